@@ -1,0 +1,90 @@
+# Every verb sets up what it needs by itself: .venv from requirements-dev.lock, the extension from crates/.
+# `make` alone lists the verbs.
+
+SHELL := bash
+.SHELLFLAGS := -eu -o pipefail -c
+.DELETE_ON_ERROR:
+MAKEFLAGS += --no-builtin-rules --no-print-directory
+.DEFAULT_GOAL := help
+
+VENV := .venv
+BIN := $(VENV)/bin
+PYTHON ?= $(shell command -v python3.11 || command -v python3)
+CASE_SEED := $(if $(SEED),--seed $(SEED))
+CASE_KIND := $(if $(KIND),--kind $(KIND))
+LOCKED := $(if $(CI),--locked)
+RUST_SOURCES := $(shell find crates -name '*.rs' -path '*/src/*' 2>/dev/null) \
+                $(shell find crates -name Cargo.toml 2>/dev/null) Cargo.toml $(wildcard Cargo.lock)
+PYTHON_SOURCES := python tests trial demo benchmarks
+
+# The binding crate must see the same interpreter from cargo and from maturin, or it is rebuilt each time.
+export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+export MPLBACKEND := Agg
+export OPENBLAS_NUM_THREADS ?= 1
+
+.PHONY: help setup build demo test test-rust test-python lint format bench golden lock clean
+
+help:  ## this list
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
+
+$(VENV)/.created:
+	@"$(PYTHON)" -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed; this is " + sys.version.split()[0] + " (choose one: make PYTHON=path/to/python)")'
+	"$(PYTHON)" -m venv $(VENV)
+	@touch $@
+
+$(VENV)/.installed: requirements-dev.lock $(VENV)/.created
+	$(BIN)/python -m pip install --quiet --requirement requirements-dev.lock
+	@touch $@
+
+$(VENV)/.built: $(VENV)/.installed pyproject.toml $(RUST_SOURCES)
+	PATH="$(CURDIR)/$(BIN):$$PATH" VIRTUAL_ENV="$(CURDIR)/$(VENV)" \
+	    $(BIN)/maturin develop --release --quiet $(LOCKED)
+	@touch $@
+
+setup: $(VENV)/.installed  ## .venv with the pinned tools
+
+build: $(VENV)/.built  ## the package, its Rust core compiled, in .venv
+
+demo: build  ## conceal an effect, diagnose it, open the key (KIND=leak_muscle SEED=7 to choose)
+	$(BIN)/python demo/run.py $(CASE_KIND) $(CASE_SEED)
+
+test: build lint test-rust test-python  ## everything that CI checks
+
+lint: build  ## formatting, clippy, ruff, mypy, the stub against the compiled module
+	cargo fmt --all --check
+	cargo clippy --quiet --workspace --all-targets $(LOCKED) -- -D warnings
+	$(BIN)/ruff check --quiet $(PYTHON_SOURCES)
+	$(BIN)/ruff format --quiet --check $(PYTHON_SOURCES)
+	$(BIN)/mypy --no-error-summary python/pamrs trial
+	$(BIN)/python -m mypy.stubtest pamrs._core
+
+test-rust: build  ## the core's tests, documentation examples included
+	cargo test --quiet --release --workspace $(LOCKED) --lib --tests
+	cargo test --quiet --release -p pam-core $(LOCKED) --doc
+
+test-python: build  ## pytest
+	$(BIN)/python -m pytest -q
+
+format:  ## rewrite the sources in the house's layout
+	cargo fmt --all
+	$(BIN)/ruff check --quiet --fix $(PYTHON_SOURCES)
+	$(BIN)/ruff format $(PYTHON_SOURCES)
+
+bench: build  ## this package and its reference side by side
+	cargo bench --quiet --package pam-core $(LOCKED)
+	$(BIN)/python -m benchmarks.bench
+
+golden: build  ## the published golden values against this build
+	$(BIN)/python -m pytest -q tests/golden
+
+lock:  ## pin the newest versions that pyproject.toml allows
+	rm -rf $(VENV)/lock && "$(PYTHON)" -m venv $(VENV)/lock
+	$(VENV)/lock/bin/python -c 'import tomllib; p = tomllib.load(open("pyproject.toml", "rb"))["project"]; o = p["optional-dependencies"]; print("\n".join(r for r in p["dependencies"] + sum(o.values(), []) if not r.startswith("pamrs")))' > $(VENV)/lock/wanted.txt
+	$(VENV)/lock/bin/python -m pip install --quiet --requirement $(VENV)/lock/wanted.txt
+	{ head -1 requirements-dev.lock; $(VENV)/lock/bin/python -m pip freeze; } > $(VENV)/lock/new && mv $(VENV)/lock/new requirements-dev.lock
+
+clean:  ## remove everything that was built
+	rm -rf $(VENV) target out .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	find python trial tests benchmarks demo -name __pycache__ -type d -prune -exec rm -rf {} + 2>/dev/null || true
+	rm -f python/pamrs/_core*.so

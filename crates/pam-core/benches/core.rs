@@ -1,0 +1,2 @@
+//! Time of the core's hot paths.
+fn main() {}

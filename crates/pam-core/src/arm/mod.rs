@@ -1,0 +1,3 @@
+//! Arms: the load that a joint moves.
+
+pub mod one_link;

@@ -1,0 +1,103 @@
+//! One-link arm with payload, friction and elastic stops.
+//!
+//! `(Iz + mp l^2) theta'' = tau - c theta' - f tanh(theta'/w) - (m lc + mp l) g sin(theta) + tau_stop`, angle from the gravity
+//! vector (physics of dissertation ch. 5; stops as one-sided spring and damper).
+
+use crate::scalar::{constant, Scalar};
+
+/// Parameters of a one-link arm.
+#[derive(Debug, Clone, Copy)]
+pub struct OneLink<S> {
+    /// Inertia about the joint without payload [kg m2].
+    pub inertia: S,
+    /// First moment without payload [kg m].
+    pub first_moment: S,
+    /// Distance of the payload from the joint [m].
+    pub length: f64,
+    /// Payload mass [kg].
+    pub payload: S,
+    /// Viscous friction [N m s/rad].
+    pub viscous: S,
+    /// Coulomb friction [N m].
+    pub coulomb: S,
+    /// Speed over which Coulomb friction changes sign [rad/s].
+    pub coulomb_speed: f64,
+    /// Gravity [m/s2].
+    pub gravity: f64,
+}
+
+/// Elastic stops at both ends of the range.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stops {
+    /// Lower limit [rad].
+    pub min_angle: f64,
+    /// Upper limit [rad].
+    pub max_angle: f64,
+    /// Stiffness [N m/rad].
+    pub stiffness: f64,
+    /// Damping [N m s/rad].
+    pub damping: f64,
+}
+
+impl Stops {
+    /// Torque of the stops [N m]: never pulls.
+    #[inline]
+    pub fn torque<S: Scalar>(&self, angle: S, rate: S) -> S {
+        let zero = constant(0.0);
+        if angle.re() < self.min_angle {
+            let push = (-angle + self.min_angle) * self.stiffness - rate * self.damping;
+            if push.re() > 0.0 { push } else { zero }
+        } else if angle.re() > self.max_angle {
+            let push = (angle - self.max_angle) * self.stiffness + rate * self.damping;
+            if push.re() > 0.0 { -push } else { zero }
+        } else {
+            zero
+        }
+    }
+}
+
+impl<S: Scalar> OneLink<S> {
+    /// Inertia about the joint with payload [kg m2].
+    #[inline]
+    pub fn total_inertia(&self) -> S {
+        self.inertia + self.payload * (self.length * self.length)
+    }
+
+    /// Angular acceleration [rad/s2] under a joint torque and a stop torque [N m].
+    #[inline]
+    pub fn acceleration(&self, angle: S, rate: S, torque: S, stop_torque: S) -> S {
+        let friction = self.viscous * rate + self.coulomb * (rate / self.coulomb_speed).tanh();
+        let weight = (self.first_moment + self.payload * self.length) * self.gravity * angle.sin();
+        (torque - friction - weight + stop_torque) / self.total_inertia()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stops_push_only_inwards() {
+        let stops = Stops { min_angle: 0.2, max_angle: 2.0, stiffness: 2e4, damping: 60.0 };
+        assert_eq!(stops.torque(1.0, 5.0), 0.0);
+        assert!(stops.torque(0.19, 0.0) > 0.0 && stops.torque(2.01, 0.0) < 0.0);
+        assert_eq!(stops.torque(0.199, 10.0), 0.0, "leaving the stop fast: it does not pull");
+    }
+
+    #[test]
+    fn hanging_arm_is_in_equilibrium() {
+        let arm = OneLink {
+            inertia: 0.6,
+            first_moment: 1.8,
+            length: 0.9,
+            payload: 9.0,
+            viscous: 3.0,
+            coulomb: 1.5,
+            coulomb_speed: 0.02,
+            gravity: 9.80665,
+        };
+        assert_eq!(arm.acceleration(0.0, 0.0, 0.0, 0.0), 0.0);
+        let weight = (1.8 + 9.0 * 0.9) * 9.80665;
+        assert!(arm.acceleration(std::f64::consts::FRAC_PI_2, 0.0, weight, 0.0).abs() < 1e-12);
+    }
+}

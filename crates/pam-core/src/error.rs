@@ -1,0 +1,65 @@
+//! One error type: every message names the quantity, its value and what is allowed.
+
+use thiserror::Error;
+
+/// What can be wrong with an input of the core.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A parameter or argument outside its allowed range (NaN included).
+    #[error("{name} = {value} is not allowed: {allowed}")]
+    Parameter {
+        /// The parameter's dotted name, for example `muscle.braid_angle`.
+        name: String,
+        /// The value that was given.
+        value: f64,
+        /// What is allowed, in words with the unit.
+        allowed: String,
+    },
+    /// Two arrays that must have matching lengths do not.
+    #[error("{name} has {found} values, {expected} expected ({why})")]
+    Length {
+        /// The argument's name.
+        name: String,
+        /// Values found.
+        found: usize,
+        /// Values expected.
+        expected: usize,
+        /// Where the expectation comes from.
+        why: String,
+    },
+    /// The model description cannot be read, or its blocks do not fit together.
+    #[error("{0}")]
+    Model(String),
+    /// The integration left the range in which the model holds.
+    #[error("integration stopped at time = {time} s: {name} = {value}, {allowed}")]
+    Integration {
+        /// Simulated time [s].
+        time: f64,
+        /// The state that left its range.
+        name: String,
+        /// Its value.
+        value: f64,
+        /// What is allowed.
+        allowed: String,
+    },
+}
+
+impl Error {
+    /// A [`Error::Parameter`] from its parts.
+    pub fn parameter(name: impl Into<String>, value: f64, allowed: impl Into<String>) -> Self {
+        Self::Parameter { name: name.into(), value, allowed: allowed.into() }
+    }
+}
+
+/// Result of a core operation.
+pub type Result<T> = std::result::Result<T, Error>;
+
+/// `value` if it is finite and inside `[low, high]`, otherwise an error that names it.
+pub fn check_range(name: &str, value: f64, low: f64, high: f64, unit: &str) -> Result<f64> {
+    if value.is_finite() && value >= low && value <= high {
+        Ok(value)
+    } else {
+        Err(Error::parameter(name, value, format!("a finite number from {low} to {high} {unit}")))
+    }
+}

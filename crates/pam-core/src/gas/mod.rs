@@ -1,0 +1,5 @@
+//! Gas flow and storage: orifice, servo-valve, chamber.
+
+pub mod chamber;
+pub mod orifice;
+pub mod valve;

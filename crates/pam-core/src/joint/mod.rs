@@ -1,0 +1,3 @@
+//! Joints: how a muscle's shortening turns a link.
+
+pub mod tendon;

@@ -1,0 +1,28 @@
+//! Pneumatic artificial muscles (McKibben muscles) and the arms they drive.
+//!
+//! The physics of R. M. Robinson's dissertation (University of Maryland, 2014) with its printed
+//! errors corrected: muscle geometry and force, valve and gas, tendon joint, one-link arm; fixed-step
+//! integration, and *cut-chain* simulation, in which measured signals drive each block so that a
+//! mismatch with a recording is located in one of them. Every equation is written once, generic over
+//! [`scalar::Scalar`], and is read as plain numbers or as dual numbers for exact sensitivities.
+//!
+//! SI units, radians; pressures are gauge in force equations and absolute in gas equations. Nothing in
+//! this crate panics on bad input, prints, or knows Python.
+#![forbid(unsafe_code)]
+#![warn(missing_docs)]
+
+pub mod arm;
+pub mod effects;
+pub mod error;
+pub mod gas;
+pub mod geometry;
+pub mod integrate;
+pub mod joint;
+pub mod muscle;
+pub mod residual;
+pub mod rig;
+pub mod scalar;
+pub mod simulate;
+
+pub use error::{Error, Result};
+pub use rig::{Rig, RigSpec};

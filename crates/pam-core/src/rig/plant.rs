@@ -1,0 +1,277 @@
+//! The state equation of a rig, composed of its blocks.
+//!
+//! State: supply pressure and chamber pressure [Pa, absolute], joint angle [rad] and rate [rad/s], gas mass [kg]
+//! (only moved by `heat_transfer`), and the memory of the muscle's hysteresis. Any of the pressures and the motion can
+//! be *driven* by a signal instead of being integrated: that is where the chain is cut.
+
+use super::{ParameterId as P, Rig, Values};
+use crate::arm::one_link::{OneLink, Stops};
+use crate::effects::{heat_transfer, leak_muscle, muscle_hysteresis};
+use crate::gas::chamber::{pressure_rate, ChamberState, Polytropic};
+use crate::gas::valve::spool_position;
+use crate::scalar::{constant, Scalar};
+use nalgebra::SVector;
+
+/// Number of continuous states.
+pub const STATES: usize = 5;
+/// Index of the supply pressure [Pa, absolute].
+pub const SUPPLY: usize = 0;
+/// Index of the chamber pressure [Pa, absolute].
+pub const PRESSURE: usize = 1;
+/// Index of the joint angle [rad].
+pub const ANGLE: usize = 2;
+/// Index of the joint rate [rad/s].
+pub const RATE: usize = 3;
+/// Index of the gas mass [kg].
+pub const MASS: usize = 4;
+
+/// Continuous state.
+pub type State<S> = SVector<S, STATES>;
+/// Memory of the muscle's hysteresis.
+pub type Memory<S> = muscle_hysteresis::Memory<S>;
+
+/// Which states are integrated; the others are driven.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Simulated {
+    /// Supply pressure.
+    pub supply: bool,
+    /// Chamber pressure (and gas mass).
+    pub chamber: bool,
+    /// Joint angle and rate.
+    pub arm: bool,
+}
+
+impl Simulated {
+    /// Nothing is driven.
+    pub const ALL: Self = Self { supply: true, chamber: true, arm: true };
+}
+
+/// Quantities that follow from a state, for output.
+#[derive(Debug, Clone, Copy)]
+pub struct Output<S> {
+    /// Contraction ratio [1].
+    pub contraction_ratio: S,
+    /// Chamber volume [m3].
+    pub volume: S,
+    /// Force of all muscles [N].
+    pub force: S,
+    /// Joint torque [N m].
+    pub torque: S,
+    /// Gas temperature [K].
+    pub temperature: S,
+}
+
+/// A rig with the values of its parameters in a scalar type.
+#[derive(Debug, Clone)]
+pub struct Plant<'a, S> {
+    rig: &'a Rig,
+    values: Values<S>,
+    count: f64,
+    rest_length: f64,
+    arm: Option<(OneLink<S>, Stops)>,
+}
+
+/// What the muscle and joint are at one angle.
+struct Mechanics<S> {
+    contraction: S,
+    moment_arm: S,
+    volume: S,
+    volume_rate: S,
+    muscle_volume: S,
+    force: S,
+}
+
+impl<'a, S: Scalar> Plant<'a, S> {
+    /// Compose a rig with parameter values.
+    pub fn new(rig: &'a Rig, values: Values<S>) -> Self {
+        let spec = rig.spec();
+        let arm = match (&spec.arm, &spec.joint) {
+            (Some(a), Some(j)) => Some((
+                OneLink {
+                    inertia: values[P::Inertia],
+                    first_moment: values[P::FirstMoment],
+                    length: a.length,
+                    payload: values[P::Payload],
+                    viscous: values[P::Viscous],
+                    coulomb: values[P::Coulomb],
+                    coulomb_speed: a.coulomb_speed,
+                    gravity: a.gravity,
+                },
+                Stops {
+                    min_angle: j.min_angle,
+                    max_angle: j.max_angle,
+                    stiffness: j.stop_stiffness,
+                    damping: j.stop_damping,
+                },
+            )),
+            _ => None,
+        };
+        let (count, rest_length) = spec.muscle.as_ref().map_or((0.0, 1.0), |m| (f64::from(m.count), m.rest_length));
+        Self { rig, values, count, rest_length, arm }
+    }
+
+    /// Parameter values.
+    pub fn values(&self) -> &Values<S> {
+        &self.values
+    }
+
+    /// The rig.
+    pub fn rig(&self) -> &Rig {
+        self.rig
+    }
+
+    fn mechanics(&self, state: &State<S>, memory: &Memory<S>, step_start_contraction: S) -> Mechanics<S> {
+        let dead = self.values[P::DeadVolume];
+        let (Some(muscle), Some(joint)) = (&self.rig.muscle, &self.rig.joint) else {
+            let zero = constant(0.0);
+            return Mechanics {
+                contraction: zero,
+                moment_arm: zero,
+                volume: dead,
+                volume_rate: zero,
+                muscle_volume: zero,
+                force: zero,
+            };
+        };
+        let point = joint.eval(state[ANGLE]);
+        let contraction = point.shortening / self.rest_length;
+        let table = muscle.table.eval(contraction);
+        let gauge = state[PRESSURE] - self.rig.gas.ambient_pressure;
+        let mut force = gauge * table.a_gas + self.values[P::ModulusScale] * (gauge * table.a_elastic + table.b_elastic);
+        if self.rig.active.hysteresis {
+            let moved = memory
+                .moved((step_start_contraction - contraction) * self.rest_length, self.values[P::Presliding]);
+            force += muscle_hysteresis::force(&moved, self.values[P::FrictionConstant], self.values[P::FrictionPressure], gauge);
+        }
+        Mechanics {
+            contraction,
+            moment_arm: point.moment_arm,
+            volume: table.volume * self.count + dead,
+            volume_rate: table.volume_slope * point.moment_arm * state[RATE] * (self.count / self.rest_length),
+            muscle_volume: table.volume,
+            force: force * self.count,
+        }
+    }
+
+    /// Contraction ratio at an angle [rad] (0 without a joint).
+    #[inline]
+    pub fn contraction(&self, angle: S) -> S {
+        match &self.rig.joint {
+            Some(joint) => joint.eval(angle).shortening / self.rest_length,
+            None => constant(0.0),
+        }
+    }
+
+    /// Memory after a step that moved the muscle between two contraction ratios.
+    #[inline]
+    pub fn advance_memory(&self, memory: &Memory<S>, from: S, to: S) -> Memory<S> {
+        if self.rig.active.hysteresis {
+            memory.moved((from - to) * self.rest_length, self.values[P::Presliding])
+        } else {
+            *memory
+        }
+    }
+
+    /// Valve command [V] as a normalised spool position (0 without a valve).
+    pub fn spool(&self, command: f64) -> S {
+        match &self.rig.spec().valve {
+            Some(valve) => spool_position(command, self.values[P::NullVoltage], valve.half_range),
+            None => constant(0.0),
+        }
+    }
+
+    /// Gas mass [kg] at rest temperature for a state.
+    pub fn rest_mass(&self, state: &State<S>) -> S {
+        let volume = self.mechanics(state, &Memory::default(), constant(0.0)).volume;
+        state[PRESSURE] * volume / (self.rig.gas.gas_constant * self.rig.gas.temperature)
+    }
+
+    /// Time derivative of the state; entries of driven states are zero.
+    #[inline]
+    pub fn rates(
+        &self,
+        state: &State<S>,
+        spool: S,
+        memory: &Memory<S>,
+        step_start_contraction: S,
+        simulated: Simulated,
+    ) -> State<S> {
+        let zero = constant(0.0);
+        let mut rates = State::<S>::from_element(zero);
+        let m = self.mechanics(state, memory, step_start_contraction);
+        if simulated.supply || simulated.chamber {
+            self.gas_rates(state, spool, &m, simulated, &mut rates);
+        }
+        if let (true, Some((arm, stops))) = (simulated.arm, &self.arm) {
+            rates[ANGLE] = state[RATE];
+            let stop = stops.torque(state[ANGLE], state[RATE]);
+            rates[RATE] = arm.acceleration(state[ANGLE], state[RATE], m.force * m.moment_arm, stop);
+        }
+        rates
+    }
+
+    #[inline]
+    fn gas_rates(&self, state: &State<S>, spool: S, m: &Mechanics<S>, simulated: Simulated, rates: &mut State<S>) {
+        let gas = &self.rig.gas;
+        let zero = constant(0.0);
+        let pressure = state[PRESSURE];
+        let (mut inflow, mut outflow) = (zero, zero);
+        if let Some(table) = &self.rig.valve {
+            let x = spool.re();
+            if x > 0.0 {
+                inflow = gas.mass_flow(self.values[P::DischargeArea] * table.eval(spool), state[SUPPLY], pressure);
+            } else if x < 0.0 {
+                let area = self.values[P::DischargeArea] * table.eval(-spool);
+                outflow = gas.mass_flow(area, pressure, constant(gas.ambient_pressure));
+            }
+        }
+        let rt = gas.gas_constant * gas.temperature;
+        if simulated.supply && self.rig.valve.is_some() {
+            rates[SUPPLY] = -(inflow * rt) / self.values[P::SupplyVolume];
+        }
+        if !simulated.chamber {
+            return;
+        }
+        if self.rig.active.leak {
+            outflow += leak_muscle::mass_flow(gas, self.values[P::LeakConductance], pressure);
+        }
+        let chamber = ChamberState { pressure, volume: m.volume, volume_rate: m.volume_rate, inflow, outflow };
+        if self.rig.active.heat {
+            let temperature = heat_transfer::temperature(gas, pressure, m.volume, state[MASS]);
+            let area = if self.count > 0.0 {
+                let length = (-m.contraction + 1.0) * self.rest_length;
+                heat_transfer::cylinder_area(self.count, m.muscle_volume, length)
+            } else {
+                heat_transfer::cube_area(m.volume)
+            };
+            rates[PRESSURE] =
+                heat_transfer::pressure_rate(gas, &chamber, temperature, area, self.values[P::HeatCoefficient]);
+            rates[MASS] = inflow - outflow;
+        } else {
+            let alpha = Polytropic {
+                inflow: self.values[P::AlphaIn],
+                outflow: self.values[P::AlphaOut],
+                volume: self.values[P::Alpha],
+            };
+            rates[PRESSURE] = pressure_rate(&chamber, &alpha, rt);
+        }
+    }
+
+    /// Quantities that follow from a state.
+    pub fn output(&self, state: &State<S>, memory: &Memory<S>) -> Output<S> {
+        let here = self.contraction(state[ANGLE]);
+        let m = self.mechanics(state, memory, here);
+        let temperature = if self.rig.active.heat {
+            heat_transfer::temperature(&self.rig.gas, state[PRESSURE], m.volume, state[MASS])
+        } else {
+            constant(self.rig.gas.temperature)
+        };
+        Output {
+            contraction_ratio: m.contraction,
+            volume: m.volume,
+            force: m.force,
+            torque: m.force * m.moment_arm,
+            temperature,
+        }
+    }
+}

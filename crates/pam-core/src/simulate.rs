@@ -1,0 +1,220 @@
+//! Fixed-step simulation: the command is held over each sample, RK4 steps fill it.
+
+use crate::integrate::rk4;
+use crate::rig::plant::{Memory, Plant, Simulated, State, ANGLE, MASS, PRESSURE, RATE, STATES, SUPPLY};
+use crate::rig::{ParameterId as P, Rig};
+use crate::scalar::Scalar;
+use crate::{Error, Result};
+
+/// Sample time and step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Timing {
+    /// Sample time [s]: one output row and one held command each.
+    pub sample_time: f64,
+    /// RK4 steps per sample.
+    pub substeps: usize,
+}
+
+impl Timing {
+    /// Timing from a sample time and a step [s] that divides it.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] when either is not positive or the step does not divide the sample time.
+    pub fn new(sample_time: f64, step: f64) -> Result<Self> {
+        if !(sample_time.is_finite() && sample_time > 0.0) {
+            return Err(Error::parameter("sample_time", sample_time, "a finite time > 0 s"));
+        }
+        let ratio = sample_time / step;
+        let rounded = ratio.round();
+        let divides = (1.0..=1e7).contains(&rounded) && (ratio - rounded).abs() <= 1e-6 * rounded;
+        if !(step.is_finite() && step > 0.0 && divides) {
+            let allowed = format!("a time > 0 s that divides sample_time = {sample_time} s into 1 to 1e7 steps");
+            return Err(Error::parameter("step", step, allowed));
+        }
+        Ok(Self { sample_time, substeps: rounded as usize })
+    }
+
+    /// Step [s].
+    pub fn step(&self) -> f64 {
+        self.sample_time / self.substeps as f64
+    }
+}
+
+/// Initial state as a user states it: gauge pressures [Pa], angle [rad], rate [rad/s]; true values, not sensor readings.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Initial {
+    /// Supply pressure [Pa, gauge].
+    pub supply_pressure: f64,
+    /// Muscle pressure [Pa, gauge].
+    pub muscle_pressure: f64,
+    /// Joint angle [rad].
+    pub joint_angle: f64,
+    /// Joint rate [rad/s].
+    pub joint_rate: f64,
+}
+
+impl Initial {
+    /// The rig at rest: muscles vented, joint at its rest angle, tank as filled.
+    pub fn rest(rig: &Rig) -> Self {
+        Self {
+            supply_pressure: rig.spec().supply.as_ref().map_or(0.0, |s| s.initial_pressure),
+            muscle_pressure: 0.0,
+            joint_angle: rig.spec().joint.as_ref().map_or(0.0, |j| j.rest_angle),
+            joint_rate: 0.0,
+        }
+    }
+
+    fn validate(&self, rig: &Rig) -> Result<()> {
+        let vacuum = -rig.gas.ambient_pressure;
+        for (name, value) in [
+            ("initial.supply_pressure", self.supply_pressure),
+            ("initial.muscle_pressure", self.muscle_pressure),
+        ] {
+            crate::error::check_range(name, value, vacuum, 1e8, "Pa (gauge)")?;
+        }
+        crate::error::check_range("initial.joint_rate", self.joint_rate, -1e4, 1e4, "rad/s")?;
+        let (low, high) = rig.spec().joint.as_ref().map_or((-7.0, 7.0), |j| (j.min_angle - 0.2, j.max_angle + 0.2));
+        crate::error::check_range("initial.joint_angle", self.joint_angle, low, high, "rad")?;
+        Ok(())
+    }
+}
+
+/// Simulated channels, one row per sample; row 0 is the initial state. Pressures gauge and as the sensors
+/// read them (zeros included), SI.
+#[allow(missing_docs)]
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Trajectory {
+    pub supply_pressure: Vec<f64>,
+    pub muscle_pressure: Vec<f64>,
+    pub joint_angle: Vec<f64>,
+    pub joint_rate: Vec<f64>,
+    pub contraction_ratio: Vec<f64>,
+    pub air_volume: Vec<f64>,
+    pub muscle_force: Vec<f64>,
+    pub joint_torque: Vec<f64>,
+    pub gas_temperature: Vec<f64>,
+}
+
+/// One RK4 step of a plant with the given states integrated; driven states are read from
+/// `drive(fraction, &mut state)`.
+#[inline]
+pub(crate) fn step<S: Scalar>(
+    plant: &Plant<'_, S>,
+    state: &mut State<S>,
+    memory: &mut Memory<S>,
+    spool: S,
+    dt: f64,
+    simulated: Simulated,
+    mut drive: impl FnMut(f64, &mut State<S>),
+) {
+    let mut here = *state;
+    drive(0.0, &mut here);
+    let start = plant.contraction(here[ANGLE]);
+    let mut next = rk4(state, dt, |fraction, y| {
+        let mut y = *y;
+        drive(fraction, &mut y);
+        plant.rates(&y, spool, memory, start, simulated)
+    });
+    drive(1.0, &mut next);
+    *memory = plant.advance_memory(memory, start, plant.contraction(next[ANGLE]));
+    *state = next;
+}
+
+/// Error for a state that has left the model's range, if it has.
+pub(crate) fn check_state<S: Scalar>(plant: &Plant<'_, S>, state: &State<S>, time: f64) -> Result<()> {
+    let rig = plant.rig();
+    let failure = |name: &str, value: f64, allowed: &str| {
+        Err(Error::Integration { time, name: name.into(), value, allowed: allowed.into() })
+    };
+    const NAMES: [&str; STATES] = ["supply_pressure", "muscle_pressure", "joint_angle", "joint_rate", "gas_mass"];
+    for (index, name) in NAMES.iter().enumerate() {
+        let value = state[index].re();
+        if !value.is_finite() {
+            return failure(name, value, "a finite value (a smaller step may help)");
+        }
+    }
+    if state[PRESSURE].re() < 0.0 || state[SUPPLY].re() < 0.0 {
+        let worst = if state[PRESSURE].re() < 0.0 { PRESSURE } else { SUPPLY };
+        return failure(NAMES[worst], state[worst].re(), "an absolute pressure >= 0 Pa (a smaller step may help)");
+    }
+    if let Some(joint) = &rig.joint {
+        let angle = state[ANGLE].re();
+        if !joint.reaches(angle) {
+            return failure("joint_angle", angle, "an angle that the tendon reaches");
+        }
+        let contraction = plant.contraction(state[ANGLE]).re();
+        if let Some(muscle) = rig.muscle().filter(|m| !m.table.contains(contraction)) {
+            let allowed = format!("inside the muscle's range {:.4} to {:.4}", muscle.table.e_min, muscle.table.e_max);
+            return failure("contraction_ratio", contraction, &allowed);
+        }
+    }
+    Ok(())
+}
+
+/// Simulate `valve_command` [V], one value per sample, held; without a valve its values have no effect but
+/// their number sets the duration.
+///
+/// # Errors
+/// [`Error::Parameter`] for an impossible argument, [`Error::Integration`] when the state leaves the model's range.
+pub fn simulate(rig: &Rig, valve_command: &[f64], timing: Timing, initial: Initial) -> Result<Trajectory> {
+    initial.validate(rig)?;
+    if let Some((k, u)) = valve_command.iter().enumerate().find(|(_, u)| !u.is_finite()) {
+        return Err(Error::parameter(format!("valve_command[{k}]"), *u, "a finite voltage"));
+    }
+    let plant = Plant::new(rig, *rig.values());
+    let ambient = rig.gas.ambient_pressure;
+    let mut state = State::<f64>::from_column_slice(&[
+        initial.supply_pressure + ambient,
+        initial.muscle_pressure + ambient,
+        initial.joint_angle,
+        initial.joint_rate,
+        0.0,
+    ]);
+    state[MASS] = plant.rest_mass(&state);
+    let mut memory = Memory::default();
+    let mut out = Trajectory::with_capacity(valve_command.len());
+    let dt = timing.step();
+    let (pressure_zero, angle_zero) = (rig.values[P::PressureZero], rig.values[P::AngleZero]);
+    for (k, command) in valve_command.iter().enumerate() {
+        check_state(&plant, &state, k as f64 * timing.sample_time)?;
+        out.push(&plant, &state, &memory, ambient, pressure_zero, angle_zero);
+        if k + 1 == valve_command.len() {
+            break;
+        }
+        let spool = plant.spool(*command);
+        for _ in 0..timing.substeps {
+            step(&plant, &mut state, &mut memory, spool, dt, Simulated::ALL, |_, _| {});
+        }
+    }
+    Ok(out)
+}
+
+impl Trajectory {
+    fn with_capacity(n: usize) -> Self {
+        let v = || Vec::with_capacity(n);
+        Self {
+            supply_pressure: v(),
+            muscle_pressure: v(),
+            joint_angle: v(),
+            joint_rate: v(),
+            contraction_ratio: v(),
+            air_volume: v(),
+            muscle_force: v(),
+            joint_torque: v(),
+            gas_temperature: v(),
+        }
+    }
+
+    fn push(&mut self, plant: &Plant<'_, f64>, state: &State<f64>, memory: &Memory<f64>, ambient: f64, pressure_zero: f64, angle_zero: f64) {
+        let output = plant.output(state, memory);
+        self.supply_pressure.push(state[SUPPLY] - ambient);
+        self.muscle_pressure.push(state[PRESSURE] - ambient + pressure_zero);
+        self.joint_angle.push(state[ANGLE] + angle_zero);
+        self.joint_rate.push(state[RATE]);
+        self.contraction_ratio.push(output.contraction_ratio);
+        self.air_volume.push(output.volume);
+        self.muscle_force.push(output.force);
+        self.joint_torque.push(output.torque);
+        self.gas_temperature.push(output.temperature);
+    }
+}

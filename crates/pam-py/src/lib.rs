@@ -1,0 +1,18 @@
+//! Python bindings of `pam-core`: convert arguments, release the GIL, map errors. No physics here.
+
+mod convert;
+mod muscle;
+mod rig;
+
+use pyo3::prelude::*;
+
+/// The compiled core of pamrs.
+#[pymodule(gil_used = false)]
+fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
+    m.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    m.add_class::<rig::Rig>()?;
+    m.add_class::<muscle::Muscle>()?;
+    m.add_function(wrap_pyfunction!(rig::parameter_names, m)?)?;
+    m.add_function(wrap_pyfunction!(rig::effects, m)?)?;
+    Ok(())
+}

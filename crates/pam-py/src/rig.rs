@@ -1,0 +1,126 @@
+//! `_core.Rig`: simulation and cut-chain prediction.
+
+use crate::convert::{array, error, values};
+use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray1};
+use pam_core::residual::{predict, Block, Measured, Signal};
+use pam_core::rig::{ParameterId, RigSpec};
+use pam_core::simulate::{simulate, Initial, Timing};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+/// A rig compiled from a JSON description (SI, radians, gauge pressures).
+#[pyclass(frozen, module = "pamrs._core")]
+pub struct Rig {
+    inner: pam_core::Rig,
+}
+
+type Pair<'py> = (PyReadonlyArray1<'py, f64>, PyReadonlyArray1<'py, f64>);
+
+#[pymethods]
+impl Rig {
+    #[new]
+    fn new(py: Python<'_>, json: &str) -> PyResult<Self> {
+        let made = py.detach(|| RigSpec::from_json(json).and_then(pam_core::Rig::new));
+        Ok(Self { inner: made.map_err(|e| error(py, &e))? })
+    }
+
+    /// The same rig from another description; the compiled muscle is kept where it can be.
+    fn respecified(&self, py: Python<'_>, json: &str) -> PyResult<Self> {
+        let made = py.detach(|| RigSpec::from_json(json).and_then(|spec| self.inner.respecified(spec)));
+        Ok(Self { inner: made.map_err(|e| error(py, &e))? })
+    }
+
+    /// Simulate a held command; returns channels by name.
+    #[pyo3(signature = (valve_command, sample_time, step, *, muscle_pressure=None, supply_pressure=None, joint_angle=None, joint_rate=None))]
+    #[allow(clippy::too_many_arguments)]
+    fn simulate<'py>(
+        &self,
+        py: Python<'py>,
+        valve_command: PyReadonlyArray1<'py, f64>,
+        sample_time: f64,
+        step: f64,
+        muscle_pressure: Option<f64>,
+        supply_pressure: Option<f64>,
+        joint_angle: Option<f64>,
+        joint_rate: Option<f64>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let u = values(&valve_command);
+        let rest = Initial::rest(&self.inner);
+        let initial = Initial {
+            supply_pressure: supply_pressure.unwrap_or(rest.supply_pressure),
+            muscle_pressure: muscle_pressure.unwrap_or(rest.muscle_pressure),
+            joint_angle: joint_angle.unwrap_or(rest.joint_angle),
+            joint_rate: joint_rate.unwrap_or(rest.joint_rate),
+        };
+        let inner = &self.inner;
+        let run = py.detach(|| simulate(inner, &u, Timing::new(sample_time, step)?, initial));
+        let t = run.map_err(|e| error(py, &e))?;
+        let out = PyDict::new(py);
+        if inner.spec().supply.is_some() {
+            out.set_item("supply_pressure", array(py, t.supply_pressure))?;
+        }
+        out.set_item("muscle_pressure", array(py, t.muscle_pressure))?;
+        if inner.spec().arm.is_some() {
+            out.set_item("joint_angle", array(py, t.joint_angle))?;
+            out.set_item("joint_rate", array(py, t.joint_rate))?;
+            out.set_item("contraction_ratio", array(py, t.contraction_ratio))?;
+            out.set_item("muscle_force", array(py, t.muscle_force))?;
+            out.set_item("joint_torque", array(py, t.joint_torque))?;
+        }
+        out.set_item("air_volume", array(py, t.air_volume))?;
+        out.set_item("temperature", array(py, t.gas_temperature))?;
+        Ok(out)
+    }
+
+    /// Predict a block's output from its measured neighbours, with the jacobian (None without parameters).
+    #[pyo3(signature = (block, valve_command, sample_time, step, starts, parameters, *, supply_pressure=None, muscle_pressure=None, joint_angle=None))]
+    #[allow(clippy::too_many_arguments, clippy::type_complexity)]
+    fn predict<'py>(
+        &self,
+        py: Python<'py>,
+        block: &str,
+        valve_command: PyReadonlyArray1<'py, f64>,
+        sample_time: f64,
+        step: f64,
+        starts: Vec<usize>,
+        parameters: Vec<String>,
+        supply_pressure: Option<Pair<'py>>,
+        muscle_pressure: Option<Pair<'py>>,
+        joint_angle: Option<Pair<'py>>,
+    ) -> PyResult<(Bound<'py, numpy::PyArray1<f64>>, Option<Bound<'py, PyArray2<f64>>>)> {
+        let u = values(&valve_command);
+        let own = |pair: Option<Pair<'py>>| pair.map(|(value, slope)| (values(&value), values(&slope)));
+        let (supply, pressure, angle) = (own(supply_pressure), own(muscle_pressure), own(joint_angle));
+        let inner = &self.inner;
+        let run = py.detach(|| {
+            let measured = Measured {
+                valve_command: &u,
+                supply_pressure: supply.as_ref().map(|(value, slope)| Signal { value, slope }),
+                muscle_pressure: pressure.as_ref().map(|(value, slope)| Signal { value, slope }),
+                joint_angle: angle.as_ref().map(|(value, slope)| Signal { value, slope }),
+            };
+            let ids = parameters.iter().map(|name| ParameterId::from_name(name)).collect::<pam_core::Result<Vec<_>>>()?;
+            predict(inner, Block::from_name(block)?, &measured, Timing::new(sample_time, step)?, &starts, &ids)
+        });
+        let p = run.map_err(|e| error(py, &e))?;
+        let rows = p.value.len();
+        let jacobian = if p.columns > 0 {
+            Some(array(py, p.jacobian).reshape([rows, p.columns])?)
+        } else {
+            None
+        };
+        Ok((array(py, p.value), jacobian))
+    }
+}
+
+/// Dotted names of the scalar parameters that predictions can be differentiated with respect to.
+#[pyfunction]
+pub fn parameter_names() -> Vec<&'static str> {
+    ParameterId::ALL.iter().map(|p| p.name()).collect()
+}
+
+/// Effects of the core: (id, block, [(parameter, SI unit), ...]).
+#[pyfunction]
+pub fn effects() -> Vec<(&'static str, &'static str, Vec<(&'static str, &'static str)>)> {
+    pam_core::effects::EFFECTS.iter().map(|e| (e.id, e.block, e.parameters.to_vec())).collect()
+}

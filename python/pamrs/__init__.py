@@ -1,0 +1,104 @@
+"""pamrs: simulate pneumatic artificial muscles and arms, and find the physics that a simulation leaves out.
+
+Names are loaded when they are first used, so that importing the package costs next to nothing.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any, Final
+
+if TYPE_CHECKING:
+    from pamrs import rigs
+    from pamrs.case import Case, load_case
+    from pamrs.diagnosis import diagnose
+    from pamrs.diagnosis.result import Diagnosis
+    from pamrs.errors import (
+        CaseError,
+        DiagnosisError,
+        PamrsError,
+        ParameterError,
+        RecordingError,
+        RigError,
+        SimulationError,
+    )
+    from pamrs.muscle import Muscle
+    from pamrs.recording import Issue, Recording, load_recording
+    from pamrs.rig import Parameter, Rig, load_rig
+    from pamrs.simulation import Simulation, simulate
+
+    __version__: str
+
+__all__ = [
+    "Case",
+    "CaseError",
+    "Diagnosis",
+    "DiagnosisError",
+    "Issue",
+    "Muscle",
+    "PamrsError",
+    "Parameter",
+    "ParameterError",
+    "Recording",
+    "RecordingError",
+    "Rig",
+    "RigError",
+    "Simulation",
+    "SimulationError",
+    "__version__",
+    "diagnose",
+    "load_case",
+    "load_recording",
+    "load_rig",
+    "rigs",
+    "simulate",
+]
+
+_HOMES: Final[dict[str, str]] = {
+    "Case": "pamrs.case",
+    "CaseError": "pamrs.errors",
+    "Diagnosis": "pamrs.diagnosis.result",
+    "DiagnosisError": "pamrs.errors",
+    "Issue": "pamrs.recording",
+    "Muscle": "pamrs.muscle",
+    "PamrsError": "pamrs.errors",
+    "Parameter": "pamrs.rig",
+    "ParameterError": "pamrs.errors",
+    "Recording": "pamrs.recording",
+    "RecordingError": "pamrs.errors",
+    "Rig": "pamrs.rig",
+    "RigError": "pamrs.errors",
+    "Simulation": "pamrs.simulation",
+    "SimulationError": "pamrs.errors",
+    "diagnose": "pamrs.diagnosis",
+    "load_case": "pamrs.case",
+    "load_recording": "pamrs.recording",
+    "load_rig": "pamrs.rig",
+    "simulate": "pamrs.simulation",
+}
+
+
+def _version() -> str:
+    from importlib import metadata
+
+    try:
+        return metadata.version("pamrs")
+    except metadata.PackageNotFoundError:
+        return "0+unknown"
+
+
+def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        value: Any = _version()
+    elif name == "rigs":
+        value = importlib.import_module("pamrs.rigs")
+    elif name in _HOMES:
+        value = getattr(importlib.import_module(_HOMES[name]), name)
+    else:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -1,0 +1,213 @@
+"""The command line: ``pamrs diagnose``, ``pamrs simulate``, ``pamrs rig check``.
+
+Results go to standard output, progress and errors to standard error. The exit code is 0 when the
+command did its work (a diagnosis that finds nothing missing included), 2 when the input is wrong.
+Everything heavy is imported inside the command that needs it, so that ``pamrs --help`` answers at once.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+__all__ = ["app", "main"]
+
+CHANNEL_UNITS = {
+    "time": "s",
+    "valve_command": "V",
+    "supply_pressure": "Pa",
+    "muscle_pressure": "Pa",
+    "joint_angle": "rad",
+    "length": "m",
+    "force": "N",
+    "joint_torque": "N m",
+    "temperature": "K",
+    "reference": "rad",
+}
+
+app = typer.Typer(
+    name="pamrs",
+    help="Simulate pneumatic artificial muscles, and find the physics that a simulation leaves out.",
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+rig_app = typer.Typer(help="Work with rig files.")
+app.add_typer(rig_app, name="rig")
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        from pamrs import __version__
+
+        typer.echo(f"pamrs {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _root(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    """Simulate pneumatic artificial muscles, and find the physics that a simulation leaves out."""
+
+
+@contextmanager
+def _progress(text: str) -> Iterator[None]:
+    """Say on standard error what is going on, with a clock where a person is looking."""
+    started = time.perf_counter()
+    if sys.stderr.isatty():
+        from rich.console import Console
+
+        with Console(stderr=True).status(text):
+            yield
+    else:
+        typer.echo(f"{text} ...", err=True)
+        yield
+    typer.echo(f"{text}: done in {time.perf_counter() - started:.1f} s", err=True)
+
+
+def _check_writable(*paths: Path | None) -> None:
+    """Refuse an output whose folder does not exist before any long work starts."""
+    for path in paths:
+        if path is not None and not path.absolute().parent.is_dir():
+            raise FileNotFoundError(f"{path}: the folder {path.parent} does not exist")
+
+
+@app.command("diagnose")
+def _diagnose(
+    case: Annotated[Path, typer.Argument(help="Folder with case.toml, rig.toml and the recordings.")],
+    report: Annotated[Path | None, typer.Option(help="Write the report, one HTML file.")] = None,
+    json: Annotated[Path | None, typer.Option(help="Write the result (schema pamrs.diagnosis/1).")] = None,
+    png: Annotated[Path | None, typer.Option(help="Write the summary picture.")] = None,
+    model: Annotated[Path | None, typer.Option(help="Write the rig with the named effect in it.")] = None,
+) -> None:
+    """Find the physics that the rig's model leaves out of a case's recordings."""
+    _check_writable(report, json, png, model)
+    from pamrs.case import load_case
+    from pamrs.diagnosis import diagnose
+
+    loaded = load_case(case)
+    with _progress(f"diagnosing {loaded.name}"):
+        result = diagnose(loaded)
+    if json is not None:
+        result.to_json(json)
+    if model is not None:
+        model.write_text(result.model, encoding="utf-8")
+    if report is not None:
+        result.report(report)
+    if png is not None:
+        result.figure(png)
+    typer.echo(result.summary())
+    for path in (report, json, png, model):
+        if path is not None:
+            typer.echo(f"written: {path}", err=True)
+
+
+@app.command("simulate")
+def _simulate(
+    rig: Annotated[Path, typer.Argument(help="Rig file (TOML).")],
+    input: Annotated[Path, typer.Option("--input", help="Recording whose inputs drive the rig (CSV).")],
+    output: Annotated[Path, typer.Option("--output", help="Where to write the simulated channels (CSV).")],
+) -> None:
+    """Drive a rig with a recording's inputs and write what its channels would be."""
+    _check_writable(output)
+    from pamrs.recording import load_recording
+    from pamrs.rig import load_rig
+    from pamrs.simulation import simulate
+
+    loaded = load_rig(rig)
+    recording = load_recording(input)
+    with _progress(f"simulating {loaded.name}"):
+        result = simulate(loaded, recording)
+    columns = {"time": result.time, **result.channels}
+    _write_csv(output, columns)
+    typer.echo(f"{loaded.name}: {len(result.time)} samples of {', '.join(result.channels)} in {output}")
+
+
+def _write_csv(path: Path, columns: dict[str, Sequence[float]]) -> None:
+    """Write channels in SI units under headers that carry the unit; masked samples stay empty."""
+    import math
+
+    names = list(columns)
+    rows = zip(*(columns[name] for name in names), strict=True)
+    with path.open("w", encoding="utf-8", newline="\n") as file:
+        file.write(",".join(f"{name} [{CHANNEL_UNITS.get(name, '1')}]" for name in names) + "\n")
+        for row in rows:
+            file.write(",".join("" if math.isnan(value) else f"{value:.10g}" for value in row) + "\n")
+
+
+@rig_app.command("check")
+def _rig_check(file: Annotated[Path, typer.Argument(help="Rig file (TOML).")]) -> None:
+    """Check a rig file and list its parameters in SI units."""
+    from pamrs.rig import load_rig
+
+    rig = load_rig(file)
+    width = max((len(name) for name in rig.parameters), default=0)
+    for name, parameter in rig.parameters.items():
+        known = (
+            f"{parameter.value:.6g} {parameter.unit}" if parameter.known else f"unknown [{parameter.unit}]"
+        )
+        spread = f" ± {parameter.tol:.3g}" if parameter.known and parameter.tol else ""
+        typer.echo(f"{name:<{width}}  {known}{spread} {parameter.unit}")
+    typer.echo(
+        f"{file}: rig {rig.name!r} is valid, {len(rig.parameters)} parameters, {len(rig.effects)} effects"
+    )
+
+
+def _one_line(error: BaseException) -> str:
+    """The message of an error on one line, its kind where there is no message."""
+    parts = [line.strip().removeprefix("- ") for line in str(error).splitlines() if line.strip()]
+    if len(parts) > 1:
+        parts = [f"{parts[0].rstrip(':')}: {parts[1]}", *parts[2:]]
+    return "; ".join(parts) or type(error).__name__
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        The words after ``pamrs``; those of this process by default.
+
+    Returns
+    -------
+    int
+        Exit code: 0 done, 1 interrupted, 2 wrong input (one line on standard error says what).
+
+    Examples
+    --------
+    >>> main(["rig", "check", "no_such_file.toml"])
+    2
+    """
+    command = typer.main.get_command(app)
+    words = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
+    try:
+        code = command.main(args=words, prog_name="pamrs", standalone_mode=False)
+    except (KeyboardInterrupt, EOFError, typer.Abort):
+        typer.echo("pamrs: interrupted", err=True)
+        return 1
+    except OSError as error:
+        where = f"{error.filename}: " if error.filename is not None else ""
+        typer.echo(f"pamrs: error: {where}{error.strerror or _one_line(error)}", err=True)
+        return 2
+    except ValueError as error:
+        typer.echo(f"pamrs: error: {_one_line(error)}", err=True)
+        return 2
+    except Exception as error:
+        from pamrs.errors import PamrsError
+
+        usage = getattr(error, "format_message", None)
+        if usage is None and not isinstance(error, PamrsError):
+            raise
+        typer.echo(f"pamrs: error: {usage() if usage is not None else _one_line(error)}", err=True)
+        return 2
+    return int(code or 0)

@@ -1,0 +1,54 @@
+"""The errors of pamrs: every message names the quantity, its value and what is allowed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+
+class PamrsError(Exception):
+    """Base of every error that pamrs raises on purpose."""
+
+
+class ParameterError(PamrsError, ValueError):
+    """A parameter or argument is unknown, or outside its allowed range."""
+
+
+class RigError(PamrsError, ValueError):
+    """A rig file is unreadable, or what it describes is impossible."""
+
+
+class RecordingError(PamrsError, ValueError):
+    """A recording is unreadable, or its columns cannot be understood."""
+
+
+class CaseError(PamrsError, ValueError):
+    """A case folder is incomplete, or its ``case.toml`` is wrong."""
+
+
+class SimulationError(PamrsError, ArithmeticError):
+    """An integration left the range in which the model holds; the message gives the time and the state."""
+
+
+class DiagnosisError(PamrsError, ValueError):
+    """The recordings of a case do not allow a diagnosis."""
+
+
+def joined(head: str, problems: Iterable[str]) -> str:
+    """One message out of a headline and the problems found under it.
+
+    Parameters
+    ----------
+    head : str
+        What the problems belong to, usually a file.
+    problems : iterable of str
+        One sentence each.
+
+    Returns
+    -------
+    str
+        A single line for one problem, else the headline and a line for each.
+    """
+    found = list(problems)
+    if len(found) == 1:
+        return f"{head}: {found[0]}"
+    return "\n".join([f"{head}: {len(found)} problems", *(f"  - {line}" for line in found)])

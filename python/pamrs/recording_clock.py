@@ -1,0 +1,181 @@
+"""Puts jittered, gapped or jumping time stamps on one uniform grid, never across a hole."""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pamrs.errors import RecordingError
+
+__all__ = ["Event", "Grid", "lay_grid"]
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+_GAP: Final = 1.6  # intervals longer than this many samples are holes
+_JUMP_HOLE: Final = 10  # samples left empty where the clock jumped: the true pause is unknown
+_ON_SAMPLE: Final = 0.05  # samples: nearer than this, a recorded value stands as it is
+_MOST_EVENTS: Final = 20
+
+
+class Event(NamedTuple):
+    """Something the clock did, ``start`` to ``stop`` in seconds of the grid."""
+
+    kind: str
+    start: float
+    stop: float
+    text: str
+
+
+class Grid:
+    """A uniform grid over the rows of a recording.
+
+    Attributes
+    ----------
+    time : (n,) array
+        Seconds from 0.
+    sample_time : float
+        Seconds.
+    events : list of Event
+        Gaps, jumps, repeats.
+    rows : array of int
+        The rows that are used, in order (repeated time stamps are left out).
+    """
+
+    def __init__(
+        self, stamps: Array, rows: NDArray[np.intp], step: float, usual: float, events: list[Event]
+    ) -> None:
+        self.rows = rows
+        self.sample_time = step
+        self.events = events
+        self._stamps = stamps
+        count = int(np.floor(stamps[-1] / step + _ON_SAMPLE)) + 1
+        self.time: Array = np.arange(count, dtype=np.float64) * step
+        right = np.clip(np.searchsorted(stamps, self.time, side="left"), 1, len(stamps) - 1)
+        self._left, self._right = right - 1, right
+        span = stamps[self._right] - stamps[self._left]
+        share = (self.time - stamps[self._left]) / span
+        near = _ON_SAMPLE * step
+        share = np.where(np.abs(self.time - stamps[self._left]) <= near, 0.0, share)
+        self._share = np.where(np.abs(stamps[self._right] - self.time) <= near, 1.0, share)
+        single = (self._share == 0.0) | (self._share == 1.0)
+        self._reachable = single | ((span <= _GAP * usual) & (self._share > 0.0) & (self._share < 1.0))
+
+    def lay(self, values: Array, usable: Mask) -> tuple[Array, Mask]:
+        """Values of the used rows on the grid; NaN where the mask is False.
+
+        Parameters
+        ----------
+        values : (r,) array
+            One value for each used row.
+        usable : (r,) bool array
+            Which of them may be used.
+
+        Returns
+        -------
+        (values, mask) : (n,) arrays
+        """
+        left, right, share = self._left, self._right, self._share
+        mask = self._reachable & (usable[left] | (share == 1.0)) & (usable[right] | (share == 0.0))
+        safe = np.where(usable, values, 0.0)
+        laid = np.where(share == 1.0, safe[right], safe[left] + share * (safe[right] - safe[left]))
+        laid = np.where(share == 0.0, safe[left], laid)
+        laid[~mask] = np.nan
+        return laid, mask
+
+    def when(self, start: int, stop: int) -> tuple[float, float]:
+        """Time of the used rows ``start`` to ``stop`` (exclusive) on the grid, in seconds."""
+        return float(self._stamps[start]), float(self._stamps[stop - 1])
+
+
+def lay_grid(stamps: Array, source: str, sample_time: float | None) -> Grid:
+    """Lay a uniform grid under time stamps.
+
+    Parameters
+    ----------
+    stamps : (n,) array
+        Seconds, finite, in the order of the rows; they may repeat and jump.
+    source : str
+        The file, for messages.
+    sample_time : float, optional
+        Spacing of the grid; without it the usual interval of the stamps.
+
+    Returns
+    -------
+    Grid
+        The grid, with what the clock did.
+
+    Raises
+    ------
+    RecordingError
+        If there are fewer than two different time stamps.
+    """
+    intervals = np.diff(stamps)
+    forward = intervals[intervals > 0.0]
+    if not len(forward):
+        raise RecordingError(f"{source}: column 'time': two rows at least, at different times, are needed")
+    usual = float(np.median(forward))
+    ordinary = forward[forward < _GAP * usual]
+    if len(ordinary) and np.ptp(ordinary) < 0.5 * usual:
+        usual = float(np.mean(ordinary))
+    usual = float(f"{usual:.6g}") if abs(float(f"{usual:.4g}") / usual - 1) > 2e-5 else float(f"{usual:.4g}")
+    step = sample_time if sample_time is not None else usual
+
+    events: list[Event] = []
+    repeats = np.flatnonzero(intervals == 0.0)
+    rows = np.flatnonzero(np.concatenate([[True], intervals != 0.0]))
+    kept = stamps[rows]
+    intervals = np.diff(kept)
+    recorded = float(np.sum(intervals[(intervals > 0.0) & (intervals < _GAP * usual)]))
+    jumps = (intervals < 0.0) | (intervals > max(recorded, 1000.0 * usual))
+    elapsed = np.where(jumps, (_JUMP_HOLE + 1) * usual, intervals)
+    placed = np.concatenate([[0.0], np.cumsum(elapsed)])
+    placed = _exact(placed, kept, jumps)
+
+    if len(repeats):
+        at = placed[np.searchsorted(rows, repeats, side="right") - 1]
+        text = f"{len(repeats)} rows repeat the time of the row before and are left out"
+        events.append(Event("clock_jump", float(at[0]), float(at[-1]), text))
+    for index in np.flatnonzero(jumps)[:_MOST_EVENTS]:
+        way = "back" if intervals[index] < 0 else "forward"
+        text = (
+            f"the clock steps {way} by {abs(float(intervals[index])):.6g} s; what follows is placed after "
+            f"{_JUMP_HOLE} empty samples, because the true pause is not known"
+        )
+        events.append(Event("clock_jump", float(placed[index]), float(placed[index + 1]), text))
+    further = int(jumps.sum()) - _MOST_EVENTS
+    if further > 0:
+        last = np.flatnonzero(jumps)
+        first_at, last_at = float(placed[last[_MOST_EVENTS]]), float(placed[last[-1] + 1])
+        events.append(Event("clock_jump", first_at, last_at, f"{further} further steps of the clock"))
+    events += _gaps(placed, elapsed, jumps, usual)
+    return Grid(placed, rows, step, usual, events)
+
+
+def _exact(placed: Array, kept: Array, jumps: Mask) -> Array:
+    """Without jumps the stamps themselves, free of the rounding of a running sum."""
+    return placed if jumps.any() else kept - kept[0]
+
+
+def _gaps(placed: Array, elapsed: Array, jumps: Mask, usual: float) -> list[Event]:
+    holes = np.flatnonzero(~jumps & (elapsed > _GAP * usual))
+    missing = np.maximum(np.rint(elapsed[holes] / usual).astype(int) - 1, 1)
+    if len(holes) > _MOST_EVENTS:
+        total = int(missing.sum())
+        share = 100.0 * total / (total + len(placed))
+        text = (
+            f"{len(holes)} gaps, about {total} samples ({share:.0f} %) are missing, "
+            f"the longest gap {float(elapsed[holes].max()):.6g} s"
+        )
+        return [Event("gap", float(placed[holes[0]]), float(placed[holes[-1] + 1]), text)]
+    return [
+        Event(
+            "gap",
+            float(placed[i]),
+            float(placed[i + 1]),
+            f"no samples for {elapsed[i]:.6g} s (about {m} missing)",
+        )
+        for i, m in zip(holes, missing, strict=True)
+    ]

@@ -1,0 +1,229 @@
+"""Finds what is wrong with a sampled channel: frozen, saturated, spiked, constant.
+
+A channel is judged against itself. Ordinary quantised data repeat values, a joint rests against its
+stop, a vented muscle reads zero: none of that is a fault. A channel counts as frozen when it stays
+exactly equal far longer than its own noise ever leaves it equal elsewhere at rest.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Fault", "find_faults"]
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+_WINDOW: Final = 40  # samples of a window in which rest and noise are judged
+_LEAST: Final = 20  # no shorter run is ever suspect
+_CHANCE: Final = 1e-6  # chance of a false alarm per channel, under the channel's own noise
+_MARGIN: Final = 2.0  # on the longest expected run
+_REST: Final = 12.0  # quanta that a channel at rest may span
+
+#: Set by the controller or the user: constant stretches are their nature.
+COMMANDS: Final = frozenset({"valve_command", "reference"})
+#: Stops and dry friction hold these exactly still.
+MECHANICAL: Final = frozenset({"joint_angle", "length"})
+#: Transducers whose end of range is a fault.
+CLIPPING: Final = frozenset({"supply_pressure", "muscle_pressure", "force", "joint_torque"})
+
+
+class Fault(NamedTuple):
+    """A faulty stretch, ``rows[start:stop]`` of the channel as it was read."""
+
+    kind: str
+    start: int
+    stop: int
+    text: str
+    masked: bool = True
+
+
+def find_faults(channel: str, values: Array) -> list[Fault]:
+    """Judge one channel.
+
+    Parameters
+    ----------
+    channel : str
+        Its canonical name; commands are only looked at for nothing, sensors for everything.
+    values : (n,) array
+        SI values in the order of sampling, NaN where there is none.
+
+    Returns
+    -------
+    list of Fault
+        In the order of kinds: constant, outlier, saturated, frozen.
+    """
+    if channel in COMMANDS or len(values) < 3:
+        return []
+    good = np.flatnonzero(np.isfinite(values))
+    data = values[good]
+    if len(data) < 3:
+        return []
+    if np.all(data == data[0]):
+        return _constant(channel, data, good)
+    faults = _outliers(data, good)
+    spiked = np.zeros(len(values), dtype=bool)
+    for fault in faults:
+        spiked[fault.start : fault.stop] = True
+    good = good[~spiked[good]]
+    data = values[good]
+    if len(data) < 3 * _LEAST:
+        return faults
+    stretches = _Stretches(channel, data)
+    for kind, start, stop in stretches.suspects():
+        length = stop - start
+        where = "its extreme value" if kind == "saturated" else "exactly one value"
+        faults.append(Fault(kind, int(good[start]), int(good[stop - 1]) + 1, f"{length} samples at {where}"))
+    return faults
+
+
+def _constant(channel: str, data: Array, good: NDArray[np.intp]) -> list[Fault]:
+    if len(data) < _LEAST:
+        return []
+    masked = channel in CLIPPING - {"supply_pressure"}
+    text = "one and the same value throughout"
+    return [Fault("constant", int(good[0]), int(good[-1]) + 1, text, masked)]
+
+
+def _outliers(data: Array, good: NDArray[np.intp]) -> list[Fault]:
+    """Spikes of one or two samples that stand off from both sides."""
+    n = len(data)
+    if n < _LEAST:
+        return []
+    padded = np.pad(data, 3, mode="edge")
+    windows = np.lib.stride_tricks.sliding_window_view(padded, 7)
+    off = data - np.median(windows, axis=1)
+    quantum = _quantum(data)
+    ordinary = np.quantile(np.abs(off), 0.99)
+    around = np.sort(windows, axis=1)
+    local = around[:, 4] - around[:, 2]
+    limit = np.maximum(np.maximum(12.0 * quantum, 7.0 * ordinary), 6.0 * local)
+    rows = np.flatnonzero(np.abs(off) > limit)
+    if len(rows) > n // 50:
+        return []
+    return [
+        Fault("outlier", int(good[first]), int(good[last]) + 1, f"a spike of {off[first]:.3g} (SI)")
+        for first, last in _groups(rows)
+    ]
+
+
+def _groups(rows: NDArray[np.intp]) -> list[tuple[int, int]]:
+    if not len(rows):
+        return []
+    cuts = np.flatnonzero(np.diff(rows) > 1)
+    firsts = np.concatenate([rows[:1], rows[cuts + 1]])
+    lasts = np.concatenate([rows[cuts], rows[-1:]])
+    return [(int(a), int(b)) for a, b in zip(firsts, lasts, strict=True)]
+
+
+def _quantum(data: Array) -> float:
+    """The smallest step between values, near enough: a low quantile of the steps that are not rounding."""
+    steps = np.diff(np.unique(data))
+    span = float(data.max() - data.min())
+    steps = steps[steps > 1e-9 * max(span, abs(float(data[0])) * 1e-3)]
+    return float(np.quantile(steps, 0.05)) if len(steps) else 0.0
+
+
+class _Stretches:
+    """Runs of exactly equal values of one channel, and what its noise makes of rest."""
+
+    def __init__(self, channel: str, data: Array) -> None:
+        self.channel = channel
+        self.data = data
+        self.step = np.diff(data)
+        edges = np.flatnonzero(self.step != 0.0) + 1
+        self.starts = np.concatenate([[0], edges])
+        self.stops = np.concatenate([edges, [len(data)]])
+        self.lengths = self.stops - self.starts
+        self.quantum = _quantum(data)
+        self.low, self.high = float(data.min()), float(data.max())
+        self.typical = float(np.quantile(np.abs(self.step[self.step != 0.0]), 0.5))
+        self.rest_windows, self.limit = self._noise()
+
+    def _noise(self) -> tuple[int, float]:
+        """Number of windows in which the channel rests but its noise lives, and the longest run allowed."""
+        count = len(self.data) // _WINDOW
+        if count < 3:
+            return 0, math.inf
+        windows = self.data[: count * _WINDOW].reshape(count, _WINDOW)
+        steps = np.diff(windows, axis=1)
+        equal = np.mean(steps == 0.0, axis=1)
+        spans = np.ptp(windows, axis=1)
+        signs = np.sign(steps)
+        reversals = np.sum(signs[:, 1:] * signs[:, :-1] < 0, axis=1) + _skipped_reversals(signs)
+        noisy = reversals >= 5
+        calm = spans <= np.quantile(spans[noisy], 0.5) * 2 + _REST * self.quantum if noisy.any() else noisy
+        alive = noisy & calm
+        number = int(alive.sum())
+        if number < 3:
+            return number, math.inf
+        most = min(max(float(np.max(equal[alive])), 0.05), 0.97)
+        n = len(self.data)
+        return number, max(_LEAST, _MARGIN * (1.0 + math.log(n / _CHANCE) / -math.log(most)))
+
+    def suspects(self) -> list[tuple[str, int, int]]:
+        """``(kind, start, stop)`` of the stretches that are saturated or frozen."""
+        found: list[tuple[str, int, int]] = []
+        clipped: dict[float, bool] = {}
+        for index in np.flatnonzero(self.lengths >= _LEAST):
+            start, stop = int(self.starts[index]), int(self.stops[index])
+            value = float(self.data[start])
+            extreme = value in (self.low, self.high)
+            if extreme and self._ordinary_extreme(value):
+                continue
+            long = stop - start > self.limit
+            if extreme and self.channel in CLIPPING and (long or self._cut_off(start, stop)):
+                clipped[value] = True
+            elif long and self._believable(start, stop):
+                found.append(("frozen", start, stop))
+            elif self._jump(start, stop) > 5.0 * self._largest_step(start, stop):
+                found.append(("frozen", start, stop))
+        for value in clipped:
+            at = (self.data[self.starts] == value) & (self.lengths >= 3)
+            found += [("saturated", int(self.starts[i]), int(self.stops[i])) for i in np.flatnonzero(at)]
+        return sorted(found, key=lambda item: item[1])
+
+    def _ordinary_extreme(self, value: float) -> bool:
+        """A joint against its stop; a vented pressure or an unloaded cell at zero."""
+        if self.channel in MECHANICAL:
+            return True
+        return value == self.low and abs(value) <= 0.02 * (self.high - self.low)
+
+    def _believable(self, start: int, stop: int) -> bool:
+        """Whether an overlong run is the sensor's doing and not that of a joint held by friction."""
+        if self.channel not in MECHANICAL:
+            return True
+        lively = self.rest_windows * _WINDOW >= 3 * (stop - start)
+        return lively or self._jump(start, stop) > max(3.0 * self.quantum, 3.0 * self.typical)
+
+    def _jump(self, start: int, stop: int) -> float:
+        """The step with which the channel comes back to life."""
+        return abs(float(self.step[stop - 1])) if stop < len(self.data) else 0.0
+
+    def _largest_step(self, start: int, stop: int) -> float:
+        size = np.abs(self.step)
+        before = float(size[: max(start - 1, 0)].max(initial=0.0))
+        after = float(size[stop:].max(initial=0.0))
+        return max(before, after, self.quantum)
+
+    def _cut_off(self, start: int, stop: int) -> bool:
+        """Whether the signal runs into the extreme, or leaves it, at full slope."""
+        slopes = []
+        if start >= 6:
+            slopes.append(abs(float(self.data[start] - self.data[start - 6])) / 6)
+        if stop + 6 <= len(self.data):
+            slopes.append(abs(float(self.data[stop + 5] - self.data[stop - 1])) / 6)
+        usual = max(3.0 * self.quantum, self.typical)
+        return len(slopes) > 0 and max(slopes) > usual and math.isinf(self.limit)
+
+
+def _skipped_reversals(signs: Array) -> NDArray[np.intp]:
+    """Reversals across one or two equal samples: up, still, down."""
+    one = (signs[:, 2:] * signs[:, :-2] < 0) & (signs[:, 1:-1] == 0)
+    two = (signs[:, 3:] * signs[:, :-3] < 0) & (signs[:, 2:-1] == 0) & (signs[:, 1:-2] == 0)
+    total: NDArray[np.intp] = np.sum(one, axis=1) + np.sum(two, axis=1)
+    return total

@@ -1,0 +1,201 @@
+"""Reads the table of a recording: text or Parquet in, columns of numbers out.
+
+Nothing is judged here but whether a cell is a number; empty cells and the usual words for "no value"
+become NaN.
+"""
+
+from __future__ import annotations
+
+import csv
+import gzip
+import io
+import math
+import zlib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pamrs.errors import RecordingError
+
+__all__ = ["Table", "read_table"]
+
+Array = NDArray[np.float64]
+
+_NO_VALUE = frozenset({"", "nan", "na", "n/a", "null", "none", "-", "--", "inf", "-inf", "+inf"})
+_READABLE = ".csv, .tsv, .txt, .dat (each also .gz) and .parquet"
+_TEXT = (".csv", ".tsv", ".txt", ".dat", "")
+
+
+class Table:
+    """Raw columns of a file.
+
+    Parameters
+    ----------
+    header : list of str or None
+        The file's own headings, None when it has none.
+    cells : sequence of columns
+        For text files the cells of each column, for others numbers.
+    ragged : list of int
+        Row numbers (from 1, as an editor counts them) with too few or too many cells.
+    """
+
+    def __init__(
+        self,
+        header: list[str] | None,
+        cells: Sequence[Sequence[str] | Array],
+        first_row: int,
+        ragged: list[int],
+    ) -> None:
+        self.header = header
+        self.cells = cells
+        self.first_row = first_row
+        self.ragged = ragged
+
+    def numbers(self, index: int, label: str, source: str, thousands: str | None, decimal: str) -> Array:
+        """Column ``index`` as numbers, NaN where it has no value.
+
+        Raises
+        ------
+        RecordingError
+            If a cell is not a number; the message names column, row and cell.
+        """
+        cells = self.cells[index]
+        if isinstance(cells, np.ndarray):
+            return cells
+        if thousands:
+            cells = [cell.replace(thousands, "") for cell in cells]
+        if decimal != ".":
+            cells = [cell.replace(decimal, ".") for cell in cells]
+        try:
+            return np.array(cells, dtype=np.float64)
+        except ValueError:
+            pass
+        values = np.empty(len(cells))
+        for row, cell in enumerate(cells):
+            text = cell.strip()
+            try:
+                values[row] = math.nan if text.lower() in _NO_VALUE else float(text)
+            except ValueError:
+                raise RecordingError(
+                    f"{source}: column {label!r}, row {self.first_row + row}: {text[:40]!r} is not a number"
+                    + _number_hint(text, thousands, decimal)
+                ) from None
+        return values
+
+
+def _number_hint(text: str, thousands: str | None, decimal: str) -> str:
+    if decimal == "." and "," in text:
+        return " (give decimal=',' if the comma is the decimal mark)"
+    if thousands is None and text.count(".") > 1:
+        return " (give thousands='.' for this column if the point marks thousands)"
+    return ""
+
+
+def read_table(path: Path, *, delimiter: str, header: bool) -> Table:
+    """Read the table of one file.
+
+    Parameters
+    ----------
+    path : Path
+        The file; the ending tells the format.
+    delimiter : str
+        What separates cells in text files; ``" "`` means any run of blanks.
+    header : bool
+        Whether the first row of a text file has the headings.
+
+    Returns
+    -------
+    Table
+        The columns.
+
+    Raises
+    ------
+    RecordingError
+        If the file is missing, unreadable, empty or has no rows.
+    """
+    packed = path.suffix == ".gz"
+    ending = (path.with_suffix("").suffix if packed else path.suffix).lower()
+    if ending == ".parquet" and not packed:
+        return _parquet(path)
+    if ending not in _TEXT:
+        raise RecordingError(f"{path}: the format {ending!r} is not read here; readable are {_READABLE}")
+    try:
+        data = path.read_bytes()
+        raw = gzip.decompress(data) if packed else data
+        text = raw.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise RecordingError(f"{path}: not a text file in UTF-8; readable are {_READABLE}") from None
+    except (OSError, EOFError, zlib.error) as error:
+        raise RecordingError(
+            f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})"
+        ) from error
+    if "\x00" in text:
+        raise RecordingError(f"{path}: not a text file (it has zero bytes); readable are {_READABLE}")
+    return _parse(text, str(path), delimiter, header)
+
+
+def _parse(text: str, source: str, delimiter: str, header: bool) -> Table:
+    rows, numbers = [], []
+    for number, row in enumerate(_split(text, delimiter), start=1):
+        if any(cell.strip() for cell in row):
+            rows.append(row)
+            numbers.append(number)
+    if not rows:
+        raise RecordingError(f"{source}: the file is empty")
+    headings = [cell.strip() for cell in rows.pop(0)] if header else None
+    first_row = numbers[1 if header else 0] if len(numbers) > int(header) else 0
+    if not rows:
+        raise RecordingError(f"{source}: a header without rows")
+    width = len(headings) if headings is not None else _usual_width(rows)
+    ragged = []
+    for index, row in enumerate(rows):
+        if len(row) != width:
+            ragged.append(numbers[index + int(header)])
+            rows[index] = (row + [""] * width)[:width] if len(row) < width else [""] * width
+    if len(ragged) > max(1, len(rows) // 20):
+        raise RecordingError(
+            f"{source}: {len(ragged)} of {len(rows)} rows do not have {width} cells (first: row {ragged[0]}, "
+            f"delimiter {delimiter!r})"
+        )
+    return Table(headings, list(zip(*rows, strict=True)), first_row, ragged)
+
+
+def _split(text: str, delimiter: str) -> list[list[str]]:
+    if delimiter == " ":
+        return [line.split() for line in text.splitlines()]
+    if '"' in text:
+        return list(csv.reader(io.StringIO(text), delimiter=delimiter))
+    return [line.split(delimiter) for line in text.splitlines()]
+
+
+def _usual_width(rows: list[list[str]]) -> int:
+    widths = [len(row) for row in rows]
+    return max(set(widths), key=widths.count)
+
+
+def _parquet(path: Path) -> Table:
+    if not path.is_file():
+        raise RecordingError(f"{path}: cannot be read (no such file)")
+    try:
+        import pandas as pd
+    except ImportError as error:
+        raise RecordingError(
+            f"{path}: Parquet needs pandas and pyarrow: pip install 'pamrs[io]' pyarrow"
+        ) from error
+    try:
+        frame = pd.read_parquet(path)
+        columns = [np.asarray(frame[name], dtype=np.float64) for name in frame.columns]
+    except Exception as error:
+        raise RecordingError(f"{path}: cannot be read ({error})") from error
+    if not len(frame):
+        raise RecordingError(f"{path}: a header without rows")
+    return Table([str(name) for name in frame.columns], columns, 1, [])
+
+
+def thousands_of(thousands: str | Mapping[str, str] | None, name: str) -> str | None:
+    """The thousands mark of one column: ``thousands`` is one mark for all, or one for each name."""
+    if thousands is None or isinstance(thousands, str):
+        return thousands
+    return thousands.get(name)

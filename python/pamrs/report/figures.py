@@ -1,0 +1,430 @@
+"""Figures of a diagnosis, as SVG text to put into a page, or PNG bytes."""
+
+from __future__ import annotations
+
+import io
+import math
+import re
+import textwrap
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import matplotlib as mpl
+import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
+from matplotlib.collections import QuadMesh
+from matplotlib.figure import Figure
+
+from pamrs.report.text import (
+    display_unit,
+    format_number,
+    format_probability,
+    headline,
+    is_named,
+    is_number,
+    label,
+    ranked_probabilities,
+)
+
+if TYPE_CHECKING:
+    from pamrs.diagnosis.result import Diagnosis, Trace
+
+__all__ = ["COLOURS", "blocks_svg", "decimate", "map_svg", "summary_png", "telling_trace", "traces_svg"]
+
+COLOURS = {
+    "measured": "#1f1f1f",
+    "before": "#d55e00",
+    "refit": "#c79a00",
+    "after": "#0072b2",
+    "quiet": "#b9bec6",
+}
+"""Colours of the curves (after Okabe and Ito: told apart by colour-blind readers and in grey print)."""
+
+CHAIN = ("supply", "valve", "line", "chamber", "muscle", "joint", "arm", "sensors")
+MAX_POINTS = 1500
+
+FloatArray = npt.NDArray[np.float64]
+
+_STYLE: Any = {
+    "svg.fonttype": "none",
+    "font.family": "DejaVu Sans",
+    "font.size": 9.0,
+    "axes.titlesize": 9.5,
+    "axes.titlelocation": "left",
+    "axes.titleweight": "bold",
+    "axes.labelsize": 9.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.edgecolor": "#6b7280",
+    "axes.labelcolor": "#374151",
+    "axes.linewidth": 0.8,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "#e7e9ed",
+    "grid.linewidth": 0.7,
+    "xtick.color": "#6b7280",
+    "ytick.color": "#6b7280",
+    "xtick.labelcolor": "#374151",
+    "ytick.labelcolor": "#374151",
+    "legend.frameon": False,
+    "legend.fontsize": 9.0,
+    "path.simplify_threshold": 0.3,
+    "figure.facecolor": "white",
+    "savefig.facecolor": "white",
+}
+
+
+def decimate(time: FloatArray, values: FloatArray, points: int = MAX_POINTS) -> tuple[FloatArray, FloatArray]:
+    """Thin a curve for drawing, keeping the extremes of every stretch.
+
+    Parameters
+    ----------
+    time, values : ndarray, shape (n,)
+        Curve; NaN in `values` are gaps.
+    points : int
+        Largest number of points returned.
+
+    Returns
+    -------
+    tuple of ndarray
+        Times and values of at most `points` samples, in order; a stretch that is all NaN stays a gap.
+    """
+    n = len(time)
+    if n <= points:
+        return time, values
+    edges = np.linspace(0, n, points // 2 + 1).astype(np.int64)
+    chosen: list[int] = []
+    for start, stop in zip(edges[:-1], edges[1:], strict=True):
+        part = values[start:stop]
+        if np.all(np.isnan(part)):
+            chosen.append(int(start))
+        else:
+            chosen.extend(sorted({int(start + np.nanargmin(part)), int(start + np.nanargmax(part))}))
+    index = np.asarray(chosen, dtype=np.int64)
+    return time[index], values[index]
+
+
+def _rms(values: FloatArray | None) -> float:
+    if values is None or not np.any(np.isfinite(values)):
+        return math.nan
+    return float(np.sqrt(np.nanmean(np.square(values))))
+
+
+def _largest(*curves: FloatArray | None) -> float:
+    sizes = [float(np.nanmax(np.abs(c))) for c in curves if c is not None and np.any(np.isfinite(c))]
+    return max(sizes, default=math.nan)
+
+
+def _has(values: FloatArray | None, besides: FloatArray | None = None) -> bool:
+    """Whether a curve has data and differs from another one."""
+    if values is None or not np.any(np.isfinite(values)):
+        return False
+    return besides is None or not np.allclose(values, besides, equal_nan=True)
+
+
+def telling_trace(diagnosis: Diagnosis) -> Trace | None:
+    """Trace that shows the most: the telling channel, held out if there is one, with the largest improvement."""
+    if not diagnosis.traces:
+        return None
+    channel = diagnosis.where.get("channel")
+
+    def merit(trace: Trace) -> tuple[bool, bool, float]:
+        gain = _rms(trace.residual_before) / max(_rms(trace.residual_after), 1e-300)
+        return trace.channel == channel, trace.role == "held_out", gain if math.isfinite(gain) else 0.0
+
+    return max(diagnosis.traces, key=merit)
+
+
+def _noise(diagnosis: Diagnosis, trace: Trace) -> float | None:
+    for part in ("held_out", "channels") if trace.role == "held_out" else ("channels", "held_out"):
+        noise = ((diagnosis.fit.get(part) or {}).get(trace.channel) or {}).get("noise")
+        if is_number(noise) and float(noise) > 0:
+            return float(noise)
+    return None
+
+
+def _draw_curves(axes: Axes, trace: Trace, *, width: float = 1.2) -> None:
+    """Measured and simulated signals."""
+    unit, factor = display_unit(trace.unit, _largest(trace.measured))
+
+    def plot(values: FloatArray, name: str, text: str, **kw: Any) -> None:
+        x, y = decimate(trace.time, values)
+        axes.plot(x, y * factor, color=COLOURS[name], label=text, **kw)
+
+    plot(trace.measured, "measured", "measured", lw=2.1 * width, alpha=0.9)
+    plot(trace.before, "before", "before", lw=width)
+    if trace.refit is not None and _has(trace.refit, trace.before):
+        plot(trace.refit, "refit", "parameters refitted", lw=width, ls=(0, (5, 2)))
+    if trace.after is not None and _has(trace.after, trace.refit):
+        plot(trace.after, "after", "after: with the effect", lw=width)
+    axes.set_ylabel(f"{label(trace.channel)} [{unit}]" if unit else label(trace.channel))
+
+
+def _draw_residuals(axes: Axes, trace: Trace, noise: float | None, *, width: float = 1.0) -> None:
+    """Residuals of the refitted baseline and with the effect, over a band of two noise standard deviations."""
+    before, after = trace.residual_before, trace.residual_after
+    unit, factor = display_unit(trace.unit, _largest(before, after))
+    if noise is not None:
+        axes.axhspan(-2 * noise * factor, 2 * noise * factor, color="#dfe3e8", lw=0, label="noise (± 2 std)")
+    axes.axhline(0.0, color="#6b7280", lw=0.7)
+    for values, name, text in ((before, "before", "baseline"), (after, "after", "with the effect")):
+        if values is not None and _has(values, before if name == "after" else None):
+            x, y = decimate(trace.time, values)
+            axes.plot(x, y * factor, color=COLOURS[name], lw=width, label=text)
+    axes.set_ylabel(f"residual [{unit}]" if unit else "residual")
+
+
+def _legend_above(axes: Axes, *, columns: int = 4) -> None:
+    axes.legend(
+        loc="lower right",
+        bbox_to_anchor=(1.0, 1.0),
+        ncols=columns,
+        borderaxespad=0.1,
+        handlelength=1.8,
+        columnspacing=1.3,
+    )
+
+
+def _shade(axes: Axes, diagnosis: Diagnosis, trace: Trace) -> None:
+    """Mark the intervals that carry the excess, where they are known to belong to this recording."""
+    if diagnosis.where.get("recording") == trace.recording:
+        for start, stop in diagnosis.where.get("intervals") or []:
+            axes.axvspan(float(start), float(stop), color="#f5e6b8", alpha=0.5, lw=0, zorder=0)
+
+
+def _svg(figure: Figure, prefix: str) -> str:
+    """SVG element without prolog; ids carry `prefix` so that several can share a page."""
+    stream = io.StringIO()
+    with mpl.rc_context({"svg.hashsalt": prefix}):
+        none: dict[str, Any] = {"Date": None, "Creator": None, "Format": None, "Type": None}
+        figure.savefig(stream, format="svg", metadata=none)
+    text = stream.getvalue()
+    text = text[text.index("<svg") :]
+    text = re.sub(r'\bid="', f'id="{prefix}-', text)
+    text = text.replace("url(#", f"url(#{prefix}-").replace('href="#', f'href="#{prefix}-')
+    text = re.sub(r' width="[\d.]+pt"', "", re.sub(r' height="[\d.]+pt"', "", text, count=1), count=1)
+    return text.strip()
+
+
+def traces_svg(diagnosis: Diagnosis, traces: Sequence[Trace], prefix: str) -> str:
+    """Measured and simulated channels of one recording, each with its residual below.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        For noise floors and marked intervals.
+    traces : sequence of Trace
+        Channels of one recording, at least one.
+    prefix : str
+        Prefix of the element ids.
+
+    Returns
+    -------
+    str
+        SVG element.
+    """
+    with mpl.rc_context(_STYLE):
+        figure = Figure(figsize=(10.0, 3.7 * len(traces) + 0.3), layout="constrained")
+        axes = figure.subplots(
+            2 * len(traces),
+            1,
+            sharex=True,
+            squeeze=False,
+            gridspec_kw={"height_ratios": [2.0, 1.1] * len(traces)},
+        )[:, 0]
+        for i, trace in enumerate(traces):
+            upper, lower = axes[2 * i], axes[2 * i + 1]
+            _draw_curves(upper, trace)
+            _draw_residuals(lower, trace, _noise(diagnosis, trace))
+            for panel in (upper, lower):
+                _shade(panel, diagnosis, trace)
+                _legend_above(panel)
+                panel.margins(x=0.005)
+            figure.align_ylabels([upper, lower])
+        axes[-1].set_xlabel("time [s]")
+        figure.align_ylabels(list(axes))
+        return _svg(figure, prefix)
+
+
+def _block_rows(diagnosis: Diagnosis) -> list[tuple[str, float, bool]]:
+    """Name, residual in units of the noise floor, whether located; in the order of the chain."""
+    rows = []
+    for name, entry in diagnosis.blocks.items():
+        rms, noise = entry.get("rms"), entry.get("noise")
+        if is_number(rms) and is_number(noise) and float(noise) > 0:
+            rows.append((name, float(rms) / float(noise), name == diagnosis.where.get("block")))
+    return sorted(rows, key=lambda r: CHAIN.index(r[0]) if r[0] in CHAIN else len(CHAIN))
+
+
+def _draw_blocks(axes: Axes, rows: Sequence[tuple[str, float, bool]]) -> None:
+    position = np.arange(len(rows))
+    size = np.asarray([r[1] for r in rows])
+    left = min(0.5, 0.8 * float(size.min()))
+    colours = [COLOURS["before"] if r[2] else COLOURS["quiet"] for r in rows]
+    axes.barh(position, size - left, left=left, color=colours, height=0.62)
+    axes.axvline(1.0, color="#1f1f1f", lw=1.1, ls=(0, (3, 2)))
+    axes.text(1.0, -0.62, " noise floor", va="bottom", ha="left", color="#374151", fontsize="small")
+    axes.set_xscale("log")
+    axes.set_xlim(left, max(3.0, float(size.max()) * 1.9))
+    for y, value in zip(position.tolist(), size.tolist(), strict=True):
+        axes.text(value, y, f"  {format_number(value, 2)}×", va="center", ha="left", fontsize="small")
+    axes.set_yticks(position, [label(r[0]) for r in rows])
+    axes.set_ylim(len(rows) - 0.45, -1.0)
+    axes.xaxis.set_major_formatter(lambda v, _: format_number(v, 1))
+    axes.xaxis.set_minor_formatter("")
+    axes.grid(axis="y", visible=False)
+    axes.set_xlabel("residual of the refitted baseline / noise floor")
+
+
+def blocks_svg(diagnosis: Diagnosis, prefix: str = "blocks") -> str | None:
+    """Bar chart of each block's residual against its noise floor; None when there are no blocks."""
+    rows = _block_rows(diagnosis)
+    if not rows:
+        return None
+    with mpl.rc_context(_STYLE):
+        figure = Figure(figsize=(5.6, 1.1 + 0.36 * (len(rows) + 1)), layout="constrained")
+        _draw_blocks(figure.subplots(), rows)
+        return _svg(figure, prefix)
+
+
+def _grids(
+    condition_map: dict[str, Any],
+) -> tuple[FloatArray, FloatArray, list[tuple[str, Any]], float] | None:
+    """Edges, titled grids and colour limit of a conditions map."""
+    x = np.asarray(condition_map["x_edges"], dtype=np.float64)
+    y = np.asarray(condition_map["y_edges"], dtype=np.float64)
+    grids = []
+    for key, title in (("z", "before"), ("z_after", "after")):
+        if condition_map.get(key) is not None:
+            z = np.asarray(condition_map[key], dtype=np.float64)
+            if z.shape != (len(y) - 1, len(x) - 1) and z.T.shape == (len(y) - 1, len(x) - 1):
+                z = z.T
+            if z.shape != (len(y) - 1, len(x) - 1):
+                raise ValueError(
+                    f"condition_map {key} has shape {z.shape}; the edges ask for {(len(y) - 1, len(x) - 1)}"
+                )
+            grids.append((title, np.ma.masked_invalid(z)))
+    sizes = [np.abs(z.compressed()) for _, z in grids]
+    everything = np.concatenate(sizes) if sizes else np.empty(0)
+    if everything.size == 0:
+        return None
+    return x, y, grids, max(2.0, float(np.percentile(everything, 99)))
+
+
+def _draw_map(axes: Axes, x: FloatArray, y: FloatArray, z: Any, limit: float) -> QuadMesh:
+    axes.set_facecolor("#eef0f3")
+    axes.grid(visible=False)
+    mesh = axes.pcolormesh(x, y, z, cmap="RdBu_r", vmin=-limit, vmax=limit, rasterized=z.size > 600)
+    return mesh
+
+
+def map_svg(diagnosis: Diagnosis, prefix: str = "map") -> str | None:
+    """Heat maps of the mean residual over the two telling conditions, before and after; None without data."""
+    content = diagnosis.condition_map and _grids(diagnosis.condition_map)
+    if not content or diagnosis.condition_map is None:
+        return None
+    x, y, grids, limit = content
+    with mpl.rc_context(_STYLE):
+        figure = Figure(figsize=(5.0 * len(grids) + 0.6, 3.9), layout="constrained")
+        axes = figure.subplots(1, len(grids), sharey=True, squeeze=False)[0]
+        for panel, (title, z) in zip(axes, grids, strict=True):
+            mesh = _draw_map(panel, x, y, z, limit)
+            panel.set_title(title)
+            panel.set_xlabel(str(diagnosis.condition_map.get("x_label", "")))
+        axes[0].set_ylabel(str(diagnosis.condition_map.get("y_label", "")))
+        figure.colorbar(mesh, ax=list(axes), label="mean residual / noise", extend="both", pad=0.015)
+        return _svg(figure, prefix)
+
+
+def _draw_probabilities(axes: Axes, diagnosis: Diagnosis) -> None:
+    rows = ranked_probabilities(diagnosis, 6)
+    position = np.arange(len(rows))
+    colours = [COLOURS["after" if is_named(diagnosis, name) else "quiet"] for name, _ in rows]
+    axes.barh(position, [p for _, p in rows], color=colours, height=0.62)
+    for y, (_, p) in zip(position.tolist(), rows, strict=True):
+        axes.text(p + 0.015, y, format_probability(p), va="center", fontsize="small")
+    axes.set_yticks(position, [textwrap.shorten(label(name), 34, placeholder=" …") for name, _ in rows])
+    axes.set_xlim(0.0, 1.16)
+    axes.set_xticks([0.0, 0.5, 1.0])
+    axes.invert_yaxis()
+    axes.grid(axis="y", visible=False)
+
+
+def summary_png(diagnosis: Diagnosis) -> bytes:
+    """One picture: the telling channel and its residual, probabilities, conditions map, verdict.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        Result to draw; parts that it lacks are left out.
+
+    Returns
+    -------
+    bytes
+        PNG of 1600 x 1000 pixels.
+    """
+    style = {**_STYLE, "font.size": 8.5, "axes.titlesize": 9.5, "legend.fontsize": 8.0, "axes.labelsize": 8.5}
+    with mpl.rc_context(style):
+        figure = Figure(figsize=(10.0, 6.25), dpi=160, layout="constrained")
+        figure.get_layout_engine().set(w_pad=0.12, h_pad=0.06, wspace=0.03, hspace=0.03)  # type: ignore[union-attr, call-arg]
+        title = "\n".join(textwrap.wrap(headline(diagnosis), 78))
+        figure.suptitle(title, x=0.012, ha="left", fontsize=15, fontweight="bold", color="#111827")
+        left, right = figure.subfigures(1, 2, width_ratios=[1.45, 1.0], squeeze=False)[0]
+        trace = telling_trace(diagnosis)
+        if trace is not None:
+            upper, lower = left.subplots(2, 1, sharex=True, gridspec_kw={"height_ratios": [1.7, 1.0]})
+            _draw_curves(upper, trace, width=1.1)
+            _draw_residuals(lower, trace, _noise(diagnosis, trace), width=0.8)
+            role = "held-out recording" if trace.role == "held_out" else "fitted recording"
+            upper.set_title(f"{label(trace.channel).capitalize()}, {role} {trace.recording}", pad=20)
+            lower.set_title("What the model does not explain", pad=20)
+            for panel in (upper, lower):
+                panel.legend(
+                    loc="lower left",
+                    bbox_to_anchor=(-0.01, 0.995),
+                    ncols=4,
+                    borderaxespad=0.1,
+                    handlelength=1.6,
+                    columnspacing=1.2,
+                )
+                panel.margins(x=0.005)
+            lower.set_xlabel("time [s]")
+            left.align_ylabels([upper, lower])
+        _draw_right(right, diagnosis)
+        stream = io.BytesIO()
+        figure.savefig(stream, format="png", dpi=160)
+        return stream.getvalue()
+
+
+def _head(part: Any, text: str) -> None:
+    """Title of a part of the summary, flush left."""
+    part.suptitle(text, x=0.03, ha="left", fontsize=9.5, fontweight="bold")
+
+
+def _draw_right(right: Any, diagnosis: Diagnosis) -> None:
+    """Right column of the summary: probabilities above, conditions map or blocks below."""
+    content = diagnosis.condition_map and _grids(diagnosis.condition_map)
+    rows = _block_rows(diagnosis)
+    below = bool(content) or bool(rows)
+    above = bool(diagnosis.probabilities)
+    parts = right.subfigures(int(above) + int(below) or 1, 1, squeeze=False)[:, 0]
+    if above:
+        _draw_probabilities(parts[0].subplots(), diagnosis)
+        _head(parts[0], "Probability of each hypothesis")
+    if content and diagnosis.condition_map is not None:
+        _head(parts[-1], "When: residual over two conditions")
+        x, y, grids, limit = content
+        axes = parts[-1].subplots(1, len(grids), sharey=True, squeeze=False)[0]
+        for panel, (title, z) in zip(axes, grids, strict=True):
+            mesh = _draw_map(panel, x, y, z, limit)
+            panel.set_title(title, fontweight="normal", pad=4)
+            panel.set_xlabel(str(diagnosis.condition_map.get("x_label", "")))
+        axes[0].set_ylabel(str(diagnosis.condition_map.get("y_label", "")))
+        parts[-1].colorbar(
+            mesh, ax=list(axes), label="mean residual / noise", extend="both", pad=0.02, aspect=28
+        )
+    elif rows:
+        axes = parts[-1].subplots()
+        _draw_blocks(axes, rows)
+        _head(parts[-1], "Where the residual is")

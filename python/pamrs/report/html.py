@@ -1,0 +1,282 @@
+"""The report page: gathers what the template shows. Import through `pamrs.report`."""
+
+from __future__ import annotations
+
+import math
+from importlib import metadata
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import jinja2
+from markupsafe import Markup
+
+from pamrs.report import figures
+from pamrs.report import text as words
+
+if TYPE_CHECKING:
+    from pamrs.diagnosis.result import Diagnosis, Trace
+
+__all__ = ["render"]
+
+HELD_OUT_SHOWN = 2
+BADGES = {
+    "none": "nothing missing",
+    "parameters": "parameters only",
+    "effects": "missing physics named",
+    "unlisted": "missing physics, not in the catalogue",
+}
+
+
+def _version() -> str:
+    try:
+        return metadata.version("pamrs")
+    except metadata.PackageNotFoundError:
+        return ""
+
+
+def _span(bounds: tuple[float, float] | None, digits: int = 3) -> str:
+    if bounds is None:
+        return "–"
+    return f"{words.format_number(bounds[0], digits)} to {words.format_number(bounds[1], digits)}"
+
+
+def _unit(unit: Any) -> str:
+    """Unit with raised powers; empty for dimensionless."""
+    text = str(unit or "")
+    if text in {"1", "-", ""}:
+        return ""
+    for digit, raised in (("2", "²"), ("3", "³"), ("4", "⁴")):
+        text = text.replace(f"^{digit}", raised)
+        for letter in ("m", "s", "K"):
+            text = text.replace(f"{letter}{digit}", f"{letter}{raised}")
+    return text
+
+
+def _effects(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+    rows = []
+    for effect in diagnosis.effects:
+        parameters = []
+        for name, p in (effect.get("parameters") or {}).items():
+            known = bool(p.get("identifiable", True)) and words.is_number(p.get("value"))
+            parameters.append(
+                {
+                    "name": words.label(str(name)),
+                    "known": known,
+                    "value": words.format_uncertain(p.get("value"), p.get("std")),
+                    "interval": _span(words.span95(p)),
+                    "unit": _unit(p.get("unit")),
+                }
+            )
+        rows.append(
+            {
+                "id": str(effect["id"]),
+                "name": str(effect.get("name") or words.label(str(effect["id"]))),
+                "probability": words.format_probability(effect.get("probability")),
+                "parameters": parameters,
+            }
+        )
+    return rows
+
+
+def _parameters(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+    rows = []
+    for name, p in diagnosis.parameters.items():
+        known = bool(p.get("identifiable", True))
+        raw = p.get("moved_sigmas")
+        moved = float(raw) if words.is_number(raw) else math.nan
+        flag = ""
+        if not known:
+            flag = "not determined by these recordings"
+        elif abs(moved) >= 3:
+            flag = "outside its tolerance"
+        elif abs(moved) >= 2:
+            flag = "at the edge of its tolerance"
+        rows.append(
+            {
+                "name": str(name),
+                "nominal": words.format_number(p.get("nominal"), 4),
+                "value": words.format_uncertain(p.get("value"), p.get("std")) if known else "–",
+                "unit": _unit(p.get("unit")),
+                "moved": f"{moved:+.1f}".replace("-", "−") if known and math.isfinite(moved) else "–",
+                "bar": min(1.0, abs(moved) / 4.0) if known and math.isfinite(moved) else 0.0,
+                "right": moved >= 0,
+                "flag": flag,
+                "known": known and math.isfinite(moved),
+                "alarm": known and abs(moved) >= 3,
+            }
+        )
+    return rows
+
+
+def _fit(diagnosis: Diagnosis, part: str) -> list[dict[str, Any]]:
+    rows = []
+    for channel, entry in (diagnosis.fit.get(part) or {}).items():
+        sizes = [abs(float(v)) for v in entry.values() if words.is_number(v)]
+        unit, factor = words.display_unit(words.CHANNEL_UNITS.get(channel, ""), max(sizes, default=math.nan))
+        noise = entry.get("noise")
+        cells = []
+        for key in ("noise", "before", "refit", "after"):
+            value = entry.get(key)
+            good = words.is_number(value)
+            ratio = (
+                float(value) / float(noise)
+                if good and words.is_number(noise) and float(noise) > 0
+                else math.nan
+            )
+            times = "–" if math.isnan(ratio) else f"{words.format_number(ratio, 2)}×"
+            shown = words.format_number(float(value) * factor) if good else "–"
+            cells.append({"key": key, "value": shown, "times": "" if key == "noise" else times})
+        rows.append({"channel": words.label(channel), "unit": unit, "cells": cells})
+    return rows
+
+
+def _recordings(diagnosis: Diagnosis) -> tuple[list[dict[str, Any]], int]:
+    """One fitted and up to two held-out recordings with their figure, and how many are not shown."""
+    telling = figures.telling_trace(diagnosis)
+    groups: dict[tuple[str, str], list[Trace]] = {}
+    for trace in diagnosis.traces:
+        groups.setdefault((trace.role, trace.recording), []).append(trace)
+    keys = list(groups)
+    if telling is not None:
+        keys.sort(key=lambda k: k != (telling.role, telling.recording))
+    chosen = [k for k in keys if k[0] != "held_out"][:1] + [k for k in keys if k[0] == "held_out"][
+        :HELD_OUT_SHOWN
+    ]
+    shown = []
+    for i, key in enumerate(chosen):
+        traces = sorted(groups[key], key=lambda t: t.channel != diagnosis.where.get("channel"))
+        shown.append(
+            {
+                "name": key[1],
+                "role": "held out" if key[0] == "held_out" else "used for the fit",
+                "svg": Markup(figures.traces_svg(diagnosis, traces, f"rec{i}")),  # noqa: S704
+            }
+        )
+    return shown, len(groups) - len(shown)
+
+
+def _conditions(diagnosis: Diagnosis) -> list[str]:
+    """Each condition as a sentence."""
+    lines = []
+    for condition in diagnosis.where.get("conditions") or []:
+        if isinstance(condition, dict):
+            text = condition.get("text")
+            if not text:
+                text = ", ".join(
+                    f"{words.label(str(k))} {words.format_number(v) if words.is_number(v) else v}"
+                    for k, v in condition.items()
+                )
+            lines.append(str(text))
+        else:
+            lines.append(str(condition))
+    return lines
+
+
+def _probabilities(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+    return [
+        {
+            "name": words.label(name),
+            "text": words.format_probability(p),
+            "width": f"{100 * max(0.0, min(1.0, p)):.1f}",
+            "named": words.is_named(diagnosis, name),
+        }
+        for name, p in words.ranked_probabilities(diagnosis, 12)
+    ]
+
+
+def _markup(svg: str | None) -> Markup | None:
+    return None if svg is None else Markup(svg)  # noqa: S704
+
+
+def _facts(diagnosis: Diagnosis) -> list[tuple[str, str]]:
+    """The few numbers under the headline."""
+    facts = []
+    if diagnosis.probabilities:
+        name, p = words.ranked_probabilities(diagnosis, len(diagnosis.probabilities))[0]
+        facts.append((words.format_probability(p), f"probability of: {words.label(name)}"))
+    gap = diagnosis.fit.get("gap_closed")
+    if words.is_number(gap):
+        facts.append(
+            (
+                f"{100 * float(gap):.0f} %".replace("-", "−"),
+                "of the gap to the noise closed on held-out recordings",
+            )
+        )
+    if diagnosis.where.get("block"):
+        channel = diagnosis.where.get("channel")
+        seen = f"block; seen in {words.label(str(channel))}" if channel else "block"
+        facts.append((words.label(str(diagnosis.where["block"])), seen))
+    facts.append(
+        (
+            f"{diagnosis.seconds:.0f} s" if diagnosis.seconds >= 10 else f"{diagnosis.seconds:.1f} s",
+            "computing time",
+        )
+    )
+    return facts
+
+
+def _excitation(diagnosis: Diagnosis) -> list[tuple[str, str]]:
+    content = diagnosis.next_experiment.get("excitation") or {}
+    return [
+        (
+            words.label(str(k)),
+            words.format_number(v) if words.is_number(v) and not isinstance(v, bool) else str(v),
+        )
+        for k, v in content.items()
+    ]
+
+
+def render(diagnosis: Diagnosis) -> str:
+    """Return the report of a diagnosis as one HTML page without references to anything outside it.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        Result to show; parts that it lacks are left out.
+
+    Returns
+    -------
+    str
+        HTML text.
+    """
+    environment = jinja2.Environment(
+        autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    source = Path(__file__).with_name("template.html.j2").read_text(encoding="utf-8")
+    recordings, hidden = _recordings(diagnosis)
+    bits = diagnosis.next_experiment.get("expected_information_bits")
+    return environment.from_string(source).render(
+        d=diagnosis,
+        badge=BADGES[diagnosis.verdict],
+        headline=words.headline(diagnosis),
+        paragraphs=[p.strip() for p in diagnosis.text.split("\n\n") if p.strip()],
+        facts=_facts(diagnosis),
+        where_text=str(diagnosis.where.get("text") or ""),
+        intervals=[f"{float(a):.2f} to {float(b):.2f} s" for a, b in diagnosis.where.get("intervals") or []],
+        conditions=_conditions(diagnosis),
+        blocks=_markup(figures.blocks_svg(diagnosis)),
+        map=_markup(figures.map_svg(diagnosis)),
+        map_block=words.label(
+            str((diagnosis.condition_map or {}).get("block") or diagnosis.where.get("block") or "")
+        ),
+        probabilities=_probabilities(diagnosis),
+        effects=_effects(diagnosis),
+        ambiguity=[words.set_label(list(s)) for s in diagnosis.ambiguity],
+        experiment=str(diagnosis.next_experiment.get("text") or ""),
+        excitation=_excitation(diagnosis),
+        bits=words.format_number(bits, 2) if words.is_number(bits) else "",
+        fits=[
+            (title, rows)
+            for title, rows in (
+                ("Held-out recordings (not used for the fit)", _fit(diagnosis, "held_out")),
+                ("Fitted recordings", _fit(diagnosis, "channels")),
+            )
+            if rows
+        ],
+        recordings=recordings,
+        hidden=hidden,
+        parameters=_parameters(diagnosis),
+        timings=[(words.label(k), f"{float(v):.1f} s") for k, v in diagnosis.timings.items()],
+        model=diagnosis.model,
+        version=_version(),
+    )

@@ -1,0 +1,150 @@
+"""Simulation of a rig under a held valve command."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pamrs import _core
+from pamrs.errors import ParameterError
+from pamrs.rig import Rig
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["Simulation", "core_rig", "simulate"]
+
+Array = NDArray[np.float64]
+
+_INITIAL = ("muscle_pressure", "supply_pressure", "joint_angle", "joint_rate")
+
+
+class Simulation(Mapping[str, Array]):
+    """Simulated channels by name, SI, gauge pressures; ``time`` [s] is a channel too.
+
+    ``result["muscle_pressure"]`` is an array with one row per sample; ``result.time`` is ``result["time"]``.
+    """
+
+    def __init__(self, channels: Mapping[str, Array], rig: Rig) -> None:
+        self._channels = dict(channels)
+        self.rig = rig
+
+    @property
+    def time(self) -> Array:
+        """Time of each row [s]."""
+        return self._channels["time"]
+
+    def __getitem__(self, channel: str) -> Array:
+        try:
+            return self._channels[channel]
+        except KeyError:
+            raise KeyError(f"no channel {channel!r}; there are: {', '.join(self._channels)}") from None
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._channels)
+
+    def __len__(self) -> int:
+        return len(self._channels)
+
+    def to_pandas(self) -> pd.DataFrame:
+        """All channels as a table indexed by time [s]."""
+        import pandas as pd
+
+        columns = {name: values for name, values in self._channels.items() if name != "time"}
+        return pd.DataFrame(columns, index=pd.Index(self.time, name="time"))
+
+    def __repr__(self) -> str:
+        return f"Simulation({self.rig.name}: {self.time.size} rows of {', '.join(self._channels)})"
+
+
+def core_rig(rig: Rig) -> _core.Rig:
+    """The compiled rig of a description, kept with it so that a second simulation costs no compilation."""
+    cached: Any = rig.__dict__.get("_compiled")
+    if cached is None:
+        cached = _core.Rig(rig.to_json())
+        object.__setattr__(rig, "_compiled", cached)
+    compiled: _core.Rig = cached
+    return compiled
+
+
+def simulate(
+    rig: Rig,
+    valve_command: ArrayLike | None = None,
+    *,
+    sample_time: float,
+    step: float | None = None,
+    initial: Mapping[str, float] | None = None,
+    duration: float | None = None,
+) -> Simulation:
+    """Simulate a rig from an initial state by fixed-step RK4.
+
+    Parameters
+    ----------
+    rig : Rig
+        The model.
+    valve_command : array_like, shape (n,), optional
+        Command [V]; entry ``k`` is held over ``[k, k + 1)`` samples. Needed by a rig with a valve.
+    sample_time : float
+        Time between rows [s].
+    step : float, optional
+        RK4 step [s]; divides ``sample_time``. By default the longest that does and is at most 1 ms.
+    initial : mapping of str to float, optional
+        Initial ``muscle_pressure``, ``supply_pressure`` [Pa, gauge], ``joint_angle`` [rad], ``joint_rate`` [rad/s]. What
+        is left out is at rest: muscle vented, tank at its initial pressure, joint at its rest angle.
+    duration : float, optional
+        Simulated time [s] of a rig without a valve, instead of ``valve_command``.
+
+    Returns
+    -------
+    Simulation
+        n rows at ``k * sample_time``; the first one is the initial state.
+
+    Raises
+    ------
+    ParameterError
+        If an argument is not finite or outside its range; the message names it.
+    SimulationError
+        If the state leaves the range in which the model holds.
+
+    Examples
+    --------
+    >>> import numpy as np, pamrs
+    >>> rig = pamrs.rigs.shoulder()
+    >>> result = pamrs.simulate(rig, valve_command=np.full(201, 6.0), sample_time=0.005)
+    >>> bool(result["joint_angle"][-1] > result["joint_angle"][0])
+    True
+    """
+    if not (np.isfinite(sample_time) and sample_time > 0):
+        raise ParameterError(f"sample_time = {sample_time} is not allowed: a finite time > 0 s is needed")
+    has_valve = rig.model["valve"] is not None
+    if valve_command is None:
+        if has_valve:
+            raise ParameterError("valve_command is missing: a rig with a valve needs one value per sample [V]")
+        if duration is None or not (np.isfinite(duration) and duration >= 0):
+            raise ParameterError(f"duration = {duration} is not allowed: a finite time >= 0 s (or give valve_command)")
+        command = np.zeros(round(duration / sample_time) + 1)
+    else:
+        if duration is not None:
+            raise ParameterError(f"duration = {duration} is not allowed together with valve_command, which sets it")
+        command = np.ascontiguousarray(np.asarray(valve_command, dtype=np.float64))
+        if command.ndim != 1 or command.size == 0:
+            raise ParameterError(f"valve_command has the shape {command.shape}; (n,) with n >= 1 is needed")
+    start = dict(initial or {})
+    unknown = sorted(set(start) - set(_INITIAL))
+    if unknown:
+        raise ParameterError(f"initial has the unknown entry {unknown[0]!r}; allowed: {', '.join(_INITIAL)}")
+    fine = default_step(sample_time) if step is None else step
+    channels = core_rig(rig).simulate(
+        command, sample_time, fine, **{name: float(value) for name, value in start.items()}
+    )
+    time = np.arange(command.size) * sample_time
+    shown = {"valve_command": command} if has_valve else {}
+    return Simulation({"time": time, **shown, **channels}, rig)
+
+
+def default_step(sample_time: float, longest: float = 1e-3) -> float:
+    """The longest step [s] up to ``longest`` that divides a sample time [s]."""
+    return sample_time / max(1, int(np.ceil(sample_time / longest - 1e-9)))

@@ -1,0 +1,93 @@
+"""Write the project's golden vectors from the independent reference model.
+
+Run ``python tests/golden/generate.py``; the files in ``tests/golden/data`` are replaced.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+import sys
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from reference import GeometryReference, MuscleReference, shoulder  # noqa: E402
+
+DATA = Path(__file__).resolve().parent / "data"
+INCH = 0.0254
+MODULUS_SLOPE = [3.0, -0.35, 0.0, 0.0]
+MODULUS_OFFSET = [1.15e6, -0.15e6, 0.0, 0.0]
+PRESSURES = {"force_1bar_N": 1e5, "force_4bar_N": 4e5, "force_8bar_N": 8e5}
+CONTRACTIONS = [-0.02, -0.01, -0.005, 0.0, 0.001, 0.01, 0.03, 0.07, 0.12, 0.18, 0.24, 0.3, 0.36]
+SAMPLE_TIME = 0.005
+INITIAL = {
+    "muscle_pressure": 2.6e5 + 101325.0,
+    "supply_pressure": 13.8e5 + 101325.0,
+    "joint_angle": math.radians(40.0),
+    "joint_rate": 0.0,
+}
+
+#: name -> rest length, rest diameter, braid angle (deg), wall thickness, geometry
+MUSCLES: dict[str, tuple[float, float, float, float, str]] = {
+    "shoulder_1in": (0.276, 0.0254, 73.5, 0.003175, "elliptic"),
+    "large_2in": (13.0 * INCH, 2.0 * INCH, 78.0, 0.125 * INCH, "elliptic"),
+    "cylinder_1in": (0.276, 0.0254, 73.5, 0.003175, "cylinder"),
+}
+
+
+def smooth_command(seconds: float = 3.0) -> np.ndarray:
+    """Multisine about 5 V, held for 10 ms, one value per 5 ms row."""
+    rows = round(seconds / SAMPLE_TIME) + 1
+    held = SAMPLE_TIME * 2.0 * (np.arange(rows) // 2)
+    lines = ((0.42, 0.4, 0.3), (0.35, 0.9, 1.7), (0.28, 1.7, 4.1), (0.15, 3.1, 2.2))
+    return 5.0 + sum(a * np.sin(2.0 * np.pi * f * held + p) for a, f, p in lines)
+
+
+def muscle_rows() -> list[list[str]]:
+    """Rows of ``muscle_static.csv`` without the header."""
+    rows = []
+    for name, (length, diameter, angle, wall, kind) in MUSCLES.items():
+        geometry = GeometryReference(length, diameter, math.radians(angle), wall, kind)
+        muscle = MuscleReference(geometry, MODULUS_SLOPE, MODULUS_OFFSET)
+        for e in CONTRACTIONS:
+            if e <= geometry.min_contraction or (kind == "cylinder" and e < -0.006):
+                continue
+            shape = geometry.solve(e)
+            values = [shape.radius, shape.thickness, shape.air_volume, muscle.strains(shape)[1]]
+            values += [float(muscle.force(p, e)) for p in PRESSURES.values()]
+            rows.append([name, repr(e), *(f"{v:.12e}" for v in values)])
+    return rows
+
+
+def main() -> None:
+    """Write both files."""
+    DATA.mkdir(exist_ok=True)
+    with (DATA / "muscle_static.csv").open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        names = ["muscle", "contraction_ratio", "radius_m", "thickness_m", "air_volume_m3", "eps_c", *PRESSURES]
+        writer.writerow(names)
+        writer.writerows(muscle_rows())
+    run = shoulder().simulate(smooth_command(), SAMPLE_TIME, INITIAL, rtol=1e-12)
+    columns = {
+        "time_s": run.time,
+        "valve_command_V": run.valve_command,
+        "muscle_pressure_abs_Pa": run.muscle_pressure,
+        "supply_pressure_abs_Pa": run.supply_pressure,
+        "joint_angle_rad": run.joint_angle,
+        "joint_rate_rad_s": run.joint_rate,
+    }
+    np.savetxt(
+        DATA / "shoulder_smooth.csv",
+        np.column_stack(list(columns.values())),
+        fmt="%.12e",
+        delimiter=",",
+        header=",".join(columns),
+        comments="",
+    )
+
+
+if __name__ == "__main__":
+    main()

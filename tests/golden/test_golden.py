@@ -1,0 +1,121 @@
+"""pamrs against golden vectors: the project's own and, when present, the shared set beside the project."""
+
+from __future__ import annotations
+
+import csv
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import pamrs
+
+HERE = Path(__file__).resolve().parent
+OWN = HERE / "data"
+SHARED = HERE.parents[1] / ".." / "shared" / "golden"
+AMBIENT = 101325.0
+INCH = 0.0254
+MODULI = {"modulus_slope": [3.0, -0.35, 0.0, 0.0], "modulus_offset": [1.15e6, -0.15e6, 0.0, 0.0]}
+
+#: name -> rest length, rest diameter, braid angle (deg), wall thickness, geometry
+MUSCLES: dict[str, tuple[float, float, float, float, str]] = {
+    "shoulder_1in": (0.276, 0.0254, 73.5, 0.003175, "elliptic"),
+    "large_2in": (13.0 * INCH, 2.0 * INCH, 78.0, 0.125 * INCH, "elliptic"),
+    "cylinder_1in": (0.276, 0.0254, 73.5, 0.003175, "cylinder"),
+    "elbow_0625in": (7.785 * INCH, 0.625 * INCH, 72.5, INCH / 16.0, "elliptic"),
+    "ch2_075in": (7.3 * INCH, 0.75 * INCH, 76.5, 0.125 * INCH, "elliptic"),
+}
+
+
+def make_muscle(name: str) -> pamrs.Muscle:
+    """Muscle of one golden set."""
+    length, diameter, angle, wall, kind = MUSCLES[name]
+    return pamrs.Muscle(
+        rest_length=length,
+        rest_diameter=diameter,
+        braid_angle=math.radians(angle),
+        wall_thickness=wall,
+        geometry=kind,
+        **MODULI,
+    )
+
+
+def golden_path(folder: Path, name: str) -> Path:
+    """Path of one golden file; skips the test when the shared set is not beside the project."""
+    path = folder / name
+    if folder == SHARED and not path.is_file():
+        pytest.skip("the shared golden set (../shared/golden) is not beside this project")
+    return path
+
+
+def read_muscles(path: Path) -> dict[str, dict[str, NDArray[np.float64]]]:
+    """Columns of a ``muscle_static.csv`` by muscle."""
+    with path.open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    names = list(dict.fromkeys(row["muscle"] for row in rows))
+    columns = [key for key in rows[0] if key != "muscle"]
+    return {
+        name: {c: np.array([float(row[c]) for row in rows if row["muscle"] == name]) for c in columns} for name in names
+    }
+
+
+@pytest.mark.parametrize("folder", [OWN, SHARED], ids=["own", "shared"])
+def test_muscle_static(folder: Path) -> None:
+    sets = read_muscles(golden_path(folder, "muscle_static.csv"))
+    assert len(sets) == 3
+    for name, want in sets.items():
+        muscle, e = make_muscle(name), want["contraction_ratio"]
+        got = {
+            "radius_m": muscle.radius(e),
+            "thickness_m": muscle.thickness(e),
+            "air_volume_m3": muscle.air_volume(e),
+            "force_1bar_N": muscle.force(1e5, e),
+            "force_4bar_N": muscle.force(4e5, e),
+            "force_8bar_N": muscle.force(8e5, e),
+        }
+        for column, values in got.items():
+            # A force is a difference of larger terms: the smallest scale it can be held to is the blocked force.
+            floor = 1e-9 * np.abs(want[column][e == 0.0][0]) if column.startswith("force") else 0.0
+            np.testing.assert_allclose(values, want[column], rtol=1e-9, atol=floor, err_msg=f"{name} {column}")
+
+
+def trajectory_misses(path: Path) -> dict[str, float]:
+    """Largest error of every channel as a fraction of its range, simulated at a step of 0.1 ms."""
+    data = np.genfromtxt(path, delimiter=",", skip_header=1)
+    result = pamrs.simulate(
+        pamrs.rigs.shoulder(),
+        valve_command=data[:, 1],
+        sample_time=0.005,
+        step=1e-4,
+        initial={
+            "muscle_pressure": data[0, 2] - AMBIENT,
+            "supply_pressure": data[0, 3] - AMBIENT,
+            "joint_angle": data[0, 4],
+            "joint_rate": data[0, 5],
+        },
+    )
+    np.testing.assert_allclose(result.time, data[:, 0], rtol=0.0, atol=1e-12)
+    misses = {}
+    for column, (channel, offset) in enumerate(
+        [("muscle_pressure", AMBIENT), ("supply_pressure", AMBIENT), ("joint_angle", 0.0), ("joint_rate", 0.0)], 2
+    ):
+        want = data[:, column] - offset
+        misses[channel] = float(np.max(np.abs(result[channel] - want)) / np.ptp(want))
+    return misses
+
+
+@pytest.mark.parametrize(
+    ("folder", "name", "tolerance"),
+    [
+        (OWN, "shoulder_smooth.csv", 1e-6),
+        (SHARED, "shoulder_lift.csv", 1e-6),
+        (SHARED, "shoulder_multisine.csv", 1e-6),
+        (SHARED, "shoulder_choked_steps.csv", 1e-3),
+    ],
+    ids=["own-smooth", "shared-lift", "shared-multisine", "shared-choked_steps"],
+)
+def test_shoulder_trajectory(folder: Path, name: str, tolerance: float) -> None:
+    misses = trajectory_misses(golden_path(folder, name))
+    assert max(misses.values()) <= tolerance, misses

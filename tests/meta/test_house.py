@@ -1,0 +1,126 @@
+"""Rules of the house that no linter knows."""
+
+import doctest
+import importlib
+import inspect
+import pkgutil
+import re
+import subprocess
+import sys
+import tomllib
+from itertools import chain
+from pathlib import Path
+
+import pytest
+
+import pamrs
+
+ROOT = Path(__file__).parents[2]
+NOT_SOURCES = {".git", ".venv", "target", "out"}
+
+
+def modules():
+    """Every module of the package that is written in Python, private ones left out."""
+    names = ["pamrs"]
+    for found in pkgutil.walk_packages(pamrs.__path__, "pamrs."):
+        if not any(part.startswith("_") for part in found.name.split(".")):
+            names.append(found.name)
+    return names
+
+
+def public_callables():
+    """Functions, and classes' public methods, each once, where they are defined."""
+    for name in modules():
+        module = importlib.import_module(name)
+        for attribute, thing in vars(module).items():
+            if attribute.startswith("_") or getattr(thing, "__module__", None) != name:
+                continue
+            if inspect.isfunction(thing):
+                yield f"{name}.{attribute}", thing
+            elif inspect.isclass(thing):
+                for method, function in vars(thing).items():
+                    function = getattr(function, "__func__", function)
+                    if not method.startswith("_") and inspect.isfunction(function):
+                        yield f"{name}.{attribute}.{method}", function
+
+
+CALLABLES = dict(public_callables())
+
+
+@pytest.mark.parametrize("name", CALLABLES)
+def test_every_argument_is_documented(name):
+    function = CALLABLES[name]
+    text = inspect.getdoc(function)
+    assert text, f"{name} has no docstring"
+    arguments = [word for word in inspect.signature(function).parameters if word not in ("self", "cls")]
+    if not arguments:
+        return
+    section = re.search(r"^Parameters\n-{3,}\n(.*?)(?=^\w[^\n]*\n-{3,}$|\Z)", text, re.MULTILINE | re.DOTALL)
+    assert section, f"{name}: the docstring has no Parameters section"
+    documented = set()
+    for line in section[1].splitlines():
+        if line and not line[0].isspace():
+            documented |= {word.strip().lstrip("*") for word in line.split(" : ")[0].split(",")}
+    missing = [word for word in arguments if word not in documented]
+    assert not missing, f"{name}: not documented: {', '.join(missing)}"
+
+
+@pytest.mark.parametrize("name", modules())
+def test_examples_in_docstrings_run(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    outcome = doctest.testmod(importlib.import_module(name), optionflags=doctest.ELLIPSIS)
+    assert outcome.failed == 0
+
+
+@pytest.mark.parametrize("name", modules())
+def test_every_module_says_what_it_is(name):
+    assert importlib.import_module(name).__doc__
+
+
+def test_import_is_light():
+    heavy = ("scipy", "pandas", "matplotlib", "jinja2", "typer")
+    code = f"import sys, pamrs; sys.exit(','.join(m for m in {heavy!r} if m in sys.modules) or 0)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 0, f"import pamrs also imports {done.stderr}"
+
+
+def test_public_names_exist():
+    assert pamrs.__all__
+    for name in pamrs.__all__:
+        assert getattr(pamrs, name) is not None
+
+
+def sources(*suffixes):
+    """The project's own files with one of these suffixes."""
+    for path in sorted(ROOT.rglob("*")):
+        inside = path.relative_to(ROOT)
+        if path.suffix in suffixes and path.is_file() and not NOT_SOURCES & set(inside.parts):
+            yield path
+
+
+def test_files_can_be_read_in_one_sitting():
+    lengths = {
+        path: len(path.read_text(encoding="utf-8").splitlines()) for path in sources(".py", ".rs", ".pyi")
+    }
+    assert lengths
+    assert not {str(path.relative_to(ROOT)): n for path, n in lengths.items() if n > 600}
+
+
+def test_trial_does_not_know_the_package():
+    pattern = re.compile(r"^\s*(from|import)\s+pamrs\b", re.MULTILINE)
+    files = [path for path in sources(".py") if path.is_relative_to(ROOT / "trial")]
+    assert files
+    assert not [path.name for path in files if pattern.search(path.read_text(encoding="utf-8"))]
+
+
+def test_lock_pins_every_dependency():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    lock = (ROOT / "requirements-dev.lock").read_text(encoding="utf-8")
+    wanted = [*project["dependencies"], *chain.from_iterable(project["optional-dependencies"].values())]
+
+    def plain(name):
+        return re.sub(r"[-_.]+", "-", name).lower()
+
+    pinned = {plain(name) for name in re.findall(r"^([\w.-]+)==", lock, re.MULTILINE)}
+    names = {plain(re.split(r"[\s<>=!~\[;]", requirement)[0]) for requirement in wanted}
+    assert names - {"pamrs"} <= pinned

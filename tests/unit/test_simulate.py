@@ -1,0 +1,152 @@
+"""The simulation call: rows, defaults, results and refusals."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pamrs
+
+START = {"muscle_pressure": 1e5, "joint_angle": 0.52}
+CHANNELS = ("muscle_pressure", "supply_pressure", "joint_angle", "joint_rate")
+
+
+def run(command: Any = (5.5,) * 11, **changes: Any) -> Any:
+    """Short shoulder run with some arguments changed."""
+    arguments: dict[str, Any] = {"sample_time": 0.005, "step": 5e-4, "initial": START, **changes}
+    rig = arguments.pop("rig", None) or pamrs.rigs.shoulder()
+    return pamrs.simulate(rig, valve_command=command, **arguments)
+
+
+def test_one_row_per_command() -> None:
+    result = run()
+    np.testing.assert_allclose(result.time, np.arange(11) * 0.005, rtol=0.0, atol=1e-15)
+    for name in CHANNELS:
+        assert result[name].shape == (11,)
+        assert result[name].dtype == np.float64
+        assert np.all(np.isfinite(result[name]))
+
+
+def test_first_row_is_the_initial_state() -> None:
+    result = run(initial={**START, "supply_pressure": 9e5, "joint_rate": 0.25})
+    first = {name: float(result[name][0]) for name in CHANNELS}
+    assert first["muscle_pressure"] == pytest.approx(1e5, rel=1e-12)
+    assert first["supply_pressure"] == pytest.approx(9e5, rel=1e-12)
+    assert first["joint_angle"] == pytest.approx(0.52, rel=1e-15)
+    assert first["joint_rate"] == pytest.approx(0.25, rel=1e-15)
+
+
+def test_missing_initial_values_have_defaults() -> None:
+    result = run(initial={})
+    assert float(result["muscle_pressure"][0]) == pytest.approx(0.0, abs=1e-9)
+    assert float(result["supply_pressure"][0]) == pytest.approx(13.8e5, rel=1e-12)
+    assert float(result["joint_angle"][0]) == pytest.approx(math.radians(15.0), rel=1e-12)
+    assert float(result["joint_rate"][0]) == 0.0
+
+
+def test_command_holds_until_the_next_row() -> None:
+    steady = run([5.0] * 11)
+    late = run([5.0] * 5 + [7.0] * 6)
+    np.testing.assert_array_equal(late["muscle_pressure"][:6], steady["muscle_pressure"][:6])
+    assert late["muscle_pressure"][6] > steady["muscle_pressure"][6] + 100.0
+    # The last command has no row after it.
+    np.testing.assert_array_equal(
+        run([6.0] * 10 + [9.0])["muscle_pressure"], run([6.0] * 11)["muscle_pressure"]
+    )
+
+
+def test_valve_fills_vents_and_closes() -> None:
+    filled, vented, closed = run([7.0] * 11), run([3.0] * 11), run([5.0] * 11)
+    assert filled["muscle_pressure"][-1] > closed["muscle_pressure"][-1] > vented["muscle_pressure"][-1]
+    assert filled["supply_pressure"][-1] < 13.8e5
+    for result in (vented, closed):
+        assert float(np.ptp(result["supply_pressure"])) == 0.0
+
+
+def test_stop_holds_a_slack_arm() -> None:
+    result = run([5.0] * 101, initial={"joint_angle": math.radians(20.0)}, step=2e-4)
+    assert float(result["joint_angle"].min()) > math.radians(14.0)
+    assert float(result["joint_angle"][-1]) < math.radians(20.0)
+
+
+def test_unknown_channel_names_the_known_ones() -> None:
+    with pytest.raises(KeyError, match="joint_angle"):
+        run()["no_such_channel"]
+
+
+def test_to_pandas() -> None:
+    pandas = pytest.importorskip("pandas")
+    result = run()
+    frame = result.to_pandas()
+    assert isinstance(frame, pandas.DataFrame)
+    assert len(frame) == 11
+    np.testing.assert_array_equal(frame["joint_angle"].to_numpy(), result["joint_angle"])
+
+
+def test_with_parameters_leaves_the_original_alone() -> None:
+    rig = pamrs.rigs.shoulder()
+    heavy = rig.with_parameters({"arm.payload": 20.0})
+    assert heavy.parameters["arm.payload"].value == 20.0
+    assert rig.parameters["arm.payload"].value == 9.07
+    assert run(rig=heavy)["joint_angle"][-1] != run(rig=rig)["joint_angle"][-1]
+
+
+def test_leak_empties_a_sealed_chamber() -> None:
+    rig = pamrs.rigs.sealed_chamber().with_effect("leak_muscle", {"conductance": 1e-11})
+    result = pamrs.simulate(rig, duration=5.0, sample_time=0.1, step=0.01, initial={"muscle_pressure": 7e5})
+    assert result.time.shape == result["muscle_pressure"].shape
+    assert np.all(np.diff(result["muscle_pressure"]) < 0.0)
+    assert float(result["muscle_pressure"].min()) >= 0.0
+
+
+@pytest.mark.parametrize(
+    ("name", "changes"),
+    [
+        ("valve_command", {"command": [5.0, math.nan, 5.0]}),
+        ("valve_command", {"command": [5.0, math.inf]}),
+        ("valve_command", {"command": []}),
+        ("valve_command", {"command": [[5.0, 5.0], [5.0, 5.0]]}),
+        ("sample_time", {"sample_time": 0.0}),
+        ("sample_time", {"sample_time": math.nan}),
+        ("sample_time", {"sample_time": -0.005}),
+        ("step", {"step": 0.0}),
+        ("step", {"step": math.nan}),
+        ("muscle_pressure", {"initial": {"muscle_pressure": math.nan}}),
+        ("muscle_pressure", {"initial": {"muscle_pressure": -2e5}}),
+        ("supply_pressure", {"initial": {"supply_pressure": -2e5}}),
+        ("joint_angle", {"initial": {"joint_angle": math.inf}}),
+        ("joint_rate", {"initial": {"joint_rate": math.nan}}),
+        ("elbow_angle", {"initial": {"elbow_angle": 0.1}}),
+    ],
+)
+def test_bad_argument_is_refused_by_name(name: str, changes: dict[str, Any]) -> None:
+    with pytest.raises(ValueError, match=name) as caught:
+        run(**changes)
+    assert isinstance(caught.value, (pamrs.ParameterError, pamrs.RigError))
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("arm.payload", -1.0),
+        ("arm.inertia", math.nan),
+        ("supply.volume", 0.0),
+        ("chamber.dead_volume", -1e-4),
+        ("valve.discharge_area_max", math.inf),
+        ("arm.no_such_thing", 1.0),
+    ],
+)
+def test_impossible_parameter_is_refused_by_name(name: str, value: float) -> None:
+    with pytest.raises(ValueError, match=name.replace(".", r"\.")) as caught:
+        run(rig=pamrs.rigs.shoulder().with_parameters({name: value}))
+    assert isinstance(caught.value, (pamrs.ParameterError, pamrs.RigError))
+
+
+def test_shoulder_needs_a_command_and_a_sealed_rig_takes_none() -> None:
+    with pytest.raises(ValueError, match="valve_command"):
+        pamrs.simulate(pamrs.rigs.shoulder(), duration=0.1, sample_time=0.01, step=1e-3)
+    with pytest.raises(ValueError, match="valve_command"):
+        pamrs.simulate(pamrs.rigs.sealed_chamber(), valve_command=[5.0] * 5, sample_time=0.01, step=1e-3)

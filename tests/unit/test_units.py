@@ -1,0 +1,108 @@
+"""Units: conversion, dimensions, and messages for what cannot be read."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pamrs.errors import PamrsError, ParameterError
+from pamrs.units import DIMENSIONS, from_si, parse_unit, same_dimension, to_si
+
+KNOWN = [
+    (1.0, "bar", "Pa", 1e5),
+    (2.0, "mbar", "pressure", 200.0),
+    (1.0, "psi", "pressure", 6894.757293168361),
+    (7.0, "barg", "pressure", 7e5),
+    (180.0, "deg", "angle", math.pi),
+    (60.0, "rpm", "rad/s", 2 * math.pi),
+    (1500.0, "us", "time", 1.5e-3),
+    (2.0, "min", "time", 120.0),
+    (1.0, "in", "length", 0.0254),
+    (10.0, "cm3", "volume", 1e-5),
+    (10.0, "cm^3", "volume", 1e-5),
+    (3.0, "l", "volume", 3e-3),
+    (3.0, "ml", "volume", 3e-6),
+    (1.0, "lb", "mass", 0.45359237),
+    (20.0, "degC", "temperature", 293.15),
+    (68.0, "degF", "temperature", 293.15),
+    (1.0, "l/(s bar)", "conductance", 1e-8),
+    (1.0, "m3/s/Pa", "conductance", 1.0),
+    (1.0, "kg cm2", "inertia", 1e-4),
+    (1.0, "mNm", "torque", None),
+    (1.0, "kN mm", "torque", 1.0),
+    (1.0, "N m/deg", "N m/rad", 180 / math.pi),
+    (5.0, "%", "1", 0.05),
+    (-3.0, "mV", "V", -3e-3),
+]
+
+
+@pytest.mark.parametrize(("value", "unit", "dimension", "expected"), KNOWN)
+def test_known_conversions(value: float, unit: str, dimension: str, expected: float | None) -> None:
+    if expected is None:
+        with pytest.raises(ParameterError, match=unit):
+            to_si(value, unit, dimension)
+    else:
+        assert to_si(value, unit, dimension) == pytest.approx(expected, rel=1e-14)
+
+
+@given(st.floats(-1e6, 1e6), st.sampled_from([row[1:3] for row in KNOWN if row[3] is not None]))
+def test_back_and_forth(value: float, pair: tuple[str, str]) -> None:
+    unit, dimension = pair
+    assert from_si(to_si(value, unit, dimension), unit, dimension) == pytest.approx(value, rel=1e-12, abs=1e-9)
+
+
+def test_a_difference_of_temperatures_has_no_offset() -> None:
+    assert to_si(3.0, "degC", "K", difference=True) == 3.0
+    assert from_si(3.0, "degC", "K", difference=True) == 3.0
+
+
+@pytest.mark.parametrize("unit", DIMENSIONS.values())
+def test_si_units_stand_as_they_are(unit: str) -> None:
+    assert parse_unit(unit).scale == 1.0
+    assert parse_unit(unit).offset == 0.0
+
+
+@pytest.mark.parametrize(
+    ("unit", "dimension"),
+    [("V", "pressure"), ("bar", "angle"), ("1", "angle"), ("deg", "1"), ("kg m", "inertia"), ("s", "length")],
+)
+def test_wrong_dimension_names_both(unit: str, dimension: str) -> None:
+    with pytest.raises(ParameterError) as caught:
+        to_si(1.0, unit, dimension)
+    assert repr(unit) in str(caught.value)
+    assert repr(DIMENSIONS.get(dimension, dimension)) in str(caught.value)
+
+
+@pytest.mark.parametrize("unit", ["Bar", "pascal", "m//s", "m/", "(m)", "2", "m3/(s", "kg-m2", "[bar]", "bar bar bara"])
+def test_unknown_units_are_named(unit: str) -> None:
+    with pytest.raises(ParameterError) as caught:
+        parse_unit(unit)
+    assert unit.split()[-1] in str(caught.value)
+
+
+def test_helpful_messages() -> None:
+    with pytest.raises(ParameterError, match="did you mean 'bar'"):
+        parse_unit("Bar")
+    with pytest.raises(ParameterError, match="gauge"):
+        parse_unit("bara")
+    with pytest.raises(ParameterError, match="empty"):
+        parse_unit("  ")
+
+
+@given(st.text(max_size=12))
+def test_any_text_is_read_or_refused(text: str) -> None:
+    try:
+        unit = parse_unit(text)
+    except PamrsError:
+        return
+    assert math.isfinite(unit.scale)
+    assert unit.scale > 0.0
+
+
+def test_the_angle_counts_only_alone() -> None:
+    assert same_dimension("N m/rad", "N m")
+    assert not same_dimension("rad", "1")
+    assert not same_dimension("N m", "N")

@@ -1,0 +1,181 @@
+"""Reference trajectories and the controller that drives the valve."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .plant import Plant
+
+Array = NDArray[np.floating]
+DAC_STEP = 10.0 / 4095.0
+
+#: name, role, in the order in which they are written
+RECORDINGS = (
+    ("lift_hold", "fit"),
+    ("multisine", "fit"),
+    ("sealed_holds", "fit"),
+    ("angle_steps", "held_out"),
+    ("slow_triangle", "held_out"),
+)
+_SUBSETS = {1: (2,), 2: (2, 3), 3: (1, 2, 3), 4: (0, 1, 2, 3), 5: (0, 1, 2, 3, 4)}
+
+
+def select(count: int) -> list[tuple[str, str]]:
+    """Names and roles of `count` (1 to 5) recordings."""
+    if count not in _SUBSETS:
+        raise ValueError(f"recordings must be 1 to 5, got {count!r}")
+    return [RECORDINGS[i] for i in _SUBSETS[count]]
+
+
+@dataclass(frozen=True)
+class Excitation:
+    """Reference angle [rad], mask of the samples with the valve at its believed null, and a dither [V]; all of shape (n,)."""
+
+    reference: Array
+    sealed: NDArray[np.bool_]
+    dither: Array
+
+
+def _ramps(time: Array, points: list[tuple[float, float]], smooth: bool) -> Array:
+    """Angle [deg] through (time, angle) points, by half cosines or straight lines."""
+    t = np.array([p[0] for p in points])
+    v = np.array([p[1] for p in points])
+    if not smooth:
+        return np.interp(time, t, v)
+    i = np.clip(np.searchsorted(t, time, side="right") - 1, 0, len(t) - 2)
+    s = np.clip((time - t[i]) / (t[i + 1] - t[i]), 0.0, 1.0)
+    return np.asarray(v[i] + (v[i + 1] - v[i]) * 0.5 * (1.0 - np.cos(np.pi * s)))
+
+
+def build(name: str, duration: float, sample_time: float, rng: np.random.Generator) -> Excitation:
+    """Build one excitation.
+
+    Parameters
+    ----------
+    name : str
+        One of the names in :data:`RECORDINGS`.
+    duration, sample_time : float
+        Length and sample time [s].
+    rng : numpy.random.Generator
+        Source of levels and times.
+
+    Raises
+    ------
+    ValueError
+        Unknown name.
+    """
+    n = round(duration / sample_time)
+    time = sample_time * np.arange(n)
+    sealed = np.zeros(n, dtype=bool)
+    dither = np.zeros(n)
+    points = [(0.0, 16.0)]
+    if name == "lift_hold":
+        while points[-1][0] < duration:
+            t, level = points[-1]
+            goal = float(rng.uniform(30.0, 85.0))
+            if abs(goal - level) < 15.0:
+                goal = level + math.copysign(20.0, goal - level)
+            move, hold = float(rng.uniform(3.0, 6.0)), float(rng.uniform(3.0, 5.0))
+            points += [(t + move, goal), (t + move + hold, goal)]
+            if rng.random() < 0.4:
+                points += [(points[-1][0] + move, 18.0), (points[-1][0] + move + 1.5, 18.0)]
+        angle = _ramps(time, points, smooth=True)
+    elif name == "multisine":
+        base = np.geomspace(0.08, 2.2, 9) * rng.uniform(0.9, 1.1, 9)
+        size = 1.0 / np.sqrt(1.0 + (base / 0.5) ** 2)
+        wave = (
+            size[:, None] * np.sin(2.0 * np.pi * base[:, None] * time + rng.uniform(0.0, 2.0 * np.pi, (9, 1)))
+        ).sum(axis=0)
+        wave *= 26.0 / np.abs(wave).max()
+        fade = np.clip(time / 3.0, 0.0, 1.0)
+        angle = 16.0 + fade * (float(rng.uniform(48.0, 58.0)) - 16.0 + wave)
+        every = max(1, round(0.06 / sample_time))
+        dither = np.repeat(rng.choice([-0.15, 0.15], n // every + 1), every)[:n]
+    elif name == "sealed_holds":
+        angle = np.full(n, 16.0)
+        t, level = 0.0, 16.0
+        while t < duration:
+            goal = float(rng.uniform(30.0, 95.0))
+            if abs(goal - level) < 12.0:
+                goal = level + math.copysign(18.0, 60.0 - level)
+            move, hold = float(rng.uniform(1.5, 3.5)), float(rng.uniform(5.0, 8.0))
+            settle = move + float(rng.uniform(0.3, 1.0))
+            part = (time >= t) & (time < t + settle + hold)
+            angle[part] = _ramps(
+                time[part] - t, [(0.0, level), (move, goal), (settle + hold + 1.0, goal)], smooth=True
+            )
+            sealed |= (time >= t + settle) & (time < t + settle + hold)
+            t, level = t + settle + hold, goal
+    elif name == "angle_steps":
+        while points[-1][0] < duration:
+            t, level = points[-1]
+            goal = float(rng.uniform(20.0, 95.0))
+            hold = float(rng.uniform(1.5, 4.0))
+            move = max(0.25, abs(goal - level) / 120.0)
+            points += [(t + move, goal), (t + move + hold, goal)]
+        angle = _ramps(time, points, smooth=False)
+    elif name == "slow_triangle":
+        top = float(rng.uniform(75.0, 95.0))
+        points.append((float(rng.uniform(0.4, 0.5)) * duration, top))
+        middle = float(rng.uniform(55.0, 65.0))
+        points.append((points[-1][0] + (top - middle) / 4.0, middle))
+        inner = middle + float(rng.uniform(8.0, 14.0))
+        points.append((points[-1][0] + (inner - middle) / 4.0, inner))
+        points.append((max(duration, points[-1][0] + 5.0), 18.0))
+        angle = _ramps(time, points, smooth=False)
+    else:
+        raise ValueError(f"unknown excitation {name!r}; known: {', '.join(r[0] for r in RECORDINGS)}")
+    return Excitation(np.radians(np.clip(angle, 15.5, 105.0)), sealed, dither)
+
+
+class Controller:
+    """PID on the angle with feedforward from the nominal model, over an inner pressure loop; output quantised by the DAC.
+
+    Parameters
+    ----------
+    nominal : Plant
+        What the controller believes (its holding pressure and null voltage).
+    sample_time : float
+        Sample time [s].
+    rng : numpy.random.Generator
+        Draws the gains within 15 %.
+    """
+
+    def __init__(self, nominal: Plant, sample_time: float, rng: np.random.Generator) -> None:
+        gains = np.array([6.0e4, 8.0e4, 5.0e4, 1.6e-5, 5.0e-5]) * rng.uniform(0.85, 1.15, 5)
+        self.kp, self.ki, self.kd, self.fill, self.vent = (float(v) for v in gains)
+        self.null = nominal.par.null_voltage
+        grid = np.radians(np.linspace(14.0, 112.0, 99))
+        self.first, self.width = float(grid[0]), float(grid[1] - grid[0])
+        self.hold = [nominal.holding_pressure(float(a)) for a in grid]
+        self.step = sample_time
+        self.smooth = 1.0 - math.exp(-2.0 * math.pi * 12.0 * sample_time)
+        self.sum = 0.0
+        self.rate = 0.0
+        self.last: float | None = None
+
+    @staticmethod
+    def quantise(command: float) -> float:
+        """Nearest DAC level [V] within 0 to 10 V."""
+        return round(min(max(command, 0.0), 10.0) / DAC_STEP) * DAC_STEP
+
+    def __call__(self, reference: float, angle: float, pressure: float, dither: float, sealed: bool) -> float:
+        """Command [V] from the reference and measured angle [rad] and the measured gauge pressure [Pa]."""
+        if self.last is not None:
+            self.rate += self.smooth * ((angle - self.last) / self.step - self.rate)
+        self.last = angle
+        if sealed:
+            return self.quantise(self.null)
+        s = min(max((reference - self.first) / self.width, 0.0), 97.999)
+        i = int(s)
+        ahead = self.hold[i] + (s - i) * (self.hold[i + 1] - self.hold[i])
+        error = reference - angle
+        self.sum = min(max(self.sum + error * self.step, -1.0), 1.0)
+        wanted = max(ahead + self.kp * error + self.ki * self.sum - self.kd * self.rate, 0.0)
+        gap = wanted - pressure
+        command = self.null + (self.fill if gap > 0.0 else self.vent) * gap + dither
+        return self.quantise(min(max(command, self.null - 2.5), self.null + 1.5))

@@ -1,0 +1,217 @@
+"""Muscle with elliptic ends and tendon joint, written independently of the package under test."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import quad
+from scipy.interpolate import CubicSpline, PchipInterpolator
+from scipy.optimize import brentq
+
+Array = NDArray[np.floating]
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(40)
+
+
+@dataclass(frozen=True)
+class Shape:
+    """Shape of one muscle at one length (SI units).
+
+    `radius` and `thickness` belong to the middle section, `volume` is the air volume; `taut` tells that the neck floor holds.
+    """
+
+    length: float
+    radius: float
+    thickness: float
+    volume: float
+    taut: bool
+
+
+class Muscle:
+    """One braided muscle with elliptic ends; lengths in m, moduli in Pa.
+
+    Parameters
+    ----------
+    spec : dict
+        Keys rest_length, rest_diameter, braid_angle [rad], wall_thickness, modulus_slope, modulus_offset, k0,
+        contraction_slope, extension_slope, neck_floor.
+    """
+
+    def __init__(self, spec: dict[str, Any]) -> None:
+        self.rest_length = float(spec["rest_length"])
+        self.rest_radius = 0.5 * float(spec["rest_diameter"])
+        angle = float(spec["braid_angle"])
+        self.wall = float(spec["wall_thickness"])
+        self.fibre = self.rest_length / math.sin(angle)
+        self.turns = self.rest_length / (2.0 * math.pi * self.rest_radius * math.tan(angle))
+        self.rubber = math.pi * (self.rest_radius**2 - (self.rest_radius - self.wall) ** 2) * self.rest_length
+        self.slope = [float(v) for v in spec["modulus_slope"]]
+        self.offset = [float(v) for v in spec["modulus_offset"]]
+        self.k0 = float(spec["k0"])
+        self.k_con = float(spec["contraction_slope"])
+        self.k_ext = float(spec["extension_slope"])
+        self.neck = float(spec["neck_floor"])
+
+    def _ends(self, contraction: float, radius: float) -> tuple[float, float, float, float, float, float]:
+        k = self.k0 - (self.k_con if contraction >= 0.0 else self.k_ext) * contraction
+        q = k / math.sqrt(k * k + 3.0)
+        a = (radius - self.rest_radius) / (1.0 - q)
+        b = k * abs(a)
+        return a, b, radius - a, math.sqrt(3.0) * q * abs(a), math.atan(math.sqrt(3.0) / k), q
+
+    def fibre_excess(self, contraction: float, radius: float) -> float:
+        """Fibre length [m] that the radius [m] would need, less the true one."""
+        length = self.rest_length * (1.0 - contraction)
+        a, b, c, reach, last, _ = self._ends(contraction, radius)
+        middle = (length - 2.0 * reach) / length * math.hypot(length, 2.0 * math.pi * radius * self.turns)
+        if a == 0.0:
+            return middle - self.fibre
+        w = 2.0 * math.pi * self.turns * reach / (length * last)
+        v = 0.5 * last * (_NODES + 1.0)
+        speed = np.sqrt(((a * np.cos(v) + c) * w) ** 2 + (a * np.sin(v)) ** 2 + (b * np.cos(v)) ** 2)
+        return middle + last * float(_WEIGHTS @ speed) - self.fibre
+
+    def shape(self, contraction: float) -> Shape:
+        """Solve the shape at a contraction ratio (positive when shorter than at rest)."""
+        length = self.rest_length * (1.0 - contraction)
+        if not 0.55 * self.fibre < length < self.fibre:
+            raise ValueError(
+                f"contraction ratio {contraction!r} leaves the range of the braid (length {length:.4f} m)"
+            )
+        taut = False
+        rest = self.rest_radius
+        if contraction == 0.0:
+            radius = rest
+        else:
+            floor = max(math.sqrt(self.rubber / (math.pi * length)), self.neck * rest)
+            step = 0.01 * rest if contraction > 0.0 else -(rest - floor) / 40.0
+            near, radius = rest, floor
+            sign = math.copysign(1.0, self.fibre_excess(contraction, rest))
+            for i in range(1, 200 if step > 0.0 else 41):
+                far = rest + i * step
+                if sign * self.fibre_excess(contraction, far) <= 0.0:
+                    lo, hi = min(near, far), max(near, far)
+                    radius = float(
+                        brentq(lambda r: self.fibre_excess(contraction, r), lo, hi, xtol=1e-16, rtol=1e-14)
+                    )
+                    break
+                near = far
+            else:
+                if step > 0.0:
+                    raise ValueError(f"no braid radius at contraction ratio {contraction!r}")
+                taut = True
+        a, b, c, reach, last, _ = self._ends(contraction, radius)
+        cylinder = length - 2.0 * reach
+        first = cylinder * radius + 2.0 * b * (
+            c * math.sin(last) + a * (0.5 * last + 0.25 * math.sin(2.0 * last))
+        )
+        sin_l = math.sin(last)
+        second = cylinder * radius**2 + 2.0 * b * (
+            c * c * sin_l
+            + 2.0 * a * c * (0.5 * last + 0.25 * math.sin(2.0 * last))
+            + a * a * (sin_l - sin_l**3 / 3.0)
+        )
+        wall = (first - math.sqrt(first * first - length * self.rubber / math.pi)) / length
+        volume = math.pi * (second - 2.0 * wall * first + wall * wall * length)
+        return Shape(length, radius, wall, volume, taut)
+
+    def force_terms(self, shape: Shape, modulus_scale: float = 1.0) -> tuple[float, float]:
+        """Force of one muscle as ``gauge_pressure * first + second`` [m2, N]."""
+        length, radius, wall, turns = shape.length, shape.radius, shape.thickness, self.turns
+        hoop = wall * length**2 / (2.0 * math.pi * radius * turns**2)
+        axial = self.rubber / length
+        gas = (3.0 * length**2 - self.fibre**2) / (4.0 * math.pi * turns**2) + axial - hoop
+        ez = length / self.rest_length - 1.0
+        ec = (radius - 0.5 * wall) / (self.rest_radius - 0.5 * self.wall) - 1.0
+        first = sum(m * (ez**k * axial - ec**k * hoop) for k, m in enumerate(self.slope, 1))
+        second = sum(m * (ez**k * axial - ec**k * hoop) for k, m in enumerate(self.offset, 1))
+        return gas + modulus_scale * first, modulus_scale * second
+
+    def volume_by_quadrature(self, shape: Shape) -> float:
+        """Air volume [m3] by adaptive quadrature of the profile, for the self-check."""
+        contraction = 1.0 - shape.length / self.rest_length
+        a, b, c, reach, last, _ = self._ends(contraction, shape.radius)
+
+        def ring(v: float) -> float:
+            return float((c + a * math.cos(v) - shape.thickness) ** 2 * b * math.cos(v))
+
+        ends = 2.0 * quad(ring, 0.0, last, epsabs=0.0, epsrel=1e-12)[0]
+        return math.pi * ((shape.length - 2.0 * reach) * (shape.radius - shape.thickness) ** 2 + ends)
+
+
+class Tendon:
+    """Tendon joint: contraction [m] and moment arm [m/rad] as functions of the joint angle [rad]."""
+
+    def __init__(self, spec: dict[str, Any]) -> None:
+        self.axial = float(spec["upper_axial"])
+        self.offset = float(spec["upper_offset"])
+        self.lower = math.hypot(float(spec["lower_axial"]), float(spec["lower_offset"]))
+        self.tilt = math.atan2(float(spec["lower_offset"]), float(spec["lower_axial"]))
+        x, y = self._point(float(spec["rest_angle"]))
+        self.tendon = math.hypot(self.axial - x, self.offset - y)
+
+    def _point(self, angle: float) -> tuple[float, float]:
+        phi = math.pi - angle - self.tilt
+        return self.lower * math.cos(phi), self.lower * math.sin(phi)
+
+    def contraction(self, angle: float) -> float:
+        """Contraction [m] of the muscles at a joint angle [rad]."""
+        x, y = self._point(angle)
+        return x + math.sqrt(self.tendon**2 - (self.offset - y) ** 2) - self.axial
+
+    def arm(self, angle: float) -> float:
+        """Moment arm [m] at a joint angle [rad]."""
+        x, y = self._point(angle)
+        return y - (self.offset - y) * x / math.sqrt(self.tendon**2 - (self.offset - y) ** 2)
+
+
+class JointTables:
+    """Everything the plant needs as cubic pieces over the joint angle.
+
+    Rows of `cells`: one list of coefficients per cell, for the gas torque per pressure [m3], the elastic torque [N m], the air
+    volume of all muscles [m3], the contraction [m] and the wall area [m2]; each cubic highest power first.
+
+    Parameters
+    ----------
+    muscle, tendon : Muscle, Tendon
+        The geometry.
+    count : int
+        Number of parallel muscles.
+    modulus_scale : float
+        Multiplies every modulus.
+    """
+
+    def __init__(
+        self, muscle: Muscle, tendon: Tendon, count: int, modulus_scale: float, rest_angle: float
+    ) -> None:
+        step = math.radians(0.1)
+        below, above = 80, 1160
+        self.start = rest_angle - below * step
+        self.step = step
+        self.knots = self.start + step * np.arange(below + above + 1)
+        rows = np.array([self.exact(muscle, tendon, count, modulus_scale, float(t)) for t in self.knots])
+        cells: list[list[float]] = []
+        for lo, hi, kind in ((0, below, PchipInterpolator), (below, below + above, CubicSpline)):
+            pieces = kind(self.knots[lo : hi + 1], rows[lo : hi + 1])
+            # c has shape (4, cells, quantities)
+            cells.extend(np.transpose(pieces.c, (1, 2, 0)).reshape(hi - lo, -1).tolist())
+        self.cells = cells
+
+    @staticmethod
+    def exact(muscle: Muscle, tendon: Tendon, count: int, modulus_scale: float, angle: float) -> Array:
+        """The five tabulated quantities at one angle [rad], without interpolation."""
+        contraction = tendon.contraction(angle)
+        shape = muscle.shape(contraction / muscle.rest_length)
+        first, second = muscle.force_terms(shape, modulus_scale)
+        arm = count * tendon.arm(angle)
+        wall = count * 2.0 * math.pi * (shape.radius - shape.thickness) * shape.length
+        return np.array([first * arm, second * arm, count * shape.volume, contraction, wall])
+
+    def at(self, angle: float) -> Array:
+        """Interpolated quantities at one angle [rad]."""
+        i = min(max(int((angle - self.start) / self.step), 0), len(self.cells) - 1)
+        s = angle - float(self.knots[i])
+        return np.array(self.cells[i]).reshape(5, 4) @ np.array([s**3, s * s, s, 1.0])

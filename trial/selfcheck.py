@@ -1,0 +1,99 @@
+"""Checks of the plant: against an adaptive integrator of another kind, the golden vectors and conservation of air."""
+
+from __future__ import annotations
+
+import csv
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from .concealed import ROOT, default_rig, read_rig, to_parameters
+from .effects import LISTED, UNLISTED, Effects, draw
+from .excitation import DAC_STEP
+from .plant import Plant
+
+GOLDEN = ROOT / ".." / "shared" / "golden"
+
+
+def against_golden(plant: Plant, path: Path) -> dict[str, float] | None:
+    """Largest error of each channel over its range for the commands of a golden file; None when the file is absent."""
+    if not path.is_file():
+        return None
+    with path.open(newline="", encoding="utf-8") as stream:
+        rows = [[float(v) for v in r] for r in list(csv.reader(stream))[1:]]
+    data = np.array(rows)
+    y = plant.initial(data[0, 2], data[0, 3], data[0, 4], data[0, 5])
+    step = 1.0e-3
+    found = [y[:4]]
+    for i in range(len(data) - 1):
+        y, step = plant.advance(
+            y, plant.valve_opening(float(data[i, 1])), float(data[i + 1, 0] - data[i, 0]), step
+        )
+        found.append(y[:4])
+    error = np.abs(np.array(found) - data[:, 2:6]).max(axis=0) / np.ptp(data[:, 2:6], axis=0)
+    names = ("muscle_pressure", "supply_pressure", "joint_angle", "joint_rate")
+    return dict(zip(names, (float(e) for e in error), strict=True))
+
+
+def against_lsoda(plant: Plant, seconds: float = 3.0) -> float:
+    """Largest difference from scipy's LSODA (rtol 1e-10) over a few valve commands, relative to the size of each state."""
+    y = plant.rest(13.8e5 + plant.par.ambient)
+    other = list(y)
+    step, worst = 1.0e-3, 0.0
+    for i in range(round(seconds / 0.1)):
+        command = 5.0 + round((0.5 * math.sin(0.9 * i) + 0.25 * (i < 15)) / DAC_STEP) * DAC_STEP
+        opening = plant.valve_opening(command)
+        y, step = plant.advance(y, opening, 0.1, step)
+
+        def slope(_: float, state: Any, x: float = opening) -> list[float]:
+            return plant.derivative(state.tolist(), x)
+
+        kwargs: dict[str, Any] = {
+            "method": "LSODA",
+            "rtol": 1e-10,
+            "atol": 1e-12 * np.array(plant.scale),
+            "max_step": 2e-3,
+        }
+        other = solve_ivp(slope, (0.0, 0.1), other, **kwargs).y[:, -1].tolist()
+        worst = max(
+            worst, *(abs(a - b) / (abs(b) + s) for a, b, s in zip(y, other, plant.scale, strict=True))
+        )
+    return worst
+
+
+def selfcheck() -> str:
+    """Run every check and describe the outcome.
+
+    Raises
+    ------
+    ValueError
+        A check failed.
+    """
+    parameters = to_parameters(read_rig(default_rig())[0])
+    plant = Plant(parameters)
+    lines: list[str] = []
+    bad: list[str] = []
+    for name in ("shoulder_lift", "shoulder_multisine"):
+        errors = against_golden(plant, GOLDEN / f"{name}.csv")
+        if errors is None:
+            lines.append(f"golden {name}: absent, skipped")
+            continue
+        lines.append(f"golden {name}: " + ", ".join(f"{k} {v:.1e}" for k, v in errors.items()) + " of range")
+        if not max(errors.values()) < 1.0e-4:
+            bad.append(lines[-1])
+    rng = np.random.default_rng(1)
+    for name in (*LISTED, *UNLISTED):
+        error = against_lsoda(Plant(parameters, Effects(**{name: draw(name, 1.0, rng)})))
+        lines.append(f"LSODA with {name}: {error:.1e}")
+        if not error < 1.0e-5:
+            bad.append(lines[-1])
+    if bad:
+        raise ValueError("self-check failed:\n" + "\n".join(bad))
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    print(selfcheck())
