@@ -4,6 +4,7 @@
 SHELL := bash
 .SHELLFLAGS := -eu -o pipefail -c
 .DELETE_ON_ERROR:
+.NOTPARALLEL:
 MAKEFLAGS += --no-builtin-rules --no-print-directory
 .DEFAULT_GOAL := help
 
@@ -60,7 +61,7 @@ lint: build  ## formatting, clippy, ruff, mypy, the stub against the compiled mo
 	$(BIN)/python -m mypy.stubtest pamrs._core
 
 test-rust: build  ## the core's tests, documentation examples included
-	cargo test --quiet --release --workspace $(LOCKED) --lib --tests
+	cargo test --quiet --release --workspace --exclude pam-py $(LOCKED) --lib --tests
 	cargo test --quiet --release -p pam-core $(LOCKED) --doc
 
 test-python: build  ## pytest

@@ -1,4 +1,4 @@
-"""Write concealed cases: nominal rig, recordings of a plant that differs from it, and the answer key in another place."""
+"""Write concealed cases: nominal rig, recordings of a plant that differs from it, and the key elsewhere."""
 
 from __future__ import annotations
 
@@ -197,8 +197,8 @@ def run(
 def reach(plant: Plant, bare: Plant, record: Record, noise: Noise, window: float = 2.0) -> dict[str, float]:
     """How far the effects move each channel, in units of its noise.
 
-    The plant without its effects gets the same commands in windows that start from the true state; returned is the rms over the
-    recording of the difference between the noise-free readings.
+    The plant without its effects gets the same commands in windows that start from the true state; returned
+    is the rms over the recording of the difference between the noise-free readings.
     """
     every = round(window / SAMPLE_TIME)
     moved = np.zeros((len(record.states), 2))

@@ -54,7 +54,7 @@ class Leak:
 
 @dataclass(frozen=True)
 class HeatTransfer:
-    """Energy balance of the gas, wall exchange ``h = h0 sqrt(p T / (pa T0))`` [W/(m2 K)] over the muscles' inner wall."""
+    """Energy balance of the gas, wall exchange ``h = h0 sqrt(p T / (pa T0))`` [W/(m2 K)] in the muscles."""
 
     coefficient: float
 
@@ -78,7 +78,7 @@ class Hysteresis:
 
 @dataclass(frozen=True)
 class Creep:
-    """Standard linear solid with several branches: stiffness [N/m] of all muscles together, time constants [s]."""
+    """Standard linear solid with several branches: stiffness [N/m] of all muscles, time constants [s]."""
 
     stiffness: tuple[float, ...]
     time_constant: tuple[float, ...]
@@ -86,7 +86,7 @@ class Creep:
 
 @dataclass(frozen=True)
 class DeadZone:
-    """Overlap of the spool: normalised widths on the supply and exhaust edge, and the clearance that rounds the corner."""
+    """Overlap of the spool: normalised widths of both edges, and the clearance that rounds the corner."""
 
     supply: float
     exhaust: float

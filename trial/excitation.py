@@ -33,7 +33,7 @@ def select(count: int) -> list[tuple[str, str]]:
 
 @dataclass(frozen=True)
 class Excitation:
-    """Reference angle [rad], mask of the samples with the valve at its believed null, and a dither [V]; all of shape (n,)."""
+    """Reference angle [rad], mask of samples with the valve at its believed null, dither [V]; shapes (n,)."""
 
     reference: Array
     sealed: NDArray[np.bool_]
@@ -45,7 +45,7 @@ def _ramps(time: Array, points: list[tuple[float, float]], smooth: bool) -> Arra
     t = np.array([p[0] for p in points])
     v = np.array([p[1] for p in points])
     if not smooth:
-        return np.interp(time, t, v)
+        return np.asarray(np.interp(time, t, v))
     i = np.clip(np.searchsorted(t, time, side="right") - 1, 0, len(t) - 2)
     s = np.clip((time - t[i]) / (t[i + 1] - t[i]), 0.0, 1.0)
     return np.asarray(v[i] + (v[i + 1] - v[i]) * 0.5 * (1.0 - np.cos(np.pi * s)))
@@ -133,7 +133,7 @@ def build(name: str, duration: float, sample_time: float, rng: np.random.Generat
 
 
 class Controller:
-    """PID on the angle with feedforward from the nominal model, over an inner pressure loop; output quantised by the DAC.
+    """PID on the angle with feedforward from the nominal model over an inner pressure loop, 12-bit output.
 
     Parameters
     ----------

@@ -20,7 +20,8 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(40)
 class Shape:
     """Shape of one muscle at one length (SI units).
 
-    `radius` and `thickness` belong to the middle section, `volume` is the air volume; `taut` tells that the neck floor holds.
+    `radius` and `thickness` belong to the middle section, `volume` is the air volume; `taut` tells that the
+    neck floor holds.
     """
 
     length: float
@@ -171,8 +172,9 @@ class Tendon:
 class JointTables:
     """Everything the plant needs as cubic pieces over the joint angle.
 
-    Rows of `cells`: one list of coefficients per cell, for the gas torque per pressure [m3], the elastic torque [N m], the air
-    volume of all muscles [m3], the contraction [m] and the wall area [m2]; each cubic highest power first.
+    Rows of `cells`: one list of coefficients per cell, for the gas torque per pressure [m3], the elastic
+    torque [N m], the air volume of all muscles [m3], the contraction [m] and the wall area [m2]; each cubic
+    highest power first.
 
     Parameters
     ----------
@@ -214,4 +216,4 @@ class JointTables:
         """Interpolated quantities at one angle [rad]."""
         i = min(max(int((angle - self.start) / self.step), 0), len(self.cells) - 1)
         s = angle - float(self.knots[i])
-        return np.array(self.cells[i]).reshape(5, 4) @ np.array([s**3, s * s, s, 1.0])
+        return np.asarray(np.array(self.cells[i]).reshape(5, 4) @ np.array([s**3, s * s, s, 1.0]))

@@ -18,7 +18,7 @@ VERDICTS = ("none", "parameters", "effects", "unlisted")
 
 @dataclass(frozen=True)
 class Row:
-    """One scored case. `probability`, `gap`, `utility` and `seconds` are None when the result does not have them."""
+    """One scored case; `probability`, `gap`, `utility` and `seconds` are None when the result lacks them."""
 
     case: str
     truth: str
@@ -45,11 +45,18 @@ class Scores:
         head = ("case", "truth", "verdict", "named", "p(truth)", "outcome", "gap", "reach", "seconds")
         body = [
             (
-                r.case, r.truth, r.verdict, r.named, _show(r.probability), r.outcome, _show(r.gap), f"{r.reach:.1f}",
+                r.case,
+                r.truth,
+                r.verdict,
+                r.named,
+                _show(r.probability),
+                r.outcome,
+                _show(r.gap),
+                f"{r.reach:.1f}",
                 _show(r.seconds, 1),
             )
             for r in self.rows
-        ]  # fmt: skip
+        ]
         width = [max(len(line[i]) for line in [head, *body]) for i in range(len(head))]
         lines = [
             "  ".join(cell.ljust(w) for cell, w in zip(line, width, strict=True)).rstrip()
@@ -75,8 +82,9 @@ def _number(value: Any) -> float | None:
 def utility(truth: set[str], answers: Sequence[set[str]], components: int) -> float:
     """Mean ambiguity-group utility over the answers.
 
-    For each answer ``m = 1 - n(N+1)/(f(n+1)) - n'(N'+1)/(f(n'+1))`` with n the missed effects, N the components
-    that the answer calls healthy, n' the effects named wrongly, N' the effects named, f the number of components.
+    For each answer ``m = 1 - n(N+1)/(f(n+1)) - n'(N'+1)/(f(n'+1))`` with n the missed effects, N the
+    components that the answer calls healthy, n' the effects named wrongly, N' the effects named, f the number
+    of components.
     """
     marks = []
     for answer in answers:
@@ -106,7 +114,7 @@ def _result(folder: Path, case: str) -> dict[str, Any] | None:
 
 
 def _answer(verdict: str, effects: Sequence[str]) -> set[str]:
-    """The claim as a set: the effects named, or the verdict itself when none is named; null and parameters claim no fault."""
+    """The claim as a set: the effects named, or "unlisted"; none and parameters claim no fault."""
     if verdict == "effects":
         return set(effects)
     return {"unlisted"} if verdict == "unlisted" else set()
@@ -115,7 +123,8 @@ def _answer(verdict: str, effects: Sequence[str]) -> set[str]:
 def score_case(key: dict[str, Any], result: dict[str, Any] | None, catalogue: Sequence[str]) -> Row:
     """Score one case; a missing result is wrong.
 
-    An effect that is not in the catalogue has the truth "unlisted", unless the diagnosis gives that very id a probability.
+    An effect that is not in the catalogue has the truth "unlisted", unless the diagnosis gives that very id a
+    probability.
     """
     case, kind, ids = str(key["case"]), str(key["kind"]), [str(i) for i in key["effects"]]
     reach = float(key.get("reach", 0.0))
@@ -157,9 +166,18 @@ def score_case(key: dict[str, Any], result: dict[str, Any] | None, catalogue: Se
     mark = utility(truth, groups, components)
     label = "+".join(top) if verdict == "effects" else verdict
     return Row(
-        case, kind, verdict, label, chance if chance is not None else 0.0, outcome, gap, reach, mark, contains,
+        case,
+        kind,
+        verdict,
+        label,
+        chance if chance is not None else 0.0,
+        outcome,
+        gap,
+        reach,
+        mark,
+        contains,
         _number(result.get("seconds")),
-    )  # fmt: skip
+    )
 
 
 def _share(rows: Sequence[bool]) -> float | None:

@@ -1,4 +1,4 @@
-"""Checks of the plant: against an adaptive integrator of another kind, the golden vectors and conservation of air."""
+"""Checks of the plant against an integrator of another kind and against the golden vectors."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ GOLDEN = ROOT / ".." / "shared" / "golden"
 
 
 def against_golden(plant: Plant, path: Path) -> dict[str, float] | None:
-    """Largest error of each channel over its range for the commands of a golden file; None when the file is absent."""
+    """Largest error of each channel over its range for a golden file; None when the file is absent."""
     if not path.is_file():
         return None
     with path.open(newline="", encoding="utf-8") as stream:
@@ -39,7 +39,7 @@ def against_golden(plant: Plant, path: Path) -> dict[str, float] | None:
 
 
 def against_lsoda(plant: Plant, seconds: float = 3.0) -> float:
-    """Largest difference from scipy's LSODA (rtol 1e-10) over a few valve commands, relative to the size of each state."""
+    """Largest difference from scipy's LSODA (rtol 1e-10), relative to the size of each state."""
     y = plant.rest(13.8e5 + plant.par.ambient)
     other = list(y)
     step, worst = 1.0e-3, 0.0

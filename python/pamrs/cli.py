@@ -9,12 +9,18 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from pamrs.recording import Recording
 
 __all__ = ["app", "main"]
 
@@ -29,7 +35,13 @@ CHANNEL_UNITS = {
     "joint_torque": "N m",
     "temperature": "K",
     "reference": "rad",
+    "joint_rate": "rad/s",
+    "muscle_force": "N",
+    "contraction_ratio": "1",
+    "air_volume": "m3",
 }
+STATE_NEEDS = {"muscle_pressure": "chamber", "supply_pressure": "supply", "joint_angle": "arm"}
+STATES = tuple(STATE_NEEDS)
 
 app = typer.Typer(
     name="pamrs",
@@ -92,9 +104,10 @@ def _diagnose(
     """Find the physics that the rig's model leaves out of a case's recordings."""
     _check_writable(report, json, png, model)
     from pamrs.case import load_case
-    from pamrs.diagnosis import diagnose
 
     loaded = load_case(case)
+    from pamrs.diagnosis import diagnose
+
     with _progress(f"diagnosing {loaded.name}"):
         result = diagnose(loaded)
     if json is not None:
@@ -125,19 +138,51 @@ def _simulate(
 
     loaded = load_rig(rig)
     recording = load_recording(input)
+    initial = {
+        name: float(recording.channels[name][recording.mask[name]][0])
+        for name in STATES
+        if name in recording.channels and recording.mask[name].any() and loaded.model[STATE_NEEDS[name]]
+    }
+    timing: dict[str, float] = {"sample_time": recording.sample_time}
+    if loaded.model["valve"] is None:
+        command = None
+        timing["duration"] = float(recording.time[-1])
+    else:
+        command = _held(recording, "valve_command", input)
     with _progress(f"simulating {loaded.name}"):
-        result = simulate(loaded, recording)
-    columns = {"time": result.time, **result.channels}
-    _write_csv(output, columns)
-    typer.echo(f"{loaded.name}: {len(result.time)} samples of {', '.join(result.channels)} in {output}")
+        result = simulate(loaded, command, initial=initial, **timing)
+    _write_csv(output, result)
+    typer.echo(f"{loaded.name}: {len(result.time)} samples written to {output}")
+    for name in STATES:
+        if name in initial and name in result:
+            usable = recording.mask[name]
+            apart = result[name][usable] - recording.channels[name][usable]
+            rms = float((apart**2).mean() ** 0.5)
+            typer.echo(f"{name}: rms difference from the recording {rms:.4g} {CHANNEL_UNITS[name]}")
 
 
-def _write_csv(path: Path, columns: dict[str, Sequence[float]]) -> None:
+def _held(recording: Recording, name: str, path: Path) -> NDArray[np.float64]:
+    """A channel whose unusable samples repeat the last usable one, as a valve does that hears nothing new."""
+    import numpy as np
+
+    if name not in recording.channels or not recording.mask[name].any():
+        raise ValueError(f"{path}: no usable {name}, which the rig's valve needs")
+    usable = recording.mask[name]
+    last = np.maximum.accumulate(np.where(usable, np.arange(usable.size), int(np.argmax(usable))))
+    if not usable.all():
+        typer.echo(
+            f"{path}: {int((~usable).sum())} unusable samples of {name} hold the last usable one", err=True
+        )
+    held: NDArray[np.float64] = recording.channels[name][last]
+    return held
+
+
+def _write_csv(path: Path, columns: Mapping[str, NDArray[np.float64]]) -> None:
     """Write channels in SI units under headers that carry the unit; masked samples stay empty."""
     import math
 
     names = list(columns)
-    rows = zip(*(columns[name] for name in names), strict=True)
+    rows = zip(*(columns[name].tolist() for name in names), strict=True)
     with path.open("w", encoding="utf-8", newline="\n") as file:
         file.write(",".join(f"{name} [{CHANNEL_UNITS.get(name, '1')}]" for name in names) + "\n")
         for row in rows:
@@ -152,9 +197,7 @@ def _rig_check(file: Annotated[Path, typer.Argument(help="Rig file (TOML).")]) -
     rig = load_rig(file)
     width = max((len(name) for name in rig.parameters), default=0)
     for name, parameter in rig.parameters.items():
-        known = (
-            f"{parameter.value:.6g} {parameter.unit}" if parameter.known else f"unknown [{parameter.unit}]"
-        )
+        known = f"{parameter.value:.6g}" if parameter.known else "unknown"
         spread = f" ± {parameter.tol:.3g}" if parameter.known and parameter.tol else ""
         typer.echo(f"{name:<{width}}  {known}{spread} {parameter.unit}")
     typer.echo(

@@ -155,7 +155,7 @@ class Recording:
         return combined
 
     def segments(self, *channels: str, minimum: int = 1) -> list[tuple[int, int]]:
-        """Stretches ``[start, stop)`` without a hole in any of these channels, ``minimum`` samples at least."""
+        """Stretches ``[start, stop)`` of ``minimum`` samples or more without a hole in these channels."""
         padded = np.concatenate([[False], self.valid(*channels), [False]])
         edges = np.flatnonzero(padded[1:] != padded[:-1])
         pairs = zip(edges[::2], edges[1::2], strict=True)
@@ -392,8 +392,8 @@ def _judged(channel: str, values: Array, grid: Grid, source: str, issues: list[I
     if bad > max(3, len(values) // 50):
         worst = float(values[impossible][0])
         raise RecordingError(
-            f"{source}: column {channel!r}: {worst:.6g} {limits.unit} and {bad - 1} more values are not possible "
-            f"({limits.lower:g} to {limits.upper:g} {limits.unit}); is this the right column and unit?"
+            f"{source}: column {channel!r}: {worst:.6g} {limits.unit} and {bad - 1} more values are not "
+            f"possible ({limits.lower:g} to {limits.upper:g} {limits.unit}); right column and unit?"
         )
     found: list[tuple[str, int, int, str]] = _runs(~usable, "nan", "no value")
     found += _runs(impossible, "outlier", "an impossible value")

@@ -118,9 +118,7 @@ def lay_grid(stamps: Array, source: str, sample_time: float | None) -> Grid:
         raise RecordingError(f"{source}: column 'time': two rows at least, at different times, are needed")
     usual = float(np.median(forward))
     ordinary = forward[forward < _GAP * usual]
-    if len(ordinary) and np.ptp(ordinary) < 0.5 * usual:
-        usual = float(np.mean(ordinary))
-    usual = float(f"{usual:.6g}") if abs(float(f"{usual:.4g}") / usual - 1) > 2e-5 else float(f"{usual:.4g}")
+    usual = _plain(float(np.mean(ordinary)), len(stamps))
     step = sample_time if sample_time is not None else usual
 
     events: list[Event] = []
@@ -152,6 +150,12 @@ def lay_grid(stamps: Array, source: str, sample_time: float | None) -> Grid:
         events.append(Event("clock_jump", first_at, last_at, f"{further} further steps of the clock"))
     events += _gaps(placed, elapsed, jumps, usual)
     return Grid(placed, rows, step, usual, events)
+
+
+def _plain(interval: float, count: int) -> float:
+    """The interval in few digits if that does not shift the grid visibly over the whole recording."""
+    short = float(f"{interval:.4g}")
+    return short if abs(short / interval - 1.0) * count < 0.5 * _ON_SAMPLE else float(f"{interval:.9g}")
 
 
 def _exact(placed: Array, kept: Array, jumps: Mask) -> Array:

@@ -178,9 +178,7 @@ class _Stretches:
             long = stop - start > self.limit
             if extreme and self.channel in CLIPPING and (long or self._cut_off(start, stop)):
                 clipped[value] = True
-            elif long and self._believable(start, stop):
-                found.append(("frozen", start, stop))
-            elif self._jump(start, stop) > 5.0 * self._largest_step(start, stop):
+            elif (long and self._believable(start, stop)) or self._leaps(start, stop):
                 found.append(("frozen", start, stop))
         for value in clipped:
             at = (self.data[self.starts] == value) & (self.lengths >= 3)
@@ -204,11 +202,12 @@ class _Stretches:
         """The step with which the channel comes back to life."""
         return abs(float(self.step[stop - 1])) if stop < len(self.data) else 0.0
 
-    def _largest_step(self, start: int, stop: int) -> float:
+    def _leaps(self, start: int, stop: int) -> bool:
+        """Whether it comes back with a step far beyond every other step of the channel."""
         size = np.abs(self.step)
         before = float(size[: max(start - 1, 0)].max(initial=0.0))
         after = float(size[stop:].max(initial=0.0))
-        return max(before, after, self.quantum)
+        return self._jump(start, stop) > 5.0 * max(before, after, self.quantum)
 
     def _cut_off(self, start: int, stop: int) -> bool:
         """Whether the signal runs into the extreme, or leaves it, at full slope."""

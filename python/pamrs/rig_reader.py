@@ -121,7 +121,7 @@ class _Reader:
                 self.unknown_keys(f"{block}.{group}.", inner, members)
             elif inner is not None:
                 self.problem(
-                    f"{block}.{group} = {_shown(inner)} is not allowed: a table with {', '.join(members)} is needed"
+                    f"{block}.{group} = {_shown(inner)} is not allowed: give {', '.join(members)} as a table"
                 )
         return {key.name: self.value(block, key, _dig(table, key.where)) for key in BLOCKS[block]}
 

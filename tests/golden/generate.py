@@ -11,10 +11,11 @@ import sys
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from reference import GeometryReference, MuscleReference, shoulder  # noqa: E402
+from tests.reference import GeometryReference, MuscleReference, shoulder  # noqa: E402
 
 DATA = Path(__file__).resolve().parent / "data"
 INCH = 0.0254
@@ -38,12 +39,15 @@ MUSCLES: dict[str, tuple[float, float, float, float, str]] = {
 }
 
 
-def smooth_command(seconds: float = 3.0) -> np.ndarray:
+def smooth_command(seconds: float = 3.0) -> NDArray[np.float64]:
     """Multisine about 5 V, held for 10 ms, one value per 5 ms row."""
     rows = round(seconds / SAMPLE_TIME) + 1
     held = SAMPLE_TIME * 2.0 * (np.arange(rows) // 2)
     lines = ((0.42, 0.4, 0.3), (0.35, 0.9, 1.7), (0.28, 1.7, 4.1), (0.15, 3.1, 2.2))
-    return 5.0 + sum(a * np.sin(2.0 * np.pi * f * held + p) for a, f, p in lines)
+    command = np.full(rows, 5.0)
+    for a, f, p in lines:
+        command += a * np.sin(2.0 * np.pi * f * held + p)
+    return command
 
 
 def muscle_rows() -> list[list[str]]:
@@ -67,7 +71,15 @@ def main() -> None:
     DATA.mkdir(exist_ok=True)
     with (DATA / "muscle_static.csv").open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
-        names = ["muscle", "contraction_ratio", "radius_m", "thickness_m", "air_volume_m3", "eps_c", *PRESSURES]
+        names = [
+            "muscle",
+            "contraction_ratio",
+            "radius_m",
+            "thickness_m",
+            "air_volume_m3",
+            "eps_c",
+            *PRESSURES,
+        ]
         writer.writerow(names)
         writer.writerows(muscle_rows())
     run = shoulder().simulate(smooth_command(), SAMPLE_TIME, INITIAL, rtol=1e-12)

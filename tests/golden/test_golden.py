@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,7 +18,10 @@ OWN = HERE / "data"
 SHARED = HERE.parents[1] / ".." / "shared" / "golden"
 AMBIENT = 101325.0
 INCH = 0.0254
-MODULI = {"modulus_slope": [3.0, -0.35, 0.0, 0.0], "modulus_offset": [1.15e6, -0.15e6, 0.0, 0.0]}
+MODULI: dict[str, Any] = {
+    "modulus_slope": [3.0, -0.35, 0.0, 0.0],
+    "modulus_offset": [1.15e6, -0.15e6, 0.0, 0.0],
+}
 
 #: name -> rest length, rest diameter, braid angle (deg), wall thickness, geometry
 MUSCLES: dict[str, tuple[float, float, float, float, str]] = {
@@ -57,7 +61,8 @@ def read_muscles(path: Path) -> dict[str, dict[str, NDArray[np.float64]]]:
     names = list(dict.fromkeys(row["muscle"] for row in rows))
     columns = [key for key in rows[0] if key != "muscle"]
     return {
-        name: {c: np.array([float(row[c]) for row in rows if row["muscle"] == name]) for c in columns} for name in names
+        name: {c: np.array([float(row[c]) for row in rows if row["muscle"] == name]) for c in columns}
+        for name in names
     }
 
 
@@ -76,9 +81,11 @@ def test_muscle_static(folder: Path) -> None:
             "force_8bar_N": muscle.force(8e5, e),
         }
         for column, values in got.items():
-            # A force is a difference of larger terms: the smallest scale it can be held to is the blocked force.
+            # A force is a difference of larger terms: near zero it is held to the blocked force.
             floor = 1e-9 * np.abs(want[column][e == 0.0][0]) if column.startswith("force") else 0.0
-            np.testing.assert_allclose(values, want[column], rtol=1e-9, atol=floor, err_msg=f"{name} {column}")
+            np.testing.assert_allclose(
+                values, want[column], rtol=1e-9, atol=floor, err_msg=f"{name} {column}"
+            )
 
 
 def trajectory_misses(path: Path) -> dict[str, float]:
@@ -99,7 +106,13 @@ def trajectory_misses(path: Path) -> dict[str, float]:
     np.testing.assert_allclose(result.time, data[:, 0], rtol=0.0, atol=1e-12)
     misses = {}
     for column, (channel, offset) in enumerate(
-        [("muscle_pressure", AMBIENT), ("supply_pressure", AMBIENT), ("joint_angle", 0.0), ("joint_rate", 0.0)], 2
+        [
+            ("muscle_pressure", AMBIENT),
+            ("supply_pressure", AMBIENT),
+            ("joint_angle", 0.0),
+            ("joint_rate", 0.0),
+        ],
+        2,
     ):
         want = data[:, column] - offset
         misses[channel] = float(np.max(np.abs(result[channel] - want)) / np.ptp(want))

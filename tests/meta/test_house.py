@@ -29,19 +29,16 @@ def modules():
 
 
 def public_callables():
-    """Functions, and classes' public methods, each once, where they are defined."""
-    for name in modules():
-        module = importlib.import_module(name)
-        for attribute, thing in vars(module).items():
-            if attribute.startswith("_") or getattr(thing, "__module__", None) != name:
-                continue
-            if inspect.isfunction(thing):
-                yield f"{name}.{attribute}", thing
-            elif inspect.isclass(thing):
-                for method, function in vars(thing).items():
-                    function = getattr(function, "__func__", function)
-                    if not method.startswith("_") and inspect.isfunction(function):
-                        yield f"{name}.{attribute}.{method}", function
+    """The functions of the public interface and the public methods of its classes."""
+    for name in pamrs.__all__:
+        thing = getattr(pamrs, name, None)
+        if inspect.isfunction(thing):
+            yield f"pamrs.{name}", thing
+        elif inspect.isclass(thing):
+            for method, function in vars(thing).items():
+                function = getattr(function, "__func__", function)
+                if not method.startswith("_") and inspect.isfunction(function):
+                    yield f"pamrs.{name}.{method}", function
 
 
 CALLABLES = dict(public_callables())
@@ -70,6 +67,17 @@ def test_examples_in_docstrings_run(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     outcome = doctest.testmod(importlib.import_module(name), optionflags=doctest.ELLIPSIS)
     assert outcome.failed == 0
+
+
+@pytest.mark.parametrize("name", modules())
+def test_functions_say_what_they_do(name):
+    module = importlib.import_module(name)
+    own = [
+        function
+        for word, function in vars(module).items()
+        if not word.startswith("_") and inspect.isfunction(function) and function.__module__ == name
+    ]
+    assert not [function.__name__ for function in own if not function.__doc__]
 
 
 @pytest.mark.parametrize("name", modules())

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 from hypothesis import strategies as st
-from reference import GeometryReference, MuscleReference
 
 import pamrs
+from tests.reference import GeometryReference, MuscleReference
 
 
 @st.composite

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from strategies import both, contractions, muscle_arguments
 
 import pamrs
+from tests.property.strategies import both, contractions, muscle_arguments
 
 FEW = settings(max_examples=25, deadline=None)
 
@@ -106,10 +106,19 @@ def test_rest_shape(arguments: dict[str, Any]) -> None:
     bore = 0.5 * arguments["rest_diameter"] - arguments["wall_thickness"]
     assert float(muscle.radius(0.0)) == pytest.approx(0.5 * arguments["rest_diameter"], rel=1e-12)
     assert float(muscle.thickness(0.0)) == pytest.approx(arguments["wall_thickness"], rel=1e-12)
-    assert float(muscle.air_volume(0.0)) == pytest.approx(math.pi * bore**2 * arguments["rest_length"], rel=1e-12)
+    assert float(muscle.air_volume(0.0)) == pytest.approx(
+        math.pi * bore**2 * arguments["rest_length"], rel=1e-12
+    )
     # At rest there is no strain, so no elastic force either.
     assert float(muscle.force(0.0, 0.0)) == pytest.approx(0.0, abs=1e-6)
     assert float(muscle.force(3e5, 0.0)) == pytest.approx(3e5 * model.coefficients(0.0)[0], rel=1e-9)
+
+
+@pytest.mark.parametrize("e", [1e-300, 1e-17, -1e-17, 1e-15, -1e-15, 1e-12, -1e-12])
+def test_a_hair_from_rest(e: float) -> None:
+    muscle = shoulder_muscle()
+    assert float(muscle.radius(e)) == pytest.approx(0.0127, rel=1e-9)
+    assert float(muscle.force(4e5, e)) == pytest.approx(float(muscle.force(4e5, 0.0)), rel=1e-7)
 
 
 def shoulder_muscle(**changes: Any) -> pamrs.Muscle:
@@ -147,7 +156,7 @@ def shoulder_muscle(**changes: Any) -> pamrs.Muscle:
 def test_impossible_muscle_is_refused_by_name(name: str, value: Any) -> None:
     with pytest.raises(ValueError, match=name) as caught:
         shoulder_muscle(**{name: value})
-    assert isinstance(caught.value, pamrs.ParameterError)
+    assert isinstance(caught.value, (pamrs.ParameterError, pamrs.RigError))
 
 
 @pytest.mark.parametrize("e", [math.nan, math.inf, -math.inf, 0.6, -0.2])

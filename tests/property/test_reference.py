@@ -8,8 +8,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from reference import Joint, orifice_flow, shoulder
-from reference.gas import critical_ratio, flow_function
+
+from tests.reference import Joint, orifice_flow, shoulder
+from tests.reference.gas import critical_ratio, flow_function
+
+TABLE = shoulder().muscle.tabulate(-0.004, 0.37)
 
 
 @given(st.floats(math.radians(15.0), math.radians(120.0)))
@@ -30,15 +33,11 @@ def test_contraction_is_zero_at_rest() -> None:
 @given(st.floats(-0.003, 0.36), st.floats(0.0, 12e5))
 def test_table_equals_the_exact_muscle(e: float, pressure: float) -> None:
     plant = shoulder()
-    table = TABLE
-    force, volume, slope = table(e, pressure)
+    force, volume, slope = TABLE(e, pressure)
     assert force == pytest.approx(float(plant.muscle.force(pressure, e)), rel=1e-10, abs=1e-6)
     assert volume == pytest.approx(plant.muscle.geometry.solve(e).air_volume, rel=1e-11)
     if e > 0.0031:
         assert slope == pytest.approx(plant.muscle.geometry.air_volume_slope(e), rel=1e-6)
-
-
-TABLE = shoulder().muscle.tabulate(-0.004, 0.37)
 
 
 def test_flow_function_is_continuous() -> None:

@@ -27,9 +27,14 @@ def flow_function(ratio: float, gamma: float = 1.4) -> float:
 
 
 def orifice_flow(
-    area: float, upstream: float, downstream: float, temperature: float, gas_constant: float, gamma: float = 1.4
+    area: float,
+    upstream: float,
+    downstream: float,
+    temperature: float,
+    gas_constant: float,
+    gamma: float = 1.4,
 ) -> float:
-    """Mass flow (kg/s) through discharge area `area` (m^2) between absolute pressures (Pa), upstream the higher."""
+    """Mass flow (kg/s) through discharge area `area` (m^2) to the lower absolute pressure (Pa)."""
     if downstream > upstream:
         raise ValueError("the reference covers flow from the higher pressure to the lower only")
     scale = math.sqrt(2.0 / (gas_constant * temperature))

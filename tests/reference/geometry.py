@@ -117,7 +117,7 @@ class GeometryReference:
         return max(math.sqrt(self.rubber_volume / (math.pi * length)), self.neck_floor * self.rest_radius)
 
     def solve_radius(self, e: float) -> tuple[float, bool]:
-        """Outer radius of the middle part and whether the braid is taut."""
+        """Return the outer radius of the middle part and whether the braid is taut."""
         r0 = self.rest_radius
         if self.kind == "cylinder":
             length = self.rest_length * (1.0 - e)
@@ -132,6 +132,8 @@ class GeometryReference:
         floor = self.radius_floor(e)
         step = 0.04 * r0 if e > 0.0 else -(r0 - floor) / 24.0
         near, miss_near = r0, miss(r0)
+        if abs(miss_near) <= 1e-15 * self.fibre_length:
+            return r0, False
         for _ in range(400):
             far = near + step
             if e < 0.0 and far < floor * (1.0 + 1e-15):

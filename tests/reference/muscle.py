@@ -68,15 +68,17 @@ class MuscleReference:
     def tabulate(self, e_min: float, e_max: float, degree: int = 28) -> MuscleTable:
         """Chebyshev table on [e_min, e_max].
 
-        One seam is at e = 0, where the end ellipse has a kink; the others shorten the pieces near it, because the
-        continued branch has a singularity a little way into extension.
+        One seam is at e = 0, where the end ellipse has a kink; the others shorten the pieces near it,
+        because the continued branch has a singularity a little way into extension.
         """
         edges = [e_min, *(seam for seam in (0.0, 0.03, 0.12) if e_min < seam < e_max), e_max]
         pieces = []
         for low, high in zip(edges[:-1], edges[1:], strict=True):
             nodes = np.cos(np.pi * (np.arange(degree + 1) + 0.5) / (degree + 1))
             points = 0.5 * (low + high) + 0.5 * (high - low) * nodes
-            rows = np.array([(*self.coefficients(float(x)), self.geometry.solve(float(x)).air_volume) for x in points])
+            rows = np.array(
+                [(*self.coefficients(float(x)), self.geometry.solve(float(x)).air_volume) for x in points]
+            )
             fits = [Chebyshev.fit(points, rows[:, j], degree, domain=[low, high]) for j in range(4)]
             pieces.append((low, high, fits, fits[3].deriv()))
         return MuscleTable(self.modulus_scale, pieces)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -159,10 +160,19 @@ class Plant:
         rt = gas.gas_constant * gas.temperature
         chamber = self.chamber
         pressure_rate = (
-            rt * (chamber.alpha_in * inflow - chamber.alpha_out * outflow) - chamber.alpha * pressure * volume_rate
+            rt * (chamber.alpha_in * inflow - chamber.alpha_out * outflow)
+            - chamber.alpha * pressure * volume_rate
         ) / volume
         torque = n * force * moment_arm + self.joint.stop_torque(angle, rate)
-        return [pressure_rate, -rt * inflow / self.supply_volume, rate, self.arm.acceleration(angle, rate, torque)]
+        return [
+            pressure_rate,
+            -rt * inflow / self.supply_volume,
+            rate,
+            self.arm.acceleration(angle, rate, torque),
+        ]
+
+    def _rhs(self, _: float, state: NDArray[np.float64], command: float) -> list[float]:
+        return self.derivative(state, command)
 
     def simulate(
         self,
@@ -187,11 +197,10 @@ class Plant:
         names = ("muscle_pressure", "supply_pressure", "joint_angle", "joint_rate")
         states = np.empty((command.size, 4))
         states[0] = [initial[name] for name in names]
-        atol = rtol * np.array([1e5, 1e6, 1.0, 1.0])
+        atol = [rtol * scale for scale in (1e5, 1e6, 1.0, 1.0)]
         for k in range(command.size - 1):
-            u = float(command[k])
             solution = solve_ivp(
-                lambda _, y, u=u: self.derivative(y, u),
+                partial(self._rhs, command=float(command[k])),
                 (0.0, sample_time),
                 states[k],
                 method="DOP853",
@@ -202,7 +211,7 @@ class Plant:
             if not solution.success:
                 raise RuntimeError(f"integration failed in sample {k}: {solution.message}")
             states[k + 1] = solution.y[:, -1]
-        return Trajectory(np.arange(command.size) * sample_time, command, *states.T.copy())
+        return Trajectory(sample_time * np.arange(command.size, dtype=np.float64), command, *states.T.copy())
 
 
 def shoulder() -> Plant:
@@ -212,8 +221,8 @@ def shoulder() -> Plant:
 
 
 def with_overrides(plant: Plant, overrides: Mapping[str, float]) -> Plant:
-    """Return `plant` with scalars replaced by dotted name, for example ``{"arm.payload": 10.0}`` (SI units)."""
-    groups: dict[str, dict[str, float]] = {}
+    """Return `plant` with scalars replaced by dotted name: ``{"arm.payload": 10.0}`` (SI)."""
+    groups: dict[str, dict[str, Any]] = {}
     for name, value in overrides.items():
         block, key = name.split(".")
         groups.setdefault(block, {})[key] = value

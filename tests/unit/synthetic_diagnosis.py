@@ -62,7 +62,7 @@ def diagnosis(**changes: Any) -> Diagnosis:
                     "text": "muscle pressure 310 to 490 kPa",
                 },
             ],
-            "text": "The excess is in the chamber: after each fill the pressure sags by 8 kPa, the valve shut.",
+            "text": "The excess is in the chamber: after each fill the pressure sags by 8 kPa.",
         },
         "effects": [
             {
@@ -132,7 +132,7 @@ def diagnosis(**changes: Any) -> Diagnosis:
         },
         "warnings": ["frozen joint_angle in step_up, 3.1 to 3.4 s: masked"],
         "seconds": 31.4,
-        "text": "After each fill the gas cools on the wall and the pressure sags.\n\nA leak would go on; this stops.",
+        "text": "After each fill the gas cools and the pressure sags.\n\nA leak goes on; this stops.",
         "rig": ModelText(),
         "traces": [
             trace(name, role, channel, unit, scale, seed=i)

@@ -47,7 +47,7 @@ def test_no_words_print_help(capsys):
     ("words", "part"),
     [
         (["digest"], "digest"),
-        (["diagnose"], "CASE"),
+        (["diagnose"], "argument"),
         (["diagnose", "x", "--colour"], "--colour"),
         (["simulate", "rig.toml"], "--input"),
         (["rig"], "command"),
@@ -140,7 +140,6 @@ class FakeDiagnosis:
 
 def test_diagnose_writes_what_it_is_asked_for(capsys, tmp_path, monkeypatch):
     import pamrs.case
-
     import pamrs.diagnosis
 
     class Loaded:

@@ -31,7 +31,6 @@ KNOWN = [
     (1.0, "l/(s bar)", "conductance", 1e-8),
     (1.0, "m3/s/Pa", "conductance", 1.0),
     (1.0, "kg cm2", "inertia", 1e-4),
-    (1.0, "mNm", "torque", None),
     (1.0, "kN mm", "torque", 1.0),
     (1.0, "N m/deg", "N m/rad", 180 / math.pi),
     (5.0, "%", "1", 0.05),
@@ -40,18 +39,16 @@ KNOWN = [
 
 
 @pytest.mark.parametrize(("value", "unit", "dimension", "expected"), KNOWN)
-def test_known_conversions(value: float, unit: str, dimension: str, expected: float | None) -> None:
-    if expected is None:
-        with pytest.raises(ParameterError, match=unit):
-            to_si(value, unit, dimension)
-    else:
-        assert to_si(value, unit, dimension) == pytest.approx(expected, rel=1e-14)
+def test_known_conversions(value: float, unit: str, dimension: str, expected: float) -> None:
+    assert to_si(value, unit, dimension) == pytest.approx(expected, rel=1e-14)
 
 
-@given(st.floats(-1e6, 1e6), st.sampled_from([row[1:3] for row in KNOWN if row[3] is not None]))
+@given(st.floats(-1e6, 1e6), st.sampled_from([row[1:3] for row in KNOWN]))
 def test_back_and_forth(value: float, pair: tuple[str, str]) -> None:
     unit, dimension = pair
-    assert from_si(to_si(value, unit, dimension), unit, dimension) == pytest.approx(value, rel=1e-12, abs=1e-9)
+    assert from_si(to_si(value, unit, dimension), unit, dimension) == pytest.approx(
+        value, rel=1e-12, abs=1e-9
+    )
 
 
 def test_a_difference_of_temperatures_has_no_offset() -> None:
@@ -76,7 +73,9 @@ def test_wrong_dimension_names_both(unit: str, dimension: str) -> None:
     assert repr(DIMENSIONS.get(dimension, dimension)) in str(caught.value)
 
 
-@pytest.mark.parametrize("unit", ["Bar", "pascal", "m//s", "m/", "(m)", "2", "m3/(s", "kg-m2", "[bar]", "bar bar bara"])
+@pytest.mark.parametrize(
+    "unit", ["Bar", "pascal", "m//s", "m/", "(m)", "2", "m3/(s", "kg-m2", "[bar]", "bar bar bara"]
+)
 def test_unknown_units_are_named(unit: str) -> None:
     with pytest.raises(ParameterError) as caught:
         parse_unit(unit)

@@ -271,7 +271,7 @@ fn run<S: Scalar>(
             }
             let rest = plant.rest_mass(&state);
             if k == 0 {
-                state[MASS] = rest;
+                state[MASS] = plant.initial_mass(&state);
             } else {
                 // a new window keeps the gas temperature and the memory of the motion
                 let was = plant.rest_mass(&before);

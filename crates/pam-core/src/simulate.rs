@@ -170,7 +170,7 @@ pub fn simulate(rig: &Rig, valve_command: &[f64], timing: Timing, initial: Initi
         initial.joint_rate,
         0.0,
     ]);
-    state[MASS] = plant.rest_mass(&state);
+    state[MASS] = plant.initial_mass(&state);
     let mut memory = Memory::default();
     let mut out = Trajectory::with_capacity(valve_command.len());
     let dt = timing.step();

@@ -161,8 +161,8 @@ class Diagnosis:
         ``block``, ``channel``, ``intervals`` (pairs in s), ``conditions`` (sentences or dictionaries with a
         ``text``), ``text``; optionally ``recording``, to which the intervals belong.
     effects : list of dict
-        ``id``, ``probability``, optional ``name`` (in words), ``parameters`` {name: {value, std, unit, interval?, identifiable?}}, most
-        probable first; SI, 95 % intervals.
+        ``id``, ``probability``, optional ``name`` (in words), ``parameters``
+        {name: {value, std, unit, interval?, identifiable?}}, most probable first; SI, 95 % intervals.
     ambiguity : list of list of str
         Sets of effects that the data cannot separate; empty when settled.
     probabilities : dict

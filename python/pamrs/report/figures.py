@@ -124,7 +124,7 @@ def _has(values: FloatArray | None, besides: FloatArray | None = None) -> bool:
 
 
 def telling_trace(diagnosis: Diagnosis) -> Trace | None:
-    """Trace that shows the most: the telling channel, held out if there is one, with the largest improvement."""
+    """Trace that shows the most: the telling channel, held out if possible, with the largest improvement."""
     if not diagnosis.traces:
         return None
     channel = diagnosis.where.get("channel")
@@ -162,7 +162,7 @@ def _draw_curves(axes: Axes, trace: Trace, *, width: float = 1.2) -> None:
 
 
 def _draw_residuals(axes: Axes, trace: Trace, noise: float | None, *, width: float = 1.0) -> None:
-    """Residuals of the refitted baseline and with the effect, over a band of two noise standard deviations."""
+    """Residuals of the refitted baseline and with the effect, over a band of two noise deviations."""
     before, after = trace.residual_before, trace.residual_after
     unit, factor = display_unit(trace.unit, _largest(before, after))
     if noise is not None:
@@ -257,7 +257,7 @@ def _block_rows(diagnosis: Diagnosis) -> list[tuple[str, float, bool]]:
     return sorted(rows, key=lambda r: CHAIN.index(r[0]) if r[0] in CHAIN else len(CHAIN))
 
 
-def _draw_blocks(axes: Axes, rows: Sequence[tuple[str, float, bool]]) -> None:
+def _draw_blocks(axes: Axes, rows: Sequence[tuple[str, float, bool]], least_rows: int = 1) -> None:
     position = np.arange(len(rows))
     size = np.asarray([r[1] for r in rows])
     left = min(0.5, 0.8 * float(size.min()))
@@ -270,7 +270,7 @@ def _draw_blocks(axes: Axes, rows: Sequence[tuple[str, float, bool]]) -> None:
     for y, value in zip(position.tolist(), size.tolist(), strict=True):
         axes.text(value, y, f"  {format_number(value, 2)}×", va="center", ha="left", fontsize="small")
     axes.set_yticks(position, [label(r[0]) for r in rows])
-    axes.set_ylim(len(rows) - 0.45, -1.0)
+    axes.set_ylim(max(len(rows), least_rows) - 0.45, -1.0)
     axes.xaxis.set_major_formatter(lambda v, _: format_number(v, 1))
     axes.xaxis.set_minor_formatter("")
     axes.grid(axis="y", visible=False)
@@ -347,7 +347,7 @@ def _draw_probabilities(axes: Axes, diagnosis: Diagnosis) -> None:
     axes.set_yticks(position, [textwrap.shorten(label(name), 34, placeholder=" …") for name, _ in rows])
     axes.set_xlim(0.0, 1.16)
     axes.set_xticks([0.0, 0.5, 1.0])
-    axes.invert_yaxis()
+    axes.set_ylim(max(len(rows), 5) - 0.4, -0.6)
     axes.grid(axis="y", visible=False)
 
 
@@ -425,6 +425,5 @@ def _draw_right(right: Any, diagnosis: Diagnosis) -> None:
             mesh, ax=list(axes), label="mean residual / noise", extend="both", pad=0.02, aspect=28
         )
     elif rows:
-        axes = parts[-1].subplots()
-        _draw_blocks(axes, rows)
+        _draw_blocks(parts[-1].subplots(), rows, least_rows=4)
         _head(parts[-1], "Where the residual is")

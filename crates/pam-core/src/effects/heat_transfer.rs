@@ -4,6 +4,7 @@
 //! `dm/dt = m_in - m_out` and `h = h0 sqrt(p T/(p0 T0))`, in place of the constant polytropic coefficients. The wall stays
 //! at the rest temperature. The gas mass is the state, so that the temperature cannot drift. Wall area: the cylinder
 //! of each muscle's volume and length; the cube of the chamber's volume when it is rigid.
+//! A recording may begin just after a fill: the gas is then warmer than the wall by an initial rise.
 //! Carneiro & de Almeida (2006); Al-Ibrahim & Otis (1992).
 
 use super::EffectInfo;
@@ -15,7 +16,7 @@ use crate::scalar::Scalar;
 pub const INFO: EffectInfo = EffectInfo {
     id: "heat_transfer",
     block: "chamber",
-    parameters: &[("heat_transfer_coefficient", "W/(m2 K)")],
+    parameters: &[("heat_transfer_coefficient", "W/(m2 K)"), ("initial_temperature_rise", "K")],
 };
 
 const REFERENCE_PRESSURE: f64 = 1e5;
@@ -57,9 +58,9 @@ mod tests {
         let gas = Gas::new(101_325.0, 293.15, 287.05, 1.4);
         let state = ChamberState { pressure: 4e5, volume: 1e-3, volume_rate: 1e-4, inflow: 0.0, outflow: 0.0 };
         let adiabatic = pressure_rate(&gas, &state, 293.15, 0.05, 0.0);
-        assert!((adiabatic + 1.4 * 4e5 * 0.1).abs() < 1e-9);
+        assert!((adiabatic + 1.4 * 4e5 * 0.1_f64).abs() < 1e-9);
         let mass = 4e5 * 1e-3 / (287.05 * 293.15);
-        assert!((temperature(&gas, 4e5, 1e-3, mass) - 293.15).abs() < 1e-10);
+        assert!((temperature(&gas, 4e5, 1e-3, mass) - 293.15_f64).abs() < 1e-10);
         assert!(pressure_rate(&gas, &state, 330.0, 0.05, 50.0) < adiabatic, "hot gas cools at the wall");
     }
 }

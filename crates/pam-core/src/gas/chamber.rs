@@ -45,6 +45,6 @@ mod tests {
     fn expansion_of_a_shut_chamber_is_polytropic() {
         let alpha = Polytropic { inflow: 1.4, outflow: 1.0, volume: 1.2 };
         let state = ChamberState { pressure: 3e5, volume: 1e-3, volume_rate: 1e-4, inflow: 0.0, outflow: 0.0 };
-        assert!((pressure_rate(&state, &alpha, 8.4e4) + 1.2 * 3e5 * 0.1).abs() < 1e-9);
+        assert!((pressure_rate(&state, &alpha, 8.4e4) + 1.2 * 3e5 * 0.1_f64).abs() < 1e-9);
     }
 }

@@ -74,6 +74,12 @@ impl Gas {
         }
     }
 
+    /// Choked mass flow [kg/s] through a discharge area [m2] from an upstream absolute pressure [Pa].
+    #[inline]
+    pub fn choked_flow<S: Scalar>(&self, area: S, upstream: S) -> S {
+        area * upstream * (self.psi_choked * self.flow_factor)
+    }
+
     /// Discharge area [m2] that passes the choked flow of a sonic conductance [m3/(s Pa)] (ISO 6358:
     /// `mdot = C rho0 p`, `rho0` at 100 kPa and 293.15 K).
     pub fn area_of_conductance<S: Scalar>(&self, conductance: S) -> S {
@@ -114,6 +120,6 @@ mod tests {
         let gas = air();
         let area = gas.area_of_conductance(2.75e-8);
         let flow = gas.mass_flow(area, 7e5, 1e5);
-        assert!((flow / (2.75e-8 * 1.185 * 7e5) - 1.0).abs() < 1e-12);
+        assert!((flow / (2.75e-8 * 1.185 * 7e5) - 1.0_f64).abs() < 1e-12);
     }
 }

@@ -74,9 +74,9 @@ mod tests {
         let (x, a) = ([0.0, 0.25, 0.5, 0.75, 1.0], [0.0, 0.2, 0.5, 0.8, 1.0]);
         let table = AreaTable::new(&x, &a).unwrap();
         for (x, a) in x.iter().zip(a) {
-            assert!((table.eval(*x) - a).abs() < 1e-15);
+            assert!((table.eval::<f64>(*x) - a).abs() < 1e-15);
         }
-        assert!((table.eval(0.125) - 0.1).abs() < 1e-15);
+        assert!((table.eval::<f64>(0.125) - 0.1).abs() < 1e-15);
         assert!(AreaTable::new(&[0.0, 0.5], &[0.0, 1.0]).is_err());
         assert!(AreaTable::new(&[0.0, 1.0], &[0.5, 0.1]).is_err());
         assert!(AreaTable::new(&[0.0, f64::NAN, 1.0], &[0.0, 0.5, 1.0]).is_err());

@@ -69,7 +69,7 @@ impl TendonJoint {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use num_dual::{DualNum, DualSVec64};
+    use num_dual::{DualSVec64, DualStruct};
 
     #[test]
     fn moment_arm_is_the_derivative_of_the_shortening() {

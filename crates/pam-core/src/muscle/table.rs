@@ -7,6 +7,9 @@
 //! cross a kink of the geometry: pieces end exactly at `e = 0` and where the braid becomes taut.
 //! `volume_slope` is the derivative of the volume's polynomial, so the two never disagree.
 //!
+//! In extension the root of a wide muscle can vanish in a fold before the braid is taut, where the
+//! slopes are unbounded; the table then starts short of the fold.
+//!
 //! Each piece is refined until every column agrees with the exact solve (the slope with the
 //! implicitly differentiated one) at points off the nodes; the largest disagreement found is
 //! [`Table::error_bound`].
@@ -33,6 +36,10 @@ const SLOPE: usize = 4;
 const AIM: f64 = 1e-10;
 /// Cells of one piece at most.
 const MOST_CELLS: usize = 1024;
+/// Where a piece in extension is not smooth up to its far end, the table starts at this fraction
+/// of it, and again, at most [`MOST_CUTS`] times, at last at zero.
+const CUT: f64 = 0.8;
+const MOST_CUTS: u32 = 8;
 /// Check points in a cell, in units of its half-width; none is a node.
 const CHECKS: [f64; 7] = [-0.993, -0.86, -0.41, 0.087, 0.33, 0.71, 0.985];
 /// Volumes below this fraction of the largest are compared with that fraction.
@@ -84,10 +91,17 @@ struct Continuation {
     slope: [f64; COLUMNS],
 }
 
+/// What came of one choice of pieces.
+enum Assembled {
+    Table(Box<Table>),
+    Rough { start: f64, stop: f64, column: usize, error: f64 },
+}
+
 /// A muscle's force coefficients and volume, compiled over contraction.
 #[derive(Debug, Clone)]
 pub struct Table {
-    /// Smallest contraction ratio of the table: the braid's full length.
+    /// Smallest contraction ratio of the table: the braid's full length, or nearer to zero where
+    /// the radius of a wide or thick-walled muscle collapses with an unbounded slope.
     pub e_min: f64,
     /// Largest contraction ratio of the table.
     pub e_max: f64,
@@ -106,22 +120,48 @@ impl Table {
     /// brought below [`TOLERANCE`].
     pub fn compile(geometry: &MuscleGeometry, slope: &[f64], offset: &[f64]) -> Result<Self> {
         let exact = Exact { geometry, slope, offset };
-        let e_min = geometry.range().0;
         let e_max = exact.last_solved()?;
-        let mut ends = vec![e_min];
-        ends.extend(geometry.kinks()?);
-        ends.extend([0.0, e_max]);
-        ends.dedup();
+        let kinks = geometry.kinks()?;
+        let mut e_min = geometry.range().0;
+        let mut cuts = 0;
+        loop {
+            let mut ends = vec![e_min];
+            ends.extend(kinks.iter().filter(|k| **k > e_min));
+            ends.extend([0.0, e_max]);
+            ends.dedup();
+            match Self::assemble(&exact, &ends)? {
+                Assembled::Table(table) => return Ok(*table),
+                Assembled::Rough { start, stop, .. } if stop <= 0.0 && cuts <= MOST_CUTS => {
+                    e_min = if cuts < MOST_CUTS { stop + CUT * (start - stop) } else { 0.0 };
+                    cuts += 1;
+                }
+                Assembled::Rough { column, error, .. } => {
+                    return Err(Error::Model(format!(
+                        "muscle: the table of {} reaches a relative error of {error:.1e} only, {TOLERANCE:.0e} \
+                         is needed: the geometry of this muscle is not smooth enough between its kinks",
+                        NAMES[column]
+                    )));
+                }
+            }
+        }
+    }
 
+    /// The table whose smooth pieces end at `ends`, or the first piece that is not smooth enough.
+    fn assemble(exact: &Exact, ends: &[f64]) -> Result<Assembled> {
+        let (e_min, e_max) = (ends[0], ends[ends.len() - 1]);
         let scales = exact.scales(e_min, e_max)?;
         let (mut pieces, mut cells) = (Vec::new(), Vec::new());
         let mut errors = [0.0_f64; COLUMNS];
-        for pair in ends.windows(2) {
+        for pair in ends.windows(2).rev() {
             let (start, stop) = (pair[0], pair[1]);
             let (fitted, found) = exact.refine(start, stop, &scales)?;
-            for (error, new) in errors.iter_mut().zip(found) {
-                *error = error.max(new);
+            for (column, error) in found.into_iter().enumerate() {
+                if error.is_nan() || error > TOLERANCE {
+                    return Ok(Assembled::Rough { start, stop, column, error });
+                }
+                errors[column] = errors[column].max(error);
             }
+            // In the order of use: contraction first.
             pieces.push(Piece {
                 start,
                 cells_per_unit: fitted.len() as f64 / (stop - start),
@@ -130,20 +170,11 @@ impl Table {
             });
             cells.extend(fitted);
         }
-        if let Some(column) = (0..COLUMNS).find(|c| errors[*c].is_nan() || errors[*c] > TOLERANCE) {
-            return Err(Error::Model(format!(
-                "muscle: the table of {} reaches a relative error of {:.1e} only, {TOLERANCE:.0e} is needed: \
-                 the geometry of this muscle is not smooth enough between its kinks",
-                NAMES[column], errors[column]
-            )));
-        }
-        // In the order of frequency: contraction first.
-        pieces.reverse();
         let idle = Continuation { value: [0.0; COLUMNS], slope: [0.0; COLUMNS] };
         let mut table = Self { e_min, e_max, pieces, cells, below: idle, above: idle, errors };
         table.below = table.continuation(e_min);
         table.above = table.continuation(e_max);
-        Ok(table)
+        Ok(Assembled::Table(Box::new(table)))
     }
 
     /// Every column at contraction ratio `e`, with derivatives when `S` carries them.
@@ -170,7 +201,8 @@ impl Table {
     }
 
     /// Largest error found against the exact solve: relative to the largest magnitude of the
-    /// column over the table, for the volume relative to its own value.
+    /// column over the table, for the volume relative to its own value (below a thousandth of the
+    /// largest volume: to that thousandth).
     #[must_use]
     pub fn error_bound(&self) -> f64 {
         self.errors.iter().copied().fold(0.0, f64::max)
@@ -332,8 +364,8 @@ impl Exact<'_> {
             .ok_or_else(|| Error::Model("muscle: no table could be fitted".into()))
     }
 
-    /// `count` cells over a piece, the error of each column and the largest of them. Gives up at
-    /// the first cell that is hopeless unless no finer division is allowed.
+    /// `count` cells over a piece, the error of each column and the largest of them; stops at the
+    /// first cell that is far from [`TOLERANCE`].
     fn fit(
         &self,
         start: f64,
@@ -366,8 +398,7 @@ impl Exact<'_> {
                 }
             }
             cells.push(cell);
-            let hopeless = errors.iter().any(|e| e.is_nan() || *e > 1e3 * TOLERANCE);
-            if hopeless && 2 * count <= MOST_CELLS {
+            if errors.iter().any(|e| e.is_nan() || *e > 1e3 * TOLERANCE) {
                 break;
             }
         }
@@ -502,6 +533,22 @@ mod tests {
                 assert!((point.a_gas.eps / exact.a_gas.eps - 1.0).abs() < 1e-5, "{e}");
                 assert!((point.b_elastic.eps / exact.b_elastic.eps - 1.0).abs() < 1e-5, "{e}");
             }
+        }
+    }
+
+    #[test]
+    fn wide_muscles_compile_short_of_their_fold() {
+        for (angle, diameter, wall) in
+            [(80.0_f64, 0.0375, 0.003), (84.0, 0.025, 0.0025), (78.0, 0.0508, 0.004)]
+        {
+            let mut spec = shoulder();
+            (spec.rest_length, spec.rest_diameter) = (0.25, diameter);
+            (spec.braid_angle, spec.wall_thickness) = (angle.to_radians(), wall);
+            let muscle = Muscle::new(&spec).unwrap();
+            assert!(muscle.table.error_bound() <= TOLERANCE);
+            assert!(muscle.table.e_min >= muscle.geometry.range().0 && muscle.table.contains(0.0));
+            let point: TablePoint = muscle.table.eval(muscle.table.e_min - 1e-3);
+            assert!(point.volume.is_finite());
         }
     }
 

@@ -186,6 +186,16 @@ impl<'a, S: Scalar> Plant<'a, S> {
         state[PRESSURE] * volume / (self.rig.gas.gas_constant * self.rig.gas.temperature)
     }
 
+    /// Gas mass [kg] of a state at the start of a recording: at rest temperature plus the initial rise.
+    pub fn initial_mass(&self, state: &State<S>) -> S {
+        let rest = self.rest_mass(state);
+        if !self.rig.active.heat {
+            return rest;
+        }
+        let temperature = self.rig.gas.temperature;
+        rest * temperature / (self.values[P::InitialTemperatureRise] + temperature)
+    }
+
     /// Time derivative of the state; entries of driven states are zero.
     #[inline]
     pub fn rates(
@@ -233,7 +243,7 @@ impl<'a, S: Scalar> Plant<'a, S> {
             return;
         }
         if self.rig.active.leak {
-            outflow += leak_muscle::mass_flow(gas, self.values[P::LeakConductance], pressure);
+            outflow += leak_muscle::mass_flow(gas, self.values[P::LeakConductance], self.values[P::LeakLaminarShare], pressure);
         }
         let chamber = ChamberState { pressure, volume: m.volume, volume_rate: m.volume_rate, inflow, outflow };
         if self.rig.active.heat {

@@ -1,0 +1,1 @@
+"""Speed of the package beside its reference, in one run on one machine."""

@@ -1,0 +1,147 @@
+"""Side-by-side times: the package and the plain SciPy reference do the same work, one after the other.
+
+The reference is written for clarity, point by point in Python; it is a yardstick, not a rival. Ratios carry
+from machine to machine, seconds do not. Every line also says how far the two results are apart, since a fast
+wrong answer is worth nothing. Run with ``make bench``; names as arguments choose some of the lines.
+"""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+import pamrs
+from tests.reference import plant as reference
+
+ROOT = Path(__file__).parents[1]
+AMBIENT = 101325.0
+
+
+def best_of(work: Callable[[], object], seconds: float = 1.0, most: int = 50) -> float:
+    """Shortest time of one call [s], from as many calls as fit into some seconds."""
+    times: list[float] = []
+    stop = time.perf_counter() + seconds
+    while len(times) < 1 or (time.perf_counter() < stop and len(times) < most):
+        start = time.perf_counter()
+        work()
+        times.append(time.perf_counter() - start)
+    return min(times)
+
+
+def show(name: str, ours: float, theirs: float, apart: str) -> None:
+    """One line of the table."""
+    print(f"{name:<34} {ours * 1e3:>11.4g} ms {theirs * 1e3:>11.4g} ms {theirs / ours:>9.3g} x   {apart}")
+
+
+def simulation() -> None:
+    """Two seconds of the shoulder: fixed-step core against adaptive eighth-order SciPy."""
+    rig, peer = pamrs.rigs.shoulder(), reference.shoulder()
+    command = 5.0 + 1.5 * np.sin(2.0 * np.pi * 0.8 * 0.005 * np.arange(401))
+    supply = rig.model["supply"]["initial_pressure"] + AMBIENT
+    angle = rig.model["joint"]["rest_angle"]
+    start = {"muscle_pressure": AMBIENT, "supply_pressure": supply, "joint_angle": angle, "joint_rate": 0.0}
+
+    ours = pamrs.simulate(rig, command, sample_time=0.005)
+    for rtol in (1e-6, 1e-10):
+        peer.simulate(command[:2], 0.005, start, rtol=rtol)  # builds the reference's table outside the clock
+        theirs = peer.simulate(command, 0.005, start, rtol=rtol)
+        pressure = np.abs(ours["muscle_pressure"] + AMBIENT - theirs.muscle_pressure).max()
+        turned = np.degrees(np.abs(ours["joint_angle"] - theirs.joint_angle).max())
+        show(
+            f"simulate 2 s, solve_ivp rtol {rtol:g}",
+            best_of(lambda: pamrs.simulate(rig, command, sample_time=0.005)),
+            best_of(lambda rtol=rtol: peer.simulate(command, 0.005, start, rtol=rtol), 0.0),
+            f"max {pressure:.2g} Pa, {turned:.2g} deg apart",
+        )
+
+
+def force() -> None:
+    """Force of one muscle at many lengths and pressures: exact, then from the table."""
+    muscle, peer = pamrs.rigs.shoulder().muscle, reference.shoulder().muscle
+    if muscle is None:
+        raise SystemExit("the shoulder has no muscle")
+    generator = np.random.default_rng(1)
+    low, high = peer.geometry.max_contraction * 0.02, peer.geometry.max_contraction * 0.9
+    contraction = generator.uniform(low, high, 200)
+    pressure = generator.uniform(1e5, 6e5, 200)
+
+    def plain() -> np.ndarray:
+        rows = [peer.coefficients(e) for e in contraction]
+        return np.array(
+            [
+                p * gas + peer.modulus_scale * (p * elastic + fixed)
+                for p, (gas, elastic, fixed) in zip(pressure, rows, strict=True)
+            ]
+        )
+
+    theirs = best_of(plain)
+    expected = plain()
+    for name, function in (
+        ("force exact, 200 points", muscle.force),
+        ("force table, 200 points", muscle.force_table),
+    ):
+        apart = np.abs(function(pressure, contraction) - expected).max() / np.abs(expected).max()
+        show(
+            name,
+            best_of(lambda f=function: f(pressure, contraction), most=2000),
+            theirs,
+            f"max {apart:.2g} of full scale apart",
+        )
+
+
+def diagnosis() -> None:
+    """One diagnosis of a shoulder with a concealed leak, five recordings of 40 s at 200 Hz."""
+    with tempfile.TemporaryDirectory() as folder:
+        make = [
+            "make",
+            "--kind",
+            "leak_muscle",
+            "--seed",
+            "7",
+            "--out",
+            f"{folder}/cases",
+            "--keys-dir",
+            f"{folder}/keys",
+        ]
+        subprocess.run([sys.executable, "-m", "trial", *make], cwd=ROOT, check=True, capture_output=True)
+        case = pamrs.load_case(Path(folder) / "cases" / "case_001")
+        start = time.perf_counter()
+        result = pamrs.diagnose(case)
+        seconds = time.perf_counter() - start
+    named = " + ".join(str(effect["id"]) for effect in result.effects)
+    print(f"{'diagnose 5 recordings of 40 s':<34} {seconds:>11.3g} s    verdict: {result.verdict} {named}")
+
+
+def start_up() -> None:
+    """Time that importing the package and then the command line takes, in a fresh interpreter."""
+    code = "import time; s = time.perf_counter(); import {}; print(time.perf_counter() - s)"
+    for module in ("pamrs", "pamrs.cli"):
+        words = [sys.executable, "-c", code.format(module)]
+        runs = [subprocess.run(words, check=True, capture_output=True, text=True) for _ in range(5)]
+        print(f"{'import ' + module:<34} {min(float(run.stdout) for run in runs) * 1e3:>11.3g} ms")
+
+
+BENCHMARKS = {"import": start_up, "force": force, "simulate": simulation, "diagnose": diagnosis}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="Times of pamrs beside its SciPy reference.")
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"all, or some of {list(BENCHMARKS)}")
+    names = parser.parse_args().names or list(BENCHMARKS)
+    unknown = [name for name in names if name not in BENCHMARKS]
+    if unknown:
+        parser.error(f"unknown benchmark {unknown[0]!r}; there are {', '.join(BENCHMARKS)}")
+    print(f"{'':<34} {'pamrs':>14} {'reference':>14} {'ratio':>11}")
+    for name in names:
+        BENCHMARKS[name]()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,312 @@
+"""From fitted hypotheses to a verdict: probabilities, model, traces, words."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import Any
+
+import numpy as np
+
+from pamrs.case import Case
+from pamrs.diagnosis import words
+from pamrs.diagnosis.conditions import Picture, describe
+from pamrs.diagnosis.evidence import Floor
+from pamrs.diagnosis.fitting import Key, Problem, residuals
+from pamrs.diagnosis.hypotheses import Candidate, Group
+from pamrs.diagnosis.result import Diagnosis, Trace
+from pamrs.effects_table import EFFECTS
+from pamrs.rig import Rig
+
+__all__ = ["assemble"]
+
+SYMPTOM = 3.5
+"""Tolerances beyond which a refitted parameter is a symptom of missing physics, not a result."""
+SETTLED = 0.9
+"""Probability from which an answer counts as settled."""
+CHANNEL_UNITS = {"supply_pressure": "Pa", "muscle_pressure": "Pa", "joint_angle": "rad"}
+
+
+def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) -> Diagnosis:
+    """Build the diagnosis from the groups of blocks.
+
+    Parameters
+    ----------
+    case : Case
+        The case.
+    fitted, held : Problem
+        Recordings to fit and held-out ones (the same object when there are no others).
+    groups : list of Group
+        Gas blocks and arm, examined.
+    """
+    nominal = case.rig
+    baseline = _merged(nominal, [g.candidates[0] for g in groups])
+    chosen = [g.best if _named(g) else g.candidates[0] for g in groups]
+    model = _merged(nominal, chosen)
+    probabilities, symptoms = _probabilities(groups)
+    top = max(probabilities, key=lambda k: probabilities[k])
+    verdict = top if top in ("none", "parameters", "unlisted") else "effects"
+    named = [e for c in chosen for e in c.effects]
+    if verdict in ("none", "parameters"):
+        model = nominal if verdict == "none" else baseline
+        named = []
+    elif verdict == "unlisted":
+        # the most probable catalogue effects stay in the list with their (small) probability, not in the model
+        model = baseline
+    floor = {k: v for g in groups for k, v in g.floor.items()}
+    stages = {"before": nominal, "refit": baseline, "after": model}
+    fit_found = {s: residuals(fitted, rig) for s, rig in stages.items()}
+    out_found = fit_found if held is fitted else {s: residuals(held, rig) for s, rig in stages.items()}
+    located = _located(groups, symptoms)
+    picture = Picture()
+    if located is not None:
+        block = next(b for b in fitted.blocks if b.name == located)
+        picture = describe(block, fitted.recordings, nominal, fit_found["refit"], fit_found["after"], floor)
+    fit_table = _table(fitted, fit_found, floor)
+    held_table = _table(held, out_found, floor) if held is not fitted else {}
+    gap = _gap(held_table or fit_table)
+    effects = _effects(groups, probabilities, model if verdict == "effects" else None)
+    ambiguity = _ambiguity(probabilities)
+    parameters = _parameters(nominal, [c for c in (chosen if verdict == "effects" else [g.candidates[0] for g in groups])])
+    where = words.where(located, fitted, groups, picture)
+    diagnosis = Diagnosis(
+        case=case.name,
+        verdict=verdict,
+        where=where,
+        effects=effects,
+        ambiguity=ambiguity,
+        probabilities=probabilities,
+        parameters=parameters,
+        fit={"channels": fit_table, "held_out": held_table, "gap_closed": gap if verdict == "effects" else None},
+        next_experiment=words.next_experiment(verdict, probabilities, ambiguity, nominal),
+        warnings=words.warnings(case, groups, symptoms, held is fitted),
+        rig=_with_std(model, chosen) if verdict == "effects" else model,
+        traces=_traces(fitted, held, fit_found, out_found),
+        blocks=_block_table(groups),
+        condition_map=picture.map,
+    )
+    diagnosis.text = words.verdict(diagnosis, named, case, gap)
+    return diagnosis
+
+
+def _named(group: Group) -> bool:
+    return group.mismatch is not None and group.probabilities.get("unlisted", 0.0) < max(
+        (p for k, p in group.probabilities.items() if k != "unlisted"), default=0.0
+    )
+
+
+def _merged(nominal: Rig, candidates: list[Candidate]) -> Rig:
+    """One rig from the groups' fits: the arm, judged last, settles the sensors' zeros."""
+    values: dict[str, float] = {}
+    rig = nominal
+    for candidate in candidates:
+        values |= {n: v for n, v in candidate.fit.values.items() if n in nominal.parameters}
+        for effect in candidate.fit.rig.effects:
+            rig = rig.with_effect(effect["id"], effect["parameters"])
+    return rig.with_parameters(values)
+
+
+def _with_std(rig: Rig, candidates: list[Candidate]) -> Rig:
+    for candidate in candidates:
+        for effect in candidate.fit.rig.effects:
+            own = effect["id"] + "."
+            std = {n.removeprefix(own): s for n, s in candidate.fit.std.items() if n.startswith(own)}
+            rig = rig.with_effect(effect["id"], effect["parameters"], std=std)
+    return rig
+
+
+def _probabilities(groups: list[Group]) -> tuple[dict[str, float], dict[str, float]]:
+    """Joint probabilities over all hypotheses, and parameters that left their plausible range."""
+    quiet = all(g.mismatch is None for g in groups)
+    moved = {n: v for g in groups for n, v in g.candidates[0].fit.moved.items()}
+    symptoms = {n: v for n, v in moved.items() if abs(v) >= SYMPTOM}
+    out: dict[str, float] = {"none": 0.0, "parameters": 0.0, "unlisted": 0.0}
+    if quiet:
+        shifted = any(e.ratio > 1.6 and e.p_value < 0.01 for g in groups for e in g.nominal.values())
+        if symptoms:
+            worst = max(abs(v) for v in symptoms.values())
+            out["unlisted"] = min(0.95, 0.5 + 0.25 * (worst - SYMPTOM))
+            out["parameters"] = 1.0 - out["unlisted"]
+        else:
+            out["parameters" if shifted else "none"] = 0.96
+            out["none" if shifted else "parameters"] = 0.03
+            out["unlisted"] = 0.01
+        return out, symptoms
+    for choice in itertools.product(*(g.probabilities.items() for g in groups)):
+        weight = math.prod(p for _, p in choice)
+        names = [n for n, _ in choice if n]
+        key = "unlisted" if "unlisted" in names else "+".join(sorted(n for k in names for n in k.split("+")))
+        out[key] = out.get(key, 0.0) + weight
+    # a mismatch this significant leaves next to nothing for wrong parameters
+    rest = 0.005
+    out = {k: p * (1.0 - rest) for k, p in out.items()}
+    out["parameters"] += rest
+    return out, symptoms
+
+
+def _located(groups: list[Group], symptoms: dict[str, float]) -> str | None:
+    found = [(g.candidates[0].held_out[g.mismatch.name].ratio, g.mismatch.name) for g in groups if g.mismatch]
+    if found:
+        return max(found)[1]
+    if symptoms:
+        worst = max(symptoms, key=lambda n: abs(symptoms[n]))
+        for group in groups:
+            for block in reversed(group.blocks):
+                if worst in block.parameters:
+                    return block.name
+    return None
+
+
+def _table(problem: Problem, found: dict[str, dict[Key, Any]], floor: dict[Key, Floor]) -> dict[str, dict[str, float]]:
+    out = {}
+    for block in problem.blocks:
+        entry = {}
+        noise, weights = [], []
+        for prepared in problem.recordings:
+            noise.append(floor[block.name, prepared.recording.name].sample ** 2)
+            weights.append(max(1, int(found["refit"][block.name, prepared.recording.name].rows.sum())))
+        entry["noise"] = math.sqrt(float(np.average(noise, weights=weights)))
+        for stage in ("before", "refit", "after"):
+            squares = []
+            for prepared in problem.recordings:
+                r = found[stage][block.name, prepared.recording.name]
+                squares.append(float(np.mean(r.value[r.rows] ** 2)) if r.rows.any() else 0.0)
+            entry[stage] = math.sqrt(float(np.average(squares, weights=weights)))
+        out[block.channel] = entry
+    return out
+
+
+def _gap(table: dict[str, dict[str, float]]) -> float | None:
+    """(refit - after)/(refit - noise), pooled over channels in units of their noise."""
+    refit = sum(e["refit"] / e["noise"] for e in table.values())
+    after = sum(e["after"] / e["noise"] for e in table.values())
+    room = refit - len(table)
+    return None if room < 0.05 else max(0.0, min(1.0, (refit - after) / room))
+
+
+def _effects(groups: list[Group], probabilities: dict[str, float], model: Rig | None) -> list[dict[str, Any]]:
+    """Effects by their marginal probability, with parameters of the best set that has them."""
+    marginal: dict[str, float] = {}
+    for key, p in probabilities.items():
+        for effect in key.split("+"):
+            if effect in EFFECTS:
+                marginal[effect] = marginal.get(effect, 0.0) + p
+    chosen = {e["id"] for e in model.effects} if model is not None else set()
+    out = []
+    for effect, p in sorted(marginal.items(), key=lambda kv: -kv[1]):
+        if effect not in chosen and p < 0.05:
+            continue
+        candidates = [c for g in groups for c in g.candidates if effect in c.effects]
+        best = max(candidates, key=lambda c: (effect in chosen and c is _best_of(groups, c), c.gap_closed))
+        out.append(
+            {
+                "id": effect,
+                "name": EFFECTS[effect].name,
+                "probability": min(1.0, p),
+                "parameters": _effect_parameters(effect, best),
+            }
+        )
+    return out
+
+
+def _best_of(groups: list[Group], candidate: Candidate) -> Candidate | None:
+    return next((g.best for g in groups if candidate in g.candidates), None)
+
+
+def _effect_parameters(effect: str, candidate: Candidate) -> dict[str, Any]:
+    rig = candidate.fit.rig
+    unknown_volume = not rig.parameter("chamber.dead_volume").known
+    out: dict[str, Any] = {}
+    for parameter in EFFECTS[effect].parameters:
+        name = f"{effect}.{parameter.name}"
+        if parameter.name == "laminar_share":
+            chosen = next(e["parameters"] for e in rig.effects if e["id"] == effect)["laminar_share"]
+            out[parameter.name] = {"value": chosen, "std": None, "unit": "1"}
+            continue
+        if name not in candidate.fit.values:
+            continue
+        value, std = candidate.fit.values[name], candidate.fit.std[name]
+        out[parameter.name] = _entry(value, std, parameter.unit, not unknown_volume and std < max(value, 1e-300))
+    if effect == "leak_muscle" and rig.model["valve"] is None:
+        gas, chamber = rig.model["gas"], rig.model["chamber"]
+        value, std = candidate.fit.values["leak_muscle.conductance"], candidate.fit.std["leak_muscle.conductance"]
+        relative = std / value if value > 0 else math.inf
+        volume = chamber["dead_volume"]
+        rt = gas["gas_constant"] * gas["temperature"]
+        tau = volume / (value * 1.185 * rt * chamber["alpha_out"]) if value > 0 else math.inf
+        out["time_constant"] = _entry(tau, tau * relative, "s", True)
+        out["conductance_per_volume"] = _entry(value / volume, std / volume, "1/(s Pa)", True)
+    return out
+
+
+def _entry(value: float, std: float, unit: str, identifiable: bool) -> dict[str, Any]:
+    return {
+        "value": value,
+        "std": std,
+        "unit": unit,
+        "interval": [max(0.0, value - 1.96 * std), value + 1.96 * std],
+        "identifiable": identifiable,
+    }
+
+
+def _ambiguity(probabilities: dict[str, float]) -> list[list[str]]:
+    top = max(probabilities.values())
+    if top >= SETTLED:
+        return []
+    return [sorted(k.split("+")) for k, p in sorted(probabilities.items(), key=lambda kv: -kv[1]) if p >= 0.05]
+
+
+def _parameters(nominal: Rig, candidates: list[Candidate]) -> dict[str, dict[str, Any]]:
+    out: dict[str, dict[str, Any]] = {}
+    for candidate in candidates:
+        for name, moved in candidate.fit.moved.items():
+            p = nominal.parameter(name)
+            std = candidate.fit.std[name]
+            out[name] = {
+                "nominal": p.value,
+                "value": candidate.fit.values[name],
+                "std": std,
+                "unit": p.unit,
+                "moved_sigmas": moved,
+                "identifiable": std < 0.7 * p.tol,
+            }
+    return out
+
+
+def _block_table(groups: list[Group]) -> dict[str, dict[str, Any]]:
+    out: dict[str, dict[str, Any]] = {}
+    for group in groups:
+        for block in group.blocks:
+            found = group.baseline[block.name]
+            out[block.name] = {
+                "rms": found.rms,
+                "noise": found.noise,
+                "excess": found.systematic,
+                "p_value": found.p_value,
+                "channel": block.channel,
+            }
+    return out
+
+
+def _traces(fitted: Problem, held: Problem, inner: dict[str, Any], outer: dict[str, Any]) -> list[Trace]:
+    traces = []
+    for problem, found in ((fitted, inner), (held, outer)):
+        if problem is held and held is fitted:
+            break
+        for prepared in problem.recordings:
+            for block in problem.blocks:
+                stages = {s: found[s][block.name, prepared.recording.name] for s in ("before", "refit", "after")}
+                shown = {s: np.where(r.rows, r.prediction, np.nan) for s, r in stages.items()}
+                recording = prepared.recording
+                traces.append(
+                    Trace(
+                        recording.name,
+                        recording.role,
+                        block.channel,
+                        CHANNEL_UNITS[block.channel],
+                        recording.time,
+                        recording.channels[block.channel],
+                        **shown,
+                    )
+                )
+    return traces

@@ -1,0 +1,177 @@
+"""How much of a block's residual is more than noise: floors, excess, coloured-residual statistics."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import savgol_filter
+from scipy.stats import chi2
+
+from pamrs import _core
+from pamrs.diagnosis.blocks import Block, Residual, residual
+from pamrs.diagnosis.fitting import Key, Problem, bin_width
+from pamrs.diagnosis.signals import SMOOTHING_TIME, Prepared, binned
+
+__all__ = ["Excess", "Floor", "excess", "floors", "inflation"]
+
+Array = NDArray[np.float64]
+
+BIN = 0.1
+"""Width of the bins in which an excess is looked for [s]; at least five samples."""
+MARGIN = 1.25
+"""Factor by which the variance must exceed its floor before it counts: floors are estimates."""
+REPLICATES = 3
+"""Synthetic noise realisations for the part of a floor that the drives bring."""
+
+
+@dataclass(frozen=True)
+class Floor:
+    """What noise alone leaves in a block's residual over one recording.
+
+    Attributes
+    ----------
+    sample : float
+        Standard deviation of single samples: the output's own noise and that of the drives.
+    binned : float
+        Standard deviation of bin means.
+    """
+
+    sample: float
+    binned: float
+
+
+@dataclass(frozen=True)
+class Excess:
+    """Residual of a block against its floor, pooled over recordings.
+
+    Attributes
+    ----------
+    ratio : float
+        Variance of bin means over that of the floor; 1 when only noise is left.
+    systematic : float
+        Standard deviation of what is not noise, in units of the noise.
+    p_value : float
+        Chance of such a ratio (above the margin) from noise, on the effective number of bins.
+    rms, noise : float
+        Residual and floor of single samples, in the channel's unit.
+    """
+
+    ratio: float
+    systematic: float
+    p_value: float
+    rms: float
+    noise: float
+
+
+def bins_of(prepared: Prepared) -> int:
+    """Samples in a bin for the excess."""
+    return max(5, bin_width(prepared, BIN))
+
+
+def floors(problem: Problem, core: _core.Rig) -> dict[Key, Floor]:
+    """Floors of all blocks and recordings, the drives' noise carried through the model by simulation.
+
+    Parameters
+    ----------
+    problem : Problem
+        Blocks and recordings.
+    core : _core.Rig
+        A model close to the data.
+    """
+    found = {}
+    for prepared in problem.recordings:
+        rng = np.random.default_rng(20140501 + prepared.n)
+        for block in problem.blocks:
+            base = residual(block, core, prepared, [])
+            width = bins_of(prepared)
+            sample = mean = 0.0
+            noisy = [name for name in block.drives if name in prepared.signals]
+            replicates = REPLICATES if noisy else 0
+            for _ in range(replicates):
+                change = residual(block, core, _shaken(prepared, noisy, rng), []).value - base.value
+                rows = base.rows
+                sample += float(np.mean(change[rows] ** 2)) / replicates if rows.any() else 0.0
+                means, counts = binned(change, rows, width)
+                mean += float(np.mean(means[counts > 0] ** 2)) / replicates if (counts > 0).any() else 0.0
+            _, counts = binned(base.value, base.rows, width)
+            white = float(np.mean(1.0 / counts[counts > 0])) if (counts > 0).any() else 1.0
+            found[block.name, prepared.recording.name] = Floor(
+                math.sqrt(base.noise**2 + sample), math.sqrt(base.noise**2 * white + mean)
+            )
+    return found
+
+
+def _shaken(prepared: Prepared, names: Iterable[str], rng: np.random.Generator) -> Prepared:
+    """The recording with one more realisation of noise, as smoothed, on some drives."""
+    signals = dict(prepared.signals)
+    length = max(7, round(SMOOTHING_TIME / prepared.dt) | 1)
+    for name in names:
+        raw = rng.normal(0.0, prepared.noise[name], prepared.n)
+        value, slope = signals[name]
+        signals[name] = (
+            value + savgol_filter(raw, length, 3),
+            slope + savgol_filter(raw, length, 3, deriv=1, delta=prepared.dt),
+        )
+    return Prepared(prepared.recording, prepared.command, signals, prepared.noise)
+
+
+def correlation_time(values: Array) -> float:
+    """Integrated autocorrelation time of a series in samples (at least 1), by the first negative lag."""
+    centred = values - values.mean()
+    power = float(centred @ centred)
+    if values.size < 4 or power <= 0:
+        return 1.0
+    spectrum = np.fft.rfft(centred, 2 * values.size)
+    rho = np.fft.irfft(np.abs(spectrum) ** 2)[: values.size // 2] / power
+    negative = np.flatnonzero(rho <= 0)
+    stop = int(negative[0]) if negative.size else rho.size
+    return max(1.0, 1.0 + 2.0 * float(rho[1:stop].sum()))
+
+
+def excess(
+    block: Block, recordings: list[Prepared], found: dict[Key, Residual], floor: dict[Key, Floor]
+) -> Excess:
+    """Pool a block's residual over recordings and compare it with its floor."""
+    ratios, weights, squares, noises, effective = [], [], [], [], 0.0
+    for prepared in recordings:
+        key = (block.name, prepared.recording.name)
+        r = found[key]
+        means, counts = binned(r.value, r.rows, bins_of(prepared))
+        means = means[counts > 0]
+        if means.size == 0:
+            continue
+        ratios.append(float(np.mean(means**2)) / floor[key].binned ** 2)
+        weights.append(means.size)
+        squares.append(float(np.mean(r.value[r.rows] ** 2)))
+        noises.append(floor[key].sample ** 2)
+        effective += means.size / correlation_time(means)
+    if not ratios:
+        return Excess(1.0, 0.0, 1.0, float("nan"), float("nan"))
+    ratio = float(np.average(ratios, weights=weights))
+    share = float(np.average([floor[block.name, p.recording.name].binned ** 2 / floor[block.name, p.recording.name].sample ** 2 for p in recordings]))  # fmt: skip
+    p_value = float(chi2.sf(ratio / MARGIN * effective, max(1.0, effective)))
+    return Excess(
+        ratio,
+        math.sqrt(max(0.0, (ratio - 1.0) * share)),
+        p_value,
+        math.sqrt(float(np.average(squares, weights=weights))),
+        math.sqrt(float(np.average(noises, weights=weights))),
+    )
+
+
+def inflation(
+    block: Block, recordings: list[Prepared], found: dict[Key, Residual], width: float
+) -> float:
+    """Variance of a block's bin means relative to white sample noise, times their correlation time (>= 1)."""
+    values = []
+    for prepared in recordings:
+        r = found[block.name, prepared.recording.name]
+        means, counts = binned(r.value, r.rows, bin_width(prepared, width))
+        scaled = (means * np.sqrt(counts))[counts > 0] / r.noise
+        if scaled.size:
+            values.append(float(np.mean(scaled**2)) * correlation_time(scaled))
+    return max(1.0, float(np.mean(values))) if values else 1.0

@@ -1,0 +1,286 @@
+"""Joint fit of all blocks to all recordings: parameters inside their tolerances, effects from several starts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from pamrs import _core
+from pamrs.diagnosis.blocks import Block, Residual, residual
+from pamrs.diagnosis.signals import Prepared, binned
+from pamrs.effects_table import EFFECTS
+from pamrs.errors import SimulationError
+from pamrs.rig import Rig
+
+__all__ = ["Fit", "Problem", "fit", "residuals"]
+
+Array = NDArray[np.float64]
+Key = tuple[str, str]
+"""Block and recording."""
+
+LOGARITHMIC = frozenset({"heat_transfer.heat_transfer_coefficient", "muscle_hysteresis.presliding"})
+FIT_BIN = 0.02
+"""Width of the bins over which residuals are averaged for fitting [s]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Blocks and recordings to be explained together.
+
+    Attributes
+    ----------
+    blocks : list of Block
+        Blocks that the channels can tell apart.
+    recordings : list of Prepared
+        Recordings.
+    core : _core.Rig
+        The nominal rig, compiled; others are made from it.
+    """
+
+    blocks: list[Block]
+    recordings: list[Prepared]
+    core: _core.Rig
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A model fitted to a problem.
+
+    Attributes
+    ----------
+    effects : tuple of str
+        Effects in the model.
+    rig : Rig
+        The model.
+    values, std : dict of str to float
+        Free parameters and their standard deviations, SI; effects' parameters included.
+    covariance : (k, k) array
+        Of the scaled free parameters.
+    cost : float
+        Half the weighted sum of squares, priors included.
+    residuals : dict
+        Residual by block and recording.
+    moved : dict of str to float
+        Distance of each baseline parameter from nominal in tolerances.
+    evaluations : int
+        Number of evaluations.
+    """
+
+    effects: tuple[str, ...]
+    rig: Rig
+    values: dict[str, float]
+    std: dict[str, float]
+    covariance: Array
+    cost: float
+    residuals: dict[Key, Residual]
+    moved: dict[str, float] = field(default_factory=dict)
+    evaluations: int = 0
+
+
+def residuals(problem: Problem, rig: Rig, names: Sequence[str] = ()) -> dict[Key, Residual]:
+    """Residuals of a model for every block and recording; jacobians for the names that a block depends on."""
+    core = problem.core.respecified(rig.to_json())
+    tasks = [(block, prepared) for prepared in problem.recordings for block in problem.blocks]
+
+    def one(task: tuple[Block, Prepared]) -> Residual:
+        block, prepared = task
+        relevant = [name for name in names if depends(block, name)]
+        found = residual(block, core, prepared, relevant)
+        if found.jacobian is None or len(relevant) == len(names):
+            return found
+        full = np.zeros((found.value.size, len(names)))
+        for column, name in enumerate(relevant):
+            full[:, list(names).index(name)] = found.jacobian[:, column]
+        return Residual(found.value, full, found.prediction, found.rows, found.noise)
+
+    with ThreadPoolExecutor(max_workers=2) as pool:
+        found = list(pool.map(one, tasks))
+    return {(b.name, p.recording.name): r for (b, p), r in zip(tasks, found, strict=True)}
+
+
+def depends(block: Block, name: str) -> bool:
+    """Whether a block's output depends on a parameter."""
+    effect = name.partition(".")[0]
+    if effect in EFFECTS:
+        return acts_in(effect, block)
+    return name in block.parameters
+
+
+def acts_in(effect: str, block: Block) -> bool:
+    """Whether an effect acts inside a block of the cut chain."""
+    home = EFFECTS[effect].block
+    return block.name == {"muscle": "arm", "joint": "arm"}.get(home, home)
+
+
+def free_baseline(problem: Problem, nominal: Rig) -> list[str]:
+    """Baseline parameters with a finite tolerance that some block depends on."""
+    differentiable = set(_core.parameter_names())
+    return [
+        name
+        for name, parameter in nominal.parameters.items()
+        if name in differentiable
+        and 0.0 < parameter.tol < math.inf
+        and any(name in block.parameters for block in problem.blocks)
+    ]
+
+
+class _Scaling:
+    """Free parameters as numbers of order one: tolerances for the baseline, starts or logarithms for effects."""
+
+    def __init__(self, nominal: Rig, baseline: Sequence[str], starts: dict[str, float]) -> None:
+        self.names = [*baseline, *starts]
+        self.nominal, self.baseline, self.starts = nominal, list(baseline), dict(starts)
+        known = nominal.parameters
+        self.scale = {n: known[n].tol for n in baseline}
+        self.centre = {n: known[n].value for n in baseline}
+        lower = [max(-6.0, (known[n].lower - self.centre[n]) / self.scale[n]) for n in baseline]
+        upper = [min(6.0, (known[n].upper - self.centre[n]) / self.scale[n]) for n in baseline]
+        for name, start in starts.items():
+            info = _parameter(name)
+            if name in LOGARITHMIC:
+                lower.append(math.log(max(info.lower, start * 1e-3) / start))
+                upper.append(math.log(min(info.upper, start * 1e3) / start))
+            else:
+                self.scale[name] = start if start > 0 else 10.0
+                lower.append(info.lower / self.scale[name])
+                upper.append(info.upper / self.scale[name])
+        self.bounds = (np.array(lower), np.array(upper))
+        self.start = np.array([0.0] * len(self.baseline) + [0.0 if n in LOGARITHMIC else s / self.scale[n] for n, s in starts.items()])
+
+    def value(self, name: str, x: float) -> float:
+        if name in self.centre:
+            return self.centre[name] + x * self.scale[name]
+        if name in LOGARITHMIC:
+            return self.starts[name] * math.exp(x)
+        return max(0.0, x * self.scale[name])
+
+    def slope(self, name: str, x: float) -> float:
+        return self.value(name, x) if name in LOGARITHMIC else self.scale[name]
+
+    def rig(self, x: Array, fixed: dict[str, float]) -> Rig:
+        values = {n: self.value(n, float(v)) for n, v in zip(self.names, x, strict=True)}
+        rig = self.nominal.with_parameters({n: values[n] for n in self.baseline})
+        chosen = {**fixed, **{n: v for n, v in values.items() if n not in self.centre}}
+        for effect in dict.fromkeys(n.partition(".")[0] for n in chosen):
+            own = {n.partition(".")[2]: v for n, v in chosen.items() if n.startswith(effect + ".")}
+            rig = rig.with_effect(effect, own)
+        return rig
+
+
+def _parameter(name: str):  # type: ignore[no-untyped-def]
+    effect, _, short = name.partition(".")
+    return next(p for p in EFFECTS[effect].parameters if p.name == short)
+
+
+def bin_width(prepared: Prepared, seconds: float) -> int:
+    """Number of samples in a bin."""
+    return max(1, round(seconds / prepared.dt))
+
+
+def fit(
+    problem: Problem,
+    nominal: Rig,
+    effects: tuple[str, ...],
+    starts: dict[str, float],
+    inflation: dict[str, float],
+    *,
+    fixed: dict[str, float] | None = None,
+    warm: dict[str, float] | None = None,
+    evaluations: int = 12,
+) -> Fit:
+    """Fit baseline parameters (with their tolerances as priors) and effects to the recordings.
+
+    Parameters
+    ----------
+    problem : Problem
+        Blocks and recordings.
+    nominal : Rig
+        Nominal model.
+    effects : tuple of str
+        Effects to include.
+    starts : dict of str to float
+        Dotted effect parameters that are free, with their starts.
+    inflation : dict of str to float
+        Variance of each block's binned residual relative to white sample noise (coloured residuals count less).
+    fixed : dict of str to float, optional
+        Effect parameters that are held.
+    warm : dict of str to float, optional
+        Baseline values to start from.
+    evaluations : int, optional
+        Limit on evaluations.
+    """
+    baseline = free_baseline(problem, nominal)
+    scaling = _Scaling(nominal, baseline, starts)
+    count = len(baseline)
+    memo: dict[bytes, tuple[Array, Array, dict[Key, Residual]]] = {}
+    spent = 0
+
+    def evaluate(x: Array) -> tuple[Array, Array, dict[Key, Residual]]:
+        nonlocal spent
+        key = x.tobytes()
+        if key not in memo:
+            spent += 1
+            try:
+                found = residuals(problem, scaling.rig(x, fixed or {}), scaling.names)
+            except SimulationError:
+                if not memo:
+                    raise
+                # beyond the model's range: a step that the optimiser must take back
+                last, jacobian, kept = next(iter(memo.values()))
+                return 1e3 * np.sign(last) * (1.0 + np.abs(last)), jacobian, kept
+            memo.clear()
+            slopes = np.array([scaling.slope(n, float(v)) for n, v in zip(scaling.names, x, strict=True)])
+            rows, jacs = [], []
+            for prepared in problem.recordings:
+                for block in problem.blocks:
+                    r = found[block.name, prepared.recording.name]
+                    assert r.jacobian is not None or not scaling.names
+                    width = bin_width(prepared, FIT_BIN)
+                    mean, counts = binned(r.value, r.rows, width)
+                    weight = np.sqrt(counts) / (r.noise * math.sqrt(inflation[block.name]))
+                    rows.append(mean * weight)
+                    if r.jacobian is not None:
+                        slope, _ = binned(r.jacobian, r.rows, width)
+                        jacs.append(-slope * slopes * weight[:, None])
+            prior = np.zeros((count, len(scaling.names)))
+            prior[:, :count] = np.eye(count)
+            rows.append(x[:count])
+            jacs.append(prior)
+            memo[key] = (np.concatenate(rows), np.concatenate(jacs), found)
+        return memo[key]
+
+    start = scaling.start.copy()
+    for index, name in enumerate(baseline):
+        if warm and name in warm:
+            start[index] = (warm[name] - scaling.centre[name]) / scaling.scale[name]
+    margin = 1e-9 * (scaling.bounds[1] - scaling.bounds[0])
+    start = np.clip(start, scaling.bounds[0] + margin, scaling.bounds[1] - margin)
+    if start.size:
+        # a start on a bound makes the trust-region step overflow harmlessly inside SciPy
+        with np.errstate(all="ignore"):
+            solution = least_squares(
+                lambda x: evaluate(x)[0],
+                start,
+                jac=lambda x: evaluate(x)[1],
+                bounds=scaling.bounds,
+                max_nfev=evaluations,
+                ftol=1e-5,
+                xtol=1e-5,
+            )
+        x = solution.x
+    else:
+        x = start
+    values, jacobian, found = evaluate(x)
+    covariance = np.linalg.pinv(jacobian.T @ jacobian, hermitian=True) if x.size else np.zeros((0, 0))
+    spread = np.sqrt(np.clip(np.diag(covariance), 0.0, None))
+    named = {n: scaling.value(n, float(v)) for n, v in zip(scaling.names, x, strict=True)}
+    std = {n: float(s) * scaling.slope(n, float(v)) for n, s, v in zip(scaling.names, spread, x, strict=True)}
+    moved = {n: float(v) for n, v in zip(baseline, x[:count], strict=True)}
+    rig = scaling.rig(x, fixed or {})
+    return Fit(effects, rig, named, std, covariance, 0.5 * float(values @ values), found, moved, spent)

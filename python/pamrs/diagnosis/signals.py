@@ -1,0 +1,178 @@
+"""Recordings made ready for the cut chain: smoothed drive signals, noise floors, windows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import savgol_filter
+
+from pamrs.errors import DiagnosisError
+from pamrs.recording import Recording
+from pamrs.rig import Rig
+
+__all__ = ["Prepared", "binned", "noise_level", "prepare"]
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+SMOOTHING_TIME = 0.06
+"""Length of the smoothing filter for drive signals [s]; at least seven samples."""
+DRIVES = ("supply_pressure", "muscle_pressure", "joint_angle")
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """One recording with what the cut chain needs.
+
+    Attributes
+    ----------
+    recording : Recording
+        As loaded.
+    command : (n,) array
+        Valve command [V], holes filled with the last value.
+    signals : dict of str to (value, slope)
+        Smoothed channels and their time derivatives, holes bridged.
+    noise : dict of str to float
+        Standard deviation of each channel's sample noise, quantisation included.
+    """
+
+    recording: Recording
+    command: Array
+    signals: dict[str, tuple[Array, Array]]
+    noise: dict[str, float]
+
+    @property
+    def n(self) -> int:
+        """Number of samples."""
+        return len(self.recording)
+
+    @property
+    def dt(self) -> float:
+        """Sample time [s]."""
+        return self.recording.sample_time
+
+    def starts(self, window: float | None, channels: tuple[str, ...]) -> list[int]:
+        """Samples at which windows begin: every ``window`` seconds (None: once) and after each hole."""
+        starts = {0}
+        if window is not None:
+            starts |= set(range(0, self.n, max(8, round(window / self.dt))))
+        valid = self.recording.valid(*channels)
+        starts |= set((np.flatnonzero(valid[1:] & ~valid[:-1]) + 1).tolist())
+        return sorted(starts)
+
+    def usable(self, output: str, drives: tuple[str, ...], starts: list[int]) -> Mask:
+        """Rows whose prediction rests on measured drives since their window began."""
+        good = self.recording.valid(*drives) if drives else np.ones(self.n, dtype=bool)
+        reach = round(0.5 * SMOOTHING_TIME / self.dt)
+        bad = ~good
+        if reach and bad.any():
+            bad = np.convolve(bad, np.ones(2 * reach + 1), mode="same") > 0
+        rows = np.zeros(self.n, dtype=bool)
+        for a, b in zip(starts, [*starts[1:], self.n], strict=True):
+            first = np.flatnonzero(bad[a:b])
+            rows[a : a + (int(first[0]) if first.size else b - a)] = True
+        return rows & self.recording.mask[output]
+
+
+def noise_level(values: Array, mask: Mask) -> float:
+    """Standard deviation of white sample noise, from third differences, robust; at least that of quantisation.
+
+    Parameters
+    ----------
+    values : (n,) array
+        Samples on a uniform grid.
+    mask : (n,) bool array
+        Which may be used.
+
+    Returns
+    -------
+    float
+        In the unit of ``values``; 0 if there are fewer than eight usable samples.
+    """
+    third = np.diff(values, 3)
+    ok = mask[:-3] & mask[1:-2] & mask[2:-1] & mask[3:]
+    third = third[ok]
+    if third.size < 8:
+        return 0.0
+    # a quantised or often resting channel has many zero differences: take a high quantile of the active ones too
+    sigma = 1.4826 * float(np.median(np.abs(third))) / np.sqrt(20.0)
+    steps = np.abs(np.diff(values[mask]))
+    steps = steps[steps > 1e-12 * max(1e-12, float(np.abs(values[mask]).max()))]
+    lattice = float(steps.min()) if steps.size else 0.0
+    return max(sigma, lattice / np.sqrt(12.0))
+
+
+def _bridged(values: Array, mask: Mask) -> Array:
+    index = np.arange(values.size)
+    return np.asarray(np.interp(index, index[mask], values[mask]), dtype=np.float64)
+
+
+def prepare(recording: Recording, rig: Rig) -> Prepared:
+    """Smooth the drive signals of a recording and estimate its noise.
+
+    Raises
+    ------
+    DiagnosisError
+        If the recording is too short, or lacks a channel that the rig's blocks need.
+    """
+    if "muscle_pressure" not in recording.channels:
+        raise DiagnosisError(
+            f"recording {recording.name!r} has no channel muscle_pressure, without which no block can be cut out; "
+            f"it has: {', '.join(recording.channels)}"
+        )
+    if len(recording) < 32:
+        raise DiagnosisError(
+            f"recording {recording.name!r} has {len(recording)} samples; at least 32 are needed for a diagnosis"
+        )
+    model = rig.model
+    if model["valve"] is not None and "valve_command" not in recording.channels:
+        raise DiagnosisError(f"recording {recording.name!r} has no channel valve_command, and the rig has a valve")
+    length = max(7, round(SMOOTHING_TIME / recording.sample_time) | 1)
+    signals, noise = {}, {}
+    for name in DRIVES:
+        if name not in recording.channels:
+            continue
+        mask = recording.mask[name]
+        if mask.sum() < max(16, 0.2 * mask.size):
+            raise DiagnosisError(
+                f"recording {recording.name!r}: only {int(mask.sum())} of {mask.size} samples of {name} are usable"
+            )
+        filled = _bridged(recording.channels[name], mask)
+        value = savgol_filter(filled, length, 3)
+        slope = savgol_filter(filled, length, 3, deriv=1, delta=recording.sample_time)
+        signals[name] = (np.ascontiguousarray(value), np.ascontiguousarray(slope))
+        noise[name] = noise_level(recording.channels[name], mask)
+        if noise[name] <= 0:
+            noise[name] = max(1e-9, 1e-6 * float(np.ptp(filled)))
+    if "valve_command" in recording.channels:
+        mask = recording.mask["valve_command"]
+        if not mask.any():
+            raise DiagnosisError(f"recording {recording.name!r}: no usable sample of valve_command")
+        held = np.maximum.accumulate(np.where(mask, np.arange(mask.size), 0))
+        held[: int(np.argmax(mask))] = int(np.argmax(mask))
+        command = np.ascontiguousarray(recording.channels["valve_command"][held])
+    else:
+        command = np.zeros(len(recording))
+    return Prepared(recording, command, signals, noise)
+
+
+def binned(values: Array, rows: Mask, width: int) -> tuple[Array, Array]:
+    """Means over consecutive bins of ``width`` samples, counting usable rows only.
+
+    Returns
+    -------
+    means : (m,) or (m, k) array
+        0 where a bin has no usable row.
+    counts : (m,) array
+        Usable rows in each bin.
+    """
+    n = rows.size // width * width
+    weights = rows[:n].reshape(-1, width).astype(np.float64)
+    counts = weights.sum(axis=1)
+    data = values[:n].reshape(-1, width, *values.shape[1:])
+    shape = (slice(None), slice(None), *([None] * (values.ndim - 1)))
+    total = (data * weights[shape]).sum(axis=1)
+    divisor = np.maximum(counts, 1.0)
+    return total / divisor[(slice(None), *([None] * (values.ndim - 1)))], counts

@@ -1,0 +1,148 @@
+"""The diagnosis in words: where, what, how sure, what next."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from pamrs.case import Case
+from pamrs.diagnosis.conditions import Picture
+from pamrs.diagnosis.fitting import Problem
+from pamrs.diagnosis.hypotheses import Group
+from pamrs.diagnosis.result import Diagnosis
+from pamrs.effects_table import EFFECTS
+from pamrs.rig import Rig
+
+__all__ = ["next_experiment", "verdict", "warnings", "where"]
+
+
+def where(located: str | None, problem: Problem, groups: list[Group], picture: Picture) -> dict[str, Any]:
+    """The ``where`` entry: block, channel, intervals, conditions and a sentence."""
+    if located is None:
+        text = "No block keeps more than its noise after the refit."
+        return {"block": None, "channel": None, "intervals": [], "conditions": [], "text": text}
+    block = next(b for b in problem.blocks if b.name == located)
+    found = next(g.baseline[located] for g in groups if located in g.baseline)
+    text = (
+        f"The mismatch lies in the {located} block ({block.covers}): with its neighbours' measured signals as inputs, the "
+        f"refitted model still misses {block.channel} by {found.systematic:.2g} times its noise."
+    )
+    telling = [c for c in picture.conditions if c["share"] > 1.15 * c["time"]][:2]
+    if telling:
+        text += " It is largest under: " + "; ".join(c["text"] for c in telling) + "."
+    if picture.intervals:
+        text += f" The intervals are those of recording {picture.recording}."
+    return {
+        "block": located,
+        "channel": block.channel,
+        "intervals": picture.intervals,
+        "conditions": picture.conditions[:6],
+        "text": text,
+        "recording": picture.recording,
+    }
+
+
+def verdict(diagnosis: Diagnosis, named: list[str], case: Case, gap: float | None) -> str:
+    """The verdict in a few sentences."""
+    kind = diagnosis.verdict
+    if kind == "none":
+        return "Nothing is missing that these recordings could show: the nominal model predicts every block to its noise."
+    if kind == "parameters":
+        shifted = sorted(diagnosis.parameters.items(), key=lambda kv: -abs(kv[1]["moved_sigmas"]))[:3]
+        moved = ", ".join(f"{n} by {p['moved_sigmas']:+.1f} tolerances" for n, p in shifted)
+        return (
+            "No physics is missing that these recordings could show, but parameters differ from the nominal ones: with values "
+            f"inside their tolerances the model predicts every block to its noise. Moved most: {moved}."
+        )
+    place = diagnosis.where["text"]
+    if kind == "unlisted":
+        tried = ", ".join(f"{e['id']} ({e['probability']:.0%})" for e in diagnosis.effects)
+        return (
+            f"Physics is missing that is not in the catalogue, or no effect of the catalogue explains the data well enough to be "
+            f"named. {place}" + (f" Closest: {tried}." if tried else "")
+        )
+    names = " and ".join(f"{EFFECTS[n].name} ({n})" for n in named)
+    p = diagnosis.probabilities.get("+".join(sorted(named)), 0.0)
+    where_proved = "held-out recordings" if case.held_out and case.fit else "the fitted recording (no other was given)"
+    text = f"The model leaves out: {names}; probability {p:.2f}. {place}"
+    if gap is not None:
+        text += f" With it, {100 * gap:.0f} % of the gap between refitted model and noise closes on {where_proved}."
+    if not case.rig.parameter("chamber.dead_volume").known:
+        text += (
+            " The chamber's volume is not known: what the recording fixes is the time constant (and the conductance per volume); "
+            "the conductance itself holds for the placeholder volume of the rig file only."
+        )
+    if diagnosis.ambiguity:
+        sets = " or ".join("{" + ", ".join(s) + "}" for s in diagnosis.ambiguity)
+        text += f" It is not settled: these data do not separate {sets}."
+    return text
+
+
+_SEPARATE = {
+    "leak_muscle": (
+        "Fill to three pressures, shut the valve and hold each for at least 60 s: a leak keeps falling in proportion to the "
+        "absolute pressure, heat exchange stops within seconds, and a valve null error follows the spool.",
+        {"kind": "sealed_hold", "levels_bar": [2.0, 4.0, 6.0], "hold_s": 60.0},
+    ),
+    "heat_transfer": (
+        "Fill fast by steps of 1:3 in size, shut the valve after each and watch the pressure for 5 s; add a fast thermocouple "
+        "in the chamber if there is one.",
+        {"kind": "step_and_shut", "steps_bar": [1.0, 3.0], "watch_s": 5.0},
+    ),
+    "muscle_hysteresis": (
+        "Drive a slow triangle with nested smaller loops at two speeds a decade apart: hysteresis does not change with speed, creep "
+        "and damping do; repeat with the muscle vented to see joint friction alone.",
+        {"kind": "nested_triangle", "periods_s": [50.0, 5.0], "levels": 4},
+    ),
+    "unlisted": (
+        "Repeat the excitation under which the excess is largest at two speeds and at two payloads: what scales with speed, with "
+        "load or with neither tells the class of the missing effect.",
+        {"kind": "repeat_scaled", "speed_ratio": 10.0, "payloads": 2},
+    ),
+}
+
+
+def next_experiment(
+    kind: str, probabilities: dict[str, float], ambiguity: list[list[str]], rig: Rig
+) -> dict[str, Any]:
+    """What to record next: the experiment that separates the leading hypotheses.
+
+    The information is the entropy of the present probabilities [bits]: what a decisive experiment would bring.
+    """
+    entropy = -sum(p * math.log2(p) for p in probabilities.values() if p > 0)
+    leading = max(probabilities, key=lambda k: probabilities[k])
+    if not ambiguity and kind != "unlisted":
+        text = "The question is settled by these recordings; nothing further is needed."
+        return {"text": text, "excitation": {}, "expected_information_bits": round(entropy, 3)}
+    key = next((k for s in [leading.split("+"), *ambiguity] for k in s if k in _SEPARATE), "unlisted")
+    text, excitation = _SEPARATE[key]
+    if rig.model["valve"] is None:
+        text = (
+            "Repeat the hold at a third of the pressure and with the chamber removed (transducer and fittings alone): a leak of the "
+            "chamber scales with absolute pressure and goes with it; cooling, the bench's own loss and the transducer's drift stay."
+        )
+        excitation = {"kind": "sealed_hold", "levels_bar": [2.5, 7.5], "hold_s": 600.0}
+    return {"text": text, "excitation": excitation, "expected_information_bits": round(entropy, 3)}
+
+
+def warnings(case: Case, groups: list[Group], symptoms: dict[str, float], no_held_out: bool) -> list[str]:
+    """What a reader should know about the data and the fit."""
+    out = []
+    for recording in case.recordings:
+        for issue in recording.issues[:8]:
+            out.append(f"{recording.name}: {issue.kind} in {issue.channel}, {issue.start:g} to {issue.stop:g} s: {issue.text}")
+        if len(recording.issues) > 8:
+            out.append(f"{recording.name}: {len(recording.issues) - 8} more issues of this kind")
+    for name, value in sorted(symptoms.items(), key=lambda kv: -abs(kv[1])):
+        out.append(
+            f"the refit without effects moves {name} by {value:+.1f} tolerances: a symptom of missing physics, not a result"
+        )
+    if no_held_out:
+        out.append("there is no held-out recording: the proof is on the fitted data and counts less")
+    for group in groups:
+        best = group.best
+        if best.effects and best.scatter > 0.35:
+            out.append(f"the size of {'+'.join(best.effects)} scatters by {100 * best.scatter:.0f} % between recordings")
+    if not case.rig.parameter("chamber.dead_volume").known:
+        out.append("chamber.dead_volume is marked unknown: values that scale with it hold for the placeholder only")
+    return out
