@@ -5,6 +5,8 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
+__all__ = ["Muscle", "Rig", "__version__", "effects", "parameter_names"]
+
 __version__: str
 
 _Array = NDArray[np.float64]

@@ -20,7 +20,7 @@ SCHEMA: Final = "pamrs.case/1"
 _ROLES: Final = ("fit", "held_out")
 _TOP: Final = ("schema", "name", "description", "rig", "source", "recording")
 _FORMAT: Final = ("columns", "delimiter", "header", "thousands", "sample_time", "decimal")
-_ENTRY: Final = ("file", "name", "role", *_FORMAT)
+_ENTRY: Final = ("file", "name", "role", "start", "stop", *_FORMAT)
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +64,17 @@ class Case:
         return tuple(name for name in first if all(name in other.channels for other in self.recordings))
 
     def with_rig(self, rig: Rig) -> Case:
-        """The same recordings with another rig."""
+        """The same recordings with another rig.
+
+        Parameters
+        ----------
+        rig : Rig
+            The model to put in place.
+
+        Returns
+        -------
+        Case
+        """
         return replace(self, rig=rig)
 
 
@@ -173,7 +183,8 @@ def _recordings(problems: list[str], home: Path, entries: Any, source: str) -> l
             continue
         options = {key: entry[key] for key in _FORMAT if key in entry}
         try:
-            recordings.append(load_recording(file, role=role, name=entry.get("name"), **options))
+            recording = load_recording(file, role=role, name=entry.get("name"), **options)
+            recordings.append(recording.between(entry.get("start"), entry.get("stop")))
         except RecordingError as error:
             problems.append(str(error))
     names = [recording.name for recording in recordings]
@@ -192,6 +203,9 @@ def _formats(problems: list[str], label: str, entry: Mapping[str, Any]) -> None:
     def mapping(value: object) -> bool:
         return isinstance(value, Mapping) and all(isinstance(item, str) for item in value.values())
 
+    def number(value: object) -> bool:
+        return isinstance(value, (int, float)) and not isinstance(value, bool)
+
     rules: dict[str, tuple[Any, str]] = {
         "name": (lambda v: isinstance(v, str) and v != "", "a text"),
         "columns": (
@@ -205,10 +219,12 @@ def _formats(problems: list[str], label: str, entry: Mapping[str, Any]) -> None:
             "a mark, or a table from channels to marks",
         ),
         "sample_time": (
-            lambda v: isinstance(v, (int, float)) and not isinstance(v, bool),
+            number,
             "a number of seconds",
         ),
         "decimal": (lambda v: isinstance(v, str) and len(v) == 1, "one character"),
+        "start": (number, "a number of seconds"),
+        "stop": (number, "a number of seconds"),
     }
     for key, (accepts, needed) in rules.items():
         if key in entry and not accepts(entry[key]):

@@ -101,7 +101,7 @@ EFFECTS: Final[dict[str, EffectInfo]] = _table(
         name="gas temperature with heat exchange at the wall",
         block="chamber",
         equation="p' = (k R/V)(m_in Ts - m_out T) - k p V'/V + ((k-1)/V) h A (Tw - T), h = h0 sqrt(p T/(p0 T0))",
-        fingerprint="after a fast fill and a shut valve the pressure falls for 0.1 to 2 s and then stays; after venting it rises",
+        fingerprint="after a fast fill and a shut valve the pressure falls for 0.1 to 2 s, then stays; after venting it rises",
         separates="leak_muscle never saturates; wrong polytropic coefficients show no relaxation with the valve shut",
         parameters=(
             EffectParameter(
@@ -130,8 +130,8 @@ EFFECTS: Final[dict[str, EffectInfo]] = _table(
         name="rate-independent friction of the braid (pressure-scaled Maxwell-slip)",
         block="muscle",
         equation="F_h = (W0 + c pg) mean(clip(z_i)), z_i' = L'/d_i until |z_i| = 1; four elements, d/8 to d",
-        fingerprint="less pull while contracting, more while extending; the loop does not depend on speed; after a reversal the "
-        "force changes over a finite distance",
+        fingerprint="less pull while contracting, more while extending; the loop does not depend on speed; after a "
+        "reversal the force changes over a finite distance",
         separates="joint Coulomb friction has neither presliding nor growth with pressure; creep depends on time",
         parameters=(
             EffectParameter(

@@ -50,7 +50,7 @@ class Muscle:
     >>> import numpy as np, pamrs
     >>> muscle = pamrs.rigs.shoulder().muscle
     >>> muscle.force(4e5, [0.0, 0.1]).round(1)
-    array([3350.96, 1959.62])
+    array([3351. , 1289.6])
     """
 
     def __init__(
@@ -95,7 +95,17 @@ class Muscle:
 
     @classmethod
     def from_model(cls, model: Mapping[str, Any]) -> Muscle:
-        """The muscle of a rig's model (``rig.model["muscle"]``)."""
+        """The muscle of a rig's model.
+
+        Parameters
+        ----------
+        model : mapping
+            ``rig.model["muscle"]``.
+
+        Returns
+        -------
+        Muscle
+        """
         return cls(**{key: value for key, value in model.items() if key != "model"})
 
     @property
@@ -109,7 +119,17 @@ class Muscle:
         return self._core.table_error
 
     def radius(self, contraction: ArrayLike) -> Array:
-        """Outer radius of the middle part [m] at contraction ratios of any shape (``e = 1 - L/L0``).
+        """Outer radius of the middle part [m].
+
+        Parameters
+        ----------
+        contraction : array_like
+            Contraction ratio ``e = 1 - L/L0`` [1], any shape.
+
+        Returns
+        -------
+        ndarray
+            In the shape of ``contraction``.
 
         Raises
         ------
@@ -119,11 +139,43 @@ class Muscle:
         return self._over(self._core.radius, contraction)
 
     def thickness(self, contraction: ArrayLike) -> Array:
-        """Wall thickness [m] at contraction ratios of any shape; raises as :meth:`radius`."""
+        """Wall thickness [m].
+
+        Parameters
+        ----------
+        contraction : array_like
+            Contraction ratio ``e = 1 - L/L0`` [1], any shape.
+
+        Returns
+        -------
+        ndarray
+            In the shape of ``contraction``.
+
+        Raises
+        ------
+        ParameterError
+            If a contraction ratio is not finite or beyond the braid's limits.
+        """
         return self._over(self._core.thickness, contraction)
 
     def air_volume(self, contraction: ArrayLike) -> Array:
-        """Air volume [m3] at contraction ratios of any shape; raises as :meth:`radius`."""
+        """Air volume of one muscle [m3].
+
+        Parameters
+        ----------
+        contraction : array_like
+            Contraction ratio ``e = 1 - L/L0`` [1], any shape.
+
+        Returns
+        -------
+        ndarray
+            In the shape of ``contraction``.
+
+        Raises
+        ------
+        ParameterError
+            If a contraction ratio is not finite or beyond the braid's limits.
+        """
         return self._over(self._core.air_volume, contraction)
 
     def force(self, pressure: ArrayLike, contraction: ArrayLike) -> Array:
@@ -149,7 +201,20 @@ class Muscle:
         return self._forces(self._core.force, pressure, contraction)
 
     def force_table(self, pressure: ArrayLike, contraction: ArrayLike) -> Array:
-        """Pulling force of one muscle [N] from the compiled table; arguments as :meth:`force`."""
+        """Pulling force of one muscle [N] from the compiled table; otherwise as :meth:`force`.
+
+        Parameters
+        ----------
+        pressure : array_like
+            Gauge pressure [Pa].
+        contraction : array_like
+            Contraction ratio [1], inside :attr:`contraction_range`; broadcast against ``pressure``.
+
+        Returns
+        -------
+        ndarray
+            Force in the broadcast shape.
+        """
         return self._forces(self._core.force_table, pressure, contraction)
 
     @staticmethod

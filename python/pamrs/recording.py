@@ -11,7 +11,7 @@ import math
 import os
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
@@ -155,11 +155,66 @@ class Recording:
         return combined
 
     def segments(self, *channels: str, minimum: int = 1) -> list[tuple[int, int]]:
-        """Stretches ``[start, stop)`` of ``minimum`` samples or more without a hole in these channels."""
+        """Stretches without a hole in these channels.
+
+        Parameters
+        ----------
+        *channels : str
+            Canonical names; without names all that there are.
+        minimum : int, optional
+            Shortest stretch [samples].
+
+        Returns
+        -------
+        list of (start, stop)
+            Sample indices, ``stop`` excluded.
+        """
         padded = np.concatenate([[False], self.valid(*channels), [False]])
         edges = np.flatnonzero(padded[1:] != padded[:-1])
         pairs = zip(edges[::2], edges[1::2], strict=True)
         return [(int(a), int(b)) for a, b in pairs if b - a >= minimum]
+
+    def between(self, start: float | None = None, stop: float | None = None) -> Recording:
+        """The part of a recording between two times; its time begins at 0 again.
+
+        Parameters
+        ----------
+        start, stop : float, optional
+            Limits [s], both included; by default the beginning and the end.
+
+        Returns
+        -------
+        Recording
+
+        Raises
+        ------
+        RecordingError
+            If fewer than two samples are left.
+        """
+        if start is None and stop is None:
+            return self
+        low = 0.0 if start is None else float(start)
+        high = self.duration if stop is None else float(stop)
+        slack = 1e-6 * self.sample_time
+        keep = (self.time >= low - slack) & (self.time <= high + slack)
+        if keep.sum() < 2:
+            raise RecordingError(
+                f"recording {self.name!r}: start = {low:g} and stop = {high:g} s leave {int(keep.sum())} samples of "
+                f"0 to {self.duration:g} s; at least 2 are needed"
+            )
+        offset = float(self.time[keep][0])
+        issues = [
+            Issue(i.kind, i.channel, max(0.0, i.start - offset), i.stop - offset, i.text)
+            for i in self.issues
+            if i.stop >= low and i.start <= high
+        ]
+        return replace(
+            self,
+            time=self.time[keep] - offset,
+            channels={name: values[keep] for name, values in self.channels.items()},
+            mask={name: flags[keep] for name, flags in self.mask.items()},
+            issues=issues,
+        )
 
     def to_pandas(self) -> pd.DataFrame:
         """A data frame indexed by time, SI values, NaN where masked; needs pandas."""

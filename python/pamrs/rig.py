@@ -113,6 +113,15 @@ class Rig:
     def parameter(self, name: str) -> Parameter:
         """One parameter by its dotted name.
 
+        Parameters
+        ----------
+        name : str
+            For example ``"arm.payload"``.
+
+        Returns
+        -------
+        Parameter
+
         Raises
         ------
         ParameterError
@@ -234,7 +243,17 @@ class Rig:
         return Rig(self.name, model, self._tolerances, kept, self.source)
 
     def without_effect(self, effect: str | None = None) -> Rig:
-        """A rig without one effect, or with None without any; an effect that is not there is no error."""
+        """A rig without one effect; an effect that is not there is no error.
+
+        Parameters
+        ----------
+        effect : str, optional
+            Its id; None removes all.
+
+        Returns
+        -------
+        Rig
+        """
         model = self.model
         model["effects"] = [
             entry for entry in model["effects"] if effect is not None and entry["id"] != effect
@@ -270,7 +289,17 @@ class Rig:
         return "\n".join(lines) + "\n"
 
     def to_toml(self, path: str | os.PathLike[str]) -> Path:
-        """Write :meth:`to_toml_text` to ``path`` and return the path.
+        """Write :meth:`to_toml_text` to a file.
+
+        Parameters
+        ----------
+        path : path-like
+            The file.
+
+        Returns
+        -------
+        Path
+            The file written.
 
         Raises
         ------

@@ -140,7 +140,7 @@ def simulate(
     channels = core_rig(rig).simulate(
         command, sample_time, fine, **{name: float(value) for name, value in start.items()}
     )
-    time = np.arange(command.size) * sample_time
+    time = np.asarray(np.arange(command.size) * sample_time, dtype=np.float64)
     shown = {"valve_command": command} if has_valve else {}
     return Simulation({"time": time, **shown, **channels}, rig)
 

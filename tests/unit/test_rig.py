@@ -274,7 +274,7 @@ def test_effects_round_trip(effect: str) -> None:
 def test_an_effect_replaces_its_like() -> None:
     rig = pamrs.rigs.shoulder().with_effect("leak_muscle", {"conductance": 1e-9})
     rig = rig.with_effect("leak_muscle", {"conductance": 2e-9})
-    assert rig.effects == [{"id": "leak_muscle", "parameters": {"conductance": 2e-9}}]
+    assert rig.effects == [{"id": "leak_muscle", "parameters": {"conductance": 2e-9, "laminar_share": 0.0}}]
     assert pamrs.rigs.shoulder().effects == []
 
 

@@ -186,7 +186,10 @@ fn check(rig: &Rig, block: Block, measured: &Measured<'_>, starts: &[usize], n: 
     if let Some((k, u)) = measured.valve_command.iter().enumerate().find(|(_, u)| !u.is_finite()) {
         return Err(Error::parameter(format!("valve_command[{k}]"), *u, "a finite voltage"));
     }
-    if starts.first() != Some(&0) || starts.windows(2).any(|w| w[1] <= w[0]) || starts.last().is_some_and(|s| *s >= n) {
+    if starts.first() != Some(&0)
+        || starts.windows(2).any(|w| w[1] <= w[0])
+        || starts.last().is_some_and(|s| *s >= n)
+    {
         let worst = starts.last().copied().unwrap_or(0) as f64;
         return Err(Error::parameter("starts", worst, format!("sample indices rising from 0, below {n}")));
     }
@@ -276,7 +279,11 @@ fn run<S: Scalar>(
                 // a new window keeps the gas temperature and the memory of the motion
                 let was = plant.rest_mass(&before);
                 state[MASS] = rest * before[MASS] / was;
-                memory = plant.advance_memory(&memory, plant.contraction(before[ANGLE]), plant.contraction(state[ANGLE]));
+                memory = plant.advance_memory(
+                    &memory,
+                    plant.contraction(before[ANGLE]),
+                    plant.contraction(state[ANGLE]),
+                );
             }
         }
         check_state(plant, &state, k as f64 * dt)?;

@@ -28,7 +28,8 @@ impl Timing {
         let rounded = ratio.round();
         let divides = (1.0..=1e7).contains(&rounded) && (ratio - rounded).abs() <= 1e-6 * rounded;
         if !(step.is_finite() && step > 0.0 && divides) {
-            let allowed = format!("a time > 0 s that divides sample_time = {sample_time} s into 1 to 1e7 steps");
+            let allowed =
+                format!("a time > 0 s that divides sample_time = {sample_time} s into 1 to 1e7 steps");
             return Err(Error::parameter("step", step, allowed));
         }
         Ok(Self { sample_time, substeps: rounded as usize })
@@ -73,7 +74,8 @@ impl Initial {
             crate::error::check_range(name, value, vacuum, 1e8, "Pa (gauge)")?;
         }
         crate::error::check_range("initial.joint_rate", self.joint_rate, -1e4, 1e4, "rad/s")?;
-        let (low, high) = rig.spec().joint.as_ref().map_or((-7.0, 7.0), |j| (j.min_angle - 0.2, j.max_angle + 0.2));
+        let (low, high) =
+            rig.spec().joint.as_ref().map_or((-7.0, 7.0), |j| (j.min_angle - 0.2, j.max_angle + 0.2));
         crate::error::check_range("initial.joint_angle", self.joint_angle, low, high, "rad")?;
         Ok(())
     }
@@ -126,7 +128,8 @@ pub(crate) fn check_state<S: Scalar>(plant: &Plant<'_, S>, state: &State<S>, tim
     let failure = |name: &str, value: f64, allowed: &str| {
         Err(Error::Integration { time, name: name.into(), value, allowed: allowed.into() })
     };
-    const NAMES: [&str; STATES] = ["supply_pressure", "muscle_pressure", "joint_angle", "joint_rate", "gas_mass"];
+    const NAMES: [&str; STATES] =
+        ["supply_pressure", "muscle_pressure", "joint_angle", "joint_rate", "gas_mass"];
     for (index, name) in NAMES.iter().enumerate() {
         let value = state[index].re();
         if !value.is_finite() {
@@ -135,7 +138,11 @@ pub(crate) fn check_state<S: Scalar>(plant: &Plant<'_, S>, state: &State<S>, tim
     }
     if state[PRESSURE].re() < 0.0 || state[SUPPLY].re() < 0.0 {
         let worst = if state[PRESSURE].re() < 0.0 { PRESSURE } else { SUPPLY };
-        return failure(NAMES[worst], state[worst].re(), "an absolute pressure >= 0 Pa (a smaller step may help)");
+        return failure(
+            NAMES[worst],
+            state[worst].re(),
+            "an absolute pressure >= 0 Pa (a smaller step may help)",
+        );
     }
     if let Some(joint) = &rig.joint {
         let angle = state[ANGLE].re();
@@ -144,7 +151,8 @@ pub(crate) fn check_state<S: Scalar>(plant: &Plant<'_, S>, state: &State<S>, tim
         }
         let contraction = plant.contraction(state[ANGLE]).re();
         if let Some(muscle) = rig.muscle().filter(|m| !m.table.contains(contraction)) {
-            let allowed = format!("inside the muscle's range {:.4} to {:.4}", muscle.table.e_min, muscle.table.e_max);
+            let allowed =
+                format!("inside the muscle's range {:.4} to {:.4}", muscle.table.e_min, muscle.table.e_max);
             return failure("contraction_ratio", contraction, &allowed);
         }
     }
@@ -205,7 +213,15 @@ impl Trajectory {
         }
     }
 
-    fn push(&mut self, plant: &Plant<'_, f64>, state: &State<f64>, memory: &Memory<f64>, ambient: f64, pressure_zero: f64, angle_zero: f64) {
+    fn push(
+        &mut self,
+        plant: &Plant<'_, f64>,
+        state: &State<f64>,
+        memory: &Memory<f64>,
+        ambient: f64,
+        pressure_zero: f64,
+        angle_zero: f64,
+    ) {
         let output = plant.output(state, memory);
         self.supply_pressure.push(state[SUPPLY] - ambient);
         self.muscle_pressure.push(state[PRESSURE] - ambient + pressure_zero);

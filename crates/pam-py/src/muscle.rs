@@ -40,17 +40,29 @@ impl Muscle {
     }
 
     /// Outer radius [m] at contraction ratios.
-    fn radius<'py>(&self, py: Python<'py>, contraction: PyReadonlyArray1<'py, f64>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    fn radius<'py>(
+        &self,
+        py: Python<'py>,
+        contraction: PyReadonlyArray1<'py, f64>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         self.map(py, &contraction, |m, _, e| m.radius(e))
     }
 
     /// Wall thickness [m] at contraction ratios.
-    fn thickness<'py>(&self, py: Python<'py>, contraction: PyReadonlyArray1<'py, f64>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    fn thickness<'py>(
+        &self,
+        py: Python<'py>,
+        contraction: PyReadonlyArray1<'py, f64>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         self.map(py, &contraction, |m, _, e| m.thickness(e))
     }
 
     /// Air volume [m3] of one muscle at contraction ratios.
-    fn air_volume<'py>(&self, py: Python<'py>, contraction: PyReadonlyArray1<'py, f64>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    fn air_volume<'py>(
+        &self,
+        py: Python<'py>,
+        contraction: PyReadonlyArray1<'py, f64>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         self.map(py, &contraction, |m, _, e| m.air_volume(e))
     }
 
@@ -74,7 +86,13 @@ impl Muscle {
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let p = values(&pressure);
         self.map(py, &contraction, |m, k, e| {
-            let pressure = check_range("pressure", p.get(k).copied().unwrap_or(f64::NAN), -101_325.0, 1e9, "Pa (gauge)")?;
+            let pressure = check_range(
+                "pressure",
+                p.get(k).copied().unwrap_or(f64::NAN),
+                -101_325.0,
+                1e9,
+                "Pa (gauge)",
+            )?;
             let e = check_range("contraction", e, m.table.e_min, m.table.e_max, "(the table's range)")?;
             Ok(m.table.eval(e).force(pressure, m.spec.modulus_scale))
         })

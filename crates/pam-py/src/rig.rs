@@ -99,16 +99,23 @@ impl Rig {
                 muscle_pressure: pressure.as_ref().map(|(value, slope)| Signal { value, slope }),
                 joint_angle: angle.as_ref().map(|(value, slope)| Signal { value, slope }),
             };
-            let ids = parameters.iter().map(|name| ParameterId::from_name(name)).collect::<pam_core::Result<Vec<_>>>()?;
-            predict(inner, Block::from_name(block)?, &measured, Timing::new(sample_time, step)?, &starts, &ids)
+            let ids = parameters
+                .iter()
+                .map(|name| ParameterId::from_name(name))
+                .collect::<pam_core::Result<Vec<_>>>()?;
+            predict(
+                inner,
+                Block::from_name(block)?,
+                &measured,
+                Timing::new(sample_time, step)?,
+                &starts,
+                &ids,
+            )
         });
         let p = run.map_err(|e| error(py, &e))?;
         let rows = p.value.len();
-        let jacobian = if p.columns > 0 {
-            Some(array(py, p.jacobian).reshape([rows, p.columns])?)
-        } else {
-            None
-        };
+        let jacobian =
+            if p.columns > 0 { Some(array(py, p.jacobian).reshape([rows, p.columns])?) } else { None };
         Ok((array(py, p.value), jacobian))
     }
 }
@@ -119,8 +126,10 @@ pub fn parameter_names() -> Vec<&'static str> {
     ParameterId::ALL.iter().map(|p| p.name()).collect()
 }
 
+type EffectRow = (&'static str, &'static str, Vec<(&'static str, &'static str)>);
+
 /// Effects of the core: (id, block, [(parameter, SI unit), ...]).
 #[pyfunction]
-pub fn effects() -> Vec<(&'static str, &'static str, Vec<(&'static str, &'static str)>)> {
+pub fn effects() -> Vec<EffectRow> {
     pam_core::effects::EFFECTS.iter().map(|e| (e.id, e.block, e.parameters.to_vec())).collect()
 }

@@ -66,7 +66,7 @@ def _conditions(block: Block, prepared: Prepared, rig: Rig, width: int) -> dict[
 
 def _regimes(c: dict[str, Array]) -> dict[str, NDArray[np.bool_]]:
     """Named yes/no conditions of each bin."""
-    out = {}
+    out: dict[str, NDArray[np.bool_]] = {}
     if "valve opening [1]" in c:
         x = c["valve opening [1]"]
         out |= {"valve closed": np.abs(x) < 0.01, "valve filling": x >= 0.01, "valve venting": x <= -0.01}

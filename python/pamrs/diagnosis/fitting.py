@@ -14,7 +14,7 @@ from scipy.optimize import least_squares
 from pamrs import _core
 from pamrs.diagnosis.blocks import Block, Residual, residual
 from pamrs.diagnosis.signals import Prepared, binned
-from pamrs.effects_table import EFFECTS
+from pamrs.effects_table import EFFECTS, EffectParameter
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 
@@ -173,7 +173,7 @@ class _Scaling:
         return rig
 
 
-def _parameter(name: str):  # type: ignore[no-untyped-def]
+def _parameter(name: str) -> EffectParameter:
     effect, _, short = name.partition(".")
     return next(p for p in EFFECTS[effect].parameters if p.name == short)
 
@@ -255,6 +255,12 @@ def fit(
             memo[key] = (np.concatenate(rows), np.concatenate(jacs), found)
         return memo[key]
 
+    def weighted(x: Array) -> Array:
+        return evaluate(x)[0]
+
+    def slopes_of(x: Array) -> Array:
+        return evaluate(x)[1]
+
     start = scaling.start.copy()
     for index, name in enumerate(baseline):
         if warm and name in warm:
@@ -265,9 +271,9 @@ def fit(
         # a start on a bound makes the trust-region step overflow harmlessly inside SciPy
         with np.errstate(all="ignore"):
             solution = least_squares(
-                lambda x: evaluate(x)[0],
+                weighted,
                 start,
-                jac=lambda x: evaluate(x)[1],
+                jac=slopes_of,
                 bounds=scaling.bounds,
                 max_nfev=evaluations,
                 ftol=1e-5,
@@ -277,7 +283,9 @@ def fit(
     else:
         x = start
     values, jacobian, found = evaluate(x)
-    covariance = np.linalg.pinv(jacobian.T @ jacobian, hermitian=True) if x.size else np.zeros((0, 0))
+    covariance: Array = np.zeros((0, 0))
+    if x.size:
+        covariance = np.asarray(np.linalg.pinv(jacobian.T @ jacobian, hermitian=True), dtype=np.float64)
     spread = np.sqrt(np.clip(np.diag(covariance), 0.0, None))
     named = {n: scaling.value(n, float(v)) for n, v in zip(scaling.names, x, strict=True)}
     std = {n: float(s) * scaling.slope(n, float(v)) for n, s, v in zip(scaling.names, spread, x, strict=True)}

@@ -361,6 +361,11 @@ class Diagnosis:
     def report(self, path: str | os.PathLike[str]) -> Path:
         """Write the report, one HTML file that needs no network.
 
+        Parameters
+        ----------
+        path : path-like
+            The file.
+
         Raises
         ------
         ImportError
@@ -372,6 +377,11 @@ class Diagnosis:
 
     def figure(self, path: str | os.PathLike[str]) -> Path:
         """Write one picture of the diagnosis, a PNG of 1600 x 1000 pixels.
+
+        Parameters
+        ----------
+        path : path-like
+            The file.
 
         Raises
         ------

@@ -101,7 +101,7 @@ def noise_level(values: Array, mask: Mask) -> float:
     steps = np.abs(np.diff(values[mask]))
     steps = steps[steps > 1e-12 * max(1e-12, float(np.abs(values[mask]).max()))]
     lattice = float(steps.min()) if steps.size else 0.0
-    return max(sigma, lattice / np.sqrt(12.0))
+    return float(max(sigma, lattice / np.sqrt(12.0)))
 
 
 def _bridged(values: Array, mask: Mask) -> Array:

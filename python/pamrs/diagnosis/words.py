@@ -130,7 +130,8 @@ def warnings(case: Case, groups: list[Group], symptoms: dict[str, float], no_hel
     out = []
     for recording in case.recordings:
         for issue in recording.issues[:8]:
-            out.append(f"{recording.name}: {issue.kind} in {issue.channel}, {issue.start:g} to {issue.stop:g} s: {issue.text}")
+            when = f"{issue.start:g} to {issue.stop:g} s"
+            out.append(f"{recording.name}: {issue.kind} in {issue.channel}, {when}: {issue.text}")
         if len(recording.issues) > 8:
             out.append(f"{recording.name}: {len(recording.issues) - 8} more issues of this kind")
     for name, value in sorted(symptoms.items(), key=lambda kv: -abs(kv[1])):

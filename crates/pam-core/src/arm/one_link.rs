@@ -46,10 +46,18 @@ impl Stops {
         let zero = constant(0.0);
         if angle.re() < self.min_angle {
             let push = (-angle + self.min_angle) * self.stiffness - rate * self.damping;
-            if push.re() > 0.0 { push } else { zero }
+            if push.re() > 0.0 {
+                push
+            } else {
+                zero
+            }
         } else if angle.re() > self.max_angle {
             let push = (angle - self.max_angle) * self.stiffness + rate * self.damping;
-            if push.re() > 0.0 { -push } else { zero }
+            if push.re() > 0.0 {
+                -push
+            } else {
+                zero
+            }
         } else {
             zero
         }

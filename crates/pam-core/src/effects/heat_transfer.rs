@@ -41,7 +41,13 @@ pub fn temperature<S: Scalar>(gas: &Gas, pressure: S, volume: S, mass: S) -> S {
 
 /// Rate of the absolute pressure [Pa/s].
 #[inline]
-pub fn pressure_rate<S: Scalar>(gas: &Gas, c: &ChamberState<S>, temperature: S, area: S, coefficient: S) -> S {
+pub fn pressure_rate<S: Scalar>(
+    gas: &Gas,
+    c: &ChamberState<S>,
+    temperature: S,
+    area: S,
+    coefficient: S,
+) -> S {
     let (kappa, r) = (gas.gamma, gas.gas_constant);
     let relative = c.pressure * temperature / (REFERENCE_PRESSURE * gas.temperature);
     let wall = coefficient * relative.sqrt() * area * (-temperature + gas.temperature);
@@ -56,7 +62,8 @@ mod tests {
     #[test]
     fn limits_are_adiabatic_and_isothermal() {
         let gas = Gas::new(101_325.0, 293.15, 287.05, 1.4);
-        let state = ChamberState { pressure: 4e5, volume: 1e-3, volume_rate: 1e-4, inflow: 0.0, outflow: 0.0 };
+        let state =
+            ChamberState { pressure: 4e5, volume: 1e-3, volume_rate: 1e-4, inflow: 0.0, outflow: 0.0 };
         let adiabatic = pressure_rate(&gas, &state, 293.15, 0.05, 0.0);
         assert!((adiabatic + 1.4 * 4e5 * 0.1_f64).abs() < 1e-9);
         let mass = 4e5 * 1e-3 / (287.05 * 293.15);

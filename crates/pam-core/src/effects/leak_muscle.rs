@@ -10,8 +10,11 @@ use crate::gas::orifice::Gas;
 use crate::scalar::{constant, Scalar};
 
 /// Table entry.
-pub const INFO: EffectInfo =
-    EffectInfo { id: "leak_muscle", block: "chamber", parameters: &[("conductance", "m3/(s Pa)"), ("laminar_share", "1")] };
+pub const INFO: EffectInfo = EffectInfo {
+    id: "leak_muscle",
+    block: "chamber",
+    parameters: &[("conductance", "m3/(s Pa)"), ("laminar_share", "1")],
+};
 
 /// Absolute pressure at which a laminar path of the same conductance leaks as much as a choked orifice, up to
 /// the counter pressure [Pa].

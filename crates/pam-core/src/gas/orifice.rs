@@ -84,7 +84,8 @@ impl Gas {
     /// `mdot = C rho0 p`, `rho0` at 100 kPa and 293.15 K).
     pub fn area_of_conductance<S: Scalar>(&self, conductance: S) -> S {
         const ISO_DENSITY: f64 = 1.185;
-        conductance * (ISO_DENSITY * (293.15 / self.temperature).sqrt() / (self.psi_choked * self.flow_factor))
+        conductance
+            * (ISO_DENSITY * (293.15 / self.temperature).sqrt() / (self.psi_choked * self.flow_factor))
     }
 }
 

@@ -30,10 +30,18 @@ impl AreaTable {
         let finite = opening.iter().chain(fraction).all(|v| v.is_finite());
         let last = opening[opening.len() - 1];
         if !finite || opening[0] != 0.0 || last != 1.0 || opening.windows(2).any(|w| w[1] <= w[0]) {
-            return Err(Error::parameter("valve.area_fraction.opening", last, "openings rising strictly from 0 to 1"));
+            return Err(Error::parameter(
+                "valve.area_fraction.opening",
+                last,
+                "openings rising strictly from 0 to 1",
+            ));
         }
         if fraction[0] < 0.0 || fraction.windows(2).any(|w| w[1] < w[0]) {
-            return Err(Error::parameter("valve.area_fraction.fraction", fraction[0], "area fractions >= 0 that do not fall"));
+            return Err(Error::parameter(
+                "valve.area_fraction.fraction",
+                fraction[0],
+                "area fractions >= 0 that do not fall",
+            ));
         }
         Ok(Self { opening: opening.to_vec(), fraction: fraction.to_vec() })
     }
@@ -47,7 +55,8 @@ impl AreaTable {
         while cell + 1 < last && x > self.opening[cell + 1] {
             cell += 1;
         }
-        let slope = (self.fraction[cell + 1] - self.fraction[cell]) / (self.opening[cell + 1] - self.opening[cell]);
+        let slope =
+            (self.fraction[cell + 1] - self.fraction[cell]) / (self.opening[cell + 1] - self.opening[cell]);
         (opening - self.opening[cell]) * slope + self.fraction[cell]
     }
 }

@@ -31,7 +31,13 @@ impl TendonJoint {
     ///
     /// # Errors
     /// [`Error::Parameter`] when a length is not positive.
-    pub fn new(upper_axial: f64, upper_offset: f64, lower_axial: f64, lower_offset: f64, rest_angle: f64) -> Result<Self> {
+    pub fn new(
+        upper_axial: f64,
+        upper_offset: f64,
+        lower_axial: f64,
+        lower_offset: f64,
+        rest_angle: f64,
+    ) -> Result<Self> {
         for (name, value) in [("joint.upper_axial", upper_axial), ("joint.lower_axial", lower_axial)] {
             if !(value.is_finite() && value > 0.0) {
                 return Err(Error::parameter(name, value, "a length > 0 m"));
@@ -78,7 +84,12 @@ mod tests {
         for degrees in [15.0, 40.0, 90.0, 119.0f64] {
             let angle = DualSVec64::<1>::from_re(degrees.to_radians()).derivative(0);
             let point = joint.eval(angle);
-            assert!((point.shortening.eps.unwrap_generic(nalgebra::Const::<1>, nalgebra::Const::<1>)[0] - point.moment_arm.re()).abs() < 1e-14);
+            assert!(
+                (point.shortening.eps.unwrap_generic(nalgebra::Const::<1>, nalgebra::Const::<1>)[0]
+                    - point.moment_arm.re())
+                .abs()
+                    < 1e-14
+            );
         }
         assert!(TendonJoint::new(f64::NAN, 0.02, 0.02, 0.0, 0.2).is_err());
     }

@@ -56,7 +56,9 @@ impl Rig {
         let joint = spec
             .joint
             .as_ref()
-            .map(|j| TendonJoint::new(j.upper_axial, j.upper_offset, j.lower_axial, j.lower_offset, j.rest_angle))
+            .map(|j| {
+                TendonJoint::new(j.upper_axial, j.upper_offset, j.lower_axial, j.lower_offset, j.rest_angle)
+            })
             .transpose()?;
         let (values, active) = collect_values(&spec)?;
         let rig = Self { gas, valve, muscle, joint, values, active, spec };
@@ -69,7 +71,11 @@ impl Rig {
         if let (Some(joint), Some(muscle), Some(spec)) = (&self.joint, &self.muscle, &self.spec.joint) {
             for (name, angle) in [("joint.min_angle", spec.min_angle), ("joint.max_angle", spec.max_angle)] {
                 if !joint.reaches(angle) {
-                    return Err(Error::parameter(name, angle, "an angle that the tendon reaches (it is too short)"));
+                    return Err(Error::parameter(
+                        name,
+                        angle,
+                        "an angle that the tendon reaches (it is too short)",
+                    ));
                 }
                 let contraction = joint.eval(angle).shortening / muscle.spec.rest_length;
                 if !muscle.table.contains(contraction) {
@@ -158,7 +164,10 @@ fn collect_values(spec: &RigSpec) -> Result<(Values<f64>, Active)> {
             Error::Model(format!("no effect '{}'; there are: {}", effect.id, ids.join(", ")))
         })?;
         if info.block == "muscle" && spec.muscle.is_none() {
-            return Err(Error::Model(format!("effect '{}' acts in the muscle, and the rig has none", effect.id)));
+            return Err(Error::Model(format!(
+                "effect '{}' acts in the muscle, and the rig has none",
+                effect.id
+            )));
         }
         for (name, unit) in info.parameters {
             let value = effect.parameters.get(*name).copied().ok_or_else(|| {
@@ -173,7 +182,8 @@ fn collect_values(spec: &RigSpec) -> Result<(Values<f64>, Active)> {
             }
             values.set(id, value);
         }
-        if let Some(unknown) = effect.parameters.keys().find(|k| info.parameters.iter().all(|(n, _)| n != k)) {
+        if let Some(unknown) = effect.parameters.keys().find(|k| info.parameters.iter().all(|(n, _)| n != k))
+        {
             return Err(Error::Model(format!("effect '{}' has no parameter '{unknown}'", effect.id)));
         }
         match info.id {

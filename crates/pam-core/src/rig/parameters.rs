@@ -57,7 +57,10 @@ impl ParameterId {
     pub fn from_name(name: &str) -> Result<Self> {
         Self::ALL.iter().copied().find(|p| p.name() == name).ok_or_else(|| {
             let names: Vec<_> = Self::ALL.iter().map(|p| p.name()).collect();
-            Error::Model(format!("no scalar parameter '{name}' that can vary; there are: {}", names.join(", ")))
+            Error::Model(format!(
+                "no scalar parameter '{name}' that can vary; there are: {}",
+                names.join(", ")
+            ))
         })
     }
 }

@@ -106,7 +106,8 @@ impl<'a, S: Scalar> Plant<'a, S> {
             )),
             _ => None,
         };
-        let (count, rest_length) = spec.muscle.as_ref().map_or((0.0, 1.0), |m| (f64::from(m.count), m.rest_length));
+        let (count, rest_length) =
+            spec.muscle.as_ref().map_or((0.0, 1.0), |m| (f64::from(m.count), m.rest_length));
         Self { rig, values, count, rest_length, arm }
     }
 
@@ -137,17 +138,26 @@ impl<'a, S: Scalar> Plant<'a, S> {
         let contraction = point.shortening / self.rest_length;
         let table = muscle.table.eval(contraction);
         let gauge = state[PRESSURE] - self.rig.gas.ambient_pressure;
-        let mut force = gauge * table.a_gas + self.values[P::ModulusScale] * (gauge * table.a_elastic + table.b_elastic);
+        let mut force =
+            gauge * table.a_gas + self.values[P::ModulusScale] * (gauge * table.a_elastic + table.b_elastic);
         if self.rig.active.hysteresis {
             let moved = memory
                 .moved((step_start_contraction - contraction) * self.rest_length, self.values[P::Presliding]);
-            force += muscle_hysteresis::force(&moved, self.values[P::FrictionConstant], self.values[P::FrictionPressure], gauge);
+            force += muscle_hysteresis::force(
+                &moved,
+                self.values[P::FrictionConstant],
+                self.values[P::FrictionPressure],
+                gauge,
+            );
         }
         Mechanics {
             contraction,
             moment_arm: point.moment_arm,
             volume: table.volume * self.count + dead,
-            volume_rate: table.volume_slope * point.moment_arm * state[RATE] * (self.count / self.rest_length),
+            volume_rate: table.volume_slope
+                * point.moment_arm
+                * state[RATE]
+                * (self.count / self.rest_length),
             muscle_volume: table.volume,
             force: force * self.count,
         }
@@ -221,7 +231,14 @@ impl<'a, S: Scalar> Plant<'a, S> {
     }
 
     #[inline]
-    fn gas_rates(&self, state: &State<S>, spool: S, m: &Mechanics<S>, simulated: Simulated, rates: &mut State<S>) {
+    fn gas_rates(
+        &self,
+        state: &State<S>,
+        spool: S,
+        m: &Mechanics<S>,
+        simulated: Simulated,
+        rates: &mut State<S>,
+    ) {
         let gas = &self.rig.gas;
         let zero = constant(0.0);
         let pressure = state[PRESSURE];
@@ -229,7 +246,8 @@ impl<'a, S: Scalar> Plant<'a, S> {
         if let Some(table) = &self.rig.valve {
             let x = spool.re();
             if x > 0.0 {
-                inflow = gas.mass_flow(self.values[P::DischargeArea] * table.eval(spool), state[SUPPLY], pressure);
+                inflow =
+                    gas.mass_flow(self.values[P::DischargeArea] * table.eval(spool), state[SUPPLY], pressure);
             } else if x < 0.0 {
                 let area = self.values[P::DischargeArea] * table.eval(-spool);
                 outflow = gas.mass_flow(area, pressure, constant(gas.ambient_pressure));
@@ -243,9 +261,15 @@ impl<'a, S: Scalar> Plant<'a, S> {
             return;
         }
         if self.rig.active.leak {
-            outflow += leak_muscle::mass_flow(gas, self.values[P::LeakConductance], self.values[P::LeakLaminarShare], pressure);
+            outflow += leak_muscle::mass_flow(
+                gas,
+                self.values[P::LeakConductance],
+                self.values[P::LeakLaminarShare],
+                pressure,
+            );
         }
-        let chamber = ChamberState { pressure, volume: m.volume, volume_rate: m.volume_rate, inflow, outflow };
+        let chamber =
+            ChamberState { pressure, volume: m.volume, volume_rate: m.volume_rate, inflow, outflow };
         if self.rig.active.heat {
             let temperature = heat_transfer::temperature(gas, pressure, m.volume, state[MASS]);
             let area = if self.count > 0.0 {
@@ -254,8 +278,13 @@ impl<'a, S: Scalar> Plant<'a, S> {
             } else {
                 heat_transfer::cube_area(m.volume)
             };
-            rates[PRESSURE] =
-                heat_transfer::pressure_rate(gas, &chamber, temperature, area, self.values[P::HeatCoefficient]);
+            rates[PRESSURE] = heat_transfer::pressure_rate(
+                gas,
+                &chamber,
+                temperature,
+                area,
+                self.values[P::HeatCoefficient],
+            );
             rates[MASS] = inflow - outflow;
         } else {
             let alpha = Polytropic {

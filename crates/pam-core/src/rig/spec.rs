@@ -124,7 +124,8 @@ impl RigSpec {
     /// # Errors
     /// [`Error::Model`] for text that is not of this form (unknown keys included), and as [`Self::validate`].
     pub fn from_json(text: &str) -> Result<Self> {
-        let spec: Self = serde_json::from_str(text).map_err(|e| Error::Model(format!("rig description: {e}")))?;
+        let spec: Self =
+            serde_json::from_str(text).map_err(|e| Error::Model(format!("rig description: {e}")))?;
         spec.validate()?;
         Ok(spec)
     }
@@ -134,7 +135,9 @@ impl RigSpec {
     /// # Errors
     /// [`Error::Parameter`] naming the first impossible value; [`Error::Model`] for blocks that lack a neighbour.
     pub fn validate(&self) -> Result<()> {
-        let range = |name: &str, value: f64, low: f64, high: f64, unit: &str| check_range(name, value, low, high, unit).map(|_| ());
+        let range = |name: &str, value: f64, low: f64, high: f64, unit: &str| {
+            check_range(name, value, low, high, unit).map(|_| ())
+        };
         range("gas.ambient_pressure", self.gas.ambient_pressure, 1e3, 1e6, "Pa")?;
         range("gas.temperature", self.gas.temperature, 150.0, 500.0, "K")?;
         range("gas.gas_constant", self.gas.gas_constant, 10.0, 5000.0, "J/(kg K)")?;
@@ -150,7 +153,13 @@ impl RigSpec {
             range("valve.half_range", valve.half_range, 1e-9, 1e3, "V")?;
         }
         let no_muscle = self.muscle.is_none();
-        range("chamber.dead_volume", self.chamber.dead_volume, if no_muscle { 1e-9 } else { 0.0 }, 1e4, "m3")?;
+        range(
+            "chamber.dead_volume",
+            self.chamber.dead_volume,
+            if no_muscle { 1e-9 } else { 0.0 },
+            1e4,
+            "m3",
+        )?;
         for (name, value) in [
             ("chamber.alpha_in", self.chamber.alpha_in),
             ("chamber.alpha_out", self.chamber.alpha_out),
@@ -179,7 +188,13 @@ impl RigSpec {
             range("arm.coulomb", arm.coulomb, 0.0, 1e6, "N m")?;
             range("arm.coulomb_speed", arm.coulomb_speed, 1e-9, 1e3, "rad/s")?;
             range("arm.gravity", arm.gravity, 0.0, 1e3, "m/s2")?;
-            range("arm.inertia + payload length^2", arm.inertia + arm.payload * arm.length.powi(2), 1e-9, 1e9, "kg m2")?;
+            range(
+                "arm.inertia + payload length^2",
+                arm.inertia + arm.payload * arm.length.powi(2),
+                1e-9,
+                1e9,
+                "kg m2",
+            )?;
         }
         range("sensors.pressure_zero", self.sensors.pressure_zero, -1e7, 1e7, "Pa")?;
         range("sensors.angle_zero", self.sensors.angle_zero, -7.0, 7.0, "rad")?;
@@ -187,7 +202,8 @@ impl RigSpec {
     }
 
     fn check_chain(&self) -> Result<()> {
-        let missing = |block: &str, needs: &str| Err(Error::Model(format!("a rig with [{block}] needs [{needs}]")));
+        let missing =
+            |block: &str, needs: &str| Err(Error::Model(format!("a rig with [{block}] needs [{needs}]")));
         match (&self.supply, &self.valve) {
             (Some(_), None) => return missing("supply", "valve"),
             (None, Some(_)) => return missing("valve", "supply"),
@@ -209,7 +225,8 @@ impl RigSpec {
 /// # Errors
 /// [`Error::Model`] for text that is not of this form; [`Error::Parameter`] for an impossible value.
 pub fn muscle_from_json(text: &str) -> Result<MuscleSpec> {
-    let spec: MuscleSpec = serde_json::from_str(text).map_err(|e| Error::Model(format!("muscle description: {e}")))?;
+    let spec: MuscleSpec =
+        serde_json::from_str(text).map_err(|e| Error::Model(format!("muscle description: {e}")))?;
     spec.validate()?;
     Ok(spec)
 }

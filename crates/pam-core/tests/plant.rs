@@ -1,0 +1,207 @@
+//! Laws of the composed plant: order, sensitivities against differences, typed errors, determinism.
+
+use pam_core::residual::{predict, Block, Measured, Signal};
+use pam_core::rig::spec::EffectSpec;
+use pam_core::rig::ParameterId;
+use pam_core::simulate::{simulate, Initial, Timing, Trajectory};
+use pam_core::{Error, Rig, RigSpec};
+use std::collections::BTreeMap;
+
+fn spec() -> RigSpec {
+    RigSpec::from_json(include_str!("data/shoulder.json")).unwrap()
+}
+
+fn effect(id: &str, parameters: &[(&str, f64)]) -> EffectSpec {
+    let parameters: BTreeMap<_, _> = parameters.iter().map(|(n, v)| ((*n).to_string(), *v)).collect();
+    EffectSpec { id: id.into(), parameters }
+}
+
+fn command(n: usize) -> Vec<f64> {
+    (0..n).map(|k| 5.3 + 0.25 * (k as f64 * 0.03).sin()).collect()
+}
+
+fn start(rig: &Rig) -> Initial {
+    Initial { muscle_pressure: 2e5, joint_angle: 0.9, ..Initial::rest(rig) }
+}
+
+fn run(rig: &Rig, n: usize, substeps: usize) -> Trajectory {
+    simulate(rig, &command(n), Timing { sample_time: 0.01, substeps }, start(rig)).unwrap()
+}
+
+#[test]
+fn converges_with_order_four() {
+    let rig = Rig::new(spec()).unwrap();
+    let reference = run(&rig, 60, 320);
+    let error = |substeps| {
+        let t = run(&rig, 60, substeps);
+        t.joint_angle.iter().zip(&reference.joint_angle).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    };
+    let order = (error(10) / error(20)).log2();
+    assert!((3.6..4.4).contains(&order), "order {order}");
+}
+
+#[test]
+fn a_run_repeats_bit_for_bit() {
+    let rig = Rig::new(spec()).unwrap();
+    assert_eq!(run(&rig, 100, 10), run(&rig.clone(), 100, 10));
+}
+
+/// Values and slopes of a channel by central differences.
+fn slopes(values: &[f64], dt: f64) -> Vec<f64> {
+    let n = values.len();
+    (0..n)
+        .map(|k| {
+            let (a, b) = (k.saturating_sub(1), (k + 1).min(n - 1));
+            (values[b] - values[a]) / ((b - a) as f64 * dt)
+        })
+        .collect()
+}
+
+#[test]
+fn sensitivities_agree_with_differences() {
+    let mut with_effects = spec();
+    with_effects.effects = vec![
+        effect("leak_muscle", &[("conductance", 2e-10), ("laminar_share", 0.4)]),
+        effect(
+            "muscle_hysteresis",
+            &[("friction_constant", 8.0), ("friction_pressure", 4e-5), ("presliding", 3e-3)],
+        ),
+    ];
+    let mut heated = with_effects.clone();
+    heated.effects = vec![effect(
+        "heat_transfer",
+        &[("heat_transfer_coefficient", 60.0), ("initial_temperature_rise", 3.0)],
+    )];
+    let cases: [(&RigSpec, Block, &[&str]); 4] = [
+        (&with_effects, Block::Supply, &["supply.volume", "valve.discharge_area_max", "valve.null_voltage"]),
+        (
+            &with_effects,
+            Block::Chamber,
+            &[
+                "chamber.dead_volume",
+                "chamber.alpha",
+                "leak_muscle.conductance",
+                "leak_muscle.laminar_share",
+                "sensors.angle_zero",
+            ],
+        ),
+        (
+            &with_effects,
+            Block::Arm,
+            &[
+                "arm.payload",
+                "arm.coulomb",
+                "muscle.modulus_scale",
+                "muscle_hysteresis.friction_pressure",
+                "muscle_hysteresis.presliding",
+                "sensors.pressure_zero",
+            ],
+        ),
+        (
+            &heated,
+            Block::Chamber,
+            &["heat_transfer.heat_transfer_coefficient", "heat_transfer.initial_temperature_rise"],
+        ),
+    ];
+    let base = Rig::new(with_effects.clone()).unwrap();
+    let n = 80;
+    let truth = run(&base, n, 10);
+    let dt = 0.01;
+    let (ps, p, th) = (
+        slopes(&truth.supply_pressure, dt),
+        slopes(&truth.muscle_pressure, dt),
+        slopes(&truth.joint_angle, dt),
+    );
+    let u = command(n);
+    let measured = Measured {
+        valve_command: &u,
+        supply_pressure: Some(Signal { value: &truth.supply_pressure, slope: &ps }),
+        muscle_pressure: Some(Signal { value: &truth.muscle_pressure, slope: &p }),
+        joint_angle: Some(Signal { value: &truth.joint_angle, slope: &th }),
+    };
+    let timing = Timing { sample_time: dt, substeps: 10 };
+    for (spec, block, names) in cases {
+        let rig = Rig::new(spec.clone()).unwrap();
+        let ids: Vec<_> = names.iter().map(|n| ParameterId::from_name(n).unwrap()).collect();
+        let exact = predict(&rig, block, &measured, timing, &[0, 40], &ids).unwrap();
+        for (column, name) in names.iter().enumerate() {
+            let size = if name.ends_with("zero") { 1e-3 } else { 1e-4 };
+            let shifted = |sign: f64| {
+                let rig = Rig::new(nudged(spec, name, sign * size)).unwrap();
+                predict(&rig, block, &measured, timing, &[0, 40], &[]).unwrap().value
+            };
+            let (up, down) = (shifted(1.0), shifted(-1.0));
+            let span = nudge_size(spec, name, size);
+            let scale = (0..n).map(|k| exact.jacobian[k * exact.columns + column].abs()).fold(0.0, f64::max);
+            assert!(scale > 0.0, "{name} has no influence");
+            for k in 0..n {
+                let difference = (up[k] - down[k]) / (2.0 * span);
+                let gap = (exact.jacobian[k * exact.columns + column] - difference).abs();
+                assert!(gap < 2e-3 * scale, "{name} at row {k}: {gap} of {scale}");
+            }
+        }
+    }
+}
+
+fn slot<'a>(spec: &'a mut RigSpec, name: &str) -> &'a mut f64 {
+    let (block, key) = name.split_once('.').unwrap();
+    if let Some(index) = spec.effects.iter().position(|e| e.id == block) {
+        return spec.effects[index].parameters.get_mut(key).unwrap();
+    }
+    match name {
+        "supply.volume" => &mut spec.supply.as_mut().unwrap().volume,
+        "valve.discharge_area_max" => &mut spec.valve.as_mut().unwrap().discharge_area_max,
+        "valve.null_voltage" => &mut spec.valve.as_mut().unwrap().null_voltage,
+        "chamber.dead_volume" => &mut spec.chamber.dead_volume,
+        "chamber.alpha" => &mut spec.chamber.alpha,
+        "arm.payload" => &mut spec.arm.as_mut().unwrap().payload,
+        "arm.coulomb" => &mut spec.arm.as_mut().unwrap().coulomb,
+        "muscle.modulus_scale" => &mut spec.muscle.as_mut().unwrap().modulus_scale,
+        "sensors.angle_zero" => &mut spec.sensors.angle_zero,
+        _ => &mut spec.sensors.pressure_zero,
+    }
+}
+
+fn nudge_size(spec: &RigSpec, name: &str, relative: f64) -> f64 {
+    let value = *slot(&mut spec.clone(), name);
+    if value == 0.0 {
+        if name == "sensors.pressure_zero" {
+            10.0
+        } else {
+            1e-5
+        }
+    } else {
+        value * relative
+    }
+}
+
+fn nudged(spec: &RigSpec, name: &str, signed: f64) -> RigSpec {
+    let mut out = spec.clone();
+    *slot(&mut out, name) += nudge_size(spec, name, signed.abs()) * signed.signum();
+    out
+}
+
+#[test]
+fn bad_input_is_a_typed_error() {
+    let rig = Rig::new(spec()).unwrap();
+    let timing = Timing::new(0.005, 1e-3).unwrap();
+    let initial = Initial::rest(&rig);
+    let named = |e: Error, name: &str| assert!(e.to_string().contains(name), "{e}");
+    named(simulate(&rig, &[5.0, f64::NAN], timing, initial).unwrap_err(), "valve_command[1]");
+    named(
+        simulate(&rig, &[5.0], timing, Initial { muscle_pressure: -2e5, ..initial }).unwrap_err(),
+        "initial.muscle_pressure",
+    );
+    named(Timing::new(0.005, 3e-3).unwrap_err(), "step");
+    named(Timing::new(f64::NAN, 1e-3).unwrap_err(), "sample_time");
+    let mut bad = spec();
+    bad.arm.as_mut().unwrap().payload = f64::INFINITY;
+    named(Rig::new(bad).unwrap_err(), "arm.payload");
+    let mut unknown = spec();
+    unknown.effects = vec![effect("phlogiston", &[])];
+    named(Rig::new(unknown).unwrap_err(), "phlogiston");
+    let mut short = spec();
+    short.joint.as_mut().unwrap().max_angle = 3.0;
+    named(Rig::new(short).unwrap_err(), "joint.max_angle");
+    named(RigSpec::from_json("{}").unwrap_err(), "rig description");
+}
