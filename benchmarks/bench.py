@@ -75,10 +75,7 @@ def force() -> None:
     def plain() -> np.ndarray:
         rows = [peer.coefficients(e) for e in contraction]
         return np.array(
-            [
-                p * gas + peer.modulus_scale * (p * elastic + fixed)
-                for p, (gas, elastic, fixed) in zip(pressure, rows, strict=True)
-            ]
+            [p * gas + peer.modulus_scale * (p * elastic + fixed) for p, (gas, elastic, fixed) in zip(pressure, rows, strict=True)]
         )
 
     theirs = best_of(plain)

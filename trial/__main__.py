@@ -14,24 +14,18 @@ from .selfcheck import selfcheck
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="python -m trial", description="Blinded trial of the diagnosis on concealed data."
-    )
+    parser = argparse.ArgumentParser(prog="python -m trial", description="Blinded trial of the diagnosis on concealed data.")
     sub = parser.add_subparsers(dest="command", required=True)
     make = sub.add_parser("make", help="write concealed cases and their keys")
     make.add_argument("--out", type=Path, required=True, help="folder for the cases")
-    make.add_argument(
-        "--keys-dir", type=Path, help="folder for the answer keys (default: OUT with '_keys' appended)"
-    )
+    make.add_argument("--keys-dir", type=Path, help="folder for the answer keys (default: OUT with '_keys' appended)")
     make.add_argument(
         "--kind",
         action="append",
         required=True,
         help=f"{', '.join(KINDS)}, random, or a pair a+b; may be repeated",
     )
-    make.add_argument(
-        "--seed", type=int, required=True, help="seed of the first case; the following cases count up"
-    )
+    make.add_argument("--seed", type=int, required=True, help="seed of the first case; the following cases count up")
     make.add_argument("--repeat", type=int, default=1, help="cases per kind (default 1)")
     make.add_argument("--first", type=int, default=1, help="number of the first case (default 1)")
     make.add_argument("--strength", type=float, default=1.0, help="size of the effects; 1 is typical")
@@ -40,17 +34,13 @@ def _parser() -> argparse.ArgumentParser:
     make.add_argument("--rig", type=Path, help="nominal rig file (default: the shoulder)")
     mark = sub.add_parser("score", help="score results against the keys")
     mark.add_argument("--keys", type=Path, required=True)
-    mark.add_argument(
-        "--results", type=Path, required=True, help="folder with case_xxx/out.json or case_xxx.json"
-    )
+    mark.add_argument("--results", type=Path, required=True, help="folder with case_xxx/out.json or case_xxx.json")
     mark.add_argument(
         "--catalogue",
         default=",".join(LISTED),
         help="effect ids that the diagnosis may name, comma separated",
     )
-    sub.add_parser(
-        "selfcheck", help="compare the plant with an adaptive reference and with the golden vectors"
-    )
+    sub.add_parser("selfcheck", help="compare the plant with an adaptive reference and with the golden vectors")
     return parser
 
 

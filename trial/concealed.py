@@ -79,9 +79,7 @@ def read_rig(path: Path) -> tuple[dict[str, Any], dict[str, float]]:
 def to_parameters(model: dict[str, Any]) -> Parameters:
     """Plant parameters of a nested SI model as returned by :func:`read_rig`."""
     gas, valve, arm, chamber = model["gas"], model["valve"], model["arm"], model["chamber"]
-    muscle = {
-        k: v for k, v in model["muscle"].items() if k not in ("model", "count", "modulus_scale", "end_ratio")
-    }
+    muscle = {k: v for k, v in model["muscle"].items() if k not in ("model", "count", "modulus_scale", "end_ratio")}
     muscle.update(model["muscle"]["end_ratio"])
     return Parameters(
         ambient=gas["ambient_pressure"],
@@ -189,9 +187,7 @@ def run(
         columns[i] = u, ps, p, angle
         for command, span in path.spans(u):
             y, step = plant.advance(y, plant.valve_opening(command), span, step)
-    return Record(
-        SAMPLE_TIME * np.arange(n), columns[:, 0], columns[:, 1], columns[:, 2], columns[:, 3], states
-    )
+    return Record(SAMPLE_TIME * np.arange(n), columns[:, 0], columns[:, 1], columns[:, 2], columns[:, 3], states)
 
 
 def reach(plant: Plant, bare: Plant, record: Record, noise: Noise, window: float = 2.0) -> dict[str, float]:
@@ -209,9 +205,7 @@ def reach(plant: Plant, bare: Plant, record: Record, noise: Noise, window: float
             y = bare.initial(state[0], state[1], state[2], state[3])
         true, other = plant.reading(state), bare.reading(y)
         moved[i] = true[0] - other[0], true[2] - other[2]
-        y, step = bare.advance(
-            y, bare.valve_opening(float(record.command[i])), SAMPLE_TIME, step, rtol=1.0e-6
-        )
+        y, step = bare.advance(y, bare.valve_opening(float(record.command[i])), SAMPLE_TIME, step, rtol=1.0e-6)
     lsb = math.sqrt(12.0)
     floor = np.array(
         [
@@ -241,9 +235,7 @@ def _csv(record: Record) -> str:
     lines = ["time [s],valve_command [V],supply_pressure [bar],muscle_pressure [bar],joint_angle [deg]"]
     lines += [
         f"{t:.3f},{u:.4f},{ps / 1e5:.5f},{p / 1e5:.5f},{math.degrees(a):.3f}"
-        for t, u, ps, p, a in zip(
-            record.time, record.command, record.supply, record.pressure, record.angle, strict=True
-        )
+        for t, u, ps, p, a in zip(record.time, record.command, record.supply, record.pressure, record.angle, strict=True)
     ]
     return "\n".join(lines) + "\n"
 
@@ -279,9 +271,7 @@ def draw_parameters(
                 z = float(rng.standard_normal())
             moved[name] = z
     if kind == "parameters":
-        loud = [
-            k for k in names if not k.startswith("sensors.") and k not in ("supply.volume", "arm.coulomb")
-        ]
+        loud = [k for k in names if not k.startswith("sensors.") and k not in ("supply.volume", "arm.coulomb")]
         for name in rng.choice(loud, int(rng.integers(4, 7)), replace=False):
             moved[str(name)] = float(rng.choice([-1.0, 1.0]) * rng.uniform(1.0, 2.0))
     for name, z in moved.items():
@@ -347,9 +337,7 @@ def make_case(
         kind = str(rng.choice(KINDS))
     parts = kind.split("+")
     if any(p not in KINDS for p in parts) or (len(parts) > 1 and {"none", "parameters"} & set(parts)):
-        raise ValueError(
-            f"unknown kind {kind!r}; known: {', '.join(KINDS)}, random, and effects joined by '+'"
-        )
+        raise ValueError(f"unknown kind {kind!r}; known: {', '.join(KINDS)}, random, and effects joined by '+'")
     rig = (rig or default_rig()).resolve()
     model, tolerance = read_rig(rig)
     true, moved = draw_parameters(kind, model, tolerance, rng)

@@ -42,14 +42,7 @@ class Leak:
         else:
             knee = (r - self.ratio) / (1.0 - self.ratio)
             psi = math.sqrt(1.0 - knee * knee)
-        return (
-            sign
-            * self.coefficient
-            * REFERENCE_DENSITY
-            * up
-            * math.sqrt(REFERENCE_TEMPERATURE / temperature)
-            * psi
-        )
+        return sign * self.coefficient * REFERENCE_DENSITY * up * math.sqrt(REFERENCE_TEMPERATURE / temperature) * psi
 
 
 @dataclass(frozen=True)
@@ -188,9 +181,7 @@ def draw(kind: str, strength: float, rng: np.random.Generator) -> Any:
         one, two = (float(v) for v in rng.uniform(0.02, 0.04, 2))
         return DeadZone(min(one * strength, 0.3), min(two * strength, 0.3), 0.003)
     if kind == "input_path_lag":
-        return InputLag(
-            float(rng.uniform(8.0e-3, 14.0e-3)) * strength, float(rng.uniform(6.0e-3, 10.0e-3)) * strength
-        )
+        return InputLag(float(rng.uniform(8.0e-3, 14.0e-3)) * strength, float(rng.uniform(6.0e-3, 10.0e-3)) * strength)
     if kind == "pressure_lag":
         return PressureLag(float(rng.uniform(20.0e-3, 35.0e-3)) * strength)
     raise ValueError(f"unknown effect {kind!r}; known: {', '.join((*LISTED, *UNLISTED))}")

@@ -87,9 +87,7 @@ def build(name: str, duration: float, sample_time: float, rng: np.random.Generat
     elif name == "multisine":
         base = np.geomspace(0.08, 2.2, 9) * rng.uniform(0.9, 1.1, 9)
         size = 1.0 / np.sqrt(1.0 + (base / 0.5) ** 2)
-        wave = (
-            size[:, None] * np.sin(2.0 * np.pi * base[:, None] * time + rng.uniform(0.0, 2.0 * np.pi, (9, 1)))
-        ).sum(axis=0)
+        wave = (size[:, None] * np.sin(2.0 * np.pi * base[:, None] * time + rng.uniform(0.0, 2.0 * np.pi, (9, 1)))).sum(axis=0)
         wave *= 26.0 / np.abs(wave).max()
         fade = np.clip(time / 3.0, 0.0, 1.0)
         angle = 16.0 + fade * (float(rng.uniform(48.0, 58.0)) - 16.0 + wave)
@@ -105,9 +103,7 @@ def build(name: str, duration: float, sample_time: float, rng: np.random.Generat
             move, hold = float(rng.uniform(1.5, 3.5)), float(rng.uniform(5.0, 8.0))
             settle = move + float(rng.uniform(0.3, 1.0))
             part = (time >= t) & (time < t + settle + hold)
-            angle[part] = _ramps(
-                time[part] - t, [(0.0, level), (move, goal), (settle + hold + 1.0, goal)], smooth=True
-            )
+            angle[part] = _ramps(time[part] - t, [(0.0, level), (move, goal), (settle + hold + 1.0, goal)], smooth=True)
             sealed |= (time >= t + settle) & (time < t + settle + hold)
             t, level = t + settle + hold, goal
     elif name == "angle_steps":

@@ -79,9 +79,7 @@ class Muscle:
         """Solve the shape at a contraction ratio (positive when shorter than at rest)."""
         length = self.rest_length * (1.0 - contraction)
         if not 0.55 * self.fibre < length < self.fibre:
-            raise ValueError(
-                f"contraction ratio {contraction!r} leaves the range of the braid (length {length:.4f} m)"
-            )
+            raise ValueError(f"contraction ratio {contraction!r} leaves the range of the braid (length {length:.4f} m)")
         taut = False
         rest = self.rest_radius
         if contraction == 0.0:
@@ -95,9 +93,7 @@ class Muscle:
                 far = rest + i * step
                 if sign * self.fibre_excess(contraction, far) <= 0.0:
                     lo, hi = min(near, far), max(near, far)
-                    radius = float(
-                        brentq(lambda r: self.fibre_excess(contraction, r), lo, hi, xtol=1e-16, rtol=1e-14)
-                    )
+                    radius = float(brentq(lambda r: self.fibre_excess(contraction, r), lo, hi, xtol=1e-16, rtol=1e-14))
                     break
                 near = far
             else:
@@ -106,14 +102,10 @@ class Muscle:
                 taut = True
         a, b, c, reach, last, _ = self._ends(contraction, radius)
         cylinder = length - 2.0 * reach
-        first = cylinder * radius + 2.0 * b * (
-            c * math.sin(last) + a * (0.5 * last + 0.25 * math.sin(2.0 * last))
-        )
+        first = cylinder * radius + 2.0 * b * (c * math.sin(last) + a * (0.5 * last + 0.25 * math.sin(2.0 * last)))
         sin_l = math.sin(last)
         second = cylinder * radius**2 + 2.0 * b * (
-            c * c * sin_l
-            + 2.0 * a * c * (0.5 * last + 0.25 * math.sin(2.0 * last))
-            + a * a * (sin_l - sin_l**3 / 3.0)
+            c * c * sin_l + 2.0 * a * c * (0.5 * last + 0.25 * math.sin(2.0 * last)) + a * a * (sin_l - sin_l**3 / 3.0)
         )
         wall = (first - math.sqrt(first * first - length * self.rubber / math.pi)) / length
         volume = math.pi * (second - 2.0 * wall * first + wall * wall * length)
@@ -186,9 +178,7 @@ class JointTables:
         Multiplies every modulus.
     """
 
-    def __init__(
-        self, muscle: Muscle, tendon: Tendon, count: int, modulus_scale: float, rest_angle: float
-    ) -> None:
+    def __init__(self, muscle: Muscle, tendon: Tendon, count: int, modulus_scale: float, rest_angle: float) -> None:
         step = math.radians(0.1)
         below, above = 80, 1160
         self.start = rest_angle - below * step

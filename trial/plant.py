@@ -209,11 +209,7 @@ class Plant:
                 i = last
             s = angle - start - i * step
             k = cells[i]
-            torque = (
-                (p - ambient) * (((k[0] * s + k[1]) * s + k[2]) * s + k[3])
-                + ((k[4] * s + k[5]) * s + k[6]) * s
-                + k[7]
-            )
+            torque = (p - ambient) * (((k[0] * s + k[1]) * s + k[2]) * s + k[3]) + ((k[4] * s + k[5]) * s + k[6]) * s + k[7]
             volume = ((k[8] * s + k[9]) * s + k[10]) * s + k[11] + dead
             v_rate = ((3.0 * k[8] * s + 2.0 * k[9]) * s + k[10]) * rate
             d = [0.0] * len(y)
@@ -237,9 +233,7 @@ class Plant:
                 wall = ((k[16] * s + k[17]) * s + k[18]) * s + k[19]
                 h = heat.coefficient * sqrt(p * temperature / (ambient * t0))
                 d[0] = (
-                    g * gas * (m_in * t0 - m_out * temperature)
-                    - g * p * v_rate
-                    + (g - 1.0) * h * wall * (t0 - temperature)
+                    g * gas * (m_in * t0 - m_out * temperature) - g * p * v_rate + (g - 1.0) * h * wall * (t0 - temperature)
                 ) / volume
                 d[i_mass] = m_in - m_out
             else:
@@ -262,9 +256,7 @@ class Plant:
                     force *= (p - ambient) / fric.reference_pressure if p > ambient else 0.0
                 if creep is not None:
                     short = ((k[12] * s + k[13]) * s + k[14]) * s + k[15]
-                    for j, (stiff, tau) in enumerate(
-                        zip(creep.stiffness, creep.time_constant, strict=True), i_creep
-                    ):
+                    for j, (stiff, tau) in enumerate(zip(creep.stiffness, creep.time_constant, strict=True), i_creep):
                         gap = short - y[j]
                         d[j] = gap / tau
                         force += stiff * gap
@@ -279,9 +271,7 @@ class Plant:
                 if stop > 0.0:
                     stop = 0.0
             d[2] = rate
-            d[3] = (
-                torque - viscous * rate - coulomb * tanh(rate / speed) - weight * sin(angle) + stop
-            ) / inertia
+            d[3] = (torque - viscous * rate - coulomb * tanh(rate / speed) - weight * sin(angle) + stop) / inertia
             if i_sensor >= 0:
                 d[i_sensor] = (p - y[i_sensor]) / lag_sensor
             return d
@@ -292,9 +282,7 @@ class Plant:
         """Time derivative of the state at a signed valve opening (before its lag)."""
         return self._rhs(list(state), opening)
 
-    def advance(
-        self, y: State, opening: float, span: float, step: float, rtol: float = 1.0e-8
-    ) -> tuple[State, float]:
+    def advance(self, y: State, opening: float, span: float, step: float, rtol: float = 1.0e-8) -> tuple[State, float]:
         """Integrate over `span` [s] at a constant opening.
 
         Returns
@@ -331,9 +319,7 @@ class Plant:
             k5 = f([y[i] + c1 * k1[i] + c2 * k2[i] + c3 * k3[i] + c4 * k4[i] for i in n], opening)
             c1, c2, c3 = h * 9017.0 / 3168.0, -h * 355.0 / 33.0, h * 46732.0 / 5247.0
             c4, c5 = h * 49.0 / 176.0, -h * 5103.0 / 18656.0
-            k6 = f(
-                [y[i] + c1 * k1[i] + c2 * k2[i] + c3 * k3[i] + c4 * k4[i] + c5 * k5[i] for i in n], opening
-            )
+            k6 = f([y[i] + c1 * k1[i] + c2 * k2[i] + c3 * k3[i] + c4 * k4[i] + c5 * k5[i] for i in n], opening)
             c1, c3, c4 = h * 35.0 / 384.0, h * 500.0 / 1113.0, h * 125.0 / 192.0
             c5, c6 = -h * 2187.0 / 6784.0, h * 11.0 / 84.0
             new = [y[i] + c1 * k1[i] + c3 * k3[i] + c4 * k4[i] + c5 * k5[i] + c6 * k6[i] for i in n]

@@ -58,10 +58,7 @@ class Scores:
             for r in self.rows
         ]
         width = [max(len(line[i]) for line in [head, *body]) for i in range(len(head))]
-        lines = [
-            "  ".join(cell.ljust(w) for cell, w in zip(line, width, strict=True)).rstrip()
-            for line in [head, *body]
-        ]
+        lines = ["  ".join(cell.ljust(w) for cell, w in zip(line, width, strict=True)).rstrip() for line in [head, *body]]
         lines.append("")
         wide = max(len(k) for k in self.totals)
         lines += [f"{k.ljust(wide)}  {_show(v, 3)}" for k, v in self.totals.items()]
@@ -91,11 +88,7 @@ def utility(truth: set[str], answers: Sequence[set[str]], components: int) -> fl
         missed, extra = len(truth - answer), len(answer - truth)
         sick = len(answer)
         well = components - sick
-        marks.append(
-            1.0
-            - missed * (well + 1) / (components * (missed + 1))
-            - extra * (sick + 1) / (components * (extra + 1))
-        )
+        marks.append(1.0 - missed * (well + 1) / (components * (missed + 1)) - extra * (sick + 1) / (components * (extra + 1)))
     return mean(marks)
 
 
@@ -106,9 +99,7 @@ def _result(folder: Path, case: str) -> dict[str, Any] | None:
             if not isinstance(data, dict) or data.get("schema") != SCHEMA:
                 raise ValueError(f"{path}: schema must be {SCHEMA!r}")
             if data.get("verdict") not in VERDICTS:
-                raise ValueError(
-                    f"{path}: verdict {data.get('verdict')!r} is not one of {', '.join(VERDICTS)}"
-                )
+                raise ValueError(f"{path}: verdict {data.get('verdict')!r} is not one of {', '.join(VERDICTS)}")
             return data
     return None
 
@@ -156,9 +147,7 @@ def score_case(key: dict[str, Any], result: dict[str, Any] | None, catalogue: Se
         chance = probabilities.get(next(iter(truth)))
     else:
         joint = [probabilities.get(sep.join(order)) for sep in ("+", ",") for order in (ids, ids[::-1])]
-        chance = next(
-            (p for p in joint if p is not None), min((probabilities.get(i, 0.0) for i in truth), default=0.0)
-        )
+        chance = next((p for p in joint if p is not None), min((probabilities.get(i, 0.0) for i in truth), default=0.0))
     gap = _number(result.get("fit", {}).get("gap_closed"))
     groups = sets if sets else [answer]
     groups = [s - {"none", "parameters"} for s in groups]

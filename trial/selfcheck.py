@@ -29,9 +29,7 @@ def against_golden(plant: Plant, path: Path) -> dict[str, float] | None:
     step = 1.0e-3
     found = [y[:4]]
     for i in range(len(data) - 1):
-        y, step = plant.advance(
-            y, plant.valve_opening(float(data[i, 1])), float(data[i + 1, 0] - data[i, 0]), step
-        )
+        y, step = plant.advance(y, plant.valve_opening(float(data[i, 1])), float(data[i + 1, 0] - data[i, 0]), step)
         found.append(y[:4])
     error = np.abs(np.array(found) - data[:, 2:6]).max(axis=0) / np.ptp(data[:, 2:6], axis=0)
     names = ("muscle_pressure", "supply_pressure", "joint_angle", "joint_rate")
@@ -58,9 +56,7 @@ def against_lsoda(plant: Plant, seconds: float = 3.0) -> float:
             "max_step": 2e-3,
         }
         other = solve_ivp(slope, (0.0, 0.1), other, **kwargs).y[:, -1].tolist()
-        worst = max(
-            worst, *(abs(a - b) / (abs(b) + s) for a, b, s in zip(y, other, plant.scale, strict=True))
-        )
+        worst = max(worst, *(abs(a - b) / (abs(b) + s) for a, b, s in zip(y, other, plant.scale, strict=True)))
     return worst
 
 

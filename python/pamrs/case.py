@@ -155,11 +155,7 @@ def _rig(problems: list[str], home: Path, name: str) -> Rig | None:
 
 
 def _recordings(problems: list[str], home: Path, entries: Any, source: str) -> list[Recording]:
-    if (
-        not isinstance(entries, list)
-        or not entries
-        or not all(isinstance(entry, Mapping) for entry in entries)
-    ):
+    if not isinstance(entries, list) or not entries or not all(isinstance(entry, Mapping) for entry in entries):
         problems.append("recording is missing: one table [[recording]] with file and role for each is needed")
         return []
     recordings: list[Recording] = []
@@ -188,9 +184,7 @@ def _recordings(problems: list[str], home: Path, entries: Any, source: str) -> l
         except RecordingError as error:
             problems.append(str(error))
     names = [recording.name for recording in recordings]
-    problems += [
-        f"two recordings are called {name!r}" for name in dict.fromkeys(names) if names.count(name) > 1
-    ]
+    problems += [f"two recordings are called {name!r}" for name in dict.fromkeys(names) if names.count(name) > 1]
     if recordings and not problems and all(recording.role == "held_out" for recording in recordings):
         problems.append("no recording has the role 'fit': nothing is left to fit")
     return recordings

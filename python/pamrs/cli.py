@@ -64,9 +64,7 @@ def _print_version(wanted: bool) -> None:
 
 @app.callback()
 def _root(
-    version: Annotated[
-        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
-    ] = False,
+    version: Annotated[bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")] = False,
 ) -> None:
     """Simulate pneumatic artificial muscles, and find the physics that a simulation leaves out."""
 
@@ -170,9 +168,7 @@ def _held(recording: Recording, name: str, path: Path) -> NDArray[np.float64]:
     usable = recording.mask[name]
     last = np.maximum.accumulate(np.where(usable, np.arange(usable.size), int(np.argmax(usable))))
     if not usable.all():
-        typer.echo(
-            f"{path}: {int((~usable).sum())} unusable samples of {name} hold the last usable one", err=True
-        )
+        typer.echo(f"{path}: {int((~usable).sum())} unusable samples of {name} hold the last usable one", err=True)
     held: NDArray[np.float64] = recording.channels[name][last]
     return held
 
@@ -200,9 +196,7 @@ def _rig_check(file: Annotated[Path, typer.Argument(help="Rig file (TOML).")]) -
         known = f"{parameter.value:.6g}" if parameter.known else "unknown"
         spread = f" ± {parameter.tol:.3g}" if parameter.known and parameter.tol else ""
         typer.echo(f"{name:<{width}}  {known}{spread} {parameter.unit}")
-    typer.echo(
-        f"{file}: rig {rig.name!r} is valid, {len(rig.parameters)} parameters, {len(rig.effects)} effects"
-    )
+    typer.echo(f"{file}: rig {rig.name!r} is valid, {len(rig.parameters)} parameters, {len(rig.effects)} effects")
 
 
 def _one_line(error: BaseException) -> str:

@@ -81,9 +81,7 @@ EFFECTS: Final[dict[str, EffectInfo]] = _table(
         fingerprint="pressure falls with the valve shut, in proportion to the absolute pressure, without end",
         separates="heat_transfer saturates within seconds after a fill; a valve null offset changes sign with the spool",
         parameters=(
-            EffectParameter(
-                "conductance", "m3/(s Pa)", 5e-12, 0.0, 1e-7, (1e-11,), "sonic conductance of the leak (ISO 6358)"
-            ),
+            EffectParameter("conductance", "m3/(s Pa)", 5e-12, 0.0, 1e-7, (1e-11,), "sonic conductance of the leak (ISO 6358)"),
             EffectParameter(
                 "laminar_share",
                 "1",
@@ -134,15 +132,9 @@ EFFECTS: Final[dict[str, EffectInfo]] = _table(
         "reversal the force changes over a finite distance",
         separates="joint Coulomb friction has neither presliding nor growth with pressure; creep depends on time",
         parameters=(
-            EffectParameter(
-                "friction_constant", "N", 5.0, 0.0, 1e4, (2.0,), "half width of one muscle's loop at zero pressure"
-            ),
-            EffectParameter(
-                "friction_pressure", "m2", 5e-5, 0.0, 1.0, (2e-5,), "growth of the half width with gauge pressure"
-            ),
-            EffectParameter(
-                "presliding", "m", 1e-3, 1e-6, 0.1, (5e-4, 3e-3), "distance over which the loop closes after a reversal"
-            ),
+            EffectParameter("friction_constant", "N", 5.0, 0.0, 1e4, (2.0,), "half width of one muscle's loop at zero pressure"),
+            EffectParameter("friction_pressure", "m2", 5e-5, 0.0, 1.0, (2e-5,), "growth of the half width with gauge pressure"),
+            EffectParameter("presliding", "m", 1e-3, 1e-6, 0.1, (5e-4, 3e-3), "distance over which the loop closes after a reversal"),
         ),
         reference="Vo-Minh et al. (2011); Al-Bender, Lampaert & Swevers (2005); Robinson (2014) (2.36) as a special case",
     ),

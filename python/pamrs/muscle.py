@@ -224,9 +224,7 @@ class Muscle:
 
     @staticmethod
     def _forces(function: Callable[[Array, Array], Array], pressure: ArrayLike, contraction: ArrayLike) -> Array:
-        p, e = np.broadcast_arrays(
-            np.asarray(pressure, dtype=np.float64), np.asarray(contraction, dtype=np.float64)
-        )
+        p, e = np.broadcast_arrays(np.asarray(pressure, dtype=np.float64), np.asarray(contraction, dtype=np.float64))
         return function(np.ascontiguousarray(p.ravel()), np.ascontiguousarray(e.ravel())).reshape(p.shape)
 
     def __repr__(self) -> str:

@@ -148,9 +148,7 @@ class Recording:
         combined = np.ones(len(self), dtype=bool)
         for channel in channels or self.channels:
             if channel not in self.mask:
-                raise RecordingError(
-                    f"recording {self.name!r} has no channel {channel!r}; it has: {', '.join(self.channels)}"
-                )
+                raise RecordingError(f"recording {self.name!r} has no channel {channel!r}; it has: {', '.join(self.channels)}")
             combined &= self.mask[channel]
         return combined
 
@@ -274,17 +272,13 @@ def load_recording(
     if role not in ("fit", "held_out"):
         raise RecordingError(f"{source}: role = {role!r} is not allowed: 'fit' or 'held_out'")
     if sample_time is not None and not (math.isfinite(sample_time) and sample_time > 0.0):
-        raise RecordingError(
-            f"{source}: sample_time = {sample_time!r} s is not allowed: a positive number is needed"
-        )
+        raise RecordingError(f"{source}: sample_time = {sample_time!r} s is not allowed: a positive number is needed")
     if len(delimiter) != 1:
         raise RecordingError(f"{source}: delimiter = {delimiter!r} is not allowed: one character is needed")
     if file.is_dir():
         raise RecordingError(f"{source}: cannot be read (a folder, not a file)")
     if not header and not isinstance(columns, Sequence):
-        raise RecordingError(
-            f"{source}: without a header, columns must list what each column is: 'name [unit]'"
-        )
+        raise RecordingError(f"{source}: without a header, columns must list what each column is: 'name [unit]'")
     table = read_table(file, delimiter=delimiter, header=header)
     wanted = _understood(_headings(table, columns, source), source)
     raw, units = _si_columns(table, wanted, source, thousands, decimal)
@@ -305,14 +299,10 @@ def _headings(table: Table, columns: Sequence[str] | Mapping[str, str] | None, s
         given = found or []
         strange = [key for key in columns if key not in given]
         if strange:
-            raise RecordingError(
-                f"{source}: columns names {strange[0]!r}, but the file has: {', '.join(given)}"
-            )
+            raise RecordingError(f"{source}: columns names {strange[0]!r}, but the file has: {', '.join(given)}")
         return [columns.get(heading, heading) for heading in given]
     if len(columns) != len(table.cells):
-        raise RecordingError(
-            f"{source}: columns lists {len(columns)} headings, but there are {len(table.cells)} columns"
-        )
+        raise RecordingError(f"{source}: columns lists {len(columns)} headings, but there are {len(table.cells)} columns")
     return list(columns)
 
 
@@ -328,9 +318,7 @@ def _understood(headings: list[str], source: str) -> dict[str, tuple[int, str]]:
         if match is None or name not in CHANNELS:
             near = difflib.get_close_matches(name.lower(), CHANNELS, n=1, cutoff=0.6)
             hint = f"did you mean {near[0]!r}?" if near else f"known are {', '.join(CHANNELS)}"
-            problems.append(
-                f"unknown column {heading!r}; {hint} (columns = {{{heading!r} = ''}} leaves it out)"
-            )
+            problems.append(f"unknown column {heading!r}; {hint} (columns = {{{heading!r} = ''}} leaves it out)")
             continue
         expected = _REFERENCE_UNITS if name == "reference" else (CHANNELS[name].unit,)
         unit = match["unit"]
@@ -372,9 +360,7 @@ def _si_columns(
     if isinstance(thousands, Mapping):
         strange = [key for key in thousands if key not in wanted]
         if strange:
-            raise RecordingError(
-                f"{source}: thousands names {strange[0]!r}, but the channels are: {', '.join(wanted)}"
-            )
+            raise RecordingError(f"{source}: thousands names {strange[0]!r}, but the channels are: {', '.join(wanted)}")
     raw: dict[str, Array] = {}
     units: dict[str, str] = {}
     for name, (index, unit) in wanted.items():
@@ -406,9 +392,7 @@ def _assemble(
     count = len(next(iter(raw.values())))
     if "time" not in raw:
         if sample_time is None:
-            raise RecordingError(
-                f"{source}: column 'time' is missing (give sample_time if the rows are evenly spaced)"
-            )
+            raise RecordingError(f"{source}: column 'time' is missing (give sample_time if the rows are evenly spaced)")
         raw["time"] = np.asarray(np.arange(count) * sample_time, dtype=np.float64)
     if count < 2:
         raise RecordingError(f"{source}: one row only; two at least are needed")
@@ -473,7 +457,4 @@ def _judged(channel: str, values: Array, grid: Grid, source: str, issues: list[I
 def _runs(flags: Mask, kind: str, text: str) -> list[tuple[str, int, int, str]]:
     padded: NDArray[Any] = np.concatenate([[False], flags, [False]])
     edges = np.flatnonzero(padded[1:] != padded[:-1])
-    return [
-        (kind, int(a), int(b), f"{text} ({int(b - a)} samples)")
-        for a, b in zip(edges[::2], edges[1::2], strict=True)
-    ]
+    return [(kind, int(a), int(b), f"{text} ({int(b - a)} samples)") for a, b in zip(edges[::2], edges[1::2], strict=True)]

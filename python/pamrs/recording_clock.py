@@ -44,9 +44,7 @@ class Grid:
         The rows that are used, in order (repeated time stamps are left out).
     """
 
-    def __init__(
-        self, stamps: Array, rows: NDArray[np.intp], step: float, usual: float, events: list[Event]
-    ) -> None:
+    def __init__(self, stamps: Array, rows: NDArray[np.intp], step: float, usual: float, events: list[Event]) -> None:
         self.rows = rows
         self.sample_time = step
         self.events = events
@@ -170,8 +168,7 @@ def _gaps(placed: Array, elapsed: Array, jumps: Mask, usual: float) -> list[Even
         total = int(missing.sum())
         share = 100.0 * total / (total + len(placed))
         text = (
-            f"{len(holes)} gaps, about {total} samples ({share:.0f} %) are missing, "
-            f"the longest gap {float(elapsed[holes].max()):.6g} s"
+            f"{len(holes)} gaps, about {total} samples ({share:.0f} %) are missing, the longest gap {float(elapsed[holes].max()):.6g} s"
         )
         return [Event("gap", float(placed[holes[0]]), float(placed[holes[-1] + 1]), text)]
     return [

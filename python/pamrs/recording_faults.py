@@ -106,8 +106,7 @@ def _outliers(data: Array, good: NDArray[np.intp]) -> list[Fault]:
     if len(rows) > n // 50:
         return []
     return [
-        Fault("outlier", int(good[first]), int(good[last]) + 1, f"a spike of {off[first]:.3g} (SI)")
-        for first, last in _groups(rows)
+        Fault("outlier", int(good[first]), int(good[last]) + 1, f"a spike of {off[first]:.3g} (SI)") for first, last in _groups(rows)
     ]
 
 

@@ -128,9 +128,7 @@ def read_table(path: Path, *, delimiter: str, header: bool) -> Table:
     except UnicodeDecodeError:
         raise RecordingError(f"{path}: not a text file in UTF-8; readable are {_READABLE}") from None
     except (OSError, EOFError, zlib.error) as error:
-        raise RecordingError(
-            f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})"
-        ) from error
+        raise RecordingError(f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})") from error
     if "\x00" in text:
         raise RecordingError(f"{path}: not a text file (it has zero bytes); readable are {_READABLE}")
     return _parse(text, str(path), delimiter, header)
@@ -156,8 +154,7 @@ def _parse(text: str, source: str, delimiter: str, header: bool) -> Table:
             rows[index] = (row + [""] * width)[:width] if len(row) < width else [""] * width
     if len(ragged) > max(1, len(rows) // 20):
         raise RecordingError(
-            f"{source}: {len(ragged)} of {len(rows)} rows do not have {width} cells (first: row {ragged[0]}, "
-            f"delimiter {delimiter!r})"
+            f"{source}: {len(ragged)} of {len(rows)} rows do not have {width} cells (first: row {ragged[0]}, delimiter {delimiter!r})"
         )
     return Table(headings, list(zip(*rows, strict=True)), first_row, ragged)
 
@@ -181,9 +178,7 @@ def _parquet(path: Path) -> Table:
     try:
         import pandas as pd
     except ImportError as error:
-        raise RecordingError(
-            f"{path}: Parquet needs pandas and pyarrow: pip install 'pamrs[io]' pyarrow"
-        ) from error
+        raise RecordingError(f"{path}: Parquet needs pandas and pyarrow: pip install 'pamrs[io]' pyarrow") from error
     try:
         frame = pd.read_parquet(path)
         columns = [np.asarray(frame[name], dtype=np.float64) for name in frame.columns]

@@ -215,16 +215,10 @@ class Rig:
 
         info = EFFECTS.get(effect)
         if info is None:
-            raise ParameterError(
-                f"unknown effect {effect!r}; the catalogue has: {', '.join(sorted(EFFECTS))}"
-            )
+            raise ParameterError(f"unknown effect {effect!r}; the catalogue has: {', '.join(sorted(EFFECTS))}")
         given = dict(parameters or {})
         names = [parameter.name for parameter in info.parameters]
-        problems = [
-            f"unknown parameter {name!r}; it has: {', '.join(names)}"
-            for name in {*given, *(std or {})}
-            if name not in names
-        ]
+        problems = [f"unknown parameter {name!r}; it has: {', '.join(names)}" for name in {*given, *(std or {})} if name not in names]
         chosen: dict[str, float] = {}
         for parameter in info.parameters:
             value = float(given.get(parameter.name, parameter.default))
@@ -255,9 +249,7 @@ class Rig:
         Rig
         """
         model = self.model
-        model["effects"] = [
-            entry for entry in model["effects"] if effect is not None and entry["id"] != effect
-        ]
+        model["effects"] = [entry for entry in model["effects"] if effect is not None and entry["id"] != effect]
         kept = {k: v for k, v in self._effect_std.items() if effect is not None and k != effect}
         return Rig(self.name, model, self._tolerances, kept, self.source)
 

@@ -120,9 +120,7 @@ class _Reader:
             if isinstance(inner, Mapping):
                 self.unknown_keys(f"{block}.{group}.", inner, members)
             elif inner is not None:
-                self.problem(
-                    f"{block}.{group} = {_shown(inner)} is not allowed: give {', '.join(members)} as a table"
-                )
+                self.problem(f"{block}.{group} = {_shown(inner)} is not allowed: give {', '.join(members)} as a table")
         return {key.name: self.value(block, key, _dig(table, key.where)) for key in BLOCKS[block]}
 
     # -------------------------------------------------------------------- values
@@ -135,9 +133,7 @@ class _Reader:
             return key.default
         if key.kind == "choice":
             if raw not in key.choices:
-                self.problem(
-                    f"{label} = {_shown(raw)} is not allowed: one of {', '.join(map(repr, key.choices))}"
-                )
+                self.problem(f"{label} = {_shown(raw)} is not allowed: one of {', '.join(map(repr, key.choices))}")
             return raw
         bare_allowed = key.kind == "count" or bool(key.path)
         number, unit, extra = self.quantity(label, key, raw, bare_allowed)
@@ -155,9 +151,7 @@ class _Reader:
             return int(value)
         return value
 
-    def quantity(
-        self, label: str, key: Key, raw: Any, bare_allowed: bool
-    ) -> tuple[Any, str, Mapping[str, Any]]:
+    def quantity(self, label: str, key: Key, raw: Any, bare_allowed: bool) -> tuple[Any, str, Mapping[str, Any]]:
         """Number, unit and the whole table of ``{ value, unit, tol, unknown }``, or of a bare number."""
         if not isinstance(raw, Mapping):
             if bare_allowed:
@@ -207,10 +201,7 @@ class _Reader:
         if not isinstance(numbers, list) or not numbers:
             self.problem(f"{label} = {_shown(numbers)} is not allowed: a list of numbers is needed")
             return None
-        values = [
-            self.scalar(f"{label}[{i}]", key.unit, number, unit, key.lower, key.upper)
-            for i, number in enumerate(numbers)
-        ]
+        values = [self.scalar(f"{label}[{i}]", key.unit, number, unit, key.lower, key.upper) for i, number in enumerate(numbers)]
         return [value for value in values if value is not None]
 
     def spread(self, name: str, label: str, key: Key, unit: str, extra: Mapping[str, Any]) -> None:
@@ -256,8 +247,7 @@ class _Reader:
             info = EFFECTS[identity]
             self.unknown_keys(f"{identity}.", given, [parameter.name for parameter in info.parameters])
             values = {
-                parameter.name: self.effect_value(identity, parameter, given.get(parameter.name))
-                for parameter in info.parameters
+                parameter.name: self.effect_value(identity, parameter, given.get(parameter.name)) for parameter in info.parameters
             }
             found.append({"id": identity, "parameters": values})
         return found
@@ -267,9 +257,7 @@ class _Reader:
         if raw is None:
             return float(parameter.default)
         if not isinstance(raw, Mapping):
-            self.problem(
-                f"{label} = {_shown(raw)} has no unit: write {{ value = ..., unit = {parameter.unit!r} }}"
-            )
+            self.problem(f"{label} = {_shown(raw)} has no unit: write {{ value = ..., unit = {parameter.unit!r} }}")
             return None
         self.unknown_keys(f"{label}.", raw, ("value", "unit", "std"))
         unit = raw.get("unit")
@@ -305,15 +293,10 @@ class _Reader:
         label = "valve.area_fraction"
         if len(opening) != len(fraction) or len(opening) < 2:
             self.problem(
-                f"{label}: opening has {len(opening)} values and fraction {len(fraction)}; "
-                "the same number, two at least, is needed"
+                f"{label}: opening has {len(opening)} values and fraction {len(fraction)}; the same number, two at least, is needed"
             )
             return
-        if (
-            opening[0] != 0.0
-            or opening[-1] != 1.0
-            or any(b <= a for a, b in zip(opening, opening[1:], strict=False))
-        ):
+        if opening[0] != 0.0 or opening[-1] != 1.0 or any(b <= a for a, b in zip(opening, opening[1:], strict=False)):
             self.problem(f"{label}.opening = {opening} is not allowed: it must rise from 0 to 1")
         if any(b < a for a, b in zip(fraction, fraction[1:], strict=False)):
             self.problem(f"{label}.fraction = {fraction} is not allowed: it must not fall")
@@ -322,8 +305,7 @@ class _Reader:
         slope, offset = muscle["modulus_slope"], muscle["modulus_offset"]
         if len(slope) != len(offset):
             self.problem(
-                f"muscle.modulus_slope has {len(slope)} values and muscle.modulus_offset {len(offset)}; "
-                "the same number is needed"
+                f"muscle.modulus_slope has {len(slope)} values and muscle.modulus_offset {len(offset)}; the same number is needed"
             )
         thickness, diameter = muscle["wall_thickness"], muscle["rest_diameter"]
         if not thickness < diameter / 2:

@@ -137,9 +137,7 @@ def simulate(
     if unknown:
         raise ParameterError(f"initial has the unknown entry {unknown[0]!r}; allowed: {', '.join(_INITIAL)}")
     fine = default_step(sample_time) if step is None else step
-    channels = core_rig(rig).simulate(
-        command, sample_time, fine, **{name: float(value) for name, value in start.items()}
-    )
+    channels = core_rig(rig).simulate(command, sample_time, fine, **{name: float(value) for name, value in start.items()})
     time = np.asarray(np.arange(command.size) * sample_time, dtype=np.float64)
     shown = {"valve_command": command} if has_valve else {}
     return Simulation({"time": time, **shown, **channels}, rig)

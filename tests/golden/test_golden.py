@@ -60,10 +60,7 @@ def read_muscles(path: Path) -> dict[str, dict[str, NDArray[np.float64]]]:
         rows = list(csv.DictReader(file))
     names = list(dict.fromkeys(row["muscle"] for row in rows))
     columns = [key for key in rows[0] if key != "muscle"]
-    return {
-        name: {c: np.array([float(row[c]) for row in rows if row["muscle"] == name]) for c in columns}
-        for name in names
-    }
+    return {name: {c: np.array([float(row[c]) for row in rows if row["muscle"] == name]) for c in columns} for name in names}
 
 
 @pytest.mark.parametrize("folder", [OWN, SHARED], ids=["own", "shared"])
@@ -83,9 +80,7 @@ def test_muscle_static(folder: Path) -> None:
         for column, values in got.items():
             # A force is a difference of larger terms: near zero it is held to the blocked force.
             floor = 1e-9 * np.abs(want[column][e == 0.0][0]) if column.startswith("force") else 0.0
-            np.testing.assert_allclose(
-                values, want[column], rtol=1e-9, atol=floor, err_msg=f"{name} {column}"
-            )
+            np.testing.assert_allclose(values, want[column], rtol=1e-9, atol=floor, err_msg=f"{name} {column}")
 
 
 def trajectory_misses(path: Path) -> dict[str, float]:

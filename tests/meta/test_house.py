@@ -107,9 +107,7 @@ def sources(*suffixes):
 
 
 def test_files_can_be_read_in_one_sitting():
-    lengths = {
-        path: len(path.read_text(encoding="utf-8").splitlines()) for path in sources(".py", ".rs", ".pyi")
-    }
+    lengths = {path: len(path.read_text(encoding="utf-8").splitlines()) for path in sources(".py", ".rs", ".pyi")}
     assert lengths
     assert not {str(path.relative_to(ROOT)): n for path, n in lengths.items() if n > 600}
 

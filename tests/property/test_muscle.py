@@ -106,9 +106,7 @@ def test_rest_shape(arguments: dict[str, Any]) -> None:
     bore = 0.5 * arguments["rest_diameter"] - arguments["wall_thickness"]
     assert float(muscle.radius(0.0)) == pytest.approx(0.5 * arguments["rest_diameter"], rel=1e-12)
     assert float(muscle.thickness(0.0)) == pytest.approx(arguments["wall_thickness"], rel=1e-12)
-    assert float(muscle.air_volume(0.0)) == pytest.approx(
-        math.pi * bore**2 * arguments["rest_length"], rel=1e-12
-    )
+    assert float(muscle.air_volume(0.0)) == pytest.approx(math.pi * bore**2 * arguments["rest_length"], rel=1e-12)
     # At rest there is no strain, so no elastic force either.
     assert float(muscle.force(0.0, 0.0)) == pytest.approx(0.0, abs=1e-6)
     assert float(muscle.force(3e5, 0.0)) == pytest.approx(3e5 * model.coefficients(0.0)[0], rel=1e-9)

@@ -43,9 +43,7 @@ def touches_stop(plant: Plant, angle: np.ndarray) -> bool:
     st.floats(math.radians(35.0), math.radians(80.0)),
     st.floats(-0.5, 0.5),
 )
-def test_matches_reference(
-    overrides: dict[str, float], command: list[float], pressure: float, angle: float, rate: float
-) -> None:
+def test_matches_reference(overrides: dict[str, float], command: list[float], pressure: float, angle: float, rate: float) -> None:
     initial = {"muscle_pressure": pressure, "supply_pressure": 12e5, "joint_angle": angle, "joint_rate": rate}
     rig = pamrs.rigs.shoulder().with_parameters(overrides)
     got = pamrs.simulate(rig, valve_command=command, sample_time=SAMPLE_TIME, step=1e-4, initial=initial)
@@ -78,9 +76,7 @@ def test_matches_reference(
 def test_corners_match_reference(case: str, command: float, changes: dict[str, float], rows: int) -> None:
     initial = {**START, **changes}
     commanded = [command] * rows
-    got = pamrs.simulate(
-        pamrs.rigs.shoulder(), valve_command=commanded, sample_time=SAMPLE_TIME, step=1e-5, initial=initial
-    )
+    got = pamrs.simulate(pamrs.rigs.shoulder(), valve_command=commanded, sample_time=SAMPLE_TIME, step=1e-5, initial=initial)
     offsets = {name: AMBIENT if name.endswith("pressure") else 0.0 for name in CHANNELS}
     plant = shoulder()
     want = plant.simulate(commanded, SAMPLE_TIME, {name: initial[name] + offsets[name] for name in CHANNELS})
@@ -95,10 +91,7 @@ def test_corners_match_reference(case: str, command: float, changes: dict[str, f
 @given(rig_overrides(), commands(ROWS))
 def test_runs_are_identical_bit_for_bit(overrides: dict[str, float], command: list[float]) -> None:
     rig = pamrs.rigs.shoulder().with_parameters(overrides)
-    runs = [
-        pamrs.simulate(rig, valve_command=command, sample_time=SAMPLE_TIME, step=1e-3, initial=START)
-        for _ in range(2)
-    ]
+    runs = [pamrs.simulate(rig, valve_command=command, sample_time=SAMPLE_TIME, step=1e-3, initial=START) for _ in range(2)]
     np.testing.assert_array_equal(table(runs[0]), table(runs[1]))
     # The future of the command cannot change the past.
     other = [*command[:20], *(9.0 - u / 2.0 for u in command[20:])]
@@ -148,9 +141,7 @@ def test_isothermal_filling_keeps_the_gas(u: float, pressure: float) -> None:
     plant = shoulder()
     d = np.array([plant.joint.contraction(a) for a in run["joint_angle"]])
     volume = 6 * MUSCLE.air_volume(d / 0.276) + plant.chamber.dead_volume
-    gas = (run["muscle_pressure"] + AMBIENT) * volume + (
-        run["supply_pressure"] + AMBIENT
-    ) * plant.supply_volume
+    gas = (run["muscle_pressure"] + AMBIENT) * volume + (run["supply_pressure"] + AMBIENT) * plant.supply_volume
     moved = plant.supply_volume * np.ptp(run["supply_pressure"])
     assert float(np.ptp(gas)) < 1e-6 * moved + 1e-9 * gas[0]
 

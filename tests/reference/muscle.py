@@ -76,9 +76,7 @@ class MuscleReference:
         for low, high in zip(edges[:-1], edges[1:], strict=True):
             nodes = np.cos(np.pi * (np.arange(degree + 1) + 0.5) / (degree + 1))
             points = 0.5 * (low + high) + 0.5 * (high - low) * nodes
-            rows = np.array(
-                [(*self.coefficients(float(x)), self.geometry.solve(float(x)).air_volume) for x in points]
-            )
+            rows = np.array([(*self.coefficients(float(x)), self.geometry.solve(float(x)).air_volume) for x in points])
             fits = [Chebyshev.fit(points, rows[:, j], degree, domain=[low, high]) for j in range(4)]
             pieces.append((low, high, fits, fits[3].deriv()))
         return MuscleTable(self.modulus_scale, pieces)

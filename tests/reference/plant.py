@@ -145,9 +145,7 @@ class Plant:
         pressure, supply, angle, rate = state.tolist()
         gas, rest, n = self.gas, self.muscle.geometry.rest_length, self.muscle.count
         moment_arm = self.joint.moment_arm(angle)
-        force, volume_one, slope = self.table(
-            self.joint.contraction(angle) / rest, pressure - gas.ambient_pressure
-        )
+        force, volume_one, slope = self.table(self.joint.contraction(angle) / rest, pressure - gas.ambient_pressure)
         volume = n * volume_one + self.chamber.dead_volume
         volume_rate = n * slope * moment_arm * rate / rest
         area = self.valve.area(command)
@@ -160,8 +158,7 @@ class Plant:
         rt = gas.gas_constant * gas.temperature
         chamber = self.chamber
         pressure_rate = (
-            rt * (chamber.alpha_in * inflow - chamber.alpha_out * outflow)
-            - chamber.alpha * pressure * volume_rate
+            rt * (chamber.alpha_in * inflow - chamber.alpha_out * outflow) - chamber.alpha * pressure * volume_rate
         ) / volume
         torque = n * force * moment_arm + self.joint.stop_torque(angle, rate)
         return [

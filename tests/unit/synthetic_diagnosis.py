@@ -14,9 +14,7 @@ class ModelText:
         return 'name = "sealed <chamber>"\n\n[[effects]]\nid = "heat_transfer"\n'
 
 
-def trace(
-    recording: str, role: str, channel: str, unit: str, scale: float, *, n: int = 6000, seed: int = 1
-) -> Trace:
+def trace(recording: str, role: str, channel: str, unit: str, scale: float, *, n: int = 6000, seed: int = 1) -> Trace:
     rng = np.random.default_rng(seed)
     time = np.arange(n) * 0.005
     truth = scale * (1.0 + 0.4 * np.sin(0.7 * time) * np.exp(-time / 40) + 0.1 * np.sign(np.sin(0.35 * time)))
@@ -136,9 +134,7 @@ def diagnosis(**changes: Any) -> Diagnosis:
         "rig": ModelText(),
         "traces": [
             trace(name, role, channel, unit, scale, seed=i)
-            for i, (name, role) in enumerate(
-                [("step_up", "fit"), ("sine_sweep", "held_out"), ("random", "held_out")]
-            )
+            for i, (name, role) in enumerate([("step_up", "fit"), ("sine_sweep", "held_out"), ("random", "held_out")])
             for channel, unit, scale in (("joint_angle", "rad", 0.6), ("muscle_pressure", "Pa", 3e5))
         ],
         "blocks": {
@@ -213,9 +209,5 @@ def nothing() -> Diagnosis:
         traces=[same],
         text="",
         rig=None,
-        fit={
-            "channels": {
-                "muscle_pressure": {"noise": 1.0, "before": 1.0, "refit": float("nan"), "after": None}
-            }
-        },
+        fit={"channels": {"muscle_pressure": {"noise": 1.0, "before": 1.0, "refit": float("nan"), "after": None}}},
     )

@@ -113,9 +113,7 @@ def test_simulate_writes_units_and_values(capsys, tmp_path):
     assert lines[0].startswith("time [s],")
     assert "muscle_pressure [Pa]" in lines[0]
     assert len(lines) == len(time) + 1
-    pressure = [
-        float(line.split(",")[lines[0].split(",").index("muscle_pressure [Pa]")]) for line in lines[1:]
-    ]
+    pressure = [float(line.split(",")[lines[0].split(",").index("muscle_pressure [Pa]")]) for line in lines[1:]]
     assert np.all(np.isfinite(pressure))
     assert pressure[-1] > pressure[0]
 
@@ -159,9 +157,7 @@ def test_diagnose_writes_what_it_is_asked_for(capsys, tmp_path, monkeypatch):
 
 
 def test_runs_as_a_module():
-    done = subprocess.run(
-        [sys.executable, "-m", "pamrs", "rig", "check", "absent.toml"], capture_output=True, text=True
-    )
+    done = subprocess.run([sys.executable, "-m", "pamrs", "rig", "check", "absent.toml"], capture_output=True, text=True)
     assert done.returncode == 2
     assert_one_clean_line(done.stderr, "absent.toml")
 

@@ -7,8 +7,9 @@ from pathlib import Path
 
 import jsonschema
 import numpy as np
-import pamrs
 import pytest
+
+import pamrs
 from pamrs import _core
 from pamrs.diagnosis.result import schema
 from pamrs.diagnosis.signals import noise_level
@@ -117,7 +118,8 @@ def test_printed_chambers(name: str, leaks: bool) -> None:
     found = pamrs.diagnose(CHAMBERS / name)
     leak = found.probabilities.get("leak_muscle", 0.0)
     if leaks:
-        assert found.verdict == "effects" and leak > 0.9
+        assert found.verdict == "effects"
+        assert leak > 0.9
         time_constant = found.effects[0]["parameters"]["time_constant"]["value"]
         assert 4.0 < time_constant < 30.0
     else:
@@ -138,5 +140,6 @@ def test_small_blinded_trial(kind: str, tmp_path: Path) -> None:
     if kind == "none":
         assert found.verdict in ("none", "parameters")
     else:
-        assert found.verdict == "effects" and found.effects[0]["id"] == "leak_muscle"
+        assert found.verdict == "effects"
+        assert found.effects[0]["id"] == "leak_muscle"
     jsonschema.validate(json.loads(found.to_json()), schema())

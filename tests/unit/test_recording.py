@@ -46,9 +46,7 @@ def lively(seed: int = 3) -> dict[str, Array]:
 
 def text(data: dict[str, Array], header: str = HEADER, rows: Any = slice(None)) -> str:
     table = np.column_stack([data["time"], *(data[name] for name in ("valve_command", *SENSORS))])[rows]
-    lines = [
-        f"{t:.4f},{u:.4f},{supply:.1f},{muscle:.1f},{angle:.4f}" for t, u, supply, muscle, angle in table
-    ]
+    lines = [f"{t:.4f},{u:.4f},{supply:.1f},{muscle:.1f},{angle:.4f}" for t, u, supply, muscle, angle in table]
     return "\n".join([header, *lines]) + "\n"
 
 
@@ -87,9 +85,7 @@ def test_clean_recording_in_si(tmp_path: Path) -> None:
     assert "run" in repr(recording)
 
 
-@pytest.mark.parametrize(
-    ("unit", "scale"), [("bar", 1e5), ("kPa", 1e3), ("psi", 6894.757293168361), ("mbar", 100.0)]
-)
+@pytest.mark.parametrize(("unit", "scale"), [("bar", 1e5), ("kPa", 1e3), ("psi", 6894.757293168361), ("mbar", 100.0)])
 def test_units_are_converted(tmp_path: Path, unit: str, scale: float) -> None:
     rows = "\n".join(f"{i * 10},{0.1 * i}" for i in range(30))
     recording = load(tmp_path, f"time [ms],muscle_pressure [{unit}]\n{rows}\n")
@@ -107,9 +103,7 @@ def test_time_starts_at_zero(tmp_path: Path) -> None:
 
 
 def test_gzip_bom_quotes_and_crlf(tmp_path: Path) -> None:
-    content = '\ufeff"time [s]","muscle_pressure [bar]"\r\n' + "".join(
-        f"{0.1 * i},{i % 7}\r\n" for i in range(40)
-    )
+    content = '\ufeff"time [s]","muscle_pressure [bar]"\r\n' + "".join(f"{0.1 * i},{i % 7}\r\n" for i in range(40))
     file = tmp_path / "run.csv.gz"
     file.write_bytes(gzip.compress(content.encode()))
     recording = load_recording(file)
@@ -215,9 +209,7 @@ BAD = [
 
 
 @pytest.mark.parametrize(("content", "options", "wanted"), BAD)
-def test_mistakes_name_file_and_column(
-    tmp_path: Path, content: str, options: dict[str, Any], wanted: list[str]
-) -> None:
+def test_mistakes_name_file_and_column(tmp_path: Path, content: str, options: dict[str, Any], wanted: list[str]) -> None:
     message = refused(tmp_path, content, **options)
     for words in wanted:
         assert words in message, message
@@ -492,8 +484,6 @@ def test_sealed_recordings_are_sound(case: Path) -> None:
 
 def test_every_canonical_channel_is_read(tmp_path: Path) -> None:
     header = ",".join(f"{name} [{channel.unit}]" for name, channel in CHANNELS.items())
-    rows = "\n".join(
-        ",".join([str(i)] + [str(300 + (i * 7) % 11)] * 3 + ["0.5"] * 4 + ["300", "1"]) for i in range(9)
-    )
+    rows = "\n".join(",".join([str(i)] + [str(300 + (i * 7) % 11)] * 3 + ["0.5"] * 4 + ["300", "1"]) for i in range(9))
     recording = load(tmp_path, f"{header}\n{rows}\n")
     assert ["time", *recording.channels] == list(CHANNELS)

@@ -37,9 +37,7 @@ def changed(old: str, new: str) -> str:
 
 
 def same(one: Rig, other: Rig) -> bool:
-    return (
-        one.model == other.model and one.parameters == other.parameters and one.effect_std == other.effect_std
-    )
+    return one.model == other.model and one.parameters == other.parameters and one.effect_std == other.effect_std
 
 
 # ------------------------------------------------------------------------ reading
@@ -201,9 +199,7 @@ def test_unreadable_files(tmp_path: Path) -> None:
 
 JSON_LIKE = st.recursive(
     st.one_of(st.booleans(), st.integers(-9, 9), st.floats(), st.text(max_size=5)),
-    lambda inner: st.one_of(
-        st.lists(inner, max_size=3), st.dictionaries(st.sampled_from(["value", "unit", "x"]), inner)
-    ),
+    lambda inner: st.one_of(st.lists(inner, max_size=3), st.dictionaries(st.sampled_from(["value", "unit", "x"]), inner)),
     max_leaves=5,
 )
 
@@ -259,9 +255,7 @@ def test_parameters_of_absent_blocks_are_not_there() -> None:
 @pytest.mark.parametrize("effect", sorted(EFFECTS))
 def test_effects_round_trip(effect: str) -> None:
     first = EFFECTS[effect].parameters[0]
-    rig = pamrs.rigs.shoulder().with_effect(
-        effect, {first.name: first.upper}, std={first.name: 0.1 * first.upper}
-    )
+    rig = pamrs.rigs.shoulder().with_effect(effect, {first.name: first.upper}, std={first.name: 0.1 * first.upper})
     assert rig.effects[0]["id"] == effect
     assert rig.effects[0]["parameters"][first.name] == first.upper
     again = parse_rig(rig.to_toml_text())

@@ -53,9 +53,7 @@ def test_command_holds_until_the_next_row() -> None:
     np.testing.assert_array_equal(late["muscle_pressure"][:6], steady["muscle_pressure"][:6])
     assert late["muscle_pressure"][6] > steady["muscle_pressure"][6] + 100.0
     # The last command has no row after it.
-    np.testing.assert_array_equal(
-        run([6.0] * 10 + [9.0])["muscle_pressure"], run([6.0] * 11)["muscle_pressure"]
-    )
+    np.testing.assert_array_equal(run([6.0] * 10 + [9.0])["muscle_pressure"], run([6.0] * 11)["muscle_pressure"])
 
 
 def test_valve_fills_vents_and_closes() -> None:

@@ -202,6 +202,9 @@ fn bad_input_is_a_typed_error() {
     named(Rig::new(unknown).unwrap_err(), "phlogiston");
     let mut short = spec();
     short.joint.as_mut().unwrap().lower_axial = 0.15;
-    assert!(Rig::new(short).is_err_and(|e| e.to_string().contains("joint.")), "the muscle cannot shorten so far");
+    assert!(
+        Rig::new(short).is_err_and(|e| e.to_string().contains("joint.")),
+        "the muscle cannot shorten so far"
+    );
     named(RigSpec::from_json("{}").unwrap_err(), "rig description");
 }

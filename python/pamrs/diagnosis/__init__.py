@@ -64,8 +64,7 @@ def diagnose(case: Case | str | os.PathLike[str], *, progress: Callable[[str], N
     rig = case.rig
     if rig.effects:
         raise DiagnosisError(
-            f"the nominal rig of case {case.name!r} already has the effect {rig.effects[0]['id']!r}; "
-            "diagnose a rig without effects"
+            f"the nominal rig of case {case.name!r} already has the effect {rig.effects[0]['id']!r}; diagnose a rig without effects"
         )
     say(f"{case.name}: preparing {len(case.recordings)} recordings")
     fitted = [prepare(r, rig) for r in case.fit or case.recordings]

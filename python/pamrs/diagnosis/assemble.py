@@ -290,9 +290,8 @@ def _block_table(groups: list[Group]) -> dict[str, dict[str, Any]]:
 
 def _traces(fitted: Problem, held: Problem, inner: dict[str, Any], outer: dict[str, Any]) -> list[Trace]:
     traces = []
-    for problem, found in ((fitted, inner), (held, outer)):
-        if problem is held and held is fitted:
-            break
+    stock = [(fitted, inner)] if held is fitted else [(fitted, inner), (held, outer)]
+    for problem, found in stock:
         for prepared in problem.recordings:
             for block in problem.blocks:
                 stages = {s: found[s][block.name, prepared.recording.name] for s in ("before", "refit", "after")}

@@ -105,7 +105,7 @@ class Residual:
     jacobian : (n, k) array or None
         Derivative of the *prediction* with respect to each parameter, start projected out as well.
     prediction : (n,) array
-        Predicted channel, with the window's start at its best value.
+        Predicted channel, for looking at.
     rows : (n,) bool array
         Usable rows.
     noise : float
@@ -166,4 +166,6 @@ def residual(block: Block, core: _core.Rig, prepared: Prepared, parameters: list
         shifted[a:b] += correction
         jacobian[a:b, :k] -= q @ (q.T @ np.where(used[:, None], jacobian[a:b, :k], 0.0))
     jac = np.where(rows[:, None], jacobian[:, :k], 0.0) if parameters else None
-    return Residual(value, jac, shifted, rows, prepared.noise[block.channel])
+    # a whole recording is shown from its measured start; a window from the start that suits it best
+    shown = prediction if block.window is None else shifted
+    return Residual(value, jac, shown, rows, prepared.noise[block.channel])

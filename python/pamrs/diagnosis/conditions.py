@@ -176,6 +176,9 @@ def _map(columns: dict[str, Array], z: Array, after: Array | None, block: Block)
     names = [n for n in names if edges[n].size >= 3]
     if len(names) < 2:
         return None
+    if len(names) > 2:
+        # recordings do not share their time: a condition of the rig says more
+        names = [n for n in names if n != "time [s]"]
 
     def explained(a: str, b: str) -> float:
         mean, count = _cells(columns[a], columns[b], edges[a], edges[b], z)

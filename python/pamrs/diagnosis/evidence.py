@@ -132,9 +132,7 @@ def correlation_time(values: Array) -> float:
     return max(1.0, 1.0 + 2.0 * float(rho[1:stop].sum()))
 
 
-def excess(
-    block: Block, recordings: list[Prepared], found: dict[Key, Residual], floor: dict[Key, Floor]
-) -> Excess:
+def excess(block: Block, recordings: list[Prepared], found: dict[Key, Residual], floor: dict[Key, Floor]) -> Excess:
     """Pool a block's residual over recordings and compare it with its floor."""
     ratios, weights, squares, noises, effective = [], [], [], [], 0.0
     for prepared in recordings:
@@ -152,7 +150,8 @@ def excess(
     if not ratios:
         return Excess(1.0, 0.0, 1.0, float("nan"), float("nan"))
     ratio = float(np.average(ratios, weights=weights))
-    share = float(np.average([floor[block.name, p.recording.name].binned ** 2 / floor[block.name, p.recording.name].sample ** 2 for p in recordings]))  # fmt: skip
+    keys = [(block.name, p.recording.name) for p in recordings]
+    share = float(np.mean([floor[key].binned ** 2 / floor[key].sample ** 2 for key in keys]))
     p_value = float(chi2.sf(ratio / MARGIN * effective, max(1.0, effective)))
     return Excess(
         ratio,
@@ -163,9 +162,7 @@ def excess(
     )
 
 
-def inflation(
-    block: Block, recordings: list[Prepared], found: dict[Key, Residual], width: float
-) -> float:
+def inflation(block: Block, recordings: list[Prepared], found: dict[Key, Residual], width: float) -> float:
     """Variance of a block's bin means relative to white sample noise, times their correlation time (>= 1)."""
     values = []
     for prepared in recordings:

@@ -124,9 +124,7 @@ def free_baseline(problem: Problem, nominal: Rig) -> list[str]:
     return [
         name
         for name, parameter in nominal.parameters.items()
-        if name in differentiable
-        and 0.0 < parameter.tol < math.inf
-        and any(name in block.parameters for block in problem.blocks)
+        if name in differentiable and 0.0 < parameter.tol < math.inf and any(name in block.parameters for block in problem.blocks)
     ]
 
 

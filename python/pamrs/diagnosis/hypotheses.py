@@ -92,9 +92,7 @@ class Group:
         return max(named, key=lambda c: self.probabilities.get("+".join(c.effects), 0.0))
 
 
-def examine(
-    fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], say: Callable[[str], None]
-) -> Group:
+def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], say: Callable[[str], None]) -> Group:
     """Refit the baseline of some blocks, locate what is left, and try every effect that acts there.
 
     Parameters
@@ -134,9 +132,7 @@ def examine(
     sets = [s for k in (1, 2) for s in itertools.combinations(acting, k)]
     candidates = [start]
     for effects in sets:
-        settled = any(
-            _explains(c, suspects) or (held is fitted and c.gap_closed > PAIR_GAP) for c in candidates if c.effects
-        )
+        settled = any(_explains(c, suspects) or (held is fitted and c.gap_closed > PAIR_GAP) for c in candidates if c.effects)
         if settled and len(effects) > 1:
             continue  # a single effect leaves only noise: a pair cannot be asked for by these data
         say(f"{names}: trying {' + '.join(effects)}")
@@ -275,9 +271,7 @@ def _scatter(effects: tuple[str, ...], problem: Problem, best: Fit) -> float:
     return float(max(beyond))
 
 
-def _weigh(
-    candidates: list[Candidate], suspects: list[Block], outer: Problem, doubt: float
-) -> dict[str, float]:
+def _weigh(candidates: list[Candidate], suspects: list[Block], outer: Problem, doubt: float) -> dict[str, float]:
     """Probabilities over sets of effects and ``unlisted``.
 
     Between sets: held-out likelihood on the effective sample size, with a BIC-like price per parameter. Against

@@ -232,10 +232,7 @@ class Diagnosis:
     def to_dict(self) -> dict[str, Any]:
         """Return the content of the JSON file: exactly the keys of the schema, null for no number."""
         channels = {
-            part: {
-                str(c): _pick(v, ("noise", "before", "refit", "after"))
-                for c, v in (self.fit.get(part) or {}).items()
-            }
+            part: {str(c): _pick(v, ("noise", "before", "refit", "after")) for c, v in (self.fit.get(part) or {}).items()}
             for part in ("channels", "held_out")
         }
         where = _pick(self.where, ("block", "channel"))
@@ -301,9 +298,7 @@ class Diagnosis:
         if self.probabilities:
             lines.append("")
             for name, p in words.ranked_probabilities(self, 5):
-                lines.append(
-                    f"{words.label(name):<38.38} {words.format_probability(p):>7}  {'#' * round(30 * p)}"
-                )
+                lines.append(f"{words.label(name):<38.38} {words.format_probability(p):>7}  {'#' * round(30 * p)}")
         for effect in self.effects:
             lines.append("")
             lines.append(f"{effect.get('name') or words.label(str(effect['id']))}")
@@ -320,9 +315,7 @@ class Diagnosis:
         if self.next_experiment.get("text"):
             lines += [
                 "",
-                *textwrap.wrap(
-                    f"Next experiment: {self.next_experiment['text']}", 96, subsequent_indent="  "
-                ),
+                *textwrap.wrap(f"Next experiment: {self.next_experiment['text']}", 96, subsequent_indent="  "),
             ]
         for warning in self.warnings[:3]:
             lines += textwrap.wrap(f"Warning: {warning}", 96, subsequent_indent="  ")
@@ -330,6 +323,11 @@ class Diagnosis:
             lines.append(f"({len(self.warnings) - 3} more warnings in the report)")
         lines.append(f"{self.seconds:.1f} s")
         return "\n".join(lines)
+
+    @property
+    def proof(self) -> str:
+        """The recordings on which the gap was measured, in words."""
+        return "held-out recordings" if self.fit.get("held_out") else "the fitted recordings (none was held out)"
 
     def _summary_fit(self) -> list[str]:
         """Error table of the held-out recordings, else of the fitted ones."""
@@ -341,21 +339,17 @@ class Diagnosis:
         lines = ["", f"{title:<22}{'noise':>11}{'before':>11}{'refit':>11}{'after':>11}"]
         for channel, entry in channels.items():
             sizes = [abs(float(v)) for v in entry.values() if words.is_number(v)]
-            unit, factor = words.display_unit(
-                words.CHANNEL_UNITS.get(channel, ""), max(sizes, default=math.nan)
-            )
+            unit, factor = words.display_unit(words.CHANNEL_UNITS.get(channel, ""), max(sizes, default=math.nan))
             unit = unit.replace("°", "deg")
             row = f"{channel} [{unit}]" if unit else channel
             for key in ("noise", "before", "refit", "after"):
                 value = entry.get(key)
                 shown = float(value) * factor if words.is_number(value) else None
-                row = (
-                    f"{row:<22}" if key == "noise" else row
-                ) + f"{words.format_number(shown, unicode=False):>11}"
+                row = (f"{row:<22}" if key == "noise" else row) + f"{words.format_number(shown, unicode=False):>11}"
             lines.append(row)
         gap = self.fit.get("gap_closed")
         if words.is_number(gap):
-            lines.append(f"gap to the noise closed on held-out recordings: {100 * float(gap):.0f} %")
+            lines.append(f"gap to the noise closed on {self.proof}: {100 * float(gap):.0f} %")
         return lines
 
     def report(self, path: str | os.PathLike[str]) -> Path:
@@ -402,11 +396,7 @@ class Diagnosis:
             for name, p in words.ranked_probabilities(self, 5)
         )
         gap = self.fit.get("gap_closed")
-        closed = (
-            f"<p>{100 * float(gap):.0f} % of the gap to the noise closed on held-out recordings.</p>"
-            if words.is_number(gap)
-            else ""
-        )
+        closed = f"<p>{100 * float(gap):.0f} % of the gap to the noise closed on {self.proof}.</p>" if words.is_number(gap) else ""
         where = html.escape(str(self.where.get("text") or ""))
         return (
             f"<div><p><b>{html.escape(self.headline)}.</b></p><p>{where}</p>"

@@ -123,9 +123,7 @@ def prepare(recording: Recording, rig: Rig) -> Prepared:
             f"it has: {', '.join(recording.channels)}"
         )
     if len(recording) < 32:
-        raise DiagnosisError(
-            f"recording {recording.name!r} has {len(recording)} samples; at least 32 are needed for a diagnosis"
-        )
+        raise DiagnosisError(f"recording {recording.name!r} has {len(recording)} samples; at least 32 are needed for a diagnosis")
     model = rig.model
     if model["valve"] is not None and "valve_command" not in recording.channels:
         raise DiagnosisError(f"recording {recording.name!r} has no channel valve_command, and the rig has a valve")
@@ -136,9 +134,7 @@ def prepare(recording: Recording, rig: Rig) -> Prepared:
             continue
         mask = recording.mask[name]
         if mask.sum() < max(16, 0.2 * mask.size):
-            raise DiagnosisError(
-                f"recording {recording.name!r}: only {int(mask.sum())} of {mask.size} samples of {name} are usable"
-            )
+            raise DiagnosisError(f"recording {recording.name!r}: only {int(mask.sum())} of {mask.size} samples of {name} are usable")
         filled = _bridged(recording.channels[name], mask)
         value = savgol_filter(filled, length, 3)
         slope = savgol_filter(filled, length, 3, deriv=1, delta=recording.sample_time)

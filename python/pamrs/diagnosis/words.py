@@ -23,9 +23,10 @@ def where(located: str | None, problem: Problem, groups: list[Group], picture: P
         return {"block": None, "channel": None, "intervals": [], "conditions": [], "text": text}
     block = next(b for b in problem.blocks if b.name == located)
     found = next(g.baseline[located] for g in groups if located in g.baseline)
+    parts = "" if block.covers == located else f" ({block.covers})"
     text = (
-        f"The mismatch lies in the {located} block ({block.covers}): with its neighbours' measured signals as inputs, the "
-        f"refitted model still misses {block.channel} by {found.systematic:.2g} times its noise."
+        f"The mismatch lies in the {located} block{parts}: with its neighbours' measured signals as inputs, the refitted "
+        f"model still misses {block.channel.replace('_', ' ')} by {found.systematic:.2g} times its noise."
     )
     telling = [c for c in picture.conditions if c["share"] > 1.15 * c["time"]][:2]
     if telling:
@@ -102,9 +103,7 @@ _SEPARATE = {
 }
 
 
-def next_experiment(
-    kind: str, probabilities: dict[str, float], ambiguity: list[list[str]], rig: Rig
-) -> dict[str, Any]:
+def next_experiment(kind: str, probabilities: dict[str, float], ambiguity: list[list[str]], rig: Rig) -> dict[str, Any]:
     """What to record next: the experiment that separates the leading hypotheses.
 
     The information is the entropy of the present probabilities [bits]: what a decisive experiment would bring.
@@ -135,9 +134,7 @@ def warnings(case: Case, groups: list[Group], symptoms: dict[str, float], no_hel
         if len(recording.issues) > 8:
             out.append(f"{recording.name}: {len(recording.issues) - 8} more issues of this kind")
     for name, value in sorted(symptoms.items(), key=lambda kv: -abs(kv[1])):
-        out.append(
-            f"the refit without effects moves {name} by {value:+.1f} tolerances: a symptom of missing physics, not a result"
-        )
+        out.append(f"the refit without effects moves {name} by {value:+.1f} tolerances: a symptom of missing physics, not a result")
     if no_held_out:
         out.append("there is no held-out recording: the proof is on the fitted data and counts less")
     for group in groups:

@@ -13,9 +13,7 @@ __all__ = ["render_html", "write_figure", "write_report"]
 
 
 def _missing(error: ImportError) -> ImportError:
-    return ImportError(
-        f"the report needs {error.name}, which is not installed: pip install pamrs[report]", name=error.name
-    )
+    return ImportError(f"the report needs {error.name}, which is not installed: pip install pamrs[report]", name=error.name)
 
 
 def render_html(diagnosis: Diagnosis) -> str:

@@ -301,9 +301,7 @@ def _grids(
             if z.shape != (len(y) - 1, len(x) - 1) and z.T.shape == (len(y) - 1, len(x) - 1):
                 z = z.T
             if z.shape != (len(y) - 1, len(x) - 1):
-                raise ValueError(
-                    f"condition_map {key} has shape {z.shape}; the edges ask for {(len(y) - 1, len(x) - 1)}"
-                )
+                raise ValueError(f"condition_map {key} has shape {z.shape}; the edges ask for {(len(y) - 1, len(x) - 1)}")
             grids.append((title, np.ma.masked_invalid(z)))
     sizes = [np.abs(z.compressed()) for _, z in grids]
     everything = np.concatenate(sizes) if sizes else np.empty(0)
@@ -421,9 +419,7 @@ def _draw_right(right: Any, diagnosis: Diagnosis) -> None:
             panel.set_title(title, fontweight="normal", pad=4)
             panel.set_xlabel(str(diagnosis.condition_map.get("x_label", "")))
         axes[0].set_ylabel(str(diagnosis.condition_map.get("y_label", "")))
-        parts[-1].colorbar(
-            mesh, ax=list(axes), label="mean residual / noise", extend="both", pad=0.02, aspect=28
-        )
+        parts[-1].colorbar(mesh, ax=list(axes), label="mean residual / noise", extend="both", pad=0.02, aspect=28)
     elif rows:
         _draw_blocks(parts[-1].subplots(), rows, least_rows=4)
         _head(parts[-1], "Where the residual is")

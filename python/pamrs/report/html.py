@@ -118,11 +118,7 @@ def _fit(diagnosis: Diagnosis, part: str) -> list[dict[str, Any]]:
         for key in ("noise", "before", "refit", "after"):
             value = entry.get(key)
             good = words.is_number(value)
-            ratio = (
-                float(value) / float(noise)
-                if good and words.is_number(noise) and float(noise) > 0
-                else math.nan
-            )
+            ratio = float(value) / float(noise) if good and words.is_number(noise) and float(noise) > 0 else math.nan
             times = "–" if math.isnan(ratio) else f"{words.format_number(ratio, 2)}×"
             shown = words.format_number(float(value) * factor) if good else "–"
             cells.append({"key": key, "value": shown, "times": "" if key == "noise" else times})
@@ -139,9 +135,7 @@ def _recordings(diagnosis: Diagnosis) -> tuple[list[dict[str, Any]], int]:
     keys = list(groups)
     if telling is not None:
         keys.sort(key=lambda k: k != (telling.role, telling.recording))
-    chosen = [k for k in keys if k[0] != "held_out"][:1] + [k for k in keys if k[0] == "held_out"][
-        :HELD_OUT_SHOWN
-    ]
+    chosen = [k for k in keys if k[0] != "held_out"][:1] + [k for k in keys if k[0] == "held_out"][:HELD_OUT_SHOWN]
     shown = []
     for i, key in enumerate(chosen):
         traces = sorted(groups[key], key=lambda t: t.channel != diagnosis.where.get("channel"))
@@ -163,8 +157,7 @@ def _conditions(diagnosis: Diagnosis) -> list[str]:
             text = condition.get("text")
             if not text:
                 text = ", ".join(
-                    f"{words.label(str(k))} {words.format_number(v) if words.is_number(v) else v}"
-                    for k, v in condition.items()
+                    f"{words.label(str(k))} {words.format_number(v) if words.is_number(v) else v}" for k, v in condition.items()
                 )
             lines.append(str(text))
         else:
@@ -199,7 +192,7 @@ def _facts(diagnosis: Diagnosis) -> list[tuple[str, str]]:
         facts.append(
             (
                 f"{100 * float(gap):.0f} %".replace("-", "−"),
-                "of the gap to the noise closed on held-out recordings",
+                f"of the gap to the noise closed on {diagnosis.proof}",
             )
         )
     if diagnosis.where.get("block"):
@@ -239,9 +232,7 @@ def render(diagnosis: Diagnosis) -> str:
     str
         HTML text.
     """
-    environment = jinja2.Environment(
-        autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
+    environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     source = Path(__file__).with_name("template.html.j2").read_text(encoding="utf-8")
     recordings, hidden = _recordings(diagnosis)
     bits = diagnosis.next_experiment.get("expected_information_bits")
@@ -256,9 +247,7 @@ def render(diagnosis: Diagnosis) -> str:
         conditions=_conditions(diagnosis),
         blocks=_markup(figures.blocks_svg(diagnosis)),
         map=_markup(figures.map_svg(diagnosis)),
-        map_block=words.label(
-            str((diagnosis.condition_map or {}).get("block") or diagnosis.where.get("block") or "")
-        ),
+        map_block=words.label(str((diagnosis.condition_map or {}).get("block") or diagnosis.where.get("block") or "")),
         probabilities=_probabilities(diagnosis),
         effects=_effects(diagnosis),
         ambiguity=[words.set_label(list(s)) for s in diagnosis.ambiguity],

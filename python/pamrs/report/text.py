@@ -166,9 +166,7 @@ def ranked_probabilities(diagnosis: Diagnosis, count: int = 8) -> list[tuple[str
 
 def is_named(diagnosis: Diagnosis, hypothesis: str) -> bool:
     """Whether `hypothesis` (an id, or ids joined by ``+``) is the one that the verdict names."""
-    named = (
-        {str(e["id"]) for e in diagnosis.effects} if diagnosis.verdict == "effects" else {diagnosis.verdict}
-    )
+    named = {str(e["id"]) for e in diagnosis.effects} if diagnosis.verdict == "effects" else {diagnosis.verdict}
     return set(hypothesis.replace(" ", "").split("+")) == named
 
 
