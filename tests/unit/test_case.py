@@ -137,7 +137,7 @@ def test_chambers_load(path: Path) -> None:
     assert not case.rig.parameters["chamber.dead_volume"].known
     assert {issue.kind for issue in recording.issues} <= {"gap"}
     assert recording.sample_time == pytest.approx(0.1, rel=5e-3)
-    assert 138.0 < recording.duration < 152.0
+    assert 130.0 < recording.duration < 152.0
     pressure = recording.channels["muscle_pressure"]
     assert 5.0e5 < pressure[0] < 7.9e5
     assert recording.valid().mean() > 0.98
