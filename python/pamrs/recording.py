@@ -323,7 +323,7 @@ def _understood(headings: list[str], source: str) -> dict[str, tuple[int, str]]:
         expected = _REFERENCE_UNITS if name == "reference" else (CHANNELS[name].unit,)
         unit = match["unit"]
         if unit is None or not unit.strip():
-            problems.append(f"column {heading!r} has no unit: write '{name} [{expected[0]}]'")
+            problems.append(f"column {heading!r} has no unit: write '{name} [{expected[0]}]', with the unit its values are in")
         elif name in wanted:
             problems.append(f"column {heading!r}: the channel {name!r} is there twice")
         else:

@@ -117,6 +117,8 @@ def simulate(
     >>> bool(result["joint_angle"][-1] > result["joint_angle"][0])
     True
     """
+    if not isinstance(rig, Rig):
+        raise ParameterError(f"rig is a {type(rig).__name__}; a Rig is needed, for example pamrs.load_rig({rig!r})")
     if not (np.isfinite(sample_time) and sample_time > 0):
         raise ParameterError(f"sample_time = {sample_time} is not allowed: a finite time > 0 s is needed")
     has_valve = rig.model["valve"] is not None

@@ -147,7 +147,7 @@ def write_atomically(path: str | os.PathLike[str], content: str | bytes) -> Path
     return target
 
 
-@dataclass
+@dataclass(repr=False)
 class Diagnosis:
     """Result of `pamrs.diagnose`.
 
@@ -323,6 +323,9 @@ class Diagnosis:
             lines.append(f"({len(self.warnings) - 3} more warnings in the report)")
         lines.append(f"{self.seconds:.1f} s")
         return "\n".join(lines)
+
+    def __repr__(self) -> str:
+        return f"Diagnosis({self.case!r}: {self.verdict}; {self.headline})"
 
     @property
     def proof(self) -> str:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
+
 from pamrs.case import Case
 from pamrs.diagnosis.conditions import Picture
 from pamrs.diagnosis.fitting import Problem
@@ -133,6 +135,17 @@ def warnings(case: Case, groups: list[Group], symptoms: dict[str, float], no_hel
             out.append(f"{recording.name}: {issue.kind} in {issue.channel}, {when}: {issue.text}")
         if len(recording.issues) > 8:
             out.append(f"{recording.name}: {len(recording.issues) - 8} more issues of this kind")
+    for recording in case.recordings:
+        for channel in ("muscle_pressure", "supply_pressure"):
+            values = recording.channels.get(channel)
+            if values is None or not recording.mask[channel].any():
+                continue
+            largest = float(np.nanmax(np.abs(values[recording.mask[channel]])))
+            if largest < 1e4:
+                out.append(
+                    f"{recording.name}: {channel} never exceeds {largest:.3g} Pa gauge, next to nothing for a muscle or a tank: is "
+                    "the unit in its header the one its values are in?"
+                )
     for name, value in sorted(symptoms.items(), key=lambda kv: -abs(kv[1])):
         out.append(f"the refit without effects moves {name} by {value:+.1f} tolerances: a symptom of missing physics, not a result")
     if no_held_out:
