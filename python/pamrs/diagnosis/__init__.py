@@ -14,15 +14,24 @@ from collections.abc import Callable
 
 from pamrs.case import Case, load_case
 from pamrs.diagnosis import assemble
-from pamrs.diagnosis.blocks import available_blocks
+from pamrs.diagnosis.blocks import Block, available_blocks
 from pamrs.diagnosis.fitting import Problem
 from pamrs.diagnosis.hypotheses import examine
 from pamrs.diagnosis.result import Diagnosis
-from pamrs.diagnosis.signals import prepare
-from pamrs.errors import DiagnosisError
+from pamrs.diagnosis.signals import Prepared, prepare
+from pamrs.errors import DiagnosisError, SimulationError
 from pamrs.simulation import core_rig
 
 __all__ = ["Diagnosis", "diagnose"]
+
+LEAST_SHARE = 0.2
+"""Share of usable samples below which a block is left out of the diagnosis."""
+
+
+def _usable_share(block: Block, recordings: list[Prepared]) -> float:
+    """Share of a block's rows that may be used, over all recordings."""
+    rows = [p.usable(block.channel, block.drives, p.starts(block.window, block.drives)) for p in recordings]
+    return float(sum(r.sum() for r in rows)) / sum(r.size for r in rows)
 
 
 def _quiet(message: str) -> None:
@@ -71,6 +80,14 @@ def diagnose(case: Case | str | os.PathLike[str], *, progress: Callable[[str], N
     held = [prepare(r, rig) for r in case.held_out if case.fit]
     channels = case.channels
     blocks = available_blocks(rig, channels)
+    thin = {b.name: share for b in blocks if (share := _usable_share(b, fitted)) < LEAST_SHARE}
+    blocks = [b for b in blocks if b.name not in thin]
+    if thin and not blocks:
+        raise DiagnosisError(
+            f"case {case.name!r}: holes leave too few usable samples in every block ("
+            + ", ".join(f"{name}: {100 * share:.0f} %" for name, share in thin.items())
+            + f"); at least {100 * LEAST_SHARE:.0f} % are needed"
+        )
     if not blocks:
         raise DiagnosisError(
             f"case {case.name!r}: its channels ({', '.join(channels)}) do not surround any block of the rig "
@@ -81,9 +98,17 @@ def diagnose(case: Case | str | os.PathLike[str], *, progress: Callable[[str], N
     outer = Problem(blocks, held, nominal_core) if held else inner
     gas = [b for b in blocks if b.name != "arm"]
     motion = [b for b in blocks if b.name == "arm"]
-    groups = [examine(inner, outer, rig, members, say) for members in (gas, motion) if members]
-    say("putting the answer together")
-    diagnosis = assemble.assemble(case, inner, outer, groups)
+    try:
+        groups = [examine(inner, outer, rig, members, say) for members in (gas, motion) if members]
+        say("putting the answer together")
+        diagnosis = assemble.assemble(case, inner, outer, groups)
+    except SimulationError as error:
+        raise DiagnosisError(
+            f"case {case.name!r}: the model, driven by the recordings, leaves the range in which it holds ({error}); check the "
+            "rig's geometry and the recordings' units and columns"
+        ) from error
+    for name, share in thin.items():
+        diagnosis.warnings.append(f"block {name} was left out: only {100 * share:.0f} % of its samples are usable")
     diagnosis.seconds = round(time.perf_counter() - began, 3)
     if not math.isfinite(sum(diagnosis.probabilities.values())):
         raise DiagnosisError("the probabilities are not finite: please report this case")

@@ -230,12 +230,12 @@ def _effect_parameters(effect: str, candidate: Candidate) -> dict[str, Any]:
     if effect == "leak_muscle" and rig.model["valve"] is None:
         gas, chamber = rig.model["gas"], rig.model["chamber"]
         value, std = candidate.fit.values["leak_muscle.conductance"], candidate.fit.std["leak_muscle.conductance"]
-        relative = std / value if value > 0 else math.inf
         volume = chamber["dead_volume"]
         rt = gas["gas_constant"] * gas["temperature"]
-        tau = volume / (value * 1.185 * rt * chamber["alpha_out"]) if value > 0 else math.inf
-        out["time_constant"] = _entry(tau, tau * relative, "s", True)
-        out["conductance_per_volume"] = _entry(value / volume, std / volume, "1/(s Pa)", True)
+        if value > 0:
+            tau = volume / (value * 1.185 * rt * chamber["alpha_out"])
+            out["time_constant"] = _entry(tau, tau * std / value, "s", std < value)
+            out["conductance_per_volume"] = _entry(value / volume, std / volume, "1/(s Pa)", std < value)
     return out
 
 

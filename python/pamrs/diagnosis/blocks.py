@@ -64,19 +64,19 @@ def available_blocks(rig: Rig, channels: tuple[str, ...]) -> list[Block]:
     motion = ("joint_angle",) if model["arm"] is not None else ()
     has = set(channels)
     fed = model["valve"] is not None
-    if fed and {"supply_pressure", "muscle_pressure"} <= has:
+    if fed and {"supply_pressure", "muscle_pressure", "valve_command", *motion} <= has:
         blocks.append(
             Block(
                 "supply",
                 "supply_pressure",
-                ("muscle_pressure",),
+                ("muscle_pressure", "valve_command"),
                 4.0,
                 _VALVE | {"supply.volume", "sensors.pressure_zero"},
                 CHAMBER_STEP,
                 "supply and valve",
             )
         )
-    drives = (("supply_pressure",) if fed else ()) + motion
+    drives = (("supply_pressure", "valve_command") if fed else ()) + motion
     if "muscle_pressure" in has and set(drives) <= has:
         names = _CHAMBER | _SENSORS | (_VALVE if fed else frozenset())
         blocks.append(
@@ -133,8 +133,7 @@ def residual(block: Block, core: _core.Rig, prepared: Prepared, parameters: list
     parameters : list of str
         Dotted names for the jacobian, may be empty.
     """
-    need = (block.channel, *block.drives)
-    starts = prepared.starts(block.window, need)
+    starts = prepared.starts(block.window, block.drives)
     # without parameters a free null direction is still wanted for the window's start: ask for one parameter
     names = parameters or ["sensors.pressure_zero"]
     prediction, jacobian = core.predict(

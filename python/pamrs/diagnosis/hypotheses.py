@@ -9,10 +9,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pamrs.diagnosis.blocks import Block, Residual
+from pamrs.diagnosis.blocks import Block
 from pamrs.diagnosis.evidence import Excess, Floor, excess, floors, inflation
 from pamrs.diagnosis.fitting import FIT_BIN, Fit, Key, Problem, acts_in, fit, residuals
 from pamrs.effects_table import EFFECTS
+from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 
 __all__ = ["Candidate", "Group", "examine"]
@@ -41,8 +42,6 @@ class Candidate:
         On the recordings to fit.
     held_out : dict of str to Excess
         By block, on held-out recordings (on the fitted ones if there are no others).
-    cost : float
-        Half the held-out sum of squares on the effective sample size, over the blocks it acts in.
     gap_closed : float
         Share of the baseline's excess that it removes on held-out recordings.
     scatter : float
@@ -52,7 +51,6 @@ class Candidate:
     effects: tuple[str, ...]
     fit: Fit
     held_out: dict[str, Excess]
-    cost: float
     gap_closed: float
     scatter: float = 0.0
 
@@ -121,7 +119,7 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
     now = {b.name: excess(b, inner.recordings, baseline.residuals, floor) for b in blocks}
     outside = residuals(outer, baseline.rig) if held is not fitted else baseline.residuals
     out = {b.name: excess(b, outer.recordings, outside, floor) for b in blocks}
-    start = Candidate((), baseline, out, math.nan, 0.0)
+    start = Candidate((), baseline, out, 0.0)
     suspects = [b for b in blocks if _significant(now[b.name]) and (held is fitted or out[b.name].ratio > 1.25)]
     if not suspects:
         # a parameter at the end of its plausible range is a symptom even where the fit is good
@@ -136,7 +134,9 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
         if settled and len(effects) > 1:
             continue  # a single effect leaves only noise: a pair cannot be asked for by these data
         say(f"{names}: trying {' + '.join(effects)}")
-        candidates.append(_try(effects, inner, outer, nominal, baseline, white, floor, held is fitted, out, suspects))
+        candidate = _try(effects, inner, outer, nominal, baseline, white, floor, held is fitted, out, suspects)
+        if candidate is not None:
+            candidates.append(candidate)
     doubt = _doubt(fitted, held, mismatch, now[mismatch.name].rms)
     return Group(blocks, was, now, candidates, _weigh(candidates, suspects, outer, doubt), mismatch, floor)
 
@@ -193,29 +193,30 @@ def _try(
     same: bool,
     out: dict[str, Excess],
     suspects: list[Block],
-) -> Candidate:
+) -> Candidate | None:
     sealed = nominal.model["valve"] is None
     limit = 30 if sealed else 8
-    tried = [
-        (fit(inner, nominal, effects, starts, weights, fixed=fixed, warm=baseline.values, evaluations=limit), fixed)
-        for starts, fixed in _start_sets(effects, sealed)
-    ]
+    tried = []
+    for starts, fixed in _start_sets(effects, sealed):
+        try:
+            found = fit(inner, nominal, effects, starts, weights, fixed=fixed, warm=baseline.values, evaluations=limit)
+        except SimulationError:
+            continue  # this start leaves the range in which the model holds
+        tried.append((found, fixed))
+    if not tried:
+        return None
     best, fixed = min(tried, key=lambda f: f[0].cost)
     colour = {b.name: inflation(b, inner.recordings, best.residuals, FIT_BIN) for b in inner.blocks}
     if max(colour.values()) > 2:
         starts = {n: v for n, v in best.values.items() if n.partition(".")[0] in EFFECTS}
         starts = {n: max(v, 1e-3 * s) for (n, v), s in zip(starts.items(), _defaults(starts), strict=True)}
         best = fit(inner, nominal, effects, starts, colour, fixed=fixed, warm=best.values, evaluations=limit)
-    found = best.residuals if same else residuals(outer, best.rig)
-    after = {b.name: excess(b, outer.recordings, found, floor) for b in inner.blocks}
+    outside = best.residuals if same else residuals(outer, best.rig)
+    after = {b.name: excess(b, outer.recordings, outside, floor) for b in inner.blocks}
     gaps = [(out[b.name].ratio - 1.0, max(0.0, after[b.name].ratio - 1.0)) for b in suspects]
     total = sum(math.sqrt(max(0.0, g)) for g, _ in gaps)
     gap = 1.0 - sum(math.sqrt(a) for _, a in gaps) / total if total > 0 else 0.0
-    cost = 0.0
-    for block in inner.blocks:
-        unit = inflation(block, outer.recordings, found, FIT_BIN)
-        cost += _held_out_cost(block, outer, found, unit)
-    return Candidate(effects, best, after, cost, gap, _scatter(effects, inner, best))
+    return Candidate(effects, best, after, gap, _scatter(effects, inner, best))
 
 
 def _defaults(starts: dict[str, float]) -> list[float]:
@@ -225,15 +226,6 @@ def _defaults(starts: dict[str, float]) -> list[float]:
         parameter = next(p for p in EFFECTS[effect].parameters if p.name == short)
         out.append(max(parameter.default, parameter.lower))
     return out
-
-
-def _held_out_cost(block: Block, problem: Problem, found: dict[Key, Residual], unit: float) -> float:
-    total = 0.0
-    for prepared in problem.recordings:
-        r = found[block.name, prepared.recording.name]
-        if r.rows.any():
-            total += float(np.sum((r.value[r.rows] / r.noise) ** 2))
-    return 0.5 * total / unit
 
 
 def _scatter(effects: tuple[str, ...], problem: Problem, best: Fit) -> float:
@@ -274,14 +266,14 @@ def _scatter(effects: tuple[str, ...], problem: Problem, best: Fit) -> float:
 def _weigh(candidates: list[Candidate], suspects: list[Block], outer: Problem, doubt: float) -> dict[str, float]:
     """Probabilities over sets of effects and ``unlisted``.
 
-    Between sets: held-out likelihood on the effective sample size, with a BIC-like price per parameter. Against
+    Between sets: the logarithm of the held-out excess ratio on a nominal number of independent samples (a fortieth of the
+    rows), with a BIC-like price per parameter. Against
     ``unlisted``: the share of the gap that the best set closes, whether what it leaves is above the floor, and whether its
     size is the same in all recordings.
     """
     named = [c for c in candidates if c.effects]
     if not named:
         return {"unlisted": 1.0}
-    # the same yardstick for all: the smallest left-over noise of any candidate
     scores = {}
     for c in named:
         ratio = sum(c.held_out[b.name].ratio for b in suspects)

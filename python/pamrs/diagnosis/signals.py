@@ -19,6 +19,8 @@ Mask = NDArray[np.bool_]
 
 SMOOTHING_TIME = 0.06
 """Length of the smoothing filter for drive signals [s]; at least seven samples."""
+BRIDGED = 3
+"""Longest hole in a drive signal that is bridged [samples]."""
 DRIVES = ("supply_pressure", "muscle_pressure", "joint_angle")
 
 
@@ -53,22 +55,31 @@ class Prepared:
         """Sample time [s]."""
         return self.recording.sample_time
 
-    def starts(self, window: float | None, channels: tuple[str, ...]) -> list[int]:
-        """Samples at which windows begin: every ``window`` seconds (None: once) and after each hole."""
+    def clear(self, drives: tuple[str, ...]) -> Mask:
+        """Rows at which every drive was measured: holes of up to three samples are bridged, longer ones are cut out
+        together with what the smoothing carries over their edges.
+        """
+        bad = ~self.recording.valid(*drives) if drives else np.zeros(self.n, dtype=bool)
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], bad.astype(np.int8), [0]])))
+        reach = round(0.5 * SMOOTHING_TIME / self.dt)
+        out = np.ones(self.n, dtype=bool)
+        for a, b in zip(edges[::2], edges[1::2], strict=True):
+            if b - a > BRIDGED:
+                out[max(0, a - reach) : b + reach] = False
+        return out
+
+    def starts(self, window: float | None, drives: tuple[str, ...]) -> list[int]:
+        """Samples at which windows begin: every ``window`` seconds (None: once) and after each hole in the drives."""
         starts = {0}
         if window is not None:
             starts |= set(range(0, self.n, max(8, round(window / self.dt))))
-        valid = self.recording.valid(*channels)
-        starts |= set((np.flatnonzero(valid[1:] & ~valid[:-1]) + 1).tolist())
+        good = self.clear(drives)
+        starts |= set((np.flatnonzero(good[1:] & ~good[:-1]) + 1).tolist())
         return sorted(starts)
 
     def usable(self, output: str, drives: tuple[str, ...], starts: list[int]) -> Mask:
-        """Rows whose prediction rests on measured drives since their window began."""
-        good = self.recording.valid(*drives) if drives else np.ones(self.n, dtype=bool)
-        reach = round(0.5 * SMOOTHING_TIME / self.dt)
-        bad = ~good
-        if reach and bad.any():
-            bad = np.convolve(bad, np.ones(2 * reach + 1), mode="same") > 0
+        """Rows whose prediction rests on measured drives since their window began, and whose output was measured."""
+        bad = ~self.clear(drives)
         rows = np.zeros(self.n, dtype=bool)
         for a, b in zip(starts, [*starts[1:], self.n], strict=True):
             first = np.flatnonzero(bad[a:b])
@@ -96,7 +107,7 @@ def noise_level(values: Array, mask: Mask) -> float:
     third = third[ok]
     if third.size < 8:
         return 0.0
-    # a quantised or often resting channel has many zero differences: take a high quantile of the active ones too
+    # a quantised or often resting channel has many zero differences: the lattice bounds the estimate from below
     sigma = 1.4826 * float(np.median(np.abs(third))) / np.sqrt(20.0)
     steps = np.abs(np.diff(values[mask]))
     steps = steps[steps > 1e-12 * max(1e-12, float(np.abs(values[mask]).max()))]
@@ -122,12 +133,14 @@ def prepare(recording: Recording, rig: Rig) -> Prepared:
             f"recording {recording.name!r} has no channel muscle_pressure, without which no block can be cut out; "
             f"it has: {', '.join(recording.channels)}"
         )
-    if len(recording) < 32:
-        raise DiagnosisError(f"recording {recording.name!r} has {len(recording)} samples; at least 32 are needed for a diagnosis")
+    length = max(7, round(SMOOTHING_TIME / recording.sample_time) | 1)
+    if len(recording) < max(32, length):
+        raise DiagnosisError(
+            f"recording {recording.name!r} has {len(recording)} samples; at least {max(32, length)} are needed for a diagnosis"
+        )
     model = rig.model
     if model["valve"] is not None and "valve_command" not in recording.channels:
         raise DiagnosisError(f"recording {recording.name!r} has no channel valve_command, and the rig has a valve")
-    length = max(7, round(SMOOTHING_TIME / recording.sample_time) | 1)
     signals, noise = {}, {}
     for name in DRIVES:
         if name not in recording.channels:

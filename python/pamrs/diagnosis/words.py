@@ -30,6 +30,11 @@ def where(located: str | None, problem: Problem, groups: list[Group], picture: P
         f"The mismatch lies in the {located} block{parts}: with its neighbours' measured signals as inputs, the refitted "
         f"model still misses {block.channel.replace('_', ' ')} by {found.systematic:.2g} times its noise."
     )
+    if all(g.mismatch is None for g in groups):
+        text = (
+            f"Every block fits to its noise, but the {located} block only with a parameter far outside its tolerance "
+            "(see the warnings)."
+        )
     telling = [c for c in picture.conditions if c["share"] > 1.15 * c["time"]][:2]
     if telling:
         text += " It is largest under: " + "; ".join(c["text"] for c in telling) + "."
@@ -114,7 +119,7 @@ def next_experiment(kind: str, probabilities: dict[str, float], ambiguity: list[
     leading = max(probabilities, key=lambda k: probabilities[k])
     if not ambiguity and kind != "unlisted":
         text = "The question is settled by these recordings; nothing further is needed."
-        return {"text": text, "excitation": {}, "expected_information_bits": round(entropy, 3)}
+        return {"text": text, "excitation": {}, "expected_information_bits": 0.0}
     key = next((k for s in [leading.split("+"), *ambiguity] for k in s if k in _SEPARATE), "unlisted")
     text, excitation = _SEPARATE[key]
     if rig.model["valve"] is None:
