@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
-__all__ = ["EFFECTS", "EffectInfo", "EffectParameter"]
+__all__ = ["EFFECTS", "EffectInfo", "EffectParameter", "find_parameter"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +66,12 @@ class EffectInfo:
     def dotted(self) -> tuple[str, ...]:
         """Dotted names of the parameters, ``leak_muscle.conductance``."""
         return tuple(f"{self.id}.{parameter.name}" for parameter in self.parameters)
+
+
+def find_parameter(name: str) -> EffectParameter:
+    """The parameter of a dotted name such as ``leak_muscle.conductance``; KeyError if there is none."""
+    effect, _, short = name.partition(".")
+    return {parameter.name: parameter for parameter in EFFECTS[effect].parameters}[short]
 
 
 def _table(*effects: EffectInfo) -> dict[str, EffectInfo]:

@@ -13,7 +13,7 @@ from pamrs.diagnosis import words
 from pamrs.diagnosis.conditions import Picture, describe
 from pamrs.diagnosis.evidence import Floor
 from pamrs.diagnosis.fitting import Key, Problem, residuals
-from pamrs.diagnosis.hypotheses import Candidate, Group
+from pamrs.diagnosis.hypotheses import Candidate, Group, significant
 from pamrs.diagnosis.result import Diagnosis, Trace
 from pamrs.effects_table import EFFECTS
 from pamrs.rig import Rig
@@ -67,7 +67,7 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
     gap = _gap(held_table or fit_table)
     effects = _effects(groups, probabilities, model if verdict == "effects" else None)
     ambiguity = _ambiguity(probabilities)
-    parameters = _parameters(nominal, [c for c in (chosen if verdict == "effects" else [g.candidates[0] for g in groups])])
+    parameters = _parameters(nominal, chosen if verdict == "effects" else [g.candidates[0] for g in groups])
     where = words.where(located, fitted, groups, picture)
     diagnosis = Diagnosis(
         case=case.name,
@@ -122,7 +122,7 @@ def _probabilities(groups: list[Group]) -> tuple[dict[str, float], dict[str, flo
     symptoms = {n: v for n, v in moved.items() if abs(v) >= SYMPTOM}
     out: dict[str, float] = {"none": 0.0, "parameters": 0.0, "unlisted": 0.0}
     if quiet:
-        shifted = any(e.ratio > 1.6 and e.p_value < 0.01 for g in groups for e in g.nominal.values())
+        shifted = any(significant(e) for g in groups for e in g.nominal.values())
         if symptoms:
             worst = max(abs(v) for v in symptoms.values())
             out["unlisted"] = min(0.95, 0.5 + 0.25 * (worst - SYMPTOM))

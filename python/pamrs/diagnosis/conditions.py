@@ -108,7 +108,6 @@ def describe(
         Noise floors.
     """
     columns: dict[str, list[Array]] = {}
-    flags: dict[str, list[NDArray[np.bool_]]] = {}
     scaled, scaled_after, worst, picture = [], [], -1.0, Picture()
     for prepared in recordings:
         key = (block.name, prepared.recording.name)
@@ -133,9 +132,8 @@ def describe(
             picture.intervals = _intervals(np.abs(score) > 3.0, width * prepared.dt)
     joined = {name: np.concatenate(parts) for name, parts in columns.items()}
     z = np.concatenate(scaled)
-    flags = {name: [mask] for name, mask in _regimes(joined).items()}
     total = float(np.sum(np.maximum(z**2 - 1.0, 0.0)))
-    for name, (mask,) in flags.items():
+    for name, mask in _regimes(joined).items():
         if mask.sum() < 10 or total <= 0:
             continue
         share = float(np.sum(np.maximum(z[mask] ** 2 - 1.0, 0.0))) / total

@@ -8,13 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import savgol_filter
 from scipy.stats import chi2
 
 from pamrs import _core
 from pamrs.diagnosis.blocks import Block, Residual, residual
 from pamrs.diagnosis.fitting import Key, Problem, bin_width
-from pamrs.diagnosis.signals import SMOOTHING_TIME, Prepared, binned
+from pamrs.diagnosis.signals import Prepared, binned, smoothed
 
 __all__ = ["Excess", "Floor", "excess", "floors", "inflation"]
 
@@ -108,14 +107,11 @@ def floors(problem: Problem, core: _core.Rig) -> dict[Key, Floor]:
 def _shaken(prepared: Prepared, names: Iterable[str], rng: np.random.Generator) -> Prepared:
     """The recording with one more realisation of noise, as smoothed, on some drives."""
     signals = dict(prepared.signals)
-    length = max(7, round(SMOOTHING_TIME / prepared.dt) | 1)
     for name in names:
         raw = rng.normal(0.0, prepared.noise[name], prepared.n)
         value, slope = signals[name]
-        signals[name] = (
-            value + savgol_filter(raw, length, 3),
-            slope + savgol_filter(raw, length, 3, deriv=1, delta=prepared.dt),
-        )
+        more, steeper = smoothed(raw, prepared.dt)
+        signals[name] = (value + more, slope + steeper)
     return Prepared(prepared.recording, prepared.command, signals, prepared.noise)
 
 

@@ -14,7 +14,7 @@ from scipy.optimize import least_squares
 from pamrs import _core
 from pamrs.diagnosis.blocks import Block, Residual, residual
 from pamrs.diagnosis.signals import Prepared, binned
-from pamrs.effects_table import EFFECTS, EffectParameter
+from pamrs.effects_table import EFFECTS, find_parameter
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 
@@ -140,7 +140,7 @@ class _Scaling:
         lower = [max(-6.0, (known[n].lower - self.centre[n]) / self.scale[n]) for n in baseline]
         upper = [min(6.0, (known[n].upper - self.centre[n]) / self.scale[n]) for n in baseline]
         for name, start in starts.items():
-            info = _parameter(name)
+            info = find_parameter(name)
             if name in LOGARITHMIC:
                 lower.append(math.log(max(info.lower, start * 1e-3) / start))
                 upper.append(math.log(min(info.upper, start * 1e3) / start))
@@ -169,11 +169,6 @@ class _Scaling:
             own = {n.partition(".")[2]: v for n, v in chosen.items() if n.startswith(effect + ".")}
             rig = rig.with_effect(effect, own)
         return rig
-
-
-def _parameter(name: str) -> EffectParameter:
-    effect, _, short = name.partition(".")
-    return next(p for p in EFFECTS[effect].parameters if p.name == short)
 
 
 def bin_width(prepared: Prepared, seconds: float) -> int:

@@ -12,11 +12,11 @@ import numpy as np
 from pamrs.diagnosis.blocks import Block
 from pamrs.diagnosis.evidence import Excess, Floor, excess, floors, inflation
 from pamrs.diagnosis.fitting import FIT_BIN, Fit, Key, Problem, acts_in, fit, residuals
-from pamrs.effects_table import EFFECTS
+from pamrs.effects_table import EFFECTS, find_parameter
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 
-__all__ = ["Candidate", "Group", "examine"]
+__all__ = ["Candidate", "Group", "examine", "significant"]
 
 DETECTION_RATIO = 1.6
 """Variance of bin means over the floor's from which a mismatch is taken as real."""
@@ -120,7 +120,7 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
     outside = residuals(outer, baseline.rig) if held is not fitted else baseline.residuals
     out = {b.name: excess(b, outer.recordings, outside, floor) for b in blocks}
     start = Candidate((), baseline, out, 0.0)
-    suspects = [b for b in blocks if _significant(now[b.name]) and (held is fitted or out[b.name].ratio > 1.25)]
+    suspects = [b for b in blocks if significant(now[b.name]) and (held is fitted or out[b.name].ratio > 1.25)]
     if not suspects:
         # a parameter at the end of its plausible range is a symptom even where the fit is good
         return Group(blocks, was, now, [start], {"": 1.0}, None, floor)
@@ -157,7 +157,8 @@ def _explains(candidate: Candidate, suspects: list[Block]) -> bool:
     return all(candidate.held_out[b.name].ratio < DETECTION_RATIO for b in suspects)
 
 
-def _significant(found: Excess) -> bool:
+def significant(found: Excess) -> bool:
+    """Whether a block keeps more than its noise."""
     return found.ratio > DETECTION_RATIO and found.p_value < 0.01
 
 
@@ -209,7 +210,7 @@ def _try(
     colour = {b.name: inflation(b, inner.recordings, best.residuals, FIT_BIN) for b in inner.blocks}
     if max(colour.values()) > 2:
         starts = {n: v for n, v in best.values.items() if n.partition(".")[0] in EFFECTS}
-        starts = {n: max(v, 1e-3 * s) for (n, v), s in zip(starts.items(), _defaults(starts), strict=True)}
+        starts = {n: max(v, 1e-3 * _typical(n)) for n, v in starts.items()}
         best = fit(inner, nominal, effects, starts, colour, fixed=fixed, warm=best.values, evaluations=limit)
     outside = best.residuals if same else residuals(outer, best.rig)
     after = {b.name: excess(b, outer.recordings, outside, floor) for b in inner.blocks}
@@ -219,13 +220,10 @@ def _try(
     return Candidate(effects, best, after, gap, _scatter(effects, inner, best))
 
 
-def _defaults(starts: dict[str, float]) -> list[float]:
-    out = []
-    for name in starts:
-        effect, _, short = name.partition(".")
-        parameter = next(p for p in EFFECTS[effect].parameters if p.name == short)
-        out.append(max(parameter.default, parameter.lower))
-    return out
+def _typical(name: str) -> float:
+    """A typical size of an effect's parameter, at least its lower bound."""
+    parameter = find_parameter(name)
+    return max(parameter.default, parameter.lower)
 
 
 def _scatter(effects: tuple[str, ...], problem: Problem, best: Fit) -> float:

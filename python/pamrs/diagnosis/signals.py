@@ -12,7 +12,7 @@ from pamrs.errors import DiagnosisError
 from pamrs.recording import Recording
 from pamrs.rig import Rig
 
-__all__ = ["Prepared", "binned", "noise_level", "prepare"]
+__all__ = ["Prepared", "binned", "noise_level", "prepare", "smoothed"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -115,6 +115,19 @@ def noise_level(values: Array, mask: Mask) -> float:
     return float(max(sigma, lattice / np.sqrt(12.0)))
 
 
+def filter_length(dt: float) -> int:
+    """Samples of the smoothing filter at a sample time [s]: odd, at least seven."""
+    return max(7, round(SMOOTHING_TIME / dt) | 1)
+
+
+def smoothed(values: Array, dt: float) -> tuple[Array, Array]:
+    """A channel smoothed by local cubics (Savitzky & Golay 1964), and its time derivative."""
+    length = filter_length(dt)
+    value = savgol_filter(values, length, 3)
+    slope = savgol_filter(values, length, 3, deriv=1, delta=dt)
+    return np.ascontiguousarray(value), np.ascontiguousarray(slope)
+
+
 def _bridged(values: Array, mask: Mask) -> Array:
     index = np.arange(values.size)
     return np.asarray(np.interp(index, index[mask], values[mask]), dtype=np.float64)
@@ -133,7 +146,7 @@ def prepare(recording: Recording, rig: Rig) -> Prepared:
             f"recording {recording.name!r} has no channel muscle_pressure, without which no block can be cut out; "
             f"it has: {', '.join(recording.channels)}"
         )
-    length = max(7, round(SMOOTHING_TIME / recording.sample_time) | 1)
+    length = filter_length(recording.sample_time)
     if len(recording) < max(32, length):
         raise DiagnosisError(
             f"recording {recording.name!r} has {len(recording)} samples; at least {max(32, length)} are needed for a diagnosis"
@@ -149,9 +162,7 @@ def prepare(recording: Recording, rig: Rig) -> Prepared:
         if mask.sum() < max(16, 0.2 * mask.size):
             raise DiagnosisError(f"recording {recording.name!r}: only {int(mask.sum())} of {mask.size} samples of {name} are usable")
         filled = _bridged(recording.channels[name], mask)
-        value = savgol_filter(filled, length, 3)
-        slope = savgol_filter(filled, length, 3, deriv=1, delta=recording.sample_time)
-        signals[name] = (np.ascontiguousarray(value), np.ascontiguousarray(slope))
+        signals[name] = smoothed(filled, recording.sample_time)
         noise[name] = noise_level(recording.channels[name], mask)
         if noise[name] <= 0:
             noise[name] = max(1e-9, 1e-6 * float(np.ptp(filled)))
