@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from pamrs.errors import ParameterError, RigError, joined
 from pamrs.rig_reader import read_model
-from pamrs.rig_schema import BLOCKS, SCHEMA, Key, find_key
+from pamrs.rig_schema import BLOCKS, SCHEMA, Key, find_key, keys_of
 
 if TYPE_CHECKING:
     from pamrs.muscle import Muscle
@@ -135,14 +135,14 @@ class Rig:
 
     def _scalars(self) -> Iterator[tuple[str, Key]]:
         for block in self.blocks:
-            for key in BLOCKS[block]:
+            for key in keys_of(block, self._model[block]):
                 if key.kind in ("scalar", "count"):
                     yield f"{block}.{key.name}", key
 
     def _key(self, name: str) -> Key:
         key = find_key(name)
         block = name.partition(".")[0]
-        if key is None or key.kind not in ("scalar", "count") or self._model.get(block) is None:
+        if key is None or key.kind not in ("scalar", "count") or key.name not in (self._model.get(block) or {}):
             known = ", ".join(dotted for dotted, _ in self._scalars())
             raise ParameterError(f"rig {self.name!r} has no parameter {name!r}; it has: {known}")
         return key
@@ -265,7 +265,7 @@ class Rig:
         for block in self.blocks:
             lines += ["", f"[{block}]"]
             groups: dict[str, list[str]] = {}
-            for key in BLOCKS[block]:
+            for key in keys_of(block, self._model[block]):
                 if len(key.where) == 1:
                     lines.append(f"{key.name} = {self._entry(block, key)}")
                 else:

@@ -10,7 +10,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from pamrs.errors import ParameterError, RigError, joined
-from pamrs.rig_schema import BLOCKS, REQUIRED_BLOCKS, SCHEMA, Key
+from pamrs.muscle_models import own_geometry
+from pamrs.rig_schema import BLOCKS, REQUIRED_BLOCKS, SCHEMA, Key, keys_of
 from pamrs.units import to_si
 
 __all__ = ["Content", "read_model"]
@@ -121,7 +122,15 @@ class _Reader:
                 self.unknown_keys(f"{block}.{group}.", inner, members)
             elif inner is not None:
                 self.problem(f"{block}.{group} = {_shown(inner)} is not allowed: give {', '.join(members)} as a table")
-        return {key.name: self.value(block, key, _dig(table, key.where)) for key in BLOCKS[block]}
+        keys = keys_of(block, table)
+        for key in BLOCKS[block]:
+            if key not in keys and _dig(table, key.where) is not None:
+                allowed = f"only with {', '.join(key.models)}"
+                self.problem(f"{block}.{key.name} is not allowed with model = {_shown(table.get('model', 'robinson'))}: {allowed}")
+        content = {key.name: self.value(block, key, _dig(table, key.where)) for key in keys}
+        if content.get("geometry") == "":
+            content["geometry"] = own_geometry(content["model"])
+        return content
 
     # -------------------------------------------------------------------- values
 
@@ -130,7 +139,7 @@ class _Reader:
         if raw is None:
             if key.default is None:
                 self.problem(f"{label} is missing")
-            return key.default
+            return list(key.default) if isinstance(key.default, tuple) else key.default
         if key.kind == "choice":
             if raw not in key.choices:
                 self.problem(f"{label} = {_shown(raw)} is not allowed: one of {', '.join(map(repr, key.choices))}")
@@ -302,11 +311,14 @@ class _Reader:
             self.problem(f"{label}.fraction = {fraction} is not allowed: it must not fall")
 
     def muscle(self, muscle: Mapping[str, Any]) -> None:
-        slope, offset = muscle["modulus_slope"], muscle["modulus_offset"]
+        slope, offset = muscle.get("modulus_slope", []), muscle.get("modulus_offset", [])
         if len(slope) != len(offset):
             self.problem(
                 f"muscle.modulus_slope has {len(slope)} values and muscle.modulus_offset {len(offset)}; the same number is needed"
             )
+        factors = muscle.get("extension_factors", [])
+        if factors and len(factors) != 3:
+            self.problem(f"muscle.extension_factors has {len(factors)} values; three are needed")
         thickness, diameter = muscle["wall_thickness"], muscle["rest_diameter"]
         if not thickness < diameter / 2:
             self.problem(

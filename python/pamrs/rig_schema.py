@@ -6,9 +6,12 @@ The bounds are those of the possible, not of the likely: outside them a value is
 from __future__ import annotations
 
 import math
-from typing import Final, Literal, NamedTuple
+from collections.abc import Mapping
+from typing import Any, Final, Literal, NamedTuple
 
-__all__ = ["BLOCKS", "REQUIRED_BLOCKS", "SCHEMA", "Key", "find_key"]
+from pamrs.muscle_models import GEOMETRIES, MODELS, models_with
+
+__all__ = ["BLOCKS", "REQUIRED_BLOCKS", "SCHEMA", "Key", "find_key", "keys_of"]
 
 SCHEMA: Final = "pamrs.rig/1"
 REQUIRED_BLOCKS: Final = ("gas", "chamber")
@@ -27,7 +30,7 @@ class Key(NamedTuple):
         SI unit ("1" for a pure number).
     lower, upper : float
         Bounds in SI units, both allowed.
-    default : float, str or None
+    default : float, str, tuple of float or None
         Value when the file leaves it out; None makes the key required.
     kind : str
         ``scalar``, ``count`` (whole number), ``vector`` or ``choice`` (text).
@@ -35,16 +38,19 @@ class Key(NamedTuple):
         What a ``choice`` may be.
     path : tuple of str
         Where the file has it inside the block: ``("end_ratio", "k0")``.
+    models : tuple of str
+        The force models that have this key; empty for all.
     """
 
     name: str
     unit: str = "1"
     lower: float = -math.inf
     upper: float = math.inf
-    default: float | str | None = None
+    default: float | str | tuple[float, ...] | None = None
     kind: Kind = "scalar"
     choices: tuple[str, ...] = ()
     path: tuple[str, ...] = ()
+    models: tuple[str, ...] = ()
 
     @property
     def where(self) -> tuple[str, ...]:
@@ -82,20 +88,28 @@ BLOCKS: Final[dict[str, tuple[Key, ...]]] = {
         Key("alpha", "1", _POLYTROPIC_LOW, _POLYTROPIC_HIGH, 1.2),
     ),
     "muscle": (
-        Key("model", default="robinson", kind="choice", choices=("robinson",)),
-        Key("geometry", default="elliptic", kind="choice", choices=("elliptic", "cylinder")),
+        Key("model", default="robinson", kind="choice", choices=MODELS),
+        Key("geometry", default="", kind="choice", choices=GEOMETRIES),  # the model's own
         Key("count", "1", 1, 1000, 1, kind="count"),
         Key("rest_length", "m", 1e-3, 10.0),
         Key("rest_diameter", "m", 1e-4, 1.0),
         Key("braid_angle", "rad", 1e-2, _RIGHT_ANGLE - 1e-3),
         Key("wall_thickness", "m", 1e-6, 0.1),
-        Key("modulus_slope", "1", -1e6, 1e6, kind="vector"),
-        Key("modulus_offset", "Pa", -1e11, 1e11, kind="vector"),
+        Key("modulus_slope", "1", -1e6, 1e6, kind="vector", models=models_with("modulus_slope")),
+        Key("modulus_offset", "Pa", -1e11, 1e11, kind="vector", models=models_with("modulus_offset")),
+        Key("c10", "Pa", -1e11, 1e11, models=models_with("c10")),
+        Key("c01", "Pa", -1e11, 1e11, 0.0, models=models_with("c01")),
+        Key("bladder_modulus", "Pa", -1e11, 1e11, models=models_with("bladder_modulus")),
+        Key("extension_factors", "1", -10.0, 10.0, (0.3, 0.8, 0.8), kind="vector", models=models_with("extension_factors")),
         Key("modulus_scale", "1", 0.0, 100.0, 1.0),
-        Key("k0", "1", 0.0, 100.0, path=("end_ratio", "k0")),
-        Key("contraction_slope", "1", -1e3, 1e3, path=("end_ratio", "contraction_slope")),
-        Key("extension_slope", "1", -1e3, 1e3, path=("end_ratio", "extension_slope")),
-        Key("neck_floor", "1", 0.0, 1.0, path=("end_ratio", "neck_floor")),
+        Key("k0", "1", 0.0, 100.0, 1.64, path=("end_ratio", "k0")),
+        Key("contraction_slope", "1", -1e3, 1e3, 2.405, path=("end_ratio", "contraction_slope")),
+        Key("extension_slope", "1", -1e3, 1e3, 6.105, path=("end_ratio", "extension_slope")),
+        Key("neck_floor", "1", 0.0, 1.0, 0.80, path=("end_ratio", "neck_floor")),
+        Key("friction_coefficient", "1", -1.0, 1.0, 0.0, path=("friction", "coefficient")),
+        Key("friction_pressure_slope", "1/Pa", -1e-4, 1e-4, 0.0, path=("friction", "pressure_slope")),
+        Key("friction_floor", "1", 0.0, 1.0, 0.0, path=("friction", "floor")),
+        Key("friction_presliding", "m", 1e-7, 1.0, 1e-3, path=("friction", "presliding")),
     ),
     "joint": (
         Key("kind", default="tendon", kind="choice", choices=("tendon",)),
@@ -124,6 +138,11 @@ BLOCKS: Final[dict[str, tuple[Key, ...]]] = {
         Key("angle_zero", "rad", -_TURN, _TURN, 0.0),
     ),
 }
+
+
+def keys_of(block: str, content: Mapping[str, Any]) -> tuple[Key, ...]:
+    """The keys that a block has: those of its force model where it is a muscle."""
+    return tuple(key for key in BLOCKS[block] if not key.models or content.get("model", "robinson") in key.models)
 
 
 def find_key(dotted: str) -> Key | None:

@@ -143,7 +143,7 @@ BAD = [
         ["valve.area_fraction", "5 values and fraction 4"],
     ),
     ("fraction = [0.0, 0.2, 0.5,", "fraction = [0.0, 0.6, 0.5,", ["valve.area_fraction.fraction", "fall"]),
-    ("k0 = 1.64", "k1 = 1.64", ["'muscle.end_ratio.k1'", "muscle.end_ratio.k0 is missing"]),
+    ("k0 = 1.64", "k1 = 1.64", ["'muscle.end_ratio.k1'", "k0, contraction_slope"]),
     ("value = 120.0,", "value = 10.0,", ["joint.max_angle", "joint.min_angle"]),
     ('schema = "pamrs.rig/1"', 'schema = "pamrs.rig/2"', ["schema = 'pamrs.rig/2'", "'pamrs.rig/1'"]),
     ('name = "shoulder"', "name = 7", ["name = 7"]),

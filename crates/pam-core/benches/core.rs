@@ -25,7 +25,9 @@ fn core(c: &mut Criterion) {
     let initial = Initial { muscle_pressure: 1e5, joint_angle: 0.52, ..Initial::rest(&rig) };
     if let Some(muscle) = rig.muscle() {
         c.bench_function("muscle table look-up", |b| b.iter(|| muscle.table.eval(black_box(0.123_f64))));
-        c.bench_function("muscle exact force", |b| b.iter(|| muscle.force(black_box(4e5), black_box(0.123))));
+        c.bench_function("muscle exact force", |b| {
+            b.iter(|| muscle.exact.force(black_box(4e5), black_box(0.123)))
+        });
     }
     let steps = (SAMPLES - 1) * SUBSTEPS;
     c.bench_function(&format!("shoulder, {steps} RK4 steps"), |b| {

@@ -28,6 +28,16 @@ pub enum Error {
         /// Where the expectation comes from.
         why: String,
     },
+    /// A parameter has a name for its value that is not known, or does not belong to the model chosen.
+    #[error("{name} = {value} is not allowed: {allowed}")]
+    Choice {
+        /// Dotted name of the parameter.
+        name: String,
+        /// The value as it was written.
+        value: String,
+        /// What is allowed.
+        allowed: String,
+    },
     /// The model description cannot be read, or its blocks do not fit together.
     #[error("{0}")]
     Model(String),

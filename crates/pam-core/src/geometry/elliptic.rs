@@ -9,7 +9,7 @@
 //! k = k0 - k_con e (e >= 0),  k0 - k_ext e (e < 0)       q = k / sqrt(k^2 + 3) = cos v1
 //! a = (R - R0)/(1 - q)    b = k |a|    c = R - a         b' = sqrt(3) q |a| = b sin v1
 //! f(z) = c + a sqrt(1 - ((z - b')/b)^2)  (z < b')        f(z) = R  (b' <= z <= L - b')
-//! w = 2 pi N b' / (L v1)
+//! w = 2 pi N b' / (L v1)                                 (v1 = pi/3 for `elliptic_published`)
 //! s = integral_0^v1 sqrt((a cos v + c)^2 w^2 + a^2 sin^2 v + b^2 cos^2 v) dv
 //! B_est(R) = (L - 2 b')/L sqrt(L^2 + (2 pi R N)^2) + 2 s
 //! ```
@@ -32,6 +32,15 @@ pub const ARC_NODES: usize = 24;
 
 const SQRT_3: f64 = 1.732_050_807_568_877_2;
 
+/// Over which angle the fibre's arc on an end is taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Arc {
+    /// The parametric angle of the fitting, `v1 = atan(sqrt(3)/k)`.
+    Parametric,
+    /// As printed in (2.27) and (2.28), `pi/3`: the polar angle in the place of the parametric one.
+    Published,
+}
+
 /// What the contraction ratio alone fixes about the ends.
 #[derive(Debug, Clone, Copy)]
 pub struct Ends<S> {
@@ -45,6 +54,8 @@ pub struct Ends<S> {
     pub sin_end: S,
     /// Parametric angle `v1` of the fitting [rad].
     pub angle: S,
+    /// Parametric angle over which the fibre's arc is taken: `v1`, or as printed `pi/3` [rad].
+    pub arc_angle: S,
     /// +1 in contraction, -1 in extension: the sign of `a`.
     pub sign: f64,
     cos: [S; ARC_NODES],
@@ -66,15 +77,19 @@ pub struct EndShape<S> {
 
 impl<S: Scalar> Ends<S> {
     /// The ends at contraction ratio `e`; `ratio` must be positive for the result to have a meaning.
-    pub fn new(braid: &Braid, law: &EndRatio, rule: &GaussLegendre<ARC_NODES>, e: S) -> Self {
+    pub fn new(braid: &Braid, law: &EndRatio, rule: &GaussLegendre<ARC_NODES>, arc: Arc, e: S) -> Self {
         let extension = e.re() < 0.0;
         let slope = if extension { law.extension_slope } else { law.contraction_slope };
         let ratio = -e * slope + law.k0;
         let root = (ratio * ratio + 3.0).sqrt();
         let angle = (constant::<S>(SQRT_3) / ratio).atan();
+        let arc_angle = match arc {
+            Arc::Parametric => angle,
+            Arc::Published => constant(PI / 3.0),
+        };
         let (mut cos, mut sin) = ([constant(0.0); ARC_NODES], [constant(0.0); ARC_NODES]);
         for (i, x) in rule.nodes.iter().enumerate() {
-            let v = angle * (0.5 * (1.0 + x));
+            let v = arc_angle * (0.5 * (1.0 + x));
             (sin[i], cos[i]) = v.sin_cos();
         }
         Self {
@@ -83,6 +98,7 @@ impl<S: Scalar> Ends<S> {
             cos_end: ratio / root,
             sin_end: constant::<S>(SQRT_3) / root,
             angle,
+            arc_angle,
             sign: if extension { -1.0 } else { 1.0 },
             cos,
             sin,
@@ -100,7 +116,7 @@ impl<S: Scalar> Ends<S> {
     pub fn fibre_length(&self, braid: &Braid, rule: &GaussLegendre<ARC_NODES>, radius: S) -> S {
         let end = self.shape(braid, radius);
         // The arc divided by |a|: smooth through R = R0, where the ends vanish.
-        let twist = self.ratio * self.sin_end * (2.0 * PI * braid.turns) / (self.length * self.angle);
+        let twist = self.ratio * self.sin_end * (2.0 * PI * braid.turns) / (self.length * self.arc_angle);
         let mut sum = constant::<S>(0.0);
         for i in 0..ARC_NODES {
             let (cos, sin) = (self.cos[i], self.sin[i]);
@@ -108,7 +124,7 @@ impl<S: Scalar> Ends<S> {
             let axial = self.ratio * cos;
             sum += (around * around + sin * sin + axial * axial).sqrt() * rule.weights[i];
         }
-        let arc = end.minor * self.sign * self.angle * 0.5 * sum;
+        let arc = end.minor * self.sign * self.arc_angle * 0.5 * sum;
         let turn = radius * (2.0 * PI * braid.turns);
         let straight = (self.length * self.length + turn * turn).sqrt();
         (self.length - end.length * 2.0) / self.length * straight + arc * 2.0

@@ -22,9 +22,10 @@ use std::f64::consts::PI;
 
 use num_dual::Dual64;
 
-use self::elliptic::{Ends, ARC_NODES};
-use self::numeric::{brent, GaussLegendre, Root};
+use self::elliptic::{Arc, Ends, ARC_NODES};
+use self::numeric::{brent, minimum, GaussLegendre, Root};
 use crate::error::{check_range, Error, Result};
+use crate::muscle::model::named;
 use crate::muscle::MuscleSpec;
 use crate::scalar::Scalar;
 
@@ -71,8 +72,28 @@ pub struct EndRatio {
 pub enum Profile {
     /// Toroidal ends of elliptic section and a cylindrical middle.
     Elliptic,
+    /// The same ends with the literal printed choices, for comparison: the fibre's arc over `pi/3`, and the radius that
+    /// brings its length nearest to the fibre's where none meets it.
+    EllipticPublished,
     /// One radius over the whole length.
     Cylinder,
+}
+
+impl Profile {
+    /// Names in descriptions.
+    pub const NAMES: [(&'static str, Self); 3] = [
+        ("cylinder", Self::Cylinder),
+        ("elliptic", Self::Elliptic),
+        ("elliptic_published", Self::EllipticPublished),
+    ];
+
+    /// The profile of a name.
+    ///
+    /// # Errors
+    /// [`Error::Choice`] that lists the names.
+    pub fn from_name(name: &str) -> Result<Self> {
+        named("muscle.geometry", name, &Self::NAMES)
+    }
 }
 
 /// The state of one muscle at one contraction ratio.
@@ -128,7 +149,7 @@ impl MuscleGeometry {
             contraction_slope: spec.contraction_slope,
             extension_slope: spec.extension_slope,
         };
-        let profile = if spec.geometry == "cylinder" { Profile::Cylinder } else { Profile::Elliptic };
+        let profile = spec.profile()?;
         let range = (1.0 - 1.0 / sin, 1.0 - SHORTEST / sin);
         Ok(Self { braid, ends, neck_floor: spec.neck_floor, profile, rule: GaussLegendre::new(), range })
     }
@@ -169,8 +190,14 @@ impl MuscleGeometry {
             self.floor(at)
         } else {
             match self.profile {
+                Profile::EllipticPublished if !self.meets(e, root.x) => {
+                    return Err(unsolved(
+                        e,
+                        "the published ends have only a nearest radius, without a derivative",
+                    ));
+                }
                 Profile::Cylinder => cylinder::radius(&self.braid, (-at + 1.0) * self.braid.rest_length),
-                Profile::Elliptic => {
+                Profile::Elliptic | Profile::EllipticPublished => {
                     let along = self.fibre_length(at, Dual64::new(root.x, 0.0)).eps;
                     let across = self.fibre_length(Dual64::new(e, 0.0), Dual64::new(root.x, 1.0)).eps;
                     Dual64::new(root.x, -along / across)
@@ -225,7 +252,7 @@ impl MuscleGeometry {
         if self.profile == Profile::Cylinder {
             return Ok((length * radius, length * radius * radius));
         }
-        let ends = Ends::new(&self.braid, &self.ends, &self.rule, e);
+        let ends = self.ends_at(e);
         let b_end = ends.shape(&self.braid, radius).length;
         let rule = GaussLegendre::<40>::new();
         let half = |power: i32| {
@@ -246,15 +273,13 @@ impl MuscleGeometry {
 
     /// Length of one fibre [m] if the outer radius were `radius` [m].
     fn fibre_length<S: Scalar>(&self, e: S, radius: S) -> S {
-        Ends::new(&self.braid, &self.ends, &self.rule, e).fibre_length(&self.braid, &self.rule, radius)
+        self.ends_at(e).fibre_length(&self.braid, &self.rule, radius)
     }
 
     fn closed_integrals<S: Scalar>(&self, e: S, radius: S) -> (S, S) {
         match self.profile {
             Profile::Cylinder => cylinder::integrals((-e + 1.0) * self.braid.rest_length, radius),
-            Profile::Elliptic => {
-                Ends::new(&self.braid, &self.ends, &self.rule, e).integrals(&self.braid, radius)
-            }
+            Profile::Elliptic | Profile::EllipticPublished => self.ends_at(e).integrals(&self.braid, radius),
         }
     }
 
@@ -283,7 +308,7 @@ impl MuscleGeometry {
         match self.profile {
             Profile::Cylinder if cylinder < floor.x => Ok((floor, true)),
             Profile::Cylinder => Ok((Root { x: cylinder, iterations: 0 }, false)),
-            Profile::Elliptic => {
+            Profile::Elliptic | Profile::EllipticPublished => {
                 let slope = if e < 0.0 { self.ends.extension_slope } else { self.ends.contraction_slope };
                 let ratio = self.ends.k0 - slope * e;
                 if ratio <= 0.0 {
@@ -292,6 +317,10 @@ impl MuscleGeometry {
                 let limit = if e < 0.0 { floor.x } else { rest + SCAN_REACH * (cylinder - rest) };
                 match self.scan(e, limit) {
                     Some(root) => Ok((root, false)),
+                    None if self.profile == Profile::EllipticPublished => {
+                        let root = self.nearest(e, limit);
+                        Ok((root, e < 0.0 && root.x <= limit))
+                    }
                     None if e < 0.0 => Ok((floor, true)),
                     None => Err(unsolved(e, "no radius has the fibre's length")),
                 }
@@ -301,7 +330,7 @@ impl MuscleGeometry {
 
     /// The root of `B_est(R) = B` nearest to the rest radius, between it and `limit`.
     fn scan(&self, e: f64, limit: f64) -> Option<Root> {
-        let ends = Ends::new(&self.braid, &self.ends, &self.rule, e);
+        let ends = self.ends_at(e);
         let excess =
             |radius: f64| ends.fibre_length(&self.braid, &self.rule, radius) - self.braid.fibre_length;
         let rest = self.braid.rest_radius;
@@ -323,12 +352,34 @@ impl MuscleGeometry {
         None
     }
 
+    /// The radius between rest and `limit` whose fibre length is nearest to the fibre's.
+    fn nearest(&self, e: f64, limit: f64) -> Root {
+        let ends = self.ends_at(e);
+        let rest = self.braid.rest_radius;
+        let at = |share: f64| rest + (limit - rest) * share;
+        let miss = |share: f64| {
+            (ends.fibre_length(&self.braid, &self.rule, at(share)) - self.braid.fibre_length).abs()
+        };
+        let best = minimum(miss, SCAN_STEPS);
+        Root { x: at(best.x), iterations: best.iterations }
+    }
+
+    /// Whether a radius gives the fibre its length.
+    fn meets(&self, e: f64, radius: f64) -> bool {
+        e == 0.0 || (self.fibre_length(e, radius) / self.braid.fibre_length - 1.0).abs() < 1e-12
+    }
+
+    fn ends_at<S: Scalar>(&self, e: S) -> Ends<S> {
+        let arc = if self.profile == Profile::EllipticPublished { Arc::Published } else { Arc::Parametric };
+        Ends::new(&self.braid, &self.ends, &self.rule, arc, e)
+    }
+
     /// Thickness, volume and strain at a known outer radius.
     fn shape_at<S: Scalar>(&self, e: S, radius: S, braid_taut: bool, iterations: u32) -> Result<Shape<S>> {
         let braid = &self.braid;
         let length = (-e + 1.0) * braid.rest_length;
-        if self.profile == Profile::Elliptic {
-            let ends = Ends::new(braid, &self.ends, &self.rule, e.re());
+        if self.profile != Profile::Cylinder {
+            let ends = self.ends_at(e.re());
             if 2.0 * ends.shape(braid, radius.re()).length > length.re() {
                 return Err(unsolved(e.re(), "the elliptic ends would overlap"));
             }
@@ -372,7 +423,7 @@ mod tests {
 
     fn each() -> Vec<MuscleGeometry> {
         let mut cylinder = shoulder();
-        cylinder.geometry = "cylinder".into();
+        cylinder.geometry = Some("cylinder".into());
         [shoulder(), elbow(), thick(), cylinder].iter().map(|s| MuscleGeometry::new(s).unwrap()).collect()
     }
 
@@ -432,7 +483,7 @@ mod tests {
         for geometry in each().iter().filter(|g| g.profile == Profile::Elliptic) {
             for e in grid(geometry) {
                 let radius = geometry.solve(e).unwrap().radius;
-                let ends = Ends::new(&geometry.braid, &geometry.ends, &geometry.rule, e);
+                let ends = geometry.ends_at(e);
                 let end = ends.shape(&geometry.braid, radius);
                 let w = 2.0 * PI * geometry.braid.turns * end.length / (ends.length * ends.angle);
                 let arc = fine.integrate(0.0, ends.angle, |v| {

@@ -145,6 +145,31 @@ pub fn brent(
     None
 }
 
+/// The least value of a function on `[0, 1]`: the best of `steps` equal steps, then golden-section search about it.
+pub fn minimum(f: impl Fn(f64) -> f64, steps: u32) -> Root {
+    const GOLDEN: f64 = 0.618_033_988_749_894_8;
+    const NARROWED: u32 = 80;
+    let at = |i: u32| f64::from(i) / f64::from(steps);
+    let mut best = 0;
+    for i in 1..=steps {
+        if f(at(i)) < f(at(best)) {
+            best = i;
+        }
+    }
+    let (mut low, mut high) = (at(best.saturating_sub(1)), at((best + 1).min(steps)));
+    for _ in 0..NARROWED {
+        let (left, right) = (high - GOLDEN * (high - low), low + GOLDEN * (high - low));
+        if f(left) <= f(right) {
+            high = right;
+        } else {
+            low = left;
+        }
+    }
+    let middle = 0.5 * (low + high);
+    let x = [0.0, 1.0].into_iter().find(|end| f(*end) <= f(middle)).unwrap_or(middle);
+    Root { x, iterations: 2 * (steps + NARROWED) }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -16,7 +16,7 @@
 
 use num_dual::Dual64;
 
-use super::robinson::Coefficients;
+use super::model::Elasticity;
 use crate::error::{Error, Result};
 use crate::geometry::MuscleGeometry;
 use crate::scalar::{constant, Scalar};
@@ -42,6 +42,8 @@ const CUT: f64 = 0.8;
 const MOST_CUTS: u32 = 8;
 /// Check points in a cell, in units of its half-width; none is a node.
 const CHECKS: [f64; 7] = [-0.993, -0.86, -0.41, 0.087, 0.33, 0.71, 0.985];
+/// The least range of contraction that a table is made for.
+const LEAST_RANGE: f64 = 0.01;
 /// Volumes below this fraction of the largest are compared with that fraction.
 const VOLUME_FLOOR: f64 = 1e-3;
 
@@ -113,16 +115,20 @@ pub struct Table {
 }
 
 impl Table {
-    /// Compiles a muscle with moduli `slope` (`m_k`, 1) and `offset` (`b_k`, Pa) from k = 1.
+    /// Compiles a geometry with a force model and its elastic parameters.
     ///
     /// # Errors
     /// [`Error::Model`] if the geometry has no usable range of contraction, or a column cannot be
     /// brought below [`TOLERANCE`].
-    pub fn compile(geometry: &MuscleGeometry, slope: &[f64], offset: &[f64]) -> Result<Self> {
-        let exact = Exact { geometry, slope, offset };
-        let e_max = exact.last_solved()?;
+    pub fn compile(geometry: &MuscleGeometry, elasticity: &Elasticity) -> Result<Self> {
+        let exact = Exact { geometry, elasticity };
+        let (low, high) = geometry.range();
+        let e_max = exact.solved_up_to(high);
+        if e_max <= LEAST_RANGE {
+            return Err(Error::Model("muscle: the geometry has no solution in contraction".into()));
+        }
         let kinks = geometry.kinks()?;
-        let mut e_min = geometry.range().0;
+        let mut e_min = exact.solved_up_to(low);
         let mut cuts = 0;
         loop {
             let mut ends = vec![e_min];
@@ -283,15 +289,14 @@ fn evaluate<S: Scalar>(cell: &Cell, x: S) -> [S; COLUMNS] {
 /// The exact columns and the fit to them.
 struct Exact<'a> {
     geometry: &'a MuscleGeometry,
-    slope: &'a [f64],
-    offset: &'a [f64],
+    elasticity: &'a Elasticity,
 }
 
 impl Exact<'_> {
     /// The columns at `e`; without the slope (zero) in the values used for fitting.
     fn columns(&self, e: f64) -> Result<[f64; COLUMNS]> {
         let shape = self.geometry.solve(e)?;
-        let force = Coefficients::new(self.geometry.braid(), self.slope, self.offset, &shape);
+        let force = self.elasticity.coefficients(self.geometry.braid(), &shape);
         Ok([force.a_gas, force.a_elastic, force.b_elastic, shape.air_volume, 0.0])
     }
 
@@ -302,34 +307,29 @@ impl Exact<'_> {
         Ok(columns)
     }
 
-    /// The largest contraction ratio up to which the geometry solves without a gap.
-    fn last_solved(&self) -> Result<f64> {
+    /// How far from rest towards `end` the geometry solves, with its derivatives, without a gap.
+    fn solved_up_to(&self, end: f64) -> f64 {
         const STEPS: u32 = 64;
-        let end = self.geometry.range().1;
+        let solves = |e: f64| self.geometry.solve_dual(e).is_ok();
         let mut good = 0.0;
         for i in 1..=STEPS {
             let next = if i == STEPS { end } else { end * f64::from(i) / f64::from(STEPS) };
-            if self.geometry.solve(next).is_err() {
+            if !solves(next) {
                 let mut bad = next;
                 for _ in 0..60 {
                     let middle = 0.5 * (good + bad);
-                    if self.geometry.solve(middle).is_ok() {
+                    if solves(middle) {
                         good = middle;
                     } else {
                         bad = middle;
                     }
                 }
                 // A margin of one percent: the derivatives may be unbounded at the very end.
-                good *= 0.99;
-                break;
+                return 0.99 * good;
             }
             good = next;
         }
-        if good > 0.01 {
-            Ok(good)
-        } else {
-            Err(Error::Model("muscle: the geometry has no solution in contraction".into()))
-        }
+        end
     }
 
     /// Largest magnitude of each column.
@@ -449,15 +449,16 @@ fn interpolate(values: &[[f64; COLUMNS]; NODES]) -> Cell {
 mod tests {
     use super::*;
     use crate::muscle::tests::{elbow, shoulder, thick};
-    use crate::muscle::{Muscle, MuscleSpec};
+    use crate::muscle::{CompiledMuscle, Muscle, MuscleSpec};
 
-    fn muscles() -> Vec<(MuscleSpec, Muscle)> {
+    fn compiled(spec: &MuscleSpec) -> CompiledMuscle {
+        CompiledMuscle::new(Muscle::new(spec).unwrap()).unwrap()
+    }
+
+    fn muscles() -> Vec<(MuscleSpec, CompiledMuscle)> {
         let mut cylinder = shoulder();
-        cylinder.geometry = "cylinder".into();
-        [shoulder(), elbow(), thick(), cylinder]
-            .into_iter()
-            .map(|s| (s.clone(), Muscle::new(&s).unwrap()))
-            .collect()
+        cylinder.geometry = Some("cylinder".into());
+        [shoulder(), elbow(), thick(), cylinder].into_iter().map(|s| (s.clone(), compiled(&s))).collect()
     }
 
     #[test]
@@ -481,7 +482,7 @@ mod tests {
             assert!(table.error_bound() <= TOLERANCE);
             println!(
                 "{} R0 {}: {} cells, errors {:?}, breakpoints {:?}",
-                spec.geometry,
+                spec.geometry.as_deref().unwrap_or("-"),
                 0.5 * spec.rest_diameter,
                 table.cells(),
                 table.errors(),
@@ -490,14 +491,14 @@ mod tests {
             let points: Vec<f64> = (0..=3000)
                 .map(|i| table.e_min + (table.e_max - table.e_min) * f64::from(i) / 3000.0)
                 .collect();
-            let largest = points.iter().map(|e| muscle.coefficients(*e).unwrap().b_elastic.abs());
+            let largest = points.iter().map(|e| muscle.exact.coefficients(*e).unwrap().b_elastic.abs());
             let largest = largest.fold(0.0, f64::max);
             for e in points {
                 let point: TablePoint = table.eval(e);
-                let shape = muscle.geometry.solve_dual(e).unwrap();
+                let shape = muscle.exact.geometry.solve_dual(e).unwrap();
                 assert!((point.volume / shape.air_volume.re - 1.0).abs() < 2e-9, "{e}");
                 assert!((point.volume_slope - shape.air_volume.eps).abs() < 2e-9 * 6e-3, "{e}");
-                let exact = muscle.coefficients(e).unwrap();
+                let exact = muscle.exact.coefficients(e).unwrap();
                 assert!((point.b_elastic - exact.b_elastic).abs() < 2e-9 * largest, "{e}");
             }
         }
@@ -505,14 +506,14 @@ mod tests {
 
     #[test]
     fn breakpoints_hold_the_kinks_exactly() {
-        let muscle = Muscle::new(&shoulder()).unwrap();
+        let muscle = compiled(&shoulder());
         let ends = muscle.table.breakpoints();
         assert!(ends.contains(&0.0));
         let kink = ends[1];
         assert!(kink < 0.0 && kink > ends[0]);
-        assert!(muscle.geometry.solve(kink - 1e-12).unwrap().braid_taut);
-        assert!(!muscle.geometry.solve(kink + 1e-12).unwrap().braid_taut);
-        assert_eq!(muscle.table.e_max, muscle.geometry.range().1);
+        assert!(muscle.exact.geometry.solve(kink - 1e-12).unwrap().braid_taut);
+        assert!(!muscle.exact.geometry.solve(kink + 1e-12).unwrap().braid_taut);
+        assert_eq!(muscle.table.e_max, muscle.exact.geometry.range().1);
     }
 
     #[test]
@@ -527,9 +528,9 @@ mod tests {
                 assert_eq!(point.volume.re, plain.volume);
                 let relative = point.volume.eps / plain.volume_slope - 1.0;
                 assert!(relative.abs() < 1e-12, "{e}: {relative:e}");
-                let shape = muscle.geometry.solve_dual(e).unwrap();
-                let (m, b) = (&muscle.spec.modulus_slope, &muscle.spec.modulus_offset);
-                let exact = Coefficients::new(muscle.geometry.braid(), m, b, &shape);
+                let shape = muscle.exact.geometry.solve_dual(e).unwrap();
+                let elasticity = Elasticity::contracting(&muscle.exact.spec).unwrap();
+                let exact = elasticity.coefficients(muscle.exact.geometry.braid(), &shape);
                 assert!((point.a_gas.eps / exact.a_gas.eps - 1.0).abs() < 1e-5, "{e}");
                 assert!((point.b_elastic.eps / exact.b_elastic.eps - 1.0).abs() < 1e-5, "{e}");
             }
@@ -544,9 +545,9 @@ mod tests {
             let mut spec = shoulder();
             (spec.rest_length, spec.rest_diameter) = (0.25, diameter);
             (spec.braid_angle, spec.wall_thickness) = (angle.to_radians(), wall);
-            let muscle = Muscle::new(&spec).unwrap();
+            let muscle = compiled(&spec);
             assert!(muscle.table.error_bound() <= TOLERANCE);
-            assert!(muscle.table.e_min >= muscle.geometry.range().0 && muscle.table.contains(0.0));
+            assert!(muscle.table.e_min >= muscle.exact.geometry.range().0 && muscle.table.contains(0.0));
             let point: TablePoint = muscle.table.eval(muscle.table.e_min - 1e-3);
             assert!(point.volume.is_finite());
         }
@@ -554,7 +555,7 @@ mod tests {
 
     #[test]
     fn continues_along_straight_lines_outside() {
-        let muscle = Muscle::new(&shoulder()).unwrap();
+        let muscle = compiled(&shoulder());
         let table = &muscle.table;
         for (edge, out) in [(table.e_min, -0.01), (table.e_max, 0.01)] {
             assert!(!table.contains(edge + out));

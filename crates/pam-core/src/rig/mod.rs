@@ -12,7 +12,7 @@ use crate::effects;
 use crate::gas::orifice::Gas;
 use crate::gas::valve::AreaTable;
 use crate::joint::tendon::TendonJoint;
-use crate::muscle::Muscle;
+use crate::muscle::{CompiledMuscle, Muscle};
 use crate::{Error, Result};
 
 /// A rig ready to be simulated: muscles compiled to a table, derived constants in place. Immutable.
@@ -21,7 +21,7 @@ pub struct Rig {
     spec: RigSpec,
     pub(crate) gas: Gas,
     pub(crate) valve: Option<AreaTable>,
-    pub(crate) muscle: Option<Muscle>,
+    pub(crate) muscle: Option<CompiledMuscle>,
     pub(crate) joint: Option<TendonJoint>,
     pub(crate) values: Values<f64>,
     pub(crate) active: Active,
@@ -36,6 +36,8 @@ pub struct Active {
     pub heat: bool,
     /// `muscle_hysteresis`.
     pub hysteresis: bool,
+    /// The muscle's own force depends on the direction of motion.
+    pub direction: bool,
 }
 
 impl Rig {
@@ -45,11 +47,11 @@ impl Rig {
     /// As [`RigSpec::validate`]; [`Error::Model`] for an unknown effect or effect parameter.
     pub fn new(spec: RigSpec) -> Result<Self> {
         spec.validate()?;
-        let muscle = spec.muscle.as_ref().map(Muscle::new).transpose()?;
+        let muscle = spec.muscle.as_ref().map(|m| CompiledMuscle::new(Muscle::new(m)?)).transpose()?;
         Self::with_muscle(spec, muscle)
     }
 
-    fn with_muscle(spec: RigSpec, muscle: Option<Muscle>) -> Result<Self> {
+    fn with_muscle(spec: RigSpec, muscle: Option<CompiledMuscle>) -> Result<Self> {
         let g = &spec.gas;
         let gas = Gas::new(g.ambient_pressure, g.temperature, g.gas_constant, g.heat_capacity_ratio);
         let valve = spec.valve.as_ref().map(|v| AreaTable::new(&v.opening, &v.fraction)).transpose()?;
@@ -60,7 +62,8 @@ impl Rig {
                 TendonJoint::new(j.upper_axial, j.upper_offset, j.lower_axial, j.lower_offset, j.rest_angle)
             })
             .transpose()?;
-        let (values, active) = collect_values(&spec)?;
+        let (values, mut active) = collect_values(&spec)?;
+        active.direction = muscle.as_ref().is_some_and(CompiledMuscle::has_direction);
         let rig = Self { gas, valve, muscle, joint, values, active, spec };
         rig.check_reach()?;
         Ok(rig)
@@ -77,7 +80,7 @@ impl Rig {
                         "an angle that the tendon reaches (it is too short)",
                     ));
                 }
-                let contraction = joint.eval(angle).shortening / muscle.spec.rest_length;
+                let contraction = joint.eval(angle).shortening / muscle.exact.spec.rest_length;
                 if !muscle.table.contains(contraction) {
                     let (low, high) = (muscle.table.e_min, muscle.table.e_max);
                     let allowed = format!("an angle that keeps the muscle's contraction ratio ({contraction:.4} here) from {low:.4} to {high:.4}");
@@ -95,18 +98,11 @@ impl Rig {
     /// As [`Self::new`].
     pub fn respecified(&self, spec: RigSpec) -> Result<Self> {
         spec.validate()?;
-        let reusable = match (&self.spec.muscle, &spec.muscle) {
-            (Some(old), Some(new)) => {
-                let mut scaled = old.clone();
-                scaled.modulus_scale = new.modulus_scale;
-                scaled == *new
-            }
-            _ => false,
-        };
-        if reusable {
-            Self::with_muscle(spec, self.muscle.clone())
-        } else {
-            Self::new(spec)
+        let tables =
+            self.muscle.as_ref().zip(spec.muscle.as_ref()).and_then(|(old, new)| old.respecified(new));
+        match tables {
+            Some(muscle) => Self::with_muscle(spec, Some(muscle)),
+            None => Self::new(spec),
         }
     }
 
@@ -121,7 +117,7 @@ impl Rig {
     }
 
     /// The muscle with its compiled table, if the rig has one.
-    pub fn muscle(&self) -> Option<&Muscle> {
+    pub fn muscle(&self) -> Option<&CompiledMuscle> {
         self.muscle.as_ref()
     }
 

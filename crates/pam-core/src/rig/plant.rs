@@ -1,7 +1,7 @@
 //! The state equation of a rig, composed of its blocks.
 //!
 //! State: supply pressure and chamber pressure [Pa, absolute], joint angle [rad] and rate [rad/s], gas mass [kg]
-//! (only moved by `heat_transfer`), and the memory of the muscle's hysteresis. Any of the pressures and the motion can
+//! (only moved by `heat_transfer`), and the memory of the muscle's motion. Any of the pressures and the motion can
 //! be *driven* by a signal instead of being integrated: that is where the chain is cut.
 
 use super::{ParameterId as P, Rig, Values};
@@ -9,6 +9,7 @@ use crate::arm::one_link::{OneLink, Stops};
 use crate::effects::{heat_transfer, leak_muscle, muscle_hysteresis};
 use crate::gas::chamber::{pressure_rate, ChamberState, Polytropic};
 use crate::gas::valve::spool_position;
+use crate::muscle::slip::Slip;
 use crate::scalar::{constant, Scalar};
 use nalgebra::SVector;
 
@@ -27,8 +28,20 @@ pub const MASS: usize = 4;
 
 /// Continuous state.
 pub type State<S> = SVector<S, STATES>;
-/// Memory of the muscle's hysteresis.
-pub type Memory<S> = muscle_hysteresis::Memory<S>;
+/// What the muscle remembers of its motion.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Memory<S> {
+    /// Elements of the effect `muscle_hysteresis`.
+    hysteresis: Slip<S>,
+    /// Elements of the direction of motion that the muscle's own force depends on.
+    direction: Slip<S>,
+}
+
+impl<S: Scalar> Default for Memory<S> {
+    fn default() -> Self {
+        Self { hysteresis: Slip::default(), direction: Slip::default() }
+    }
+}
 
 /// Which states are integrated; the others are driven.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -138,13 +151,16 @@ impl<'a, S: Scalar> Plant<'a, S> {
         let contraction = point.shortening / self.rest_length;
         let table = muscle.table.eval(contraction);
         let gauge = state[PRESSURE] - self.rig.gas.ambient_pressure;
-        let mut force =
-            gauge * table.a_gas + self.values[P::ModulusScale] * (gauge * table.a_elastic + table.b_elastic);
+        let scale = self.values[P::ModulusScale];
+        let mut force = table.force(gauge, scale);
+        let stretched = (step_start_contraction - contraction) * self.rest_length;
+        if self.rig.active.direction {
+            let slip = memory.direction.moved(stretched, constant(muscle.presliding()));
+            force = muscle.moving(force, contraction, gauge, scale, slip.mean());
+        }
         if self.rig.active.hysteresis {
-            let moved = memory
-                .moved((step_start_contraction - contraction) * self.rest_length, self.values[P::Presliding]);
             force += muscle_hysteresis::force(
-                &moved,
+                &memory.hysteresis.moved(stretched, self.values[P::Presliding]),
                 self.values[P::FrictionConstant],
                 self.values[P::FrictionPressure],
                 gauge,
@@ -175,11 +191,15 @@ impl<'a, S: Scalar> Plant<'a, S> {
     /// Memory after a step that moved the muscle between two contraction ratios.
     #[inline]
     pub fn advance_memory(&self, memory: &Memory<S>, from: S, to: S) -> Memory<S> {
-        if self.rig.active.hysteresis {
-            memory.moved((from - to) * self.rest_length, self.values[P::Presliding])
-        } else {
-            *memory
+        let stretched = (from - to) * self.rest_length;
+        let mut memory = *memory;
+        if let (true, Some(muscle)) = (self.rig.active.direction, &self.rig.muscle) {
+            memory.direction = memory.direction.moved(stretched, constant(muscle.presliding()));
         }
+        if self.rig.active.hysteresis {
+            memory.hysteresis = memory.hysteresis.moved(stretched, self.values[P::Presliding]);
+        }
+        memory
     }
 
     /// Valve command [V] as a normalised spool position (0 without a valve).

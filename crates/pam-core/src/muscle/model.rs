@@ -1,0 +1,190 @@
+//! The force models, by name, and what all of them have in common.
+//!
+//! Every model of the physics reference's section 2 is linear in gauge pressure and in its elastic parameters:
+//!
+//! ```text
+//! F = P gas(L) + scale sum_j (slope_j P + offset_j) basis_j(L)
+//! ```
+//!
+//! so a muscle at one length comes down to three [`Coefficients`], whichever its model, and one linear least squares
+//! finds its elastic parameters.
+
+use super::elbow_linear::{Factors, CONTRACTION};
+use super::spec::MuscleSpec;
+use super::{chou_hannaford, elbow_linear, ferraresi, gaylord, kothera, mooney_rivlin, robinson};
+use crate::error::{Error, Result};
+use crate::geometry::{Braid, Profile, Shape};
+use crate::scalar::{constant, Scalar};
+
+/// Coefficients of the force of one muscle at one length: `F = P a_gas + scale (P a_elastic + b_elastic)`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Coefficients<S = f64> {
+    /// Force per gauge pressure of the gas [m2].
+    pub a_gas: S,
+    /// Force per gauge pressure of the pressure-dependent moduli [m2].
+    pub a_elastic: S,
+    /// Force of the constant moduli [N].
+    pub b_elastic: S,
+}
+
+impl<S: Scalar> Coefficients<S> {
+    /// Force [N] at gauge pressure `pressure` [Pa].
+    pub fn force(&self, pressure: S, modulus_scale: S) -> S {
+        pressure * self.a_gas + modulus_scale * (pressure * self.a_elastic + self.b_elastic)
+    }
+}
+
+/// A quasi-static force model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ForceModel {
+    /// See [`gaylord`].
+    Gaylord,
+    /// See [`chou_hannaford`].
+    ChouHannaford,
+    /// See [`mooney_rivlin`].
+    MooneyRivlin,
+    /// See [`ferraresi`].
+    Ferraresi,
+    /// See [`kothera`].
+    Kothera,
+    /// See [`robinson`].
+    Robinson,
+    /// See [`elbow_linear`].
+    ElbowLinear,
+}
+
+impl ForceModel {
+    /// Names, in the order of the physics reference.
+    pub const NAMES: [(&'static str, Self); 7] = [
+        ("gaylord", Self::Gaylord),
+        ("chou_hannaford", Self::ChouHannaford),
+        ("mooney_rivlin", Self::MooneyRivlin),
+        ("ferraresi", Self::Ferraresi),
+        ("kothera", Self::Kothera),
+        ("robinson", Self::Robinson),
+        ("elbow_linear", Self::ElbowLinear),
+    ];
+
+    /// The model of a name.
+    ///
+    /// # Errors
+    /// [`Error::Choice`] that lists the names.
+    pub fn from_name(name: &str) -> Result<Self> {
+        named("muscle.model", name, &Self::NAMES)
+    }
+
+    /// Whether its elasticity is a polynomial stress with moduli linear in pressure.
+    #[must_use]
+    pub fn is_polynomial(self) -> bool {
+        matches!(self, Self::Ferraresi | Self::Kothera | Self::Robinson)
+    }
+
+    /// The outer profile that its source has.
+    #[must_use]
+    pub fn profile(self) -> Profile {
+        if self == Self::Robinson {
+            Profile::Elliptic
+        } else {
+            Profile::Cylinder
+        }
+    }
+
+    /// Force per gauge pressure of the gas [m2].
+    pub fn gas<S: Scalar>(self, braid: &Braid, shape: &Shape<S>, factors: Factors) -> S {
+        match self {
+            Self::Gaylord | Self::MooneyRivlin | Self::Ferraresi => gaylord::gas(braid, shape),
+            Self::ChouHannaford => chou_hannaford::gas(braid, shape),
+            Self::Kothera => kothera::gas(braid, shape),
+            Self::Robinson => robinson::gas(braid, shape),
+            Self::ElbowLinear => elbow_linear::gas(braid, shape, factors),
+        }
+    }
+
+    /// Force [N] of elastic parameters [Pa]; linear in them.
+    pub fn elastic<S: Scalar>(self, moduli: &[f64], braid: &Braid, shape: &Shape<S>, factors: Factors) -> S {
+        match self {
+            Self::Gaylord | Self::ChouHannaford => constant(0.0),
+            Self::MooneyRivlin => mooney_rivlin::elastic(moduli, braid, shape),
+            Self::Ferraresi => ferraresi::elastic(moduli, braid, shape),
+            Self::Kothera => kothera::elastic(moduli, braid, shape),
+            Self::Robinson => robinson::elastic(moduli, braid, shape),
+            Self::ElbowLinear => elbow_linear::elastic(moduli, braid, shape, factors),
+        }
+    }
+}
+
+/// The value of a name in a list of them.
+///
+/// # Errors
+/// [`Error::Choice`] that names the parameter and lists what it may be.
+pub(crate) fn named<T: Copy>(parameter: &str, name: &str, names: &[(&'static str, T)]) -> Result<T> {
+    names.iter().find(|(known, _)| *known == name).map(|(_, value)| *value).ok_or_else(|| {
+        let known: Vec<_> = names.iter().map(|(known, _)| format!("\"{known}\"")).collect();
+        Error::Choice {
+            name: parameter.into(),
+            value: format!("\"{name}\""),
+            allowed: format!("one of {}", known.join(", ")),
+        }
+    })
+}
+
+/// A force model with its elastic parameters, for one direction of motion.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Elasticity {
+    model: ForceModel,
+    slope: Vec<f64>,
+    offset: Vec<f64>,
+    factors: Factors,
+}
+
+impl Elasticity {
+    /// The model and parameters of a muscle while it contracts.
+    ///
+    /// # Errors
+    /// [`Error::Choice`] for an unknown model.
+    pub fn contracting(spec: &MuscleSpec) -> Result<Self> {
+        let model = spec.force_model()?;
+        let (slope, offset) = match model {
+            ForceModel::Gaylord | ForceModel::ChouHannaford => (Vec::new(), Vec::new()),
+            ForceModel::MooneyRivlin => (vec![0.0; 2], vec![spec.c10, spec.c01]),
+            ForceModel::ElbowLinear => (vec![0.0], vec![spec.bladder_modulus]),
+            _ => (spec.modulus_slope.clone(), spec.modulus_offset.clone()),
+        };
+        Ok(Self { model, slope, offset, factors: CONTRACTION })
+    }
+
+    /// The same while it lengthens, if the model has a branch of its own for that.
+    #[must_use]
+    pub fn lengthening(&self, spec: &MuscleSpec) -> Option<Self> {
+        let apart = self.model == ForceModel::ElbowLinear && spec.extension_factors != CONTRACTION;
+        apart.then(|| Self { factors: spec.extension_factors, ..self.clone() })
+    }
+
+    /// Number of elastic parameters that act on one pressure.
+    #[must_use]
+    pub fn order(&self) -> usize {
+        self.offset.len()
+    }
+
+    /// The coefficients at a solved shape.
+    pub fn coefficients<S: Scalar>(&self, braid: &Braid, shape: &Shape<S>) -> Coefficients<S> {
+        Coefficients {
+            a_gas: self.model.gas(braid, shape, self.factors),
+            a_elastic: self.model.elastic(&self.slope, braid, shape, self.factors),
+            b_elastic: self.model.elastic(&self.offset, braid, shape, self.factors),
+        }
+    }
+
+    /// Force per unit of each elastic parameter [m2].
+    pub fn basis(&self, braid: &Braid, shape: &Shape) -> Vec<f64> {
+        let mut unit = vec![0.0; self.order()];
+        (0..self.order())
+            .map(|j| {
+                unit[j] = 1.0;
+                let force = self.model.elastic(&unit, braid, shape, self.factors);
+                unit[j] = 0.0;
+                force
+            })
+            .collect()
+    }
+}

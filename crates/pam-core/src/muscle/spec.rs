@@ -1,0 +1,253 @@
+//! The parameters of one kind of muscle, and whether they are possible.
+
+use serde::Deserialize;
+
+use super::elbow_linear::Factors;
+use super::friction::Friction;
+use super::model::ForceModel;
+use crate::error::{check_range, Error, Result};
+use crate::geometry::Profile;
+
+/// Largest order of the stress polynomial.
+pub const HIGHEST_ORDER: usize = 12;
+
+/// Parameters of one kind of muscle, SI units and radians.
+///
+/// Elastic parameters that the force model does not have are empty or zero.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MuscleSpec {
+    /// Force model, see [`ForceModel::NAMES`].
+    pub model: String,
+    /// Outer profile, see [`Profile::NAMES`]; the model's own where it is left out.
+    #[serde(default)]
+    pub geometry: Option<String>,
+    /// Muscles in parallel.
+    pub count: u32,
+    /// Rest length between the fittings [m].
+    pub rest_length: f64,
+    /// Rest outer diameter [m].
+    pub rest_diameter: f64,
+    /// Braid angle at rest from the circumferential plane [rad].
+    pub braid_angle: f64,
+    /// Rest wall thickness of the bladder [m].
+    pub wall_thickness: f64,
+    /// `m_k`, change of the k-th modulus with pressure [1], from k = 1 (`ferraresi`, `kothera`, `robinson`).
+    #[serde(default)]
+    pub modulus_slope: Vec<f64>,
+    /// `b_k`, the k-th modulus at zero pressure [Pa], from k = 1 (the same models).
+    #[serde(default)]
+    pub modulus_offset: Vec<f64>,
+    /// First Mooney-Rivlin constant [Pa] (`mooney_rivlin`).
+    #[serde(default)]
+    pub c10: f64,
+    /// Second Mooney-Rivlin constant [Pa] (`mooney_rivlin`).
+    #[serde(default)]
+    pub c01: f64,
+    /// `E_R` [Pa] (`elbow_linear`).
+    #[serde(default)]
+    pub bladder_modulus: f64,
+    /// Factors of the lengthening branch [1] (`elbow_linear`).
+    #[serde(default = "default_factors")]
+    pub extension_factors: Factors,
+    /// Factor on every modulus [1].
+    #[serde(default = "default_scale")]
+    pub modulus_scale: f64,
+    /// `c0` of the friction hysteresis [1].
+    #[serde(default)]
+    pub friction_coefficient: f64,
+    /// `c1` of the friction hysteresis [1/Pa].
+    #[serde(default)]
+    pub friction_pressure_slope: f64,
+    /// Least coefficient of the friction hysteresis [1].
+    #[serde(default)]
+    pub friction_floor: f64,
+    /// Motion over which the force goes from one branch of the hysteresis to the other [m].
+    #[serde(default = "default_presliding")]
+    pub friction_presliding: f64,
+    /// Axis ratio of the elliptic ends at rest [1].
+    #[serde(default = "default_k0")]
+    pub k0: f64,
+    /// Its decrease per contraction ratio in contraction [1].
+    #[serde(default = "default_contraction_slope")]
+    pub contraction_slope: f64,
+    /// Its decrease per contraction ratio in extension [1].
+    #[serde(default = "default_extension_slope")]
+    pub extension_slope: f64,
+    /// Smallest outer radius in extension as a fraction of the rest radius [1].
+    #[serde(default = "default_neck_floor")]
+    pub neck_floor: f64,
+}
+
+fn default_factors() -> Factors {
+    [0.3, 0.8, 0.8]
+}
+fn default_scale() -> f64 {
+    1.0
+}
+fn default_presliding() -> f64 {
+    1e-3
+}
+fn default_k0() -> f64 {
+    1.64
+}
+fn default_contraction_slope() -> f64 {
+    2.405
+}
+fn default_extension_slope() -> f64 {
+    6.105
+}
+fn default_neck_floor() -> f64 {
+    0.80
+}
+
+impl MuscleSpec {
+    /// One muscle of a model and dimensions [m, m, rad, m], without elasticity and friction.
+    #[must_use]
+    pub fn plain(model: &str, length: f64, diameter: f64, braid_angle: f64, wall: f64) -> Self {
+        Self {
+            model: model.into(),
+            geometry: None,
+            count: 1,
+            rest_length: length,
+            rest_diameter: diameter,
+            braid_angle,
+            wall_thickness: wall,
+            modulus_slope: Vec::new(),
+            modulus_offset: Vec::new(),
+            c10: 0.0,
+            c01: 0.0,
+            bladder_modulus: 0.0,
+            extension_factors: default_factors(),
+            modulus_scale: default_scale(),
+            friction_coefficient: 0.0,
+            friction_pressure_slope: 0.0,
+            friction_floor: 0.0,
+            friction_presliding: default_presliding(),
+            k0: default_k0(),
+            contraction_slope: default_contraction_slope(),
+            extension_slope: default_extension_slope(),
+            neck_floor: default_neck_floor(),
+        }
+    }
+
+    /// The force model.
+    ///
+    /// # Errors
+    /// [`Error::Choice`] for an unknown name.
+    pub fn force_model(&self) -> Result<ForceModel> {
+        ForceModel::from_name(&self.model)
+    }
+
+    /// The outer profile.
+    ///
+    /// # Errors
+    /// [`Error::Choice`] for an unknown name.
+    pub fn profile(&self) -> Result<Profile> {
+        match &self.geometry {
+            Some(name) => Profile::from_name(name),
+            None => Ok(self.force_model()?.profile()),
+        }
+    }
+
+    /// The friction of the muscle, none if it has none.
+    #[must_use]
+    pub fn friction(&self) -> Option<Friction> {
+        let friction = Friction {
+            coefficient: self.friction_coefficient,
+            pressure_slope: self.friction_pressure_slope,
+            floor: self.friction_floor,
+            presliding: self.friction_presliding,
+        };
+        friction.acts().then_some(friction)
+    }
+
+    /// The same muscle without what the compiled table does not depend on.
+    #[must_use]
+    pub fn tabulated(&self) -> Self {
+        Self {
+            count: 1,
+            modulus_scale: 1.0,
+            friction_coefficient: 0.0,
+            friction_pressure_slope: 0.0,
+            friction_floor: 0.0,
+            friction_presliding: default_presliding(),
+            ..self.clone()
+        }
+    }
+
+    /// Whether every parameter is finite and possible.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] that names the first parameter that is not (`muscle.braid_angle`),
+    /// [`Error::Choice`] for an unknown model or geometry or an elastic parameter that the model does not have,
+    /// [`Error::Length`] if the two lists of moduli differ in length.
+    pub fn validate(&self) -> Result<()> {
+        let model = self.force_model()?;
+        self.profile()?;
+        let degree = std::f64::consts::PI / 180.0;
+        check_range("muscle.count", f64::from(self.count), 1.0, 1000.0, "muscles")?;
+        check_range("muscle.rest_length", self.rest_length, 1e-3, 20.0, "m")?;
+        check_range("muscle.rest_diameter", self.rest_diameter, 1e-4, 2.0, "m")?;
+        check_range(
+            "muscle.braid_angle",
+            self.braid_angle,
+            45.0 * degree,
+            89.0 * degree,
+            "rad (45 to 89 deg)",
+        )?;
+        let thickest = 0.45 * self.rest_diameter;
+        check_range("muscle.wall_thickness", self.wall_thickness, 0.0, thickest, "m (0.45 rest diameters)")?;
+        self.check_elastic(model)?;
+        check_range("muscle.modulus_scale", self.modulus_scale, 0.0, 1e3, "(1)")?;
+        for (factor, name) in self.extension_factors.iter().zip(["0", "1", "2"]) {
+            check_range(&format!("muscle.extension_factors[{name}]"), *factor, -10.0, 10.0, "(1)")?;
+        }
+        check_range("muscle.friction_coefficient", self.friction_coefficient, -1.0, 1.0, "(1)")?;
+        check_range("muscle.friction_pressure_slope", self.friction_pressure_slope, -1e-4, 1e-4, "1/Pa")?;
+        check_range("muscle.friction_floor", self.friction_floor, 0.0, 1.0, "(1)")?;
+        check_range("muscle.friction_presliding", self.friction_presliding, 1e-7, 1.0, "m")?;
+        check_range("muscle.k0", self.k0, 0.3, 10.0, "(1)")?;
+        check_range("muscle.contraction_slope", self.contraction_slope, -20.0, 20.0, "(1)")?;
+        check_range("muscle.extension_slope", self.extension_slope, -20.0, 20.0, "(1)")?;
+        check_range("muscle.neck_floor", self.neck_floor, 0.3, 1.0, "(1)")?;
+        Ok(())
+    }
+
+    fn check_elastic(&self, model: ForceModel) -> Result<()> {
+        let orders = self.modulus_slope.len();
+        let polynomial = model.is_polynomial();
+        let lists = f64::from(u8::from(orders > 0 || !self.modulus_offset.is_empty()));
+        let scalars = [
+            ("modulus_slope", lists, polynomial),
+            ("c10", self.c10, model == ForceModel::MooneyRivlin),
+            ("c01", self.c01, model == ForceModel::MooneyRivlin),
+            ("bladder_modulus", self.bladder_modulus, model == ForceModel::ElbowLinear),
+        ];
+        for (name, value, has) in scalars {
+            if !has && value != 0.0 {
+                let value = if name == "modulus_slope" { "[..]".into() } else { value.to_string() };
+                let allowed = format!("the model \"{}\" has no such parameter", self.model);
+                return Err(Error::Choice { name: format!("muscle.{name}"), value, allowed });
+            }
+            check_range(&format!("muscle.{name}"), value, -1e13, 1e13, "Pa")?;
+        }
+        if !polynomial {
+            return Ok(());
+        }
+        check_range("muscle.modulus_slope length", orders as f64, 1.0, HIGHEST_ORDER as f64, "moduli")?;
+        if self.modulus_offset.len() != orders {
+            return Err(Error::Length {
+                name: "muscle.modulus_offset".into(),
+                found: self.modulus_offset.len(),
+                expected: orders,
+                why: "one for each muscle.modulus_slope".into(),
+            });
+        }
+        for (k, (slope, offset)) in self.modulus_slope.iter().zip(&self.modulus_offset).enumerate() {
+            check_range(&format!("muscle.modulus_slope[{k}]"), *slope, -1e6, 1e6, "(1)")?;
+            check_range(&format!("muscle.modulus_offset[{k}]"), *offset, -1e13, 1e13, "Pa")?;
+        }
+        Ok(())
+    }
+}
