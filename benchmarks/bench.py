@@ -18,10 +18,14 @@ from pathlib import Path
 import numpy as np
 
 import pamrs
+from pamrs.muscle_models import GEOMETRIES, MODELS
+from tests.reference import GeometryReference, MuscleReference
 from tests.reference import plant as reference
 
 ROOT = Path(__file__).parents[1]
 AMBIENT = 101325.0
+#: Elastic parameters of the models that have others than the shoulder's moduli [Pa].
+ELASTIC: dict[str, dict[str, float]] = {"mooney_rivlin": {"c10": 2e5, "c01": 5e4}, "elbow_linear": {"bladder_modulus": 1e6}}
 
 
 def best_of(work: Callable[[], object], seconds: float = 1.0, most: int = 50) -> float:
@@ -62,35 +66,84 @@ def simulation() -> None:
         )
 
 
+def per_point(name: str, ours: float, theirs: float, points: int, apart: float) -> None:
+    """One line of the table of throughput: times of one point, and how far the results are apart."""
+    print(
+        f"{name:<34} {ours / points * 1e9:>11.4g} ns {theirs / points * 1e9:>11.4g} ns {theirs / ours:>9.3g} x   "
+        f"max {apart:.2g} of full scale apart"
+    )
+
+
 def force() -> None:
-    """Force of one muscle at many lengths and pressures: exact, then from the table."""
-    muscle, peer = pamrs.rigs.shoulder().muscle, reference.shoulder().muscle
-    if muscle is None:
+    """Braid solve and force of one muscle at many lengths and pressures, every model, beside the reference."""
+    base = pamrs.rigs.shoulder().muscle
+    if base is None:
         raise SystemExit("the shoulder has no muscle")
     generator = np.random.default_rng(1)
-    low, high = peer.geometry.max_contraction * 0.02, peer.geometry.max_contraction * 0.9
-    contraction = generator.uniform(low, high, 200)
-    pressure = generator.uniform(1e5, 6e5, 200)
+    points = 2000
+    few = slice(0, 100)  # as many as the reference can do in the time
+    high = 0.9 * base.contraction_limits[1]
+    contraction = generator.uniform(0.02 * high, high, points)
+    pressure = generator.uniform(1e5, 6e5, points)
 
-    def plain() -> np.ndarray:
-        rows = [peer.coefficients(e) for e in contraction]
-        return np.array(
-            [p * gas + peer.modulus_scale * (p * elastic + fixed) for p, (gas, elastic, fixed) in zip(pressure, rows, strict=True)]
-        )
+    def line(name: str, ours: Callable[[], np.ndarray], theirs: Callable[[], np.ndarray], of: slice = few) -> None:
+        found, expected = ours()[of], theirs()
+        apart = float(np.abs(found - expected).max() / np.abs(expected).max())
+        per_point(name, best_of(ours, most=2000), best_of(theirs) * points / len(expected), points, apart)
 
-    theirs = best_of(plain)
-    expected = plain()
-    for name, function in (
-        ("force exact, 200 points", muscle.force),
-        ("force table, 200 points", muscle.force_table),
-    ):
-        apart = np.abs(function(pressure, contraction) - expected).max() / np.abs(expected).max()
-        show(
-            name,
-            best_of(lambda f=function: f(pressure, contraction), most=2000),
-            theirs,
-            f"max {apart:.2g} of full scale apart",
+    for geometry in GEOMETRIES:
+        muscle = base.replace(geometry=geometry)
+        peer = reference_muscle(muscle)
+        line(
+            f"braid solve, {geometry}",
+            lambda m=muscle: m.radius(contraction),
+            lambda r=peer: np.array([r.geometry.solve_radius(float(e))[0] for e in contraction[few]]),
         )
+    for model in MODELS:
+        muscle = base.replace(model=model, **ELASTIC.get(model, {}))
+        peer = reference_muscle(muscle)
+        line(
+            f"force exact, {model}",
+            lambda m=muscle: m.force(pressure, contraction),
+            lambda r=peer: np.array([float(r.force(p, float(e))) for p, e in zip(pressure[few], contraction[few], strict=True)]),
+        )
+    peer = reference_muscle(base)
+    line(
+        "force table, robinson",
+        lambda: base.force_table(pressure, contraction),
+        lambda: np.array([float(peer.force(p, float(e))) for p, e in zip(pressure[few], contraction[few], strict=True)]),
+    )
+    bare = base.replace(model="kothera")
+    line(
+        "force exact, kothera, vector NumPy",
+        lambda: bare.force(pressure, contraction),
+        lambda: cylinder_force(bare, pressure, contraction),
+        slice(None),
+    )
+
+
+def reference_muscle(muscle: pamrs.Muscle) -> MuscleReference:
+    """The same muscle in the reference."""
+    p = muscle.parameters
+    shape = GeometryReference(p["rest_length"], p["rest_diameter"], p["braid_angle"], p["wall_thickness"], muscle.geometry)
+    elastic = {name: p[name] for name in ("c10", "c01", "bladder_modulus")}
+    return MuscleReference(shape, p["modulus_slope"], p["modulus_offset"], p["modulus_scale"], model=muscle.model, **elastic)
+
+
+def cylinder_force(muscle: pamrs.Muscle, pressure: np.ndarray, contraction: np.ndarray) -> np.ndarray:
+    """Force (2.16) of a cylinder as a NumPy user would write it: whole arrays, no loop."""
+    p = muscle.parameters
+    fibre, turns, rubber = muscle.fibre_length, muscle.turns, muscle.bladder_volume
+    length = p["rest_length"] * (1.0 - contraction)
+    radius = np.sqrt(fibre**2 - length**2) / (2.0 * np.pi * turns)
+    wall = radius - np.sqrt(radius**2 - rubber / (np.pi * length))
+    axial, hoop = rubber / length, wall * length**2 / (2.0 * np.pi * radius * turns**2)
+    middle = 0.5 * (p["rest_diameter"] - p["wall_thickness"])
+    strains = length / p["rest_length"] - 1.0, (radius - 0.5 * wall) / middle - 1.0
+    force = pressure * ((3.0 * length**2 - fibre**2) / (4.0 * np.pi * turns**2) + axial - hoop)
+    for k, (slope, offset) in enumerate(zip(p["modulus_slope"], p["modulus_offset"], strict=True), start=1):
+        force += (slope * pressure + offset) * (strains[0] ** k * axial - strains[1] ** k * hoop)
+    return force
 
 
 def diagnosis() -> None:
