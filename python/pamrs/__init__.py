@@ -9,7 +9,7 @@ import importlib
 from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
-    from pamrs import rigs
+    from pamrs import fit, library, rigs, sizing
     from pamrs.case import Case, load_case
     from pamrs.diagnosis import diagnose
     from pamrs.diagnosis.result import Diagnosis
@@ -47,13 +47,17 @@ __all__ = [
     "SimulationError",
     "__version__",
     "diagnose",
+    "fit",
+    "library",
     "load_case",
     "load_recording",
     "load_rig",
     "rigs",
     "simulate",
+    "sizing",
 ]
 
+_MODULES: Final = ("fit", "library", "rigs", "sizing")
 _HOMES: Final[dict[str, str]] = {
     "Case": "pamrs.case",
     "CaseError": "pamrs.errors",
@@ -90,8 +94,8 @@ def _version() -> str:
 def __getattr__(name: str) -> Any:
     if name == "__version__":
         value: Any = _version()
-    elif name == "rigs":
-        value = importlib.import_module("pamrs.rigs")
+    elif name in _MODULES:
+        value = importlib.import_module(f"pamrs.{name}")
     elif name in _HOMES:
         value = getattr(importlib.import_module(_HOMES[name]), name)
     else:

@@ -5,12 +5,18 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Muscle", "Rig", "__version__", "effects", "parameter_names"]
+__all__ = ["Gas", "Muscle", "Rig", "__version__", "effects", "parameter_names"]
 
 __version__: str
 
 _Array = NDArray[np.float64]
 _Signal = tuple[_Array, _Array]
+
+@final
+class Gas:
+    def __new__(cls, ambient_pressure: float, temperature: float, gas_constant: float, heat_capacity_ratio: float) -> Gas: ...
+    def mass_flow(self, area: float, upstream: float, downstream: _Array) -> _Array: ...
+    def area_of_conductance(self, conductance: float) -> float: ...
 
 @final
 class Muscle:

@@ -1,6 +1,7 @@
 //! Python bindings of `pam-core`: convert arguments, release the GIL, map errors. No physics here.
 
 mod convert;
+mod gas;
 mod muscle;
 mod rig;
 
@@ -12,6 +13,7 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("__version__", env!("CARGO_PKG_VERSION"))?;
     m.add_class::<rig::Rig>()?;
     m.add_class::<muscle::Muscle>()?;
+    m.add_class::<gas::Gas>()?;
     m.add_function(wrap_pyfunction!(rig::parameter_names, m)?)?;
     m.add_function(wrap_pyfunction!(rig::effects, m)?)?;
     Ok(())

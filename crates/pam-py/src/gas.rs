@@ -1,0 +1,60 @@
+//! `_core.Gas`: the orifice law.
+
+use crate::convert::{array, error, values};
+use numpy::{PyArray1, PyReadonlyArray1};
+use pam_core::error::check_range;
+use pam_core::gas::orifice::Gas as CoreGas;
+use pyo3::prelude::*;
+
+/// A gas with its orifice law (SI units, absolute pressures).
+#[pyclass(frozen, module = "pamrs._core")]
+pub struct Gas {
+    inner: CoreGas,
+}
+
+#[pymethods]
+impl Gas {
+    #[new]
+    fn new(
+        py: Python<'_>,
+        ambient_pressure: f64,
+        temperature: f64,
+        gas_constant: f64,
+        heat_capacity_ratio: f64,
+    ) -> PyResult<Self> {
+        let checked = [
+            ("ambient_pressure", ambient_pressure, 1e3, 1e6, "Pa"),
+            ("temperature", temperature, 150.0, 500.0, "K"),
+            ("gas_constant", gas_constant, 10.0, 5000.0, "J/(kg K)"),
+            ("heat_capacity_ratio", heat_capacity_ratio, 1.01, 1.7, "(1)"),
+        ];
+        for (name, value, low, high, unit) in checked {
+            check_range(name, value, low, high, unit).map_err(|e| error(py, &e))?;
+        }
+        Ok(Self { inner: CoreGas::new(ambient_pressure, temperature, gas_constant, heat_capacity_ratio) })
+    }
+
+    /// Mass flow [kg/s] through a discharge area [m2] from an upstream pressure [Pa] to downstream pressures [Pa].
+    fn mass_flow<'py>(
+        &self,
+        py: Python<'py>,
+        area: f64,
+        upstream: f64,
+        downstream: PyReadonlyArray1<'py, f64>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let flow = |p: f64| {
+            check_range("downstream", p, 0.0, 1e9, "Pa (absolute)")?;
+            Ok(self.inner.mass_flow(area, upstream, p))
+        };
+        check_range("area", area, 0.0, 1.0, "m2").map_err(|e| error(py, &e))?;
+        check_range("upstream", upstream, 1.0, 1e9, "Pa (absolute)").map_err(|e| error(py, &e))?;
+        let flows: pam_core::Result<Vec<f64>> = values(&downstream).into_iter().map(flow).collect();
+        flows.map(|v| array(py, v)).map_err(|e| error(py, &e))
+    }
+
+    /// Discharge area [m2] of a sonic conductance [m3/(s Pa)] (ISO 6358).
+    fn area_of_conductance(&self, py: Python<'_>, conductance: f64) -> PyResult<f64> {
+        let conductance = check_range("conductance", conductance, 0.0, 1.0, "m3/(s Pa)");
+        conductance.map(|c| self.inner.area_of_conductance(c)).map_err(|e| error(py, &e))
+    }
+}

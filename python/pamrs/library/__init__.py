@@ -1,0 +1,95 @@
+"""The muscles of the 2014 dissertation: geometry, moduli, published facts, and where each number comes from.
+
+``pamrs.library.elbow_0625in()`` is a :class:`pamrs.Muscle`; ``pamrs.library.entry("elbow_0625in")`` also has the origin of
+each number, the mass, the highest pressure and the published facts. ``python -m pamrs.library`` derives the identified numbers
+again and prints every fact beside what the muscle gives.
+"""
+
+from __future__ import annotations
+
+import difflib
+from functools import cache
+from importlib import resources
+from typing import TYPE_CHECKING, Final
+
+from pamrs.errors import ParameterError
+from pamrs.library.entry import Entry, Fact, read_entry
+
+if TYPE_CHECKING:
+    from pamrs.muscle import Muscle
+
+__all__ = [
+    "Entry",
+    "Fact",
+    "ch2_075in",
+    "elbow_0625in",
+    "entry",
+    "large_2in",
+    "large_2in_effective",
+    "names",
+    "pam_a_1in",
+    "pam_b_075in",
+]
+
+_NAMES: Final = ("elbow_0625in", "large_2in", "large_2in_effective", "ch2_075in", "pam_a_1in", "pam_b_075in")
+
+
+def names() -> list[str]:
+    """Names of the muscles, in the order of the dissertation's sections 3.2, 2 and 6.2."""
+    return list(_NAMES)
+
+
+@cache
+def entry(name: str) -> Entry:
+    """What the library knows about one muscle.
+
+    Parameters
+    ----------
+    name : str
+        One of :func:`names`.
+
+    Returns
+    -------
+    Entry
+
+    Raises
+    ------
+    ParameterError
+        If there is no such muscle.
+    """
+    if name not in _NAMES:
+        near = difflib.get_close_matches(str(name), _NAMES, n=1)
+        hint = f"; did you mean {near[0]!r}?" if near else ""
+        raise ParameterError(f"name = {name!r} is not in the library{hint} There are: {', '.join(_NAMES)}")
+    file = resources.files(__name__).joinpath(f"{name}.toml")
+    return read_entry(file.read_text(encoding="utf-8"), source=f"{name}.toml")
+
+
+def elbow_0625in() -> Muscle:
+    """The elbow's 0.625-in latex muscle (Table 3.3)."""
+    return entry("elbow_0625in").muscle
+
+
+def large_2in() -> Muscle:
+    """The 2-in silicone muscle of 3.2.2 with the published braid angle, which gives 2.5 times its published force."""
+    return entry("large_2in").muscle
+
+
+def large_2in_effective() -> Muscle:
+    """The 2-in silicone muscle of 3.2.2 with the braid angle that gives its published force."""
+    return entry("large_2in_effective").muscle
+
+
+def ch2_075in() -> Muscle:
+    """The 0.75-in latex muscle of chapter 2, with friction."""
+    return entry("ch2_075in").muscle
+
+
+def pam_a_1in() -> Muscle:
+    """The 1-in latex muscle A of Table 6.1, which is the shoulder's."""
+    return entry("pam_a_1in").muscle
+
+
+def pam_b_075in() -> Muscle:
+    """The 0.75-in silicone muscle B of Table 6.1."""
+    return entry("pam_b_075in").muscle
