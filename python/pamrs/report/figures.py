@@ -30,7 +30,18 @@ from pamrs.report.text import (
 if TYPE_CHECKING:
     from pamrs.diagnosis.result import Diagnosis, Trace
 
-__all__ = ["COLOURS", "blocks_svg", "decimate", "map_svg", "summary_png", "telling_trace", "traces_svg"]
+__all__ = [
+    "COLOURS",
+    "STYLE",
+    "blocks_svg",
+    "decimate",
+    "legend_above",
+    "map_svg",
+    "summary_png",
+    "svg_text",
+    "telling_trace",
+    "traces_svg",
+]
 
 COLOURS = {
     "measured": "#1f1f1f",
@@ -46,7 +57,7 @@ MAX_POINTS = 1500
 
 FloatArray = npt.NDArray[np.float64]
 
-_STYLE: Any = {
+STYLE: Any = {
     "svg.fonttype": "none",
     "font.family": "DejaVu Sans",
     "font.size": 9.0,
@@ -73,6 +84,7 @@ _STYLE: Any = {
     "figure.facecolor": "white",
     "savefig.facecolor": "white",
 }
+"""Matplotlib settings of every figure."""
 
 
 def decimate(time: FloatArray, values: FloatArray, points: int = MAX_POINTS) -> tuple[FloatArray, FloatArray]:
@@ -175,7 +187,8 @@ def _draw_residuals(axes: Axes, trace: Trace, noise: float | None, *, width: flo
     axes.set_ylabel(f"residual [{unit}]" if unit else "residual")
 
 
-def _legend_above(axes: Axes, *, columns: int = 4) -> None:
+def legend_above(axes: Axes, *, columns: int = 4) -> None:
+    """Legend in one line above the axes, flush right."""
     axes.legend(
         loc="lower right",
         bbox_to_anchor=(1.0, 1.0),
@@ -193,7 +206,7 @@ def _shade(axes: Axes, diagnosis: Diagnosis, trace: Trace) -> None:
             axes.axvspan(float(start), float(stop), color="#f5e6b8", alpha=0.5, lw=0, zorder=0)
 
 
-def _svg(figure: Figure, prefix: str) -> str:
+def svg_text(figure: Figure, prefix: str) -> str:
     """SVG element without prolog; ids carry `prefix` so that several can share a page."""
     stream = io.StringIO()
     with mpl.rc_context({"svg.hashsalt": prefix}):
@@ -224,7 +237,7 @@ def traces_svg(diagnosis: Diagnosis, traces: Sequence[Trace], prefix: str) -> st
     str
         SVG element.
     """
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(STYLE):
         figure = Figure(figsize=(10.0, 3.7 * len(traces) + 0.3), layout="constrained")
         axes = figure.subplots(
             2 * len(traces),
@@ -239,12 +252,12 @@ def traces_svg(diagnosis: Diagnosis, traces: Sequence[Trace], prefix: str) -> st
             _draw_residuals(lower, trace, _noise(diagnosis, trace))
             for panel in (upper, lower):
                 _shade(panel, diagnosis, trace)
-                _legend_above(panel)
+                legend_above(panel)
                 panel.margins(x=0.005)
             figure.align_ylabels([upper, lower])
         axes[-1].set_xlabel("time [s]")
         figure.align_ylabels(list(axes))
-        return _svg(figure, prefix)
+        return svg_text(figure, prefix)
 
 
 def _block_rows(diagnosis: Diagnosis) -> list[tuple[str, float, bool]]:
@@ -282,10 +295,10 @@ def blocks_svg(diagnosis: Diagnosis, prefix: str = "blocks") -> str | None:
     rows = _block_rows(diagnosis)
     if not rows:
         return None
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(STYLE):
         figure = Figure(figsize=(5.6, 1.1 + 0.36 * (len(rows) + 1)), layout="constrained")
         _draw_blocks(figure.subplots(), rows)
-        return _svg(figure, prefix)
+        return svg_text(figure, prefix)
 
 
 def _grids(
@@ -323,7 +336,7 @@ def map_svg(diagnosis: Diagnosis, prefix: str = "map") -> str | None:
     if not content or diagnosis.condition_map is None:
         return None
     x, y, grids, limit = content
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(STYLE):
         figure = Figure(figsize=(5.0 * len(grids) + 0.6, 3.9), layout="constrained")
         axes = figure.subplots(1, len(grids), sharey=True, squeeze=False)[0]
         for panel, (title, z) in zip(axes, grids, strict=True):
@@ -332,7 +345,7 @@ def map_svg(diagnosis: Diagnosis, prefix: str = "map") -> str | None:
             panel.set_xlabel(str(diagnosis.condition_map.get("x_label", "")))
         axes[0].set_ylabel(str(diagnosis.condition_map.get("y_label", "")))
         figure.colorbar(mesh, ax=list(axes), label="mean residual / noise", extend="both", pad=0.015)
-        return _svg(figure, prefix)
+        return svg_text(figure, prefix)
 
 
 def _draw_probabilities(axes: Axes, diagnosis: Diagnosis) -> None:
@@ -362,7 +375,7 @@ def summary_png(diagnosis: Diagnosis) -> bytes:
     bytes
         PNG of 1600 x 1000 pixels.
     """
-    style = {**_STYLE, "font.size": 8.5, "axes.titlesize": 9.5, "legend.fontsize": 8.0, "axes.labelsize": 8.5}
+    style = {**STYLE, "font.size": 8.5, "axes.titlesize": 9.5, "legend.fontsize": 8.0, "axes.labelsize": 8.5}
     with mpl.rc_context(style):
         figure = Figure(figsize=(10.0, 6.25), dpi=160, layout="constrained")
         figure.get_layout_engine().set(w_pad=0.12, h_pad=0.06, wspace=0.03, hspace=0.03)  # type: ignore[union-attr, call-arg]

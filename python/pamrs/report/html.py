@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import jinja2
 from markupsafe import Markup
 
 from pamrs.report import figures
 from pamrs.report import text as words
+from pamrs.report.page import render_page
 
 if TYPE_CHECKING:
     from pamrs.diagnosis.result import Diagnosis, Trace
@@ -25,13 +24,6 @@ BADGES = {
     "effects": "missing physics named",
     "unlisted": "missing physics, not in the catalogue",
 }
-
-
-def _version() -> str:
-    try:
-        return metadata.version("pamrs")
-    except metadata.PackageNotFoundError:
-        return ""
 
 
 def _span(bounds: tuple[float, float] | None, digits: int = 3) -> str:
@@ -232,11 +224,10 @@ def render(diagnosis: Diagnosis) -> str:
     str
         HTML text.
     """
-    environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    source = Path(__file__).with_name("template.html.j2").read_text(encoding="utf-8")
     recordings, hidden = _recordings(diagnosis)
     bits = diagnosis.next_experiment.get("expected_information_bits")
-    return environment.from_string(source).render(
+    return render_page(
+        Path(__file__).with_name("template.html.j2"),
         d=diagnosis,
         badge=BADGES[diagnosis.verdict],
         headline=words.headline(diagnosis),
@@ -267,5 +258,4 @@ def render(diagnosis: Diagnosis) -> str:
         parameters=_parameters(diagnosis),
         timings=[(words.label(k), f"{float(v):.1f} s") for k, v in diagnosis.timings.items()],
         model=diagnosis.model,
-        version=_version(),
     )

@@ -1,0 +1,272 @@
+"""The command line of fits: ``pamrs fit muscle``."""
+
+from __future__ import annotations
+
+import math
+import re
+import shlex
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Final
+
+import typer
+
+if TYPE_CHECKING:
+    from pamrs.fit.compare import ModelComparison
+    from pamrs.fit.data import ForceMap
+    from pamrs.fit.result import MuscleFit
+    from pamrs.muscle import Muscle
+
+__all__ = ["fit_app"]
+
+SCHEMA: Final = "pamrs.muscle_fit/1"
+_NUMBER = r"[-+]?\d*\.?\d+(?:[eE][-+]?\d+)?"
+_QUANTITY = re.compile(rf"^\s*(?P<value>{_NUMBER})\s*(?:(?:\+-|±)\s*(?P<tol>{_NUMBER})\s*)?(?P<unit>\S.*?)?\s*$")
+_GEOMETRY: Final = {"rest_length": "length", "rest_diameter": "length", "braid_angle": "angle", "wall_thickness": "length"}
+
+fit_app = typer.Typer(help="Fit models to measurements.")
+
+
+@fit_app.callback()
+def _root() -> None:
+    """Fit models to measurements."""
+
+
+@fit_app.command("muscle")
+def _muscle(
+    context: typer.Context,
+    data: Annotated[Path, typer.Argument(help="Force map: a table with units in its headings, or a TOML description.")],
+    model: Annotated[str | None, typer.Option(help="Force model; by default that of the muscle.")] = None,
+    order: Annotated[int | None, typer.Option(help="Order of the stress polynomial, 4 unless the muscle has moduli.")] = None,
+    geometry: Annotated[str | None, typer.Option(help="cylinder, elliptic or elliptic_published; by default the model's own.")] = None,
+    muscle: Annotated[str | None, typer.Option(help="Rig file (TOML) with the muscle, or a name of the library.")] = None,
+    rest_length: Annotated[str | None, typer.Option(help='For example "300 mm"; "300 +- 2 mm" with what is known of it.')] = None,
+    rest_diameter: Annotated[str | None, typer.Option(help='For example "20 mm" (outside).')] = None,
+    braid_angle: Annotated[str | None, typer.Option(help='For example "65 +- 3 deg", from the circumference.')] = None,
+    wall_thickness: Annotated[str | None, typer.Option(help='For example "2 mm".')] = None,
+    where: Annotated[list[str] | None, typer.Option(help="COLUMN=VALUE: only these rows; may be repeated.")] = None,
+    clipped: Annotated[str | None, typer.Option(help='A force that means off the scale, like "0 N".')] = None,
+    free: Annotated[str | None, typer.Option(help="Geometry to fit too: braid_angle,rest_diameter,...")] = None,
+    levels: Annotated[str | None, typer.Option(help="Fit on these pressures only: 200kPa,400kPa,6bar.")] = None,
+    per_level: Annotated[bool, typer.Option("--per-level", help="Moduli free at each pressure.")] = False,
+    compare: Annotated[bool, typer.Option("--compare", help="Fit every model and rank them.")] = False,
+    report: Annotated[Path | None, typer.Option(help="Write the report, one HTML file.")] = None,
+    rig: Annotated[Path | None, typer.Option(help="Write a rig file with the fitted muscle.")] = None,
+    json: Annotated[Path | None, typer.Option(help=f"Write the result (schema {SCHEMA}).")] = None,
+    png: Annotated[Path | None, typer.Option(help="Write the summary picture.")] = None,
+) -> None:
+    """Fit a muscle's force model to measured forces over length and pressure."""
+    from pamrs.cli import _check_writable, _progress
+
+    outputs = (report, rig, json, png)
+    _check_writable(*outputs)
+    if per_level and rig is not None:
+        raise typer.BadParameter("a rig needs moduli linear in pressure: leave out --per-level or --rig")
+    sizes = {"rest_length": rest_length, "rest_diameter": rest_diameter, "braid_angle": braid_angle, "wall_thickness": wall_thickness}
+    map_, start, tolerance = _inputs(data, muscle, {k: v for k, v in sizes.items() if v is not None}, where or [], clipped)
+    pressures = None if levels is None else [_quantity("levels", text, "pressure")[0] for text in levels.split(",")]
+    names = [] if free is None else [name.strip().replace("-", "_") for name in free.split(",") if name.strip()]
+    known = {name: value for name, value in tolerance.items() if math.isfinite(value)}
+    from pamrs.fit import FitError, fit_muscle
+
+    shape: dict[str, Any] = {"geometry": geometry, "free": names, "tolerance": known, "levels": pressures}
+    with _progress(f"fitting {map_.label}"):
+        try:
+            fit = fit_muscle(map_, start, model=model, order=order, moduli="per_level" if per_level else "linear", **shape)
+            comparison = _comparison(map_, start, fit.order, shape) if compare else None
+            contents = _contents(fit, comparison, _command(context), report=report, rig=rig, json=json, png=png)
+            summary = _summary(fit, comparison)
+        except FitError as error:
+            raise FitError("; ".join([str(error), *map_.notes])) from error
+    from pamrs.diagnosis.result import write_atomically
+
+    for path, content in contents.items():
+        write_atomically(path, content)
+    typer.echo(summary, nl=False)
+    for path in contents:
+        typer.echo(f"written: {path}", err=True)
+
+
+def _comparison(data: ForceMap, muscle: Muscle, order: int | None, shape: dict[str, Any]) -> ModelComparison:
+    """Every model, in the orders 1 to 4 and that of the fit, and in the geometry asked for where the muscle's own model is meant."""
+    from pamrs.fit import compare_models
+
+    settings = {key: value for key, value in shape.items() if key != "geometry"}
+    if shape["geometry"] is not None:
+        muscle = muscle.replace(geometry=shape["geometry"])
+    return compare_models(data, muscle, orders=sorted({1, 2, 3, 4, order or 1}), **settings)
+
+
+# ------------------------------------------------------------------------- inputs
+
+
+def _quantity(name: str, text: str, dimension: str) -> tuple[float, float | None]:
+    """Value and, after ``+-``, standard deviation of a number with a unit, in SI."""
+    from pamrs.errors import ParameterError
+    from pamrs.units import DIMENSIONS, to_si
+
+    option = f"--{name.replace('_', '-')}"
+    match = _QUANTITY.match(text)
+    if match is None or match["unit"] is None:
+        raise ParameterError(
+            f"{option} = {text.strip()!r} is not allowed: a number with a unit like {DIMENSIONS[dimension]!r} is needed"
+        )
+    try:
+        value = to_si(float(match["value"]), match["unit"], dimension)
+        spread = None if match["tol"] is None else to_si(float(match["tol"]), match["unit"], dimension, difference=True)
+    except ParameterError as error:
+        raise ParameterError(f"{option} = {text.strip()!r}: {error}") from None
+    return value, spread
+
+
+def _inputs(
+    data: Path, muscle: str | None, sizes: Mapping[str, str], where: Sequence[str], clipped: str | None
+) -> tuple[ForceMap, Muscle, dict[str, float]]:
+    """Map, muscle and tolerances, from a description or from a table and the options."""
+    from pamrs.errors import ParameterError
+
+    if data.suffix.lower() == ".toml":
+        given = ["--muscle"] if muscle is not None else []
+        given += [f"--{name.replace('_', '-')}" for name in sizes] + (["--where"] if where else [])
+        given += ["--clipped"] if clipped is not None else []
+        if given:
+            raise ParameterError(f"{', '.join(given)} cannot be given: {data} describes its table and its muscle itself")
+        from pamrs.fit.description import load_measured_muscle
+
+        measured = load_measured_muscle(data)
+        return measured.data, measured.muscle, measured.tolerance
+    start, tolerance = _start(muscle, sizes)
+    from pamrs.fit.files import load_force_map
+
+    map_ = load_force_map(
+        data,
+        rest_length=float(start.parameters["rest_length"]),
+        where=dict(_filter(text) for text in where) or None,
+        clipped=None if clipped is None else _quantity("clipped", clipped, "force")[0],
+    )
+    return map_.checked_against(start), start, tolerance
+
+
+def _filter(text: str) -> tuple[str, str]:
+    from pamrs.errors import ParameterError
+
+    column, equals, value = text.partition("=")
+    if not (column.strip() and equals and value.strip()):
+        raise ParameterError(f"--where = {text!r} is not allowed: COLUMN=VALUE is needed")
+    return column.strip(), value.strip()
+
+
+def _start(muscle: str | None, sizes: Mapping[str, str]) -> tuple[Muscle, dict[str, float]]:
+    """The nominal muscle and what is known of it."""
+    from pamrs.errors import ParameterError
+    from pamrs.fit.description import NO_MODULI
+    from pamrs.muscle import Muscle
+
+    values: dict[str, Any] = {}
+    tolerance: dict[str, float] = {}
+    for name, text in sizes.items():
+        values[name], spread = _quantity(name, text, _GEOMETRY[name])
+        if spread is not None:
+            tolerance[name] = spread
+    if muscle is not None:
+        base, known = _named_muscle(muscle)
+        return base.replace(**values), {**known, **tolerance}
+    lacking = [f"--{name.replace('_', '-')}" for name in _GEOMETRY if name not in values]
+    if lacking:
+        raise ParameterError(
+            f"the geometry of the muscle is missing: give {', '.join(lacking)} (like --rest-length '300 mm'), "
+            "or --muscle with a rig file or a name of the library"
+        )
+    return Muscle(**values, modulus_slope=NO_MODULI, modulus_offset=NO_MODULI), tolerance
+
+
+def _named_muscle(name: str) -> tuple[Muscle, dict[str, float]]:
+    """The muscle of a rig file, or of the library."""
+    from pamrs import library
+    from pamrs.errors import ParameterError
+    from pamrs.rig import load_rig
+
+    if not name.endswith(".toml") and not Path(name).exists():
+        if name not in library.names():
+            raise ParameterError(f"--muscle = {name!r} is neither a file nor in the library: {', '.join(library.names())}")
+        return library.entry(name).muscle, {}
+    rig = load_rig(name)
+    if rig.muscle is None:
+        raise ParameterError(f"--muscle = {name!r}: this rig has no block [muscle]")
+    known = {key.partition(".")[2]: p.tol for key, p in rig.parameters.items() if key.startswith("muscle.") and p.tol > 0.0}
+    return rig.muscle, {key: value for key, value in known.items() if key in _GEOMETRY}
+
+
+# ------------------------------------------------------------------------ outputs
+
+
+def _summary(fit: MuscleFit, comparison: ModelComparison | None) -> str:
+    """What goes to standard output."""
+    from pamrs.fit.remarks import cross_validation
+
+    cross, reason = cross_validation(fit)
+    text = fit.fit_report().rstrip("\n")
+    if cross is None:
+        text += f"\n  leave one pressure out: not possible, {reason}\n"
+    else:
+        text += f"\n  leave one pressure out: rms {100 * cross.rms:.2f} %, max {100 * cross.max:.2f} % of the largest force\n"
+    return text if comparison is None else f"{text}\n{comparison.to_text()}"
+
+
+def _contents(
+    fit: MuscleFit,
+    comparison: ModelComparison | None,
+    command: str,
+    *,
+    report: Path | None,
+    rig: Path | None,
+    json: Path | None,
+    png: Path | None,
+) -> dict[Path, str | bytes]:
+    """Every file to write with its content; made before the first is written."""
+    from pamrs.fit import report as pages
+
+    contents: dict[Path, str | bytes] = {}
+    if report is not None:
+        contents[report] = pages.render_html(fit, comparison, command=command)
+    if png is not None:
+        contents[png] = pages.render_png(fit, comparison)
+    if rig is not None:
+        contents[rig] = fit.to_rig().to_toml_text()
+    if json is not None:
+        contents[json] = _json(fit, comparison, command)
+    return contents
+
+
+def _command(context: typer.Context) -> str:
+    """The command line that gives this result again."""
+    words = ["pamrs", "fit", "muscle", str(context.params["data"])]
+    for name, value in context.params.items():
+        option = f"--{name.replace('_', '-')}"
+        if value is True:
+            words.append(option)
+        elif isinstance(value, (list, tuple)):
+            words += [word for item in value for word in (option, str(item))]
+        elif value not in (None, False) and name != "data":
+            words += [option, str(value)]
+    return shlex.join(words)
+
+
+def _json(fit: MuscleFit, comparison: ModelComparison | None, command: str) -> str:
+    import json
+
+    from pamrs.fit.remarks import cross_validation
+
+    cross, _ = cross_validation(fit)
+    document = {
+        "schema": SCHEMA,
+        "name": fit.data.label,
+        "source": fit.data.source,
+        "command": command,
+        "issues": fit.data.issues,
+        "rows": len(fit.data),
+        "fit": fit.to_dict(),
+        "leave_one_pressure_out": None if cross is None else cross.to_dict(),
+        "comparison": None if comparison is None else comparison.to_dicts(),
+    }
+    return json.dumps(document, indent=1, allow_nan=False) + "\n"

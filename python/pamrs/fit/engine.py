@@ -1,0 +1,288 @@
+"""Fit a muscle's moduli, and if asked its geometry, to a force map."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pamrs.errors import ParameterError
+from pamrs.fit.covariance import covariances
+from pamrs.fit.design import template
+from pamrs.fit.estimate import Estimate, Free, Problem, estimate
+from pamrs.fit.problem import FitError
+from pamrs.fit.result import FitParameter, MuscleFit
+from pamrs.fit.validation import level_force
+
+if TYPE_CHECKING:
+    from pamrs.fit.data import ForceMap
+    from pamrs.muscle import Muscle
+
+__all__ = ["GEOMETRY", "fit_muscle", "has_effect"]
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+#: Geometry that can be fitted, and its unit.
+GEOMETRY: Final[dict[str, str]] = {
+    "rest_length": "m",
+    "rest_diameter": "m",
+    "braid_angle": "rad",
+    "wall_thickness": "m",
+    "k0": "1",
+    "contraction_slope": "1",
+    "extension_slope": "1",
+    "neck_floor": "1",
+}
+
+_ELLIPTIC_ONLY = ("k0", "contraction_slope", "extension_slope", "neck_floor")
+_WALLLESS = ("gaylord",)
+_LARGE_CONDITION = 1e4
+_UNINFORMED = 0.9  # of the tolerance
+_FAR = 3.0  # tolerances
+_FEW_SPARE = 5
+
+
+def has_effect(name: str, model: str, geometry: str) -> bool:
+    """Whether a geometry parameter enters the force of a model."""
+    return not (name in _ELLIPTIC_ONLY and geometry == "cylinder") and not (name == "wall_thickness" and model in _WALLLESS)
+
+
+def fit_muscle(
+    data: ForceMap,
+    muscle: Muscle,
+    *,
+    model: str | None = None,
+    geometry: str | None = None,
+    order: int | None = None,
+    moduli: str = "linear",
+    free: Iterable[str] = (),
+    tolerance: Mapping[str, float] | None = None,
+    levels: Sequence[float] | None = None,
+    direction: str | None = "data",
+    weights: str = "force",
+    noise: float | None = None,
+    errors: str = "level",
+) -> MuscleFit:
+    """Fit a force model to measured forces (dissertation 2.2.6 and 2.3).
+
+    The force is linear in the moduli, so these are found by one linear least-squares solution, by SVD with scaled columns and
+    without regularisation. Free geometry is searched around it (variable projection, Golub and Pereyra 1973).
+
+    Parameters
+    ----------
+    data : ForceMap
+        Measured forces over length and pressure; only its used rows count. Lengths are taken as measured, so a fitted
+        rest length changes the contraction ratios.
+    muscle : Muscle
+        Nominal geometry, friction and modulus scale; its moduli are not used.
+    model, geometry : str, optional
+        Force model and shape; None keeps the muscle's own (another model comes with its own shape).
+    order : int, optional
+        Order M of the stress polynomial of ``ferraresi``, ``kothera`` and ``robinson``; None takes the muscle's own number of
+        moduli, 4 if it has none. Other models have no order.
+    moduli : {"linear", "per_level"}
+        ``E_k = m_k P + b_k`` over all levels at once, or ``E_k`` free at each level with straight lines between them.
+        Models without a polynomial have constants (``c10`` and ``c01``, ``bladder_modulus``, or none) in place of ``m_k, b_k``.
+    free : iterable of str
+        Geometry to fit as well, of :data:`GEOMETRY`.
+    tolerance : mapping of str to float, optional
+        One standard deviation of what is known of each free parameter [SI], a Gaussian prior around the muscle's value. A free
+        parameter without one has no prior. Prior and data are weighed by the scatter of the residuals, found in the fit.
+    levels : sequence of int or of float, optional
+        Pressure levels to fit: whole numbers are indices into ``data.levels``, floats are pressures [Pa]. The other levels
+        are predicted and their errors reported. None fits all.
+    direction : {"data", None}
+        ``"data"`` uses the direction of motion of the rows with the muscle's friction law and, for ``elbow_linear``, its
+        lengthening branch; rows of unknown direction have no friction. None ignores directions: the mean of a loop.
+    weights : {"force", "level"}
+        Residuals in N as in the dissertation, or divided by the largest force of their level, which minimises (2.37).
+    noise : float, optional
+        Known standard deviation of the residuals, in N (with ``weights="level"`` as a fraction); None estimates it. Points count
+        as independent beside the priors; where the misfit is the model's, a larger ``noise`` keeps the geometry nearer to nominal.
+    errors : {"level", "plain"}
+        ``"plain"`` standard errors take residuals as independent. Residuals of a quasi-static map are mostly model error and
+        hang together along a level; then plain ones are too small. ``"level"``, the default, leaves out one level at a time
+        (jackknife, CR3) and holds for any dependence within levels, not for one between them: a misfit that repeats at the
+        same length in every level stays unseen. It needs 5 levels that can each be spared; otherwise plain ones are given, with
+        a warning.
+
+    Returns
+    -------
+    MuscleFit
+
+    Raises
+    ------
+    ParameterError
+        If an argument is not allowed.
+    FitError
+        If the points do not determine the unknowns (too few points or lengths, one pressure level, collinear columns), or the
+        geometry cannot reach the measured lengths.
+
+    Examples
+    --------
+    >>> import math, numpy as np, pamrs
+    >>> from pamrs.fit import ForceMap, fit_muscle
+    >>> muscle = pamrs.rigs.shoulder().muscle
+    >>> e, p = (grid.ravel() for grid in np.meshgrid(np.linspace(0.0, 0.25, 8), [2e5, 4e5, 6e5]))
+    >>> data = ForceMap.from_arrays(0.276 * (1 - e), p, muscle.force(p, e), rest_length=0.276)
+    >>> fit = fit_muscle(data, muscle, order=2)
+    >>> fit.x.round(4)[:2].tolist()
+    [3.0, -0.35]
+    """
+    _choices(weights=weights, errors=errors, direction=direction)
+    rows = _chosen(data, levels)
+    blank = template(muscle, model, geometry, order)
+    unknowns = _free(blank, tuple(free), dict(tolerance or {}))
+    if noise is not None and not (math.isfinite(noise) and noise > 0.0):
+        raise ParameterError(f"noise = {noise!r} is not allowed: a positive number is needed")
+    rest = float(blank.parameters["rest_length"])
+    if not math.isclose(rest, data.rest_length, rel_tol=1e-6):
+        raise ParameterError(f"rest_length: the muscle has {rest:g} m, the force map {data.rest_length:g} m; the same is needed")
+    problem = _problem(data, blank, moduli, unknowns, noise, direction, weights)
+    if not float(problem.force[rows].max()) > 0.0:
+        raise FitError(f"the largest force of the fitted rows is {problem.force[rows].max():g} N: a pulling force is needed")
+    return _result(data, problem, rows, estimate(problem, rows), errors)
+
+
+def _choices(*, weights: str, errors: str, direction: str | None) -> None:
+    for name, value, allowed in (
+        ("weights", weights, ("force", "level")),
+        ("errors", errors, ("level", "plain")),
+        ("direction", direction, ("data", None)),
+    ):
+        if value not in allowed:
+            raise ParameterError(f"{name} = {value!r} is not allowed: {' or '.join(repr(choice) for choice in allowed)}")
+
+
+def level_indices(data: ForceMap, levels: Sequence[float]) -> list[int]:
+    """Indices of levels given as whole numbers (indices) or floats (pressures in Pa)."""
+    chosen = np.asarray(levels)
+    if chosen.ndim != 1 or not len(chosen) or chosen.dtype.kind not in "iuf":
+        raise ParameterError(f"levels = {levels!r} is not allowed: a list of indices, or of pressures in Pa as floats")
+    if chosen.dtype.kind == "f":
+        return data.level_indices(chosen.tolist())
+    count = len(data.levels)
+    if np.any((chosen < -count) | (chosen >= count)):
+        raise ParameterError(
+            f"levels = {chosen.tolist()} is not allowed: indices from 0 to {count - 1}; pressures are given as floats, in Pa"
+        )
+    return sorted({int(index) % count for index in chosen})
+
+
+def _chosen(data: ForceMap, levels: Sequence[float] | None) -> Mask:
+    level = data.level[data.used]
+    return np.ones(len(level), dtype=bool) if levels is None else np.isin(level, level_indices(data, levels))
+
+
+def _free(blank: Muscle, names: tuple[str, ...], tolerance: dict[str, float]) -> tuple[Free, ...]:
+    known = blank.parameters
+    for name in names:
+        if name not in GEOMETRY:
+            raise ParameterError(f"free: {name!r} is not allowed: of {', '.join(GEOMETRY)}")
+        if not has_effect(name, blank.model, blank.geometry):
+            raise ParameterError(f"free: {name!r} has no effect on the model {blank.model} with {blank.geometry} geometry")
+    if len(set(names)) < len(names):
+        raise ParameterError(f"free = {list(names)} names a parameter twice")
+    for name, value in tolerance.items():
+        if name not in GEOMETRY:
+            raise ParameterError(f"tolerance: {name!r} is not allowed: of {', '.join(GEOMETRY)}")
+        if not value > 0.0:
+            raise ParameterError(f"tolerance: {name} = {value!r} is not allowed: a positive number is needed (infinite for no prior)")
+    return tuple(Free(name, float(known[name]), float(tolerance.get(name, math.inf))) for name in names)
+
+
+def _problem(
+    data: ForceMap, blank: Muscle, moduli: str, free: tuple[Free, ...], noise: float | None, direction: str | None, weights: str
+) -> Problem:
+    used = data.used
+    pressure, _, force, level, way = data.used_rows()
+    steps = way.astype(np.float64) if direction == "data" else np.zeros(len(force))
+    arrays: dict[str, Any] = {
+        "pressure": pressure,
+        "length": data.length[used],
+        "force": force,
+        "level": level,
+        "direction": steps,
+        "levels": data.levels,
+    }
+    problem = Problem(blank=blank, moduli=moduli, free=free, noise=noise, weight=np.ones(len(force)), **arrays)
+    if weights == "force":
+        return problem
+    tops = np.array([level_force(problem, index) for index in range(len(data.levels))])
+    return Problem(blank=blank, moduli=moduli, free=free, noise=noise, weight=1.0 / tops[level], **arrays)
+
+
+def _result(data: ForceMap, problem: Problem, rows: Mask, found: Estimate, errors: str) -> MuscleFit:
+    plain, robust = covariances(problem, found, problem.level[rows])
+    warnings = []
+    kind = errors
+    if errors == "level" and robust is None:
+        kind = "plain"
+        if found.sigma > 0.0:
+            warnings.append(
+                "standard errors take the residuals as independent: errors by level need 5 levels that can each be spared "
+                f"({len(np.unique(problem.level[rows]))} fitted)"
+            )
+    covar = plain if kind == "plain" or robust is None else robust
+    parameters = _parameters(problem, found, covar, plain)
+    warnings += _warnings(problem, found, rows, parameters)
+    return MuscleFit(
+        data=data,
+        params=parameters,
+        covar=covar,
+        covar_plain=plain,
+        errors=kind,
+        success=found.success,
+        message=found.message,
+        warnings=tuple(warnings),
+        _problem=problem,
+        _estimate=found,
+        _rows=rows,
+    )
+
+
+def _parameters(problem: Problem, found: Estimate, covar: Array, plain: Array) -> dict[str, FitParameter]:
+    spread, spread_plain = np.sqrt(np.diag(covar)).tolist(), np.sqrt(np.diag(plain)).tolist()
+    parameters = {}
+    for i, (name, unit) in enumerate(zip(found.design.names, found.design.units, strict=True)):
+        parameters[name] = FitParameter(name, float(found.x[i]), spread[i], unit, spread_plain[i])
+    for i, free in enumerate(problem.free, start=len(found.x)):
+        known = free.tolerance if math.isfinite(free.tolerance) else None
+        value = float(found.geometry[i - len(found.x)])
+        parameters[free.name] = FitParameter(free.name, value, spread[i], GEOMETRY[free.name], spread_plain[i], free.nominal, known)
+    return parameters
+
+
+def _warnings(problem: Problem, found: Estimate, rows: Mask, parameters: dict[str, FitParameter]) -> list[str]:
+    notes = []
+    if found.condition_number > _LARGE_CONDITION:
+        span = np.ptp(problem.length[rows]) / problem.blank.parameters["rest_length"]
+        notes.append(
+            f"condition number {found.condition_number:.2g}: lengths over {100 * span:.3g} % of the rest length and "
+            f"{len(np.unique(problem.level[rows]))} pressure levels hardly separate {', '.join(found.design.names)}; single "
+            "moduli mean little, forces inside the fitted range are not affected"
+        )
+    spare = int(rows.sum()) - len(parameters)
+    if problem.free and problem.noise is None and spare < _FEW_SPARE:
+        notes.append(
+            f"{int(rows.sum())} points for {len(parameters)} unknowns: the scatter, which weighs data against the tolerances, is "
+            "hardly known; give noise, fit less, or take more points"
+        )
+    if not found.success:
+        notes.append(f"the search of the geometry did not converge: {found.message}")
+    for free in problem.free:
+        item = parameters[free.name]
+        if math.isinf(free.tolerance):
+            continue
+        if item.stderr_plain > _UNINFORMED * free.tolerance:
+            notes.append(f"{free.name}: the data say nothing, its value is the prior's (tolerance {free.tolerance:.3g} {item.unit})")
+        away = abs(item.value - free.nominal) / free.tolerance
+        if away > _FAR:
+            notes.append(
+                f"{free.name} = {item.value:.4g} {item.unit} lies {away:.1f} tolerances from the nominal {free.nominal:.4g} {item.unit}"
+            )
+    return notes

@@ -1,0 +1,200 @@
+"""Errors of a fit in the words of the dissertation, and on pressures that the fit has not seen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pamrs.fit.estimate import Estimate, Problem, refitted
+from pamrs.fit.problem import FitError
+
+__all__ = ["CrossValidation", "PressureErrors", "leave_one_out"]
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class PressureErrors:
+    """Error of each pressure level, the measure (2.37).
+
+    Attributes
+    ----------
+    levels : (m,) array
+        Pressure [Pa].
+    points : (m,) int array
+        Number of points.
+    rms, max : (m,) array
+        Root mean square, and largest magnitude, of ``(F - F_model)/F_max`` with the level's own largest measured force [1].
+    fitted : (m,) bool array
+        Whether the level was part of the fit.
+    """
+
+    levels: Array
+    points: NDArray[np.intp]
+    rms: Array
+    max: Array
+    fitted: Mask
+
+    @classmethod
+    def of(cls, problem: Problem, error: Array, rows: Mask, fitted: Mask) -> PressureErrors:
+        """Gather force errors [N] of all rows (n,) over the levels present in ``rows``."""
+        present = np.unique(problem.level[rows])
+        counts, rms, worst = [], [], []
+        for level in present:
+            members = rows & (problem.level == level)
+            share = error[members] / level_force(problem, int(level))
+            counts.append(len(share))
+            rms.append(float(np.sqrt(np.mean(share**2))))
+            worst.append(float(np.abs(share).max()))
+        seen = np.isin(present, np.unique(problem.level[fitted]))
+        return cls(problem.levels[present], np.array(counts), np.array(rms), np.array(worst), seen)
+
+
+def level_force(problem: Problem, level: int) -> float:
+    """Largest measured force of a level [N]; FitError if it does not pull."""
+    largest = float(problem.force[problem.level == level].max())
+    if largest <= 0.0:
+        raise FitError(
+            f"level {problem.levels[level] / 1e3:g} kPa has no pulling force (largest {largest:g} N): error (2.37) needs one; "
+            "leave it out"
+        )
+    return largest
+
+
+def summary(error: Array, scale: float) -> tuple[float, float] | None:
+    """Rms and largest magnitude of force errors over ``scale``; None without a row."""
+    if not len(error):
+        return None
+    return float(np.sqrt(np.mean(error**2))) / scale, float(np.abs(error).max()) / scale
+
+
+@dataclass(frozen=True)
+class CrossValidation:
+    """Leave-one-pressure-out: every fitted level predicted by a fit of the others.
+
+    Attributes
+    ----------
+    by_pressure : PressureErrors
+        (2.37) of each level as predicted; all levels are marked as not fitted.
+    predicted, residual : (n,) array
+        Predicted force, and measured minus predicted [N], of the fitted rows in the map's order.
+    rms, max : float
+        Over all points, as fractions of the map's largest force.
+    interior_rms, interior_max : float or None
+        The same over the levels between others (interpolation in pressure); None when there are none.
+    end_rms, end_max : float
+        Over the lowest and the highest level, which are extrapolated.
+    rms_stderr : float
+        Standard error of ``rms`` from the spread over the levels (delete-one-level jackknife).
+    """
+
+    by_pressure: PressureErrors
+    predicted: Array
+    residual: Array
+    rms: float
+    max: float
+    interior_rms: float | None
+    interior_max: float | None
+    end_rms: float
+    end_max: float
+    rms_stderr: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything as plain numbers, errors as fractions."""
+        return {
+            "rms": self.rms,
+            "max": self.max,
+            "interior_rms": self.interior_rms,
+            "interior_max": self.interior_max,
+            "end_rms": self.end_rms,
+            "end_max": self.end_max,
+            "rms_stderr": self.rms_stderr,
+            "levels": self.by_pressure.levels.tolist(),
+            "level_rms": self.by_pressure.rms.tolist(),
+            "level_max": self.by_pressure.max.tolist(),
+            "points": self.by_pressure.points.tolist(),
+        }
+
+
+def leave_one_out(problem: Problem, result: Estimate, rows: Mask) -> CrossValidation:
+    """Predict each fitted level from the others.
+
+    Without free geometry the refits follow from the one decomposition: the prediction error of a level is
+    ``(1 - H_g)^-1 r_g`` with its block ``H_g`` of the hat matrix. Otherwise everything is refitted.
+
+    Parameters
+    ----------
+    problem : Problem
+        Data and unknowns.
+    result : Estimate
+        The fit of all rows.
+    rows : (n,) bool array
+        The fitted rows.
+
+    Returns
+    -------
+    CrossValidation
+
+    Raises
+    ------
+    FitError
+        If there are fewer than two levels, or the others do not determine the unknowns.
+    """
+    level = problem.level[rows]
+    groups = np.unique(level)
+    if len(groups) < 2:
+        raise FitError("leave-one-pressure-out needs two pressure levels at least; there is one")
+    linear = not problem.free and not result.design.per_level
+    error = _by_hat_matrix(problem, result, level) if linear else _by_refits(problem, result, rows)
+    error = error / problem.weight[rows]
+    everywhere = np.zeros(len(rows))
+    everywhere[rows] = error
+    by_pressure = PressureErrors.of(problem, everywhere, rows, np.zeros_like(rows))
+    top = float(problem.force.max())
+    ends = np.isin(level, [groups[0], groups[-1]])
+    rms, worst = summary(error, top) or (0.0, 0.0)
+    interior = summary(error[~ends], top) or (None, None)
+    end_rms, end_max = summary(error[ends], top) or (0.0, 0.0)
+    dropped = np.array([np.sqrt(np.mean(error[level != group] ** 2)) / top for group in groups])
+    spread = float(np.sqrt((1.0 - 1.0 / len(groups)) * np.sum((dropped - dropped.mean()) ** 2)))
+    return CrossValidation(
+        by_pressure, problem.force[rows] - error, error, rms, worst, interior[0], interior[1], end_rms, end_max, spread
+    )
+
+
+def _gone(problem: Problem, level: int, why: str) -> FitError:
+    return FitError(
+        f"leave-one-pressure-out: without {problem.levels[level] / 1e3:g} kPa the other levels do not determine the fit: {why}"
+    )
+
+
+def _by_hat_matrix(problem: Problem, result: Estimate, level: NDArray[np.intp]) -> Array:
+    if not result.jacobian.shape[1]:
+        return result.residual
+    span, _, _ = np.linalg.svd(result.jacobian / np.linalg.norm(result.jacobian, axis=0), full_matrices=False)
+    error = np.empty_like(result.residual)
+    for group in np.unique(level):
+        own = level == group
+        left = np.eye(span.shape[1]) - span[own].T @ span[own]
+        if np.linalg.eigvalsh(left)[0] < 1e-9:
+            raise _gone(problem, int(group), f"{int(np.sum(~own))} points for {', '.join(result.design.names)}")
+        # (1 - H_g)^-1 r_g by the Woodbury identity: small matrices however long the level is.
+        error[own] = result.residual[own] + span[own] @ np.linalg.solve(left, span[own].T @ result.residual[own])
+    return error
+
+
+def _by_refits(problem: Problem, result: Estimate, rows: Mask) -> Array:
+    error = np.zeros(len(rows))
+    for group in np.unique(problem.level[rows]):
+        try:
+            other = refitted(problem, result, rows, int(group))
+        except FitError as reason:
+            raise _gone(problem, int(group), str(reason)) from reason
+        own = rows & (problem.level == group)
+        matrix, target = problem.system(other.design, other.blank, own)
+        error[own] = target - matrix @ other.x
+    return error[rows]

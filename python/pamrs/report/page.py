@@ -1,0 +1,40 @@
+"""What every report page shares: the style sheet and the settings of the templates."""
+
+from __future__ import annotations
+
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import jinja2
+from markupsafe import Markup
+
+__all__ = ["render_page"]
+
+
+def _version() -> str:
+    try:
+        return metadata.version("pamrs")
+    except metadata.PackageNotFoundError:
+        return ""
+
+
+def render_page(template: Path, **content: Any) -> str:
+    """Fill a template.
+
+    Parameters
+    ----------
+    template : Path
+        Jinja2 file; it gets ``style``, the shared style sheet, and ``version`` besides `content`.
+    **content
+        What it shows.
+
+    Returns
+    -------
+    str
+        HTML text.
+    """
+    environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    style = Path(__file__).with_name("style.css").read_text(encoding="utf-8")
+    page = environment.from_string(template.read_text(encoding="utf-8"))
+    return page.render(style=Markup(style), version=_version(), **content)  # noqa: S704

@@ -1,0 +1,403 @@
+"""Force maps: parsing, units, every flag with its count, levels, descriptions, recordings of a bench."""
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from pamrs.errors import ParameterError, RecordingError
+from pamrs.fit.data import ForceMap
+from pamrs.fit.description import load_measured_muscle
+from pamrs.fit.files import load_force_map
+
+CASE = Path(__file__).parents[2] / "cases" / "festo_dmsp"
+TABLE = CASE.parents[2] / "shared/recordings/festo_dmsp_martens_boblan/martens_boblan_2017_force_maps.csv"
+needs_festo = pytest.mark.skipif(not TABLE.exists(), reason="the Festo maps are not beside the project")
+
+REST = 0.3
+LENGTHS = np.tile([0.30, 0.28, 0.26, 0.24], 3)
+PRESSURES = np.repeat([1e5, 2e5, 4e5], 4)
+FORCES = PRESSURES * 3e-3 * (LENGTHS / REST - 0.7)
+
+DESCRIPTION = """
+schema = "pamrs.force_map/1"
+name = "bench 7"
+file = "map.csv"
+columns = { "L" = "length [mm]", "p" = "pressure [bar]", "F" = "force [N]", "spot" = "" }
+where = { specimen = "B" }
+clipped_force = { value = 0.0, unit = "N" }
+[muscle]
+rest_length = { value = 300.0, unit = "mm" }
+rest_diameter = { value = 20.0, unit = "mm", tol = 0.5 }
+braid_angle = { value = 64.0, unit = "deg", tol = 3.0 }
+wall_thickness = { value = 2.0, unit = "mm", unknown = true }
+"""
+
+
+def made(length=LENGTHS, pressure=PRESSURES, force=FORCES, rest_length=REST, **options):
+    return ForceMap.from_arrays(length, pressure, force, rest_length=rest_length, **options)
+
+
+def changed(values, index, value):
+    copy = np.array(values, dtype=float)
+    copy[index] = value
+    return copy
+
+
+def write(tmp_path, text, name="map.csv"):
+    path = tmp_path / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def csv_text(heading, scale=(1.0, 1.0, 1.0)):
+    rows = np.column_stack([LENGTHS * scale[0], PRESSURES * scale[1], FORCES * scale[2]])
+    return heading + "\n" + "\n".join(",".join(f"{value:.9g}" for value in row) for row in rows) + "\n"
+
+
+# ------------------------------------------------------------------------ arrays
+
+
+def test_clean_map_uses_every_row():
+    data = made()
+    assert data.used.all()
+    assert data.issues == []
+    assert data.reason == ("",) * 12
+    np.testing.assert_array_equal(data.levels, [1e5, 2e5, 4e5])
+    np.testing.assert_array_equal(data.level, np.repeat([0, 1, 2], 4))
+    np.testing.assert_allclose(data.contraction, 1 - LENGTHS / REST)
+    pressure, contraction, force, level, direction = data.used_rows()
+    np.testing.assert_array_equal(pressure, PRESSURES)
+    np.testing.assert_array_equal(force, FORCES)
+    np.testing.assert_allclose(contraction, data.contraction)
+    np.testing.assert_array_equal(level, data.level)
+    assert direction.dtype == np.int8
+    assert not direction.any()
+
+
+@pytest.mark.parametrize(
+    ("columns", "reason", "words"),
+    [
+        ({"force": changed(FORCES, 3, np.nan)}, "not a number", "1 row of 12 have no number"),
+        ({"length": changed(LENGTHS, 3, np.inf)}, "not a number", "no number"),
+        ({"pressure": changed(PRESSURES, 3, -2e4)}, "negative pressure", "negative gauge pressure"),
+        ({"pressure": changed(PRESSURES, 3, 9e8)}, "pressure out of range", "beyond 5 MPa"),
+        ({"length": changed(LENGTHS, 3, 280.0)}, "length out of range", "no muscle of this rest length"),
+        ({"force": changed(FORCES, 3, 0.0), "clipped": 0.0}, "clipped", "1 row of 12 are clipped"),
+        ({"faulty": np.arange(12) == 3}, "sensor fault", "masked by the check"),
+        (
+            {
+                "length": changed(LENGTHS, 3, LENGTHS[2]),
+                "pressure": changed(PRESSURES, 3, PRESSURES[2]),
+                "force": changed(FORCES, 3, FORCES[2]),
+            },
+            "duplicate",
+            "repeat an earlier row",
+        ),
+    ],
+)
+def test_each_bad_row_is_flagged_with_its_reason(columns, reason, words):
+    data = made(**columns)
+    assert np.flatnonzero(~data.used).tolist() == [3]
+    assert data.reason[3] == reason
+    assert data.level[3] == -1
+    assert len(data) == 12
+    assert len(data.issues) == 1
+    assert words in data.issues[0]
+    assert "not used" in data.issues[0]
+    assert all(np.isfinite(column).all() for column in data.used_rows())
+
+
+def test_repeats_of_a_resting_bench_are_no_duplicates():
+    assert made(np.full(9, 0.28), np.full(9, 2e5), np.full(9, 100.0), check_duplicates=False).used.all()
+
+
+def test_exact_zeros_that_nobody_explains_are_used_and_reported():
+    data = made(force=changed(FORCES, [1, 2, 3], 0.0))
+    assert data.used.all()
+    assert "3 rows have a force of exactly 0 N" in data.issues[0]
+
+
+@pytest.mark.parametrize(
+    ("columns", "unit"),
+    [
+        ({"length": LENGTHS * 1e3}, "in mm"),
+        ({"length": LENGTHS * 1e2}, "in cm"),
+        ({"length": LENGTHS / 0.0254}, "in in"),
+        ({"length": LENGTHS / 1e3}, "in m, read as mm"),
+        ({"pressure": PRESSURES / 1e3}, "in kPa"),
+        ({"pressure": PRESSURES / 1e5}, "in bar"),
+        ({"pressure": PRESSURES / 6894.757}, "in psi"),
+        ({"pressure": PRESSURES / 1e6}, "in MPa"),
+        ({"pressure": PRESSURES * 1e3}, "in Pa, read as kPa"),
+        ({"pressure": PRESSURES * 1e5}, "in Pa, read as bar"),
+    ],
+)
+def test_wrong_units_are_an_error_that_names_the_likely_unit(columns, unit):
+    with pytest.raises(RecordingError, match=f"wrong unit.* {unit}$"):
+        made(**columns)
+
+
+@pytest.mark.parametrize(
+    ("options", "match"),
+    [
+        ({"rest_length": 300.0}, "rest_length = 300 m is not allowed.*in mm"),
+        ({"rest_length": np.nan}, "rest_length"),
+        ({"level_tolerance": 0.0}, "level_tolerance = 0.0"),
+    ],
+)
+def test_impossible_arguments(options, match):
+    with pytest.raises(ParameterError, match=match):
+        made(**options)
+
+
+def test_columns_of_different_lengths():
+    with pytest.raises(RecordingError, match=r"\[11, 12, 12\] rows"):
+        made(length=LENGTHS[1:])
+    with pytest.raises(RecordingError, match="direction has 3 rows"):
+        made(direction=[1, -1, 0])
+
+
+def test_too_few_rows_says_what_became_of_the_others():
+    with pytest.raises(RecordingError, match="1 usable rows, two at least.*11 rows of 12 are clipped"):
+        made(force=np.append(np.zeros(11), 5.0), clipped=0.0)
+
+
+def test_direction_is_signed_and_unknown_is_zero():
+    data = made(direction=np.tile([-1.0, 0.4, np.nan, 0.0], 3))
+    np.testing.assert_array_equal(data.direction, np.tile([-1, 1, 0, 0], 3))
+
+
+# ------------------------------------------------------------------------ levels
+
+
+def test_scatter_around_a_level_is_one_level():
+    scatter = np.tile([-1e3, 1e3, -500.0, 500.0], 3)
+    data = made(pressure=PRESSURES + scatter)
+    np.testing.assert_allclose(data.levels, [1e5, 2e5, 4e5])
+    assert len(made(pressure=PRESSURES + scatter, level_tolerance=100.0).levels) == 12
+
+
+def test_ramping_pressure_is_cut_and_reported():
+    data = made(pressure=np.linspace(1e5, 1.2e5, 12), level_tolerance=3e3)
+    assert 3 <= len(data.levels) <= 7
+    assert np.all(np.diff(data.levels) > 0)
+    assert "have no gaps" in data.issues[0]
+
+
+def test_select_leaves_out_the_other_levels():
+    part = made().select(levels=[2, 0])
+    np.testing.assert_array_equal(part.levels, [1e5, 4e5])
+    np.testing.assert_array_equal(part.level, [0] * 4 + [-1] * 4 + [1] * 4)
+    assert part.reason[4:8] == ("left out",) * 4
+    assert "4 rows of 12" in part.issues[0]
+    np.testing.assert_array_equal(made().select(levels=[-1]).levels, [4e5])
+    with pytest.raises(ParameterError, match="levels"):
+        made().select(levels=[3])
+    with pytest.raises(ParameterError, match="one at least"):
+        made().select(levels=[])
+
+
+def test_levels_by_pressure():
+    assert made().level_indices([4.01e5, 1e5, 1e5]) == [0, 2]
+    with pytest.raises(ParameterError, match="no measurement at 300 kPa; there are levels at 100, 200, 400 kPa"):
+        made().level_indices([3e5])
+
+
+# ---------------------------------------------------------------- against a muscle
+
+
+def fake_muscle(limits=(-0.1, 0.15), area=1e-3, rest_length=REST):
+    return SimpleNamespace(
+        parameters={"rest_length": rest_length},
+        contraction_limits=limits,
+        gas_area=lambda e: np.full_like(e, area),
+    )
+
+
+def test_lengths_beyond_the_braid_are_flagged():
+    data = made().checked_against(fake_muscle())
+    assert data.reason == ("", "", "", "beyond the braid") * 3
+    np.testing.assert_array_equal(data.levels, [1e5, 2e5, 4e5])
+    assert "3 rows of 12 have a length outside the braid's limits" in data.issues[0]
+
+
+def test_a_level_without_a_row_left_vanishes():
+    data = made(length=changed(LENGTHS, [0, 1, 2, 3], 0.24)).checked_against(fake_muscle())
+    np.testing.assert_array_equal(data.levels, [2e5, 4e5])
+    np.testing.assert_array_equal(np.unique(data.level), [-1, 0, 1])
+
+
+def test_forces_that_gas_cannot_make():
+    with pytest.raises(RecordingError, match="probably in mN"):
+        made(force=FORCES * 1e3).checked_against(fake_muscle())
+    with pytest.raises(RecordingError, match="read as kgf or lbf"):
+        made(force=FORCES * 9.81).checked_against(fake_muscle(area=9e-4))
+    with pytest.raises(RecordingError, match="probably in kN"):
+        made(force=FORCES / 1e3).checked_against(fake_muscle())
+
+
+def test_another_rest_length():
+    with pytest.raises(ParameterError, match="the muscle has 0.25 m, the force map 0.3 m"):
+        made().checked_against(fake_muscle(rest_length=0.25))
+
+
+# ------------------------------------------------------------------------ tables
+
+
+@pytest.mark.parametrize(
+    ("heading", "scale"),
+    [
+        ("length [m],pressure [Pa],force [N]", (1, 1, 1)),
+        ("length_m,pressure_kPa,force_N", (1, 1e-3, 1)),
+        ("muscle_length (mm),Gauge Pressure [bar],Tension_kN", (1e3, 1e-5, 1e-3)),
+    ],
+)
+def test_headings_carry_the_unit(tmp_path, heading, scale):
+    data = load_force_map(write(tmp_path, csv_text(heading, scale)), rest_length=REST)
+    np.testing.assert_allclose(data.length, LENGTHS, rtol=1e-6)
+    np.testing.assert_allclose(data.pressure, PRESSURES, rtol=1e-6)
+    np.testing.assert_allclose(data.force, FORCES, rtol=1e-6)
+    assert data.name == "map"
+
+
+def test_contraction_in_place_of_length(tmp_path):
+    text = "contraction [%],pressure [bar],force [N]\n0,1,300\n10,1,200\n20,2,100\n"
+    data = load_force_map(write(tmp_path, text), rest_length=REST)
+    np.testing.assert_allclose(data.contraction, [0.0, 0.1, 0.2])
+    with pytest.raises(RecordingError, match="contraction around 10.*in %"):
+        load_force_map(write(tmp_path, text.replace("[%]", "[1]")), rest_length=REST)
+
+
+def test_direction_in_words_or_numbers(tmp_path):
+    text = "length_m,pressure_bar,force_N,direction\n.3,1,90,contracting\n.28,1,60,lengthening\n.26,1,30,\n.25,1,20,-1\n"
+    data = load_force_map(write(tmp_path, text), rest_length=REST)
+    np.testing.assert_array_equal(data.direction, [-1, 1, 0, -1])
+    with pytest.raises(RecordingError, match="row 2: 'sideways' is not allowed"):
+        load_force_map(write(tmp_path, text.replace("contracting", "sideways")), rest_length=REST)
+
+
+@pytest.mark.parametrize(
+    ("heading", "match"),
+    [
+        ("length,pressure [Pa],force [N]", "'length' has no unit: write 'length \\[m\\]'"),
+        ("length [m],pressure [V],force [N]", "'pressure \\[V\\]'.*wrong dimension"),
+        ("length [m],pressure [Pa],load cell [N]", "no column for force; there are: length"),
+        ("width [m],pressure [Pa],force [N]", "no column for length"),
+        ("length [m],length_mm,force [N]", "length is there twice"),
+    ],
+)
+def test_columns_that_cannot_be_understood(tmp_path, heading, match):
+    with pytest.raises(RecordingError, match=match):
+        load_force_map(write(tmp_path, csv_text(heading)), rest_length=REST)
+
+
+def test_a_bare_table_needs_the_rest_length(tmp_path):
+    with pytest.raises(RecordingError, match="rest_length is missing"):
+        load_force_map(write(tmp_path, csv_text("length_m,pressure_Pa,force_N")))
+
+
+SEVERAL = "specimen,spot,length_m,pressure_bar,force_N\nA,1,.3,1,90\nB,1,.3,1,95\nB,2,.28,1,0\nB,3,.26,2,130\nB,4,.27,2,oops\n"
+
+
+def test_rows_of_one_specimen(tmp_path):
+    path = write(tmp_path, SEVERAL.replace("oops", "nan"))
+    data = load_force_map(path, rest_length=REST, where={"specimen": "B"}, clipped=0.0)
+    np.testing.assert_array_equal(data.force[data.used], [95.0, 130.0])
+    assert len(data) == 4
+    assert sorted(set(data.reason)) == ["", "clipped", "not a number"]
+    assert any("1 rows of the file are not specimen = B" in issue for issue in data.issues)
+    assert any("columns not used: spot" in issue for issue in data.issues)
+    with pytest.raises(RecordingError, match="no row has specimen = 'C'; there are: A, B"):
+        load_force_map(path, rest_length=REST, where={"specimen": "C"})
+    with pytest.raises(RecordingError, match="where names the column 'person'"):
+        load_force_map(path, rest_length=REST, where={"person": "B"})
+
+
+def test_two_specimens_are_not_mixed(tmp_path):
+    with pytest.raises(RecordingError, match=r"column 'specimen' has 2 values \(A, B\): choose one"):
+        load_force_map(write(tmp_path, SEVERAL), rest_length=REST)
+
+
+def test_a_cell_that_is_no_number_is_named(tmp_path):
+    with pytest.raises(RecordingError, match="row 6: 'oops' is not a number"):
+        load_force_map(write(tmp_path, SEVERAL), rest_length=REST, where={"specimen": "B"})
+
+
+# -------------------------------------------------------------------- recordings
+
+
+@pytest.mark.parametrize("noise", [0.0, 300.0])
+def test_recording_of_a_bench_knows_its_direction(tmp_path, noise):
+    generator = np.random.default_rng(1)
+    time = np.arange(0, 60, 0.02)
+    held = np.repeat([1e5, 2e5, 3e5], 1000) + noise * generator.normal(size=time.size)
+    length = 0.27 - 0.03 * np.cos(2 * np.pi * time / 5) + 2e-5 * generator.normal(size=time.size)
+    way = np.sign(np.sin(2 * np.pi * time / 5))
+    force = held * 3e-3 * (length / REST - 0.7) * (1 + 0.05 * way) + generator.normal(size=time.size)
+    rows = "\n".join(",".join(f"{v:.7g}" for v in row) for row in np.column_stack([time, length * 1e3, held / 1e5, force]))
+    path = write(tmp_path, "time [s],length [mm],pressure [bar],force [N]\n" + rows)
+    data = load_force_map(path, rest_length=REST)
+    assert data.used.mean() > 0.99
+    np.testing.assert_allclose(data.levels, [1e5, 2e5, 3e5], rtol=0.01)
+    assert np.mean(data.direction == way) > 0.9
+    assert np.mean(data.direction == -way) < 0.005
+
+
+# ------------------------------------------------------------------ descriptions
+
+
+@pytest.fixture
+def described(tmp_path):
+    write(tmp_path, SEVERAL.replace("length_m", "L").replace("pressure_bar", "p").replace("force_N", "F").replace("oops", "80"))
+    text = (tmp_path / "map.csv").read_text(encoding="utf-8").replace(",.", ",0.").replace("0.3,", "300,")
+    for metres, millimetres in (("0.28", "280"), ("0.26", "260"), ("0.27", "270")):
+        text = text.replace(metres, millimetres)
+    write(tmp_path, text)
+    return write(tmp_path, DESCRIPTION, "map.toml")
+
+
+def test_description_gives_map_muscle_and_tolerances(described):
+    measured = load_measured_muscle(described)
+    assert measured.data.name == "bench 7"
+    np.testing.assert_array_equal(measured.data.force[measured.data.used], [95.0, 130.0, 80.0])
+    assert measured.data.rest_length == pytest.approx(0.3)
+    assert measured.muscle.parameters["rest_diameter"] == pytest.approx(0.02)
+    assert measured.tolerance == {
+        "rest_diameter": pytest.approx(5e-4),
+        "braid_angle": pytest.approx(np.radians(3.0)),
+        "wall_thickness": np.inf,
+    }
+    np.testing.assert_array_equal(load_force_map(described).force, measured.data.force)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "match"),
+    [
+        ("pamrs.force_map/1", "pamrs.force_map/9", "schema = 'pamrs.force_map/9'"),
+        ('file = "map.csv"', 'file = "gone.csv"', "there is no file"),
+        ('file = "map.csv"', "", "file is missing"),
+        ("where =", "were =", "unknown key 'were'; did you mean 'where'"),
+        ('unit = "N" }', 'unit = "bar" }', "clipped_force: unit 'bar' has the wrong dimension"),
+        ("value = 64.0", "value = 640.0", "muscle.braid_angle"),
+        ("[muscle]", "[mussel]", "muscle.* is missing"),
+    ],
+)
+def test_description_problems_are_named(described, old, new, match):
+    text = described.read_text(encoding="utf-8")
+    assert old in text
+    described.write_text(text.replace(old, new), encoding="utf-8")
+    with pytest.raises(RecordingError, match=match):
+        load_measured_muscle(described)
+
+
+@needs_festo
+@pytest.mark.parametrize(("name", "used", "clipped", "levels"), [("DMSP-20-300", 60, 66, 20), ("DMSP-10-250", 40, 45, 16)])
+def test_festo_maps_leave_the_clipped_zeros_out(name, used, clipped, levels):
+    measured = load_measured_muscle(CASE / f"{name}.toml")
+    assert measured.data.used.sum() == used
+    assert measured.data.reason.count("clipped") == clipped
+    assert len(measured.data.levels) == levels
+    assert (measured.data.force[measured.data.used] > 0).all()
+    assert set(measured.tolerance) == {"rest_length", "rest_diameter", "braid_angle", "wall_thickness"}

@@ -1,0 +1,317 @@
+"""Report, figures and command line of a muscle fit."""
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pamrs import cli, load_rig
+from pamrs.fit import ForceMap, compare_models, fit_muscle
+from pamrs.fit import report as pages
+from pamrs.fit.remarks import headline, limits, meaning, percent, residual_pattern
+from pamrs.muscle import Muscle
+
+REST = 0.3
+LEVELS = [1e5, 2e5, 3e5, 4e5, 5e5, 6e5]
+SIZES = ["--rest-length", "300 mm", "--rest-diameter", "20 mm", "--braid-angle", "65 +- 3 deg", "--wall-thickness", "2 mm"]
+
+
+@pytest.fixture(scope="module")
+def muscle():
+    return Muscle(
+        rest_length=REST,
+        rest_diameter=0.02,
+        braid_angle=np.radians(65.0),
+        wall_thickness=0.002,
+        model="kothera",
+        modulus_slope=[0.6, -1.0],
+        modulus_offset=[1.2e6, -1.5e6],
+    )
+
+
+@pytest.fixture(scope="module")
+def data(muscle):
+    """Six pressures, seven lengths, noise of 1 N; two rows are no numbers."""
+    e, p = (grid.ravel() for grid in np.meshgrid(np.linspace(0.01, 0.19, 7), LEVELS))
+    force = muscle.force(p, e) + np.random.default_rng(5).normal(scale=1.0, size=e.size)
+    force[[3, 17]] = np.nan
+    return ForceMap.from_arrays(REST * (1 - e), p, force, rest_length=REST, name="bench 7", source="bench.csv")
+
+
+@pytest.fixture(scope="module")
+def table(data, tmp_path_factory):
+    path = tmp_path_factory.mktemp("bench") / "bench.csv"
+    rows = np.column_stack([1e3 * data.length, data.pressure / 1e5, data.force])
+    text = "\n".join(",".join("" if np.isnan(v) else f"{v:.10g}" for v in row) for row in rows)
+    path.write_text("length [mm],pressure_bar,force (N)\n" + text + "\n", encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def fit(data, muscle):
+    return fit_muscle(data, muscle)
+
+
+def words_of(page):
+    """What a reader sees, figures and style left out."""
+    text = re.sub(r"<svg.*?</svg>|<style>.*?</style>", " ", page, flags=re.DOTALL)
+    return re.sub(r"\s+", " ", re.sub(r"<[^>]+>", " ", text))
+
+
+# ------------------------------------------------------------------------- pages
+
+
+def test_page_is_whole_and_loads_nothing(fit):
+    page = pages.render_html(fit)
+    assert page.startswith("<!DOCTYPE html>")
+    assert page.rstrip().endswith("</html>")
+    assert page.count("<svg") == page.count("</svg>") == 4
+    assert not re.search(r"<(script|link|img)\b", page)
+    assert not re.search(r'(src|href)="(?!#|data:)', page)
+    ids = re.findall(r'\bid="([^"]+)"', page)
+    assert len(ids) == len(set(ids))
+    assert "nan" not in words_of(page).lower().split()
+
+
+def test_page_says_what_was_fitted_and_how_good_it_is(fit):
+    words = words_of(pages.render_html(fit, command="pamrs fit muscle bench.csv"))
+    assert headline(fit) in words
+    assert "bench 7: 40 of 42 rows are used, at 6 pressures from 100 to 600 kPa" in words
+    assert "2 rows of 42 have no number for length, pressure or force: not used" in words
+    for value in (fit.rms_error, fit.max_error, fit.leave_one_pressure_out().rms):
+        assert f"{percent(value)} " in words
+    for name, p in fit.params.items():
+        assert name in words
+        assert p.stderr > 0
+    assert "pamrs fit muscle bench.csv" in words
+    assert "modulus_slope = { value = [" in words
+    assert "kothera" in words
+
+
+def test_page_of_a_fit_on_few_pressures_shows_the_others(data, muscle):
+    fit = fit_muscle(data, muscle, levels=[0, 2, 5])
+    words = words_of(pages.render_html(fit))
+    assert "Fitted on 3 pressures" in words
+    assert "predicts the other 3" in words
+    assert words.count("left out") >= 3
+    assert f"{100 * fit.errors_of('held_out')[1]:.2g} %" in words
+
+
+def test_page_compares_models(data, muscle, fit):
+    comparison = compare_models(data, muscle, orders=(1, 2), levels=[0, 2, 5])
+    words = words_of(pages.render_html(fit, comparison))
+    for row in comparison.rows:
+        assert row["model"] in words
+    assert "take this" in words
+    assert "fitted on 100, 300, 600 kPa only" in words
+
+
+@pytest.mark.parametrize(
+    "options", [{"model": "gaylord"}, {"model": "mooney_rivlin"}, {"moduli": "per_level"}, {"free": ["braid_angle"]}]
+)
+def test_every_kind_of_fit_has_a_page(data, muscle, options):
+    page = pages.render_html(fit_muscle(data, muscle, **options))
+    assert page.count("<svg") == (3 if options.get("model") == "gaylord" else 4)
+
+
+def test_one_pressure_alone_has_a_page(data, muscle):
+    one = fit_muscle(data, muscle, moduli="per_level", levels=[3])
+    words = words_of(pages.render_html(one))
+    assert "leave-one-pressure-out needs two pressure levels" in words
+
+
+def test_text_from_files_is_escaped(muscle):
+    e, p = (grid.ravel() for grid in np.meshgrid(np.linspace(0.01, 0.19, 5), LEVELS))
+    evil = ForceMap.from_arrays(REST * (1 - e), p, muscle.force(p, e), rest_length=REST, name="<b>x</b>")
+    page = pages.render_html(fit_muscle(evil, muscle), command="<script>")
+    assert "<b>x</b>" not in page
+    assert "<script>" not in page
+
+
+def test_directions_draw_both_branches(muscle):
+    rubbing = muscle.replace(friction_coefficient=0.05)
+    e, p, d = (grid.ravel() for grid in np.meshgrid(np.linspace(0.01, 0.19, 5), LEVELS, [-1.0, 1.0]))
+    loop = ForceMap.from_arrays(REST * (1 - e), p, rubbing.force(p, e, direction=d), rest_length=REST, direction=d)
+    page = pages.render_html(fit_muscle(loop, rubbing))
+    assert "model, contracting" in page
+    assert "model, lengthening" in page
+
+
+def test_png_has_the_promised_size(fit, tmp_path):
+    path = pages.write_figure(fit, tmp_path / "fit.png")
+    head = path.read_bytes()[:24]
+    assert head[:8] == b"\x89PNG\r\n\x1a\n"
+    assert (int.from_bytes(head[16:20], "big"), int.from_bytes(head[20:24], "big")) == (1600, 1000)
+    assert pages.write_report(fit, tmp_path / "fit.html").read_text(encoding="utf-8").startswith("<!DOCTYPE")
+
+
+# ------------------------------------------------------------------------- words
+
+
+def test_structure_of_the_residual_is_told_from_noise(data, muscle, fit):
+    assert residual_pattern(fit).by_contraction < 0.5
+    wrong = fit_muscle(data, muscle, model="gaylord")
+    assert residual_pattern(wrong).by_contraction > 0.5
+    assert any("repeats at the same contraction" in line for line in limits(wrong))
+    assert not any("repeats at the same contraction" in line for line in limits(fit))
+
+
+def test_the_bladder_share_is_gas_force_minus_model(fit, muscle):
+    line = meaning(fit)[0]
+    gas = LEVELS[-1] * float(muscle.gas_area(0.01))
+    assert float(re.search(r"would pull (\d+) N", line)[1]) == pytest.approx(gas, rel=1e-3)
+    taken = float(re.search(r"takes ([\d.]+) N", line)[1])
+    assert taken == pytest.approx(gas - float(muscle.force(LEVELS[-1], 0.01)), abs=3.0)
+
+
+# ----------------------------------------------------------------- command line
+
+
+def run(capsys, *words):
+    code = cli.main(["fit", "muscle", *(str(word) for word in words)])
+    captured = capsys.readouterr()
+    return code, captured.out, captured.err
+
+
+def test_command_writes_everything(capsys, table, tmp_path):
+    files = {name: tmp_path / f"out.{name}" for name in ("html", "json", "toml", "png")}
+    outputs = ["--report", files["html"], "--json", files["json"], "--rig", files["toml"], "--png", files["png"]]
+    code, out, err = run(capsys, table, *SIZES, "--model", "kothera", "--order", 2, "--free", "braid-angle", *outputs)
+    assert code == 0
+    assert "kothera, order 2" in out
+    assert "leave one pressure out: rms" in out
+    assert "2 rows of 42 have no number" in out
+    assert err.count("written: ") == 4
+    document = json.loads(files["json"].read_text(encoding="utf-8"))
+    assert document["schema"] == "pamrs.muscle_fit/1"
+    assert document["fit"]["rms_error"] < 0.01
+    fitted = {item["name"]: item for item in document["fit"]["parameters"]}
+    assert fitted["braid_angle"]["value"] == pytest.approx(np.radians(65.0), abs=0.01)
+    assert fitted["braid_angle"]["tolerance"] == pytest.approx(np.radians(3.0))
+    rig = load_rig(files["toml"])
+    assert rig.muscle.model == "kothera"
+    assert rig.muscle.parameters["modulus_slope"] == [fitted["m1"]["value"], fitted["m2"]["value"]]
+    page = files["html"].read_text(encoding="utf-8")
+    assert "pamrs fit muscle" in words_of(page)
+    assert "--free braid-angle" in words_of(page)
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(path.name for path in files.values())
+
+
+def test_command_predicts_left_out_pressures_and_compares(capsys, table):
+    code, out, _ = run(capsys, table, *SIZES, "--model", "kothera", "--order", 1, "--levels", "100kPa,3 bar,0.6MPa", "--compare")
+    assert code == 0
+    assert "levels not fitted" in out
+    assert "subset: fitted to 100, 300, 600 kPa" in out
+    for model in ("gaylord", "chou_hannaford", "mooney_rivlin", "ferraresi", "kothera", "robinson", "elbow_linear"):
+        assert model in out
+
+
+def test_command_takes_the_muscle_of_a_rig(capsys, table, tmp_path):
+    rig = tmp_path / "bench.toml"
+    assert run(capsys, table, *SIZES, "--model", "kothera", "--order", 2, "--rig", rig)[0] == 0
+    code, out, _ = run(capsys, table, "--muscle", rig)
+    assert code == 0
+    assert "kothera, order 2" in out
+
+
+def test_command_per_level(capsys, table):
+    code, out, _ = run(capsys, table, *SIZES, "--model", "kothera", "--order", 2, "--per-level")
+    assert code == 0
+    assert "free at each level" in out
+
+
+@pytest.mark.parametrize(
+    ("words", "parts"),
+    [
+        ([], ["geometry of the muscle is missing", "--braid-angle", "--muscle"]),
+        (SIZES[2:], ["give --rest-length (like"]),
+        ([*SIZES, "--model", "hill"], ["model = 'hill' is not allowed"]),
+        ([*SIZES, "--order", "40"], ["order = 40"]),
+        ([*SIZES, "--levels", "350kPa"], ["no measurement at 350 kPa"]),
+        ([*SIZES, "--levels", "350"], ["--levels = '350' is not allowed", "'Pa'"]),
+        ([*SIZES, "--levels", "350 mm"], ["--levels", "wrong dimension"]),
+        ([*SIZES, "--free", "colour"], ["'colour' is not allowed"]),
+        ([*SIZES, "--where", "muscle"], ["COLUMN=VALUE"]),
+        ([*SIZES, "--where", "muscle=A"], ["where names the column 'muscle'"]),
+        (["--rest-length", "30 bar", *SIZES[2:]], ["--rest-length = '30 bar'", "wrong dimension"]),
+        (["--rest-length", "3 mm", *SIZES[2:]], ["wrong unit"]),
+        (["--muscle", "no_such_muscle"], ["neither a file nor in the library", "elbow_0625in"]),
+        ([*SIZES, "--per-level", "--rig", "x.toml"], ["--per-level"]),
+        ([*SIZES, "--report", "no_such_folder/x.html"], ["folder no_such_folder does not exist"]),
+        ([*SIZES, "--order", "2", "--levels", "100kPa"], ["one pressure level only"]),
+    ],
+)
+def test_wrong_input_is_one_line(capsys, table, tmp_path, words, parts):
+    code, out, err = run(capsys, table, *words)
+    line = err.splitlines()[-1]
+    assert code == 2
+    assert out == ""
+    assert line.startswith("pamrs: error: ")
+    assert "Traceback" not in err
+    for part in parts:
+        assert part in line
+
+
+def test_nothing_is_written_when_the_fit_fails(capsys, table, tmp_path):
+    assert run(capsys, table, *SIZES, "--order", 2, "--levels", "100kPa", "--report", tmp_path / "x.html")[0] == 2
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_missing_table_is_named(capsys):
+    code, _, err = run(capsys, "no_such.csv", *SIZES)
+    assert code == 2
+    assert "no_such.csv: cannot be read" in err
+
+
+def test_a_description_needs_no_geometry(capsys, table):
+    text = 'schema = "pamrs.force_map/1"\nfile = "bench.csv"\n[muscle]\nmodel = "kothera"\n'
+    sizes = {"rest_length": (300, "mm"), "rest_diameter": (20, "mm"), "braid_angle": (65, "deg"), "wall_thickness": (2, "mm")}
+    text += "".join(f'{name} = {{ value = {value}, unit = "{unit}" }}\n' for name, (value, unit) in sizes.items())
+    path = table.with_name("bench.toml")
+    path.write_text(text, encoding="utf-8")
+    code, out, _ = run(capsys, path, "--order", 2)
+    assert code == 0
+    assert Path(path).stem in out
+    code, _, err = run(capsys, path, "--rest-length", "300 mm", "--where", "a=b")
+    assert code == 2
+    assert "--rest-length, --where cannot be given" in err
+
+
+def test_zeros_that_nobody_explains_are_named_when_the_fit_fails(capsys, data, tmp_path):
+    rows = np.column_stack([data.length, data.pressure, np.where(data.level == 0, 0.0, data.force)])[data.used]
+    path = tmp_path / "zeros.csv"
+    np.savetxt(path, rows, delimiter=",", header="length_m,pressure_Pa,force_N", comments="")
+    code, _, err = run(capsys, path, *SIZES, "--order", 2)
+    assert code == 2
+    assert "--clipped '0 N'" in err
+    code, out, _ = run(capsys, path, *SIZES, "--order", 2, "--clipped", "0 N")
+    assert code == 0
+    assert "are clipped" in out
+
+
+# ------------------------------------------------------------------ real muscles
+
+CASE = Path(__file__).parents[2] / "cases" / "festo_dmsp"
+FREE = ["--order", 2, "--free", "braid_angle,rest_length,rest_diameter"]
+
+
+@pytest.mark.skipif(
+    not (CASE.parents[2] / "shared/recordings/festo_dmsp_martens_boblan").is_dir(), reason="the Festo maps are not beside the project"
+)
+@pytest.mark.parametrize(
+    ("name", "options", "levels", "published"),
+    [
+        ("DMSP-20-300", ["--model", "robinson", "--order", 4], "197.5kPa,375kPa,675kPa", 0.044),
+        ("DMSP-10-250", FREE, "285kPa,486.5kPa,650kPa", 0.0235),
+    ],
+)
+def test_festo_maps_are_met_better_than_published(capsys, tmp_path, name, options, levels, published):
+    result = tmp_path / "fit.json"
+    assert run(capsys, CASE / f"{name}.toml", *options, "--json", result)[0] == 0
+    document = json.loads(result.read_text(encoding="utf-8"))
+    assert document["fit"]["max_error"] < published / 2
+    assert document["leave_one_pressure_out"]["max"] < published / 2
+    assert run(capsys, CASE / f"{name}.toml", *options, "--levels", levels, "--json", result)[0] == 0
+    assert json.loads(result.read_text(encoding="utf-8"))["fit"]["held_out_max_error"] < published
