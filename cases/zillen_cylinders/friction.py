@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 
 from pamrs.errors import RecordingError
-from pamrs.fit.cylinder_figure import plot_cylinders
-from pamrs.fit.cylinder_friction import CylinderFriction, HeldOut, fit_cylinder_friction
-from pamrs.fit.cylinder_record import FrictionRecord, load_friction_folder
-from pamrs.fit.cylinder_report import held_out_lines
+from pamrs.fit.cylinder.figure import plot_cylinders
+from pamrs.fit.cylinder.friction import CylinderFriction, HeldOut, fit_cylinder_friction
+from pamrs.fit.cylinder.record import FrictionRecord, load_friction_folder
+from pamrs.fit.cylinder.report import held_out_lines
 
 DATA = Path(__file__).parents[2] / "../shared/recordings/pneumatic_cylinders_zillen/results_pneumatic-actuator/data/friction"
 FIT_ON = {7: (1e5, 4e5, 7e5), 4: (1e5, 3e5, 7e5), 3: (1e5, 3e5)}  # [Pa], by the number of runs

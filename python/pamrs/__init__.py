@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from pamrs.errors import (
         CaseError,
         DiagnosisError,
+        FitError,
         PamrsError,
         ParameterError,
         RecordingError,
@@ -34,6 +35,7 @@ __all__ = [
     "CaseError",
     "Diagnosis",
     "DiagnosisError",
+    "FitError",
     "Issue",
     "Muscle",
     "PamrsError",
@@ -63,6 +65,7 @@ _HOMES: Final[dict[str, str]] = {
     "CaseError": "pamrs.errors",
     "Diagnosis": "pamrs.diagnosis.result",
     "DiagnosisError": "pamrs.errors",
+    "FitError": "pamrs.errors",
     "Issue": "pamrs.recording",
     "Muscle": "pamrs.muscle",
     "PamrsError": "pamrs.errors",

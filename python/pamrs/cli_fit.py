@@ -23,6 +23,7 @@ SCHEMA: Final = "pamrs.muscle_fit/1"
 _NUMBER = r"[-+]?\d*\.?\d+(?:[eE][-+]?\d+)?"
 _QUANTITY = re.compile(rf"^\s*(?P<value>{_NUMBER})\s*(?:(?:\+-|±)\s*(?P<tol>{_NUMBER})\s*)?(?P<unit>\S.*?)?\s*$")
 _GEOMETRY: Final = {"rest_length": "length", "rest_diameter": "length", "braid_angle": "angle", "wall_thickness": "length"}
+_MODULI: Final = {"modulus_slope": "dimensionless"}
 
 fit_app = typer.Typer(help="Fit models to measurements.")
 
@@ -47,6 +48,10 @@ def _muscle(
     where: Annotated[list[str] | None, typer.Option(help="COLUMN=VALUE: only these rows; may be repeated.")] = None,
     clipped: Annotated[str | None, typer.Option(help='A force that means off the scale, like "0 N".')] = None,
     free: Annotated[str | None, typer.Option(help="Geometry to fit too: braid_angle,rest_diameter,...")] = None,
+    prior: Annotated[
+        str | None, typer.Option(help='What is known of moduli: "modulus_slope=10, modulus_offset=10 MPa"; needs --noise.')
+    ] = None,
+    noise: Annotated[str | None, typer.Option(help='Standard deviation of the forces: "5 N", or "0.5 %" of the largest.')] = None,
     levels: Annotated[str | None, typer.Option(help="Fit on these pressures only: 200kPa,400kPa,6bar.")] = None,
     per_level: Annotated[bool, typer.Option("--per-level", help="Moduli free at each pressure.")] = False,
     compare: Annotated[bool, typer.Option("--compare", help="Fit every model and rank them.")] = False,
@@ -63,13 +68,14 @@ def _muscle(
     if per_level and rig is not None:
         raise typer.BadParameter("a rig needs moduli linear in pressure: leave out --per-level or --rig")
     sizes = {"rest_length": rest_length, "rest_diameter": rest_diameter, "braid_angle": braid_angle, "wall_thickness": wall_thickness}
-    map_, start, tolerance = _inputs(data, muscle, {k: v for k, v in sizes.items() if v is not None}, where or [], clipped)
+    map_, start, tolerance, stated = _inputs(data, muscle, {k: v for k, v in sizes.items() if v is not None}, where or [], clipped)
     pressures = None if levels is None else [_quantity("levels", text, "pressure")[0] for text in levels.split(",")]
     names = [] if free is None else [name.strip().replace("-", "_") for name in free.split(",") if name.strip()]
-    known = {name: value for name, value in tolerance.items() if math.isfinite(value)}
+    known = {name: value for name, value in tolerance.items() if math.isfinite(value)} | _prior(prior)
+    scatter = stated if noise is None else _noise(noise, map_)
     from pamrs.fit import FitError, fit_muscle
 
-    shape: dict[str, Any] = {"geometry": geometry, "free": names, "tolerance": known, "levels": pressures}
+    shape: dict[str, Any] = {"geometry": geometry, "free": names, "tolerance": known, "levels": pressures, "noise": scatter}
     with _progress(f"fitting {map_.label}"):
         try:
             fit = fit_muscle(map_, start, model=model, order=order, moduli="per_level" if per_level else "linear", **shape)
@@ -121,8 +127,8 @@ def _quantity(name: str, text: str, dimension: str) -> tuple[float, float | None
 
 def _inputs(
     data: Path, muscle: str | None, sizes: Mapping[str, str], where: Sequence[str], clipped: str | None
-) -> tuple[ForceMap, Muscle, dict[str, float]]:
-    """Map, muscle and tolerances, from a description or from a table and the options."""
+) -> tuple[ForceMap, Muscle, dict[str, float], float | None]:
+    """Map, muscle, tolerances and noise, from a description or from a table and the options."""
     from pamrs.errors import ParameterError
 
     if data.suffix.lower() == ".toml":
@@ -134,7 +140,7 @@ def _inputs(
         from pamrs.fit.description import load_measured_muscle
 
         measured = load_measured_muscle(data)
-        return measured.data, measured.muscle, measured.tolerance
+        return measured.data, measured.muscle, measured.tolerance, measured.noise
     start, tolerance = _start(muscle, sizes)
     from pamrs.fit.files import load_force_map
 
@@ -144,7 +150,28 @@ def _inputs(
         where=dict(_filter(text) for text in where) or None,
         clipped=None if clipped is None else _quantity("clipped", clipped, "force")[0],
     )
-    return map_.checked_against(start), start, tolerance
+    return map_.checked_against(start), start, tolerance, None
+
+
+def _prior(text: str | None) -> dict[str, float]:
+    """Standard deviations of moduli, ``NAME=NUMBER UNIT`` with commas between."""
+    from pamrs.errors import ParameterError
+    from pamrs.fit.engine import COEFFICIENTS
+
+    known: dict[str, float] = {}
+    for part in [] if text is None else text.split(","):
+        name, equals, value = (piece.strip() for piece in part.partition("="))
+        if not equals or name not in COEFFICIENTS:
+            raise ParameterError(f"--prior = {part.strip()!r} is not allowed: NAME=VALUE with a name of {', '.join(COEFFICIENTS)}")
+        known[name] = _quantity("prior", f"{value} 1" if name == "modulus_slope" else value, _MODULI.get(name, "pressure"))[0]
+    return known
+
+
+def _noise(text: str, data: ForceMap) -> float:
+    """Standard deviation of the forces [N]; a percentage is of the largest used force."""
+    if not text.strip().endswith("%"):
+        return _quantity("noise", text, "force")[0]
+    return _quantity("noise", text, "dimensionless")[0] * float(data.force[data.used].max())
 
 
 def _filter(text: str) -> tuple[str, str]:
@@ -159,7 +186,6 @@ def _filter(text: str) -> tuple[str, str]:
 def _start(muscle: str | None, sizes: Mapping[str, str]) -> tuple[Muscle, dict[str, float]]:
     """The nominal muscle and what is known of it."""
     from pamrs.errors import ParameterError
-    from pamrs.fit.description import NO_MODULI
     from pamrs.muscle import Muscle
 
     values: dict[str, Any] = {}
@@ -177,7 +203,7 @@ def _start(muscle: str | None, sizes: Mapping[str, str]) -> tuple[Muscle, dict[s
             f"the geometry of the muscle is missing: give {', '.join(lacking)} (like --rest-length '300 mm'), "
             "or --muscle with a rig file or a name of the library"
         )
-    return Muscle(**values, modulus_slope=NO_MODULI, modulus_offset=NO_MODULI), tolerance
+    return Muscle(**values), tolerance
 
 
 def _named_muscle(name: str) -> tuple[Muscle, dict[str, float]]:

@@ -33,6 +33,10 @@ class DiagnosisError(PamrsError, ValueError):
     """The recordings of a case do not allow a diagnosis."""
 
 
+class FitError(PamrsError, ValueError):
+    """The measurements do not determine what a fit asks for; the message says what is missing."""
+
+
 def joined(head: str, problems: Iterable[str]) -> str:
     """One message out of a headline and the problems found under it.
 

@@ -313,9 +313,12 @@ class Rig:
             return str(value)
         if key.kind == "vector":
             numbers = "[" + ", ".join(_number(item) for item in value) + "]"
-            return numbers if key.path else f"{{ value = {numbers}, unit = {_text(key.unit)} }}"
+            if key.path:
+                return numbers
         tol = self._tolerances.get(f"{block}.{key.name}", 0.0)
         note = "" if tol == 0.0 else (", unknown = true" if math.isinf(tol) else f", tol = {_number(tol)}")
+        if key.kind == "vector":
+            return f"{{ value = {numbers}, unit = {_text(key.unit)}{note} }}"
         if key.path and not note:
             return _number(value)
         return f"{{ value = {_number(value)}, unit = {_text(key.unit)}{note} }}"

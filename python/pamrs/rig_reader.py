@@ -14,7 +14,7 @@ from pamrs.muscle_models import own_geometry
 from pamrs.rig_schema import BLOCKS, REQUIRED_BLOCKS, SCHEMA, Key, keys_of
 from pamrs.units import to_si
 
-__all__ = ["Content", "read_model"]
+__all__ = ["Content", "Reader", "read_model"]
 
 _TOP = ("schema", "name", "description", "effects")
 _QUANTITY = ("value", "unit", "tol", "unknown")
@@ -54,7 +54,7 @@ def read_model(text: str, source: str) -> Content:
         document = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise RigError(f"{source}: not valid TOML: {error}") from error
-    reader = _Reader()
+    reader = Reader()
     content = reader.document(document)
     if reader.problems:
         raise RigError(joined(source, reader.problems))
@@ -66,7 +66,9 @@ def _shown(value: object) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
-class _Reader:
+class Reader:
+    """Turns tables into SI numbers, and notes every problem instead of stopping at the first."""
+
     def __init__(self) -> None:
         self.problems: list[str] = []
         self.tolerances: dict[str, float] = {}
@@ -149,6 +151,7 @@ class _Reader:
         if number is None:
             return None
         if key.kind == "vector":
+            self.spread(f"{block}.{key.name}", label, key, unit, extra)
             return self.vector(label, key, number, unit)
         value = self.scalar(label, key.unit, number, unit, key.lower, key.upper)
         if value is None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,9 @@ from hypothesis import strategies as st
 
 import pamrs
 from tests.reference import GeometryReference, MuscleReference
+
+MODELS = ("gaylord", "chou_hannaford", "mooney_rivlin", "ferraresi", "kothera", "robinson", "elbow_linear")
+GEOMETRIES = ("cylinder", "elliptic", "elliptic_published")
 
 
 @st.composite
@@ -32,23 +36,41 @@ def muscle_arguments(draw: st.DrawFn, geometry: str | None = None) -> dict[str, 
     }
 
 
+@st.composite
+def model_arguments(draw: st.DrawFn, model: str, geometry: str | None = None) -> dict[str, Any]:
+    """Keyword arguments of a muscle of one force model: its own constants, friction, no parameter of another model."""
+    arguments = draw(muscle_arguments(geometry or draw(st.sampled_from(GEOMETRIES))))
+    if model not in ("ferraresi", "kothera", "robinson"):
+        del arguments["modulus_slope"], arguments["modulus_offset"]
+    if model == "mooney_rivlin":
+        arguments |= {"c10": draw(st.floats(-1e5, 4e5)), "c01": draw(st.floats(-1e5, 4e5))}
+    if model == "elbow_linear":
+        factors = [draw(st.floats(0.0, 1.5)) for _ in range(3)]
+        arguments |= {"bladder_modulus": draw(st.floats(0.0, 5e6)), "extension_factors": factors}
+    friction = {
+        "friction_coefficient": draw(st.floats(0.0, 0.3)),
+        "friction_pressure_slope": draw(st.floats(-0.3e-6, 0.1e-6)),
+        "friction_floor": draw(st.floats(0.0, 0.05)),
+    }
+    return {**arguments, **friction, "model": model}
+
+
+def reference_of(arguments: dict[str, Any]) -> MuscleReference:
+    """Build a muscle of the reference from the arguments of a muscle of pamrs; the geometry must be among them."""
+    shape = {f.name: arguments[f.name] for f in fields(GeometryReference) if f.name in arguments}
+    own = {f.name: arguments[f.name] for f in fields(MuscleReference) if f.name in arguments and f.name != "geometry"}
+    return MuscleReference(GeometryReference(**shape, kind=arguments["geometry"]), **own)
+
+
 def both(arguments: dict[str, Any]) -> tuple[pamrs.Muscle, MuscleReference]:
     """Build the same muscle in pamrs and in the reference."""
-    shape = GeometryReference(
-        arguments["rest_length"],
-        arguments["rest_diameter"],
-        arguments["braid_angle"],
-        arguments["wall_thickness"],
-        arguments["geometry"],
-    )
-    model = MuscleReference(
-        shape,
-        arguments["modulus_slope"],
-        arguments["modulus_offset"],
-        arguments["modulus_scale"],
-        arguments["count"],
-    )
-    return pamrs.Muscle(**arguments), model
+    return pamrs.Muscle(**arguments), reference_of(arguments)
+
+
+def stroke(model: MuscleReference) -> np.ndarray:
+    """Contraction ratios from far extension (where the braid is taut) almost to the shortest muscle."""
+    low, high = model.geometry.min_contraction, model.geometry.max_contraction
+    return np.array([0.9 * low, 0.35 * low, 0.04 * low, 0.0, 0.003, 0.07, 0.2, 0.95 * high])
 
 
 def contractions(model: MuscleReference, n: int = 5) -> np.ndarray:

@@ -1,4 +1,9 @@
-"""Geometry of one braided muscle: exact solve by bracketing and adaptive quadrature."""
+"""Geometry of one braided muscle: exact solve by bracketing and adaptive quadrature.
+
+``elliptic_published`` keeps the choices printed in Robinson (2014) for comparison: the braid on an end is followed
+over the parametric angles 0 to pi/3 (2.27), and |B - B_est(R)| is minimised (2.30) where ``elliptic`` solves for its
+zero.  The sum of squared increments printed as (2.28) is not a length: the arc-length integral stands for it.
+"""
 
 from __future__ import annotations
 
@@ -7,10 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.integrate import quad
-from scipy.optimize import brentq
+from scipy.optimize import brentq, minimize_scalar
 
 #: Shortest admissible length as a fraction of the braid fibre length.
 SHORTEST_OF_FIBRE = 0.58
+
+#: The printed minimisation looks from R0 this many times as far as the radius of the cylinder (contraction).
+PUBLISHED_REACH = 1.6
 
 
 @dataclass(frozen=True)
@@ -26,7 +34,7 @@ class Shape:
 
 @dataclass(frozen=True)
 class GeometryReference:
-    """Geometry of a muscle with elliptic ends, or of a plain cylinder.
+    """Geometry of a muscle with elliptic ends (solved, or as published), or of a plain cylinder.
 
     Parameters
     ----------
@@ -34,7 +42,7 @@ class GeometryReference:
         Resting length, outer diameter and bladder thickness, m.
     braid_angle : float
         Braid angle from the circumferential plane, rad.
-    kind : {"elliptic", "cylinder"}
+    kind : {"elliptic", "elliptic_published", "cylinder"}
         Shape of the ends.
     k0, contraction_slope, extension_slope : float
         Axis ratio of the end ellipse and its slopes per unit contraction ratio.
@@ -101,7 +109,8 @@ class GeometryReference:
         straight = (length - 2.0 * end) / length * math.hypot(length, 2.0 * math.pi * radius * self.turns)
         if a == 0.0:
             return straight
-        v1 = math.atan(math.sqrt(3.0) / self.end_ratio(e))
+        published = self.kind == "elliptic_published"
+        v1 = math.pi / 3.0 if published else math.atan(math.sqrt(3.0) / self.end_ratio(e))
         w = 2.0 * math.pi * self.turns * end / (length * v1)
 
         def speed(v: float) -> float:
@@ -111,19 +120,30 @@ class GeometryReference:
         arc, _ = quad(speed, 0.0, v1, epsabs=0.0, epsrel=1e-13, limit=200)
         return straight + 2.0 * arc
 
+    def fits(self, e: float, radius: float) -> bool:
+        """Whether the fibre implied by a radius has the length of the fibre."""
+        return abs(self.fibre_estimate(e, radius) - self.fibre_length) <= 1e-9 * self.fibre_length
+
     def radius_floor(self, e: float) -> float:
         """Least outer radius in extension, m."""
         length = self.rest_length * (1.0 - e)
         return max(math.sqrt(self.rubber_volume / (math.pi * length)), self.neck_floor * self.rest_radius)
 
+    def cylinder_radius(self, e: float) -> float:
+        """Radius of a cylinder that the braid covers, m; zero where the muscle is as long as its fibre."""
+        fibre, length = self.fibre_length, self.rest_length * (1.0 - e)
+        return math.sqrt(max((fibre - length) * (fibre + length), 0.0)) / (2.0 * math.pi * self.turns)
+
     def solve_radius(self, e: float) -> tuple[float, bool]:
         """Return the outer radius of the middle part and whether the braid is taut."""
         r0 = self.rest_radius
         if self.kind == "cylinder":
-            length = self.rest_length * (1.0 - e)
-            return math.sqrt(self.fibre_length**2 - length**2) / (2.0 * math.pi * self.turns), False
+            radius, floor = self.cylinder_radius(e), self.radius_floor(e)
+            return (floor, True) if e < 0.0 and radius < floor else (radius, False)
         if e == 0.0:
             return r0, False
+        if self.kind == "elliptic_published":
+            return self._closest_radius(e)
 
         def miss(radius: float) -> float:
             return self.fibre_estimate(e, radius) - self.fibre_length
@@ -146,6 +166,29 @@ class GeometryReference:
                 return floor, True
             near, miss_near = far, miss_far
         raise ValueError(f"no radius fits the fibre at contraction ratio {e}")
+
+    def _closest_radius(self, e: float) -> tuple[float, bool]:
+        """Radius of least |B - B_est|: the zero nearest to R0, else the least miss on a fine grid, refined.
+
+        Without a zero the least miss may lie between R0 and the floor; only at the floor does the braid count as taut.
+        """
+        r0 = self.rest_radius
+        last = r0 + PUBLISHED_REACH * (self.cylinder_radius(e) - r0) if e > 0.0 else self.radius_floor(e)
+
+        def miss(radius: float) -> float:
+            return self.fibre_estimate(e, radius) - self.fibre_length
+
+        grid = np.linspace(r0, last, 65)
+        misses = [miss(float(radius)) for radius in grid]
+        for near, far, miss_near, miss_far in zip(grid[:-1], grid[1:], misses[:-1], misses[1:], strict=True):
+            if miss_near * miss_far <= 0.0:
+                return float(brentq(miss, near, far, xtol=1e-18, rtol=8.9e-16)), False
+        least = int(np.argmin(np.abs(misses)))
+        if least in (0, grid.size - 1):
+            return float(grid[least]), e < 0.0 and least > 0
+        bounds = sorted((grid[least - 1], grid[least + 1]))
+        found = minimize_scalar(lambda radius: abs(miss(radius)), bounds=bounds, method="bounded", options={"xatol": 1e-12})
+        return float(found.x), False
 
     def profile(self, z: float, e: float, radius: float) -> float:
         """Outer radius f(z) at axial position z, m."""
@@ -188,15 +231,18 @@ class GeometryReference:
 
     def taut_contraction(self) -> float:
         """Contraction ratio (negative) below which the braid is taut; no tautness gives the lower limit."""
-        if self.kind == "cylinder":
-            return self.min_contraction
-        grid = np.linspace(0.0, min(-0.05, self.min_contraction), 201)
+        low = self.min_contraction if self.kind == "cylinder" else min(-0.05, self.min_contraction)
+        grid = np.linspace(0.0, low, 201)
         taut = [self.solve_radius(float(e))[1] for e in grid]
         if True not in taut:
             return float(grid[-1])
         first = taut.index(True)
 
-        def miss(e: float) -> float:
-            return self.fibre_estimate(e, self.radius_floor(e)) - self.fibre_length
-
-        return float(brentq(miss, grid[first], grid[first - 1], xtol=1e-15))
+        taut_at, slack_at = float(grid[first]), float(grid[first - 1])
+        for _ in range(40):
+            middle = 0.5 * (taut_at + slack_at)
+            if self.solve_radius(middle)[1]:
+                taut_at = middle
+            else:
+                slack_at = middle
+        return taut_at

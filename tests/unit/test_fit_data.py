@@ -400,4 +400,7 @@ def test_festo_maps_leave_the_clipped_zeros_out(name, used, clipped, levels):
     assert measured.data.reason.count("clipped") == clipped
     assert len(measured.data.levels) == levels
     assert (measured.data.force[measured.data.used] > 0).all()
-    assert set(measured.tolerance) == {"rest_length", "rest_diameter", "braid_angle", "wall_thickness"}
+    sizes = {"rest_length", "rest_diameter", "braid_angle", "wall_thickness"}
+    assert set(measured.tolerance) == {*sizes, "modulus_slope", "modulus_offset"}
+    assert measured.tolerance["modulus_offset"] == 1e7
+    assert measured.noise == pytest.approx(0.005 * measured.data.force.max(), rel=0.02)

@@ -8,16 +8,17 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any, Final
 
+from pamrs.errors import FitError
+
 if TYPE_CHECKING:
     from pamrs.fit.bench import from_recording
     from pamrs.fit.compare import ModelComparison, compare_models
-    from pamrs.fit.cylinder_friction import CylinderFriction, fit_cylinder_friction
+    from pamrs.fit.cylinder.friction import CylinderFriction, fit_cylinder_friction
     from pamrs.fit.data import ForceMap
     from pamrs.fit.description import MeasuredMuscle, load_measured_muscle
     from pamrs.fit.engine import fit_muscle
     from pamrs.fit.files import load_force_map
     from pamrs.fit.friction import FrictionFit, fit_friction
-    from pamrs.fit.problem import FitError
     from pamrs.fit.result import FitParameter, MuscleFit
     from pamrs.fit.validation import CrossValidation, PressureErrors
 
@@ -43,8 +44,7 @@ __all__ = [
 
 _HOMES: Final[dict[str, str]] = {
     "CrossValidation": "validation",
-    "CylinderFriction": "cylinder_friction",
-    "FitError": "problem",
+    "CylinderFriction": "cylinder.friction",
     "FitParameter": "result",
     "ForceMap": "data",
     "FrictionFit": "friction",
@@ -53,7 +53,7 @@ _HOMES: Final[dict[str, str]] = {
     "MuscleFit": "result",
     "PressureErrors": "validation",
     "compare_models": "compare",
-    "fit_cylinder_friction": "cylinder_friction",
+    "fit_cylinder_friction": "cylinder.friction",
     "fit_friction": "friction",
     "fit_muscle": "engine",
     "from_recording": "bench",

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.errors import ParameterError
-from pamrs.fit.design import CONSTANTS, MODELS, POLYNOMIAL, template
-from pamrs.fit.engine import fit_muscle, has_effect, level_indices
-from pamrs.fit.problem import FitError
+from pamrs.errors import FitError, ParameterError
+from pamrs.fit.design import CONSTANTS, template
+from pamrs.fit.engine import COEFFICIENTS, fit_muscle, has_effect, level_indices
 from pamrs.fit.result import MuscleFit
+from pamrs.muscle_models import ELASTIC_PARAMETERS, MODELS, POLYNOMIAL_MODELS
 
 if TYPE_CHECKING:
     from pamrs.fit.data import ForceMap
@@ -123,6 +123,7 @@ def compare_models(
     levels: Sequence[float] | None = None,
     weights: str = "force",
     direction: str | None = "data",
+    noise: float | None = None,
 ) -> ModelComparison:
     """Fit every model and order, and rank them by leave-one-pressure-out error.
 
@@ -143,10 +144,10 @@ def compare_models(
     orders : iterable of int
         Orders of the models with a stress polynomial.
     free, tolerance
-        Geometry to fit, as in :func:`pamrs.fit.fit_muscle`; a name that has no effect on a model is left out for that model.
+        Geometry to fit and what is known, as in :func:`pamrs.fit.fit_muscle`; what a model does not have is left out for that model.
     levels : sequence of int or float, optional
         Indices or pressures of a few levels: every candidate is also fitted to these alone and its error on the others shown.
-    weights, direction : str
+    weights, direction, noise
         As in :func:`pamrs.fit.fit_muscle`.
 
     Returns
@@ -166,7 +167,7 @@ def compare_models(
     unknown = [name for name in chosen if name not in MODELS]
     if unknown or not chosen:
         raise ParameterError(f"models = {chosen} is not allowed: of {', '.join(MODELS)}")
-    pairs = [(name, order) for name in chosen for order in (wanted if name in POLYNOMIAL else [None])]
+    pairs = [(name, order) for name in chosen for order in (wanted if name in POLYNOMIAL_MODELS else [None])]
     if not pairs:
         raise ParameterError("orders is empty: the models with a stress polynomial need one order at least")
     fits: dict[tuple[str, int | None], MuscleFit] = {}
@@ -174,8 +175,9 @@ def compare_models(
     for name, order in pairs:
         blank = template(muscle, name, None if name != muscle.model else muscle.geometry, order)
         used = tuple(item for item in names if has_effect(item, name, blank.geometry))
-        settings: dict[str, Any] = {"model": name, "order": order, "free": used, "tolerance": tolerance, "weights": weights}
-        row, fit = _candidate(data, muscle, {**settings, "direction": direction}, levels)
+        spread = {key: value for key, value in (tolerance or {}).items() if key not in COEFFICIENTS or key in ELASTIC_PARAMETERS[name]}
+        settings: dict[str, Any] = {"model": name, "order": order, "free": used, "tolerance": spread, "weights": weights}
+        row, fit = _candidate(data, muscle, {**settings, "direction": direction, "noise": noise}, levels)
         rows.append({**row, "geometry": blank.geometry, "free": list(used)})
         if fit is not None:
             fits[name, order] = fit
@@ -232,7 +234,7 @@ def _candidate(
 
 def _unknowns(settings: Mapping[str, Any]) -> int:
     name = settings["model"]
-    return len(settings["free"]) + (2 * settings["order"] if name in POLYNOMIAL else len(CONSTANTS[name]))
+    return len(settings["free"]) + (2 * settings["order"] if name in POLYNOMIAL_MODELS else len(CONSTANTS[name]))
 
 
 def effective_size(fit: MuscleFit) -> float:

@@ -35,15 +35,14 @@ def covariances(problem: Problem, result: Estimate, level: Index) -> tuple[Array
         Delete-one-level jackknife (CR3) of the linearised fit plus the priors' own share: it holds when the
         residuals of one level hang together. None with fewer than 5 levels, or when a level cannot be spared.
     """
-    p, q = result.jacobian.shape[1], len(problem.free)
-    prior = np.zeros(p)
-    prior[p - q :] = [1.0 / free.tolerance for free in problem.free]
+    p = result.jacobian.shape[1]
+    prior = np.concatenate([problem.expected(result.design)[1], [1.0 / free.tolerance for free in problem.free]])
     jacobian = result.jacobian / result.sigma if result.sigma > 0.0 else result.jacobian
     if p == 0:
         return np.empty((0, 0)), np.empty((0, 0))
     scale = np.sqrt((jacobian**2).sum(axis=0) + prior**2)
     jacobian, prior = jacobian / scale, prior / scale
-    stacked = np.vstack([jacobian, np.diag(prior)[p - q :]])
+    stacked = np.vstack([jacobian, np.diag(prior)])
     _, s, vt = np.linalg.svd(stacked, full_matrices=False)
     root = vt.T / s
     inverse = root @ root.T

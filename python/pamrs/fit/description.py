@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 from pamrs.errors import RecordingError, joined
 from pamrs.fit.data import ForceMap
 from pamrs.muscle_models import models_with
-from pamrs.rig_reader import _Reader as Reader
+from pamrs.rig_reader import Reader
 
 if TYPE_CHECKING:
     from pamrs.muscle import Muscle
@@ -32,6 +32,7 @@ _TOP: Final = (
     "where",
     "clipped_force",
     "level_tolerance",
+    "noise",
     "muscle",
 )
 
@@ -58,6 +59,8 @@ class MeasuredMuscle:
         Geometry, and the force model to start from.
     tolerance : dict of str to float
         Standard deviation of what the file knows of a number, SI; infinite where it is unknown.
+    noise : float or None
+        Standard deviation of the forces [N], where the file gives one; priors of moduli need it.
     description : str
         What the file says about it.
     """
@@ -65,6 +68,7 @@ class MeasuredMuscle:
     data: ForceMap
     muscle: Muscle
     tolerance: dict[str, float]
+    noise: float | None = None
     description: str = ""
 
 
@@ -75,7 +79,7 @@ def load_measured_muscle(path: str | os.PathLike[str]) -> MeasuredMuscle:
     ----------
     path : path-like
         The TOML file. ``file`` in it is relative to its folder; ``columns`` maps the table's headings to headings with
-        units; ``where`` picks rows; ``clipped_force`` and ``level_tolerance`` are quantities; ``[muscle]`` is as in a rig
+        units; ``where`` picks rows; ``clipped_force``, ``level_tolerance`` and ``noise`` are quantities; ``[muscle]`` is as in a rig
         file, with ``tol`` as the standard deviation of what is known.
 
     Returns
@@ -99,6 +103,7 @@ def load_measured_muscle(path: str | os.PathLike[str]) -> MeasuredMuscle:
     maps = {key: _text_table(reader, document, key) for key in ("columns", "where")}
     clipped = _quantity(reader, document, "clipped_force", "N")
     tolerance = _quantity(reader, document, "level_tolerance", "Pa")
+    noise = _quantity(reader, document, "noise", "N")
     block = document.get("muscle")
     model: dict[str, Any] = {}
     if isinstance(block, Mapping):
@@ -130,7 +135,7 @@ def load_measured_muscle(path: str | os.PathLike[str]) -> MeasuredMuscle:
         name=texts["name"] or file.stem,
     )
     known = {name.partition(".")[2]: spread for name, spread in reader.tolerances.items()}
-    return MeasuredMuscle(data.checked_against(muscle), muscle, known, texts["description"])
+    return MeasuredMuscle(data.checked_against(muscle), muscle, known, noise, texts["description"])
 
 
 def with_moduli(block: Mapping[str, Any]) -> dict[str, Any]:

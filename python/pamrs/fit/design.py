@@ -13,29 +13,22 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.errors import ParameterError
-from pamrs.fit.problem import FitError
+from pamrs.errors import FitError, ParameterError
+from pamrs.muscle_models import ELASTIC_PARAMETERS, MODELS, POLYNOMIAL_MODELS
 
 if TYPE_CHECKING:
     from pamrs.muscle import Muscle
 
-__all__ = ["CONSTANTS", "MODELS", "POLYNOMIAL", "Design", "template"]
+__all__ = ["CONSTANTS", "Design", "template"]
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
-#: Every force model, simplest first.
-MODELS: Final = ("gaylord", "chou_hannaford", "elbow_linear", "mooney_rivlin", "ferraresi", "kothera", "robinson")
-
-#: Models with a stress polynomial, whose order can be chosen.
-POLYNOMIAL: Final = ("ferraresi", "kothera", "robinson")
-
-#: Coefficients of the models without one.
+#: Coefficients of the models without a stress polynomial.
 CONSTANTS: Final[dict[str, tuple[str, ...]]] = {
-    "gaylord": (),
-    "chou_hannaford": (),
-    "elbow_linear": ("bladder_modulus",),
-    "mooney_rivlin": ("c10", "c01"),
+    model: tuple(name for name in names if name != "extension_factors")
+    for model, names in ELASTIC_PARAMETERS.items()
+    if model not in POLYNOMIAL_MODELS
 }
 
 _DEFAULT_ORDER, _LARGEST_ORDER = 4, 12
@@ -69,7 +62,7 @@ def template(muscle: Muscle, model: str | None, geometry: str | None, order: int
     changes: dict[str, Any] = {"model": name}
     if geometry is not None or name != muscle.model:
         changes["geometry"] = geometry
-    if name in POLYNOMIAL:
+    if name in POLYNOMIAL_MODELS:
         given = muscle.parameters
         own = max(len(given["modulus_slope"]), len(given["modulus_offset"]))
         terms = (own or _DEFAULT_ORDER) if order is None else order
@@ -109,7 +102,7 @@ class Design:
         """The design of a template muscle; ``moduli`` is ``"linear"`` or ``"per_level"``."""
         if moduli not in ("linear", "per_level"):
             raise ParameterError(f"moduli = {moduli!r} is not allowed: 'linear' or 'per_level'")
-        if muscle.model in POLYNOMIAL:
+        if muscle.model in POLYNOMIAL_MODELS:
             base = tuple(f"E{k}" for k in range(1, len(muscle.parameters["modulus_offset"]) + 1))
         else:
             base = CONSTANTS[muscle.model]
@@ -128,6 +121,18 @@ class Design:
         if self.polynomial:
             return tuple(f"{letter}{name[1:]}" for letter in "mb" for name in self.base)
         return self.base
+
+    @property
+    def kinds(self) -> tuple[tuple[tuple[str, int, float], ...], ...]:
+        """What each coefficient is a sum of: parameter of the muscle, place in it, factor; ``("modulus_slope", 0, 1.0)`` for ``m1``."""
+        places = range(len(self.base))
+        if self.polynomial and self.per_level:
+            pressures = self.knots.tolist()
+            return tuple((("modulus_slope", k, p), ("modulus_offset", k, 1.0)) for p in pressures for k in places)
+        if self.polynomial:
+            return tuple(((kind, k, 1.0),) for kind in ("modulus_slope", "modulus_offset") for k in places)
+        groups = len(self.labels) if self.per_level else 1
+        return tuple(((name, 0, 1.0),) for _ in range(groups) for name in self.base)
 
     @property
     def units(self) -> tuple[str, ...]:

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.errors import ParameterError
+from pamrs.errors import FitError, ParameterError
 from pamrs.fit.covariance import covariances
 from pamrs.fit.design import template
-from pamrs.fit.estimate import Estimate, Free, Problem, estimate
-from pamrs.fit.problem import FitError
+from pamrs.fit.estimate import Estimate, Free, Known, Problem, estimate
 from pamrs.fit.result import FitParameter, MuscleFit
 from pamrs.fit.validation import level_force
+from pamrs.muscle_models import ELASTIC_PARAMETERS, POLYNOMIAL_MODELS
 
 if TYPE_CHECKING:
     from pamrs.fit.data import ForceMap
@@ -37,6 +38,9 @@ GEOMETRY: Final[dict[str, str]] = {
     "extension_slope": "1",
     "neck_floor": "1",
 }
+
+#: Coefficients of the models that can have a prior.
+COEFFICIENTS: Final[tuple[str, ...]] = ("modulus_slope", "modulus_offset", "c10", "c01", "bladder_modulus")
 
 _ELLIPTIC_ONLY = ("k0", "contraction_slope", "extension_slope", "neck_floor")
 _WALLLESS = ("gaylord",)
@@ -92,6 +96,9 @@ def fit_muscle(
     tolerance : mapping of str to float, optional
         One standard deviation of what is known of each free parameter [SI], a Gaussian prior around the muscle's value. A free
         parameter without one has no prior. Prior and data are weighed by the scatter of the residuals, found in the fit.
+        ``modulus_slope`` [1] and ``modulus_offset`` [Pa] (of every order alike), ``c10``, ``c01`` or ``bladder_modulus`` [Pa] do the
+        same for the moduli, around those of the muscle, 0 where it has none; they need ``noise``. With few points a wide one,
+        ``{"modulus_slope": 10.0, "modulus_offset": 1e7}`` for a rubber, keeps moduli that the points hardly tell from growing large.
     levels : sequence of int or of float, optional
         Pressure levels to fit: whole numbers are indices into ``data.levels``, floats are pressures [Pa]. The other levels
         are predicted and their errors reported. None fits all.
@@ -136,13 +143,19 @@ def fit_muscle(
     _choices(weights=weights, errors=errors, direction=direction)
     rows = _chosen(data, levels)
     blank = template(muscle, model, geometry, order)
-    unknowns = _free(blank, tuple(free), dict(tolerance or {}))
+    spread = _tolerances(tolerance)
+    unknowns = _free(blank, tuple(free), spread)
+    known = _known(muscle, blank, spread)
     if noise is not None and not (math.isfinite(noise) and noise > 0.0):
         raise ParameterError(f"noise = {noise!r} is not allowed: a positive number is needed")
+    if known and noise is None:
+        raise ParameterError(
+            f"tolerance of {', '.join(known)} needs noise: the standard deviation of the forces that it is weighed against"
+        )
     rest = float(blank.parameters["rest_length"])
     if not math.isclose(rest, data.rest_length, rel_tol=1e-6):
         raise ParameterError(f"rest_length: the muscle has {rest:g} m, the force map {data.rest_length:g} m; the same is needed")
-    problem = _problem(data, blank, moduli, unknowns, noise, direction, weights)
+    problem = _problem(data, blank, moduli, unknowns, known, noise, direction, weights)
     if not float(problem.force[rows].max()) > 0.0:
         raise FitError(f"the largest force of the fitted rows is {problem.force[rows].max():g} N: a pulling force is needed")
     return _result(data, problem, rows, estimate(problem, rows), errors)
@@ -187,16 +200,44 @@ def _free(blank: Muscle, names: tuple[str, ...], tolerance: dict[str, float]) ->
             raise ParameterError(f"free: {name!r} has no effect on the model {blank.model} with {blank.geometry} geometry")
     if len(set(names)) < len(names):
         raise ParameterError(f"free = {list(names)} names a parameter twice")
-    for name, value in tolerance.items():
-        if name not in GEOMETRY:
-            raise ParameterError(f"tolerance: {name!r} is not allowed: of {', '.join(GEOMETRY)}")
-        if not value > 0.0:
-            raise ParameterError(f"tolerance: {name} = {value!r} is not allowed: a positive number is needed (infinite for no prior)")
     return tuple(Free(name, float(known[name]), float(tolerance.get(name, math.inf))) for name in names)
 
 
+def _tolerances(tolerance: Mapping[str, float] | None) -> dict[str, float]:
+    allowed = (*GEOMETRY, *COEFFICIENTS)
+    for name, value in (tolerance or {}).items():
+        if name not in allowed:
+            raise ParameterError(f"tolerance: {name!r} is not allowed: of {', '.join(allowed)}")
+        if not value > 0.0:
+            raise ParameterError(f"tolerance: {name} = {value!r} is not allowed: a positive number is needed (infinite for no prior)")
+    return dict(tolerance or {})
+
+
+def _known(muscle: Muscle, blank: Muscle, tolerance: Mapping[str, float]) -> dict[str, Known]:
+    """Priors of the coefficients: around the muscle's own values where it has the same kind."""
+    own = muscle.parameters if muscle.model in (blank.model, *_alike(blank.model)) else {}
+    known: dict[str, Known] = {}
+    for name in (name for name in COEFFICIENTS if math.isfinite(tolerance.get(name, math.inf))):
+        if name not in ELASTIC_PARAMETERS[blank.model]:
+            raise ParameterError(f"tolerance: {name!r} is not allowed: the model {blank.model} has no such coefficient")
+        known[name] = Known(tuple(np.atleast_1d(own.get(name, 0.0)).tolist()), float(tolerance[name]))
+    return known
+
+
+def _alike(model: str) -> tuple[str, ...]:
+    """The models whose coefficients mean the same: those with a stress polynomial."""
+    return POLYNOMIAL_MODELS if model in POLYNOMIAL_MODELS else ()
+
+
 def _problem(
-    data: ForceMap, blank: Muscle, moduli: str, free: tuple[Free, ...], noise: float | None, direction: str | None, weights: str
+    data: ForceMap,
+    blank: Muscle,
+    moduli: str,
+    free: tuple[Free, ...],
+    known: Mapping[str, Known],
+    noise: float | None,
+    direction: str | None,
+    weights: str,
 ) -> Problem:
     used = data.used
     pressure, _, force, level, way = data.used_rows()
@@ -209,11 +250,11 @@ def _problem(
         "direction": steps,
         "levels": data.levels,
     }
-    problem = Problem(blank=blank, moduli=moduli, free=free, noise=noise, weight=np.ones(len(force)), **arrays)
+    problem = Problem(blank=blank, moduli=moduli, free=free, known=known, noise=noise, weight=np.ones(len(force)), **arrays)
     if weights == "force":
         return problem
     tops = np.array([level_force(problem, index) for index in range(len(data.levels))])
-    return Problem(blank=blank, moduli=moduli, free=free, noise=noise, weight=1.0 / tops[level], **arrays)
+    return replace(problem, weight=1.0 / tops[level])
 
 
 def _result(data: ForceMap, problem: Problem, rows: Mask, found: Estimate, errors: str) -> MuscleFit:
@@ -248,8 +289,10 @@ def _result(data: ForceMap, problem: Problem, rows: Mask, found: Estimate, error
 def _parameters(problem: Problem, found: Estimate, covar: Array, plain: Array) -> dict[str, FitParameter]:
     spread, spread_plain = np.sqrt(np.diag(covar)).tolist(), np.sqrt(np.diag(plain)).tolist()
     parameters = {}
+    expected, information = problem.expected(found.design)
     for i, (name, unit) in enumerate(zip(found.design.names, found.design.units, strict=True)):
-        parameters[name] = FitParameter(name, float(found.x[i]), spread[i], unit, spread_plain[i])
+        told = (float(expected[i]), 1.0 / float(information[i])) if information[i] else (None, None)
+        parameters[name] = FitParameter(name, float(found.x[i]), spread[i], unit, spread_plain[i], *told)
     for i, free in enumerate(problem.free, start=len(found.x)):
         known = free.tolerance if math.isfinite(free.tolerance) else None
         value = float(found.geometry[i - len(found.x)])

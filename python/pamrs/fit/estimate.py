@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.errors import ParameterError
+from pamrs.errors import FitError, ParameterError
 from pamrs.fit.design import Design, friction_factor
-from pamrs.fit.problem import FitError, decompose, project_out, solve
+from pamrs.fit.problem import decompose, project_out, solve
 
 if TYPE_CHECKING:
     from pamrs.muscle import Muscle
 
-__all__ = ["Estimate", "Free", "Problem", "estimate"]
+__all__ = ["Estimate", "Free", "Known", "Problem", "estimate"]
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -43,17 +43,29 @@ class Free:
 
 
 @dataclass(frozen=True)
+class Known:
+    """What is known of one kind of coefficient before the fit: its values (zero beyond the last) and one standard deviation."""
+
+    values: tuple[float, ...]
+    tolerance: float
+
+
+_UNKNOWN = Known((), math.inf)
+
+
+@dataclass(frozen=True)
 class Problem:
     """Rows of a force map and what is to be fitted to them; all arrays ``(n,)``.
 
     ``knot`` is the pressure that the moduli see: that of the row, or of its level when moduli are free at each level.
-    ``weight`` multiplies force residuals.
+    ``weight`` multiplies force residuals. ``known`` has the priors of coefficients, by kind; they need a known ``noise``.
     """
 
     blank: Muscle
     moduli: str
     free: tuple[Free, ...]
     noise: float | None
+    known: Mapping[str, Known]
     pressure: Array
     length: Array
     force: Array
@@ -85,6 +97,26 @@ class Problem:
         factor = friction_factor(muscle, pressure, direction, force)
         weight = self.weight[rows]
         return columns * (factor * weight)[:, None], (force - factor * gas) * weight
+
+    def expected(self, design: Design) -> tuple[Array, Array]:
+        """Prior values of the coefficients (k,) and their information ``1/tolerance`` (k,), 0 without a prior."""
+        values, variance = np.zeros(len(design.names)), np.zeros(len(design.names))
+        for i, parts in enumerate(design.kinds):
+            for kind, place, factor in parts:  # one, or slope and offset of a modulus at one pressure
+                known = self.known.get(kind, _UNKNOWN)
+                values[i] += factor * (known.values[place] if place < len(known.values) else 0.0)
+                variance[i] += (factor * known.tolerance) ** 2
+        return np.where(np.isfinite(variance), values, 0.0), 1.0 / np.sqrt(variance)
+
+    def equations(self, design: Design, muscle: Muscle, rows: Mask) -> tuple[Array, Array]:
+        """:meth:`system`, and below it one equation for each coefficient with a prior, weighted by the noise."""
+        matrix, target = self.system(design, muscle, rows)
+        values, information = self.expected(design)
+        prior = np.flatnonzero(information)
+        if not len(prior) or self.noise is None:
+            return matrix, target
+        extra = np.diag(self.noise * information)[prior]
+        return np.vstack([matrix, extra]), np.concatenate([target, extra @ values])
 
     def check_reach(self, muscle: Muscle) -> None:
         """Raise FitError if the geometry cannot have one of the lengths."""
@@ -174,12 +206,13 @@ def estimate(problem: Problem, rows: Mask, start: Estimate | None = None) -> Est
 def _check_counts(problem: Problem, design: Design, rows: Mask) -> None:
     """Name what is missing before the algebra does."""
     n, k = int(rows.sum()), len(design.names)
+    told = int(np.count_nonzero(problem.expected(design)[1]))  # a coefficient with a prior needs no point
     # A tolerance is an equation of its own, but what it weighs against the data must come from points to spare.
     extra = sum(math.isinf(free.tolerance) for free in problem.free) if problem.noise is not None else len(problem.free)
     terms = len(design.base)
     what = f"order {terms}" if design.polynomial else f"the model {problem.blank.model}"
     unknowns = [*(design.names if k <= 8 else (*design.names[:3], "...", design.names[-1])), *(free.name for free in problem.free)]
-    if design.per_level:
+    if design.per_level and told < k:
         counts = {int(level): int(np.sum(rows & (problem.level == level))) for level in np.unique(problem.level[rows])}
         short = [f"{problem.levels[level] / 1e3:g} kPa ({count})" for level, count in counts.items() if count < terms]
         if short:
@@ -188,20 +221,21 @@ def _check_counts(problem: Problem, design: Design, rows: Mask) -> None:
                 f"moduli free at each level need {terms} points at every level for {what}; fewer at {', '.join(short)}. "
                 f"Levels with enough: {enough or 'none'}"
             )
-    elif design.polynomial and len(np.unique(problem.level[rows])) < 2:
+    elif design.polynomial and told < k and len(np.unique(problem.level[rows])) < 2:
         only = problem.levels[problem.level[rows][0]] / 1e3
         raise FitError(
             f"one pressure level only ({only:g} kPa): slopes m_k and offsets b_k are collinear; give two levels at least, "
             "or moduli='per_level'"
         )
-    if n < k + extra + 1:
+    needed = k - told + extra + 1
+    if n < needed:
         hint = ", or a known noise" if extra and problem.noise is None else ""
         raise FitError(
-            f"{n} usable points, but {what} has {k + len(problem.free)} unknowns ({', '.join(unknowns)}); {k + extra + 1} points are "
+            f"{n} usable points, but {what} has {k + len(problem.free)} unknowns ({', '.join(unknowns)}); {needed} points are "
             f"needed at least{hint}"
         )
     lengths = len(np.unique(np.round(problem.length[rows], 9)))
-    if lengths < terms:
+    if lengths < terms and told < k:
         raise FitError(f"{lengths} different lengths, but {what} has {terms} functions of length; {terms} different lengths are needed")
 
 
@@ -219,7 +253,8 @@ def _at(
 ) -> Estimate:
     """The estimate for one geometry: coefficients, Jacobian, noise."""
     matrix, target = problem.system(design, blank, rows)
-    found = solve(matrix, target, design.names, _hint(problem, rows))
+    found = solve(*problem.equations(design, blank, rows), design.names, _hint(problem, rows))
+    residual = found.residual[: len(target)]
 
     def model(muscle: Muscle) -> Array:
         a, y = problem.system(design, muscle, rows)
@@ -227,10 +262,10 @@ def _at(
 
     slopes = geometry_slopes(problem, values, model, len(target))
     freedom = max(len(target) - len(found.x) - len(values), 1)
-    plain = math.sqrt(float(found.residual @ found.residual) / freedom)
+    plain = math.sqrt(float(residual @ residual) / freedom)
     noise = problem.noise if problem.noise is not None else (sigma or plain)
     return Estimate(
-        design, blank, found.x, values, found.residual, np.hstack([matrix, slopes]), noise, found.condition_number, message, success
+        design, blank, found.x, values, residual, np.hstack([matrix, slopes]), noise, found.condition_number, message, success
     )
 
 
@@ -283,14 +318,15 @@ def _search(problem: Problem, design: Design, rows: Mask, start: Estimate | None
     weighted = problem.force[rows] * problem.weight[rows]
     least = 1e-9 * float(np.abs(weighted).max())
     n, k = len(weighted), len(design.names)
-    impossible = np.full(n + len(nominal), np.inf)
+    priors = int(np.count_nonzero(problem.expected(design)[1]))
+    impossible = np.full(n + priors + len(nominal), np.inf)
 
     def residuals(z: Array, sigma: float) -> Array:
         values = nominal + z * scale
         try:
             blank = problem.muscle(values)
             problem.check_reach(blank)
-            matrix, target = problem.system(design, blank, rows)
+            matrix, target = problem.equations(design, blank, rows)
         except (ParameterError, FitError):  # least_squares shortens a step that ends in infinity
             return impossible
         return np.concatenate([project_out(matrix, target) / sigma, (values - nominal) * prior])
@@ -342,9 +378,8 @@ def _search(problem: Problem, design: Design, rows: Mask, start: Estimate | None
 def _check_identified(problem: Problem, result: Estimate) -> None:
     """Refuse a geometry that neither the data nor a tolerance determines."""
     names = (*result.design.names, *(free.name for free in problem.free))
-    priors = np.zeros((len(problem.free), len(names)))
-    for j, free in enumerate(problem.free):
-        priors[j, len(result.x) + j] = result.sigma / free.tolerance
+    information = np.concatenate([problem.expected(result.design)[1], [1.0 / free.tolerance for free in problem.free]])
+    priors = np.diag(result.sigma * information)
     loose = [free.name for free in problem.free if math.isinf(free.tolerance)]
     stacked = np.vstack([result.jacobian, priors])
     hint = f"; give a tolerance for {', '.join(loose)}" if loose else "; take a lower order, or free less geometry"

@@ -61,7 +61,7 @@ def to_rig(fit: MuscleFit, rig: Rig | None) -> Rig:
     if base["muscle"] is not None:
         parameters["count"] = base["muscle"]["count"]
     known = {name: given.tol for name, given in rig.parameters.items() if given.tol > 0.0 and not name.startswith("muscle.")}
-    fitted = {f"muscle.{name}": item.stderr for name, item in fit.params.items() if item.init_value is not None}
+    fitted = {f"muscle.{free.name}": fit.params[free.name].stderr for free in fit.free}
     return Rig(rig.name, {**base, "muscle": parameters}, {**known, **fitted}, rig.effect_std, rig.source)
 
 

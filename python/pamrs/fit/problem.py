@@ -1,4 +1,4 @@
-"""Errors of a fit, and the least-squares step that every fit uses: scaled columns, SVD, collinear columns named."""
+"""The least-squares step that every fit uses: scaled columns, SVD, collinear columns named."""
 
 from __future__ import annotations
 
@@ -8,18 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.errors import PamrsError
+from pamrs.errors import FitError
 
-__all__ = ["FitError", "Solution", "solve"]
+__all__ = ["Solution", "decompose", "project_out", "solve"]
 
 Array = NDArray[np.float64]
 
 #: Ratio of the smallest to the largest singular value below which columns count as collinear.
 RANK_TOLERANCE = 1e-10
-
-
-class FitError(PamrsError, ValueError):
-    """The measurements do not determine what the fit asks for; the message says what is missing."""
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.fit.problem import FitError
+from pamrs.errors import FitError
 from pamrs.report.text import format_number
 
 if TYPE_CHECKING:
@@ -248,15 +248,13 @@ def meaning(fit: MuscleFit) -> list[str]:
     if unsure:
         few = ", ".join(unsure[:8]) + (" and more" if len(unsure) > 8 else "")
         lines.append(f"Not told from zero (standard error larger than the value): {few}.")
-    for name, p in fit.params.items():
-        if p.tolerance is not None and p.init_value is not None:
-            moved = (p.value - p.init_value) / p.tolerance
-            if abs(moved) > 2:
-                lines.append(
-                    f"{name} moved {signed(moved)} tolerances from what was known of it. For a muscle that is not an open braid "
-                    f"around a bladder it "
-                    "stands for whatever does that part there, and is not the angle or size a ruler would find."
-                )
+    for free in fit.free:
+        moved = (fit.params[free.name].value - free.nominal) / free.tolerance  # an infinite tolerance moves by nothing
+        if abs(moved) > 2:
+            lines.append(
+                f"{free.name} moved {signed(moved)} tolerances from what was known of it. For a muscle that is not an open braid "
+                "around a bladder it stands for whatever does that part there, and is not the angle or size a ruler would find."
+            )
     return lines
 
 

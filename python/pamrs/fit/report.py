@@ -6,9 +6,8 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pamrs.errors import ParameterError
+from pamrs.errors import FitError, ParameterError
 from pamrs.fit import remarks
-from pamrs.fit.problem import FitError
 from pamrs.report.text import format_number, format_uncertain
 
 if TYPE_CHECKING:
@@ -76,7 +75,7 @@ def _level_by_level(fit: MuscleFit) -> MuscleFit | None:
     enough = np.flatnonzero(counts > terms)
     if len(enough) < 2:
         return None
-    fixed = {p.name: p.value for p in fit.params.values() if p.init_value is not None and p.name != "rest_length"}
+    fixed = {free.name: fit.params[free.name].value for free in fit.free if free.name != "rest_length"}
     if any(p.name == "rest_length" for p in fit.params.values()):
         return None
     try:

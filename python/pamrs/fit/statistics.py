@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.fit.estimate import Estimate, Problem
+from pamrs.fit.estimate import Estimate, Free, Problem
 
 if TYPE_CHECKING:
     from pamrs.fit.data import ForceMap
@@ -34,7 +34,7 @@ class FitParameter:
     stderr_plain : float
         Standard error if every residual were independent.
     init_value : float or None
-        Nominal value of a geometry parameter; the moduli need none.
+        Nominal value of a geometry parameter; of a modulus, where its prior is.
     tolerance : float or None
         Standard deviation of its prior; None without one.
     vary : bool
@@ -103,6 +103,11 @@ class FitStatistics:
     def order(self) -> int | None:
         """Order M of the stress polynomial; None for a model without one."""
         return len(self._estimate.design.base) if self._estimate.design.polynomial else None
+
+    @property
+    def free(self) -> tuple[Free, ...]:
+        """The geometry that was fitted: name, nominal value, tolerance."""
+        return self._problem.free
 
     @property
     def moduli_kind(self) -> str:

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs.errors import FitError
 from pamrs.fit.estimate import Estimate, Problem, refitted
-from pamrs.fit.problem import FitError
 
 __all__ = ["CrossValidation", "PressureErrors", "leave_one_out"]
 
@@ -123,7 +123,7 @@ class CrossValidation:
 def leave_one_out(problem: Problem, result: Estimate, rows: Mask) -> CrossValidation:
     """Predict each fitted level from the others.
 
-    Without free geometry the refits follow from the one decomposition: the prediction error of a level is
+    Without free geometry and priors the refits follow from the one decomposition: the prediction error of a level is
     ``(1 - H_g)^-1 r_g`` with its block ``H_g`` of the hat matrix. Otherwise everything is refitted.
 
     Parameters
@@ -148,7 +148,7 @@ def leave_one_out(problem: Problem, result: Estimate, rows: Mask) -> CrossValida
     groups = np.unique(level)
     if len(groups) < 2:
         raise FitError("leave-one-pressure-out needs two pressure levels at least; there is one")
-    linear = not problem.free and not result.design.per_level
+    linear = not (problem.free or problem.known or result.design.per_level)
     error = _by_hat_matrix(problem, result, level) if linear else _by_refits(problem, result, rows)
     error = error / problem.weight[rows]
     everywhere = np.zeros(len(rows))

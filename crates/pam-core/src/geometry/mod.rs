@@ -36,6 +36,8 @@ pub const SHORTEST: f64 = 0.58;
 const ROOT_TOLERANCE: f64 = 1e-15;
 /// Steps in which the root nearest to the rest radius is looked for.
 const SCAN_STEPS: u32 = 16;
+/// Relative distance from the floor below which the nearest radius of the published ends is the floor.
+const FLOOR_TOLERANCE: f64 = 1e-9;
 /// How far beyond the cylinder's radius a root is looked for in contraction.
 const SCAN_REACH: f64 = 1.6;
 
@@ -319,7 +321,8 @@ impl MuscleGeometry {
                     Some(root) => Ok((root, false)),
                     None if self.profile == Profile::EllipticPublished => {
                         let root = self.nearest(e, limit);
-                        Ok((root, e < 0.0 && root.x <= limit))
+                        let at_floor = e < 0.0 && root.x <= limit * (1.0 + FLOOR_TOLERANCE);
+                        Ok(if at_floor { (floor, true) } else { (root, false) })
                     }
                     None if e < 0.0 => Ok((floor, true)),
                     None => Err(unsolved(e, "no radius has the fibre's length")),

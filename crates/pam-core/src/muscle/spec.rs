@@ -217,25 +217,34 @@ impl MuscleSpec {
     fn check_elastic(&self, model: ForceModel) -> Result<()> {
         let orders = self.modulus_slope.len();
         let polynomial = model.is_polynomial();
-        let lists = f64::from(u8::from(orders > 0 || !self.modulus_offset.is_empty()));
-        let scalars = [
-            ("modulus_slope", lists, polynomial),
-            ("c10", self.c10, model == ForceModel::MooneyRivlin),
-            ("c01", self.c01, model == ForceModel::MooneyRivlin),
-            ("bladder_modulus", self.bladder_modulus, model == ForceModel::ElbowLinear),
+        let (mooney_rivlin, elbow) = (model == ForceModel::MooneyRivlin, model == ForceModel::ElbowLinear);
+        let default = self.extension_factors == default_factors();
+        let given = [
+            ("modulus_slope", format!("{:?}", self.modulus_slope), polynomial || orders == 0),
+            (
+                "modulus_offset",
+                format!("{:?}", self.modulus_offset),
+                polynomial || self.modulus_offset.is_empty(),
+            ),
+            ("c10", self.c10.to_string(), mooney_rivlin || self.c10 == 0.0),
+            ("c01", self.c01.to_string(), mooney_rivlin || self.c01 == 0.0),
+            ("bladder_modulus", self.bladder_modulus.to_string(), elbow || self.bladder_modulus == 0.0),
+            ("extension_factors", format!("{:?}", self.extension_factors), elbow || default),
         ];
-        for (name, value, has) in scalars {
-            if !has && value != 0.0 {
-                let value = if name == "modulus_slope" { "[..]".into() } else { value.to_string() };
+        for (name, value, fits) in given {
+            if !fits {
                 let allowed = format!("the model \"{}\" has no such parameter", self.model);
                 return Err(Error::Choice { name: format!("muscle.{name}"), value, allowed });
             }
+        }
+        for (name, value) in [("c10", self.c10), ("c01", self.c01), ("bladder_modulus", self.bladder_modulus)]
+        {
             check_range(&format!("muscle.{name}"), value, -1e13, 1e13, "Pa")?;
         }
         if !polynomial {
             return Ok(());
         }
-        check_range("muscle.modulus_slope length", orders as f64, 1.0, HIGHEST_ORDER as f64, "moduli")?;
+        check_range("muscle.modulus_slope length", orders as f64, 0.0, HIGHEST_ORDER as f64, "moduli")?;
         if self.modulus_offset.len() != orders {
             return Err(Error::Length {
                 name: "muscle.modulus_offset".into(),

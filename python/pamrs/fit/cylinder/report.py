@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 from pamrs.fit.level_line import LawParameter
 
 if TYPE_CHECKING:
-    from pamrs.fit.cylinder_friction import CylinderFriction, HeldOut, LevelFriction
+    from pamrs.fit.cylinder.friction import CylinderFriction, HeldOut, LevelFriction
 
 __all__ = ["held_out_lines", "report_text"]
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pamrs.errors import ParameterError
-from pamrs.fit.cylinder_friction import CylinderFriction
+from pamrs.fit.cylinder.friction import CylinderFriction
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

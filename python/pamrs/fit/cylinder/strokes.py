@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs.errors import ParameterError, RecordingError
-from pamrs.fit.cylinder_record import FrictionRecord
+from pamrs.fit.cylinder.record import FrictionRecord
 
 __all__ = ["Onset", "Stroke", "StrokePairs", "find_strokes", "onset_at_rest", "pair_strokes", "reversal_onsets"]
 

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pamrs.errors import ParameterError, RecordingError
-from pamrs.fit.cylinder_record import FrictionRecord
-from pamrs.fit.cylinder_strokes import Onset, StrokePairs, onset_at_rest, pair_strokes, reversal_onsets
+from pamrs.fit.cylinder.record import FrictionRecord
+from pamrs.fit.cylinder.strokes import Onset, StrokePairs, onset_at_rest, pair_strokes, reversal_onsets
 from pamrs.fit.level_line import LawParameter, fit_levels, mean_of_series
 
 if TYPE_CHECKING:
@@ -263,13 +263,13 @@ class CylinderFriction:
 
     def fit_report(self) -> str:
         """The result in words and tables, without the leave-one-out refits."""
-        from pamrs.fit.cylinder_report import report_text
+        from pamrs.fit.cylinder.report import report_text
 
         return report_text(self)
 
     def plot(self) -> Figure:
         """Friction over pressure and one loop; needs matplotlib."""
-        from pamrs.fit.cylinder_figure import plot_cylinders
+        from pamrs.fit.cylinder.figure import plot_cylinders
 
         return plot_cylinders([self])
 

@@ -1,0 +1,141 @@
+"""Every force model on both Festo maps: all pressures, each pressure from the others, three pressures for all the rest.
+
+    python cases/festo_dmsp/compare.py out/festo_dmsp
+
+prints the tables of the README beside it and writes a picture of each map.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pamrs.errors import PamrsError
+from pamrs.fit import MeasuredMuscle, ModelComparison, compare_models, fit_muscle, load_measured_muscle
+from pamrs.fit.report import render_png
+
+HERE = Path(__file__).parent
+PUBLISHED = {"DMSP-20-300": 4.4, "DMSP-10-250": 2.35}
+FREE = ("braid_angle", "rest_length")
+#: The shares of the highest pressure at which the dissertation characterised its muscle (20, 60 and 120 psi).
+SHARES = (1 / 6, 1 / 2, 1.0)
+TRIPLES = 100
+
+
+def three(levels: np.ndarray) -> list[int]:
+    """The levels nearest to a sixth, half and all of the highest pressure."""
+    return [int(np.argmin(np.abs(levels - share * levels[-1]))) for share in SHARES]
+
+
+def wide_triples(levels: np.ndarray) -> list[list[int]]:
+    """Sets of three a person might measure: the highest, one in the middle, one below; at most :data:`TRIPLES`, drawn with seed 0."""
+    top = len(levels) - 1
+    share = levels / levels[-1]
+    middle, low = np.flatnonzero((share > 0.45) & (share < 0.85)), np.flatnonzero(share < 0.45)
+    sets = [[int(a), int(b), top] for a in low for b in middle]
+    order = np.random.default_rng(0).permutation(len(sets))[:TRIPLES]
+    return [sets[i] for i in order]
+
+
+def percent(value: float | None) -> str:
+    """A fraction in percent, a dash where there is none."""
+    return "–" if value is None else f"{100 * value:.2f}"
+
+
+def table(comparison: ModelComparison) -> str:
+    """Largest and rms errors of every model as Markdown."""
+    lines = [
+        "| model | order | unknowns | all pressures | each from the others | three pressures, the others |",
+        "|---|---|---|---|---|---|",
+    ]
+    for row in comparison.rows:
+        if row["rank"] is None:
+            lines.append(f"| {row['model']} | {row['order'] or ''} | {row['nvarys']} | not determined | | |")
+            continue
+        pairs = [(row["max"], row["rms"]), (row["lopo_max"], row["lopo_rms"]), (row["subset_max"], row["subset_rms"])]
+        cells = " | ".join(f"{percent(worst)} ({percent(rms)})" for worst, rms in pairs)
+        star = " *" if row["recommended"] else ""
+        lines.append(f"| {row['model']}{star} | {row['order'] or ''} | {row['nvarys']} | {cells} |")
+    return "\n".join(lines)
+
+
+def other_choices(measured: MeasuredMuscle, published: float, settings: dict[str, Any]) -> str:
+    """How much the choice of the three pressures, and the width of the moduli's prior, matter: largest held-out errors."""
+    lines = [
+        "| model | order | prior | median | nine in ten below | worst | choices below the published error |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    choices = wide_triples(measured.data.levels)
+    for model, order, width in (
+        ("kothera", 2, 1),
+        ("robinson", 2, 1),
+        ("robinson", 3, 1),
+        ("robinson", 4, 1),
+        ("robinson", 4, 1 / 3),
+        ("robinson", 4, 3),
+    ):
+        known = {key: value * (width if key.startswith("modulus") else 1) for key, value in settings["tolerance"].items()}
+        errors = []
+        for levels in choices:
+            fit = fit_muscle(
+                measured.data, measured.muscle, model=model, order=order, levels=levels, **{**settings, "tolerance": known}
+            )
+            errors.append(100 * (fit.errors_of("held_out") or (0.0, 0.0))[1])
+        found = np.array(errors)
+        numbers = " | ".join(f"{value:.2f}" for value in (np.median(found), np.percentile(found, 90), found.max()))
+        lines.append(f"| {model} | {order} | x {width:.2g} | {numbers} | {int((found < published).sum())} of {len(choices)} |")
+    return "\n".join(lines)
+
+
+def one_map(name: str, out: Path) -> None:
+    """Tables and picture of one map."""
+    measured = load_measured_muscle(HERE / f"{name}.toml")
+    data, published = measured.data, PUBLISHED[name]
+    chosen = three(data.levels)
+    pressures = ", ".join(f"{data.levels[i] / 1e3:g}" for i in chosen)
+    largest = float(data.force[data.used].max())
+    print(f"\n## {name}\n\n{int(data.used.sum())} points, largest force {largest:.1f} N; published: within {published} %.")
+    print(f"Three pressures: {pressures} kPa. Largest error (rms in brackets), percent of the largest force.\n")
+    print(f"comparing the models on {name} ...", file=sys.stderr)
+    sizes = {key: value for key, value in measured.tolerance.items() if not key.startswith("modulus")}
+    nominal = compare_models(data, measured.muscle, levels=chosen)
+    print(f"Geometry as stated, nothing known of the moduli:\n\n{table(nominal)}\n")
+    settings: dict[str, Any] = {
+        "free": FREE,
+        "tolerance": {**sizes, "c10": 1e7, "c01": 1e7, "bladder_modulus": 1e7},
+        "noise": measured.noise,
+    }
+    settings["tolerance"] |= {key: measured.tolerance[key] for key in ("modulus_slope", "modulus_offset")}
+    fitted = compare_models(data, measured.muscle, levels=chosen, **settings)
+    print(f"Braid angle and rest length fitted within their tolerances, moduli with their wide prior:\n\n{table(fitted)}\n")
+    print(f"trying other sets of three on {name} ...", file=sys.stderr)
+    settings["tolerance"] = {k: v for k, v in settings["tolerance"].items() if k in measured.tolerance}
+    print("Other choices of three (highest, one in the middle, one low), largest error on the rest:\n")
+    print(other_choices(measured, published, settings))
+    fit = fit_muscle(data, measured.muscle, model="robinson", order=4, levels=chosen, **settings)
+    picture = out / f"{name}.png"
+    picture.write_bytes(render_png(fit))
+    print(f"written: {picture}", file=sys.stderr)
+
+
+def main() -> int:
+    """Both maps; 2 where the measurements are not at hand."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0] if __doc__ else None)
+    parser.add_argument("out", type=Path, help="folder for the pictures")
+    out = parser.parse_args().out
+    out.mkdir(parents=True, exist_ok=True)
+    try:
+        for name in PUBLISHED:
+            one_map(name, out)
+    except PamrsError as error:
+        print(f"skipped: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
