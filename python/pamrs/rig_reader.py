@@ -75,9 +75,11 @@ class Reader:
         self.effect_std: dict[str, dict[str, float]] = {}
 
     def problem(self, text: str) -> None:
+        """Note a problem."""
         self.problems.append(text)
 
     def unknown_keys(self, prefix: str, given: Iterable[str], allowed: Iterable[str]) -> None:
+        """Note every key that is not allowed, with what is near to it."""
         names = list(allowed)
         for name in given:
             if name not in names:
@@ -88,6 +90,7 @@ class Reader:
     # ------------------------------------------------------------------ document
 
     def document(self, document: Mapping[str, Any]) -> Content:
+        """A whole rig file."""
         self.unknown_keys("", document, [*_TOP, *BLOCKS])
         if document.get("schema") != SCHEMA:
             self.problem(f"schema = {_shown(document.get('schema'))} is not allowed: {SCHEMA!r} is needed")
@@ -113,6 +116,7 @@ class Reader:
         return Content(name, model, self.tolerances, self.effect_std)
 
     def block(self, block: str, table: Mapping[str, Any]) -> dict[str, Any]:
+        """One block by the keys of its table."""
         groups: dict[str, list[str]] = {}
         for key in BLOCKS[block]:
             if key.path:
@@ -137,6 +141,7 @@ class Reader:
     # -------------------------------------------------------------------- values
 
     def value(self, block: str, key: Key, raw: Any) -> Any:
+        """The value of one key in SI, None after noting what is wrong with it."""
         label = ".".join((block, *key.where))
         if raw is None:
             if key.default is None:
@@ -210,6 +215,7 @@ class Reader:
         return value
 
     def vector(self, label: str, key: Key, numbers: Any, unit: str) -> list[float] | None:
+        """A list of numbers in SI."""
         if not isinstance(numbers, list) or not numbers:
             self.problem(f"{label} = {_shown(numbers)} is not allowed: a list of numbers is needed")
             return None
@@ -217,6 +223,7 @@ class Reader:
         return [value for value in values if value is not None]
 
     def spread(self, name: str, label: str, key: Key, unit: str, extra: Mapping[str, Any]) -> None:
+        """Keep what is known of a value: ``tol``, or ``unknown = true``."""
         unknown = extra.get("unknown", False)
         if not isinstance(unknown, bool):
             self.problem(f"{label}.unknown = {_shown(unknown)} is not allowed: true or false")
@@ -233,6 +240,7 @@ class Reader:
     # ------------------------------------------------------------------- effects
 
     def effects(self, raw: Any) -> list[dict[str, Any]]:
+        """The tables ``[[effects]]``."""
         if not isinstance(raw, list) or not all(isinstance(entry, Mapping) for entry in raw):
             self.problem("effects is not allowed as it stands: one table [[effects]] for each is needed")
             return []
@@ -265,6 +273,7 @@ class Reader:
         return found
 
     def effect_value(self, identity: str, parameter: Any, raw: Any) -> float | None:
+        """One parameter of an effect, its default where it is left out."""
         label = f"{identity}.{parameter.name}"
         if raw is None:
             return float(parameter.default)
@@ -302,6 +311,7 @@ class Reader:
             )
 
     def area_fraction(self, opening: list[float], fraction: list[float]) -> None:
+        """Note what is wrong with a valve's area table."""
         label = "valve.area_fraction"
         if len(opening) != len(fraction) or len(opening) < 2:
             self.problem(
@@ -314,6 +324,7 @@ class Reader:
             self.problem(f"{label}.fraction = {fraction} is not allowed: it must not fall")
 
     def muscle(self, muscle: Mapping[str, Any]) -> None:
+        """Note what does not go together in a muscle."""
         slope, offset = muscle.get("modulus_slope", []), muscle.get("modulus_offset", [])
         if len(slope) != len(offset):
             self.problem(

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -16,6 +18,7 @@ from pamrs.fit.statistics import FitParameter, FitStatistics, determination
 from pamrs.fit.validation import CrossValidation, PressureErrors, leave_one_out, summary
 
 if TYPE_CHECKING:
+    from pamrs.fit.compare import ModelComparison
     from pamrs.fit.data import ForceMap
     from pamrs.muscle import Muscle
     from pamrs.rig import Rig
@@ -268,6 +271,49 @@ class MuscleFit(FitStatistics):
         from pamrs.fit.export import to_dict
 
         return to_dict(self)
+
+    def report(self, path: str | os.PathLike[str], comparison: ModelComparison | None = None) -> Path:
+        """Write the report, one HTML file that needs no network.
+
+        Parameters
+        ----------
+        path : path-like
+            The file.
+        comparison : ModelComparison, optional
+            Models to show beside the fit, from :func:`pamrs.fit.compare_models`.
+
+        Returns
+        -------
+        Path
+            The file written.
+
+        Raises
+        ------
+        ImportError
+            If matplotlib or jinja2 is missing; names the extra to install.
+        """
+        from pamrs.fit.report import write_report
+
+        return write_report(self, path, comparison)
+
+    def figure(self, path: str | os.PathLike[str], comparison: ModelComparison | None = None) -> Path:
+        """Write one picture of the fit, a PNG of 1600 x 1000 pixels; arguments as :meth:`report`.
+
+        Parameters
+        ----------
+        path : path-like
+            The file.
+        comparison : ModelComparison, optional
+            Models to show beside the fit.
+
+        Returns
+        -------
+        Path
+            The file written.
+        """
+        from pamrs.fit.report import write_figure
+
+        return write_figure(self, path, comparison)
 
     def fit_report(self) -> str:
         """The fit in words and numbers, for a terminal."""
