@@ -114,7 +114,9 @@ def _diagnose(
     if json is not None:
         result.to_json(json)
     if model is not None:
-        model.write_text(result.model, encoding="utf-8")
+        from pamrs.writing import write_atomically
+
+        write_atomically(model, result.model)
     if report is not None:
         result.report(report)
     if png is not None:
@@ -180,12 +182,13 @@ def _write_csv(path: Path, columns: Mapping[str, NDArray[np.float64]]) -> None:
     """Write channels in SI units under headers that carry the unit; masked samples stay empty."""
     import math
 
+    from pamrs.writing import write_atomically
+
     names = list(columns)
-    rows = zip(*(columns[name].tolist() for name in names), strict=True)
-    with path.open("w", encoding="utf-8", newline="\n") as file:
-        file.write(",".join(f"{name} [{CHANNEL_UNITS.get(name, '1')}]" for name in names) + "\n")
-        for row in rows:
-            file.write(",".join("" if math.isnan(value) else f"{value:.10g}" for value in row) + "\n")
+    lines = [",".join(f"{name} [{CHANNEL_UNITS.get(name, '1')}]" for name in names)]
+    for row in zip(*(columns[name].tolist() for name in names), strict=True):
+        lines.append(",".join("" if math.isnan(value) else f"{value:.10g}" for value in row))
+    write_atomically(path, "\n".join(lines) + "\n")
 
 
 @rig_app.command("check")

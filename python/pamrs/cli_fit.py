@@ -84,7 +84,7 @@ def _muscle(
             summary = _summary(fit, comparison)
         except FitError as error:
             raise FitError("; ".join([str(error), *map_.notes])) from error
-    from pamrs.diagnosis.result import write_atomically
+    from pamrs.writing import write_atomically
 
     for path, content in contents.items():
         write_atomically(path, content)

@@ -298,12 +298,12 @@ class Rig:
         RigError
             If the file cannot be written.
         """
-        target = Path(path)
+        from pamrs.writing import write_atomically
+
         try:
-            target.write_text(self.to_toml_text(), encoding="utf-8")
+            return write_atomically(path, self.to_toml_text())
         except OSError as error:
-            raise RigError(f"{target}: cannot be written ({error.strerror or error})") from error
-        return target
+            raise RigError(f"{path}: cannot be written ({error.strerror or error})") from error
 
     def _entry(self, block: str, key: Key) -> str:
         value = self._model[block][key.name]

@@ -207,10 +207,10 @@ JSON_LIKE = st.recursive(
 @settings(max_examples=150)
 @given(st.sampled_from(list(BLOCKS)), st.text("abcdef_", min_size=1, max_size=9), JSON_LIKE, st.booleans())
 def test_nothing_but_a_rig_error(block: str, key: str, value: Any, known: bool) -> None:
-    from pamrs.rig_reader import _Reader
+    from pamrs.rig_reader import Reader
 
     name = BLOCKS[block][0].where[0] if known else key
-    reader = _Reader()
+    reader = Reader()
     reader.document({"schema": "pamrs.rig/1", block: {name: value}, "effects": value})
     assert reader.problems
 

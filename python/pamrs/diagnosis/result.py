@@ -6,7 +6,6 @@ import html
 import json
 import math
 import os
-import tempfile
 import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -17,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pamrs.report import text as words
+from pamrs.writing import write_atomically
 
 __all__ = ["SCHEMA", "VERDICTS", "Diagnosis", "Trace", "schema"]
 
@@ -127,24 +127,6 @@ def _pick(entry: Mapping[str, Any], always: Sequence[str], optional: Sequence[st
     if "unit" in chosen:
         chosen["unit"] = str(chosen["unit"] or "1")
     return chosen
-
-
-def write_atomically(path: str | os.PathLike[str], content: str | bytes) -> Path:
-    """Write `content` to a temporary file beside `path`, then rename: readers never see half a file."""
-    target = Path(path)
-    data = content.encode("utf-8") if isinstance(content, str) else content
-    handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.", suffix=".tmp")
-    try:
-        with os.fdopen(handle, "wb") as stream:
-            stream.write(data)
-        umask = os.umask(0)
-        os.umask(umask)
-        os.chmod(temporary, 0o666 & ~umask)
-        os.replace(temporary, target)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
-    return target
 
 
 @dataclass(repr=False)

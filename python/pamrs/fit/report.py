@@ -261,7 +261,7 @@ def render_html(fit: MuscleFit, comparison: ModelComparison | None = None, *, co
 
 def write_report(fit: MuscleFit, path: str | os.PathLike[str], comparison: ModelComparison | None = None, *, command: str = "") -> Path:
     """Write :func:`render_html` to `path` and return the path; the file appears whole or not at all."""
-    from pamrs.diagnosis.result import write_atomically
+    from pamrs.writing import write_atomically
 
     return write_atomically(path, render_html(fit, comparison, command=command))
 
@@ -285,6 +285,6 @@ def render_png(fit: MuscleFit, comparison: ModelComparison | None = None) -> byt
 
 def write_figure(fit: MuscleFit, path: str | os.PathLike[str], comparison: ModelComparison | None = None) -> Path:
     """Write :func:`render_png` to `path` and return the path; the file appears whole or not at all."""
-    from pamrs.diagnosis.result import write_atomically
+    from pamrs.writing import write_atomically
 
     return write_atomically(path, render_png(fit, comparison))

@@ -42,7 +42,7 @@ def write_report(diagnosis: Diagnosis, path: str | os.PathLike[str]) -> Path:
     ImportError
         If matplotlib or jinja2 is missing; names the extra to install.
     """
-    from pamrs.diagnosis.result import write_atomically
+    from pamrs.writing import write_atomically
 
     return write_atomically(path, render_html(diagnosis))
 
@@ -55,7 +55,7 @@ def write_figure(diagnosis: Diagnosis, path: str | os.PathLike[str]) -> Path:
     ImportError
         If matplotlib is missing; names the extra to install.
     """
-    from pamrs.diagnosis.result import write_atomically
+    from pamrs.writing import write_atomically
 
     try:
         import matplotlib  # noqa: F401
