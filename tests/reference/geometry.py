@@ -184,11 +184,11 @@ class GeometryReference:
             if miss_near * miss_far <= 0.0:
                 return float(brentq(miss, near, far, xtol=1e-18, rtol=8.9e-16)), False
         least = int(np.argmin(np.abs(misses)))
-        if least in (0, grid.size - 1):
-            return float(grid[least]), e < 0.0 and least > 0
-        bounds = sorted((grid[least - 1], grid[least + 1]))
+        bounds = sorted((float(grid[max(least - 1, 0)]), float(grid[min(least + 1, grid.size - 1)])))
         found = minimize_scalar(lambda radius: abs(miss(radius)), bounds=bounds, method="bounded", options={"xatol": 1e-12})
-        return float(found.x), False
+        inside = abs(found.x - grid[least]) > 1e-9 * r0 and found.fun < abs(misses[least])
+        best = float(found.x if inside else grid[least])
+        return best, e < 0.0 and best == last
 
     def profile(self, z: float, e: float, radius: float) -> float:
         """Outer radius f(z) at axial position z, m."""
