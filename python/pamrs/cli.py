@@ -1,4 +1,4 @@
-"""The command line: ``pamrs diagnose``, ``pamrs fit``, ``pamrs simulate``, ``pamrs rig check``.
+"""The command line: ``pamrs diagnose``, ``fit``, ``library``, ``simulate``, ``size`` and ``rig check``.
 
 Results go to standard output, progress and errors to standard error. The exit code is 0 when the
 command did its work (a diagnosis that finds nothing missing included), 2 when the input is wrong.
@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pamrs.cli_fit import fit_app
+from pamrs.cli_library import library_command, size_command
 
 if TYPE_CHECKING:
     import numpy as np
@@ -55,6 +56,8 @@ app = typer.Typer(
 rig_app = typer.Typer(help="Work with rig files.")
 app.add_typer(rig_app, name="rig")
 app.add_typer(fit_app, name="fit")
+app.command("library")(library_command)
+app.command("size")(size_command)
 
 
 def _print_version(wanted: bool) -> None:

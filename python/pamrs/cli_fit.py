@@ -1,4 +1,4 @@
-"""The command line of fits: ``pamrs fit muscle``."""
+"""The command line of fits: ``pamrs fit muscle`` and ``pamrs fit friction``."""
 
 from __future__ import annotations
 
@@ -14,16 +14,27 @@ import typer
 if TYPE_CHECKING:
     from pamrs.fit.compare import ModelComparison
     from pamrs.fit.data import ForceMap
+    from pamrs.fit.friction import FrictionFit
     from pamrs.fit.result import MuscleFit
     from pamrs.muscle import Muscle
 
 __all__ = ["fit_app"]
 
 SCHEMA: Final = "pamrs.muscle_fit/1"
+FRICTION_SCHEMA: Final = "pamrs.friction_fit/1"
 _NUMBER = r"[-+]?\d*\.?\d+(?:[eE][-+]?\d+)?"
 _QUANTITY = re.compile(rf"^\s*(?P<value>{_NUMBER})\s*(?:(?:\+-|±)\s*(?P<tol>{_NUMBER})\s*)?(?P<unit>\S.*?)?\s*$")
 _GEOMETRY: Final = {"rest_length": "length", "rest_diameter": "length", "braid_angle": "angle", "wall_thickness": "length"}
 _MODULI: Final = {"modulus_slope": "dimensionless"}
+
+_MuscleName = Annotated[str | None, typer.Option("--muscle", help="Rig file (TOML) with the muscle, or a name of the library.")]
+_RestLength = Annotated[str | None, typer.Option(help='For example "300 mm"; "300 +- 2 mm" with what is known of it.')]
+_RestDiameter = Annotated[str | None, typer.Option(help='For example "20 mm" (outside).')]
+_BraidAngle = Annotated[str | None, typer.Option(help='For example "65 +- 3 deg", from the circumference.')]
+_WallThickness = Annotated[str | None, typer.Option(help='For example "2 mm".')]
+_Where = Annotated[list[str] | None, typer.Option(help="COLUMN=VALUE: only these rows; may be repeated.")]
+_Clipped = Annotated[str | None, typer.Option(help='A force that means off the scale, like "0 N".')]
+_Picture = Annotated[Path | None, typer.Option("--png", help="Write the summary picture.")]
 
 fit_app = typer.Typer(help="Fit models to measurements.")
 
@@ -40,13 +51,13 @@ def _muscle(
     model: Annotated[str | None, typer.Option(help="Force model; by default that of the muscle.")] = None,
     order: Annotated[int | None, typer.Option(help="Order of the stress polynomial, 4 unless the muscle has moduli.")] = None,
     geometry: Annotated[str | None, typer.Option(help="cylinder, elliptic or elliptic_published; by default the model's own.")] = None,
-    muscle: Annotated[str | None, typer.Option(help="Rig file (TOML) with the muscle, or a name of the library.")] = None,
-    rest_length: Annotated[str | None, typer.Option(help='For example "300 mm"; "300 +- 2 mm" with what is known of it.')] = None,
-    rest_diameter: Annotated[str | None, typer.Option(help='For example "20 mm" (outside).')] = None,
-    braid_angle: Annotated[str | None, typer.Option(help='For example "65 +- 3 deg", from the circumference.')] = None,
-    wall_thickness: Annotated[str | None, typer.Option(help='For example "2 mm".')] = None,
-    where: Annotated[list[str] | None, typer.Option(help="COLUMN=VALUE: only these rows; may be repeated.")] = None,
-    clipped: Annotated[str | None, typer.Option(help='A force that means off the scale, like "0 N".')] = None,
+    muscle: _MuscleName = None,
+    rest_length: _RestLength = None,
+    rest_diameter: _RestDiameter = None,
+    braid_angle: _BraidAngle = None,
+    wall_thickness: _WallThickness = None,
+    where: _Where = None,
+    clipped: _Clipped = None,
     free: Annotated[str | None, typer.Option(help="Geometry to fit too: braid_angle,rest_diameter,...")] = None,
     prior: Annotated[
         str | None, typer.Option(help='What is known of moduli: "modulus_slope=10, modulus_offset=10 MPa"; needs --noise.')
@@ -58,7 +69,7 @@ def _muscle(
     report: Annotated[Path | None, typer.Option(help="Write the report, one HTML file.")] = None,
     rig: Annotated[Path | None, typer.Option(help="Write a rig file with the fitted muscle.")] = None,
     json: Annotated[Path | None, typer.Option(help=f"Write the result (schema {SCHEMA}).")] = None,
-    png: Annotated[Path | None, typer.Option(help="Write the summary picture.")] = None,
+    png: _Picture = None,
 ) -> None:
     """Fit a muscle's force model to measured forces over length and pressure."""
     from pamrs.cli import _check_writable, _progress
@@ -84,13 +95,44 @@ def _muscle(
             summary = _summary(fit, comparison)
         except FitError as error:
             raise FitError("; ".join([str(error), *map_.notes])) from error
-    from pamrs.writing import write_atomically
-
-    for path, content in contents.items():
-        write_atomically(path, content)
     typer.echo(summary, nl=False)
-    for path in contents:
-        typer.echo(f"written: {path}", err=True)
+    _write(contents)
+
+
+@fit_app.command("friction")
+def _friction(
+    context: typer.Context,
+    data: Annotated[Path, typer.Argument(help="Force map with a column direction, recording of a bench, or a TOML description.")],
+    muscle: _MuscleName = None,
+    rest_length: _RestLength = None,
+    rest_diameter: _RestDiameter = None,
+    braid_angle: _BraidAngle = None,
+    wall_thickness: _WallThickness = None,
+    where: _Where = None,
+    clipped: _Clipped = None,
+    floor: Annotated[float, typer.Option(help="The least that c_F becomes.")] = 0.01,
+    json: Annotated[Path | None, typer.Option(help=f"Write the result (schema {FRICTION_SCHEMA}).")] = None,
+    png: _Picture = None,
+) -> None:
+    """Fit the friction c_F = max(c0 + c1 P, floor) of a muscle to its hysteresis loops; of its geometry, the rest length is enough."""
+    from pamrs.cli import _check_writable, _progress
+
+    _check_writable(json, png)
+    sizes = {"rest_length": rest_length, "rest_diameter": rest_diameter, "braid_angle": braid_angle, "wall_thickness": wall_thickness}
+    map_ = _loops(data, muscle, {k: v for k, v in sizes.items() if v is not None}, where or [], clipped)
+    from pamrs.fit import fit_friction
+
+    contents: dict[Path, str | bytes] = {}
+    with _progress(f"fitting {map_.label}"):
+        fit = fit_friction(map_, floor=floor)
+        if json is not None:
+            contents[json] = _friction_json(fit, map_, _command(context))
+        if png is not None:
+            from pamrs.fit.report import render_friction_png
+
+            contents[png] = render_friction_png(fit, map_)
+    typer.echo(f"{map_.label}: {fit.fit_report()}")
+    _write(contents)
 
 
 def _comparison(data: ForceMap, muscle: Muscle, order: int | None, shape: dict[str, Any]) -> ModelComparison:
@@ -142,15 +184,33 @@ def _inputs(
         measured = load_measured_muscle(data)
         return measured.data, measured.muscle, measured.tolerance, measured.noise
     start, tolerance = _start(muscle, sizes)
+    map_ = _table(data, float(start.parameters["rest_length"]), where, clipped)
+    return map_.checked_against(start), start, tolerance, None
+
+
+def _table(data: Path, rest_length: float, where: Sequence[str], clipped: str | None) -> ForceMap:
+    """The map of a table."""
     from pamrs.fit.files import load_force_map
 
-    map_ = load_force_map(
+    return load_force_map(
         data,
-        rest_length=float(start.parameters["rest_length"]),
+        rest_length=rest_length,
         where=dict(_filter(text) for text in where) or None,
         clipped=None if clipped is None else _quantity("clipped", clipped, "force")[0],
     )
-    return map_.checked_against(start), start, tolerance, None
+
+
+def _loops(data: Path, muscle: str | None, sizes: Mapping[str, str], where: Sequence[str], clipped: str | None) -> ForceMap:
+    """The map of hysteresis loops: friction needs the rest length alone, any other size is for the check of the forces."""
+    from pamrs.errors import ParameterError
+
+    if data.suffix.lower() == ".toml" or muscle is not None or set(sizes) - {"rest_length"}:
+        return _inputs(data, muscle, sizes, where, clipped)[0]
+    if not sizes:
+        raise ParameterError(
+            "the rest length is missing: give --rest-length (like '300 mm'), or --muscle with a rig file or a name of the library"
+        )
+    return _table(data, _quantity("rest_length", sizes["rest_length"], "length")[0], where, clipped)
 
 
 def _prior(text: str | None) -> dict[str, float]:
@@ -206,19 +266,19 @@ def _start(muscle: str | None, sizes: Mapping[str, str]) -> tuple[Muscle, dict[s
     return Muscle(**values), tolerance
 
 
-def _named_muscle(name: str) -> tuple[Muscle, dict[str, float]]:
-    """The muscle of a rig file, or of the library."""
+def _named_muscle(name: str, option: str = "--muscle") -> tuple[Muscle, dict[str, float]]:
+    """The muscle of a rig file, or of the library, and what is known of its geometry."""
     from pamrs import library
     from pamrs.errors import ParameterError
     from pamrs.rig import load_rig
 
     if not name.endswith(".toml") and not Path(name).exists():
         if name not in library.names():
-            raise ParameterError(f"--muscle = {name!r} is neither a file nor in the library: {', '.join(library.names())}")
+            raise ParameterError(f"{option} = {name!r} is neither a file nor in the library: {', '.join(library.names())}")
         return library.entry(name).muscle, {}
     rig = load_rig(name)
     if rig.muscle is None:
-        raise ParameterError(f"--muscle = {name!r}: this rig has no block [muscle]")
+        raise ParameterError(f"{option} = {name!r}: this rig has no block [muscle]")
     known = {key.partition(".")[2]: p.tol for key, p in rig.parameters.items() if key.startswith("muscle.") and p.tol > 0.0}
     return rig.muscle, {key: value for key, value in known.items() if key in _GEOMETRY}
 
@@ -264,16 +324,25 @@ def _contents(
     return contents
 
 
+def _write(contents: Mapping[Path, str | bytes]) -> None:
+    """Write every file, and say so."""
+    from pamrs.writing import write_atomically
+
+    for path, content in contents.items():
+        write_atomically(path, content)
+        typer.echo(f"written: {path}", err=True)
+
+
 def _command(context: typer.Context) -> str:
     """The command line that gives this result again."""
-    words = ["pamrs", "fit", "muscle", str(context.params["data"])]
+    words = ["pamrs", "fit", str(context.info_name), str(context.params["data"])]
     for name, value in context.params.items():
         option = f"--{name.replace('_', '-')}"
         if value is True:
             words.append(option)
         elif isinstance(value, (list, tuple)):
             words += [word for item in value for word in (option, str(item))]
-        elif value not in (None, False) and name != "data":
+        elif value is not None and value is not False and name != "data":
             words += [option, str(value)]
     return shlex.join(words)
 
@@ -296,3 +365,10 @@ def _json(fit: MuscleFit, comparison: ModelComparison | None, command: str) -> s
         "comparison": None if comparison is None else comparison.to_dicts(),
     }
     return json.dumps(document, indent=1, allow_nan=False) + "\n"
+
+
+def _friction_json(fit: FrictionFit, data: ForceMap, command: str) -> str:
+    import json
+
+    document = {"schema": FRICTION_SCHEMA, "name": data.label, "source": data.source, "command": command, "rows": len(data)}
+    return json.dumps({**document, "fit": fit.to_dict()}, indent=1, allow_nan=False) + "\n"

@@ -227,7 +227,7 @@ class SizingResult:
         width = max([14, *(len(row["name"]) + 2 for row in self.rows)])
         lines = ["".ljust(30) + "".join(str(row["name"]).rjust(width) for row in self.rows)] if self.rows else []
         winners = {key: self.best[rule] for rule, (key, _) in _RULES.items()}
-        for label, key, unit in _LINES:
+        for label, key, unit in _LINES if self.rows else ():
             line = label.ljust(30)
             for row in self.rows:
                 value = row[key]

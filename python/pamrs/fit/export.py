@@ -10,13 +10,6 @@ if TYPE_CHECKING:
 
 __all__ = ["fit_report", "to_dict", "to_rig"]
 
-_BENCH = """schema = "pamrs.rig/1"
-name = "bench"
-gas = {{ ambient_pressure = {{ value = 101325.0, unit = "Pa" }}, temperature = {{ value = 293.15, unit = "K" }} }}
-[chamber]
-dead_volume = {{ value = {volume!r}, unit = "m3" }}
-"""
-
 
 def fit_report(fit: MuscleFit) -> str:
     """What :meth:`MuscleFit.fit_report` returns."""
@@ -51,12 +44,13 @@ def fit_report(fit: MuscleFit) -> str:
 
 def to_rig(fit: MuscleFit, rig: Rig | None) -> Rig:
     """What :meth:`MuscleFit.to_rig` returns."""
-    from pamrs.rig import Rig, parse_rig
+    from pamrs.rig import Rig
+    from pamrs.rigs import bench
 
     muscle = fit.muscle
     parameters = dict(muscle.parameters)
     if rig is None:
-        rig = parse_rig(_BENCH.format(volume=0.1 * float(muscle.air_volume(0.0))), source="to_rig")
+        rig = bench(muscle)
     base = rig.model
     if base["muscle"] is not None:
         parameters["count"] = base["muscle"]["count"]

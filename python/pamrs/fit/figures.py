@@ -21,7 +21,7 @@ from pamrs.report.figures import COLOURS, STYLE, svg_text
 if TYPE_CHECKING:
     from pamrs.fit.result import MuscleFit
 
-__all__ = ["ErrorCurve", "errors_svg", "family_svg", "moduli_svg", "residuals_svg", "summary_png"]
+__all__ = ["ErrorCurve", "errors_svg", "family_svg", "moduli_svg", "pressure_colours", "residuals_svg", "summary_png", "thinned"]
 
 Array = NDArray[np.float64]
 
@@ -64,14 +64,14 @@ class ErrorCurve:
     left_rms: Array
 
 
-def _colours(levels: Array) -> tuple[Any, Normalize]:
+def pressure_colours(levels: Array) -> tuple[Any, Normalize]:
     """A map from pressure [kPa] to colours dark enough for lines on white, and its range."""
     steps = mpl.colormaps["viridis"](np.linspace(0.0, 0.88, 64))
     low, high = float(levels.min()) / 1e3, float(levels.max()) / 1e3
     return LinearSegmentedColormap.from_list("pressure", steps.tolist()), Normalize(low, high if high > low else low + 1.0)
 
 
-def _thinned(rows: NDArray[np.intp]) -> NDArray[np.intp]:
+def thinned(rows: NDArray[np.intp]) -> NDArray[np.intp]:
     """At most ``_MOST_POINTS`` of some rows, evenly."""
     if len(rows) <= _MOST_POINTS:
         return rows
@@ -89,9 +89,9 @@ def _fitted_levels(fit: MuscleFit) -> set[int]:
 def _draw_family(axes: Axes, fit: MuscleFit, *, size: float = 26.0) -> Any:
     """Measured points and model lines over contraction, coloured by pressure; returns what a colour bar needs."""
     data = fit.data
-    cmap, norm = _colours(data.levels)
+    cmap, norm = pressure_colours(data.levels)
     contraction, shown = 100.0 * data.contraction, _fitted_levels(fit)
-    off = _thinned(np.flatnonzero((data.level < 0) & np.isfinite(contraction) & np.isfinite(data.force)))
+    off = thinned(np.flatnonzero((data.level < 0) & np.isfinite(contraction) & np.isfinite(data.force)))
     used = contraction[data.used]
     low, high = float(used.min()), float(used.max())
     inside = off[(contraction[off] >= low - 20) & (contraction[off] <= high + 20)]
@@ -112,7 +112,7 @@ def _draw_family(axes: Axes, fit: MuscleFit, *, size: float = 26.0) -> Any:
                 force = fit.predict(level, length=lengths, direction=way)
                 axes.plot(grid, np.where(force > floor, force, np.nan), color=colour, lw=0.8, ls=(0, (1, 2)))
                 axes.plot(grid[own], force[own], color=colour, lw=1.3, ls=dash)
-        rows = _thinned(rows)
+        rows = thinned(rows)
         face = colour if index in shown else "white"
         axes.scatter(contraction[rows], data.force[rows], s=size, facecolor=face, edgecolor=colour, lw=1.1, zorder=3)
     if shown != set(range(len(data.levels))):
@@ -312,7 +312,7 @@ def _draw_residuals(axes: Axes, fit: MuscleFit, *, size: float = 34.0) -> Any:
     pressure, contraction, force, level, _ = data.used_rows()
     share = 100 * fit.all_residuals / float(force.max())
     limit = max(float(np.percentile(np.abs(share), 98)), 1e-6)
-    keep = _thinned(np.arange(len(share)))
+    keep = thinned(np.arange(len(share)))
     fitted = np.isin(level, list(_fitted_levels(fit)))
     colours = None
     for rows, mark in ((keep[fitted[keep]], "o"), (keep[~fitted[keep]], "s")):

@@ -8,8 +8,8 @@ is ``F``, whatever the force model: friction comes from the loops alone, and the
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -185,6 +185,39 @@ class FrictionFit:
             )
         return "\n".join([*lines, *(f"  note: {issue}" for issue in self.issues)])
 
+    def to_dict(self) -> dict[str, Any]:
+        """The result as plain data, SI units; None where a number is not determinable."""
+        return {
+            "parameters": [{**asdict(item), "stderr": _or_none(item.stderr)} for item in self.params.values()],
+            "floor": self.floor,
+            "presliding": self.presliding,
+            "presliding_reason": self.presliding_reason,
+            "levels": [
+                {
+                    "pressure": level.pressure,
+                    "coefficient": level.coefficient,
+                    "stderr": level.stderr,
+                    "law": law,
+                    "at_floor": level.at_floor,
+                    "rows": level.rows,
+                    "contraction": level.contraction.tolist(),
+                    "force": level.force.tolist(),
+                    "half_width": level.half_width.tolist(),
+                }
+                for level, law in zip(self.levels, self.best_fit.tolist(), strict=True)
+            ],
+            "residual": self.residual.tolist(),
+            "ndata": self.ndata,
+            "nvarys": self.nvarys,
+            "nfree": self.nfree,
+            "redchi": _or_none(self.redchi),
+            "between": _or_none(self.between),
+            "covar": [[_or_none(value) for value in row] for row in self.covar.tolist()],
+            "slope_pvalue": _or_none(self.slope_pvalue),
+            "slope_significant": self.slope_significant,
+            "issues": self.issues,
+        }
+
     def _slope_words(self) -> str:
         if math.isnan(self.slope_pvalue):
             return "its significance cannot be tested without a spare pressure"
@@ -289,6 +322,10 @@ def fit_friction(
         slope_pvalue=_pvalue(line, free),
         issues=issues,
     )
+
+
+def _or_none(value: float) -> float | None:
+    return value if math.isfinite(value) else None
 
 
 def _loop(pressure: float, contraction: Array, force: Array, way: NDArray[np.int8]) -> FrictionLevel | str:

@@ -12,10 +12,12 @@ from pamrs.report.text import format_number, format_uncertain
 
 if TYPE_CHECKING:
     from pamrs.fit.compare import ModelComparison
+    from pamrs.fit.data import ForceMap
     from pamrs.fit.figures import ErrorCurve
+    from pamrs.fit.friction import FrictionFit
     from pamrs.fit.result import MuscleFit
 
-__all__ = ["error_curves", "render_html", "render_png", "write_figure", "write_report"]
+__all__ = ["error_curves", "render_friction_png", "render_html", "render_png", "write_figure", "write_report"]
 
 _SHOWN_UNITS = {"Pa": ("MPa", 1e-6), "m": ("mm", 1e3), "rad": ("°", 57.29577951308232), "1": ("", 1.0)}
 
@@ -281,6 +283,34 @@ def render_png(fit: MuscleFit, comparison: ModelComparison | None = None) -> byt
     from pamrs.fit.figures import summary_png
 
     return summary_png(fit, error_curves(fit, comparison), remarks.headline(fit))
+
+
+def render_friction_png(fit: FrictionFit, data: ForceMap) -> bytes:
+    """Measured loops with their mean curves, and the friction coefficient over pressure: a PNG of 1600 x 800 pixels.
+
+    Parameters
+    ----------
+    fit : FrictionFit
+        Fitted friction.
+    data : ForceMap
+        The loops that it was fitted to.
+
+    Returns
+    -------
+    bytes
+
+    Raises
+    ------
+    ImportError
+        If matplotlib is missing; names the extra to install.
+    """
+    try:
+        import matplotlib  # noqa: F401
+    except ImportError as error:
+        raise _missing(error) from error
+    from pamrs.fit.friction_figure import friction_png
+
+    return friction_png(fit, data)
 
 
 def write_figure(fit: MuscleFit, path: str | os.PathLike[str], comparison: ModelComparison | None = None) -> Path:

@@ -107,7 +107,7 @@ def _compare(item: Entry, fact: Fact) -> Comparison:
     )
 
 
-def table(rows: Iterable[Comparison], *, notes: bool = True) -> str:
+def table(rows: Iterable[Comparison], *, notes: bool = True, titles: bool = True) -> str:
     """The comparison as text, one line per fact.
 
     Parameters
@@ -116,6 +116,8 @@ def table(rows: Iterable[Comparison], *, notes: bool = True) -> str:
         As :func:`compare` or :func:`compare_all` return them.
     notes : bool
         Whether remarks follow their line.
+    titles : bool
+        Whether a line names the muscle before its facts.
 
     Returns
     -------
@@ -124,7 +126,7 @@ def table(rows: Iterable[Comparison], *, notes: bool = True) -> str:
     lines = [f"{'fact':<52} {'published':>10} {'ours':>10} {'unit':<7} {'deviation':>9}  verdict"]
     muscle = ""
     for row in rows:
-        if row.muscle != muscle:
+        if titles and row.muscle != muscle:
             muscle = row.muscle
             lines += ["", f"{muscle}: {entry(muscle).title}" if muscle in names() else muscle]
         published = {"equals": "", "above": "> ", "below": "< "}[row.relation] + _number(row.published)

@@ -1,0 +1,92 @@
+"""The library as text: the list of its muscles, one muscle with the origin of each number, and every published fact."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+
+from pamrs.library import entry, names
+from pamrs.library.design import compare_design, six_against_two
+from pamrs.library.identify import derive
+from pamrs.library.published import compare, compare_all, counts, table
+from pamrs.units import parse_unit
+
+__all__ = ["description", "facts", "overview"]
+
+_UNITS: Final = {
+    "rest_length": "mm",
+    "rest_diameter": "mm",
+    "braid_angle": "deg",
+    "wall_thickness": "mm",
+    "modulus_offset": "MPa",
+    "friction_pressure_slope": "1/MPa",
+    "friction_presliding": "mm",
+    "mass": "kg",
+    "max_pressure": "bar",
+}
+
+
+def overview() -> str:
+    """One line per muscle: name, highest pressure of its tests, mass, title."""
+    lines = [f"{'name':<21}{'max pressure':>13}{'mass':>13}  title"]
+    for name in names():
+        item = entry(name)
+        mass = "unknown" if item.mass is None else _shown("mass", item.mass)
+        lines.append(f"{name:<21}{_shown('max_pressure', item.max_pressure):>13}{mass:>13}  {item.title}")
+    return "\n".join(lines)
+
+
+def description(name: str) -> str:
+    """The parameters of one muscle with the origin of each, and its published facts beside ours.
+
+    Parameters
+    ----------
+    name : str
+        A name of the library.
+
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    ParameterError
+        If there is no such muscle.
+    """
+    item = entry(name)
+    values = {**item.parameters, "mass": item.mass, "max_pressure": item.max_pressure}
+    shown = {key: "unknown" if value is None else _shown(key, value) for key, value in values.items()}
+    width, room = max(map(len, shown)), max(map(len, shown.values()))
+    lines = [f"{name}: {item.title}", ""]
+    lines += [f"  {key:<{width}}  {text:<{room}}  {item.origins.get(key, 'not published')}" for key, text in shown.items()]
+    rows = compare(name)
+    verdicts = ", ".join(f"{number} {verdict}" for verdict, number in counts(rows).items())
+    return "\n".join([*lines, "", table(rows, titles=False), "", verdicts])
+
+
+def facts() -> str:
+    """The identified numbers derived again, every published fact beside ours, and the comparison of 3.2.3."""
+    lines = ["Identified numbers, derived again from prior and facts", ""]
+    for name in names():
+        item, again = entry(name), derive(entry(name))
+        slope, offset = (again.parameters[f"modulus_{key}"] for key in ("slope", "offset"))
+        lines.append(f"{name}: m = {np.array(slope)}, b = {np.array(offset)} Pa")
+        if "braid_angle" in again.parameters:
+            lines.append(f"    braid angle {np.degrees(again.parameters['braid_angle']):.4f} deg")
+        lines += [
+            f"    facts: {', '.join(again.conditions) or 'none'}; they determine {again.rank} of {again.unknowns} combinations",
+            f"    prior: {item.identification['prior']['origin']}",
+            f"    moved by {np.round(again.change, 3)} prior standard deviations",
+        ]
+    rows = [*compare_all(), *compare_design("large_2in_effective"), *compare_design("large_2in")]
+    lines += ["", "Published facts", "", table(rows), "", "Six against two", "", six_against_two().table(), ""]
+    return "\n".join([*lines, ", ".join(f"{number} {verdict}" for verdict, number in counts(rows).items())])
+
+
+def _shown(name: str, value: Any) -> str:
+    """A number, or several, in the unit that people use for it."""
+    unit = _UNITS.get(name, "1")
+    numbers = np.atleast_1d(np.asarray(value, dtype=np.float64)) / parse_unit(unit).scale
+    text = ", ".join(f"{number:.5g}" for number in numbers)
+    return text if unit == "1" else f"{text} {unit}"
