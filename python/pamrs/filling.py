@@ -26,9 +26,14 @@ def positive(name: str, value: float, *, zero: bool = False) -> float:
     ParameterError
         Naming the argument, its value and what is allowed.
     """
-    if not (math.isfinite(value) and (value > 0.0 or (zero and value == 0.0))):
-        raise ParameterError(f"{name} = {value} is not allowed: a finite number {'from' if zero else 'above'} zero is needed")
-    return float(value)
+    allowed = f"a finite number {'from' if zero else 'above'} zero is needed"
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        raise ParameterError(f"{name} = {value!r} is not allowed: {allowed}") from None
+    if not (math.isfinite(number) and (number > 0.0 or (zero and number == 0.0))):
+        raise ParameterError(f"{name} = {value} is not allowed: {allowed}")
+    return number
 
 
 @dataclass(frozen=True)

@@ -27,6 +27,7 @@ __all__ = ["Candidate", "Filling", "Requirement", "SizingResult", "packed_diamet
 
 Array = NDArray[np.float64]
 
+_LEAST_PRESSURE: Final = 2e3  # [Pa], below which a working pressure is a mistake of unit
 _RULES: Final[dict[str, tuple[str, bool]]] = {  # criterion: (key, larger is better)
     "count": ("count", False),
     "mass": ("mass", False),
@@ -313,11 +314,15 @@ def size(
     rows: list[dict[str, Any]] = []
     infeasible: dict[str, str] = {}
     for candidate in chosen:
-        count, reason = _count(candidate, requirement, supply, max_count)
+        try:
+            count, reason = _count(candidate, requirement, supply, max_count)
+            if not reason:
+                rows.append(_row(candidate, count, requirement, supply, core))
+        except ParameterError as error:  # its geometry has no solution at a length that is asked for
+            reason = str(error)
         if reason:
-            infeasible[candidate.name] = reason
-        else:
-            rows.append(_row(candidate, count, requirement, supply, core))
+            hint = f" (its pressure is {candidate.pressure:g} Pa: were bar meant?)" if candidate.pressure < _LEAST_PRESSURE else ""
+            infeasible[candidate.name] = reason + hint
     return SizingResult(rows, infeasible)
 
 

@@ -9,19 +9,21 @@ from pathlib import Path
 __all__ = ["write_atomically"]
 
 
+_UMASK = os.umask(0)  # it can only be read by setting it: once, at import
+os.umask(_UMASK)
+
+
 def write_atomically(path: str | os.PathLike[str], content: str | bytes) -> Path:
     """Write `content` to a temporary file beside `path`, then rename: readers never see half a file."""
-    target = Path(path)
+    target = Path(os.path.realpath(path))  # through a symbolic link, not over it
     data = content.encode("utf-8") if isinstance(content, str) else content
     handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.", suffix=".tmp")
     try:
         with os.fdopen(handle, "wb") as stream:
             stream.write(data)
-        umask = os.umask(0)
-        os.umask(umask)
-        os.chmod(temporary, 0o666 & ~umask)
+        os.chmod(temporary, 0o666 & ~_UMASK)
         os.replace(temporary, target)
     except BaseException:
         Path(temporary).unlink(missing_ok=True)
         raise
-    return target
+    return Path(path)

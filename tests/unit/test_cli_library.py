@@ -67,7 +67,7 @@ def test_a_muscle_is_shown_with_the_origin_of_each_number(capsys, name):
     for row in rows:
         assert f"{row.fact} " in out
     agree = sum(row.verdict == "agree" for row in rows)
-    assert out.splitlines()[-1].startswith(f"{agree} agree, ")
+    assert out.splitlines()[-1].startswith(f"{agree} agree")
 
 
 def test_friction_is_shown_per_megapascal(capsys):
@@ -94,7 +94,7 @@ def test_facts_are_what_the_module_prints(capsys):
     assert capsys.readouterr().out == out
     assert "they determine 3 of 4 combinations" in out
     assert "Six against two" in out
-    assert re.search(r"\d+ agree, \d+ differs, \d+ cannot tell\n$", out)
+    assert re.search(r"\d+ agree( .*)?, \d+ differ, \d+ cannot tell\n$", out)
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import pamrs.library as library
+from pamrs import Muscle
 from pamrs.errors import ParameterError
 from pamrs.filling import Filling
 from pamrs.sizing import Candidate, Requirement, SizingResult, packed_diameter, size
@@ -184,3 +185,20 @@ def test_sonic_conductance_gives_the_choked_flow():
 def test_bad_input_is_named(call, message):
     with pytest.raises(ParameterError, match=message):
         call()
+
+
+def test_a_muscle_whose_geometry_has_no_solution_is_infeasible():
+    wide = Muscle(rest_length=0.12, rest_diameter=0.05, braid_angle=math.radians(75.0), wall_thickness=0.002)
+    result = size([Candidate("wide", wide, 5e5), "elbow_0625in"], Requirement([(0.0, 1e3)]))
+    assert "at which the geometry has a solution" in result.infeasible["wide"]
+    assert [row["name"] for row in result.rows] == ["elbow_0625in"]
+
+
+def test_a_pressure_in_bar_is_asked_about():
+    result = size([Candidate.from_library("elbow_0625in", pressure=6.0)], Requirement([(0.0, 1e3)]))
+    assert "were bar meant?" in result.infeasible["elbow_0625in"]
+
+
+def test_a_pressure_that_is_no_number_is_named():
+    with pytest.raises(ParameterError, match="pressure = 'x' is not allowed"):
+        Candidate("x", Muscle(rest_length=0.2, rest_diameter=0.02, braid_angle=1.2, wall_thickness=0.001), "x")

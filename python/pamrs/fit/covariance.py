@@ -33,7 +33,8 @@ def covariances(problem: Problem, result: Estimate, level: Index) -> tuple[Array
         ``sigma^2 (J'J + sigma^2 D)^-1`` with the priors' information ``D``: residuals taken as independent.
     robust : (p, p) array or None
         Delete-one-level jackknife (CR3) of the linearised fit plus the priors' own share: it holds when the
-        residuals of one level hang together. None with fewer than 5 levels, or when a level cannot be spared.
+        residuals of one level hang together. None with fewer than 5 levels or no more levels than parameters,
+        or when a level cannot be spared.
     """
     p = result.jacobian.shape[1]
     prior = np.concatenate([problem.expected(result.design)[1], [1.0 / free.tolerance for free in problem.free]])
@@ -50,7 +51,7 @@ def covariances(problem: Problem, result: Estimate, level: Index) -> tuple[Array
     if result.sigma == 0.0:
         return plain * 0.0, None
     groups = np.unique(level)
-    if len(groups) < _FEWEST_LEVELS:
+    if len(groups) < max(_FEWEST_LEVELS, p + 1):  # fewer would leave combinations without any spread
         return plain, None
     residual = result.residual / result.sigma
     moves = []

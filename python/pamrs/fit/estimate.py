@@ -103,6 +103,8 @@ class Problem:
         values, variance = np.zeros(len(design.names)), np.zeros(len(design.names))
         for i, parts in enumerate(design.kinds):
             for kind, place, factor in parts:  # one, or slope and offset of a modulus at one pressure
+                if factor == 0.0:  # a slope at no pressure
+                    continue
                 known = self.known.get(kind, _UNKNOWN)
                 values[i] += factor * (known.values[place] if place < len(known.values) else 0.0)
                 variance[i] += (factor * known.tolerance) ** 2

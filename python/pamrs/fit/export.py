@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from pamrs.muscle_models import ELASTIC_PARAMETERS
+
 if TYPE_CHECKING:
     from pamrs.fit.result import MuscleFit
     from pamrs.rig import Rig
@@ -54,7 +56,8 @@ def to_rig(fit: MuscleFit, rig: Rig | None) -> Rig:
     base = rig.model
     if base["muscle"] is not None:
         parameters["count"] = base["muscle"]["count"]
-    known = {name: given.tol for name, given in rig.parameters.items() if given.tol > 0.0 and not name.startswith("muscle.")}
+    elastic = {f"muscle.{name}" for names in ELASTIC_PARAMETERS.values() for name in names}
+    known = {name: given.tol for name, given in rig.parameters.items() if given.tol > 0.0 and name not in elastic}
     fitted = {f"muscle.{free.name}": fit.params[free.name].stderr for free in fit.free}
     return Rig(rig.name, {**base, "muscle": parameters}, {**known, **fitted}, rig.effect_std, rig.source)
 

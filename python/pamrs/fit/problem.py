@@ -66,6 +66,8 @@ def decompose(matrix: Array, names: Sequence[str], hint: str = "") -> tuple[Arra
     empty = [name for name, size in zip(names, scale.tolist(), strict=True) if size == 0.0]
     if empty:
         raise FitError(f"{', '.join(empty)} {'has' if len(empty) == 1 else 'have'} no effect on any fitted point{hint}")
+    if not np.isfinite(matrix).all():
+        raise FitError("the model gives no finite force at some of the fitted points")
     u, s, vt = np.linalg.svd(matrix / scale, full_matrices=False)
     if s[-1] <= RANK_TOLERANCE * s[0]:
         share = np.abs(vt[-1])

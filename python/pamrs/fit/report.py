@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from pamrs.errors import FitError, ParameterError
 from pamrs.fit import remarks
@@ -20,6 +20,10 @@ if TYPE_CHECKING:
 __all__ = ["error_curves", "render_friction_png", "render_html", "render_png", "write_figure", "write_report"]
 
 _SHOWN_UNITS = {"Pa": ("MPa", 1e-6), "m": ("mm", 1e3), "rad": ("°", 57.29577951308232), "1": ("", 1.0)}
+
+
+#: Levels up to which the moduli of each are shown beside the straight lines.
+_MOST_LEVELS: Final = 40
 
 
 def _missing(error: ImportError) -> ImportError:
@@ -75,7 +79,7 @@ def _level_by_level(fit: MuscleFit) -> MuscleFit | None:
     counts = np.bincount(fit.data.level[fit.fitted], minlength=len(fit.data.levels))
     terms = fit.order or sum(p.unit == "Pa" for p in fit.params.values())
     enough = np.flatnonzero(counts > terms)
-    if len(enough) < 2:
+    if not 2 <= len(enough) <= _MOST_LEVELS:
         return None
     fixed = {free.name: fit.params[free.name].value for free in fit.free if free.name != "rest_length"}
     if any(p.name == "rest_length" for p in fit.params.values()):
@@ -90,6 +94,7 @@ def _level_by_level(fit: MuscleFit) -> MuscleFit | None:
             moduli="per_level",
             levels=enough.tolist(),
             errors="plain",
+            **fit.settings,
         )
     except (FitError, ParameterError):
         return None
@@ -169,12 +174,11 @@ def _facts(fit: MuscleFit) -> list[tuple[str, str]]:
 
 
 def _muscle(fit: MuscleFit) -> list[tuple[str, str]]:
-    known = fit.data.rest_length, fit.muscle_at(float(fit.data.levels[-1])).parameters
-    rest, parameters = known
+    parameters = fit.muscle_at(float(fit.data.levels[-1])).parameters
     return [
         ("model", remarks.title(fit)),
         ("geometry", str(parameters["geometry"])),
-        ("rest length", f"{format_number(1e3 * rest, 4)} mm"),
+        ("rest length", f"{format_number(1e3 * parameters['rest_length'], 4)} mm"),
         ("rest diameter", f"{format_number(1e3 * parameters['rest_diameter'], 4)} mm"),
         ("braid angle", f"{format_number(57.29577951308232 * parameters['braid_angle'], 4)}°"),
         ("wall thickness", f"{format_number(1e3 * parameters['wall_thickness'], 3)} mm"),

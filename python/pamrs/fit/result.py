@@ -155,7 +155,7 @@ class MuscleFit(FitStatistics):
         length : array_like, optional
             Length [m].
         direction : array_like, optional
-            -1 while contracting, +1 while lengthening; None without friction.
+            -1 while contracting, +1 while lengthening, 0 midway between the branches; None without friction.
 
         Returns
         -------
@@ -238,6 +238,8 @@ class MuscleFit(FitStatistics):
         chosen = self.data if data is None else data
         used = chosen.used
         way = chosen.direction[used] if np.any(self._problem.direction) else None
+        if way is not None and self.model == "elbow_linear":
+            way = np.where(way == 0, -1, way)  # as in the fit: rows of unknown direction are on the contracting branch
         force = self.predict(chosen.pressure[used], length=chosen.length[used], direction=way)
         return determination(chosen.force[used], force)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -108,6 +108,13 @@ class FitStatistics:
     def free(self) -> tuple[Free, ...]:
         """The geometry that was fitted: name, nominal value, tolerance."""
         return self._problem.free
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """How the rows were used: ``weights``, ``direction`` and ``noise`` of :func:`pamrs.fit.fit_muscle`."""
+        problem = self._problem
+        weights = "force" if np.all(problem.weight == 1.0) else "level"
+        return {"weights": weights, "direction": "data" if np.any(problem.direction) else None, "noise": problem.noise}
 
     @property
     def moduli_kind(self) -> str:

@@ -59,8 +59,8 @@ def entry(name: str) -> Entry:
     """
     if name not in _NAMES:
         near = difflib.get_close_matches(str(name), _NAMES, n=1)
-        hint = f"; did you mean {near[0]!r}?" if near else ""
-        raise ParameterError(f"name = {name!r} is not in the library{hint} There are: {', '.join(_NAMES)}")
+        hint = f" Did you mean {near[0]!r}?" if near else ""
+        raise ParameterError(f"name = {name!r} is not in the library.{hint} There are: {', '.join(_NAMES)}")
     file = resources.files(__name__).joinpath(f"{name}.toml")
     return read_entry(file.read_text(encoding="utf-8"), source=f"{name}.toml")
 

@@ -12,7 +12,7 @@ from pamrs.library import Entry, Fact, entry, names
 from pamrs.library.evaluate import KINDS
 from pamrs.units import parse_unit
 
-__all__ = ["Comparison", "compare", "compare_all", "counts", "table"]
+__all__ = ["Comparison", "compare", "compare_all", "table", "verdicts"]
 
 
 @dataclass(frozen=True)
@@ -143,9 +143,12 @@ def table(rows: Iterable[Comparison], *, notes: bool = True, titles: bool = True
     return "\n".join(lines)
 
 
-def counts(rows: Sequence[Comparison]) -> dict[str, int]:
-    """How many facts agree, differ, or cannot tell."""
-    return {verdict: sum(row.verdict == verdict for row in rows) for verdict in ("agree", "differs", "cannot tell")}
+def verdicts(rows: Sequence[Comparison]) -> str:
+    """How many facts agree, differ, or cannot tell, in words."""
+    found = {verdict: sum(row.verdict == verdict for row in rows) for verdict in ("agree", "differs", "cannot tell")}
+    used = sum(row.verdict == "agree" and row.used for row in rows)
+    note = f" ({used} used to identify)" if used else ""
+    return f"{found['agree']} agree{note}, {found['differs']} differ, {found['cannot tell']} cannot tell"
 
 
 def _number(value: float, *, sign: bool = False) -> str:

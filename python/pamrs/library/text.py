@@ -9,7 +9,7 @@ import numpy as np
 from pamrs.library import entry, names
 from pamrs.library.design import compare_design, six_against_two
 from pamrs.library.identify import derive
-from pamrs.library.published import compare, compare_all, counts, table
+from pamrs.library.published import compare, compare_all, table, verdicts
 from pamrs.units import parse_unit
 
 __all__ = ["description", "facts", "overview"]
@@ -61,8 +61,7 @@ def description(name: str) -> str:
     lines = [f"{name}: {item.title}", ""]
     lines += [f"  {key:<{width}}  {text:<{room}}  {item.origins.get(key, 'not published')}" for key, text in shown.items()]
     rows = compare(name)
-    verdicts = ", ".join(f"{number} {verdict}" for verdict, number in counts(rows).items())
-    return "\n".join([*lines, "", table(rows, titles=False), "", verdicts])
+    return "\n".join([*lines, "", table(rows, titles=False), "", verdicts(rows)])
 
 
 def facts() -> str:
@@ -71,7 +70,7 @@ def facts() -> str:
     for name in names():
         item, again = entry(name), derive(entry(name))
         slope, offset = (again.parameters[f"modulus_{key}"] for key in ("slope", "offset"))
-        lines.append(f"{name}: m = {np.array(slope)}, b = {np.array(offset)} Pa")
+        lines.append(f"{name}: m = {_shown('modulus_slope', slope)}; b = {_shown('modulus_offset', offset)}")
         if "braid_angle" in again.parameters:
             lines.append(f"    braid angle {np.degrees(again.parameters['braid_angle']):.4f} deg")
         lines += [
@@ -81,12 +80,13 @@ def facts() -> str:
         ]
     rows = [*compare_all(), *compare_design("large_2in_effective"), *compare_design("large_2in")]
     lines += ["", "Published facts", "", table(rows), "", "Six against two", "", six_against_two().table(), ""]
-    return "\n".join([*lines, ", ".join(f"{number} {verdict}" for verdict, number in counts(rows).items())])
+    return "\n".join([*lines, verdicts(rows)])
 
 
 def _shown(name: str, value: Any) -> str:
     """A number, or several, in the unit that people use for it."""
     unit = _UNITS.get(name, "1")
     numbers = np.atleast_1d(np.asarray(value, dtype=np.float64)) / parse_unit(unit).scale
+    numbers[np.abs(numbers) < 1e-12 * np.abs(numbers).max()] = 0.0
     text = ", ".join(f"{number:.5g}" for number in numbers)
     return text if unit == "1" else f"{text} {unit}"
