@@ -23,6 +23,7 @@ if TYPE_CHECKING:
         RigError,
         SimulationError,
     )
+    from pamrs.joint import Joint
     from pamrs.muscle import Muscle
     from pamrs.recording import Issue, Recording, load_recording
     from pamrs.rig import Parameter, Rig, load_rig
@@ -37,6 +38,7 @@ __all__ = [
     "DiagnosisError",
     "FitError",
     "Issue",
+    "Joint",
     "Muscle",
     "PamrsError",
     "Parameter",
@@ -67,6 +69,7 @@ _HOMES: Final[dict[str, str]] = {
     "DiagnosisError": "pamrs.errors",
     "FitError": "pamrs.errors",
     "Issue": "pamrs.recording",
+    "Joint": "pamrs.joint",
     "Muscle": "pamrs.muscle",
     "PamrsError": "pamrs.errors",
     "Parameter": "pamrs.rig",

@@ -11,7 +11,7 @@ from typing import Any
 
 from pamrs.errors import ParameterError, RigError, joined
 from pamrs.muscle_models import own_geometry
-from pamrs.rig_schema import BLOCKS, REQUIRED_BLOCKS, SCHEMA, Key, keys_of
+from pamrs.rig_schema import BLOCKS, REQUIRED_BLOCKS, SCHEMA, Key, keys_of, kind_of
 from pamrs.units import to_si
 
 __all__ = ["Content", "Reader", "read_model"]
@@ -131,8 +131,8 @@ class Reader:
         keys = keys_of(block, table)
         for key in BLOCKS[block]:
             if key not in keys and _dig(table, key.where) is not None:
-                allowed = f"only with {', '.join(key.models)}"
-                self.problem(f"{block}.{key.name} is not allowed with model = {_shown(table.get('model', 'robinson'))}: {allowed}")
+                kind, allowed = _shown(kind_of(block, table)), ", ".join(key.only)
+                self.problem(f"{block}.{key.name} is not allowed with {kind}: only with {allowed}")
         content = {key.name: self.value(block, key, _dig(table, key.where)) for key in keys}
         if content.get("geometry") == "":
             content["geometry"] = own_geometry(content["model"])

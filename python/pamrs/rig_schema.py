@@ -11,7 +11,7 @@ from typing import Any, Final, Literal, NamedTuple
 
 from pamrs.muscle_models import GEOMETRIES, MODELS, models_with
 
-__all__ = ["BLOCKS", "REQUIRED_BLOCKS", "SCHEMA", "Key", "find_key", "keys_of"]
+__all__ = ["BLOCKS", "REQUIRED_BLOCKS", "SCHEMA", "Key", "find_key", "keys_of", "kind_of"]
 
 SCHEMA: Final = "pamrs.rig/1"
 REQUIRED_BLOCKS: Final = ("gas", "chamber")
@@ -38,8 +38,8 @@ class Key(NamedTuple):
         What a ``choice`` may be.
     path : tuple of str
         Where the file has it inside the block: ``("end_ratio", "k0")``.
-    models : tuple of str
-        The force models that have this key; empty for all.
+    only : tuple of str
+        The kinds of the block (force model of a muscle, kind of a joint) that have this key; empty for all.
     """
 
     name: str
@@ -50,7 +50,7 @@ class Key(NamedTuple):
     kind: Kind = "scalar"
     choices: tuple[str, ...] = ()
     path: tuple[str, ...] = ()
-    models: tuple[str, ...] = ()
+    only: tuple[str, ...] = ()
 
     @property
     def where(self) -> tuple[str, ...]:
@@ -61,6 +61,10 @@ class Key(NamedTuple):
 _POLYTROPIC_LOW, _POLYTROPIC_HIGH = 0.3, 3.0
 _RIGHT_ANGLE = math.pi / 2
 _TURN = 2 * math.pi
+_TENDON = ("tendon", "published")
+
+#: The key of a block that says of which kind it is, and the kind where it is left out.
+_KINDS: Final = {"muscle": ("model", "robinson"), "joint": ("kind", "tendon")}
 
 #: block -> its keys, in the order in which they are written.
 BLOCKS: Final[dict[str, tuple[Key, ...]]] = {
@@ -95,12 +99,12 @@ BLOCKS: Final[dict[str, tuple[Key, ...]]] = {
         Key("rest_diameter", "m", 1e-4, 1.0),
         Key("braid_angle", "rad", 1e-2, _RIGHT_ANGLE - 1e-3),
         Key("wall_thickness", "m", 1e-6, 0.1),
-        Key("modulus_slope", "1", -1e6, 1e6, kind="vector", models=models_with("modulus_slope")),
-        Key("modulus_offset", "Pa", -1e11, 1e11, kind="vector", models=models_with("modulus_offset")),
-        Key("c10", "Pa", -1e11, 1e11, models=models_with("c10")),
-        Key("c01", "Pa", -1e11, 1e11, 0.0, models=models_with("c01")),
-        Key("bladder_modulus", "Pa", -1e11, 1e11, models=models_with("bladder_modulus")),
-        Key("extension_factors", "1", -10.0, 10.0, (0.3, 0.8, 0.8), kind="vector", models=models_with("extension_factors")),
+        Key("modulus_slope", "1", -1e6, 1e6, kind="vector", only=models_with("modulus_slope")),
+        Key("modulus_offset", "Pa", -1e11, 1e11, kind="vector", only=models_with("modulus_offset")),
+        Key("c10", "Pa", -1e11, 1e11, only=models_with("c10")),
+        Key("c01", "Pa", -1e11, 1e11, 0.0, only=models_with("c01")),
+        Key("bladder_modulus", "Pa", -1e11, 1e11, only=models_with("bladder_modulus")),
+        Key("extension_factors", "1", -10.0, 10.0, (0.3, 0.8, 0.8), kind="vector", only=models_with("extension_factors")),
         Key("modulus_scale", "1", 0.0, 100.0, 1.0),
         Key("k0", "1", 0.0, 100.0, 1.64, path=("end_ratio", "k0")),
         Key("contraction_slope", "1", -1e3, 1e3, 2.405, path=("end_ratio", "contraction_slope")),
@@ -112,11 +116,13 @@ BLOCKS: Final[dict[str, tuple[Key, ...]]] = {
         Key("friction_presliding", "m", 1e-7, 1.0, 1e-3, path=("friction", "presliding")),
     ),
     "joint": (
-        Key("kind", default="tendon", kind="choice", choices=("tendon",)),
-        Key("upper_axial", "m", -10.0, 10.0),
-        Key("upper_offset", "m", -10.0, 10.0),
-        Key("lower_axial", "m", -10.0, 10.0),
-        Key("lower_offset", "m", -10.0, 10.0),
+        Key("kind", default="tendon", kind="choice", choices=("tendon", "published", "pulley", "polynomial")),
+        Key("upper_axial", "m", -10.0, 10.0, only=_TENDON),
+        Key("upper_offset", "m", -10.0, 10.0, only=_TENDON),
+        Key("lower_axial", "m", -10.0, 10.0, only=_TENDON),
+        Key("lower_offset", "m", -10.0, 10.0, only=_TENDON),
+        Key("radius", "m", -10.0, 10.0, only=("pulley",)),
+        Key("coefficients", "m", -100.0, 100.0, kind="vector", only=("polynomial",)),
         Key("rest_angle", "rad", -_TURN, _TURN),
         Key("min_angle", "rad", -_TURN, _TURN),
         Key("max_angle", "rad", -_TURN, _TURN),
@@ -141,8 +147,15 @@ BLOCKS: Final[dict[str, tuple[Key, ...]]] = {
 
 
 def keys_of(block: str, content: Mapping[str, Any]) -> tuple[Key, ...]:
-    """The keys that a block has: those of its force model where it is a muscle."""
-    return tuple(key for key in BLOCKS[block] if not key.models or content.get("model", "robinson") in key.models)
+    """The keys that a block of its kind has: force model of a muscle, kind of a joint."""
+    kind = kind_of(block, content)
+    return tuple(key for key in BLOCKS[block] if not key.only or kind in key.only)
+
+
+def kind_of(block: str, content: Mapping[str, Any]) -> Any:
+    """Force model of a muscle, kind of a joint, None for the other blocks."""
+    name, default = _KINDS.get(block, ("", None))
+    return content.get(name, default)
 
 
 def find_key(dotted: str) -> Key | None:

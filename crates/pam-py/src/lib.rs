@@ -2,6 +2,7 @@
 
 mod convert;
 mod gas;
+mod joint;
 mod muscle;
 mod rig;
 
@@ -14,6 +15,7 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<rig::Rig>()?;
     m.add_class::<muscle::Muscle>()?;
     m.add_class::<gas::Gas>()?;
+    m.add_class::<joint::Joint>()?;
     m.add_function(wrap_pyfunction!(rig::parameter_names, m)?)?;
     m.add_function(wrap_pyfunction!(rig::effects, m)?)?;
     Ok(())

@@ -2,8 +2,10 @@
 //!
 //! With `phi = pi - theta - atan2(rl, ll)`, `BO = hypot(ll, rl)`, `(Bx, By) = BO (cos phi, sin phi)` and
 //! `s = sqrt(lT^2 - (ru - By)^2)`: shortening `d = Bx + s - lu`, moment arm `dd/dtheta = By - (ru - By) Bx/s`. The tendon
-//! length `lT` follows from `d = 0` at the rest angle. (3.6)-(3.8) as printed lose power; not used here.
+//! length `lT` follows from `d = 0` at the rest angle. The torque of a pull `F` is `F dd/dtheta`; (3.6)-(3.8) as printed
+//! multiply by `cos^2` of the tendon's angle, `(s/lT)^2`, too much: [`Torque::Published`] keeps them for comparison.
 
+use super::JointPoint;
 use crate::error::{Error, Result};
 use crate::scalar::Scalar;
 
@@ -15,15 +17,16 @@ pub struct TendonJoint {
     lower_angle: f64,
     lower_radius: f64,
     tendon_squared: f64,
+    torque: Torque,
 }
 
-/// Shortening and moment arm at one angle.
-#[derive(Debug, Clone, Copy)]
-pub struct JointPoint<S> {
-    /// Shortening of the muscle [m].
-    pub shortening: S,
-    /// Moment arm dd/dtheta [m].
-    pub moment_arm: S,
+/// Which torque a pull gives.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Torque {
+    /// `F dd/dtheta`: power is conserved.
+    Power,
+    /// As printed in (3.6)-(3.8).
+    Published,
 }
 
 impl TendonJoint {
@@ -47,7 +50,14 @@ impl TendonJoint {
         let phi = std::f64::consts::PI - rest_angle - lower_angle;
         let (bx, by) = (lower_radius * phi.cos(), lower_radius * phi.sin());
         let tendon_squared = (upper_axial - bx).powi(2) + (upper_offset - by).powi(2);
-        Ok(Self { upper_axial, upper_offset, lower_angle, lower_radius, tendon_squared })
+        let torque = Torque::Power;
+        Ok(Self { upper_axial, upper_offset, lower_angle, lower_radius, tendon_squared, torque })
+    }
+
+    /// The same joint with the torque of a pull taken in one way or the other.
+    #[must_use]
+    pub fn with_torque(self, torque: Torque) -> Self {
+        Self { torque, ..self }
     }
 
     /// Tendon length [m].
@@ -68,7 +78,12 @@ impl TendonJoint {
         let (bx, by) = (cos * self.lower_radius, sin * self.lower_radius);
         let gap = -by + self.upper_offset;
         let s = (-(gap * gap) + self.tendon_squared).sqrt();
-        JointPoint { shortening: bx + s - self.upper_axial, moment_arm: by - gap * bx / s }
+        let moment_arm = by - gap * bx / s;
+        let torque_arm = match self.torque {
+            Torque::Power => moment_arm,
+            Torque::Published => moment_arm * (s * s / self.tendon_squared),
+        };
+        JointPoint { shortening: bx + s - self.upper_axial, moment_arm, torque_arm }
     }
 }
 

@@ -11,7 +11,7 @@ pub use spec::RigSpec;
 use crate::effects;
 use crate::gas::orifice::Gas;
 use crate::gas::valve::AreaTable;
-use crate::joint::tendon::TendonJoint;
+use crate::joint::Joint;
 use crate::muscle::{CompiledMuscle, Muscle};
 use crate::{Error, Result};
 
@@ -22,7 +22,7 @@ pub struct Rig {
     pub(crate) gas: Gas,
     pub(crate) valve: Option<AreaTable>,
     pub(crate) muscle: Option<CompiledMuscle>,
-    pub(crate) joint: Option<TendonJoint>,
+    pub(crate) joint: Option<Joint>,
     pub(crate) values: Values<f64>,
     pub(crate) active: Active,
 }
@@ -55,13 +55,7 @@ impl Rig {
         let g = &spec.gas;
         let gas = Gas::new(g.ambient_pressure, g.temperature, g.gas_constant, g.heat_capacity_ratio);
         let valve = spec.valve.as_ref().map(|v| AreaTable::new(&v.opening, &v.fraction)).transpose()?;
-        let joint = spec
-            .joint
-            .as_ref()
-            .map(|j| {
-                TendonJoint::new(j.upper_axial, j.upper_offset, j.lower_axial, j.lower_offset, j.rest_angle)
-            })
-            .transpose()?;
+        let joint = spec.joint.as_ref().map(Joint::new).transpose()?;
         let (values, mut active) = collect_values(&spec)?;
         active.direction = muscle.as_ref().is_some_and(CompiledMuscle::has_direction);
         let rig = Self { gas, valve, muscle, joint, values, active, spec };

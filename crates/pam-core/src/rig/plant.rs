@@ -87,7 +87,7 @@ pub struct Plant<'a, S> {
 /// What the muscle and joint are at one angle.
 struct Mechanics<S> {
     contraction: S,
-    moment_arm: S,
+    torque_arm: S,
     volume: S,
     volume_rate: S,
     muscle_volume: S,
@@ -140,7 +140,7 @@ impl<'a, S: Scalar> Plant<'a, S> {
             let zero = constant(0.0);
             return Mechanics {
                 contraction: zero,
-                moment_arm: zero,
+                torque_arm: zero,
                 volume: dead,
                 volume_rate: zero,
                 muscle_volume: zero,
@@ -168,7 +168,7 @@ impl<'a, S: Scalar> Plant<'a, S> {
         }
         Mechanics {
             contraction,
-            moment_arm: point.moment_arm,
+            torque_arm: point.torque_arm,
             volume: table.volume * self.count + dead,
             volume_rate: table.volume_slope
                 * point.moment_arm
@@ -245,7 +245,7 @@ impl<'a, S: Scalar> Plant<'a, S> {
         if let (true, Some((arm, stops))) = (simulated.arm, &self.arm) {
             rates[ANGLE] = state[RATE];
             let stop = stops.torque(state[ANGLE], state[RATE]);
-            rates[RATE] = arm.acceleration(state[ANGLE], state[RATE], m.force * m.moment_arm, stop);
+            rates[RATE] = arm.acceleration(state[ANGLE], state[RATE], m.force * m.torque_arm, stop);
         }
         rates
     }
@@ -329,7 +329,7 @@ impl<'a, S: Scalar> Plant<'a, S> {
             contraction_ratio: m.contraction,
             volume: m.volume,
             force: m.force,
-            torque: m.force * m.moment_arm,
+            torque: m.force * m.torque_arm,
             temperature,
         }
     }

@@ -49,21 +49,39 @@ pub struct ChamberSpec {
     pub alpha: f64,
 }
 
-/// Tendon joint with elastic stops.
+/// Joint with elastic stops; the lengths are those of its kind, see [`crate::joint::Joint`].
 #[allow(missing_docs)]
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct JointSpec {
     pub kind: String,
+    #[serde(default)]
     pub upper_axial: f64,
+    #[serde(default)]
     pub upper_offset: f64,
+    #[serde(default)]
     pub lower_axial: f64,
+    #[serde(default)]
     pub lower_offset: f64,
+    #[serde(default)]
+    pub radius: f64,
+    #[serde(default)]
+    pub coefficients: Vec<f64>,
     pub rest_angle: f64,
     pub min_angle: f64,
     pub max_angle: f64,
     pub stop_stiffness: f64,
     pub stop_damping: f64,
+}
+
+impl JointSpec {
+    /// Read a joint on its own from JSON text.
+    ///
+    /// # Errors
+    /// [`Error::Model`] for text that is not of this form (unknown keys included).
+    pub fn from_json(text: &str) -> Result<Self> {
+        serde_json::from_str(text).map_err(|e| Error::Model(format!("joint description: {e}")))
+    }
 }
 
 /// One-link arm.
@@ -171,9 +189,7 @@ impl RigSpec {
             muscle.validate()?;
         }
         if let Some(joint) = &self.joint {
-            if joint.kind != "tendon" {
-                return Err(Error::Model(format!("joint.kind = '{}' is not known: 'tendon'", joint.kind)));
-            }
+            crate::joint::Joint::new(joint)?;
             range("joint.stop_stiffness", joint.stop_stiffness, 0.0, 1e9, "N m/rad")?;
             range("joint.stop_damping", joint.stop_damping, 0.0, 1e9, "N m s/rad")?;
             range("joint.min_angle", joint.min_angle, -7.0, joint.max_angle, "rad (below joint.max_angle)")?;
