@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from pamrs.recording import Issue, Recording, load_recording
     from pamrs.rig import Parameter, Rig, load_rig
     from pamrs.simulation import Simulation, simulate
+    from pamrs.simulator import Simulator
 
     __version__: str
 
@@ -49,6 +50,7 @@ __all__ = [
     "RigError",
     "Simulation",
     "SimulationError",
+    "Simulator",
     "__version__",
     "diagnose",
     "fit",
@@ -80,6 +82,7 @@ _HOMES: Final[dict[str, str]] = {
     "RigError": "pamrs.errors",
     "Simulation": "pamrs.simulation",
     "SimulationError": "pamrs.errors",
+    "Simulator": "pamrs.simulator",
     "diagnose": "pamrs.diagnosis",
     "load_case": "pamrs.case",
     "load_recording": "pamrs.recording",

@@ -5,7 +5,7 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Gas", "Joint", "Muscle", "Rig", "__version__", "effects", "parameter_names"]
+__all__ = ["Gas", "Joint", "Muscle", "Rig", "Simulator", "__version__", "effects", "parameter_names"]
 
 __version__: str
 
@@ -75,6 +75,27 @@ class Rig:
         muscle_pressure: _Signal | None = None,
         joint_angle: _Signal | None = None,
     ) -> tuple[_Array, _Array | None]: ...
+
+@final
+class Simulator:
+    def __new__(
+        cls,
+        rig: Rig,
+        sample_time: float,
+        step: float,
+        *,
+        muscle_pressure: float | None = None,
+        supply_pressure: float | None = None,
+        joint_angle: float | None = None,
+        joint_rate: float | None = None,
+    ) -> Simulator: ...
+    def advance(self, valve_command: _Array) -> dict[str, _Array]: ...
+    def observe(self) -> dict[str, _Array]: ...
+    @property
+    def state(self) -> _Array: ...
+    def restore(self, state: _Array) -> None: ...
+    @property
+    def samples(self) -> int: ...
 
 def effects() -> list[tuple[str, str, list[tuple[str, str]]]]: ...
 def parameter_names() -> list[str]: ...

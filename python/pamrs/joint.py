@@ -196,6 +196,9 @@ class Joint:
         values = np.asarray(angle, dtype=np.float64)
         return function(np.ascontiguousarray(values.ravel())).reshape(values.shape)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Joint.from_model, (self.parameters,)
+
     def __repr__(self) -> str:
         return f"Joint({self._spec['kind']}, rest_angle={math.degrees(self._spec['rest_angle']):.4g} deg)"
 

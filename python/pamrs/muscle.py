@@ -398,6 +398,9 @@ class Muscle:
         flat = [np.ascontiguousarray(array.ravel()) for array in arrays]
         return function(flat[0], flat[1], flat[2] if len(flat) > 2 else None).reshape(arrays[0].shape)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Muscle.from_model, (self.parameters,)
+
     def __repr__(self) -> str:
         m = self._model
         shape = f"rest_length={m['rest_length']:g} m, rest_diameter={m['rest_diameter']:g} m"

@@ -73,6 +73,9 @@ class Rig:
     _effect_std: dict[str, dict[str, float]] = field(default_factory=dict, repr=False)
     source: str = field(default="", repr=False)
 
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in self.__dict__.items() if name != "_compiled"}  # made again when needed
+
     # ------------------------------------------------------------------ reading
 
     @property

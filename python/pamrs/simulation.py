@@ -131,18 +131,32 @@ def simulate(
     else:
         if duration is not None:
             raise ParameterError(f"duration = {duration} is not allowed together with valve_command, which sets it")
-        command = np.ascontiguousarray(np.asarray(valve_command, dtype=np.float64))
-        if command.ndim != 1 or command.size == 0:
-            raise ParameterError(f"valve_command has the shape {command.shape}; (n,) with n >= 1 is needed")
+        command = held_command(valve_command)
+    fine = default_step(sample_time) if step is None else step
+    channels = core_rig(rig).simulate(command, sample_time, fine, **initial_values(initial))
+    time = np.asarray(np.arange(command.size) * sample_time, dtype=np.float64)
+    shown = {"valve_command": command} if has_valve else {}
+    return Simulation({"time": time, **shown, **channels}, rig)
+
+
+def held_command(valve_command: ArrayLike) -> NDArray[np.float64]:
+    """Commands [V] as an array (n,), n >= 1, checked; ParameterError names the first that is not finite."""
+    command = np.ascontiguousarray(np.asarray(valve_command, dtype=np.float64))
+    if command.ndim != 1 or command.size == 0:
+        raise ParameterError(f"valve_command has the shape {command.shape}; (n,) with n >= 1 is needed")
+    bad = np.flatnonzero(~np.isfinite(command))
+    if bad.size:
+        raise ParameterError(f"valve_command[{bad[0]}] = {command[bad[0]]} is not allowed: a finite voltage is needed")
+    return command
+
+
+def initial_values(initial: Mapping[str, float] | None) -> dict[str, float]:
+    """Initial values by name, unknown names refused."""
     start = dict(initial or {})
     unknown = sorted(set(start) - set(_INITIAL))
     if unknown:
         raise ParameterError(f"initial has the unknown entry {unknown[0]!r}; allowed: {', '.join(_INITIAL)}")
-    fine = default_step(sample_time) if step is None else step
-    channels = core_rig(rig).simulate(command, sample_time, fine, **{name: float(value) for name, value in start.items()})
-    time = np.asarray(np.arange(command.size) * sample_time, dtype=np.float64)
-    shown = {"valve_command": command} if has_valve else {}
-    return Simulation({"time": time, **shown, **channels}, rig)
+    return {name: float(value) for name, value in start.items()}
 
 
 def default_step(sample_time: float, longest: float = 1e-3) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import pickle
 from typing import Any
 
 import numpy as np
@@ -128,3 +129,15 @@ def test_braid_taut_only_in_extension() -> None:
 def test_a_direction_beyond_the_branches_is_named(direction: float) -> None:
     with pytest.raises(pamrs.ParameterError, match=r"muscle\.direction"):
         shoulder_muscle().force(1e5, 0.1, direction=direction)
+
+
+def test_muscles_and_joints_can_be_pickled() -> None:
+    muscle = shoulder_muscle().replace(friction_coefficient=0.1)
+    again = pickle.loads(pickle.dumps(muscle))
+    assert again.parameters == muscle.parameters
+    np.testing.assert_array_equal(again.force(3e5, [0.1], direction=1.0), muscle.force(3e5, [0.1], direction=1.0))
+    joint = pamrs.Joint(kind="pulley", radius=0.03, rest_angle=0.2)
+    assert pickle.loads(pickle.dumps(joint)).parameters == joint.parameters
+    rig = pamrs.rigs.shoulder()
+    pamrs.simulate(rig, [5.0, 5.0], sample_time=0.005)
+    assert pickle.loads(pickle.dumps(rig)).model == rig.model

@@ -159,46 +159,145 @@ pub(crate) fn check_state<S: Scalar>(plant: &Plant<'_, S>, state: &State<S>, tim
     Ok(())
 }
 
+/// A running simulation at a sample: all that its future depends on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Progress {
+    state: State<f64>,
+    memory: Memory<f64>,
+    samples: u64,
+}
+
+impl Progress {
+    /// Length of [`Self::to_vec`].
+    pub const NUMBERS: usize = STATES + Memory::<f64>::NUMBERS + 1;
+
+    /// The start of a simulation.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for an impossible initial value.
+    pub fn start(rig: &Rig, initial: Initial) -> Result<Self> {
+        initial.validate(rig)?;
+        let ambient = rig.gas.ambient_pressure;
+        let mut state = State::<f64>::from_column_slice(&[
+            initial.supply_pressure + ambient,
+            initial.muscle_pressure + ambient,
+            initial.joint_angle,
+            initial.joint_rate,
+            0.0,
+        ]);
+        state[MASS] = Plant::new(rig, *rig.values()).initial_mass(&state);
+        Ok(Self { state, memory: Memory::default(), samples: 0 })
+    }
+
+    /// Samples since the start.
+    #[must_use]
+    pub fn samples(&self) -> u64 {
+        self.samples
+    }
+
+    /// The numbers that [`Self::from_slice`] makes the same progress of, bit for bit.
+    #[must_use]
+    pub fn to_vec(&self) -> Vec<f64> {
+        let memory = self.memory.to_array();
+        self.state.iter().chain(&memory).copied().chain([self.samples as f64]).collect()
+    }
+
+    /// Progress from the numbers of [`Self::to_vec`].
+    ///
+    /// # Errors
+    /// [`Error::Length`] for another number of them, [`Error::Parameter`] for one that is not finite.
+    pub fn from_slice(numbers: &[f64]) -> Result<Self> {
+        if numbers.len() != Self::NUMBERS {
+            return Err(Error::Length {
+                name: "state".into(),
+                found: numbers.len(),
+                expected: Self::NUMBERS,
+                why: "as it was read".into(),
+            });
+        }
+        for (k, value) in numbers.iter().enumerate() {
+            crate::error::check_range(&format!("state[{k}]"), *value, -1e15, 1e15, "(as it was read)")?;
+        }
+        let (state, rest) = numbers.split_at(STATES);
+        let (memory, samples) = rest.split_at(Memory::<f64>::NUMBERS);
+        Ok(Self {
+            state: State::from_column_slice(state),
+            memory: Memory::from_slice(memory),
+            samples: samples.first().map_or(0, |n| n.max(0.0) as u64),
+        })
+    }
+
+    /// Append this sample to a trajectory.
+    ///
+    /// # Errors
+    /// [`Error::Integration`] when the state has left the model's range.
+    pub fn observe(&self, rig: &Rig, timing: Timing, out: &mut Trajectory) -> Result<()> {
+        self.observed(&Plant::new(rig, *rig.values()), timing, out)
+    }
+
+    fn observed(&self, plant: &Plant<'_, f64>, timing: Timing, out: &mut Trajectory) -> Result<()> {
+        check_state(plant, &self.state, self.samples as f64 * timing.sample_time)?;
+        out.push(plant, &self.state, &self.memory);
+        Ok(())
+    }
+
+    /// Hold each command [V] for one sample and append the sample after it.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for a command that is not finite, [`Error::Integration`] when the state leaves the model's
+    /// range; what was appended before stays, and the progress is that of the last good sample.
+    pub fn advance(
+        &mut self,
+        rig: &Rig,
+        timing: Timing,
+        valve_command: &[f64],
+        out: &mut Trajectory,
+    ) -> Result<()> {
+        let plant = Plant::new(rig, *rig.values());
+        let dt = timing.step();
+        for (k, command) in valve_command.iter().enumerate() {
+            if !command.is_finite() {
+                return Err(Error::parameter(format!("valve_command[{k}]"), *command, "a finite voltage"));
+            }
+            let spool = plant.spool(*command);
+            let mut next = *self;
+            for _ in 0..timing.substeps {
+                step(&plant, &mut next.state, &mut next.memory, spool, dt, Simulated::ALL, |_, _| {});
+            }
+            next.samples += 1;
+            next.observed(&plant, timing, out)?;
+            *self = next;
+        }
+        Ok(())
+    }
+}
+
 /// Simulate `valve_command` [V], one value per sample, held; without a valve its values have no effect but
 /// their number sets the duration.
 ///
 /// # Errors
 /// [`Error::Parameter`] for an impossible argument, [`Error::Integration`] when the state leaves the model's range.
 pub fn simulate(rig: &Rig, valve_command: &[f64], timing: Timing, initial: Initial) -> Result<Trajectory> {
-    initial.validate(rig)?;
-    if let Some((k, u)) = valve_command.iter().enumerate().find(|(_, u)| !u.is_finite()) {
-        return Err(Error::parameter(format!("valve_command[{k}]"), *u, "a finite voltage"));
-    }
-    let plant = Plant::new(rig, *rig.values());
-    let ambient = rig.gas.ambient_pressure;
-    let mut state = State::<f64>::from_column_slice(&[
-        initial.supply_pressure + ambient,
-        initial.muscle_pressure + ambient,
-        initial.joint_angle,
-        initial.joint_rate,
-        0.0,
-    ]);
-    state[MASS] = plant.initial_mass(&state);
-    let mut memory = Memory::default();
+    let mut progress = Progress::start(rig, initial)?;
     let mut out = Trajectory::with_capacity(valve_command.len());
-    let dt = timing.step();
-    let (pressure_zero, angle_zero) = (rig.values[P::PressureZero], rig.values[P::AngleZero]);
-    for (k, command) in valve_command.iter().enumerate() {
-        check_state(&plant, &state, k as f64 * timing.sample_time)?;
-        out.push(&plant, &state, &memory, ambient, pressure_zero, angle_zero);
-        if k + 1 == valve_command.len() {
-            break;
-        }
-        let spool = plant.spool(*command);
-        for _ in 0..timing.substeps {
-            step(&plant, &mut state, &mut memory, spool, dt, Simulated::ALL, |_, _| {});
+    if let Some((last, held)) = valve_command.split_last() {
+        progress.observe(rig, timing, &mut out)?;
+        progress.advance(rig, timing, held, &mut out)?;
+        if !last.is_finite() {
+            return Err(Error::parameter(
+                format!("valve_command[{}]", held.len()),
+                *last,
+                "a finite voltage",
+            ));
         }
     }
     Ok(out)
 }
 
 impl Trajectory {
-    fn with_capacity(n: usize) -> Self {
+    /// An empty trajectory with room for `n` samples.
+    #[must_use]
+    pub fn with_capacity(n: usize) -> Self {
         let v = || Vec::with_capacity(n);
         Self {
             supply_pressure: v(),
@@ -213,15 +312,9 @@ impl Trajectory {
         }
     }
 
-    fn push(
-        &mut self,
-        plant: &Plant<'_, f64>,
-        state: &State<f64>,
-        memory: &Memory<f64>,
-        ambient: f64,
-        pressure_zero: f64,
-        angle_zero: f64,
-    ) {
+    fn push(&mut self, plant: &Plant<'_, f64>, state: &State<f64>, memory: &Memory<f64>) {
+        let ambient = plant.rig().gas.ambient_pressure;
+        let (pressure_zero, angle_zero) = (plant.values()[P::PressureZero], plant.values()[P::AngleZero]);
         let output = plant.output(state, memory);
         self.supply_pressure.push(state[SUPPLY] - ambient);
         self.muscle_pressure.push(state[PRESSURE] - ambient + pressure_zero);

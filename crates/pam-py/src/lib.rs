@@ -5,6 +5,7 @@ mod gas;
 mod joint;
 mod muscle;
 mod rig;
+mod simulator;
 
 use pyo3::prelude::*;
 
@@ -16,6 +17,7 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<muscle::Muscle>()?;
     m.add_class::<gas::Gas>()?;
     m.add_class::<joint::Joint>()?;
+    m.add_class::<simulator::Simulator>()?;
     m.add_function(wrap_pyfunction!(rig::parameter_names, m)?)?;
     m.add_function(wrap_pyfunction!(rig::effects, m)?)?;
     Ok(())

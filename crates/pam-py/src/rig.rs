@@ -1,17 +1,27 @@
 //! `_core.Rig`: simulation and cut-chain prediction.
 
+use std::sync::Arc;
+
 use crate::convert::{array, error, values};
+use crate::simulator::{channels, initial, run};
 use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray1};
 use pam_core::residual::{predict, Block, Measured, Signal};
 use pam_core::rig::{ParameterId, RigSpec};
-use pam_core::simulate::{simulate, Initial, Timing};
+use pam_core::simulate::{Progress, Timing, Trajectory};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 /// A rig compiled from a JSON description (SI, radians, gauge pressures).
 #[pyclass(frozen, module = "pamrs._core")]
 pub struct Rig {
-    inner: pam_core::Rig,
+    inner: Arc<pam_core::Rig>,
+}
+
+impl Rig {
+    /// The compiled rig, shared.
+    pub fn shared(&self) -> Arc<pam_core::Rig> {
+        Arc::clone(&self.inner)
+    }
 }
 
 type Pair<'py> = (PyReadonlyArray1<'py, f64>, PyReadonlyArray1<'py, f64>);
@@ -21,13 +31,13 @@ impl Rig {
     #[new]
     fn new(py: Python<'_>, json: &str) -> PyResult<Self> {
         let made = py.detach(|| RigSpec::from_json(json).and_then(pam_core::Rig::new));
-        Ok(Self { inner: made.map_err(|e| error(py, &e))? })
+        Ok(Self { inner: Arc::new(made.map_err(|e| error(py, &e))?) })
     }
 
     /// The same rig from another description; the compiled muscle is kept where it can be.
     fn respecified(&self, py: Python<'_>, json: &str) -> PyResult<Self> {
         let made = py.detach(|| RigSpec::from_json(json).and_then(|spec| self.inner.respecified(spec)));
-        Ok(Self { inner: made.map_err(|e| error(py, &e))? })
+        Ok(Self { inner: Arc::new(made.map_err(|e| error(py, &e))?) })
     }
 
     /// Simulate a held command; returns channels by name.
@@ -44,32 +54,17 @@ impl Rig {
         joint_angle: Option<f64>,
         joint_rate: Option<f64>,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let u = values(&valve_command);
-        let rest = Initial::rest(&self.inner);
-        let initial = Initial {
-            supply_pressure: supply_pressure.unwrap_or(rest.supply_pressure),
-            muscle_pressure: muscle_pressure.unwrap_or(rest.muscle_pressure),
-            joint_angle: joint_angle.unwrap_or(rest.joint_angle),
-            joint_rate: joint_rate.unwrap_or(rest.joint_rate),
-        };
-        let inner = &self.inner;
-        let run = py.detach(|| simulate(inner, &u, Timing::new(sample_time, step)?, initial));
-        let t = run.map_err(|e| error(py, &e))?;
-        let out = PyDict::new(py);
-        if inner.spec().supply.is_some() {
-            out.set_item("supply_pressure", array(py, t.supply_pressure))?;
-        }
-        out.set_item("muscle_pressure", array(py, t.muscle_pressure))?;
-        if inner.spec().arm.is_some() {
-            out.set_item("joint_angle", array(py, t.joint_angle))?;
-            out.set_item("joint_rate", array(py, t.joint_rate))?;
-            out.set_item("contraction_ratio", array(py, t.contraction_ratio))?;
-            out.set_item("muscle_force", array(py, t.muscle_force))?;
-            out.set_item("joint_torque", array(py, t.joint_torque))?;
-        }
-        out.set_item("air_volume", array(py, t.air_volume))?;
-        out.set_item("temperature", array(py, t.gas_temperature))?;
-        Ok(out)
+        let command = values(&valve_command);
+        let start = initial(&self.inner, muscle_pressure, supply_pressure, joint_angle, joint_rate);
+        let begun = Timing::new(sample_time, step)
+            .and_then(|timing| Ok((timing, Progress::start(&self.inner, start)?)))
+            .map_err(|e| error(py, &e))?;
+        let (timing, mut progress) = begun;
+        let mut out = Trajectory::with_capacity(command.len());
+        progress.observe(&self.inner, timing, &mut out).map_err(|e| error(py, &e))?;
+        let held = command.split_last().map_or(&[][..], |(_, held)| held);
+        run(py, &self.inner, timing, &mut progress, held, &mut out)?;
+        channels(py, &self.inner, out)
     }
 
     /// Predict a block's output from its measured neighbours, with the jacobian (None without parameters).
@@ -91,8 +86,8 @@ impl Rig {
         let u = values(&valve_command);
         let own = |pair: Option<Pair<'py>>| pair.map(|(value, slope)| (values(&value), values(&slope)));
         let (supply, pressure, angle) = (own(supply_pressure), own(muscle_pressure), own(joint_angle));
-        let inner = &self.inner;
-        let run = py.detach(|| {
+        let inner = &*self.inner;
+        let found = py.detach(|| {
             let measured = Measured {
                 valve_command: &u,
                 supply_pressure: supply.as_ref().map(|(value, slope)| Signal { value, slope }),
@@ -112,7 +107,7 @@ impl Rig {
                 &ids,
             )
         });
-        let p = run.map_err(|e| error(py, &e))?;
+        let p = found.map_err(|e| error(py, &e))?;
         let rows = p.value.len();
         let jacobian =
             if p.columns > 0 { Some(array(py, p.jacobian).reshape([rows, p.columns])?) } else { None };

@@ -1,3 +1,4 @@
 //! Arms: the load that a joint moves.
 
 pub mod one_link;
+pub mod planar;

@@ -40,6 +40,16 @@ impl<S: Scalar> Slip<S> {
         Self { elements }
     }
 
+    /// The elements.
+    pub fn elements(&self) -> [S; ELEMENTS] {
+        self.elements
+    }
+
+    /// Elements as they were read.
+    pub fn from_elements(elements: [S; ELEMENTS]) -> Self {
+        Self { elements }
+    }
+
     /// Mean of the elements, -1 to 1.
     #[inline]
     pub fn mean(&self) -> S {

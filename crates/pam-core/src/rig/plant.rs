@@ -9,7 +9,7 @@ use crate::arm::one_link::{OneLink, Stops};
 use crate::effects::{heat_transfer, leak_muscle, muscle_hysteresis};
 use crate::gas::chamber::{pressure_rate, ChamberState, Polytropic};
 use crate::gas::valve::spool_position;
-use crate::muscle::slip::Slip;
+use crate::muscle::slip::{Slip, ELEMENTS};
 use crate::scalar::{constant, Scalar};
 use nalgebra::SVector;
 
@@ -40,6 +40,28 @@ pub struct Memory<S> {
 impl<S: Scalar> Default for Memory<S> {
     fn default() -> Self {
         Self { hysteresis: Slip::default(), direction: Slip::default() }
+    }
+}
+
+impl Memory<f64> {
+    /// Length of [`Self::to_array`].
+    pub const NUMBERS: usize = 2 * ELEMENTS;
+
+    /// All elements.
+    #[must_use]
+    pub fn to_array(&self) -> [f64; 2 * ELEMENTS] {
+        let (hysteresis, direction) = (self.hysteresis.elements(), self.direction.elements());
+        std::array::from_fn(|k| if k < ELEMENTS { hysteresis[k] } else { direction[k - ELEMENTS] })
+    }
+
+    /// The memory of the numbers of [`Self::to_array`]; what is missing is zero.
+    #[must_use]
+    pub fn from_slice(numbers: &[f64]) -> Self {
+        let at = |k: usize| numbers.get(k).copied().unwrap_or(0.0);
+        Self {
+            hysteresis: Slip::from_elements(std::array::from_fn(at)),
+            direction: Slip::from_elements(std::array::from_fn(|k| at(k + ELEMENTS))),
+        }
     }
 }
 

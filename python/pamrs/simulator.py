@@ -1,0 +1,183 @@
+"""A simulation that goes on sample by sample: for controllers, live loops and restarts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pamrs import _core
+from pamrs.errors import ParameterError
+from pamrs.rig import Rig
+from pamrs.simulation import core_rig, default_step, held_command, initial_values
+
+__all__ = ["Simulator"]
+
+Array = NDArray[np.float64]
+
+
+class Simulator:
+    """A rig that takes one command after the other.
+
+    The command is held exactly over one sample. A simulator can be pickled and copied, and goes on from a state bit for bit as
+    the run that it was taken from.
+
+    Parameters
+    ----------
+    rig : Rig
+        The model.
+    sample_time : float
+        Time between two samples [s].
+    step : float, optional
+        RK4 step [s]; divides ``sample_time``. By default the longest that does and is at most 1 ms.
+    initial : mapping of str to float, optional
+        Initial values as for :func:`pamrs.simulate`.
+
+    Raises
+    ------
+    ParameterError
+        If an argument is not finite or outside its range; the message names it.
+
+    Examples
+    --------
+    >>> import pamrs
+    >>> simulator = pamrs.Simulator(pamrs.rigs.shoulder(), sample_time=0.005)
+    >>> for _ in range(100):
+    ...     sample = simulator.step(6.0)
+    >>> round(simulator.time, 3), sample["joint_angle"] > 0.27
+    (0.5, True)
+    """
+
+    def __init__(self, rig: Rig, *, sample_time: float, step: float | None = None, initial: Mapping[str, float] | None = None) -> None:
+        if not isinstance(rig, Rig):
+            raise ParameterError(f"rig is a {type(rig).__name__}; a Rig is needed, for example pamrs.load_rig({rig!r})")
+        if not (np.isfinite(sample_time) and sample_time > 0):
+            raise ParameterError(f"sample_time = {sample_time} is not allowed: a finite time > 0 s is needed")
+        self.rig = rig
+        self.sample_time = float(sample_time)
+        self._step = default_step(self.sample_time) if step is None else float(step)
+        self._initial = initial_values(initial)
+        self._has_valve = rig.model["valve"] is not None
+        self._core = self._started()
+
+    def _started(self) -> _core.Simulator:
+        return _core.Simulator(core_rig(self.rig), self.sample_time, self._step, **self._initial)
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return self._core.samples * self.sample_time
+
+    @property
+    def state(self) -> Array:
+        """The numbers that everything to come depends on (a copy); give them back to :meth:`restore`."""
+        return self._core.state
+
+    def restore(self, state: ArrayLike) -> None:
+        """Go on from a state.
+
+        Parameters
+        ----------
+        state : array_like
+            :attr:`state` of a simulator of the same rig.
+
+        Raises
+        ------
+        ParameterError
+            If it has another length or a number that is not finite.
+        """
+        self._core.restore(np.ascontiguousarray(np.asarray(state, dtype=np.float64)))
+
+    def reset(self, initial: Mapping[str, float] | None = None) -> dict[str, float]:
+        """Begin again.
+
+        Parameters
+        ----------
+        initial : mapping of str to float, optional
+            Other initial values; those of the last start by default.
+
+        Returns
+        -------
+        dict of str to float
+            The first sample.
+        """
+        if initial is not None:
+            self._initial = initial_values(initial)
+        self._core = self._started()
+        return self.observe()
+
+    def observe(self) -> dict[str, float]:
+        """The present sample: channel -> value in SI units, pressures gauge.
+
+        Returns
+        -------
+        dict of str to float
+        """
+        return _single(self._core.observe())
+
+    def step(self, valve_command: float | None = None) -> dict[str, float]:
+        """Hold a command for one sample.
+
+        Parameters
+        ----------
+        valve_command : float, optional
+            Command [V]; needed by a rig with a valve.
+
+        Returns
+        -------
+        dict of str to float
+            The sample after it.
+
+        Raises
+        ------
+        ParameterError
+            If the command is missing or not finite.
+        SimulationError
+            If the state leaves the range in which the model holds; the simulator then stays at the last good sample.
+        """
+        if valve_command is None:
+            if self._has_valve:
+                raise ParameterError("valve_command is missing: a rig with a valve needs one value per sample [V]")
+            valve_command = 0.0
+        return _single(self._core.advance(np.array([valve_command], dtype=np.float64)))
+
+    def run(self, valve_command: ArrayLike) -> dict[str, Array]:
+        """Hold one command after the other.
+
+        Parameters
+        ----------
+        valve_command : array_like, shape (n,)
+            Commands [V]; for a rig without a valve only their number counts.
+
+        Returns
+        -------
+        dict of str to ndarray
+            The n samples after them.
+
+        Raises
+        ------
+        ParameterError
+            If a command is not finite; the message gives its index.
+        SimulationError
+            As :meth:`step`.
+        """
+        return self._core.advance(held_command(valve_command))
+
+    def __getstate__(self) -> dict[str, Any]:
+        kept = {name: value for name, value in self.__dict__.items() if name != "_core"}
+        return {**kept, "state": self.state}
+
+    def __setstate__(self, kept: dict[str, Any]) -> None:
+        state = kept.pop("state")
+        self.__dict__.update(kept)
+        self._core = self._started()
+        self.restore(state)
+
+    def __repr__(self) -> str:
+        return f"Simulator({self.rig.name}, time={self.time:.6g} s, sample_time={self.sample_time:g} s)"
+
+
+def _single(channels: Mapping[str, Array]) -> dict[str, float]:
+    return {name: float(values[0]) for name, values in channels.items()}

@@ -1,0 +1,107 @@
+"""The simulator that goes on sample by sample: the same run, restarts bit for bit, copies, Ctrl-C."""
+
+from __future__ import annotations
+
+import copy
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import textwrap
+
+import numpy as np
+import pytest
+
+import pamrs
+
+COMMAND = 5.0 + 1.2 * np.sin(np.arange(300) * 0.05)
+
+
+def rig() -> pamrs.Rig:
+    """The shoulder with everything on that has a memory."""
+    friction = {"friction_constant": 2.0, "friction_pressure": 2e-5, "presliding": 1e-3}
+    return pamrs.rigs.shoulder().with_effect("muscle_hysteresis", friction).with_effect("heat_transfer")
+
+
+def simulator(**changes: float) -> pamrs.Simulator:
+    return pamrs.Simulator(rig(), sample_time=0.005, **changes)
+
+
+def test_steps_are_the_run() -> None:
+    whole = pamrs.simulate(rig(), COMMAND, sample_time=0.005)
+    one = simulator()
+    rows = [one.observe(), *(one.step(u) for u in COMMAND[:-1])]
+    for name in rows[0]:
+        np.testing.assert_array_equal([row[name] for row in rows], whole[name], err_msg=name)
+    assert one.time == pytest.approx(0.005 * (len(COMMAND) - 1))
+
+
+def test_a_restart_is_exact_to_the_last_bit() -> None:
+    first = simulator()
+    first.run(COMMAND[:150])
+    state = first.state
+    straight = first.run(COMMAND[150:])
+    again = simulator()
+    again.restore(state)
+    assert again.time == pytest.approx(0.75)
+    for other in (again, pickle.loads(pickle.dumps(again)), copy.deepcopy(again)):
+        for name, values in other.run(COMMAND[150:]).items():
+            np.testing.assert_array_equal(values, straight[name], err_msg=name)
+
+
+def test_reset_begins_again_with_other_values() -> None:
+    one = simulator()
+    one.run(COMMAND)
+    assert one.reset({"muscle_pressure": 2e5})["muscle_pressure"] == pytest.approx(2e5)
+    assert one.time == 0.0
+    one.step(5.0)
+    assert one.reset()["muscle_pressure"] == pytest.approx(2e5)
+
+
+def test_a_rig_without_a_valve_needs_no_command() -> None:
+    chamber = pamrs.Simulator(pamrs.rigs.sealed_chamber(), sample_time=0.1, initial={"muscle_pressure": 5e5})
+    assert chamber.step()["muscle_pressure"] == pytest.approx(5e5)
+
+
+def test_bad_input_is_named_and_leaves_the_state_alone() -> None:
+    one = simulator()
+    before = one.state
+    with pytest.raises(pamrs.ParameterError, match="valve_command is missing"):
+        one.step()
+    with pytest.raises(pamrs.ParameterError, match=r"valve_command\[0\] = NaN"):
+        one.step(float("nan"))
+    with pytest.raises(pamrs.ParameterError, match=r"valve_command\[1\] = inf"):
+        one.run([5.0, np.inf])
+    with pytest.raises(pamrs.ParameterError, match="state"):
+        one.restore(before[:-1])
+    with pytest.raises(pamrs.ParameterError, match=r"state\[0\]"):
+        one.restore(np.full(before.shape, np.nan))
+    with pytest.raises(pamrs.ParameterError, match="sample_time = 0"):
+        pamrs.Simulator(rig(), sample_time=0)
+    with pytest.raises(pamrs.ParameterError, match="unknown entry 'pressure'"):
+        simulator().reset({"pressure": 1.0})
+    np.testing.assert_array_equal(one.state, before)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals as on POSIX")
+def test_ctrl_c_ends_a_long_run() -> None:
+    code = """
+        import os, signal, threading, time, numpy as np, pamrs
+        rig = pamrs.rigs.shoulder()
+        pamrs.simulate(rig, np.full(2, 5.0), sample_time=0.005)
+        def press():
+            time.sleep(0.3)
+            print(time.perf_counter(), flush=True)
+            os.kill(os.getpid(), signal.SIGINT)
+        threading.Thread(target=press).start()
+        try:
+            pamrs.simulate(rig, np.full(4_000_000, 5.0), sample_time=0.005)
+        except KeyboardInterrupt:
+            print(time.perf_counter())
+    """
+    done = subprocess.run([sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr
+    pressed, ended = (float(line) for line in done.stdout.split())
+    assert ended > pressed
+    assert signal.SIGINT == 2
