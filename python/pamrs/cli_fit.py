@@ -6,6 +6,7 @@ import math
 import re
 import shlex
 from collections.abc import Mapping, Sequence
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from pamrs.fit.friction import FrictionFit
     from pamrs.fit.result import MuscleFit
     from pamrs.muscle import Muscle
+    from pamrs.rig import Rig
 
 __all__ = ["fit_app"]
 
@@ -26,6 +28,15 @@ _NUMBER = r"[-+]?\d*\.?\d+(?:[eE][-+]?\d+)?"
 _QUANTITY = re.compile(rf"^\s*(?P<value>{_NUMBER})\s*(?:(?:\+-|±)\s*(?P<tol>{_NUMBER})\s*)?(?P<unit>\S.*?)?\s*$")
 _GEOMETRY: Final = {"rest_length": "length", "rest_diameter": "length", "braid_angle": "angle", "wall_thickness": "length"}
 _MODULI: Final = {"modulus_slope": "dimensionless"}
+
+
+class FrictionChoice(StrEnum):
+    """Where the friction of the muscle comes from."""
+
+    fit = "fit"
+    none = "none"
+    muscle = "muscle"
+
 
 _MuscleName = Annotated[str | None, typer.Option("--muscle", help="Rig file (TOML) with the muscle, or a name of the library.")]
 _RestLength = Annotated[str | None, typer.Option(help='For example "300 mm"; "300 +- 2 mm" with what is known of it.')]
@@ -65,9 +76,18 @@ def _muscle(
     noise: Annotated[str | None, typer.Option(help='Standard deviation of the forces: "5 N", or "0.5 %" of the largest.')] = None,
     levels: Annotated[str | None, typer.Option(help="Fit on these pressures only: 200kPa,400kPa,6bar.")] = None,
     per_level: Annotated[bool, typer.Option("--per-level", help="Moduli free at each pressure.")] = False,
+    friction: Annotated[
+        FrictionChoice | None,
+        typer.Option(
+            help="fit: to the loops, before the moduli; muscle: as the muscle has it; none. By default fit where the rows have both "
+            "directions and the muscle no friction."
+        ),
+    ] = None,
     compare: Annotated[bool, typer.Option("--compare", help="Fit every model and rank them.")] = False,
     report: Annotated[Path | None, typer.Option(help="Write the report, one HTML file.")] = None,
-    rig: Annotated[Path | None, typer.Option(help="Write a rig file with the fitted muscle.")] = None,
+    rig: Annotated[
+        Path | None, typer.Option(help="Write a rig file with the fitted muscle: that of --muscle, or a new one with the muscle alone.")
+    ] = None,
     json: Annotated[Path | None, typer.Option(help=f"Write the result (schema {SCHEMA}).")] = None,
     png: _Picture = None,
 ) -> None:
@@ -79,24 +99,34 @@ def _muscle(
     if per_level and rig is not None:
         raise typer.BadParameter("a rig needs moduli linear in pressure: leave out --per-level or --rig")
     sizes = {"rest_length": rest_length, "rest_diameter": rest_diameter, "braid_angle": braid_angle, "wall_thickness": wall_thickness}
-    map_, start, tolerance, stated = _inputs(data, muscle, {k: v for k, v in sizes.items() if v is not None}, where or [], clipped)
+    map_, start, tolerance, stated, base = _inputs(
+        data, muscle, {k: v for k, v in sizes.items() if v is not None}, where or [], clipped
+    )
     pressures = None if levels is None else [_quantity("levels", text, "pressure")[0] for text in levels.split(",")]
     names = [] if free is None else [name.strip().replace("-", "_") for name in free.split(",") if name.strip()]
     known = {name: value for name, value in tolerance.items() if math.isfinite(value)} | _prior(prior)
     scatter = stated if noise is None else _noise(noise, map_)
+    notes = [
+        f"tolerance of {name} is not used: it is not free"
+        for name, text in sizes.items()
+        if name not in names and text is not None and _quantity(name, text, _GEOMETRY[name])[1] is not None
+    ]
     from pamrs.fit import FitError, fit_muscle
 
     shape: dict[str, Any] = {"geometry": geometry, "free": names, "tolerance": known, "levels": pressures, "noise": scatter}
     with _progress(f"fitting {map_.label}"):
         try:
+            start, rubbing, words = _rubbing(map_, start, friction, model, pressures)
             fit = fit_muscle(map_, start, model=model, order=order, moduli="per_level" if per_level else "linear", **shape)
             comparison = _comparison(map_, start, fit.order, shape) if compare else None
-            contents = _contents(fit, comparison, _command(context), report=report, rig=rig, json=json, png=png)
-            summary = _summary(fit, comparison)
+            contents = _contents(fit, comparison, rubbing, _command(context), base, report=report, rig=rig, json=json, png=png)
+            summary = _summary(fit, comparison, words, notes)
         except FitError as error:
             raise FitError("; ".join([str(error), *map_.notes])) from error
     typer.echo(summary, nl=False)
     _write(contents)
+    if rig is not None and (base is None or "joint" not in base.blocks):
+        typer.echo(f"{rig} has a muscle only: it cannot be simulated until it has [joint] and [arm]", err=True)
 
 
 @fit_app.command("friction")
@@ -135,6 +165,44 @@ def _friction(
     _write(contents)
 
 
+def _rubbing(
+    data: ForceMap, muscle: Muscle, choice: FrictionChoice | None, model: str | None, pressures: Sequence[float] | None
+) -> tuple[Muscle, FrictionFit | None, str]:
+    """The muscle with the friction asked for, the fit of that to the loops where there is one, and what to say of it.
+
+    Unasked, friction is fitted where the rows have both directions and the muscle has none; not for the elbow's model, which has
+    a branch of its own for lengthening.
+    """
+    import numpy as np
+
+    from pamrs.errors import RecordingError
+    from pamrs.fit import fit_friction
+    from pamrs.fit.export import friction_words
+
+    given = muscle.parameters
+    bare = dict.fromkeys(("friction_coefficient", "friction_pressure_slope", "friction_floor"), 0.0)
+    if choice is FrictionChoice.none:
+        return muscle.replace(**bare), None, ""
+    way = data.direction[data.used]
+    loops = bool(np.any(way < 0) and np.any(way > 0))
+    alone = loops and not any(given[name] for name in bare) and (model or muscle.model) != "elbow_linear"
+    if choice is FrictionChoice.muscle or (choice is None and not alone):
+        law = friction_words(muscle) if loops else ""
+        return muscle, None, f"friction as the muscle has it: {law}" if law else ""
+    seen = data if pressures is None else data.select(levels=data.level_indices(pressures))
+    try:
+        found = fit_friction(seen)
+    except RecordingError as error:
+        if choice is FrictionChoice.fit:
+            raise
+        return muscle, None, f"friction: not fitted, {error}"
+    if choice is None and not found.ndata:
+        return muscle, None, f"friction: none, no pressure's c_F stands above {found.floor:g}"
+    c0, c1 = found.params["friction_coefficient"], found.params["friction_pressure_slope"]
+    line = f"c0 = {c0.value:.4g} +- {c0.stderr:.2g}, c1 = {1e6 * c1.value:.4g} +- {1e6 * c1.stderr:.2g} 1/MPa"
+    return found.to_muscle(muscle), found, f"friction, fitted to the loops before the moduli: {line}"
+
+
 def _comparison(data: ForceMap, muscle: Muscle, order: int | None, shape: dict[str, Any]) -> ModelComparison:
     """Every model, in the orders 1 to 4 and that of the fit, and in the geometry asked for where the muscle's own model is meant."""
     from pamrs.fit import compare_models
@@ -169,8 +237,8 @@ def _quantity(name: str, text: str, dimension: str) -> tuple[float, float | None
 
 def _inputs(
     data: Path, muscle: str | None, sizes: Mapping[str, str], where: Sequence[str], clipped: str | None
-) -> tuple[ForceMap, Muscle, dict[str, float], float | None]:
-    """Map, muscle, tolerances and noise, from a description or from a table and the options."""
+) -> tuple[ForceMap, Muscle, dict[str, float], float | None, Rig | None]:
+    """Map, muscle, tolerances, noise, and the rig of the muscle if it is of one; from a description or from a table and the options."""
     from pamrs.errors import ParameterError
 
     if data.suffix.lower() == ".toml":
@@ -182,10 +250,10 @@ def _inputs(
         from pamrs.fit.description import load_measured_muscle
 
         measured = load_measured_muscle(data)
-        return measured.data, measured.muscle, measured.tolerance, measured.noise
-    start, tolerance = _start(muscle, sizes)
+        return measured.data, measured.muscle, measured.tolerance, measured.noise, None
+    start, tolerance, base = _start(muscle, sizes)
     map_ = _table(data, float(start.parameters["rest_length"]), where, clipped)
-    return map_.checked_against(start), start, tolerance, None
+    return map_.checked_against(start), start, tolerance, None, base
 
 
 def _table(data: Path, rest_length: float, where: Sequence[str], clipped: str | None) -> ForceMap:
@@ -243,8 +311,8 @@ def _filter(text: str) -> tuple[str, str]:
     return column.strip(), value.strip()
 
 
-def _start(muscle: str | None, sizes: Mapping[str, str]) -> tuple[Muscle, dict[str, float]]:
-    """The nominal muscle and what is known of it."""
+def _start(muscle: str | None, sizes: Mapping[str, str]) -> tuple[Muscle, dict[str, float], Rig | None]:
+    """The nominal muscle, what is known of it, and the rig that it is of."""
     from pamrs.errors import ParameterError
     from pamrs.muscle import Muscle
 
@@ -255,19 +323,19 @@ def _start(muscle: str | None, sizes: Mapping[str, str]) -> tuple[Muscle, dict[s
         if spread is not None:
             tolerance[name] = spread
     if muscle is not None:
-        base, known = _named_muscle(muscle)
-        return base.replace(**values), {**known, **tolerance}
+        base, known, rig = _named_muscle(muscle)
+        return base.replace(**values), {**known, **tolerance}, rig
     lacking = [f"--{name.replace('_', '-')}" for name in _GEOMETRY if name not in values]
     if lacking:
         raise ParameterError(
             f"the geometry of the muscle is missing: give {', '.join(lacking)} (like --rest-length '300 mm'), "
             "or --muscle with a rig file or a name of the library"
         )
-    return Muscle(**values), tolerance
+    return Muscle(**values), tolerance, None
 
 
-def _named_muscle(name: str, option: str = "--muscle") -> tuple[Muscle, dict[str, float]]:
-    """The muscle of a rig file, or of the library, and what is known of its geometry."""
+def _named_muscle(name: str, option: str = "--muscle") -> tuple[Muscle, dict[str, float], Rig | None]:
+    """The muscle of a rig file, or of the library, what is known of its geometry, and the rig."""
     from pamrs import library
     from pamrs.errors import ParameterError
     from pamrs.rig import load_rig
@@ -275,34 +343,38 @@ def _named_muscle(name: str, option: str = "--muscle") -> tuple[Muscle, dict[str
     if not name.endswith(".toml") and not Path(name).exists():
         if name not in library.names():
             raise ParameterError(f"{option} = {name!r} is neither a file nor in the library: {', '.join(library.names())}")
-        return library.entry(name).muscle, {}
+        return library.entry(name).muscle, {}, None
     rig = load_rig(name)
     if rig.muscle is None:
         raise ParameterError(f"{option} = {name!r}: this rig has no block [muscle]")
     known = {key.partition(".")[2]: p.tol for key, p in rig.parameters.items() if key.startswith("muscle.") and p.tol > 0.0}
-    return rig.muscle, {key: value for key, value in known.items() if key in _GEOMETRY}
+    return rig.muscle, {key: value for key, value in known.items() if key in _GEOMETRY}, rig
 
 
 # ------------------------------------------------------------------------ outputs
 
 
-def _summary(fit: MuscleFit, comparison: ModelComparison | None) -> str:
+def _summary(fit: MuscleFit, comparison: ModelComparison | None, friction: str, notes: Sequence[str]) -> str:
     """What goes to standard output."""
     from pamrs.fit.remarks import cross_validation
 
     cross, reason = cross_validation(fit)
-    text = fit.fit_report().rstrip("\n")
+    lines = [fit.fit_report().rstrip("\n"), *(f"  note: {note}" for note in notes), *([f"  {friction}"] if friction else [])]
     if cross is None:
-        text += f"\n  leave one pressure out: not possible, {reason}\n"
+        lines.append(f"  leave one pressure out: not possible, {reason}")
     else:
-        text += f"\n  leave one pressure out: rms {100 * cross.rms:.2f} %, max {100 * cross.max:.2f} % of the largest force\n"
+        numbers = f"rms {100 * cross.rms:.2f} %, max {100 * cross.max:.2f} %"
+        lines.append(f"  leave one pressure out: {numbers} of the map's largest force")
+    text = "\n".join(lines) + "\n"
     return text if comparison is None else f"{text}\n{comparison.to_text()}"
 
 
 def _contents(
     fit: MuscleFit,
     comparison: ModelComparison | None,
+    friction: FrictionFit | None,
     command: str,
+    base: Rig | None,
     *,
     report: Path | None,
     rig: Path | None,
@@ -318,9 +390,9 @@ def _contents(
     if png is not None:
         contents[png] = pages.render_png(fit, comparison)
     if rig is not None:
-        contents[rig] = fit.to_rig().to_toml_text()
+        contents[rig] = fit.to_rig(base).to_toml_text()
     if json is not None:
-        contents[json] = _json(fit, comparison, command)
+        contents[json] = _json(fit, comparison, friction, command)
     return contents
 
 
@@ -347,7 +419,7 @@ def _command(context: typer.Context) -> str:
     return shlex.join(words)
 
 
-def _json(fit: MuscleFit, comparison: ModelComparison | None, command: str) -> str:
+def _json(fit: MuscleFit, comparison: ModelComparison | None, friction: FrictionFit | None, command: str) -> str:
     import json
 
     from pamrs.fit.remarks import cross_validation
@@ -360,6 +432,7 @@ def _json(fit: MuscleFit, comparison: ModelComparison | None, command: str) -> s
         "command": command,
         "issues": fit.data.issues,
         "rows": len(fit.data),
+        "friction": None if friction is None else friction.to_dict(),
         "fit": fit.to_dict(),
         "leave_one_pressure_out": None if cross is None else cross.to_dict(),
         "comparison": None if comparison is None else comparison.to_dicts(),

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from pamrs.errors import RecordingError
 
-__all__ = ["Table", "read_table"]
+__all__ = ["Table", "read_table", "read_text", "split_rows"]
 
 Array = NDArray[np.float64]
 
@@ -37,20 +37,22 @@ class Table:
         The file's own headings, None when it has none.
     cells : sequence of columns
         For text files the cells of each column, for others numbers.
+    row_numbers : list of int
+        Number of each row (from 1, as an editor counts them; the header and blank rows count).
     ragged : list of int
-        Row numbers (from 1, as an editor counts them) with too few or too many cells.
+        Row numbers with too few or too many cells.
     """
 
     def __init__(
         self,
         header: list[str] | None,
         cells: Sequence[Sequence[str] | Array],
-        first_row: int,
+        row_numbers: list[int],
         ragged: list[int],
     ) -> None:
         self.header = header
         self.cells = cells
-        self.first_row = first_row
+        self.row_numbers = row_numbers
         self.ragged = ragged
 
     def numbers(self, index: int, label: str, source: str, thousands: str | None, decimal: str) -> Array:
@@ -79,7 +81,7 @@ class Table:
                 values[row] = math.nan if text.lower() in _NO_VALUE else float(text)
             except ValueError:
                 raise RecordingError(
-                    f"{source}: column {label!r}, row {self.first_row + row}: {text[:40]!r} is not a number"
+                    f"{source}: column {label!r}, row {self.row_numbers[row]}: {text[:40]!r} is not a number"
                     + _number_hint(text, thousands, decimal)
                 ) from None
         return values
@@ -115,10 +117,31 @@ def read_table(path: Path, *, delimiter: str, header: bool) -> Table:
     RecordingError
         If the file is missing, unreadable, empty or has no rows.
     """
+    if path.suffix.lower() == ".parquet":
+        return _parquet(path)
+    return _parse(read_text(path), str(path), delimiter, header)
+
+
+def read_text(path: Path) -> str:
+    """Text of a file that is not Parquet, unpacked.
+
+    Parameters
+    ----------
+    path : Path
+        The file; the ending tells the format.
+
+    Returns
+    -------
+    str
+        What is in it.
+
+    Raises
+    ------
+    RecordingError
+        If the file is missing, unreadable or no text in UTF-8.
+    """
     packed = path.suffix == ".gz"
     ending = (path.with_suffix("").suffix if packed else path.suffix).lower()
-    if ending == ".parquet" and not packed:
-        return _parquet(path)
     if ending not in _TEXT:
         raise RecordingError(f"{path}: the format {ending!r} is not read here; readable are {_READABLE}")
     try:
@@ -131,35 +154,36 @@ def read_table(path: Path, *, delimiter: str, header: bool) -> Table:
         raise RecordingError(f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})") from error
     if "\x00" in text:
         raise RecordingError(f"{path}: not a text file (it has zero bytes); readable are {_READABLE}")
-    return _parse(text, str(path), delimiter, header)
+    return text
 
 
 def _parse(text: str, source: str, delimiter: str, header: bool) -> Table:
     rows, numbers = [], []
-    for number, row in enumerate(_split(text, delimiter), start=1):
+    for number, row in enumerate(split_rows(text, delimiter), start=1):
         if any(cell.strip() for cell in row):
             rows.append(row)
             numbers.append(number)
     if not rows:
         raise RecordingError(f"{source}: the file is empty")
     headings = [cell.strip() for cell in rows.pop(0)] if header else None
-    first_row = numbers[1 if header else 0] if len(numbers) > int(header) else 0
+    numbers = numbers[int(header) :]
     if not rows:
         raise RecordingError(f"{source}: a header without rows")
     width = len(headings) if headings is not None else _usual_width(rows)
     ragged = []
     for index, row in enumerate(rows):
         if len(row) != width:
-            ragged.append(numbers[index + int(header)])
+            ragged.append(numbers[index])
             rows[index] = (row + [""] * width)[:width] if len(row) < width else [""] * width
     if len(ragged) > max(1, len(rows) // 20):
         raise RecordingError(
             f"{source}: {len(ragged)} of {len(rows)} rows do not have {width} cells (first: row {ragged[0]}, delimiter {delimiter!r})"
         )
-    return Table(headings, list(zip(*rows, strict=True)), first_row, ragged)
+    return Table(headings, list(zip(*rows, strict=True)), numbers, ragged)
 
 
-def _split(text: str, delimiter: str) -> list[list[str]]:
+def split_rows(text: str, delimiter: str) -> list[list[str]]:
+    """Cells of each row; ``" "`` means any run of blanks."""
     if delimiter == " ":
         return [line.split() for line in text.splitlines()]
     if '"' in text:
@@ -186,7 +210,7 @@ def _parquet(path: Path) -> Table:
         raise RecordingError(f"{path}: cannot be read ({error})") from error
     if not len(frame):
         raise RecordingError(f"{path}: a header without rows")
-    return Table([str(name) for name in frame.columns], columns, 1, [])
+    return Table([str(name) for name in frame.columns], columns, list(range(1, len(frame) + 1)), [])
 
 
 def thousands_of(thousands: str | Mapping[str, str] | None, name: str) -> str | None:

@@ -152,7 +152,7 @@ def test_a_description_brings_its_muscle(capsys, table):
         ([*OPTIONS, "--floor", "1.5"], ["floor = 1.5 is not allowed"]),
         ([*OPTIONS, "--floor", "nan"], ["floor = nan is not allowed"]),
         ([*OPTIONS, "--where", "direction"], ["--where = 'direction' is not allowed"]),
-        ([*OPTIONS, "--where", "direction=1"], ["no row has a direction of motion"]),
+        ([*OPTIONS, "--where", "direction=1"], ["no pressure gives a coefficient", "0 rows while contracting"]),
         ([*OPTIONS, "--clipped", "0"], ["--clipped = '0' is not allowed"]),
         ([*OPTIONS, "--colour", "red"], ["--colour"]),
     ],

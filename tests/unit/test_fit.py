@@ -9,6 +9,7 @@ import pytest
 from pamrs import rigs
 from pamrs.errors import ParameterError
 from pamrs.fit import FitError, ForceMap, fit_muscle
+from pamrs.rig import Rig
 
 from .fit_cases import CONTRACTIONS, OFFSETS, PRESSURES, REST, SLOPES, TOLERANCE, measure, muscle, truth
 
@@ -107,7 +108,15 @@ def test_per_level_moduli_lie_on_the_line_when_the_truth_is_a_line():
     assert stderr.shape == values.shape
     np.testing.assert_allclose(fit.predict(2.7e5, [0.05, 0.2]), real.force(2.7e5, [0.05, 0.2]), rtol=1e-9)
     np.testing.assert_allclose(fit.muscle_at(2.7e5).force(2.7e5, 0.1), real.force(2.7e5, 0.1), rtol=1e-9)
-    assert list(fit.params)[:3] == ["E1_0", "E2_0", "E1_1"]
+    assert list(fit.params)[:3] == ["E1_100kPa", "E2_100kPa", "E1_200kPa"]
+
+
+def test_names_tell_the_pressure_of_each_level_apart():
+    real = muscle(order=1)
+    p, e = (grid.ravel() for grid in np.meshgrid([2e5, 2.0004e5, 343.75e3], CONTRACTIONS, indexing="ij"))
+    data = ForceMap.from_arrays(REST * (1.0 - e), p, real.force(p, e), rest_length=REST, level_tolerance=10.0)
+    assert list(fit_muscle(data, real, moduli="per_level").params) == ["E1_200kPa", "E1_200.04kPa", "E1_343.75kPa"]
+    assert list(fit_muscle(data, real, moduli="per_level", levels=[0, 2]).params) == ["E1_200kPa", "E1_343.8kPa"]
 
 
 def test_moduli_of_a_linear_fit_have_the_error_of_the_line():
@@ -185,6 +194,37 @@ def test_error_by_pressure_is_2_37():
     assert fit.errors_of("held_out") is None
 
 
+def with_level_at_zero(force):
+    """A map whose first level, at 0 Pa, has a force of this size."""
+    data = measure(muscle(), noise=2.0)
+    length = REST * (1.0 - CONTRACTIONS)
+    pull = force * np.cos(np.arange(len(length)))
+    return ForceMap.from_arrays(
+        np.append(data.length, length),
+        np.append(data.pressure, np.zeros(len(length))),
+        np.append(data.force, pull),
+        rest_length=REST,
+    )
+
+
+@pytest.mark.parametrize("force", [0.0, -1.0, 0.5])
+def test_a_level_that_does_not_pull_is_no_scale_and_no_obstacle(force):
+    data = with_level_at_zero(force)
+    for levels in (None, [1, 2, 3, 4, 5, 6]):
+        fit = fit_muscle(data, muscle(), levels=levels)
+        errors = fit.error_by_pressure()
+        assert errors.levels.tolist() == PRESSURES.tolist()
+        assert errors.weak.tolist() == [0.0]
+        assert "0 kPa: not in this table" in fit.fit_report()
+        cross = fit.leave_one_pressure_out()
+        assert cross.by_pressure.weak.tolist() == ([0.0] if levels is None else [])
+        assert math.isfinite(cross.rms)
+        assert json.loads(json.dumps(fit.to_dict(), allow_nan=False))["weak_levels"] == [0.0]
+    assert fit_muscle(data, muscle(), weights="level", levels=[1, 2, 3, 4, 5, 6]).errors_of("held_out")[0] < 1.0
+    with pytest.raises(FitError, match=r"weights = 'level' .* at 0 kPa \(.* N\): leave these levels out"):
+        fit_muscle(data, muscle(), weights="level")
+
+
 def test_weights_by_level_minimise_2_37():
     real = muscle(order=3)
     data = measure(real, noise=8.0, seed=2)
@@ -225,9 +265,9 @@ def test_one_pressure_left_out_with_moduli_per_level():
 
 def test_leaving_out_needs_levels_to_spare():
     data = measure(muscle(), pressures=[2e5, 6e5])
-    with pytest.raises(FitError, match="without 200 kPa the other levels do not determine"):
+    with pytest.raises(FitError, match="^without 200 kPa the other levels do not determine"):
         fit_muscle(data, muscle()).leave_one_pressure_out()
-    with pytest.raises(FitError, match="two pressure levels at least"):
+    with pytest.raises(FitError, match="two pressure levels at least are needed to predict one from the others"):
         fit_muscle(measure(muscle(), pressures=[2e5]), muscle(), moduli="per_level").leave_one_pressure_out()
 
 
@@ -351,3 +391,43 @@ def test_report_and_dictionary_hold_the_numbers():
     assert (fit.ndata, fit.nvarys, fit.nfree) == (44, 5, 39)
     assert fit.aic < fit.aicc < fit.bic
     assert "order 2" in repr(fit)
+
+
+def test_the_report_says_what_its_numbers_are_of():
+    data = measure(muscle(), noise=3.0)
+    fit = fit_muscle(data, muscle())
+    text = fit.fit_report()
+    assert f"chi2 {fit.chisqr:.4g} N2, residual rms {math.sqrt(fit.chisqr / fit.ndata):.4g} N\n" in text
+    assert "reduced" not in text
+    assert "with all 66 points as independent: AIC" in text
+    assert "of the map's largest force: rms" in text
+    assert "force error of each level, of the largest force of that level:" in text
+    known = fit_muscle(data, muscle(), noise=3.0)
+    assert f"reduced chi2 {known.chisqr / 9.0 / known.nfree:.4g} with the stated noise of 3 N" in known.fit_report()
+    level = fit_muscle(data, muscle(), weights="level", noise=0.01)
+    assert "N2" not in level.fit_report()
+    assert "with the stated noise of 1 % of the level's largest force" in level.fit_report()
+
+
+def test_results_show_themselves_in_one_line():
+    fit = fit_muscle(measure(muscle(), noise=3.0), muscle())
+    cross = fit.leave_one_pressure_out()
+    assert repr(cross) == (
+        f"CrossValidation(6 levels, each from the others: rms {100 * cross.rms:.2f} %, max {100 * cross.max:.2f} % "
+        "of the map's largest force)"
+    )
+    worst = 100 * fit.error_by_pressure().rms.max()
+    assert repr(fit.error_by_pressure()) == f"PressureErrors(6 levels, rms at most {worst:.2f} % of the level's largest force)"
+    assert "6 levels, 1 left out, rms" in repr(fit_muscle(with_level_at_zero(0.5), muscle()).error_by_pressure())
+
+
+def test_a_rig_keeps_the_tolerances_of_what_the_fit_did_not_change():
+    shoulder = rigs.shoulder()
+    real = shoulder.muscle
+    e, p = (grid.ravel() for grid in np.meshgrid(np.linspace(0.0, 0.25, 9), PRESSURES))
+    data = ForceMap.from_arrays(0.276 * (1.0 - e), p, real.force(p, e), rest_length=0.276)
+    nominal = real.replace(friction_coefficient=0.5 * real.parameters["friction_coefficient"] + 0.01)
+    told = Rig(shoulder.name, shoulder.model, {"muscle.braid_angle": 0.02, "muscle.friction_coefficient": 0.03})
+    rig = fit_muscle(data, nominal, order=2).to_rig(told)
+    assert rig.parameter("muscle.braid_angle").tol == 0.02
+    assert rig.parameter("muscle.friction_coefficient").tol == 0.0

@@ -1,11 +1,14 @@
 """Force maps: parsing, units, every flag with its count, levels, descriptions, recordings of a bench."""
 
+import math
+import re
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from pamrs import Muscle
 from pamrs.errors import ParameterError, RecordingError
 from pamrs.fit.data import ForceMap
 from pamrs.fit.description import load_measured_muscle
@@ -79,12 +82,12 @@ def test_clean_map_uses_every_row():
 @pytest.mark.parametrize(
     ("columns", "reason", "words"),
     [
-        ({"force": changed(FORCES, 3, np.nan)}, "not a number", "1 row of 12 have no number"),
+        ({"force": changed(FORCES, 3, np.nan)}, "not a number", "1 row of 12 has no number"),
         ({"length": changed(LENGTHS, 3, np.inf)}, "not a number", "no number"),
         ({"pressure": changed(PRESSURES, 3, -2e4)}, "negative pressure", "negative gauge pressure"),
         ({"pressure": changed(PRESSURES, 3, 9e8)}, "pressure out of range", "beyond 5 MPa"),
         ({"length": changed(LENGTHS, 3, 280.0)}, "length out of range", "no muscle of this rest length"),
-        ({"force": changed(FORCES, 3, 0.0), "clipped": 0.0}, "clipped", "1 row of 12 are clipped"),
+        ({"force": changed(FORCES, 3, 0.0), "clipped": 0.0}, "clipped", "1 row of 12 is clipped"),
         ({"faulty": np.arange(12) == 3}, "sensor fault", "masked by the check"),
         (
             {
@@ -93,7 +96,7 @@ def test_clean_map_uses_every_row():
                 "force": changed(FORCES, 3, FORCES[2]),
             },
             "duplicate",
-            "repeat an earlier row",
+            "repeats an earlier row",
         ),
     ],
 )
@@ -105,7 +108,7 @@ def test_each_bad_row_is_flagged_with_its_reason(columns, reason, words):
     assert len(data) == 12
     assert len(data.issues) == 1
     assert words in data.issues[0]
-    assert "not used" in data.issues[0]
+    assert data.issues[0].endswith("not used (index 3)")
     assert all(np.isfinite(column).all() for column in data.used_rows())
 
 
@@ -122,14 +125,14 @@ def test_exact_zeros_that_nobody_explains_are_used_and_reported():
 @pytest.mark.parametrize(
     ("columns", "unit"),
     [
-        ({"length": LENGTHS * 1e3}, "in mm"),
-        ({"length": LENGTHS * 1e2}, "in cm"),
-        ({"length": LENGTHS / 0.0254}, "in in"),
+        ({"length": LENGTHS * 1e3}, "in mm, read as m"),
+        ({"length": LENGTHS * 1e2}, "in cm, read as m"),
+        ({"length": LENGTHS / 0.0254}, "in in, read as m"),
         ({"length": LENGTHS / 1e3}, "in m, read as mm"),
-        ({"pressure": PRESSURES / 1e3}, "in kPa"),
-        ({"pressure": PRESSURES / 1e5}, "in bar"),
-        ({"pressure": PRESSURES / 6894.757}, "in psi"),
-        ({"pressure": PRESSURES / 1e6}, "in MPa"),
+        ({"pressure": PRESSURES / 1e3}, "in kPa, read as Pa"),
+        ({"pressure": PRESSURES / 1e5}, "in bar, read as Pa"),
+        ({"pressure": PRESSURES / 6894.757}, "in psi, read as Pa"),
+        ({"pressure": PRESSURES / 1e6}, "in MPa, read as Pa"),
         ({"pressure": PRESSURES * 1e3}, "in Pa, read as kPa"),
         ({"pressure": PRESSURES * 1e5}, "in Pa, read as bar"),
     ],
@@ -160,7 +163,7 @@ def test_columns_of_different_lengths():
 
 
 def test_too_few_rows_says_what_became_of_the_others():
-    with pytest.raises(RecordingError, match="1 usable rows, two at least.*11 rows of 12 are clipped"):
+    with pytest.raises(RecordingError, match="1 usable row, two at least.*11 rows of 12 are clipped.*indices 0, 1, 2, 3, 4 and 6 more"):
         made(force=np.append(np.zeros(11), 5.0), clipped=0.0)
 
 
@@ -213,6 +216,7 @@ def fake_muscle(limits=(-0.1, 0.15), area=1e-3, rest_length=REST):
         parameters={"rest_length": rest_length},
         contraction_limits=limits,
         gas_area=lambda e: np.full_like(e, area),
+        radius=np.ones_like,
     )
 
 
@@ -229,13 +233,21 @@ def test_a_level_without_a_row_left_vanishes():
     np.testing.assert_array_equal(np.unique(data.level), [-1, 0, 1])
 
 
-def test_forces_that_gas_cannot_make():
-    with pytest.raises(RecordingError, match="probably in mN"):
-        made(force=FORCES * 1e3).checked_against(fake_muscle())
-    with pytest.raises(RecordingError, match="read as kgf or lbf"):
-        made(force=FORCES * 9.81).checked_against(fake_muscle(area=9e-4))
-    with pytest.raises(RecordingError, match="probably in kN"):
-        made(force=FORCES / 1e3).checked_against(fake_muscle())
+@pytest.mark.parametrize(
+    ("columns", "units", "words"),
+    [
+        ({"force": FORCES * 1e3}, {"force": "N"}, "forces are too large (in mN, read as N?)"),
+        ({"force": FORCES * 9.81}, {"force": "kgf"}, "forces are too large (in N, read as kgf?)"),
+        ({"force": FORCES / 1e3}, {}, "forces are too small (in kN, read as N or in N, read as mN?)"),
+        ({"pressure": PRESSURES / 14.5}, {"pressure": "psi"}, "pressures are too small (in bar, read as psi?)"),
+        ({"force": FORCES * 30.0}, {}, "forces are too large, or the pressures are too small, or the muscle's sizes are too small"),
+    ],
+)
+def test_forces_that_gas_cannot_make(columns, units, words):
+    with pytest.raises(RecordingError) as error:
+        made(**columns, units=units).checked_against(fake_muscle(area=9e-4))
+    assert words in str(error.value)
+    assert "or the pressures are too" in str(error.value)
 
 
 def test_another_rest_length():
@@ -307,7 +319,7 @@ def test_rows_of_one_specimen(tmp_path):
     np.testing.assert_array_equal(data.force[data.used], [95.0, 130.0])
     assert len(data) == 4
     assert sorted(set(data.reason)) == ["", "clipped", "not a number"]
-    assert any("1 rows of the file are not specimen = B" in issue for issue in data.issues)
+    assert any("1 row of the file is not specimen = B and belongs" in issue for issue in data.issues)
     assert any("columns not used: spot" in issue for issue in data.issues)
     with pytest.raises(RecordingError, match="no row has specimen = 'C'; there are: A, B"):
         load_force_map(path, rest_length=REST, where={"specimen": "C"})
@@ -323,6 +335,181 @@ def test_two_specimens_are_not_mixed(tmp_path):
 def test_a_cell_that_is_no_number_is_named(tmp_path):
     with pytest.raises(RecordingError, match="row 6: 'oops' is not a number"):
         load_force_map(write(tmp_path, SEVERAL), rest_length=REST, where={"specimen": "B"})
+
+
+# ------------------------------------------------------- tables as newcomers bring them
+
+
+@pytest.mark.parametrize("name", ["map.csv", "map.txt", "map.tsv"])
+@pytest.mark.parametrize(
+    ("delimiter", "decimal"), [(";", ","), (";", "."), ("\t", ","), ("\t", "."), (",", "."), ("|", ","), (" ", ","), (" ", ".")]
+)
+def test_delimiter_and_decimal_mark_are_found(tmp_path, name, delimiter, decimal):
+    text = csv_text("length_mm,pressure_bar,force_N", (1e3, 1e-5, 1.0)).replace(",", delimiter).replace(".", decimal)
+    data = load_force_map(write(tmp_path, text, name), rest_length=REST)
+    np.testing.assert_allclose(data.length, LENGTHS)
+    np.testing.assert_allclose(data.force, FORCES, rtol=1e-6)
+
+
+def test_quoted_cells_may_have_decimal_commas(tmp_path):
+    text = '"length [mm]","pressure [bar]","force [N]"\n"300,5","1,0","12,3"\n"290,5","1,0","8,5"\n"280,0","1,0","4,25"\n'
+    data = load_force_map(write(tmp_path, text), rest_length=REST)
+    np.testing.assert_allclose(data.force, [12.3, 8.5, 4.25])
+
+
+def test_descriptions_find_delimiter_and_decimal_mark(described):
+    table = described.with_name("map.csv")
+    table.write_text(table.read_text(encoding="utf-8").replace(",", ";").replace("95", "95,5"), encoding="utf-8")
+    assert load_measured_muscle(described).data.force[0] == 95.5
+
+
+@pytest.mark.parametrize(
+    ("text", "match"),
+    [
+        (
+            "length [mm],pressure [bar],force [N]\n300,5,1,0,12,3\n290,5,1,0,8,5\n",
+            "3 cells, row 2 has 6.*both part.*delimiter and decimal",
+        ),
+        ("bench 7\nlength [mm];pressure [bar];force [N]\n300;1;12\n", "'bench 7', is not parted.*delimiter and decimal"),
+        ("length_mm;pressure_bar;force_N\n300,5;1.5;12\n290;1;8\n", "'300,5' and '1.5': which mark.*decimal"),
+        ("length_mm;pressure_Pa;force_N\n300;100,000;12\n290;100,000;8\n", "decimals or thousands.*decimal = ','"),
+        ("length_mm;pressure_Pa;force_N\n300;1.000,5;12\n290;1.000,5;8\n", "'1.000,5' has a mark between thousands"),
+    ],
+)
+def test_tables_that_cannot_be_told_apart_ask_for_delimiter_and_decimal(tmp_path, text, match):
+    with pytest.raises(RecordingError, match=match):
+        load_force_map(write(tmp_path, text), rest_length=REST)
+
+
+def test_a_given_decimal_mark_settles_thousands(tmp_path):
+    text = "length_mm;pressure_bar;force_N\n300;1,000;12\n290;1,500;8\n"
+    data = load_force_map(write(tmp_path, text), rest_length=REST, decimal=",")
+    np.testing.assert_allclose(data.pressure, [1e5, 1.5e5])
+
+
+@pytest.mark.parametrize(("option", "value"), [("delimiter", "tab"), ("decimal", ";")])
+def test_impossible_marks(tmp_path, option, value):
+    with pytest.raises(RecordingError, match=f"{option} = '{value}' is not allowed"):
+        load_force_map(write(tmp_path, csv_text("length_m,pressure_Pa,force_N")), rest_length=REST, **{option: value})
+
+
+@pytest.mark.parametrize("heading", ["L [mm],p [bar],F [N]", "L\u00e4nge [mm],Druck [bar],Kraft [N]"])
+def test_unknown_headings_say_how_to_map_them(tmp_path, heading):
+    path = write(tmp_path, csv_text(heading, (1e3, 1e-5, 1.0)))
+    long, gas, pull = heading.split(",")
+    with pytest.raises(RecordingError) as error:
+        load_force_map(path, rest_length=REST)
+    proposed = f'columns = {{ "{long}" = "length [mm]", "{gas}" = "pressure [bar]", "{pull}" = "force [N]" }} in a .toml'
+    assert proposed in str(error.value)
+    assert f"there are: {long}, {gas}, {pull}. Rename" in str(error.value)
+    mapped = load_force_map(path, rest_length=REST, columns={long: "length [mm]", gas: "pressure [bar]", pull: "force [N]"})
+    np.testing.assert_allclose(mapped.force, FORCES, rtol=1e-6)
+
+
+def test_headings_without_units_are_mapped_by_hand(tmp_path):
+    with pytest.raises(RecordingError, match=r'columns = \{ "\.\.\." = "length \[m\]", .* "\.\.\." = "force \[N\]" \}'):
+        load_force_map(write(tmp_path, csv_text("L,p,F")), rest_length=REST)
+
+
+@pytest.mark.parametrize(
+    ("heading", "rest", "words"),
+    [
+        ("length [mm]", 3.0, "Either rest_length is 10 times too large, or the length column is in cm, read as mm"),
+        ("length [cm]", REST, "Either rest_length is 10 times too small, or the length column is in mm, read as cm"),
+        ("length [in]", REST, "25.4 times too small, or the length column is in mm, read as in"),
+        ("length [mm]", 4.5, "They differ by a factor of 15: check rest_length and the length column"),
+    ],
+)
+def test_wrong_lengths_name_the_rest_length_too(tmp_path, heading, rest, words):
+    path = write(tmp_path, csv_text(f"{heading},pressure [bar],force [N]", (1e3, 1e-5, 1.0)))
+    with pytest.raises(RecordingError) as error:
+        load_force_map(path, rest_length=rest)
+    assert str(error.value).endswith(words)
+
+
+def test_bar_under_a_heading_in_psi_does_not_blame_the_forces_alone(tmp_path):
+    path = write(tmp_path, csv_text("length [mm],pressure [psi],force [N]", (1e3, 1e-5, 1.0)))
+    with pytest.raises(
+        RecordingError, match=r"forces are too large( \(.*\))?, or the pressures are too small \(in bar, read as psi\?\)"
+    ):
+        load_force_map(path, rest_length=REST).checked_against(fake_muscle())
+
+
+def test_where_on_a_measured_column_keeps_it(tmp_path):
+    path = write(tmp_path, csv_text("length [mm],pressure [bar],force [N]", (1e3, 1e-5, 1.0)).replace(",1,", ",1.000,"))
+    for value in ("1.000", "1", 1.0):
+        data = load_force_map(path, rest_length=REST, where={"pressure [bar]": value})
+        np.testing.assert_allclose(data.pressure, np.full(4, 1e5))
+        np.testing.assert_allclose(data.force, FORCES[:4], rtol=1e-6)
+    with pytest.raises(RecordingError, match=r"where names the column 'pressure', but .*; did you mean 'pressure \[bar\]'\?"):
+        load_force_map(path, rest_length=REST, where={"pressure": "1"})
+    with pytest.raises(RecordingError, match=r"columns names 'Force', but .*; did you mean 'force \[N\]'\?"):
+        load_force_map(path, rest_length=REST, columns={"Force": "force [N]"})
+
+
+def test_where_compares_numbers_with_decimal_commas(tmp_path):
+    path = write(tmp_path, csv_text("length [mm],pressure [bar],force [N]", (1e3, 1.5e-5, 1.0)).replace(",", ";").replace(".", ","))
+    for value in ("1.5", "1,50"):
+        assert len(load_force_map(path, rest_length=REST, where={"pressure [bar]": value})) == 4
+
+
+def test_rows_not_used_are_named_as_in_the_file(tmp_path):
+    lines = csv_text("length [mm],pressure [bar],force [N]", (1e3, 1e-5, 1.0)).splitlines()
+    lines[3] = lines[3].rpartition(",")[0] + ",nan"
+    lines.insert(6, "")
+    for row in (7, 8, 9, 10, 11, 12):
+        lines[row] = lines[row].rpartition(",")[0] + ",0"
+    data = load_force_map(write(tmp_path, "\n".join(lines)), rest_length=REST, clipped=0.0)
+    assert data.issues == [
+        "1 row of 12 has no number for length, pressure or force: not used (row 4)",
+        "6 rows of 12 are clipped: the true force lies beyond the end of the scale: not used (rows 8, 9, 10, 11, 12 and 1 more)",
+    ]
+    with pytest.raises(RecordingError, match=r"3 rows of 4 are clipped.*\(rows 11, 12, 13\)"):
+        load_force_map(tmp_path / "map.csv", rest_length=REST, where={"pressure [bar]": 4}, clipped=0.0)
+
+
+@pytest.mark.parametrize(("scale", "found"), [(1.0, True), (100.0, False)])
+def test_fractions_under_a_heading_in_percent_are_asked_about(tmp_path, scale, found):
+    rows = "".join(f"{e * scale},{p},{100 * p * (0.3 - e)}\n" for e in (0.0, 0.1, 0.21) for p in (1, 2, 3))
+    data = load_force_map(write(tmp_path, "contraction [%],pressure [bar],force [N]\n" + rows), rest_length=REST)
+    note = "contractions span only 0.21 %: are they fractions? write contraction [1]"
+    assert (note in data.issues) == found
+
+
+def test_contractions_near_five_percent_are_no_fractions(tmp_path):
+    text = "contraction [%],pressure [bar],force [N]\n5.0,1,300\n5.1,1,299\n5.2,2,500\n"
+    assert load_force_map(write(tmp_path, text), rest_length=REST).issues == []
+
+
+def grid(activation, ambient=0.0, stiffness=2e3, noise=0.0, lengths=(0.30, 0.29, 0.27, 0.25)):
+    """Gauge data of a muscle whose bladder lifts at ``activation``, with ``ambient`` added to the pressures."""
+    pressure, length = (column.ravel() for column in np.meshgrid(np.arange(1e5, 6.1e5, 1e5), lengths, indexing="ij"))
+    force = (pressure - activation) * 3e-3 * (length / REST - 0.7) - stiffness * (1 - length / REST)
+    return length, pressure + ambient, force + noise * np.random.default_rng(3).normal(size=force.size)
+
+
+@pytest.mark.parametrize("noise", [0.0, 2.0])
+def test_absolute_pressures_are_asked_about(noise):
+    issues = made(*grid(0.0, 101.3e3, noise=noise)).issues
+    assert len(issues) == 1
+    assert re.match(r"forces vanish near (9\d|10\d)(\.\d)? kPa .*are the pressures absolute\? gauge pressures are needed", issues[0])
+
+
+@pytest.mark.parametrize(
+    "columns",
+    [
+        grid(0.0),
+        grid(7e4),
+        grid(7e4, noise=2.0),
+        grid(7e4, stiffness=5e3, lengths=(0.299, 0.28, 0.26)),
+        grid(0.0, stiffness=1e4, lengths=(0.28, 0.26)),
+        [column[:12] for column in grid(0.0, 101.3e3)],
+        [np.append(column, value) for column, value in zip(grid(1e5), (0.30, 5e4, 1.0), strict=True)],
+    ],
+    ids=["gauge", "activation", "noise", "stiff", "no long length", "three levels", "pressure below ambient"],
+)
+def test_gauge_pressures_are_not_asked_about(columns):
+    assert not any("absolute" in issue for issue in made(*columns).issues)
 
 
 # -------------------------------------------------------------------- recordings
@@ -343,6 +530,8 @@ def test_recording_of_a_bench_knows_its_direction(tmp_path, noise):
     np.testing.assert_allclose(data.levels, [1e5, 2e5, 3e5], rtol=0.01)
     assert np.mean(data.direction == way) > 0.9
     assert np.mean(data.direction == -way) < 0.005
+    path.write_text(path.read_text(encoding="utf-8").replace(",", ";").replace(".", ","), encoding="utf-8")
+    np.testing.assert_array_equal(load_force_map(path, rest_length=REST).force, data.force)
 
 
 # ------------------------------------------------------------------ descriptions
@@ -403,4 +592,35 @@ def test_festo_maps_leave_the_clipped_zeros_out(name, used, clipped, levels):
     sizes = {"rest_length", "rest_diameter", "braid_angle", "wall_thickness"}
     assert set(measured.tolerance) == {*sizes, "modulus_slope", "modulus_offset"}
     assert measured.tolerance["modulus_offset"] == 1e7
+    assert not any("absolute" in issue for issue in measured.data.issues)
     assert measured.noise == pytest.approx(0.005 * measured.data.force.max(), rel=0.02)
+
+
+def test_lengths_at_which_the_geometry_has_no_solution_are_flagged():
+    wide = Muscle(rest_length=0.12, rest_diameter=0.05, braid_angle=math.radians(75.0), wall_thickness=0.002)
+    length = np.array([0.119, 0.115, 0.11, 0.08])
+    map_ = ForceMap.from_arrays(length, np.full(4, 3e5), [900.0, 700.0, 500.0, 100.0], rest_length=0.12).checked_against(wide)
+    assert "no solution" in map_.reason
+    assert any("no solution" in issue for issue in map_.issues)
+    assert map_.used.any()
+
+
+def test_a_stray_force_is_flagged_alone():
+    muscle = Muscle(rest_length=0.3, rest_diameter=0.023, braid_angle=1.117, wall_thickness=0.0015)
+    p, e = (grid.ravel() for grid in np.meshgrid([2e5, 4e5, 6e5], np.linspace(0.0, 0.2, 6)))
+    force = muscle.force(p, e)
+    force[7] = 1e30
+    map_ = ForceMap.from_arrays(0.3 * (1.0 - e), p, force, rest_length=0.3).checked_against(muscle)
+    assert [row for row, why in enumerate(map_.reason) if why] == [7]
+    assert map_.reason[7] == "force out of range"
+
+
+def test_psi_read_as_bar_is_refused_though_half_the_rows_are_possible():
+    p, e = (grid.ravel() for grid in np.meshgrid(np.arange(10.0, 100.0, 10.0), np.linspace(0.0, 0.2, 6)))
+    with pytest.raises(RecordingError, match=r"pressures .*beyond 5 MPa: wrong unit\?"):
+        ForceMap.from_arrays(0.3 * (1.0 - e), 1e5 * p, 100.0 - 200.0 * e, rest_length=0.3)
+
+
+def test_a_description_takes_no_arguments_beside_it(described):
+    with pytest.raises(ParameterError, match=r"rest_length cannot be given: .* describes its table itself"):
+        load_force_map(described, rest_length=0.3)

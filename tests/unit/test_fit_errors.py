@@ -56,7 +56,91 @@ def test_levels_with_too_few_points_are_named():
 def test_few_levels_give_plain_errors_and_say_so():
     fit = fit_muscle(measure(muscle(), noise=1.0), muscle(), levels=[0, 2, 4])
     assert fit.errors == "plain"
-    assert any("5 levels that can each be spared (3 fitted)" in note for note in fit.warnings)
+    assert any("errors by level need 5 fitted levels for 4 unknowns, there are 3" in note for note in fit.warnings)
+    many = fit_muscle(measure(muscle(order=3), noise=1.0), muscle(order=3))
+    assert any("errors by level need 7 fitted levels for 6 unknowns, there are 6" in note for note in many.warnings)
+
+
+def test_a_level_that_cannot_be_missed_gives_plain_errors():
+    data = measure(muscle(), noise=1.0)
+    kept = np.isin(data.level, [0, 5]) | np.isclose(data.contraction, CONTRACTIONS[4])
+    thin = ForceMap.from_arrays(data.length[kept], data.pressure[kept], data.force[kept], rest_length=REST)
+    fit = fit_muscle(thin, muscle())
+    assert fit.errors == "plain"
+    assert any("one of the 6 cannot be missed" in note for note in fit.warnings)
+
+
+def noted(fit, words):
+    return [note for note in fit.warnings if words in note]
+
+
+def test_moduli_that_are_not_told_from_zero_are_counted():
+    data = measure(muscle(order=1), noise=8.0)
+    fit = fit_muscle(data, muscle(order=1), order=4)
+    count = sum(item.stderr > abs(item.value) for item in fit.params.values())
+    assert count >= 4
+    assert noted(fit, f"{count} of 8 moduli are not told from zero: a lower order may predict as well, compare_models (--compare)")
+    assert not noted(fit_muscle(data, muscle(order=1)), "not told from zero")
+
+
+@pytest.mark.parametrize(
+    "settings", [{}, {"free": ["braid_angle"], "tolerance": TOLERANCE}, {"weights": "level"}, {"model": "gaylord"}]
+)
+def test_a_point_that_the_others_do_not_predict_is_named_by_its_row(settings):
+    data = measure(muscle(settings.get("model", "kothera")), noise=2.0)
+    assert not noted(fit_muscle(data, muscle(), **settings), "times their scatter")
+    force = data.force.copy()
+    wrong = [17, 40]
+    force[wrong] += [900.0, -700.0]
+    force[5] = np.nan  # rows that are not used count too
+    fit = fit_muscle(ForceMap.from_arrays(data.length, data.pressure, force, rest_length=REST), muscle(), **settings)
+    (note,) = noted(fit, "times their scatter")
+    assert note.startswith(f"row 18 (200 kPa, {1e3 * data.length[17]:.4g} mm: {force[17]:.4g} N, the others predict ")
+    assert note.count("row ") == 2
+    assert ", row 41 (" in note
+    if not settings:
+        others = ForceMap.from_arrays(*(np.delete(v, [5, *wrong]) for v in (data.length, data.pressure, force)), rest_length=REST)
+        predicted = float(fit_muscle(others, muscle()).predict(2e5, length=data.length[17]))
+        assert float(note.split("the others predict ")[1].split(" N")[0]) == pytest.approx(predicted, abs=40.0)  # row 41 is still in
+
+
+def test_scatter_alone_names_no_point():
+    named = sum(bool(noted(fit_muscle(measure(muscle(), noise=5.0, seed=seed), muscle()), "their scatter")) for seed in range(100))
+    assert named == 0
+
+
+def test_lengths_that_hardly_differ_are_a_warning():
+    close = measure(muscle(order=1), contractions=np.linspace(0.1, 0.118, 6), noise=1.0)
+    assert noted(fit_muscle(close, muscle(order=1)), "the fitted lengths span 1.8 % of the rest length only")
+    assert not noted(fit_muscle(measure(muscle(order=1), noise=1.0), muscle(order=1)), "lengths span")
+
+
+def test_a_modulus_beyond_any_rubber_is_named():
+    steel = muscle(order=1, modulus_offset=[3e9])
+    (note,) = noted(fit_muscle(measure(steel, contractions=np.linspace(0.0, 0.01, 8)), steel), "1 GPa")
+    assert note.startswith("b1 = 3e+09 Pa: beyond 1 GPa")
+
+
+def test_geometry_that_moves_far_without_a_tolerance_is_named():
+    real = muscle(order=1, wall_thickness=1.1e-3)
+    nominal = muscle(order=1, wall_thickness=1.8e-3)
+    fit = fit_muscle(measure(real, noise=0.1), nominal, free=["wall_thickness"])
+    assert noted(fit, "moved by -39 % from the nominal 0.0018 m")
+    near = fit_muscle(measure(real, noise=0.1), muscle(order=1, wall_thickness=1.2e-3), free=["wall_thickness"])
+    assert not noted(near, "moved by")
+
+
+def test_hysteresis_of_a_muscle_without_friction_is_named():
+    rubbing = muscle(friction_coefficient=0.04)
+    parts = [measure(rubbing, direction=way, noise=3.0, seed=way + 1) for way in (-1, 1)]
+    columns = [np.concatenate([getattr(part, name) for part in parts]) for name in ("length", "pressure", "force", "direction")]
+    loops = ForceMap.from_arrays(*columns[:3], rest_length=REST, direction=columns[3])
+    (note,) = noted(fit_muscle(loops, muscle()), "the muscle has no friction")
+    assert "differ by +- 4 %" in note
+    assert not noted(fit_muscle(loops, rubbing), "no friction")
+    assert not noted(fit_muscle(loops, muscle(), direction=None), "no friction")
+    still = ForceMap.from_arrays(*columns[:2], np.tile(measure(muscle(), noise=3.0).force, 2), rest_length=REST, direction=columns[3])
+    assert not noted(fit_muscle(still, muscle()), "no friction")
 
 
 @pytest.mark.parametrize(

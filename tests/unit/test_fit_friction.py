@@ -63,6 +63,20 @@ def test_exact_loops_give_the_coefficients_back():
     assert np.allclose(force, muscle().force(pressure, contraction), rtol=1e-3, atol=0.5)
 
 
+def test_it_shows_itself_in_one_line():
+    assert repr(fit_friction(**loops())) == "FrictionFit(c_F = max(0.16 - 0.145/MPa P, 0.01), 6 levels)"
+
+
+def test_a_pressure_at_which_nothing_pulls_gives_no_coefficient():
+    given = loops(levels=np.append(1e3, LEVELS), noise=3.0)
+    slack = given["pressure"] < 2e3
+    given["force"][slack] = np.random.default_rng(1).normal(size=slack.sum())
+    fit = fit_friction(**given)
+    assert len(fit.levels) == 6
+    assert "1 kPa: forces below 1 % of the map's largest: no coefficient" in fit.issues
+    assert fit.params["friction_coefficient"].value == pytest.approx(C0, rel=0.02)
+
+
 def test_standard_errors_tell_the_truth():
     scores = []
     for seed in range(24):
@@ -129,7 +143,7 @@ def test_force_map_with_rows_of_unknown_direction():
     assert fit.params["friction_coefficient"].value == pytest.approx(C0, rel=2e-3)
     text = " ".join(fit.issues)
     assert "7 rows have no direction of motion" in text
-    assert "1 row of 1440 have no number" in text
+    assert "1 row of 1440 has no number" in text
 
 
 def test_a_pressure_with_one_branch_is_named_and_the_others_count():

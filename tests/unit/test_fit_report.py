@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pamrs import cli, load_rig
+from pamrs import cli, load_rig, rigs
 from pamrs.fit import ForceMap, compare_models, fit_muscle
 from pamrs.fit import report as pages
 from pamrs.fit.remarks import headline, limits, meaning, percent, residual_pattern
@@ -119,7 +119,7 @@ def test_every_kind_of_fit_has_a_page(data, muscle, options):
 def test_one_pressure_alone_has_a_page(data, muscle):
     one = fit_muscle(data, muscle, moduli="per_level", levels=[3])
     words = words_of(pages.render_html(one))
-    assert "leave-one-pressure-out needs two pressure levels" in words
+    assert "Leaving one pressure out is not possible: two pressure levels at least are needed" in words
 
 
 def test_text_from_files_is_escaped(muscle):
@@ -222,6 +222,138 @@ def test_command_per_level(capsys, table):
     assert "free at each level" in out
 
 
+def write(path, data):
+    """A table of a map."""
+    columns = [data.length, data.pressure, data.force, *([data.direction] if np.any(data.direction) else [])]
+    heading = "length [m],pressure [Pa],force [N]" + (",direction" if len(columns) > 3 else "")
+    np.savetxt(path, np.column_stack(columns), delimiter=",", header=heading, comments="", fmt="%.10g")
+    return path
+
+
+@pytest.fixture(scope="module")
+def loops(muscle, tmp_path_factory):
+    """A table of loops with c_F = 0.06 - 0.04/MPa P and noise of 1 N."""
+    rubbing = muscle.replace(friction_coefficient=0.06, friction_pressure_slope=-4e-8)
+    e, p, d = (grid.ravel() for grid in np.meshgrid(np.linspace(0.01, 0.19, 8), LEVELS, [-1.0, 1.0]))
+    force = rubbing.force(p, e, direction=d) + np.random.default_rng(2).normal(size=e.size)
+    path = tmp_path_factory.mktemp("loops") / "loops.csv"
+    return write(path, ForceMap.from_arrays(REST * (1 - e), p, force, rest_length=REST, direction=d))
+
+
+def test_friction_is_fitted_before_the_moduli_and_goes_into_the_rig(capsys, loops, muscle, tmp_path):
+    rig, result = tmp_path / "rig.toml", tmp_path / "fit.json"
+    options = [*SIZES, "--model", "kothera", "--order", 2]
+    code, out, err = run(capsys, loops, *options, "--rig", rig, "--json", result, "--compare")
+    assert code == 0
+    c0, c1 = (
+        float(text) for text in re.search(r"friction, fitted to the loops before .* c0 = (\S+) \+- .* c1 = (\S+) \+-", out).groups()
+    )
+    assert (c0, c1) == (pytest.approx(0.06, abs=0.005), pytest.approx(-0.04, abs=0.01))
+    given = load_rig(rig).muscle.parameters
+    assert given["friction_coefficient"] == pytest.approx(c0, rel=1e-3)
+    assert given["friction_pressure_slope"] == pytest.approx(1e-6 * c1, rel=1e-3)
+    np.testing.assert_allclose(load_rig(rig).muscle.force(4e5, [0.05, 0.15]), muscle.force(4e5, [0.05, 0.15]), rtol=0.01)
+    document = json.loads(result.read_text(encoding="utf-8"))
+    assert document["friction"]["parameters"][0]["value"] == given["friction_coefficient"]
+    assert document["fit"]["rms_error"] < 0.01
+    assert document["comparison"][0]["rms"] < 0.01  # every model has it
+    assert f"{rig} has a muscle only: it cannot be simulated until it has [joint] and [arm]" in err
+    code, out, _ = run(capsys, loops, *options, "--muscle", rig)  # that muscle has friction
+    assert "friction as the muscle has it: c_F = max(c0 + c1 P, 0.01), c0 = 0.0" in out
+    code, out, _ = run(capsys, loops, *options, "--muscle", rig, "--friction", "fit", "--levels", "100kPa,300kPa,600kPa")
+    assert "friction, fitted to the loops" in out
+
+
+@pytest.mark.parametrize(("choice", "model"), [("none", "kothera"), ("muscle", "kothera"), (None, "elbow_linear")])
+def test_friction_may_stay_out(capsys, loops, tmp_path, choice, model):
+    result = tmp_path / "fit.json"
+    code, out, _ = run(capsys, loops, *SIZES, "--model", model, "--json", result, *([] if choice is None else ["--friction", choice]))
+    assert code == 0
+    assert "fitted to the loops" not in out
+    assert json.loads(result.read_text(encoding="utf-8"))["friction"] is None
+    assert ("the muscle has no friction" in out) == (model == "kothera")
+
+
+def test_friction_that_cannot_be_fitted_is_said_or_refused(capsys, loops, tmp_path):
+    lines = loops.read_text(encoding="utf-8").splitlines()
+    few = tmp_path / "few.csv"  # one pressure has a loop, the others one branch
+    kept = [line for line in lines[1:] if line.endswith(",-1") or ",100000," in line]
+    few.write_text("\n".join([lines[0], *kept]) + "\n", encoding="utf-8")
+    code, out, _ = run(capsys, few, *SIZES, "--order", 2)
+    assert code == 0
+    assert "friction: not fitted, few: one pressure only (100 kPa)" in out
+    code, _, err = run(capsys, few, *SIZES, "--order", 2, "--friction", "fit")
+    assert code == 2
+    assert "one pressure only (100 kPa)" in err
+    code, _, err = run(capsys, few, *SIZES, "--friction", "some")
+    assert code == 2
+    assert "--friction" in err
+
+
+def test_loops_without_friction_get_none(capsys, muscle, tmp_path):
+    e, p, d = (grid.ravel() for grid in np.meshgrid(np.linspace(0.01, 0.19, 8), LEVELS, [-1.0, 1.0]))
+    force = muscle.force(p, e) + 1e-3 * np.random.default_rng(2).normal(size=e.size)
+    path = write(tmp_path / "still.csv", ForceMap.from_arrays(REST * (1 - e), p, force, rest_length=REST, direction=d))
+    code, out, _ = run(capsys, path, *SIZES, "--model", "kothera", "--order", 2)
+    assert code == 0
+    assert "friction: none, no pressure's c_F stands above 0.01" in out
+
+
+def test_the_fitted_muscle_goes_into_the_rig_that_it_is_of(capsys, tmp_path):
+    shoulder = rigs.shoulder()
+    source = shoulder.to_toml(tmp_path / "shoulder.toml")
+    real = shoulder.muscle
+    e, p = (grid.ravel() for grid in np.meshgrid(np.linspace(0.0, 0.25, 9), LEVELS))
+    stiffer = real.replace(modulus_offset=[1.1 * value for value in real.parameters["modulus_offset"]])
+    path = write(tmp_path / "map.csv", ForceMap.from_arrays(0.276 * (1 - e), p, stiffer.force(p, e), rest_length=0.276))
+    code, _, err = run(capsys, path, "--muscle", source, "--rig", tmp_path / "fitted.toml")
+    assert code == 0
+    assert "cannot be simulated" not in err
+    fitted = load_rig(tmp_path / "fitted.toml")
+    assert fitted.blocks == shoulder.blocks
+    for block in ("joint", "arm"):
+        assert fitted.model[block] == pytest.approx(shoulder.model[block])
+    assert fitted.model["muscle"]["count"] == 6
+    np.testing.assert_allclose(fitted.muscle.force(p, e), stiffer.force(p, e), rtol=1e-6, atol=1e-3)
+
+
+def test_a_tolerance_of_what_is_not_free_is_named(capsys, table, tmp_path):
+    options = ["--model", "kothera", "--order", 2]
+    note = "note: tolerance of braid_angle is not used: it is not free"
+    assert note in run(capsys, table, *SIZES, *options)[1]
+    rig = tmp_path / "bench.toml"
+    code, out, _ = run(capsys, table, *SIZES, *options, "--free", "braid_angle", "--rig", rig)
+    assert code == 0
+    assert "is not used" not in out
+    assert load_rig(rig).parameter("muscle.braid_angle").tol > 0.0
+    assert "is not used" not in run(capsys, table, "--muscle", rig)[1]
+
+
+def test_what_cannot_be_left_out_is_said_once(capsys, table):
+    _, out, _ = run(capsys, table, *SIZES, "--model", "kothera", "--order", 2, "--levels", "100kPa,600kPa")
+    assert "leave one pressure out: not possible, without 100 kPa the other levels do not determine the fit" in out
+    assert out.count("leave one pressure out") == 1
+    assert "leave-one-pressure-out" not in out
+
+
+def test_a_level_at_rest_has_a_page_and_pictures(capsys, data, tmp_path):
+    e = np.linspace(0.01, 0.19, 7)
+    columns = [np.append(data.length, REST * (1 - e)), np.append(data.pressure, 0 * e), np.append(data.force, -0.5 * np.cos(9 * e))]
+    path = write(tmp_path / "rest.csv", ForceMap.from_arrays(*columns, rest_length=REST))
+    for levels in ([], ["--levels", "100kPa,300kPa,600kPa"]):
+        files = [tmp_path / name for name in ("x.html", "x.png", "x.json")]
+        outputs = ["--report", files[0], "--png", files[1], "--json", files[2]]
+        code, out, _ = run(capsys, path, *SIZES, "--model", "kothera", "--order", 2, "--compare", *outputs, *levels)
+        assert code == 0
+        assert "0 kPa: not in this table" in out
+        words = words_of(files[0].read_text(encoding="utf-8"))
+        assert "0 kPa: not in this table, the largest force there is below 1 % of the map" in words
+        assert not {"nan", "inf"} & set(re.findall(r"[a-z]+", (out + words).lower()))
+        assert ("Fitted on 3 pressures" in words) == bool(levels)
+        assert ("predicts the other 4" in words) == bool(levels)
+        json.loads(files[2].read_text(encoding="utf-8"))
+
+
 @pytest.mark.parametrize(
     ("words", "parts"),
     [
@@ -279,13 +411,17 @@ def test_a_description_needs_no_geometry(capsys, table):
     assert "--rest-length, --where cannot be given" in err
 
 
-def test_zeros_that_nobody_explains_are_named_when_the_fit_fails(capsys, data, tmp_path):
+def test_zeros_that_nobody_explains_are_named(capsys, data, tmp_path):
     rows = np.column_stack([data.length, data.pressure, np.where(data.level == 0, 0.0, data.force)])[data.used]
     path = tmp_path / "zeros.csv"
     np.savetxt(path, rows, delimiter=",", header="length_m,pressure_Pa,force_N", comments="")
-    code, _, err = run(capsys, path, *SIZES, "--order", 2)
+    code, _, err = run(capsys, path, *SIZES, "--order", 2, "--levels", "100kPa")
     assert code == 2
     assert "--clipped '0 N'" in err
+    code, out, _ = run(capsys, path, *SIZES, "--order", 2)
+    assert code == 0
+    assert "--clipped '0 N'" in out
+    assert "100 kPa: not in this table" in out
     code, out, _ = run(capsys, path, *SIZES, "--order", 2, "--clipped", "0 N")
     assert code == 0
     assert "are clipped" in out

@@ -129,25 +129,21 @@ fn check_laws<const N: usize>((numbers, rows): &Case<N>) -> Result<(), TestCaseE
     prop_assert!((torque - sum).amax() < 1e-12 * sum.amax().max(mass * r.norm_squared()).max(1.0));
     let back = plain.acceleration(&q, &r, &torque).unwrap();
     let eigenvalues = nalgebra::DMatrix::from_fn(N, N, |i, j| h[(i, j)]).symmetric_eigenvalues();
-    let condition = eigenvalues.max() / eigenvalues.min();
-    prop_assert!(
-        (back - a).amax() < 1e-14 * condition * (1.0 + a.amax() + r.norm_squared()),
-        "{}",
-        (back - a).amax()
-    );
+    let (low, high) = (eigenvalues.min(), eigenvalues.max());
+    let scale = (high * (1.0 + a.amax() + r.norm_squared()) + torque.amax() + friction.amax()) / low;
+    prop_assert!((back - a).amax() < 1e-14 * scale, "{}", (back - a).amax());
 
     // Power: d/dt energy = tau q' - friction q', and friction never gives.
     let (place, rate) = (moving(&q, &r), moving(&r, &a));
     let power = (dual.kinetic_energy(&place, &rate) + dual.potential_energy(&place)).eps;
-    let scale = torque.abs().dot(&r.abs()).max(speed * r.norm_squared()).max(1.0);
-    prop_assert!((power - (torque - friction).dot(&r)).abs() < 1e-12 * scale);
+    let flow = torque.abs().dot(&r.abs()).max(speed * r.norm_squared()).max(1.0);
+    prop_assert!((power - (torque - friction).dot(&r)).abs() < 1e-12 * flow);
     prop_assert!(friction.iter().zip(r.iter()).all(|(f, r)| f * r >= 0.0));
 
     // Forward and inverse are inverses in values and derivatives: friction, H, C and G all move here.
     let pull = moving(&torque, &unit(0));
     let lifted = dual.acceleration(&place, &rate, &pull).unwrap();
     let slopes = lifted.map(|v| v.eps).amax();
-    let scale = condition * (1.0 + a.amax() + r.norm_squared());
     prop_assert!((lifted.map(|v| v.re()) - back).amax() <= 1e-14 * scale);
     let returned = dual.inverse_dynamics(&place, &rate, &lifted).map(|v| v.eps) - unit::<N>(0);
     prop_assert!(returned.amax() < 1e-13 * mass * (scale + slopes) * (1.0 + r.amax()), "{}", returned.amax());
@@ -172,7 +168,7 @@ fn check_payload<const N: usize>((numbers, rows): &Case<N>) -> Result<(), TestCa
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 30000, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 128, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn laws_of_one_link(case in case::<1>()) { check_laws(&case)?; }
@@ -187,7 +183,9 @@ proptest! {
     fn laws_of_six_links(case in case::<6>()) { check_laws(&case)?; check_payload(&case)?; }
 
     #[test]
-    fn one_link_is_the_one_link_arm(numbers in numbers(), angle in -3.0..3.0_f64, rate in -3.0..3.0_f64, torque in -500.0..500.0_f64) {
+    fn one_link_is_the_one_link_arm(
+        numbers in numbers(), angle in -3.0..3.0_f64, rate in -3.0..3.0_f64, torque in -500.0..500.0_f64,
+    ) {
         let stops = Stops { min_angle: 0.26, max_angle: 2.0, stiffness: 2e4, damping: 60.0 };
         let l = Link { stops: Some(stops), ..link(&numbers, [3.0, 1.5]) };
         let one = OneLink {
@@ -207,7 +205,7 @@ proptest! {
         prop_assert_eq!(planar.mass_matrix(&q)[0], one.total_inertia());
     }
 
-    /// Spong, Hutchinson & Vidyasagar (2006), planar elbow manipulator (7.84)-(7.90): the first angle from the horizontal.
+    /// Spong, Hutchinson & Vidyasagar, ch. 7, planar elbow manipulator: the first angle from the horizontal.
     #[test]
     fn two_links_are_the_textbooks(case in case::<2>()) {
         let (mut numbers, rows) = case;
@@ -216,7 +214,8 @@ proptest! {
         }
         let links = numbers.map(|n| link(&n, [0.0; 2]));
         let [q, r, a] = motion(&rows);
-        let (m1, m2, l1, lc1, lc2) = (links[0].mass, links[1].mass, links[0].length, links[0].centre, links[1].centre);
+        let [(m1, lc1), (m2, lc2)] = [0, 1].map(|k| (links[k].mass, links[k].centre));
+        let l1 = links[0].length;
         let (i1, i2) = (links[0].inertia, links[1].inertia);
         let (q1, q2) = (q[0] - std::f64::consts::FRAC_PI_2, q[1]);
         let d11 = m1 * lc1.powi(2) + m2 * (l1.powi(2) + lc2.powi(2) + 2.0 * l1 * lc2 * q2.cos()) + i1 + i2;

@@ -38,6 +38,8 @@ class ModelComparison:
         ``rank``: 1 is best, None when the data do not determine the candidate, with ``reason`` in words;
         ``rms``, ``max``: all levels fitted; ``lopo_rms``, ``lopo_max``, ``lopo_stderr``: leave-one-pressure-out over all points,
         ``lopo_interior_rms``, ``lopo_end_rms``: levels between others, and the two outer levels;
+        ``lopo_excess``, ``lopo_excess_stderr``: squared leave-one-pressure-out error of a level beyond that of the first rank, mean
+        over the levels and its standard error, in squares of the map's largest force;
         ``aicc``, ``bic``: with the effective sample size, ``aicc`` None when that is too small for the number of unknowns;
         ``subset_rms``, ``subset_max``: fitted to the chosen levels only, error on the others, with ``subset_reason`` when impossible;
         ``recommended``: True for one candidate.
@@ -64,7 +66,7 @@ class ModelComparison:
 
     @property
     def recommended(self) -> MuscleFit:
-        """The fit with the fewest unknowns whose leave-one-pressure-out error is within one standard error of the best."""
+        """The fit with the fewest unknowns of those that predict no worse than the best, see :func:`compare_models`."""
         return self._fit(next(row for row in self.rows if row["recommended"]))
 
     def _fit(self, row: Mapping[str, Any]) -> MuscleFit:
@@ -79,7 +81,8 @@ class ModelComparison:
         head = f"{'rank':>4}  {'model':15} {'M':>2} {'k':>3} {'rms':>6} {'max':>6} | {'LOPO rms':>8} {'max':>6} {'ends':>6}"
         head += f" | {'AICc':>7} {'BIC':>7}" + (f" | {'subset':>7} {'max':>6}" if self.subset else "")
         lines = [
-            f"{self.ndata} points, effectively {self.effective_size:.3g} independent; errors in % of the largest force; k unknowns",
+            f"{self.ndata} points, effectively {self.effective_size:.3g} independent, the number that AICc and BIC here count",
+            "errors in % of the map's largest force; k unknowns",
             *(
                 ["subset: fitted to " + ", ".join(f"{p / 1e3:g}" for p in self.subset) + " kPa, error on the other levels"]
                 if self.subset
@@ -88,7 +91,10 @@ class ModelComparison:
             head,
         ]
         lines += [self._line(row) for row in self.rows]
-        lines.append("* fewest unknowns within one standard error of the best leave-one-pressure-out (LOPO) error")
+        lines += [
+            "* fewest unknowns among those that predict pressures left out (LOPO) no worse than rank 1:",
+            "  the excess of their squared errors, level by level, is within one standard error",
+        ]
         return "\n".join(lines) + "\n"
 
     def _line(self, row: Mapping[str, Any]) -> str:
@@ -133,12 +139,16 @@ def compare_models(
     neighbouring residuals along contraction and along pressure (negative ones count as 0), of the best-ranked candidate, and
     at least the number of pressure levels.
 
+    Recommended is the candidate with the fewest unknowns among those that predict no worse than the first rank: the squared
+    errors of each level left out are subtracted level by level, and the mean of these differences may be one standard error at
+    most. Differences of pairs do not know the scatter that all candidates share, such as hysteresis or noise.
+
     Parameters
     ----------
     data : ForceMap
         Measured forces.
     muscle : Muscle
-        Nominal muscle.
+        Nominal muscle; its friction is that of every candidate. :meth:`pamrs.fit.FrictionFit.to_muscle` gives it that of the loops.
     models : iterable of str, optional
         Models to compare; all by default.
     orders : iterable of int
@@ -185,19 +195,32 @@ def compare_models(
     if not ranked:
         raise FitError("the data determine none of the candidates: " + "; ".join(f"{row['model']}: {row['reason']}" for row in rows))
     size = effective_size(fits[ranked[0]["model"], ranked[0]["order"]])
+    least = _level_squares(fits[ranked[0]["model"], ranked[0]["order"]])
     for place, row in enumerate(ranked, start=1):
-        _, row["aicc"], row["bic"] = fits[row["model"], row["order"]].criteria(size)
+        fit = fits[row["model"], row["order"]]
+        _, row["aicc"], row["bic"] = fit.criteria(size)
         row["rank"] = place
-    limit = ranked[0]["lopo_rms"] + ranked[0]["lopo_stderr"]
-    min((row for row in ranked if row["lopo_rms"] <= limit), key=lambda row: (row["nvarys"], row["lopo_rms"]))["recommended"] = True
+        row["lopo_excess"], row["lopo_excess_stderr"] = _paired(_level_squares(fit) - least)
+    eligible = [row for row in ranked if row["lopo_excess"] <= row["lopo_excess_stderr"]]
+    min(eligible, key=lambda row: (row["nvarys"], row["lopo_rms"]))["recommended"] = True
     subset = [] if levels is None else [float(data.levels[index]) for index in level_indices(data, levels)]
     return ModelComparison(ranked + [row for row in rows if row["reason"] is not None], fits, size, int(data.used.sum()), subset)
 
 
 _EMPTY: dict[str, Any] = dict.fromkeys(
     ("rank", "reason", "condition_number", "rms", "max", "lopo_rms", "lopo_max", "lopo_stderr", "lopo_interior_rms", "lopo_end_rms",
-     "aicc", "bic", "subset_rms", "subset_max", "subset_reason")
+     "lopo_excess", "lopo_excess_stderr", "aicc", "bic", "subset_rms", "subset_max", "subset_reason")
 )  # fmt: skip
+
+
+def _level_squares(fit: MuscleFit) -> Array:
+    """Sum of squared leave-one-pressure-out errors of each level, in squares of the map's largest force."""
+    return fit.leave_one_pressure_out().level_squares() / float(fit.data.force[fit.data.used].max()) ** 2
+
+
+def _paired(difference: Array) -> tuple[float, float]:
+    """Mean over the levels and its standard error."""
+    return float(difference.mean()), float(np.std(difference, ddof=1)) / math.sqrt(len(difference))
 
 
 def _candidate(

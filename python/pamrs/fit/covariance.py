@@ -7,12 +7,17 @@ from numpy.typing import NDArray
 
 from pamrs.fit.estimate import Estimate, Problem
 
-__all__ = ["covariances"]
+__all__ = ["covariances", "levels_needed"]
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 _FEWEST_LEVELS = 5
+
+
+def levels_needed(unknowns: int) -> int:
+    """Fitted levels that the jackknife needs: fewer than the unknowns would leave combinations of them without any spread."""
+    return max(_FEWEST_LEVELS, unknowns + 1)
 
 
 def covariances(problem: Problem, result: Estimate, level: Index) -> tuple[Array, Array | None]:
@@ -51,7 +56,7 @@ def covariances(problem: Problem, result: Estimate, level: Index) -> tuple[Array
     if result.sigma == 0.0:
         return plain * 0.0, None
     groups = np.unique(level)
-    if len(groups) < max(_FEWEST_LEVELS, p + 1):  # fewer would leave combinations without any spread
+    if len(groups) < levels_needed(p):
         return plain, None
     residual = result.residual / result.sigma
     moves = []

@@ -1,21 +1,20 @@
 """Force maps: forces measured over length and pressure, every row checked before a fit uses it.
 
-A row that a fit must not use is flagged with its reason and counted, never dropped; a column that looks
-like the wrong unit is an error that names the likely one.
+A row that a fit must not use is flagged with its reason and counted, never dropped.
 """
 
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pamrs.errors import ParameterError, RecordingError
+from pamrs.fit.checks import FORCE_HIGH, PRESSURE_HIGH, absolute_pressures, check_forces, check_units, reachable
 
 if TYPE_CHECKING:
     from pamrs.muscle import Muscle
@@ -29,27 +28,25 @@ Index = NDArray[np.intp]
 #: Reason of the rows that :meth:`ForceMap.select` leaves out.
 LEFT_OUT: Final = "left out"
 
-# reason -> the words after "12 rows"
+# reason -> the words after "1 row" and after "12 rows"
 _WORDS: Final = {
-    "not a number": "have no number for length, pressure or force",
-    "clipped": "are clipped: the true force lies beyond the end of the scale",
-    "negative pressure": "have a negative gauge pressure (vacuum)",
-    "pressure out of range": "have a pressure beyond 5 MPa",
-    "length out of range": "have a length that no muscle of this rest length reaches",
-    "duplicate": "repeat an earlier row exactly",
-    "sensor fault": "are masked by the check of the recording",
-    "beyond the braid": "have a length outside the braid's limits",
-    LEFT_OUT: "are at pressures that this fit leaves out",
+    "not a number": ("has", "have", "no number for length, pressure or force"),
+    "clipped": ("is", "are", "clipped: the true force lies beyond the end of the scale"),
+    "negative pressure": ("has", "have", "a negative gauge pressure (vacuum)"),
+    "pressure out of range": ("has", "have", "a pressure beyond 5 MPa"),
+    "length out of range": ("has", "have", "a length that no muscle of this rest length reaches"),
+    "duplicate": ("repeats", "repeat", "an earlier row exactly"),
+    "sensor fault": ("is", "are", "masked by the check of the recording"),
+    "beyond the braid": ("has", "have", "a length outside the braid's limits"),
+    "no solution": ("has", "have", "a length at which this geometry has no solution"),
+    "force out of range": ("has", "have", "a force beyond three times what the gas could do"),
+    LEFT_OUT: ("is", "are", "at pressures that this fit leaves out"),
 }
+_SHOWN: Final = 5  # rows that an issue names
+_MOST: Final = 0.9  # of the rows are what a map is judged by: a stray row is flagged alone
 
-_PRESSURE_LOW, _PRESSURE_HIGH = 2e3, 5e6  # a map whose largest pressure is outside is in another unit
-_LENGTH_LOW, _LENGTH_HIGH = 0.3, 3.0  # of the rest length
 _REST_LOW, _REST_HIGH = 1e-3, 10.0  # [m], as in a rig file
-_FORCE_FACTOR = 3.0  # over what the gas alone could do
 _LEVEL_RELATIVE, _LEVEL_ABSOLUTE = 0.02, 3e3
-_PRESSURE_UNITS: Final = {"kPa": 1e3, "bar": 1e5, "psi": 6894.757, "MPa": 1e6, "mbar": 1e2}
-_LENGTH_UNITS: Final = {"mm": 1e-3, "cm": 1e-2, "in": 0.0254, "m, read as mm": 1e3, "m, read as cm": 1e2}
-_FORCE_UNITS: Final = {"mN (or in N, read as kN)": 1e-3, "N, read as kgf or lbf": 0.15}
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +74,10 @@ class ForceMap:
         What to call the map, and where it came from.
     notes : tuple of str
         Findings that concern no single row.
+    row_numbers : (n,) int array or None
+        Row of the file that each row comes from, the header being row 1; None for arrays.
+    units : mapping of str to str
+        Unit that the file gives length, pressure and force in; empty for arrays.
     """
 
     length: Array
@@ -91,6 +92,8 @@ class ForceMap:
     name: str = ""
     source: str = ""
     notes: tuple[str, ...] = ()
+    row_numbers: Index | None = None
+    units: Mapping[str, str] = field(default_factory=dict)
 
     # ------------------------------------------------------------------ making
 
@@ -110,6 +113,8 @@ class ForceMap:
         name: str = "",
         source: str = "",
         notes: Sequence[str] = (),
+        row_numbers: Sequence[int] | None = None,
+        units: Mapping[str, str] | None = None,
     ) -> ForceMap:
         """A map from arrays in SI units.
 
@@ -133,6 +138,10 @@ class ForceMap:
             What to call the map, and where it came from.
         notes : sequence of str
             Findings to carry along.
+        row_numbers : (n,) sequence of int, optional
+            Row of the file that each row comes from; without it, issues give the index, from 0.
+        units : mapping of str to str, optional
+            Unit that the file gives length, pressure and force in, for messages about a wrong one.
 
         Returns
         -------
@@ -164,13 +173,13 @@ class ForceMap:
             flag(np.asarray(faulty, dtype=bool), "sensor fault")
         finite = np.isfinite(long) & np.isfinite(gas) & np.isfinite(pull)
         flag(~finite, "not a number")
-        _check_units(label, long[finite], gas[finite], rest)
+        given = dict(units or {})
+        check_units(label, long[finite], gas[finite], rest, given)
         if clipped is not None:
             flag(finite & np.isclose(pull, clipped, rtol=1e-9, atol=1e-12), "clipped")
         flag(finite & (gas < 0.0), "negative pressure")
-        flag(finite & (gas > _PRESSURE_HIGH), "pressure out of range")
-        ratio = long / rest
-        flag(finite & ((ratio < _LENGTH_LOW) | (ratio > _LENGTH_HIGH)), "length out of range")
+        flag(finite & (gas > PRESSURE_HIGH), "pressure out of range")
+        flag(finite & ~reachable(long, rest), "length out of range")
         way = _directions(direction, n, label)
         if check_duplicates:
             flag(finite & _duplicates(long, gas, pull, way.astype(np.float64)), "duplicate")
@@ -179,9 +188,15 @@ class ForceMap:
         if clipped is None and zeros >= 3:
             hint = "if the reading stops at zero, say so: clipped = 0 (--clipped '0 N')"
             found.insert(0, f"{zeros} rows have a force of exactly 0 N under pressure and are used; {hint}")
-        map_ = cls(long, gas, pull, rest, way, reason == "", tuple(reason), np.full(n, -1), np.empty(0), name, source, tuple(found))
+        map_ = cls(
+            *(long, gas, pull, rest, way, reason == "", tuple(reason), np.full(n, -1), np.empty(0), name, source, tuple(found)),
+            row_numbers=None if row_numbers is None else np.asarray(row_numbers, dtype=np.intp),
+            units=given,
+        )
         map_._check_count()
-        return map_._with_levels(level_tolerance)
+        map_ = map_._with_levels(level_tolerance)
+        pressure, contraction, force, level, _ = map_.used_rows()
+        return replace(map_, notes=(*map_.notes, *absolute_pressures(pressure, contraction, force, level)))
 
     def _with_levels(self, tolerance: float | None) -> ForceMap:
         """The map with its pressure levels found from the used rows."""
@@ -207,7 +222,7 @@ class ForceMap:
         count = int(self.used.sum())
         if count < 2:
             why = "; ".join(self._counts()) or f"{len(self.length)} rows in all"
-            raise RecordingError(f"{self.label}: {count} usable rows, two at least are needed ({why})")
+            raise RecordingError(f"{self.label}: {count} usable {'row' if count == 1 else 'rows'}, two at least are needed ({why})")
 
     # ----------------------------------------------------------------- reading
 
@@ -229,12 +244,26 @@ class ForceMap:
 
     @property
     def issues(self) -> list[str]:
-        """What was found, in words: how many rows are not used and why, then what concerns no single row."""
+        """What was found, in words: how many rows are not used, why, and the first of them, then what concerns no single row."""
         return [*self._counts(), *self.notes]
 
     def _counts(self) -> list[str]:
-        counts = Counter(why for why in self.reason if why)
-        return [f"{n} {'rows' if n > 1 else 'row'} of {len(self)} {_WORDS.get(why, why)}: not used" for why, n in counts.items()]
+        rows: dict[str, list[int]] = {}
+        for index, why in enumerate(self.reason):
+            if why:
+                rows.setdefault(why, []).append(index)
+        return [f"{self._found(why, found)}: not used ({self._places(found)})" for why, found in rows.items()]
+
+    def _found(self, why: str, rows: Sequence[int]) -> str:
+        one, several, rest = _WORDS.get(why, ("is", "are", why))
+        return f"1 row of {len(self)} {one} {rest}" if len(rows) == 1 else f"{len(rows)} rows of {len(self)} {several} {rest}"
+
+    def _places(self, rows: Sequence[int]) -> str:
+        """The first of some rows, by their number in the file or else by their index."""
+        one, several, numbers = ("index", "indices", rows) if self.row_numbers is None else ("row", "rows", self.row_numbers[rows])
+        shown = ", ".join(str(number) for number in numbers[:_SHOWN])
+        more = f" and {len(rows) - _SHOWN} more" if len(rows) > _SHOWN else ""
+        return f"{one if len(rows) == 1 else several} {shown}{more}"
 
     def used_rows(self) -> tuple[Array, Array, Array, Index, NDArray[np.int8]]:
         """Pressure [Pa], contraction [1], force [N], level and direction of the used rows, (k,) arrays."""
@@ -308,7 +337,8 @@ class ForceMap:
         Returns
         -------
         ForceMap
-            Rows outside the braid's limits are flagged ``"beyond the braid"``.
+            Rows outside the braid's limits are flagged ``"beyond the braid"``, those at lengths for which the geometry has no
+            solution ``"no solution"``, and single ones beyond three times what the gas could do ``"force out of range"``.
 
         Raises
         ------
@@ -324,21 +354,12 @@ class ForceMap:
         low, high = muscle.contraction_limits
         e = self.contraction
         map_ = self._without(self.used & ~((e >= low) & (e <= high)), "beyond the braid")
+        map_ = map_._without(map_.used & ~_solved(muscle, e, map_.used), "no solution")
         pressure, contraction, force, _, _ = map_.used_rows()
         able = float(np.max(pressure)) * float(np.max(np.abs(muscle.gas_area(contraction))))
-        largest = float(np.max(np.abs(force)))
-        if able > 0.0 and largest > _FORCE_FACTOR * able:
-            likely = _likely(largest, able, _FORCE_UNITS)
-            raise RecordingError(
-                f"{self.label}: force up to {largest:.4g} N, but the gas could pull {able:.4g} N at most: wrong unit or wrong "
-                f"muscle? The column is probably in {likely}"
-            )
-        if largest < 0.01 * able:
-            raise RecordingError(
-                f"{self.label}: force up to {largest:.4g} N only, where the gas could pull {able:.4g} N: wrong unit or wrong "
-                "muscle? The column is probably in kN"
-            )
-        return map_
+        pull = np.abs(force)
+        check_forces(self.label, float(np.quantile(pull, _MOST)), able, self.units)
+        return map_._without(map_.used & (np.abs(self.force) > FORCE_HIGH * able), "force out of range")
 
 
 # ------------------------------------------------------------------------- checks
@@ -350,45 +371,26 @@ def _column(values: ArrayLike) -> Array:
     return column
 
 
+def _solved(muscle: Muscle, contraction: Array, rows: Mask) -> Mask:
+    """Whether the geometry has a solution at each of some contractions; True for the other rows."""
+    solved = np.ones(len(contraction), dtype=bool)
+    try:
+        muscle.radius(contraction[rows])
+    except ParameterError:
+        for value in np.unique(contraction[rows]):
+            try:
+                muscle.radius(value)
+            except ParameterError:
+                solved[rows & (contraction == value)] = False
+    return solved
+
+
 def _rest_length(value: float) -> float:
     rest = float(value)
     if not (math.isfinite(rest) and _REST_LOW <= rest <= _REST_HIGH):
         hint = "; in mm, probably" if 10.0 < rest < 1e4 else ""
         raise ParameterError(f"rest_length = {rest:g} m is not allowed: from {_REST_LOW:g} to {_REST_HIGH:g} m{hint}")
     return rest
-
-
-def _likely(value: float, usual: float, units: Mapping[str, float]) -> str:
-    """The unit whose factor brings ``value`` nearest to ``usual``."""
-
-    def off(unit: str) -> float:
-        return abs(math.log(value * units[unit] / usual))
-
-    return min(units, key=off)
-
-
-def _check_units(label: str, length: Array, pressure: Array, rest: float) -> None:
-    """Refuse columns that as a whole are in another unit; single stray rows are flagged elsewhere."""
-    if not len(pressure):
-        return
-    top, usual = float(np.max(pressure)), float(np.median(np.abs(pressure)))
-    if 0.0 < top < _PRESSURE_LOW:
-        likely = _likely(top, 5e5, _PRESSURE_UNITS)
-        raise RecordingError(
-            f"{label}: pressure up to {top:.4g} Pa only, at which no muscle pulls: wrong unit? The column is probably in {likely}"
-        )
-    if usual > _PRESSURE_HIGH:
-        read_as = _likely(5e5, usual, _PRESSURE_UNITS)
-        raise RecordingError(
-            f"{label}: pressures around {usual:.4g} Pa, beyond 5 MPa: wrong unit? The column is probably in Pa, read as {read_as}"
-        )
-    ratio = float(np.median(np.abs(length))) / rest
-    if not _LENGTH_LOW <= ratio <= _LENGTH_HIGH:
-        likely = _likely(max(ratio, 1e-12), 1.0, _LENGTH_UNITS)
-        raise RecordingError(
-            f"{label}: lengths around {ratio * rest:.4g} m do not go with rest_length = {rest:g} m: wrong unit? "
-            f"The column is probably in {likely}"
-        )
 
 
 def _directions(direction: ArrayLike | None, n: int, label: str) -> NDArray[np.int8]:

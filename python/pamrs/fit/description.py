@@ -131,7 +131,7 @@ def load_measured_muscle(path: str | os.PathLike[str]) -> MeasuredMuscle:
         clipped=clipped,
         level_tolerance=tolerance,
         delimiter=texts["delimiter"] or None,
-        decimal=texts["decimal"] or ".",
+        decimal=texts["decimal"] or None,
         name=texts["name"] or file.stem,
     )
     known = {name.partition(".")[2]: spread for name, spread in reader.tolerances.items()}

@@ -88,17 +88,14 @@ class Design:
         Coefficients free at each level.
     knots : (g,) array
         Pressures of the levels [Pa]; used when ``per_level``.
-    labels : tuple of int
-        Their indices in the force map, for names.
     """
 
     base: tuple[str, ...]
     per_level: bool
     knots: Array
-    labels: tuple[int, ...]
 
     @classmethod
-    def of(cls, muscle: Muscle, moduli: str, knots: Array, labels: tuple[int, ...]) -> Design:
+    def of(cls, muscle: Muscle, moduli: str, knots: Array) -> Design:
         """The design of a template muscle; ``moduli`` is ``"linear"`` or ``"per_level"``."""
         if moduli not in ("linear", "per_level"):
             raise ParameterError(f"moduli = {moduli!r} is not allowed: 'linear' or 'per_level'")
@@ -106,7 +103,7 @@ class Design:
             base = tuple(f"E{k}" for k in range(1, len(muscle.parameters["modulus_offset"]) + 1))
         else:
             base = CONSTANTS[muscle.model]
-        return cls(base, moduli == "per_level" and bool(base), knots, labels)
+        return cls(base, moduli == "per_level" and bool(base), knots)
 
     @property
     def polynomial(self) -> bool:
@@ -115,9 +112,9 @@ class Design:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the coefficients: ``m1.. b1..``, the model's own, or ``E1_3`` (level 3) when free at each level."""
+        """Names of the coefficients: ``m1.. b1..``, the model's own, or ``E1_100kPa`` when free at each level."""
         if self.per_level:
-            return tuple(f"{name}_{label}" for label in self.labels for name in self.base)
+            return tuple(f"{name}_{level}" for level in _level_names(self.knots) for name in self.base)
         if self.polynomial:
             return tuple(f"{letter}{name[1:]}" for letter in "mb" for name in self.base)
         return self.base
@@ -131,7 +128,7 @@ class Design:
             return tuple((("modulus_slope", k, p), ("modulus_offset", k, 1.0)) for p in pressures for k in places)
         if self.polynomial:
             return tuple(((kind, k, 1.0),) for kind in ("modulus_slope", "modulus_offset") for k in places)
-        groups = len(self.labels) if self.per_level else 1
+        groups = len(self.knots) if self.per_level else 1
         return tuple(((name, 0, 1.0),) for _ in range(groups) for name in self.base)
 
     @property
@@ -181,6 +178,12 @@ class Design:
         if self.polynomial:
             return blank.replace(modulus_slope=[0.0] * len(values), modulus_offset=values)
         return blank.replace(**dict(zip(self.base, values, strict=True)))
+
+
+def _level_names(knots: Array) -> list[str]:
+    """Pressures like ``343.8kPa``, with as many decimals as tell them apart."""
+    decimals = next(d for d in range(1, 20) if len(set(np.round(knots / 1e3, d).tolist())) == len(knots))
+    return [f"{round(pressure / 1e3, decimals):.12g}kPa" for pressure in knots.tolist()]
 
 
 def _parts(muscle: Muscle, pressure: Array, contraction: Array, direction: Array) -> tuple[Array, Array]:

@@ -11,11 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs.errors import FitError, ParameterError
-from pamrs.fit.covariance import covariances
+from pamrs.fit.cautions import cautions
+from pamrs.fit.covariance import covariances, levels_needed
 from pamrs.fit.design import template
 from pamrs.fit.estimate import Estimate, Free, Known, Problem, estimate
 from pamrs.fit.result import FitParameter, MuscleFit
-from pamrs.fit.validation import level_force
+from pamrs.fit.validation import WEAK, level_forces
 from pamrs.muscle_models import ELASTIC_PARAMETERS, POLYNOMIAL_MODELS
 
 if TYPE_CHECKING:
@@ -44,10 +45,6 @@ COEFFICIENTS: Final[tuple[str, ...]] = ("modulus_slope", "modulus_offset", "c10"
 
 _ELLIPTIC_ONLY = ("k0", "contraction_slope", "extension_slope", "neck_floor")
 _WALLLESS = ("gaylord",)
-_LARGE_CONDITION = 1e4
-_UNINFORMED = 0.9  # of the tolerance
-_FAR = 3.0  # tolerances
-_FEW_SPARE = 5
 
 
 def has_effect(name: str, model: str, geometry: str) -> bool:
@@ -82,7 +79,8 @@ def fit_muscle(
         Measured forces over length and pressure; only its used rows count. Lengths are taken as measured, so a fitted
         rest length changes the contraction ratios.
     muscle : Muscle
-        Nominal geometry, friction and modulus scale; its moduli are not used.
+        Nominal geometry, friction and modulus scale; its moduli are not used. For the friction of the loops in ``data``, fit that
+        first: ``muscle = fit_friction(data).to_muscle(muscle)``.
     model, geometry : str, optional
         Force model and shape; None keeps the muscle's own (another model comes with its own shape).
     order : int, optional
@@ -106,7 +104,8 @@ def fit_muscle(
         ``"data"`` uses the direction of motion of the rows with the muscle's friction law and, for ``elbow_linear``, its
         lengthening branch; rows of unknown direction have no friction. None ignores directions: the mean of a loop.
     weights : {"force", "level"}
-        Residuals in N as in the dissertation, or divided by the largest force of their level, which minimises (2.37).
+        Residuals in N as in the dissertation, or divided by the largest force of their level, which minimises (2.37); every fitted
+        level must then pull with 1 % of the map's largest force at least.
     noise : float, optional
         Known standard deviation of the residuals, in N (with ``weights="level"`` as a fraction); None estimates it. Points count
         as independent beside the priors; where the misfit is the model's, a larger ``noise`` keeps the geometry nearer to nominal.
@@ -114,8 +113,8 @@ def fit_muscle(
         ``"plain"`` standard errors take residuals as independent. Residuals of a quasi-static map are mostly model error and
         hang together along a level; then plain ones are too small. ``"level"``, the default, leaves out one level at a time
         (jackknife, CR3) and holds for any dependence within levels, not for one between them: a misfit that repeats at the
-        same length in every level stays unseen. It needs 5 levels that can each be spared; otherwise plain ones are given, with
-        a warning.
+        same length in every level stays unseen. It needs 5 levels and more than there are unknowns, each of which
+        the others can do without; otherwise plain ones are given, with a warning.
 
     Returns
     -------
@@ -126,8 +125,8 @@ def fit_muscle(
     ParameterError
         If an argument is not allowed.
     FitError
-        If the points do not determine the unknowns (too few points or lengths, one pressure level, collinear columns), or the
-        geometry cannot reach the measured lengths.
+        If the points do not determine the unknowns (too few points or lengths, one pressure level, collinear columns), the geometry
+        cannot reach the measured lengths, or a level has no force to weigh it by.
 
     Examples
     --------
@@ -155,9 +154,11 @@ def fit_muscle(
     rest = float(blank.parameters["rest_length"])
     if not math.isclose(rest, data.rest_length, rel_tol=1e-6):
         raise ParameterError(f"rest_length: the muscle has {rest:g} m, the force map {data.rest_length:g} m; the same is needed")
-    problem = _problem(data, blank, moduli, unknowns, known, noise, direction, weights)
+    problem = _problem(data, blank, moduli, unknowns, known, noise, direction)
     if not float(problem.force[rows].max()) > 0.0:
         raise FitError(f"the largest force of the fitted rows is {problem.force[rows].max():g} N: a pulling force is needed")
+    if weights == "level":
+        problem = _weighted(problem, rows)
     return _result(data, problem, rows, estimate(problem, rows), errors)
 
 
@@ -237,7 +238,6 @@ def _problem(
     known: Mapping[str, Known],
     noise: float | None,
     direction: str | None,
-    weights: str,
 ) -> Problem:
     used = data.used
     pressure, _, force, level, way = data.used_rows()
@@ -250,11 +250,20 @@ def _problem(
         "direction": steps,
         "levels": data.levels,
     }
-    problem = Problem(blank=blank, moduli=moduli, free=free, known=known, noise=noise, weight=np.ones(len(force)), **arrays)
-    if weights == "force":
-        return problem
-    tops = np.array([level_force(problem, index) for index in range(len(data.levels))])
-    return replace(problem, weight=1.0 / tops[level])
+    return Problem(blank=blank, moduli=moduli, free=free, known=known, noise=noise, weight=np.ones(len(force)), **arrays)
+
+
+def _weighted(problem: Problem, rows: Mask) -> Problem:
+    """The problem with every fitted residual over the largest force of its level."""
+    tops = level_forces(problem)
+    weak = tops < WEAK * float(problem.force.max())
+    named = [f"{problem.levels[i] / 1e3:g} kPa ({tops[i]:.3g} N)" for i in np.unique(problem.level[rows]) if weak[i]]
+    if named:
+        raise FitError(
+            f"weights = 'level' divides by the largest force of a level, which is below {100 * WEAK:g} % of the map's largest at "
+            f"{', '.join(named)}: leave these levels out, or take weights = 'force'"
+        )
+    return replace(problem, weight=1.0 / np.where(weak, 1.0, tops)[problem.level])
 
 
 def _result(data: ForceMap, problem: Problem, rows: Mask, found: Estimate, errors: str) -> MuscleFit:
@@ -264,13 +273,16 @@ def _result(data: ForceMap, problem: Problem, rows: Mask, found: Estimate, error
     if errors == "level" and robust is None:
         kind = "plain"
         if found.sigma > 0.0:
-            warnings.append(
-                "standard errors take the residuals as independent: errors by level need 5 levels that can each be spared "
-                f"({len(np.unique(problem.level[rows]))} fitted)"
+            count, needed = len(np.unique(problem.level[rows])), levels_needed(len(plain))
+            why = (
+                f"errors by level need {needed} fitted levels for {len(plain)} unknowns, there are {count}"
+                if count < needed
+                else f"errors by level leave out one level at a time, and one of the {count} cannot be missed"
             )
+            warnings.append(f"standard errors take the residuals as independent: {why}")
     covar = plain if kind == "plain" or robust is None else robust
     parameters = _parameters(problem, found, covar, plain)
-    warnings += _warnings(problem, found, rows, parameters)
+    warnings += cautions(problem, found, rows, np.flatnonzero(data.used), parameters)
     return MuscleFit(
         data=data,
         params=parameters,
@@ -298,34 +310,3 @@ def _parameters(problem: Problem, found: Estimate, covar: Array, plain: Array) -
         value = float(found.geometry[i - len(found.x)])
         parameters[free.name] = FitParameter(free.name, value, spread[i], GEOMETRY[free.name], spread_plain[i], free.nominal, known)
     return parameters
-
-
-def _warnings(problem: Problem, found: Estimate, rows: Mask, parameters: dict[str, FitParameter]) -> list[str]:
-    notes = []
-    if found.condition_number > _LARGE_CONDITION:
-        span = np.ptp(problem.length[rows]) / problem.blank.parameters["rest_length"]
-        notes.append(
-            f"condition number {found.condition_number:.2g}: lengths over {100 * span:.3g} % of the rest length and "
-            f"{len(np.unique(problem.level[rows]))} pressure levels hardly separate {', '.join(found.design.names)}; single "
-            "moduli mean little, forces inside the fitted range are not affected"
-        )
-    spare = int(rows.sum()) - len(parameters)
-    if problem.free and problem.noise is None and spare < _FEW_SPARE:
-        notes.append(
-            f"{int(rows.sum())} points for {len(parameters)} unknowns: the scatter, which weighs data against the tolerances, is "
-            "hardly known; give noise, fit less, or take more points"
-        )
-    if not found.success:
-        notes.append(f"the search of the geometry did not converge: {found.message}")
-    for free in problem.free:
-        item = parameters[free.name]
-        if math.isinf(free.tolerance):
-            continue
-        if item.stderr_plain > _UNINFORMED * free.tolerance:
-            notes.append(f"{free.name}: the data say nothing, its value is the prior's (tolerance {free.tolerance:.3g} {item.unit})")
-        away = abs(item.value - free.nominal) / free.tolerance
-        if away > _FAR:
-            notes.append(
-                f"{free.name} = {item.value:.4g} {item.unit} lies {away:.1f} tolerances from the nominal {free.nominal:.4g} {item.unit}"
-            )
-    return notes

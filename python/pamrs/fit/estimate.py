@@ -77,7 +77,7 @@ class Problem:
     def design(self, rows: Mask) -> Design:
         """The coefficients that the levels of some rows allow."""
         present = np.unique(self.level[rows])
-        return Design.of(self.blank, self.moduli, self.levels[present], tuple(present.tolist()))
+        return Design.of(self.blank, self.moduli, self.levels[present])
 
     def knot(self, rows: Mask) -> Array:
         """Pressure at which the moduli of some rows are taken [Pa]."""

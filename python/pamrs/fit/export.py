@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from pamrs.muscle_models import ELASTIC_PARAMETERS
+import numpy as np
 
 if TYPE_CHECKING:
     from pamrs.fit.result import MuscleFit
+    from pamrs.muscle import Muscle
     from pamrs.rig import Rig
 
-__all__ = ["fit_report", "to_dict", "to_rig"]
+__all__ = ["fit_report", "friction_words", "to_dict", "to_rig"]
 
 
 def fit_report(fit: MuscleFit) -> str:
@@ -21,13 +23,14 @@ def fit_report(fit: MuscleFit) -> str:
     lines = [
         f"{fit.data.label}: {fit.model}{order}{moduli}",
         f"  points fitted {fit.ndata} of {len(fit.data.used)} rows, {fit.nvarys} unknowns, condition number {fit.condition_number:.3g}",
-        f"  force error, of the largest force: rms {100 * rms:.2f} %, max {100 * worst:.2f} %; R2 {fit.rsquared:.5f}",
+        f"  force error, of the map's largest force: rms {100 * rms:.2f} %, max {100 * worst:.2f} %; R2 {fit.rsquared:.5f}",
     ]
     held_out = fit.errors_of("held_out")
     if held_out is not None:
-        lines.append(f"  levels not fitted:                 rms {100 * held_out[0]:.2f} %, max {100 * held_out[1]:.2f} %")
+        lines.append(f"  levels not fitted, of the same:          rms {100 * held_out[0]:.2f} %, max {100 * held_out[1]:.2f} %")
     aicc = "none" if fit.aicc is None else f"{fit.aicc:.1f}"
-    lines.append(f"  chi2 {fit.chisqr:.4g}, reduced {fit.redchi:.4g}, AIC {fit.aic:.1f}, AICc {aicc}, BIC {fit.bic:.1f}")
+    lines.append(f"  {_scatter(fit)}")
+    lines.append(f"  with all {fit.ndata} points as independent: AIC {fit.aic:.1f}, AICc {aicc}, BIC {fit.bic:.1f}")
     if fit.params:
         kind = "by level" if fit.errors == "level" else "plain"
         lines += ["", f"  {'':18} {'value':>12} {'std error':>11}  unit   (standard errors {kind})"]
@@ -35,13 +38,38 @@ def fit_report(fit: MuscleFit) -> str:
         nominal = "" if item.init_value is None else f"   nominal {item.init_value:.5g}"
         known = "" if item.tolerance is None else f" +- {item.tolerance:.2g}"
         lines.append(f"  {item.name:18} {item.value:12.5g} {item.stderr:11.2g}  {item.unit}{nominal}{known}")
-    lines += ["", "  level [kPa]  points  rms/Fmax [%]  max/Fmax [%]"]
     errors = fit.error_by_pressure()
+    lines += [
+        "",
+        "  force error of each level, of the largest force of that level:",
+        "  level [kPa]  points       rms [%]       max [%]",
+    ]
     for level, points, mean, largest, fitted in zip(errors.levels, errors.points, errors.rms, errors.max, errors.fitted, strict=True):
         mark = "" if fitted else "  not fitted"
         lines.append(f"  {level / 1e3:11.5g} {points:7d} {100 * mean:13.2f} {100 * largest:13.2f}{mark}")
+    lines += [f"  {errors.note}"] if errors.note else []
     lines += [f"  note: {note}" for note in (*fit.data.issues, *fit.warnings)]
     return "\n".join(lines) + "\n"
+
+
+def _scatter(fit: MuscleFit) -> str:
+    """The sum of squares, measured by the stated noise where there is one, else as newtons."""
+    rms = float(np.sqrt(np.mean((fit.all_residuals[fit.fitted[fit.data.used]]) ** 2)))
+    unit = " N2" if fit.weights == "force" else " (residuals over the largest force of their level)"
+    text = f"chi2 {fit.chisqr:.4g}{unit}, residual rms {rms:.4g} N"
+    if fit.stated_noise is None:
+        return text
+    shown = f"{fit.stated_noise:.4g} N" if fit.weights == "force" else f"{100 * fit.stated_noise:.3g} % of the level's largest force"
+    return f"{text}, reduced chi2 {fit.redchi / fit.stated_noise**2:.4g} with the stated noise of {shown}"
+
+
+def friction_words(muscle: Muscle) -> str:
+    """The friction law (2.36) of a muscle with its numbers; empty without friction."""
+    given = muscle.parameters
+    c0, c1, floor = given["friction_coefficient"], given["friction_pressure_slope"], given["friction_floor"]
+    if not (c0 or c1 or floor):
+        return ""
+    return f"c_F = max(c0 + c1 P, {floor:.4g}), c0 = {c0:.4g}, c1 = {1e6 * c1:.4g} 1/MPa"
 
 
 def to_rig(fit: MuscleFit, rig: Rig | None) -> Rig:
@@ -56,10 +84,15 @@ def to_rig(fit: MuscleFit, rig: Rig | None) -> Rig:
     base = rig.model
     if base["muscle"] is not None:
         parameters["count"] = base["muscle"]["count"]
-    elastic = {f"muscle.{name}" for names in ELASTIC_PARAMETERS.values() for name in names}
-    known = {name: given.tol for name, given in rig.parameters.items() if given.tol > 0.0 and name not in elastic}
+    known = {name: given.tol for name, given in rig.parameters.items() if given.tol > 0.0 and _kept(name, given.value, parameters)}
     fitted = {f"muscle.{free.name}": fit.params[free.name].stderr for free in fit.free}
     return Rig(rig.name, {**base, "muscle": parameters}, {**known, **fitted}, rig.effect_std, rig.source)
+
+
+def _kept(name: str, value: float, muscle: Mapping[str, Any]) -> bool:
+    """Whether a number of the rig, by its dotted name, is the same with the fitted muscle in it."""
+    block, _, key = name.partition(".")
+    return block != "muscle" or muscle.get(key) == value
 
 
 def to_dict(fit: MuscleFit) -> dict[str, Any]:
@@ -91,6 +124,7 @@ def to_dict(fit: MuscleFit) -> dict[str, Any]:
         "level_rms": by_pressure.rms.tolist(),
         "level_max": by_pressure.max.tolist(),
         "level_fitted": by_pressure.fitted.tolist(),
+        "weak_levels": by_pressure.weak.tolist(),
         "success": fit.success,
         "message": fit.message,
         "warnings": list(fit.warnings),

@@ -165,15 +165,7 @@ def _coefficients(fit: MuscleFit | None) -> dict[str, _Curve]:
     if fit is None:
         return {}
     levels, values, stderr = fit.moduli()
-    names = [f"E{k + 1}" for k in range(fit.order or 0)] or list(
-        dict.fromkeys(name.rpartition("_")[0] if _per_level(name) else name for name, p in fit.params.items() if p.unit == "Pa")
-    )
-    return {name: (levels, values[:, k], stderr[:, k]) for k, name in enumerate(names)}
-
-
-def _per_level(name: str) -> bool:
-    base, _, level = name.rpartition("_")
-    return bool(base) and level.isdigit()
+    return {name: (levels, values[:, k], stderr[:, k]) for k, name in enumerate(fit.moduli_names)}
 
 
 def _span(line: _Curve | None, points: _Curve | None) -> tuple[float, float]:

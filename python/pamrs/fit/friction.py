@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from pamrs.errors import ParameterError, RecordingError
 from pamrs.fit.data import ForceMap
 from pamrs.fit.level_line import LawParameter, LevelLine, fit_levels
+from pamrs.fit.validation import WEAK
 
 if TYPE_CHECKING:
     from pamrs.muscle import Muscle
@@ -64,7 +65,7 @@ class FrictionLevel:
     at_floor: bool = False
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class FrictionFit:
     """Friction coefficients of a muscle; the names are those of lmfit's results where there is one.
 
@@ -111,6 +112,11 @@ class FrictionFit:
     covar: Array
     slope_pvalue: float
     issues: list[str]
+
+    def __repr__(self) -> str:
+        c0, c1 = self.params["friction_coefficient"].value, self.params["friction_pressure_slope"].value
+        law = f"max({c0:.4g} {'-' if c1 < 0.0 else '+'} {1e6 * abs(c1):.4g}/MPa P, {self.floor:g})"
+        return f"FrictionFit(c_F = {law}, {len(self.levels)} levels)"
 
     @property
     def slope_significant(self) -> bool:
@@ -280,8 +286,12 @@ def fit_friction(
     if unknown:
         issues.append(f"{unknown} rows have no direction of motion: not used here")
     levels: list[FrictionLevel] = []
+    least = WEAK * float(np.abs(pull).max())
     for index, nominal in enumerate(data.levels.tolist()):
         rows = level == index
+        if float(np.abs(pull[rows]).max()) < least:
+            issues.append(f"{nominal / 1e3:.0f} kPa: forces below {100 * WEAK:g} % of the map's largest: no coefficient")
+            continue
         found = _loop(float(np.median(gas[rows])), e[rows], pull[rows], way[rows])
         if isinstance(found, str):
             issues.append(f"{nominal / 1e3:.0f} kPa: {found}: no coefficient")

@@ -71,9 +71,9 @@ def headline(fit: MuscleFit) -> str:
     """One line that states the result."""
     held_out = fit.errors_of("held_out")
     if held_out is not None:
-        levels = fit.error_by_pressure().fitted
+        seen = len(np.unique(fit.data.level[fit.fitted]))
         return (
-            f"Fitted on {int(levels.sum())} pressures, the {_named(fit)} predicts the other {int((~levels).sum())} "
+            f"Fitted on {seen} pressures, the {_named(fit)} predicts the other {len(fit.data.levels) - seen} "
             f"within {percent(held_out[1], 2)} of the largest force, {percent(held_out[0], 2)} rms"
         )
     reached = f"{percent(fit.max_error, 2)} of the largest force, {percent(fit.rms_error, 2)} rms"

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from pamrs.errors import FitError, ParameterError
 from pamrs.fit import remarks
+from pamrs.fit.export import friction_words
 from pamrs.report.text import format_number, format_uncertain
 
 if TYPE_CHECKING:
@@ -174,7 +175,8 @@ def _facts(fit: MuscleFit) -> list[tuple[str, str]]:
 
 
 def _muscle(fit: MuscleFit) -> list[tuple[str, str]]:
-    parameters = fit.muscle_at(float(fit.data.levels[-1])).parameters
+    muscle = fit.muscle_at(float(fit.data.levels[-1]))
+    parameters, friction = muscle.parameters, friction_words(muscle)
     return [
         ("model", remarks.title(fit)),
         ("geometry", str(parameters["geometry"])),
@@ -182,6 +184,7 @@ def _muscle(fit: MuscleFit) -> list[tuple[str, str]]:
         ("rest diameter", f"{format_number(1e3 * parameters['rest_diameter'], 4)} mm"),
         ("braid angle", f"{format_number(57.29577951308232 * parameters['braid_angle'], 4)}°"),
         ("wall thickness", f"{format_number(1e3 * parameters['wall_thickness'], 3)} mm"),
+        *([("friction", friction)] if friction else []),
     ]
 
 
@@ -250,7 +253,8 @@ def render_html(fit: MuscleFit, comparison: ModelComparison | None = None, *, co
         residuals=markup(figures.residuals_svg(fit)),
         levels=_levels(fit),
         cross_reason=reason if cross is None else "",
-        all_fitted=bool(fit.error_by_pressure().fitted.all()),
+        weak=fit.error_by_pressure().note,
+        all_fitted=fit.errors_of("held_out") is None,
         parameters=_parameters(fit),
         robust=fit.errors == "level",
         ranking=[] if comparison is None else _ranking(comparison),

@@ -48,7 +48,10 @@ class MuscleFit(FitStatistics):
         return (target - matrix @ self._estimate.x) / self._problem.weight
 
     def error_by_pressure(self) -> PressureErrors:
-        """The measure (2.37) of every level of the map, fitted or not: rms of ``(F - F_model)/F_max`` of the level."""
+        """The measure (2.37) of every level of the map, fitted or not: rms of ``(F - F_model)/F_max`` of the level.
+
+        Levels whose own largest force is below 1 % of the map's are not in it but named: no force there to measure errors by.
+        """
         everything = np.ones_like(self._rows)
         return PressureErrors.of(self._problem, self.all_residuals, everything, self._rows)
 
@@ -217,7 +220,7 @@ class MuscleFit(FitStatistics):
         slopes = np.hstack([columns, geometry_slopes(self._problem, self._estimate.geometry, force, len(p))])
         variance = np.einsum("ni,ij,nj->n", slopes, self.covar, slopes)
         if new_point:
-            if np.any(self._problem.weight != 1.0):
+            if self.weights != "force":
                 raise ParameterError("new_point = True needs a fit with weights='force': the scatter is one number in N only there")
             variance = variance + self.noise**2
         return np.asarray(np.sqrt(np.maximum(variance, 0.0))).reshape(shape)
@@ -252,12 +255,12 @@ class MuscleFit(FitStatistics):
         ----------
         rig : Rig, optional
             Gets its muscle replaced, the number of muscles kept. None makes a bench: gas, muscle, and a dead volume of a tenth
-            of the muscle's air.
+            of the muscle's air; without joint and arm it cannot be simulated.
 
         Returns
         -------
         Rig
-            Fitted geometry carries its standard error as tolerance.
+            Fitted geometry carries its standard error as tolerance; the rig's other tolerances stay where the number does.
 
         Raises
         ------

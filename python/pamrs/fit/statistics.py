@@ -117,6 +117,11 @@ class FitStatistics:
         return {"weights": weights, "direction": "data" if np.any(problem.direction) else None, "noise": problem.noise}
 
     @property
+    def moduli_names(self) -> tuple[str, ...]:
+        """What the columns of :meth:`moduli` are: ``E1``..., ``c10`` and ``c01``, ``bladder_modulus``, or none."""
+        return self._estimate.design.base
+
+    @property
     def moduli_kind(self) -> str:
         """``"linear"`` (in pressure) or ``"per_level"``."""
         return self._problem.moduli
@@ -179,6 +184,16 @@ class FitStatistics:
     def noise(self) -> float:
         """Standard deviation of the weighted residuals that priors and standard errors use."""
         return self._estimate.sigma
+
+    @property
+    def stated_noise(self) -> float | None:
+        """``noise`` as given to the fit; None where it was estimated."""
+        return self._problem.noise
+
+    @property
+    def weights(self) -> str:
+        """``"force"`` or ``"level"``."""
+        return "force" if np.all(self._problem.weight == 1.0) else "level"
 
     def criteria(self, effective_size: float | None = None) -> tuple[float, float | None, float]:
         """AIC, AICc and BIC of a Gaussian fit of unknown noise, ``n log(chisqr/ndata) + penalty``.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,9 +17,13 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 
-@dataclass(frozen=True)
+#: Share of the map's largest force below which a level's own largest force is no scale for its errors.
+WEAK: Final = 0.01
+
+
+@dataclass(frozen=True, repr=False)
 class PressureErrors:
-    """Error of each pressure level, the measure (2.37).
+    """Error of each pressure level, the measure (2.37), where the level pulls enough to be its scale.
 
     Attributes
     ----------
@@ -31,6 +35,8 @@ class PressureErrors:
         Root mean square, and largest magnitude, of ``(F - F_model)/F_max`` with the level's own largest measured force [1].
     fitted : (m,) bool array
         Whether the level was part of the fit.
+    weak : (k,) array
+        Pressure of the levels that are not in the arrays above [Pa]: their largest force is below 1 % of the map's largest.
     """
 
     levels: Array
@@ -38,31 +44,42 @@ class PressureErrors:
     rms: Array
     max: Array
     fitted: Mask
+    weak: Array
+
+    @property
+    def note(self) -> str:
+        """Which levels are left out of (2.37) and why; empty when none is."""
+        if not len(self.weak):
+            return ""
+        names = ", ".join(f"{pressure / 1e3:.5g}" for pressure in self.weak)
+        return f"{names} kPa: not in this table, the largest force there is below {100 * WEAK:g} % of the map's largest"
+
+    def __repr__(self) -> str:
+        left = f", {len(self.weak)} left out" if len(self.weak) else ""
+        worst = f", rms at most {100 * self.rms.max():.2f} % of the level's largest force" if len(self.rms) else ""
+        return f"PressureErrors({len(self.levels)} levels{left}{worst})"
 
     @classmethod
     def of(cls, problem: Problem, error: Array, rows: Mask, fitted: Mask) -> PressureErrors:
         """Gather force errors [N] of all rows (n,) over the levels present in ``rows``."""
-        present = np.unique(problem.level[rows])
-        counts, rms, worst = [], [], []
-        for level in present:
-            members = rows & (problem.level == level)
-            share = error[members] / level_force(problem, int(level))
-            counts.append(len(share))
-            rms.append(float(np.sqrt(np.mean(share**2))))
-            worst.append(float(np.abs(share).max()))
-        seen = np.isin(present, np.unique(problem.level[fitted]))
-        return cls(problem.levels[present], np.array(counts), np.array(rms), np.array(worst), seen)
-
-
-def level_force(problem: Problem, level: int) -> float:
-    """Largest measured force of a level [N]; FitError if it does not pull."""
-    largest = float(problem.force[problem.level == level].max())
-    if largest <= 0.0:
-        raise FitError(
-            f"level {problem.levels[level] / 1e3:g} kPa has no pulling force (largest {largest:g} N): error (2.37) needs one; "
-            "leave it out"
+        everything = np.unique(problem.level[rows])
+        tops = level_forces(problem)
+        pulls = tops[everything] >= WEAK * float(problem.force.max())
+        present = everything[pulls]
+        shares = [error[rows & (problem.level == level)] / tops[level] for level in present]
+        return cls(
+            problem.levels[present],
+            np.array([len(share) for share in shares], dtype=np.intp),
+            np.array([np.sqrt(np.mean(share**2)) for share in shares]),
+            np.array([np.abs(share).max() for share in shares]),
+            np.isin(present, np.unique(problem.level[fitted])),
+            problem.levels[everything[~pulls]],
         )
-    return largest
+
+
+def level_forces(problem: Problem) -> Array:
+    """Largest measured force of every level [N]; zero or negative where a level does not pull."""
+    return np.array([problem.force[problem.level == level].max() for level in range(len(problem.levels))])
 
 
 def summary(error: Array, scale: float) -> tuple[float, float] | None:
@@ -72,7 +89,7 @@ def summary(error: Array, scale: float) -> tuple[float, float] | None:
     return float(np.sqrt(np.mean(error**2))) / scale, float(np.abs(error).max()) / scale
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class CrossValidation:
     """Leave-one-pressure-out: every fitted level predicted by a fit of the others.
 
@@ -82,6 +99,8 @@ class CrossValidation:
         (2.37) of each level as predicted; all levels are marked as not fitted.
     predicted, residual : (n,) array
         Predicted force, and measured minus predicted [N], of the fitted rows in the map's order.
+    level : (n,) int array
+        Index of the level of these rows in the map.
     rms, max : float
         Over all points, as fractions of the map's largest force.
     interior_rms, interior_max : float or None
@@ -95,6 +114,7 @@ class CrossValidation:
     by_pressure: PressureErrors
     predicted: Array
     residual: Array
+    level: NDArray[np.intp]
     rms: float
     max: float
     interior_rms: float | None
@@ -102,6 +122,16 @@ class CrossValidation:
     end_rms: float
     end_max: float
     rms_stderr: float
+
+    def __repr__(self) -> str:
+        return (
+            f"CrossValidation({len(np.unique(self.level))} levels, each from the others: rms {100 * self.rms:.2f} %, "
+            f"max {100 * self.max:.2f} % of the map's largest force)"
+        )
+
+    def level_squares(self) -> Array:
+        """Sum of the squared prediction errors of each fitted level [N2], by rising pressure."""
+        return np.array([np.sum(self.residual[self.level == group] ** 2) for group in np.unique(self.level)])
 
     def to_dict(self) -> dict[str, Any]:
         """Everything as plain numbers, errors as fractions."""
@@ -117,6 +147,7 @@ class CrossValidation:
             "level_rms": self.by_pressure.rms.tolist(),
             "level_max": self.by_pressure.max.tolist(),
             "points": self.by_pressure.points.tolist(),
+            "weak_levels": self.by_pressure.weak.tolist(),
         }
 
 
@@ -147,7 +178,7 @@ def leave_one_out(problem: Problem, result: Estimate, rows: Mask) -> CrossValida
     level = problem.level[rows]
     groups = np.unique(level)
     if len(groups) < 2:
-        raise FitError("leave-one-pressure-out needs two pressure levels at least; there is one")
+        raise FitError("two pressure levels at least are needed to predict one from the others; there is one")
     linear = not (problem.free or problem.known or result.design.per_level)
     error = _by_hat_matrix(problem, result, level) if linear else _by_refits(problem, result, rows)
     error = error / problem.weight[rows]
@@ -162,14 +193,12 @@ def leave_one_out(problem: Problem, result: Estimate, rows: Mask) -> CrossValida
     dropped = np.array([np.sqrt(np.mean(error[level != group] ** 2)) / top for group in groups])
     spread = float(np.sqrt((1.0 - 1.0 / len(groups)) * np.sum((dropped - dropped.mean()) ** 2)))
     return CrossValidation(
-        by_pressure, problem.force[rows] - error, error, rms, worst, interior[0], interior[1], end_rms, end_max, spread
+        by_pressure, problem.force[rows] - error, error, level, rms, worst, interior[0], interior[1], end_rms, end_max, spread
     )
 
 
 def _gone(problem: Problem, level: int, why: str) -> FitError:
-    return FitError(
-        f"leave-one-pressure-out: without {problem.levels[level] / 1e3:g} kPa the other levels do not determine the fit: {why}"
-    )
+    return FitError(f"without {problem.levels[level] / 1e3:g} kPa the other levels do not determine the fit: {why}")
 
 
 def _by_hat_matrix(problem: Problem, result: Estimate, level: NDArray[np.intp]) -> Array:

@@ -1,18 +1,19 @@
 //! Planar arm of `N` links in series, with payloads, friction and elastic stops.
 //!
-//! `H(q) q'' + C(q, q') q' + G(q) = tau - c q' - f tanh(q'/w) + tau_stop` (Spong, Hutchinson & Vidyasagar, *Robot Modeling and
-//! Control*, ch. 7; dissertation ch. 3 for the elbow and wrist). `q_1` is measured from the gravity vector, as in the one-link
-//! arm, `q_k` from the link before; positive torque raises `q`. In the links' directions `phi_i = q_1 + ... + q_i`, with `mu_i`
-//! all mass carried at the end of link `i` (its payload and every link beyond),
+//! `H(q) q'' + C(q, q') q' + G(q) = tau - c q' - f tanh(q'/w) + tau_stop` (Spong, Hutchinson & Vidyasagar,
+//! *Robot Modeling and Control*, ch. 7). `q_1` is measured from the gravity vector, as in the one-link arm,
+//! `q_k` from the link before; positive torque raises `q`. In the links' directions `phi_i = q_1 + ... +
+//! q_i`, with `mu_i` all mass carried at the end of link `i` (its payload and every link beyond),
 //!
 //! - `A_ii = I_i + m_i c_i^2 + mu_i l_i^2`, `B_i = m_i c_i + mu_i l_i`, `A_ij = l_i B_j` for `i < j`;
 //! - kinetic energy `1/2 sum A_ij cos(phi_i - phi_j) phi_i' phi_j'`, potential energy `-g sum B_i cos phi_i`;
 //! - Christoffel symbols leave `C_ij = A_ij sin(phi_i - phi_j) phi_j'`, so that `H' - 2C` is skew.
 //!
-//! `phi` is linear in `q` with ones, so that `H` and `C` in `q` are sums of those in `phi` over all `i >= a, j >= b`, the
-//! Christoffel property included. Everything has fixed size: nothing allocates. `H` is solved by Cholesky's method without
-//! square roots (`L D L^T`), written here because nalgebra's asks for more of a number than [`Scalar`] does; for one link it is
-//! the plain division of [`super::one_link::OneLink`].
+//! `phi` is linear in `q` with ones, so that `H_ab` and `C_ab` in `q` are sums of those in `phi` over all `i
+//! >= a`, `j >= b`, the Christoffel property included. Everything has fixed size: nothing allocates. `H` is
+//! solved by Cholesky's method without square roots (`L D L^T`), written here because nalgebra's asks for
+//! more of a number than [`Scalar`] does; for one link it is the plain division of
+//! [`super::one_link::OneLink`].
 
 pub use super::one_link::Stops;
 use crate::error::{check_range, Error, Result};
@@ -173,14 +174,15 @@ impl<S: Scalar, const N: usize> PlanarArm<S, N> {
         twice * 0.5
     }
 
-    /// Potential energy of gravity [J], zero with every mass at the height of the first joint; the stops' is not in it.
+    /// Potential energy of gravity [J], zero with every mass at the height of the first joint; without the
+    /// stops'.
     pub fn potential_energy(&self, angle: &SVector<S, N>) -> S {
         let pose = Pose::new(angle);
         (0..N).fold(constant(0.0), |sum, i| sum - self.moment[i] * self.gravity * pose.cos[i])
     }
 
-    /// Ends of the links [m]: column `k` has joint `k + 2`, the last one the tip; the first joint is at the origin. Rows: across
-    /// (where positive angles point) and up.
+    /// Ends of the links [m], the first joint at the origin: column `k` is the place of joint `k + 1`, both
+    /// counted from 0, the last column the tip. Rows: across (where positive angles point) and up.
     pub fn positions(&self, angle: &SVector<S, N>) -> SMatrix<S, 2, N> {
         let pose = Pose::new(angle);
         let (mut across, mut up) = (constant::<S>(0.0), constant::<S>(0.0));
@@ -193,11 +195,12 @@ impl<S: Scalar, const N: usize> PlanarArm<S, N> {
         ends
     }
 
-    /// Angular accelerations [rad/s2] of the joints under joint torques [N m]; friction and stops are added here.
+    /// Angular accelerations [rad/s2] of the joints under joint torques [N m]; friction and stops are added
+    /// here.
     ///
     /// # Errors
-    /// [`Error::Parameter`] that names the argument that is not finite, or the pivot of a mass matrix that is not positive definite
-    /// (a link without inertia).
+    /// [`Error::Parameter`] that names the argument that is not finite, or the pivot of a mass matrix that is
+    /// not positive definite (a link without inertia).
     pub fn acceleration(
         &self,
         angle: &SVector<S, N>,
@@ -272,8 +275,8 @@ impl<S: Scalar, const N: usize> PlanarArm<S, N> {
 
 impl<S: Scalar> Link<S> {
     fn check(&self, index: usize) -> Result<()> {
+        // The full name is only made when there is something wrong.
         let range = |field: &str, value: f64, low: f64, high: f64, unit: &str| {
-            // The name is only made when there is something wrong.
             check_range(field, value, low, high, unit)
                 .or_else(|_| check_range(&format!("arm.links[{index}].{field}"), value, low, high, unit))
         };

@@ -1,0 +1,42 @@
+"""Joint design (dissertation 3.5): four lengths of a tendon joint that give a wanted torque at the least pressure.
+
+>>> import math, pamrs
+>>> from pamrs.design import JointProblem, optimise
+>>> muscle = pamrs.library.pam_a_1in()
+>>> problem = JointProblem(muscle, 6, torque=400.0, min_angle=math.radians(15), max_angle=math.radians(120), pressure=1.3e6)
+>>> optimise(problem, "de", evaluations=200).met()
+True
+
+Searches need ``pip install pamrs[search]``, figures ``pamrs[plot]``; both are imported when they are used.
+"""
+
+from __future__ import annotations
+
+from pamrs.design.joint_design import AREA_TOLERANCE, JointDesign, MethodComparison, compare_methods, optimise
+from pamrs.design.pressure import ParetoFront, PressureSearch, Trial, least_pressure, minimum_pressure, pareto_front
+from pamrs.design.problem import DEFAULT_BOUNDS, LENGTHS, SYMBOLS, JointProblem, Scores
+from pamrs.design.search import METHODS, Genetic, History, Search, search
+
+__all__ = [
+    "AREA_TOLERANCE",
+    "DEFAULT_BOUNDS",
+    "LENGTHS",
+    "METHODS",
+    "SYMBOLS",
+    "Genetic",
+    "History",
+    "JointDesign",
+    "JointProblem",
+    "MethodComparison",
+    "ParetoFront",
+    "PressureSearch",
+    "Scores",
+    "Search",
+    "Trial",
+    "compare_methods",
+    "least_pressure",
+    "minimum_pressure",
+    "optimise",
+    "pareto_front",
+    "search",
+]
