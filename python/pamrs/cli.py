@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from pamrs.cli_design import design_app
 from pamrs.cli_fit import fit_app
 from pamrs.cli_library import library_command, size_command
 
@@ -56,6 +57,7 @@ app = typer.Typer(
 rig_app = typer.Typer(help="Work with rig files.")
 app.add_typer(rig_app, name="rig")
 app.add_typer(fit_app, name="fit")
+app.add_typer(design_app, name="design")
 app.command("library")(library_command)
 app.command("size")(size_command)
 

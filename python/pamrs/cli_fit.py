@@ -104,6 +104,10 @@ def _muscle(
     )
     pressures = None if levels is None else [_quantity("levels", text, "pressure")[0] for text in levels.split(",")]
     names = [] if free is None else [name.strip().replace("-", "_") for name in free.split(",") if name.strip()]
+    from pamrs.muscle_models import ELASTIC_PARAMETERS
+
+    elastic = ELASTIC_PARAMETERS.get(model or start.model, ())  # a description may know of coefficients that another model has
+    tolerance = {name: value for name, value in tolerance.items() if name in _GEOMETRY or name in elastic}
     known = {name: value for name, value in tolerance.items() if math.isfinite(value)} | _prior(prior)
     scatter = stated if noise is None else _noise(noise, map_)
     notes = [

@@ -1,6 +1,5 @@
 """Force maps: parsing, units, every flag with its count, levels, descriptions, recordings of a bench."""
 
-import math
 import re
 from pathlib import Path
 from types import SimpleNamespace
@@ -8,7 +7,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from pamrs import Muscle
 from pamrs.errors import ParameterError, RecordingError
 from pamrs.fit.data import ForceMap
 from pamrs.fit.description import load_measured_muscle
@@ -594,31 +592,6 @@ def test_festo_maps_leave_the_clipped_zeros_out(name, used, clipped, levels):
     assert measured.tolerance["modulus_offset"] == 1e7
     assert not any("absolute" in issue for issue in measured.data.issues)
     assert measured.noise == pytest.approx(0.005 * measured.data.force.max(), rel=0.02)
-
-
-def test_lengths_at_which_the_geometry_has_no_solution_are_flagged():
-    wide = Muscle(rest_length=0.12, rest_diameter=0.05, braid_angle=math.radians(75.0), wall_thickness=0.002)
-    length = np.array([0.119, 0.115, 0.11, 0.08])
-    map_ = ForceMap.from_arrays(length, np.full(4, 3e5), [900.0, 700.0, 500.0, 100.0], rest_length=0.12).checked_against(wide)
-    assert "no solution" in map_.reason
-    assert any("no solution" in issue for issue in map_.issues)
-    assert map_.used.any()
-
-
-def test_a_stray_force_is_flagged_alone():
-    muscle = Muscle(rest_length=0.3, rest_diameter=0.023, braid_angle=1.117, wall_thickness=0.0015)
-    p, e = (grid.ravel() for grid in np.meshgrid([2e5, 4e5, 6e5], np.linspace(0.0, 0.2, 6)))
-    force = muscle.force(p, e)
-    force[7] = 1e30
-    map_ = ForceMap.from_arrays(0.3 * (1.0 - e), p, force, rest_length=0.3).checked_against(muscle)
-    assert [row for row, why in enumerate(map_.reason) if why] == [7]
-    assert map_.reason[7] == "force out of range"
-
-
-def test_psi_read_as_bar_is_refused_though_half_the_rows_are_possible():
-    p, e = (grid.ravel() for grid in np.meshgrid(np.arange(10.0, 100.0, 10.0), np.linspace(0.0, 0.2, 6)))
-    with pytest.raises(RecordingError, match=r"pressures .*beyond 5 MPa: wrong unit\?"):
-        ForceMap.from_arrays(0.3 * (1.0 - e), 1e5 * p, 100.0 - 200.0 * e, rest_length=0.3)
 
 
 def test_a_description_takes_no_arguments_beside_it(described):

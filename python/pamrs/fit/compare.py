@@ -274,20 +274,21 @@ def effective_size(fit: MuscleFit) -> float:
         Between the number of levels and ``ndata``.
     """
     rows = fit.fitted
-    level, length = fit.data.level[rows], fit.data.length[rows]
-    order = np.lexsort((length, level))
-    level, length, residual = level[order], length[order], fit.residual[order]
-    groups = [level == group for group in np.unique(level)]
-    same = level[1:] == level[:-1]
+    level, length, way = fit.data.level[rows], fit.data.length[rows], fit.data.direction[rows]
+    order = np.lexsort((length, level, way))
+    level, length, way, residual = level[order], length[order], way[order], fit.residual[order]
+    same = (level[1:] == level[:-1]) & (way[1:] == way[:-1])  # neighbours on one branch: the branches of a loop lie apart
     along = _correlation(residual[1:][same], residual[:-1][same])
-    below, above = [], []
-    for lower, upper in zip(groups[:-1], groups[1:], strict=True):
-        at = (length[lower] >= length[upper][0]) & (length[lower] <= length[upper][-1])
-        below.append(residual[lower][at])
-        above.append(np.interp(length[lower][at], length[upper], residual[upper]))
-    across = _correlation(np.concatenate(below), np.concatenate(above)) if below else 0.0
+    below, above = [np.empty(0)], [np.empty(0)]
+    for branch in np.unique(way):
+        groups = [(level == group) & (way == branch) for group in np.unique(level[way == branch])]
+        for lower, upper in zip(groups[:-1], groups[1:], strict=True):
+            at = (length[lower] >= length[upper][0]) & (length[lower] <= length[upper][-1])
+            below.append(residual[lower][at])
+            above.append(np.interp(length[lower][at], length[upper], residual[upper]))
+    across = _correlation(np.concatenate(below), np.concatenate(above))
     size = len(residual) * (1.0 - along) / (1.0 + along) * (1.0 - across) / (1.0 + across)
-    return float(min(max(size, len(groups)), len(residual)))
+    return float(min(max(size, len(np.unique(level))), len(residual)))
 
 
 def _correlation(one: Array, other: Array) -> float:

@@ -66,7 +66,7 @@ def template(muscle: Muscle, model: str | None, geometry: str | None, order: int
         given = muscle.parameters
         own = max(len(given["modulus_slope"]), len(given["modulus_offset"]))
         terms = (own or _DEFAULT_ORDER) if order is None else order
-        if isinstance(terms, bool) or terms != int(terms) or not 1 <= terms <= _LARGEST_ORDER:
+        if isinstance(terms, bool) or not isinstance(terms, (int, np.integer)) or not 1 <= terms <= _LARGEST_ORDER:
             raise ParameterError(f"order = {order!r} is not allowed: a whole number from 1 to {_LARGEST_ORDER}")
         changes |= {"modulus_slope": [0.0] * int(terms), "modulus_offset": [0.0] * int(terms)}
     elif order is not None:

@@ -145,7 +145,7 @@ def fit_muscle(
     spread = _tolerances(tolerance)
     unknowns = _free(blank, tuple(free), spread)
     known = _known(muscle, blank, spread)
-    if noise is not None and not (math.isfinite(noise) and noise > 0.0):
+    if noise is not None and not (_is_number(noise) and 0.0 < noise < math.inf):
         raise ParameterError(f"noise = {noise!r} is not allowed: a positive number is needed")
     if known and noise is None:
         raise ParameterError(
@@ -204,12 +204,16 @@ def _free(blank: Muscle, names: tuple[str, ...], tolerance: dict[str, float]) ->
     return tuple(Free(name, float(known[name]), float(tolerance.get(name, math.inf))) for name in names)
 
 
+def _is_number(value: object) -> bool:
+    return isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
+
+
 def _tolerances(tolerance: Mapping[str, float] | None) -> dict[str, float]:
     allowed = (*GEOMETRY, *COEFFICIENTS)
     for name, value in (tolerance or {}).items():
         if name not in allowed:
             raise ParameterError(f"tolerance: {name!r} is not allowed: of {', '.join(allowed)}")
-        if not value > 0.0:
+        if not (_is_number(value) and value > 0.0):
             raise ParameterError(f"tolerance: {name} = {value!r} is not allowed: a positive number is needed (infinite for no prior)")
     return dict(tolerance or {})
 

@@ -200,6 +200,12 @@ def estimate(problem: Problem, rows: Mask, start: Estimate | None = None) -> Est
     nominal = np.array([free.nominal for free in problem.free])
     blank = problem.muscle(nominal)
     problem.check_reach(blank)
+    try:
+        problem.system(design, blank, rows)
+    except ParameterError as error:
+        raise FitError(
+            f"the nominal geometry does not do at every fitted length: {error}; data.checked_against(muscle) flags such rows"
+        ) from error
     if not problem.free:
         return _at(problem, design, rows, blank, nominal, None, "linear least squares", True)
     return _search(problem, design, rows, start)

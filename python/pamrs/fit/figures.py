@@ -64,6 +64,9 @@ class ErrorCurve:
     left_rms: Array
 
 
+_LEAST_ERROR = 1e-7  # drawn for an exact fit: the axis is logarithmic
+
+
 def pressure_colours(levels: Array) -> tuple[Any, Normalize]:
     """A map from pressure [kPa] to colours dark enough for lines on white, and its range."""
     steps = mpl.colormaps["viridis"](np.linspace(0.0, 0.88, 64))
@@ -247,8 +250,14 @@ def _draw_modulus(axes: Axes, line: _Curve | None, points: _Curve | None) -> Non
 
 def _draw_errors(axes: Axes, curves: Sequence[ErrorCurve], *, left: bool) -> None:
     """Error (2.37) of each model over pressure; ``left`` draws the predicted levels instead of the fitted ones."""
+    drawn = [100 * np.maximum(curve.left_rms if left else curve.rms, _LEAST_ERROR) for curve in curves]
+    values = np.concatenate([np.ones(0), *drawn])
+    if values.size:
+        axes.set_ylim(values.min() / 1.6, values.max() * 1.6)
+    axes.set_yscale("log")
     for curve, (colour, mark) in zip(curves, _SERIES * 3, strict=False):
         levels, rms = (curve.left_levels, curve.left_rms) if left else (curve.levels, curve.rms)
+        rms = np.maximum(rms, _LEAST_ERROR)
         if not len(levels):
             continue
         fitted = np.zeros(len(levels), dtype=bool) if left else curve.fitted
@@ -256,7 +265,6 @@ def _draw_errors(axes: Axes, curves: Sequence[ErrorCurve], *, left: bool) -> Non
         for rows, face in ((fitted, colour), (~fitted, "white")):
             axes.scatter(levels[rows] / 1e3, 100 * rms[rows], marker=mark, s=24, facecolor=face, edgecolor=colour, lw=1.1, zorder=3)
         axes.plot([], [], color=colour, marker=mark, ms=5, lw=1.1, mfc="white" if left else colour, label=curve.name)
-    axes.set_yscale("log")
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.yaxis.set_minor_formatter(lambda value, _: f"{value:g}" if f"{value:e}"[0] in "25" else "")
     axes.tick_params(axis="y", which="minor", labelsize="small")
@@ -389,7 +397,7 @@ def summary_png(fit: MuscleFit, curves: Sequence[ErrorCurve], title: str) -> byt
         if len(curves) > 1:
             upper.legend(loc="upper center", bbox_to_anchor=(0.45, -0.22), ncols=3, fontsize=7.0, columnspacing=1.0)
         colours = _draw_residuals(lower, fit, size=26.0)
-        lower.set_title("Residual")
+        lower.set_title("Residual (squares: left out)" if np.any(~fit.fitted & fit.data.used) else "Residual")
         right.colorbar(colours, ax=lower, label="measured − model [%]", extend="both", pad=0.02)
         stream = io.BytesIO()
         figure.savefig(stream, format="png", dpi=160)

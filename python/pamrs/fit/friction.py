@@ -419,6 +419,7 @@ def _presliding(data: ForceMap, levels: list[FrictionLevel]) -> tuple[float | No
         c = coefficients.get(int(level[turn]), 0.0)
         before, after = _runs(level, way, int(turn))
         if c <= 0.0 or before.stop - before.start < _FEWEST:
+            sparse += 1
             continue
         order = np.argsort(contraction[before], kind="stable")
         old = np.interp(contraction[after], contraction[before][order], force[before][order])

@@ -2,18 +2,18 @@
 //!
 //! `H(q) q'' + C(q, q') q' + G(q) = tau - c q' - f tanh(q'/w) + tau_stop` (Spong, Hutchinson & Vidyasagar,
 //! *Robot Modeling and Control*, ch. 7). `q_1` is measured from the gravity vector, as in the one-link arm,
-//! `q_k` from the link before; positive torque raises `q`. In the links' directions `phi_i = q_1 + ... +
-//! q_i`, with `mu_i` all mass carried at the end of link `i` (its payload and every link beyond),
+//! `q_k` from the link before; positive torque raises `q`. In the links' directions
+//! `phi_i = q_1 + ... + q_i`, with `mu_i` all mass carried at the end of link `i` (its payload and every link
+//! beyond),
 //!
 //! - `A_ii = I_i + m_i c_i^2 + mu_i l_i^2`, `B_i = m_i c_i + mu_i l_i`, `A_ij = l_i B_j` for `i < j`;
 //! - kinetic energy `1/2 sum A_ij cos(phi_i - phi_j) phi_i' phi_j'`, potential energy `-g sum B_i cos phi_i`;
 //! - Christoffel symbols leave `C_ij = A_ij sin(phi_i - phi_j) phi_j'`, so that `H' - 2C` is skew.
 //!
-//! `phi` is linear in `q` with ones, so that `H_ab` and `C_ab` in `q` are sums of those in `phi` over all `i
-//! >= a`, `j >= b`, the Christoffel property included. Everything has fixed size: nothing allocates. `H` is
-//! solved by Cholesky's method without square roots (`L D L^T`), written here because nalgebra's asks for
-//! more of a number than [`Scalar`] does; for one link it is the plain division of
-//! [`super::one_link::OneLink`].
+//! `phi` is linear in `q` with ones, so that `H_ab` and `C_ab` in `q` are sums of those in `phi` over all
+//! `i >= a`, `j >= b`, the Christoffel property included. Everything has fixed size: nothing allocates. `H`
+//! is solved by Cholesky's method without square roots (`L D L^T`), written here because nalgebra's asks for
+//! more of a number than [`Scalar`] does; for one link it is the division of [`super::one_link::OneLink`].
 
 pub use super::one_link::Stops;
 use crate::error::{check_range, Error, Result};
