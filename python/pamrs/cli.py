@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from pamrs.recording import Recording
+    from pamrs.rig import Rig
 
 __all__ = ["app", "main"]
 
@@ -134,17 +135,16 @@ def _diagnose(
 
 @app.command("simulate")
 def _simulate(
-    rig: Annotated[Path, typer.Argument(help="Rig file (TOML).")],
+    rig: Annotated[Path, typer.Argument(help="Rig file (TOML), or the name of a rig of the package.")],
     input: Annotated[Path, typer.Option("--input", help="Recording whose inputs drive the rig (CSV).")],
     output: Annotated[Path, typer.Option("--output", help="Where to write the simulated channels (CSV).")],
 ) -> None:
     """Drive a rig with a recording's inputs and write what its channels would be."""
     _check_writable(output)
     from pamrs.recording import load_recording
-    from pamrs.rig import load_rig
     from pamrs.simulation import simulate
 
-    loaded = load_rig(rig)
+    loaded = _rig(rig)
     recording = load_recording(input)
     initial = {
         name: float(recording.channels[name][recording.mask[name]][0])
@@ -197,17 +197,40 @@ def _write_csv(path: Path, columns: Mapping[str, NDArray[np.float64]]) -> None:
 
 
 @rig_app.command("check")
-def _rig_check(file: Annotated[Path, typer.Argument(help="Rig file (TOML).")]) -> None:
+def _rig_check(file: Annotated[Path, typer.Argument(help="Rig file (TOML), or the name of a rig of the package.")]) -> None:
     """Check a rig file and list its parameters in SI units."""
-    from pamrs.rig import load_rig
-
-    rig = load_rig(file)
+    rig = _rig(file)
     width = max((len(name) for name in rig.parameters), default=0)
     for name, parameter in rig.parameters.items():
         known = f"{parameter.value:.6g}" if parameter.known else "unknown"
         spread = f" ± {parameter.tol:.3g}" if parameter.known and parameter.tol else ""
         typer.echo(f"{name:<{width}}  {known}{spread} {parameter.unit}")
     typer.echo(f"{file}: rig {rig.name!r} is valid, {len(rig.parameters)} parameters, {len(rig.effects)} effects")
+
+
+@rig_app.command("new")
+def _rig_new(
+    file: Annotated[Path, typer.Argument(help="The file to write; it must not be there yet.")],
+    like: Annotated[str, typer.Option(help="Rig of the package to begin with: shoulder or sealed_chamber.")] = "shoulder",
+    name: Annotated[str | None, typer.Option(help="What to call the rig; by default as the file.")] = None,
+) -> None:
+    """Write a rig file to begin with, every key explained in comments."""
+    from pamrs import rigs
+    from pamrs.writing import write_atomically
+
+    _check_writable(file)
+    if file.exists():
+        raise FileExistsError(f"{file}: is there already; it is not overwritten")
+    write_atomically(file, rigs.template(like, file.stem if name is None else name))
+    typer.echo(f"written: {file}; change it, then: pamrs rig check {file}")
+
+
+def _rig(file: Path) -> Rig:
+    """A rig file, or a rig of the package by its name."""
+    from pamrs import rigs
+    from pamrs.rig import load_rig
+
+    return rigs.named(str(file)) if not file.exists() and str(file) in rigs.names() else load_rig(file)
 
 
 def _one_line(error: BaseException) -> str:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import pamrs
 from pamrs import cli
 
 RIG = Path(cli.__file__).parent / "rigs" / "shoulder.toml"
@@ -169,3 +170,26 @@ def test_help_loads_nothing_heavy():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("like", pamrs.rigs.names())
+def test_a_new_rig_file_can_be_read_as_it_stands(capsys, tmp_path, like):
+    file = tmp_path / "my arm.toml"
+    assert cli.main(["rig", "new", str(file), "--like", like]) == 0
+    rig = pamrs.load_rig(file)
+    assert rig.name == "my arm"
+    assert rig.parameters == pamrs.rigs.named(like).parameters
+    text = file.read_text(encoding="utf-8")
+    for word in ("friction", "elbow_linear", "polynomial", "leak_muscle", "from 0 to"):
+        assert word in text
+    assert cli.main(["rig", "check", str(file)]) == 0
+    capsys.readouterr()
+    assert cli.main(["rig", "new", str(file)]) == 2
+    assert "is there already" in capsys.readouterr().err
+    assert cli.main(["rig", "new", str(tmp_path / "other.toml"), "--like", "knee"]) == 2
+    assert "'knee' does not come with the package; there are: shoulder" in capsys.readouterr().err
+
+
+def test_rig_check_takes_the_name_of_a_packaged_rig(capsys):
+    assert cli.main(["rig", "check", "sealed_chamber"]) == 0
+    assert "'sealed_chamber' is valid" in capsys.readouterr().out

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import json
 from importlib import resources
 from typing import TYPE_CHECKING, Final
 
+from pamrs.errors import ParameterError
 from pamrs.rig import Rig, parse_rig
 
 if TYPE_CHECKING:
     from pamrs.muscle import Muscle
 
-__all__ = ["bench", "sealed_chamber", "shoulder"]
+__all__ = ["bench", "names", "named", "sealed_chamber", "shoulder", "template"]
 
 _BENCH: Final = """schema = "pamrs.rig/1"
 name = "bench"
@@ -20,14 +22,73 @@ dead_volume = {{ value = {volume!r}, unit = "m3" }}
 """
 
 
-def _packaged(name: str) -> Rig:
-    file = resources.files(__name__).joinpath(f"{name}.toml")
-    return parse_rig(file.read_text(encoding="utf-8"), source=f"{name}.toml")
+_NAMES: Final = ("shoulder", "sealed_chamber")
+
+
+def names() -> list[str]:
+    """Names of the rigs that come with the package."""
+    return list(_NAMES)
+
+
+def _text(name: str) -> str:
+    if name not in _NAMES:
+        raise ParameterError(f"rig = {name!r} does not come with the package; there are: {', '.join(_NAMES)}")
+    return resources.files(__name__).joinpath(f"{name}.toml").read_text(encoding="utf-8")
+
+
+def named(name: str) -> Rig:
+    """A rig of the package by its name.
+
+    Parameters
+    ----------
+    name : str
+        One of :func:`names`.
+
+    Returns
+    -------
+    Rig
+
+    Raises
+    ------
+    ParameterError
+        If there is no such rig.
+    """
+    return parse_rig(_text(name), source=f"{name}.toml")
+
+
+def template(like: str = "shoulder", name: str | None = None) -> str:
+    """A rig file to begin with: a rig of the package, and in comments every key that a rig file may have.
+
+    Parameters
+    ----------
+    like : str
+        One of :func:`names`.
+    name : str, optional
+        What the rig is called; ``like`` by default.
+
+    Returns
+    -------
+    str
+        TOML that can be read as it stands.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such rig, or the name is empty.
+    """
+    from pamrs.rigs.keys import every_key
+
+    text = _text(like)
+    if name is not None:
+        if not name.strip():
+            raise ParameterError("name is empty: a rig needs a name")
+        text = text.replace(f'name = "{like}"', f"name = {json.dumps(name, ensure_ascii=False)}", 1)
+    return f"{text.rstrip()}\n\n{every_key()}"
 
 
 def shoulder() -> Rig:
     """The shoulder joint of the 2014 dissertation: six muscles, spool valve, tank, arm with a payload."""
-    return _packaged("shoulder")
+    return named("shoulder")
 
 
 def bench(muscle: Muscle, name: str = "bench") -> Rig:
@@ -50,4 +111,4 @@ def bench(muscle: Muscle, name: str = "bench") -> Rig:
 
 def sealed_chamber() -> Rig:
     """A rigid chamber of one decilitre behind a shut valve, with a pressure transducer."""
-    return _packaged("sealed_chamber")
+    return named("sealed_chamber")
