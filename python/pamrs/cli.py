@@ -137,10 +137,15 @@ def _diagnose(
 def _simulate(
     rig: Annotated[Path, typer.Argument(help="Rig file (TOML), or the name of a rig of the package.")],
     input: Annotated[Path, typer.Option("--input", help="Recording whose inputs drive the rig (CSV).")],
-    output: Annotated[Path, typer.Option("--output", help="Where to write the simulated channels (CSV).")],
+    output: Annotated[Path | None, typer.Option("--output", help="Where to write the simulated channels (CSV).")] = None,
+    plot: Annotated[Path | None, typer.Option(help="Write a picture of the channels beside the recorded ones (PNG).")] = None,
+    animation: Annotated[Path | None, typer.Option(help="Write the arm as it moves (GIF).")] = None,
+    speed: Annotated[float, typer.Option(help="Of the animation: times faster than it happens.")] = 1.0,
 ) -> None:
     """Drive a rig with a recording's inputs and write what its channels would be."""
-    _check_writable(output)
+    if output is None and plot is None and animation is None:
+        raise typer.BadParameter("nothing would be written: give --output, --plot or --animation")
+    _check_writable(output, plot, animation)
     from pamrs.recording import load_recording
     from pamrs.simulation import simulate
 
@@ -159,8 +164,17 @@ def _simulate(
         command = _held(recording, "valve_command", input)
     with _progress(f"simulating {loaded.name}"):
         result = simulate(loaded, command, initial=initial, **timing)
-    _write_csv(output, result)
-    typer.echo(f"{loaded.name}: {len(result.time)} samples written to {output}")
+    if output is not None:
+        _write_csv(output, result)
+        typer.echo(f"{loaded.name}: {len(result.time)} samples written to {output}")
+    if plot is not None:
+        recorded = {name: (recording.time[usable], recording.channels[name][usable]) for name, usable in recording.mask.items()}
+        result.plot(plot, recorded=recorded)
+        typer.echo(f"written: {plot}", err=True)
+    if animation is not None:
+        with _progress("drawing the motion"):
+            result.animate(animation, speed=speed)
+        typer.echo(f"written: {animation}", err=True)
     for name in STATES:
         if name in initial and name in result:
             usable = recording.mask[name]

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import importlib
+import os
 from collections.abc import Iterator, Mapping
+from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -56,8 +60,65 @@ class Simulation(Mapping[str, Array]):
         columns = {name: values for name, values in self._channels.items() if name != "time"}
         return pd.DataFrame(columns, index=pd.Index(self.time, name="time"))
 
+    def plot(self, path: str | os.PathLike[str], *, recorded: Mapping[str, tuple[Array, Array]] | None = None) -> Path:
+        """Write a picture of the channels over time, a PNG.
+
+        Parameters
+        ----------
+        path : path-like
+            The file.
+        recorded : mapping of str to (time, value), optional
+            Recorded channels to draw beside them [s, SI].
+
+        Returns
+        -------
+        Path
+            The file written.
+
+        Raises
+        ------
+        ImportError
+            If matplotlib is missing; names the extra to install.
+        """
+        from pamrs.writing import write_atomically
+
+        return write_atomically(path, _motion().channels_png(self, recorded))
+
+    def animate(self, path: str | os.PathLike[str], *, speed: float = 1.0) -> Path:
+        """Write the arm as it moves, an animated GIF.
+
+        Parameters
+        ----------
+        path : path-like
+            The file.
+        speed : float
+            Times faster than it happens.
+
+        Returns
+        -------
+        Path
+            The file written.
+
+        Raises
+        ------
+        ImportError
+            If matplotlib is missing; names the extra to install.
+        ParameterError
+            If the rig has no arm, there are fewer than two samples, or the speed is not a finite number above zero.
+        """
+        written: Path = _motion().write_animation(self, Path(path), speed=speed)
+        return written
+
     def __repr__(self) -> str:
         return f"Simulation({self.rig.name}: {self.time.size} rows of {', '.join(self._channels)})"
+
+
+def _motion() -> ModuleType:
+    """The module that draws; an ImportError names the extra where matplotlib is missing."""
+    try:
+        return importlib.import_module("pamrs.report.motion")
+    except ImportError as error:
+        raise ImportError("pictures need matplotlib: pip install 'pamrs[plot]'") from error
 
 
 def core_rig(rig: Rig) -> _core.Rig:

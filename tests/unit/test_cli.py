@@ -193,3 +193,29 @@ def test_a_new_rig_file_can_be_read_as_it_stands(capsys, tmp_path, like):
 def test_rig_check_takes_the_name_of_a_packaged_rig(capsys):
     assert cli.main(["rig", "check", "sealed_chamber"]) == 0
     assert "'sealed_chamber' is valid" in capsys.readouterr().out
+
+
+def test_simulate_draws_channels_and_motion(capsys, tmp_path):
+    run_ = pamrs.simulate(pamrs.rigs.shoulder(), np.full(41, 6.0), sample_time=0.01)
+    lines = ["time [s],valve_command [V],muscle_pressure [Pa],supply_pressure [Pa],joint_angle [rad]"]
+    columns = ("time", "valve_command", "muscle_pressure", "supply_pressure", "joint_angle")
+    lines += [",".join(f"{run_[name][row]:.9g}" for name in columns) for row in range(41)]
+    table = tmp_path / "input.csv"
+    table.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    plot, motion = tmp_path / "run.png", tmp_path / "run.gif"
+    code, _, err = run(capsys, "simulate", "shoulder", "--input", table, "--plot", plot, "--animation", motion, "--speed", "2")
+    assert code == 0, err
+    assert plot.read_bytes().startswith(b"\x89PNG")
+    assert motion.read_bytes().startswith(b"GIF89a")
+    code, _, err = run(capsys, "simulate", "shoulder", "--input", table)
+    assert code == 2
+    assert "nothing would be written" in err
+    code, _, err = run(capsys, "simulate", "shoulder", "--input", table, "--animation", motion, "--speed", "0")
+    assert code == 2
+    assert "speed = 0.0 is not allowed" in err
+
+
+def test_a_chamber_has_no_motion(tmp_path):
+    still = pamrs.simulate(pamrs.rigs.sealed_chamber(), sample_time=0.1, duration=1.0, initial={"muscle_pressure": 5e5})
+    with pytest.raises(pamrs.ParameterError, match="'sealed_chamber' has no arm to draw"):
+        still.animate(tmp_path / "x.gif")
