@@ -11,9 +11,10 @@
 //! - Christoffel symbols leave `C_ij = A_ij sin(phi_i - phi_j) phi_j'`, so that `H' - 2C` is skew.
 //!
 //! `phi` is linear in `q` with ones, so that `H_ab` and `C_ab` in `q` are sums of those in `phi` over all
-//! `i >= a`, `j >= b`, the Christoffel property included. Everything has fixed size: nothing allocates. `H`
-//! is solved by Cholesky's method without square roots (`L D L^T`), written here because nalgebra's asks for
-//! more of a number than [`Scalar`] does; for one link it is the division of [`super::one_link::OneLink`].
+//! `i >= a`, `j >= b`, the Christoffel property included. Everything has fixed size: nothing allocates.
+//! Accelerations are solved for in `phi`, where no sum cancels, by Cholesky's method without square roots
+//! (`L D L^T`), written here because nalgebra's asks for more of a number than [`Scalar`] does; for one link
+//! it is the division of [`super::one_link::OneLink`].
 
 pub use super::one_link::Stops;
 use crate::error::{check_range, Error, Result};
@@ -123,7 +124,9 @@ impl<S: Scalar, const N: usize> PlanarArm<S, N> {
 
     /// Mass matrix `H` [kg m2] at joint angles [rad].
     pub fn mass_matrix(&self, angle: &SVector<S, N>) -> SMatrix<S, N, N> {
-        self.mass_at(&Pose::new(angle))
+        let mut mass = outward_sums(self.mass_of_links(&Pose::new(angle)));
+        mass.fill_lower_triangle_with_upper_triangle(); // the two differ by the order of rounding
+        mass
     }
 
     /// Coriolis matrix `C` [kg m2/s] of the Christoffel symbols, at joint angles [rad] and rates [rad/s].
@@ -140,7 +143,7 @@ impl<S: Scalar, const N: usize> PlanarArm<S, N> {
 
     /// Gravity torques `G` [N m]: what holds the arm at rest.
     pub fn gravity_torque(&self, angle: &SVector<S, N>) -> SVector<S, N> {
-        self.weight_at(&Pose::new(angle))
+        outward_sum(self.weight_on_links(&Pose::new(angle)))
     }
 
     /// Friction torques [N m] at joint rates [rad/s], positive against positive rates.
@@ -209,16 +212,14 @@ impl<S: Scalar, const N: usize> PlanarArm<S, N> {
     ) -> Result<SVector<S, N>> {
         let pose = Pose::new(angle);
         let (friction, stop) = (self.friction_torque(rate), self.stop_torque(angle, rate));
-        let (velocity, weight) = (self.velocity_torque(&pose, rate), self.weight_at(&pose));
-        let net = SVector::from_fn(|i, _| torque[i] - friction[i] - velocity[i] - weight[i] + stop[i]);
-        let result = solve(&self.mass_at(&pose), net).map_err(|e| named(e, angle, rate, torque))?;
-        match result.iter().position(|a| !a.re().is_finite()) {
-            None => Ok(result),
-            Some(k) => {
-                let error = Error::parameter(format!("acceleration[{k}]"), result[k].re(), "a finite number");
-                Err(named(error, angle, rate, torque))
-            }
-        }
+        let (velocity, weight) = (self.velocity_on_links(&pose, rate), self.weight_on_links(&pose));
+        let (drive, stop) = (reactions(torque.zip_map(&friction, |t, f| t - f)), reactions(stop));
+        let net = SVector::from_fn(|i, _| drive[i] - velocity[i] - weight[i] + stop[i]);
+        let turn = solve(&self.mass_of_links(&pose), net).map_err(|e| named(e, angle, rate, torque))?;
+        let result = SVector::<S, N>::from_fn(|i, _| if i > 0 { turn[i] - turn[i - 1] } else { turn[i] });
+        let Some(k) = result.iter().position(|a| !a.re().is_finite()) else { return Ok(result) };
+        let error = Error::parameter(format!("acceleration[{k}]"), result[k].re(), "a finite number");
+        Err(named(error, angle, rate, torque))
     }
 
     /// Joint torques [N m] that give joint accelerations [rad/s2], friction and stops overcome.
@@ -230,36 +231,32 @@ impl<S: Scalar, const N: usize> PlanarArm<S, N> {
     ) -> SVector<S, N> {
         let pose = Pose::new(angle);
         let (friction, stop) = (self.friction_torque(rate), self.stop_torque(angle, rate));
-        let (velocity, weight) = (self.velocity_torque(&pose, rate), self.weight_at(&pose));
-        let mass = self.mass_at(&pose);
-        SVector::from_fn(|i, _| {
-            let inertial = (0..N).fold(constant::<S>(0.0), |sum, j| sum + mass[(i, j)] * acceleration[j]);
-            inertial + velocity[i] + weight[i] + friction[i] - stop[i]
+        let (velocity, weight) = (self.velocity_on_links(&pose, rate), self.weight_on_links(&pose));
+        let (mass, turn) = (self.mass_of_links(&pose), running_sum(acceleration));
+        let joints: SVector<S, N> = outward_sum(SVector::from_fn(|i, _| {
+            (0..N).fold(constant::<S>(0.0), |sum, j| sum + mass[(i, j)] * turn[j]) + velocity[i] + weight[i]
+        }));
+        SVector::from_fn(|i, _| joints[i] + friction[i] - stop[i])
+    }
+
+    /// Mass matrix of the links' directions.
+    #[inline]
+    fn mass_of_links(&self, pose: &Pose<S, N>) -> SMatrix<S, N, N> {
+        SMatrix::from_fn(|i, j| match i == j {
+            true => self.coupling[(i, j)],
+            false => self.coupling[(i, j)] * pose.cos_between(i, j),
         })
     }
 
+    /// Torques of gravity on the links.
     #[inline]
-    fn mass_at(&self, pose: &Pose<S, N>) -> SMatrix<S, N, N> {
-        let mut mass = self.coupling;
-        for i in 0..N {
-            for j in i + 1..N {
-                mass[(i, j)] *= pose.cos_between(i, j);
-                mass[(j, i)] = mass[(i, j)];
-            }
-        }
-        mass = outward_sums(mass);
-        mass.fill_lower_triangle_with_upper_triangle(); // the two differ by the order of rounding
-        mass
+    fn weight_on_links(&self, pose: &Pose<S, N>) -> SVector<S, N> {
+        SVector::from_fn(|i, _| self.moment[i] * self.gravity * pose.sin[i])
     }
 
+    /// `C phi'` of the links, without the matrix.
     #[inline]
-    fn weight_at(&self, pose: &Pose<S, N>) -> SVector<S, N> {
-        outward_sum(SVector::from_fn(|i, _| self.moment[i] * self.gravity * pose.sin[i]))
-    }
-
-    /// `C q'`, without the matrix.
-    #[inline]
-    fn velocity_torque(&self, pose: &Pose<S, N>, rate: &SVector<S, N>) -> SVector<S, N> {
+    fn velocity_on_links(&self, pose: &Pose<S, N>, rate: &SVector<S, N>) -> SVector<S, N> {
         let turn = running_sum(rate);
         let mut torque = zeros::<S, N>();
         for i in 0..N {
@@ -269,7 +266,7 @@ impl<S: Scalar, const N: usize> PlanarArm<S, N> {
                 torque[j] -= pull * turn[i] * turn[i];
             }
         }
-        outward_sum(torque)
+        torque
     }
 }
 
@@ -303,7 +300,7 @@ fn zeros<S: Scalar, const N: usize>() -> SVector<S, N> {
     SVector::from_element(constant(0.0))
 }
 
-/// Rates of the links' directions from joint rates.
+/// Rates (or accelerations) of the links' directions from those of the joints.
 #[inline]
 fn running_sum<S: Scalar, const N: usize>(rate: &SVector<S, N>) -> SVector<S, N> {
     let mut sum = *rate;
@@ -323,25 +320,29 @@ fn outward_sum<S: Scalar, const N: usize>(mut torque: SVector<S, N>) -> SVector<
     torque
 }
 
-/// The same for both sides of a matrix.
+/// Torques on the links from torques of the joints: each joint's reaction is on the link before.
 #[inline]
-fn outward_sums<S: Scalar, const N: usize>(mut matrix: SMatrix<S, N, N>) -> SMatrix<S, N, N> {
-    for i in (1..N).rev() {
-        for j in 0..N {
-            let beyond = matrix[(i, j)];
-            matrix[(i - 1, j)] += beyond;
-        }
+fn reactions<S: Scalar, const N: usize>(mut torque: SVector<S, N>) -> SVector<S, N> {
+    for i in 1..N {
+        let reaction = torque[i];
+        torque[i - 1] -= reaction;
     }
-    for j in (1..N).rev() {
-        for i in 0..N {
-            let beyond = matrix[(i, j)];
-            matrix[(i, j - 1)] += beyond;
+    torque
+}
+
+/// [`outward_sum`] on both sides of a matrix.
+fn outward_sums<S: Scalar, const N: usize>(mut matrix: SMatrix<S, N, N>) -> SMatrix<S, N, N> {
+    for _ in 0..2 {
+        for j in 0..N {
+            let sum = outward_sum(matrix.column(j).into_owned());
+            matrix.set_column(j, &sum);
         }
+        matrix = matrix.transpose();
     }
     matrix
 }
 
-/// `H^-1 b` by `L D L^T`.
+/// `h^-1 b` by `L D L^T`.
 #[inline]
 fn solve<S: Scalar, const N: usize>(h: &SMatrix<S, N, N>, mut b: SVector<S, N>) -> Result<SVector<S, N>> {
     let (mut lower, mut pivot) = (*h, zeros::<S, N>());
