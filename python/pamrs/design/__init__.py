@@ -15,7 +15,7 @@ from __future__ import annotations
 from pamrs.design.joint_design import AREA_TOLERANCE, JointDesign, MethodComparison, compare_methods, optimise
 from pamrs.design.pressure import ParetoFront, PressureSearch, Trial, least_pressure, minimum_pressure, pareto_front
 from pamrs.design.problem import DEFAULT_BOUNDS, LENGTHS, SYMBOLS, JointProblem, Scores
-from pamrs.design.search import METHODS, Genetic, History, Search, search
+from pamrs.design.search import METHODS, Genetic, History, MissingPackageError, Search, search
 
 __all__ = [
     "AREA_TOLERANCE",
@@ -28,6 +28,7 @@ __all__ = [
     "JointDesign",
     "JointProblem",
     "MethodComparison",
+    "MissingPackageError",
     "ParetoFront",
     "PressureSearch",
     "Scores",

@@ -258,8 +258,8 @@ def pareto_front(
     ------
     ParameterError
         If the population is not a multiple of four, or a number is too small.
-    ImportError
-        If DEAP is not installed.
+    MissingPackageError
+        If DEAP is not installed; also an ``ImportError``.
     """
     if population < 4 or population % 4 or generations < 1 or seed < 0:
         raise ParameterError(

@@ -11,9 +11,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pamrs.errors import ParameterError
+from pamrs.errors import PamrsError, ParameterError
 
-__all__ = ["METHODS", "Genetic", "History", "Search", "search"]
+__all__ = ["METHODS", "Genetic", "History", "MissingPackageError", "Search", "search"]
 
 Array = NDArray[np.float64]
 Objective = Callable[[Array], Array]
@@ -25,7 +25,9 @@ METHODS: Final = ("ga", "de", "cma", "random")
 #: Evaluations of the published algorithm: 20 designs, then 18 new ones in each of 100 generations.
 PUBLISHED_EVALUATIONS: Final = 1820
 
-_MISSING: Final = "pip install pamrs[search]"
+
+class MissingPackageError(PamrsError, ImportError):
+    """A package that only some commands need is not installed."""
 
 
 @dataclass(frozen=True)
@@ -214,8 +216,8 @@ def search(
     ------
     ParameterError
         If the method is unknown, the budget too small, or the seed negative.
-    ImportError
-        If DEAP or cma is not installed.
+    MissingPackageError
+        If DEAP or cma is not installed; also an ``ImportError``.
     """
     settings = genetic or Genetic()
     if method not in METHODS:
@@ -244,9 +246,9 @@ def search(
     return evaluator.result(method, seed)
 
 
-def missing(error: ImportError) -> ImportError:
-    """The error that says what to install."""
-    return ImportError(f"this search needs {error.name}, which is not installed: {_MISSING}", name=error.name)
+def missing(error: ImportError, extra: str = "search") -> MissingPackageError:
+    """The error that says what to install for a package that could not be imported."""
+    return MissingPackageError(f"this needs {error.name}, which is not installed: pip install pamrs[{extra}]", name=error.name)
 
 
 @contextmanager
