@@ -61,6 +61,9 @@ class Rig:
         supply_pressure: float | None = None,
         joint_angle: float | None = None,
         joint_rate: float | None = None,
+        length: float | None = None,
+        lengths: _Array | None = None,
+        pressures: _Array | None = None,
     ) -> dict[str, _Array]: ...
     def predict(
         self,
@@ -88,8 +91,9 @@ class Simulator:
         supply_pressure: float | None = None,
         joint_angle: float | None = None,
         joint_rate: float | None = None,
+        length: float | None = None,
     ) -> Simulator: ...
-    def advance(self, valve_command: _Array) -> dict[str, _Array]: ...
+    def advance(self, valve_command: _Array, length: _Array | None = None, pressure: _Array | None = None) -> dict[str, _Array]: ...
     def observe(self) -> dict[str, _Array]: ...
     @property
     def state(self) -> _Array: ...

@@ -12,7 +12,7 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -43,6 +43,7 @@ CHANNEL_UNITS = {
     "joint_rate": "rad/s",
     "muscle_force": "N",
     "contraction_ratio": "1",
+    "length_rate": "m/s",
     "air_volume": "m3",
 }
 STATE_NEEDS = {"muscle_pressure": "chamber", "supply_pressure": "supply", "joint_angle": "arm"}
@@ -146,6 +147,8 @@ def _simulate(
     if output is None and plot is None and animation is None:
         raise typer.BadParameter("nothing would be written: give --output, --plot or --animation")
     _check_writable(output, plot, animation)
+    import numpy as np
+
     from pamrs.recording import load_recording
     from pamrs.simulation import simulate
 
@@ -156,14 +159,17 @@ def _simulate(
         for name in STATES
         if name in recording.channels and recording.mask[name].any() and loaded.model[STATE_NEEDS[name]]
     }
-    timing: dict[str, float] = {"sample_time": recording.sample_time}
-    if loaded.model["valve"] is None:
-        command = None
-        timing["duration"] = float(recording.time[-1])
+    drive: dict[str, Any] = {}
+    if loaded.model["valve"] is not None:
+        drive["valve_command"] = _held(recording, "valve_command", input)
+    elif (loaded.model["load"] or {}).get("kind") == "frame":
+        drive["length"] = _held(recording, "length", input)
+        if recording.mask.get("muscle_pressure", np.zeros(1)).any():
+            drive["pressure"] = _held(recording, "muscle_pressure", input)
     else:
-        command = _held(recording, "valve_command", input)
+        drive["duration"] = float(recording.time[-1])
     with _progress(f"simulating {loaded.name}"):
-        result = simulate(loaded, command, initial=initial, **timing)
+        result = simulate(loaded, sample_time=recording.sample_time, initial=initial, **drive)
     if output is not None:
         _write_csv(output, result)
         typer.echo(f"{loaded.name}: {len(result.time)} samples written to {output}")
@@ -188,7 +194,7 @@ def _held(recording: Recording, name: str, path: Path) -> NDArray[np.float64]:
     import numpy as np
 
     if name not in recording.channels or not recording.mask[name].any():
-        raise ValueError(f"{path}: no usable {name}, which the rig's valve needs")
+        raise ValueError(f"{path}: no usable {name}, which the rig needs")
     usable = recording.mask[name]
     last = np.maximum.accumulate(np.where(usable, np.arange(usable.size), int(np.argmax(usable))))
     if not usable.all():

@@ -129,8 +129,8 @@ def _muscle(
             raise FitError("; ".join([str(error), *map_.notes])) from error
     typer.echo(summary, nl=False)
     _write(contents)
-    if rig is not None and (base is None or "joint" not in base.blocks):
-        typer.echo(f"{rig} has a muscle only: it cannot be simulated until it has [joint] and [arm]", err=True)
+    if rig is not None and base is None:
+        typer.echo(f"{rig} is the muscle on a load frame: simulate it with a length, or give it [joint] and [arm]", err=True)
 
 
 @fit_app.command("friction")

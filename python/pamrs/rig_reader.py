@@ -296,9 +296,18 @@ class Reader:
 
     def cross_checks(self, model: Mapping[str, Any]) -> None:
         """What no key alone shows: lists that belong together, and blocks that need each other."""
-        for block, needs in (("valve", "supply"), ("joint", "muscle"), ("joint", "arm"), ("arm", "joint")):
+        for block, needs in (("valve", "supply"), ("joint", "muscle"), ("joint", "arm"), ("arm", "joint"), ("load", "muscle")):
             if model[block] is not None and model[needs] is None:
                 self.problem(f"the block [{block}] needs the block [{needs}], which is missing")
+        load = model["load"]
+        if load is not None:
+            if model["joint"] is not None or model["arm"] is not None:
+                self.problem("the block [load] does not go with [joint] and [arm]: a rig has one or the others")
+            if not load["min_length"] < load["max_length"]:
+                self.problem(
+                    f"load.max_length = {load['max_length']:g} m is not allowed: "
+                    f"more than load.min_length = {load['min_length']:g} m is needed"
+                )
         valve, muscle, joint = model["valve"], model["muscle"], model["joint"]
         if valve is not None:
             self.area_fraction(valve["opening"], valve["fraction"])

@@ -64,7 +64,7 @@ _TURN = 2 * math.pi
 _TENDON = ("tendon", "published")
 
 #: The key of a block that says of which kind it is, and the kind where it is left out.
-_KINDS: Final = {"muscle": ("model", "robinson"), "joint": ("kind", "tendon")}
+_KINDS: Final = {"muscle": ("model", "robinson"), "joint": ("kind", "tendon"), "load": ("kind", "mass")}
 
 #: block -> its keys, in the order in which they are written.
 BLOCKS: Final[dict[str, tuple[Key, ...]]] = {
@@ -138,6 +138,18 @@ BLOCKS: Final[dict[str, tuple[Key, ...]]] = {
         Key("coulomb", "N m", 0.0, 1e6, 0.0),
         Key("coulomb_speed", "rad/s", 1e-9, 100.0, 0.02),
         Key("gravity", "m/s2", -50.0, 50.0, 9.80665),
+    ),
+    "load": (
+        Key("kind", default="mass", kind="choice", choices=("mass", "frame")),
+        Key("min_length", "m", 1e-3, 10.0),
+        Key("max_length", "m", 1e-3, 10.0),
+        Key("mass", "kg", 1e-6, 1e5, only=("mass",)),
+        Key("viscous", "N s/m", 0.0, 1e7, 0.0, only=("mass",)),
+        Key("coulomb", "N", 0.0, 1e7, 0.0, only=("mass",)),
+        Key("coulomb_speed", "m/s", 1e-9, 100.0, 0.01, only=("mass",)),
+        Key("gravity", "m/s2", -50.0, 50.0, 9.80665, only=("mass",)),
+        Key("stop_stiffness", "N/m", 0.0, 1e11, 1e6, only=("mass",)),
+        Key("stop_damping", "N s/m", 0.0, 1e9, 1e3, only=("mass",)),
     ),
     "sensors": (
         Key("pressure_zero", "Pa", -1e6, 1e6, 0.0),

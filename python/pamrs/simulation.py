@@ -23,7 +23,7 @@ __all__ = ["Simulation", "core_rig", "simulate"]
 
 Array = NDArray[np.float64]
 
-_INITIAL = ("muscle_pressure", "supply_pressure", "joint_angle", "joint_rate")
+_INITIAL = ("muscle_pressure", "supply_pressure", "joint_angle", "joint_rate", "length")
 
 
 class Simulation(Mapping[str, Array]):
@@ -139,6 +139,8 @@ def simulate(
     step: float | None = None,
     initial: Mapping[str, float] | None = None,
     duration: float | None = None,
+    length: ArrayLike | None = None,
+    pressure: ArrayLike | None = None,
 ) -> Simulation:
     """Simulate a rig from an initial state by fixed-step RK4.
 
@@ -153,10 +155,15 @@ def simulate(
     step : float, optional
         RK4 step [s]; divides ``sample_time``. By default the longest that does and is at most 1 ms.
     initial : mapping of str to float, optional
-        Initial ``muscle_pressure``, ``supply_pressure`` [Pa, gauge], ``joint_angle`` [rad], ``joint_rate`` [rad/s]. What
-        is left out is at rest: muscle vented, tank at its initial pressure, joint at its rest angle.
+        Initial ``muscle_pressure``, ``supply_pressure`` [Pa, gauge], ``joint_angle`` [rad], ``joint_rate`` [rad/s], or
+        ``length`` [m] with a linear load. What is left out is at rest: muscle vented, tank at its initial pressure, joint at
+        its rest angle, muscle at its rest length.
     duration : float, optional
         Simulated time [s] of a rig without a valve, instead of ``valve_command``.
+    length : array_like, shape (n,), optional
+        Length of the muscle at each row [m], straight lines between: what a load frame (``[load] kind = "frame"``) prescribes.
+    pressure : array_like, shape (n,), optional
+        Gauge pressure in the muscle at each row [Pa], as a regulator holds it, for a rig without a valve.
 
     Returns
     -------
@@ -186,18 +193,45 @@ def simulate(
     if valve_command is None:
         if has_valve:
             raise ParameterError("valve_command is missing: a rig with a valve needs one value per sample [V]")
-        if duration is None or not (np.isfinite(duration) and duration >= 0):
-            raise ParameterError(f"duration = {duration} is not allowed: a finite time >= 0 s (or give valve_command)")
-        command = np.zeros(round(duration / sample_time) + 1)
+        command = np.zeros(_rows(sample_time, duration, length, pressure))
     else:
         if duration is not None:
             raise ParameterError(f"duration = {duration} is not allowed together with valve_command, which sets it")
         command = held_command(valve_command)
     fine = default_step(sample_time) if step is None else step
-    channels = core_rig(rig).simulate(command, sample_time, fine, **initial_values(initial))
+    start: dict[str, Any] = dict(initial_values(initial))
+    prescribed = (("length", length, "length", "lengths"), ("pressure", pressure, "muscle_pressure", "pressures"))
+    for name, values, first, channel in prescribed:
+        if values is not None:
+            signal = _signal(name, values, command.size)
+            start |= {first: float(signal[0]), channel: np.ascontiguousarray(signal[1:])}
+    channels = core_rig(rig).simulate(command, sample_time, fine, **start)
     time = np.asarray(np.arange(command.size) * sample_time, dtype=np.float64)
     shown = {"valve_command": command} if has_valve else {}
     return Simulation({"time": time, **shown, **channels}, rig)
+
+
+def _rows(sample_time: float, duration: float | None, *signals: ArrayLike | None) -> int:
+    """Number of rows without a valve command: that of what is prescribed, or of the duration."""
+    given = [np.asarray(signal) for signal in signals if signal is not None]
+    if given:
+        if duration is not None:
+            raise ParameterError(f"duration = {duration} is not allowed together with length or pressure, which set it")
+        return max(int(given[0].size), 1)
+    if duration is None or not (np.isfinite(duration) and duration >= 0):
+        raise ParameterError(f"duration = {duration} is not allowed: a finite time >= 0 s (or give valve_command)")
+    return round(duration / sample_time) + 1
+
+
+def _signal(name: str, values: ArrayLike, rows: int) -> Array:
+    """A prescribed channel, one finite value for each row."""
+    signal = np.asarray(values, dtype=np.float64)
+    if signal.shape != (rows,):
+        raise ParameterError(f"{name} has the shape {signal.shape}; ({rows},) is needed, one value for each row")
+    bad = np.flatnonzero(~np.isfinite(signal))
+    if bad.size:
+        raise ParameterError(f"{name}[{bad[0]}] = {signal[bad[0]]} is not allowed: a finite number is needed")
+    return signal
 
 
 def held_command(valve_command: ArrayLike) -> NDArray[np.float64]:

@@ -117,13 +117,18 @@ class Simulator:
         """
         return _single(self._core.observe())
 
-    def step(self, valve_command: float | None = None) -> dict[str, float]:
+    def step(
+        self, valve_command: float | None = None, *, length: float | None = None, pressure: float | None = None
+    ) -> dict[str, float]:
         """Hold a command for one sample.
 
         Parameters
         ----------
         valve_command : float, optional
             Command [V]; needed by a rig with a valve.
+        length, pressure : float, optional
+            Length [m] that a load frame, and gauge pressure [Pa] that a regulator reaches by the end of the sample; as for
+            :func:`pamrs.simulate`.
 
         Returns
         -------
@@ -141,7 +146,8 @@ class Simulator:
             if self._has_valve:
                 raise ParameterError("valve_command is missing: a rig with a valve needs one value per sample [V]")
             valve_command = 0.0
-        return _single(self._core.advance(np.array([valve_command], dtype=np.float64)))
+        given = [None if value is None else np.array([value], dtype=np.float64) for value in (length, pressure)]
+        return _single(self._core.advance(np.array([valve_command], dtype=np.float64), *given))
 
     def run(self, valve_command: ArrayLike) -> dict[str, Array]:
         """Hold one command after the other.

@@ -257,7 +257,7 @@ def test_friction_is_fitted_before_the_moduli_and_goes_into_the_rig(capsys, loop
     assert document["friction"]["parameters"][0]["value"] == given["friction_coefficient"]
     assert document["fit"]["rms_error"] < 0.01
     assert document["comparison"][0]["rms"] < 0.01  # every model has it
-    assert f"{rig} has a muscle only: it cannot be simulated until it has [joint] and [arm]" in err
+    assert f"{rig} is the muscle on a load frame: simulate it with a length" in err
     code, out, _ = run(capsys, loops, *options, "--muscle", rig)  # that muscle has friction
     assert "friction as the muscle has it: c_F = max(c0 + c1 P, 0.01), c0 = 0.0" in out
     code, out, _ = run(capsys, loops, *options, "--muscle", rig, "--friction", "fit", "--levels", "100kPa,300kPa,600kPa")

@@ -208,6 +208,7 @@ fn check(rig: &Rig, block: Block, measured: &Measured<'_>, starts: &[usize], n: 
         return lacks("muscle_pressure was not measured");
     }
     match block {
+        _ if spec.load.is_some() => lacks("a linear load cannot be cut from its muscle yet"),
         Block::Supply if spec.supply.is_none() => lacks("the rig has no supply"),
         Block::Supply | Block::Chamber if spec.valve.is_some() && measured.supply_pressure.is_none() => {
             lacks("supply_pressure was not measured")

@@ -1,5 +1,6 @@
 //! Fixed-step simulation: the command is held over each sample, RK4 steps fill it.
 
+use crate::error::check_range;
 use crate::integrate::rk4;
 use crate::rig::plant::{Memory, Plant, Simulated, State, ANGLE, MASS, PRESSURE, RATE, STATES, SUPPLY};
 use crate::rig::{ParameterId as P, Rig};
@@ -71,12 +72,17 @@ impl Initial {
             ("initial.supply_pressure", self.supply_pressure),
             ("initial.muscle_pressure", self.muscle_pressure),
         ] {
-            crate::error::check_range(name, value, vacuum, 1e8, "Pa (gauge)")?;
+            check_range(name, value, vacuum, 1e8, "Pa (gauge)")?;
         }
-        crate::error::check_range("initial.joint_rate", self.joint_rate, -1e4, 1e4, "rad/s")?;
+        check_range("initial.joint_rate", self.joint_rate, -1e4, 1e4, "rad/s")?;
+        if let (Some(load), Some(muscle)) = (&rig.spec().load, &rig.spec().muscle) {
+            let length = muscle.rest_length - self.joint_angle;
+            check_range("initial.length", length, load.min_length, load.max_length, "m")?;
+            return Ok(());
+        }
         let (low, high) =
             rig.spec().joint.as_ref().map_or((-7.0, 7.0), |j| (j.min_angle - 0.2, j.max_angle + 0.2));
-        crate::error::check_range("initial.joint_angle", self.joint_angle, low, high, "rad")?;
+        check_range("initial.joint_angle", self.joint_angle, low, high, "rad")?;
         Ok(())
     }
 }
@@ -216,7 +222,7 @@ impl Progress {
             });
         }
         for (k, value) in numbers.iter().enumerate() {
-            crate::error::check_range(&format!("state[{k}]"), *value, -1e15, 1e15, "(as it was read)")?;
+            check_range(&format!("state[{k}]"), *value, -1e15, 1e15, "(as it was read)")?;
         }
         let (state, rest) = numbers.split_at(STATES);
         let (memory, samples) = rest.split_at(Memory::<f64>::NUMBERS);
@@ -241,7 +247,8 @@ impl Progress {
         Ok(())
     }
 
-    /// Hold each command [V] for one sample and append the sample after it.
+    /// Hold each command [V] for one sample and append the sample after it. What is prescribed moves evenly to its
+    /// value for the end of each sample.
     ///
     /// # Errors
     /// [`Error::Parameter`] for a command that is not finite, [`Error::Integration`] when the state leaves the model's
@@ -251,18 +258,29 @@ impl Progress {
         rig: &Rig,
         timing: Timing,
         valve_command: &[f64],
+        prescribed: Prescribed<'_>,
         out: &mut Trajectory,
     ) -> Result<()> {
         let plant = Plant::new(rig, *rig.values());
         let dt = timing.step();
+        prescribed.validate(rig, valve_command.len())?;
         for (k, command) in valve_command.iter().enumerate() {
             if !command.is_finite() {
                 return Err(Error::parameter(format!("valve_command[{k}]"), *command, "a finite voltage"));
             }
             let spool = plant.spool(*command);
             let mut next = *self;
-            for _ in 0..timing.substeps {
-                step(&plant, &mut next.state, &mut next.memory, spool, dt, Simulated::ALL, |_, _| {});
+            let ends = prescribed.ends(rig, &self.state, k);
+            for sub in 0..timing.substeps {
+                let (state, memory) = (&mut next.state, &mut next.memory);
+                if ends.is_free() {
+                    step(&plant, state, memory, spool, dt, Simulated::ALL, |_, _| {});
+                } else {
+                    step(&plant, state, memory, spool, dt, ends.simulated(), |fraction, y| {
+                        let share = (sub as f64 + fraction) / timing.substeps as f64;
+                        ends.drive(share, timing.sample_time, y);
+                    });
+                }
             }
             next.samples += 1;
             next.observed(&plant, timing, out)?;
@@ -270,6 +288,98 @@ impl Progress {
         }
         Ok(())
     }
+}
+
+/// Channels that are given instead of simulated, one value for the end of each sample.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Prescribed<'a> {
+    /// Length of the muscle [m]: needed by a load frame, refused by other rigs.
+    pub length: Option<&'a [f64]>,
+    /// Gauge pressure in the muscle [Pa], as a regulator holds it: for rigs without a valve.
+    pub pressure: Option<&'a [f64]>,
+}
+
+impl Prescribed<'_> {
+    fn validate(&self, rig: &Rig, samples: usize) -> Result<()> {
+        let frame = rig.spec().load.as_ref().filter(|load| load.is_frame());
+        let model = |text: &str| Err(Error::Model(text.into()));
+        match (frame, self.length) {
+            (Some(_), None) => {
+                return model("length is missing: a load frame needs one value per sample [m]")
+            }
+            (None, Some(_)) => {
+                return model(
+                    "length is given, which only a rig with a load frame takes ([load] kind = \"frame\")",
+                )
+            }
+            (Some(load), Some(length)) => {
+                check_signal("length", length, samples, (load.min_length, load.max_length), "m")?;
+            }
+            (None, None) => {}
+        }
+        if let Some(pressure) = self.pressure {
+            if rig.spec().valve.is_some() {
+                return model(
+                    "pressure is given, which only a rig without [valve] takes: there the valve decides",
+                );
+            }
+            check_signal("pressure", pressure, samples, (-rig.gas.ambient_pressure, 1e8), "Pa (gauge)")?;
+        }
+        Ok(())
+    }
+
+    /// Where one sample begins and ends.
+    fn ends(&self, rig: &Rig, state: &State<f64>, sample: usize) -> Ends {
+        let rest = rig.spec().muscle.as_ref().map_or(0.0, |m| m.rest_length);
+        let at = |signal: Option<&[f64]>| signal.and_then(|s| s.get(sample)).copied();
+        Ends {
+            shortening: at(self.length).map(|length| (state[ANGLE], rest - length)),
+            pressure: at(self.pressure).map(|p| (state[PRESSURE], p + rig.gas.ambient_pressure)),
+        }
+    }
+}
+
+/// Prescribed channels over one sample: (from, to).
+#[derive(Debug, Clone, Copy)]
+struct Ends {
+    shortening: Option<(f64, f64)>,
+    pressure: Option<(f64, f64)>,
+}
+
+impl Ends {
+    fn is_free(&self) -> bool {
+        self.shortening.is_none() && self.pressure.is_none()
+    }
+
+    fn simulated(&self) -> Simulated {
+        Simulated { arm: self.shortening.is_none(), chamber: self.pressure.is_none(), supply: true }
+    }
+
+    fn drive(&self, share: f64, sample_time: f64, state: &mut State<f64>) {
+        if let Some((from, to)) = self.shortening {
+            (state[ANGLE], state[RATE]) = (from + (to - from) * share, (to - from) / sample_time);
+        }
+        if let Some((from, to)) = self.pressure {
+            state[PRESSURE] = from + (to - from) * share;
+        }
+    }
+}
+
+fn check_signal(
+    name: &str,
+    values: &[f64],
+    samples: usize,
+    (low, high): (f64, f64),
+    unit: &str,
+) -> Result<()> {
+    if values.len() != samples {
+        let why = "one for the end of each sample".into();
+        return Err(Error::Length { name: name.into(), found: values.len(), expected: samples, why });
+    }
+    for (k, value) in values.iter().enumerate() {
+        check_range(&format!("{name}[{k}]"), *value, low, high, unit)?;
+    }
+    Ok(())
 }
 
 /// Simulate `valve_command` [V], one value per sample, held; without a valve its values have no effect but
@@ -282,7 +392,7 @@ pub fn simulate(rig: &Rig, valve_command: &[f64], timing: Timing, initial: Initi
     let mut out = Trajectory::with_capacity(valve_command.len());
     if let Some((last, held)) = valve_command.split_last() {
         progress.observe(rig, timing, &mut out)?;
-        progress.advance(rig, timing, held, &mut out)?;
+        progress.advance(rig, timing, held, Prescribed::default(), &mut out)?;
         if !last.is_finite() {
             return Err(Error::parameter(
                 format!("valve_command[{}]", held.len()),

@@ -7,7 +7,7 @@ use crate::simulator::{channels, initial, run};
 use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray1};
 use pam_core::residual::{predict, Block, Measured, Signal};
 use pam_core::rig::{ParameterId, RigSpec};
-use pam_core::simulate::{Progress, Timing, Trajectory};
+use pam_core::simulate::{Prescribed, Progress, Timing, Trajectory};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -41,7 +41,7 @@ impl Rig {
     }
 
     /// Simulate a held command; returns channels by name.
-    #[pyo3(signature = (valve_command, sample_time, step, *, muscle_pressure=None, supply_pressure=None, joint_angle=None, joint_rate=None))]
+    #[pyo3(signature = (valve_command, sample_time, step, *, muscle_pressure=None, supply_pressure=None, joint_angle=None, joint_rate=None, length=None, lengths=None, pressures=None))]
     #[allow(clippy::too_many_arguments)]
     fn simulate<'py>(
         &self,
@@ -53,9 +53,14 @@ impl Rig {
         supply_pressure: Option<f64>,
         joint_angle: Option<f64>,
         joint_rate: Option<f64>,
+        length: Option<f64>,
+        lengths: Option<PyReadonlyArray1<'py, f64>>,
+        pressures: Option<PyReadonlyArray1<'py, f64>>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let command = values(&valve_command);
-        let start = initial(&self.inner, muscle_pressure, supply_pressure, joint_angle, joint_rate);
+        let start = initial(&self.inner, muscle_pressure, supply_pressure, joint_angle, joint_rate, length);
+        let (lengths, pressures) = (lengths.as_ref().map(values), pressures.as_ref().map(values));
+        let prescribed = Prescribed { length: lengths.as_deref(), pressure: pressures.as_deref() };
         let begun = Timing::new(sample_time, step)
             .and_then(|timing| Ok((timing, Progress::start(&self.inner, start)?)))
             .map_err(|e| error(py, &e))?;
@@ -63,7 +68,7 @@ impl Rig {
         let mut out = Trajectory::with_capacity(command.len());
         progress.observe(&self.inner, timing, &mut out).map_err(|e| error(py, &e))?;
         let held = command.split_last().map_or(&[][..], |(_, held)| held);
-        run(py, &self.inner, timing, &mut progress, held, &mut out)?;
+        run(py, &self.inner, timing, &mut progress, held, prescribed, &mut out)?;
         channels(py, &self.inner, out)
     }
 

@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use crate::convert::{array, error, values};
 use crate::rig::Rig;
 use numpy::{PyArray1, PyReadonlyArray1};
-use pam_core::simulate::{Initial, Progress, Timing, Trajectory};
+use pam_core::simulate::{Initial, Prescribed, Progress, Timing, Trajectory};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -19,10 +19,17 @@ pub fn run(
     timing: Timing,
     progress: &mut Progress,
     command: &[f64],
+    prescribed: Prescribed<'_>,
     out: &mut Trajectory,
 ) -> PyResult<()> {
-    for chunk in command.chunks((STEPS_AT_ONCE / timing.substeps).max(1)) {
-        py.detach(|| progress.advance(rig, timing, chunk, out)).map_err(|e| error(py, &e))?;
+    let at_once = (STEPS_AT_ONCE / timing.substeps).max(1);
+    for first in (0..command.len()).step_by(at_once) {
+        let last = (first + at_once).min(command.len());
+        let part = |signal: Option<&'_ [f64]>| signal.map(|s| s.get(first..last).unwrap_or(&[]).to_vec());
+        let (length, pressure) = (part(prescribed.length), part(prescribed.pressure));
+        let here = Prescribed { length: length.as_deref(), pressure: pressure.as_deref() };
+        let held = &command[first..last];
+        py.detach(|| progress.advance(rig, timing, held, here, out)).map_err(|e| error(py, &e))?;
         py.check_signals()?;
     }
     Ok(())
@@ -41,6 +48,12 @@ pub fn channels<'py>(py: Python<'py>, rig: &pam_core::Rig, t: Trajectory) -> PyR
         out.set_item("contraction_ratio", array(py, t.contraction_ratio))?;
         out.set_item("muscle_force", array(py, t.muscle_force))?;
         out.set_item("joint_torque", array(py, t.joint_torque))?;
+    } else if let (Some(_), Some(muscle)) = (&rig.spec().load, &rig.spec().muscle) {
+        let length = t.contraction_ratio.iter().map(|e| muscle.rest_length * (1.0 - e)).collect();
+        out.set_item("length", array(py, length))?;
+        out.set_item("length_rate", array(py, t.joint_rate.iter().map(|rate| -rate).collect()))?;
+        out.set_item("contraction_ratio", array(py, t.contraction_ratio))?;
+        out.set_item("muscle_force", array(py, t.muscle_force))?;
     }
     out.set_item("air_volume", array(py, t.air_volume))?;
     out.set_item("temperature", array(py, t.gas_temperature))?;
@@ -54,12 +67,14 @@ pub fn initial(
     supply_pressure: Option<f64>,
     joint_angle: Option<f64>,
     joint_rate: Option<f64>,
+    length: Option<f64>,
 ) -> Initial {
     let rest = Initial::rest(rig);
+    let shortening = length.zip(rig.spec().muscle.as_ref()).map(|(l, muscle)| muscle.rest_length - l);
     Initial {
         supply_pressure: supply_pressure.unwrap_or(rest.supply_pressure),
         muscle_pressure: muscle_pressure.unwrap_or(rest.muscle_pressure),
-        joint_angle: joint_angle.unwrap_or(rest.joint_angle),
+        joint_angle: shortening.or(joint_angle).unwrap_or(rest.joint_angle),
         joint_rate: joint_rate.unwrap_or(rest.joint_rate),
     }
 }
@@ -81,7 +96,7 @@ impl Simulator {
 #[pymethods]
 impl Simulator {
     #[new]
-    #[pyo3(signature = (rig, sample_time, step, *, muscle_pressure=None, supply_pressure=None, joint_angle=None, joint_rate=None))]
+    #[pyo3(signature = (rig, sample_time, step, *, muscle_pressure=None, supply_pressure=None, joint_angle=None, joint_rate=None, length=None))]
     #[allow(clippy::too_many_arguments)]
     fn new(
         py: Python<'_>,
@@ -92,24 +107,30 @@ impl Simulator {
         supply_pressure: Option<f64>,
         joint_angle: Option<f64>,
         joint_rate: Option<f64>,
+        length: Option<f64>,
     ) -> PyResult<Self> {
         let rig = rig.shared();
-        let start = initial(&rig, muscle_pressure, supply_pressure, joint_angle, joint_rate);
+        let start = initial(&rig, muscle_pressure, supply_pressure, joint_angle, joint_rate, length);
         let made = Timing::new(sample_time, step).and_then(|t| Ok((t, Progress::start(&rig, start)?)));
         let (timing, progress) = made.map_err(|e| error(py, &e))?;
         Ok(Self { rig, timing, progress: Mutex::new(progress) })
     }
 
     /// Hold each command [V] for one sample; the samples after them as channels by name.
+    #[pyo3(signature = (valve_command, length=None, pressure=None))]
     fn advance<'py>(
         &self,
         py: Python<'py>,
         valve_command: PyReadonlyArray1<'py, f64>,
+        length: Option<PyReadonlyArray1<'py, f64>>,
+        pressure: Option<PyReadonlyArray1<'py, f64>>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let command = values(&valve_command);
+        let (length, pressure) = (length.as_ref().map(values), pressure.as_ref().map(values));
+        let prescribed = Prescribed { length: length.as_deref(), pressure: pressure.as_deref() };
         let mut out = Trajectory::with_capacity(command.len());
         let mut progress = *self.progress();
-        let done = run(py, &self.rig, self.timing, &mut progress, &command, &mut out);
+        let done = run(py, &self.rig, self.timing, &mut progress, &command, prescribed, &mut out);
         *self.progress() = progress;
         done?;
         channels(py, &self.rig, out)

@@ -75,6 +75,10 @@ def diagnose(case: Case | str | os.PathLike[str], *, progress: Callable[[str], N
         raise DiagnosisError(
             f"the nominal rig of case {case.name!r} already has the effect {rig.effects[0]['id']!r}; diagnose a rig without effects"
         )
+    if "load" in rig.blocks:
+        raise DiagnosisError(
+            f"the rig of case {case.name!r} has a [load]; rigs with [joint] and [arm], or without a muscle, can be diagnosed"
+        )
     say(f"{case.name}: preparing {len(case.recordings)} recordings")
     fitted = [prepare(r, rig) for r in case.fit or case.recordings]
     held = [prepare(r, rig) for r in case.held_out if case.fit]

@@ -22,6 +22,7 @@ dead_volume = {{ value = {volume!r}, unit = "m3" }}
 """
 
 
+_INSIDE: Final = 0.999  # of the range of the muscle that the frame uses
 _NAMES: Final = ("shoulder", "sealed_chamber")
 
 
@@ -92,7 +93,9 @@ def shoulder() -> Rig:
 
 
 def bench(muscle: Muscle, name: str = "bench") -> Rig:
-    """A bench with one muscle and a dead volume of a tenth of the muscle's own, without valve, supply and arm.
+    """A bench: one muscle on a load frame over all lengths that it can have, and a dead volume of a tenth of the muscle's own.
+
+    It has no valve: :func:`pamrs.simulate` takes the length and, where it is held, the pressure.
 
     Parameters
     ----------
@@ -106,7 +109,10 @@ def bench(muscle: Muscle, name: str = "bench") -> Rig:
     Rig
     """
     rig = parse_rig(_BENCH.format(volume=0.1 * float(muscle.air_volume(0.0))), source="bench")
-    return Rig(name, {**rig.model, "muscle": dict(muscle.parameters)})
+    low, high = muscle.contraction_range
+    rest = float(muscle.parameters["rest_length"])
+    frame = {"kind": "frame", "min_length": rest * (1.0 - _INSIDE * high), "max_length": rest * (1.0 - _INSIDE * low)}
+    return Rig(name, {**rig.model, "muscle": dict(muscle.parameters), "load": frame})
 
 
 def sealed_chamber() -> Rig:

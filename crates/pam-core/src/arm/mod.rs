@@ -1,4 +1,5 @@
 //! Arms: the load that a joint moves.
 
+pub mod linear;
 pub mod one_link;
 pub mod planar;

@@ -13,7 +13,7 @@ pub use self::pulley::Pulley;
 pub use self::tendon::TendonJoint;
 use crate::error::{check_range, Error, Result};
 use crate::rig::spec::JointSpec;
-use crate::scalar::Scalar;
+use crate::scalar::{constant, Scalar};
 
 /// Shortening and moment arms at one angle.
 #[derive(Debug, Clone, Copy)]
@@ -35,6 +35,8 @@ pub enum Joint {
     Pulley(Pulley),
     /// Polynomial of the angle.
     Polynomial(Polynomial),
+    /// No joint: the coordinate is the shortening itself, of a linear load.
+    Direct,
 }
 
 impl Joint {
@@ -79,7 +81,7 @@ impl Joint {
     pub fn reaches(&self, angle: f64) -> bool {
         match self {
             Self::Tendon(joint) => joint.reaches(angle),
-            Self::Pulley(_) | Self::Polynomial(_) => true,
+            Self::Pulley(_) | Self::Polynomial(_) | Self::Direct => true,
         }
     }
 
@@ -90,6 +92,10 @@ impl Joint {
             Self::Tendon(joint) => joint.eval(angle),
             Self::Pulley(joint) => joint.eval(angle),
             Self::Polynomial(joint) => joint.eval(angle),
+            Self::Direct => {
+                let one = constant(1.0);
+                JointPoint { shortening: angle, moment_arm: one, torque_arm: one }
+            }
         }
     }
 }

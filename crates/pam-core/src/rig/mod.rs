@@ -55,11 +55,16 @@ impl Rig {
         let g = &spec.gas;
         let gas = Gas::new(g.ambient_pressure, g.temperature, g.gas_constant, g.heat_capacity_ratio);
         let valve = spec.valve.as_ref().map(|v| AreaTable::new(&v.opening, &v.fraction)).transpose()?;
-        let joint = spec.joint.as_ref().map(Joint::new).transpose()?;
+        let joint = match (&spec.joint, &spec.load) {
+            (Some(joint), _) => Some(Joint::new(joint)?),
+            (None, Some(_)) => Some(Joint::Direct),
+            (None, None) => None,
+        };
         let (values, mut active) = collect_values(&spec)?;
         active.direction = muscle.as_ref().is_some_and(CompiledMuscle::has_direction);
         let rig = Self { gas, valve, muscle, joint, values, active, spec };
         rig.check_reach()?;
+        rig.check_lengths()?;
         Ok(rig)
     }
 
@@ -79,6 +84,24 @@ impl Rig {
                     let (low, high) = (muscle.table.e_min, muscle.table.e_max);
                     let allowed = format!("an angle that keeps the muscle's contraction ratio ({contraction:.4} here) from {low:.4} to {high:.4}");
                     return Err(Error::parameter(name, angle, allowed));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// A linear load's whole range must be within the muscle's table.
+    fn check_lengths(&self) -> Result<()> {
+        if let (Some(load), Some(muscle)) = (&self.spec.load, &self.muscle) {
+            let rest = muscle.exact.spec.rest_length;
+            for (name, length) in [("load.min_length", load.min_length), ("load.max_length", load.max_length)]
+            {
+                if !muscle.table.contains(1.0 - length / rest) {
+                    let (short, long) =
+                        (rest * (1.0 - muscle.table.e_max), rest * (1.0 - muscle.table.e_min));
+                    let allowed =
+                        format!("a length that the muscle can have, from {short:.5} to {long:.5} m");
+                    return Err(Error::parameter(name, length, allowed));
                 }
             }
         }

@@ -5,6 +5,7 @@
 //! be *driven* by a signal instead of being integrated: that is where the chain is cut.
 
 use super::{ParameterId as P, Rig, Values};
+use crate::arm::linear::HangingMass;
 use crate::arm::one_link::{OneLink, Stops};
 use crate::effects::{heat_transfer, leak_muscle, muscle_hysteresis};
 use crate::gas::chamber::{pressure_rate, ChamberState, Polytropic};
@@ -19,9 +20,9 @@ pub const STATES: usize = 5;
 pub const SUPPLY: usize = 0;
 /// Index of the chamber pressure [Pa, absolute].
 pub const PRESSURE: usize = 1;
-/// Index of the joint angle [rad].
+/// Index of the joint angle [rad], or of the shortening [m] of a linear load.
 pub const ANGLE: usize = 2;
-/// Index of the joint rate [rad/s].
+/// Index of the joint rate [rad/s], or of the rate of shortening [m/s].
 pub const RATE: usize = 3;
 /// Index of the gas mass [kg].
 pub const MASS: usize = 4;
@@ -103,7 +104,14 @@ pub struct Plant<'a, S> {
     values: Values<S>,
     count: f64,
     rest_length: f64,
-    arm: Option<(OneLink<S>, Stops)>,
+    body: Option<(Body<S>, Stops)>,
+}
+
+/// What the muscles move.
+#[derive(Debug, Clone)]
+enum Body<S> {
+    Arm(OneLink<S>),
+    Mass(HangingMass),
 }
 
 /// What the muscle and joint are at one angle.
@@ -120,9 +128,9 @@ impl<'a, S: Scalar> Plant<'a, S> {
     /// Compose a rig with parameter values.
     pub fn new(rig: &'a Rig, values: Values<S>) -> Self {
         let spec = rig.spec();
-        let arm = match (&spec.arm, &spec.joint) {
-            (Some(a), Some(j)) => Some((
-                OneLink {
+        let body = match (&spec.arm, &spec.joint, &spec.load, &spec.muscle) {
+            (Some(a), Some(j), ..) => Some((
+                Body::Arm(OneLink {
                     inertia: values[P::Inertia],
                     first_moment: values[P::FirstMoment],
                     length: a.length,
@@ -131,7 +139,7 @@ impl<'a, S: Scalar> Plant<'a, S> {
                     coulomb: values[P::Coulomb],
                     coulomb_speed: a.coulomb_speed,
                     gravity: a.gravity,
-                },
+                }),
                 Stops {
                     min_angle: j.min_angle,
                     max_angle: j.max_angle,
@@ -139,11 +147,26 @@ impl<'a, S: Scalar> Plant<'a, S> {
                     damping: j.stop_damping,
                 },
             )),
+            (_, _, Some(load), Some(muscle)) if !load.is_frame() => Some((
+                Body::Mass(HangingMass {
+                    mass: load.mass,
+                    viscous: load.viscous,
+                    coulomb: load.coulomb,
+                    coulomb_speed: load.coulomb_speed,
+                    gravity: load.gravity,
+                }),
+                Stops {
+                    min_angle: muscle.rest_length - load.max_length,
+                    max_angle: muscle.rest_length - load.min_length,
+                    stiffness: load.stop_stiffness,
+                    damping: load.stop_damping,
+                },
+            )),
             _ => None,
         };
         let (count, rest_length) =
             spec.muscle.as_ref().map_or((0.0, 1.0), |m| (f64::from(m.count), m.rest_length));
-        Self { rig, values, count, rest_length, arm }
+        Self { rig, values, count, rest_length, body }
     }
 
     /// Parameter values.
@@ -264,10 +287,14 @@ impl<'a, S: Scalar> Plant<'a, S> {
         if simulated.supply || simulated.chamber {
             self.gas_rates(state, spool, &m, simulated, &mut rates);
         }
-        if let (true, Some((arm, stops))) = (simulated.arm, &self.arm) {
+        if let (true, Some((body, stops))) = (simulated.arm, &self.body) {
             rates[ANGLE] = state[RATE];
             let stop = stops.torque(state[ANGLE], state[RATE]);
-            rates[RATE] = arm.acceleration(state[ANGLE], state[RATE], m.force * m.torque_arm, stop);
+            let torque = m.force * m.torque_arm;
+            rates[RATE] = match body {
+                Body::Arm(arm) => arm.acceleration(state[ANGLE], state[RATE], torque, stop),
+                Body::Mass(load) => load.acceleration(state[RATE], torque, stop),
+            };
         }
         rates
     }

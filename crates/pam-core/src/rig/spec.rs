@@ -99,6 +99,61 @@ pub struct ArmSpec {
     pub gravity: f64,
 }
 
+/// Linear load on a muscle, in the place of joint and arm: a hanging `mass`, or a `frame` that prescribes the length.
+#[allow(missing_docs)]
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LoadSpec {
+    pub kind: String,
+    #[serde(default)]
+    pub mass: f64,
+    #[serde(default)]
+    pub viscous: f64,
+    #[serde(default)]
+    pub coulomb: f64,
+    #[serde(default)]
+    pub coulomb_speed: f64,
+    #[serde(default)]
+    pub gravity: f64,
+    pub min_length: f64,
+    pub max_length: f64,
+    #[serde(default)]
+    pub stop_stiffness: f64,
+    #[serde(default)]
+    pub stop_damping: f64,
+}
+
+impl LoadSpec {
+    /// Whether the length is prescribed.
+    #[must_use]
+    pub fn is_frame(&self) -> bool {
+        self.kind == "frame"
+    }
+
+    fn validate(&self) -> Result<()> {
+        if !matches!(self.kind.as_str(), "mass" | "frame") {
+            return Err(Error::Choice {
+                name: "load.kind".into(),
+                value: format!("\"{}\"", self.kind),
+                allowed: "one of \"mass\", \"frame\"".into(),
+            });
+        }
+        check_range("load.min_length", self.min_length, 1e-3, self.max_length, "m (below load.max_length)")?;
+        check_range("load.max_length", self.max_length, self.min_length, 20.0, "m")?;
+        if self.is_frame() {
+            return Ok(());
+        }
+        check_range("load.mass", self.mass, 1e-6, 1e6, "kg")?;
+        check_range("load.viscous", self.viscous, 0.0, 1e9, "N s/m")?;
+        check_range("load.coulomb", self.coulomb, 0.0, 1e9, "N")?;
+        check_range("load.coulomb_speed", self.coulomb_speed, 1e-9, 1e3, "m/s")?;
+        check_range("load.gravity", self.gravity, -1e3, 1e3, "m/s2")?;
+        check_range("load.stop_stiffness", self.stop_stiffness, 0.0, 1e12, "N/m")?;
+        check_range("load.stop_damping", self.stop_damping, 0.0, 1e12, "N s/m")?;
+        Ok(())
+    }
+}
+
 /// Constant sensor errors: measured = true + zero.
 #[allow(missing_docs)]
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
@@ -131,6 +186,8 @@ pub struct RigSpec {
     pub muscle: Option<MuscleSpec>,
     pub joint: Option<JointSpec>,
     pub arm: Option<ArmSpec>,
+    #[serde(default)]
+    pub load: Option<LoadSpec>,
     pub sensors: SensorSpec,
     #[serde(default)]
     pub effects: Vec<EffectSpec>,
@@ -195,6 +252,9 @@ impl RigSpec {
             range("joint.min_angle", joint.min_angle, -7.0, joint.max_angle, "rad (below joint.max_angle)")?;
             range("joint.max_angle", joint.max_angle, joint.min_angle, 7.0, "rad")?;
         }
+        if let Some(load) = &self.load {
+            load.validate()?;
+        }
         if let Some(arm) = &self.arm {
             range("arm.inertia", arm.inertia, 0.0, 1e6, "kg m2")?;
             range("arm.first_moment", arm.first_moment, -1e6, 1e6, "kg m")?;
@@ -225,12 +285,19 @@ impl RigSpec {
             (None, Some(_)) => return missing("valve", "supply"),
             _ => {}
         }
+        if self.load.is_some() {
+            return match (&self.muscle, &self.joint, &self.arm) {
+                (Some(_), None, None) => Ok(()),
+                (None, ..) => missing("load", "muscle"),
+                _ => Err(Error::Model("a rig has either [joint] and [arm] or [load], not both".into())),
+            };
+        }
         match (&self.muscle, &self.joint, &self.arm) {
             (Some(_), Some(_), Some(_)) | (None, None, None) => {}
             (_, None, Some(_)) => return missing("arm", "joint"),
             (None, Some(_), _) => return missing("joint", "muscle"),
             (_, Some(_), None) => return missing("joint", "arm"),
-            (Some(_), None, None) => return missing("muscle", "joint"),
+            (Some(_), None, None) => return missing("muscle", "joint] and [arm], or [load"),
         }
         Ok(())
     }

@@ -1,0 +1,152 @@
+"""Linear loads: a muscle on a load frame, and one that carries a mass."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pamrs
+from pamrs.fit import ForceMap, fit_muscle
+from pamrs.rig import parse_rig
+
+MASS = """
+schema = "pamrs.rig/1"
+name = "hanging"
+[gas]
+[chamber]
+dead_volume = { value = 20, unit = "cm3" }
+[muscle]
+rest_length = { value = 276, unit = "mm" }
+rest_diameter = { value = 25.4, unit = "mm" }
+braid_angle = { value = 73.5, unit = "deg" }
+wall_thickness = { value = 3.175, unit = "mm" }
+modulus_slope = { value = [3.0, -0.35], unit = "1" }
+modulus_offset = { value = [1.15, -0.15], unit = "MPa" }
+[load]
+mass = { value = 40, unit = "kg" }
+viscous = { value = 600, unit = "N s/m" }
+min_length = { value = 180, unit = "mm" }
+max_length = { value = 280, unit = "mm" }
+"""
+
+
+def muscle() -> pamrs.Muscle:
+    found = pamrs.rigs.shoulder().muscle
+    assert found is not None
+    return found.replace(count=1, friction_coefficient=0.1, friction_presliding=5e-4)
+
+
+def test_a_bench_measures_the_force_of_its_muscle_in_both_directions() -> None:
+    rig = pamrs.rigs.bench(muscle())
+    there = np.linspace(0.276, 0.22, 201)
+    length = np.concatenate([there, there[::-1][1:]])
+    run = pamrs.simulate(rig, sample_time=0.01, length=length, pressure=np.full(length.size, 4e5))
+    np.testing.assert_allclose(run["length"], length, rtol=1e-12)
+    np.testing.assert_allclose(run["muscle_pressure"], 4e5, rtol=1e-12)
+    e = 1.0 - length / 0.276
+    for rows, way in ((slice(20, 201), -1.0), (slice(221, 401), 1.0)):
+        np.testing.assert_allclose(run["muscle_force"][rows], muscle().force(4e5, e[rows], direction=way), rtol=1e-8)
+
+
+def test_a_shut_chamber_on_the_frame_follows_its_volume() -> None:
+    rig = pamrs.rigs.bench(muscle())
+    length = np.linspace(0.27, 0.24, 101)
+    run = pamrs.simulate(rig, sample_time=0.01, length=length, initial={"muscle_pressure": 3e5})
+    absolute = run["muscle_pressure"] + 101325.0
+    constant = absolute * run["air_volume"] ** rig.model["chamber"]["alpha"]
+    np.testing.assert_allclose(constant, constant[0], rtol=1e-7)
+
+
+def test_a_mass_hangs_where_the_muscle_carries_it() -> None:
+    rig = parse_rig(MASS)
+    assert parse_rig(rig.to_toml_text()).model == rig.model
+    run = pamrs.simulate(rig, sample_time=0.01, duration=20.0, initial={"muscle_pressure": 4e5, "length": 0.25})
+    assert run["length"][0] == pytest.approx(0.25)
+    assert run["muscle_force"][-1] == pytest.approx(40.0 * 9.80665, rel=1e-4)
+    assert abs(run["length_rate"][-1]) < 1e-5
+    assert "joint_angle" not in run
+
+
+def test_a_mass_can_be_raised_by_a_pressure_that_is_given() -> None:
+    rig = parse_rig(MASS)
+    pressure = np.linspace(2e5, 6e5, 1001)
+    run = pamrs.simulate(rig, sample_time=0.01, pressure=pressure, initial={"length": 0.262})
+    np.testing.assert_allclose(run["muscle_pressure"], pressure, rtol=1e-12)
+    assert run["length"][-1] < run["length"][200] - 0.01
+
+
+def test_steps_on_the_frame_are_the_run() -> None:
+    rig = pamrs.rigs.bench(muscle())
+    length = np.linspace(0.276, 0.25, 30)
+    whole = pamrs.simulate(rig, sample_time=0.01, length=length, pressure=np.full(30, 2e5))
+    one = pamrs.Simulator(rig, sample_time=0.01, initial={"muscle_pressure": 2e5, "length": float(length[0])})
+    for row in range(1, 30):
+        sample = one.step(length=float(length[row]), pressure=2e5)
+        assert sample["muscle_force"] == whole["muscle_force"][row]
+
+
+def test_a_fitted_muscle_goes_onto_the_bench_and_back() -> None:
+    real = muscle().replace(friction_coefficient=0.0)
+    p, e = (grid.ravel() for grid in np.meshgrid([2e5, 4e5, 6e5], np.linspace(0.0, 0.25, 8)))
+    data = ForceMap.from_arrays(0.276 * (1.0 - e), p, real.force(p, e), rest_length=0.276)
+    rig = parse_rig(fit_muscle(data, real, order=2).to_rig().to_toml_text())
+    length = np.linspace(0.276, 0.21, 50)
+    run = pamrs.simulate(rig, sample_time=0.01, length=length, pressure=np.full(50, 3e5))
+    np.testing.assert_allclose(run["muscle_force"], real.force(3e5, 1.0 - length / 0.276), rtol=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({}, r"duration = None"),
+        ({"duration": 1.0}, r"length is missing"),
+        ({"length": [0.27, np.nan]}, r"length\[1\] = nan"),
+        ({"length": [0.27, 0.5]}, r"length\[0\] = 0\.5 is not allowed"),
+        ({"length": [0.27, 0.26], "pressure": [1e5]}, r"pressure has the shape \(1,\); \(2,\)"),
+        ({"length": [0.27, 0.26], "duration": 1.0}, r"duration = 1\.0 is not allowed together with length"),
+        ({"length": [0.5, 0.26]}, r"initial\.length = 0\.5"),
+    ],
+)
+def test_what_a_frame_cannot_do_is_named(arguments: dict[str, object], message: str) -> None:
+    with pytest.raises(pamrs.PamrsError, match=message):
+        pamrs.simulate(pamrs.rigs.bench(muscle()), sample_time=0.01, **arguments)  # type: ignore[arg-type]
+
+
+def test_only_a_frame_takes_a_length_and_no_valve_a_pressure() -> None:
+    with pytest.raises(pamrs.PamrsError, match="only a rig with a load frame"):
+        pamrs.simulate(pamrs.rigs.sealed_chamber(), sample_time=0.1, length=[0.1, 0.1])
+    with pytest.raises(pamrs.PamrsError, match=r"without \[valve\]"):
+        pamrs.simulate(pamrs.rigs.shoulder(), [5.0, 5.0], sample_time=0.01, pressure=[0.0, 1e5])
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("value = 280", "value = 170", r"load\.max_length = 0\.17 m is not allowed"),
+        ("[load]\nmass", '[load]\nkind = "frame"\nmass', r"load\.mass is not allowed with 'frame': only with mass"),
+        ("value = 40, ", "value = 0, ", r"load\.mass = 0 kg"),
+        ("[muscle]", "[sensor]", r"needs the block \[muscle\]|sensor"),
+    ],
+)
+def test_loads_that_cannot_be_are_named(old: str, new: str, message: str) -> None:
+    with pytest.raises(pamrs.RigError, match=message):
+        parse_rig(MASS.replace(old, new))
+
+
+def test_a_load_and_a_joint_exclude_each_other() -> None:
+    load = '[load]\nkind = "frame"\nmin_length = { value = 200, unit = "mm" }\nmax_length = { value = 270, unit = "mm" }\n'
+    with pytest.raises(pamrs.RigError, match=r"\[load\] does not go with \[joint\] and \[arm\]"):
+        parse_rig(pamrs.rigs.shoulder().to_toml_text() + load)
+
+
+def test_a_rig_with_a_load_is_not_diagnosed_by_guessing(tmp_path: Path) -> None:
+    (tmp_path / "rig.toml").write_text(MASS, encoding="utf-8")
+    run = pamrs.simulate(parse_rig(MASS), sample_time=0.01, duration=2.0, initial={"muscle_pressure": 4e5, "length": 0.25})
+    rows = "\n".join(f"{t:.3f},{p:.3f}" for t, p in zip(run.time, run["muscle_pressure"], strict=True))
+    (tmp_path / "run.csv").write_text(f"time [s],muscle_pressure [Pa]\n{rows}\n", encoding="utf-8")
+    case = 'schema = "pamrs.case/1"\nrig = "rig.toml"\n[[recording]]\nfile = "run.csv"\nrole = "fit"\n'
+    (tmp_path / "case.toml").write_text(case, encoding="utf-8")
+    with pytest.raises(pamrs.DiagnosisError, match=r"has a \[load\]"):
+        pamrs.diagnose(tmp_path)
