@@ -46,7 +46,8 @@ CHANNEL_UNITS = {
     "length_rate": "m/s",
     "air_volume": "m3",
 }
-STATE_NEEDS = {"muscle_pressure": "chamber", "supply_pressure": "supply", "joint_angle": "arm"}
+STATE_NEEDS = {"muscle_pressure": "chamber", "supply_pressure": "supply", "joint_angle": "arm", "length": "load"}
+SENSOR_ZEROS = {"muscle_pressure": "pressure_zero", "joint_angle": "angle_zero"}
 STATES = tuple(STATE_NEEDS)
 
 app = typer.Typer(
@@ -154,19 +155,21 @@ def _simulate(
 
     loaded = _rig(rig)
     recording = load_recording(input)
+    zeros = {name: loaded.model["sensors"][zero] for name, zero in SENSOR_ZEROS.items()}
     initial = {
-        name: float(recording.channels[name][recording.mask[name]][0])
+        name: float(recording.channels[name][recording.mask[name]][0]) - zeros.get(name, 0.0)
         for name in STATES
         if name in recording.channels and recording.mask[name].any() and loaded.model[STATE_NEEDS[name]]
     }
     drive: dict[str, Any] = {}
     if loaded.model["valve"] is not None:
         drive["valve_command"] = _held(recording, "valve_command", input)
-    elif (loaded.model["load"] or {}).get("kind") == "frame":
+    if (loaded.model["load"] or {}).get("kind") == "frame":
         drive["length"] = _held(recording, "length", input)
-        if recording.mask.get("muscle_pressure", np.zeros(1)).any():
-            drive["pressure"] = _held(recording, "muscle_pressure", input)
-    else:
+        if loaded.model["valve"] is None and recording.mask.get("muscle_pressure", np.zeros(1)).any():
+            drive["pressure"] = _held(recording, "muscle_pressure", input) - zeros["muscle_pressure"]
+        initial = {name: value for name, value in initial.items() if name == "supply_pressure"}
+    elif loaded.model["valve"] is None:
         drive["duration"] = float(recording.time[-1])
     with _progress(f"simulating {loaded.name}"):
         result = simulate(loaded, sample_time=recording.sample_time, initial=initial, **drive)
@@ -181,10 +184,10 @@ def _simulate(
         with _progress("drawing the motion"):
             result.animate(animation, speed=speed)
         typer.echo(f"written: {animation}", err=True)
-    for name in STATES:
-        if name in initial and name in result:
-            usable = recording.mask[name]
-            apart = result[name][usable] - recording.channels[name][usable]
+    for name, recorded_as in (*((name, name) for name in STATES), ("muscle_force", "force")):
+        usable = recording.mask.get(recorded_as)
+        if name in result and name not in drive and usable is not None and usable.any():
+            apart = result[name][usable] - recording.channels[recorded_as][usable]
             rms = float((apart**2).mean() ** 0.5)
             typer.echo(f"{name}: rms difference from the recording {rms:.4g} {CHANNEL_UNITS[name]}")
 
@@ -219,7 +222,10 @@ def _write_csv(path: Path, columns: Mapping[str, NDArray[np.float64]]) -> None:
 @rig_app.command("check")
 def _rig_check(file: Annotated[Path, typer.Argument(help="Rig file (TOML), or the name of a rig of the package.")]) -> None:
     """Check a rig file and list its parameters in SI units."""
+    from pamrs.simulation import core_rig
+
     rig = _rig(file)
+    core_rig(rig)  # what only the whole model shows: lengths that the muscle cannot have, angles that the tendon does not reach
     width = max((len(name) for name in rig.parameters), default=0)
     for name, parameter in rig.parameters.items():
         known = f"{parameter.value:.6g}" if parameter.known else "unknown"

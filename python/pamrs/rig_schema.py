@@ -117,9 +117,9 @@ BLOCKS: Final[dict[str, tuple[Key, ...]]] = {
     ),
     "joint": (
         Key("kind", default="tendon", kind="choice", choices=("tendon", "published", "pulley", "polynomial")),
-        Key("upper_axial", "m", -10.0, 10.0, only=_TENDON),
+        Key("upper_axial", "m", 1e-6, 10.0, only=_TENDON),
         Key("upper_offset", "m", -10.0, 10.0, only=_TENDON),
-        Key("lower_axial", "m", -10.0, 10.0, only=_TENDON),
+        Key("lower_axial", "m", 1e-6, 10.0, only=_TENDON),
         Key("lower_offset", "m", -10.0, 10.0, only=_TENDON),
         Key("radius", "m", -10.0, 10.0, only=("pulley",)),
         Key("coefficients", "m", -100.0, 100.0, kind="vector", only=("polynomial",)),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import math
 import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -23,7 +24,16 @@ __all__ = ["Simulation", "core_rig", "simulate"]
 
 Array = NDArray[np.float64]
 
-_INITIAL = ("muscle_pressure", "supply_pressure", "joint_angle", "joint_rate", "length")
+#: Initial values, and the block that each needs.
+_INITIAL = {
+    "muscle_pressure": "chamber",
+    "supply_pressure": "supply",
+    "joint_angle": "arm",
+    "joint_rate": "arm",
+    "length": "load",
+    "length_rate": "load",
+}
+_STABLE = 2.0  # of the 2.78 of RK4 on the negative real axis
 
 
 class Simulation(Mapping[str, Array]):
@@ -155,9 +165,9 @@ def simulate(
     step : float, optional
         RK4 step [s]; divides ``sample_time``. By default the longest that does and is at most 1 ms.
     initial : mapping of str to float, optional
-        Initial ``muscle_pressure``, ``supply_pressure`` [Pa, gauge], ``joint_angle`` [rad], ``joint_rate`` [rad/s], or
-        ``length`` [m] with a linear load. What is left out is at rest: muscle vented, tank at its initial pressure, joint at
-        its rest angle, muscle at its rest length.
+        Initial ``muscle_pressure``, ``supply_pressure`` [Pa, gauge], ``joint_angle`` [rad], ``joint_rate`` [rad/s], or with a
+        linear load ``length`` [m], ``length_rate`` [m/s]. What is left out is at rest: muscle vented, tank at its initial
+        pressure, joint at its rest angle, muscle at its rest length.
     duration : float, optional
         Simulated time [s] of a rig without a valve, instead of ``valve_command``.
     length : array_like, shape (n,), optional
@@ -198,14 +208,13 @@ def simulate(
         if duration is not None:
             raise ParameterError(f"duration = {duration} is not allowed together with valve_command, which sets it")
         command = held_command(valve_command)
-    fine = default_step(sample_time) if step is None else step
-    start: dict[str, Any] = dict(initial_values(initial))
-    prescribed = (("length", length, "length", "lengths"), ("pressure", pressure, "muscle_pressure", "pressures"))
-    for name, values, first, channel in prescribed:
-        if values is not None:
-            signal = _signal(name, values, command.size)
-            start |= {first: float(signal[0]), channel: np.ascontiguousarray(signal[1:])}
-    channels = core_rig(rig).simulate(command, sample_time, fine, **start)
+    start: dict[str, Any] = dict(initial_values(initial, rig))
+    for name, values, first, channel in _prescribed(rig, length, pressure):
+        signal = _signal(name, values, command.size)
+        if start.setdefault(first, float(signal[0])) != float(signal[0]):
+            raise ParameterError(f"initial {first} = {start[first]:g} does not go with {name}[0] = {signal[0]:g}: leave one out")
+        start[channel] = np.ascontiguousarray(signal[1:])
+    channels = core_rig(rig).simulate(command, sample_time, chosen_step(sample_time, step, rig), **start)
     time = np.asarray(np.arange(command.size) * sample_time, dtype=np.float64)
     shown = {"valve_command": command} if has_valve else {}
     return Simulation({"time": time, **shown, **channels}, rig)
@@ -223,14 +232,42 @@ def _rows(sample_time: float, duration: float | None, *signals: ArrayLike | None
     return round(duration / sample_time) + 1
 
 
+def _prescribed(rig: Rig, length: ArrayLike | None, pressure: ArrayLike | None) -> list[tuple[str, ArrayLike, str, str]]:
+    """What is prescribed, checked against the rig: (name, values, its initial value, its channel of the core)."""
+    given = []
+    frame = rig.model["load"] is not None and rig.model["load"]["kind"] == "frame"
+    if length is not None:
+        if not frame:
+            raise ParameterError('length is given, which only a rig with a load frame takes ([load] kind = "frame")')
+        low, high = rig.model["load"]["min_length"], rig.model["load"]["max_length"]
+        _within("length", length, low, high, "m")
+        given.append(("length", length, "length", "lengths"))
+    elif frame:
+        raise ParameterError("length is missing: a load frame needs one value per sample [m]")
+    if pressure is not None:
+        if rig.model["valve"] is not None:
+            raise ParameterError("pressure is given, which only a rig without [valve] takes: there the valve decides")
+        _within("pressure", pressure, 1.0 - rig.model["gas"]["ambient_pressure"], 1e8, "Pa (gauge)")
+        given.append(("pressure", pressure, "muscle_pressure", "pressures"))
+    return given
+
+
+def _within(name: str, values: ArrayLike, low: float, high: float, unit: str) -> None:
+    """Refuse a prescribed channel that leaves a range; the message gives the row."""
+    try:
+        signal = np.asarray(values, dtype=np.float64).ravel()
+    except (TypeError, ValueError):
+        raise ParameterError(f"{name} is not allowed: numbers are needed [{unit}]") from None
+    bad = np.flatnonzero(~((signal >= low) & (signal <= high)))
+    if bad.size:
+        raise ParameterError(f"{name}[{bad[0]}] = {signal[bad[0]]:g} is not allowed: a number from {low:g} to {high:g} {unit}")
+
+
 def _signal(name: str, values: ArrayLike, rows: int) -> Array:
-    """A prescribed channel, one finite value for each row."""
+    """A prescribed channel with one value for each row."""
     signal = np.asarray(values, dtype=np.float64)
     if signal.shape != (rows,):
         raise ParameterError(f"{name} has the shape {signal.shape}; ({rows},) is needed, one value for each row")
-    bad = np.flatnonzero(~np.isfinite(signal))
-    if bad.size:
-        raise ParameterError(f"{name}[{bad[0]}] = {signal[bad[0]]} is not allowed: a finite number is needed")
     return signal
 
 
@@ -245,15 +282,54 @@ def held_command(valve_command: ArrayLike) -> NDArray[np.float64]:
     return command
 
 
-def initial_values(initial: Mapping[str, float] | None) -> dict[str, float]:
-    """Initial values by name, unknown names refused."""
-    start = dict(initial or {})
-    unknown = sorted(set(start) - set(_INITIAL))
-    if unknown:
-        raise ParameterError(f"initial has the unknown entry {unknown[0]!r}; allowed: {', '.join(_INITIAL)}")
-    return {name: float(value) for name, value in start.items()}
+def initial_values(initial: Mapping[str, float] | None, rig: Rig) -> dict[str, float]:
+    """Initial values by the names of the core; names that the rig does not have are refused."""
+    start: dict[str, float] = {}
+    for name, value in (initial or {}).items():
+        if name not in _INITIAL:
+            raise ParameterError(f"initial has the unknown entry {name!r}; allowed: {', '.join(_INITIAL)}")
+        if _INITIAL[name] not in rig.blocks:
+            raise ParameterError(f"initial has {name!r}, but the rig {rig.name!r} has no [{_INITIAL[name]}]")
+        try:
+            number = float(value)
+        except (TypeError, ValueError):
+            raise ParameterError(f"initial {name} = {value!r} is not allowed: a number is needed") from None
+        start |= {"joint_rate": -number} if name == "length_rate" else {name: number}
+    return start
 
 
-def default_step(sample_time: float, longest: float = 1e-3) -> float:
-    """The longest step [s] up to ``longest`` that divides a sample time [s]."""
-    return sample_time / max(1, int(np.ceil(sample_time / longest - 1e-9)))
+def chosen_step(sample_time: float, step: float | None, rig: Rig) -> float:
+    """The RK4 step [s]: the default, or the one given if it is short enough for the rig's stops and friction."""
+    if step is None:
+        return default_step(sample_time, rig)
+    longest = stable_step(rig)
+    if step > longest:
+        raise ParameterError(
+            f"step = {step:g} s is not allowed for the rig {rig.name!r}: at most {longest:.3g} s, "
+            "or its stops and friction become unstable"
+        )
+    return float(step)
+
+
+def stable_step(rig: Rig) -> float:
+    """Longest RK4 step [s] that the stops and the friction of a rig allow; infinite where it has neither arm nor mass."""
+    model = rig.model
+    if model["arm"] is not None:
+        arm, joint = model["arm"], model["joint"]
+        inertia = arm["inertia"] + arm["payload"] * arm["length"] ** 2
+        stiffness, damping = joint["stop_stiffness"], joint["stop_damping"] + arm["viscous"]
+        coulomb = arm["coulomb"] / arm["coulomb_speed"]
+    elif model["load"] is not None and model["load"]["kind"] == "mass":
+        load = model["load"]
+        inertia, stiffness, damping = load["mass"], load["stop_stiffness"], load["stop_damping"] + load["viscous"]
+        coulomb = load["coulomb"] / load["coulomb_speed"]
+    else:
+        return math.inf
+    fastest = max((damping + coulomb) / inertia, math.sqrt(stiffness / inertia))
+    return _STABLE / fastest if fastest > 0.0 else math.inf
+
+
+def default_step(sample_time: float, rig: Rig | None = None, longest: float = 1e-3) -> float:
+    """The longest step [s] that divides a sample time [s], is at most ``longest`` and short enough for a rig."""
+    limit = longest if rig is None else min(longest, stable_step(rig))
+    return sample_time / max(1, int(np.ceil(sample_time / limit - 1e-9)))

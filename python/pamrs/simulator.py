@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from pamrs import _core
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
-from pamrs.simulation import core_rig, default_step, held_command, initial_values
+from pamrs.simulation import chosen_step, core_rig, held_command, initial_values
 
 __all__ = ["Simulator"]
 
@@ -22,7 +22,7 @@ class Simulator:
     """A rig that takes one command after the other.
 
     The command is held exactly over one sample. A simulator can be pickled and copied, and goes on from a state bit for bit as
-    the run that it was taken from.
+    the run that it was taken from. It belongs to one thread at a time. A run that Ctrl-C ends stays at a sample in between.
 
     Parameters
     ----------
@@ -57,13 +57,13 @@ class Simulator:
             raise ParameterError(f"sample_time = {sample_time} is not allowed: a finite time > 0 s is needed")
         self.rig = rig
         self.sample_time = float(sample_time)
-        self._step = default_step(self.sample_time) if step is None else float(step)
-        self._initial = initial_values(initial)
+        self._step = chosen_step(self.sample_time, step, rig)
+        self._initial = initial_values(initial, rig)
         self._has_valve = rig.model["valve"] is not None
-        self._core = self._started()
+        self._core = self._started(self._initial)
 
-    def _started(self) -> _core.Simulator:
-        return _core.Simulator(core_rig(self.rig), self.sample_time, self._step, **self._initial)
+    def _started(self, initial: Mapping[str, float]) -> _core.Simulator:
+        return _core.Simulator(core_rig(self.rig), self.sample_time, self._step, **initial)
 
     @property
     def time(self) -> float:
@@ -103,9 +103,8 @@ class Simulator:
         dict of str to float
             The first sample.
         """
-        if initial is not None:
-            self._initial = initial_values(initial)
-        self._core = self._started()
+        start = self._initial if initial is None else initial_values(initial, self.rig)
+        self._core, self._initial = self._started(start), start
         return self.observe()
 
     def observe(self) -> dict[str, float]:
@@ -149,13 +148,15 @@ class Simulator:
         given = [None if value is None else np.array([value], dtype=np.float64) for value in (length, pressure)]
         return _single(self._core.advance(np.array([valve_command], dtype=np.float64), *given))
 
-    def run(self, valve_command: ArrayLike) -> dict[str, Array]:
+    def run(self, valve_command: ArrayLike, *, length: ArrayLike | None = None, pressure: ArrayLike | None = None) -> dict[str, Array]:
         """Hold one command after the other.
 
         Parameters
         ----------
         valve_command : array_like, shape (n,)
             Commands [V]; for a rig without a valve only their number counts.
+        length, pressure : array_like, shape (n,), optional
+            As in :meth:`step`, for the end of each sample.
 
         Returns
         -------
@@ -169,7 +170,8 @@ class Simulator:
         SimulationError
             As :meth:`step`.
         """
-        return self._core.advance(held_command(valve_command))
+        given = [None if v is None else np.ascontiguousarray(np.asarray(v, dtype=np.float64)) for v in (length, pressure)]
+        return self._core.advance(held_command(valve_command), *given)
 
     def __getstate__(self) -> dict[str, Any]:
         kept = {name: value for name, value in self.__dict__.items() if name != "_core"}
@@ -178,7 +180,7 @@ class Simulator:
     def __setstate__(self, kept: dict[str, Any]) -> None:
         state = kept.pop("state")
         self.__dict__.update(kept)
-        self._core = self._started()
+        self._core = self._started(self._initial)
         self.restore(state)
 
     def __repr__(self) -> str:

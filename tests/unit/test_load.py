@@ -103,10 +103,12 @@ def test_a_fitted_muscle_goes_onto_the_bench_and_back() -> None:
         ({}, r"duration = None"),
         ({"duration": 1.0}, r"length is missing"),
         ({"length": [0.27, np.nan]}, r"length\[1\] = nan"),
-        ({"length": [0.27, 0.5]}, r"length\[0\] = 0\.5 is not allowed"),
+        ({"length": [0.27, 0.5]}, r"length\[1\] = 0\.5 is not allowed"),
         ({"length": [0.27, 0.26], "pressure": [1e5]}, r"pressure has the shape \(1,\); \(2,\)"),
         ({"length": [0.27, 0.26], "duration": 1.0}, r"duration = 1\.0 is not allowed together with length"),
-        ({"length": [0.5, 0.26]}, r"initial\.length = 0\.5"),
+        ({"length": [0.5, 0.26]}, r"length\[0\] = 0\.5"),
+        ({"length": [0.27, 0.26], "initial": {"length": 0.25}}, r"initial length = 0\.25 does not go with length\[0\]"),
+        ({"length": [0.27], "initial": {"joint_angle": 0.1}}, r"has 'joint_angle', but the rig .* no \[arm\]"),
     ],
 )
 def test_what_a_frame_cannot_do_is_named(arguments: dict[str, object], message: str) -> None:
@@ -150,3 +152,42 @@ def test_a_rig_with_a_load_is_not_diagnosed_by_guessing(tmp_path: Path) -> None:
     (tmp_path / "case.toml").write_text(case, encoding="utf-8")
     with pytest.raises(pamrs.DiagnosisError, match=r"has a \[load\]"):
         pamrs.diagnose(tmp_path)
+
+
+def test_air_of_a_regulator_that_is_then_shut_is_at_room_temperature() -> None:
+    rig = pamrs.rigs.bench(muscle()).with_effect("heat_transfer")
+    one = pamrs.Simulator(rig, sample_time=0.01, initial={"length": 0.26})
+    for k in range(100):
+        sample = one.step(length=0.26, pressure=6e3 * (k + 1))
+    assert sample["temperature"] == pytest.approx(293.15)
+    shut = one.step(length=0.26)
+    assert shut["muscle_pressure"] == pytest.approx(6e5, rel=1e-6)
+
+
+@pytest.mark.parametrize("mass", [0.01, 0.05, 0.2, 5.0])
+def test_a_light_mass_is_stable_on_its_stops(mass: float) -> None:
+    rig = parse_rig(MASS.replace("value = 40,", f"value = {mass},").replace("value = 180", "value = 240"))
+    start = {"muscle_pressure": 4e5, "length": 0.26}
+    run = pamrs.simulate(rig, sample_time=0.005, duration=0.5, initial=start)
+    fine = pamrs.simulate(rig, sample_time=0.005, step=1e-6 if mass < 0.1 else 1e-5, duration=0.5, initial=start)
+    assert abs(run["length_rate"][-1]) < 1e-3
+    np.testing.assert_allclose(run["length"][-1], fine["length"][-1], atol=1e-6)
+    if mass < 1.0:
+        with pytest.raises(pamrs.ParameterError, match="step = 0.005 s is not allowed"):
+            pamrs.simulate(rig, sample_time=0.005, step=0.005, duration=0.5, initial=start)
+
+
+def test_a_bench_round_trips() -> None:
+    rig = pamrs.rigs.bench(muscle().replace(count=6))
+    assert parse_rig(rig.to_toml_text()).model == rig.model
+    assert rig.model["muscle"]["count"] == 1
+
+
+def test_pictures_of_a_bench_and_of_nothing_that_moves(tmp_path: Path) -> None:
+    rig = pamrs.rigs.bench(muscle())
+    for run in (
+        pamrs.simulate(rig, sample_time=0.01, length=[0.27, 0.26, 0.25], pressure=[1e5] * 3),
+        pamrs.simulate(rig, sample_time=0.01, length=[0.27, 0.27], pressure=[1e5] * 2),
+        pamrs.simulate(pamrs.rigs.sealed_chamber(), sample_time=0.1, duration=0.0),
+    ):
+        assert run.plot(tmp_path / "run.png").read_bytes().startswith(b"\x89PNG")

@@ -103,3 +103,26 @@ def test_ctrl_c_ends_a_long_run() -> None:
     assert done.returncode == 0, done.stderr
     pressed, ended = (float(line) for line in done.stdout.split())
     assert ended > pressed
+
+
+def test_a_reset_that_fails_leaves_the_simulator_alone() -> None:
+    one = simulator()
+    one.run(COMMAND[:20])
+    before = one.state
+    with pytest.raises(pamrs.ParameterError, match="muscle_pressure"):
+        one.reset({"muscle_pressure": -1e9})
+    np.testing.assert_array_equal(pickle.loads(pickle.dumps(one)).state, before)
+    with pytest.raises(pamrs.ParameterError, match=r"has 'length', but the rig .* no \[load\]"):
+        one.reset({"length": 0.2})
+
+
+@pytest.mark.parametrize(("duration", "speed"), [(0.5, 1.0), (1.3, 1.0), (3.0, 2.5)])
+def test_an_animation_lasts_as_long_as_it_says(tmp_path, duration: float, speed: float) -> None:
+    image = pytest.importorskip("PIL.Image")
+    run = pamrs.simulate(pamrs.rigs.shoulder(), np.full(int(duration * 50) + 1, 5.2), sample_time=0.02)
+    lasts = 0.0
+    with image.open(run.animate(tmp_path / "arm.gif", speed=speed)) as picture:
+        for frame in range(picture.n_frames):
+            picture.seek(frame)
+            lasts += picture.info["duration"] / 1e3
+    assert lasts == pytest.approx(duration / speed, abs=0.06)

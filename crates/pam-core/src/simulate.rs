@@ -280,6 +280,10 @@ impl Progress {
                         let share = (sub as f64 + fraction) / timing.substeps as f64;
                         ends.drive(share, timing.sample_time, y);
                     });
+                    if ends.pressure.is_some() {
+                        // A regulator's air is at the temperature of the room.
+                        next.state[MASS] = plant.rest_mass(&next.state);
+                    }
                 }
             }
             next.samples += 1;
@@ -289,6 +293,9 @@ impl Progress {
         Ok(())
     }
 }
+
+/// Lowest absolute pressure that may be prescribed [Pa].
+const LEAST_PRESSURE: f64 = 1.0;
 
 /// Channels that are given instead of simulated, one value for the end of each sample.
 #[derive(Debug, Clone, Copy, Default)]
@@ -323,7 +330,13 @@ impl Prescribed<'_> {
                     "pressure is given, which only a rig without [valve] takes: there the valve decides",
                 );
             }
-            check_signal("pressure", pressure, samples, (-rig.gas.ambient_pressure, 1e8), "Pa (gauge)")?;
+            check_signal(
+                "pressure",
+                pressure,
+                samples,
+                (LEAST_PRESSURE - rig.gas.ambient_pressure, 1e8),
+                "Pa (gauge)",
+            )?;
         }
         Ok(())
     }

@@ -140,7 +140,7 @@ def residual(block: Block, core: _core.Rig, prepared: Prepared, parameters: list
         block.name,
         prepared.command,
         prepared.dt,
-        default_step(prepared.dt, block.step),
+        default_step(prepared.dt, longest=block.step),
         starts,
         names,
         **prepared.signals,

@@ -32,8 +32,12 @@ _PANELS: Final = (
     ("pressure, gauge", "bar", 1e-5, ("supply_pressure", "muscle_pressure")),
     ("joint angle", "deg", 180.0 / math.pi, ("joint_angle",)),
     ("joint torque of the muscles", "N m", 1.0, ("joint_torque",)),
+    ("length of the muscle", "mm", 1e3, ("length",)),
+    ("pull of the muscles", "N", 1.0, ("muscle_force",)),
     ("gas temperature", "K", 1.0, ("temperature",)),
 )
+#: A recorded channel that is drawn beside a simulated one of another name.
+_RECORDED_AS: Final = {"muscle_force": "force"}
 _NAMES: Final = {"supply_pressure": "supply", "muscle_pressure": "muscle"}
 _FRAMES: Final = 150
 _FAINT: Final = "#9ca3af"
@@ -53,8 +57,10 @@ def channels_png(result: Simulation, measured: Mapping[str, tuple[Array, Array]]
     -------
     bytes
     """
-    recorded = measured or {}
-    moving = [panel for panel in _PANELS if any(_tells(result, name) or name in recorded for name in panel[3])]
+    given = measured or {}
+    recorded = {name: given[other] for panel in _PANELS for name in panel[3] if (other := _RECORDED_AS.get(name, name)) in given}
+    there = [panel for panel in _PANELS if any(name in result for name in panel[3])]
+    moving = [panel for panel in there if any(_tells(result, name) or name in recorded for name in panel[3])] or there
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(10.0, 1.0 + 1.75 * len(moving)), dpi=110, layout="constrained")
         rows = figure.subplots(len(moving), 1, sharex=True, squeeze=False)[:, 0]
@@ -114,15 +120,18 @@ def write_animation(result: Simulation, path: Path, *, speed: float = 1.0) -> Pa
         raise ParameterError(f"{result.time.size} sample is not enough to draw a motion: two at least")
     if not (math.isfinite(speed) and speed > 0.0):
         raise ParameterError(f"speed = {speed} is not allowed: a finite number above zero")
-    frames = np.unique(np.linspace(0, result.time.size - 1, min(_FRAMES, result.time.size)).astype(int))
     duration = float(result.time[-1] - result.time[0]) / speed
+    delay = max(2, math.ceil(100.0 * duration / _FRAMES))  # hundredths of a second: what a GIF knows, and players keep
+    shown = np.arange(0.0, 100.0 * duration + 1e-9, delay) * 0.01 * speed + result.time[0]
+    frames = np.clip(np.searchsorted(result.time, shown - 1e-9), 0, result.time.size - 1)
     with mpl.rc_context(STYLE), tempfile.TemporaryDirectory() as folder:
         figure = Figure(figsize=(5.2, 5.2), dpi=80)
         axes = figure.subplots()
         scene = _Scene(axes, result, float(figure.get_size_inches()[0]))
         motion = FuncAnimation(figure, scene.draw, frames=frames.tolist(), blit=False)
         picture = File(folder) / "motion.gif"
-        motion.save(picture, writer=PillowWriter(fps=max(1, round(len(frames) / max(duration, 0.1)))))
+        rate: Any = 100.0 / delay * (1.0 - 1e-9)  # a hair slow: the writer cuts the delay to whole milliseconds
+        motion.save(picture, writer=PillowWriter(fps=rate))
         return write_atomically(path, picture.read_bytes())
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig, parse_rig
+from pamrs.rig_schema import keys_of
 
 if TYPE_CHECKING:
     from pamrs.muscle import Muscle
@@ -112,7 +113,8 @@ def bench(muscle: Muscle, name: str = "bench") -> Rig:
     low, high = muscle.contraction_range
     rest = float(muscle.parameters["rest_length"])
     frame = {"kind": "frame", "min_length": rest * (1.0 - _INSIDE * high), "max_length": rest * (1.0 - _INSIDE * low)}
-    return Rig(name, {**rig.model, "muscle": dict(muscle.parameters), "load": frame})
+    own = {key.name: muscle.parameters[key.name] for key in keys_of("muscle", muscle.parameters)}
+    return Rig(name, {**rig.model, "muscle": {**own, "count": 1}, "load": frame})
 
 
 def sealed_chamber() -> Rig:

@@ -50,6 +50,10 @@ impl TendonJoint {
         let phi = std::f64::consts::PI - rest_angle - lower_angle;
         let (bx, by) = (lower_radius * phi.cos(), lower_radius * phi.sin());
         let tendon_squared = (upper_axial - bx).powi(2) + (upper_offset - by).powi(2);
+        if bx > upper_axial {
+            let allowed = format!("at least {bx:.5} m at this rest angle: the tendon would be folded over");
+            return Err(Error::parameter("joint.upper_axial", upper_axial, allowed));
+        }
         let torque = Torque::Power;
         Ok(Self { upper_axial, upper_offset, lower_angle, lower_radius, tendon_squared, torque })
     }

@@ -263,7 +263,7 @@ impl RigSpec {
             range("arm.viscous", arm.viscous, 0.0, 1e6, "N m s/rad")?;
             range("arm.coulomb", arm.coulomb, 0.0, 1e6, "N m")?;
             range("arm.coulomb_speed", arm.coulomb_speed, 1e-9, 1e3, "rad/s")?;
-            range("arm.gravity", arm.gravity, 0.0, 1e3, "m/s2")?;
+            range("arm.gravity", arm.gravity, -1e3, 1e3, "m/s2")?;
             range(
                 "arm.inertia + payload length^2",
                 arm.inertia + arm.payload * arm.length.powi(2),
