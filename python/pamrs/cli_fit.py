@@ -110,11 +110,8 @@ def _muscle(
     tolerance = {name: value for name, value in tolerance.items() if name in _GEOMETRY or name in elastic}
     known = {name: value for name, value in tolerance.items() if math.isfinite(value)} | _prior(prior)
     scatter = stated if noise is None else _noise(noise, map_)
-    notes = [
-        f"tolerance of {name} is not used: it is not free"
-        for name, text in sizes.items()
-        if name not in names and text is not None and _quantity(name, text, _GEOMETRY[name])[1] is not None
-    ]
+    idle = [name for name in known if name in _GEOMETRY and name not in names]
+    notes = [f"tolerance of {', '.join(idle)} is not used: not free (--free {','.join([*names, *idle])})"] if idle else []
     from pamrs.fit import FitError, fit_muscle
 
     shape: dict[str, Any] = {"geometry": geometry, "free": names, "tolerance": known, "levels": pressures, "noise": scatter}
@@ -202,6 +199,8 @@ def _rubbing(
         return muscle, None, f"friction: not fitted, {error}"
     if choice is None and not found.ndata:
         return muscle, None, f"friction: none, no pressure's c_F stands above {found.floor:g}"
+    if choice is None and not found.told:
+        return muscle, None, "friction: none, the loops do not tell it from their scatter (--friction fit takes it all the same)"
     c0, c1 = found.params["friction_coefficient"], found.params["friction_pressure_slope"]
     line = f"c0 = {c0.value:.4g} +- {c0.stderr:.2g}, c1 = {1e6 * c1.value:.4g} +- {1e6 * c1.stderr:.2g} 1/MPa"
     return found.to_muscle(muscle), found, f"friction, fitted to the loops before the moduli: {line}"

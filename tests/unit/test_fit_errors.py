@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pamrs.errors import ParameterError
-from pamrs.fit import FitError, ForceMap, fit_muscle
+from pamrs.fit import FitError, ForceMap, fit_friction, fit_muscle, load_force_map
 
 from .fit_cases import CONTRACTIONS, PRESSURES, REST, SHAPE, TOLERANCE, measure, muscle
 
@@ -95,13 +95,57 @@ def test_a_point_that_the_others_do_not_predict_is_named_by_its_row(settings):
     force[5] = np.nan  # rows that are not used count too
     fit = fit_muscle(ForceMap.from_arrays(data.length, data.pressure, force, rest_length=REST), muscle(), **settings)
     (note,) = noted(fit, "times their scatter")
-    assert note.startswith(f"row 18 (200 kPa, {1e3 * data.length[17]:.4g} mm: {force[17]:.4g} N, the others predict ")
-    assert note.count("row ") == 2
-    assert ", row 41 (" in note
+    assert f"index 17 (200 kPa, {1e3 * data.length[17]:.4g} mm: {force[17]:.4g} N, the others predict " in note
+    assert "index 40 (" in note
+    assert note.count("index ") == 2
     if not settings:
         others = ForceMap.from_arrays(*(np.delete(v, [5, *wrong]) for v in (data.length, data.pressure, force)), rest_length=REST)
         predicted = float(fit_muscle(others, muscle()).predict(2e5, length=data.length[17]))
-        assert float(note.split("the others predict ")[1].split(" N")[0]) == pytest.approx(predicted, abs=40.0)  # row 41 is still in
+        assert float(note.split("index 17 ")[1].split("the others predict ")[1].split(" N")[0]) == pytest.approx(predicted, abs=40.0)
+
+
+def test_a_point_of_a_file_is_named_by_its_row_there(tmp_path):
+    data = measure(muscle(), noise=2.0)
+    force = data.force.copy()
+    force[30] += 900.0
+    rows = "\n".join(f"{v},{p},{f},B" for v, p, f in zip(1e3 * data.length, data.pressure, force, strict=True))
+    (tmp_path / "map.csv").write_text("length [mm],pressure [Pa],force [N],specimen\n250,1e5,1,A\n" + rows + "\n", encoding="utf-8")
+    loaded = load_force_map(tmp_path / "map.csv", rest_length=REST, where={"specimen": "B"})
+    (note,) = noted(fit_muscle(loaded, muscle()), "times their scatter")
+    assert note.startswith("row 33 (")
+
+
+@pytest.mark.parametrize("share", [0.005, 0.01])
+def test_scatter_that_grows_with_the_force_names_no_point(share):
+    found = 0
+    for seed in range(40):
+        data = measure(muscle())
+        noise = share * np.random.default_rng(seed).standard_normal(len(data.force))
+        map_ = ForceMap.from_arrays(data.length, data.pressure, data.force * (1.0 + noise), rest_length=REST)
+        found += bool(noted(fit_muscle(map_, muscle()), "their scatter"))
+    assert found <= 2
+
+
+def test_exchanged_directions_are_asked_about():
+    real = muscle(friction_coefficient=0.05)
+    maps = [measure(real, direction=way, noise=0.5) for way in (-1.0, 1.0)]
+    columns = [np.concatenate([getattr(m, name) for m in maps]) for name in ("length", "pressure", "force")]
+    way = np.concatenate([np.ones(len(maps[0])), -np.ones(len(maps[1]))])
+    data = ForceMap.from_arrays(*columns, rest_length=REST, direction=way)
+    assert noted(fit_muscle(data, muscle()), "are the directions exchanged?")
+    assert any("are the directions exchanged?" in issue for issue in fit_friction(data).issues)
+    one = ForceMap.from_arrays(maps[0].length, maps[0].pressure, maps[0].force, rest_length=REST, direction=-np.ones(len(maps[0])))
+    assert noted(fit_muscle(one, muscle()), "all rows are contracting: friction cannot be told")
+
+
+def test_loops_without_friction_do_not_tell_any():
+    told = 0
+    for seed in range(30):
+        maps = [measure(muscle(), noise=8.0, seed=2 * seed + k) for k in (0, 1)]
+        columns = [np.concatenate([getattr(m, name) for m in maps]) for name in ("length", "pressure", "force")]
+        way = np.concatenate([-np.ones(len(maps[0])), np.ones(len(maps[1]))])
+        told += fit_friction(ForceMap.from_arrays(*columns, rest_length=REST, direction=way)).told
+    assert told <= 1
 
 
 def test_scatter_alone_names_no_point():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 import numpy as np
@@ -26,13 +26,14 @@ _FAR: Final = 3.0  # tolerances
 _MOVED: Final = 0.3  # of the nominal value
 _FEW_SPARE: Final = 5  # points beyond the unknowns
 _STIFF: Final = 1e9  # [Pa], beyond any rubber
-_APART: Final = 6.0  # robust standard deviations
+_APART: Final = 8.0  # robust standard deviations
+_LEAST_APART: Final = 1e-3  # of the largest force
 _MOST_APART: Final = 5  # points to name
 _MAD: Final = 1.4826  # standard deviation of a normal distribution over its median absolute value
 _LOOP: Final = 4.0  # standard errors
 
 
-def cautions(problem: Problem, found: Estimate, rows: Mask, places: Index, parameters: Parameters) -> list[str]:
+def cautions(problem: Problem, found: Estimate, rows: Mask, labels: Sequence[str], parameters: Parameters) -> list[str]:
     """Every warning of a fit, in words.
 
     Parameters
@@ -43,7 +44,7 @@ def cautions(problem: Problem, found: Estimate, rows: Mask, places: Index, param
         The fit.
     rows : (n,) bool array
         The fitted rows.
-    places : (n,) int array
+    labels : sequence of str
         Which row of the map each of them is.
     parameters : mapping of str to FitParameter
         The fitted numbers.
@@ -56,7 +57,7 @@ def cautions(problem: Problem, found: Estimate, rows: Mask, places: Index, param
         *_range(problem, found, rows, len(parameters)),
         *_moduli(found, parameters),
         *_geometry(problem, found, parameters),
-        *_points(problem, found, rows, places),
+        *_points(problem, found, rows, labels),
         *_loops(problem, found, rows),
     ]
 
@@ -120,22 +121,24 @@ def _geometry(problem: Problem, found: Estimate, parameters: Parameters) -> list
     return notes
 
 
-def _points(problem: Problem, found: Estimate, rows: Mask, places: Index) -> list[str]:
+def _points(problem: Problem, found: Estimate, rows: Mask, labels: Sequence[str]) -> list[str]:
     """Points that the others do not predict."""
-    apart = outlying(problem, found)
+    apart = outlying(problem, found, rows)
     if not apart:
         return []
     force, length, pressure = problem.force[rows], problem.length[rows], problem.pressure[rows]
-    weight, number = problem.weight[rows], places[rows] + 1
+    weight = problem.weight[rows]
+    named = [label for label, fitted in zip(labels, rows.tolist(), strict=True) if fitted]
     words = ", ".join(
-        f"row {number[i]} ({pressure[i] / 1e3:.4g} kPa, {1e3 * length[i]:.4g} mm: {force[i]:.4g} N, the others predict "
+        f"{named[i]} ({pressure[i] / 1e3:.4g} kPa, {1e3 * length[i]:.4g} mm: {force[i]:.4g} N, the others predict "
         f"{force[i] - error / weight[i]:.4g} N)"
         for i, error in apart
     )
-    return [f"{words}: further from the other points than {_APART:g} times their scatter; check {'it' if len(apart) == 1 else 'them'}"]
+    which = "it" if len(apart) == 1 else "them"
+    return [f"{words}: further from the other points than {_APART:g} times their scatter; check {which}"]
 
 
-def outlying(problem: Problem, found: Estimate) -> list[tuple[int, float]]:
+def outlying(problem: Problem, found: Estimate, rows: Mask) -> list[tuple[int, float]]:
     """Points that stand apart, one after the other: each is taken away before the next is sought.
 
     The error of a point predicted by the others is ``r_i / (1 - h_i)`` with the hat matrix, its standard deviation
@@ -147,6 +150,8 @@ def outlying(problem: Problem, found: Estimate) -> list[tuple[int, float]]:
         Data and unknowns.
     found : Estimate
         The fit.
+    rows : (n,) bool array
+        The fitted rows.
 
     Returns
     -------
@@ -159,20 +164,33 @@ def outlying(problem: Problem, found: Estimate) -> list[tuple[int, float]]:
     count = len(residual)
     places = np.arange(count)
     apart: list[tuple[int, float]] = []
-    least = 1e-9 * float(np.abs(problem.force * problem.weight).max())
+    least = _LEAST_APART * float(np.abs(problem.force * problem.weight).max())
+    level = problem.level[rows]
+    apart_by = _APART + math.log10(max(count, 100) / 100.0) * 2.0
     while len(apart) <= _MOST_APART and len(residual) - matrix.shape[1] >= _FEW_SPARE:
         basis = _basis(matrix)[: len(residual)]
         left = np.clip(1.0 - np.sum(basis**2, axis=1), 0.0, 1.0)
         told = left > 1e-6
         scaled = np.where(told, residual, 0.0) / np.sqrt(np.where(told, left, 1.0))
-        at = int(np.argmax(np.abs(scaled)))
-        if abs(scaled[at]) <= max(_APART * _MAD * float(np.median(np.abs(scaled[told]))), least):
+        ratio = np.abs(scaled) / np.maximum(apart_by * _scatter(scaled, told, level[places]), least)
+        at = int(np.argmax(ratio))
+        if ratio[at] <= 1.0:
             break
         error = float(residual[at] / left[at])
         apart.append((int(places[at]), error))
         residual = np.delete(residual + basis @ basis[at] * error, at)
         matrix, places = np.delete(matrix, at, axis=0), np.delete(places, at)
     return apart if len(apart) <= _MOST_APART else []
+
+
+def _scatter(scaled: Array, told: Mask, level: Index) -> Array:
+    """Standard deviation about each point from medians: of all points, or of its own level where that scatters more."""
+    spread = np.full(len(scaled), _MAD * float(np.median(np.abs(scaled[told]))))
+    for group in np.unique(level):
+        own = told & (level == group)
+        if np.sum(own) >= _FEW_SPARE:
+            spread[level == group] = np.maximum(spread[level == group], _MAD * float(np.median(np.abs(scaled[own]))))
+    return spread
 
 
 def _basis(matrix: Array) -> Array:
@@ -187,13 +205,18 @@ def _loops(problem: Problem, found: Estimate, rows: Mask) -> list[str]:
     way, force = problem.direction[rows], problem.force[rows]
     given = problem.blank.parameters
     rubs = any(given[name] for name in ("friction_coefficient", "friction_pressure_slope", "friction_floor"))
+    if len(way) and not rubs and np.all(way == way[0]) and way[0] != 0:
+        word = "contracting" if way[0] < 0 else "lengthening"
+        return [f"all rows are {word}: friction cannot be told and is in the moduli"]
     if rubs or problem.blank.model == "elbow_linear" or not (np.any(way < 0) and np.any(way > 0)):
         return []
     side, residual = way * np.abs(force), found.residual / problem.weight[rows]
     share = float(side @ residual) / float(side @ side)
     rest = residual - share * side
-    if share <= _LOOP * math.sqrt(float(rest @ rest) / (max(len(rest) - 1, 1) * float(side @ side))):
+    if abs(share) <= _LOOP * math.sqrt(float(rest @ rest) / (max(len(rest) - 1, 1) * float(side @ side))):
         return []
+    if share < 0.0:
+        return [f"the forces while lengthening lie {-200 * share:.2g} % below those while contracting: are the directions exchanged?"]
     return [
         f"the forces while lengthening and contracting differ by +- {100 * share:.2g} %, and the muscle has no friction: fit it first, "
         "fit_friction(data).to_muscle(muscle) (--friction fit)"

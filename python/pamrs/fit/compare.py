@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from pamrs.muscle import Muscle
 
 __all__ = ["ModelComparison", "compare_models"]
+
+_NEAR: Final = 1.25  # times the best leave-one-pressure-out error, for a recommendation
 
 Array = NDArray[np.float64]
 
@@ -93,7 +95,7 @@ class ModelComparison:
         lines += [self._line(row) for row in self.rows]
         lines += [
             "* fewest unknowns among those that predict pressures left out (LOPO) no worse than rank 1:",
-            "  the excess of their squared errors, level by level, is within one standard error",
+            f"  the excess of their squared errors, level by level, is within one standard error, their rms within {_NEAR:g} times",
         ]
         return "\n".join(lines) + "\n"
 
@@ -201,7 +203,8 @@ def compare_models(
         _, row["aicc"], row["bic"] = fit.criteria(size)
         row["rank"] = place
         row["lopo_excess"], row["lopo_excess_stderr"] = _paired(_level_squares(fit) - least)
-    eligible = [row for row in ranked if row["lopo_excess"] <= row["lopo_excess_stderr"]]
+    near = _NEAR * ranked[0]["lopo_rms"]  # a candidate that fails at one level only has an excess of one standard error, however large
+    eligible = [row for row in ranked if row["lopo_excess"] <= row["lopo_excess_stderr"] and row["lopo_rms"] <= near]
     min(eligible, key=lambda row: (row["nvarys"], row["lopo_rms"]))["recommended"] = True
     subset = [] if levels is None else [float(data.levels[index]) for index in level_indices(data, levels)]
     return ModelComparison(ranked + [row for row in rows if row["reason"] is not None], fits, size, int(data.used.sum()), subset)

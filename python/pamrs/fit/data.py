@@ -265,6 +265,13 @@ class ForceMap:
         more = f" and {len(rows) - _SHOWN} more" if len(rows) > _SHOWN else ""
         return f"{one if len(rows) == 1 else several} {shown}{more}"
 
+    def labels(self) -> list[str]:
+        """What each used row is called: its row in the file, or else its index."""
+        used = np.flatnonzero(self.used)
+        if self.row_numbers is None:
+            return [f"index {index}" for index in used]
+        return [f"row {self.row_numbers[index]}" for index in used]
+
     def used_rows(self) -> tuple[Array, Array, Array, Index, NDArray[np.int8]]:
         """Pressure [Pa], contraction [1], force [N], level and direction of the used rows, (k,) arrays."""
         rows = self.used
@@ -359,6 +366,8 @@ class ForceMap:
         able = float(np.max(pressure)) * float(np.max(np.abs(muscle.gas_area(contraction))))
         pull = np.abs(force)
         check_forces(self.label, float(np.quantile(pull, _MOST)), able, self.units)
+        if able <= 0.0:  # no pressure, or no pull of the gas: nothing to judge by
+            return map_
         return map_._without(map_.used & (np.abs(self.force) > FORCE_HIGH * able), "force out of range")
 
 

@@ -286,7 +286,7 @@ def _result(data: ForceMap, problem: Problem, rows: Mask, found: Estimate, error
             warnings.append(f"standard errors take the residuals as independent: {why}")
     covar = plain if kind == "plain" or robust is None else robust
     parameters = _parameters(problem, found, covar, plain)
-    warnings += cautions(problem, found, rows, np.flatnonzero(data.used), parameters)
+    warnings += cautions(problem, found, rows, data.labels(), parameters)
     return MuscleFit(
         data=data,
         params=parameters,

@@ -35,6 +35,7 @@ _HALFWAY: Final = 2.0 / 7.0  # of the presliding distance, where slip elements o
 _PART_WAY: Final = 0.95  # of the way to either branch: rows within are in transition
 _RESOLVED: Final = 3  # rows in transition that a reversal needs
 _SIGNIFICANT: Final = 0.05
+_SURE: Final = 4.0  # standard errors, for a friction that nobody asked about
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,6 +118,12 @@ class FrictionFit:
         c0, c1 = self.params["friction_coefficient"].value, self.params["friction_pressure_slope"].value
         law = f"max({c0:.4g} {'-' if c1 < 0.0 else '+'} {1e6 * abs(c1):.4g}/MPa P, {self.floor:g})"
         return f"FrictionFit(c_F = {law}, {len(self.levels)} levels)"
+
+    @property
+    def told(self) -> bool:
+        """Whether the loops tell a friction from none: all levels together, by four standard errors, at two levels above the floor."""
+        mean, spread = _pooled(self.levels)
+        return self.ndata >= 2 and mean > _SURE * spread
 
     @property
     def slope_significant(self) -> bool:
@@ -302,6 +309,17 @@ def fit_friction(
     if len(levels) < 2:
         raise RecordingError(f"{data.label}: one pressure only ({levels[0].pressure / 1e3:.0f} kPa): the slope c1 is not determinable")
     line, above = _law(levels, floor)
+    above &= np.array([x.coefficient > floor for x in levels])
+    if above.sum() == 1:
+        issues.append(
+            f"one pressure only stands above the floor of {floor:g}: the slope c1 is hardly determined by it and its neighbour"
+        )
+    pooled, spread = _pooled(levels)
+    if pooled < -_SURE * spread:
+        issues.append(
+            f"forces while lengthening lie below those while contracting (c_F = {pooled:.2g} +- {spread:.1g}): "
+            "are the directions exchanged?"
+        )
     if not above.any():
         issues.append(f"no coefficient stands above the floor of {floor:g}: the law is its floor at every pressure")
     levels = [
@@ -376,6 +394,14 @@ def _ratio(half: Array, size: Array) -> float:
     order = np.argsort(ratio)
     share = np.cumsum(size[order])
     return float(ratio[order][np.searchsorted(share, 0.5 * share[-1])])
+
+
+def _pooled(levels: list[FrictionLevel]) -> tuple[float, float]:
+    """One coefficient for all levels and its standard error, from the levels' own errors or their scatter, whichever is larger."""
+    value, error = (np.array([getattr(x, key) for x in levels]) for key in ("coefficient", "stderr"))
+    weight = 1.0 / np.maximum(error, 1e-9) ** 2
+    mean = float(weight @ value / weight.sum())
+    return mean, float(1.0 / math.sqrt(weight.sum()))
 
 
 def _law(levels: list[FrictionLevel], floor: float) -> tuple[LevelLine, Mask]:
