@@ -44,7 +44,7 @@ def _joint(
     evaluations: Annotated[int, typer.Option(help="Designs tried in a search; 1820 are 100 generations as published.")] = 1820,
     mutation: Annotated[float, typer.Option(help="Chance of the genetic algorithm that a child gets one length at random.")] = 0.2,
     minimise_pressure: Annotated[
-        bool, typer.Option("--minimise-pressure", help="Repeat at other pressures: the least that does.")
+        bool, typer.Option("--minimise-pressure", help="Repeat at other pressures for the least that does; also by direct search.")
     ] = False,
     compare: Annotated[bool, typer.Option("--compare", help="Also run all methods with ten seeds each.")] = False,
     pareto: Annotated[bool, typer.Option("--pareto", help="Also find pressure against size.")] = False,
@@ -59,7 +59,7 @@ def _joint(
     _check_writable(png, json, rig_joint)
     if method not in _METHODS:
         raise typer.BadParameter(f"--method = {method!r} is not allowed: {', '.join(_METHODS)}")
-    from pamrs.design import Genetic, compare_methods, minimum_pressure, optimise, pareto_front
+    from pamrs.design import Genetic, compare_methods, least_pressure, minimum_pressure, optimise, pareto_front
     from pamrs.design.joint_design import _psi
     from pamrs.design.search import missing
 
@@ -70,11 +70,13 @@ def _joint(
             raise missing(error, "plot") from None
     problem = _problem(muscle, count, torque, (min_angle, max_angle), pressure, bounds or [], max_stroke)
     options: dict[str, Any] = {"evaluations": evaluations, "seed": seed, "genetic": Genetic(mutation=mutation)}
-    lowest = comparison = front = None
+    lowest = strict = comparison = front = None
     if minimise_pressure:
         with _bar("pressures") as progress:
             lowest = minimum_pressure(problem, method, **options, progress=progress)
         design = lowest.design
+        with _bar("designs") as progress:
+            strict = least_pressure(problem, seed=seed, progress=progress)
     else:
         with _bar("designs") as progress:
             design = optimise(problem, method, **options, progress=progress)
@@ -88,7 +90,7 @@ def _joint(
     title = f"{count} {muscle}, {torque} from {min_angle} to {max_angle}"
     contents: dict[Path, str | bytes] = {}
     if json is not None:
-        contents[json] = _json(title, design, lowest, comparison, front)
+        contents[json] = _json(title, design, (lowest, strict), comparison, front)
     if png is not None:
         contents[png] = summary_png(design, f"{title}: {_psi(design.problem.pressure)}", comparison=comparison, front=front)
     if rig_joint is not None:
@@ -96,7 +98,7 @@ def _joint(
     typer.echo(title)
     typer.echo(design.summary())
     if lowest is not None:
-        typer.echo(f"\n{lowest.summary()}")
+        typer.echo(f"\n{lowest.summary()}\n{_strict_line(strict)}")
     if comparison is not None:
         typer.echo(f"\nJ in joule at {_psi(design.problem.pressure)}\n{comparison.table()}")
     if front is not None:
@@ -172,6 +174,17 @@ def _bar(what: str) -> Iterator[Callable[[int, int], None] | None]:
         yield lambda done, total: progress.update(task, completed=done, total=total)
 
 
+def _strict_line(design: JointDesign | None) -> str:
+    """What the direct search found."""
+    from pamrs.design.joint_design import _psi
+
+    if design is None:
+        return "strict, direct search: no design was found that any pressure makes good enough"
+    assert design.search is not None
+    found = f"{_psi(design.problem.pressure)} gives the torque at every angle"
+    return f"strict, direct search: {found} ({design.search.method}, {design.search.evaluations} evaluations)"
+
+
 def _front_table(front: ParetoFront) -> str:
     """About a dozen designs of the front."""
     import numpy as np
@@ -191,9 +204,15 @@ def _front_table(front: ParetoFront) -> str:
 
 
 def _json(
-    title: str, design: JointDesign, lowest: PressureSearch | None, comparison: MethodComparison | None, front: ParetoFront | None
+    title: str,
+    design: JointDesign,
+    pressures: tuple[PressureSearch | None, JointDesign | None],
+    comparison: MethodComparison | None,
+    front: ParetoFront | None,
 ) -> str:
     import json
+
+    lowest, strict = pressures
 
     problem = design.problem
     document = {
@@ -210,6 +229,7 @@ def _json(
         },
         "design": design.to_dict(),
         "minimum_pressure": None if lowest is None else lowest.to_dict(),
+        "least_pressure": None if strict is None else strict.to_dict(),
         "comparison": None if comparison is None else comparison.rows(),
         "front": None if front is None else front.to_dict(),
     }

@@ -34,6 +34,9 @@ def run(capsys, arguments):
 
 
 def test_a_design_is_printed_and_repeats_by_its_seed(capsys):
+    low = run(capsys, words("--method", "de", pressure="183 psi"))[1]
+    assert re.search(r"met within 0\.1 % of the work wanted; least torque [\d.]+ % below the wanted one at [\d.]+ deg", low)
+    assert "the requirement is met" not in low
     code, out, err = run(capsys, words("--method", "de"))
     assert (code, err) == (0, "")
     assert "the requirement is met" in out
@@ -80,7 +83,13 @@ def test_minimum_pressure_comparison_and_front(capsys, tmp_path, monkeypatch):
     lowest = document["minimum_pressure"]
     assert lowest["met"]
     assert lowest["pressure"] == document["design"]["pressure"] < 1.31e6
-    assert f"minimum pressure {lowest['pressure'] / 1e5:.4g} bar" in out
+    assert f"pressure {lowest['pressure'] / 1e5:.4g} bar" in out
+    assert "the smallest at which this search succeeded" in out
+    strict = document["least_pressure"]
+    assert f"strict, direct search: {strict['pressure'] / 1e5:.4g} bar" in out
+    assert min(strict["torque"]) >= (1.0 - 1e-9) * document["problem"]["torque"]
+    assert (strict["shortfall"], document["design"]["area_tolerance"]) == (0.0, 1e-3)
+    assert document["design"]["shortfall"] >= 0.0
     assert [row["method"] for row in document["comparison"]] == ["ga", "de", "cma", "random"]
     assert {row["evaluations"] for row in document["comparison"]} == {100}
     assert np.all(np.diff(document["front"]["size"]) > 0.0)
@@ -92,6 +101,11 @@ def test_a_requirement_that_cannot_be_met_is_a_result(capsys):
     assert code == 0
     assert "THE REQUIREMENT IS NOT MET" in out
     assert "NO PRESSURE UP TO" in out
+    assert "strict, direct search: " in out
+
+
+def test_no_design_of_the_direct_search_is_said():
+    assert "no design was found" in cli_design._strict_line(None)
 
 
 @pytest.mark.parametrize(

@@ -115,7 +115,8 @@ def test_many_designs_at_once_are_the_same_as_one_by_one():
 def test_designs_out_of_reach_are_penalised_and_finite():
     task = problem(max_angle=math.radians(170.0))
     short = np.array([0.001, 0.02, 0.02, 0.08])
-    assert not np.all(task.joint(short).reaches(task.angles))
+    with pytest.raises(ParameterError, match="folded"):
+        task.joint(short)
     designs = np.array([short, [0.0127, 0.0635, 0.0127, 0.0], [0.5, 0.5, 0.5, 0.5], [0.05, 0.0, 0.05, 0.05]])
     scores = task.evaluate(designs)
     for values in (scores.fitness, scores.area_below, scores.area_above, scores.torque, scores.max_angle):
@@ -124,6 +125,9 @@ def test_designs_out_of_reach_are_penalised_and_finite():
     assert not np.any(scores.available)
     assert np.all(task.needed_pressure(designs) >= 1e10)
     assert np.all(np.isfinite(task.size(designs)))
+    folding = {"upper_axial": (0.001, 0.003), "lower_offset": (0.04, 0.09)}
+    assert not JointDesign.of(task, short).met()
+    assert np.isfinite(optimise(task.replace(bounds=folding), "random", evaluations=60).scores.fitness[0])
 
 
 def test_a_muscle_that_cannot_pull_is_slack():
@@ -140,6 +144,38 @@ def test_needed_pressure_is_where_the_torque_just_suffices():
     assert task.replace(pressure=needed).evaluate(GOOD).torque.min() == pytest.approx(task.torque, rel=1e-9)
     assert JointDesign.of(task.replace(pressure=1.001 * needed), GOOD).met(1e-9)
     assert JointDesign.of(task, TABLE).needed_pressure is None  # beyond 15 % of stroke
+
+
+def test_met_within_a_tolerance_is_not_called_met():
+    task = problem()
+    needed = float(task.needed_pressure(GOOD)[0])
+    low = JointDesign.of(task.replace(pressure=0.99 * needed), GOOD)
+    torque = low.scores.torque[0]
+    short, angle = low.shortfall
+    assert low.met()
+    assert short == pytest.approx(1.0 - torque.min() / task.torque)
+    assert angle == task.angles[int(np.argmin(torque))]
+    words = (
+        f"met within 0.1 % of the work wanted; least torque {100 * short:.2g} % below the wanted one at {math.degrees(angle):.4g} deg"
+    )
+    assert words in low.summary()
+    assert "the requirement is met" not in low.summary()
+    found = low.to_dict()
+    assert [found[name] for name in ("met", "area_tolerance", "shortfall", "shortfall_angle")] == [True, 1e-3, short, angle]
+    enough = JointDesign.of(task.replace(pressure=needed), GOOD)
+    assert enough.shortfall[0] == 0.0
+    assert "the requirement is met" in enough.summary()
+
+
+def test_a_design_keeps_its_tolerance():
+    task = problem(pressure=0.99 * float(problem().needed_pressure(GOOD)[0]))
+    strict, loose = (JointDesign(task, np.array(GOOD), area_tolerance=value) for value in (0.0, 0.05))
+    assert (strict.met(), loose.met(), strict.met(0.05)) == (False, True, True)
+    assert (strict.to_dict()["met"], loose.to_dict()["met"]) == (False, True)
+    assert "THE REQUIREMENT IS NOT MET" in strict.summary()
+    assert "met within 5 % of the work wanted" in loose.summary()
+    with pytest.raises(ParameterError, match="area_tolerance"):
+        JointDesign(task, np.array(GOOD), area_tolerance=-1.0)
 
 
 def test_no_joint_gets_more_work_out_of_a_stroke_than_the_muscle_gives():
@@ -375,6 +411,21 @@ def test_the_outer_loop_brackets_the_smallest_pressure():
     strict = least_pressure(task)
     assert 0.97 * strict.problem.pressure < found.pressure < 1.02 * strict.problem.pressure
     assert found.pressure > 0.99 * task.least_possible_pressure()
+
+
+def test_the_tolerance_of_the_outer_loop_is_kept_and_its_bound_holds():
+    task = problem(points=22)
+    found = minimum_pressure(task, "de", tries=1, evaluations=400, tolerance=2e4, area_tolerance=0.2)
+    assert found.design.area_tolerance == found.to_dict()["area_tolerance"] == 0.2
+    assert found.design.met()
+    assert found.design.to_dict()["met"]
+    assert not found.design.met(1e-3)
+    assert "met within 20 % of the work wanted" in found.design.summary()
+    bound = found.to_dict()["least_possible_pressure"]
+    assert bound == pytest.approx(task.least_possible_pressure(0.2), rel=1e-12)
+    assert bound <= found.pressure < task.least_possible_pressure()
+    assert f"less than {bound / 1e5:.4g} bar" in found.summary()
+    assert "the smallest at which this search succeeded" in found.summary()
 
 
 def test_more_torque_needs_more_pressure():

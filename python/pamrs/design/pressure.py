@@ -38,7 +38,8 @@ class PressureSearch:
     met : bool
         Whether any pressure up to ``highest`` was enough.
     design : JointDesign
-        The design at the smallest pressure that was enough, its problem at that pressure; the best found where none was.
+        The design at the smallest pressure at which this search succeeded, its problem at that pressure; the best found where
+        it never did.
     trials : tuple of Trial
         In the order tried.
     evaluations : int
@@ -55,17 +56,22 @@ class PressureSearch:
 
     @property
     def pressure(self) -> float | None:
-        """The smallest pressure that was enough [Pa]; None where none was."""
+        """The smallest pressure at which this search succeeded [Pa], no bound; None where it never did."""
         return self.design.problem.pressure if self.met else None
+
+    @property
+    def least_possible_pressure(self) -> float:
+        """Pressure below which no joint can do [Pa]; the share of the work that may be missing is the design's ``area_tolerance``."""
+        return self.design.problem.least_possible_pressure(self.design.area_tolerance)
 
     def summary(self) -> str:
         """The result in a line or two."""
         tried = f"{len(self.trials)} pressures, {self.evaluations} evaluations"
-        least = _psi(self.design.problem.least_possible_pressure())
+        least = f"no joint of any shape could do with less than {_psi(self.least_possible_pressure)}"
         if not self.met:
             highest = max(trial.pressure for trial in self.trials)
-            return f"NO PRESSURE UP TO {_psi(highest)} IS ENOUGH ({tried}); no joint of any shape could do with less than {least}"
-        return f"minimum pressure {_psi(self.design.problem.pressure)} ({tried}); no joint of any shape could do with less than {least}"
+            return f"NO PRESSURE UP TO {_psi(highest)} IS ENOUGH ({tried})\n{least}"
+        return f"pressure {_psi(self.design.problem.pressure)}: the smallest at which this search succeeded ({tried})\n{least}"
 
     def to_dict(self) -> dict[str, Any]:
         """Numbers in SI units, ready for JSON."""
@@ -74,7 +80,8 @@ class PressureSearch:
             "pressure": self.pressure,
             "tolerance": self.tolerance,
             "evaluations": self.evaluations,
-            "least_possible_pressure": self.design.problem.least_possible_pressure(),
+            "area_tolerance": self.design.area_tolerance,
+            "least_possible_pressure": self.least_possible_pressure,
             "trials": [vars(trial) for trial in self.trials],
         }
 
@@ -94,7 +101,8 @@ def minimum_pressure(
 ) -> PressureSearch:
     """Repeat the search at other pressures until the area below the threshold is essentially zero (3.5.1).
 
-    From the problem's pressure upward by half as much again until a search succeeds, then by bisection.
+    From the problem's pressure upward by half as much again until a search succeeds, then by bisection. A search may miss what
+    another start finds, so the result depends on the start and is no bound: see :func:`least_pressure`.
 
     Parameters
     ----------
@@ -129,21 +137,22 @@ def minimum_pressure(
     if tries < 1:
         raise ParameterError(f"tries = {tries} is not allowed: a whole number from 1 on is needed")
     trials: list[Trial] = []
+    options: dict[str, Any] = {"evaluations": evaluations, "genetic": genetic, "area_tolerance": area_tolerance}
     used = 0
 
     def attempt(pressure: float) -> JointDesign:
         nonlocal used
         best: JointDesign | None = None
         count = 0
-        while count < tries and not (best is not None and best.met(area_tolerance)):
+        while count < tries and not (best is not None and best.met()):
             start = seed + 1000 * len(trials) + count
-            design = optimise(problem.replace(pressure=pressure), method, evaluations=evaluations, seed=start, genetic=genetic)
+            design = optimise(problem.replace(pressure=pressure), method, **options, seed=start)
             used += design.search.evaluations if design.search is not None else 0
             count += 1
-            if best is None or design.met(area_tolerance) or design.scores.fitness[0] < best.scores.fitness[0]:
+            if best is None or design.met() or design.scores.fitness[0] < best.scores.fitness[0]:
                 best = design
         assert best is not None
-        trials.append(Trial(pressure, float(best.scores.area_below[0]), best.met(area_tolerance), count))
+        trials.append(Trial(pressure, float(best.scores.area_below[0]), best.met(), count))
         if progress is not None:
             progress(len(trials), len(trials) + max(0, math.ceil(math.log2(max(high - low, tolerance) / tolerance))))
         return best

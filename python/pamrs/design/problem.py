@@ -263,11 +263,16 @@ class JointProblem:
         stroke = np.where(np.isnan(contraction), 0.0, contraction).max(axis=1) * float(self.muscle.parameters["rest_length"])
         return np.asarray(np.maximum(np.hypot(rows[:, 0] + stroke, rows[:, 1]), np.hypot(rows[:, 2], rows[:, 3])))
 
-    def least_possible_pressure(self) -> float:
+    def least_possible_pressure(self, area_tolerance: float = 0.0) -> float:
         """Pressure below which no joint of any shape can meet the requirement [Pa].
 
         The work wanted must come out of the muscles' stroke: ``torque * range <= count * integral F dd``. A joint whose moment
         arm fits the muscle at every angle would need just this pressure.
+
+        Parameters
+        ----------
+        area_tolerance : float
+            Share of the work wanted that may be missing [1].
         """
         highest = min(self.max_contraction, self.muscle.contraction_limits[1])
         contraction = np.linspace(0.0, highest, 2001)
@@ -276,7 +281,7 @@ class JointProblem:
         slope = (self.muscle.force(self.pressure, contraction) - passive) / self.pressure
         work, work_slope = (_running_integral(contraction * length, values) for values in (passive, slope))
         possible = work_slope > 0.0
-        needed = (self.required_area / self.count - work[possible]) / work_slope[possible]
+        needed = ((1.0 - area_tolerance) * self.required_area / self.count - work[possible]) / work_slope[possible]
         return float(needed.min())
 
     def _rows(self, designs: ArrayLike) -> Array:
@@ -285,6 +290,8 @@ class JointProblem:
             raise ParameterError(f"designs has shape {rows.shape}: rows of {', '.join(LENGTHS)} are needed")
         if not np.all(np.isfinite(rows)):
             raise ParameterError("designs must hold finite lengths")
+        if np.any(rows[:, [0, 2]] <= 0.0):
+            raise ParameterError("designs must hold axial lengths above 0 m")
         return rows
 
     def _motion(self, designs: ArrayLike) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
@@ -294,7 +301,10 @@ class JointProblem:
         contraction, arm, torque_arm = (np.full((len(rows), self.points), np.nan) for _ in range(3))
         angles = self.angles
         for index, row in enumerate(rows):
-            joint = self.joint(row)
+            try:
+                joint = self.joint(row)
+            except ParameterError:  # the tendon would be folded over at the least angle: out of reach
+                continue
             reached = joint.reaches(angles)
             contraction[index, reached] = joint.shortening(angles[reached]) / length
             arm[index, reached] = joint.moment_arm(angles[reached])
