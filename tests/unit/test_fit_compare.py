@@ -148,3 +148,16 @@ def test_independent_noise_counts_every_point_and_model_error_does_not():
     turned = np.where(data.level % 2 == 0, wave, -wave)  # smooth along each level, opposite in the next
     along = ForceMap.from_arrays(data.length, data.pressure, data.force + turned, rest_length=REST)
     assert effective_size(fit_muscle(along, muscle())) < 0.5 * 360
+
+
+def test_loops_without_a_friction_law_are_said_to_favour_the_model_with_two_branches():
+    real = muscle(friction_coefficient=0.05)
+    maps = [measure(real, direction=way, noise=1.0) for way in (-1.0, 1.0)]
+    columns = [np.concatenate([getattr(m, name) for m in maps]) for name in ("length", "pressure", "force")]
+    way = np.repeat([-1.0, 1.0], len(maps[0]))
+    data = ForceMap.from_arrays(*columns, rest_length=REST, direction=way)
+    found = compare_models(data, muscle(), models=["kothera", "elbow_linear"], orders=[2])
+    assert "which favours it; fit friction first" in found.to_text()
+    fitted = compare_models(data, real, models=["kothera", "elbow_linear"], orders=[2])
+    assert fitted.notes == ()
+    assert fitted.rows[0]["model"] == "kothera"

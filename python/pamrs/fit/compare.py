@@ -53,6 +53,8 @@ class ModelComparison:
         Points in the map.
     subset : list of float
         Pressures of the chosen levels [Pa]; empty without.
+    notes : tuple of str
+        What to know before using the ranking.
     """
 
     rows: list[dict[str, Any]]
@@ -60,6 +62,7 @@ class ModelComparison:
     effective_size: float
     ndata: int
     subset: list[float]
+    notes: tuple[str, ...] = ()
 
     @property
     def best(self) -> MuscleFit:
@@ -97,6 +100,7 @@ class ModelComparison:
             "* fewest unknowns among those that predict pressures left out (LOPO) no worse than rank 1:",
             f"  the excess of their squared errors, level by level, is within one standard error, their rms within {_NEAR:g} times",
         ]
+        lines += [f"note: {note}" for note in self.notes]
         return "\n".join(lines) + "\n"
 
     def _line(self, row: Mapping[str, Any]) -> str:
@@ -207,7 +211,20 @@ def compare_models(
     eligible = [row for row in ranked if row["lopo_excess"] <= row["lopo_excess_stderr"] and row["lopo_rms"] <= near]
     min(eligible, key=lambda row: (row["nvarys"], row["lopo_rms"]))["recommended"] = True
     subset = [] if levels is None else [float(data.levels[index]) for index in level_indices(data, levels)]
-    return ModelComparison(ranked + [row for row in rows if row["reason"] is not None], fits, size, int(data.used.sum()), subset)
+    rows = ranked + [row for row in rows if row["reason"] is not None]
+    return ModelComparison(rows, fits, size, int(data.used.sum()), subset, _loops(data, muscle, direction))
+
+
+def _loops(data: ForceMap, muscle: Muscle, direction: str | None) -> tuple[str, ...]:
+    """A note where the rows are loops and the muscle has no friction: only one model then has two branches."""
+    way = data.direction[data.used]
+    rubs = any(muscle.parameters[name] for name in ("friction_coefficient", "friction_pressure_slope", "friction_floor"))
+    if direction is None or rubs or not (np.any(way < 0) and np.any(way > 0)):
+        return ()
+    return (
+        "the rows are loops and the muscle has no friction: only elbow_linear has a branch for each direction, which favours it; "
+        "fit friction first, fit_friction(data).to_muscle(muscle)",
+    )
 
 
 _EMPTY: dict[str, Any] = dict.fromkeys(
