@@ -195,10 +195,7 @@ def simulate(
     >>> bool(result["joint_angle"][-1] > result["joint_angle"][0])
     True
     """
-    if not isinstance(rig, Rig):
-        raise ParameterError(f"rig is a {type(rig).__name__}; a Rig is needed, for example pamrs.load_rig({rig!r})")
-    if not (np.isfinite(sample_time) and sample_time > 0):
-        raise ParameterError(f"sample_time = {sample_time} is not allowed: a finite time > 0 s is needed")
+    check_run(rig, sample_time)
     has_valve = rig.model["valve"] is not None
     if valve_command is None:
         if has_valve:
@@ -218,6 +215,14 @@ def simulate(
     time = np.asarray(np.arange(command.size) * sample_time, dtype=np.float64)
     shown = {"valve_command": command} if has_valve else {}
     return Simulation({"time": time, **shown, **channels}, rig)
+
+
+def check_run(rig: Rig, sample_time: float) -> None:
+    """Refuse what is not a rig and a sample time [s] that is not a finite number above zero."""
+    if not isinstance(rig, Rig):
+        raise ParameterError(f"rig is a {type(rig).__name__}; a Rig is needed, for example pamrs.load_rig({rig!r})")
+    if not (np.isfinite(sample_time) and sample_time > 0):
+        raise ParameterError(f"sample_time = {sample_time} is not allowed: a finite time > 0 s is needed")
 
 
 def _rows(sample_time: float, duration: float | None, *signals: ArrayLike | None) -> int:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from pamrs import _core
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
-from pamrs.simulation import chosen_step, core_rig, held_command, initial_values
+from pamrs.simulation import check_run, chosen_step, core_rig, held_command, initial_values
 
 __all__ = ["Simulator"]
 
@@ -51,10 +51,7 @@ class Simulator:
     """
 
     def __init__(self, rig: Rig, *, sample_time: float, step: float | None = None, initial: Mapping[str, float] | None = None) -> None:
-        if not isinstance(rig, Rig):
-            raise ParameterError(f"rig is a {type(rig).__name__}; a Rig is needed, for example pamrs.load_rig({rig!r})")
-        if not (np.isfinite(sample_time) and sample_time > 0):
-            raise ParameterError(f"sample_time = {sample_time} is not allowed: a finite time > 0 s is needed")
+        check_run(rig, sample_time)
         self.rig = rig
         self.sample_time = float(sample_time)
         self._step = chosen_step(self.sample_time, step, rig)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 from pamrs.errors import FitError, ParameterError
 from pamrs.fit import remarks
 from pamrs.fit.export import friction_words
+from pamrs.report import require
 from pamrs.report.text import format_number, format_uncertain
 
 if TYPE_CHECKING:
@@ -25,10 +26,6 @@ _SHOWN_UNITS = {"Pa": ("MPa", 1e-6), "m": ("mm", 1e3), "rad": ("°", 57.29577951
 
 #: Levels up to which the moduli of each are shown beside the straight lines.
 _MOST_LEVELS: Final = 40
-
-
-def _missing(error: ImportError) -> ImportError:
-    return ImportError(f"the report needs {error.name}, which is not installed: pip install pamrs[report]", name=error.name)
 
 
 # ------------------------------------------------------------------------- curves
@@ -223,12 +220,9 @@ def render_html(fit: MuscleFit, comparison: ModelComparison | None = None, *, co
     ImportError
         If matplotlib or jinja2 is missing; names the extra to install.
     """
-    try:
-        import jinja2  # noqa: F401
-        import matplotlib  # noqa: F401
-        from markupsafe import Markup
-    except ImportError as error:
-        raise _missing(error) from error
+    require("jinja2", "matplotlib", "markupsafe")
+    from markupsafe import Markup
+
     from pamrs.fit import figures
     from pamrs.report.page import render_page
 
@@ -284,10 +278,7 @@ def render_png(fit: MuscleFit, comparison: ModelComparison | None = None) -> byt
     ImportError
         If matplotlib is missing; names the extra to install.
     """
-    try:
-        import matplotlib  # noqa: F401
-    except ImportError as error:
-        raise _missing(error) from error
+    require("matplotlib")
     from pamrs.fit.figures import summary_png
 
     return summary_png(fit, error_curves(fit, comparison), remarks.headline(fit))
@@ -312,10 +303,7 @@ def render_friction_png(fit: FrictionFit, data: ForceMap) -> bytes:
     ImportError
         If matplotlib is missing; names the extra to install.
     """
-    try:
-        import matplotlib  # noqa: F401
-    except ImportError as error:
-        raise _missing(error) from error
+    require("matplotlib")
     from pamrs.fit.friction_figure import friction_png
 
     return friction_png(fit, data)

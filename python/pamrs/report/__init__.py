@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,8 +13,25 @@ if TYPE_CHECKING:
 __all__ = ["render_html", "write_figure", "write_report"]
 
 
-def _missing(error: ImportError) -> ImportError:
-    return ImportError(f"the report needs {error.name}, which is not installed: pip install pamrs[report]", name=error.name)
+def require(*packages: str) -> None:
+    """Import the packages that a report is made with.
+
+    Parameters
+    ----------
+    *packages : str
+        Names to import.
+
+    Raises
+    ------
+    ImportError
+        If one is missing; names it and the extra to install.
+    """
+    for package in packages:
+        try:
+            importlib.import_module(package)
+        except ImportError as error:
+            text = f"the report needs {error.name}, which is not installed: pip install pamrs[report]"
+            raise ImportError(text, name=error.name) from error
 
 
 def render_html(diagnosis: Diagnosis) -> str:
@@ -24,11 +42,7 @@ def render_html(diagnosis: Diagnosis) -> str:
     ImportError
         If matplotlib or jinja2 is missing; names the extra to install.
     """
-    try:
-        import jinja2  # noqa: F401
-        import matplotlib  # noqa: F401
-    except ImportError as error:
-        raise _missing(error) from error
+    require("jinja2", "matplotlib")
     from pamrs.report.html import render
 
     return render(diagnosis)
@@ -57,10 +71,7 @@ def write_figure(diagnosis: Diagnosis, path: str | os.PathLike[str]) -> Path:
     """
     from pamrs.writing import write_atomically
 
-    try:
-        import matplotlib  # noqa: F401
-    except ImportError as error:
-        raise _missing(error) from error
+    require("matplotlib")
     from pamrs.report.figures import summary_png
 
     return write_atomically(path, summary_png(diagnosis))
