@@ -8,9 +8,7 @@ Everything heavy is imported inside the command that needs it, so that ``pamrs -
 from __future__ import annotations
 
 import sys
-import time
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -19,6 +17,7 @@ import typer
 from pamrs.cli_design import design_app
 from pamrs.cli_fit import fit_app
 from pamrs.cli_library import library_command, size_command
+from pamrs.cli_shared import check_writable, progress
 
 if TYPE_CHECKING:
     import numpy as np
@@ -80,28 +79,6 @@ def _root(
     """Simulate pneumatic artificial muscles, and find the physics that a simulation leaves out."""
 
 
-@contextmanager
-def _progress(text: str) -> Iterator[None]:
-    """Say on standard error what is going on, with a clock where a person is looking."""
-    started = time.perf_counter()
-    if sys.stderr.isatty():
-        from rich.console import Console
-
-        with Console(stderr=True).status(text):
-            yield
-    else:
-        typer.echo(f"{text} ...", err=True)
-        yield
-    typer.echo(f"{text}: done in {time.perf_counter() - started:.1f} s", err=True)
-
-
-def _check_writable(*paths: Path | None) -> None:
-    """Refuse an output whose folder does not exist before any long work starts."""
-    for path in paths:
-        if path is not None and not path.absolute().parent.is_dir():
-            raise FileNotFoundError(f"{path}: the folder {path.parent} does not exist")
-
-
 @app.command("diagnose")
 def _diagnose(
     case: Annotated[Path, typer.Argument(help="Folder with case.toml, rig.toml and the recordings.")],
@@ -111,13 +88,13 @@ def _diagnose(
     model: Annotated[Path | None, typer.Option(help="Write the rig with the named effect in it.")] = None,
 ) -> None:
     """Find the physics that the rig's model leaves out of a case's recordings."""
-    _check_writable(report, json, png, model)
+    check_writable(report, json, png, model)
     from pamrs.case import load_case
 
     loaded = load_case(case)
     from pamrs.diagnosis import diagnose
 
-    with _progress(f"diagnosing {loaded.name}"):
+    with progress(f"diagnosing {loaded.name}"):
         result = diagnose(loaded)
     if json is not None:
         result.to_json(json)
@@ -147,7 +124,7 @@ def _simulate(
     """Drive a rig with a recording's inputs and write what its channels would be."""
     if output is None and plot is None and animation is None:
         raise typer.BadParameter("nothing would be written: give --output, --plot or --animation")
-    _check_writable(output, plot, animation)
+    check_writable(output, plot, animation)
     import numpy as np
 
     from pamrs.recording import load_recording
@@ -171,7 +148,7 @@ def _simulate(
         initial = {name: value for name, value in initial.items() if name == "supply_pressure"}
     elif loaded.model["valve"] is None:
         drive["duration"] = float(recording.time[-1])
-    with _progress(f"simulating {loaded.name}"):
+    with progress(f"simulating {loaded.name}"):
         result = simulate(loaded, sample_time=recording.sample_time, initial=initial, **drive)
     if output is not None:
         _write_csv(output, result)
@@ -181,7 +158,7 @@ def _simulate(
         result.plot(plot, recorded=recorded)
         typer.echo(f"written: {plot}", err=True)
     if animation is not None:
-        with _progress("drawing the motion"):
+        with progress("drawing the motion"):
             result.animate(animation, speed=speed)
         typer.echo(f"written: {animation}", err=True)
     for name, recorded_as in (*((name, name) for name in STATES), ("muscle_force", "force")):
@@ -244,7 +221,7 @@ def _rig_new(
     from pamrs import rigs
     from pamrs.writing import write_atomically
 
-    _check_writable(file)
+    check_writable(file)
     if file.exists():
         raise FileExistsError(f"{file}: is there already; it is not overwritten")
     write_atomically(file, rigs.template(like, file.stem if name is None else name))

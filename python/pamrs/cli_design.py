@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from pamrs.cli_fit import _named_muscle, _quantity, _write
+from pamrs.cli_shared import check_writable, exact, named_muscle, write
 
 if TYPE_CHECKING:
     from pamrs.design import JointDesign, JointProblem, MethodComparison, ParetoFront, PressureSearch
@@ -54,9 +54,7 @@ def _joint(
     rig_joint: Annotated[Path | None, typer.Option(help="Write the block [joint] of a rig file.")] = None,
 ) -> None:
     """Find the four lengths of a tendon joint that give a torque over a range of angles (dissertation 3.5)."""
-    from pamrs.cli import _check_writable
-
-    _check_writable(png, json, rig_joint)
+    check_writable(png, json, rig_joint)
     if method not in _METHODS:
         raise typer.BadParameter(f"--method = {method!r} is not allowed: {', '.join(_METHODS)}")
     from pamrs.design import Genetic, compare_methods, least_pressure, minimum_pressure, optimise, pareto_front
@@ -103,20 +101,10 @@ def _joint(
         typer.echo(f"\nJ in joule at {_psi(design.problem.pressure)}\n{comparison.table()}")
     if front is not None:
         typer.echo(f"\n{_front_table(front)}")
-    _write(contents)
+    write(contents)
 
 
 # ------------------------------------------------------------------------- inputs
-
-
-def _value(name: str, text: str, dimension: str) -> float:
-    """A number with a unit in SI, without a standard deviation."""
-    from pamrs.errors import ParameterError
-
-    value, spread = _quantity(name, text, dimension)
-    if spread is not None:
-        raise ParameterError(f"--{name.replace('_', '-')} = {text.strip()!r} is not allowed: a standard deviation has no use here")
-    return value
 
 
 def _problem(
@@ -125,14 +113,14 @@ def _problem(
     from pamrs.design import JointProblem
 
     return JointProblem(
-        _named_muscle(muscle)[0],
+        named_muscle(muscle)[0],
         count,
-        _value("torque", torque, "torque"),
-        _value("min_angle", angles[0], "angle"),
-        _value("max_angle", angles[1], "angle"),
-        _value("pressure", pressure, "pressure"),
+        exact("torque", torque, "torque"),
+        exact("min_angle", angles[0], "angle"),
+        exact("max_angle", angles[1], "angle"),
+        exact("pressure", pressure, "pressure"),
         bounds=_bounds(bounds),
-        max_contraction=_value("max_stroke", max_stroke, "dimensionless"),
+        max_contraction=exact("max_stroke", max_stroke, "dimensionless"),
     )
 
 
@@ -152,7 +140,7 @@ def _bounds(given: Sequence[str]) -> dict[str, tuple[float, float]]:
             raise ParameterError(f"--bounds = {text!r} is not allowed: {reason}")
         unit = high.strip().lstrip("+-0123456789.eE").strip()
         bare = not low.strip().lstrip("+-0123456789.eE").strip()
-        found[key] = (_value("bounds", f"{low} {unit}" if bare else low, "length"), _value("bounds", high, "length"))
+        found[key] = (exact("bounds", f"{low} {unit}" if bare else low, "length"), exact("bounds", high, "length"))
     return found
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 import shlex
 from collections.abc import Mapping, Sequence
 from enum import StrEnum
@@ -11,6 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
+
+from pamrs.cli_shared import GEOMETRY, check_writable, named_muscle, progress, quantity, write
 
 if TYPE_CHECKING:
     from pamrs.fit.compare import ModelComparison
@@ -24,9 +25,6 @@ __all__ = ["fit_app"]
 
 SCHEMA: Final = "pamrs.muscle_fit/1"
 FRICTION_SCHEMA: Final = "pamrs.friction_fit/1"
-_NUMBER = r"[-+]?\d*\.?\d+(?:[eE][-+]?\d+)?"
-_QUANTITY = re.compile(rf"^\s*(?P<value>{_NUMBER})\s*(?:(?:\+-|±)\s*(?P<tol>{_NUMBER})\s*)?(?P<unit>\S.*?)?\s*$")
-_GEOMETRY: Final = {"rest_length": "length", "rest_diameter": "length", "braid_angle": "angle", "wall_thickness": "length"}
 _MODULI: Final = {"modulus_slope": "dimensionless"}
 
 
@@ -92,30 +90,28 @@ def _muscle(
     png: _Picture = None,
 ) -> None:
     """Fit a muscle's force model to measured forces over length and pressure."""
-    from pamrs.cli import _check_writable, _progress
-
     outputs = (report, rig, json, png)
-    _check_writable(*outputs)
+    check_writable(*outputs)
     if per_level and rig is not None:
         raise typer.BadParameter("a rig needs moduli linear in pressure: leave out --per-level or --rig")
     sizes = {"rest_length": rest_length, "rest_diameter": rest_diameter, "braid_angle": braid_angle, "wall_thickness": wall_thickness}
     map_, start, tolerance, stated, base = _inputs(
         data, muscle, {k: v for k, v in sizes.items() if v is not None}, where or [], clipped
     )
-    pressures = None if levels is None else [_quantity("levels", text, "pressure")[0] for text in levels.split(",")]
+    pressures = None if levels is None else [quantity("levels", text, "pressure")[0] for text in levels.split(",")]
     names = [] if free is None else [name.strip().replace("-", "_") for name in free.split(",") if name.strip()]
     from pamrs.muscle_models import ELASTIC_PARAMETERS
 
     elastic = ELASTIC_PARAMETERS.get(model or start.model, ())  # a description may know of coefficients that another model has
-    tolerance = {name: value for name, value in tolerance.items() if name in _GEOMETRY or name in elastic}
+    tolerance = {name: value for name, value in tolerance.items() if name in GEOMETRY or name in elastic}
     known = {name: value for name, value in tolerance.items() if math.isfinite(value)} | _prior(prior)
     scatter = stated if noise is None else _noise(noise, map_)
-    idle = [name for name in known if name in _GEOMETRY and name not in names]
+    idle = [name for name in known if name in GEOMETRY and name not in names]
     notes = [f"tolerance of {', '.join(idle)} is not used: not free (--free {','.join([*names, *idle])})"] if idle else []
     from pamrs.fit import FitError, fit_muscle
 
     shape: dict[str, Any] = {"geometry": geometry, "free": names, "tolerance": known, "levels": pressures, "noise": scatter}
-    with _progress(f"fitting {map_.label}"):
+    with progress(f"fitting {map_.label}"):
         try:
             start, rubbing, words = _rubbing(map_, start, friction, model, pressures)
             fit = fit_muscle(map_, start, model=model, order=order, moduli="per_level" if per_level else "linear", **shape)
@@ -125,7 +121,7 @@ def _muscle(
         except FitError as error:
             raise FitError("; ".join([str(error), *map_.notes])) from error
     typer.echo(summary, nl=False)
-    _write(contents)
+    write(contents)
     if rig is not None and base is None:
         typer.echo(f"{rig} is the muscle on a load frame: simulate it with a length, or give it [joint] and [arm]", err=True)
 
@@ -146,15 +142,13 @@ def _friction(
     png: _Picture = None,
 ) -> None:
     """Fit the friction c_F = max(c0 + c1 P, floor) of a muscle to its hysteresis loops; of its geometry, the rest length is enough."""
-    from pamrs.cli import _check_writable, _progress
-
-    _check_writable(json, png)
+    check_writable(json, png)
     sizes = {"rest_length": rest_length, "rest_diameter": rest_diameter, "braid_angle": braid_angle, "wall_thickness": wall_thickness}
     map_ = _loops(data, muscle, {k: v for k, v in sizes.items() if v is not None}, where or [], clipped)
     from pamrs.fit import fit_friction
 
     contents: dict[Path, str | bytes] = {}
-    with _progress(f"fitting {map_.label}"):
+    with progress(f"fitting {map_.label}"):
         fit = fit_friction(map_, floor=floor)
         if json is not None:
             contents[json] = _friction_json(fit, map_, _command(context))
@@ -163,7 +157,7 @@ def _friction(
 
             contents[png] = render_friction_png(fit, map_)
     typer.echo(f"{map_.label}: {fit.fit_report()}")
-    _write(contents)
+    write(contents)
 
 
 def _rubbing(
@@ -219,25 +213,6 @@ def _comparison(data: ForceMap, muscle: Muscle, order: int | None, shape: dict[s
 # ------------------------------------------------------------------------- inputs
 
 
-def _quantity(name: str, text: str, dimension: str) -> tuple[float, float | None]:
-    """Value and, after ``+-``, standard deviation of a number with a unit, in SI."""
-    from pamrs.errors import ParameterError
-    from pamrs.units import DIMENSIONS, to_si
-
-    option = f"--{name.replace('_', '-')}"
-    match = _QUANTITY.match(text)
-    if match is None or match["unit"] is None:
-        raise ParameterError(
-            f"{option} = {text.strip()!r} is not allowed: a number with a unit like {DIMENSIONS[dimension]!r} is needed"
-        )
-    try:
-        value = to_si(float(match["value"]), match["unit"], dimension)
-        spread = None if match["tol"] is None else to_si(float(match["tol"]), match["unit"], dimension, difference=True)
-    except ParameterError as error:
-        raise ParameterError(f"{option} = {text.strip()!r}: {error}") from None
-    return value, spread
-
-
 def _inputs(
     data: Path, muscle: str | None, sizes: Mapping[str, str], where: Sequence[str], clipped: str | None
 ) -> tuple[ForceMap, Muscle, dict[str, float], float | None, Rig | None]:
@@ -267,7 +242,7 @@ def _table(data: Path, rest_length: float, where: Sequence[str], clipped: str | 
         data,
         rest_length=rest_length,
         where=dict(_filter(text) for text in where) or None,
-        clipped=None if clipped is None else _quantity("clipped", clipped, "force")[0],
+        clipped=None if clipped is None else quantity("clipped", clipped, "force")[0],
     )
 
 
@@ -281,7 +256,7 @@ def _loops(data: Path, muscle: str | None, sizes: Mapping[str, str], where: Sequ
         raise ParameterError(
             "the rest length is missing: give --rest-length (like '300 mm'), or --muscle with a rig file or a name of the library"
         )
-    return _table(data, _quantity("rest_length", sizes["rest_length"], "length")[0], where, clipped)
+    return _table(data, quantity("rest_length", sizes["rest_length"], "length")[0], where, clipped)
 
 
 def _prior(text: str | None) -> dict[str, float]:
@@ -294,15 +269,15 @@ def _prior(text: str | None) -> dict[str, float]:
         name, equals, value = (piece.strip() for piece in part.partition("="))
         if not equals or name not in COEFFICIENTS:
             raise ParameterError(f"--prior = {part.strip()!r} is not allowed: NAME=VALUE with a name of {', '.join(COEFFICIENTS)}")
-        known[name] = _quantity("prior", f"{value} 1" if name == "modulus_slope" else value, _MODULI.get(name, "pressure"))[0]
+        known[name] = quantity("prior", f"{value} 1" if name == "modulus_slope" else value, _MODULI.get(name, "pressure"))[0]
     return known
 
 
 def _noise(text: str, data: ForceMap) -> float:
     """Standard deviation of the forces [N]; a percentage is of the largest used force."""
     if not text.strip().endswith("%"):
-        return _quantity("noise", text, "force")[0]
-    return _quantity("noise", text, "dimensionless")[0] * float(data.force[data.used].max())
+        return quantity("noise", text, "force")[0]
+    return quantity("noise", text, "dimensionless")[0] * float(data.force[data.used].max())
 
 
 def _filter(text: str) -> tuple[str, str]:
@@ -322,36 +297,19 @@ def _start(muscle: str | None, sizes: Mapping[str, str]) -> tuple[Muscle, dict[s
     values: dict[str, Any] = {}
     tolerance: dict[str, float] = {}
     for name, text in sizes.items():
-        values[name], spread = _quantity(name, text, _GEOMETRY[name])
+        values[name], spread = quantity(name, text, GEOMETRY[name])
         if spread is not None:
             tolerance[name] = spread
     if muscle is not None:
-        base, known, rig = _named_muscle(muscle)
+        base, known, rig = named_muscle(muscle)
         return base.replace(**values), {**known, **tolerance}, rig
-    lacking = [f"--{name.replace('_', '-')}" for name in _GEOMETRY if name not in values]
+    lacking = [f"--{name.replace('_', '-')}" for name in GEOMETRY if name not in values]
     if lacking:
         raise ParameterError(
             f"the geometry of the muscle is missing: give {', '.join(lacking)} (like --rest-length '300 mm'), "
             "or --muscle with a rig file or a name of the library"
         )
     return Muscle(**values), tolerance, None
-
-
-def _named_muscle(name: str, option: str = "--muscle") -> tuple[Muscle, dict[str, float], Rig | None]:
-    """The muscle of a rig file, or of the library, what is known of its geometry, and the rig."""
-    from pamrs import library
-    from pamrs.errors import ParameterError
-    from pamrs.rig import load_rig
-
-    if not name.endswith(".toml") and not Path(name).exists():
-        if name not in library.names():
-            raise ParameterError(f"{option} = {name!r} is neither a file nor in the library: {', '.join(library.names())}")
-        return library.entry(name).muscle, {}, None
-    rig = load_rig(name)
-    if rig.muscle is None:
-        raise ParameterError(f"{option} = {name!r}: this rig has no block [muscle]")
-    known = {key.partition(".")[2]: p.tol for key, p in rig.parameters.items() if key.startswith("muscle.") and p.tol > 0.0}
-    return rig.muscle, {key: value for key, value in known.items() if key in _GEOMETRY}, rig
 
 
 # ------------------------------------------------------------------------ outputs
@@ -397,15 +355,6 @@ def _contents(
     if json is not None:
         contents[json] = _json(fit, comparison, friction, command)
     return contents
-
-
-def _write(contents: Mapping[Path, str | bytes]) -> None:
-    """Write every file, and say so."""
-    from pamrs.writing import write_atomically
-
-    for path, content in contents.items():
-        write_atomically(path, content)
-        typer.echo(f"written: {path}", err=True)
 
 
 def _command(context: typer.Context) -> str:

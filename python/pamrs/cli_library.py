@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from pamrs.cli_fit import _QUANTITY, _named_muscle, _quantity, _write
+from pamrs.cli_shared import QUANTITY, as_given, check_writable, exact, named_muscle, write
 
 if TYPE_CHECKING:
     from pamrs.filling import Filling
@@ -25,9 +25,7 @@ def library_command(
     facts: Annotated[bool, typer.Option("--facts", help="Every published fact beside ours.")] = False,
 ) -> None:
     """List the muscles of the 2014 dissertation, or print one with the origin of each number."""
-    from pamrs.cli import _check_writable
-
-    _check_writable(rig)
+    check_writable(rig)
     if facts and (name is not None or rig is not None):
         raise typer.BadParameter("--facts prints the facts of all muscles: leave out NAME and --rig")
     if rig is not None and name is None:
@@ -45,7 +43,7 @@ def library_command(
 
         contents[rig] = bench(entry(name).muscle, name).to_toml_text()
     typer.echo(shown)
-    _write(contents)
+    write(contents)
 
 
 def size_command(
@@ -69,9 +67,7 @@ def size_command(
     json: Annotated[Path | None, typer.Option(help=f"Write the result (schema {SCHEMA}).")] = None,
 ) -> None:
     """Count the muscles that a force over a stroke needs, and compare candidates (dissertation 3.2.3)."""
-    from pamrs.cli import _check_writable
-
-    _check_writable(json)
+    check_writable(json)
     from pamrs import library
     from pamrs.sizing import size
 
@@ -88,20 +84,10 @@ def size_command(
     typer.echo(result.table())
     for line in _remarks(candidates):
         typer.echo(line)
-    _write(contents)
+    write(contents)
 
 
 # ------------------------------------------------------------------------- inputs
-
-
-def _exact(name: str, text: str, dimension: str) -> float:
-    """A number with a unit in SI, without a standard deviation."""
-    from pamrs.errors import ParameterError
-
-    value, spread = _quantity(name, text, dimension)
-    if spread is not None:
-        raise ParameterError(f"{_option(name, text)} is not allowed: a standard deviation has no use here")
-    return value
 
 
 def _size(name: str, text: str, dimension: str, *, zero: bool = False) -> float:
@@ -109,15 +95,11 @@ def _size(name: str, text: str, dimension: str, *, zero: bool = False) -> float:
     from pamrs.errors import ParameterError
     from pamrs.filling import positive
 
-    value = _exact(name, text, dimension)
+    value = exact(name, text, dimension)
     try:
         return positive(dimension, value, zero=zero)
     except ParameterError as error:
-        raise ParameterError(f"{_option(name, text)}: {error}") from None
-
-
-def _option(name: str, text: str) -> str:
-    return f"--{name.replace('_', '-')} = {text.strip()!r}"
+        raise ParameterError(f"{as_given(name, text)}: {error}") from None
 
 
 def _measures(text: str, unit: str) -> bool:
@@ -125,7 +107,7 @@ def _measures(text: str, unit: str) -> bool:
     from pamrs.errors import ParameterError
     from pamrs.units import same_dimension
 
-    match = _QUANTITY.match(text)
+    match = QUANTITY.match(text)
     try:
         return match is not None and same_dimension(match["unit"] or "", unit)
     except ParameterError:
@@ -147,7 +129,7 @@ def _requirement(points: Sequence[str]) -> Requirement:
     if any(_measures(position, "1") != (kind == "contraction") for position, _ in pairs):
         raise ParameterError(f"--point: {', '.join(points)}: all positions must be strokes, or all contractions")
     dimension = "dimensionless" if kind == "contraction" else "length"
-    values = [(_exact("point", position, dimension), _exact("point", force, "force")) for position, force in pairs]
+    values = [(exact("point", position, dimension), exact("point", force, "force")) for position, force in pairs]
     try:
         return Requirement(values, position=kind)
     except ParameterError as error:
@@ -178,7 +160,7 @@ def _candidate(name: str, pressure: float | None) -> Candidate:
 
     if name in library.names():
         return Candidate.from_library(name, pressure=pressure)
-    muscle = _named_muscle(name, "MUSCLE")[0]
+    muscle = named_muscle(name, "MUSCLE")[0]
     if pressure is None:
         raise ParameterError(f"MUSCLE = {name!r} is a rig file, which has no working pressure: give --pressure")
     return Candidate(name, muscle, pressure)
