@@ -3,7 +3,6 @@
 
 use criterion::{criterion_main, Criterion};
 use pam_core::residual::{predict, Block, Measured, Signal};
-use pam_core::rig::ParameterId;
 use pam_core::simulate::{simulate, Initial, Timing};
 use pam_core::{Rig, RigSpec};
 use std::hint::black_box;
@@ -22,8 +21,9 @@ fn core(c: &mut Criterion) {
     };
     let command: Vec<f64> = (0..SAMPLES).map(|k| 5.0 + 0.5 * (k as f64 * 0.05).sin()).collect();
     let timing = Timing { sample_time: 0.005, substeps: SUBSTEPS };
-    let initial = Initial { muscle_pressure: 1e5, joint_angle: 0.52, ..Initial::rest(&rig) };
-    if let Some(muscle) = rig.muscle() {
+    let start = Initial::rest(&rig).with(&rig, "muscle_pressure", 1e5);
+    let Ok(initial) = start.and_then(|i| i.with(&rig, "joint_angle", 0.52)) else { return };
+    if let Some(muscle) = rig.muscle(0) {
         c.bench_function("muscle table look-up", |b| b.iter(|| muscle.table.eval(black_box(0.123_f64))));
         c.bench_function("muscle exact force", |b| {
             b.iter(|| muscle.exact.force(black_box(4e5), black_box(0.123)))
@@ -31,28 +31,27 @@ fn core(c: &mut Criterion) {
     }
     let steps = (SAMPLES - 1) * SUBSTEPS;
     c.bench_function(&format!("shoulder, {steps} RK4 steps"), |b| {
-        b.iter(|| simulate(&rig, black_box(&command), timing, initial));
+        b.iter(|| simulate(&rig, SAMPLES, &[("valve_command", black_box(&command))], timing, &initial));
     });
-    let Ok(run) = simulate(&rig, &command, timing, initial) else { return };
+    let Ok(run) = simulate(&rig, SAMPLES, &[("valve_command", &command)], timing, &initial) else { return };
     let zero = vec![0.0; SAMPLES];
-    let signal = |value| Some(Signal { value, slope: &zero });
-    let measured = Measured {
-        valve_command: &command,
-        supply_pressure: signal(&run.supply_pressure),
-        muscle_pressure: signal(&run.muscle_pressure),
-        joint_angle: signal(&run.joint_angle),
-    };
+    let channels = ["supply_pressure", "muscle_pressure", "joint_angle"];
+    let signals: Vec<_> = (channels.iter())
+        .filter_map(|name| Some((*name, Signal { value: run.get(&rig, name)?, slope: &zero })))
+        .collect();
+    let Ok(measured) = Measured::new(&rig, SAMPLES, &[("valve_command", &command)], &signals) else { return };
     let names = [
-        ParameterId::DischargeArea,
-        ParameterId::NullVoltage,
-        ParameterId::DeadVolume,
-        ParameterId::AlphaIn,
-        ParameterId::AlphaOut,
-        ParameterId::Alpha,
-        ParameterId::PressureZero,
+        "valve.discharge_area_max",
+        "valve.null_voltage",
+        "chamber.dead_volume",
+        "chamber.alpha_in",
+        "chamber.alpha_out",
+        "chamber.alpha",
+        "sensors.pressure_zero",
     ];
+    let ids: Vec<_> = names.iter().filter_map(|name| rig.parameters().find(name).ok()).collect();
     c.bench_function(&format!("chamber cut, {steps} RK4 steps, eight sensitivities"), |b| {
-        b.iter(|| predict(&rig, Block::Chamber, black_box(&measured), timing, &[0], &names));
+        b.iter(|| predict(&rig, Block::Chamber(0), black_box(&measured), timing, &[0], &ids));
     });
 }
 

@@ -1,7 +1,7 @@
 //! Pneumatic artificial muscles (McKibben muscles) and the arms they drive.
 //!
 //! The physics of R. M. Robinson's dissertation (University of Maryland, 2014) with its printed
-//! errors corrected: muscle geometry and force, valve and gas, tendon joint, one-link arm; fixed-step
+//! errors corrected: muscle geometry and force, supplies, valves, tubes and gas, joints, arms; fixed-step
 //! integration, and *cut-chain* simulation, in which measured signals drive each block so that a
 //! mismatch with a recording is located in one of them. Every equation is written once, generic over
 //! [`scalar::Scalar`], and is read as plain numbers or as dual numbers for exact sensitivities.
@@ -14,6 +14,7 @@
 pub mod arm;
 pub mod effects;
 pub mod error;
+pub mod events;
 pub mod gas;
 pub mod geometry;
 pub mod integrate;

@@ -5,10 +5,11 @@
 //! the derivative with respect to the window's initial state comes along, so that its error can be projected out.
 
 use crate::rig::parameters::unit;
-use crate::rig::plant::{Memory, Plant, Simulated, State, ANGLE, MASS, PRESSURE, RATE, SUPPLY};
-use crate::rig::{ParameterId as P, Rig};
+use crate::rig::plant::{Memory, Plant, Simulated};
+use crate::rig::spec::dotted;
+use crate::rig::{Channel, Layout, ParameterId, Rig};
 use crate::scalar::{constant, Scalar};
-use crate::simulate::{check_state, step, Timing};
+use crate::simulate::{check_state, Stepper, Timing};
 use crate::{Error, Result};
 use nalgebra::Const;
 use num_dual::DualSVec64;
@@ -16,53 +17,75 @@ use num_dual::DualSVec64;
 /// A block whose output channel is predicted from its measured neighbours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Block {
-    /// Command and chamber pressure to supply pressure.
-    Supply,
-    /// Command, supply pressure and angle to chamber pressure.
-    Chamber,
-    /// Chamber pressure to angle (muscle, joint and arm).
-    Arm,
+    /// Commands and the pressures it feeds to a supply's pressure.
+    Supply(usize),
+    /// Commands, neighbouring pressures and the angles of its muscles to a chamber's pressure.
+    Chamber(usize),
+    /// Chamber pressures to the angle of a joint (muscles, joints and arm).
+    Arm(usize),
 }
 
 impl Block {
-    /// The block of a name: `supply`, `chamber` or `arm`.
+    /// The block of a name: `supply`, `chamber` or `arm`, with the name of the supply, chamber or joint behind it where it has
+    /// one (`chamber.flexor`).
     ///
     /// # Errors
     /// [`Error::Model`] for another name.
-    pub fn from_name(name: &str) -> Result<Self> {
-        match name {
-            "supply" => Ok(Self::Supply),
-            "chamber" => Ok(Self::Chamber),
-            "arm" => Ok(Self::Arm),
-            _ => Err(Error::Model(format!("no block '{name}': supply, chamber, arm"))),
-        }
+    pub fn from_name(rig: &Rig, name: &str) -> Result<Self> {
+        let spec = rig.spec();
+        let joints = rig.names().coordinates.iter().map(|n| n.replacen("joint", "arm", 1));
+        let blocks = (spec
+            .supplies
+            .iter()
+            .enumerate()
+            .map(|(k, s)| (dotted("supply", &s.name), Self::Supply(k))))
+        .chain(spec.chambers.iter().enumerate().map(|(k, c)| (dotted("chamber", &c.name), Self::Chamber(k))))
+        .chain(joints.enumerate().map(|(k, name)| (name, Self::Arm(k))));
+        let blocks: Vec<_> = blocks.collect();
+        blocks.iter().find(|(n, _)| n == name).map(|(_, block)| *block).ok_or_else(|| {
+            let names: Vec<_> = blocks.iter().map(|(n, _)| n.as_str()).collect();
+            Error::Model(format!("no block '{name}' in this rig; there are: {}", names.join(", ")))
+        })
     }
 
-    fn simulated(self) -> Simulated {
-        Simulated { supply: self == Self::Supply, chamber: self == Self::Chamber, arm: self == Self::Arm }
-    }
-
-    fn output(self) -> usize {
+    /// Place of the predicted state.
+    fn output(self, layout: &Layout) -> usize {
         match self {
-            Self::Supply => SUPPLY,
-            Self::Chamber => PRESSURE,
-            Self::Arm => ANGLE,
+            Self::Supply(k) => layout.supply(k),
+            Self::Chamber(k) => layout.pressure(k),
+            Self::Arm(k) => layout.angle(k),
         }
     }
 
     /// States of the block that a window starts from, in the order of their sensitivities.
-    fn initial_states(self) -> &'static [usize] {
+    fn initial_states(self, layout: &Layout) -> Vec<usize> {
         match self {
-            Self::Supply => &[SUPPLY],
-            Self::Chamber => &[PRESSURE],
-            Self::Arm => &[ANGLE, RATE],
+            Self::Supply(_) | Self::Chamber(_) => vec![self.output(layout)],
+            Self::Arm(_) => (layout.angle(0)..layout.states()).collect(),
         }
     }
 
     /// Number of initial states per window.
-    pub fn initial_count(self) -> usize {
-        self.initial_states().len()
+    pub fn initial_count(self, rig: &Rig) -> usize {
+        self.initial_states(rig.layout()).len()
     }
+
+    /// States that are integrated: the block's, and those of line inlets, which nobody measures.
+    fn simulated(self, rig: &Rig, measured: &Measured<'_>) -> Simulated {
+        let layout = rig.layout();
+        let mut places = self.initial_states(layout);
+        if let Self::Chamber(k) = self {
+            places.push(layout.mass(k));
+        }
+        places.extend(hidden(layout, measured));
+        Simulated::only(layout, &places)
+    }
+}
+
+/// Pressures of line inlets that were not measured.
+fn hidden(layout: &Layout, measured: &Measured<'_>) -> Vec<usize> {
+    let inlets = (layout.chambers..layout.gases).map(|k| layout.pressure(k));
+    inlets.filter(|place| measured.signal(*place).is_none()).collect()
 }
 
 /// A measured signal, smoothed, with its time derivative at each sample; as the sensor reads it, SI, gauge.
@@ -106,17 +129,65 @@ impl Signal<'_> {
     }
 }
 
-/// Measured signals around a block; a channel that was not measured is `None`.
-#[derive(Debug, Clone, Copy)]
+/// Measured signals around a block.
+#[derive(Debug, Clone)]
 pub struct Measured<'a> {
-    /// Valve command [V], held over each sample.
-    pub valve_command: &'a [f64],
-    /// Supply pressure [Pa, gauge].
-    pub supply_pressure: Option<Signal<'a>>,
-    /// Muscle pressure [Pa, gauge].
-    pub muscle_pressure: Option<Signal<'a>>,
-    /// Joint angle [rad].
-    pub joint_angle: Option<Signal<'a>>,
+    samples: usize,
+    commands: Vec<&'a [f64]>,
+    /// Place of the state and its signal.
+    signals: Vec<(usize, Signal<'a>)>,
+}
+
+impl<'a> Measured<'a> {
+    /// Commands (one for each input of the rig, held over each sample) and measured channels by name: `supply_pressure`,
+    /// `muscle_pressure`, `line_pressure`, `joint_angle`, each with the name of its block behind it where it has one.
+    ///
+    /// # Errors
+    /// [`Error::Length`] or [`Error::Parameter`] for bad arrays; [`Error::Model`] for a name that the rig does not have, or a
+    /// command that is missing.
+    pub fn new(
+        rig: &Rig,
+        samples: usize,
+        commands: &[(&str, &'a [f64])],
+        signals: &[(&str, Signal<'a>)],
+    ) -> Result<Self> {
+        let mut own = Vec::new();
+        for name in &rig.names().inputs {
+            let Some((_, values)) = commands.iter().find(|(n, _)| n == name) else {
+                return Err(Error::Model(format!("{name} is missing: one value per sample is needed")));
+            };
+            if values.len() != samples {
+                let why = "one per sample".into();
+                let (found, expected) = (values.len(), samples);
+                return Err(Error::Length { name: name.clone(), found, expected, why });
+            }
+            if let Some((k, u)) = values.iter().enumerate().find(|(_, u)| !u.is_finite()) {
+                return Err(Error::parameter(format!("{name}[{k}]"), *u, "a finite value"));
+            }
+            own.push(*values);
+        }
+        let layout = rig.layout();
+        let mut places = Vec::new();
+        for (name, signal) in signals {
+            let place = rig.names().channels.iter().find(|(n, _)| n == name).and_then(|(_, c)| match *c {
+                Channel::Supply(k) => Some(layout.supply(k)),
+                Channel::Pressure(k) => Some(layout.pressure(k)),
+                Channel::Angle(k) => Some(layout.angle(k)),
+                _ => None,
+            });
+            let Some(place) = place else {
+                return Err(Error::Model(format!("{name} is not a channel at which this rig can be cut")));
+            };
+            signal.check(name, samples)?;
+            places.push((place, *signal));
+        }
+        Ok(Self { samples, commands: own, signals: places })
+    }
+
+    #[inline]
+    fn signal(&self, place: usize) -> Option<&Signal<'a>> {
+        self.signals.iter().find(|(p, _)| *p == place).map(|(_, signal)| signal)
+    }
 }
 
 /// Prediction of a block's output with its sensitivities.
@@ -139,7 +210,7 @@ const LANES: usize = 8;
 /// differentiate with respect to; pass none for values alone (`columns` is then 0).
 ///
 /// # Errors
-/// [`Error::Length`], [`Error::Parameter`] for bad arguments; [`Error::Model`] when the block lacks a measured neighbour;
+/// [`Error::Parameter`] for bad arguments; [`Error::Model`] when the block lacks a measured neighbour;
 /// [`Error::Integration`] when the state leaves the model's range.
 pub fn predict(
     rig: &Rig,
@@ -147,31 +218,32 @@ pub fn predict(
     measured: &Measured<'_>,
     timing: Timing,
     starts: &[usize],
-    parameters: &[P],
+    parameters: &[ParameterId],
 ) -> Result<Prediction> {
-    let n = measured.valve_command.len();
-    check(rig, block, measured, starts, n)?;
+    let n = measured.samples;
+    check(rig, block, measured, starts)?;
+    let initial = block.initial_count(rig);
     let mut out = Prediction { value: vec![0.0; n], jacobian: Vec::new(), columns: 0 };
     if parameters.is_empty() {
-        let plant = Plant::new(rig, *rig.values());
-        run(&plant, block, measured, timing, starts, &[0.0; 2], |k, y| out.value[k] = y)?;
+        let plant = Plant::new(rig, rig.parameters().lift(), false)?;
+        run(plant, block, measured, timing, starts, &vec![0.0; initial], |k, y| out.value[k] = y)?;
         return Ok(out);
     }
-    out.columns = parameters.len() + block.initial_count();
+    out.columns = parameters.len() + initial;
     out.jacobian = vec![0.0; n * out.columns];
     let columns: Vec<usize> = (0..out.columns).collect();
     for chunk in columns.chunks(LANES) {
-        let mut values = rig.values().lift::<DualSVec64<LANES>>();
-        let mut bumps = [constant::<DualSVec64<LANES>>(0.0); 2];
+        let mut values = rig.parameters().lift::<DualSVec64<LANES>>();
+        let mut bumps = vec![constant::<DualSVec64<LANES>>(0.0); initial];
         for (lane, column) in chunk.iter().enumerate() {
             match parameters.get(*column) {
                 Some(id) => values.seed(*id, lane),
                 None => bumps[column - parameters.len()].eps = unit(lane),
             }
         }
-        let plant = Plant::new(rig, values);
+        let plant = Plant::new(rig, values, false)?;
         let (value, jacobian, width) = (&mut out.value, &mut out.jacobian, out.columns);
-        run(&plant, block, measured, timing, starts, &bumps, |k, y| {
+        run(plant, block, measured, timing, starts, &bumps, |k, y| {
             value[k] = y.re;
             let gradient = y.eps.unwrap_generic(Const::<LANES>, Const::<1>);
             for (column, slope) in chunk.iter().zip(gradient.iter()) {
@@ -182,10 +254,8 @@ pub fn predict(
     Ok(out)
 }
 
-fn check(rig: &Rig, block: Block, measured: &Measured<'_>, starts: &[usize], n: usize) -> Result<()> {
-    if let Some((k, u)) = measured.valve_command.iter().enumerate().find(|(_, u)| !u.is_finite()) {
-        return Err(Error::parameter(format!("valve_command[{k}]"), *u, "a finite voltage"));
-    }
+fn check(rig: &Rig, block: Block, measured: &Measured<'_>, starts: &[usize]) -> Result<()> {
+    let n = measured.samples;
     if starts.first() != Some(&0)
         || starts.windows(2).any(|w| w[1] <= w[0])
         || starts.last().is_some_and(|s| *s >= n)
@@ -193,110 +263,155 @@ fn check(rig: &Rig, block: Block, measured: &Measured<'_>, starts: &[usize], n: 
         let worst = starts.last().copied().unwrap_or(0) as f64;
         return Err(Error::parameter("starts", worst, format!("sample indices rising from 0, below {n}")));
     }
-    let spec = rig.spec();
-    let lacks = |what: &str| Err(Error::Model(format!("block '{block:?}' cannot be predicted: {what}")));
-    for (name, signal) in [
-        ("supply_pressure", &measured.supply_pressure),
-        ("muscle_pressure", &measured.muscle_pressure),
-        ("joint_angle", &measured.joint_angle),
-    ] {
-        if let Some(signal) = signal {
-            signal.check(name, n)?;
+    if rig.spec().load.is_some() {
+        return Err(Error::Model(format!(
+            "block '{block:?}' cannot be predicted: a linear load cannot be cut from its muscle yet"
+        )));
+    }
+    let hidden = hidden(rig.layout(), measured);
+    for place in neighbours(rig, block) {
+        if measured.signal(place).is_none() && !hidden.contains(&place) {
+            let name = rig.names().initial.iter().find(|(_, p)| *p == place).map_or("?", |(n, _)| n.as_str());
+            return Err(Error::Model(format!(
+                "block '{block:?}' cannot be predicted: {name} was not measured"
+            )));
         }
     }
-    if measured.muscle_pressure.is_none() {
-        return lacks("muscle_pressure was not measured");
+    Ok(())
+}
+
+/// Places of the states that a block needs measured: its own, every angle, and the pressures next to it.
+fn neighbours(rig: &Rig, block: Block) -> Vec<usize> {
+    let (layout, wiring) = (rig.layout(), &rig.wiring);
+    let mut places: Vec<usize> = (layout.angle(0)..layout.rate(0)).collect();
+    places.push(block.output(layout));
+    if matches!(block, Block::Arm(_)) {
+        places.extend(wiring.groups.iter().map(|g| layout.pressure(g.chamber)));
+        return places;
     }
-    match block {
-        _ if spec.load.is_some() => lacks("a linear load cannot be cut from its muscle yet"),
-        Block::Supply if spec.supply.is_none() => lacks("the rig has no supply"),
-        Block::Supply | Block::Chamber if spec.valve.is_some() && measured.supply_pressure.is_none() => {
-            lacks("supply_pressure was not measured")
+    let valves = wiring.valves.iter().map(|v| (v.from.place(layout), Some(layout.pressure(v.to))));
+    let lines = wiring.lines.iter().map(|l| (l.from.place(layout), l.to.place(layout)));
+    for (a, b) in valves.chain(lines) {
+        if a == Some(block.output(layout)) {
+            places.extend(b);
+        } else if b == Some(block.output(layout)) {
+            places.extend(a);
         }
-        Block::Arm if spec.arm.is_none() => lacks("the rig has no arm"),
-        _ if spec.arm.is_some() && measured.joint_angle.is_none() => lacks("joint_angle was not measured"),
-        _ => Ok(()),
+    }
+    // The pressure of a constant supply is known without measuring it.
+    let constant = |place: &usize| rig.spec().supplies.get(*place).is_some_and(|s| s.kind == "constant");
+    places.retain(|place| !constant(place));
+    places
+}
+
+/// A measured state with what to subtract from its sensor's reading.
+struct Driven<'a, S> {
+    place: usize,
+    signal: Signal<'a>,
+    zero: S,
+}
+
+impl<S: Scalar> Driven<'_, S> {
+    /// True state at a fraction of sample `k`; an angle brings its rate along.
+    #[inline]
+    fn write(&self, rig: &Rig, k: usize, fraction: f64, dt: f64, state: &mut [S]) {
+        let layout = rig.layout();
+        let (value, slope) = self.signal.at(k, fraction, dt);
+        if self.place < layout.angle(0) {
+            state[self.place] = -self.zero + (value + rig.gas.ambient_pressure);
+        } else {
+            state[self.place] = -self.zero + value;
+            state[self.place + layout.coordinates] = constant(slope);
+        }
     }
 }
 
-/// True state from measured signals at a fraction of sample `k`; `keep` tells which states are not driven.
+/// Zero of the sensor of a state.
 #[inline]
-fn drive<S: Scalar>(
-    plant: &Plant<'_, S>,
-    measured: &Measured<'_>,
-    k: usize,
-    fraction: f64,
-    dt: f64,
-    keep: Simulated,
-    state: &mut State<S>,
-) {
-    let ambient = plant.rig().gas.ambient_pressure;
-    if let (false, Some(signal)) = (keep.supply, &measured.supply_pressure) {
-        state[SUPPLY] = constant(signal.at(k, fraction, dt).0 + ambient);
-    }
-    if let (false, Some(signal)) = (keep.chamber, &measured.muscle_pressure) {
-        state[PRESSURE] = -plant.values()[P::PressureZero] + (signal.at(k, fraction, dt).0 + ambient);
-    }
-    if let (false, Some(signal)) = (keep.arm, &measured.joint_angle) {
-        let (angle, rate) = signal.at(k, fraction, dt);
-        state[ANGLE] = -plant.values()[P::AngleZero] + angle;
-        state[RATE] = constant(rate);
-    }
+fn zero<S: Scalar>(plant: &Plant<'_, S>, place: usize) -> S {
+    let (rig, layout) = (plant.rig(), plant.rig().layout());
+    let id = if place < layout.supplies {
+        None
+    } else if place < layout.mass(0) {
+        rig.wiring.gases[place - layout.supplies].pressure_zero
+    } else {
+        rig.wiring.coordinates[place - layout.angle(0)].zero
+    };
+    id.map_or(constant(0.0), |id| plant.values()[id])
 }
 
 fn run<S: Scalar>(
-    plant: &Plant<'_, S>,
+    plant: Plant<'_, S>,
     block: Block,
     measured: &Measured<'_>,
     timing: Timing,
     starts: &[usize],
-    bumps: &[S; 2],
+    bumps: &[S],
     mut sink: impl FnMut(usize, S),
 ) -> Result<()> {
-    let simulated = block.simulated();
-    let (dt, ambient) = (timing.sample_time, plant.rig().gas.ambient_pressure);
-    let nothing = Simulated { supply: false, chamber: false, arm: false };
-    let output = block.output();
+    let rig = plant.rig();
+    let layout = rig.layout();
+    let simulated = block.simulated(rig, measured);
+    let (dt, ambient) = (timing.sample_time, rig.gas.ambient_pressure);
+    let (output, own) = (block.output(layout), block.initial_states(layout));
     let offset: S = match block {
-        Block::Supply => constant(-ambient),
-        Block::Chamber => plant.values()[P::PressureZero] - ambient,
-        Block::Arm => plant.values()[P::AngleZero],
+        Block::Arm(_) => zero(&plant, output),
+        Block::Supply(_) | Block::Chamber(_) => zero(&plant, output) - ambient,
     };
-    let n = measured.valve_command.len();
-    let mut memory = Memory::default();
-    let mut state = State::<S>::from_element(constant(0.0));
+    let n = measured.samples;
+    let drivers: Vec<Driven<'_, S>> = (measured.signals.iter())
+        .map(|(place, signal)| Driven { place: *place, signal: *signal, zero: zero(&plant, *place) })
+        .collect();
+    let mut stepper = Stepper::new(plant);
+    let mut memory = vec![Memory::default(); rig.wiring.groups.len()];
+    let mut state = vec![constant::<S>(0.0); stepper.plant.states()];
+    for (k, supply) in rig.spec().supplies.iter().enumerate() {
+        state[layout.supply(k)] = constant(supply.initial_pressure + ambient);
+    }
+    let mut contractions = [vec![constant::<S>(0.0); memory.len()], vec![constant::<S>(0.0); memory.len()]];
     let mut starts = starts.iter().peekable();
     for k in 0..n {
         if starts.next_if(|s| **s == k).is_some() {
-            let before = state;
-            drive(plant, measured, k, 0.0, dt, nothing, &mut state);
-            for (index, bump) in block.initial_states().iter().zip(bumps) {
-                state[*index] += *bump;
+            let before = state.clone();
+            let plant = &stepper.plant;
+            drivers.iter().for_each(|driver| driver.write(rig, k, 0.0, dt, &mut state));
+            for (place, bump) in own.iter().zip(bumps) {
+                state[*place] += *bump;
             }
-            let rest = plant.rest_mass(&state);
             if k == 0 {
-                state[MASS] = plant.initial_mass(&state);
+                for (inlet, (_, end)) in rig.wiring.inlets.iter().enumerate() {
+                    let place = layout.pressure(rig.wiring.chambers + inlet);
+                    if let (None, Some(end)) = (measured.signal(place), end.place(layout)) {
+                        state[place] = state[end];
+                    }
+                }
+                for gas in 0..layout.gases {
+                    state[layout.mass(gas)] = plant.initial_mass(gas, &state);
+                }
             } else {
                 // a new window keeps the gas temperature and the memory of the motion
-                let was = plant.rest_mass(&before);
-                state[MASS] = rest * before[MASS] / was;
-                memory = plant.advance_memory(
-                    &memory,
-                    plant.contraction(before[ANGLE]),
-                    plant.contraction(state[ANGLE]),
-                );
+                for gas in 0..layout.gases {
+                    let (rest, was) = (plant.rest_mass(gas, &state), plant.rest_mass(gas, &before));
+                    state[layout.mass(gas)] = rest * before[layout.mass(gas)] / was;
+                }
+                let [from, to] = &mut contractions;
+                plant.contractions(&before, from);
+                plant.contractions(&state, to);
+                plant.advance_memory(&mut memory, from, to);
             }
         }
-        check_state(plant, &state, k as f64 * dt)?;
+        check_state(&stepper.plant, &state, k as f64 * dt)?;
         sink(k, state[output] + offset);
         if k + 1 == n {
             break;
         }
-        let spool = plant.spool(measured.valve_command[k]);
+        let controls = stepper.plant.controls(|input| measured.commands[input][k]);
         let h = 1.0 / timing.substeps as f64;
         for i in 0..timing.substeps {
-            step(plant, &mut state, &mut memory, spool, timing.step(), simulated, |fraction, y| {
-                drive(plant, measured, k, (i as f64 + fraction) * h, dt, simulated, y);
+            stepper.step(&mut state, &mut memory, &controls, timing.step(), &simulated, |fraction, y| {
+                for driver in drivers.iter().filter(|d| !own.contains(&d.place)) {
+                    driver.write(rig, k, (i as f64 + fraction) * h, dt, y);
+                }
             });
         }
     }

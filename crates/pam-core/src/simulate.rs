@@ -1,10 +1,15 @@
-//! Fixed-step simulation: the command is held over each sample, RK4 steps fill it.
+//! Fixed-step simulation: commands are held over each sample, RK4 steps fill it.
+
+use std::borrow::Cow;
+use std::ops::Range;
 
 use crate::error::check_range;
-use crate::integrate::rk4;
-use crate::rig::plant::{Memory, Plant, Simulated, State, ANGLE, MASS, PRESSURE, RATE, STATES, SUPPLY};
-use crate::rig::{ParameterId as P, Rig};
-use crate::scalar::Scalar;
+use crate::events::{Event, Watch};
+use crate::integrate::Rk4;
+use crate::rig::plant::{Controls, Memory, Plant, Scratch, Simulated};
+use crate::rig::spec::dotted;
+use crate::rig::Rig;
+use crate::scalar::{constant, Scalar};
 use crate::{Error, Result};
 
 /// Sample time and step.
@@ -36,346 +41,229 @@ impl Timing {
         Ok(Self { sample_time, substeps: rounded as usize })
     }
 
+    /// The same with each step divided until it is at most as long as a rig allows.
+    #[must_use]
+    pub fn stable(self, rig: &Rig) -> Self {
+        let parts = (self.step() / rig.stable_step() - 1e-9).ceil().max(1.0);
+        Self { substeps: self.substeps.saturating_mul(parts as usize), ..self }
+    }
+
     /// Step [s].
     pub fn step(&self) -> f64 {
         self.sample_time / self.substeps as f64
     }
 }
 
-/// Initial state as a user states it: gauge pressures [Pa], angle [rad], rate [rad/s]; true values, not sensor readings.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// Initial state as a user states it, by the names of [`crate::rig::Names::initial`]: gauge pressures [Pa], angles [rad],
+/// rates [rad/s], length [m]; true values, not sensor readings.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Initial {
-    /// Supply pressure [Pa, gauge].
-    pub supply_pressure: f64,
-    /// Muscle pressure [Pa, gauge].
-    pub muscle_pressure: f64,
-    /// Joint angle [rad].
-    pub joint_angle: f64,
-    /// Joint rate [rad/s].
-    pub joint_rate: f64,
+    values: Vec<f64>,
+    given: Vec<bool>,
 }
 
 impl Initial {
-    /// The rig at rest: muscles vented, joint at its rest angle, tank as filled.
+    /// The rig at rest: every pressure its initial one, joints at their rest angle, a loaded muscle at its rest length.
     pub fn rest(rig: &Rig) -> Self {
-        Self {
-            supply_pressure: rig.spec().supply.as_ref().map_or(0.0, |s| s.initial_pressure),
-            muscle_pressure: 0.0,
-            joint_angle: rig.spec().joint.as_ref().map_or(0.0, |j| j.rest_angle),
-            joint_rate: 0.0,
-        }
+        let (spec, wiring, layout) = (rig.spec(), &rig.wiring, &rig.layout);
+        let of = |place: usize| {
+            if place < layout.supplies {
+                spec.supplies[place].initial_pressure
+            } else if place < layout.mass(0) {
+                wiring.gases[place - layout.supplies].initial_pressure
+            } else if place < layout.rate(0) && spec.load.is_some() {
+                wiring.groups[0].rest_length
+            } else if place < layout.rate(0) {
+                wiring.coordinates[place - layout.angle(0)].rest
+            } else {
+                0.0
+            }
+        };
+        let values: Vec<f64> = rig.names.initial.iter().map(|(_, place)| of(*place)).collect();
+        Self { given: vec![false; values.len()], values }
     }
 
-    fn validate(&self, rig: &Rig) -> Result<()> {
-        let vacuum = -rig.gas.ambient_pressure;
-        for (name, value) in [
-            ("initial.supply_pressure", self.supply_pressure),
-            ("initial.muscle_pressure", self.muscle_pressure),
-        ] {
-            check_range(name, value, vacuum, 1e8, "Pa (gauge)")?;
-        }
-        check_range("initial.joint_rate", self.joint_rate, -1e4, 1e4, "rad/s")?;
-        if let (Some(load), Some(muscle)) = (&rig.spec().load, &rig.spec().muscle) {
-            let length = muscle.rest_length - self.joint_angle;
-            check_range("initial.length", length, load.min_length, load.max_length, "m")?;
-            return Ok(());
-        }
-        let (low, high) =
-            rig.spec().joint.as_ref().map_or((-7.0, 7.0), |j| (j.min_angle - 0.2, j.max_angle + 0.2));
-        check_range("initial.joint_angle", self.joint_angle, low, high, "rad")?;
-        Ok(())
-    }
-}
-
-/// Simulated channels, one row per sample; row 0 is the initial state. Pressures gauge and as the sensors
-/// read them (zeros included), SI.
-#[allow(missing_docs)]
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Trajectory {
-    pub supply_pressure: Vec<f64>,
-    pub muscle_pressure: Vec<f64>,
-    pub joint_angle: Vec<f64>,
-    pub joint_rate: Vec<f64>,
-    pub contraction_ratio: Vec<f64>,
-    pub air_volume: Vec<f64>,
-    pub muscle_force: Vec<f64>,
-    pub joint_torque: Vec<f64>,
-    pub gas_temperature: Vec<f64>,
-}
-
-/// One RK4 step of a plant with the given states integrated; driven states are read from
-/// `drive(fraction, &mut state)`.
-#[inline]
-pub(crate) fn step<S: Scalar>(
-    plant: &Plant<'_, S>,
-    state: &mut State<S>,
-    memory: &mut Memory<S>,
-    spool: S,
-    dt: f64,
-    simulated: Simulated,
-    mut drive: impl FnMut(f64, &mut State<S>),
-) {
-    let mut here = *state;
-    drive(0.0, &mut here);
-    let start = plant.contraction(here[ANGLE]);
-    let mut next = rk4(state, dt, |fraction, y| {
-        let mut y = *y;
-        drive(fraction, &mut y);
-        plant.rates(&y, spool, memory, start, simulated)
-    });
-    drive(1.0, &mut next);
-    *memory = plant.advance_memory(memory, start, plant.contraction(next[ANGLE]));
-    *state = next;
-}
-
-/// Error for a state that has left the model's range, if it has.
-pub(crate) fn check_state<S: Scalar>(plant: &Plant<'_, S>, state: &State<S>, time: f64) -> Result<()> {
-    let rig = plant.rig();
-    let failure = |name: &str, value: f64, allowed: &str| {
-        Err(Error::Integration { time, name: name.into(), value, allowed: allowed.into() })
-    };
-    const NAMES: [&str; STATES] =
-        ["supply_pressure", "muscle_pressure", "joint_angle", "joint_rate", "gas_mass"];
-    for (index, name) in NAMES.iter().enumerate() {
-        let value = state[index].re();
-        if !value.is_finite() {
-            return failure(name, value, "a finite value (a smaller step may help)");
-        }
-    }
-    if state[PRESSURE].re() < 0.0 || state[SUPPLY].re() < 0.0 {
-        let worst = if state[PRESSURE].re() < 0.0 { PRESSURE } else { SUPPLY };
-        return failure(
-            NAMES[worst],
-            state[worst].re(),
-            "an absolute pressure >= 0 Pa (a smaller step may help)",
-        );
-    }
-    if let Some(joint) = &rig.joint {
-        let angle = state[ANGLE].re();
-        if !joint.reaches(angle) {
-            return failure("joint_angle", angle, "an angle that the tendon reaches");
-        }
-        let contraction = plant.contraction(state[ANGLE]).re();
-        if let Some(muscle) = rig.muscle().filter(|m| !m.table.contains(contraction)) {
-            let allowed =
-                format!("inside the muscle's range {:.4} to {:.4}", muscle.table.e_min, muscle.table.e_max);
-            return failure("contraction_ratio", contraction, &allowed);
-        }
-    }
-    Ok(())
-}
-
-/// A running simulation at a sample: all that its future depends on.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Progress {
-    state: State<f64>,
-    memory: Memory<f64>,
-    samples: u64,
-}
-
-impl Progress {
-    /// Length of [`Self::to_vec`].
-    pub const NUMBERS: usize = STATES + Memory::<f64>::NUMBERS + 1;
-
-    /// The start of a simulation.
+    /// The same with one value more, by its name.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for an impossible initial value.
-    pub fn start(rig: &Rig, initial: Initial) -> Result<Self> {
-        initial.validate(rig)?;
+    /// [`Error::Model`] for a name that the rig does not have, [`Error::Parameter`] for an impossible value.
+    pub fn with(mut self, rig: &Rig, name: &str, value: f64) -> Result<Self> {
+        let Some(k) = rig.names.initial.iter().position(|(n, _)| n == name) else {
+            let names: Vec<_> = rig.names.initial.iter().map(|(n, _)| n.as_str()).collect();
+            return Err(Error::Model(format!(
+                "initial has the unknown entry '{name}'; there are: {}",
+                names.join(", ")
+            )));
+        };
+        let (layout, place) = (&rig.layout, rig.names.initial[k].1);
+        let full = format!("initial.{name}");
+        if place < layout.angle(0) {
+            check_range(&full, value, -rig.gas.ambient_pressure, 1e8, "Pa (gauge)")?;
+        } else if place >= layout.rate(0) {
+            check_range(&full, value, -1e4, 1e4, if rig.spec().load.is_some() { "m/s" } else { "rad/s" })?;
+        } else if let Some(load) = &rig.spec().load {
+            check_range(&full, value, load.min_length, load.max_length, "m")?;
+        } else {
+            let stops = rig.wiring.coordinates[place - layout.angle(0)].stops;
+            let (low, high) = stops.map_or((-7.0, 7.0), |s| (s.min_angle - 0.2, s.max_angle + 0.2));
+            check_range(&full, value, low, high, "rad")?;
+        }
+        (self.values[k], self.given[k]) = (value, true);
+        Ok(self)
+    }
+
+    /// The state, its masses and books still zero.
+    fn state(&self, rig: &Rig, states: usize) -> Vec<f64> {
+        let (layout, wiring) = (&rig.layout, &rig.wiring);
+        let mut state = vec![0.0; states];
         let ambient = rig.gas.ambient_pressure;
-        let mut state = State::<f64>::from_column_slice(&[
-            initial.supply_pressure + ambient,
-            initial.muscle_pressure + ambient,
-            initial.joint_angle,
-            initial.joint_rate,
-            0.0,
-        ]);
-        state[MASS] = Plant::new(rig, *rig.values()).initial_mass(&state);
-        Ok(Self { state, memory: Memory::default(), samples: 0 })
-    }
-
-    /// Samples since the start.
-    #[must_use]
-    pub fn samples(&self) -> u64 {
-        self.samples
-    }
-
-    /// The numbers that [`Self::from_slice`] makes the same progress of, bit for bit.
-    #[must_use]
-    pub fn to_vec(&self) -> Vec<f64> {
-        let memory = self.memory.to_array();
-        self.state.iter().chain(&memory).copied().chain([self.samples as f64]).collect()
-    }
-
-    /// Progress from the numbers of [`Self::to_vec`].
-    ///
-    /// # Errors
-    /// [`Error::Length`] for another number of them, [`Error::Parameter`] for one that is not finite.
-    pub fn from_slice(numbers: &[f64]) -> Result<Self> {
-        if numbers.len() != Self::NUMBERS {
-            return Err(Error::Length {
-                name: "state".into(),
-                found: numbers.len(),
-                expected: Self::NUMBERS,
-                why: "as it was read".into(),
-            });
-        }
-        for (k, value) in numbers.iter().enumerate() {
-            check_range(&format!("state[{k}]"), *value, -1e15, 1e15, "(as it was read)")?;
-        }
-        let (state, rest) = numbers.split_at(STATES);
-        let (memory, samples) = rest.split_at(Memory::<f64>::NUMBERS);
-        Ok(Self {
-            state: State::from_column_slice(state),
-            memory: Memory::from_slice(memory),
-            samples: samples.first().map_or(0, |n| n.max(0.0) as u64),
-        })
-    }
-
-    /// Append this sample to a trajectory.
-    ///
-    /// # Errors
-    /// [`Error::Integration`] when the state has left the model's range.
-    pub fn observe(&self, rig: &Rig, timing: Timing, out: &mut Trajectory) -> Result<()> {
-        self.observed(&Plant::new(rig, *rig.values()), timing, out)
-    }
-
-    fn observed(&self, plant: &Plant<'_, f64>, timing: Timing, out: &mut Trajectory) -> Result<()> {
-        check_state(plant, &self.state, self.samples as f64 * timing.sample_time)?;
-        out.push(plant, &self.state, &self.memory);
-        Ok(())
-    }
-
-    /// Hold each command [V] for one sample and append the sample after it. What is prescribed moves evenly to its
-    /// value for the end of each sample.
-    ///
-    /// # Errors
-    /// [`Error::Parameter`] for a command that is not finite, [`Error::Integration`] when the state leaves the model's
-    /// range; what was appended before stays, and the progress is that of the last good sample.
-    pub fn advance(
-        &mut self,
-        rig: &Rig,
-        timing: Timing,
-        valve_command: &[f64],
-        prescribed: Prescribed<'_>,
-        out: &mut Trajectory,
-    ) -> Result<()> {
-        let plant = Plant::new(rig, *rig.values());
-        let dt = timing.step();
-        prescribed.validate(rig, valve_command.len())?;
-        for (k, command) in valve_command.iter().enumerate() {
-            if !command.is_finite() {
-                return Err(Error::parameter(format!("valve_command[{k}]"), *command, "a finite voltage"));
-            }
-            let spool = plant.spool(*command);
-            let mut next = *self;
-            let ends = prescribed.ends(rig, &self.state, k);
-            for sub in 0..timing.substeps {
-                let (state, memory) = (&mut next.state, &mut next.memory);
-                if ends.is_free() {
-                    step(&plant, state, memory, spool, dt, Simulated::ALL, |_, _| {});
+        for ((_, place), value) in rig.names.initial.iter().zip(&self.values) {
+            state[*place] = if *place < layout.mass(0) {
+                value + ambient
+            } else if rig.spec().load.is_some() {
+                if *place < layout.rate(0) {
+                    wiring.groups[0].rest_length - value
                 } else {
-                    step(&plant, state, memory, spool, dt, ends.simulated(), |fraction, y| {
-                        let share = (sub as f64 + fraction) / timing.substeps as f64;
-                        ends.drive(share, timing.sample_time, y);
-                    });
-                    if ends.pressure.is_some() {
-                        // A regulator's air is at the temperature of the room.
-                        next.state[MASS] = plant.rest_mass(&next.state);
-                    }
+                    0.0 - value
                 }
-            }
-            next.samples += 1;
-            next.observed(&plant, timing, out)?;
-            *self = next;
+            } else {
+                *value
+            };
         }
-        Ok(())
+        for (k, (_, end)) in wiring.inlets.iter().enumerate() {
+            let place = layout.pressure(wiring.chambers + k);
+            let given =
+                rig.names.initial.iter().zip(&self.given).any(|((_, p), given)| *p == place && *given);
+            if let (false, Some(end)) = (given, end.place(layout)) {
+                state[place] = state[end];
+            }
+        }
+        state
     }
+}
+
+/// What drives a simulation: one command per sample and input, and what is prescribed for the end of each sample.
+#[derive(Debug, Clone)]
+pub struct Drive<'a> {
+    samples: usize,
+    commands: Vec<Cow<'a, [f64]>>,
+    prescribed: Vec<(usize, Cow<'a, [f64]>)>,
 }
 
 /// Lowest absolute pressure that may be prescribed [Pa].
 const LEAST_PRESSURE: f64 = 1.0;
 
-/// Channels that are given instead of simulated, one value for the end of each sample.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Prescribed<'a> {
-    /// Length of the muscle [m]: needed by a load frame, refused by other rigs.
-    pub length: Option<&'a [f64]>,
-    /// Gauge pressure in the muscle [Pa], as a regulator holds it: for rigs without a valve.
-    pub pressure: Option<&'a [f64]>,
+impl<'a> Drive<'a> {
+    /// A drive over a number of samples from signals by name: the rig's inputs (`valve_command` [V], `supply_command` [Pa,
+    /// gauge]), `length` of a load frame [m], `pressure` of chambers without a valve [Pa, gauge].
+    ///
+    /// # Errors
+    /// [`Error::Model`] for a signal that is missing or that the rig does not take, [`Error::Length`] for one of another
+    /// length, [`Error::Parameter`] for a value that is not possible.
+    pub fn new(rig: &Rig, samples: usize, signals: &[(&str, &'a [f64])]) -> Result<Self> {
+        let (spec, names) = (rig.spec(), &rig.names);
+        let find = |name: &str| signals.iter().find(|(n, _)| *n == name).map(|(_, values)| *values);
+        let mut commands = Vec::new();
+        for (k, name) in names.inputs.iter().enumerate() {
+            commands.push(match find(name) {
+                Some(values) => {
+                    let (low, high, unit) = if k < spec.valves.len() {
+                        (f64::MIN, f64::MAX, "V")
+                    } else {
+                        (-rig.gas.ambient_pressure, 1e8, "Pa (gauge)")
+                    };
+                    check_signal(name, values, samples, (low, high), unit)?;
+                    Cow::Borrowed(values)
+                }
+                None if k < spec.valves.len() => {
+                    return Err(Error::Model(format!(
+                        "{name} is missing: a rig with a valve needs one value per sample [V]"
+                    )));
+                }
+                None => {
+                    let supply =
+                        spec.supplies.iter().filter(|s| s.kind == "regulator").nth(k - spec.valves.len());
+                    Cow::Owned(vec![supply.map_or(0.0, |s| s.initial_pressure); samples])
+                }
+            });
+        }
+        let mut prescribed = Vec::new();
+        for (name, values) in signals.iter().filter(|(n, _)| !names.inputs.iter().any(|i| i == n)) {
+            let (place, low, high, unit) = prescribable(rig, name)?;
+            check_signal(name, values, samples, (low, high), unit)?;
+            prescribed.push((place, Cow::Borrowed(*values)));
+        }
+        if spec.load.as_ref().is_some_and(|l| l.is_frame()) && find("length").is_none() {
+            return Err(Error::Model(
+                "length is missing: a load frame needs one value per sample [m]".into(),
+            ));
+        }
+        Ok(Self { samples, commands, prescribed })
+    }
+
+    /// Samples.
+    #[must_use]
+    pub fn samples(&self) -> usize {
+        self.samples
+    }
+
+    /// Some of the samples.
+    #[must_use]
+    pub fn part(&self, range: Range<usize>) -> Drive<'static> {
+        let cut = |values: &Cow<'a, [f64]>| values.get(range.clone()).unwrap_or(&[]).to_vec();
+        Drive {
+            samples: range.len(),
+            commands: self.commands.iter().map(|values| Cow::Owned(cut(values))).collect(),
+            prescribed: self
+                .prescribed
+                .iter()
+                .map(|(place, values)| (*place, Cow::Owned(cut(values))))
+                .collect(),
+        }
+    }
+
+    fn places(&self) -> Vec<usize> {
+        self.prescribed.iter().map(|(place, _)| *place).collect()
+    }
+
+    /// Where one sample begins and ends: place, from, to.
+    fn ends(&self, rig: &Rig, state: &[f64], sample: usize) -> Vec<(usize, f64, f64)> {
+        let end = |(place, values): &(usize, Cow<'_, [f64]>)| {
+            let value = values.get(sample).copied().unwrap_or(f64::NAN);
+            let to = if *place < rig.layout.angle(0) {
+                value + rig.gas.ambient_pressure
+            } else {
+                rig.wiring.groups[0].rest_length - value
+            };
+            (*place, state[*place], to)
+        };
+        self.prescribed.iter().map(end).collect()
+    }
 }
 
-impl Prescribed<'_> {
-    fn validate(&self, rig: &Rig, samples: usize) -> Result<()> {
-        let frame = rig.spec().load.as_ref().filter(|load| load.is_frame());
-        let model = |text: &str| Err(Error::Model(text.into()));
-        match (frame, self.length) {
-            (Some(_), None) => {
-                return model("length is missing: a load frame needs one value per sample [m]")
-            }
-            (None, Some(_)) => {
-                return model(
-                    "length is given, which only a rig with a load frame takes ([load] kind = \"frame\")",
-                )
-            }
-            (Some(load), Some(length)) => {
-                check_signal("length", length, samples, (load.min_length, load.max_length), "m")?;
-            }
-            (None, None) => {}
-        }
-        if let Some(pressure) = self.pressure {
-            if rig.spec().valve.is_some() {
-                return model(
-                    "pressure is given, which only a rig without [valve] takes: there the valve decides",
-                );
-            }
-            check_signal(
-                "pressure",
-                pressure,
-                samples,
-                (LEAST_PRESSURE - rig.gas.ambient_pressure, 1e8),
-                "Pa (gauge)",
-            )?;
-        }
-        Ok(())
+/// Place of a state that can be prescribed, with the range and unit of its signal.
+fn prescribable(rig: &Rig, name: &str) -> Result<(usize, f64, f64, &'static str)> {
+    let spec = rig.spec();
+    if name == "length" {
+        return match spec.load.as_ref().filter(|load| load.is_frame()) {
+            Some(load) => Ok((rig.layout.angle(0), load.min_length, load.max_length, "m")),
+            None => Err(Error::Model(
+                "length is given, which only a rig with a load frame takes ([load] kind = \"frame\")".into(),
+            )),
+        };
     }
-
-    /// Where one sample begins and ends.
-    fn ends(&self, rig: &Rig, state: &State<f64>, sample: usize) -> Ends {
-        let rest = rig.spec().muscle.as_ref().map_or(0.0, |m| m.rest_length);
-        let at = |signal: Option<&[f64]>| signal.and_then(|s| s.get(sample)).copied();
-        Ends {
-            shortening: at(self.length).map(|length| (state[ANGLE], rest - length)),
-            pressure: at(self.pressure).map(|p| (state[PRESSURE], p + rig.gas.ambient_pressure)),
-        }
+    let Some(k) = spec.chambers.iter().position(|c| dotted("pressure", &c.name) == name) else {
+        return Err(Error::Model(format!(
+            "{name} is not a signal that this rig takes; it takes: {}",
+            rig.names.inputs.join(", ")
+        )));
+    };
+    if rig.wiring.valves.iter().any(|v| v.to == k) {
+        return Err(Error::Model(format!(
+            "{name} is given, which only a chamber without [valve] takes: there the valve decides"
+        )));
     }
-}
-
-/// Prescribed channels over one sample: (from, to).
-#[derive(Debug, Clone, Copy)]
-struct Ends {
-    shortening: Option<(f64, f64)>,
-    pressure: Option<(f64, f64)>,
-}
-
-impl Ends {
-    fn is_free(&self) -> bool {
-        self.shortening.is_none() && self.pressure.is_none()
-    }
-
-    fn simulated(&self) -> Simulated {
-        Simulated { arm: self.shortening.is_none(), chamber: self.pressure.is_none(), supply: true }
-    }
-
-    fn drive(&self, share: f64, sample_time: f64, state: &mut State<f64>) {
-        if let Some((from, to)) = self.shortening {
-            (state[ANGLE], state[RATE]) = (from + (to - from) * share, (to - from) / sample_time);
-        }
-        if let Some((from, to)) = self.pressure {
-            state[PRESSURE] = from + (to - from) * share;
-        }
-    }
+    Ok((rig.layout.pressure(k), LEAST_PRESSURE - rig.gas.ambient_pressure, 1e8, "Pa (gauge)"))
 }
 
 fn check_signal(
@@ -386,67 +274,325 @@ fn check_signal(
     unit: &str,
 ) -> Result<()> {
     if values.len() != samples {
-        let why = "one for the end of each sample".into();
+        let why = "one for each sample".into();
         return Err(Error::Length { name: name.into(), found: values.len(), expected: samples, why });
     }
     for (k, value) in values.iter().enumerate() {
-        check_range(&format!("{name}[{k}]"), *value, low, high, unit)?;
+        if !(value.is_finite() && *value >= low && *value <= high) {
+            let allowed = if low == f64::MIN {
+                "a finite voltage".into()
+            } else {
+                format!("a number from {low} to {high} {unit}")
+            };
+            return Err(Error::parameter(format!("{name}[{k}]"), *value, allowed));
+        }
     }
     Ok(())
 }
 
-/// Simulate `valve_command` [V], one value per sample, held; without a valve its values have no effect but
-/// their number sets the duration.
-///
-/// # Errors
-/// [`Error::Parameter`] for an impossible argument, [`Error::Integration`] when the state leaves the model's range.
-pub fn simulate(rig: &Rig, valve_command: &[f64], timing: Timing, initial: Initial) -> Result<Trajectory> {
-    let mut progress = Progress::start(rig, initial)?;
-    let mut out = Trajectory::with_capacity(valve_command.len());
-    if let Some((last, held)) = valve_command.split_last() {
-        progress.observe(rig, timing, &mut out)?;
-        progress.advance(rig, timing, held, Prescribed::default(), &mut out)?;
-        if !last.is_finite() {
-            return Err(Error::parameter(
-                format!("valve_command[{}]", held.len()),
-                *last,
-                "a finite voltage",
-            ));
+/// A plant with the memory that a step needs.
+pub(crate) struct Stepper<'a, S> {
+    pub plant: Plant<'a, S>,
+    pub scratch: Scratch<S>,
+    method: Rk4<S>,
+    start: Vec<S>,
+    end: Vec<S>,
+    remembers: bool,
+}
+
+impl<'a, S: Scalar> Stepper<'a, S> {
+    pub fn new(plant: Plant<'a, S>) -> Self {
+        let groups = plant.rig().wiring.groups.len();
+        let zeros = || vec![constant(0.0); groups];
+        Self {
+            scratch: plant.scratch(),
+            method: Rk4::new(plant.states()),
+            start: zeros(),
+            end: zeros(),
+            remembers: plant.remembers(),
+            plant,
         }
     }
-    Ok(out)
+
+    /// One RK4 step; driven states are written by `drive(fraction, state)`.
+    #[inline]
+    pub fn step(
+        &mut self,
+        state: &mut [S],
+        memory: &mut [Memory<S>],
+        controls: &Controls<S>,
+        dt: f64,
+        simulated: &Simulated,
+        mut drive: impl FnMut(f64, &mut [S]),
+    ) {
+        let Self { plant, scratch, method, start, end, remembers } = self;
+        if *remembers {
+            drive(0.0, state);
+            plant.contractions(state, start);
+        }
+        method.step(state, dt, |fraction, y, out| {
+            drive(fraction, y);
+            plant.rates(y, controls, memory, start, simulated, scratch, out);
+        });
+        drive(1.0, state);
+        if *remembers {
+            plant.contractions(state, end);
+            plant.advance_memory(memory, start, end);
+        }
+    }
+}
+
+/// Error for a state that has left the model's range, if it has.
+pub(crate) fn check_state<S: Scalar>(plant: &Plant<'_, S>, state: &[S], time: f64) -> Result<()> {
+    let rig = plant.rig();
+    let layout = &rig.layout;
+    let failure = |name: &str, value: f64, allowed: &str| {
+        Err(Error::Integration { time, name: name.into(), value, allowed: allowed.into() })
+    };
+    for (name, place) in &rig.names.initial {
+        let value = state[*place].re();
+        if !value.is_finite() {
+            return failure(name, value, "a finite value (a smaller step may help)");
+        }
+        if *place < layout.mass(0) && value < 0.0 {
+            return failure(name, value, "an absolute pressure >= 0 Pa (a smaller step may help)");
+        }
+    }
+    for k in 0..layout.gases {
+        if !state[layout.mass(k)].re().is_finite() {
+            return failure(
+                "gas_mass",
+                state[layout.mass(k)].re(),
+                "a finite value (a smaller step may help)",
+            );
+        }
+    }
+    for (group, spec) in rig.wiring.groups.iter().zip(&rig.spec().muscles) {
+        let angle = state[layout.angle(group.coordinate)];
+        if !group.joint.reaches(angle.re()) {
+            return failure("joint_angle", angle.re(), "an angle that the tendon reaches");
+        }
+        let contraction = (group.joint.eval(angle).shortening / group.rest_length).re();
+        let table = &group.muscle.table;
+        if !table.contains(contraction) {
+            let allowed = format!("inside the muscle's range {:.4} to {:.4}", table.e_min, table.e_max);
+            return failure(&dotted("contraction_ratio", &spec.name), contraction, &allowed);
+        }
+    }
+    Ok(())
+}
+
+/// Simulated channels in the order of [`crate::rig::Names::channels`], one row per sample; row 0 is the initial state. SI,
+/// pressures gauge and as the sensors read them (zeros included). And what happened on the way.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trajectory {
+    /// One vector for each channel.
+    pub channels: Vec<Vec<f64>>,
+    /// In the order of time.
+    pub events: Vec<Event>,
 }
 
 impl Trajectory {
-    /// An empty trajectory with room for `n` samples.
+    /// Without rows.
     #[must_use]
-    pub fn with_capacity(n: usize) -> Self {
-        let v = || Vec::with_capacity(n);
-        Self {
-            supply_pressure: v(),
-            muscle_pressure: v(),
-            joint_angle: v(),
-            joint_rate: v(),
-            contraction_ratio: v(),
-            air_volume: v(),
-            muscle_force: v(),
-            joint_torque: v(),
-            gas_temperature: v(),
-        }
+    pub fn new(rig: &Rig, rows: usize) -> Self {
+        let channels = rig.names.channels.iter().map(|_| Vec::with_capacity(rows)).collect();
+        Self { channels, events: Vec::new() }
     }
 
-    fn push(&mut self, plant: &Plant<'_, f64>, state: &State<f64>, memory: &Memory<f64>) {
-        let ambient = plant.rig().gas.ambient_pressure;
-        let (pressure_zero, angle_zero) = (plant.values()[P::PressureZero], plant.values()[P::AngleZero]);
-        let output = plant.output(state, memory);
-        self.supply_pressure.push(state[SUPPLY] - ambient);
-        self.muscle_pressure.push(state[PRESSURE] - ambient + pressure_zero);
-        self.joint_angle.push(state[ANGLE] + angle_zero);
-        self.joint_rate.push(state[RATE]);
-        self.contraction_ratio.push(output.contraction_ratio);
-        self.air_volume.push(output.volume);
-        self.muscle_force.push(output.force);
-        self.joint_torque.push(output.torque);
-        self.gas_temperature.push(output.temperature);
+    /// The channel of a name.
+    #[must_use]
+    pub fn get(&self, rig: &Rig, name: &str) -> Option<&[f64]> {
+        let k = rig.names.channels.iter().position(|(n, _)| n == name)?;
+        self.channels.get(k).map(Vec::as_slice)
     }
+}
+
+/// A running simulation at a sample: all that its future depends on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Progress {
+    state: Vec<f64>,
+    memory: Vec<Memory<f64>>,
+    /// Conditions that an event ends, see [`Watch`].
+    flags: Vec<bool>,
+    samples: u64,
+}
+
+impl Progress {
+    /// The start of a simulation.
+    ///
+    /// # Errors
+    /// As [`Plant::new`].
+    pub fn start(rig: &Rig, initial: &Initial) -> Result<Self> {
+        let plant = Plant::new(rig, rig.parameters().lift(), true)?;
+        let mut state = initial.state(rig, plant.states());
+        for gas in 0..rig.layout.gases {
+            state[rig.layout.mass(gas)] = plant.initial_mass(gas, &state);
+        }
+        let stops: Vec<_> = rig.wiring.coordinates.iter().map(|c| c.stops).collect();
+        let mut flags = Vec::new();
+        for (k, stops) in stops.iter().enumerate() {
+            let x = state[rig.layout.angle(k)];
+            flags.push(stops.is_some_and(|s| x < s.min_angle));
+            flags.push(stops.is_some_and(|s| x > s.max_angle));
+        }
+        flags.extend(std::iter::repeat_n(false, rig.wiring.valves.len() + rig.wiring.lines.len()));
+        Ok(Self { state, memory: vec![Memory::default(); rig.wiring.groups.len()], flags, samples: 0 })
+    }
+
+    /// Samples since the start.
+    #[must_use]
+    pub fn samples(&self) -> u64 {
+        self.samples
+    }
+
+    /// The numbers that [`Self::restored`] makes the same progress of, bit for bit.
+    #[must_use]
+    pub fn to_vec(&self) -> Vec<f64> {
+        let memory = self.memory.iter().flat_map(Memory::to_array);
+        let flags = self.flags.iter().map(|f| f64::from(u8::from(*f)));
+        self.state.iter().copied().chain(memory).chain(flags).chain([self.samples as f64]).collect()
+    }
+
+    /// This progress with the numbers of another [`Self::to_vec`] of the same rig.
+    ///
+    /// # Errors
+    /// [`Error::Length`] for another number of them, [`Error::Parameter`] for one that is not finite.
+    pub fn restored(&self, numbers: &[f64]) -> Result<Self> {
+        let parts = [self.state.len(), self.memory.len() * Memory::<f64>::NUMBERS, self.flags.len(), 1];
+        let expected = parts.iter().sum();
+        if numbers.len() != expected {
+            let why = "as it was read".into();
+            return Err(Error::Length { name: "state".into(), found: numbers.len(), expected, why });
+        }
+        for (k, value) in numbers.iter().enumerate() {
+            check_range(&format!("state[{k}]"), *value, -1e15, 1e15, "(as it was read)")?;
+        }
+        let (state, rest) = numbers.split_at(parts[0]);
+        let (memory, rest) = rest.split_at(parts[1]);
+        let (flags, samples) = rest.split_at(parts[2]);
+        Ok(Self {
+            state: state.to_vec(),
+            memory: memory.chunks(Memory::<f64>::NUMBERS).map(Memory::from_slice).collect(),
+            flags: flags.iter().map(|f| *f > 0.5).collect(),
+            samples: samples.first().map_or(0, |n| n.max(0.0) as u64),
+        })
+    }
+
+    /// Append this sample to a trajectory.
+    ///
+    /// # Errors
+    /// [`Error::Integration`] when the state has left the model's range.
+    pub fn observe(&self, rig: &Rig, timing: Timing, out: &mut Trajectory) -> Result<()> {
+        let plant = Plant::new(rig, rig.parameters().lift(), true)?;
+        let mut scratch = plant.scratch();
+        self.observed(&plant, &mut scratch, timing, out)
+    }
+
+    fn observed(
+        &self,
+        plant: &Plant<'_, f64>,
+        scratch: &mut Scratch<f64>,
+        timing: Timing,
+        out: &mut Trajectory,
+    ) -> Result<()> {
+        check_state(plant, &self.state, self.samples as f64 * timing.sample_time)?;
+        plant.observe(&self.state, &self.memory, scratch, &mut out.channels);
+        Ok(())
+    }
+
+    /// Hold the commands of each sample and append the sample after it. What is prescribed moves evenly to its value for the
+    /// end of each sample.
+    ///
+    /// # Errors
+    /// [`Error::Integration`] when the state leaves the model's range; what was appended before stays, and the progress is
+    /// that of the last good sample.
+    pub fn advance(
+        &mut self,
+        rig: &Rig,
+        timing: Timing,
+        drive: &Drive<'_>,
+        out: &mut Trajectory,
+    ) -> Result<()> {
+        let mut stepper = Stepper::new(Plant::new(rig, rig.parameters().lift(), true)?);
+        let simulated = Simulated::all_but(&rig.layout, &drive.places());
+        let dt = timing.step();
+        let (mut before, mut after) = (Watch::default(), Watch::default());
+        for k in 0..drive.samples {
+            let controls = stepper.plant.controls(|input| drive.commands[input][k]);
+            let mut next = self.clone();
+            let happened = out.events.len();
+            let ends = drive.ends(rig, &self.state, k);
+            let began = self.samples as f64 * timing.sample_time;
+            before.look(&stepper.plant, &next.state, &controls);
+            before.report(rig, None, began, &mut next.flags, &mut out.events);
+            for sub in 0..timing.substeps {
+                let (state, memory) = (&mut next.state, &mut next.memory);
+                stepper.step(state, memory, &controls, dt, &simulated, |fraction, y| {
+                    let share = (sub as f64 + fraction) / timing.substeps as f64;
+                    for (place, from, to) in &ends {
+                        y[*place] = from + (to - from) * share;
+                        if *place >= rig.layout.angle(0) {
+                            y[place + rig.layout.coordinates] = (to - from) / timing.sample_time;
+                        }
+                    }
+                });
+                after.look(&stepper.plant, &next.state, &controls);
+                let time = began + (sub + 1) as f64 * dt;
+                after.report(rig, Some((&before, dt)), time, &mut next.flags, &mut out.events);
+                std::mem::swap(&mut before, &mut after);
+            }
+            for (place, ..) in &ends {
+                held_mass(&stepper.plant, *place, &mut next.state);
+            }
+            next.samples += 1;
+            if let Err(error) = next.observed(&stepper.plant, &mut stepper.scratch, timing, out) {
+                out.events.truncate(happened);
+                return Err(error);
+            }
+            *self = next;
+        }
+        Ok(())
+    }
+}
+
+/// The gas of a prescribed pressure is at the temperature of the room, and what that takes was supplied from outside (or,
+/// where it is less, vented).
+fn held_mass(plant: &Plant<'_, f64>, place: usize, state: &mut [f64]) {
+    let layout = plant.rig().layout;
+    if place >= layout.mass(0) {
+        return;
+    }
+    let gas = place - layout.supplies;
+    let (mass, pressure) = (plant.rest_mass(gas, state), state[place]);
+    let more = mass - state[layout.mass(gas)];
+    let air = &plant.rig().gas;
+    let rt = air.gas_constant * air.temperature;
+    state[layout.mass(gas)] = mass;
+    if more > 0.0 {
+        state[layout.book(0)] += more;
+        state[layout.book(2)] += more * rt;
+        state[layout.book(3)] += more * rt * (pressure / air.ambient_pressure).ln();
+    } else {
+        state[layout.book(1)] -= more;
+    }
+}
+
+/// Simulate `rows` rows: the initial state, and one for each held sample but the last.
+///
+/// # Errors
+/// As [`Drive::new`] and [`Progress::advance`].
+pub fn simulate(
+    rig: &Rig,
+    rows: usize,
+    signals: &[(&str, &[f64])],
+    timing: Timing,
+    initial: &Initial,
+) -> Result<Trajectory> {
+    let mut out = Trajectory::new(rig, rows);
+    let mut progress = Progress::start(rig, initial)?;
+    progress.observe(rig, timing, &mut out)?;
+    let drive = Drive::new(rig, rows, signals)?;
+    progress.advance(rig, timing, &drive.part(0..rows.saturating_sub(1)), &mut out)?;
+    Ok(out)
 }

@@ -1,15 +1,17 @@
 //! Linear loads: a mass hangs where the muscle carries it and keeps its energy, a frame gives the static force.
 
 use pam_core::muscle::{Muscle, MuscleSpec};
-use pam_core::simulate::{Initial, Prescribed, Progress, Timing, Trajectory};
+use pam_core::simulate::{Drive, Initial, Progress, Timing, Trajectory};
 use pam_core::{Rig, RigSpec};
 
 const SHOULDER: &str = include_str!("data/shoulder.json");
 
 fn rig(kind: &str, mass: f64, friction: f64) -> Rig {
     let mut spec = RigSpec::from_json(SHOULDER).unwrap();
-    (spec.joint, spec.arm, spec.supply, spec.valve) = (None, None, None, None);
-    spec.muscle.as_mut().unwrap().count = 1;
+    spec.arm = None;
+    (spec.joints, spec.supplies, spec.valves) = (vec![], vec![], vec![]);
+    spec.muscles[0].muscle.count = 1;
+    spec.muscles[0].joint = "load".into();
     let text = format!(
         r#"{{"kind": "{kind}", "mass": {mass}, "viscous": {friction}, "coulomb_speed": 0.01, "gravity": 9.80665,
             "min_length": 0.2, "max_length": 0.28, "stop_stiffness": 1e6, "stop_damping": 1e3}}"#
@@ -18,25 +20,33 @@ fn rig(kind: &str, mass: f64, friction: f64) -> Rig {
     Rig::new(spec).unwrap()
 }
 
-fn run(rig: &Rig, initial: Initial, length: Option<&[f64]>, samples: usize) -> pam_core::Result<Trajectory> {
-    let timing = Timing { sample_time: 0.01, substeps: 20 };
-    let mut progress = Progress::start(rig, initial)?;
-    let mut out = Trajectory::default();
-    progress.observe(rig, timing, &mut out)?;
-    let prescribed = Prescribed { length, pressure: None };
-    progress.advance(rig, timing, &vec![0.0; samples], prescribed, &mut out)?;
-    Ok(out)
+struct Run(Rig, Trajectory);
+
+impl Run {
+    fn get(&self, name: &str) -> &[f64] {
+        self.1.get(&self.0, name).unwrap()
+    }
 }
 
-fn pressed(rig: &Rig, pressure: f64, shortening: f64) -> Initial {
-    Initial { muscle_pressure: pressure, joint_angle: shortening, ..Initial::rest(rig) }
+fn run(rig: &Rig, initial: Initial, length: Option<&[f64]>, samples: usize) -> pam_core::Result<Run> {
+    let timing = Timing { sample_time: 0.01, substeps: 20 };
+    let mut progress = Progress::start(rig, &initial)?;
+    let mut out = Trajectory::new(rig, samples);
+    progress.observe(rig, timing, &mut out)?;
+    let signals: Vec<_> = length.iter().map(|length| ("length", *length)).collect();
+    progress.advance(rig, timing, &Drive::new(rig, samples, &signals)?, &mut out)?;
+    Ok(Run(rig.clone(), out))
+}
+
+fn pressed(rig: &Rig, pressure: f64, shortening: f64) -> pam_core::Result<Initial> {
+    Initial::rest(rig).with(rig, "muscle_pressure", pressure)?.with(rig, "length", 0.276 - shortening)
 }
 
 #[test]
 fn a_mass_comes_to_rest_where_the_muscle_carries_it() {
     let rig = rig("mass", 50.0, 800.0);
-    let out = run(&rig, pressed(&rig, 4e5, 0.02), None, 1500).unwrap();
-    let (force, rate) = (out.muscle_force.last().unwrap(), out.joint_rate.last().unwrap());
+    let out = run(&rig, pressed(&rig, 4e5, 0.02).unwrap(), None, 1500).unwrap();
+    let (force, rate) = (out.get("muscle_force").last().unwrap(), out.get("length_rate").last().unwrap());
     assert!((force - 50.0 * 9.80665).abs() < 0.05, "{force}");
     assert!(rate.abs() < 1e-5, "{rate}");
 }
@@ -45,15 +55,15 @@ fn a_mass_comes_to_rest_where_the_muscle_carries_it() {
 fn a_frame_gives_the_static_force_at_its_length() {
     let rig = rig("frame", 0.0, 0.0);
     let length: Vec<f64> = (1..=100).map(|k| 0.276 - 0.0005 * f64::from(k)).collect();
-    let out = run(&rig, pressed(&rig, 3e5, 0.0), Some(&length), 100).unwrap();
-    let muscle = Muscle::new(&MuscleSpec { count: 1, ..rig.spec().muscle.clone().unwrap() }).unwrap();
+    let out = run(&rig, pressed(&rig, 3e5, 0.0).unwrap(), Some(&length), 100).unwrap();
+    let muscle = Muscle::new(&MuscleSpec { count: 1, ..rig.spec().muscles[0].muscle.clone() }).unwrap();
     for (k, length) in length.iter().enumerate() {
         let e = 1.0 - length / 0.276;
-        assert!((out.contraction_ratio[k + 1] - e).abs() < 1e-14);
-        let force = muscle.force(out.muscle_pressure[k + 1], e).unwrap();
-        assert!((out.muscle_force[k + 1] - force).abs() < 1e-6 * force.abs().max(1.0));
+        assert!((out.get("contraction_ratio")[k + 1] - e).abs() < 1e-14);
+        let force = muscle.force(out.get("muscle_pressure")[k + 1], e).unwrap();
+        assert!((out.get("muscle_force")[k + 1] - force).abs() < 1e-6 * force.abs().max(1.0));
     }
-    assert!(out.muscle_pressure.last().unwrap() < &3e5, "the shut chamber grows: its pressure falls");
+    assert!(out.get("muscle_pressure").last().unwrap() < &3e5, "the shut chamber grows: its pressure falls");
 }
 
 #[test]
@@ -61,23 +71,18 @@ fn a_held_pressure_stays_and_a_moving_one_is_followed() {
     let rig = rig("frame", 0.0, 0.0);
     let length: Vec<f64> = (1..=50).map(|k| 0.276 - 0.0005 * f64::from(k)).collect();
     let pressure: Vec<f64> = (1..=50).map(|k| 2e5 + 1e3 * f64::from(k)).collect();
-    let mut progress = Progress::start(&rig, pressed(&rig, 2e5, 0.0)).unwrap();
-    let mut out = Trajectory::default();
+    let mut progress = Progress::start(&rig, &pressed(&rig, 2e5, 0.0).unwrap()).unwrap();
+    let mut out = Run(rig.clone(), Trajectory::new(&rig, 50));
     let timing = Timing { sample_time: 0.01, substeps: 7 };
-    let prescribed = Prescribed { length: Some(&length), pressure: Some(&pressure) };
-    progress.advance(&rig, timing, &[0.0; 50], prescribed, &mut out).unwrap();
+    let drive = Drive::new(&rig, 50, &[("length", &length), ("pressure", &pressure)]).unwrap();
+    progress.advance(&rig, timing, &drive, &mut out.1).unwrap();
     for k in 0..50 {
-        assert!((out.muscle_pressure[k] - pressure[k]).abs() < 1e-9);
-        assert!((out.contraction_ratio[k] - (1.0 - length[k] / 0.276)).abs() < 1e-14);
+        assert!((out.get("muscle_pressure")[k] - pressure[k]).abs() < 1e-9);
+        assert!((out.get("contraction_ratio")[k] - (1.0 - length[k] / 0.276)).abs() < 1e-14);
     }
-    let message = {
-        let mut spec = RigSpec::from_json(SHOULDER).unwrap();
-        spec.name = "with a valve".into();
-        let rig = Rig::new(spec).unwrap();
-        let mut progress = Progress::start(&rig, Initial::rest(&rig)).unwrap();
-        let prescribed = Prescribed { length: None, pressure: Some(&[1e5]) };
-        progress.advance(&rig, timing, &[5.0], prescribed, &mut out).unwrap_err().to_string()
-    };
+    let valve = Rig::new(RigSpec::from_json(SHOULDER).unwrap()).unwrap();
+    let signals: [(&str, &[f64]); 2] = [("valve_command", &[5.0]), ("pressure", &[1e5])];
+    let message = Drive::new(&valve, 1, &signals).unwrap_err().to_string();
     assert!(message.contains("without [valve]"), "{message}");
 }
 
@@ -87,13 +92,13 @@ fn loads_that_cannot_be_are_named() {
     for (length, word) in
         [(None, "length is missing"), (Some(vec![0.1]), "length[0]"), (Some(vec![]), "length")]
     {
-        let message = run(&frame, Initial::rest(&frame), length.as_deref(), 1).unwrap_err().to_string();
+        let message = run(&frame, Initial::rest(&frame), length.as_deref(), 1).err().unwrap().to_string();
         assert!(message.contains(word), "{message}");
     }
     let mass = rig("mass", 5.0, 0.0);
-    let message = run(&mass, Initial::rest(&mass), Some(&[0.25]), 1).unwrap_err().to_string();
+    let message = run(&mass, Initial::rest(&mass), Some(&[0.25]), 1).err().unwrap().to_string();
     assert!(message.contains("load frame"), "{message}");
-    let message = run(&mass, pressed(&mass, 1e5, 0.2), None, 1).unwrap_err().to_string();
+    let message = pressed(&mass, 1e5, 0.2).unwrap_err().to_string();
     assert!(message.contains("initial.length"), "{message}");
     let mut spec = mass.spec().clone();
     spec.load.as_mut().unwrap().min_length = 0.05;

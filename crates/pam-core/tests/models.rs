@@ -111,11 +111,12 @@ fn published_ends_meet_the_fibre_in_contraction_and_keep_their_radius_in_extensi
 
 fn lift(change: impl Fn(&mut MuscleSpec)) -> Vec<f64> {
     let mut rig = RigSpec::from_json(SHOULDER).unwrap();
-    change(rig.muscle.as_mut().unwrap());
+    change(&mut rig.muscles[0].muscle);
     let rig = Rig::new(rig).unwrap();
     let command: Vec<f64> = (0..601).map(|k| 5.0 + 1.2 * (f64::from(k) * 0.02).sin()).collect();
     let timing = Timing { sample_time: 0.005, substeps: 10 };
-    simulate(&rig, &command, timing, Initial::rest(&rig)).unwrap().joint_angle
+    let run = simulate(&rig, 601, &[("valve_command", &command)], timing, &Initial::rest(&rig)).unwrap();
+    run.get(&rig, "joint_angle").unwrap().to_vec()
 }
 
 #[test]

@@ -4,7 +4,7 @@ use nalgebra::{SMatrix, SVector};
 use num_dual::{Dual64, DualStruct};
 use pam_core::arm::one_link::OneLink;
 use pam_core::arm::planar::{Link, PlanarArm, Stops};
-use pam_core::integrate::rk4;
+use pam_core::integrate::Rk4;
 use pam_core::scalar::{constant, Scalar};
 use pam_core::Error;
 use proptest::prelude::*;
@@ -241,11 +241,15 @@ const CHAIN: [Numbers; 3] =
 /// States after `steps` over 1 s from one start; `M = 2 N`.
 fn fall<const N: usize, const M: usize>(arm: &PlanarArm<f64, N>, steps: u32) -> Vec<SVector<f64, M>> {
     let mut states = vec![SVector::<f64, M>::from_fn(|i, _| if i < N { 1.2 - 0.3 * i as f64 } else { 0.5 })];
+    let mut method = Rk4::new(M);
     for k in 0..steps as usize {
-        let next = rk4(&states[k], 1.0 / f64::from(steps), |_, s| {
-            let (q, r) = (s.fixed_rows::<N>(0).into_owned(), s.fixed_rows::<N>(N).into_owned());
+        let mut next = states[k];
+        method.step(next.as_mut_slice(), 1.0 / f64::from(steps), |_, s, out| {
+            let q = SVector::<f64, N>::from_column_slice(&s[..N]);
+            let r = SVector::<f64, N>::from_column_slice(&s[N..]);
             let a = arm.acceleration(&q, &r, &SVector::zeros()).unwrap();
-            SVector::from_fn(|i, _| if i < N { r[i] } else { a[i - N] })
+            out[..N].copy_from_slice(r.as_slice());
+            out[N..].copy_from_slice(a.as_slice());
         });
         states.push(next);
     }

@@ -2,7 +2,6 @@
 
 use pam_core::residual::{predict, Block, Measured, Signal};
 use pam_core::rig::spec::EffectSpec;
-use pam_core::rig::ParameterId;
 use pam_core::simulate::{simulate, Initial, Timing, Trajectory};
 use pam_core::{Error, Rig, RigSpec};
 use std::collections::BTreeMap;
@@ -13,7 +12,7 @@ fn spec() -> RigSpec {
 
 fn effect(id: &str, parameters: &[(&str, f64)]) -> EffectSpec {
     let parameters: BTreeMap<_, _> = parameters.iter().map(|(n, v)| ((*n).to_string(), *v)).collect();
-    EffectSpec { id: id.into(), parameters }
+    EffectSpec { id: id.into(), at: String::new(), parameters }
 }
 
 fn command(n: usize) -> Vec<f64> {
@@ -21,11 +20,13 @@ fn command(n: usize) -> Vec<f64> {
 }
 
 fn start(rig: &Rig) -> Initial {
-    Initial { muscle_pressure: 2e5, joint_angle: 0.9, ..Initial::rest(rig) }
+    let rest = Initial::rest(rig);
+    rest.with(rig, "muscle_pressure", 2e5).unwrap().with(rig, "joint_angle", 0.9).unwrap()
 }
 
 fn run(rig: &Rig, n: usize, substeps: usize) -> Trajectory {
-    simulate(rig, &command(n), Timing { sample_time: 0.01, substeps }, start(rig)).unwrap()
+    let timing = Timing { sample_time: 0.01, substeps };
+    simulate(rig, n, &[("valve_command", &command(n))], timing, &start(rig)).unwrap()
 }
 
 #[test]
@@ -34,7 +35,8 @@ fn converges_with_order_four() {
     let reference = run(&rig, 60, 320);
     let error = |substeps| {
         let t = run(&rig, 60, substeps);
-        t.joint_angle.iter().zip(&reference.joint_angle).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+        let angle = |t: &Trajectory| t.get(&rig, "joint_angle").unwrap().to_vec();
+        angle(&t).iter().zip(&angle(&reference)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
     };
     let order = (error(10) / error(20)).log2();
     assert!((3.6..4.4).contains(&order), "order {order}");
@@ -73,10 +75,14 @@ fn sensitivities_agree_with_differences() {
         &[("heat_transfer_coefficient", 60.0), ("initial_temperature_rise", 3.0)],
     )];
     let cases: [(&RigSpec, Block, &[&str]); 4] = [
-        (&with_effects, Block::Supply, &["supply.volume", "valve.discharge_area_max", "valve.null_voltage"]),
         (
             &with_effects,
-            Block::Chamber,
+            Block::Supply(0),
+            &["supply.volume", "valve.discharge_area_max", "valve.null_voltage"],
+        ),
+        (
+            &with_effects,
+            Block::Chamber(0),
             &[
                 "chamber.dead_volume",
                 "chamber.alpha",
@@ -87,7 +93,7 @@ fn sensitivities_agree_with_differences() {
         ),
         (
             &with_effects,
-            Block::Arm,
+            Block::Arm(0),
             &[
                 "arm.payload",
                 "arm.coulomb",
@@ -99,7 +105,7 @@ fn sensitivities_agree_with_differences() {
         ),
         (
             &heated,
-            Block::Chamber,
+            Block::Chamber(0),
             &["heat_transfer.heat_transfer_coefficient", "heat_transfer.initial_temperature_rise"],
         ),
     ];
@@ -107,22 +113,17 @@ fn sensitivities_agree_with_differences() {
     let n = 80;
     let truth = run(&base, n, 10);
     let dt = 0.01;
-    let (ps, p, th) = (
-        slopes(&truth.supply_pressure, dt),
-        slopes(&truth.muscle_pressure, dt),
-        slopes(&truth.joint_angle, dt),
-    );
+    let channel = |name: &str| truth.get(&base, name).unwrap();
+    let names = ["supply_pressure", "muscle_pressure", "joint_angle"];
+    let rates = names.map(|name| slopes(channel(name), dt));
     let u = command(n);
-    let measured = Measured {
-        valve_command: &u,
-        supply_pressure: Some(Signal { value: &truth.supply_pressure, slope: &ps }),
-        muscle_pressure: Some(Signal { value: &truth.muscle_pressure, slope: &p }),
-        joint_angle: Some(Signal { value: &truth.joint_angle, slope: &th }),
-    };
+    let signal = |k: usize| (names[k], Signal { value: channel(names[k]), slope: &rates[k] });
+    let measured =
+        Measured::new(&base, n, &[("valve_command", &u)], &[signal(0), signal(1), signal(2)]).unwrap();
     let timing = Timing { sample_time: dt, substeps: 10 };
     for (spec, block, names) in cases {
         let rig = Rig::new(spec.clone()).unwrap();
-        let ids: Vec<_> = names.iter().map(|n| ParameterId::from_name(n).unwrap()).collect();
+        let ids: Vec<_> = names.iter().map(|n| rig.parameters().find(n).unwrap()).collect();
         let exact = predict(&rig, block, &measured, timing, &[0, 40], &ids).unwrap();
         for (column, name) in names.iter().enumerate() {
             let size = if name.ends_with("zero") { 1e-3 } else { 1e-4 };
@@ -149,16 +150,16 @@ fn slot<'a>(spec: &'a mut RigSpec, name: &str) -> &'a mut f64 {
         return spec.effects[index].parameters.get_mut(key).unwrap();
     }
     match name {
-        "supply.volume" => &mut spec.supply.as_mut().unwrap().volume,
-        "valve.discharge_area_max" => &mut spec.valve.as_mut().unwrap().discharge_area_max,
-        "valve.null_voltage" => &mut spec.valve.as_mut().unwrap().null_voltage,
-        "chamber.dead_volume" => &mut spec.chamber.dead_volume,
-        "chamber.alpha" => &mut spec.chamber.alpha,
+        "supply.volume" => &mut spec.supplies[0].volume,
+        "valve.discharge_area_max" => &mut spec.valves[0].discharge_area_max,
+        "valve.null_voltage" => &mut spec.valves[0].null_voltage,
+        "chamber.dead_volume" => &mut spec.chambers[0].dead_volume,
+        "chamber.alpha" => &mut spec.chambers[0].alpha,
         "arm.payload" => &mut spec.arm.as_mut().unwrap().payload,
         "arm.coulomb" => &mut spec.arm.as_mut().unwrap().coulomb,
-        "muscle.modulus_scale" => &mut spec.muscle.as_mut().unwrap().modulus_scale,
-        "sensors.angle_zero" => &mut spec.sensors.angle_zero,
-        _ => &mut spec.sensors.pressure_zero,
+        "muscle.modulus_scale" => &mut spec.muscles[0].muscle.modulus_scale,
+        "sensors.angle_zero" => &mut spec.sensors[0].angle_zero,
+        _ => &mut spec.sensors[0].pressure_zero,
     }
 }
 
@@ -187,11 +188,13 @@ fn bad_input_is_a_typed_error() {
     let timing = Timing::new(0.005, 1e-3).unwrap();
     let initial = Initial::rest(&rig);
     let named = |e: Error, name: &str| assert!(e.to_string().contains(name), "{e}");
-    named(simulate(&rig, &[5.0, f64::NAN], timing, initial).unwrap_err(), "valve_command[1]");
-    named(
-        simulate(&rig, &[5.0], timing, Initial { muscle_pressure: -2e5, ..initial }).unwrap_err(),
-        "initial.muscle_pressure",
-    );
+    let run = |command: &[f64]| {
+        simulate(&rig, command.len(), &[("valve_command", command)], timing, &initial).unwrap_err()
+    };
+    named(run(&[5.0, f64::NAN]), "valve_command[1]");
+    named(simulate(&rig, 2, &[], timing, &initial).unwrap_err(), "valve_command is missing");
+    named(initial.clone().with(&rig, "muscle_pressure", -2e5).unwrap_err(), "initial.muscle_pressure");
+    named(initial.clone().with(&rig, "muscle_colour", 1.0).unwrap_err(), "muscle_colour");
     named(Timing::new(0.005, 3e-3).unwrap_err(), "step");
     named(Timing::new(f64::NAN, 1e-3).unwrap_err(), "sample_time");
     let mut bad = spec();
@@ -201,7 +204,7 @@ fn bad_input_is_a_typed_error() {
     unknown.effects = vec![effect("phlogiston", &[])];
     named(Rig::new(unknown).unwrap_err(), "phlogiston");
     let mut short = spec();
-    short.joint.as_mut().unwrap().lower_axial = 0.15;
+    short.joints[0].transmission.as_mut().unwrap().lower_axial = 0.15;
     assert!(
         Rig::new(short).is_err_and(|e| e.to_string().contains("joint.")),
         "the muscle cannot shorten so far"

@@ -4,7 +4,7 @@ use crate::convert::{array, error, values};
 use numpy::{PyArray1, PyReadonlyArray1};
 use pam_core::error::check_range;
 use pam_core::joint::{Joint as CoreJoint, JointPoint};
-use pam_core::rig::spec::JointSpec;
+use pam_core::rig::spec::TransmissionSpec;
 use pyo3::prelude::*;
 
 /// A joint made from a JSON description (SI, radians).
@@ -37,7 +37,7 @@ impl Joint {
 impl Joint {
     #[new]
     fn new(py: Python<'_>, json: &str) -> PyResult<Self> {
-        let made = JointSpec::from_json(json).and_then(|spec| CoreJoint::new(&spec));
+        let made = TransmissionSpec::from_json(json).and_then(|spec| CoreJoint::new(&spec));
         Ok(Self { inner: made.map_err(|e| error(py, &e))? })
     }
 

@@ -18,7 +18,6 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<gas::Gas>()?;
     m.add_class::<joint::Joint>()?;
     m.add_class::<simulator::Simulator>()?;
-    m.add_function(wrap_pyfunction!(rig::parameter_names, m)?)?;
     m.add_function(wrap_pyfunction!(rig::effects, m)?)?;
     Ok(())
 }

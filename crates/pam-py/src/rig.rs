@@ -1,13 +1,14 @@
 //! `_core.Rig`: simulation and cut-chain prediction.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::convert::{array, error, values};
-use crate::simulator::{channels, initial, run};
+use crate::simulator::{channels, events, initial, run, EventRow};
 use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray1};
 use pam_core::residual::{predict, Block, Measured, Signal};
-use pam_core::rig::{ParameterId, RigSpec};
-use pam_core::simulate::{Prescribed, Progress, Timing, Trajectory};
+use pam_core::rig::RigSpec;
+use pam_core::simulate::{Drive, Progress, Timing, Trajectory};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -24,7 +25,20 @@ impl Rig {
     }
 }
 
+/// Signals by name as Python gives them.
+pub type Signals<'py> = BTreeMap<String, PyReadonlyArray1<'py, f64>>;
 type Pair<'py> = (PyReadonlyArray1<'py, f64>, PyReadonlyArray1<'py, f64>);
+type Owned = Vec<(String, Vec<f64>)>;
+
+/// Signals by name as the core takes them.
+pub fn owned(signals: &Signals<'_>) -> Owned {
+    signals.iter().map(|(name, signal)| (name.clone(), values(signal))).collect()
+}
+
+/// Borrowed view of [`owned`].
+pub fn borrowed(signals: &Owned) -> Vec<(&str, &[f64])> {
+    signals.iter().map(|(name, signal)| (name.as_str(), signal.as_slice())).collect()
+}
 
 #[pymethods]
 impl Rig {
@@ -34,83 +48,96 @@ impl Rig {
         Ok(Self { inner: Arc::new(made.map_err(|e| error(py, &e))?) })
     }
 
-    /// The same rig from another description; the compiled muscle is kept where it can be.
+    /// The same rig from another description; compiled muscles are kept where they can be.
     fn respecified(&self, py: Python<'_>, json: &str) -> PyResult<Self> {
         let made = py.detach(|| RigSpec::from_json(json).and_then(|spec| self.inner.respecified(spec)));
         Ok(Self { inner: Arc::new(made.map_err(|e| error(py, &e))?) })
     }
 
-    /// Simulate a held command; returns channels by name.
-    #[pyo3(signature = (valve_command, sample_time, step, *, muscle_pressure=None, supply_pressure=None, joint_angle=None, joint_rate=None, length=None, lengths=None, pressures=None))]
-    #[allow(clippy::too_many_arguments)]
+    /// Names of the commands that a simulation takes.
+    #[getter]
+    fn inputs(&self) -> Vec<String> {
+        self.inner.names().inputs.clone()
+    }
+
+    /// Names of the simulated channels.
+    #[getter]
+    fn channels(&self) -> Vec<String> {
+        self.inner.names().channels.iter().map(|(name, _)| name.clone()).collect()
+    }
+
+    /// Names of the states that an initial value can be given for.
+    #[getter]
+    fn states(&self) -> Vec<String> {
+        self.inner.names().initial.iter().map(|(name, _)| name.clone()).collect()
+    }
+
+    /// Dotted names of the scalar parameters that predictions can be differentiated with respect to.
+    #[getter]
+    fn parameter_names(&self) -> Vec<String> {
+        self.inner.parameters().names().to_vec()
+    }
+
+    /// Longest stable step [s].
+    #[getter]
+    fn stable_step(&self) -> f64 {
+        self.inner.stable_step()
+    }
+
+    /// Simulate a number of rows under held signals; channels by name, and what happened on the way.
     fn simulate<'py>(
         &self,
         py: Python<'py>,
-        valve_command: PyReadonlyArray1<'py, f64>,
+        rows: usize,
+        signals: Signals<'py>,
         sample_time: f64,
         step: f64,
-        muscle_pressure: Option<f64>,
-        supply_pressure: Option<f64>,
-        joint_angle: Option<f64>,
-        joint_rate: Option<f64>,
-        length: Option<f64>,
-        lengths: Option<PyReadonlyArray1<'py, f64>>,
-        pressures: Option<PyReadonlyArray1<'py, f64>>,
-    ) -> PyResult<Bound<'py, PyDict>> {
-        let command = values(&valve_command);
-        let start = initial(&self.inner, muscle_pressure, supply_pressure, joint_angle, joint_rate, length);
-        let (lengths, pressures) = (lengths.as_ref().map(values), pressures.as_ref().map(values));
-        let prescribed = Prescribed { length: lengths.as_deref(), pressure: pressures.as_deref() };
+        start: BTreeMap<String, f64>,
+    ) -> PyResult<(Bound<'py, PyDict>, Vec<EventRow>)> {
+        let rig = &*self.inner;
+        let signals = owned(&signals);
         let begun = Timing::new(sample_time, step)
-            .and_then(|timing| Ok((timing, Progress::start(&self.inner, start)?)))
+            .and_then(|timing| {
+                let progress = Progress::start(rig, &initial(rig, &start)?)?;
+                Ok((timing.stable(rig), progress, Drive::new(rig, rows, &borrowed(&signals))?))
+            })
             .map_err(|e| error(py, &e))?;
-        let (timing, mut progress) = begun;
-        let mut out = Trajectory::with_capacity(command.len());
-        progress.observe(&self.inner, timing, &mut out).map_err(|e| error(py, &e))?;
-        let held = command.split_last().map_or(&[][..], |(_, held)| held);
-        run(py, &self.inner, timing, &mut progress, held, prescribed, &mut out)?;
-        channels(py, &self.inner, out)
+        let (timing, mut progress, drive) = begun;
+        let mut out = Trajectory::new(rig, rows);
+        progress.observe(rig, timing, &mut out).map_err(|e| error(py, &e))?;
+        run(py, rig, timing, &mut progress, &drive.part(0..rows.saturating_sub(1)), &mut out)?;
+        let happened = events(&out);
+        Ok((channels(py, rig, out)?, happened))
     }
 
     /// Predict a block's output from its measured neighbours, with the jacobian (None without parameters).
-    #[pyo3(signature = (block, valve_command, sample_time, step, starts, parameters, *, supply_pressure=None, muscle_pressure=None, joint_angle=None))]
     #[allow(clippy::too_many_arguments, clippy::type_complexity)]
     fn predict<'py>(
         &self,
         py: Python<'py>,
         block: &str,
-        valve_command: PyReadonlyArray1<'py, f64>,
+        commands: Signals<'py>,
         sample_time: f64,
         step: f64,
         starts: Vec<usize>,
         parameters: Vec<String>,
-        supply_pressure: Option<Pair<'py>>,
-        muscle_pressure: Option<Pair<'py>>,
-        joint_angle: Option<Pair<'py>>,
+        measured: BTreeMap<String, Pair<'py>>,
+        samples: usize,
     ) -> PyResult<(Bound<'py, numpy::PyArray1<f64>>, Option<Bound<'py, PyArray2<f64>>>)> {
-        let u = values(&valve_command);
-        let own = |pair: Option<Pair<'py>>| pair.map(|(value, slope)| (values(&value), values(&slope)));
-        let (supply, pressure, angle) = (own(supply_pressure), own(muscle_pressure), own(joint_angle));
+        let commands = owned(&commands);
+        let signals: Vec<_> =
+            measured.iter().map(|(name, (value, slope))| (name, values(value), values(slope))).collect();
         let inner = &*self.inner;
         let found = py.detach(|| {
-            let measured = Measured {
-                valve_command: &u,
-                supply_pressure: supply.as_ref().map(|(value, slope)| Signal { value, slope }),
-                muscle_pressure: pressure.as_ref().map(|(value, slope)| Signal { value, slope }),
-                joint_angle: angle.as_ref().map(|(value, slope)| Signal { value, slope }),
-            };
-            let ids = parameters
-                .iter()
-                .map(|name| ParameterId::from_name(name))
+            let signals: Vec<_> = (signals.iter())
+                .map(|(name, value, slope)| (name.as_str(), Signal { value, slope }))
+                .collect();
+            let measured = Measured::new(inner, samples, &borrowed(&commands), &signals)?;
+            let ids = (parameters.iter())
+                .map(|name| inner.parameters().find(name))
                 .collect::<pam_core::Result<Vec<_>>>()?;
-            predict(
-                inner,
-                Block::from_name(block)?,
-                &measured,
-                Timing::new(sample_time, step)?,
-                &starts,
-                &ids,
-            )
+            let block = Block::from_name(inner, block)?;
+            predict(inner, block, &measured, Timing::new(sample_time, step)?.stable(inner), &starts, &ids)
         });
         let p = found.map_err(|e| error(py, &e))?;
         let rows = p.value.len();
@@ -118,12 +145,6 @@ impl Rig {
             if p.columns > 0 { Some(array(py, p.jacobian).reshape([rows, p.columns])?) } else { None };
         Ok((array(py, p.value), jacobian))
     }
-}
-
-/// Dotted names of the scalar parameters that predictions can be differentiated with respect to.
-#[pyfunction]
-pub fn parameter_names() -> Vec<&'static str> {
-    ParameterId::ALL.iter().map(|p| p.name()).collect()
 }
 
 type EffectRow = (&'static str, &'static str, Vec<(&'static str, &'static str)>);

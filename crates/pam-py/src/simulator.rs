@@ -1,11 +1,12 @@
 //! `_core.Simulator`: a simulation that goes on sample by sample, and the one way both it and `Rig.simulate` run.
 
+use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::convert::{array, error, values};
-use crate::rig::Rig;
+use crate::rig::{borrowed, owned, Rig, Signals};
 use numpy::{PyArray1, PyReadonlyArray1};
-use pam_core::simulate::{Initial, Prescribed, Progress, Timing, Trajectory};
+use pam_core::simulate::{Drive, Initial, Progress, Timing, Trajectory};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -18,65 +19,38 @@ pub fn run(
     rig: &pam_core::Rig,
     timing: Timing,
     progress: &mut Progress,
-    command: &[f64],
-    prescribed: Prescribed<'_>,
+    drive: &Drive<'_>,
     out: &mut Trajectory,
 ) -> PyResult<()> {
     let at_once = (STEPS_AT_ONCE / timing.substeps).max(1);
-    for first in (0..command.len()).step_by(at_once) {
-        let last = (first + at_once).min(command.len());
-        let part = |signal: Option<&'_ [f64]>| signal.map(|s| s.get(first..last).unwrap_or(&[]).to_vec());
-        let (length, pressure) = (part(prescribed.length), part(prescribed.pressure));
-        let here = Prescribed { length: length.as_deref(), pressure: pressure.as_deref() };
-        let held = &command[first..last];
-        py.detach(|| progress.advance(rig, timing, held, here, out)).map_err(|e| error(py, &e))?;
+    for first in (0..drive.samples()).step_by(at_once) {
+        let part = drive.part(first..(first + at_once).min(drive.samples()));
+        py.detach(|| progress.advance(rig, timing, &part, out)).map_err(|e| error(py, &e))?;
         py.check_signals()?;
     }
     Ok(())
 }
 
-/// Channels of a trajectory by name, those that the rig has.
+/// Channels of a trajectory by name.
 pub fn channels<'py>(py: Python<'py>, rig: &pam_core::Rig, t: Trajectory) -> PyResult<Bound<'py, PyDict>> {
     let out = PyDict::new(py);
-    if rig.spec().supply.is_some() {
-        out.set_item("supply_pressure", array(py, t.supply_pressure))?;
+    for ((name, _), values) in rig.names().channels.iter().zip(t.channels) {
+        out.set_item(name, array(py, values))?;
     }
-    out.set_item("muscle_pressure", array(py, t.muscle_pressure))?;
-    if rig.spec().arm.is_some() {
-        out.set_item("joint_angle", array(py, t.joint_angle))?;
-        out.set_item("joint_rate", array(py, t.joint_rate))?;
-        out.set_item("contraction_ratio", array(py, t.contraction_ratio))?;
-        out.set_item("muscle_force", array(py, t.muscle_force))?;
-        out.set_item("joint_torque", array(py, t.joint_torque))?;
-    } else if let (Some(_), Some(muscle)) = (&rig.spec().load, &rig.spec().muscle) {
-        let length = t.contraction_ratio.iter().map(|e| muscle.rest_length * (1.0 - e)).collect();
-        out.set_item("length", array(py, length))?;
-        out.set_item("length_rate", array(py, t.joint_rate.iter().map(|rate| -rate).collect()))?;
-        out.set_item("contraction_ratio", array(py, t.contraction_ratio))?;
-        out.set_item("muscle_force", array(py, t.muscle_force))?;
-    }
-    out.set_item("air_volume", array(py, t.air_volume))?;
-    out.set_item("temperature", array(py, t.gas_temperature))?;
     Ok(out)
 }
 
-/// Initial values; what is left out is at rest.
-pub fn initial(
-    rig: &pam_core::Rig,
-    muscle_pressure: Option<f64>,
-    supply_pressure: Option<f64>,
-    joint_angle: Option<f64>,
-    joint_rate: Option<f64>,
-    length: Option<f64>,
-) -> Initial {
-    let rest = Initial::rest(rig);
-    let shortening = length.zip(rig.spec().muscle.as_ref()).map(|(l, muscle)| muscle.rest_length - l);
-    Initial {
-        supply_pressure: supply_pressure.unwrap_or(rest.supply_pressure),
-        muscle_pressure: muscle_pressure.unwrap_or(rest.muscle_pressure),
-        joint_angle: shortening.or(joint_angle).unwrap_or(rest.joint_angle),
-        joint_rate: joint_rate.unwrap_or(rest.joint_rate),
-    }
+/// Time [s], kind and block of an event.
+pub type EventRow = (f64, &'static str, String);
+
+/// Events of a trajectory.
+pub fn events(t: &Trajectory) -> Vec<EventRow> {
+    t.events.iter().map(|e| (e.time, e.kind.name(), e.block.clone())).collect()
+}
+
+/// Initial values by name; what is left out is at rest.
+pub fn initial(rig: &pam_core::Rig, given: &BTreeMap<String, f64>) -> pam_core::Result<Initial> {
+    given.iter().try_fold(Initial::rest(rig), |start, (name, value)| start.with(rig, name, *value))
 }
 
 /// A simulation of a rig that waits for its next command.
@@ -96,50 +70,42 @@ impl Simulator {
 #[pymethods]
 impl Simulator {
     #[new]
-    #[pyo3(signature = (rig, sample_time, step, *, muscle_pressure=None, supply_pressure=None, joint_angle=None, joint_rate=None, length=None))]
-    #[allow(clippy::too_many_arguments)]
     fn new(
         py: Python<'_>,
         rig: &Rig,
         sample_time: f64,
         step: f64,
-        muscle_pressure: Option<f64>,
-        supply_pressure: Option<f64>,
-        joint_angle: Option<f64>,
-        joint_rate: Option<f64>,
-        length: Option<f64>,
+        start: BTreeMap<String, f64>,
     ) -> PyResult<Self> {
         let rig = rig.shared();
-        let start = initial(&rig, muscle_pressure, supply_pressure, joint_angle, joint_rate, length);
-        let made = Timing::new(sample_time, step).and_then(|t| Ok((t, Progress::start(&rig, start)?)));
+        let made = Timing::new(sample_time, step)
+            .and_then(|t| Ok((t.stable(&rig), Progress::start(&rig, &initial(&rig, &start)?)?)));
         let (timing, progress) = made.map_err(|e| error(py, &e))?;
         Ok(Self { rig, timing, progress: Mutex::new(progress) })
     }
 
-    /// Hold each command [V] for one sample; the samples after them as channels by name.
-    #[pyo3(signature = (valve_command, length=None, pressure=None))]
+    /// Hold each command for one sample; the samples after them as channels by name, and what happened on the way.
     fn advance<'py>(
         &self,
         py: Python<'py>,
-        valve_command: PyReadonlyArray1<'py, f64>,
-        length: Option<PyReadonlyArray1<'py, f64>>,
-        pressure: Option<PyReadonlyArray1<'py, f64>>,
-    ) -> PyResult<Bound<'py, PyDict>> {
-        let command = values(&valve_command);
-        let (length, pressure) = (length.as_ref().map(values), pressure.as_ref().map(values));
-        let prescribed = Prescribed { length: length.as_deref(), pressure: pressure.as_deref() };
-        let mut out = Trajectory::with_capacity(command.len());
-        let mut progress = *self.progress();
-        let done = run(py, &self.rig, self.timing, &mut progress, &command, prescribed, &mut out);
+        samples: usize,
+        signals: Signals<'py>,
+    ) -> PyResult<(Bound<'py, PyDict>, Vec<EventRow>)> {
+        let signals = owned(&signals);
+        let drive = Drive::new(&self.rig, samples, &borrowed(&signals)).map_err(|e| error(py, &e))?;
+        let mut out = Trajectory::new(&self.rig, samples);
+        let mut progress = self.progress().clone();
+        let done = run(py, &self.rig, self.timing, &mut progress, &drive, &mut out);
         *self.progress() = progress;
         done?;
-        channels(py, &self.rig, out)
+        let happened = events(&out);
+        Ok((channels(py, &self.rig, out)?, happened))
     }
 
     /// The present sample as channels by name, one value each.
     fn observe<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let mut out = Trajectory::with_capacity(1);
-        let progress = *self.progress();
+        let mut out = Trajectory::new(&self.rig, 1);
+        let progress = self.progress().clone();
         progress.observe(&self.rig, self.timing, &mut out).map_err(|e| error(py, &e))?;
         channels(py, &self.rig, out)
     }
@@ -152,8 +118,15 @@ impl Simulator {
 
     /// Go back, or on, to a state.
     fn restore(&self, py: Python<'_>, state: PyReadonlyArray1<'_, f64>) -> PyResult<()> {
-        *self.progress() = Progress::from_slice(&values(&state)).map_err(|e| error(py, &e))?;
+        let restored = self.progress().restored(&values(&state)).map_err(|e| error(py, &e))?;
+        *self.progress() = restored;
         Ok(())
+    }
+
+    /// RK4 steps per sample.
+    #[getter]
+    fn substeps(&self) -> usize {
+        self.timing.substeps
     }
 
     /// Samples since the start.

@@ -74,6 +74,17 @@ impl Gas {
         }
     }
 
+    /// Pressure ratio below which the flow is choked [1].
+    #[inline]
+    pub fn critical_ratio(&self) -> f64 {
+        self.critical_ratio
+    }
+
+    /// Largest change of mass flow per pressure [kg/(s Pa)] of a discharge area [m2]: next to equal pressures.
+    pub fn steepest(&self, area: f64) -> f64 {
+        area * self.flow_factor * self.psi_laminar / (1.0 - LAMINAR_RATIO)
+    }
+
     /// Choked mass flow [kg/s] through a discharge area [m2] from an upstream absolute pressure [Pa].
     #[inline]
     pub fn choked_flow<S: Scalar>(&self, area: S, upstream: S) -> S {

@@ -1,23 +1,44 @@
 //! Fixed-step integration.
 
-use crate::scalar::Scalar;
-use nalgebra::SVector;
+use crate::scalar::{constant, Scalar};
 
-/// One step of the classical fourth-order Runge-Kutta method.
-///
-/// `rate(fraction, state)` is the time derivative at `fraction` (0, 1/2 or 1) of the step.
-#[inline]
-pub fn rk4<S: Scalar, const N: usize>(
-    state: &SVector<S, N>,
-    step: f64,
-    mut rate: impl FnMut(f64, &SVector<S, N>) -> SVector<S, N>,
-) -> SVector<S, N> {
-    let scaled = |k: &SVector<S, N>, factor: f64| k.map(|v| v * factor);
-    let k1 = rate(0.0, state);
-    let k2 = rate(0.5, &(state + scaled(&k1, 0.5 * step)));
-    let k3 = rate(0.5, &(state + scaled(&k2, 0.5 * step)));
-    let k4 = rate(1.0, &(state + scaled(&k3, step)));
-    state + scaled(&(k1 + scaled(&(k2 + k3), 2.0) + k4), step / 6.0)
+/// The classical fourth-order Runge-Kutta method, with the memory that its stages need.
+#[derive(Debug, Clone)]
+pub struct Rk4<S> {
+    stage: Vec<S>,
+    rate: Vec<S>,
+    sum: Vec<S>,
+}
+
+impl<S: Scalar> Rk4<S> {
+    /// For a number of states.
+    pub fn new(states: usize) -> Self {
+        let zeros = || vec![constant(0.0); states];
+        Self { stage: zeros(), rate: zeros(), sum: zeros() }
+    }
+
+    /// One step in place.
+    ///
+    /// `rate(fraction, state, out)` writes the time derivative at `fraction` (0, 1/2 or 1) of the step; it may overwrite
+    /// driven entries of the state that it is given.
+    #[inline]
+    pub fn step(&mut self, state: &mut [S], step: f64, mut rate: impl FnMut(f64, &mut [S], &mut [S])) {
+        self.stage.copy_from_slice(state);
+        rate(0.0, &mut self.stage, &mut self.rate);
+        self.sum.copy_from_slice(&self.rate);
+        for (fraction, weight) in [(0.5, 2.0), (0.5, 2.0), (1.0, 1.0)] {
+            for ((stage, start), slope) in self.stage.iter_mut().zip(state.iter()).zip(&self.rate) {
+                *stage = *start + *slope * (fraction * step);
+            }
+            rate(fraction, &mut self.stage, &mut self.rate);
+            for (sum, slope) in self.sum.iter_mut().zip(&self.rate) {
+                *sum += *slope * weight;
+            }
+        }
+        for (value, sum) in state.iter_mut().zip(&self.sum) {
+            *value += *sum * (step / 6.0);
+        }
+    }
 }
 
 #[cfg(test)]
@@ -28,9 +49,9 @@ mod tests {
     fn order_is_four() {
         let error = |n: u32| {
             let h = 1.0 / f64::from(n);
-            let mut y = SVector::<f64, 2>::new(1.0, 0.0);
+            let (mut y, mut method) = ([1.0_f64, 0.0], Rk4::new(2));
             for _ in 0..n {
-                y = rk4(&y, h, |_, y| SVector::<f64, 2>::new(y[1], -y[0]));
+                method.step(&mut y, h, |_, y, out| out.copy_from_slice(&[y[1], -y[0]]));
             }
             (y[0] - 1f64.cos()).abs()
         };

@@ -12,7 +12,7 @@ pub use self::polynomial::Polynomial;
 pub use self::pulley::Pulley;
 pub use self::tendon::TendonJoint;
 use crate::error::{check_range, Error, Result};
-use crate::rig::spec::JointSpec;
+use crate::rig::spec::TransmissionSpec;
 use crate::scalar::{constant, Scalar};
 
 /// Shortening and moment arms at one angle.
@@ -47,7 +47,7 @@ impl Joint {
     ///
     /// # Errors
     /// [`Error::Choice`] for an unknown kind, [`Error::Parameter`] for an impossible length.
-    pub fn new(spec: &JointSpec) -> Result<Self> {
+    pub fn new(spec: &TransmissionSpec) -> Result<Self> {
         let rest = spec.rest_angle;
         match spec.kind.as_str() {
             "tendon" | "published" => {

@@ -1,88 +1,106 @@
-//! A rig: blocks in a chain, described by data, composed into one state equation.
+//! A rig: blocks joined by ports, described by data, composed into one state equation.
 
+mod body;
+mod check;
+pub mod layout;
 pub mod parameters;
 pub mod plant;
 pub mod spec;
+mod wiring;
 
-pub use parameters::{ParameterId, Values};
+pub use layout::{Channel, Layout, Names};
+pub use parameters::{ParameterId, Parameters, Values};
 pub use plant::Plant;
 pub use spec::RigSpec;
 
-use crate::effects;
+use self::wiring::{Group, Wiring};
 use crate::gas::orifice::Gas;
-use crate::gas::valve::AreaTable;
 use crate::joint::Joint;
-use crate::muscle::{CompiledMuscle, Muscle};
+use crate::muscle::CompiledMuscle;
 use crate::{Error, Result};
+use spec::dotted;
 
-/// A rig ready to be simulated: muscles compiled to a table, derived constants in place. Immutable.
+/// Of the 2.78 that the Runge-Kutta method bears on the negative real axis.
+const STABLE: f64 = 2.0;
+/// The least step that a rig may need [s].
+const LEAST_STEP: f64 = 1e-7;
+
+/// A rig ready to be simulated: muscles compiled to a table, ports resolved. Immutable.
 #[derive(Debug, Clone)]
 pub struct Rig {
     spec: RigSpec,
     pub(crate) gas: Gas,
-    pub(crate) valve: Option<AreaTable>,
-    pub(crate) muscle: Option<CompiledMuscle>,
-    pub(crate) joint: Option<Joint>,
-    pub(crate) values: Values<f64>,
-    pub(crate) active: Active,
-}
-
-/// Which effects are switched on.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Active {
-    /// `leak_muscle`.
-    pub leak: bool,
-    /// `heat_transfer`.
-    pub heat: bool,
-    /// `muscle_hysteresis`.
-    pub hysteresis: bool,
-    /// The muscle's own force depends on the direction of motion.
-    pub direction: bool,
+    pub(crate) wiring: Wiring,
+    pub(crate) layout: Layout,
+    pub(crate) names: Names,
+    stable_step: f64,
 }
 
 impl Rig {
     /// Compile a rig from its description.
     ///
     /// # Errors
-    /// As [`RigSpec::validate`]; [`Error::Model`] for an unknown effect or effect parameter.
+    /// As [`RigSpec::validate`]; [`Error::Model`] for blocks that do not fit together, an unknown effect or effect parameter,
+    /// or a volume too small for its openings.
     pub fn new(spec: RigSpec) -> Result<Self> {
-        spec.validate()?;
-        let muscle = spec.muscle.as_ref().map(|m| CompiledMuscle::new(Muscle::new(m)?)).transpose()?;
-        Self::with_muscle(spec, muscle)
+        Self::with_groups(spec, &[])
     }
 
-    fn with_muscle(spec: RigSpec, muscle: Option<CompiledMuscle>) -> Result<Self> {
+    fn with_groups(spec: RigSpec, known: &[Group]) -> Result<Self> {
+        spec.validate()?;
         let g = &spec.gas;
         let gas = Gas::new(g.ambient_pressure, g.temperature, g.gas_constant, g.heat_capacity_ratio);
-        let valve = spec.valve.as_ref().map(|v| AreaTable::new(&v.opening, &v.fraction)).transpose()?;
-        let joint = match (&spec.joint, &spec.load) {
-            (Some(joint), _) => Some(Joint::new(joint)?),
-            (None, Some(_)) => Some(Joint::Direct),
-            (None, None) => None,
+        let wiring = Wiring::new(&spec, known)?;
+        let layout = Layout {
+            supplies: wiring.supplies.len(),
+            gases: wiring.gases.len(),
+            coordinates: wiring.coordinates.len(),
+            chambers: wiring.chambers,
         };
-        let (values, mut active) = collect_values(&spec)?;
-        active.direction = muscle.as_ref().is_some_and(CompiledMuscle::has_direction);
-        let rig = Self { gas, valve, muscle, joint, values, active, spec };
+        let names = Names::new(&spec, &wiring, &layout);
+        let mut rig = Self { gas, wiring, layout, names, stable_step: f64::INFINITY, spec };
         rig.check_reach()?;
-        rig.check_lengths()?;
+        rig.stable_step = rig.find_step()?;
         Ok(rig)
     }
 
-    /// The joint's whole range must be within the reach of its tendon and of the muscle's table.
+    /// Every joint's and load's whole range must be within the reach of the tendons and of the muscles' tables.
     fn check_reach(&self) -> Result<()> {
-        if let (Some(joint), Some(muscle), Some(spec)) = (&self.joint, &self.muscle, &self.spec.joint) {
-            for (name, angle) in [("joint.min_angle", spec.min_angle), ("joint.max_angle", spec.max_angle)] {
-                if !joint.reaches(angle) {
-                    return Err(Error::parameter(
-                        name,
-                        angle,
-                        "an angle that the tendon reaches (it is too short)",
-                    ));
+        for (group, spec) in self.wiring.groups.iter().zip(&self.spec.muscles) {
+            let table = &group.muscle.table;
+            let joint = &self.names.coordinates[group.coordinate];
+            if let Some(load) = &self.spec.load {
+                for (name, length) in
+                    [("load.min_length", load.min_length), ("load.max_length", load.max_length)]
+                {
+                    if !table.contains(1.0 - length / group.rest_length) {
+                        let (short, long) = (
+                            group.rest_length * (1.0 - table.e_max),
+                            group.rest_length * (1.0 - table.e_min),
+                        );
+                        let allowed =
+                            format!("a length that the muscle can have, from {short:.5} to {long:.5} m");
+                        return Err(Error::parameter(name, length, allowed));
+                    }
                 }
-                let contraction = joint.eval(angle).shortening / muscle.exact.spec.rest_length;
-                if !muscle.table.contains(contraction) {
-                    let (low, high) = (muscle.table.e_min, muscle.table.e_max);
-                    let allowed = format!("an angle that keeps the muscle's contraction ratio ({contraction:.4} here) from {low:.4} to {high:.4}");
+                continue;
+            }
+            let Some(stops) = self.wiring.coordinates[group.coordinate].stops else { continue };
+            let of = if spec.name.is_empty() {
+                String::new()
+            } else {
+                format!(" of {}", dotted("muscle", &spec.name))
+            };
+            for (key, angle) in [("min_angle", stops.min_angle), ("max_angle", stops.max_angle)] {
+                let name = format!("{joint}.{key}");
+                if !group.joint.reaches(angle) {
+                    let allowed = format!("an angle that the tendon{of} reaches (it is too short)");
+                    return Err(Error::parameter(name, angle, allowed));
+                }
+                let contraction = group.joint.eval(angle).shortening / group.rest_length;
+                if !table.contains(contraction) {
+                    let (low, high) = (table.e_min, table.e_max);
+                    let allowed = format!("an angle that keeps the contraction ratio{of} ({contraction:.4} here) from {low:.4} to {high:.4}");
                     return Err(Error::parameter(name, angle, allowed));
                 }
             }
@@ -90,37 +108,50 @@ impl Rig {
         Ok(())
     }
 
-    /// A linear load's whole range must be within the muscle's table.
-    fn check_lengths(&self) -> Result<()> {
-        if let (Some(load), Some(muscle)) = (&self.spec.load, &self.muscle) {
-            let rest = muscle.exact.spec.rest_length;
-            for (name, length) in [("load.min_length", load.min_length), ("load.max_length", load.max_length)]
-            {
-                if !muscle.table.contains(1.0 - length / rest) {
-                    let (short, long) =
-                        (rest * (1.0 - muscle.table.e_max), rest * (1.0 - muscle.table.e_min));
-                    let allowed =
-                        format!("a length that the muscle can have, from {short:.5} to {long:.5} m");
-                    return Err(Error::parameter(name, length, allowed));
-                }
-            }
-        }
-        Ok(())
+    /// Contraction ratios of a group over the range of its joint or load.
+    pub(crate) fn range(&self, group: &Group) -> (f64, f64) {
+        let table = &group.muscle.table;
+        let coordinate = &self.wiring.coordinates[group.coordinate];
+        let (low, high) = match (coordinate.stops, &self.spec.load) {
+            (Some(stops), _) => (stops.min_angle, stops.max_angle),
+            (None, Some(load)) => (group.rest_length - load.max_length, group.rest_length - load.min_length),
+            (None, None) => (coordinate.rest, coordinate.rest),
+        };
+        let at =
+            |x: f64| (group.joint.eval(x).shortening / group.rest_length).clamp(table.e_min, table.e_max);
+        let (a, b) = (at(low), at(high));
+        (a.min(b), a.max(b))
     }
 
-    /// The same rig with other parameter values and effects; the muscle table is kept when the muscle's
-    /// geometry and moduli are the same.
+    fn find_step(&self) -> Result<f64> {
+        let plant = Plant::new(self, self.wiring.parameters.lift::<f64>(), false)?;
+        let body = plant.fastest_body();
+        if !body.is_finite() {
+            return Err(Error::Model(
+                "the arm's mass matrix is not positive definite: a link without inertia".into(),
+            ));
+        }
+        let (air, place) = plant.fastest_gas();
+        let step = STABLE / air;
+        if step < LEAST_STEP {
+            let name = place.map_or("a supply", |k| self.names.gases[k].as_str());
+            return Err(Error::Model(format!(
+                "{name} is too small for what flows through it: a step of {step:.1e} s would be needed, at least {LEAST_STEP:.0e} s \
+                 is allowed; it needs {:.1} times its volume",
+                LEAST_STEP / step
+            )));
+        }
+        let fastest = air.max(body);
+        Ok(if fastest > 0.0 { STABLE / fastest } else { f64::INFINITY })
+    }
+
+    /// The same rig with other parameter values and effects; a muscle's table is kept when its geometry and moduli are the
+    /// same.
     ///
     /// # Errors
     /// As [`Self::new`].
     pub fn respecified(&self, spec: RigSpec) -> Result<Self> {
-        spec.validate()?;
-        let tables =
-            self.muscle.as_ref().zip(spec.muscle.as_ref()).and_then(|(old, new)| old.respecified(new));
-        match tables {
-            Some(muscle) => Self::with_muscle(spec, Some(muscle)),
-            None => Self::new(spec),
-        }
+        Self::with_groups(spec, &self.wiring.groups)
     }
 
     /// The description it was made from.
@@ -128,82 +159,34 @@ impl Rig {
         &self.spec
     }
 
-    /// Effects that are switched on.
-    pub fn active(&self) -> Active {
-        self.active
+    /// Longest Runge-Kutta step [s] that openings next to volumes, stops and friction allow; infinite where nothing limits
+    /// it.
+    pub fn stable_step(&self) -> f64 {
+        self.stable_step
     }
 
-    /// The muscle with its compiled table, if the rig has one.
-    pub fn muscle(&self) -> Option<&CompiledMuscle> {
-        self.muscle.as_ref()
+    /// Places of its states.
+    pub fn layout(&self) -> &Layout {
+        &self.layout
     }
 
-    /// Values of all scalar parameters.
-    pub fn values(&self) -> &Values<f64> {
-        &self.values
+    /// Names of its channels, states and inputs.
+    pub fn names(&self) -> &Names {
+        &self.names
     }
-}
 
-fn collect_values(spec: &RigSpec) -> Result<(Values<f64>, Active)> {
-    use ParameterId as P;
-    let mut values = Values::zero();
-    if let Some(s) = &spec.supply {
-        values.set(P::SupplyVolume, s.volume);
+    /// Names and values of all scalar parameters.
+    pub fn parameters(&self) -> &Parameters {
+        &self.wiring.parameters
     }
-    if let Some(v) = &spec.valve {
-        values.set(P::DischargeArea, v.discharge_area_max);
-        values.set(P::NullVoltage, v.null_voltage);
+
+    /// The muscles of a group with their compiled table.
+    pub fn muscle(&self, group: usize) -> Option<&CompiledMuscle> {
+        self.wiring.groups.get(group).map(|g| &g.muscle)
     }
-    values.set(P::DeadVolume, spec.chamber.dead_volume);
-    values.set(P::AlphaIn, spec.chamber.alpha_in);
-    values.set(P::AlphaOut, spec.chamber.alpha_out);
-    values.set(P::Alpha, spec.chamber.alpha);
-    if let Some(m) = &spec.muscle {
-        values.set(P::ModulusScale, m.modulus_scale);
+
+    /// The transmission of a group.
+    pub fn joint(&self, group: usize) -> Option<&Joint> {
+        self.wiring.groups.get(group).map(|g| &g.joint)
     }
-    if let Some(a) = &spec.arm {
-        values.set(P::Inertia, a.inertia);
-        values.set(P::FirstMoment, a.first_moment);
-        values.set(P::Payload, a.payload);
-        values.set(P::Viscous, a.viscous);
-        values.set(P::Coulomb, a.coulomb);
-    }
-    values.set(P::PressureZero, spec.sensors.pressure_zero);
-    values.set(P::AngleZero, spec.sensors.angle_zero);
-    let mut active = Active::default();
-    for effect in &spec.effects {
-        let info = effects::EFFECTS.iter().find(|e| e.id == effect.id).ok_or_else(|| {
-            let ids: Vec<_> = effects::EFFECTS.iter().map(|e| e.id).collect();
-            Error::Model(format!("no effect '{}'; there are: {}", effect.id, ids.join(", ")))
-        })?;
-        if info.block == "muscle" && spec.muscle.is_none() {
-            return Err(Error::Model(format!(
-                "effect '{}' acts in the muscle, and the rig has none",
-                effect.id
-            )));
-        }
-        for (name, unit) in info.parameters {
-            let value = effect.parameters.get(*name).copied().ok_or_else(|| {
-                Error::Model(format!("effect '{}' lacks its parameter '{name}' [{unit}]", effect.id))
-            })?;
-            let dotted = format!("{}.{name}", effect.id);
-            let id = ParameterId::from_name(&dotted)?;
-            let positive = id == P::Presliding;
-            if !value.is_finite() || value < 0.0 || (positive && value < 1e-9) {
-                let allowed = if positive { "at least 1e-9" } else { "finite and not negative" };
-                return Err(Error::parameter(dotted, value, format!("{allowed} {unit}")));
-            }
-            values.set(id, value);
-        }
-        if let Some(unknown) = effect.parameters.keys().find(|k| info.parameters.iter().all(|(n, _)| n != k))
-        {
-            return Err(Error::Model(format!("effect '{}' has no parameter '{unknown}'", effect.id)));
-        }
-        match info.id {
-            "leak_muscle" => active.leak = true,
-            "heat_transfer" => active.heat = true,
-            _ => active.hysteresis = true,
-        }
-    }
-    Ok((values, active))
 }

@@ -5,96 +5,66 @@ use crate::{Error, Result};
 use nalgebra::Const;
 use num_dual::{Derivative, DualSVec64};
 
-macro_rules! parameters {
-    ($($variant:ident = $name:literal),+ $(,)?) => {
-        /// A scalar parameter of a rig.
-        #[allow(missing_docs)]
-        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-        pub enum ParameterId { $($variant),+ }
+/// Place of a scalar parameter in the table of its rig.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct ParameterId(usize);
 
-        impl ParameterId {
-            /// Every parameter, in the order of the table.
-            pub const ALL: &'static [Self] = &[$(Self::$variant),+];
-
-            /// Dotted name, for example `arm.payload`.
-            pub fn name(self) -> &'static str {
-                match self { $(Self::$variant => $name),+ }
-            }
-        }
-    };
+/// Names and values of the scalar parameters of a rig.
+#[derive(Debug, Clone, Default)]
+pub struct Parameters {
+    names: Vec<String>,
+    values: Vec<f64>,
 }
 
-parameters! {
-    SupplyVolume = "supply.volume",
-    DischargeArea = "valve.discharge_area_max",
-    NullVoltage = "valve.null_voltage",
-    DeadVolume = "chamber.dead_volume",
-    AlphaIn = "chamber.alpha_in",
-    AlphaOut = "chamber.alpha_out",
-    Alpha = "chamber.alpha",
-    ModulusScale = "muscle.modulus_scale",
-    Inertia = "arm.inertia",
-    FirstMoment = "arm.first_moment",
-    Payload = "arm.payload",
-    Viscous = "arm.viscous",
-    Coulomb = "arm.coulomb",
-    PressureZero = "sensors.pressure_zero",
-    AngleZero = "sensors.angle_zero",
-    LeakConductance = "leak_muscle.conductance",
-    LeakLaminarShare = "leak_muscle.laminar_share",
-    HeatCoefficient = "heat_transfer.heat_transfer_coefficient",
-    InitialTemperatureRise = "heat_transfer.initial_temperature_rise",
-    FrictionConstant = "muscle_hysteresis.friction_constant",
-    FrictionPressure = "muscle_hysteresis.friction_pressure",
-    Presliding = "muscle_hysteresis.presliding",
-}
+impl Parameters {
+    /// Append a parameter by its dotted name, for example `valve.flexor.null_voltage`.
+    pub(crate) fn add(&mut self, name: String, value: f64) -> ParameterId {
+        self.names.push(name);
+        self.values.push(value);
+        ParameterId(self.values.len() - 1)
+    }
 
-impl ParameterId {
-    /// The parameter of a dotted name.
+    /// The place of a dotted name.
     ///
     /// # Errors
     /// [`Error::Model`] that lists the names when there is none.
-    pub fn from_name(name: &str) -> Result<Self> {
-        Self::ALL.iter().copied().find(|p| p.name() == name).ok_or_else(|| {
-            let names: Vec<_> = Self::ALL.iter().map(|p| p.name()).collect();
+    pub fn find(&self, name: &str) -> Result<ParameterId> {
+        self.names.iter().position(|n| n == name).map(ParameterId).ok_or_else(|| {
             Error::Model(format!(
                 "no scalar parameter '{name}' that can vary; there are: {}",
-                names.join(", ")
+                self.names.join(", ")
             ))
         })
     }
-}
 
-/// Number of parameters in the table.
-pub const COUNT: usize = ParameterId::ALL.len();
-
-/// Values of all parameters.
-#[derive(Debug, Clone, Copy)]
-pub struct Values<S> {
-    values: [S; COUNT],
-}
-
-impl Values<f64> {
-    /// All parameters zero.
-    pub fn zero() -> Self {
-        Self { values: [0.0; COUNT] }
+    /// Dotted names, in the order of the table.
+    pub fn names(&self) -> &[String] {
+        &self.names
     }
 
-    /// Set one value.
-    pub fn set(&mut self, id: ParameterId, value: f64) {
-        self.values[id as usize] = value;
+    /// The value at a place (NaN where there is none).
+    pub fn value(&self, id: ParameterId) -> f64 {
+        self.values.get(id.0).copied().unwrap_or(f64::NAN)
     }
 
-    /// Plain numbers as constants of another scalar type.
+    /// All values in a scalar type.
     pub fn lift<S: Scalar>(&self) -> Values<S> {
-        Values { values: self.values.map(constant) }
+        Values { values: self.values.iter().map(|v| constant(*v)).collect() }
     }
+}
+
+/// Values of all parameters in a scalar type.
+#[derive(Debug, Clone)]
+pub struct Values<S> {
+    values: Vec<S>,
 }
 
 impl<const N: usize> Values<DualSVec64<N>> {
     /// Give a parameter the unit derivative in one lane.
     pub fn seed(&mut self, id: ParameterId, lane: usize) {
-        self.values[id as usize].eps = unit(lane);
+        if let Some(value) = self.values.get_mut(id.0) {
+            value.eps = unit(lane);
+        }
     }
 }
 
@@ -112,7 +82,7 @@ impl<S: Scalar> std::ops::Index<ParameterId> for Values<S> {
 
     #[inline(always)]
     fn index(&self, id: ParameterId) -> &S {
-        &self.values[id as usize]
+        &self.values[id.0]
     }
 }
 
@@ -121,19 +91,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_round_trip_and_unknown_names_are_errors() {
-        for id in ParameterId::ALL {
-            assert_eq!(ParameterId::from_name(id.name()).unwrap(), *id);
-        }
-        assert!(ParameterId::from_name("arm.weight").unwrap_err().to_string().contains("arm.payload"));
-    }
-
-    #[test]
-    fn effect_parameters_stand_in_the_table() {
-        for effect in crate::effects::EFFECTS {
-            for (parameter, _) in effect.parameters {
-                assert!(ParameterId::from_name(&format!("{}.{parameter}", effect.id)).is_ok());
-            }
-        }
+    fn names_are_found_and_unknown_names_are_errors() {
+        let mut table = Parameters::default();
+        let (a, b) =
+            (table.add("arm.payload".into(), 2.0), table.add("valve.flexor.null_voltage".into(), 5.0));
+        assert_eq!(table.find("valve.flexor.null_voltage").unwrap(), b);
+        assert_eq!((table.value(a), table.lift::<f64>()[b]), (2.0, 5.0));
+        assert!(table.find("arm.weight").unwrap_err().to_string().contains("arm.payload"));
     }
 }

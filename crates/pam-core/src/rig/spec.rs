@@ -1,6 +1,5 @@
 //! A rig as data: the description that a TOML file (read and unit-converted outside) comes down to.
 
-use crate::error::check_range;
 use crate::muscle::MuscleSpec;
 use crate::{Error, Result};
 use serde::Deserialize;
@@ -17,20 +16,36 @@ pub struct GasSpec {
     pub heat_capacity_ratio: f64,
 }
 
-/// Supply tank; initial pressure gauge [Pa].
+/// Where a flow begins or ends, as a description names it: `supply`, `chamber.flexor`, `line.flexor`, `ambient`.
+pub type Port = String;
+
+/// Supply of air; initial pressure gauge [Pa].
 #[allow(missing_docs)]
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SupplySpec {
+    #[serde(default)]
+    pub name: String,
+    /// `tank`, `constant` or `regulator`.
+    pub kind: String,
+    #[serde(default)]
     pub volume: f64,
     pub initial_pressure: f64,
+    #[serde(default)]
+    pub time_constant: f64,
+    #[serde(default)]
+    pub droop: f64,
 }
 
-/// Proportional servo-valve.
+/// Proportional servo-valve from a supply (or a chamber: a manifold) to a chamber or the inlet of a line.
 #[allow(missing_docs)]
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ValveSpec {
+    #[serde(default)]
+    pub name: String,
+    pub from: Port,
+    pub to: Port,
     pub discharge_area_max: f64,
     pub null_voltage: f64,
     pub half_range: f64,
@@ -38,22 +53,48 @@ pub struct ValveSpec {
     pub fraction: Vec<f64>,
 }
 
-/// Chamber: dead (or, without a muscle, total) volume and polytropic coefficients.
+/// Tube or orifice; an empty `from` means that valves feed an inlet node of its own.
+#[allow(missing_docs)]
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LineSpec {
+    #[serde(default)]
+    pub name: String,
+    /// `tube` or `orifice`.
+    pub kind: String,
+    #[serde(default)]
+    pub from: Port,
+    pub to: Port,
+    #[serde(default)]
+    pub length: f64,
+    #[serde(default)]
+    pub diameter: f64,
+    #[serde(default)]
+    pub discharge_area: f64,
+    #[serde(default)]
+    pub inlet_volume: f64,
+}
+
+/// Chamber: dead (or, without a muscle, total) volume and polytropic coefficients; initial pressure gauge [Pa].
 #[allow(missing_docs)]
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ChamberSpec {
+    #[serde(default)]
+    pub name: String,
     pub dead_volume: f64,
+    #[serde(default)]
+    pub initial_pressure: f64,
     pub alpha_in: f64,
     pub alpha_out: f64,
     pub alpha: f64,
 }
 
-/// Joint with elastic stops; the lengths are those of its kind, see [`crate::joint::Joint`].
+/// How a muscle pulls on a joint; the lengths are those of its kind, see [`crate::joint::Joint`].
 #[allow(missing_docs)]
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct JointSpec {
+pub struct TransmissionSpec {
     pub kind: String,
     #[serde(default)]
     pub upper_axial: f64,
@@ -68,14 +109,10 @@ pub struct JointSpec {
     #[serde(default)]
     pub coefficients: Vec<f64>,
     pub rest_angle: f64,
-    pub min_angle: f64,
-    pub max_angle: f64,
-    pub stop_stiffness: f64,
-    pub stop_damping: f64,
 }
 
-impl JointSpec {
-    /// Read a joint on its own from JSON text.
+impl TransmissionSpec {
+    /// Read a transmission on its own from JSON text.
     ///
     /// # Errors
     /// [`Error::Model`] for text that is not of this form (unknown keys included).
@@ -84,19 +121,82 @@ impl JointSpec {
     }
 }
 
-/// One-link arm.
+/// Muscles of one kind that share a chamber and pull on one joint (`joint.elbow`, or `load`).
+#[allow(missing_docs)]
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MuscleGroupSpec {
+    #[serde(default)]
+    pub name: String,
+    pub chamber: Port,
+    pub joint: Port,
+    /// In place of the joint's own.
+    #[serde(default)]
+    pub transmission: Option<TransmissionSpec>,
+    pub muscle: MuscleSpec,
+}
+
+/// Joint with elastic stops, and how muscles pull on it that have no transmission of their own.
+#[allow(missing_docs)]
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct JointSpec {
+    #[serde(default)]
+    pub name: String,
+    #[serde(default)]
+    pub transmission: Option<TransmissionSpec>,
+    pub rest_angle: f64,
+    pub min_angle: f64,
+    pub max_angle: f64,
+    pub stop_stiffness: f64,
+    pub stop_damping: f64,
+}
+
+/// Arm: `one_link` about the only joint, or `planar` links in series, base first.
 #[allow(missing_docs)]
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ArmSpec {
+    pub kind: String,
+    #[serde(default)]
     pub inertia: f64,
+    #[serde(default)]
     pub first_moment: f64,
+    #[serde(default)]
     pub length: f64,
+    #[serde(default)]
+    pub payload: f64,
+    #[serde(default)]
+    pub viscous: f64,
+    #[serde(default)]
+    pub coulomb: f64,
+    #[serde(default = "default_coulomb_speed")]
+    pub coulomb_speed: f64,
+    pub gravity: f64,
+    #[serde(default)]
+    pub links: Vec<LinkSpec>,
+}
+
+fn default_coulomb_speed() -> f64 {
+    0.02
+}
+
+/// One link of a planar arm with the joint at its base.
+#[allow(missing_docs)]
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LinkSpec {
+    #[serde(default)]
+    pub name: String,
+    pub joint: Port,
+    pub length: f64,
+    pub mass: f64,
+    pub centre: f64,
+    pub inertia: f64,
     pub payload: f64,
     pub viscous: f64,
     pub coulomb: f64,
     pub coulomb_speed: f64,
-    pub gravity: f64,
 }
 
 /// Linear load on a muscle, in the place of joint and arm: a hanging `mass`, or a `frame` that prescribes the length.
@@ -129,36 +229,15 @@ impl LoadSpec {
     pub fn is_frame(&self) -> bool {
         self.kind == "frame"
     }
-
-    fn validate(&self) -> Result<()> {
-        if !matches!(self.kind.as_str(), "mass" | "frame") {
-            return Err(Error::Choice {
-                name: "load.kind".into(),
-                value: format!("\"{}\"", self.kind),
-                allowed: "one of \"mass\", \"frame\"".into(),
-            });
-        }
-        check_range("load.min_length", self.min_length, 1e-3, self.max_length, "m (below load.max_length)")?;
-        check_range("load.max_length", self.max_length, self.min_length, 20.0, "m")?;
-        if self.is_frame() {
-            return Ok(());
-        }
-        check_range("load.mass", self.mass, 1e-6, 1e6, "kg")?;
-        check_range("load.viscous", self.viscous, 0.0, 1e9, "N s/m")?;
-        check_range("load.coulomb", self.coulomb, 0.0, 1e9, "N")?;
-        check_range("load.coulomb_speed", self.coulomb_speed, 1e-9, 1e3, "m/s")?;
-        check_range("load.gravity", self.gravity, -1e3, 1e3, "m/s2")?;
-        check_range("load.stop_stiffness", self.stop_stiffness, 0.0, 1e12, "N/m")?;
-        check_range("load.stop_damping", self.stop_damping, 0.0, 1e12, "N s/m")?;
-        Ok(())
-    }
 }
 
-/// Constant sensor errors: measured = true + zero.
+/// Constant sensor errors: measured = true + zero; of the chamber or joint of its name, of all without a name.
 #[allow(missing_docs)]
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SensorSpec {
+    #[serde(default)]
+    pub name: String,
     pub pressure_zero: f64,
     pub angle_zero: f64,
 }
@@ -169,26 +248,35 @@ pub struct SensorSpec {
 pub struct EffectSpec {
     /// Identifier, see [`crate::effects::EFFECTS`].
     pub id: String,
+    /// Name of the one block that it acts on; empty for every block of its kind.
+    #[serde(default)]
+    pub at: String,
     /// Values by parameter name, SI.
     pub parameters: BTreeMap<String, f64>,
 }
 
-/// A rig: the chain supply - valve - chamber - muscle - joint - arm - sensors. SI units, radians.
+/// A rig: blocks and what joins them. SI units, radians.
 #[allow(missing_docs)]
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RigSpec {
     pub name: String,
     pub gas: GasSpec,
-    pub supply: Option<SupplySpec>,
-    pub valve: Option<ValveSpec>,
-    pub chamber: ChamberSpec,
-    pub muscle: Option<MuscleSpec>,
-    pub joint: Option<JointSpec>,
-    pub arm: Option<ArmSpec>,
     #[serde(default)]
+    pub supplies: Vec<SupplySpec>,
+    #[serde(default)]
+    pub valves: Vec<ValveSpec>,
+    #[serde(default)]
+    pub lines: Vec<LineSpec>,
+    pub chambers: Vec<ChamberSpec>,
+    #[serde(default)]
+    pub muscles: Vec<MuscleGroupSpec>,
+    #[serde(default)]
+    pub joints: Vec<JointSpec>,
+    pub arm: Option<ArmSpec>,
     pub load: Option<LoadSpec>,
-    pub sensors: SensorSpec,
+    #[serde(default)]
+    pub sensors: Vec<SensorSpec>,
     #[serde(default)]
     pub effects: Vec<EffectSpec>,
 }
@@ -204,102 +292,15 @@ impl RigSpec {
         spec.validate()?;
         Ok(spec)
     }
+}
 
-    /// Check every value and that the blocks fit together.
-    ///
-    /// # Errors
-    /// [`Error::Parameter`] naming the first impossible value; [`Error::Model`] for blocks that lack a neighbour.
-    pub fn validate(&self) -> Result<()> {
-        let range = |name: &str, value: f64, low: f64, high: f64, unit: &str| {
-            check_range(name, value, low, high, unit).map(|_| ())
-        };
-        range("gas.ambient_pressure", self.gas.ambient_pressure, 1e3, 1e6, "Pa")?;
-        range("gas.temperature", self.gas.temperature, 150.0, 500.0, "K")?;
-        range("gas.gas_constant", self.gas.gas_constant, 10.0, 5000.0, "J/(kg K)")?;
-        range("gas.heat_capacity_ratio", self.gas.heat_capacity_ratio, 1.01, 1.7, "")?;
-        let vacuum = -self.gas.ambient_pressure;
-        if let Some(supply) = &self.supply {
-            range("supply.volume", supply.volume, 1e-7, 1e4, "m3")?;
-            range("supply.initial_pressure", supply.initial_pressure, vacuum, 1e8, "Pa")?;
-        }
-        if let Some(valve) = &self.valve {
-            range("valve.discharge_area_max", valve.discharge_area_max, 0.0, 1.0, "m2")?;
-            range("valve.null_voltage", valve.null_voltage, -1e3, 1e3, "V")?;
-            range("valve.half_range", valve.half_range, 1e-9, 1e3, "V")?;
-        }
-        let no_muscle = self.muscle.is_none();
-        range(
-            "chamber.dead_volume",
-            self.chamber.dead_volume,
-            if no_muscle { 1e-9 } else { 0.0 },
-            1e4,
-            "m3",
-        )?;
-        for (name, value) in [
-            ("chamber.alpha_in", self.chamber.alpha_in),
-            ("chamber.alpha_out", self.chamber.alpha_out),
-            ("chamber.alpha", self.chamber.alpha),
-        ] {
-            range(name, value, 0.2, 3.0, "")?;
-        }
-        if let Some(muscle) = &self.muscle {
-            muscle.validate()?;
-        }
-        if let Some(joint) = &self.joint {
-            crate::joint::Joint::new(joint)?;
-            range("joint.stop_stiffness", joint.stop_stiffness, 0.0, 1e9, "N m/rad")?;
-            range("joint.stop_damping", joint.stop_damping, 0.0, 1e9, "N m s/rad")?;
-            range("joint.min_angle", joint.min_angle, -7.0, joint.max_angle, "rad (below joint.max_angle)")?;
-            range("joint.max_angle", joint.max_angle, joint.min_angle, 7.0, "rad")?;
-        }
-        if let Some(load) = &self.load {
-            load.validate()?;
-        }
-        if let Some(arm) = &self.arm {
-            range("arm.inertia", arm.inertia, 0.0, 1e6, "kg m2")?;
-            range("arm.first_moment", arm.first_moment, -1e6, 1e6, "kg m")?;
-            range("arm.length", arm.length, 0.0, 1e3, "m")?;
-            range("arm.payload", arm.payload, 0.0, 1e6, "kg")?;
-            range("arm.viscous", arm.viscous, 0.0, 1e6, "N m s/rad")?;
-            range("arm.coulomb", arm.coulomb, 0.0, 1e6, "N m")?;
-            range("arm.coulomb_speed", arm.coulomb_speed, 1e-9, 1e3, "rad/s")?;
-            range("arm.gravity", arm.gravity, -1e3, 1e3, "m/s2")?;
-            range(
-                "arm.inertia + payload length^2",
-                arm.inertia + arm.payload * arm.length.powi(2),
-                1e-9,
-                1e9,
-                "kg m2",
-            )?;
-        }
-        range("sensors.pressure_zero", self.sensors.pressure_zero, -1e7, 1e7, "Pa")?;
-        range("sensors.angle_zero", self.sensors.angle_zero, -7.0, 7.0, "rad")?;
-        self.check_chain()
-    }
-
-    fn check_chain(&self) -> Result<()> {
-        let missing =
-            |block: &str, needs: &str| Err(Error::Model(format!("a rig with [{block}] needs [{needs}]")));
-        match (&self.supply, &self.valve) {
-            (Some(_), None) => return missing("supply", "valve"),
-            (None, Some(_)) => return missing("valve", "supply"),
-            _ => {}
-        }
-        if self.load.is_some() {
-            return match (&self.muscle, &self.joint, &self.arm) {
-                (Some(_), None, None) => Ok(()),
-                (None, ..) => missing("load", "muscle"),
-                _ => Err(Error::Model("a rig has either [joint] and [arm] or [load], not both".into())),
-            };
-        }
-        match (&self.muscle, &self.joint, &self.arm) {
-            (Some(_), Some(_), Some(_)) | (None, None, None) => {}
-            (_, None, Some(_)) => return missing("arm", "joint"),
-            (None, Some(_), _) => return missing("joint", "muscle"),
-            (_, Some(_), None) => return missing("joint", "arm"),
-            (Some(_), None, None) => return missing("muscle", "joint] and [arm], or [load"),
-        }
-        Ok(())
+/// `valve.flexor`, or `valve` for a block without a name.
+#[must_use]
+pub fn dotted(block: &str, name: &str) -> String {
+    if name.is_empty() {
+        block.into()
+    } else {
+        format!("{block}.{name}")
     }
 }
 

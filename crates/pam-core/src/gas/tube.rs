@@ -1,0 +1,98 @@
+//! Tube by its conductance and critical pressure ratio.
+//!
+//! `mdot = C rho0 p_up sqrt(T0/T) psi(r)`, `psi = sqrt(1 - ((r - b)/(1 - b))^2)` above `b` (ISO 6358-1:2013, linear above
+//! [`LAMINAR_RATIO`]), with `C = 0.029 d^2/sqrt(L/d^1.25 + 510)` and `b = 474 C/d^2` of a tube (ISO 6358-3 practice; P. Beater,
+//! *Pneumatic Drives*, 2007).
+
+use super::orifice::LAMINAR_RATIO;
+use crate::scalar::{constant, Scalar};
+
+/// Density at the reference state, 100 kPa and [`REFERENCE_TEMPERATURE`] [kg/m3].
+pub const REFERENCE_DENSITY: f64 = 1.185;
+/// Reference temperature [K].
+pub const REFERENCE_TEMPERATURE: f64 = 293.15;
+const HIGHEST_RATIO: f64 = 0.9;
+
+/// A tube at one gas temperature.
+#[derive(Debug, Clone, Copy)]
+pub struct Tube<S> {
+    /// Choked mass flow per upstream pressure [kg/(s Pa)].
+    flow_factor: S,
+    /// Critical pressure ratio [1].
+    critical_ratio: S,
+}
+
+impl<S: Scalar> Tube<S> {
+    /// A tube of a length and an inner diameter [m] with gas of a temperature [K].
+    pub fn new(length: S, diameter: S, temperature: f64) -> Self {
+        let square = diameter * diameter;
+        let conductance = square * 0.029 / (length / diameter.powf(1.25) + 510.0).sqrt();
+        let ratio = conductance * 474.0 / square;
+        let critical_ratio = if ratio.re() > HIGHEST_RATIO { constant(HIGHEST_RATIO) } else { ratio };
+        let factor = REFERENCE_DENSITY * (REFERENCE_TEMPERATURE / temperature).sqrt();
+        Self { flow_factor: conductance * factor, critical_ratio }
+    }
+
+    /// Critical pressure ratio [1]: the flow is choked below.
+    #[inline]
+    pub fn critical_ratio(&self) -> f64 {
+        self.critical_ratio.re()
+    }
+
+    #[inline]
+    fn psi(&self, ratio: S) -> S {
+        let elliptic = |r: S| {
+            let x = (r - self.critical_ratio) / (-self.critical_ratio + 1.0);
+            (-x * x + 1.0).sqrt()
+        };
+        if ratio.re() <= self.critical_ratio.re() {
+            constant(1.0)
+        } else if ratio.re() <= LAMINAR_RATIO {
+            elliptic(ratio)
+        } else {
+            elliptic(constant(LAMINAR_RATIO)) * (-ratio + 1.0) / (1.0 - LAMINAR_RATIO)
+        }
+    }
+
+    /// Mass flow [kg/s] between two absolute pressures [Pa], negative against the arrow.
+    #[inline]
+    pub fn mass_flow(&self, upstream: S, downstream: S) -> S {
+        if upstream.re() >= downstream.re() {
+            self.flow_factor * upstream * self.psi(downstream / upstream)
+        } else {
+            -(self.flow_factor * downstream * self.psi(upstream / downstream))
+        }
+    }
+
+    /// Largest change of mass flow per pressure [kg/(s Pa)]: next to equal pressures.
+    pub fn steepest(&self) -> f64 {
+        let psi = self.psi(constant(LAMINAR_RATIO)).re();
+        self.flow_factor.re() * psi / (1.0 - LAMINAR_RATIO)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_metre_of_four_millimetres_has_the_tabulated_conductance() {
+        let tube = Tube::<f64>::new(1.0, 0.004, 293.15);
+        assert!((tube.flow_factor / REFERENCE_DENSITY - 1.2e-8).abs() < 0.02e-8);
+        assert!((tube.critical_ratio() - 0.354).abs() < 0.002);
+        assert!((tube.mass_flow(6e5, 1e5) / (1.2e-8 * 1.185 * 6e5) - 1.0).abs() < 0.01, "choked");
+    }
+
+    #[test]
+    fn flow_is_continuous_and_turns_with_the_pressures() {
+        let tube = Tube::<f64>::new(2.0, 0.004, 293.15);
+        for r in [tube.critical_ratio(), LAMINAR_RATIO] {
+            let (a, b) = (tube.mass_flow(5e5, 5e5 * (r - 1e-12)), tube.mass_flow(5e5, 5e5 * (r + 1e-12)));
+            assert!((a - b).abs() < 1e-8 * a, "jump at {r}");
+        }
+        assert_eq!(tube.mass_flow(3e5, 2e5), -tube.mass_flow(2e5, 3e5));
+        assert_eq!(tube.mass_flow(3e5, 3e5), 0.0);
+        let slope = tube.mass_flow(4e5, 4e5 - 1.0);
+        assert!((slope / tube.steepest() - 1.0).abs() < 1e-6);
+    }
+}
