@@ -5,12 +5,13 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Gas", "Joint", "Muscle", "Rig", "Simulator", "__version__", "effects", "parameter_names"]
+__all__ = ["Gas", "Joint", "Muscle", "Rig", "Simulator", "__version__", "effects"]
 
 __version__: str
 
 _Array = NDArray[np.float64]
 _Signal = tuple[_Array, _Array]
+_Event = tuple[float, str, str]
 
 @final
 class Gas:
@@ -51,55 +52,42 @@ class Muscle:
 class Rig:
     def __new__(cls, json: str) -> Rig: ...
     def respecified(self, json: str) -> Rig: ...
+    @property
+    def inputs(self) -> list[str]: ...
+    @property
+    def channels(self) -> list[str]: ...
+    @property
+    def states(self) -> list[str]: ...
+    @property
+    def parameter_names(self) -> list[str]: ...
+    @property
+    def stable_step(self) -> float: ...
     def simulate(
-        self,
-        valve_command: _Array,
-        sample_time: float,
-        step: float,
-        *,
-        muscle_pressure: float | None = None,
-        supply_pressure: float | None = None,
-        joint_angle: float | None = None,
-        joint_rate: float | None = None,
-        length: float | None = None,
-        lengths: _Array | None = None,
-        pressures: _Array | None = None,
-    ) -> dict[str, _Array]: ...
+        self, rows: int, signals: dict[str, _Array], sample_time: float, step: float, start: dict[str, float]
+    ) -> tuple[dict[str, _Array], list[_Event]]: ...
     def predict(
         self,
         block: str,
-        valve_command: _Array,
+        commands: dict[str, _Array],
         sample_time: float,
         step: float,
         starts: list[int],
         parameters: list[str],
-        *,
-        supply_pressure: _Signal | None = None,
-        muscle_pressure: _Signal | None = None,
-        joint_angle: _Signal | None = None,
+        measured: dict[str, _Signal],
+        samples: int,
     ) -> tuple[_Array, _Array | None]: ...
 
 @final
 class Simulator:
-    def __new__(
-        cls,
-        rig: Rig,
-        sample_time: float,
-        step: float,
-        *,
-        muscle_pressure: float | None = None,
-        supply_pressure: float | None = None,
-        joint_angle: float | None = None,
-        joint_rate: float | None = None,
-        length: float | None = None,
-    ) -> Simulator: ...
-    def advance(self, valve_command: _Array, length: _Array | None = None, pressure: _Array | None = None) -> dict[str, _Array]: ...
+    def __new__(cls, rig: Rig, sample_time: float, step: float, start: dict[str, float]) -> Simulator: ...
+    def advance(self, samples: int, signals: dict[str, _Array]) -> tuple[dict[str, _Array], list[_Event]]: ...
     def observe(self) -> dict[str, _Array]: ...
     @property
     def state(self) -> _Array: ...
     def restore(self, state: _Array) -> None: ...
     @property
+    def substeps(self) -> int: ...
+    @property
     def samples(self) -> int: ...
 
 def effects() -> list[tuple[str, str, list[tuple[str, str]]]]: ...
-def parameter_names() -> list[str]: ...

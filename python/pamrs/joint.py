@@ -79,8 +79,7 @@ class Joint:
                 raise ParameterError(f"joint.{name} = {value} is not allowed: a finite number is needed")
         if not all(math.isfinite(value) for value in self._spec["coefficients"]):
             raise ParameterError(f"joint.coefficients = {self._spec['coefficients']} is not allowed: finite numbers are needed")
-        stops = {"min_angle": -math.pi, "max_angle": math.pi, "stop_stiffness": 0.0, "stop_damping": 0.0}
-        self._core = _core.Joint(json.dumps({**self._spec, **stops}))
+        self._core = _core.Joint(json.dumps(self._spec))
 
     @classmethod
     def from_model(cls, model: Mapping[str, Any]) -> Joint:

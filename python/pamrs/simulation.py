@@ -1,39 +1,94 @@
-"""Simulation of a rig under a held valve command."""
+"""Simulation of a rig under held commands."""
 
 from __future__ import annotations
 
 import importlib
 import math
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pamrs import _core
+from pamrs.driving import Signals, initial_values, signals_of
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
 
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Simulation", "core_rig", "simulate"]
+__all__ = ["Balance", "Event", "Simulation", "core_rig", "simulate"]
 
 Array = NDArray[np.float64]
 
-#: Initial values, and the block that each needs.
-_INITIAL = {
-    "muscle_pressure": "chamber",
-    "supply_pressure": "supply",
-    "joint_angle": "arm",
-    "joint_rate": "arm",
-    "length": "load",
-    "length_rate": "load",
-}
-_STABLE = 2.0  # of the 2.78 of RK4 on the negative real axis
+
+class Event(NamedTuple):
+    """Something that happened between two samples.
+
+    Attributes
+    ----------
+    time : float
+        When [s], by a straight line through the step in which it happened.
+    kind : str
+        ``min_stop_reached``, ``min_stop_left``, ``max_stop_reached``, ``max_stop_left``, ``choked`` or ``unchoked``.
+    block : str
+        Where: ``joint.elbow``, ``load``, ``valve.flexor``, ``line``.
+    """
+
+    time: float
+    kind: str
+    block: str
+
+
+@dataclass(frozen=True)
+class Balance:
+    """Mass, energy and work over a simulation.
+
+    Attributes
+    ----------
+    supplied, vented, stored : float
+        Mass out of the supplies (what a regulator takes back subtracted), mass to the ambient, gain of all chambers and lines [kg].
+    energy : float
+        ``R T`` times the mass supplied, what section 6 of the dissertation calls ``E_in``: ``(P_initial - P_final) V`` of a
+        tank [J].
+    exergy : float
+        ``R T ln(P/P_a)`` times the mass supplied at the supply's pressure ``P``: the most work that it could do [J].
+    muscle_work : float
+        Work of the muscles, ``F dd`` [J].
+    joint_work : float
+        Work at the joints where torque and motion go the same way, ``tau dtheta > 0`` [J].
+    """
+
+    supplied: float
+    vented: float
+    stored: float
+    energy: float
+    exergy: float
+    muscle_work: float
+    joint_work: float
+
+    @property
+    def residual(self) -> float:
+        """Mass that is unaccounted for [kg]: rounding."""
+        return self.supplied - self.vented - self.stored
+
+    @property
+    def efficiency(self) -> float:
+        """Work at the joints by energy supplied [1] (dissertation 6.4); NaN where nothing was supplied."""
+        return self.joint_work / self.energy if self.energy > 0.0 else math.nan
+
+    def __str__(self) -> str:
+        return (
+            f"air {1e3 * self.supplied:.4g} g supplied, {1e3 * self.vented:.4g} g vented, {1e3 * self.stored:.4g} g stored "
+            f"(residual {1e3 * self.residual:.1e} g); energy {self.energy:.4g} J, exergy {self.exergy:.4g} J; work of the muscles "
+            f"{self.muscle_work:.4g} J, positive work at the joints {self.joint_work:.4g} J"
+            + ("" if math.isnan(self.efficiency) else f", efficiency {100 * self.efficiency:.1f} %")
+        )
 
 
 class Simulation(Mapping[str, Array]):
@@ -42,9 +97,11 @@ class Simulation(Mapping[str, Array]):
     ``result["muscle_pressure"]`` is an array with one row per sample; ``result.time`` is ``result["time"]``.
     """
 
-    def __init__(self, channels: Mapping[str, Array], rig: Rig) -> None:
+    def __init__(self, channels: Mapping[str, Array], rig: Rig, events: Sequence[tuple[float, str, str]] = ()) -> None:
         self._channels = dict(channels)
         self.rig = rig
+        self.events = [Event(*event) for event in events]
+        """Stops that were reached or left, flows that became choked or no longer are, in the order of time."""
 
     @property
     def time(self) -> Array:
@@ -62,6 +119,38 @@ class Simulation(Mapping[str, Array]):
 
     def __len__(self) -> int:
         return len(self._channels)
+
+    def under(self, channel: str) -> dict[str, Array]:
+        """A channel of every block that has it.
+
+        Parameters
+        ----------
+        channel : str
+            For example ``"muscle_pressure"``.
+
+        Returns
+        -------
+        dict of str to ndarray
+            Name of the block ("" where it has none) -> channel.
+        """
+        split = {name: name.partition(".") for name in self._channels}
+        return {block: self._channels[name] for name, (head, _, block) in split.items() if head == channel}
+
+    @property
+    def balance(self) -> Balance:
+        """Mass, energy and work from the first to the last row."""
+        channels = self._channels
+        gain = {name: float(channels[name][-1] - channels[name][0]) for name in _BOOKS}
+        masses = [m for channel in ("air_mass", "line_mass") for m in self.under(channel).values()]
+        return Balance(
+            supplied=gain["mass_supplied"],
+            vented=gain["mass_vented"],
+            stored=sum(float(mass[-1] - mass[0]) for mass in masses),
+            energy=gain["energy_supplied"],
+            exergy=gain["exergy_supplied"],
+            muscle_work=gain["muscle_work"],
+            joint_work=gain["joint_work"],
+        )
 
     def to_pandas(self) -> pd.DataFrame:
         """All channels as a table indexed by time [s]."""
@@ -143,14 +232,15 @@ def core_rig(rig: Rig) -> _core.Rig:
 
 def simulate(
     rig: Rig,
-    valve_command: ArrayLike | None = None,
+    valve_command: Signals | None = None,
     *,
     sample_time: float,
     step: float | None = None,
     initial: Mapping[str, float] | None = None,
     duration: float | None = None,
+    supply_command: Signals | None = None,
     length: ArrayLike | None = None,
-    pressure: ArrayLike | None = None,
+    pressure: Signals | None = None,
 ) -> Simulation:
     """Simulate a rig from an initial state by fixed-step RK4.
 
@@ -158,22 +248,26 @@ def simulate(
     ----------
     rig : Rig
         The model.
-    valve_command : array_like, shape (n,), optional
-        Command [V]; entry ``k`` is held over ``[k, k + 1)`` samples. Needed by a rig with a valve.
+    valve_command : array_like, shape (n,), or mapping of str to array_like, optional
+        Command [V]; entry ``k`` is held over ``[k, k + 1)`` samples. Needed by a rig with a valve; of several valves, one for each
+        name. A number is held throughout where another signal or ``duration`` says how long.
     sample_time : float
         Time between rows [s].
     step : float, optional
-        RK4 step [s]; divides ``sample_time``. By default the longest that does and is at most 1 ms.
+        RK4 step [s]; divides ``sample_time``. By default the longest that does and is at most 1 ms. Where the rig is stiffer (small
+        volumes behind large openings, hard stops, a small mass), each step is divided until it is stable.
     initial : mapping of str to float, optional
-        Initial ``muscle_pressure``, ``supply_pressure`` [Pa, gauge], ``joint_angle`` [rad], ``joint_rate`` [rad/s], or with a
-        linear load ``length`` [m], ``length_rate`` [m/s]. What is left out is at rest: muscle vented, tank at its initial
-        pressure, joint at its rest angle, muscle at its rest length.
+        Initial ``muscle_pressure``, ``supply_pressure``, ``line_pressure`` [Pa, gauge], ``joint_angle`` [rad], ``joint_rate``
+        [rad/s], or with a linear load ``length`` [m], ``length_rate`` [m/s]; of a block with a name, ``muscle_pressure.flexor``.
+        What is left out is at rest: pressures as the rig file has them, joint at its rest angle, muscle at its rest length.
     duration : float, optional
-        Simulated time [s] of a rig without a valve, instead of ``valve_command``.
+        Simulated time [s], where no signal has a length.
+    supply_command : array_like, shape (n,), or mapping of str to array_like, optional
+        Set pressure [Pa, gauge] of a regulator, held like ``valve_command``; its initial pressure where it is left out.
     length : array_like, shape (n,), optional
         Length of the muscle at each row [m], straight lines between: what a load frame (``[load] kind = "frame"``) prescribes.
-    pressure : array_like, shape (n,), optional
-        Gauge pressure in the muscle at each row [Pa], as a regulator holds it, for a rig without a valve.
+    pressure : array_like, shape (n,), or mapping of str to array_like, optional
+        Gauge pressure at each row [Pa], straight lines between, of a chamber without a valve.
 
     Returns
     -------
@@ -196,25 +290,26 @@ def simulate(
     True
     """
     check_run(rig, sample_time)
-    has_valve = rig.model["valve"] is not None
-    if valve_command is None:
-        if has_valve:
-            raise ParameterError("valve_command is missing: a rig with a valve needs one value per sample [V]")
-        command = np.zeros(_rows(sample_time, duration, length, pressure))
-    else:
-        if duration is not None:
-            raise ParameterError(f"duration = {duration} is not allowed together with valve_command, which sets it")
-        command = held_command(valve_command)
-    start: dict[str, Any] = dict(initial_values(initial, rig))
-    for name, values, first, channel in _prescribed(rig, length, pressure):
-        signal = _signal(name, values, command.size)
+    rows = _rows(sample_time, duration, valve_command, supply_command, length, pressure)
+    signals, count = signals_of(
+        rig, valve_command=valve_command, supply_command=supply_command, length=length, pressure=pressure, rows=rows
+    )
+    if count is None:
+        raise ParameterError("duration is missing: a finite time >= 0 s is needed (or give valve_command)")
+    start = initial_values(initial, rig)
+    held = {name: signal for name, signal in signals.items() if name.partition(".")[0] in ("valve_command", "supply_command")}
+    driven = {}
+    for name, signal in signals.items():
+        if name in held:
+            driven[name] = signal
+            continue
+        first = name.replace("pressure", "muscle_pressure", 1)
         if start.setdefault(first, float(signal[0])) != float(signal[0]):
             raise ParameterError(f"initial {first} = {start[first]:g} does not go with {name}[0] = {signal[0]:g}: leave one out")
-        start[channel] = np.ascontiguousarray(signal[1:])
-    channels = core_rig(rig).simulate(command, sample_time, chosen_step(sample_time, step, rig), **start)
-    time = np.asarray(np.arange(command.size) * sample_time, dtype=np.float64)
-    shown = {"valve_command": command} if has_valve else {}
-    return Simulation({"time": time, **shown, **channels}, rig)
+        driven[name] = np.ascontiguousarray(np.append(signal[1:], signal[-1]))  # for the end of each sample; the last is not run
+    channels, events = core_rig(rig).simulate(count, driven, sample_time, chosen_step(sample_time, step), start)
+    time = np.asarray(np.arange(count) * sample_time, dtype=np.float64)
+    return Simulation({"time": time, **held, **channels}, rig, events)
 
 
 def check_run(rig: Rig, sample_time: float) -> None:
@@ -225,116 +320,27 @@ def check_run(rig: Rig, sample_time: float) -> None:
         raise ParameterError(f"sample_time = {sample_time} is not allowed: a finite time > 0 s is needed")
 
 
-def _rows(sample_time: float, duration: float | None, *signals: ArrayLike | None) -> int:
-    """Number of rows without a valve command: that of what is prescribed, or of the duration."""
-    given = [np.asarray(signal) for signal in signals if signal is not None]
-    if given:
-        if duration is not None:
-            raise ParameterError(f"duration = {duration} is not allowed together with length or pressure, which set it")
-        return max(int(given[0].size), 1)
-    if duration is None or not (np.isfinite(duration) and duration >= 0):
+def _rows(sample_time: float, duration: float | None, *given: Signals | None) -> int | None:
+    """Number of rows from the duration; None where a signal says it."""
+    if duration is None:
+        return None
+    signals = [v for g in given if g is not None for v in (g.values() if isinstance(g, Mapping) else [g])]
+    if any(np.ndim(signal) > 0 for signal in signals):
+        raise ParameterError(f"duration = {duration} is not allowed together with a signal that sets it (valve_command, length, pressure)")
+    if not (np.isfinite(duration) and duration >= 0):
         raise ParameterError(f"duration = {duration} is not allowed: a finite time >= 0 s (or give valve_command)")
     return round(duration / sample_time) + 1
 
 
-def _prescribed(rig: Rig, length: ArrayLike | None, pressure: ArrayLike | None) -> list[tuple[str, ArrayLike, str, str]]:
-    """What is prescribed, checked against the rig: (name, values, its initial value, its channel of the core)."""
-    given = []
-    frame = rig.model["load"] is not None and rig.model["load"]["kind"] == "frame"
-    if length is not None:
-        if not frame:
-            raise ParameterError('length is given, which only a rig with a load frame takes ([load] kind = "frame")')
-        low, high = rig.model["load"]["min_length"], rig.model["load"]["max_length"]
-        _within("length", length, low, high, "m")
-        given.append(("length", length, "length", "lengths"))
-    elif frame:
-        raise ParameterError("length is missing: a load frame needs one value per sample [m]")
-    if pressure is not None:
-        if rig.model["valve"] is not None:
-            raise ParameterError("pressure is given, which only a rig without [valve] takes: there the valve decides")
-        _within("pressure", pressure, 1.0 - rig.model["gas"]["ambient_pressure"], 1e8, "Pa (gauge)")
-        given.append(("pressure", pressure, "muscle_pressure", "pressures"))
-    return given
+def chosen_step(sample_time: float, step: float | None) -> float:
+    """The RK4 step [s] to begin with: the one given, or the longest that divides the sample time and is at most 1 ms."""
+    return default_step(sample_time) if step is None else float(step)
 
 
-def _within(name: str, values: ArrayLike, low: float, high: float, unit: str) -> None:
-    """Refuse a prescribed channel that leaves a range; the message gives the row."""
-    try:
-        signal = np.asarray(values, dtype=np.float64).ravel()
-    except (TypeError, ValueError):
-        raise ParameterError(f"{name} is not allowed: numbers are needed [{unit}]") from None
-    bad = np.flatnonzero(~((signal >= low) & (signal <= high)))
-    if bad.size:
-        raise ParameterError(f"{name}[{bad[0]}] = {signal[bad[0]]:g} is not allowed: a number from {low:g} to {high:g} {unit}")
+def default_step(sample_time: float, longest: float = 1e-3) -> float:
+    """The longest step [s] that divides a sample time [s] and is at most ``longest``."""
+    return sample_time / max(1, int(np.ceil(sample_time / longest - 1e-9)))
 
 
-def _signal(name: str, values: ArrayLike, rows: int) -> Array:
-    """A prescribed channel with one value for each row."""
-    signal = np.asarray(values, dtype=np.float64)
-    if signal.shape != (rows,):
-        raise ParameterError(f"{name} has the shape {signal.shape}; ({rows},) is needed, one value for each row")
-    return signal
-
-
-def held_command(valve_command: ArrayLike) -> NDArray[np.float64]:
-    """Commands [V] as an array (n,), n >= 1, checked; ParameterError names the first that is not finite."""
-    command = np.ascontiguousarray(np.asarray(valve_command, dtype=np.float64))
-    if command.ndim != 1 or command.size == 0:
-        raise ParameterError(f"valve_command has the shape {command.shape}; (n,) with n >= 1 is needed")
-    bad = np.flatnonzero(~np.isfinite(command))
-    if bad.size:
-        raise ParameterError(f"valve_command[{bad[0]}] = {command[bad[0]]} is not allowed: a finite voltage is needed")
-    return command
-
-
-def initial_values(initial: Mapping[str, float] | None, rig: Rig) -> dict[str, float]:
-    """Initial values by the names of the core; names that the rig does not have are refused."""
-    start: dict[str, float] = {}
-    for name, value in (initial or {}).items():
-        if name not in _INITIAL:
-            raise ParameterError(f"initial has the unknown entry {name!r}; allowed: {', '.join(_INITIAL)}")
-        if _INITIAL[name] not in rig.blocks:
-            raise ParameterError(f"initial has {name!r}, but the rig {rig.name!r} has no [{_INITIAL[name]}]")
-        try:
-            number = float(value)
-        except (TypeError, ValueError):
-            raise ParameterError(f"initial {name} = {value!r} is not allowed: a number is needed") from None
-        start |= {"joint_rate": -number} if name == "length_rate" else {name: number}
-    return start
-
-
-def chosen_step(sample_time: float, step: float | None, rig: Rig) -> float:
-    """The RK4 step [s]: the default, or the one given if it is short enough for the rig's stops and friction."""
-    if step is None:
-        return default_step(sample_time, rig)
-    longest = stable_step(rig)
-    if step > longest:
-        raise ParameterError(
-            f"step = {step:g} s is not allowed for the rig {rig.name!r}: at most {longest:.3g} s, "
-            "or its stops and friction become unstable"
-        )
-    return float(step)
-
-
-def stable_step(rig: Rig) -> float:
-    """Longest RK4 step [s] that the stops and the friction of a rig allow; infinite where it has neither arm nor mass."""
-    model = rig.model
-    if model["arm"] is not None:
-        arm, joint = model["arm"], model["joint"]
-        inertia = arm["inertia"] + arm["payload"] * arm["length"] ** 2
-        stiffness, damping = joint["stop_stiffness"], joint["stop_damping"] + arm["viscous"]
-        coulomb = arm["coulomb"] / arm["coulomb_speed"]
-    elif model["load"] is not None and model["load"]["kind"] == "mass":
-        load = model["load"]
-        inertia, stiffness, damping = load["mass"], load["stop_stiffness"], load["stop_damping"] + load["viscous"]
-        coulomb = load["coulomb"] / load["coulomb_speed"]
-    else:
-        return math.inf
-    fastest = max((damping + coulomb) / inertia, math.sqrt(stiffness / inertia))
-    return _STABLE / fastest if fastest > 0.0 else math.inf
-
-
-def default_step(sample_time: float, rig: Rig | None = None, longest: float = 1e-3) -> float:
-    """The longest step [s] that divides a sample time [s], is at most ``longest`` and short enough for a rig."""
-    limit = longest if rig is None else min(longest, stable_step(rig))
-    return sample_time / max(1, int(np.ceil(sample_time / limit - 1e-9)))
+#: Channels of the core that are sums since the start.
+_BOOKS = ("mass_supplied", "mass_vented", "energy_supplied", "exergy_supplied", "muscle_work", "joint_work")

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pamrs import _core
+from pamrs.driving import Signals, initial_values, signals_of
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
-from pamrs.simulation import check_run, chosen_step, core_rig, held_command, initial_values
+from pamrs.simulation import Event, Simulation, check_run, chosen_step, core_rig
 
 __all__ = ["Simulator"]
 
@@ -54,13 +55,14 @@ class Simulator:
         check_run(rig, sample_time)
         self.rig = rig
         self.sample_time = float(sample_time)
-        self._step = chosen_step(self.sample_time, step, rig)
+        self._step = chosen_step(self.sample_time, step)
         self._initial = initial_values(initial, rig)
-        self._has_valve = rig.model["valve"] is not None
+        self.events: list[Event] = []
+        """What happened since the start or the last :meth:`reset`, see :class:`pamrs.simulation.Event`."""
         self._core = self._started(self._initial)
 
     def _started(self, initial: Mapping[str, float]) -> _core.Simulator:
-        return _core.Simulator(core_rig(self.rig), self.sample_time, self._step, **initial)
+        return _core.Simulator(core_rig(self.rig), self.sample_time, self._step, dict(initial))
 
     @property
     def time(self) -> float:
@@ -102,6 +104,7 @@ class Simulator:
         """
         start = self._initial if initial is None else initial_values(initial, self.rig)
         self._core, self._initial = self._started(start), start
+        self.events = []
         return self.observe()
 
     def observe(self) -> dict[str, float]:
@@ -114,17 +117,24 @@ class Simulator:
         return _single(self._core.observe())
 
     def step(
-        self, valve_command: float | None = None, *, length: float | None = None, pressure: float | None = None
+        self,
+        valve_command: float | Mapping[str, float] | None = None,
+        *,
+        supply_command: float | Mapping[str, float] | None = None,
+        length: float | None = None,
+        pressure: float | Mapping[str, float] | None = None,
     ) -> dict[str, float]:
         """Hold a command for one sample.
 
         Parameters
         ----------
-        valve_command : float, optional
-            Command [V]; needed by a rig with a valve.
+        valve_command : float or mapping of str to float, optional
+            Command [V]; needed by a rig with a valve, of several one for each name.
+        supply_command : float or mapping of str to float, optional
+            Set pressure of a regulator [Pa, gauge].
         length, pressure : float, optional
-            Length [m] that a load frame, and gauge pressure [Pa] that a regulator reaches by the end of the sample; as for
-            :func:`pamrs.simulate`.
+            Length [m] that a load frame, and gauge pressure [Pa] that a chamber without a valve reaches by the end of the sample;
+            as for :func:`pamrs.simulate`.
 
         Returns
         -------
@@ -138,22 +148,30 @@ class Simulator:
         SimulationError
             If the state leaves the range in which the model holds; the simulator then stays at the last good sample.
         """
-        if valve_command is None:
-            if self._has_valve:
-                raise ParameterError("valve_command is missing: a rig with a valve needs one value per sample [V]")
-            valve_command = 0.0
-        given = [None if value is None else np.array([value], dtype=np.float64) for value in (length, pressure)]
-        return _single(self._core.advance(np.array([valve_command], dtype=np.float64), *given))
+        signals, _ = signals_of(
+            self.rig, valve_command=valve_command, supply_command=supply_command, length=length, pressure=pressure, rows=1
+        )
+        return _single(self._advance(1, signals))
 
-    def run(self, valve_command: ArrayLike, *, length: ArrayLike | None = None, pressure: ArrayLike | None = None) -> dict[str, Array]:
+    def run(
+        self,
+        valve_command: Signals | None = None,
+        *,
+        samples: int | None = None,
+        supply_command: Signals | None = None,
+        length: ArrayLike | None = None,
+        pressure: Signals | None = None,
+    ) -> dict[str, Array]:
         """Hold one command after the other.
 
         Parameters
         ----------
-        valve_command : array_like, shape (n,)
-            Commands [V]; for a rig without a valve only their number counts.
-        length, pressure : array_like, shape (n,), optional
-            As in :meth:`step`, for the end of each sample.
+        valve_command : array_like, shape (n,), or mapping of str to array_like, optional
+            Commands [V].
+        samples : int, optional
+            How many, where no signal says it.
+        supply_command, length, pressure : array_like, shape (n,), or mapping, optional
+            As in :meth:`step`, for each sample.
 
         Returns
         -------
@@ -163,12 +181,81 @@ class Simulator:
         Raises
         ------
         ParameterError
-            If a command is not finite; the message gives its index.
+            If a command is missing or not finite; the message gives its index.
         SimulationError
             As :meth:`step`.
         """
-        given = [None if v is None else np.ascontiguousarray(np.asarray(v, dtype=np.float64)) for v in (length, pressure)]
-        return self._core.advance(held_command(valve_command), *given)
+        signals, count = signals_of(
+            self.rig, valve_command=valve_command, supply_command=supply_command, length=length, pressure=pressure, rows=samples
+        )
+        if count is None:
+            raise ParameterError("samples is missing: no signal says how many there are")
+        return self._advance(count, signals)
+
+    def control(
+        self,
+        update: Callable[[dict[str, float]], float | Mapping[str, float] | Mapping[str, Mapping[str, float]]],
+        duration: float,
+        *,
+        period: float | None = None,
+    ) -> Simulation:
+        """Close the loop with a sampled controller.
+
+        The controller sees the present sample every ``period`` and what it answers is held exactly until the next; the rows in between
+        are simulated at the sample time.
+
+        Parameters
+        ----------
+        update : callable
+            Takes the sample (channel -> value in SI units, and ``time`` [s]); returns the valve command [V], of several valves a
+            mapping of names, or a mapping of the keywords of :meth:`step`.
+        duration : float
+            How long [s].
+        period : float, optional
+            Time between two updates [s], a multiple of the sample time; the sample time by default.
+
+        Returns
+        -------
+        Simulation
+            The present sample and all that follow, with the commands that were held from each.
+
+        Raises
+        ------
+        ParameterError
+            If the period is not a multiple of the sample time, or the controller answers what :meth:`step` refuses.
+        SimulationError
+            As :meth:`step`.
+        """
+        every = self._samples("period", self.sample_time if period is None else period, least=1)
+        total = self._samples("duration", duration, least=0)
+        rows = [self.observe()]
+        held: list[dict[str, float]] = []
+        began, happened = self.time, len(self.events)
+        signals: dict[str, Array] = {}
+        for k in range(total):
+            if k % every == 0:
+                signals, _ = signals_of(self.rig, **_keywords(update({"time": self.time, **rows[-1]})), rows=1)
+            rows.append(_single(self._advance(1, signals)))
+            held.append({name: float(values[0]) for name, values in signals.items()})
+        held.append(held[-1] if held else {})
+        inputs = {name: np.array([row[name] for row in held]) for name in held[0] if name not in rows[0]}
+        channels = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+        time = began + np.arange(total + 1) * self.sample_time
+        return Simulation({"time": time, **inputs, **channels}, self.rig, self.events[happened:])
+
+    def _samples(self, name: str, value: float, least: int) -> int:
+        """A time as a whole number of samples."""
+        count = round(value / self.sample_time) if np.isfinite(value) else -1
+        if count < least or abs(count * self.sample_time - value) > 1e-6 * self.sample_time:
+            raise ParameterError(
+                f"{name} = {value} s is not allowed: a multiple of sample_time = {self.sample_time} s, {least} at least, is needed"
+            )
+        return count
+
+    def _advance(self, count: int, signals: dict[str, Array]) -> dict[str, Array]:
+        channels, events = self._core.advance(count, signals)
+        self.events += [Event(*event) for event in events]
+        return channels
 
     def __getstate__(self) -> dict[str, Any]:
         kept = {name: value for name, value in self.__dict__.items() if name != "_core"}
@@ -186,3 +273,11 @@ class Simulator:
 
 def _single(channels: Mapping[str, Array]) -> dict[str, float]:
     return {name: float(values[0]) for name, values in channels.items()}
+
+
+def _keywords(answer: Any) -> dict[str, Any]:
+    """What a controller answers as keywords of :meth:`Simulator.step`."""
+    known = ("valve_command", "supply_command", "length", "pressure")
+    if isinstance(answer, Mapping) and any(name in known for name in answer):
+        return dict(answer)
+    return {"valve_command": answer}

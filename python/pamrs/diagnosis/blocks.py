@@ -138,12 +138,13 @@ def residual(block: Block, core: _core.Rig, prepared: Prepared, parameters: list
     names = parameters or ["sensors.pressure_zero"]
     prediction, jacobian = core.predict(
         block.name,
-        prepared.command,
+        {"valve_command": prepared.command} if core.inputs else {},
         prepared.dt,
         default_step(prepared.dt, longest=block.step),
         starts,
         names,
-        **prepared.signals,
+        prepared.signals,
+        prepared.n,
     )
     if jacobian is None:
         raise AssertionError("the core returns a jacobian when parameters are named")

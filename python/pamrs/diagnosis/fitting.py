@@ -17,6 +17,7 @@ from pamrs.diagnosis.signals import Prepared, binned
 from pamrs.effects_table import EFFECTS, find_parameter
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
+from pamrs.simulation import core_rig
 
 __all__ = ["Fit", "Problem", "fit", "residuals"]
 
@@ -120,7 +121,7 @@ def acts_in(effect: str, block: Block) -> bool:
 
 def free_baseline(problem: Problem, nominal: Rig) -> list[str]:
     """Baseline parameters with a finite tolerance that some block depends on."""
-    differentiable = set(_core.parameter_names())
+    differentiable = set(core_rig(nominal).parameter_names)
     return [
         name
         for name, parameter in nominal.parameters.items()

@@ -255,7 +255,7 @@ impl<'a, S: Scalar> Plant<'a, S> {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn pull(&self, k: usize, group: &Group, state: &[S], memory: &Memory<S>, start: S) -> Pull<S> {
         let point = group.joint.eval(state[self.layout.angle(group.coordinate)]);
         let contraction = point.shortening / group.rest_length;
@@ -288,7 +288,7 @@ impl<'a, S: Scalar> Plant<'a, S> {
     }
 
     /// Volumes, torques and what the muscles do, written to the scratch.
-    #[inline]
+    #[inline(always)]
     fn mechanics(&self, state: &[S], memory: &[Memory<S>], start: &[S], here: &mut Scratch<S>) {
         let zero = constant::<S>(0.0);
         here.volume.copy_from_slice(&self.fixed_volume);
@@ -428,7 +428,7 @@ impl<'a, S: Scalar> Plant<'a, S> {
     }
 
     /// Mass flows between all nodes, written to the scratch.
-    #[inline]
+    #[inline(always)]
     fn flows(&self, state: &[S], controls: &Controls<S>, here: &mut Scratch<S>) {
         let zero = constant::<S>(0.0);
         let gas = &self.rig.gas;
@@ -476,7 +476,7 @@ impl<'a, S: Scalar> Plant<'a, S> {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn gas_rates(&self, state: &[S], controls: &Controls<S>, here: &mut Scratch<S>, out: &mut [S]) {
         let (gas, layout) = (&self.rig.gas, &self.layout);
         let rt = gas.gas_constant * gas.temperature;
@@ -511,6 +511,9 @@ impl<'a, S: Scalar> Plant<'a, S> {
         let (mut drawn, mut exergy) = (constant::<S>(0.0), constant::<S>(0.0));
         for (k, flow) in here.drawn.iter().enumerate() {
             drawn += *flow;
+            if flow.re() == 0.0 {
+                continue; // most of the time, and the logarithm is dear
+            }
             exergy += (state[layout.supply(k)] / gas.ambient_pressure).ln() * *flow * rt;
         }
         let mut work = constant::<S>(0.0);

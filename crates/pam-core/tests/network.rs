@@ -1,0 +1,424 @@
+//! Laws of rigs of several blocks: what is conserved, what they come to rest at, order, stability, and what is refused.
+
+use pam_core::rig::spec::{
+    ArmSpec, ChamberSpec, JointSpec, LineSpec, LinkSpec, SupplySpec, TransmissionSpec, ValveSpec,
+};
+use pam_core::simulate::{simulate, Initial, Progress, Timing, Trajectory};
+use pam_core::{Rig, RigSpec};
+
+const SHOULDER: &str = include_str!("data/shoulder.json");
+const RT: f64 = 287.05 * 293.15;
+const AMBIENT: f64 = 101_325.0;
+
+fn shoulder() -> RigSpec {
+    RigSpec::from_json(SHOULDER).unwrap()
+}
+
+/// Nothing but chambers and lines.
+fn gas(chambers: &[(&str, f64, f64)], lines: Vec<LineSpec>) -> RigSpec {
+    let mut spec = shoulder();
+    spec.arm = None;
+    (spec.supplies, spec.valves, spec.muscles, spec.joints) = (vec![], vec![], vec![], vec![]);
+    spec.chambers = (chambers.iter())
+        .map(|(name, volume, pressure)| ChamberSpec {
+            name: (*name).into(),
+            dead_volume: *volume,
+            initial_pressure: *pressure,
+            alpha_in: 1.0,
+            alpha_out: 1.0,
+            alpha: 1.0,
+        })
+        .collect();
+    spec.lines = lines;
+    spec
+}
+
+fn tube(from: &str, to: &str, length: f64, diameter: f64) -> LineSpec {
+    LineSpec {
+        name: String::new(),
+        kind: "tube".into(),
+        from: from.into(),
+        to: to.into(),
+        length,
+        diameter,
+        discharge_area: 0.0,
+        inlet_volume: 0.0,
+    }
+}
+
+fn orifice(from: &str, to: &str, area: f64) -> LineSpec {
+    LineSpec { kind: "orifice".into(), discharge_area: area, ..tube(from, to, 0.0, 0.0) }
+}
+
+/// Flexor and extensor on one pulley, a valve each.
+fn antagonists() -> RigSpec {
+    let mut spec = shoulder();
+    let pulley = |radius: f64, rest_angle: f64| {
+        Some(TransmissionSpec {
+            kind: "pulley".into(),
+            upper_axial: 0.0,
+            upper_offset: 0.0,
+            lower_axial: 0.0,
+            lower_offset: 0.0,
+            radius,
+            coefficients: vec![],
+            rest_angle,
+        })
+    };
+    let (valve, chamber, muscle) =
+        (spec.valves[0].clone(), spec.chambers[0].clone(), spec.muscles[0].clone());
+    (spec.valves, spec.chambers, spec.muscles) = (vec![], vec![], vec![]);
+    for (name, radius, rest) in [("flexor", 0.025, -1.0), ("extensor", -0.025, 1.0)] {
+        let port = format!("chamber.{name}");
+        spec.valves.push(ValveSpec { name: name.into(), to: port.clone(), ..valve.clone() });
+        spec.chambers.push(ChamberSpec { name: name.into(), ..chamber.clone() });
+        let mut group = muscle.clone();
+        (group.name, group.chamber, group.transmission) = (name.into(), port, pulley(radius, rest));
+        group.muscle.count = 2;
+        spec.muscles.push(group);
+    }
+    let joint = &mut spec.joints[0];
+    (joint.transmission, joint.rest_angle, joint.min_angle, joint.max_angle) = (None, 0.0, -0.9, 0.9);
+    let arm = spec.arm.as_mut().unwrap();
+    (arm.payload, arm.gravity, arm.coulomb) = (0.5, 0.0, 0.0);
+    spec
+}
+
+/// Elbow and wrist, a valve, chamber and muscles each.
+fn two_joints() -> RigSpec {
+    let mut spec = shoulder();
+    let (valve, chamber, muscle, joint) =
+        (spec.valves[0].clone(), spec.chambers[0].clone(), spec.muscles[0].clone(), spec.joints[0].clone());
+    (spec.valves, spec.chambers, spec.muscles, spec.joints) = (vec![], vec![], vec![], vec![]);
+    let mut links = vec![];
+    for (name, count, length, mass) in [("elbow", 6, 0.4, 2.0), ("wrist", 2, 0.2, 0.8)] {
+        let (port, hinge) = (format!("chamber.{name}"), format!("joint.{name}"));
+        spec.valves.push(ValveSpec { name: name.into(), to: port.clone(), ..valve.clone() });
+        spec.chambers.push(ChamberSpec { name: name.into(), ..chamber.clone() });
+        let mut group = muscle.clone();
+        (group.name, group.chamber, group.joint) = (name.into(), port, hinge.clone());
+        group.muscle.count = count;
+        spec.muscles.push(group);
+        spec.joints.push(JointSpec { name: name.into(), ..joint.clone() });
+        links.push(LinkSpec {
+            name: name.into(),
+            joint: hinge,
+            length,
+            mass,
+            centre: length / 2.0,
+            inertia: mass * length * length / 12.0,
+            payload: if name == "wrist" { 3.0 } else { 0.0 },
+            viscous: 1.0,
+            coulomb: 0.3,
+            coulomb_speed: 0.02,
+        });
+    }
+    spec.arm = Some(ArmSpec { kind: "planar".into(), links, ..spec.arm.unwrap() });
+    spec
+}
+
+fn wave(rows: usize, phase: f64) -> Vec<f64> {
+    (0..rows).map(|k| 5.2 + 0.9 * (k as f64 * 0.02 + phase).sin()).collect()
+}
+
+fn last(rig: &Rig, run: &Trajectory, name: &str) -> f64 {
+    *run.get(rig, name).unwrap().last().unwrap()
+}
+
+fn run(rig: &Rig, rows: usize, signals: &[(&str, &[f64])], sample_time: f64, step: f64) -> Trajectory {
+    let timing = Timing::new(sample_time, step).unwrap().stable(rig);
+    simulate(rig, rows, signals, timing, &Initial::rest(rig)).unwrap()
+}
+
+/// Supplied less vented less stored, relative to what moved.
+fn imbalance(rig: &Rig, run: &Trajectory) -> f64 {
+    let masses = |k: usize| -> f64 {
+        let own = rig
+            .names()
+            .channels
+            .iter()
+            .filter(|(n, _)| n.starts_with("air_mass") || n.starts_with("line_mass"));
+        own.map(|(n, _)| run.get(rig, n).unwrap()[k]).sum()
+    };
+    let rows = run.channels[0].len();
+    let (supplied, vented) = (last(rig, run, "mass_supplied"), last(rig, run, "mass_vented"));
+    let moved = supplied.abs() + vented.abs() + masses(0);
+    (supplied - vented - (masses(rows - 1) - masses(0))).abs() / moved
+}
+
+#[test]
+fn mass_in_is_mass_stored_and_vented() {
+    let (a, b) = (wave(400, 0.0), wave(400, 2.0));
+    let pair: [(&str, &[f64]); 2] = [("valve_command.flexor", &a), ("valve_command.extensor", &b)];
+    let rig = Rig::new(antagonists()).unwrap();
+    let out = run(&rig, 400, &pair, 0.005, 1e-3);
+    assert!(imbalance(&rig, &out) < 1e-12, "{}", imbalance(&rig, &out));
+    assert!(last(&rig, &out, "mass_supplied") > 1e-4 && last(&rig, &out, "mass_vented") > 1e-4);
+    // The tank, whose mass is P V/(R T), lost what was supplied; and E_in is its pressure times its volume.
+    let tank = out.get(&rig, "supply_pressure").unwrap();
+    let lost = (tank[0] - tank[399]) * 0.015;
+    assert!((lost / last(&rig, &out, "energy_supplied") - 1.0).abs() < 1e-9);
+    assert!((lost / RT / last(&rig, &out, "mass_supplied") - 1.0).abs() < 1e-9);
+    let closed = Rig::new(gas(
+        &[("a", 1e-4, 5e5), ("b", 3e-4, 0.0)],
+        vec![tube("chamber.a", "chamber.b", 2.0, 0.004)],
+    ))
+    .unwrap();
+    let out = run(&closed, 200, &[], 0.01, 1e-3);
+    assert!(imbalance(&closed, &out) < 1e-13);
+}
+
+#[test]
+fn a_choked_isothermal_blow_down_is_an_exponential() {
+    let (volume, area) = (2e-3, 1e-6);
+    let rig = Rig::new(gas(&[("", volume, 9e5)], vec![orifice("chamber", "ambient", area)])).unwrap();
+    let out = run(&rig, 401, &[], 0.05, 1e-3);
+    let psi = (2.0_f64 / 2.4).powf(2.5) * (1.4_f64 / 2.4).sqrt();
+    let tau = volume / (RT * area * (2.0 / RT).sqrt() * psi);
+    let pressure = out.get(&rig, "muscle_pressure").unwrap();
+    let mut checked = 0;
+    for (k, p) in pressure.iter().enumerate() {
+        let exact = (9e5 + AMBIENT) * (-(k as f64) * 0.05 / tau).exp();
+        if AMBIENT / exact < 0.528 {
+            assert!(((p + AMBIENT) / exact - 1.0).abs() < 1e-9, "row {k}");
+            checked += 1;
+        }
+    }
+    assert!(checked > 50);
+    let event = &out.events[out.events.len() - 1];
+    let t = tau * ((9e5 + AMBIENT) * 0.528_281_787_717 / AMBIENT).ln();
+    assert_eq!((event.kind.name(), event.block.as_str()), ("unchoked", "line"));
+    assert!((event.time - t).abs() < 1e-4, "{} {t}", event.time);
+}
+
+#[test]
+fn a_tube_brings_two_chambers_to_one_pressure() {
+    let spec = gas(&[("a", 1e-4, 5e5), ("b", 3e-4, 0.0)], vec![tube("chamber.a", "chamber.b", 2.0, 0.004)]);
+    let rig = Rig::new(spec).unwrap();
+    let out = run(&rig, 300, &[], 0.01, 1e-3);
+    let half = std::f64::consts::PI * 0.002 * 0.002 * 2.0 / 2.0;
+    let (va, vb) = (1e-4 + half, 3e-4 + half);
+    let expected = ((5e5 + AMBIENT) * va + AMBIENT * vb) / (va + vb) - AMBIENT;
+    for name in ["muscle_pressure.a", "muscle_pressure.b"] {
+        assert!((last(&rig, &out, name) / expected - 1.0).abs() < 1e-9, "{name}");
+    }
+}
+
+#[test]
+fn antagonists_at_one_pressure_stay_in_the_middle_and_move_with_a_difference() {
+    let rig = Rig::new(antagonists()).unwrap();
+    let (five, six) = (vec![5.0; 300], vec![5.4; 300]);
+    let still =
+        run(&rig, 300, &[("valve_command.flexor", &six), ("valve_command.extensor", &six)], 0.01, 1e-3);
+    assert!(last(&rig, &still, "joint_angle").abs() < 1e-12);
+    assert!(last(&rig, &still, "muscle_pressure.flexor") > 5e5);
+    let bent =
+        run(&rig, 300, &[("valve_command.flexor", &six), ("valve_command.extensor", &five)], 0.01, 1e-3);
+    assert!(last(&rig, &bent, "joint_angle") > 0.3);
+    let pull = |run: &Trajectory, name: &str| last(&rig, run, &format!("muscle_force.{name}"));
+    let torque = 0.025 * (pull(&bent, "flexor") - pull(&bent, "extensor"));
+    assert!((torque - last(&rig, &bent, "joint_torque")).abs() < 1e-9 * torque.abs().max(1.0));
+}
+
+#[test]
+fn what_the_muscles_give_the_arm_takes() {
+    // No gravity, no friction, no stop touched: kinetic energy is the work of the muscles.
+    let mut spec = antagonists();
+    let arm = spec.arm.as_mut().unwrap();
+    (arm.viscous, arm.coulomb) = (0.0, 0.0);
+    let inertia = arm.inertia + arm.payload * arm.length * arm.length;
+    let rig = Rig::new(spec).unwrap();
+    let (a, b) = (vec![5.2; 60], vec![5.0; 60]);
+    let out = run(&rig, 60, &[("valve_command.flexor", &a), ("valve_command.extensor", &b)], 0.005, 2e-4);
+    assert!(out.events.iter().all(|e| !e.block.starts_with("joint")));
+    let rate = last(&rig, &out, "joint_rate");
+    let kinetic = 0.5 * inertia * rate * rate;
+    assert!(kinetic > 0.1, "{kinetic}");
+    let rest = Progress::start(&rig, &Initial::rest(&rig)).unwrap();
+    assert_eq!(rest.samples(), 0);
+    assert!((last(&rig, &out, "muscle_work") / kinetic - 1.0).abs() < 1e-6);
+}
+
+#[test]
+fn a_planar_arm_of_one_link_is_the_one_link_arm() {
+    let one = Rig::new(shoulder()).unwrap();
+    let mut spec = shoulder();
+    let arm = spec.arm.clone().unwrap();
+    // mass and centre that give the same first moment and, with their inertia, the same about the joint
+    let (mass, centre) = (4.0, arm.first_moment / 4.0);
+    let link = LinkSpec {
+        name: String::new(),
+        joint: "joint".into(),
+        length: arm.length,
+        mass,
+        centre,
+        inertia: arm.inertia - mass * centre * centre * 0.5,
+        payload: arm.payload,
+        viscous: arm.viscous,
+        coulomb: arm.coulomb,
+        coulomb_speed: arm.coulomb_speed,
+    };
+    let mut same = spec.arm.take().unwrap();
+    same.inertia = link.inertia + mass * centre * centre;
+    let mut one_link = shoulder();
+    one_link.arm = Some(same);
+    spec.arm = Some(ArmSpec { kind: "planar".into(), links: vec![link], ..arm });
+    let (planar, one_link) = (Rig::new(spec).unwrap(), Rig::new(one_link).unwrap());
+    let u = wave(300, 0.0);
+    let a = run(&planar, 300, &[("valve_command", &u)], 0.005, 1e-3);
+    let b = run(&one_link, 300, &[("valve_command", &u)], 0.005, 1e-3);
+    for name in ["joint_angle", "muscle_pressure", "joint_torque"] {
+        let pairs = a.get(&planar, name).unwrap().iter().zip(b.get(&one_link, name).unwrap());
+        assert!(pairs.clone().all(|(a, b)| (a - b).abs() < 1e-9 * b.abs().max(1.0)), "{name}");
+    }
+    assert!(one.stable_step() > 1e-3);
+}
+
+#[test]
+fn a_regulator_settles_and_its_droop_follows_the_flow() {
+    let mut spec = gas(&[("", 1e-3, 0.0)], vec![orifice("supply", "chamber", 5e-6)]);
+    spec.supplies = vec![SupplySpec {
+        name: String::new(),
+        kind: "regulator".into(),
+        volume: 0.0,
+        initial_pressure: 4e5,
+        time_constant: 0.05,
+        droop: 4e6,
+    }];
+    let rig = Rig::new(spec).unwrap();
+    let out = run(&rig, 500, &[], 0.02, 1e-3);
+    assert!((last(&rig, &out, "muscle_pressure") - 4e5).abs() < 1.0);
+    let supply = out.get(&rig, "supply_pressure").unwrap();
+    let flow = 5e-6 * (supply[10] + AMBIENT) * (2.0 / RT).sqrt() * 0.4842;
+    assert!((supply[10] - (4e5 - 4e6 * flow)).abs() < 500.0, "{}", supply[10]);
+    let set: Vec<f64> = (0..500).map(|k| if k < 250 { 4e5 } else { 1e5 }).collect();
+    let out = run(&rig, 500, &[("supply_command", &set)], 0.02, 1e-3);
+    assert!((last(&rig, &out, "muscle_pressure") - 1e5).abs() < 5.0, "it takes air back");
+    assert!(imbalance(&rig, &out) < 1e-12);
+}
+
+fn fed_through_a_tube(inlet_volume: f64, length: f64) -> RigSpec {
+    let mut spec = shoulder();
+    spec.lines = vec![LineSpec { inlet_volume, ..tube("", "chamber", length, 0.004) }];
+    spec.valves[0].to = "line".into();
+    spec
+}
+
+#[test]
+fn small_volumes_are_stable_at_a_millisecond_and_accurate() {
+    let rig = Rig::new(fed_through_a_tube(0.0, 1.0)).unwrap();
+    assert!(rig.stable_step() < 2e-4, "{}", rig.stable_step());
+    let u = wave(200, 0.0);
+    let coarse = run(&rig, 200, &[("valve_command", &u)], 0.005, 1e-3);
+    let fine = run(&rig, 200, &[("valve_command", &u)], 0.005, 2e-6);
+    for name in ["line_pressure", "muscle_pressure", "joint_angle"] {
+        let (a, b) = (coarse.get(&rig, name).unwrap(), fine.get(&rig, name).unwrap());
+        let range = b.iter().copied().fold(f64::MIN, f64::max) - b.iter().copied().fold(f64::MAX, f64::min);
+        let worst = a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(worst < 2e-4 * range, "{name}: {worst} of {range}");
+    }
+}
+
+#[test]
+fn two_joints_converge_with_order_four() {
+    let mut spec = two_joints();
+    // smooth: no Coulomb friction, no stop within reach
+    for (joint, link) in spec.joints.iter_mut().zip(&mut spec.arm.as_mut().unwrap().links) {
+        (joint.stop_stiffness, joint.stop_damping, link.coulomb) = (0.0, 0.0, 0.0);
+    }
+    let rig = Rig::new(spec).unwrap();
+    let (a, b) = (vec![5.6; 26], vec![5.3; 26]);
+    let go = |substeps: usize| {
+        let timing = Timing { sample_time: 0.02, substeps };
+        let initial = Initial::rest(&rig);
+        let initial = ["elbow", "wrist"].iter().fold(initial, |i, n| {
+            let i = i.with(&rig, &format!("muscle_pressure.{n}"), 2e5).unwrap();
+            i.with(&rig, &format!("joint_angle.{n}"), 0.6).unwrap()
+        });
+        let signals: [(&str, &[f64]); 2] = [("valve_command.elbow", &a), ("valve_command.wrist", &b)];
+        simulate(&rig, 26, &signals, timing, &initial)
+            .unwrap()
+            .get(&rig, "joint_angle.wrist")
+            .unwrap()
+            .to_vec()
+    };
+    let reference = go(640);
+    let error = |n: usize| go(n).iter().zip(&reference).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    let order = (error(20) / error(40)).log2();
+    assert!((3.5..4.5).contains(&order), "order {order}");
+}
+
+#[test]
+fn stops_and_choking_are_recorded_with_their_times() {
+    let rig = Rig::new(shoulder()).unwrap();
+    let u: Vec<f64> = (0..800).map(|k| if k < 400 { 9.0 } else { 2.0 }).collect();
+    let out = run(&rig, 800, &[("valve_command", &u)], 0.005, 1e-3);
+    let kinds: Vec<&str> = out.events.iter().map(|e| e.kind.name()).collect();
+    for kind in
+        ["min_stop_left", "max_stop_reached", "max_stop_left", "min_stop_reached", "choked", "unchoked"]
+    {
+        assert!(kinds.contains(&kind), "{kind} in {kinds:?}");
+    }
+    assert!(out.events.windows(2).all(|w| w[1].time >= w[0].time - 1e-3));
+    let angle = out.get(&rig, "joint_angle").unwrap();
+    let reached = out.events.iter().find(|e| e.kind.name() == "max_stop_reached").unwrap();
+    let row = (reached.time / 0.005) as usize;
+    let limit = rig.spec().joints[0].max_angle;
+    assert!(angle[row] <= limit && angle[row + 1] >= limit - 0.02);
+}
+
+#[test]
+fn a_rig_goes_on_from_its_numbers_bit_for_bit() {
+    let rig = Rig::new(two_joints()).unwrap();
+    let timing = Timing::new(0.005, 1e-3).unwrap().stable(&rig);
+    let (a, b) = (wave(120, 0.0), wave(120, 1.0));
+    let drive = |range: std::ops::Range<usize>| {
+        let signals: [(&str, &[f64]); 2] = [("valve_command.elbow", &a), ("valve_command.wrist", &b)];
+        pam_core::simulate::Drive::new(&rig, 120, &signals).unwrap().part(range)
+    };
+    let mut whole = Progress::start(&rig, &Initial::rest(&rig)).unwrap();
+    let mut out = Trajectory::new(&rig, 120);
+    whole.advance(&rig, timing, &drive(0..120), &mut out).unwrap();
+    let mut first = Progress::start(&rig, &Initial::rest(&rig)).unwrap();
+    let mut parts = Trajectory::new(&rig, 120);
+    first.advance(&rig, timing, &drive(0..50), &mut parts).unwrap();
+    let fresh = Progress::start(&rig, &Initial::rest(&rig)).unwrap();
+    let mut again = fresh.restored(&first.to_vec()).unwrap();
+    again.advance(&rig, timing, &drive(50..120), &mut parts).unwrap();
+    assert_eq!(parts, out);
+    assert!(fresh.restored(&[1.0]).unwrap_err().to_string().contains("state"));
+}
+
+#[test]
+fn what_does_not_fit_together_is_named() {
+    type Change = fn(&mut RigSpec);
+    let cases: [(&str, Change); 14] = [
+        ("valve.from is missing", |s| s.valves[0].from = String::new()),
+        ("valve.to = \"chamber.x\"", |s| s.valves[0].to = "chamber.x".into()),
+        ("valve.from = \"ambient\"", |s| s.valves[0].from = "ambient".into()),
+        ("valve.from = \"chamber\"", |s| s.valves[0].from = "chamber".into()),
+        ("valve.to = \"supply\"", |s| s.valves[0].to = "supply".into()),
+        ("line.from is missing", |s| s.lines = vec![tube("", "chamber", 1.0, 0.004)]),
+        ("line.from = \"chamber\"", |s| s.lines = vec![tube("chamber", "chamber", 1.0, 0.004)]),
+        ("muscle.chamber", |s| s.muscles[0].chamber = "chamber.b".into()),
+        ("muscle.joint", |s| s.muscles[0].joint = "joint.b".into()),
+        ("transmission", |s| s.joints[0].transmission = None),
+        ("[chamber] is there twice", |s| s.chambers.push(s.chambers[0].clone())),
+        ("at least one chamber", |s| s.chambers.clear()),
+        ("supply.kind", |s| s.supplies[0].kind = "pump".into()),
+        ("1 to 4 links", |s| s.arm.as_mut().unwrap().kind = "planar".into()),
+    ];
+    for (word, change) in cases {
+        let mut spec = shoulder();
+        change(&mut spec);
+        let message = spec.validate().and_then(|()| Rig::new(spec)).unwrap_err().to_string();
+        assert!(message.contains(word), "{word}: {message}");
+    }
+    let message = Rig::new(fed_through_a_tube(0.0, 1e-4)).unwrap_err().to_string();
+    assert!(message.contains("line is too small"), "{message}");
+    let mut singular = two_joints();
+    for link in &mut singular.arm.as_mut().unwrap().links {
+        (link.mass, link.inertia, link.payload) = (0.0, 0.0, 0.0);
+    }
+    assert!(Rig::new(singular).unwrap_err().to_string().contains("mass matrix"));
+}
