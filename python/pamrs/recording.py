@@ -39,11 +39,13 @@ class _Channel(NamedTuple):
     upper: float
 
 
-#: Canonical channels: SI unit and the range of the possible (SI; pressures gauge).
+#: Canonical channels, each with the name of its block behind a dot where a rig has several (``muscle_pressure.flexor``): SI unit and the range of the possible (SI; pressures gauge).
 CHANNELS: Final[dict[str, _Channel]] = {
     "time": _Channel("s", -math.inf, math.inf),
     "valve_command": _Channel("V", -1000.0, 1000.0),
+    "supply_command": _Channel("Pa", -1.3e5, 1e8),
     "supply_pressure": _Channel("Pa", -1.3e5, 1e8),
+    "line_pressure": _Channel("Pa", -1.3e5, 1e8),
     "muscle_pressure": _Channel("Pa", -1.3e5, 1e8),
     "joint_angle": _Channel("rad", -100.0, 100.0),
     "length": _Channel("m", -100.0, 100.0),
@@ -52,6 +54,13 @@ CHANNELS: Final[dict[str, _Channel]] = {
     "temperature": _Channel("K", 50.0, 2000.0),
     "reference": _Channel("rad", -1e9, 1e9),
 }
+
+
+def channel_of(name: str) -> str:
+    """The canonical channel of a name: ``muscle_pressure`` of ``muscle_pressure.flexor``."""
+    return name.partition(".")[0]
+
+
 # a reference may be one of an angle or of a pressure
 _REFERENCE_UNITS: Final = ("rad", "Pa")
 _HEADING = re.compile(r"^\s*(?P<name>[^\[\]]*?)\s*(?:\[(?P<unit>[^\[\]]*)\])?\s*$")
@@ -315,12 +324,13 @@ def _understood(headings: list[str], source: str) -> dict[str, tuple[int, str]]:
             continue
         match = _HEADING.match(heading)
         name = match["name"] if match else heading
-        if match is None or name not in CHANNELS:
-            near = difflib.get_close_matches(name.lower(), CHANNELS, n=1, cutoff=0.6)
+        channel = channel_of(name)
+        if match is None or channel not in CHANNELS or name.endswith("."):
+            near = difflib.get_close_matches(channel.lower(), CHANNELS, n=1, cutoff=0.6)
             hint = f"did you mean {near[0]!r}?" if near else f"known are {', '.join(CHANNELS)}"
             problems.append(f"unknown column {heading!r}; {hint} (columns = {{{heading!r} = ''}} leaves it out)")
             continue
-        expected = _REFERENCE_UNITS if name == "reference" else (CHANNELS[name].unit,)
+        expected = _REFERENCE_UNITS if channel == "reference" else (CHANNELS[channel].unit,)
         unit = match["unit"]
         if unit is None or not unit.strip():
             problems.append(f"column {heading!r} has no unit: write '{name} [{expected[0]}]', with the unit its values are in")
@@ -370,8 +380,8 @@ def _si_columns(
         values: Array = np.asarray(numbers * parsed.scale + parsed.offset, dtype=np.float64)
         values[~np.isfinite(values)] = np.nan
         raw[name] = values
-        units[name] = CHANNELS[name].unit
-        if name == "reference" and parsed.dimension != parse_unit("rad").dimension:
+        units[name] = CHANNELS[channel_of(name)].unit
+        if channel_of(name) == "reference" and parsed.dimension != parse_unit("rad").dimension:
             units[name] = "Pa"
     return raw, units
 
@@ -424,7 +434,7 @@ def _assemble(
 def _judged(channel: str, values: Array, grid: Grid, source: str, issues: list[Issue]) -> tuple[Array, Mask]:
     """One channel on the grid with its mask; what is wrong with it goes to ``issues``."""
     values = values.copy()
-    limits = CHANNELS[channel]
+    limits = CHANNELS[channel_of(channel)]
     usable = np.isfinite(values)
     impossible = usable & ((values < limits.lower) | (values > limits.upper))
     bad = int(impossible.sum())
@@ -438,7 +448,7 @@ def _judged(channel: str, values: Array, grid: Grid, source: str, issues: list[I
     found += _runs(impossible, "outlier", "an impossible value")
     usable &= ~impossible
     values[~usable] = np.nan
-    for fault in find_faults(channel, values):
+    for fault in find_faults(channel_of(channel), values):
         found.append((fault.kind, fault.start, fault.stop, fault.text))
         if fault.masked:
             usable[fault.start : fault.stop] = False

@@ -25,11 +25,11 @@ _MARGIN: Final = 2.0  # on the longest expected run
 _REST: Final = 12.0  # quanta that a channel at rest may span
 
 #: Set by the controller or the user: constant stretches are their nature.
-COMMANDS: Final = frozenset({"valve_command", "reference"})
+COMMANDS: Final = frozenset({"valve_command", "supply_command", "reference"})
 #: Stops and dry friction hold these exactly still.
 MECHANICAL: Final = frozenset({"joint_angle", "length"})
 #: Transducers whose end of range is a fault.
-CLIPPING: Final = frozenset({"supply_pressure", "muscle_pressure", "force", "joint_torque"})
+CLIPPING: Final = frozenset({"supply_pressure", "line_pressure", "muscle_pressure", "force", "joint_torque"})
 
 
 class Fault(NamedTuple):

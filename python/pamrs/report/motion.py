@@ -1,4 +1,4 @@
-"""A simulation to look at: its channels over time, and the arm as it moves."""
+"""A simulation to look at: its channels over time, and the arm or the mass as it moves."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from pamrs.driving import dotted
 from pamrs.errors import ParameterError
 from pamrs.report.figures import COLOURS, STYLE, decimate
 
@@ -29,7 +30,7 @@ Array = NDArray[np.float64]
 #: Panels from top to bottom: (title, unit, factor from SI, channels); those of which nothing was simulated are left out.
 _PANELS: Final = (
     ("valve command", "V", 1.0, ("valve_command",)),
-    ("pressure, gauge", "bar", 1e-5, ("supply_pressure", "muscle_pressure")),
+    ("pressure, gauge", "bar", 1e-5, ("supply_command", "supply_pressure", "line_pressure", "muscle_pressure")),
     ("joint angle", "deg", 180.0 / math.pi, ("joint_angle",)),
     ("joint torque of the muscles", "N m", 1.0, ("joint_torque",)),
     ("length of the muscle", "mm", 1e3, ("length",)),
@@ -38,9 +39,11 @@ _PANELS: Final = (
 )
 #: A recorded channel that is drawn beside a simulated one of another name.
 _RECORDED_AS: Final = {"muscle_force": "force"}
-_NAMES: Final = {"supply_pressure": "supply", "muscle_pressure": "muscle"}
+_NAMES: Final = {"supply_command": "set", "supply_pressure": "supply", "line_pressure": "line", "muscle_pressure": "muscle"}
 _FRAMES: Final = 150
 _FAINT: Final = "#9ca3af"
+#: Colours of the blocks of one channel; the first is the one of a rig without names.
+_OWN: Final = (COLOURS["after"], "#0f766e", "#b45309", "#7c3aed", "#be123c", "#4d7c0f")
 
 
 def channels_png(result: Simulation, measured: Mapping[str, tuple[Array, Array]] | None = None) -> bytes:
@@ -58,20 +61,25 @@ def channels_png(result: Simulation, measured: Mapping[str, tuple[Array, Array]]
     bytes
     """
     given = measured or {}
-    recorded = {name: given[other] for panel in _PANELS for name in panel[3] if (other := _RECORDED_AS.get(name, name)) in given}
-    there = [panel for panel in _PANELS if any(name in result for name in panel[3])]
-    moving = [panel for panel in there if any(_tells(result, name) or name in recorded for name in panel[3])] or there
+    there = [(title, unit, factor, _of(result, heads)) for title, unit, factor, heads in _PANELS]
+    there = [panel for panel in there if panel[3]]
+    moving = [panel for panel in there if any(_tells(result, name) or _recorded(name, given) for name in panel[3])] or there
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(10.0, 1.0 + 1.75 * len(moving)), dpi=110, layout="constrained")
         rows = figure.subplots(len(moving), 1, sharex=True, squeeze=False)[:, 0]
         for axes, (title, unit, factor, names) in zip(rows, moving, strict=True):
-            for name, colour in zip(names, (_FAINT, COLOURS["after"]) if len(names) > 1 else (COLOURS["after"],), strict=True):
-                if name in recorded:
-                    time, value = recorded[name]
-                    axes.plot(time, factor * value, color=COLOURS["measured"], lw=0.9, label=f"{_NAMES.get(name, '')} recorded".strip())
-                if name in result:
-                    time, value = decimate(result.time, factor * result[name])
-                    axes.plot(time, value, color=colour, lw=1.3, label=f"{_NAMES.get(name, '')} simulated".strip())
+            heads = [name.partition(".")[0] for name in names]
+            for name, head in zip(names, heads, strict=True):
+                label, nth = _label(name, len(set(heads)) > 1), [n for n in names if n.partition(".")[0] == head].index(name)
+                other = _recorded(name, given)
+                if other:
+                    time, value = given[other]
+                    axes.plot(time, factor * value, color=COLOURS["measured"], lw=0.9, label=f"{label} recorded".strip())
+                time, value = decimate(result.time, factor * result[name])
+                faint = head in ("supply_pressure", "supply_command", "line_pressure") and len(set(heads)) > 1
+                style = {"supply_command": "--", "line_pressure": ":"}.get(head, "-")
+                colour = _FAINT if faint and nth == 0 and head == "supply_pressure" else _OWN[nth % len(_OWN)]
+                axes.plot(time, value, style, color=colour, lw=1.3, label=f"{label} simulated".strip())
             axes.set_title(title)
             axes.set_ylabel(unit)
             if len(axes.lines) > 1:
@@ -82,9 +90,26 @@ def channels_png(result: Simulation, measured: Mapping[str, tuple[Array, Array]]
     return stream.getvalue()
 
 
+def _of(result: Simulation, heads: tuple[str, ...]) -> list[str]:
+    """The simulated channels of a panel."""
+    return [name for head in heads for name in result if name.partition(".")[0] == head]
+
+
+def _recorded(name: str, given: Mapping[str, Any]) -> str:
+    """Name of the recorded channel that belongs beside a simulated one, empty where there is none."""
+    head, dot, block = name.partition(".")
+    other = _RECORDED_AS.get(head, head) + dot + block
+    return other if other in given else ""
+
+
+def _label(name: str, several: bool) -> str:
+    head, _, block = name.partition(".")
+    return " ".join(part for part in (_NAMES.get(head, "") if several else "", block) if part)
+
+
 def _tells(result: Simulation, name: str) -> bool:
     """Whether a simulated channel moves at all."""
-    return name in result and float(np.ptp(result[name])) > 1e-9 * max(float(np.abs(result[name]).max()), 1e-12)
+    return float(np.ptp(result[name])) > 1e-9 * max(float(np.abs(result[name]).max()), 1e-12)
 
 
 def write_animation(result: Simulation, path: Path, *, speed: float = 1.0) -> Path:
@@ -93,7 +118,7 @@ def write_animation(result: Simulation, path: Path, *, speed: float = 1.0) -> Pa
     Parameters
     ----------
     result : Simulation
-        Of a rig with a one-link arm.
+        Of a rig with an arm or a linear load.
     path : Path
         The file.
     speed : float
@@ -107,15 +132,15 @@ def write_animation(result: Simulation, path: Path, *, speed: float = 1.0) -> Pa
     Raises
     ------
     ParameterError
-        If the rig has no arm, there are fewer than two samples, or the speed is not a finite number above zero.
+        If the rig has nothing that moves, there are fewer than two samples, or the speed is not a finite number above zero.
     """
     import tempfile
     from pathlib import Path as File
 
     from pamrs.writing import write_atomically
 
-    if "joint_angle" not in result:
-        raise ParameterError(f"the rig {result.rig.name!r} has no arm to draw")
+    if not result.under("joint_angle") and "length" not in result:
+        raise ParameterError(f"the rig {result.rig.name!r} has no arm and no load to draw")
     if result.time.size < 2:
         raise ParameterError(f"{result.time.size} sample is not enough to draw a motion: two at least")
     if not (math.isfinite(speed) and speed > 0.0):
@@ -135,48 +160,95 @@ def write_animation(result: Simulation, path: Path, *, speed: float = 1.0) -> Pa
         return write_atomically(path, picture.read_bytes())
 
 
+class _Muscles:
+    """The muscles of one group: a line as wide as they are, coloured by pressure."""
+
+    def __init__(self, axes: Axes, result: Simulation, name: str, scale: float, span: tuple[float, float]) -> None:
+        muscle = result.rig.muscle_of(name)
+        self.result, self.name, self.scale, self.span = result, name, scale, span
+        self.rest = float(muscle.parameters["rest_length"])
+        self.contraction = result[dotted("contraction_ratio", name)]
+        self.widths = 2.0 * muscle.radius(np.clip(self.contraction, *muscle.contraction_limits))
+        chamber = result.rig.ports("muscle")[name]["chamber"].partition(".")[2]
+        self.pressure = result[dotted("muscle_pressure", chamber)]
+        self.line: Any = axes.plot([], [], solid_capstyle="round", alpha=0.85)[0]
+
+    def draw(self, row: int, base: Array, along: Array, side: float) -> Array:
+        """From a distance beyond a joint towards it, on one side of the link that carries them; the end that moves."""
+        beside = side * 1.2 * float(self.widths.max()) * np.array([along[1], -along[0]])
+        far = base + 1.1 * self.rest * along + beside
+        near = far - self.rest * (1.0 - float(self.contraction[row])) * along
+        self.line.set_data([far[0], near[0]], [far[1], near[1]])
+        self.line.set_linewidth(self.scale * float(self.widths[row]))
+        low, high = self.span
+        self.line.set_color(mpl.colormaps["viridis"](0.15 + 0.75 * (float(self.pressure[row]) - low) / (high - low)))
+        return near
+
+
 class _Scene:
-    """Upper link, muscles along it, and the link that they turn; the angle is from straight down."""
+    """The fixed link, the links that hang from it (angles from straight down, then from link to link) and the muscles along the link
+    before each joint; or the mass that hangs from a muscle.
+    """
 
     def __init__(self, axes: Axes, result: Simulation, width: float) -> None:
         self.result = result
-        model = result.rig.model
-        self.length = float(model["arm"]["length"])
-        muscle = result.rig.muscle
-        assert muscle is not None
-        self.rest = float(muscle.parameters["rest_length"])
-        e = np.clip(result["contraction_ratio"], *muscle.contraction_limits)
-        self.widths = 2.0 * muscle.radius(e)
-        top = 1.15 * self.rest
-        reach = 1.1 * max(self.length, top)
+        rig = result.rig
+        self.angles = list(result.under("joint_angle").values())
+        links = rig.tables("link") or {name: table for name, table in rig.tables("arm").items() if self.angles}
+        self.lengths = [float(link["length"]) for link in links.values()]
+        groups = list(rig.tables("muscle"))
+        rests = [float(rig.muscle_of(name).parameters["rest_length"]) for name in groups]
+        top = 1.15 * max(rests)
+        reach = 1.1 * (max(sum(self.lengths), top) if self.angles else top)
         axes.set_xlim(-reach, reach)
         axes.set_ylim(-reach, reach)
         axes.set_aspect("equal")
         axes.grid(visible=False)
         axes.set_xlabel("m")
         axes.set_ylabel("m")
+        scale = 72.0 * width * axes.get_position().width / (2.0 * reach)  # points a metre
+        pressures = np.concatenate(list(result.under("muscle_pressure").values()))
+        low = min(float(pressures.min()), 0.0)
+        span = low, max(float(pressures.max()), low + 1.0)
+        joints = list(result.under("joint_angle"))
+        self.groups = [_Muscles(axes, result, name, scale, span) for name in groups]
+        self.at = [self._joint_of(name, joints) for name in groups]
         axes.plot([0.0, 0.0], [0.0, top], color=COLOURS["measured"], lw=5.0, solid_capstyle="round")
-        self.scale = 72.0 * width * axes.get_position().width / (2.0 * reach)  # points a metre
-        low = min(float(result["muscle_pressure"].min()), 0.0)
-        self.colours = mpl.colormaps["viridis"]
-        self.span = low, max(float(result["muscle_pressure"].max()), low + 1.0)
-        self.muscle: Any = axes.plot([], [], solid_capstyle="round", alpha=0.85)[0]
-        self.arm: Any = axes.plot([], [], color=COLOURS["after"], lw=4.0, solid_capstyle="round")[0]
-        self.payload: Any = axes.plot([], [], "o", color=COLOURS["before"], ms=7.0 + min(float(model["arm"]["payload"]), 60.0) / 6.0)[0]
+        self.arm: Any = axes.plot([], [], "-o", color=COLOURS["after"], lw=4.0, ms=4.0, solid_capstyle="round")[0]
+        payload = sum(float(table.get("payload", 0.0)) for table in links.values())
+        payload += sum(float(load.get("mass", 0.0)) for load in rig.tables("load").values())
+        self.payload: Any = axes.plot([], [], "o", color=COLOURS["before"], ms=7.0 + min(payload, 60.0) / 6.0)[0]
         self.text: Any = axes.set_title("")
+        self.base = np.array([0.0, 0.0])
+        self.top = top
+
+    def _joint_of(self, name: str, joints: list[str]) -> int:
+        joint = self.result.rig.ports("muscle")[name]["joint"]
+        return joints.index(joint.partition(".")[2]) if joint != "load" else 0
 
     def draw(self, row: int) -> tuple[Any, ...]:
         """Put one sample into the picture."""
-        angle = float(self.result["joint_angle"][row])
-        pressure = float(self.result["muscle_pressure"][row])
-        tip = self.length * math.sin(angle), -self.length * math.cos(angle)
-        self.arm.set_data([0.0, tip[0]], [0.0, tip[1]])
+        points, along = [self.base], [np.array([0.0, 1.0])]
+        direction = 0.0
+        for angle, length in zip(self.angles, self.lengths, strict=True):
+            direction += float(angle[row])
+            down = np.array([math.sin(direction), -math.cos(direction)])
+            points.append(points[-1] + length * down)
+            along.append(-down)
+        count = [0] * max(len(points), 1)
+        near = self.base
+        for group, joint in zip(self.groups, self.at, strict=True):
+            side = -1.0 - count[joint] // 2 if count[joint] % 2 == 0 else 1.0 + count[joint] // 2
+            count[joint] += 1
+            near = group.draw(row, points[joint], along[joint], side)
+        if self.angles:
+            self.arm.set_data([p[0] for p in points], [p[1] for p in points])
+            tip = points[-1]
+            said = " / ".join(f"{math.degrees(float(angle[row])):.0f}" for angle in self.angles) + " deg"
+        else:
+            tip = near - np.array([0.0, 0.05 * self.top])
+            said = f"{1e3 * float(self.result['length'][row]):.0f} mm"
         self.payload.set_data([tip[0]], [tip[1]])
-        shortened = self.rest * (1.0 - float(self.result["contraction_ratio"][row]))
-        beside = -1.2 * float(self.widths.max())
-        self.muscle.set_data([beside, beside], [1.1 * self.rest - shortened, 1.1 * self.rest])
-        self.muscle.set_linewidth(self.scale * float(self.widths[row]))
-        low, high = self.span
-        self.muscle.set_color(self.colours(0.15 + 0.75 * (pressure - low) / (high - low)))
-        self.text.set_text(f"{self.result.time[row]:.2f} s    {math.degrees(angle):.0f} deg    {pressure / 1e5:.1f} bar")
-        return self.arm, self.payload, self.muscle, self.text
+        bars = " / ".join(f"{float(p[row]) / 1e5:.1f}" for p in self.result.under("muscle_pressure").values())
+        self.text.set_text(f"{self.result.time[row]:.2f} s    {said}    {bars} bar")
+        return self.arm, self.payload, self.text, *(group.line for group in self.groups)
