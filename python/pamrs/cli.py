@@ -18,6 +18,7 @@ from pamrs.cli_design import design_app
 from pamrs.cli_fit import fit_app
 from pamrs.cli_library import library_command, size_command
 from pamrs.cli_shared import check_writable, progress
+from pamrs.rig_files import packaged
 
 if TYPE_CHECKING:
     import numpy as np
@@ -198,11 +199,13 @@ def _write_csv(path: Path, columns: Mapping[str, NDArray[np.float64]]) -> None:
 
 @rig_app.command("check")
 def _rig_check(file: Annotated[Path, typer.Argument(help="Rig file (TOML), or the name of a rig of the package.")]) -> None:
-    """Check a rig file and list its parameters in SI units."""
+    """Check a rig file, say what is connected to what, and list its parameters in SI units."""
     from pamrs.simulation import core_rig
 
     rig = _rig(file)
     core_rig(rig)  # what only the whole model shows: lengths that the muscle cannot have, angles that the tendon does not reach
+    for line in rig.wiring:
+        typer.echo(line)
     width = max((len(name) for name in rig.parameters), default=0)
     for name, parameter in rig.parameters.items():
         known = f"{parameter.value:.6g}" if parameter.known else "unknown"
@@ -214,7 +217,7 @@ def _rig_check(file: Annotated[Path, typer.Argument(help="Rig file (TOML), or th
 @rig_app.command("new")
 def _rig_new(
     file: Annotated[Path, typer.Argument(help="The file to write; it must not be there yet.")],
-    like: Annotated[str, typer.Option(help="Rig of the package to begin with: shoulder or sealed_chamber.")] = "shoulder",
+    like: Annotated[str, typer.Option(help=f"Rig of the package to begin with: {', '.join(packaged())}.")] = "shoulder",
     name: Annotated[str | None, typer.Option(help="What to call the rig; by default as the file.")] = None,
 ) -> None:
     """Write a rig file to begin with, every key explained in comments."""

@@ -1,13 +1,14 @@
 """Rigs: the nominal model of a test stand, read from TOML with units and tolerances.
 
-A rig is a chain of blocks (supply, valve, chamber, muscle, joint, arm, sensors) around a gas. Only
-``gas`` and ``chamber`` are always there. Everything inside is SI; angles are radians, pressures gauge.
+A rig is blocks around a gas: supplies, valves, lines and chambers that the air goes through, muscles, joints and an arm or a
+load that the force goes through, sensors. Only ``gas`` and ``chamber`` are always there. A block that stands once needs no name;
+several of a kind have one each, and ports say which is connected to which. Everything inside is SI; angles are radians, pressures
+gauge.
 """
 
 from __future__ import annotations
 
 import copy
-import json
 import math
 import os
 from collections.abc import Iterator, Mapping
@@ -16,13 +17,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pamrs.errors import ParameterError, RigError, joined
-from pamrs.rig_reader import read_model
-from pamrs.rig_schema import BLOCKS, SCHEMA, Key, find_key, keys_of
+from pamrs.rig_ports import Ports, bare, connect, effect_problem, wiring
+from pamrs.rig_reader import Content, read_model
+from pamrs.rig_schema import BLOCKS, Key, keys_of, qualified, split_name, tables_of
+from pamrs.rig_writer import core_json, toml_text
 
 if TYPE_CHECKING:
     from pamrs.muscle import Muscle
 
 __all__ = ["Parameter", "Rig", "load_rig", "parse_rig"]
+
+_MADE_AGAIN = ("_compiled", "_connected")  # by the core and from the ports when they are needed
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +37,7 @@ class Parameter:
     Attributes
     ----------
     name : str
-        Dotted name, ``"valve.discharge_area_max"``.
+        Dotted name, ``"valve.discharge_area_max"`` or, of a block with a name, ``"valve.flexor.discharge_area_max"``.
     value : float
         SI value; only a placeholder where ``known`` is False.
     unit : str
@@ -74,14 +79,77 @@ class Rig:
     source: str = field(default="", repr=False)
 
     def __getstate__(self) -> dict[str, Any]:
-        return {name: value for name, value in self.__dict__.items() if name != "_compiled"}  # made again when needed
+        return {name: value for name, value in self.__dict__.items() if name not in _MADE_AGAIN}
 
     # ------------------------------------------------------------------ reading
 
     @property
     def model(self) -> dict[str, Any]:
-        """The nested model as the core takes it: SI values, absent blocks None (a copy)."""
+        """The nested model in SI values (a copy).
+
+        A block is its table, named ones are ``{name: table}``, an absent one is None. ``"ports"`` has the ports that the file
+        gives, by the full name of the block; :meth:`ports` has all of them.
+        """
         return copy.deepcopy(self._model)
+
+    def tables(self, block: str) -> dict[str, dict[str, Any]]:
+        """The tables of one kind of block, with or without names (a copy).
+
+        Parameters
+        ----------
+        block : str
+            For example ``"valve"``.
+
+        Returns
+        -------
+        dict
+            Name -> SI table, in the order of the file; ``""`` is the name of a block without one. Empty when the rig has none.
+
+        Raises
+        ------
+        ParameterError
+            If there is no such kind of block.
+        """
+        if block not in BLOCKS:
+            raise ParameterError(f"block = {block!r} is not allowed: one of {', '.join(BLOCKS)}")
+        return copy.deepcopy(tables_of(self._model, block))
+
+    def ports(self, block: str) -> dict[str, dict[str, str]]:
+        """What the blocks of one kind are connected to, given in the file or by default.
+
+        Parameters
+        ----------
+        block : str
+            For example ``"valve"``, whose ports are ``from`` and ``to``.
+
+        Returns
+        -------
+        dict
+            Name -> port -> block in full, ``"chamber.flexor"``; links base first. The ``from`` of a line that valves feed is ``""``.
+
+        Raises
+        ------
+        ParameterError
+            If there is no such kind of block.
+        RigError
+            If the blocks do not fit together, which only a rig made by hand can show.
+        """
+        names = self.tables(block)
+        return copy.deepcopy(self._ports().get(block, {name: {} for name in names}))
+
+    @property
+    def wiring(self) -> list[str]:
+        """The ways of the air and of the force in words, one line each: ``"air: supply -> valve -> chamber -> ambient"``."""
+        return wiring(self._model, self._ports())
+
+    def _ports(self) -> Ports:
+        cached: Ports | None = self.__dict__.get("_connected")
+        if cached is None:
+            cached, problems = connect(self._model)
+            if problems:
+                raise RigError(joined(f"rig {self.name!r}", problems))
+            object.__setattr__(self, "_connected", cached)
+        return cached
 
     @property
     def parameters(self) -> dict[str, Parameter]:
@@ -90,7 +158,7 @@ class Rig:
 
     @property
     def effects(self) -> list[dict[str, Any]]:
-        """The omitted physics already in the model: ``{"id", "parameters": {name: SI value}}`` each."""
+        """The omitted physics already in the model: ``{"id", "parameters": {name: SI value}}`` each, ``"at"`` if on one block only."""
         effects: list[dict[str, Any]] = copy.deepcopy(self._model["effects"])
         return effects
 
@@ -101,17 +169,47 @@ class Rig:
 
     @property
     def blocks(self) -> tuple[str, ...]:
-        """The blocks that this rig has."""
-        return tuple(block for block in BLOCKS if self._model[block] is not None)
+        """The kinds of block that this rig has."""
+        return tuple(block for block in BLOCKS if tables_of(self._model, block))
 
     @property
     def muscle(self) -> Muscle | None:
-        """The rig's muscle as a model of its own, or None when the rig has none."""
-        if self._model["muscle"] is None:
-            return None
+        """The rig's muscle as a model of its own, or None when the rig has none.
+
+        Raises
+        ------
+        ParameterError
+            If the rig has several: :meth:`muscle_of` takes the name of one.
+        """
+        names = list(tables_of(self._model, "muscle"))
+        if len(names) > 1:
+            raise ParameterError(f"rig {self.name!r} has the muscles {', '.join(names)}: take one by Rig.muscle_of(name)")
+        return self.muscle_of(names[0]) if names else None
+
+    def muscle_of(self, name: str = "") -> Muscle:
+        """One of the rig's muscles as a model of its own.
+
+        Parameters
+        ----------
+        name : str
+            Its name; ``""`` for the muscle without a name.
+
+        Returns
+        -------
+        Muscle
+
+        Raises
+        ------
+        ParameterError
+            If the rig has no such muscle.
+        """
+        tables = tables_of(self._model, "muscle")
+        if name not in tables:
+            there = ", ".join(map(repr, tables)) or "none"
+            raise ParameterError(f"name = {name!r}: rig {self.name!r} has no such muscle; it has: {there}")
         from pamrs.muscle import Muscle
 
-        return Muscle.from_model(self._model["muscle"])
+        return Muscle.from_model(tables[name])
 
     def parameter(self, name: str) -> Parameter:
         """One parameter by its dotted name.
@@ -119,7 +217,7 @@ class Rig:
         Parameters
         ----------
         name : str
-            For example ``"arm.payload"``.
+            For example ``"arm.payload"``, or ``"chamber.flexor.dead_volume"`` of a block with a name.
 
         Returns
         -------
@@ -130,25 +228,26 @@ class Rig:
         ParameterError
             If the rig has no such scalar.
         """
-        key = self._key(name)
-        block = name.partition(".")[0]
+        table, key = self._scalar(self._model, name)
         tol = self._tolerances.get(name, 0.0)
-        value = float(self._model[block][key.name])
-        return Parameter(name, value, key.unit, tol, key.lower, key.upper, not math.isinf(tol))
+        return Parameter(name, float(table[key.name]), key.unit, tol, key.lower, key.upper, not math.isinf(tol))
 
     def _scalars(self) -> Iterator[tuple[str, Key]]:
-        for block in self.blocks:
-            for key in keys_of(block, self._model[block]):
-                if key.kind in ("scalar", "count"):
-                    yield f"{block}.{key.name}", key
+        for block in BLOCKS:
+            for name, table in tables_of(self._model, block).items():
+                for key in keys_of(block, table):
+                    if key.kind in ("scalar", "count") and key.name in table:
+                        yield f"{qualified(block, name)}.{key.name}", key
 
-    def _key(self, name: str) -> Key:
-        key = find_key(name)
-        block = name.partition(".")[0]
-        if key is None or key.kind not in ("scalar", "count") or key.name not in (self._model.get(block) or {}):
-            known = ", ".join(dotted for dotted, _ in self._scalars())
-            raise ParameterError(f"rig {self.name!r} has no parameter {name!r}; it has: {known}")
-        return key
+    def _scalar(self, model: dict[str, Any], dotted: str) -> tuple[dict[str, Any], Key]:
+        """The table in which ``model`` has a scalar, and what is known of it; the model is of the form of this rig's own."""
+        block, name, own = split_name(dotted)
+        table = tables_of(model, block).get(name, {}) if block in BLOCKS else {}
+        key = next((key for key in BLOCKS.get(block, ()) if key.name == own and own in table), None)
+        if key is None or key.kind not in ("scalar", "count"):
+            known = ", ".join(scalar for scalar, _ in self._scalars())
+            raise ParameterError(f"rig {self.name!r} has no parameter {dotted!r}; it has: {known}")
+        return table, key
 
     # ----------------------------------------------------------------- changing
 
@@ -173,7 +272,7 @@ class Rig:
         model = self.model
         problems = []
         for name, value in values.items():
-            key = self._key(name)
+            table, key = self._scalar(model, name)
             number = float(value)
             if not (math.isfinite(number) and key.lower <= number <= key.upper):
                 problems.append(f"{name} = {number:g} {key.unit} is not allowed: {_range(key)}")
@@ -181,7 +280,7 @@ class Rig:
             if whole and not number.is_integer():
                 problems.append(f"{name} = {number:g} is not allowed: a whole number is needed")
                 continue
-            model[name.partition(".")[0]][key.name] = int(number) if whole else number
+            table[key.name] = int(number) if whole else number
         if problems:
             raise ParameterError(joined(f"rig {self.name!r}", problems))
         return Rig(self.name, model, self._tolerances, self._effect_std, self.source)
@@ -192,6 +291,7 @@ class Rig:
         parameters: Mapping[str, float] | None = None,
         *,
         std: Mapping[str, float] | None = None,
+        at: str = "",
     ) -> Rig:
         """A rig with one effect more; an effect of the same id is replaced.
 
@@ -203,6 +303,8 @@ class Rig:
             SI values; what is left out gets the catalogue's default.
         std : mapping of str to float, optional
             Standard deviations, SI; written to the file as a note of how well each is known.
+        at : str, optional
+            Name of the one block on which it acts, for example of a chamber; by default it acts on every block of its kind.
 
         Returns
         -------
@@ -212,16 +314,18 @@ class Rig:
         Raises
         ------
         ParameterError
-            For an unknown effect or parameter, or a value outside its bounds.
+            For an unknown effect, parameter or block, or a value outside its bounds.
         """
         from pamrs.effects_table import EFFECTS
 
         info = EFFECTS.get(effect)
         if info is None:
             raise ParameterError(f"unknown effect {effect!r}; the catalogue has: {', '.join(sorted(EFFECTS))}")
+        at = bare(info.block, at)
         given = dict(parameters or {})
         names = [parameter.name for parameter in info.parameters]
         problems = [f"unknown parameter {name!r}; it has: {', '.join(names)}" for name in {*given, *(std or {})} if name not in names]
+        problems += [text] if (text := effect_problem(self._model, effect, at)) else []
         chosen: dict[str, float] = {}
         for parameter in info.parameters:
             value = float(given.get(parameter.name, parameter.default))
@@ -235,7 +339,7 @@ class Rig:
             raise ParameterError(joined(f"effect {effect!r}", problems))
         base = self.without_effect(effect)
         model = base.model
-        model["effects"].append({"id": effect, "parameters": chosen})
+        model["effects"].append({"id": effect, **({"at": at} if at else {}), "parameters": chosen})
         kept = {**base._effect_std, **({effect: {k: float(v) for k, v in std.items()}} if std else {})}
         return Rig(self.name, model, self._tolerances, kept, self.source)
 
@@ -259,29 +363,22 @@ class Rig:
     # ------------------------------------------------------------------ writing
 
     def to_json(self) -> str:
-        """The model as JSON text, as the core takes it (SI, radians, gauge pressures)."""
-        return json.dumps(self._model)
+        """The model as JSON text, as the core takes it: every block in a list, every port in full (SI, radians, gauge pressures).
+
+        Returns
+        -------
+        str
+
+        Raises
+        ------
+        RigError
+            As :meth:`ports`.
+        """
+        return core_json(self._model, self._ports())
 
     def to_toml_text(self) -> str:
-        """The rig as TOML in SI units; reading it gives the same numbers to the last bit."""
-        lines = [f"schema = {_text(SCHEMA)}", f"name = {_text(self.name)}"]
-        for block in self.blocks:
-            lines += ["", f"[{block}]"]
-            groups: dict[str, list[str]] = {}
-            for key in keys_of(block, self._model[block]):
-                if len(key.where) == 1:
-                    lines.append(f"{key.name} = {self._entry(block, key)}")
-                else:
-                    groups.setdefault(key.where[0], []).append(f"{key.where[1]} = {self._entry(block, key)}")
-            lines += [f"{group} = {{ {', '.join(members)} }}" for group, members in groups.items()]
-        for effect in self._model["effects"]:
-            lines += ["", "[[effects]]", f"id = {_text(effect['id'])}", "[effects.parameters]"]
-            units = _effect_units(effect["id"])
-            spread = self._effect_std.get(effect["id"], {})
-            for name, value in effect["parameters"].items():
-                std = f", std = {_number(spread[name])}" if name in spread else ""
-                lines.append(f"{name} = {{ value = {_number(value)}, unit = {_text(units[name])}{std} }}")
-        return "\n".join(lines) + "\n"
+        """The rig as TOML in SI units; reading it gives the same numbers to the last bit, the same names and the same ports."""
+        return toml_text(Content(self.name, self._model, self._tolerances, self._effect_std))
 
     def to_toml(self, path: str | os.PathLike[str]) -> Path:
         """Write :meth:`to_toml_text` to a file.
@@ -307,38 +404,6 @@ class Rig:
             return write_atomically(path, self.to_toml_text())
         except OSError as error:
             raise RigError(f"{path}: cannot be written ({error.strerror or error})") from error
-
-    def _entry(self, block: str, key: Key) -> str:
-        value = self._model[block][key.name]
-        if key.kind == "choice":
-            return _text(value)
-        if key.kind == "count":
-            return str(value)
-        if key.kind == "vector":
-            numbers = "[" + ", ".join(_number(item) for item in value) + "]"
-            if key.path:
-                return numbers
-        tol = self._tolerances.get(f"{block}.{key.name}", 0.0)
-        note = "" if tol == 0.0 else (", unknown = true" if math.isinf(tol) else f", tol = {_number(tol)}")
-        if key.kind == "vector":
-            return f"{{ value = {numbers}, unit = {_text(key.unit)}{note} }}"
-        if key.path and not note:
-            return _number(value)
-        return f"{{ value = {_number(value)}, unit = {_text(key.unit)}{note} }}"
-
-
-def _effect_units(effect: str) -> dict[str, str]:
-    from pamrs.effects_table import EFFECTS
-
-    return {parameter.name: parameter.unit for parameter in EFFECTS[effect].parameters}
-
-
-def _text(value: str) -> str:
-    return json.dumps(value, ensure_ascii=False)
-
-
-def _number(value: float) -> str:
-    return repr(float(value))
 
 
 def _range(key: Key) -> str:

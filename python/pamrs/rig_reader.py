@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
+import re
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -11,13 +12,16 @@ from typing import Any
 
 from pamrs.errors import ParameterError, RigError, joined
 from pamrs.muscle_models import own_geometry
-from pamrs.rig_schema import BLOCKS, REQUIRED_BLOCKS, SCHEMA, Key, keys_of, kind_of
+from pamrs.rig_checks import block_problems
+from pamrs.rig_ports import bare, connect, near_name
+from pamrs.rig_schema import BLOCKS, PORTS, REQUIRED_BLOCKS, SCHEMA, SINGLE_BLOCKS, Key, Port, keys_of, kind_of, qualified, tables_of
 from pamrs.units import to_si
 
 __all__ = ["Content", "Reader", "read_model"]
 
 _TOP = ("schema", "name", "description", "effects")
 _QUANTITY = ("value", "unit", "tol", "unknown")
+_NAME = re.compile(r"[A-Za-z0-9_-]+")
 
 
 @dataclass
@@ -73,6 +77,8 @@ class Reader:
         self.problems: list[str] = []
         self.tolerances: dict[str, float] = {}
         self.effect_std: dict[str, dict[str, float]] = {}
+        self.ports: dict[str, dict[str, str]] = {}
+        self.whole = True  # every block could be told: what is connected to what can be checked
 
     def problem(self, text: str) -> None:
         """Note a problem."""
@@ -98,50 +104,104 @@ class Reader:
         if not isinstance(name, str) or not name.strip():
             self.problem(f"name = {_shown(name)} is not allowed: a text is needed")
             name = "rig"
+        self.whole = set(document) <= {*_TOP, *BLOCKS}
         model: dict[str, Any] = {"name": name}
         for block in BLOCKS:
-            table = document.get(block)
-            if table is None:
-                if block in REQUIRED_BLOCKS:
-                    self.problem(f"the block [{block}] is missing")
-                model[block] = self.block("sensors", {}) if block == "sensors" else None
-            elif isinstance(table, Mapping):
-                model[block] = self.block(block, table)
-            else:
-                self.problem(f"{block} = {_shown(table)} is not allowed: a table [{block}] is needed")
-                model[block] = None
+            model[block] = self.blocks(block, document.get(block))
+        self.sensors(model, document.get("sensors"))
+        model["ports"] = self.ports
         model["effects"] = self.effects(document.get("effects", []))
-        if not self.problems:
-            self.cross_checks(model)
+        if self.whole:
+            self.problems += connect(model)[1]
+        self.problems += block_problems(model)
         return Content(name, model, self.tolerances, self.effect_std)
 
-    def block(self, block: str, table: Mapping[str, Any]) -> dict[str, Any]:
-        """One block by the keys of its table."""
+    def blocks(self, block: str, raw: Any) -> dict[str, Any] | None:
+        """A block without a name, or all blocks of a kind by their names; None where there is none."""
+        if raw is None:
+            if block in REQUIRED_BLOCKS:
+                self.problem(f"the block [{block}] is missing")
+                self.whole = False
+            return None
+        if not isinstance(raw, Mapping):
+            self.problem(f"{block} = {_shown(raw)} is not allowed: a table [{block}] is needed")
+            self.whole = False
+            return None
+        names = _block_names(block, raw)
+        if not names:
+            return self.block(block, raw, ports=PORTS.get(block, ()))
+        others = [name for name in raw if name not in names]
+        if block in SINGLE_BLOCKS or others:
+            self.whole = False
+            named = ", ".join(f"[{block}.{name}]" for name in names)
+            if block in SINGLE_BLOCKS:
+                self.problem(f"{named} is not allowed: a rig has one [{block}], without a name")
+            else:
+                self.problem(f"[{block}] has {', '.join(others)} beside {named}: either one [{block}] or only named ones are needed")
+            return None
+        wrong = [name for name in names if not _NAME.fullmatch(name)]
+        for name in wrong:
+            self.problem(f"[{block}.{name!r}]: the name {name!r} is not allowed: letters, digits, _ and - are needed")
+            self.whole = False
+        return {name: self.block(block, raw[name], name, ports=PORTS.get(block, ())) for name in names if name not in wrong}
+
+    def block(self, block: str, table: Mapping[str, Any], name: str = "", *, ports: Iterable[Port] = ()) -> dict[str, Any]:
+        """One block by the keys of its table; the ports that it may have go to :attr:`ports`."""
+        label = qualified(block, name)
         groups: dict[str, list[str]] = {}
         for key in BLOCKS[block]:
             if key.path:
                 groups.setdefault(key.path[0], []).append(key.path[1])
-        self.unknown_keys(f"{block}.", table, [*(k.name for k in BLOCKS[block] if not k.path), *groups])
+        allowed = [port.name for port in ports]
+        self.unknown_keys(f"{label}.", table, [*allowed, *(k.name for k in BLOCKS[block] if not k.path), *groups])
         for group, members in groups.items():
             inner = table.get(group)
             if isinstance(inner, Mapping):
-                self.unknown_keys(f"{block}.{group}.", inner, members)
+                self.unknown_keys(f"{label}.{group}.", inner, members)
             elif inner is not None:
-                self.problem(f"{block}.{group} = {_shown(inner)} is not allowed: give {', '.join(members)} as a table")
+                self.problem(f"{label}.{group} = {_shown(inner)} is not allowed: give {', '.join(members)} as a table")
+        for port in allowed:
+            other = table.get(port)
+            if isinstance(other, str):
+                self.ports.setdefault(label, {})[port] = other
+            elif other is not None:
+                self.problem(f"{label}.{port} = {_shown(other)} is not allowed: the name of a block is needed")
         keys = keys_of(block, table)
         for key in BLOCKS[block]:
             if key not in keys and _dig(table, key.where) is not None:
-                kind, allowed = _shown(kind_of(block, table)), ", ".join(key.only)
-                self.problem(f"{block}.{key.name} is not allowed with {kind}: only with {allowed}")
-        content = {key.name: self.value(block, key, _dig(table, key.where)) for key in keys}
+                kind, only = _shown(kind_of(block, table)), ", ".join(key.only)
+                self.problem(f"{label}.{key.name} is not allowed with {kind}: only with {only}")
+        content = {key.name: self.value(label, key, _dig(table, key.where)) for key in keys}
         if content.get("geometry") == "":
             content["geometry"] = own_geometry(content["model"])
         return content
 
+    def sensors(self, model: dict[str, Any], raw: Any) -> None:
+        """Put in the sensors that a file leaves out, and hold their names against the chambers and joints.
+
+        Sensors without a name are those of every chamber and joint, so that they are always there where none has a name.
+        """
+        if raw is None:
+            model["sensors"] = self.block("sensors", {})
+        owners = {"pressure_zero": tables_of(model, "chamber"), "angle_zero": tables_of(model, "joint")}
+        for name, table in tables_of(model, "sensors").items():
+            if not name or not self.whole:
+                continue
+            if not any(name in names for names in owners.values()):
+                named = dict.fromkeys(other for names in owners.values() for other in names if other)
+                self.problem(f"the block [sensors.{name}] is named after no chamber and no joint{near_name(name, named)}")
+                continue
+            for key, names in owners.items():
+                if name not in names:
+                    del table[key]
+                    if key in raw[name]:
+                        what = "chamber" if key == "pressure_zero" else "joint"
+                        self.problem(f"sensors.{name}.{key} is not allowed: the rig has no {what}.{name}")
+
     # -------------------------------------------------------------------- values
 
     def value(self, block: str, key: Key, raw: Any) -> Any:
-        """The value of one key in SI, None after noting what is wrong with it."""
+        """The value of one key in SI, None after noting what is wrong with it; ``block`` is what its block is called."""
         label = ".".join((block, *key.where))
         if raw is None:
             if key.default is None:
@@ -150,6 +210,7 @@ class Reader:
         if key.kind == "choice":
             if raw not in key.choices:
                 self.problem(f"{label} = {_shown(raw)} is not allowed: one of {', '.join(map(repr, key.choices))}")
+                return None
             return raw
         bare_allowed = key.kind == "count" or bool(key.path)
         number, unit, extra = self.quantity(label, key, raw, bare_allowed)
@@ -220,7 +281,8 @@ class Reader:
             self.problem(f"{label} = {_shown(numbers)} is not allowed: a list of numbers is needed")
             return None
         values = [self.scalar(f"{label}[{i}]", key.unit, number, unit, key.lower, key.upper) for i, number in enumerate(numbers)]
-        return [value for value in values if value is not None]
+        known = [value for value in values if value is not None]
+        return known if len(known) == len(values) else None
 
     def spread(self, name: str, label: str, key: Key, unit: str, extra: Mapping[str, Any]) -> None:
         """Keep what is known of a value: ``tol``, or ``unknown = true``."""
@@ -251,7 +313,7 @@ class Reader:
         found: list[dict[str, Any]] = []
         for index, entry in enumerate(raw):
             label = f"effects[{index}]"
-            self.unknown_keys(f"{label}.", entry, ("id", "parameters"))
+            self.unknown_keys(f"{label}.", entry, ("id", "at", "parameters"))
             identity = entry.get("id")
             if not isinstance(identity, str) or identity not in EFFECTS:
                 allowed = ", ".join(sorted(EFFECTS))
@@ -269,8 +331,16 @@ class Reader:
             values = {
                 parameter.name: self.effect_value(identity, parameter, given.get(parameter.name)) for parameter in info.parameters
             }
-            found.append({"id": identity, "parameters": values})
+            place = self.place(label, info.block, entry.get("at", ""))
+            found.append({"id": identity, **({"at": place} if place else {}), "parameters": values})
         return found
+
+    def place(self, label: str, block: str, raw: Any) -> str:
+        """Name of the block that an effect acts on, ``""`` for every one of its kind."""
+        if not isinstance(raw, str):
+            self.problem(f"{label}.at = {_shown(raw)} is not allowed: the name of a {block} is needed")
+            return ""
+        return bare(block, raw)
 
     def effect_value(self, identity: str, parameter: Any, raw: Any) -> float | None:
         """One parameter of an effect, its default where it is left out."""
@@ -292,62 +362,16 @@ class Reader:
                 self.effect_std.setdefault(identity, {})[parameter.name] = std
         return value
 
-    # -------------------------------------------------------------- whole model
 
-    def cross_checks(self, model: Mapping[str, Any]) -> None:
-        """What no key alone shows: lists that belong together, and blocks that need each other."""
-        for block, needs in (("valve", "supply"), ("joint", "muscle"), ("joint", "arm"), ("arm", "joint"), ("load", "muscle")):
-            if model[block] is not None and model[needs] is None:
-                self.problem(f"the block [{block}] needs the block [{needs}], which is missing")
-        load = model["load"]
-        if load is not None:
-            if model["joint"] is not None or model["arm"] is not None:
-                self.problem("the block [load] does not go with [joint] and [arm]: a rig has one or the others")
-            if not load["min_length"] < load["max_length"]:
-                self.problem(
-                    f"load.max_length = {load['max_length']:g} m is not allowed: "
-                    f"more than load.min_length = {load['min_length']:g} m is needed"
-                )
-        valve, muscle, joint = model["valve"], model["muscle"], model["joint"]
-        if valve is not None:
-            self.area_fraction(valve["opening"], valve["fraction"])
-        if muscle is not None:
-            self.muscle(muscle)
-        if joint is not None and not joint["min_angle"] < joint["max_angle"]:
-            self.problem(
-                f"joint.max_angle = {joint['max_angle']:g} rad is not allowed: "
-                f"more than joint.min_angle = {joint['min_angle']:g} rad is needed"
-            )
-
-    def area_fraction(self, opening: list[float], fraction: list[float]) -> None:
-        """Note what is wrong with a valve's area table."""
-        label = "valve.area_fraction"
-        if len(opening) != len(fraction) or len(opening) < 2:
-            self.problem(
-                f"{label}: opening has {len(opening)} values and fraction {len(fraction)}; the same number, two at least, is needed"
-            )
-            return
-        if opening[0] != 0.0 or opening[-1] != 1.0 or any(b <= a for a, b in zip(opening, opening[1:], strict=False)):
-            self.problem(f"{label}.opening = {opening} is not allowed: it must rise from 0 to 1")
-        if any(b < a for a, b in zip(fraction, fraction[1:], strict=False)):
-            self.problem(f"{label}.fraction = {fraction} is not allowed: it must not fall")
-
-    def muscle(self, muscle: Mapping[str, Any]) -> None:
-        """Note what does not go together in a muscle."""
-        slope, offset = muscle.get("modulus_slope", []), muscle.get("modulus_offset", [])
-        if len(slope) != len(offset):
-            self.problem(
-                f"muscle.modulus_slope has {len(slope)} values and muscle.modulus_offset {len(offset)}; the same number is needed"
-            )
-        factors = muscle.get("extension_factors", [])
-        if factors and len(factors) != 3:
-            self.problem(f"muscle.extension_factors has {len(factors)} values; three are needed")
-        thickness, diameter = muscle["wall_thickness"], muscle["rest_diameter"]
-        if not thickness < diameter / 2:
-            self.problem(
-                f"muscle.wall_thickness = {thickness:g} m is not allowed: "
-                f"less than half of muscle.rest_diameter = {diameter:g} m is needed"
-            )
+def _block_names(block: str, table: Mapping[str, Any]) -> list[str]:
+    """Entries of a block that are blocks with a name, and neither a key of its own nor a mistyped one."""
+    own = {*(key.where[0] for key in BLOCKS[block]), *(port.name for port in PORTS.get(block, ()))}
+    names = [
+        name for name, inner in table.items() if name not in own and isinstance(inner, Mapping) and not {"value", "unit"} & {*inner}
+    ]
+    if own & {*table}:
+        names = [name for name in names if not difflib.get_close_matches(name, own, n=1)]
+    return names
 
 
 def _dig(table: Mapping[str, Any], path: tuple[str, ...]) -> Any:

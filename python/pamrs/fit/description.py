@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 from pamrs.errors import RecordingError, joined
 from pamrs.fit.data import ForceMap
 from pamrs.muscle_models import models_with
+from pamrs.rig_checks import muscle_problems
 from pamrs.rig_reader import Reader
 
 if TYPE_CHECKING:
@@ -109,7 +110,7 @@ def load_measured_muscle(path: str | os.PathLike[str]) -> MeasuredMuscle:
     if isinstance(block, Mapping):
         model = reader.block("muscle", with_moduli(block))
         if not reader.problems:
-            reader.muscle(model)
+            reader.problems += muscle_problems("muscle", model)
     else:
         reader.problem("the block [muscle] is missing: the geometry of the muscle, as in a rig file")
     if reader.problems:

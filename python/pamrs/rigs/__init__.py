@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import json
-from importlib import resources
 from typing import TYPE_CHECKING, Final
 
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig, parse_rig
+from pamrs.rig_files import packaged, text_of
 from pamrs.rig_schema import keys_of
 
 if TYPE_CHECKING:
@@ -24,18 +24,17 @@ dead_volume = {{ value = {volume!r}, unit = "m3" }}
 
 
 _INSIDE: Final = 0.999  # of the range of the muscle that the frame uses
-_NAMES: Final = ("shoulder", "sealed_chamber")
 
 
 def names() -> list[str]:
-    """Names of the rigs that come with the package."""
-    return list(_NAMES)
+    """Names of the rigs that come with the package, the shoulder first."""
+    return packaged()
 
 
 def _text(name: str) -> str:
-    if name not in _NAMES:
-        raise ParameterError(f"rig = {name!r} does not come with the package; there are: {', '.join(_NAMES)}")
-    return resources.files(__name__).joinpath(f"{name}.toml").read_text(encoding="utf-8")
+    if name not in names():
+        raise ParameterError(f"rig = {name!r} does not come with the package; there are: {', '.join(names())}")
+    return text_of(name)
 
 
 def named(name: str) -> Rig:
