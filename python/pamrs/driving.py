@@ -79,8 +79,8 @@ def signals_of(
     given = {
         **_named("valve_command", valve_command, list(valves), "valve"),
         **_named("supply_command", supply_command, regulators, "supply of kind regulator"),
-        **_named("pressure", pressure, list(rig.tables("chamber")), "chamber"),
         **({} if length is None else {"length": length}),
+        **_named("pressure", pressure, list(rig.tables("chamber")), "chamber"),
     }
     for name in valves:
         if dotted("valve_command", name) not in given:
@@ -106,7 +106,9 @@ def initial_values(initial: Mapping[str, float] | None, rig: Rig) -> dict[str, f
         if not tables:
             raise ParameterError(f"initial has {name!r}, but the rig {rig.name!r} has no [{_INITIAL[channel]}]")
         if block not in tables:
-            raise ParameterError(f"initial has {name!r}; the rig {rig.name!r} has: {', '.join(dotted(channel, other) for other in tables)}")
+            raise ParameterError(
+                f"initial has {name!r}; the rig {rig.name!r} has: {', '.join(dotted(channel, other) for other in tables)}"
+            )
         try:
             start[name] = float(value)
         except (TypeError, ValueError):
@@ -124,11 +126,15 @@ def _named(channel: str, given: Signals | None, names: list[str], block: str) ->
         return {}
     if not isinstance(given, Mapping):
         if len(names) > 1:
-            raise ParameterError(f"{channel} is one signal, and the rig has a {block} each of: {', '.join(names)}; give a mapping of names")
+            raise ParameterError(
+                f"{channel} is one signal, and the rig has a {block} each of: {', '.join(names)}; give a mapping of names"
+            )
         return {dotted(channel, names[0] if names else ""): given}
     for name in given:
         if name not in names:
-            raise ParameterError(f"{channel} has {name!r}, and the rig has no {block} of that name; it has: {', '.join(names) or 'none'}")
+            raise ParameterError(
+                f"{channel} has {name!r}, and the rig has no {block} of that name; it has: {', '.join(names) or 'none'}"
+            )
     return {dotted(channel, name): values for name, values in given.items()}
 
 

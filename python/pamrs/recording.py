@@ -39,7 +39,8 @@ class _Channel(NamedTuple):
     upper: float
 
 
-#: Canonical channels, each with the name of its block behind a dot where a rig has several (``muscle_pressure.flexor``): SI unit and the range of the possible (SI; pressures gauge).
+#: Canonical channels: SI unit and the range of the possible (SI; pressures gauge). Where a rig has several blocks of a kind, the
+#: name of the block stands behind a dot: ``muscle_pressure.flexor``.
 CHANNELS: Final[dict[str, _Channel]] = {
     "time": _Channel("s", -math.inf, math.inf),
     "valve_command": _Channel("V", -1000.0, 1000.0),

@@ -326,7 +326,9 @@ def _rows(sample_time: float, duration: float | None, *given: Signals | None) ->
         return None
     signals = [v for g in given if g is not None for v in (g.values() if isinstance(g, Mapping) else [g])]
     if any(np.ndim(signal) > 0 for signal in signals):
-        raise ParameterError(f"duration = {duration} is not allowed together with a signal that sets it (valve_command, length, pressure)")
+        raise ParameterError(
+            f"duration = {duration} is not allowed together with a signal that sets it (valve_command, length, pressure)"
+        )
     if not (np.isfinite(duration) and duration >= 0):
         raise ParameterError(f"duration = {duration} is not allowed: a finite time >= 0 s (or give valve_command)")
     return round(duration / sample_time) + 1

@@ -240,7 +240,7 @@ class Simulator:
         held.append(held[-1] if held else {})
         inputs = {name: np.array([row[name] for row in held]) for name in held[0] if name not in rows[0]}
         channels = {name: np.array([row[name] for row in rows]) for name in rows[0]}
-        time = began + np.arange(total + 1) * self.sample_time
+        time = np.asarray(began + np.arange(total + 1) * self.sample_time, dtype=np.float64)
         return Simulation({"time": time, **inputs, **channels}, self.rig, self.events[happened:])
 
     def _samples(self, name: str, value: float, least: int) -> int:

@@ -118,8 +118,8 @@ def test_convergence_is_of_fourth_order() -> None:
         run = pamrs.simulate(rig, valve_command=command, sample_time=0.02, step=step, initial=START)
         return table(run)[1:] / list(CHANNELS.values())
 
-    fine = final(1e-4)
-    steps = np.array([0.02, 0.01, 0.005, 0.0025])
+    fine = final(2.5e-5)
+    steps = np.array([0.0025, 0.00125, 0.000625])  # longer ones are divided
     errors = np.array([np.max(np.abs(final(float(h)) - fine)) for h in steps])
     order = np.polyfit(np.log(steps), np.log(errors), 1)[0]
     assert 3.7 < order < 4.6, (order, errors)

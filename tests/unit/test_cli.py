@@ -217,5 +217,5 @@ def test_simulate_draws_channels_and_motion(capsys, tmp_path):
 
 def test_a_chamber_has_no_motion(tmp_path):
     still = pamrs.simulate(pamrs.rigs.sealed_chamber(), sample_time=0.1, duration=1.0, initial={"muscle_pressure": 5e5})
-    with pytest.raises(pamrs.ParameterError, match="'sealed_chamber' has no arm to draw"):
+    with pytest.raises(pamrs.ParameterError, match="'sealed_chamber' has no arm and no load to draw"):
         still.animate(tmp_path / "x.gif")

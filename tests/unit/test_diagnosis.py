@@ -16,6 +16,7 @@ from pamrs.diagnosis.result import schema
 from pamrs.diagnosis.signals import noise_level, prepare
 from pamrs.effects_table import EFFECTS
 from pamrs.recording import Recording
+from pamrs.simulation import core_rig
 
 ROOT = Path(__file__).parents[2]
 CHAMBERS = ROOT / "cases" / "zillen_chambers"
@@ -39,7 +40,7 @@ def test_catalogue_matches_the_core() -> None:
     table = {e.id: (e.block, {p.name: p.unit for p in e.parameters}) for e in EFFECTS.values()}
     assert table == core
     for effect in EFFECTS.values():
-        assert set(effect.dotted()) <= set(_core.parameter_names())
+        assert set(effect.dotted()) <= set(core_rig(pamrs.rigs.shoulder().with_effect(effect.id)).parameter_names)
 
 
 @pytest.mark.parametrize("laminar", [0.0, 1.0])

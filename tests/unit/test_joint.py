@@ -85,9 +85,11 @@ def rig_with(kind: str) -> str:
         "polynomial": 'coefficients = { value = [0.03, -0.002], unit = "m" }',
     }.get(kind, "")
     lines = []
+    block = ""
     for line in pamrs.rigs.shoulder().to_toml_text().splitlines():
+        block = line if line.startswith("[") else block
         name = line.partition(" = ")[0]
-        if name == "kind":
+        if name == "kind" and block == "[joint]":
             lines += [f'kind = "{kind}"', own]
         elif not (name in TENDON and name != "rest_angle" and own):
             lines.append(line)

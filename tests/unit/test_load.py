@@ -100,15 +100,15 @@ def test_a_fitted_muscle_goes_onto_the_bench_and_back() -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({}, r"duration = None"),
+        ({}, r"length is missing"),
         ({"duration": 1.0}, r"length is missing"),
         ({"length": [0.27, np.nan]}, r"length\[1\] = nan"),
         ({"length": [0.27, 0.5]}, r"length\[1\] = 0\.5 is not allowed"),
         ({"length": [0.27, 0.26], "pressure": [1e5]}, r"pressure has the shape \(1,\); \(2,\)"),
-        ({"length": [0.27, 0.26], "duration": 1.0}, r"duration = 1\.0 is not allowed together with length"),
+        ({"length": [0.27, 0.26], "duration": 1.0}, r"duration = 1\.0 is not allowed together with a signal that sets it"),
         ({"length": [0.5, 0.26]}, r"length\[0\] = 0\.5"),
         ({"length": [0.27, 0.26], "initial": {"length": 0.25}}, r"initial length = 0\.25 does not go with length\[0\]"),
-        ({"length": [0.27], "initial": {"joint_angle": 0.1}}, r"has 'joint_angle', but the rig .* no \[arm\]"),
+        ({"length": [0.27], "initial": {"joint_angle": 0.1}}, r"has 'joint_angle', but the rig .* no \[joint\]"),
     ],
 )
 def test_what_a_frame_cannot_do_is_named(arguments: dict[str, object], message: str) -> None:
@@ -172,9 +172,8 @@ def test_a_light_mass_is_stable_on_its_stops(mass: float) -> None:
     fine = pamrs.simulate(rig, sample_time=0.005, step=1e-6 if mass < 0.1 else 1e-5, duration=0.5, initial=start)
     assert abs(run["length_rate"][-1]) < 1e-3
     np.testing.assert_allclose(run["length"][-1], fine["length"][-1], atol=1e-6)
-    if mass < 1.0:
-        with pytest.raises(pamrs.ParameterError, match="step = 0.005 s is not allowed"):
-            pamrs.simulate(rig, sample_time=0.005, step=0.005, duration=0.5, initial=start)
+    coarse = pamrs.simulate(rig, sample_time=0.005, step=0.005, duration=0.5, initial=start)  # divided until it is stable
+    np.testing.assert_allclose(coarse["length"][-1], fine["length"][-1], atol=1e-6)
 
 
 def test_a_bench_round_trips() -> None:

@@ -484,6 +484,8 @@ def test_sealed_recordings_are_sound(case: Path) -> None:
 
 def test_every_canonical_channel_is_read(tmp_path: Path) -> None:
     header = ",".join(f"{name} [{channel.unit}]" for name, channel in CHANNELS.items())
-    rows = "\n".join(",".join([str(i)] + [str(300 + (i * 7) % 11)] * 3 + ["0.5"] * 4 + ["300", "1"]) for i in range(9))
+    values = {"V": "5", "Pa": "30{}", "K": "300"}
+    cells = [values.get(channel.unit, "0.5") for name, channel in CHANNELS.items() if name != "time"]
+    rows = "\n".join(f"{i}," + ",".join(cell.format(i * 7 % 11) for cell in cells) for i in range(9))
     recording = load(tmp_path, f"{header}\n{rows}\n")
     assert ["time", *recording.channels] == list(CHANNELS)

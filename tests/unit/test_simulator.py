@@ -68,7 +68,7 @@ def test_bad_input_is_named_and_leaves_the_state_alone() -> None:
     before = one.state
     with pytest.raises(pamrs.ParameterError, match="valve_command is missing"):
         one.step()
-    with pytest.raises(pamrs.ParameterError, match=r"valve_command\[0\] = NaN"):
+    with pytest.raises(pamrs.ParameterError, match=r"valve_command\[0\] = nan"):
         one.step(float("nan"))
     with pytest.raises(pamrs.ParameterError, match=r"valve_command\[1\] = inf"):
         one.run([5.0, np.inf])
