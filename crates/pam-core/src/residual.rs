@@ -5,9 +5,9 @@
 //! the derivative with respect to the window's initial state comes along, so that its error can be projected out.
 
 use crate::rig::parameters::unit;
-use crate::rig::plant::{Memory, Plant, Simulated};
+use crate::rig::plant::{Plant, Simulated};
 use crate::rig::spec::dotted;
-use crate::rig::{Channel, Layout, ParameterId, Rig};
+use crate::rig::{Channel, Layout, Memory, ParameterId, Rig};
 use crate::scalar::{constant, Scalar};
 use crate::simulate::{check_state, Stepper, Timing};
 use crate::{Error, Result};

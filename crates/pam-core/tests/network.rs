@@ -374,7 +374,7 @@ fn a_rig_goes_on_from_its_numbers_bit_for_bit() {
     let (a, b) = (wave(120, 0.0), wave(120, 1.0));
     let drive = |range: std::ops::Range<usize>| {
         let signals: [(&str, &[f64]); 2] = [("valve_command.elbow", &a), ("valve_command.wrist", &b)];
-        pam_core::simulate::Drive::new(&rig, 120, &signals).unwrap().part(range)
+        pam_core::drive::Drive::new(&rig, 120, &signals).unwrap().part(range)
     };
     let mut whole = Progress::start(&rig, &Initial::rest(&rig)).unwrap();
     let mut out = Trajectory::new(&rig, 120);

@@ -6,9 +6,10 @@ use std::sync::Arc;
 use crate::convert::{array, error, values};
 use crate::simulator::{channels, events, initial, run, EventRow};
 use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray1};
+use pam_core::drive::Drive;
 use pam_core::residual::{predict, Block, Measured, Signal};
 use pam_core::rig::RigSpec;
-use pam_core::simulate::{Drive, Progress, Timing, Trajectory};
+use pam_core::simulate::{Progress, Timing, Trajectory};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 

@@ -6,7 +6,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use crate::convert::{array, error, values};
 use crate::rig::{borrowed, owned, Rig, Signals};
 use numpy::{PyArray1, PyReadonlyArray1};
-use pam_core::simulate::{Drive, Initial, Progress, Timing, Trajectory};
+use pam_core::drive::Drive;
+use pam_core::simulate::{Initial, Progress, Timing, Trajectory};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 

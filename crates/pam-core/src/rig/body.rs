@@ -1,6 +1,6 @@
 //! What the muscles move, of any kind.
 
-use super::wiring::{BodyUnit, Coordinate, LinkUnit};
+use super::units::{BodyUnit, Coordinate, LinkUnit};
 use super::Values;
 use crate::arm::linear::HangingMass;
 use crate::arm::one_link::{OneLink, Stops};

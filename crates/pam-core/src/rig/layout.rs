@@ -1,7 +1,8 @@
 //! Where each state and channel of a rig is, and what it is called.
 
 use super::spec::{dotted, RigSpec};
-use super::wiring::{coordinate_names, Wiring};
+use super::units::Wiring;
+use super::wiring_motion::coordinate_names;
 
 /// Number of sums that are kept beside the states: see [`BOOKS`].
 pub const BOOK_COUNT: usize = 6;

@@ -1,19 +1,24 @@
 //! A rig: blocks joined by ports, described by data, composed into one state equation.
 
+mod air;
 mod body;
 mod check;
 pub mod layout;
+pub mod memory;
 pub mod parameters;
 pub mod plant;
 pub mod spec;
+mod units;
 mod wiring;
+mod wiring_motion;
 
 pub use layout::{Channel, Layout, Names};
+pub use memory::Memory;
 pub use parameters::{ParameterId, Parameters, Values};
 pub use plant::Plant;
 pub use spec::RigSpec;
 
-use self::wiring::{Group, Wiring};
+use self::units::{Group, Wiring};
 use crate::gas::orifice::Gas;
 use crate::joint::Joint;
 use crate::muscle::CompiledMuscle;
