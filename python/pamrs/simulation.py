@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pamrs import _core
+from pamrs.channels import dotted
 from pamrs.driving import Signals, initial_values, signals_of
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
@@ -52,7 +53,12 @@ class Balance:
     Attributes
     ----------
     supplied, vented, stored : float
-        Mass out of the supplies (what a regulator takes back subtracted), mass to the ambient, gain of all chambers and lines [kg].
+        Mass out of the supplies, mass to the ambient (what regulators relieve included), gain of all chambers and lines by what
+        flowed [kg].
+    implied : float
+        Gain by the gas law at the rest temperature, ``P V/(R T)`` [kg]. The constant coefficients of filling, emptying and volume
+        change are no energy balance, so that it differs from ``stored`` where they are not 1; with the effect ``heat_transfer``
+        the two differ by the gas's temperature alone.
     energy : float
         ``R T`` times the mass supplied, what section 6 of the dissertation calls ``E_in``: ``(P_initial - P_final) V`` of a
         tank [J].
@@ -67,6 +73,7 @@ class Balance:
     supplied: float
     vented: float
     stored: float
+    implied: float
     energy: float
     exergy: float
     muscle_work: float
@@ -85,7 +92,8 @@ class Balance:
     def __str__(self) -> str:
         return (
             f"air {1e3 * self.supplied:.4g} g supplied, {1e3 * self.vented:.4g} g vented, {1e3 * self.stored:.4g} g stored "
-            f"(residual {1e3 * self.residual:.1e} g); energy {self.energy:.4g} J, exergy {self.exergy:.4g} J; work of the muscles "
+            f"(residual {1e3 * self.residual:.1e} g; {1e3 * self.implied:.4g} g by pressure and volume at rest temperature); "
+            f"energy {self.energy:.4g} J, exergy {self.exergy:.4g} J; work of the muscles "
             f"{self.muscle_work:.4g} J, positive work at the joints {self.joint_work:.4g} J"
             + ("" if math.isnan(self.efficiency) else f", efficiency {100 * self.efficiency:.1f} %")
         )
@@ -146,11 +154,36 @@ class Simulation(Mapping[str, Array]):
             supplied=gain["mass_supplied"],
             vented=gain["mass_vented"],
             stored=sum(float(mass[-1] - mass[0]) for mass in masses),
+            implied=self._implied(),
             energy=gain["energy_supplied"],
             exergy=gain["exergy_supplied"],
             muscle_work=gain["muscle_work"],
             joint_work=gain["joint_work"],
         )
+
+    def _implied(self) -> float:
+        """Gain of mass by the gas law at the rest temperature [kg]."""
+        gas, sensors = self.rig.tables("gas")[""], self.rig.tables("sensors")
+        total = sum(float(mass[-1] - mass[0]) for mass in self.under("line_mass").values())
+        for name, volume in self.under("air_volume").items():
+            zero = float(sensors.get(name, sensors.get("", {})).get("pressure_zero", 0.0))
+            absolute = self._channels[dotted("muscle_pressure", name)] - zero + gas["ambient_pressure"]
+            total += float(absolute[-1] * volume[-1] - absolute[0] * volume[0]) / (gas["gas_constant"] * gas["temperature"])
+        return total
+
+    def summary(self) -> str:
+        """Where every motion and pressure ends, what happened on the way, and what went where, in a few lines."""
+        said = [f"{self.rig.name}: {self.time[-1]:g} s, {self.time.size} rows"]
+        for channel, unit, factor in (("muscle_pressure", "bar", 1e-5), ("joint_angle", "deg", 180.0 / math.pi), ("length", "mm", 1e3)):
+            for block, values in self.under(channel).items():
+                low, high, last = (factor * float(v) for v in (values.min(), values.max(), values[-1]))
+                said.append(f"{dotted(channel, block)}: from {low:.4g} to {high:.4g} {unit}, at the end {last:.4g} {unit}")
+        kinds = dict.fromkeys((event.block, event.kind) for event in self.events)
+        for block, kind in kinds:
+            times = [event.time for event in self.events if (event.block, event.kind) == (block, kind)]
+            often = "" if len(times) == 1 else f" and {len(times) - 1} times more"
+            said.append(f"{block}: {kind.replace('_', ' ')} at {times[0]:.4g} s{often}")
+        return "\n".join([*said, str(self.balance)])
 
     def to_pandas(self) -> pd.DataFrame:
         """All channels as a table indexed by time [s]."""

@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from pamrs.driving import dotted
+from pamrs.channels import dotted
 from pamrs.errors import ParameterError
 from pamrs.report.figures import COLOURS, STYLE, decimate
 
@@ -213,7 +213,8 @@ class _Scene:
         joints = list(result.under("joint_angle"))
         self.groups = [_Muscles(axes, result, name, scale, span) for name in groups]
         self.at = [self._joint_of(name, joints) for name in groups]
-        axes.plot([0.0, 0.0], [0.0, top], color=COLOURS["measured"], lw=5.0, solid_capstyle="round")
+        fixed = ([0.0, 0.0], [0.0, top]) if self.angles else ([-0.4 * reach, 0.4 * reach], [1.1 * max(rests)] * 2)
+        axes.plot(*fixed, color=COLOURS["measured"], lw=5.0, solid_capstyle="round")
         self.arm: Any = axes.plot([], [], "-o", color=COLOURS["after"], lw=4.0, ms=4.0, solid_capstyle="round")[0]
         payload = sum(float(table.get("payload", 0.0)) for table in links.values())
         payload += sum(float(load.get("mass", 0.0)) for load in rig.tables("load").values())
@@ -239,6 +240,7 @@ class _Scene:
         near = self.base
         for group, joint in zip(self.groups, self.at, strict=True):
             side = -1.0 - count[joint] // 2 if count[joint] % 2 == 0 else 1.0 + count[joint] // 2
+            side = side if self.angles else float(count[joint])
             count[joint] += 1
             near = group.draw(row, points[joint], along[joint], side)
         if self.angles:

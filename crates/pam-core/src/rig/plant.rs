@@ -384,12 +384,16 @@ impl<'a, S: Scalar> Plant<'a, S> {
     fn book(&self, state: &[S], here: &Scratch<S>, out: &mut [S]) {
         let (gas, layout) = (&self.rig.gas, &self.layout);
         let rt = gas.gas_constant * gas.temperature;
-        let (mut drawn, mut exergy) = (constant::<S>(0.0), constant::<S>(0.0));
+        let (mut drawn, mut exergy, mut vented) = (constant::<S>(0.0), constant::<S>(0.0), here.vented);
         for (k, flow) in here.drawn.iter().enumerate() {
-            drawn += *flow;
             if flow.re() == 0.0 {
                 continue; // most of the time, and the logarithm is dear
             }
+            if flow.re() < 0.0 && matches!(self.supplies[k], Supply::Regulator { .. }) {
+                vented -= *flow; // a regulator relieves to the ambient what it takes back
+                continue;
+            }
+            drawn += *flow;
             exergy += (state[layout.supply(k)] / gas.ambient_pressure).ln() * *flow * rt;
         }
         let mut work = constant::<S>(0.0);
@@ -399,7 +403,7 @@ impl<'a, S: Scalar> Plant<'a, S> {
                 work += power;
             }
         }
-        let sums = [drawn, here.vented, drawn * rt, exergy, here.muscle_work, work];
+        let sums = [drawn, vented, drawn * rt, exergy, here.muscle_work, work];
         out[layout.states()..].copy_from_slice(&sums);
     }
 }
