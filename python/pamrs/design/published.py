@@ -13,7 +13,7 @@ from pamrs.design.joint_design import JointDesign, compare_methods, optimise
 from pamrs.design.pressure import least_pressure, minimum_pressure
 from pamrs.design.problem import LENGTHS, JointProblem
 from pamrs.library import entry
-from pamrs.library.published import Comparison
+from pamrs.reproduce.facts import Comparison, judge
 from pamrs.units import to_si
 
 __all__ = ["CASES", "PublishedCase", "facts_of_geometry", "facts_of_search"]
@@ -212,24 +212,15 @@ class _Speaker:
         tolerance: float = _TOLERANCE,
         cannot_tell: str = "",
     ) -> Comparison:
-        gap = float(ours) - published
-        if cannot_tell:
-            verdict = "cannot tell"
-        elif relation == "equals":
-            verdict = "agree" if abs(gap) <= tolerance * abs(published) else "differs"
-        else:
-            verdict = "agree" if (gap > 0.0) == (relation == "above") else "differs"
-        return Comparison(
-            muscle=self.title,
-            fact=fact,
-            where="3.5",
-            unit=unit,
-            published=published,
-            ours=float(ours),
-            deviation=gap,
-            relative=gap / published,
+        return judge(
+            self.title,
+            fact,
+            "3.5",
+            published,
+            float(ours),
+            unit,
             relation=relation,
-            verdict=verdict,
-            used=False,
-            note=cannot_tell or note,
+            tolerance=tolerance * abs(published),
+            cannot_tell=cannot_tell,
+            note="" if cannot_tell else note,
         )
