@@ -24,7 +24,7 @@ dead_volume = {{ value = {volume!r}, unit = "m3" }}
 
 
 _INSIDE: Final = 0.999  # of the range of the muscle that the frame uses
-_NAMES: Final = ("shoulder", "sealed_chamber")
+_NAMES: Final = ("shoulder", "elbow", "sealed_chamber")
 
 
 def names() -> list[str]:
