@@ -59,9 +59,11 @@ class Comparison:
 
     @property
     def criterion(self) -> str:
-        """When ours counts as agreeing, in words."""
+        """When ours counts as agreeing, in words; empty where there is no published number."""
+        if not math.isfinite(self.published):
+            return ""
         if self.relation != "equals":
-            return f"{self.relation} it"
+            return self.relation
         return f"within {self.tolerance:.3g} {self.unit}".rstrip()
 
     @property
@@ -183,7 +185,7 @@ def table(rows: Iterable[Comparison], *, notes: bool = True, titles: bool = True
     return "\n".join(lines)
 
 
-def markdown(rows: Iterable[Comparison], *, headings: Mapping[str, str] | None = None) -> str:
+def markdown(rows: Iterable[Comparison], *, headings: Mapping[str, str] | None = None, below: Mapping[str, str] | None = None) -> str:
     """The comparison as Markdown: a table for each group, its remarks as a list below.
 
     Parameters
@@ -192,6 +194,8 @@ def markdown(rows: Iterable[Comparison], *, headings: Mapping[str, str] | None =
         The statements; a group stands together.
     headings : mapping of str to str, optional
         Heading of each group; the group itself by default.
+    below : mapping of str to str, optional
+        What follows a group.
 
     Returns
     -------
@@ -204,7 +208,10 @@ def markdown(rows: Iterable[Comparison], *, headings: Mapping[str, str] | None =
     number = 0
     for group, members in groups.items():
         lines += [f"### {(headings or {}).get(group, group)}", ""]
-        lines += ["| statement | where | published | ours | unit | deviation | agrees | verdict |", "|---|---|--:|--:|---|--:|---|---|"]
+        lines += [
+            "| statement | where | published | ours | unit | deviation | criterion | verdict |",
+            "|---|---|--:|--:|---|--:|---|---|",
+        ]
         remarks = []
         for row in members:
             mark = ""
@@ -216,6 +223,8 @@ def markdown(rows: Iterable[Comparison], *, headings: Mapping[str, str] | None =
             cells = (row.fact, row.where, _published(row), _number(row.ours), row.unit, row.gap, row.criterion, verdict + mark)
             lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
         lines += ["", *remarks, *([""] if remarks else [])]
+        if below and group in below:
+            lines += [below[group].rstrip(), ""]
     return "\n".join(lines).rstrip() + "\n"
 
 
@@ -248,7 +257,7 @@ def verdicts(rows: Sequence[Comparison]) -> str:
 
 
 def _published(row: Comparison) -> str:
-    return _SIGN[row.relation] + _number(row.published)
+    return _SIGN[row.relation] * math.isfinite(row.published) + _number(row.published)
 
 
 def _verdict(row: Comparison) -> str:
@@ -259,7 +268,7 @@ def _cell(value: Any) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, float):
-        return f"{value:.10g}" if math.isfinite(value) else ""
+        return f"{value:.6g}" if math.isfinite(value) else ""
     return "" if value is None else str(value)
 
 
