@@ -169,7 +169,7 @@ class Lift:
 
         Raises
         ------
-        ImportError
+        MissingPackageError
             If matplotlib is missing; names the extra to install.
         """
         from pamrs.writing import write_atomically
@@ -177,7 +177,9 @@ class Lift:
         try:
             from pamrs.report.lifting import lift_png
         except ImportError as error:
-            raise ImportError("pictures need matplotlib: pip install 'pamrs[plot]'") from error
+            from pamrs.design.search import missing
+
+            raise missing(error, "plot") from None
         return write_atomically(path, lift_png(self))
 
 

@@ -4,6 +4,7 @@ import csv
 import io
 import math
 import re
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -356,3 +357,12 @@ def test_command_refuses_chapters_that_there_are_not(capsys, tmp_path):
     assert "the folder" in err
     assert not folder.exists()
     assert reproduce.names() == ["ch3"]
+
+
+def test_missing_plot_package_is_named(capsys, tmp_path, monkeypatch):
+    for name in [name for name in sys.modules if name.startswith(("matplotlib", "pamrs.reproduce.chapter3_fig", "pamrs.report.fig"))]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    code, out, err = run(capsys, "ch3", "--output", tmp_path, "--no-search")
+    assert (code, out) == (2, "")
+    assert "pip install pamrs[plot]" in err

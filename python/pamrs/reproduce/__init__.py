@@ -68,7 +68,7 @@ def section(name: str, *, search: bool = True, pictures: bool = True, progress: 
     ------
     ParameterError
         If there is no such chapter; the message lists those that there are.
-    ImportError
+    MissingPackageError
         If an extra is missing; the message names it.
     """
     from pamrs.reproduce.page import Section
@@ -78,7 +78,9 @@ def section(name: str, *, search: bool = True, pictures: bool = True, progress: 
         try:
             drawn = importlib.import_module(f"pamrs.reproduce.{_CHAPTERS[name]}_figures")
         except ImportError as error:
-            raise ImportError("pictures need matplotlib: pip install 'pamrs[plot]'") from error
+            from pamrs.design.search import missing
+
+            raise missing(error, "plot") from None
     chapter = importlib.import_module(f"pamrs.reproduce.{_CHAPTERS[name]}")
     rows = chapter.facts(search=search, progress=progress)
     if pictures and progress is not None:

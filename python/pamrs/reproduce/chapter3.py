@@ -88,7 +88,7 @@ def facts(*, search: bool = True, progress: Progress | None = None) -> list[Comp
 
     Raises
     ------
-    ImportError
+    MissingPackageError
         If a search library is missing; names the extra to install.
     """
     tell = progress or (lambda _: None)
