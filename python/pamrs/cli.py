@@ -218,7 +218,7 @@ def _rig_check(file: Annotated[Path, typer.Argument(help="Rig file (TOML), or th
 @rig_app.command("new")
 def _rig_new(
     file: Annotated[Path, typer.Argument(help="The file to write; it must not be there yet.")],
-    like: Annotated[str, typer.Option(help="Rig of the package to begin with: shoulder, elbow or sealed_chamber.")] = "shoulder",
+    like: Annotated[str, typer.Option(help="Rig of the package to begin with: shoulder or sealed_chamber.")] = "shoulder",
     name: Annotated[str | None, typer.Option(help="What to call the rig; by default as the file.")] = None,
 ) -> None:
     """Write a rig file to begin with, every key explained in comments."""
