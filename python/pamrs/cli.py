@@ -1,4 +1,4 @@
-"""The command line: ``pamrs diagnose``, ``fit``, ``library``, ``simulate``, ``size`` and ``rig check``.
+"""The command line: ``pamrs diagnose``, ``fit``, ``library``, ``lift``, ``reproduce``, ``simulate``, ``size`` and ``rig check``.
 
 Results go to standard output, progress and errors to standard error. The exit code is 0 when the
 command did its work (a diagnosis that finds nothing missing included), 2 when the input is wrong.
@@ -17,6 +17,8 @@ import typer
 from pamrs.cli_design import design_app
 from pamrs.cli_fit import fit_app
 from pamrs.cli_library import library_command, size_command
+from pamrs.cli_lift import lift_command
+from pamrs.cli_reproduce import reproduce_command
 from pamrs.cli_shared import check_writable, progress, rig_named
 from pamrs.cli_simulate import simulate_command
 from pamrs.rig_files import packaged
@@ -36,6 +38,8 @@ app.add_typer(fit_app, name="fit")
 app.add_typer(design_app, name="design")
 app.command("simulate")(simulate_command)
 app.command("library")(library_command)
+app.command("lift")(lift_command)
+app.command("reproduce")(reproduce_command)
 app.command("size")(size_command)
 
 
