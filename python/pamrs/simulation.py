@@ -324,11 +324,13 @@ def simulate(
     """
     check_run(rig, sample_time)
     rows = _rows(sample_time, duration, valve_command, supply_command, length, pressure)
+    check_rows(rig, rows or 0)
     signals, count = signals_of(
         rig, valve_command=valve_command, supply_command=supply_command, length=length, pressure=pressure, rows=rows
     )
     if count is None:
         raise ParameterError("duration is missing: a finite time >= 0 s is needed (or give valve_command)")
+    check_rows(rig, count)
     start = initial_values(initial, rig)
     held = {name: signal for name, signal in signals.items() if name.partition(".")[0] in ("valve_command", "supply_command")}
     driven = {}
@@ -351,6 +353,16 @@ def check_run(rig: Rig, sample_time: float) -> None:
         raise ParameterError(f"rig is a {type(rig).__name__}; a Rig is needed, for example pamrs.load_rig({rig!r})")
     if not (np.isfinite(sample_time) and sample_time > 0):
         raise ParameterError(f"sample_time = {sample_time} is not allowed: a finite time > 0 s is needed")
+
+
+def check_rows(rig: Rig, rows: int) -> None:
+    """Refuse a simulation whose channels would not fit in memory, before it starts."""
+    channels = len(core_rig(rig).channels)
+    if rows * channels > _MOST_NUMBERS:
+        raise ParameterError(
+            f"{rows} rows of {channels} channels are not allowed: at most {_MOST_NUMBERS // channels} rows (2 GB); "
+            "give a longer sample_time, or run pamrs.Simulator piece by piece"
+        )
 
 
 def _rows(sample_time: float, duration: float | None, *given: Signals | None) -> int | None:
@@ -377,5 +389,6 @@ def default_step(sample_time: float, longest: float = 1e-3) -> float:
     return sample_time / max(1, int(np.ceil(sample_time / longest - 1e-9)))
 
 
+_MOST_NUMBERS = 250_000_000
 #: Channels of the core that are sums since the start.
 _BOOKS = ("mass_supplied", "mass_vented", "energy_supplied", "exergy_supplied", "muscle_work", "joint_work")
