@@ -58,7 +58,7 @@ class Simulator:
         self._step = chosen_step(self.sample_time, step)
         self._initial = initial_values(initial, rig)
         self.events: list[Event] = []
-        """What happened since the start or the last :meth:`reset`, see :class:`pamrs.simulation.Event`."""
+        """What happened since the start or the last :meth:`reset` or :meth:`restore`, see :class:`pamrs.simulation.Event`."""
         self._core = self._started(self._initial)
 
     def _started(self, initial: Mapping[str, float]) -> _core.Simulator:
@@ -87,6 +87,7 @@ class Simulator:
         ParameterError
             If it has another length or a number that is not finite.
         """
+        self.events = []
         self._core.restore(np.ascontiguousarray(np.asarray(state, dtype=np.float64)))
 
     def reset(self, initial: Mapping[str, float] | None = None) -> dict[str, float]:
@@ -228,6 +229,8 @@ class Simulator:
         SimulationError
             As :meth:`step`.
         """
+        if not callable(update):
+            raise ParameterError(f"update is a {type(update).__name__}; something that can be called with a sample is needed")
         every = self._samples("period", self.sample_time if period is None else period, least=1)
         total = self._samples("duration", duration, least=0)
         check_rows(self.rig, total + 1)
@@ -265,13 +268,14 @@ class Simulator:
 
     def __getstate__(self) -> dict[str, Any]:
         kept = {name: value for name, value in self.__dict__.items() if name != "_core"}
-        return {**kept, "state": self.state}
+        return {**kept, "events": list(self.events), "state": self.state}
 
     def __setstate__(self, kept: dict[str, Any]) -> None:
-        state = kept.pop("state")
+        state, events = kept.pop("state"), kept.pop("events")
         self.__dict__.update(kept)
         self._core = self._started(self._initial)
         self.restore(state)
+        self.events = list(events)
 
     def __repr__(self) -> str:
         return f"Simulator({self.rig.name}, time={self.time:.6g} s, sample_time={self.sample_time:g} s)"
