@@ -137,6 +137,13 @@ RUNS: dict[str, Run] = {
         {"joint_angle": 40.0 * _DEGREE, "muscle_pressure": 2.6e5},
         _valves(("",), 0.8, 2.5, (0.0,), 121),
     ),
+    "elbow": Run(
+        "elbow",
+        0.005,
+        121,
+        {"joint_angle": 45.0 * _DEGREE, "muscle_pressure": 5.5e5},
+        _valves(("",), 0.8, 2.5, (0.0,), 121),
+    ),
     "antagonistic_joint": Run(
         "antagonistic_joint",
         0.005,

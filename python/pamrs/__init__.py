@@ -24,6 +24,7 @@ if TYPE_CHECKING:
         SimulationError,
     )
     from pamrs.joint import Joint
+    from pamrs.lifting import Lift, lift
     from pamrs.muscle import Muscle
     from pamrs.recording import Issue, Recording, load_recording
     from pamrs.rig import Parameter, Rig, load_rig
@@ -40,6 +41,7 @@ __all__ = [
     "FitError",
     "Issue",
     "Joint",
+    "Lift",
     "Muscle",
     "PamrsError",
     "Parameter",
@@ -55,6 +57,7 @@ __all__ = [
     "diagnose",
     "fit",
     "library",
+    "lift",
     "load_case",
     "load_recording",
     "load_rig",
@@ -72,6 +75,7 @@ _HOMES: Final[dict[str, str]] = {
     "FitError": "pamrs.errors",
     "Issue": "pamrs.recording",
     "Joint": "pamrs.joint",
+    "Lift": "pamrs.lifting",
     "Muscle": "pamrs.muscle",
     "PamrsError": "pamrs.errors",
     "Parameter": "pamrs.rig",
@@ -84,6 +88,7 @@ _HOMES: Final[dict[str, str]] = {
     "SimulationError": "pamrs.errors",
     "Simulator": "pamrs.simulator",
     "diagnose": "pamrs.diagnosis",
+    "lift": "pamrs.lifting",
     "load_case": "pamrs.case",
     "load_recording": "pamrs.recording",
     "load_rig": "pamrs.rig",

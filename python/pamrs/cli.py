@@ -1,4 +1,4 @@
-"""The command line: ``pamrs diagnose``, ``fit``, ``library``, ``simulate``, ``size`` and ``rig check``.
+"""The command line: ``pamrs diagnose``, ``fit``, ``library``, ``lift``, ``reproduce``, ``simulate``, ``size`` and ``rig check``.
 
 Results go to standard output, progress and errors to standard error. The exit code is 0 when the
 command did its work (a diagnosis that finds nothing missing included), 2 when the input is wrong.
@@ -8,47 +8,22 @@ Everything heavy is imported inside the command that needs it, so that ``pamrs -
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
 from pamrs.cli_design import design_app
 from pamrs.cli_fit import fit_app
 from pamrs.cli_library import library_command, size_command
-from pamrs.cli_shared import check_writable, progress
+from pamrs.cli_lift import lift_command
+from pamrs.cli_reproduce import reproduce_command
+from pamrs.cli_shared import check_writable, progress, rig_named
+from pamrs.cli_simulate import simulate_command
 from pamrs.rig_files import packaged
 
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from pamrs.recording import Recording
-    from pamrs.rig import Rig
-
 __all__ = ["app", "main"]
-
-CHANNEL_UNITS = {
-    "time": "s",
-    "valve_command": "V",
-    "supply_pressure": "Pa",
-    "muscle_pressure": "Pa",
-    "joint_angle": "rad",
-    "length": "m",
-    "force": "N",
-    "joint_torque": "N m",
-    "temperature": "K",
-    "reference": "rad",
-    "joint_rate": "rad/s",
-    "muscle_force": "N",
-    "contraction_ratio": "1",
-    "length_rate": "m/s",
-    "air_volume": "m3",
-}
-STATE_NEEDS = {"muscle_pressure": "chamber", "supply_pressure": "supply", "joint_angle": "arm", "length": "load"}
-SENSOR_ZEROS = {"muscle_pressure": "pressure_zero", "joint_angle": "angle_zero"}
-STATES = tuple(STATE_NEEDS)
 
 app = typer.Typer(
     name="pamrs",
@@ -61,7 +36,10 @@ rig_app = typer.Typer(help="Work with rig files.")
 app.add_typer(rig_app, name="rig")
 app.add_typer(fit_app, name="fit")
 app.add_typer(design_app, name="design")
+app.command("simulate")(simulate_command)
 app.command("library")(library_command)
+app.command("lift")(lift_command)
+app.command("reproduce")(reproduce_command)
 app.command("size")(size_command)
 
 
@@ -113,96 +91,12 @@ def _diagnose(
             typer.echo(f"written: {path}", err=True)
 
 
-@app.command("simulate")
-def _simulate(
-    rig: Annotated[Path, typer.Argument(help="Rig file (TOML), or the name of a rig of the package.")],
-    input: Annotated[Path, typer.Option("--input", help="Recording whose inputs drive the rig (CSV).")],
-    output: Annotated[Path | None, typer.Option("--output", help="Where to write the simulated channels (CSV).")] = None,
-    plot: Annotated[Path | None, typer.Option(help="Write a picture of the channels beside the recorded ones (PNG).")] = None,
-    animation: Annotated[Path | None, typer.Option(help="Write the arm as it moves (GIF).")] = None,
-    speed: Annotated[float, typer.Option(help="Of the animation: times faster than it happens.")] = 1.0,
-) -> None:
-    """Drive a rig with a recording's inputs and write what its channels would be."""
-    if output is None and plot is None and animation is None:
-        raise typer.BadParameter("nothing would be written: give --output, --plot or --animation")
-    check_writable(output, plot, animation)
-    import numpy as np
-
-    from pamrs.recording import load_recording
-    from pamrs.simulation import simulate
-
-    loaded = _rig(rig)
-    recording = load_recording(input)
-    zeros = {name: loaded.model["sensors"][zero] for name, zero in SENSOR_ZEROS.items()}
-    initial = {
-        name: float(recording.channels[name][recording.mask[name]][0]) - zeros.get(name, 0.0)
-        for name in STATES
-        if name in recording.channels and recording.mask[name].any() and loaded.model[STATE_NEEDS[name]]
-    }
-    drive: dict[str, Any] = {}
-    if loaded.model["valve"] is not None:
-        drive["valve_command"] = _held(recording, "valve_command", input)
-    if (loaded.model["load"] or {}).get("kind") == "frame":
-        drive["length"] = _held(recording, "length", input)
-        if loaded.model["valve"] is None and recording.mask.get("muscle_pressure", np.zeros(1)).any():
-            drive["pressure"] = _held(recording, "muscle_pressure", input) - zeros["muscle_pressure"]
-        initial = {name: value for name, value in initial.items() if name == "supply_pressure"}
-    elif loaded.model["valve"] is None:
-        drive["duration"] = float(recording.time[-1])
-    with progress(f"simulating {loaded.name}"):
-        result = simulate(loaded, sample_time=recording.sample_time, initial=initial, **drive)
-    if output is not None:
-        _write_csv(output, result)
-        typer.echo(f"{loaded.name}: {len(result.time)} samples written to {output}")
-    if plot is not None:
-        recorded = {name: (recording.time[usable], recording.channels[name][usable]) for name, usable in recording.mask.items()}
-        result.plot(plot, recorded=recorded)
-        typer.echo(f"written: {plot}", err=True)
-    if animation is not None:
-        with progress("drawing the motion"):
-            result.animate(animation, speed=speed)
-        typer.echo(f"written: {animation}", err=True)
-    for name, recorded_as in (*((name, name) for name in STATES), ("muscle_force", "force")):
-        usable = recording.mask.get(recorded_as)
-        if name in result and name not in drive and usable is not None and usable.any():
-            apart = result[name][usable] - recording.channels[recorded_as][usable]
-            rms = float((apart**2).mean() ** 0.5)
-            typer.echo(f"{name}: rms difference from the recording {rms:.4g} {CHANNEL_UNITS[name]}")
-
-
-def _held(recording: Recording, name: str, path: Path) -> NDArray[np.float64]:
-    """A channel whose unusable samples repeat the last usable one, as a valve does that hears nothing new."""
-    import numpy as np
-
-    if name not in recording.channels or not recording.mask[name].any():
-        raise ValueError(f"{path}: no usable {name}, which the rig needs")
-    usable = recording.mask[name]
-    last = np.maximum.accumulate(np.where(usable, np.arange(usable.size), int(np.argmax(usable))))
-    if not usable.all():
-        typer.echo(f"{path}: {int((~usable).sum())} unusable samples of {name} hold the last usable one", err=True)
-    held: NDArray[np.float64] = recording.channels[name][last]
-    return held
-
-
-def _write_csv(path: Path, columns: Mapping[str, NDArray[np.float64]]) -> None:
-    """Write channels in SI units under headers that carry the unit; masked samples stay empty."""
-    import math
-
-    from pamrs.writing import write_atomically
-
-    names = list(columns)
-    lines = [",".join(f"{name} [{CHANNEL_UNITS.get(name, '1')}]" for name in names)]
-    for row in zip(*(columns[name].tolist() for name in names), strict=True):
-        lines.append(",".join("" if math.isnan(value) else f"{value:.10g}" for value in row))
-    write_atomically(path, "\n".join(lines) + "\n")
-
-
 @rig_app.command("check")
 def _rig_check(file: Annotated[Path, typer.Argument(help="Rig file (TOML), or the name of a rig of the package.")]) -> None:
     """Check a rig file, say what is connected to what, and list its parameters in SI units."""
     from pamrs.simulation import core_rig
 
-    rig = _rig(file)
+    rig = rig_named(file)
     core_rig(rig)  # what only the whole model shows: lengths that the muscle cannot have, angles that the tendon does not reach
     for line in rig.wiring:
         typer.echo(line)
@@ -224,19 +118,11 @@ def _rig_new(
     from pamrs import rigs
     from pamrs.writing import write_atomically
 
-    check_writable(file)
+    file.parent.mkdir(parents=True, exist_ok=True)
     if file.exists():
         raise FileExistsError(f"{file}: is there already; it is not overwritten")
     write_atomically(file, rigs.template(like, file.stem if name is None else name))
     typer.echo(f"written: {file}; change it, then: pamrs rig check {file}")
-
-
-def _rig(file: Path) -> Rig:
-    """A rig file, or a rig of the package by its name."""
-    from pamrs import rigs
-    from pamrs.rig import load_rig
-
-    return rigs.named(str(file)) if not file.exists() and str(file) in rigs.names() else load_rig(file)
 
 
 def _one_line(error: BaseException) -> str:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from pamrs.muscle import Muscle
     from pamrs.rig import Rig
 
-__all__ = ["GEOMETRY", "QUANTITY", "as_given", "check_writable", "exact", "named_muscle", "progress", "quantity", "write"]
+__all__ = ["GEOMETRY", "QUANTITY", "as_given", "check_writable", "exact", "named_muscle", "progress", "quantity", "rig_named", "write"]
 
 _NUMBER = r"[-+]?\d*\.?\d+(?:[eE][-+]?\d+)?"
 QUANTITY = re.compile(rf"^\s*(?P<value>{_NUMBER})\s*(?:(?:\+-|±)\s*(?P<tol>{_NUMBER})\s*)?(?P<unit>\S.*?)?\s*$")
@@ -70,6 +70,14 @@ def named_muscle(name: str, option: str = "--muscle") -> tuple[Muscle, dict[str,
         raise ParameterError(f"{option} = {name!r}: this rig has no block [muscle]")
     known = {key.partition(".")[2]: p.tol for key, p in rig.parameters.items() if key.startswith("muscle.") and p.tol > 0.0}
     return rig.muscle, {key: value for key, value in known.items() if key in GEOMETRY}, rig
+
+
+def rig_named(file: Path) -> Rig:
+    """A rig file, or a rig of the package by its name."""
+    from pamrs import rigs
+    from pamrs.rig import load_rig
+
+    return rigs.named(str(file)) if not file.exists() and str(file) in rigs.names() else load_rig(file)
 
 
 def write(contents: Mapping[Path, str | bytes]) -> None:

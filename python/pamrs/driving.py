@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pamrs.channels import dotted
 from pamrs.errors import ParameterError
 
 if TYPE_CHECKING:
     from pamrs.rig import Rig
 
-__all__ = ["Signals", "dotted", "initial_values", "signals_of"]
+__all__ = ["Signals", "initial_values", "signals_of"]
 
 Array = NDArray[np.float64]
 #: One array for a block without a name or the only one of its kind, else one for each name.
@@ -31,11 +32,6 @@ _INITIAL = {
 }
 _LEAST_PRESSURE = 1.0  # Pa, absolute
 _MOST_PRESSURE = 1e8  # Pa, gauge
-
-
-def dotted(channel: str, name: str) -> str:
-    """``muscle_pressure.flexor``, or ``muscle_pressure`` for a block without a name."""
-    return f"{channel}.{name}" if name else channel
 
 
 def signals_of(
@@ -130,6 +126,8 @@ def _named(channel: str, given: Signals | None, names: list[str], block: str) ->
                 f"{channel} is one signal, and the rig has a {block} each of: {', '.join(names)}; give a mapping of names"
             )
         return {dotted(channel, names[0] if names else ""): given}
+    if set(given) == {""} and len(names) == 1:
+        return {dotted(channel, names[0]): given[""]}  # the only one is meant
     for name in given:
         if name not in names:
             raise ParameterError(

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs.channels import UNITS, channel_of
 from pamrs.errors import ParameterError, RecordingError, joined
 from pamrs.recording_clock import Grid, lay_grid
 from pamrs.recording_faults import find_faults
@@ -42,26 +43,22 @@ class _Channel(NamedTuple):
 #: Canonical channels: SI unit and the range of the possible (SI; pressures gauge). Where a rig has several blocks of a kind, the
 #: name of the block stands behind a dot: ``muscle_pressure.flexor``.
 CHANNELS: Final[dict[str, _Channel]] = {
-    "time": _Channel("s", -math.inf, math.inf),
-    "valve_command": _Channel("V", -1000.0, 1000.0),
-    "supply_command": _Channel("Pa", -1.3e5, 1e8),
-    "supply_pressure": _Channel("Pa", -1.3e5, 1e8),
-    "line_pressure": _Channel("Pa", -1.3e5, 1e8),
-    "muscle_pressure": _Channel("Pa", -1.3e5, 1e8),
-    "joint_angle": _Channel("rad", -100.0, 100.0),
-    "length": _Channel("m", -100.0, 100.0),
-    "force": _Channel("N", -1e7, 1e7),
-    "joint_torque": _Channel("N m", -1e7, 1e7),
-    "temperature": _Channel("K", 50.0, 2000.0),
-    "reference": _Channel("rad", -1e9, 1e9),
+    name: _Channel(UNITS[name], lower, upper)
+    for name, lower, upper in (
+        ("time", -math.inf, math.inf),
+        ("valve_command", -1000.0, 1000.0),
+        ("supply_command", -1.3e5, 1e8),
+        ("supply_pressure", -1.3e5, 1e8),
+        ("line_pressure", -1.3e5, 1e8),
+        ("muscle_pressure", -1.3e5, 1e8),
+        ("joint_angle", -100.0, 100.0),
+        ("length", -100.0, 100.0),
+        ("force", -1e7, 1e7),
+        ("joint_torque", -1e7, 1e7),
+        ("temperature", 50.0, 2000.0),
+        ("reference", -1e9, 1e9),
+    )
 }
-
-
-def channel_of(name: str) -> str:
-    """The canonical channel of a name: ``muscle_pressure`` of ``muscle_pressure.flexor``."""
-    return name.partition(".")[0]
-
-
 # a reference may be one of an angle or of a pressure
 _REFERENCE_UNITS: Final = ("rad", "Pa")
 _HEADING = re.compile(r"^\s*(?P<name>[^\[\]]*?)\s*(?:\[(?P<unit>[^\[\]]*)\])?\s*$")

@@ -68,7 +68,7 @@ def falling(rig: str, rows: int, changes: dict[str, float] | None = None, **star
         (falling("two_joint_arm", 41, elbow=(0.2, 5e4), wrist=(0.8, 2e5)), "joint.elbow"),
         (falling("two_joint_arm", 41, elbow=(0.6, 2e5), wrist=(0.3, 5e4)), "joint.wrist"),
         (falling("antagonistic_joint", 61, elbow=(0.2, None), flexor=(None, 1e4)), "joint.elbow"),
-        (falling("hanging_mass", 61, {"load.mass": 250.0}, load=(0.275, 5e4)), "load"),
+        (falling("hanging_mass", 61, {"load.mass": 120.0}, load=(0.272, None)), "load"),
         (falling("recruitment", 61, shoulder=(0.4, None)), "joint.shoulder"),
     ],
     ids=["elbow", "wrist", "antagonists", "load", "shoulder"],
@@ -91,8 +91,6 @@ def test_networks(drawn: tuple[Blocks, Run]) -> None:
     run = drawn[1]
     got = run.core(1e-5)
     assume(not stops(got))
-    pressures = [values for name, values in got.items() if name.partition(".")[0] in ("muscle_pressure", "line_pressure")]
-    assume(min(float(values.min()) for values in pressures) > 0.0)  # else air comes in through a valve: see BACKWARDS
     assert not beyond(misses(got, run.reference(1e-10)), SMOOTH)
 
 
@@ -117,15 +115,10 @@ def with_tube(**changes: float) -> pamrs.Rig:
 
 # ------------------------------------------------------------------ against the arrow
 
-BACKWARDS = pytest.mark.xfail(
-    strict=True,
-    reason="what flows back through a valve takes alpha_in for alpha_out in the core, by 1.4 here; through a line it does not",
-)
-
 
 @pytest.mark.parametrize(
     ("command", "pressure"),
-    [pytest.param(8.0, 6e5, marks=BACKWARDS), pytest.param(2.0, -5e4, marks=BACKWARDS), (8.0, 1e5), (2.0, 6e5)],
+    [(8.0, 6e5), (2.0, -5e4), (8.0, 1e5), (2.0, 6e5)],
     ids=["back into the supply", "in from the ambient", "filling", "venting"],
 )
 def test_air_through_a_valve_in_both_directions(command: float, pressure: float) -> None:

@@ -3,10 +3,10 @@
 A rig is a graph: gas nodes (supplies, chambers, inlets of lines, ambient) joined by flows, and coordinates (joint
 angles, or the shortening on a linear load) on which muscles pull.  Pressures inside are absolute, channels are gauge.
 Every book (masses, energies, works) is a further state of the integrator, not a sum over samples; the positive work at
-the joints is read off the smooth signed work of each, whose slope alone would have a kink at every reversal.
+the joints, with a kink at every reversal, is read off the signed work of each.
 
-Beyond the equations of ``plant``: flows run down the pressure in either direction, through a valve too.  What the
-reference has no equation for (effects, sensor errors, hysteresis, load frames) is refused.
+Flows run down the pressure in either direction, through a valve too.  What the reference has no equation for (effects,
+sensor errors, hysteresis, load frames) is refused.
 """
 
 from __future__ import annotations
@@ -465,11 +465,13 @@ class Network:
             volume_rate[pull.chamber] += n * slope * moment_arm * rate[k] / rest
             force[k] += n * one * moment_arm
             work += n * one * moment_arm * rate[k]
-        supplied = exergy = 0.0
+        supplied = exergy = relieved = 0.0
         pressure_rate = []
         for i, node in enumerate(self.nodes[:-1]):
             net_out = outflow[i] - inflow[i]
-            if node.kind in SUPPLIES:
+            if node.kind == "regulator" and net_out < 0.0:
+                relieved -= net_out  # to the ambient
+            elif node.kind in SUPPLIES:
                 supplied += net_out
                 exergy += self.rt * math.log(pressure[i] / gas.ambient_pressure) * net_out
             if node.kind == "constant":
@@ -485,7 +487,8 @@ class Network:
             *rate,
             *self.body(position, rate, stopped),
             *(inflow[i] - outflow[i] for i in range(count - 1)),
-            supplied, inflow[-1] - outflow[-1], self.rt * supplied, exergy, work, *(f * v for f, v in zip(force, rate, strict=True)),
+            supplied, inflow[-1] - outflow[-1] + relieved, self.rt * supplied, exergy, work,
+            *(f * v for f, v in zip(force, rate, strict=True)),
         ]  # fmt: skip
 
     def channels(self, states: Array) -> dict[str, Array]:
@@ -586,9 +589,8 @@ def simulate(
         rate = partial(rig.derivative, ways=ways, set_pressure=set_pressure)
         left: list[str] = []
         slope = partial(_rhs, rate=rate, left=left)
-        solution = solve_ivp(
-            slope, (0.0, sample_time), states[k], method=method, rtol=rtol, atol=atol, first_step=first, dense_output=True
-        )
+        settings = {"rtol": rtol, "atol": atol, "first_step": first, "dense_output": True}
+        solution = solve_ivp(slope, (0.0, sample_time), states[k], method=method, **settings)
         if not solution.success:
             raise RuntimeError(f"integration failed in sample {k}: {'; '.join([solution.message, *left])}")
         states[k + 1] = solution.y[:, -1]

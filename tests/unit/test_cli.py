@@ -50,7 +50,7 @@ def test_no_words_print_help(capsys):
         (["digest"], "digest"),
         (["diagnose"], "argument"),
         (["diagnose", "x", "--colour"], "--colour"),
-        (["simulate", "rig.toml"], "--input"),
+        (["simulate", "rig.toml"], "--output"),
         (["rig"], "command"),
     ],
 )

@@ -74,7 +74,7 @@ def test_facts_fitted_are_met(rows):
 
 
 def test_verdicts(rows):
-    assert {(row.muscle, row.fact) for row in rows if row.verdict == "differs"} == DIFFERS
+    assert {(row.group, row.fact) for row in rows if row.verdict == "differs"} == DIFFERS
     assert published.verdicts(rows) == "23 agree (8 used to identify), 18 differ, 6 cannot tell"
 
 
@@ -90,13 +90,13 @@ def test_blocked_force_row_against_reference_geometry(name, psi, force, rows):
     # at rest: pressure on the Gaylord area, plus the wall's two terms
     area = (3.0 * length**2 - reference.fibre_length**2) / (4.0 * math.pi * turns**2) + reference.rubber_volume / length
     area -= reference.wall_thickness * length**2 / (2.0 * math.pi * reference.rest_radius * turns**2)
-    row = next(r for r in rows if r.muscle == name and r.fact.startswith("blocked force at"))
+    row = next(r for r in rows if r.group == name and r.fact.startswith("blocked force at"))
     assert row.published == pytest.approx(force)
     assert row.ours == pytest.approx(area * psi * PSI / POUND_FORCE, rel=1e-9)
 
 
 def test_published_geometry_cannot_give_the_large_force_and_the_angle_that_can(rows):
-    by_fact = {row.fact: row for row in rows if row.muscle == "large_2in"}
+    by_fact = {row.fact: row for row in rows if row.group == "large_2in"}
     assert by_fact["blocked force at 90 psi"].relative == pytest.approx(1.508, abs=0.01)
     angle = by_fact["braid angle for 4280 lbf"].ours
     muscle = library.large_2in().replace(braid_angle=math.radians(angle))

@@ -12,6 +12,7 @@
 #![warn(missing_docs)]
 
 pub mod arm;
+pub mod drive;
 pub mod effects;
 pub mod error;
 pub mod events;

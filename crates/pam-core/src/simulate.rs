@@ -1,14 +1,12 @@
 //! Fixed-step simulation: commands are held over each sample, RK4 steps fill it.
 
-use std::borrow::Cow;
-use std::ops::Range;
-
+use crate::drive::{Drive, LEAST_PRESSURE};
 use crate::error::check_range;
 use crate::events::{Event, Watch};
 use crate::integrate::Rk4;
-use crate::rig::plant::{Controls, Memory, Plant, Scratch, Simulated};
+use crate::rig::plant::{Controls, Plant, Scratch, Simulated};
 use crate::rig::spec::dotted;
-use crate::rig::Rig;
+use crate::rig::{Memory, Rig};
 use crate::scalar::{constant, Scalar};
 use crate::{Error, Result};
 
@@ -44,7 +42,13 @@ impl Timing {
     /// The same with each step divided until it is at most as long as a rig allows.
     #[must_use]
     pub fn stable(self, rig: &Rig) -> Self {
-        let parts = (self.step() / rig.stable_step() - 1e-9).ceil().max(1.0);
+        self.at_most(rig.stable_step())
+    }
+
+    /// The same with each step divided until it is at most so long [s].
+    #[must_use]
+    pub fn at_most(self, longest: f64) -> Self {
+        let parts = (self.step() / longest - 1e-9).ceil().max(1.0);
         Self { substeps: self.substeps.saturating_mul(parts as usize), ..self }
     }
 
@@ -74,7 +78,8 @@ impl Initial {
             } else if place < layout.rate(0) && spec.load.is_some() {
                 wiring.groups[0].rest_length
             } else if place < layout.rate(0) {
-                wiring.coordinates[place - layout.angle(0)].rest
+                let coordinate = &wiring.coordinates[place - layout.angle(0)];
+                coordinate.stops.map_or(coordinate.rest, |s| coordinate.rest.clamp(s.min_angle, s.max_angle))
             } else {
                 0.0
             }
@@ -98,7 +103,7 @@ impl Initial {
         let (layout, place) = (&rig.layout, rig.names.initial[k].1);
         let full = format!("initial.{name}");
         if place < layout.angle(0) {
-            check_range(&full, value, -rig.gas.ambient_pressure, 1e8, "Pa (gauge)")?;
+            check_range(&full, value, LEAST_PRESSURE - rig.gas.ambient_pressure, 1e8, "Pa (gauge)")?;
         } else if place >= layout.rate(0) {
             check_range(&full, value, -1e4, 1e4, if rig.spec().load.is_some() { "m/s" } else { "rad/s" })?;
         } else if let Some(load) = &rig.spec().load {
@@ -142,153 +147,10 @@ impl Initial {
     }
 }
 
-/// What drives a simulation: one command per sample and input, and what is prescribed for the end of each sample.
-#[derive(Debug, Clone)]
-pub struct Drive<'a> {
-    samples: usize,
-    commands: Vec<Cow<'a, [f64]>>,
-    prescribed: Vec<(usize, Cow<'a, [f64]>)>,
-}
-
-/// Lowest absolute pressure that may be prescribed [Pa].
-const LEAST_PRESSURE: f64 = 1.0;
-
-impl<'a> Drive<'a> {
-    /// A drive over a number of samples from signals by name: the rig's inputs (`valve_command` [V], `supply_command` [Pa,
-    /// gauge]), `length` of a load frame [m], `pressure` of chambers without a valve [Pa, gauge].
-    ///
-    /// # Errors
-    /// [`Error::Model`] for a signal that is missing or that the rig does not take, [`Error::Length`] for one of another
-    /// length, [`Error::Parameter`] for a value that is not possible.
-    pub fn new(rig: &Rig, samples: usize, signals: &[(&str, &'a [f64])]) -> Result<Self> {
-        let (spec, names) = (rig.spec(), &rig.names);
-        let find = |name: &str| signals.iter().find(|(n, _)| *n == name).map(|(_, values)| *values);
-        let mut commands = Vec::new();
-        for (k, name) in names.inputs.iter().enumerate() {
-            commands.push(match find(name) {
-                Some(values) => {
-                    let (low, high, unit) = if k < spec.valves.len() {
-                        (f64::MIN, f64::MAX, "V")
-                    } else {
-                        (-rig.gas.ambient_pressure, 1e8, "Pa (gauge)")
-                    };
-                    check_signal(name, values, samples, (low, high), unit)?;
-                    Cow::Borrowed(values)
-                }
-                None if k < spec.valves.len() => {
-                    return Err(Error::Model(format!(
-                        "{name} is missing: a rig with a valve needs one value per sample [V]"
-                    )));
-                }
-                None => {
-                    let supply =
-                        spec.supplies.iter().filter(|s| s.kind == "regulator").nth(k - spec.valves.len());
-                    Cow::Owned(vec![supply.map_or(0.0, |s| s.initial_pressure); samples])
-                }
-            });
-        }
-        let mut prescribed = Vec::new();
-        for (name, values) in signals.iter().filter(|(n, _)| !names.inputs.iter().any(|i| i == n)) {
-            let (place, low, high, unit) = prescribable(rig, name)?;
-            check_signal(name, values, samples, (low, high), unit)?;
-            prescribed.push((place, Cow::Borrowed(*values)));
-        }
-        if spec.load.as_ref().is_some_and(|l| l.is_frame()) && find("length").is_none() {
-            return Err(Error::Model(
-                "length is missing: a load frame needs one value per sample [m]".into(),
-            ));
-        }
-        Ok(Self { samples, commands, prescribed })
-    }
-
-    /// Samples.
-    #[must_use]
-    pub fn samples(&self) -> usize {
-        self.samples
-    }
-
-    /// Some of the samples.
-    #[must_use]
-    pub fn part(&self, range: Range<usize>) -> Drive<'static> {
-        let cut = |values: &Cow<'a, [f64]>| values.get(range.clone()).unwrap_or(&[]).to_vec();
-        Drive {
-            samples: range.len(),
-            commands: self.commands.iter().map(|values| Cow::Owned(cut(values))).collect(),
-            prescribed: self
-                .prescribed
-                .iter()
-                .map(|(place, values)| (*place, Cow::Owned(cut(values))))
-                .collect(),
-        }
-    }
-
-    fn places(&self) -> Vec<usize> {
-        self.prescribed.iter().map(|(place, _)| *place).collect()
-    }
-
-    /// Where one sample begins and ends: place, from, to.
-    fn ends(&self, rig: &Rig, state: &[f64], sample: usize) -> Vec<(usize, f64, f64)> {
-        let end = |(place, values): &(usize, Cow<'_, [f64]>)| {
-            let value = values.get(sample).copied().unwrap_or(f64::NAN);
-            let to = if *place < rig.layout.angle(0) {
-                value + rig.gas.ambient_pressure
-            } else {
-                rig.wiring.groups[0].rest_length - value
-            };
-            (*place, state[*place], to)
-        };
-        self.prescribed.iter().map(end).collect()
-    }
-}
-
-/// Place of a state that can be prescribed, with the range and unit of its signal.
-fn prescribable(rig: &Rig, name: &str) -> Result<(usize, f64, f64, &'static str)> {
-    let spec = rig.spec();
-    if name == "length" {
-        return match spec.load.as_ref().filter(|load| load.is_frame()) {
-            Some(load) => Ok((rig.layout.angle(0), load.min_length, load.max_length, "m")),
-            None => Err(Error::Model(
-                "length is given, which only a rig with a load frame takes ([load] kind = \"frame\")".into(),
-            )),
-        };
-    }
-    let Some(k) = spec.chambers.iter().position(|c| dotted("pressure", &c.name) == name) else {
-        return Err(Error::Model(format!(
-            "{name} is not a signal that this rig takes; it takes: {}",
-            rig.names.inputs.join(", ")
-        )));
-    };
-    if rig.wiring.valves.iter().any(|v| v.to == k) {
-        return Err(Error::Model(format!(
-            "{name} is given, which only a chamber without [valve] takes: there the valve decides"
-        )));
-    }
-    Ok((rig.layout.pressure(k), LEAST_PRESSURE - rig.gas.ambient_pressure, 1e8, "Pa (gauge)"))
-}
-
-fn check_signal(
-    name: &str,
-    values: &[f64],
-    samples: usize,
-    (low, high): (f64, f64),
-    unit: &str,
-) -> Result<()> {
-    if values.len() != samples {
-        let why = "one for each sample".into();
-        return Err(Error::Length { name: name.into(), found: values.len(), expected: samples, why });
-    }
-    for (k, value) in values.iter().enumerate() {
-        if !(value.is_finite() && *value >= low && *value <= high) {
-            let allowed = if low == f64::MIN {
-                "a finite voltage".into()
-            } else {
-                format!("a number from {low} to {high} {unit}")
-            };
-            return Err(Error::parameter(format!("{name}[{k}]"), *value, allowed));
-        }
-    }
-    Ok(())
-}
+/// Steps between two looks outside: some ten milliseconds of a large rig.
+const STEPS_UNSEEN: usize = 8_000;
+/// Rows that room is made for at once.
+const MOST_ROOM: usize = 65_536;
 
 /// A plant with the memory that a step needs.
 pub(crate) struct Stepper<'a, S> {
@@ -396,7 +258,8 @@ impl Trajectory {
     /// Without rows.
     #[must_use]
     pub fn new(rig: &Rig, rows: usize) -> Self {
-        let channels = rig.names.channels.iter().map(|_| Vec::with_capacity(rows)).collect();
+        let room = rows.min(MOST_ROOM);
+        let channels = rig.names.channels.iter().map(|_| Vec::with_capacity(room)).collect();
         Self { channels, events: Vec::new() }
     }
 
@@ -514,10 +377,26 @@ impl Progress {
         drive: &Drive<'_>,
         out: &mut Trajectory,
     ) -> Result<()> {
+        self.advance_watched(rig, timing, drive, out, &mut || Ok(()))
+    }
+
+    /// As [`Self::advance`], with a look outside every few milliseconds: an error of `look` ends the run at the last sample.
+    ///
+    /// # Errors
+    /// As [`Self::advance`], and that of `look`.
+    pub fn advance_watched(
+        &mut self,
+        rig: &Rig,
+        timing: Timing,
+        drive: &Drive<'_>,
+        out: &mut Trajectory,
+        look: &mut dyn FnMut() -> Result<()>,
+    ) -> Result<()> {
         let mut stepper = Stepper::new(Plant::new(rig, rig.parameters().lift(), true)?);
         let simulated = Simulated::all_but(&rig.layout, &drive.places());
         let dt = timing.step();
         let (mut before, mut after) = (Watch::default(), Watch::default());
+        let mut unseen = 0;
         for k in 0..drive.samples {
             let controls = stepper.plant.controls(|input| drive.commands[input][k]);
             let mut next = self.clone();
@@ -541,6 +420,14 @@ impl Progress {
                 let time = began + (sub + 1) as f64 * dt;
                 after.report(rig, Some((&before, dt)), time, &mut next.flags, &mut out.events);
                 std::mem::swap(&mut before, &mut after);
+                unseen += 1;
+                if unseen >= STEPS_UNSEEN {
+                    unseen = 0;
+                    if let Err(error) = look() {
+                        out.events.truncate(happened);
+                        return Err(error);
+                    }
+                }
             }
             for (place, ..) in &ends {
                 held_mass(&stepper.plant, *place, &mut next.state);

@@ -6,9 +6,10 @@ use std::sync::Arc;
 use crate::convert::{array, error, values};
 use crate::simulator::{channels, events, initial, run, EventRow};
 use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray1};
+use pam_core::drive::Drive;
 use pam_core::residual::{predict, Block, Measured, Signal};
 use pam_core::rig::RigSpec;
-use pam_core::simulate::{Drive, Progress, Timing, Trajectory};
+use pam_core::simulate::{Progress, Timing, Trajectory};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -137,7 +138,8 @@ impl Rig {
                 .map(|name| inner.parameters().find(name))
                 .collect::<pam_core::Result<Vec<_>>>()?;
             let block = Block::from_name(inner, block)?;
-            predict(inner, block, &measured, Timing::new(sample_time, step)?.stable(inner), &starts, &ids)
+            let timing = Timing::new(sample_time, step)?.at_most(block.longest_step(inner));
+            predict(inner, block, &measured, timing, &starts, &ids)
         });
         let p = found.map_err(|e| error(py, &e))?;
         let rows = p.value.len();

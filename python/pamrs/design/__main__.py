@@ -6,7 +6,7 @@ import sys
 
 from pamrs.design.joint_design import compare_methods
 from pamrs.design.published import CASES, facts_of_geometry, facts_of_search
-from pamrs.library.published import table
+from pamrs.reproduce.facts import table
 
 if __name__ == "__main__":
     for case in CASES:

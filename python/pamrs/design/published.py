@@ -13,7 +13,7 @@ from pamrs.design.joint_design import JointDesign, compare_methods, optimise
 from pamrs.design.pressure import least_pressure, minimum_pressure
 from pamrs.design.problem import LENGTHS, JointProblem
 from pamrs.library import entry
-from pamrs.library.published import Comparison
+from pamrs.reproduce.facts import Comparison, judge
 from pamrs.units import to_si
 
 __all__ = ["CASES", "PublishedCase", "facts_of_geometry", "facts_of_search"]
@@ -25,6 +25,7 @@ _INCH: Final = 0.0254
 #: Share of a torque or pressure within which "agree" is said, where both sides mean the same muscle.
 _TOLERANCE: Final = 0.05
 
+_BRAID: Final = "braid's force alone"
 _MODULI = {
     "shoulder": "the muscle's moduli are not published; the library's are chosen by 6.3 (850 N m at 13 bar, 90 deg)",
     "elbow": "the muscle's moduli are not published; the library's are a prior for its rubber",
@@ -110,20 +111,29 @@ def facts_of_geometry(case: PublishedCase) -> list[Comparison]:
     rows = [
         say("muscle length", "in", case.muscle_length, problem.muscle.parameters["rest_length"] / _INCH, tolerance=0.01),
         say("stroke of Table 3.5 over the range", "%", 15.0, stroke, "below", "the printed lengths miss (3.26)"),
-        say("largest angle within 15 % of stroke", "deg", case.angles[1], reached, tolerance=0.02),
+        say(
+            "largest angle within 15 % of stroke",
+            "deg",
+            case.angles[1],
+            reached,
+            tolerance=0.02,
+            note="geometry alone: as the line above",
+        ),
         say(
             "torque of Table 3.5 at the least angle",
             "ft lbf",
             case.torque,
             torque[0],
             "above",
-            "3.5.2: 'well above'; at rest length the moduli play no part",
+            f"3.5.2: 'well above'; at rest length the moduli play no part{_angle_needed(case, problem, torque[0])}",
         ),
         say("least torque of Table 3.5", "ft lbf", case.torque, torque.min(), "above", cannot_tell=unknown),
     ]
     for title, other in _others(case, problem):
         least = case.design(other).scores.torque[0].min() / _FOOT_POUND
-        rows.append(say(f"the same, {title}", "ft lbf", case.torque, least, "above"))
+        bound = title == _BRAID and least < case.torque
+        note = "no rubber at all: with this braid angle no moduli give it" if bound else ""
+        rows.append(say(f"the same, {title}", "ft lbf", case.torque, least, "above", note))
     needed = free.needed_pressure or np.nan
     rows.append(say("pressure that Table 3.5 needs, any stroke", "psi", case.pressure, needed / _PSI, cannot_tell=unknown))
     least_any = problem.least_possible_pressure() / _PSI
@@ -178,18 +188,34 @@ def facts_of_search(case: PublishedCase, *, seeds: int = 10, progress: Callable[
     return rows
 
 
+def _angle_needed(case: PublishedCase, problem: JointProblem, torque: float) -> str:
+    """The braid angle with which the rest torque is the wanted one, in words; empty where it is there already."""
+    from pamrs.library.evaluate import root_between
+
+    if torque >= case.torque:
+        return ""
+    force = float(problem.muscle.force(problem.pressure, 0.0)) * case.torque / torque
+    found = root_between(
+        lambda angle: float(problem.muscle.replace(braid_angle=angle).force(problem.pressure, 0.0)) - force,
+        radians(60.0),
+        radians(85.0),
+    )
+    given = np.degrees(problem.muscle.parameters["braid_angle"])
+    return "" if found is None else f"; a braid angle of {np.degrees(found):.1f} deg instead of {given:.4g} would give it"
+
+
 def _others(case: PublishedCase, problem: JointProblem) -> list[tuple[str, JointProblem]]:
     """The problem with other readings of its muscle."""
     muscle = problem.muscle
     if case.name == "shoulder":
         braid = muscle.replace(model="gaylord", braid_angle=radians(75.4))
         return [
-            ("braid's force alone", problem.replace(muscle=muscle.replace(model="gaylord"))),
+            (_BRAID, problem.replace(muscle=muscle.replace(model="gaylord"))),
             ("braid's force alone, 75.4 deg (ch. 5: N 0.9)", problem.replace(muscle=braid)),
         ]
     other = entry("ch2_075in").muscle.replace(rest_length=case.muscle_length * _INCH)
     return [
-        ("braid's force alone", problem.replace(muscle=muscle.replace(model="gaylord"))),
+        (_BRAID, problem.replace(muscle=muscle.replace(model="gaylord"))),
         ("muscle ch2_075in, 4.94 in long", problem.replace(muscle=other)),
     ]
 
@@ -212,24 +238,15 @@ class _Speaker:
         tolerance: float = _TOLERANCE,
         cannot_tell: str = "",
     ) -> Comparison:
-        gap = float(ours) - published
-        if cannot_tell:
-            verdict = "cannot tell"
-        elif relation == "equals":
-            verdict = "agree" if abs(gap) <= tolerance * abs(published) else "differs"
-        else:
-            verdict = "agree" if (gap > 0.0) == (relation == "above") else "differs"
-        return Comparison(
-            muscle=self.title,
-            fact=fact,
-            where="3.5",
-            unit=unit,
-            published=published,
-            ours=float(ours),
-            deviation=gap,
-            relative=gap / published,
+        return judge(
+            self.title,
+            fact,
+            "3.5",
+            published,
+            float(ours),
+            unit,
             relation=relation,
-            verdict=verdict,
-            used=False,
-            note=cannot_tell or note,
+            tolerance=tolerance * abs(published),
+            cannot_tell=cannot_tell,
+            note="" if cannot_tell else note,
         )

@@ -75,6 +75,15 @@ def diagnose(case: Case | str | os.PathLike[str], *, progress: Callable[[str], N
         raise DiagnosisError(
             f"the nominal rig of case {case.name!r} already has the effect {rig.effects[0]['id']!r}; diagnose a rig without effects"
         )
+    several = [block for block in rig.blocks if "" not in rig.tables(block)]
+    if several:
+        raise DiagnosisError(
+            f"the rig of case {case.name!r} has named blocks ({', '.join(several)}); rigs of one chain can be diagnosed, without names"
+        )
+    if any(supply["kind"] == "regulator" for supply in rig.tables("supply").values()):
+        raise DiagnosisError(
+            f"the rig of case {case.name!r} is fed by a regulator; rigs fed by a tank or a constant supply can be diagnosed"
+        )
     if "load" in rig.blocks:
         raise DiagnosisError(
             f"the rig of case {case.name!r} has a [load]; rigs with [joint] and [arm], or without a muscle, can be diagnosed"

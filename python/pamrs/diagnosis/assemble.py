@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from pamrs.case import Case
+from pamrs.channels import unit_of
 from pamrs.diagnosis import words
 from pamrs.diagnosis.conditions import Picture, describe
 from pamrs.diagnosis.evidence import Floor
@@ -24,7 +25,6 @@ SYMPTOM = 3.5
 """Tolerances beyond which a refitted parameter is a symptom of missing physics, not a result."""
 SETTLED = 0.9
 """Probability from which an answer counts as settled."""
-CHANNEL_UNITS = {"supply_pressure": "Pa", "muscle_pressure": "Pa", "joint_angle": "rad"}
 
 
 def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) -> Diagnosis:
@@ -302,7 +302,7 @@ def _traces(fitted: Problem, held: Problem, inner: dict[str, Any], outer: dict[s
                         recording.name,
                         recording.role,
                         block.channel,
-                        CHANNEL_UNITS[block.channel],
+                        unit_of(block.channel),
                         recording.time,
                         recording.channels[block.channel],
                         **shown,

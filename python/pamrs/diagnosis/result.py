@@ -15,6 +15,7 @@ from typing import Any, Protocol, cast
 import numpy as np
 import numpy.typing as npt
 
+from pamrs.channels import UNITS
 from pamrs.report import text as words
 from pamrs.writing import write_atomically
 
@@ -324,7 +325,7 @@ class Diagnosis:
         lines = ["", f"{title:<22}{'noise':>11}{'before':>11}{'refit':>11}{'after':>11}"]
         for channel, entry in channels.items():
             sizes = [abs(float(v)) for v in entry.values() if words.is_number(v)]
-            unit, factor = words.display_unit(words.CHANNEL_UNITS.get(channel, ""), max(sizes, default=math.nan))
+            unit, factor = words.display_unit(UNITS.get(channel, ""), max(sizes, default=math.nan))
             unit = unit.replace("°", "deg")
             row = f"{channel} [{unit}]" if unit else channel
             for key in ("noise", "before", "refit", "after"):

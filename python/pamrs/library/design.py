@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from pamrs.library import entry
-from pamrs.library.published import Comparison
+from pamrs.reproduce.facts import Comparison, judge
 from pamrs.sizing import Candidate, Filling, Requirement, SizingResult, size
 from pamrs.units import to_si
 
@@ -104,21 +104,8 @@ def compare_design(large: str = "large_2in_effective") -> list[Comparison]:
 
 
 def _row(heading: str, fact: str, where: str, published: float, ours: float, *, exact: bool) -> Comparison:
-    holds = ours == published if exact else ours < published
     force = entry("elbow_0625in").muscle.force(to_si(150.0, "psi", "pressure"), 0.0)
     short = float(force) / to_si(820.0, "lbf", "force")
-    note = f"our blocked force is {short:.2f} of the published one" if exact and not holds and published == 6 else ""
-    return Comparison(
-        muscle=heading,
-        fact=fact,
-        where=where,
-        unit="",
-        published=published,
-        ours=ours,
-        deviation=ours - published,
-        relative=(ours - published) / published,
-        relation="equals" if exact else "below",
-        verdict="agree" if holds else "differs",
-        used=False,
-        note=note,
-    )
+    weak = exact and ours != published and published == 6
+    note = f"our blocked force is {short:.2f} of the published one" if weak else ""
+    return judge(heading, fact, where, published, ours, relation="equals" if exact else "below", note=note)

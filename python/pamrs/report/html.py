@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from markupsafe import Markup
 
+from pamrs.channels import UNITS
 from pamrs.report import figures
 from pamrs.report import text as words
 from pamrs.report.page import render_page
@@ -104,7 +105,7 @@ def _fit(diagnosis: Diagnosis, part: str) -> list[dict[str, Any]]:
     rows = []
     for channel, entry in (diagnosis.fit.get(part) or {}).items():
         sizes = [abs(float(v)) for v in entry.values() if words.is_number(v)]
-        unit, factor = words.display_unit(words.CHANNEL_UNITS.get(channel, ""), max(sizes, default=math.nan))
+        unit, factor = words.display_unit(UNITS.get(channel, ""), max(sizes, default=math.nan))
         noise = entry.get("noise")
         cells = []
         for key in ("noise", "before", "refit", "after"):

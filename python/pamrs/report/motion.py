@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from pamrs.driving import dotted
+from pamrs.channels import dotted
 from pamrs.errors import ParameterError
 from pamrs.report.figures import COLOURS, STYLE, decimate
 
@@ -41,6 +41,7 @@ _PANELS: Final = (
 _RECORDED_AS: Final = {"muscle_force": "force"}
 _NAMES: Final = {"supply_command": "set", "supply_pressure": "supply", "line_pressure": "line", "muscle_pressure": "muscle"}
 _FRAMES: Final = 150
+_SLOWEST: Final = 1e-3
 _FAINT: Final = "#9ca3af"
 #: Colours of the blocks of one channel; the first is the one of a rig without names.
 _OWN: Final = (COLOURS["after"], "#0f766e", "#b45309", "#7c3aed", "#be123c", "#4d7c0f")
@@ -145,6 +146,8 @@ def write_animation(result: Simulation, path: Path, *, speed: float = 1.0) -> Pa
         raise ParameterError(f"{result.time.size} sample is not enough to draw a motion: two at least")
     if not (math.isfinite(speed) and speed > 0.0):
         raise ParameterError(f"speed = {speed} is not allowed: a finite number above zero")
+    if not _SLOWEST <= speed <= 1.0 / _SLOWEST:
+        raise ParameterError(f"speed = {speed:g} is not allowed: from {_SLOWEST:g} to {1.0 / _SLOWEST:g}")
     duration = float(result.time[-1] - result.time[0]) / speed
     delay = max(2, math.ceil(100.0 * duration / _FRAMES))  # hundredths of a second: what a GIF knows, and players keep
     shown = np.arange(0.0, 100.0 * duration + 1e-9, delay) * 0.01 * speed + result.time[0]
@@ -194,7 +197,10 @@ class _Scene:
         self.result = result
         rig = result.rig
         self.angles = list(result.under("joint_angle").values())
-        links = rig.tables("link") or {name: table for name, table in rig.tables("arm").items() if self.angles}
+        own = rig.tables("link")
+        links = {name: own[name] for name in rig.ports("link")} or {
+            name: table for name, table in rig.tables("arm").items() if self.angles
+        }
         self.lengths = [float(link["length"]) for link in links.values()]
         groups = list(rig.tables("muscle"))
         rests = [float(rig.muscle_of(name).parameters["rest_length"]) for name in groups]
@@ -213,7 +219,8 @@ class _Scene:
         joints = list(result.under("joint_angle"))
         self.groups = [_Muscles(axes, result, name, scale, span) for name in groups]
         self.at = [self._joint_of(name, joints) for name in groups]
-        axes.plot([0.0, 0.0], [0.0, top], color=COLOURS["measured"], lw=5.0, solid_capstyle="round")
+        fixed = ([0.0, 0.0], [0.0, top]) if self.angles else ([-0.4 * reach, 0.4 * reach], [1.1 * max(rests)] * 2)
+        axes.plot(*fixed, color=COLOURS["measured"], lw=5.0, solid_capstyle="round")
         self.arm: Any = axes.plot([], [], "-o", color=COLOURS["after"], lw=4.0, ms=4.0, solid_capstyle="round")[0]
         payload = sum(float(table.get("payload", 0.0)) for table in links.values())
         payload += sum(float(load.get("mass", 0.0)) for load in rig.tables("load").values())
@@ -239,6 +246,7 @@ class _Scene:
         near = self.base
         for group, joint in zip(self.groups, self.at, strict=True):
             side = -1.0 - count[joint] // 2 if count[joint] % 2 == 0 else 1.0 + count[joint] // 2
+            side = side if self.angles else float(count[joint])
             count[joint] += 1
             near = group.draw(row, points[joint], along[joint], side)
         if self.angles:

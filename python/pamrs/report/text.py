@@ -9,7 +9,6 @@ if TYPE_CHECKING:
     from pamrs.diagnosis.result import Diagnosis
 
 __all__ = [
-    "CHANNEL_UNITS",
     "display_unit",
     "format_number",
     "format_probability",
@@ -23,19 +22,6 @@ __all__ = [
     "set_label",
     "span95",
 ]
-
-CHANNEL_UNITS: dict[str, str] = {
-    "valve_command": "V",
-    "supply_pressure": "Pa",
-    "muscle_pressure": "Pa",
-    "joint_angle": "rad",
-    "length": "m",
-    "force": "N",
-    "joint_torque": "N m",
-    "temperature": "K",
-    "reference": "rad",
-}
-"""SI unit of each canonical channel."""
 
 _LABELS = {
     "none": "nothing missing",

@@ -1,13 +1,14 @@
 //! Where each state and channel of a rig is, and what it is called.
 
 use super::spec::{dotted, RigSpec};
-use super::wiring::{coordinate_names, Wiring};
+use super::units::Wiring;
+use super::wiring_motion::coordinate_names;
 
 /// Number of sums that are kept beside the states: see [`BOOKS`].
 pub const BOOK_COUNT: usize = 6;
 
-/// Channels of the sums over a simulation, in their order: mass out of the supplies (what a regulator takes back
-/// subtracted) and into the ambient [kg]; energy `R T m` and exergy `R T ln(p/p_a) m` of what the supplies gave, work of
+/// Channels of the sums over a simulation, in their order: mass out of the supplies and into the ambient, what
+/// regulators relieve included [kg]; energy `R T m` and exergy `R T ln(p/p_a) m` of what the supplies gave, work of
 /// the muscles, positive work at the joints [J].
 pub const BOOKS: [&str; BOOK_COUNT] =
     ["mass_supplied", "mass_vented", "energy_supplied", "exergy_supplied", "muscle_work", "joint_work"];

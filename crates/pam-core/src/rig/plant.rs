@@ -6,54 +6,21 @@
 
 use super::body::Body;
 use super::layout::{Channel, Layout, BOOK_COUNT};
-use super::wiring::{Group, Node, Path, SupplyUnit};
+use super::memory::Memory;
+use super::units::{Group, LineUnit, Path, SupplyUnit};
 use super::{Rig, Values};
-use crate::effects::{heat_transfer, leak_muscle, muscle_hysteresis};
-use crate::gas::chamber::{pressure_rate, ChamberState, Polytropic};
+use crate::effects::{heat_transfer, muscle_hysteresis};
+use crate::gas::chamber::Polytropic;
 use crate::gas::supply::Supply;
 use crate::gas::tube::Tube;
 use crate::gas::valve::spool_position;
-use crate::muscle::slip::{Slip, ELEMENTS};
 use crate::muscle::TablePoint;
 use crate::scalar::{constant, Scalar};
 use crate::Result;
+use num_dual::Dual64;
 
-/// What a muscle remembers of its motion.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Memory<S> {
-    /// Elements of the effect `muscle_hysteresis`.
-    hysteresis: Slip<S>,
-    /// Elements of the direction of motion that the muscle's own force depends on.
-    direction: Slip<S>,
-}
-
-impl<S: Scalar> Default for Memory<S> {
-    fn default() -> Self {
-        Self { hysteresis: Slip::default(), direction: Slip::default() }
-    }
-}
-
-impl Memory<f64> {
-    /// Length of [`Self::to_array`].
-    pub const NUMBERS: usize = 2 * ELEMENTS;
-
-    /// All elements.
-    #[must_use]
-    pub fn to_array(&self) -> [f64; 2 * ELEMENTS] {
-        let (hysteresis, direction) = (self.hysteresis.elements(), self.direction.elements());
-        std::array::from_fn(|k| if k < ELEMENTS { hysteresis[k] } else { direction[k - ELEMENTS] })
-    }
-
-    /// The memory of the numbers of [`Self::to_array`]; what is missing is zero.
-    #[must_use]
-    pub fn from_slice(numbers: &[f64]) -> Self {
-        let at = |k: usize| numbers.get(k).copied().unwrap_or(0.0);
-        Self {
-            hysteresis: Slip::from_elements(std::array::from_fn(at)),
-            direction: Slip::from_elements(std::array::from_fn(|k| at(k + ELEMENTS))),
-        }
-    }
-}
+/// Slope of the mean of a bank of slip elements where all of them stick, times the presliding distance.
+const BANK: f64 = 3.75;
 
 /// What is integrated; the other states are driven.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -72,7 +39,7 @@ impl Simulated {
         let driven: Vec<bool> = (0..layout.states()).map(|k| places.contains(&k)).collect();
         let (air, motion) = driven.split_at(layout.angle(0));
         let some = |part: &[bool]| part.iter().any(|d| !d);
-        Self { gas: some(&air[..layout.mass(0)]), motion: some(motion), driven }
+        Self { gas: some(air), motion: some(motion), driven }
     }
 
     /// Only the states of these places are integrated.
@@ -92,13 +59,13 @@ pub struct Controls<S> {
 }
 
 #[derive(Debug, Clone)]
-struct Valve<S> {
-    area: S,
-    null: S,
+pub(super) struct Valve<S> {
+    pub area: S,
+    pub null: S,
 }
 
 #[derive(Debug, Clone)]
-enum Line<S> {
+pub(super) enum Line<S> {
     Orifice(S),
     Tube(Tube<S>),
 }
@@ -106,16 +73,16 @@ enum Line<S> {
 /// A rig with the values of its parameters in a scalar type.
 #[derive(Debug, Clone)]
 pub struct Plant<'a, S> {
-    rig: &'a Rig,
-    layout: Layout,
-    values: Values<S>,
+    pub(super) rig: &'a Rig,
+    pub(super) layout: Layout,
+    pub(super) values: Values<S>,
     books: bool,
-    supplies: Vec<Supply<S>>,
+    pub(super) supplies: Vec<Supply<S>>,
     /// Fixed volume of each gas, halves of tubes included [m3].
-    fixed_volume: Vec<S>,
-    alphas: Vec<Polytropic<S>>,
-    valves: Vec<Valve<S>>,
-    lines: Vec<Line<S>>,
+    pub(super) fixed_volume: Vec<S>,
+    pub(super) alphas: Vec<Polytropic<S>>,
+    pub(super) valves: Vec<Valve<S>>,
+    pub(super) lines: Vec<Line<S>>,
     scales: Vec<S>,
     body: Body<S>,
 }
@@ -123,15 +90,15 @@ pub struct Plant<'a, S> {
 /// What the equations need to write down on the way.
 #[derive(Debug, Clone)]
 pub struct Scratch<S> {
-    volume: Vec<S>,
-    volume_rate: Vec<S>,
-    wall: Vec<S>,
-    inflow: Vec<S>,
-    outflow: Vec<S>,
-    drawn: Vec<S>,
-    torque: Vec<S>,
-    vented: S,
-    muscle_work: S,
+    pub(super) volume: Vec<S>,
+    pub(super) volume_rate: Vec<S>,
+    pub(super) wall: Vec<S>,
+    pub(super) inflow: Vec<S>,
+    pub(super) outflow: Vec<S>,
+    pub(super) drawn: Vec<S>,
+    pub(super) torque: Vec<S>,
+    pub(super) vented: S,
+    pub(super) muscle_work: S,
 }
 
 /// One group at one instant.
@@ -151,7 +118,7 @@ impl<'a, S: Scalar> Plant<'a, S> {
     /// [`crate::Error::Parameter`] for links that cannot be.
     pub fn new(rig: &'a Rig, values: Values<S>, books: bool) -> Result<Self> {
         let wiring = &rig.wiring;
-        let line = |line: &super::wiring::LineUnit| match line.path {
+        let line = |line: &LineUnit| match line.path {
             Path::Orifice(area) => Line::Orifice(values[area]),
             Path::Tube { length, diameter } => {
                 Line::Tube(Tube::new(values[length], values[diameter], rig.gas.temperature))
@@ -418,102 +385,19 @@ impl<'a, S: Scalar> Plant<'a, S> {
         }
     }
 
-    #[inline]
-    fn pressure_at(&self, node: Node, state: &[S]) -> S {
-        match node {
-            Node::Ambient => constant(self.rig.gas.ambient_pressure),
-            Node::Supply(k) => state[self.layout.supply(k)],
-            Node::Gas(k) => state[self.layout.pressure(k)],
-        }
-    }
-
-    /// Mass flows between all nodes, written to the scratch.
-    #[inline(always)]
-    fn flows(&self, state: &[S], controls: &Controls<S>, here: &mut Scratch<S>) {
-        let zero = constant::<S>(0.0);
-        let gas = &self.rig.gas;
-        let ambient = constant::<S>(gas.ambient_pressure);
-        here.inflow.fill(zero);
-        here.outflow.fill(zero);
-        here.drawn.fill(zero);
-        here.vented = zero;
-        for ((unit, valve), spool) in self.rig.wiring.valves.iter().zip(&self.valves).zip(&controls.spool) {
-            let pressure = state[self.layout.pressure(unit.to)];
-            if spool.re() > 0.0 {
-                let flow = gas.mass_flow(
-                    valve.area * unit.table.eval(*spool),
-                    self.pressure_at(unit.from, state),
-                    pressure,
-                );
-                here.inflow[unit.to] += flow;
-                here.take(unit.from, flow);
-            } else if spool.re() < 0.0 {
-                let flow = gas.mass_flow(valve.area * unit.table.eval(-*spool), pressure, ambient);
-                here.outflow[unit.to] += flow;
-                here.vented += flow;
-            }
-        }
-        for (unit, line) in self.rig.wiring.lines.iter().zip(&self.lines) {
-            let (from, to) = (self.pressure_at(unit.from, state), self.pressure_at(unit.to, state));
-            let flow = match line {
-                Line::Orifice(area) => gas.mass_flow(*area, from, to),
-                Line::Tube(tube) => tube.mass_flow(from, to),
-            };
-            // What goes against the arrow goes out of its end and into its beginning.
-            let (giver, taker, flow) =
-                if flow.re() >= 0.0 { (unit.from, unit.to, flow) } else { (unit.to, unit.from, -flow) };
-            here.take(giver, flow);
-            here.give(taker, flow);
-        }
-        if let Some([conductance, share]) = self.rig.wiring.effects.leak {
-            for (k, _) in self.rig.wiring.gases.iter().enumerate().filter(|(_, unit)| unit.leak) {
-                let pressure = state[self.layout.pressure(k)];
-                let flow =
-                    leak_muscle::mass_flow(gas, self.values[conductance], self.values[share], pressure);
-                here.outflow[k] += flow;
-                here.vented += flow;
-            }
-        }
-    }
-
-    #[inline(always)]
-    fn gas_rates(&self, state: &[S], controls: &Controls<S>, here: &mut Scratch<S>, out: &mut [S]) {
-        let (gas, layout) = (&self.rig.gas, &self.layout);
-        let rt = gas.gas_constant * gas.temperature;
-        for (k, supply) in self.supplies.iter().enumerate() {
-            let set = controls.set_pressure[k];
-            out[layout.supply(k)] = supply.pressure_rate(state[layout.supply(k)], here.drawn[k], rt, set);
-        }
-        for (k, unit) in self.rig.wiring.gases.iter().enumerate() {
-            let chamber = ChamberState {
-                pressure: state[layout.pressure(k)],
-                volume: here.volume[k],
-                volume_rate: here.volume_rate[k],
-                inflow: here.inflow[k],
-                outflow: here.outflow[k],
-            };
-            out[layout.mass(k)] = chamber.inflow - chamber.outflow;
-            out[layout.pressure(k)] = match self.rig.wiring.effects.heat {
-                Some([coefficient, _]) if unit.heat => {
-                    let mass = state[layout.mass(k)];
-                    let temperature = heat_transfer::temperature(gas, chamber.pressure, chamber.volume, mass);
-                    let coefficient = self.values[coefficient];
-                    heat_transfer::pressure_rate(gas, &chamber, temperature, here.wall[k], coefficient)
-                }
-                _ => pressure_rate(&chamber, &self.alphas[k], rt),
-            };
-        }
-    }
-
     fn book(&self, state: &[S], here: &Scratch<S>, out: &mut [S]) {
         let (gas, layout) = (&self.rig.gas, &self.layout);
         let rt = gas.gas_constant * gas.temperature;
-        let (mut drawn, mut exergy) = (constant::<S>(0.0), constant::<S>(0.0));
+        let (mut drawn, mut exergy, mut vented) = (constant::<S>(0.0), constant::<S>(0.0), here.vented);
         for (k, flow) in here.drawn.iter().enumerate() {
-            drawn += *flow;
             if flow.re() == 0.0 {
                 continue; // most of the time, and the logarithm is dear
             }
+            if flow.re() < 0.0 && matches!(self.supplies[k], Supply::Regulator { .. }) {
+                vented -= *flow; // a regulator relieves to the ambient what it takes back
+                continue;
+            }
+            drawn += *flow;
             exergy += (state[layout.supply(k)] / gas.ambient_pressure).ln() * *flow * rt;
         }
         let mut work = constant::<S>(0.0);
@@ -523,28 +407,8 @@ impl<'a, S: Scalar> Plant<'a, S> {
                 work += power;
             }
         }
-        let sums = [drawn, here.vented, drawn * rt, exergy, here.muscle_work, work];
+        let sums = [drawn, vented, drawn * rt, exergy, here.muscle_work, work];
         out[layout.states()..].copy_from_slice(&sums);
-    }
-}
-
-impl<S: Scalar> Scratch<S> {
-    #[inline]
-    fn take(&mut self, node: Node, flow: S) {
-        match node {
-            Node::Ambient => self.vented -= flow,
-            Node::Supply(k) => self.drawn[k] += flow,
-            Node::Gas(k) => self.outflow[k] += flow,
-        }
-    }
-
-    #[inline]
-    fn give(&mut self, node: Node, flow: S) {
-        match node {
-            Node::Ambient => self.vented += flow,
-            Node::Supply(k) => self.drawn[k] -= flow,
-            Node::Gas(k) => self.inflow[k] += flow,
-        }
     }
 }
 
@@ -590,97 +454,57 @@ impl Plant<'_, f64> {
         }
     }
 
-    /// Choked, for each valve and then each line: what flows is faster than its narrowest place lets pressure back.
-    pub fn choked(&self, state: &[f64], controls: &Controls<f64>) -> Vec<bool> {
-        self.ratios(state, controls).map(|(ratio, critical)| ratio < critical).collect()
-    }
-
-    /// Pressure ratio (1 where nothing can flow) and critical ratio of each valve and line.
-    pub(crate) fn ratios<'b>(
-        &'b self,
-        state: &'b [f64],
-        controls: &'b Controls<f64>,
-    ) -> impl Iterator<Item = (f64, f64)> + 'b {
-        let gas = &self.rig.gas;
-        let ratio = |a: f64, b: f64| a.min(b) / a.max(b).max(f64::MIN_POSITIVE);
-        let valves = self.rig.wiring.valves.iter().zip(&self.valves).zip(&controls.spool);
-        let valves = valves.map(move |((unit, valve), spool)| {
-            let here = state[self.layout.pressure(unit.to)];
-            let other = if *spool > 0.0 { self.pressure_at(unit.from, state) } else { gas.ambient_pressure };
-            let open = valve.area * unit.table.eval(spool.abs()) > 0.0;
-            (if open { ratio(here, other) } else { 1.0 }, gas.critical_ratio())
-        });
-        let lines = self.rig.wiring.lines.iter().zip(&self.lines).map(move |(unit, line)| {
-            let critical = match line {
-                Line::Orifice(_) => gas.critical_ratio(),
-                Line::Tube(tube) => tube.critical_ratio(),
-            };
-            (ratio(self.pressure_at(unit.from, state), self.pressure_at(unit.to, state)), critical)
-        });
-        valves.chain(lines)
-    }
-
-    /// Fastest rate of the gas [1/s], and the gas that it is in (none for a supply): a bound by Gershgorin's rows, every
-    /// valve open, next to equal pressures.
-    pub(crate) fn fastest_gas(&self) -> (f64, Option<usize>) {
-        let (wiring, gas) = (&self.rig.wiring, &self.rig.gas);
-        let rt = gas.gas_constant * gas.temperature;
-        let mut steepest = vec![0.0; wiring.gases.len()];
-        let mut drawn = vec![0.0; wiring.supplies.len()];
-        let mut add = |node: Node, other: Node, slope: f64| {
-            // The other end answers with the same slope where its pressure is a state.
-            let twice = if matches!(other, Node::Ambient) { slope } else { 2.0 * slope };
-            match node {
-                Node::Gas(k) => steepest[k] += twice,
-                Node::Supply(k) => drawn[k] += twice,
-                Node::Ambient => {}
-            }
-        };
-        for (unit, valve) in wiring.valves.iter().zip(&self.valves) {
-            let slope = gas.steepest(valve.area * unit.table.eval(1.0));
-            add(Node::Gas(unit.to), unit.from, slope);
-            add(unit.from, Node::Gas(unit.to), slope);
-        }
-        for (unit, line) in wiring.lines.iter().zip(&self.lines) {
-            let slope = match line {
-                Line::Orifice(area) => gas.steepest(*area),
-                Line::Tube(tube) => tube.steepest(),
-            };
-            add(unit.from, unit.to, slope);
-            add(unit.to, unit.from, slope);
-        }
-        let mut worst = (0.0, None);
-        for (k, slope) in steepest.iter().enumerate() {
-            let alpha = self.alphas[k].inflow.max(self.alphas[k].outflow).max(gas.gamma);
-            let rate = alpha * rt * slope / self.least_volume(k);
-            if rate > worst.0 {
-                worst = (rate, Some(k));
-            }
-        }
-        for (supply, slope) in self.supplies.iter().zip(&drawn) {
-            let rate = supply.fastest(*slope, rt);
-            if rate > worst.0 {
-                worst = (rate, None);
-            }
-        }
-        worst
-    }
-
-    /// Least volume of a gas over the range of its muscles [m3].
-    fn least_volume(&self, gas: usize) -> f64 {
-        let mut volume = self.fixed_volume[gas];
-        for group in self.rig.wiring.groups.iter().filter(|g| g.chamber == gas) {
-            let (low, high) = self.rig.range(group);
-            let least = (0..=32)
-                .map(|i| group.muscle.table.eval(low + (high - low) * f64::from(i) / 32.0).volume)
-                .fold(f64::INFINITY, f64::min);
-            volume += least.max(0.0) * group.count;
-        }
-        volume.max(f64::MIN_POSITIVE)
-    }
-
-    /// Fastest rate of the body [1/s].
+    /// Fastest rate of the body [1/s] on the springs that muscles, trapped air and presliding friction are.
     pub(crate) fn fastest_body(&self) -> f64 {
-        self.body.fastest(&self.rig.wiring.coordinates)
+        let springs: Vec<f64> = (0..self.layout.coordinates).map(|k| self.stiffness(k)).collect();
+        self.body.fastest(&springs)
+    }
+
+    /// Largest stiffness [N m/rad] of what pulls on a coordinate, over its range, at the highest pressure.
+    fn stiffness(&self, coordinate: usize) -> f64 {
+        let wiring = &self.rig.wiring;
+        let pressure = self.rig.highest_pressure();
+        let gauge = pressure - self.rig.gas.ambient_pressure;
+        let mut total = 0.0;
+        for (k, group) in wiring.groups.iter().enumerate().filter(|(_, g)| g.coordinate == coordinate) {
+            let (low, high) = self.rig.angles(group);
+            let mut most = 0.0_f64;
+            for i in 0..=32 {
+                let angle = Dual64::new(low + (high - low) * f64::from(i) / 32.0, 1.0);
+                let point = group.joint.eval(angle);
+                let table = group.muscle.table.eval(point.shortening / group.rest_length);
+                let torque =
+                    table.force(Dual64::from(gauge), Dual64::from(self.scales[k])) * point.torque_arm;
+                let arm = point.moment_arm.re.abs();
+                let volume = (self.fixed_volume[group.chamber] + table.volume.re.max(0.0) * group.count)
+                    .max(f64::MIN_POSITIVE);
+                let swept = table.volume_slope.re * arm * group.count / group.rest_length;
+                let air = self.alphas[group.chamber].volume * pressure * swept * swept / volume;
+                let friction = self.presliding_stiffness(
+                    group,
+                    table.force(Dual64::from(gauge), Dual64::from(1.0)).re.abs(),
+                    gauge,
+                );
+                most = most.max(group.count * (torque.eps.abs() + friction * arm * arm) + air);
+            }
+            total += most;
+        }
+        total
+    }
+
+    /// Stiffness of one muscle's friction before it slips [N/m]: every element of the bank still sticks.
+    fn presliding_stiffness(&self, group: &Group, force: f64, gauge: f64) -> f64 {
+        let mut total = 0.0;
+        if group.direction {
+            let spec = &group.muscle.exact.spec;
+            let width = spec.friction_coefficient.abs() + (spec.friction_pressure_slope * gauge).abs();
+            total += width.max(spec.friction_floor) * force * BANK / group.muscle.presliding();
+        }
+        if let (true, Some([constant, slope, presliding])) =
+            (group.hysteresis, self.rig.wiring.effects.hysteresis)
+        {
+            total += (self.values[constant] + self.values[slope] * gauge) * BANK / self.values[presliding];
+        }
+        total
     }
 }

@@ -1,0 +1,52 @@
+"""Channels by name: what is measured or simulated, and its SI unit."""
+
+from __future__ import annotations
+
+from typing import Final
+
+__all__ = ["UNITS", "channel_of", "dotted", "unit_of"]
+
+#: SI unit of each channel, recorded or simulated; pressures gauge. Where a rig has several blocks of a kind, the name of the
+#: block stands behind a dot: ``muscle_pressure.flexor``.
+UNITS: Final[dict[str, str]] = {
+    "time": "s",
+    "valve_command": "V",
+    "supply_command": "Pa",
+    "supply_pressure": "Pa",
+    "line_pressure": "Pa",
+    "muscle_pressure": "Pa",
+    "joint_angle": "rad",
+    "length": "m",
+    "force": "N",
+    "joint_torque": "N m",
+    "temperature": "K",
+    "reference": "rad",
+    "joint_rate": "rad/s",
+    "length_rate": "m/s",
+    "contraction_ratio": "1",
+    "muscle_force": "N",
+    "air_volume": "m3",
+    "air_mass": "kg",
+    "line_mass": "kg",
+    "mass_supplied": "kg",
+    "mass_vented": "kg",
+    "energy_supplied": "J",
+    "exergy_supplied": "J",
+    "muscle_work": "J",
+    "joint_work": "J",
+}
+
+
+def channel_of(name: str) -> str:
+    """The channel of a name: ``muscle_pressure`` of ``muscle_pressure.flexor``."""
+    return name.partition(".")[0]
+
+
+def dotted(channel: str, name: str) -> str:
+    """``muscle_pressure.flexor``, or ``muscle_pressure`` for a block without a name."""
+    return f"{channel}.{name}" if name else channel
+
+
+def unit_of(name: str) -> str:
+    """SI unit of a channel, "1" for one that is not known."""
+    return UNITS.get(channel_of(name), "1")

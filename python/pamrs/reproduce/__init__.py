@@ -1,0 +1,95 @@
+"""The 2014 dissertation chapter by chapter: what it states beside what this package gives.
+
+``pamrs.reproduce.section("ch3")`` runs the experiments of a chapter and has its statements, each with a verdict, and its pictures;
+``pamrs reproduce ch3 --output DIR`` writes them.
+"""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Final
+
+from pamrs.errors import ParameterError
+
+if TYPE_CHECKING:
+    from pamrs.reproduce.page import Section
+
+__all__ = ["check", "names", "section"]
+
+#: Chapter -> its module; the one of its pictures has the same name and ``_figures``.
+_CHAPTERS: Final = {"ch3": "chapter3"}
+
+
+def names() -> list[str]:
+    """Names of the chapters that there are."""
+    return list(_CHAPTERS)
+
+
+def check(name: str) -> None:
+    """Refuse a chapter that there is not.
+
+    Parameters
+    ----------
+    name : str
+        One of :func:`names`.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such chapter; the message lists those that there are.
+    """
+    if name not in _CHAPTERS:
+        near = difflib.get_close_matches(str(name), _CHAPTERS, n=1)
+        hint = f" Did you mean {near[0]!r}?" if near else ""
+        raise ParameterError(f"chapter = {name!r} is not reproduced.{hint} There are: {', '.join(_CHAPTERS)}")
+
+
+def section(name: str, *, search: bool = True, pictures: bool = True, progress: Callable[[str], None] | None = None) -> Section:
+    """Run the experiments of a chapter.
+
+    Parameters
+    ----------
+    name : str
+        One of :func:`names`.
+    search : bool
+        Whether searches that take minutes run too (extra ``search``).
+    pictures : bool
+        Whether its pictures are drawn (extra ``plot``).
+    progress : callable, optional
+        Called with what is done next.
+
+    Returns
+    -------
+    Section
+
+    Raises
+    ------
+    ParameterError
+        If there is no such chapter; the message lists those that there are.
+    MissingPackageError
+        If an extra is missing; the message names it.
+    """
+    from pamrs.reproduce.page import Section
+
+    check(name)
+    if pictures:
+        try:
+            drawn = importlib.import_module(f"pamrs.reproduce.{_CHAPTERS[name]}_figures")
+        except ImportError as error:
+            from pamrs.design.search import missing
+
+            raise missing(error, "plot") from None
+    chapter = importlib.import_module(f"pamrs.reproduce.{_CHAPTERS[name]}")
+    rows = chapter.facts(search=search, progress=progress)
+    if pictures and progress is not None:
+        progress(f"{name}: pictures")
+    return Section(
+        title=chapter.TITLE,
+        rows=rows,
+        headings=chapter.headings(),
+        in_short=chapter.in_short(rows),
+        chosen=chapter.chosen(),
+        pictures=drawn.pictures() if pictures else [],
+    )
