@@ -2,10 +2,11 @@
 
 A rig is a graph: gas nodes (supplies, chambers, inlets of lines, ambient) joined by flows, and coordinates (joint
 angles, or the shortening on a linear load) on which muscles pull.  Pressures inside are absolute, channels are gauge.
-Every book (masses, energies, works) is a further state of the integrator, not a sum over samples.
+Every book (masses, energies, works) is a further state of the integrator, not a sum over samples; the positive work at
+the joints, with a kink at every reversal, is read off the signed work of each.
 
-Beyond the equations of ``plant``: flows run down the pressure in either direction, through a valve too.  What the
-reference has no equation for (effects, sensor errors, hysteresis, load frames) is refused.
+Flows run down the pressure in either direction, through a valve too.  What the reference has no equation for (effects,
+sensor errors, hysteresis, load frames) is refused.
 """
 
 from __future__ import annotations
@@ -400,7 +401,7 @@ class Network:
             raise ValueError(f"initial values of nothing in this rig: {', '.join(left)}")
         volume = self.volumes(position)
         mass = [p * v / self.rt for p, v in zip(pressure, volume, strict=True)]
-        return np.array([*pressure[:-1], *position, *rate, *mass[:-1], *(0.0 for _ in BOOKS)])
+        return np.array([*pressure[:-1], *position, *rate, *mass[:-1], *(0.0 for _ in BOOKS[:-1]), *(0.0 for _ in position)])
 
     def volumes(self, position: Sequence[float]) -> list[float]:
         """Volume of every node with the muscles that belong to it, m^3 (zero where it does not matter)."""
@@ -411,16 +412,16 @@ class Network:
         return volume
 
     def split(self, state: Array) -> tuple[Array, ...]:
-        """Pressures (absolute), positions, rates, masses and books of states (..., m)."""
+        """Pressures (absolute), positions, rates, masses and books of states (..., m), the last of these the work at each joint."""
         n, c = len(self.nodes) - 1, len(self.coordinates)
         parts = np.split(state, np.cumsum([n, c, c, n]), axis=-1)
         return tuple(parts)
 
     def tolerances(self, state: Array, rtol: float) -> Array:
         """Absolute tolerances of a state."""
-        pressure, position, rate, mass, _ = self.split(state)
+        pressure, position, rate, mass, books = self.split(state)
         air = max(self.gas.ambient_pressure * sum(self.volumes(position.tolist())[:-1]) / self.rt, 1e-9)
-        works = [air, air, *(air * self.rt,) * (len(BOOKS) - 2)]
+        works = [air, air, *(air * self.rt,) * (books.size - 2)]
         return rtol * np.array([*(1e5,) * pressure.size, *(1.0,) * (position.size + rate.size), *(air,) * mass.size, *works])
 
     # ---------------------------------------------------------------- equations
@@ -481,17 +482,17 @@ class Network:
                 moved = self.rt * (node.alpha_in * inflow[i] - node.alpha_out * outflow[i])
                 pressure_rate.append((moved - node.alpha * pressure[i] * volume_rate[i]) / volume[i])
         stopped = [f + c.stop(q, v) for f, c, q, v in zip(force, self.coordinates, position, rate, strict=True)]
-        joint_work = sum(max(f * v, 0.0) for f, v in zip(force, rate, strict=True))
         return [
             *pressure_rate,
             *rate,
             *self.body(position, rate, stopped),
             *(inflow[i] - outflow[i] for i in range(count - 1)),
-            supplied, inflow[-1] - outflow[-1] + relieved, self.rt * supplied, exergy, work, joint_work,
+            supplied, inflow[-1] - outflow[-1] + relieved, self.rt * supplied, exergy, work,
+            *(f * v for f, v in zip(force, rate, strict=True)),
         ]  # fmt: skip
 
     def channels(self, states: Array) -> dict[str, Array]:
-        """Channels of states (n, m): gauge pressures, positions, rates and books."""
+        """Channels of states (n, m): gauge pressures, positions, rates and books but the positive work at the joints."""
         pressure, position, rate, mass, books = self.split(states)
         ambient = self.gas.ambient_pressure
         words = {"chamber": ("muscle_pressure", "air_mass"), "inlet": ("line_pressure", "line_air_mass")}
@@ -507,7 +508,7 @@ class Network:
                 out[suffix("joint_rate", coordinate.name)] = rate[:, k]
             else:
                 out["length"], out["length_rate"] = self.rest_length - position[:, k], -rate[:, k]
-        return out | {name: books[:, k] for k, name in enumerate(BOOKS)}
+        return out | {name: books[:, k] for k, name in enumerate(BOOKS[:-1])}
 
 
 def _possible(means: Transmission, positions: Iterable[float]) -> Iterable[float]:
@@ -576,6 +577,7 @@ def simulate(
     n = sizes.pop()
     states = np.empty((n, rig.start(initial or {}).size))
     states[0] = rig.start(initial or {})
+    positive = np.zeros(n)
     atol = rig.tolerances(states[0], rtol)
     first = min(1e-3, sample_time)
     for k in range(n - 1):
@@ -587,9 +589,12 @@ def simulate(
         rate = partial(rig.derivative, ways=ways, set_pressure=set_pressure)
         left: list[str] = []
         slope = partial(_rhs, rate=rate, left=left)
-        solution = solve_ivp(slope, (0.0, sample_time), states[k], method=method, rtol=rtol, atol=atol, first_step=first)
+        settings = {"rtol": rtol, "atol": atol, "first_step": first, "dense_output": True}
+        solution = solve_ivp(slope, (0.0, sample_time), states[k], method=method, **settings)
         if not solution.success:
             raise RuntimeError(f"integration failed in sample {k}: {'; '.join([solution.message, *left])}")
         states[k + 1] = solution.y[:, -1]
+        work = rig.split(solution.sol(np.linspace(0.0, sample_time, 1001)).T)[-1][:, len(BOOKS) - 1 :]
+        positive[k + 1] = positive[k] + np.maximum(np.diff(work, axis=0), 0.0).sum()
         first = min(float(np.diff(solution.t).max()), sample_time)
-    return {"time": sample_time * np.arange(n, dtype=np.float64), **rig.channels(states)}
+    return {"time": sample_time * np.arange(n, dtype=np.float64), **rig.channels(states), BOOKS[-1]: positive}
