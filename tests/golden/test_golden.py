@@ -12,6 +12,8 @@ import pytest
 from numpy.typing import NDArray
 
 import pamrs
+from tests.golden.generate import NETWORKS
+from tests.runs import RUNS, misses
 
 HERE = Path(__file__).resolve().parent
 OWN = HERE / "data"
@@ -127,3 +129,17 @@ def trajectory_misses(path: Path) -> dict[str, float]:
 def test_shoulder_trajectory(folder: Path, name: str, tolerance: float) -> None:
     misses = trajectory_misses(golden_path(folder, name))
     assert max(misses.values()) <= tolerance, misses
+
+
+@pytest.mark.parametrize("name", NETWORKS)
+def test_networks(name: str) -> None:
+    """Rigs of several blocks at a step of 0.1 ms: every channel of the reference, sums of mass and energy included."""
+    path = OWN / f"network_{name}.csv"
+    header = path.read_text(encoding="utf-8").partition("\n")[0].split(",")
+    data = dict(zip(header, np.genfromtxt(path, delimiter=",", skip_header=1).T, strict=True))
+    run = RUNS[name]
+    for command, values in run.commands.items():
+        np.testing.assert_allclose(values, data.pop(command), rtol=1e-11, atol=1e-12)
+    np.testing.assert_allclose(run.time, data.pop("time"), atol=1e-12)
+    found = misses(run.core(1e-4), data)
+    assert max(found.values()) <= 1e-6, found
