@@ -321,7 +321,7 @@ class Rig:
         info = EFFECTS.get(effect)
         if info is None:
             raise ParameterError(f"unknown effect {effect!r}; the catalogue has: {', '.join(sorted(EFFECTS))}")
-        at = bare(info.block, at)
+        at = bare(info.at, at)
         given = dict(parameters or {})
         names = [parameter.name for parameter in info.parameters]
         problems = [f"unknown parameter {name!r}; it has: {', '.join(names)}" for name in {*given, *(std or {})} if name not in names]

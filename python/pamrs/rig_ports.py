@@ -57,7 +57,9 @@ def effect_problem(model: Mapping[str, Any], effect: str, place: str) -> str:
     """What is wrong with the block that an effect acts on, ``""`` where nothing is."""
     from pamrs.effects_table import EFFECTS
 
-    block = EFFECTS[effect].block
+    block = EFFECTS[effect].at
+    if not block:
+        return f"{effect}: at = {place!r} is not allowed: it acts on the whole rig" if place else ""
     names = [name for name in tables_of(model, block) if name]
     if not place or place in names:
         return ""

@@ -331,7 +331,7 @@ class Reader:
             values = {
                 parameter.name: self.effect_value(identity, parameter, given.get(parameter.name)) for parameter in info.parameters
             }
-            place = self.place(label, info.block, entry.get("at", ""))
+            place = self.place(label, info.at or "rig", entry.get("at", ""))
             found.append({"id": identity, **({"at": place} if place else {}), "parameters": values})
         return found
 

@@ -69,7 +69,7 @@ impl Block {
     fn initial_states(self, layout: &Layout) -> Vec<usize> {
         match self {
             Self::Supply(_) | Self::Chamber(_) => vec![self.output(layout)],
-            Self::Arm(_) => (layout.angle(0)..layout.states()).collect(),
+            Self::Arm(_) => (layout.angle(0)..layout.extra(0)).collect(),
         }
     }
 
@@ -82,8 +82,10 @@ impl Block {
     fn simulated(self, rig: &Rig, measured: &Measured<'_>) -> Simulated {
         let layout = rig.layout();
         let mut places = self.initial_states(layout);
-        if let Self::Chamber(k) = self {
-            places.push(layout.mass(k));
+        match self {
+            Self::Chamber(k) => places.push(layout.mass(k)),
+            Self::Arm(_) => places.extend(layout.extra(0)..layout.states()),
+            Self::Supply(_) => {}
         }
         if !matches!(self, Self::Arm(_)) {
             places.extend(hidden(layout, measured));
@@ -319,6 +321,8 @@ struct Driven<'a, S> {
     place: usize,
     signal: Signal<'a>,
     zero: S,
+    /// Time constant of its sensor [s].
+    lag: S,
 }
 
 impl<S: Scalar> Driven<'_, S> {
@@ -328,7 +332,7 @@ impl<S: Scalar> Driven<'_, S> {
         let layout = rig.layout();
         let (value, slope) = self.signal.at(k, fraction, dt);
         if self.place < layout.angle(0) {
-            state[self.place] = -self.zero + (value + rig.gas.ambient_pressure);
+            state[self.place] = -self.zero + (value + rig.gas.ambient_pressure) + self.lag * slope;
         } else {
             state[self.place] = -self.zero + value;
             state[self.place + layout.coordinates] = constant(slope);
@@ -350,6 +354,17 @@ fn zero<S: Scalar>(plant: &Plant<'_, S>, place: usize) -> S {
     id.map_or(constant(0.0), |id| plant.values()[id])
 }
 
+/// Time constant of the sensor of a state [s].
+fn lag<S: Scalar>(plant: &Plant<'_, S>, place: usize) -> S {
+    let (rig, layout) = (plant.rig(), plant.rig().layout());
+    let gases = layout.pressure(0)..layout.mass(0);
+    let lags = gases.contains(&place) && rig.wiring.gases[place - layout.supplies].lag.is_some();
+    match rig.wiring.effects.pressure_lag {
+        Some([time_constant]) if lags => plant.values()[time_constant],
+        _ => constant(0.0),
+    }
+}
+
 fn run<S: Scalar>(
     plant: Plant<'_, S>,
     block: Block,
@@ -368,10 +383,21 @@ fn run<S: Scalar>(
         Block::Arm(_) => zero(&plant, output),
         Block::Supply(_) | Block::Chamber(_) => zero(&plant, output) - ambient,
     };
+    // What a lagging sensor reads, in the place of the pressure.
+    let reading = match block {
+        Block::Chamber(k) => rig.wiring.gases[k].lag.map(|lag| layout.extra(lag)),
+        _ => None,
+    };
     let n = measured.samples;
     let drivers: Vec<Driven<'_, S>> = (measured.signals.iter())
-        .map(|(place, signal)| Driven { place: *place, signal: *signal, zero: zero(&plant, *place) })
+        .map(|(place, signal)| Driven {
+            place: *place,
+            signal: *signal,
+            zero: zero(&plant, *place),
+            lag: lag(&plant, *place),
+        })
         .collect();
+    let skewed = plant.skewed();
     let mut stepper = Stepper::new(plant);
     let mut memory = vec![Memory::default(); rig.wiring.groups.len()];
     let mut state = vec![constant::<S>(0.0); stepper.plant.states()];
@@ -405,6 +431,8 @@ fn run<S: Scalar>(
                 for gas in 0..layout.gases {
                     state[layout.mass(gas)] = plant.initial_mass(gas, &state);
                 }
+                plant.start_effects(&mut state);
+                memory = plant.fresh_memory(&state);
             } else {
                 // a new window keeps the gas temperature and the memory of the motion
                 for gas in 0..layout.gases {
@@ -416,20 +444,39 @@ fn run<S: Scalar>(
                 plant.contractions(&state, to);
                 plant.advance_memory(&mut memory, from, to);
             }
+            if let (Some(reading), Some(signal)) = (reading, measured.signal(output)) {
+                state[reading] = bumps[0] - offset + signal.value[k];
+            }
         }
         check_state(&stepper.plant, &state, k as f64 * dt)?;
-        sink(k, state[output] + offset);
+        sink(k, state[reading.unwrap_or(output)] + offset);
         if k + 1 == n {
             break;
         }
-        let controls = stepper.plant.controls(|input| measured.commands[input][k]);
+        let mut controls = stepper.plant.controls(|input| measured.commands[input][k]);
         let h = 1.0 / timing.substeps as f64;
         for i in 0..timing.substeps {
-            stepper.step(&mut state, &mut memory, &controls, timing.step(), &simulated, |fraction, y| {
-                for driver in drivers.iter().filter(|d| !own.contains(&d.place)) {
-                    driver.write(rig, k, (i as f64 + fraction) * h, dt, y);
-                }
-            });
+            let time = (k as f64 + i as f64 * h) * dt;
+            if skewed {
+                let command = |input: usize, sample: i64| {
+                    let row = sample.clamp(0, n as i64 - 1) as usize;
+                    measured.commands[input][row]
+                };
+                controls = stepper.plant.skewed_controls(time, timing.step(), dt, command);
+            }
+            stepper.step(
+                &mut state,
+                &mut memory,
+                &controls,
+                time,
+                timing.step(),
+                &simulated,
+                |fraction, y| {
+                    for driver in drivers.iter().filter(|d| !own.contains(&d.place)) {
+                        driver.write(rig, k, (i as f64 + fraction) * h, dt, y);
+                    }
+                },
+            );
         }
     }
     Ok(())

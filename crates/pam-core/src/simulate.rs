@@ -160,13 +160,22 @@ pub(crate) struct Stepper<'a, S> {
     start: Vec<S>,
     end: Vec<S>,
     remembers: bool,
+    /// Controls at the beginning, the middle and the end of a step, where they differ.
+    stages: Option<[Controls<S>; 3]>,
+    /// State before a step, where something happens between steps.
+    before: Option<Vec<S>>,
 }
 
 impl<'a, S: Scalar> Stepper<'a, S> {
     pub fn new(plant: Plant<'a, S>) -> Self {
         let groups = plant.rig().wiring.groups.len();
         let zeros = || vec![constant(0.0); groups];
+        let effects = &plant.rig().wiring.effects;
+        let stages = effects.staged().then(|| std::array::from_fn(|_| plant.controls(|_| 0.0)));
+        let before = effects.between_steps().then(|| vec![constant(0.0); plant.states()]);
         Self {
+            stages,
+            before,
             scratch: plant.scratch(),
             method: Rk4::new(plant.states()),
             start: zeros(),
@@ -176,27 +185,54 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         }
     }
 
-    /// One RK4 step; driven states are written by `drive(fraction, state)`.
+    /// Controls as they are at the beginning (0), the middle or the end (2) of the step that began last.
+    pub fn controls<'b>(&'b self, held: &'b Controls<S>, stage: usize) -> &'b Controls<S> {
+        self.stages.as_ref().map_or(held, |stages| &stages[stage])
+    }
+
+    /// Controls at the beginning of a step that is still to come.
+    pub fn begin(&mut self, state: &[S], held: &Controls<S>, time: f64) {
+        if let Some([first, ..]) = &mut self.stages {
+            self.plant.stage(state, held, time, 0.0, first);
+        }
+    }
+
+    /// One RK4 step from a time [s] on; driven states are written by `drive(fraction, state)`.
     #[inline]
+    #[allow(clippy::too_many_arguments)]
     pub fn step(
         &mut self,
         state: &mut [S],
         memory: &mut [Memory<S>],
         controls: &Controls<S>,
+        time: f64,
         dt: f64,
         simulated: &Simulated,
         mut drive: impl FnMut(f64, &mut [S]),
     ) {
-        let Self { plant, scratch, method, start, end, remembers } = self;
+        let Self { plant, scratch, method, start, end, remembers, stages, before } = self;
         if *remembers {
             drive(0.0, state);
             plant.contractions(state, start);
         }
+        if let Some(stages) = stages {
+            for (k, stage) in stages.iter_mut().enumerate() {
+                plant.stage(state, controls, time, 0.5 * k as f64 * dt, stage);
+            }
+        }
+        if let Some(before) = before {
+            drive(0.0, state);
+            before.copy_from_slice(state);
+        }
         method.step(state, dt, |fraction, y, out| {
             drive(fraction, y);
+            let controls = stages.as_ref().map_or(controls, |stages| &stages[(2.0 * fraction) as usize]);
             plant.rates(y, controls, memory, start, simulated, scratch, out);
         });
         drive(1.0, state);
+        if let Some(before) = before {
+            plant.between_steps(before, state, controls, dt);
+        }
         if *remembers {
             plant.contractions(state, end);
             plant.advance_memory(memory, start, end);
@@ -279,6 +315,10 @@ pub struct Progress {
     /// Conditions that an event ends, see [`Watch`].
     flags: Vec<bool>,
     samples: u64,
+    /// Commands of the samples before, newest last, as far back as the effect `clock_skew` reaches.
+    past: Vec<f64>,
+    /// Commands of a sample that are kept: those of all inputs, or none.
+    inputs: usize,
 }
 
 impl Progress {
@@ -292,6 +332,8 @@ impl Progress {
         for gas in 0..rig.layout.gases {
             state[rig.layout.mass(gas)] = plant.initial_mass(gas, &state);
         }
+        plant.start_effects(&mut state);
+        let memory = plant.fresh_memory(&state);
         let stops: Vec<_> = rig.wiring.coordinates.iter().map(|c| c.stops).collect();
         let mut flags = Vec::new();
         for (k, stops) in stops.iter().enumerate() {
@@ -300,7 +342,8 @@ impl Progress {
             flags.push(stops.is_some_and(|s| x > s.max_angle));
         }
         flags.extend(std::iter::repeat_n(false, rig.wiring.valves.len() + rig.wiring.lines.len()));
-        Ok(Self { state, memory: vec![Memory::default(); rig.wiring.groups.len()], flags, samples: 0 })
+        let inputs = if plant.skewed() { rig.names.inputs.len() } else { 0 };
+        Ok(Self { state, memory, flags, samples: 0, past: Vec::new(), inputs })
     }
 
     /// Samples since the start.
@@ -314,7 +357,8 @@ impl Progress {
     pub fn to_vec(&self) -> Vec<f64> {
         let memory = self.memory.iter().flat_map(Memory::to_array);
         let flags = self.flags.iter().map(|f| f64::from(u8::from(*f)));
-        self.state.iter().copied().chain(memory).chain(flags).chain([self.samples as f64]).collect()
+        let numbers = self.state.iter().copied().chain(memory).chain(flags).chain([self.samples as f64]);
+        numbers.chain(self.past.iter().copied()).collect()
     }
 
     /// This progress with the numbers of another [`Self::to_vec`] of the same rig.
@@ -323,8 +367,10 @@ impl Progress {
     /// [`Error::Length`] for another number of them, [`Error::Parameter`] for one that is not finite.
     pub fn restored(&self, numbers: &[f64]) -> Result<Self> {
         let parts = [self.state.len(), self.memory.len() * Memory::<f64>::NUMBERS, self.flags.len(), 1];
-        let expected = parts.iter().sum();
-        if numbers.len() != expected {
+        let expected: usize = parts.iter().sum();
+        let past = numbers.len().wrapping_sub(expected);
+        let whole = past == 0 || (past < numbers.len() && self.inputs > 0 && past % self.inputs == 0);
+        if !whole {
             let why = "as it was read".into();
             return Err(Error::Length { name: "state".into(), found: numbers.len(), expected, why });
         }
@@ -333,8 +379,11 @@ impl Progress {
         }
         let (state, rest) = numbers.split_at(parts[0]);
         let (memory, rest) = rest.split_at(parts[1]);
-        let (flags, samples) = rest.split_at(parts[2]);
+        let (flags, rest) = rest.split_at(parts[2]);
+        let (samples, past) = rest.split_at(1);
         Ok(Self {
+            past: past.to_vec(),
+            inputs: self.inputs,
             state: state.to_vec(),
             memory: memory.chunks(Memory::<f64>::NUMBERS).map(Memory::from_slice).collect(),
             flags: flags.iter().map(|f| *f > 0.5).collect(),
@@ -362,6 +411,23 @@ impl Progress {
         check_state(plant, &self.state, self.samples as f64 * timing.sample_time)?;
         plant.observe(&self.state, &self.memory, scratch, &mut out.channels);
         Ok(())
+    }
+
+    /// Note the commands of a sample, and forget those that no step asks for any more.
+    fn remember(&mut self, drive: &Drive<'_>, sample: usize, skew: f64, timing: Timing) {
+        self.past.extend((0..self.inputs).map(|input| drive.commands[input][sample]));
+        let kept = self.inputs * (2 + (skew / timing.sample_time).ceil() as usize);
+        self.past.drain(..self.past.len().saturating_sub(kept));
+    }
+
+    /// Commands over the step that begins at a time, the newest being those of the present sample.
+    fn skewed(&self, plant: &Plant<'_, f64>, time: f64, timing: Timing) -> Controls<f64> {
+        let rows = self.past.len() / self.inputs;
+        let command = |input: usize, sample: i64| {
+            let back = (self.samples as i64 - sample).clamp(0, rows as i64 - 1) as usize;
+            self.past[(rows - 1 - back) * self.inputs + input]
+        };
+        plant.skewed_controls(time, timing.step(), timing.sample_time, command)
     }
 
     /// Hold the commands of each sample and append the sample after it. What is prescribed moves evenly to its value for the
@@ -398,16 +464,25 @@ impl Progress {
         let (mut before, mut after) = (Watch::default(), Watch::default());
         let mut unseen = 0;
         for k in 0..drive.samples {
-            let controls = stepper.plant.controls(|input| drive.commands[input][k]);
+            let mut controls = stepper.plant.controls(|input| drive.commands[input][k]);
             let mut next = self.clone();
             let happened = out.events.len();
             let ends = drive.ends(rig, &self.state, k);
             let began = self.samples as f64 * timing.sample_time;
-            before.look(&stepper.plant, &next.state, &controls);
+            if self.inputs > 0 {
+                next.remember(drive, k, stepper.plant.skew(began), timing);
+                controls = next.skewed(&stepper.plant, began, timing);
+            }
+            stepper.begin(&next.state, &controls, began);
+            before.look(&stepper.plant, &next.state, stepper.controls(&controls, 0));
             before.report(rig, None, began, &mut next.flags, &mut out.events);
             for sub in 0..timing.substeps {
+                let from = began + sub as f64 * dt;
+                if self.inputs > 0 {
+                    controls = next.skewed(&stepper.plant, from, timing);
+                }
                 let (state, memory) = (&mut next.state, &mut next.memory);
-                stepper.step(state, memory, &controls, dt, &simulated, |fraction, y| {
+                stepper.step(state, memory, &controls, from, dt, &simulated, |fraction, y| {
                     let share = (sub as f64 + fraction) / timing.substeps as f64;
                     for (place, from, to) in &ends {
                         y[*place] = from + (to - from) * share;
@@ -416,7 +491,7 @@ impl Progress {
                         }
                     }
                 });
-                after.look(&stepper.plant, &next.state, &controls);
+                after.look(&stepper.plant, &next.state, stepper.controls(&controls, 2));
                 let time = began + (sub + 1) as f64 * dt;
                 after.report(rig, Some((&before, dt)), time, &mut next.flags, &mut out.events);
                 std::mem::swap(&mut before, &mut after);

@@ -1,18 +1,14 @@
 //! Laws of rigs of several blocks: what is conserved, what they come to rest at, order, stability, and what is refused.
 
-use pam_core::rig::spec::{
-    ArmSpec, ChamberSpec, JointSpec, LineSpec, LinkSpec, SupplySpec, TransmissionSpec, ValveSpec,
-};
+use pam_core::rig::spec::{ArmSpec, ChamberSpec, LineSpec, LinkSpec, SupplySpec};
 use pam_core::simulate::{simulate, Initial, Progress, Timing, Trajectory};
 use pam_core::{Rig, RigSpec};
 
-const SHOULDER: &str = include_str!("data/shoulder.json");
+mod rigs;
+use rigs::{antagonists, shoulder, two_joints};
+
 const RT: f64 = 287.05 * 293.15;
 const AMBIENT: f64 = 101_325.0;
-
-fn shoulder() -> RigSpec {
-    RigSpec::from_json(SHOULDER).unwrap()
-}
 
 /// Nothing but chambers and lines.
 fn gas(chambers: &[(&str, f64, f64)], lines: Vec<LineSpec>) -> RigSpec {
@@ -48,73 +44,6 @@ fn tube(from: &str, to: &str, length: f64, diameter: f64) -> LineSpec {
 
 fn orifice(from: &str, to: &str, area: f64) -> LineSpec {
     LineSpec { kind: "orifice".into(), discharge_area: area, ..tube(from, to, 0.0, 0.0) }
-}
-
-/// Flexor and extensor on one pulley, a valve each.
-fn antagonists() -> RigSpec {
-    let mut spec = shoulder();
-    let pulley = |radius: f64, rest_angle: f64| {
-        Some(TransmissionSpec {
-            kind: "pulley".into(),
-            upper_axial: 0.0,
-            upper_offset: 0.0,
-            lower_axial: 0.0,
-            lower_offset: 0.0,
-            radius,
-            coefficients: vec![],
-            rest_angle,
-        })
-    };
-    let (valve, chamber, muscle) =
-        (spec.valves[0].clone(), spec.chambers[0].clone(), spec.muscles[0].clone());
-    (spec.valves, spec.chambers, spec.muscles) = (vec![], vec![], vec![]);
-    for (name, radius, rest) in [("flexor", 0.025, -1.0), ("extensor", -0.025, 1.0)] {
-        let port = format!("chamber.{name}");
-        spec.valves.push(ValveSpec { name: name.into(), to: port.clone(), ..valve.clone() });
-        spec.chambers.push(ChamberSpec { name: name.into(), ..chamber.clone() });
-        let mut group = muscle.clone();
-        (group.name, group.chamber, group.transmission) = (name.into(), port, pulley(radius, rest));
-        group.muscle.count = 2;
-        spec.muscles.push(group);
-    }
-    let joint = &mut spec.joints[0];
-    (joint.transmission, joint.rest_angle, joint.min_angle, joint.max_angle) = (None, 0.0, -0.9, 0.9);
-    let arm = spec.arm.as_mut().unwrap();
-    (arm.payload, arm.gravity, arm.coulomb) = (0.5, 0.0, 0.0);
-    spec
-}
-
-/// Elbow and wrist, a valve, chamber and muscles each.
-fn two_joints() -> RigSpec {
-    let mut spec = shoulder();
-    let (valve, chamber, muscle, joint) =
-        (spec.valves[0].clone(), spec.chambers[0].clone(), spec.muscles[0].clone(), spec.joints[0].clone());
-    (spec.valves, spec.chambers, spec.muscles, spec.joints) = (vec![], vec![], vec![], vec![]);
-    let mut links = vec![];
-    for (name, count, length, mass) in [("elbow", 6, 0.4, 2.0), ("wrist", 2, 0.2, 0.8)] {
-        let (port, hinge) = (format!("chamber.{name}"), format!("joint.{name}"));
-        spec.valves.push(ValveSpec { name: name.into(), to: port.clone(), ..valve.clone() });
-        spec.chambers.push(ChamberSpec { name: name.into(), ..chamber.clone() });
-        let mut group = muscle.clone();
-        (group.name, group.chamber, group.joint) = (name.into(), port, hinge.clone());
-        group.muscle.count = count;
-        spec.muscles.push(group);
-        spec.joints.push(JointSpec { name: name.into(), ..joint.clone() });
-        links.push(LinkSpec {
-            name: name.into(),
-            joint: hinge,
-            length,
-            mass,
-            centre: length / 2.0,
-            inertia: mass * length * length / 12.0,
-            payload: if name == "wrist" { 3.0 } else { 0.0 },
-            viscous: 1.0,
-            coulomb: 0.3,
-            coulomb_speed: 0.02,
-        });
-    }
-    spec.arm = Some(ArmSpec { kind: "planar".into(), links, ..spec.arm.unwrap() });
-    spec
 }
 
 fn wave(rows: usize, phase: f64) -> Vec<f64> {

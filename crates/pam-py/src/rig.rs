@@ -154,5 +154,7 @@ type EffectRow = (&'static str, &'static str, Vec<(&'static str, &'static str)>)
 /// Effects of the core: (id, block, [(parameter, SI unit), ...]).
 #[pyfunction]
 pub fn effects() -> Vec<EffectRow> {
-    pam_core::effects::EFFECTS.iter().map(|e| (e.id, e.block, e.parameters.to_vec())).collect()
+    let parameters =
+        |e: &pam_core::effects::EffectInfo| e.parameters.iter().map(|p| (p.name, p.unit)).collect();
+    pam_core::effects::EFFECTS.iter().map(|e| (e.id, e.block, parameters(e))).collect()
 }

@@ -18,6 +18,8 @@ from pamrs.rig import Rig
 
 __all__ = ["Candidate", "Group", "examine", "significant"]
 
+CANDIDATES = ("leak_muscle", "heat_transfer", "muscle_hysteresis")
+"""Effects of the catalogue that are tried for an explanation."""
 DETECTION_RATIO = 1.6
 """Variance of bin means over the floor's from which a mismatch is taken as real."""
 NAMING_GAP = 0.72
@@ -126,7 +128,7 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
         return Group(blocks, was, now, [start], {"": 1.0}, None, floor)
     mismatch = max(suspects, key=lambda b: out[b.name].ratio)
     say(f"{names}: {mismatch.name} keeps {now[mismatch.name].systematic:.2g} noise units after the refit")
-    acting = [e for e in EFFECTS if any(acts_in(e, b) for b in suspects)]
+    acting = [e for e in CANDIDATES if any(acts_in(e, b) for b in suspects)]
     sets = [s for k in (1, 2) for s in itertools.combinations(acting, k)]
     candidates = [start]
     for effects in sets:

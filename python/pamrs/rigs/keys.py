@@ -72,7 +72,8 @@ def _effects() -> list[str]:
     lines = ["# [[effects]]                physics that the blocks leave out, as often as needed"]
     for name, info in EFFECTS.items():
         lines.append(f'# id = "{name}"')
-        lines.append(f"#   at                   name of the one {info.block} that it acts on; default every {info.block}")
+        if info.at:
+            lines.append(f"#   at                   name of the one {info.at} that it acts on; default {info.everywhere}")
         for parameter in info.parameters:
             unit = "" if parameter.unit == "1" else f" [{parameter.unit}]"
             lines.append(f"#   parameters.{parameter.name}: number{unit}, default {parameter.default:g}")

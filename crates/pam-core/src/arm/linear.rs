@@ -3,13 +3,13 @@
 //! `m x'' = F - m g - c x' - f tanh(x'/w) + F_stop`, `x` the shortening of the muscle, `F` the pull of all muscles; stops as of
 //! the one-link arm, in metres. A frame prescribes `x` (dissertation ch. 2: length cycled slowly at held pressure).
 
-use crate::scalar::Scalar;
+use crate::scalar::{constant, tanh, Scalar};
 
 /// A mass that hangs from a muscle.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct HangingMass {
+pub struct HangingMass<S> {
     /// Mass [kg].
-    pub mass: f64,
+    pub mass: S,
     /// Viscous friction [N s/m].
     pub viscous: f64,
     /// Coulomb friction [N].
@@ -20,12 +20,25 @@ pub struct HangingMass {
     pub gravity: f64,
 }
 
-impl HangingMass {
+impl HangingMass<f64> {
+    /// The same in another scalar type.
+    pub fn lift<S: Scalar>(&self) -> HangingMass<S> {
+        let Self { mass, viscous, coulomb, coulomb_speed, gravity } = *self;
+        HangingMass { mass: constant(mass), viscous, coulomb, coulomb_speed, gravity }
+    }
+}
+
+impl<S: Scalar> HangingMass<S> {
+    /// Friction [N] at a speed [m/s], positive against it.
+    #[inline]
+    pub fn friction(&self, speed: S) -> S {
+        speed * self.viscous + tanh(speed / self.coulomb_speed) * self.coulomb
+    }
+
     /// Acceleration of the shortening [m/s2] under the pull of the muscles and a stop force [N].
     #[inline]
-    pub fn acceleration<S: Scalar>(&self, speed: S, pull: S, stop_force: S) -> S {
-        let friction = speed * self.viscous + (speed / self.coulomb_speed).tanh() * self.coulomb;
-        (pull - friction + stop_force - self.mass * self.gravity) / self.mass
+    pub fn acceleration(&self, speed: S, pull: S, stop_force: S) -> S {
+        (pull - self.friction(speed) + stop_force - self.mass * self.gravity) / self.mass
     }
 }
 

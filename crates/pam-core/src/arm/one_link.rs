@@ -3,7 +3,7 @@
 //! `(Iz + mp l^2) theta'' = tau - c theta' - f tanh(theta'/w) - (m lc + mp l) g sin(theta) + tau_stop`, angle from the gravity
 //! vector (physics of dissertation ch. 5; stops as one-sided spring and damper).
 
-use crate::scalar::{constant, Scalar};
+use crate::scalar::{constant, tanh, Scalar};
 
 /// Parameters of a one-link arm.
 #[derive(Debug, Clone, Copy)]
@@ -71,12 +71,22 @@ impl<S: Scalar> OneLink<S> {
         self.inertia + self.payload * (self.length * self.length)
     }
 
+    /// Friction of the joint [N m] at a rate [rad/s], positive against it.
+    #[inline]
+    pub fn friction(&self, rate: S) -> S {
+        self.viscous * rate + self.coulomb * tanh(rate / self.coulomb_speed)
+    }
+
+    /// Torque that holds the arm against gravity [N m].
+    #[inline]
+    pub fn weight(&self, angle: S) -> S {
+        (self.first_moment + self.payload * self.length) * self.gravity * angle.sin()
+    }
+
     /// Angular acceleration [rad/s2] under a joint torque and a stop torque [N m].
     #[inline]
     pub fn acceleration(&self, angle: S, rate: S, torque: S, stop_torque: S) -> S {
-        let friction = self.viscous * rate + self.coulomb * (rate / self.coulomb_speed).tanh();
-        let weight = (self.first_moment + self.payload * self.length) * self.gravity * angle.sin();
-        (torque - friction - weight + stop_torque) / self.total_inertia()
+        (torque - self.friction(rate) - self.weight(angle) + stop_torque) / self.total_inertia()
     }
 }
 

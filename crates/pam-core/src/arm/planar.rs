@@ -18,7 +18,7 @@
 
 pub use super::one_link::Stops;
 use crate::error::{check_range, Error, Result};
-use crate::scalar::{constant, Scalar};
+use crate::scalar::{constant, tanh, Scalar};
 use nalgebra::{SMatrix, SVector};
 
 /// One link and the joint at its base.
@@ -96,6 +96,20 @@ impl<S: Scalar, const N: usize> PlanarArm<S, N> {
         for (k, link) in links.iter().enumerate() {
             link.check(k)?;
         }
+        Ok(Self::assembled(links, gravity))
+    }
+
+    /// The same with another payload at the end of a link; one that cannot be shows in the mass matrix.
+    #[must_use]
+    pub fn with_payload(&self, link: usize, payload: S) -> Self {
+        let mut links = self.links;
+        if let Some(link) = links.get_mut(link) {
+            link.payload = payload;
+        }
+        Self::assembled(links, self.gravity)
+    }
+
+    fn assembled(links: [Link<S>; N], gravity: f64) -> Self {
         let (mut coupling, mut moment) = (SMatrix::from_element(constant(0.0)), zeros());
         let mut beyond = constant::<S>(0.0);
         for i in (0..N).rev() {
@@ -109,7 +123,7 @@ impl<S: Scalar, const N: usize> PlanarArm<S, N> {
             }
             beyond = carried + mass;
         }
-        Ok(Self { links, gravity, coupling, moment })
+        Self { links, gravity, coupling, moment }
     }
 
     /// The links, base first.
@@ -151,7 +165,7 @@ impl<S: Scalar, const N: usize> PlanarArm<S, N> {
     pub fn friction_torque(&self, rate: &SVector<S, N>) -> SVector<S, N> {
         SVector::from_fn(|i, _| {
             let link = &self.links[i];
-            link.viscous * rate[i] + link.coulomb * (rate[i] / link.coulomb_speed).tanh()
+            link.viscous * rate[i] + link.coulomb * tanh(rate[i] / link.coulomb_speed)
         })
     }
 
@@ -220,6 +234,15 @@ impl<S: Scalar, const N: usize> PlanarArm<S, N> {
         let Some(k) = result.iter().position(|a| !a.re().is_finite()) else { return Ok(result) };
         let error = Error::parameter(format!("acceleration[{k}]"), result[k].re(), "a finite number");
         Err(named(error, angle, rate, torque))
+    }
+
+    /// Angular accelerations [rad/s2] of the joints by joint torques [N m] alone, without weight, motion, friction and stops.
+    ///
+    /// # Errors
+    /// As [`Self::acceleration`].
+    pub fn response(&self, angle: &SVector<S, N>, torque: &SVector<S, N>) -> Result<SVector<S, N>> {
+        let turn = solve(&self.mass_of_links(&Pose::new(angle)), reactions(*torque))?;
+        Ok(SVector::<S, N>::from_fn(|i, _| if i > 0 { turn[i] - turn[i - 1] } else { turn[i] }))
     }
 
     /// Joint torques [N m] that give joint accelerations [rad/s2], friction and stops overcome.

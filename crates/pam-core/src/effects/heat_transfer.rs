@@ -7,7 +7,7 @@
 //! A recording may begin just after a fill: the gas is then warmer than the wall by an initial rise.
 //! Carneiro & de Almeida (2006); Al-Ibrahim & Otis (1992).
 
-use super::EffectInfo;
+use super::{EffectInfo, EffectParameter};
 use crate::gas::chamber::ChamberState;
 use crate::gas::orifice::Gas;
 use crate::scalar::Scalar;
@@ -16,7 +16,11 @@ use crate::scalar::Scalar;
 pub const INFO: EffectInfo = EffectInfo {
     id: "heat_transfer",
     block: "chamber",
-    parameters: &[("heat_transfer_coefficient", "W/(m2 K)"), ("initial_temperature_rise", "K")],
+    at: "chamber",
+    parameters: &[
+        EffectParameter::new("heat_transfer_coefficient", "W/(m2 K)"),
+        EffectParameter::new("initial_temperature_rise", "K"),
+    ],
 };
 
 const REFERENCE_PRESSURE: f64 = 1e5;

@@ -5,7 +5,7 @@
 //! `p_ref` = 500 kPa absolute. Sealed, choked and with `s = 0` the absolute pressure decays with the time constant
 //! `V/(alpha_out C rho0 R T)`. Beater, *Pneumatic Drives* (2007).
 
-use super::EffectInfo;
+use super::{EffectInfo, EffectParameter};
 use crate::gas::orifice::Gas;
 use crate::scalar::{constant, Scalar};
 
@@ -13,7 +13,11 @@ use crate::scalar::{constant, Scalar};
 pub const INFO: EffectInfo = EffectInfo {
     id: "leak_muscle",
     block: "chamber",
-    parameters: &[("conductance", "m3/(s Pa)"), ("laminar_share", "1")],
+    at: "chamber",
+    parameters: &[
+        EffectParameter::new("conductance", "m3/(s Pa)"),
+        EffectParameter::new("laminar_share", "1"),
+    ],
 };
 
 /// Absolute pressure at which a laminar path of the same conductance leaks as much as a choked orifice, up to

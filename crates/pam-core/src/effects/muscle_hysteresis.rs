@@ -6,7 +6,7 @@
 //! Al-Bender, Lampaert & Swevers (2005). Between steps the elements are updated by exact return mapping; inside a
 //! step the force follows the stage's length, so that smooth stretches keep the integrator's order.
 
-use super::EffectInfo;
+use super::{EffectInfo, EffectParameter};
 use crate::muscle::slip::Slip;
 use crate::scalar::{constant, Scalar};
 
@@ -14,7 +14,12 @@ use crate::scalar::{constant, Scalar};
 pub const INFO: EffectInfo = EffectInfo {
     id: "muscle_hysteresis",
     block: "muscle",
-    parameters: &[("friction_constant", "N"), ("friction_pressure", "m2"), ("presliding", "m")],
+    at: "muscle",
+    parameters: &[
+        EffectParameter::new("friction_constant", "N"),
+        EffectParameter::new("friction_pressure", "m2"),
+        EffectParameter::new("presliding", "m").within(1e-9, 1.0),
+    ],
 };
 
 /// Friction force of one muscle [N] at a gauge pressure [Pa] (the part below zero does not count).

@@ -26,7 +26,7 @@ impl<S: Scalar> Supply<S> {
     /// Rate of the absolute pressure [Pa/s] while a mass flow [kg/s] goes out; `rt` is `R T` [J/kg], `set` the set pressure
     /// [Pa, absolute].
     #[inline]
-    pub fn pressure_rate(&self, pressure: S, outflow: S, rt: f64, set: f64) -> S {
+    pub fn pressure_rate(&self, pressure: S, outflow: S, rt: f64, set: S) -> S {
         match self {
             Self::Tank(volume) => -(outflow * rt) / *volume,
             Self::Constant => constant(0.0),

@@ -29,8 +29,19 @@ impl<S: Scalar> Tube<S> {
         let conductance = square * 0.029 / (length / diameter.powf(1.25) + 510.0).sqrt();
         let ratio = conductance * 474.0 / square;
         let critical_ratio = if ratio.re() > HIGHEST_RATIO { constant(HIGHEST_RATIO) } else { ratio };
+        Self::of_conductance(conductance, critical_ratio, temperature)
+    }
+
+    /// A restriction of a sonic conductance [m3/(s Pa)] and a critical pressure ratio with gas of a temperature [K].
+    pub fn of_conductance(conductance: S, critical_ratio: S, temperature: f64) -> Self {
         let factor = REFERENCE_DENSITY * (REFERENCE_TEMPERATURE / temperature).sqrt();
         Self { flow_factor: conductance * factor, critical_ratio }
+    }
+
+    /// The same without derivatives.
+    #[inline]
+    pub fn re(&self) -> Tube<f64> {
+        Tube { flow_factor: self.flow_factor.re(), critical_ratio: self.critical_ratio.re() }
     }
 
     /// Critical pressure ratio [1]: the flow is choked below.
@@ -68,6 +79,14 @@ impl<S: Scalar> Tube<S> {
     pub fn steepest(&self) -> f64 {
         let psi = self.psi(constant(LAMINAR_RATIO)).re();
         self.flow_factor.re() * psi / (1.0 - LAMINAR_RATIO)
+    }
+}
+
+impl Tube<f64> {
+    /// The same in another scalar type.
+    #[inline]
+    pub fn lift<S: Scalar>(&self) -> Tube<S> {
+        Tube { flow_factor: constant(self.flow_factor), critical_ratio: constant(self.critical_ratio) }
     }
 }
 

@@ -2,7 +2,10 @@
 
 use super::plant::{Controls, Line, Plant, Scratch};
 use super::units::Node;
-use crate::effects::{heat_transfer, leak_muscle};
+use crate::effects::{
+    compressor_cut_in, heat_transfer, leak_muscle, supply_leak, supply_regulator_deadband,
+    tube_flow_restriction, valve_centre_leakage,
+};
 use crate::gas::chamber::{pressure_rate, ChamberState};
 use crate::scalar::{constant, Scalar};
 
@@ -29,14 +32,23 @@ impl<S: Scalar> Plant<'_, S> {
         for ((unit, valve), spool) in self.rig.wiring.valves.iter().zip(&self.valves).zip(&controls.spool) {
             let pressure = state[self.layout.pressure(unit.to)];
             if spool.re() > 0.0 {
-                let flow = gas.mass_flow(
-                    valve.area * unit.table.eval(*spool),
-                    self.pressure_at(unit.from, state),
-                    pressure,
-                );
+                let area = valve.area * unit.table.eval(*spool);
+                let upstream = self.pressure_at(unit.from, state);
+                let flow = match &self.restriction {
+                    Some(tube) if unit.effects.restriction => {
+                        tube_flow_restriction::mass_flow(gas, area, tube, upstream, pressure, false)
+                    }
+                    _ => gas.mass_flow(area, upstream, pressure),
+                };
                 here.pass(unit.from, Node::Gas(unit.to), flow);
             } else if spool.re() < 0.0 {
-                let flow = gas.mass_flow(valve.area * unit.table.eval(-*spool), pressure, ambient);
+                let area = valve.area * unit.table.eval(-*spool);
+                let flow = match &self.restriction {
+                    Some(tube) if unit.effects.restriction => {
+                        tube_flow_restriction::mass_flow(gas, area, tube, pressure, ambient, true)
+                    }
+                    _ => gas.mass_flow(area, pressure, ambient),
+                };
                 here.pass(Node::Gas(unit.to), Node::Ambient, flow);
             }
         }
@@ -57,6 +69,65 @@ impl<S: Scalar> Plant<'_, S> {
                 here.vented += flow;
             }
         }
+        if let Some([conductance, opening]) = self.rig.wiring.effects.centre_leak {
+            self.centre_leaks(self.values[conductance], self.values[opening], state, controls, here);
+        }
+        if let Some([conductance]) = self.rig.wiring.effects.supply_leak {
+            for (k, _) in self.rig.wiring.supply_effects.iter().enumerate().filter(|(_, unit)| unit.leak) {
+                let pressure = state[self.layout.supply(k)];
+                let flow = supply_leak::mass_flow(gas, self.values[conductance], pressure);
+                here.drawn[k] += flow;
+                here.vented += flow;
+            }
+        }
+    }
+
+    /// Flows around the null of the valves, from the supply and to the ambient.
+    #[inline(never)]
+    fn centre_leaks(
+        &self,
+        conductance: S,
+        opening: S,
+        state: &[S],
+        controls: &Controls<S>,
+        here: &mut Scratch<S>,
+    ) {
+        let gas = &self.rig.gas;
+        for (unit, spool) in self.rig.wiring.valves.iter().zip(&controls.spool) {
+            if !unit.effects.centre_leak {
+                continue;
+            }
+            let area = valve_centre_leakage::area(gas, conductance, opening, *spool);
+            for (from, to) in [(unit.from, Node::Gas(unit.to)), (Node::Gas(unit.to), Node::Ambient)] {
+                let flow = gas.mass_flow(area, self.pressure_at(from, state), self.pressure_at(to, state));
+                if flow.re() >= 0.0 {
+                    here.take(from, flow);
+                    here.give(to, flow);
+                } else {
+                    here.take(to, -flow);
+                    here.give(from, -flow);
+                }
+            }
+        }
+    }
+
+    /// Rate of a supply's pressure with the effects on it [Pa/s].
+    #[inline(never)]
+    fn altered_supply(&self, k: usize, state: &[S], drawn: S, rt: f64, set: S) -> S {
+        let (units, here) = (&self.rig.wiring.effects, &self.rig.wiring.supply_effects[k]);
+        let pressure = state[self.layout.supply(k)];
+        match (units.dead_band, units.compressor, here.compressor) {
+            (Some([dead_band]), ..) if here.dead_band => {
+                let error = set - pressure;
+                let ignored = error - supply_regulator_deadband::answered(error, self.values[dead_band]);
+                self.supplies[k].pressure_rate(pressure, drawn, rt, set - ignored)
+            }
+            (_, Some([delivery, ..]), Some(relay)) if state[self.layout.extra(relay)].re() > 0.5 => {
+                let given = compressor_cut_in::mass_flow(self.values[delivery]);
+                self.supplies[k].pressure_rate(pressure, drawn - given, rt, set)
+            }
+            _ => self.supplies[k].pressure_rate(pressure, drawn, rt, set),
+        }
     }
 
     #[inline(always)]
@@ -71,7 +142,11 @@ impl<S: Scalar> Plant<'_, S> {
         let rt = gas.gas_constant * gas.temperature;
         for (k, supply) in self.supplies.iter().enumerate() {
             let set = controls.set_pressure[k];
-            out[layout.supply(k)] = supply.pressure_rate(state[layout.supply(k)], here.drawn[k], rt, set);
+            out[layout.supply(k)] = if self.rig.wiring.effects.on_supplies() {
+                self.altered_supply(k, state, here.drawn[k], rt, set)
+            } else {
+                supply.pressure_rate(state[layout.supply(k)], here.drawn[k], rt, set)
+            };
         }
         for (k, unit) in self.rig.wiring.gases.iter().enumerate() {
             let chamber = ChamberState {
@@ -177,6 +252,14 @@ impl Plant<'_, f64> {
             };
             add(unit.from, unit.to, slope);
             add(unit.to, unit.from, slope);
+        }
+        if let Some([conductance, _]) = wiring.effects.centre_leak {
+            let slope = gas.steepest(gas.area_of_conductance(self.values[conductance]));
+            for unit in wiring.valves.iter().filter(|unit| unit.effects.centre_leak) {
+                add(Node::Gas(unit.to), unit.from, slope);
+                add(unit.from, Node::Gas(unit.to), slope);
+                add(Node::Gas(unit.to), Node::Ambient, slope);
+            }
         }
         let mut worst = (0.0, None);
         for (k, slope) in steepest.iter().enumerate() {

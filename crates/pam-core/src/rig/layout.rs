@@ -13,7 +13,7 @@ pub const BOOK_COUNT: usize = 6;
 pub const BOOKS: [&str; BOOK_COUNT] =
     ["mass_supplied", "mass_vented", "energy_supplied", "exergy_supplied", "muscle_work", "joint_work"];
 
-/// Places of the states: supplies' pressures, gases' pressures, gases' masses, coordinates, their rates.
+/// Places of the states: supplies' pressures, gases' pressures, gases' masses, coordinates, their rates, what effects need.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Layout {
     /// Supplies.
@@ -24,6 +24,8 @@ pub struct Layout {
     pub coordinates: usize,
     /// Chambers among the gases.
     pub chambers: usize,
+    /// Numbers that effects move or remember, behind the motion.
+    pub extras: usize,
 }
 
 impl Layout {
@@ -31,7 +33,14 @@ impl Layout {
     #[inline]
     #[must_use]
     pub fn states(&self) -> usize {
-        self.supplies + 2 * (self.gases + self.coordinates)
+        self.extra(0) + self.extras
+    }
+
+    /// A number of an effect; the first one is where the motion ends.
+    #[inline]
+    #[must_use]
+    pub fn extra(&self, k: usize) -> usize {
+        self.supplies + 2 * (self.gases + self.coordinates) + k
     }
 
     /// Absolute pressure of a supply [Pa].

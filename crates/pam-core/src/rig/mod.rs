@@ -1,15 +1,20 @@
 //! A rig: blocks joined by ports, described by data, composed into one state equation.
 
 mod air;
+mod between;
 mod body;
 mod check;
 pub mod layout;
 pub mod memory;
+mod motion;
 pub mod parameters;
 pub mod plant;
+mod pull;
 pub mod spec;
 mod units;
+mod units_effects;
 mod wiring;
+mod wiring_effects;
 mod wiring_motion;
 
 pub use layout::{Channel, Layout, Names};
@@ -19,6 +24,7 @@ pub use plant::Plant;
 pub use spec::RigSpec;
 
 use self::units::{Group, Wiring};
+use crate::effects::input_path_lag;
 use crate::gas::orifice::Gas;
 use crate::joint::Joint;
 use crate::muscle::CompiledMuscle;
@@ -66,6 +72,7 @@ impl Rig {
             gases: wiring.gases.len(),
             coordinates: wiring.coordinates.len(),
             chambers: wiring.chambers,
+            extras: wiring.extras,
         };
         let names = Names::new(&spec, &wiring, &layout);
         let endless = f64::INFINITY;
@@ -186,6 +193,10 @@ impl Rig {
                 None => format!("a supply answers too fast to what flows out of it: {}", needed(step)),
             }));
         }
+        let path = |[lag, delay]: [ParameterId; 2]| {
+            input_path_lag::fastest(plant.values()[lag], plant.values()[delay])
+        };
+        let step = step.min(STABLE / self.wiring.effects.path.map_or(0.0, path));
         Ok((step, STABLE / body))
     }
 

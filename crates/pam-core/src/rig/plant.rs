@@ -1,26 +1,20 @@
 //! The state equation of a rig, composed of its blocks.
 //!
 //! States as in [`Layout`]: absolute pressures of supplies and gases [Pa], gas masses [kg], joint angles [rad] and rates
-//! [rad/s], then, where they are kept, the sums of [`super::layout::BOOKS`]. Any of them can be *driven* by a signal
+//! [rad/s], then what effects need and, where they are kept, the sums of [`super::layout::BOOKS`]. Any of them can be *driven* by a signal
 //! instead of being integrated: that is where the rig is cut.
 
 use super::body::Body;
 use super::layout::{Channel, Layout, BOOK_COUNT};
 use super::memory::Memory;
-use super::units::{Group, LineUnit, Path, SupplyUnit};
+use super::units::{LineUnit, Path, SupplyUnit};
 use super::{Rig, Values};
-use crate::effects::{heat_transfer, muscle_hysteresis};
+use crate::effects::{heat_transfer, tube_flow_restriction};
 use crate::gas::chamber::Polytropic;
 use crate::gas::supply::Supply;
 use crate::gas::tube::Tube;
-use crate::gas::valve::spool_position;
-use crate::muscle::TablePoint;
 use crate::scalar::{constant, Scalar};
 use crate::Result;
-use num_dual::Dual64;
-
-/// Slope of the mean of a bank of slip elements where all of them stick, times the presliding distance.
-const BANK: f64 = 3.75;
 
 /// What is integrated; the other states are driven.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -31,15 +25,22 @@ pub struct Simulated {
     gas: bool,
     /// Some motion is integrated.
     motion: bool,
+    /// Some number of an effect is integrated.
+    extras: bool,
 }
 
 impl Simulated {
     /// Everything is integrated but the states of these places.
     pub fn all_but(layout: &Layout, places: &[usize]) -> Self {
         let driven: Vec<bool> = (0..layout.states()).map(|k| places.contains(&k)).collect();
-        let (air, motion) = driven.split_at(layout.angle(0));
-        let some = |part: &[bool]| part.iter().any(|d| !d);
-        Self { gas: some(air), motion: some(motion), driven }
+        let some = |from: usize, to: usize| driven[from..to].iter().any(|d| !d);
+        let end = layout.extra(0);
+        Self {
+            gas: some(0, layout.angle(0)),
+            motion: some(layout.angle(0), end),
+            extras: some(end, layout.states()),
+            driven,
+        }
     }
 
     /// Only the states of these places are integrated.
@@ -55,7 +56,9 @@ pub struct Controls<S> {
     /// Normalised spool position of each valve, -1 to 1.
     pub(crate) spool: Vec<S>,
     /// Set pressure of each supply [Pa, absolute].
-    pub(crate) set_pressure: Vec<f64>,
+    pub(crate) set_pressure: Vec<S>,
+    /// Time since the start [s], where an effect asks for it.
+    pub(crate) time: f64,
 }
 
 #[derive(Debug, Clone)]
@@ -83,8 +86,10 @@ pub struct Plant<'a, S> {
     pub(super) alphas: Vec<Polytropic<S>>,
     pub(super) valves: Vec<Valve<S>>,
     pub(super) lines: Vec<Line<S>>,
-    scales: Vec<S>,
-    body: Body<S>,
+    pub(super) scales: Vec<S>,
+    pub(super) body: Body<S>,
+    /// Tube behind each valve, by the effect.
+    pub(super) restriction: Option<Tube<S>>,
 }
 
 /// What the equations need to write down on the way.
@@ -99,16 +104,8 @@ pub struct Scratch<S> {
     pub(super) torque: Vec<S>,
     pub(super) vented: S,
     pub(super) muscle_work: S,
-}
-
-/// One group at one instant.
-struct Pull<S> {
-    contraction: S,
-    /// Of all its muscles [N].
-    force: S,
-    moment_arm: S,
-    torque_arm: S,
-    table: TablePoint<S>,
+    /// Poses, rates and torques that effects on the arm change.
+    pub(super) arm: [Vec<S>; 4],
 }
 
 impl<'a, S: Scalar> Plant<'a, S> {
@@ -163,6 +160,9 @@ impl<'a, S: Scalar> Plant<'a, S> {
             lines,
             scales: wiring.groups.iter().map(|group| values[group.scale]).collect(),
             body: Body::new(&wiring.body, &wiring.coordinates, &values)?,
+            restriction: (wiring.effects.restriction)
+                .filter(|[id]| values[*id].re() < tube_flow_restriction::NONE)
+                .map(|[id]| tube_flow_restriction::tube(values[id], rig.gas.temperature)),
             rig,
             values,
         })
@@ -197,60 +197,7 @@ impl<'a, S: Scalar> Plant<'a, S> {
             torque: zeros(coordinates),
             vented: constant(0.0),
             muscle_work: constant(0.0),
-        }
-    }
-
-    /// Commands [V, Pa gauge] of one sample, in the order of the rig's inputs.
-    pub fn controls(&self, commands: impl Fn(usize) -> f64) -> Controls<S> {
-        let wiring = &self.rig.wiring;
-        let ambient = self.rig.gas.ambient_pressure;
-        let valves = wiring.valves.iter().zip(&self.valves).enumerate();
-        let mut regulator = wiring.valves.len();
-        let spec = self.rig.spec();
-        let set_pressure = wiring.supplies.iter().zip(&spec.supplies).map(|(unit, supply)| match unit {
-            SupplyUnit::Regulator { .. } => {
-                regulator += 1;
-                commands(regulator - 1) + ambient
-            }
-            _ => supply.initial_pressure + ambient,
-        });
-        Controls {
-            set_pressure: set_pressure.collect(),
-            spool: valves
-                .map(|(k, (unit, v))| spool_position(commands(k), v.null, unit.half_range))
-                .collect(),
-        }
-    }
-
-    #[inline(always)]
-    fn pull(&self, k: usize, group: &Group, state: &[S], memory: &Memory<S>, start: S) -> Pull<S> {
-        let point = group.joint.eval(state[self.layout.angle(group.coordinate)]);
-        let contraction = point.shortening / group.rest_length;
-        let table = group.muscle.table.eval(contraction);
-        let gauge = state[self.layout.pressure(group.chamber)] - self.rig.gas.ambient_pressure;
-        let scale = self.scales[k];
-        let mut force = table.force(gauge, scale);
-        let stretched = (start - contraction) * group.rest_length;
-        if group.direction {
-            let slip = memory.direction.moved(stretched, constant(group.muscle.presliding()));
-            force = group.muscle.moving(force, contraction, gauge, scale, slip.mean());
-        }
-        if let (true, Some([friction, pressure, presliding])) =
-            (group.hysteresis, self.rig.wiring.effects.hysteresis)
-        {
-            force += muscle_hysteresis::force(
-                &memory.hysteresis.moved(stretched, self.values[presliding]),
-                self.values[friction],
-                self.values[pressure],
-                gauge,
-            );
-        }
-        Pull {
-            contraction,
-            force: force * group.count,
-            moment_arm: point.moment_arm,
-            torque_arm: point.torque_arm,
-            table,
+            arm: std::array::from_fn(|_| zeros(coordinates)),
         }
     }
 
@@ -294,33 +241,6 @@ impl<'a, S: Scalar> Plant<'a, S> {
                 here.wall[k] = heat_transfer::cube_area(here.volume[k]);
             }
         }
-    }
-
-    /// Contraction ratio of each group at a state.
-    pub fn contractions(&self, state: &[S], out: &mut [S]) {
-        for (out, group) in out.iter_mut().zip(&self.rig.wiring.groups) {
-            *out =
-                group.joint.eval(state[self.layout.angle(group.coordinate)]).shortening / group.rest_length;
-        }
-    }
-
-    /// Memories after a step that moved the muscles between contraction ratios.
-    pub fn advance_memory(&self, memory: &mut [Memory<S>], from: &[S], to: &[S]) {
-        for (k, group) in self.rig.wiring.groups.iter().enumerate() {
-            let stretched = (from[k] - to[k]) * group.rest_length;
-            if group.direction {
-                memory[k].direction =
-                    memory[k].direction.moved(stretched, constant(group.muscle.presliding()));
-            }
-            if let (true, Some([.., presliding])) = (group.hysteresis, self.rig.wiring.effects.hysteresis) {
-                memory[k].hysteresis = memory[k].hysteresis.moved(stretched, self.values[presliding]);
-            }
-        }
-    }
-
-    /// Whether any muscle remembers its motion.
-    pub fn remembers(&self) -> bool {
-        self.rig.wiring.groups.iter().any(|g| g.direction || g.hysteresis)
     }
 
     /// Mass of a gas [kg] at rest temperature for a state.
@@ -367,11 +287,18 @@ impl<'a, S: Scalar> Plant<'a, S> {
             out[..layout.angle(0)].fill(constant(0.0));
         }
         let (angle, rate) = (layout.angle(0), layout.rate(0));
-        let end = layout.states();
+        let end = layout.extra(0);
+        if simulated.extras {
+            self.extra_rates(state, out);
+        }
         if simulated.motion && self.body.moves() {
             let (angles, rates) = state[angle..end].split_at(layout.coordinates);
             out[angle..rate].copy_from_slice(rates);
-            self.body.accelerations(angles, rates, &here.torque, &mut out[rate..end]);
+            if self.rig.wiring.effects.on_motion() {
+                self.altered_motion(state, controls.time, here, out);
+            } else {
+                self.body.accelerations(angles, rates, &here.torque, &mut out[rate..end]);
+            }
         } else {
             out[angle..end].fill(constant(0.0));
         }
@@ -431,7 +358,8 @@ impl Plant<'_, f64> {
             out.push(match *channel {
                 Channel::Supply(k) => state[layout.supply(k)] - ambient,
                 Channel::Pressure(k) => {
-                    state[layout.pressure(k)] - ambient + zero(wiring.gases[k].pressure_zero)
+                    let place = wiring.gases[k].lag.map_or(layout.pressure(k), |lag| layout.extra(lag));
+                    state[place] - ambient + zero(wiring.gases[k].pressure_zero)
                 }
                 Channel::Angle(k) => state[layout.angle(k)] + zero(wiring.coordinates[k].zero),
                 Channel::Rate(k) => state[layout.rate(k)],
@@ -452,59 +380,5 @@ impl Plant<'_, f64> {
                 Channel::Book(k) => state.get(layout.book(k)).copied().unwrap_or(f64::NAN),
             });
         }
-    }
-
-    /// Fastest rate of the body [1/s] on the springs that muscles, trapped air and presliding friction are.
-    pub(crate) fn fastest_body(&self) -> f64 {
-        let springs: Vec<f64> = (0..self.layout.coordinates).map(|k| self.stiffness(k)).collect();
-        self.body.fastest(&springs)
-    }
-
-    /// Largest stiffness [N m/rad] of what pulls on a coordinate, over its range, at the highest pressure.
-    fn stiffness(&self, coordinate: usize) -> f64 {
-        let wiring = &self.rig.wiring;
-        let pressure = self.rig.highest_pressure();
-        let gauge = pressure - self.rig.gas.ambient_pressure;
-        let mut total = 0.0;
-        for (k, group) in wiring.groups.iter().enumerate().filter(|(_, g)| g.coordinate == coordinate) {
-            let (low, high) = self.rig.angles(group);
-            let mut most = 0.0_f64;
-            for i in 0..=32 {
-                let angle = Dual64::new(low + (high - low) * f64::from(i) / 32.0, 1.0);
-                let point = group.joint.eval(angle);
-                let table = group.muscle.table.eval(point.shortening / group.rest_length);
-                let torque =
-                    table.force(Dual64::from(gauge), Dual64::from(self.scales[k])) * point.torque_arm;
-                let arm = point.moment_arm.re.abs();
-                let volume = (self.fixed_volume[group.chamber] + table.volume.re.max(0.0) * group.count)
-                    .max(f64::MIN_POSITIVE);
-                let swept = table.volume_slope.re * arm * group.count / group.rest_length;
-                let air = self.alphas[group.chamber].volume * pressure * swept * swept / volume;
-                let friction = self.presliding_stiffness(
-                    group,
-                    table.force(Dual64::from(gauge), Dual64::from(1.0)).re.abs(),
-                    gauge,
-                );
-                most = most.max(group.count * (torque.eps.abs() + friction * arm * arm) + air);
-            }
-            total += most;
-        }
-        total
-    }
-
-    /// Stiffness of one muscle's friction before it slips [N/m]: every element of the bank still sticks.
-    fn presliding_stiffness(&self, group: &Group, force: f64, gauge: f64) -> f64 {
-        let mut total = 0.0;
-        if group.direction {
-            let spec = &group.muscle.exact.spec;
-            let width = spec.friction_coefficient.abs() + (spec.friction_pressure_slope * gauge).abs();
-            total += width.max(spec.friction_floor) * force * BANK / group.muscle.presliding();
-        }
-        if let (true, Some([constant, slope, presliding])) =
-            (group.hysteresis, self.rig.wiring.effects.hysteresis)
-        {
-            total += (self.values[constant] + self.values[slope] * gauge) * BANK / self.values[presliding];
-        }
-        total
     }
 }

@@ -1,6 +1,9 @@
 //! The blocks of a rig with their ports resolved to indices and their numbers to parameters.
 
 use super::parameters::{ParameterId, Parameters};
+use super::units_effects::{
+    ArmEffects, EffectUnits, JointEffects, MuscleEffects, SupplyEffects, ValveEffects,
+};
 use crate::arm::linear::HangingMass;
 use crate::arm::planar::Stops;
 use crate::gas::valve::AreaTable;
@@ -45,6 +48,7 @@ pub(crate) struct ValveUnit {
     pub area: ParameterId,
     pub null: ParameterId,
     pub half_range: f64,
+    pub effects: ValveEffects,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -74,6 +78,8 @@ pub(crate) struct GasUnit {
     pub initial_pressure: f64,
     pub leak: bool,
     pub heat: bool,
+    /// Reading of its lagging sensor among the extras.
+    pub lag: Option<usize>,
 }
 
 /// Muscles of one kind that share a chamber and a joint.
@@ -87,7 +93,7 @@ pub(crate) struct Group {
     pub count: f64,
     pub rest_length: f64,
     pub direction: bool,
-    pub hysteresis: bool,
+    pub effects: MuscleEffects,
 }
 
 /// What moves: a joint angle, or the shortening of a linear load.
@@ -96,6 +102,7 @@ pub(crate) struct Coordinate {
     pub rest: f64,
     pub stops: Option<Stops>,
     pub zero: Option<ParameterId>,
+    pub effects: JointEffects,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -128,15 +135,7 @@ pub(crate) enum BodyUnit {
         gravity: f64,
         links: Vec<LinkUnit>,
     },
-    Mass(HangingMass),
-}
-
-/// Parameters of the effects that are switched on.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct EffectUnits {
-    pub leak: Option<[ParameterId; 2]>,
-    pub heat: Option<[ParameterId; 2]>,
-    pub hysteresis: Option<[ParameterId; 3]>,
+    Mass(HangingMass<f64>),
 }
 
 /// A whole rig, resolved.
@@ -155,4 +154,9 @@ pub(crate) struct Wiring {
     pub coordinates: Vec<Coordinate>,
     pub body: BodyUnit,
     pub effects: EffectUnits,
+    /// Effects on each supply.
+    pub supply_effects: Vec<SupplyEffects>,
+    pub arm_effects: ArmEffects,
+    /// Numbers behind the states: what effects move or remember.
+    pub extras: usize,
 }

@@ -1,12 +1,11 @@
 //! How the air and the effects of a description fit together: ports become indices, numbers become parameters.
 
-use super::parameters::{ParameterId, Parameters};
-use super::spec::{dotted, EffectSpec, RigSpec};
-use super::units::{
-    Coordinate, EffectUnits, GasUnit, Group, LineUnit, Node, Path, SupplyUnit, ValveUnit, Wiring,
-};
+use super::parameters::Parameters;
+use super::spec::{dotted, RigSpec};
+use super::units::{Coordinate, GasUnit, Group, LineUnit, Node, Path, SupplyUnit, ValveUnit, Wiring};
+use super::units_effects::{ArmEffects, EffectUnits, SupplyEffects, ValveEffects};
+use super::wiring_effects::switch_on;
 use super::wiring_motion::{body, coordinate_names, coordinates, groups};
-use crate::effects;
 use crate::gas::valve::AreaTable;
 use crate::{Error, Result};
 
@@ -80,14 +79,14 @@ impl Wiring {
             }
         }
         let coordinates = coordinates(spec)?;
-        let mut groups = groups(spec, known, &mut table)?;
+        let groups = groups(spec, known, &mut table)?;
         let body = body(spec, &mut table)?;
         sensors(spec, &mut table, &mut gases)?;
         let coordinates = zeros(spec, &table, coordinates);
-        let effects = effect_units(spec, &mut table, &mut gases, &mut groups)?;
-        Ok(Self {
+        let mut wiring = Self {
             parameters: table,
             chambers: spec.chambers.len(),
+            supply_effects: vec![SupplyEffects::default(); supplies.len()],
             supplies,
             gases,
             inlets,
@@ -96,8 +95,12 @@ impl Wiring {
             groups,
             coordinates,
             body,
-            effects,
-        })
+            effects: EffectUnits::default(),
+            arm_effects: ArmEffects::default(),
+            extras: 0,
+        };
+        switch_on(spec, &mut wiring)?;
+        Ok(wiring)
     }
 }
 
@@ -165,6 +168,7 @@ fn valves(spec: &RigSpec, ports: &Ports<'_>, table: &mut Parameters) -> Result<V
             area: table.add(format!("{block}.discharge_area_max"), valve.discharge_area_max),
             null: table.add(format!("{block}.null_voltage"), valve.null_voltage),
             half_range: valve.half_range,
+            effects: ValveEffects::default(),
         });
     }
     Ok(units)
@@ -216,6 +220,7 @@ fn gases(spec: &RigSpec, inlets: &[(usize, Node)], table: &mut Parameters) -> Ve
         pressure_zero: None,
         leak: false,
         heat: false,
+        lag: None,
     };
     for chamber in &spec.chambers {
         let name = |key: &str| format!("{}.{key}", dotted("chamber", &chamber.name));
@@ -269,77 +274,4 @@ fn zeros(spec: &RigSpec, table: &Parameters, mut coordinates: Vec<Coordinate>) -
         coordinate.zero = own(&name).or_else(|| own(""));
     }
     coordinates
-}
-
-fn effect_units(
-    spec: &RigSpec,
-    table: &mut Parameters,
-    gases: &mut [GasUnit],
-    groups: &mut [Group],
-) -> Result<EffectUnits> {
-    let mut units = EffectUnits::default();
-    for effect in &spec.effects {
-        let Some(info) = effects::EFFECTS.iter().find(|e| e.id == effect.id) else {
-            let ids: Vec<_> = effects::EFFECTS.iter().map(|e| e.id).collect();
-            return model(format!("no effect '{}'; there are: {}", effect.id, ids.join(", ")));
-        };
-        if info.block == "muscle" && groups.is_empty() {
-            return model(format!("effect '{}' acts in the muscle, and the rig has none", effect.id));
-        }
-        let ids = effect_parameters(effect, info, table)?;
-        let mut found = false;
-        let mut here = |name: &String| {
-            let here = effect.at.is_empty() || *name == effect.at;
-            found |= here;
-            here
-        };
-        let (chambers, muscles) =
-            (spec.chambers.iter().map(|c| &c.name), spec.muscles.iter().map(|m| &m.name));
-        match (info.id, ids.as_slice()) {
-            ("leak_muscle", [conductance, share]) => {
-                units.leak = Some([*conductance, *share]);
-                gases.iter_mut().zip(chambers).for_each(|(gas, name)| gas.leak = here(name));
-            }
-            ("heat_transfer", [coefficient, rise]) => {
-                units.heat = Some([*coefficient, *rise]);
-                gases.iter_mut().zip(chambers).for_each(|(gas, name)| gas.heat = here(name));
-            }
-            ("muscle_hysteresis", [constant, pressure, presliding]) => {
-                units.hysteresis = Some([*constant, *pressure, *presliding]);
-                groups.iter_mut().zip(muscles).for_each(|(group, name)| group.hysteresis = here(name));
-            }
-            _ => return model(format!("effect '{}' is not in this build", effect.id)),
-        }
-        if !found {
-            return model(format!(
-                "effect '{}' acts at '{}', and the rig has no {} of that name",
-                effect.id, effect.at, info.block
-            ));
-        }
-    }
-    Ok(units)
-}
-
-fn effect_parameters(
-    effect: &EffectSpec,
-    info: &effects::EffectInfo,
-    table: &mut Parameters,
-) -> Result<Vec<ParameterId>> {
-    let mut ids = Vec::new();
-    for (name, unit) in info.parameters {
-        let Some(value) = effect.parameters.get(*name).copied() else {
-            return model(format!("effect '{}' lacks its parameter '{name}' [{unit}]", effect.id));
-        };
-        let full = format!("{}.{name}", effect.id);
-        let positive = *name == "presliding";
-        if !value.is_finite() || value < 0.0 || (positive && value < 1e-9) {
-            let allowed = if positive { "at least 1e-9" } else { "finite and not negative" };
-            return Err(Error::parameter(full, value, format!("{allowed} {unit}")));
-        }
-        ids.push(table.add(full, value));
-    }
-    if let Some(unknown) = effect.parameters.keys().find(|k| info.parameters.iter().all(|(n, _)| n != k)) {
-        return model(format!("effect '{}' has no parameter '{unknown}'", effect.id));
-    }
-    Ok(ids)
 }

@@ -3,6 +3,7 @@
 use super::parameters::Parameters;
 use super::spec::{dotted, ArmSpec, LinkSpec, LoadSpec, RigSpec};
 use super::units::{BodyUnit, Coordinate, Group, LinkUnit, MOST_LINKS};
+use super::units_effects::{JointEffects, MuscleEffects};
 use super::wiring::model;
 use crate::arm::linear::HangingMass;
 use crate::arm::planar::Stops;
@@ -22,7 +23,12 @@ pub(super) fn coordinates(spec: &RigSpec) -> Result<Vec<Coordinate>> {
         if spec.muscles.iter().any(|m| m.muscle.rest_length != rest) {
             return model("muscles on one load must have the same rest_length");
         }
-        return Ok(vec![Coordinate { rest: 0.0, stops: load_stops(load, rest), zero: None }]);
+        return Ok(vec![Coordinate {
+            rest: 0.0,
+            stops: load_stops(load, rest),
+            zero: None,
+            effects: JointEffects::default(),
+        }]);
     }
     let coordinate = |joint: &super::spec::JointSpec| Coordinate {
         rest: joint.rest_angle,
@@ -33,6 +39,7 @@ pub(super) fn coordinates(spec: &RigSpec) -> Result<Vec<Coordinate>> {
             damping: joint.stop_damping,
         }),
         zero: None,
+        effects: JointEffects::default(),
     };
     let named = |port: &str| spec.joints.iter().position(|j| dotted("joint", &j.name) == port);
     match &spec.arm {
@@ -147,7 +154,7 @@ pub(super) fn groups(spec: &RigSpec, known: &[Group], table: &mut Parameters) ->
             count: f64::from(group.muscle.count),
             rest_length: group.muscle.rest_length,
             direction: muscle.has_direction(),
-            hysteresis: false,
+            effects: MuscleEffects::default(),
             muscle,
         });
     }

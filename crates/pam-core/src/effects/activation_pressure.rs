@@ -1,0 +1,52 @@
+//! `activation_pressure`: pressure that a muscle needs before its bladder presses on the braid.
+//!
+//! The force is that of the gauge pressure less `p_th`, and that of none below it: `p_e = p - min(p, p_th)` for `p > 0`, the corner at
+//! `p_th` rounded over a tenth of it on either side. N. G. Tsagarakis & D. G. Caldwell, "Improved modelling and assessment of pneumatic
+//! muscle actuators", ICRA 2000; E. G. Hocking & N. M. Wereley, "Analysis of nonlinear elastic behavior in miniature pneumatic artificial
+//! muscles", Smart Materials and Structures 22, 2013.
+
+use super::{EffectInfo, EffectParameter};
+use crate::scalar::{constant, Scalar};
+
+/// Table entry.
+pub const INFO: EffectInfo = EffectInfo {
+    id: "activation_pressure",
+    block: "muscle",
+    at: "muscle",
+    parameters: &[EffectParameter::new("threshold", "Pa")],
+};
+
+const CORNER: f64 = 0.1;
+
+/// Gauge pressure that the force is that of [Pa].
+#[inline]
+pub fn effective<S: Scalar>(pressure: S, threshold: S) -> S {
+    let width = threshold * CORNER;
+    if pressure.re() <= 0.0 || pressure.re() >= threshold.re() + width.re() {
+        let lost = if pressure.re() > 0.0 { threshold } else { constant(0.0) };
+        pressure - lost
+    } else if pressure.re() > threshold.re() - width.re() {
+        let into = pressure - threshold + width;
+        into * into / (width * 4.0)
+    } else {
+        constant(0.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn it_takes_the_threshold_and_nothing_below_zero() {
+        assert_eq!((effective(1e5, 2e4), effective(1e4, 2e4), effective(-3e3, 2e4)), (8e4, 0.0, -3e3));
+        for p in [-1e4, 0.0, 1.0, 3e5] {
+            assert_eq!(effective(p, 0.0), p);
+        }
+        for edge in [1.8e4, 2.2e4] {
+            let jump: f64 = effective(edge + 1e-3, 2e4) - effective(edge - 1e-3, 2e4);
+            assert!(jump.abs() < 3e-3);
+        }
+        assert!((effective(2e4, 2e4) - 500.0_f64).abs() < 1e-9);
+    }
+}

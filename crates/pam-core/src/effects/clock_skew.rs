@@ -1,0 +1,72 @@
+//! `clock_skew`: pressures and angles are recorded by another clock than the commands.
+//!
+//! What is recorded at `t` was there at `t - d(t)` of the commands' clock, `d = d_0 + r t`, never less than zero: the commands act on the
+//! recording later by `d`. Within a step the held commands are averaged over the shifted time, so that an edge moves through it
+//! continuously and the shift can be differentiated. The rate of some 1e-4 changes no other time.
+//! D. L. Mills, "Internet time synchronization: the network time protocol", IEEE Trans. Communications 39, 1991 (offset and skew).
+
+use super::{EffectInfo, EffectParameter};
+use crate::scalar::{constant, Scalar};
+
+/// Table entry.
+pub const INFO: EffectInfo = EffectInfo {
+    id: "clock_skew",
+    block: "sensors",
+    at: "",
+    parameters: &[
+        EffectParameter::new("offset", "s").within(0.0, 10.0),
+        EffectParameter::new("rate", "1").within(-0.01, 0.01),
+    ],
+};
+
+/// How late a command acts at a time [s].
+#[inline]
+pub fn shift<S: Scalar>(offset: S, rate: S, time: f64) -> S {
+    let shift = offset + rate * time;
+    if shift.re() > 0.0 {
+        shift
+    } else {
+        constant(0.0)
+    }
+}
+
+/// Mean over a step [s] that begins at a time of values that are held over each sample, seen later by a shift.
+pub fn held_mean<S: Scalar>(value: impl Fn(i64) -> S, time: f64, step: f64, sample_time: f64, shift: S) -> S {
+    // In samples; what lies nearer to an edge than rounding lies on it.
+    let from = -shift / sample_time + time / sample_time;
+    let to = from + step / sample_time;
+    let cell = |x: f64| (x + 1e-9).floor();
+    let (first, last) = (cell(from.re()), cell(to.re() - 2e-9).max(cell(from.re())));
+    if first == last {
+        return value(first as i64);
+    }
+    let mut sum = (-from + (first + 1.0)) * value(first as i64);
+    let mut k = first + 1.0;
+    while k < last {
+        sum += value(k as i64);
+        k += 1.0;
+    }
+    (sum + (to - last) * value(last as i64)) / (step / sample_time)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use num_dual::Dual64;
+
+    #[test]
+    fn an_edge_moves_through_a_step() {
+        let value = |k: i64| if k < 3 { 1.0 } else { 5.0 };
+        let mean = |time: f64, shift: f64| held_mean(value, time, 1e-3, 5e-3, shift);
+        assert_eq!((mean(0.014, 0.0), mean(0.015, 0.0), mean(0.015, 2e-3)), (1.0, 5.0, 1.0));
+        assert!((mean(0.017, 2.25e-3) - (0.25 * 1.0 + 0.75 * 5.0)).abs() < 1e-9);
+        let slope = held_mean(|k| Dual64::from(value(k)), 0.017, 1e-3, 5e-3, Dual64::new(2.25e-3, 1.0)).eps;
+        assert!((slope + 4.0 / 1e-3).abs() < 1e-6, "{slope}");
+    }
+
+    #[test]
+    fn a_shift_grows_and_is_never_negative() {
+        assert!((shift(1e-2, 1e-4, 100.0) - 2e-2_f64).abs() < 1e-15);
+        assert_eq!((shift(0.0, 0.0, 50.0), shift(0.0, -1e-3, 50.0)), (0.0, 0.0));
+    }
+}

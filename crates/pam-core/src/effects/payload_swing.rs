@@ -1,0 +1,72 @@
+//! `payload_swing`: a part of the payload that hangs on a cord instead of being fixed to the link.
+//!
+//! A mass `mu = s m_p` at the end of a cord of length `l` from the end of the link, at the angle `phi` from the gravity vector. With the
+//! acceleration `a` of the cord's upper end, along the cord `r = (sin phi, -cos phi)` and across it `t = (cos phi, sin phi)`:
+//! `l phi'' = -(a + g) t - 2 zeta sqrt(g/l) l phi'`, pull on the link `-mu [((a + g) r - l phi'^2) r - 2 zeta sqrt(g/l) l phi' t]`. At `s = 0`
+//! nothing pulls. Double pendulum, L. D. Landau & E. M. Lifshitz, *Mechanics*, section 5. Two states; at the start the cord hangs at rest.
+
+use super::{EffectInfo, EffectParameter};
+use crate::scalar::Scalar;
+
+/// Table entry.
+pub const INFO: EffectInfo = EffectInfo {
+    id: "payload_swing",
+    block: "arm",
+    at: "joint",
+    parameters: &[
+        EffectParameter::new("swinging_share", "1").within(0.0, 1.0),
+        EffectParameter::new("length", "m").within(1e-3, 100.0),
+        EffectParameter::new("damping_ratio", "1").within(0.0, 10.0),
+    ],
+};
+
+/// A hanging mass at one instant.
+#[derive(Debug, Clone, Copy)]
+pub struct Cord<S> {
+    /// Along the cord, away from the link: across and up.
+    pub along: [S; 2],
+    /// Across the cord.
+    pub across: [S; 2],
+    /// Damping, as an acceleration across the cord [m/s2].
+    pub damping: S,
+    /// Centripetal acceleration [m/s2].
+    pub centripetal: S,
+    length: S,
+}
+
+impl<S: Scalar> Cord<S> {
+    /// A cord of a length [m] and damping ratio at an angle [rad] and its rate, under gravity [m/s2].
+    #[inline]
+    pub fn new(length: S, damping_ratio: S, gravity: f64, angle: S, rate: S) -> Self {
+        let (sin, cos) = angle.sin_cos();
+        let damping = damping_ratio * (length * gravity.abs()).sqrt() * rate * 2.0;
+        Self { along: [sin, -cos], across: [cos, sin], damping, centripetal: length * rate * rate, length }
+    }
+
+    /// Angular acceleration [rad/s2] where the upper end accelerates [m/s2], gravity counted as an acceleration upwards.
+    #[inline]
+    pub fn acceleration(&self, felt: [S; 2]) -> S {
+        -(felt[0] * self.across[0] + felt[1] * self.across[1] + self.damping) / self.length
+    }
+}
+
+/// Bound of the pendulum's frequency [rad/s], the link's inertia without the swinging mass being smaller by `ratio`.
+pub fn fastest(length: f64, gravity: f64, ratio: f64) -> f64 {
+    (gravity.abs() / length * (1.0 + ratio)).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn it_swings_with_the_frequency_of_a_pendulum() {
+        let (length, g) = (0.4, 9.80665);
+        let still = Cord::new(length, 0.0, g, 0.0_f64, 0.0);
+        assert_eq!(still.acceleration([0.0, g]), 0.0);
+        let slope = Cord::new(length, 0.0, g, 1e-6_f64, 0.0).acceleration([0.0, g]) / 1e-6;
+        assert!((slope + g / length).abs() < 1e-6);
+        let damped = Cord::new(length, 0.1, g, 0.0_f64, 1.0).acceleration([0.0, g]);
+        assert!((damped + 2.0 * 0.1 * (g / length).sqrt()).abs() < 1e-9);
+    }
+}

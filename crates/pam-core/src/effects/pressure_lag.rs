@@ -1,0 +1,46 @@
+//! `pressure_lag`: the recorded pressure lags behind the true one, by the transducer, its snubber or its line.
+//!
+//! `T y' = p - y`. Over a step the true pressure is taken as straight, which has a closed form: no lag is too short for a step. Where the
+//! recorded pressure drives a block, the true one is `y + T y'`. At `T = 0` both are the same. E. O. Doebelin, *Measurement Systems*, ch. 6.
+
+use super::{EffectInfo, EffectParameter};
+use crate::scalar::{constant, Scalar};
+
+/// Table entry.
+pub const INFO: EffectInfo = EffectInfo {
+    id: "pressure_lag",
+    block: "sensors",
+    at: "chamber",
+    parameters: &[EffectParameter::new("time_constant", "s").within(0.0, 100.0)],
+};
+
+/// Reading after a step [s] in which the pressure went from one value to another.
+#[inline]
+pub fn read<S: Scalar>(reading: S, from: S, to: S, time_constant: S, step: f64) -> S {
+    let behind = time_constant * (to - from) / step;
+    let steps = if time_constant.re() > 0.0 { step / time_constant.re() } else { f64::INFINITY };
+    // Further back than the number's last digit reaches.
+    let left = if steps < 700.0 { (-constant::<S>(step) / time_constant).exp() } else { constant(0.0) };
+    to - behind + (reading - from + behind) * left
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_step_decays_and_a_ramp_is_followed_at_a_distance() {
+        let mut y = 0.0;
+        for _ in 0..50 {
+            y = read(y, 1.0, 1.0, 0.01, 1e-3);
+        }
+        assert!((1.0 - y - (-5.0_f64).exp()).abs() < 1e-12);
+        let mut y = 0.0;
+        for k in 0..500 {
+            let p = f64::from(k) * 1e-3;
+            y = read(y, p, p + 1e-3, 0.01, 1e-3);
+        }
+        assert!((y - (0.5 - 0.01_f64)).abs() < 1e-12);
+        assert_eq!(read(7.0, 1.0, 3.0, 0.0, 1e-3), 3.0);
+    }
+}

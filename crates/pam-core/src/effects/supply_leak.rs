@@ -1,0 +1,37 @@
+//! `supply_leak`: leakage of a tank, its fittings or the supply line to the ambient.
+//!
+//! `m_l = C rho0 sqrt(T0/T) p psi(pa/p)/psi(0)`, out of the supply at all times, with the sonic conductance `C` of ISO 6358. A tank
+//! with every valve shut loses its absolute pressure with the time constant `V/(C rho0 R T)`; behind a regulator the leak shows as
+//! droop. P. Beater, *Pneumatic Drives* (2007).
+
+use super::{EffectInfo, EffectParameter};
+use crate::gas::orifice::Gas;
+use crate::scalar::{constant, Scalar};
+
+/// Table entry.
+pub const INFO: EffectInfo = EffectInfo {
+    id: "supply_leak",
+    block: "supply",
+    at: "supply",
+    parameters: &[EffectParameter::new("conductance", "m3/(s Pa)")],
+};
+
+/// Leaking mass flow [kg/s] out of a supply at an absolute pressure [Pa].
+#[inline]
+pub fn mass_flow<S: Scalar>(gas: &Gas, conductance: S, pressure: S) -> S {
+    gas.mass_flow(gas.area_of_conductance(conductance), pressure, constant(gas.ambient_pressure))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_standard_litre_a_minute_empties_a_tank_as_known() {
+        let gas = Gas::new(101_325.0, 293.15, 287.05, 1.4);
+        // 1 l/min of free air at 14 bar absolute: 111 Pa/s out of 15 l
+        let rate = mass_flow(&gas, 1e-3 / 60.0 / 14e5, 14e5) * 287.05 * 293.15 / 0.015;
+        assert!((rate - 111.0_f64).abs() < 1.5, "{rate}");
+        assert_eq!(mass_flow(&gas, 0.0, 14e5), 0.0);
+    }
+}

@@ -1,0 +1,41 @@
+//! `valve_centre_leakage`: flow through the clearance between spool and sleeve around the null.
+//!
+//! `C_l(x) = C_0 exp(-|x|/x_l)` from the supply to the chamber and from the chamber to the ambient at once: with the valve shut the
+//! pressure goes to where both are the same, from either side. M. Belgharbi, S. Sesmat, S. Scavarda & D. Thomasset, "Analytical model
+//! of the flow stage of a pneumatic servo-distributor", 1999; *Energies* 12, 1096 (2019).
+
+use super::{EffectInfo, EffectParameter};
+use crate::gas::orifice::Gas;
+use crate::scalar::Scalar;
+
+/// Table entry.
+pub const INFO: EffectInfo = EffectInfo {
+    id: "valve_centre_leakage",
+    block: "valve",
+    at: "valve",
+    parameters: &[
+        EffectParameter::new("conductance", "m3/(s Pa)"),
+        EffectParameter::new("opening", "1").within(1e-4, 1e3),
+    ],
+};
+
+/// Discharge area [m2] of either path at a normalised spool position; `opening` is that over which it fades.
+#[inline]
+pub fn area<S: Scalar>(gas: &Gas, conductance: S, opening: S, x: S) -> S {
+    gas.area_of_conductance(conductance) * (-x.abs() / opening).exp()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn it_fades_with_the_opening() {
+        let gas = Gas::new(101_325.0, 293.15, 287.05, 1.4);
+        let shut = area(&gas, 5e-11, 0.02, 0.0);
+        assert_eq!(shut, gas.area_of_conductance(5e-11));
+        assert!((area(&gas, 5e-11, 0.02, -0.02) / shut - (-1.0_f64).exp()).abs() < 1e-12);
+        assert!(area(&gas, 5e-11, 0.02, 1.0) < 1e-15 * shut);
+        assert_eq!(area(&gas, 0.0, 0.02, 0.0), 0.0);
+    }
+}

@@ -1,0 +1,45 @@
+//! `valve_dead_zone`: positive overlap of the spool.
+//!
+//! `x_e = sgn(x) max(|x| - d, 0)/(1 - d)` in the place of the normalised spool position `x`; one half width `d` for both edges, since
+//! a difference of the edges is a shift of the null voltage. E. Richer & Y. Hurmuzlu, "A high performance pneumatic force actuator
+//! system", ASME J. Dyn. Syst. Meas. Control 122, 2000; A. C. Valdiero et al., "Nonlinear mathematical modeling in pneumatic servo
+//! position applications", Math. Probl. Eng. 2011.
+
+use super::{EffectInfo, EffectParameter};
+use crate::scalar::{constant, Scalar};
+
+/// Table entry.
+pub const INFO: EffectInfo = EffectInfo {
+    id: "valve_dead_zone",
+    block: "valve",
+    at: "valve",
+    parameters: &[EffectParameter::new("half_width", "1").within(0.0, 0.9)],
+};
+
+/// The position that opens the valve, for a normalised spool position.
+#[inline]
+pub fn effective<S: Scalar>(x: S, half_width: S) -> S {
+    let full = -half_width + 1.0;
+    if x.re() > half_width.re() {
+        (x - half_width) / full
+    } else if x.re() < -half_width.re() {
+        (x + half_width) / full
+    } else {
+        constant(0.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn it_is_shut_inside_and_wide_open_at_the_ends() {
+        assert_eq!((effective(0.03, 0.04), effective(-0.04, 0.04)), (0.0, 0.0));
+        assert_eq!((effective(1.0, 0.04), effective(-1.0, 0.04)), (1.0, -1.0));
+        assert!((effective(0.52, 0.04) - 0.5_f64).abs() < 1e-15);
+        for x in [-1.0, -0.3, 0.0, 0.3, 1.0] {
+            assert_eq!(effective(x, 0.0), x);
+        }
+    }
+}

@@ -1,0 +1,410 @@
+//! Effects against what is known in closed form, and the order of convergence with them.
+
+mod rigs;
+
+use pam_core::rig::spec::EffectSpec;
+use pam_core::simulate::{simulate, Initial, Timing, Trajectory};
+use pam_core::{Rig, RigSpec};
+use rigs::{effect, lone_tank, regulated, shoulder, TYPICAL};
+
+const AMBIENT: f64 = 101_325.0;
+const RT: f64 = 287.05 * 293.15;
+
+fn with(spec: RigSpec, effects: Vec<EffectSpec>) -> Rig {
+    Rig::new(RigSpec { effects, ..spec }).unwrap()
+}
+
+struct Run {
+    rig: Rig,
+    out: Trajectory,
+}
+
+impl Run {
+    fn new(
+        rig: Rig,
+        rows: usize,
+        dt: f64,
+        substeps: usize,
+        command: impl Fn(usize) -> f64,
+        start: &[(&str, f64)],
+    ) -> Self {
+        let values: Vec<f64> = (0..rows).map(command).collect();
+        let names = rig.names().inputs.clone();
+        let signals: Vec<_> = names.iter().map(|n| (n.as_str(), values.as_slice())).collect();
+        let mut initial = Initial::rest(&rig);
+        for (name, value) in start {
+            initial = initial.with(&rig, name, *value).unwrap();
+        }
+        let timing = Timing { sample_time: dt, substeps };
+        let out = simulate(&rig, rows, &signals, timing, &initial).unwrap();
+        Self { rig, out }
+    }
+
+    fn get(&self, name: &str) -> &[f64] {
+        self.out.get(&self.rig, name).unwrap()
+    }
+
+    fn last(&self, name: &str) -> f64 {
+        *self.get(name).last().unwrap()
+    }
+}
+
+/// The shoulder without its arm: a valve on a rigid chamber.
+fn rigid_chamber(volume: f64) -> RigSpec {
+    let mut spec = shoulder();
+    (spec.arm, spec.muscles, spec.joints) = (None, vec![], vec![]);
+    spec.chambers[0].dead_volume = volume;
+    spec
+}
+
+#[test]
+fn a_leaking_tank_decays_with_its_time_constant() {
+    let rig = with(lone_tank(), vec![effect("supply_leak", &[("conductance", 1e-9)])]);
+    let run = Run::new(rig, 101, 0.1, 10, |_| 0.0, &[]);
+    let tau = 0.015 / (1e-9 * 1.185 * RT);
+    let expected = (1.38e6 + AMBIENT) * (-10.0 / tau).exp() - AMBIENT;
+    assert!((run.last("supply_pressure") - expected).abs() < 1.0, "{}", run.last("supply_pressure"));
+    assert!((run.last("mass_supplied") - run.last("mass_vented")).abs() < 1e-15);
+}
+
+#[test]
+fn a_compressor_runs_between_its_pressures() {
+    let leak = effect("supply_leak", &[("conductance", 4e-9)]);
+    let parameters = [("free_air_delivery", 0.02), ("cut_in_pressure", 1.3e6), ("cut_out_pressure", 1.36e6)];
+    let rig = with(lone_tank(), vec![leak, effect("compressor_cut_in", &parameters)]);
+    let run = Run::new(rig, 4001, 0.01, 2, |_| 0.0, &[]);
+    let p = run.get("supply_pressure");
+    let after: Vec<f64> = p.iter().copied().skip(1000).collect();
+    let (low, high) =
+        (after.iter().copied().fold(f64::MAX, f64::min), after.iter().copied().fold(0.0, f64::max));
+    assert!((low - 1.3e6).abs() < 1.5e3 && (high - 1.36e6).abs() < 1.5e3, "{low} {high}");
+    // Running, it gains what it gives less what leaks.
+    let rising = after.windows(2).map(|w| (w[1] - w[0]) / 0.01).fold(0.0, f64::max);
+    let given = 0.02 * 1.185 * RT / 0.015;
+    let lost = 4e-9 * 1.185 * RT / 0.015 * (1.3e6 + AMBIENT);
+    assert!((rising - (given - lost)).abs() < 0.01 * given, "{rising} {given} {lost}");
+}
+
+#[test]
+fn a_regulator_does_not_answer_a_small_step() {
+    let mut spec = regulated();
+    (spec.arm, spec.muscles, spec.joints, spec.valves) = (None, vec![], vec![], vec![]);
+    let rig = with(spec, vec![effect("supply_regulator_deadband", &[("dead_band", 5e4)])]);
+    let small = Run::new(rig.clone(), 200, 0.01, 5, |k| if k > 20 { 6.4e5 } else { 6e5 }, &[]);
+    assert!(small.get("supply_pressure").iter().all(|p| (p - 6e5).abs() < 1e-6));
+    let large = Run::new(rig, 200, 0.01, 5, |k| if k > 20 { 7.5e5 } else { 6e5 }, &[]);
+    assert!((large.last("supply_pressure") - 7e5).abs() < 1.0, "short of its aim by the band");
+}
+
+#[test]
+fn a_valve_is_shut_inside_its_dead_zone_and_follows_its_play() {
+    let dead = || vec![effect("valve_dead_zone", &[("half_width", 0.04)])];
+    let still =
+        Run::new(with(rigid_chamber(1e-3), dead()), 50, 0.01, 5, |_| 5.19, &[("muscle_pressure", 2e5)]);
+    assert!(still.get("muscle_pressure").iter().all(|p| (p - 2e5).abs() < 1e-6));
+    // Open by 0.5 of the rest: the area of the free valve at that position.
+    let rig = with(rigid_chamber(1e-2), dead());
+    let moved = Run::new(rig, 5, 0.01, 5, |_| 5.0 + 5.0 * 0.52, &[("muscle_pressure", 2e5)]);
+    let free = Run::new(with(rigid_chamber(1e-2), vec![]), 5, 0.01, 5, |_| 7.5, &[("muscle_pressure", 2e5)]);
+    assert!((moved.last("muscle_pressure") / free.last("muscle_pressure") - 1.0).abs() < 1e-12);
+    let play = vec![effect("valve_hysteresis", &[("half_width", 0.02)])];
+    let command = |k: usize| if k < 10 { 5.0 } else { 5.5 };
+    let run = Run::new(with(rigid_chamber(1e-2), play), 20, 0.01, 5, command, &[("muscle_pressure", 2e5)]);
+    let less = |k: usize| if k < 10 { 5.0 } else { 5.4 };
+    let same = Run::new(with(rigid_chamber(1e-2), vec![]), 20, 0.01, 5, less, &[("muscle_pressure", 2e5)]);
+    assert!((run.last("muscle_pressure") / same.last("muscle_pressure") - 1.0).abs() < 1e-12);
+}
+
+#[test]
+fn a_lag_in_the_path_costs_its_time() {
+    // Choked filling of a large chamber: what flows is linear in the spool, so that what is missing is its lag.
+    let filled = |effects: Vec<EffectSpec>| {
+        let command = |k: usize| if k < 10 { 5.0 } else { 5.5 };
+        let run =
+            Run::new(with(rigid_chamber(0.05), effects), 60, 0.01, 10, command, &[("muscle_pressure", 1e5)]);
+        run.last("muscle_pressure") - 1e5
+    };
+    let free = filled(vec![]);
+    for (time_constant, delay) in [(0.02, 0.0), (0.0, 0.03), (0.015, 0.012)] {
+        let lag = effect("input_path_lag", &[("time_constant", time_constant), ("delay", delay)]);
+        let missing = 1.0 - filled(vec![lag]) / free;
+        let expected = (time_constant + delay) / 0.49;
+        assert!((missing / expected - 1.0).abs() < 0.01, "{time_constant} {delay}: {missing} {expected}");
+    }
+    let shift = 1.0 - filled(vec![effect("clock_skew", &[("offset", 0.0123), ("rate", 0.0)])]) / free;
+    assert!((shift * 0.49 - 0.0123).abs() < 1e-4, "{shift}");
+}
+
+#[test]
+fn centre_leakage_settles_where_both_flows_are_equal() {
+    let mut spec = rigid_chamber(1e-4);
+    spec.supplies[0].kind = "constant".into();
+    let leak = vec![effect("valve_centre_leakage", &[("conductance", 1e-9), ("opening", 0.02)])];
+    let from = |pressure: f64| {
+        let rig = with(spec.clone(), leak.clone());
+        Run::new(rig, 400, 0.1, 100, |_| 5.0, &[("muscle_pressure", pressure)]).last("muscle_pressure")
+    };
+    let (up, down) = (from(1e5), from(1.3e6));
+    assert!((up - down).abs() < 100.0, "{up} {down}");
+    let gas = pam_core::gas::orifice::Gas::new(AMBIENT, 293.15, 287.05, 1.4);
+    let p = up + AMBIENT;
+    let (fills, vents) = (gas.mass_flow(1e-9, 1.38e6 + AMBIENT, p), gas.mass_flow(1e-9, p, AMBIENT));
+    // alpha_in is 1.4 here and alpha_out 1: the pressure stands still where the one is less by that.
+    assert!((1.4 * fills / vents - 1.0_f64).abs() < 1e-3, "{fills} {vents}");
+}
+
+#[test]
+fn a_narrow_tube_decides_how_fast_a_chamber_fills() {
+    let tube = vec![effect("tube_flow_restriction", &[("conductance", 1e-9)])];
+    let run = Run::new(with(rigid_chamber(0.01), tube), 101, 0.01, 10, |_| 10.0, &[]);
+    let rate = 1e-9 * 1.185 * (1.38e6 + AMBIENT) * RT / 0.01 * 1.4;
+    let ratio = run.last("muscle_pressure") / (rate * 1.0);
+    assert!((ratio - 1.0).abs() < 0.01, "{ratio}");
+}
+
+#[test]
+fn the_reading_of_a_pressure_lags() {
+    let lag = vec![effect("pressure_lag", &[("time_constant", 0.03)])];
+    let command = |k: usize| if k < 10 { 5.0 } else { 5.2 };
+    let slow = Run::new(with(rigid_chamber(0.05), lag), 60, 0.01, 10, command, &[("muscle_pressure", 1e5)]);
+    let true_ =
+        Run::new(with(rigid_chamber(0.05), vec![]), 60, 0.01, 10, command, &[("muscle_pressure", 1e5)]);
+    let p = true_.get("muscle_pressure");
+    // Choked filling is a ramp: the reading is behind by the time constant.
+    let expected = p[59] - 0.03 * (p[59] - p[58]) / 0.01;
+    let gap = slow.last("muscle_pressure") - expected;
+    assert!(gap.abs() < 2e-3 * (p[59] - p[58]), "{gap}");
+    assert_eq!(slow.last("air_mass"), true_.last("air_mass"));
+}
+
+/// The shoulder with its angle held by a wall of inertia: what the muscle pulls at one length.
+fn held(effects: Vec<EffectSpec>, pressure: f64, angle: f64, rows: usize) -> Run {
+    let mut spec = shoulder();
+    spec.valves.clear();
+    spec.arm.as_mut().unwrap().inertia = 1e6;
+    Run::new(
+        with(spec, effects),
+        rows,
+        0.01,
+        5,
+        |_| 5.0,
+        &[("muscle_pressure", pressure), ("joint_angle", angle)],
+    )
+}
+
+#[test]
+fn force_effects_have_their_size() {
+    let force = |effects: Vec<EffectSpec>| held(effects, 3e5, 1.0, 1).last("muscle_force");
+    let plain = force(vec![]);
+    let e = held(vec![], 3e5, 1.0, 1).last("contraction_ratio");
+    let less = held(vec![], 2.8e5, 1.0, 1).last("muscle_force");
+    let started = force(vec![effect("activation_pressure", &[("threshold", 2e4)])]);
+    assert!((started - less).abs() < 1e-9 * plain, "{started} {less}");
+    let crowded =
+        force(vec![effect("pam_crowding_contact", &[("contact_area", 1e-3), ("onset_contraction", 0.02)])]);
+    assert!((crowded - (plain - 6.0 * 1e-3 * 3e5 * (e - 0.02 - 0.0025))).abs() < 1e-6);
+    assert_eq!(force(vec![effect("muscle_creep", &[("stiffness", 5e3), ("time_constant", 1.0)])]), plain);
+    assert_eq!(
+        force(vec![effect("mullins_softening", &[("softening", 0.3), ("contraction_width", 0.03)])]),
+        plain
+    );
+}
+
+#[test]
+fn a_damped_muscle_loses_what_the_speed_times_the_damping_is() {
+    let damping = |share: f64| {
+        effect(
+            "muscle_rate_damping",
+            &[("damping_constant", 200.0), ("damping_pressure", 1e-3), ("lengthening_share", share)],
+        )
+    };
+    let force = |effects: Vec<EffectSpec>, rate: f64| {
+        let start = [("muscle_pressure", 3e5), ("joint_angle", 1.0), ("joint_rate", rate)];
+        Run::new(with(shoulder(), effects), 1, 0.01, 5, |_| 5.0, &start).last("muscle_force")
+    };
+    let rig = with(shoulder(), vec![]);
+    let arm = rig.joint(0).unwrap().eval(1.0_f64).moment_arm;
+    let lost = force(vec![], 0.5) - force(vec![damping(0.5)], 0.5);
+    assert!((lost - 6.0 * 500.0 * 0.5 * arm).abs() < 1e-6, "contracting: {lost}");
+    let won = force(vec![damping(0.5)], -0.5) - force(vec![], -0.5);
+    assert!((won - 0.5 * lost).abs() < 1e-6, "lengthening: {won}");
+}
+
+/// A hanging arm that swings freely, without muscles' pull: gravity and friction alone.
+fn pendulum(effects: Vec<EffectSpec>, rows: usize, dt: f64, angle: f64, rate: f64) -> Run {
+    let mut spec = shoulder();
+    spec.valves.clear();
+    spec.muscles[0].muscle.count = 1;
+    spec.muscles[0].muscle.modulus_scale = 1e-9;
+    let arm = spec.arm.as_mut().unwrap();
+    (arm.viscous, arm.coulomb) = (0.0, 0.0);
+    Run::new(with(spec, effects), rows, dt, 10, |_| 5.0, &[("joint_angle", angle), ("joint_rate", rate)])
+}
+
+#[test]
+fn a_change_of_payload_changes_mass_and_weight() {
+    // Released from rest: the acceleration is weight by inertia.
+    let fall = |change: f64| {
+        let change = effect("payload_change", &[("mass_change", change), ("time", -1.0)]);
+        pendulum(vec![change], 3, 1e-3, 1.5, 0.0).last("joint_rate") / 2e-3
+    };
+    for change in [0.0, 3.0, -6.0] {
+        let payload = 9.07 + change;
+        let expected = -(1.8 + payload * 0.9) * 9.80665 * 1.5_f64.sin() / (0.634 + payload * 0.81);
+        assert!((fall(change) / expected - 1.0).abs() < 2e-3, "{change}: {} {expected}", fall(change));
+    }
+}
+
+#[test]
+fn a_push_is_torque_times_duration() {
+    let push = |torque: f64| {
+        let push = effect("external_torque", &[("torque", torque), ("time", 0.01), ("duration", 0.03)]);
+        pendulum(vec![push], 101, 1e-3, 0.8, 0.0).last("joint_rate")
+    };
+    let gained = (push(5.0) - push(0.0)) * (0.634 + 9.07 * 0.81);
+    assert!((gained - 0.15).abs() < 5e-3, "{gained}");
+}
+
+#[test]
+fn a_stop_in_the_way_carries_the_arm() {
+    let stop = effect("joint_end_stop", &[("stiffness", 2000.0), ("angle", 0.6), ("dissipation", 2.0)]);
+    let run = pendulum(vec![stop], 4000, 5e-3, 0.9, 0.0);
+    let (angle, torque) = (run.last("joint_angle"), run.last("joint_torque"));
+    let weight = (1.8 + 9.07 * 0.9) * 9.80665 * angle.sin();
+    let corner = 0.1_f64.to_radians();
+    let carried = 2000.0 * (0.6 - angle - corner);
+    assert!((carried + torque - weight).abs() < 0.3, "{carried} {torque} {weight}");
+}
+
+#[test]
+fn stiction_takes_from_slow_motion_alone() {
+    let friction = effect("joint_coulomb_stribeck", &[("stiction", 4.0), ("stribeck_speed", 0.05)]);
+    let slowed =
+        |effects: Vec<EffectSpec>, rate: f64| pendulum(effects, 2, 1e-3, 0.8, rate).last("joint_rate") - rate;
+    let lost = |rate: f64| {
+        (slowed(vec![], rate) - slowed(vec![friction.clone()], rate)) * (0.634 + 9.07 * 0.81) / 1e-3
+    };
+    assert!((lost(0.8)).abs() < 1e-6);
+    assert!(lost(0.03) > 1.5 && lost(0.03) < 4.0, "{}", lost(0.03));
+}
+
+#[test]
+fn a_swinging_payload_keeps_its_energy() {
+    // Two pendulums without friction: the sum of kinetic and potential energy stays, hence the arm's comes and goes.
+    let share = [("swinging_share", 1.0), ("length", 0.4), ("damping_ratio", 0.0)];
+    let run = pendulum(vec![effect("payload_swing", &share)], 2001, 1e-3, 1.0, 0.0);
+    let angle = run.get("joint_angle");
+    let free = pendulum(vec![], 2001, 1e-3, 1.0, 0.0);
+    let apart = angle.iter().zip(free.get("joint_angle")).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    assert!(apart > 0.05, "{apart}");
+    // A long cord holds the payload where it is: the arm alone falls faster than the payload would let it.
+    let long = [("swinging_share", 1.0), ("length", 50.0), ("damping_ratio", 0.0)];
+    let start = pendulum(vec![effect("payload_swing", &long)], 2, 1e-3, 1.5, 0.0).last("joint_rate") / 1e-3;
+    let (j, m) = (0.9 * 1.5_f64.sin(), 9.07); // along the cord the payload follows, across it does not
+    let expected = -(1.8 * 9.80665 * 1.5_f64.sin() + m * 9.80665 * j) / (0.634 + m * j * j);
+    assert!((start / expected - 1.0).abs() < 5e-3, "{start} {expected}");
+}
+
+#[test]
+fn a_base_gives_way_and_rings() {
+    let base = [("compliance", 2e-4), ("natural_frequency", 6.0), ("damping_ratio", 0.5)];
+    let run = held(vec![effect("base_flexibility", &base)], 3e5, 1.0, 2);
+    assert!(run.last("joint_angle").is_finite());
+    // A stiff mounting is none.
+    let stiff = [("compliance", 1e-12), ("natural_frequency", 6.0), ("damping_ratio", 0.5)];
+    let (a, b) = (
+        pendulum(vec![effect("base_flexibility", &stiff)], 500, 1e-3, 1.0, 0.0),
+        pendulum(vec![], 500, 1e-3, 1.0, 0.0),
+    );
+    assert!((a.last("joint_angle") - b.last("joint_angle")).abs() < 1e-6);
+    // Slowly, a base that gives way lets the arm hang lower: the joint reads what the base has not taken.
+    let soft = pendulum(
+        vec![effect(
+            "base_flexibility",
+            &[("compliance", 2e-4), ("natural_frequency", 6.0), ("damping_ratio", 0.5)],
+        )],
+        500,
+        1e-3,
+        1.0,
+        0.0,
+    );
+    assert!((soft.last("joint_angle") - b.last("joint_angle")).abs() > 1e-4);
+}
+
+/// One muscle in a load frame that shortens it evenly by 10 mm within a tenth of a second, and holds it.
+fn framed(effects: Vec<EffectSpec>) -> Vec<f64> {
+    let mut spec = shoulder();
+    spec.arm = None;
+    (spec.joints, spec.supplies, spec.valves) = (vec![], vec![], vec![]);
+    spec.muscles[0].joint = "load".into();
+    let text = r#"{"kind": "frame", "min_length": 0.2, "max_length": 0.28}"#;
+    spec.load = Some(serde_json::from_str(text).unwrap());
+    let rig = with(spec, effects);
+    let length: Vec<f64> = (1..=400).map(|k| 0.27 - 1e-3 * f64::from(k.min(10))).collect();
+    let start = Initial::rest(&rig).with(&rig, "muscle_pressure", 3e5).unwrap();
+    let timing = Timing { sample_time: 0.01, substeps: 5 };
+    let start = start.with(&rig, "length", 0.27).unwrap();
+    let out = simulate(&rig, 400, &[("length", &length)], timing, &start).unwrap();
+    out.get(&rig, "muscle_force").unwrap().to_vec()
+}
+
+#[test]
+fn creep_relaxes_the_force_at_a_held_length() {
+    let (k, tau) = (3e3, 0.8);
+    let (creeping, free) =
+        (framed(vec![effect("muscle_creep", &[("stiffness", k), ("time_constant", tau)])]), framed(vec![]));
+    let count = 6.0;
+    for row in [10, 50, 150, 399] {
+        let held = (row as f64 * 0.01 - 0.1) / tau;
+        let expected = -count * k * 0.1 * tau * (1.0 - (-0.1 / tau).exp()) * (-held).exp();
+        let found = creeping[row] - free[row];
+        assert!((found - expected).abs() < 1e-6 * count * k, "{row}: {found} {expected}");
+    }
+}
+
+#[test]
+fn softening_is_met_on_the_way_back_only() {
+    let soft = effect("mullins_softening", &[("softening", 0.3), ("contraction_width", 0.03)]);
+    let (a, b) = (framed(vec![soft]), framed(vec![]));
+    assert_eq!(a, b, "a muscle that only contracts is always at its largest contraction");
+}
+
+#[test]
+fn convergence_is_of_order_four_where_the_effect_is_smooth() {
+    let smooth = [
+        "supply_leak",
+        "valve_centre_leakage",
+        "input_path_lag",
+        "muscle_creep",
+        "payload_swing",
+        "base_flexibility",
+    ];
+    for typical in TYPICAL.iter().filter(|t| smooth.contains(&t.id)) {
+        let rig = with(shoulder(), vec![typical.on()]);
+        let run = |substeps: usize| {
+            let command = |k: usize| 5.3 + 0.25 * (k as f64 * 0.03).sin();
+            let start = [("muscle_pressure", 2e5), ("joint_angle", 0.9)];
+            Run::new(rig.clone(), 60, 0.01, substeps, command, &start).get("joint_angle").to_vec()
+        };
+        let reference = run(320);
+        let error = |n: usize| run(n).iter().zip(&reference).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        let order = (error(10) / error(20)).log2();
+        assert!((3.4..4.6).contains(&order), "{}: order {order}", typical.id);
+    }
+}
+
+#[test]
+fn fast_effects_shorten_the_step() {
+    let step = |effects: Vec<EffectSpec>| with(shoulder(), effects).stable_step();
+    let free = step(vec![]);
+    let lag = step(vec![effect("input_path_lag", &[("time_constant", 1e-4), ("delay", 0.0)])]);
+    assert!((lag - 2e-4).abs() < 1e-12, "{lag} {free}");
+    assert_eq!(step(vec![effect("input_path_lag", &[("time_constant", 1e-5), ("delay", 1e-5)])]), free);
+    let stiff = [("stiffness", 1e9), ("angle", 1.0), ("dissipation", 0.0)];
+    let expected = 2.0 / ((1e9 + 2e4) / (0.634 + 9.07 * 0.81_f64)).sqrt();
+    // the muscles are springs beside it, a thousand times softer
+    assert!((step(vec![effect("joint_end_stop", &stiff)]) / expected - 1.0).abs() < 1e-3);
+    let base = [("compliance", 1e-5), ("natural_frequency", 500.0), ("damping_ratio", 0.1)];
+    assert!(step(vec![effect("base_flexibility", &base)]) < 1e-3);
+    assert_eq!(step(vec![effect("pressure_lag", &[("time_constant", 1e-6)])]), free);
+}

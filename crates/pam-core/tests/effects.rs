@@ -1,0 +1,320 @@
+//! Laws of every effect: off it changes nothing, its sensitivities are those of differences, a restart is bit for bit, one block
+//! can be named, and every kind of rig takes it.
+
+mod rigs;
+
+use pam_core::drive::Drive;
+use pam_core::effects::EFFECTS;
+use pam_core::residual::{predict, Block, Measured, Signal};
+use pam_core::simulate::{Initial, Progress, Timing, Trajectory};
+use pam_core::{Rig, RigSpec};
+use rigs::{antagonists, effect_at, lone_tank, regulated, shoulder, two_joints, Typical, TYPICAL};
+
+const DT: f64 = 0.01;
+const TIMING: Timing = Timing { sample_time: DT, substeps: 10 };
+const ROWS: usize = 80;
+
+fn spec_for(id: &str) -> RigSpec {
+    if id == "supply_regulator_deadband" {
+        regulated()
+    } else {
+        shoulder()
+    }
+}
+
+/// A command with edges, and one that goes up and down, for each valve; a set pressure for each regulator.
+fn signals(rig: &Rig, rows: usize) -> Vec<(String, Vec<f64>)> {
+    let valve = |k: usize| {
+        let t = k as f64 * DT;
+        let edge = if (k / 16) % 2 == 0 { 0.12 } else { -0.2 };
+        5.15 + edge + 0.35 * (9.0 * t).sin()
+    };
+    let pressure = |k: usize| if (k / 25) % 2 == 0 { 6.0e5 } else { 6.6e5 };
+    let values = |name: &str| -> Vec<f64> {
+        (0..rows).map(|k| if name.starts_with("valve") { valve(k) } else { pressure(k) }).collect()
+    };
+    rig.names().inputs.iter().map(|name| (name.clone(), values(name))).collect()
+}
+
+fn initial(rig: &Rig) -> Initial {
+    let mut start = Initial::rest(rig);
+    for (name, _) in &rig.names().initial {
+        let value = match name.split('.').next() {
+            Some("muscle_pressure") if name.ends_with("extensor") => 1.4e5,
+            Some("muscle_pressure") => 2e5,
+            Some("joint_angle") if rig.spec().chambers.len() == 1 => 0.9,
+            Some("joint_angle") if rig.names().coordinates.len() == 2 => 0.5,
+            _ => continue,
+        };
+        start = start.with(rig, name, value).unwrap();
+    }
+    start
+}
+
+fn borrowed(signals: &[(String, Vec<f64>)]) -> Vec<(&str, &[f64])> {
+    signals.iter().map(|(name, values)| (name.as_str(), values.as_slice())).collect()
+}
+
+fn run(rig: &Rig, rows: usize) -> Trajectory {
+    let signals = signals(rig, rows);
+    pam_core::simulate::simulate(rig, rows, &borrowed(&signals), TIMING.stable(rig), &initial(rig)).unwrap()
+}
+
+fn with(spec: RigSpec, effects: Vec<pam_core::rig::spec::EffectSpec>) -> Rig {
+    Rig::new(RigSpec { effects, ..spec }).unwrap()
+}
+
+#[test]
+fn every_effect_is_tested() {
+    let others = ["heat_transfer"]; // it replaces an equation and has no neutral value
+    for info in EFFECTS.iter().filter(|e| !others.contains(&e.id)) {
+        let typical = TYPICAL.iter().find(|t| t.id == info.id).unwrap_or_else(|| panic!("{}", info.id));
+        assert!(info.parameters.iter().map(|p| p.name).eq(typical.parameters.iter().map(|(n, _)| *n)));
+    }
+}
+
+#[test]
+fn switched_off_it_changes_nothing_bit_for_bit() {
+    for typical in TYPICAL {
+        for spec in [spec_for(typical.id), antagonists(), two_joints()] {
+            let (plain, off) = (with(spec.clone(), vec![]), with(spec.clone(), vec![typical.off()]));
+            let (a, b) = (run(&plain, ROWS), run(&off, ROWS));
+            for (k, (name, _)) in plain.names().channels.iter().enumerate() {
+                assert!(a.channels[k] == b.channels[k], "{}: {name} of {}", typical.id, spec.name);
+            }
+        }
+    }
+}
+
+#[test]
+fn switched_on_it_moves_its_channel() {
+    for typical in TYPICAL {
+        let spec = spec_for(typical.id);
+        let (plain, on) = (with(spec.clone(), vec![]), with(spec, vec![typical.on()]));
+        let (a, b) = (run(&plain, ROWS), run(&on, ROWS));
+        let name = match EFFECTS.iter().find(|e| e.id == typical.id).map(|e| e.block) {
+            Some("supply") => "supply_pressure",
+            Some("valve" | "line" | "chamber" | "sensors") => "muscle_pressure",
+            _ => "joint_angle",
+        };
+        let pairs = || a.get(&plain, name).unwrap().iter().zip(b.get(&on, name).unwrap());
+        let moved = pairs().map(|(x, y)| (x - y).abs()).fold(0.0, f64::max);
+        let size = pairs().map(|(x, _)| x.abs()).fold(0.0, f64::max);
+        assert!(moved > 1e-4 * size, "{}: {name} by {moved} of {size}", typical.id);
+    }
+}
+
+#[test]
+fn rigs_of_several_blocks_take_it_everywhere_or_at_one_of_them() {
+    for typical in TYPICAL.iter().filter(|t| t.id != "supply_regulator_deadband") {
+        let info = EFFECTS.iter().find(|e| e.id == typical.id).unwrap();
+        for (spec, names) in [(antagonists(), ["flexor", "extensor"]), (two_joints(), ["elbow", "wrist"])] {
+            let two = match info.at {
+                "joint" => spec.joints.len() == 2,
+                at => ["valve", "chamber", "muscle"].contains(&at),
+            };
+            let all = run(&with(spec.clone(), vec![typical.on()]), 40);
+            if !two {
+                continue;
+            }
+            let at = |name: &str| {
+                run(&with(spec.clone(), vec![effect_at(typical.id, name, typical.parameters)]), 40)
+            };
+            let (first, second) = (at(names[0]), at(names[1]));
+            assert!(first.channels != second.channels, "{}: the same at either", typical.id);
+            let tip = ["payload_swing", "payload_change"].contains(&typical.id); // alone it acts at the tip
+            assert_eq!(all.channels == second.channels, tip, "{}", typical.id);
+            let wrong = RigSpec { effects: vec![effect_at(typical.id, "nose", typical.parameters)], ..spec };
+            assert!(Rig::new(wrong).unwrap_err().to_string().contains("nose"));
+        }
+    }
+}
+
+#[test]
+fn one_block_alone_changes() {
+    let spec = antagonists();
+    let on = with(
+        spec.clone(),
+        vec![effect_at("leak_muscle", "flexor", &[("conductance", 1e-9), ("laminar_share", 0.0)])],
+    );
+    let lag = with(spec.clone(), vec![effect_at("pressure_lag", "flexor", &[("time_constant", 0.02)])]);
+    let plain = with(spec, vec![]);
+    let (a, b, c) = (run(&plain, 5), run(&on, 5), run(&lag, 60));
+    let get = |rig: &Rig, t: &Trajectory, name: &str| t.get(rig, name).unwrap().to_vec();
+    assert!(get(&plain, &a, "muscle_pressure.flexor") != get(&on, &b, "muscle_pressure.flexor"));
+    let long = run(&plain, 60);
+    assert_eq!(get(&plain, &long, "muscle_pressure.extensor"), get(&lag, &c, "muscle_pressure.extensor"));
+    assert_eq!(get(&plain, &long, "joint_angle"), get(&lag, &c, "joint_angle"));
+    assert!(get(&plain, &long, "muscle_pressure.flexor") != get(&lag, &c, "muscle_pressure.flexor"));
+}
+
+#[test]
+fn a_restart_is_bit_for_bit_with_every_effect_on() {
+    let all = TYPICAL.iter().map(Typical::on).collect();
+    let rig = with(shoulder(), all);
+    let signals = signals(&rig, ROWS);
+    let drive = Drive::new(&rig, ROWS, &borrowed(&signals)).unwrap();
+    let mut whole = Progress::start(&rig, &initial(&rig)).unwrap();
+    let mut first = whole.clone();
+    let mut out = Trajectory::new(&rig, ROWS);
+    whole.advance(&rig, TIMING, &drive, &mut out).unwrap();
+    let mut parts = Trajectory::new(&rig, ROWS);
+    for range in [0..33, 33..34, 34..ROWS] {
+        let fresh = Progress::start(&rig, &initial(&rig)).unwrap();
+        first = fresh.restored(&first.to_vec()).unwrap();
+        first.advance(&rig, TIMING, &drive.part(range), &mut parts).unwrap();
+    }
+    assert_eq!(whole, first);
+    assert_eq!(out, parts);
+    let mut short = whole.to_vec();
+    short.pop();
+    short.pop();
+    short.truncate(10);
+    assert!(whole.restored(&short).is_err());
+}
+
+/// Values and slopes of a channel by central differences.
+fn slopes(values: &[f64]) -> Vec<f64> {
+    let n = values.len();
+    (0..n)
+        .map(|k| {
+            let (a, b) = (k.saturating_sub(1), (k + 1).min(n - 1));
+            (values[b] - values[a]) / ((b - a) as f64 * DT)
+        })
+        .collect()
+}
+
+fn sensitivities(typical: &Typical, spec: &RigSpec, truth: &Trajectory, block: &str, blind: &[&str]) {
+    let rig = with(spec.clone(), vec![typical.on()]);
+    let inputs = signals(&rig, ROWS);
+    let channels: Vec<_> = (rig.names().channels.iter())
+        .map(|(name, _)| name.as_str())
+        .filter(|n| {
+            ["supply_pressure", "muscle_pressure", "joint_angle"].contains(&n.split('.').next().unwrap())
+        })
+        .collect();
+    let rates: Vec<_> = channels.iter().map(|n| slopes(truth.get(&rig, n).unwrap())).collect();
+    let measured: Vec<_> = (channels.iter().zip(&rates))
+        .map(|(n, slope)| (*n, Signal { value: truth.get(&rig, n).unwrap(), slope }))
+        .collect();
+    let measured = Measured::new(&rig, ROWS, &borrowed(&inputs), &measured).unwrap();
+    let names: Vec<_> = typical.parameters.iter().map(|(n, _)| format!("{}.{n}", typical.id)).collect();
+    let ids: Vec<_> = names.iter().map(|n| rig.parameters().find(n).unwrap()).collect();
+    let predicted = |rig: &Rig, ids: &[_]| {
+        predict(rig, Block::from_name(rig, block).unwrap(), &measured, TIMING.stable(rig), &[0, 40], ids)
+            .unwrap_or_else(|e| panic!("{}: {e}", typical.id))
+    };
+    let exact = predicted(&rig, &ids);
+    for (column, (name, value)) in typical.parameters.iter().enumerate() {
+        // Small enough for no edge of the relay to jump over a step, large enough for rounding.
+        let h = if *value == 0.0 { 1e-6 } else { 1e-5 * value.abs() };
+        let shifted = |by: f64| {
+            let mut effect = typical.on();
+            *effect.parameters.get_mut(*name).unwrap() += by;
+            predicted(&with(spec.clone(), vec![effect]), &[]).value
+        };
+        let (up, down) = (shifted(h), shifted(-h));
+        let slope = |k: usize| exact.jacobian[k * exact.columns + column];
+        let scale = (0..ROWS).map(|k| slope(k).abs()).fold(0.0, f64::max);
+        assert_eq!(scale > 0.0, !blind.contains(name), "{}.{name} has influence {scale}", typical.id);
+        for k in 0..ROWS {
+            let gap = (slope(k) - (up[k] - down[k]) / (2.0 * h)).abs();
+            assert!(gap <= 2e-3 * scale, "{}.{name} in {block} at row {k}: {gap} of {scale}", typical.id);
+        }
+    }
+}
+
+#[test]
+fn sensitivities_are_those_of_differences() {
+    for typical in TYPICAL {
+        let info = EFFECTS.iter().find(|e| e.id == typical.id).unwrap();
+        let spec = spec_for(typical.id);
+        let truth = run(&with(spec.clone(), vec![typical.on()]), ROWS);
+        let block = match info.block {
+            "supply" => "supply",
+            "valve" | "line" | "chamber" | "sensors" => "chamber",
+            _ => "arm",
+        };
+        // The upper stop and the compressor's cut-out are not reached.
+        let blind: &[&str] = if typical.id == "compressor_cut_in" { &["cut_out_pressure"] } else { &[] };
+        sensitivities(typical, &spec, &truth, block, blind);
+        if typical.id == "pressure_lag" {
+            sensitivities(typical, &spec, &truth, "arm", &[]);
+        }
+        if info.block == "valve" {
+            sensitivities(typical, &spec, &truth, "supply", &[]);
+        }
+    }
+}
+
+#[test]
+fn sensitivities_hold_on_two_joints() {
+    for typical in TYPICAL {
+        let info = EFFECTS.iter().find(|e| e.id == typical.id).unwrap();
+        let spec = two_joints();
+        if ["supply", "sensors"].contains(&info.block) {
+            continue;
+        }
+        let truth = run(&with(spec.clone(), vec![typical.on()]), ROWS);
+        let arm = !["valve", "line", "chamber"].contains(&info.block);
+        sensitivities(typical, &spec, &truth, if arm { "arm.wrist" } else { "chamber.elbow" }, &[]);
+    }
+}
+
+#[test]
+fn predictions_repeat_what_was_simulated() {
+    // Measured without noise, cut anywhere, a block predicts what the whole rig did: to the error of the signals' slopes.
+    for typical in TYPICAL {
+        let rig = with(spec_for(typical.id), vec![typical.on()]);
+        let truth = run(&rig, ROWS);
+        let inputs = signals(&rig, ROWS);
+        let names = ["supply_pressure", "muscle_pressure", "joint_angle"];
+        let rates = names.map(|n| slopes(truth.get(&rig, n).unwrap()));
+        let signal =
+            |k: usize| (names[k], Signal { value: truth.get(&rig, names[k]).unwrap(), slope: &rates[k] });
+        let measured = [signal(0), signal(1), signal(2)];
+        let measured = Measured::new(&rig, ROWS, &borrowed(&inputs), &measured).unwrap();
+        for (block, name) in [("supply", names[0]), ("chamber", names[1]), ("arm", names[2])] {
+            let block = Block::from_name(&rig, block).unwrap();
+            let found = predict(&rig, block, &measured, TIMING, &[0], &[]).unwrap().value;
+            let was = truth.get(&rig, name).unwrap();
+            let span =
+                was.iter().copied().fold(f64::MIN, f64::max) - was.iter().copied().fold(f64::MAX, f64::min);
+            let gap = found.iter().zip(was).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            assert!(gap < 0.05 * span, "{}: {name} differs by {gap} of {span}", typical.id);
+        }
+    }
+}
+
+#[test]
+fn impossible_effects_are_refused_by_name() {
+    let refused = |spec: RigSpec, id: &str, parameters: &[(&str, f64)], word: &str| {
+        let effects = vec![effect_at(id, "", parameters)];
+        let text = Rig::new(RigSpec { effects, ..spec }).unwrap_err().to_string();
+        assert!(text.contains(id) && text.contains(word), "{text}");
+    };
+    refused(shoulder(), "valve_dead_zone", &[("half_width", 0.95)], "half_width");
+    refused(shoulder(), "valve_dead_zone", &[("width", 0.01)], "half_width");
+    refused(shoulder(), "valve_dead_zone", &[("half_width", 0.01), ("width", 0.01)], "width");
+    refused(shoulder(), "payload_change", &[("mass_change", -90.0), ("time", 0.0)], "mass_change");
+    for (id, block) in [
+        ("valve_dead_zone", "valve"),
+        ("muscle_creep", "muscle"),
+        ("joint_end_stop", "joint"),
+        ("payload_swing", "arm"),
+        ("payload_change", "arm"),
+        ("base_flexibility", "arm"),
+    ] {
+        let typical = TYPICAL.iter().find(|t| t.id == id).unwrap();
+        refused(lone_tank(), id, typical.parameters, block);
+    }
+    let tank = effect_at("supply_regulator_deadband", "", &[("dead_band", 1e4)]);
+    assert!(Rig::new(RigSpec { effects: vec![tank], ..shoulder() }).is_ok(), "no regulator, nothing to do");
+    let rate = effect_at(
+        "base_flexibility",
+        "joint",
+        &[("compliance", 0.0), ("natural_frequency", 8.0), ("damping_ratio", 0.0)],
+    );
+    let text = Rig::new(RigSpec { effects: vec![rate], ..shoulder() }).unwrap_err().to_string();
+    assert!(text.contains("whole rig"), "{text}");
+}

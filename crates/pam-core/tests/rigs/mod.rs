@@ -1,0 +1,201 @@
+//! Rigs that several tests use.
+#![allow(dead_code)]
+
+use pam_core::rig::spec::{
+    ArmSpec, ChamberSpec, EffectSpec, JointSpec, LinkSpec, TransmissionSpec, ValveSpec,
+};
+use pam_core::RigSpec;
+
+/// One link, six muscles, a valve and a tank.
+pub fn shoulder() -> RigSpec {
+    RigSpec::from_json(include_str!("../data/shoulder.json")).unwrap()
+}
+
+/// Flexor and extensor on one pulley, a valve each.
+pub fn antagonists() -> RigSpec {
+    let mut spec = shoulder();
+    let pulley = |radius: f64, rest_angle: f64| {
+        Some(TransmissionSpec {
+            kind: "pulley".into(),
+            upper_axial: 0.0,
+            upper_offset: 0.0,
+            lower_axial: 0.0,
+            lower_offset: 0.0,
+            radius,
+            coefficients: vec![],
+            rest_angle,
+        })
+    };
+    let (valve, chamber, muscle) =
+        (spec.valves[0].clone(), spec.chambers[0].clone(), spec.muscles[0].clone());
+    (spec.valves, spec.chambers, spec.muscles) = (vec![], vec![], vec![]);
+    for (name, radius, rest) in [("flexor", 0.025, -1.0), ("extensor", -0.025, 1.0)] {
+        let port = format!("chamber.{name}");
+        spec.valves.push(ValveSpec { name: name.into(), to: port.clone(), ..valve.clone() });
+        spec.chambers.push(ChamberSpec { name: name.into(), ..chamber.clone() });
+        let mut group = muscle.clone();
+        (group.name, group.chamber, group.transmission) = (name.into(), port, pulley(radius, rest));
+        group.muscle.count = 2;
+        spec.muscles.push(group);
+    }
+    let joint = &mut spec.joints[0];
+    (joint.transmission, joint.rest_angle, joint.min_angle, joint.max_angle) = (None, 0.0, -0.9, 0.9);
+    let arm = spec.arm.as_mut().unwrap();
+    (arm.payload, arm.gravity, arm.coulomb) = (0.5, 0.0, 0.0);
+    spec
+}
+
+/// Elbow and wrist, a valve, chamber and muscles each.
+pub fn two_joints() -> RigSpec {
+    let mut spec = shoulder();
+    let (valve, chamber, muscle, joint) =
+        (spec.valves[0].clone(), spec.chambers[0].clone(), spec.muscles[0].clone(), spec.joints[0].clone());
+    (spec.valves, spec.chambers, spec.muscles, spec.joints) = (vec![], vec![], vec![], vec![]);
+    let mut links = vec![];
+    for (name, count, length, mass) in [("elbow", 6, 0.4, 2.0), ("wrist", 2, 0.2, 0.8)] {
+        let (port, hinge) = (format!("chamber.{name}"), format!("joint.{name}"));
+        spec.valves.push(ValveSpec { name: name.into(), to: port.clone(), ..valve.clone() });
+        spec.chambers.push(ChamberSpec { name: name.into(), ..chamber.clone() });
+        let mut group = muscle.clone();
+        (group.name, group.chamber, group.joint) = (name.into(), port, hinge.clone());
+        group.muscle.count = count;
+        spec.muscles.push(group);
+        spec.joints.push(JointSpec { name: name.into(), ..joint.clone() });
+        links.push(LinkSpec {
+            name: name.into(),
+            joint: hinge,
+            length,
+            mass,
+            centre: length / 2.0,
+            inertia: mass * length * length / 12.0,
+            payload: if name == "wrist" { 3.0 } else { 0.0 },
+            viscous: 1.0,
+            coulomb: 0.3,
+            coulomb_speed: 0.02,
+        });
+    }
+    spec.arm = Some(ArmSpec { kind: "planar".into(), links, ..spec.arm.unwrap() });
+    spec
+}
+
+/// The shoulder behind a regulator in the place of the tank.
+pub fn regulated() -> RigSpec {
+    let mut spec = shoulder();
+    let supply = &mut spec.supplies[0];
+    (supply.kind, supply.time_constant, supply.droop) = ("regulator".into(), 0.1, 1e7);
+    supply.initial_pressure = 6e5;
+    spec
+}
+
+/// Nothing but a tank.
+pub fn lone_tank() -> RigSpec {
+    let mut spec = shoulder();
+    spec.arm = None;
+    (spec.valves, spec.muscles, spec.joints) = (vec![], vec![], vec![]);
+    spec
+}
+
+/// An effect at one block, or at all.
+pub fn effect_at(id: &str, at: &str, parameters: &[(&str, f64)]) -> EffectSpec {
+    let parameters = parameters.iter().map(|(n, v)| ((*n).to_string(), *v)).collect();
+    EffectSpec { id: id.into(), at: at.into(), parameters }
+}
+
+/// An effect everywhere.
+pub fn effect(id: &str, parameters: &[(&str, f64)]) -> EffectSpec {
+    effect_at(id, "", parameters)
+}
+
+/// Typical values of every effect, and the parameters that switch it off.
+pub struct Typical {
+    pub id: &'static str,
+    pub parameters: &'static [(&'static str, f64)],
+    pub neutral: &'static [(&'static str, f64)],
+}
+
+/// Every effect.
+pub const TYPICAL: &[Typical] = &[
+    typical("supply_leak", &[("conductance", 5e-10)], &[("conductance", 0.0)]),
+    typical(
+        "compressor_cut_in",
+        &[("free_air_delivery", 5e-3), ("cut_in_pressure", 1.379e6), ("cut_out_pressure", 1.41e6)],
+        &[("free_air_delivery", 0.0)],
+    ),
+    typical("supply_regulator_deadband", &[("dead_band", 2e4)], &[("dead_band", 0.0)]),
+    typical("valve_dead_zone", &[("half_width", 0.03)], &[("half_width", 0.0)]),
+    typical("valve_hysteresis", &[("half_width", 0.01)], &[("half_width", 0.0)]),
+    typical("valve_centre_leakage", &[("conductance", 1e-9), ("opening", 0.05)], &[("conductance", 0.0)]),
+    typical(
+        "input_path_lag",
+        &[("time_constant", 0.012), ("delay", 0.015)],
+        &[("time_constant", 0.0), ("delay", 0.0)],
+    ),
+    typical("tube_flow_restriction", &[("conductance", 3e-9)], &[("conductance", 1.0)]),
+    typical(
+        "leak_muscle",
+        &[("conductance", 2e-10), ("laminar_share", 0.4)],
+        &[("conductance", 0.0), ("laminar_share", 0.0)],
+    ),
+    typical(
+        "muscle_hysteresis",
+        &[("friction_constant", 8.0), ("friction_pressure", 4e-5), ("presliding", 3e-3)],
+        &[("friction_constant", 0.0), ("friction_pressure", 0.0)],
+    ),
+    typical("muscle_creep", &[("stiffness", 3e3), ("time_constant", 0.3)], &[("stiffness", 0.0)]),
+    typical(
+        "muscle_rate_damping",
+        &[("damping_constant", 300.0), ("damping_pressure", 1e-3), ("lengthening_share", 0.5)],
+        &[("damping_constant", 0.0), ("damping_pressure", 0.0)],
+    ),
+    typical("activation_pressure", &[("threshold", 2e4)], &[("threshold", 0.0)]),
+    typical("mullins_softening", &[("softening", 0.3), ("contraction_width", 0.03)], &[("softening", 0.0)]),
+    typical(
+        "pam_crowding_contact",
+        &[("contact_area", 2e-3), ("onset_contraction", 0.05)],
+        &[("contact_area", 0.0)],
+    ),
+    typical("joint_coulomb_stribeck", &[("stiction", 3.0), ("stribeck_speed", 0.08)], &[("stiction", 0.0)]),
+    typical(
+        "joint_end_stop",
+        &[("stiffness", 800.0), ("angle", 0.95), ("dissipation", 0.3)],
+        &[("stiffness", 0.0)],
+    ),
+    typical(
+        "payload_swing",
+        &[("swinging_share", 0.6), ("length", 0.3), ("damping_ratio", 0.02)],
+        &[("swinging_share", 0.0)],
+    ),
+    typical("payload_change", &[("mass_change", 1.5), ("time", 0.35)], &[("mass_change", 0.0)]),
+    typical("external_torque", &[("torque", 12.0), ("time", 0.2), ("duration", 0.25)], &[("torque", 0.0)]),
+    typical(
+        "base_flexibility",
+        &[("compliance", 1e-4), ("natural_frequency", 8.0), ("damping_ratio", 0.03)],
+        &[("compliance", 0.0)],
+    ),
+    typical("pressure_lag", &[("time_constant", 0.01)], &[("time_constant", 0.0)]),
+    typical("clock_skew", &[("offset", 0.012), ("rate", 1e-3)], &[("offset", 0.0), ("rate", 0.0)]),
+];
+
+const fn typical(
+    id: &'static str,
+    parameters: &'static [(&'static str, f64)],
+    neutral: &'static [(&'static str, f64)],
+) -> Typical {
+    Typical { id, parameters, neutral }
+}
+
+impl Typical {
+    /// The effect at its typical values.
+    pub fn on(&self) -> EffectSpec {
+        effect(self.id, self.parameters)
+    }
+
+    /// The effect where it does nothing.
+    pub fn off(&self) -> EffectSpec {
+        let mut off = self.on();
+        for (name, value) in self.neutral {
+            off.parameters.insert((*name).into(), *value);
+        }
+        off
+    }
+}

@@ -1,0 +1,102 @@
+"""Effects on joint and arm."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from pamrs.effects_table.entry import EffectInfo
+from pamrs.effects_table.entry import EffectParameter as Parameter
+
+__all__ = ["MOTION"]
+
+MOTION: Final[tuple[EffectInfo, ...]] = (
+    EffectInfo(
+        id="joint_coulomb_stribeck",
+        name="stiction of the joint above its Coulomb friction (Stribeck)",
+        block="joint",
+        at="joint",
+        equation="tau = -(f_s - f) exp(-(w/w_s)^2) tanh(10 w/w_s), beside f of the arm",
+        fingerprint="the joint stands while the pressure moves, then breaks away; largest at each return, the same at all pressures",
+        separates="friction of the braid grows with pressure and doubles with co-contraction; a dead band holds the pressure itself",
+        parameters=(
+            Parameter("stiction", "N m", 1.0, 0.0, 1e6, (0.5, 3.0), "static friction above the Coulomb friction", 0.0),
+            Parameter("stribeck_speed", "rad/s", 0.05, 1e-3, 1e3, (0.02, 0.1), "speed over which it fades"),
+        ),
+        reference="Armstrong-Helouvry, Dupont & Canudas de Wit (1994)",
+    ),
+    EffectInfo(
+        id="joint_end_stop",
+        name="stop of the joint before the nominal one",
+        block="joint",
+        at="joint",
+        equation="tau = -k d (1 + c d'), d the depth beyond the stop (rounded over 0.2 deg), never a pull",
+        fingerprint="motion ends or rebounds at one angle, at all pressures, and the pressure does not move it further",
+        separates="crowding grows with pressure and has no rebound; the end of the muscle's stroke is smooth",
+        parameters=(
+            Parameter("stiffness", "N m/rad", 500.0, 0.0, 1e9, (200.0, 2000.0), "of the stop", 0.0),
+            Parameter("angle", "rad", 1.2, -7.0, 7.0, (0.5, 1.2, 1.9), "where it is met: above the middle of the range an upper stop"),
+            Parameter("dissipation", "s/rad", 0.5, 0.0, 1e4, (0.5,), "growth of its torque with the speed of the blow"),
+        ),
+        reference="Hunt & Crossley (1975)",
+    ),
+    EffectInfo(
+        id="payload_swing",
+        name="payload that swings on a cord",
+        block="arm",
+        at="joint",
+        equation="mu = s m_p on a cord l: l phi'' = -(a + g) t - 2 z sqrt(g/l) l phi', pull on the link along the cord",
+        fingerprint="after each manoeuvre a slightly damped oscillation near sqrt(g/l)/(2 pi) that no pressure changes",
+        separates="a base that gives way rings faster and less by posture; the arm on its muscles rings faster at higher pressure",
+        parameters=(
+            Parameter("swinging_share", "1", 0.5, 0.0, 1.0, (0.2, 0.8), "share of the payload that swings", 0.0),
+            Parameter("length", "m", 0.3, 1e-3, 100.0, (0.15, 0.5), "of the cord"),
+            Parameter("damping_ratio", "1", 0.02, 0.0, 10.0, (0.02,), "of the pendulum"),
+        ),
+        reference="Landau & Lifshitz, Mechanics, section 5 (double pendulum)",
+    ),
+    EffectInfo(
+        id="payload_change",
+        name="payload that changes during a recording",
+        block="arm",
+        at="joint",
+        equation="m_p -> m_p + dm from a time on (over 20 ms); the hanging mass of a load",
+        fingerprint="from a moment on another torque holds the same pose, in proportion to the weight's lever; inertia changes too",
+        separates="an external torque does not change with the pose; a wrong payload is wrong from the start",
+        parameters=(
+            Parameter("mass_change", "kg", 1.0, -1e6, 1e6, (-2.0, 2.0), "what is added (negative: taken away)", 0.0),
+            Parameter("time", "s", 5.0, -1e9, 1e9, (5.0, 15.0), "when, from the start of the recording"),
+        ),
+        reference="Spong, Hutchinson & Vidyasagar, Robot Modeling and Control, ch. 7",
+    ),
+    EffectInfo(
+        id="external_torque",
+        name="push from outside",
+        block="arm",
+        at="joint",
+        equation="tau_ext from a time on, for a duration, edges over 20 ms",
+        fingerprint="a torque that begins and ends at moments which no command explains, and that does not repeat with the command",
+        separates="stiction and slack repeat with the command; a payload's change stays and follows the pose",
+        parameters=(
+            Parameter("torque", "N m", 5.0, -1e9, 1e9, (-5.0, 5.0), "of the push", 0.0),
+            Parameter("time", "s", 5.0, -1e9, 1e9, (5.0, 15.0), "when it begins, from the start of the recording"),
+            Parameter("duration", "s", 1.0, 0.0, 1e9, (0.5, 3.0), "how long it lasts"),
+        ),
+        reference="Ohnishi, Shibata & Murakami (1996), disturbance torque",
+    ),
+    EffectInfo(
+        id="base_flexibility",
+        name="mounting that gives way",
+        block="arm",
+        at="",
+        equation="q'' + 2 z w q' + w^2 q = -c w^2 tau_1; the first link stands at theta + q, sensor and muscles see theta",
+        fingerprint="a narrow peak at the base's frequency, excited by fast moves; the arm's inertia seems too small below it",
+        separates="a swinging payload is slower and follows the posture; tendons ring faster at higher pressure",
+        parameters=(
+            Parameter("compliance", "rad/(N m)", 5e-5, 0.0, 1.0, (2e-5, 2e-4), "turn of the base by a torque", 0.0),
+            Parameter("natural_frequency", "Hz", 8.0, 1e-2, 1e3, (5.0, 12.0), "of the base without the arm"),
+            Parameter("damping_ratio", "1", 0.03, 0.0, 10.0, (0.03,), "of the base"),
+        ),
+        reference="Spong (1987), elastic joint with the spring in the base",
+    ),
+)
+"""In the order of the chain."""
