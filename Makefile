@@ -76,7 +76,7 @@ bench: build  ## this package and its reference side by side
 	cargo bench --quiet --package pam-core $(LOCKED)
 	$(BIN)/python -m benchmarks.bench
 
-convergence: build  ## order, error and cost of the integrator on every rig, to docs/convergence.md
+convergence: build  ## order, stability and error of every packaged rig
 	$(BIN)/python -m benchmarks.convergence docs
 
 golden: build  ## the published golden values against this build
