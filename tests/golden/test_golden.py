@@ -12,6 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 import pamrs
+from tests.runs import FRICTIONLESS, misses
 
 HERE = Path(__file__).resolve().parent
 OWN = HERE / "data"
@@ -127,3 +128,30 @@ def trajectory_misses(path: Path) -> dict[str, float]:
 def test_shoulder_trajectory(folder: Path, name: str, tolerance: float) -> None:
     misses = trajectory_misses(golden_path(folder, name))
     assert max(misses.values()) <= tolerance, misses
+
+
+#: What an initial value can be given for.
+STATES = ("muscle_pressure", "supply_pressure", "joint_angle", "joint_rate")
+BOOKS = ("mass_supplied", "mass_vented", "energy_supplied", "exergy_supplied", "muscle_work", "joint_work")
+
+
+@pytest.mark.parametrize(
+    ("name", "changes"),
+    [("antagonistic_joint", FRICTIONLESS), ("tube", {}), ("two_joint_arm", {})],
+    ids=["antagonists", "tube", "two joints"],
+)
+def test_network_trajectory(name: str, changes: dict[str, float]) -> None:
+    """Every channel of the reference, masses and works included, gauge pressures in Pa; commands stand beside them."""
+    with (OWN / f"{name}_smooth.csv").open(encoding="utf-8") as file:
+        words = file.readline().strip().split(",")
+        columns = dict(zip(words, np.genfromtxt(file, delimiter=",").T, strict=True))
+    time = columns.pop("time")
+    commands = {word.partition(".")[2]: columns.pop(word) for word in list(columns) if word.startswith("valve_command")}
+    signals: dict[str, Any] = {"valve_command": commands} if commands else {"duration": time[-1]}
+    initial = {word: values[0] for word, values in columns.items() if word.partition(".")[0] in STATES}
+    rig = pamrs.rigs.named(name).with_parameters(changes)
+    got = pamrs.simulate(rig, sample_time=float(time[1]), step=1e-4, initial=initial, **signals)
+    simulated = {word for word in got if word.partition(".")[0] in (*STATES, "air_mass", *BOOKS)}
+    assert set(columns) == simulated
+    found = misses(got, columns)
+    assert max(found.values()) <= 1e-6, found
