@@ -105,6 +105,11 @@ WORKING: dict[str, Run] = {
     "antagonistic_joint": replace(RUNS["antagonistic_joint"], changes={}),
     "antagonistic_joint without friction": RUNS["antagonistic_joint"],
     "bench": bench(101),
+    "regulated_joint, outlet from 0 bar": replace(
+        RUNS["regulated_joint"],
+        initial={"joint_angle": 45.0 * DEGREE, "muscle_pressure": 2e5, "supply_pressure": 0.0},
+        commands={"supply_command": 3e5 + 5e4 * np.sin(0.05 * np.arange(RUNS["regulated_joint"].rows))},
+    ),
 }
 
 
@@ -229,6 +234,8 @@ Where the order is less, something is not smooth:
 - Coulomb friction where a joint turns back: it changes its direction over `coulomb_speed`, which light links pass in less than 1 ms.
   All of the two-joint arm's error comes from there; without it 4e-8 is left.
 - The positive work at the joints, which has a kink there: order two.
+- A flow that turns round: next to equal pressures, above a ratio of 0.999, its law is linear, and a fast pressure passes both kinks in
+  one step. That is the largest error of the table, in the air that a regulator relieves while its outlet rises from 0 bar.
 
 Small volumes behind the shoulder's valve, at the same 1 ms. The errors are those against the independent reference
 (`tests/reference`: other code, implicit and adaptive, tolerance 1e-10), so that they speak for the equations too. The smallest volume
@@ -281,7 +288,7 @@ def main() -> None:
     smooth, rows = {}, []
     for name, run in sorted(WORKING.items()):
         errors = grouped(errors_of(run.core(usual(run)), run.core(usual(run) / 64.0)))
-        order = "exact"
+        order = ""
         if name in SMOOTH:
             smooth[name] = curve_of(SMOOTH[name])
             order = f"{smooth[name].order:.2f}"
