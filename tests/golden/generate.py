@@ -107,5 +107,27 @@ def main() -> None:
         write(f"{name}_smooth.csv", {"time": planned.time, **planned.commands, **planned.reference(1e-12)})
 
 
+#: Rigs of several blocks that have golden trajectories.
+NETWORKS = ("antagonistic_joint", "two_joint_arm", "tube", "hanging_mass")
+
+
+def networks() -> None:
+    """Write ``network_NAME.csv`` of each rig: the smooth run of ``tests/runs.py`` by the reference."""
+    from tests.runs import RUNS
+
+    for name in NETWORKS:
+        run = RUNS[name]
+        columns = {"time": run.time, **run.commands, **run.reference()}
+        np.savetxt(
+            DATA / f"network_{name}.csv",
+            np.column_stack(list(columns.values())),
+            fmt="%.12e",
+            delimiter=",",
+            header=",".join(columns),
+            comments="",
+        )
+
+
 if __name__ == "__main__":
     main()
+    networks()

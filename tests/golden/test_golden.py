@@ -12,7 +12,8 @@ import pytest
 from numpy.typing import NDArray
 
 import pamrs
-from tests.runs import FRICTIONLESS, misses
+from tests.golden.generate import NETWORKS
+from tests.runs import RUNS, misses
 
 HERE = Path(__file__).resolve().parent
 OWN = HERE / "data"
@@ -130,28 +131,15 @@ def test_shoulder_trajectory(folder: Path, name: str, tolerance: float) -> None:
     assert max(misses.values()) <= tolerance, misses
 
 
-#: What an initial value can be given for.
-STATES = ("muscle_pressure", "supply_pressure", "joint_angle", "joint_rate")
-BOOKS = ("mass_supplied", "mass_vented", "energy_supplied", "exergy_supplied", "muscle_work", "joint_work")
-
-
-@pytest.mark.parametrize(
-    ("name", "changes"),
-    [("antagonistic_joint", FRICTIONLESS), ("tube", {}), ("two_joint_arm", {})],
-    ids=["antagonists", "tube", "two joints"],
-)
-def test_network_trajectory(name: str, changes: dict[str, float]) -> None:
-    """Every channel of the reference, masses and works included, gauge pressures in Pa; commands stand beside them."""
-    with (OWN / f"{name}_smooth.csv").open(encoding="utf-8") as file:
-        words = file.readline().strip().split(",")
-        columns = dict(zip(words, np.genfromtxt(file, delimiter=",").T, strict=True))
-    time = columns.pop("time")
-    commands = {word.partition(".")[2]: columns.pop(word) for word in list(columns) if word.startswith("valve_command")}
-    signals: dict[str, Any] = {"valve_command": commands} if commands else {"duration": time[-1]}
-    initial = {word: values[0] for word, values in columns.items() if word.partition(".")[0] in STATES}
-    rig = pamrs.rigs.named(name).with_parameters(changes)
-    got = pamrs.simulate(rig, sample_time=float(time[1]), step=1e-4, initial=initial, **signals)
-    simulated = {word for word in got if word.partition(".")[0] in (*STATES, "air_mass", *BOOKS)}
-    assert set(columns) == simulated
-    found = misses(got, columns)
+@pytest.mark.parametrize("name", NETWORKS)
+def test_networks(name: str) -> None:
+    """Rigs of several blocks at a step of 0.1 ms: every channel of the reference, sums of mass and energy included."""
+    path = OWN / f"network_{name}.csv"
+    header = path.read_text(encoding="utf-8").partition("\n")[0].split(",")
+    data = dict(zip(header, np.genfromtxt(path, delimiter=",", skip_header=1).T, strict=True))
+    run = RUNS[name]
+    for command, values in run.commands.items():
+        np.testing.assert_allclose(values, data.pop(command), rtol=1e-11, atol=1e-12)
+    np.testing.assert_allclose(run.time, data.pop("time"), atol=1e-12)
+    found = misses(run.core(1e-4), data)
     assert max(found.values()) <= 1e-6, found
