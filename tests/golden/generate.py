@@ -1,7 +1,6 @@
 """Write the project's golden vectors from the independent reference model.
 
-Run ``python tests/golden/generate.py``; the files in ``tests/golden/data`` are replaced. The rigs of several blocks are those of the
-package's own rig files: who changes a number there makes their vectors again.
+Run ``python tests/golden/generate.py``; the files in ``tests/golden/data`` are replaced.
 """
 
 from __future__ import annotations
@@ -17,7 +16,6 @@ from numpy.typing import NDArray
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from tests.reference import GeometryReference, MuscleReference, shoulder  # noqa: E402
-from tests.runs import RUNS  # noqa: E402
 
 DATA = Path(__file__).resolve().parent / "data"
 INCH = 0.0254
@@ -26,8 +24,6 @@ MODULUS_OFFSET = [1.15e6, -0.15e6, 0.0, 0.0]
 PRESSURES = {"force_1bar_N": 1e5, "force_4bar_N": 4e5, "force_8bar_N": 8e5}
 CONTRACTIONS = [-0.02, -0.01, -0.005, 0.0, 0.001, 0.01, 0.03, 0.07, 0.12, 0.18, 0.24, 0.3, 0.36]
 SAMPLE_TIME = 0.005
-#: Packaged rigs of several blocks whose smooth run is written, all channels that the reference has.
-NETWORKS = ("antagonistic_joint", "tube", "two_joint_arm")
 INITIAL = {
     "muscle_pressure": 2.6e5 + 101325.0,
     "supply_pressure": 13.8e5 + 101325.0,
@@ -70,14 +66,8 @@ def muscle_rows() -> list[list[str]]:
     return rows
 
 
-def write(name: str, columns: dict[str, NDArray[np.float64]]) -> None:
-    """Write columns of one length to a file of the data."""
-    table = np.column_stack(list(columns.values()))
-    np.savetxt(DATA / name, table, fmt="%.12e", delimiter=",", header=",".join(columns), comments="")
-
-
 def main() -> None:
-    """Write all files."""
+    """Write both files."""
     DATA.mkdir(exist_ok=True)
     with (DATA / "muscle_static.csv").open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
@@ -101,10 +91,14 @@ def main() -> None:
         "joint_angle_rad": run.joint_angle,
         "joint_rate_rad_s": run.joint_rate,
     }
-    write("shoulder_smooth.csv", columns)
-    for name in NETWORKS:
-        planned = RUNS[name]
-        write(f"{name}_smooth.csv", {"time": planned.time, **planned.commands, **planned.reference(1e-12)})
+    np.savetxt(
+        DATA / "shoulder_smooth.csv",
+        np.column_stack(list(columns.values())),
+        fmt="%.12e",
+        delimiter=",",
+        header=",".join(columns),
+        comments="",
+    )
 
 
 #: Rigs of several blocks that have golden trajectories.
