@@ -108,7 +108,9 @@ def misses(got: Mapping[str, Array], want: Mapping[str, Array]) -> dict[str, flo
     """
     found = {}
     for name, values in want.items():
-        scale = float(np.ptp(values)) or max(1.0, float(np.abs(values).max()))
+        most = float(np.abs(values).max())
+        # a range far below the magnitude is rounding's
+        scale = max(float(np.ptp(values)), 1e-5 * most) if np.ptp(values) else max(1.0, most)
         if name == "joint_work" and "muscle_work" in want:
             scale = max(float(np.ptp(want["muscle_work"])), scale)
         found[name] = float(np.abs(got[name] - values).max()) / scale
