@@ -39,7 +39,8 @@ class Run:
     initial : dict of str to float
         Gauge pressures (Pa), angles (rad), rates (rad/s), lengths (m).
     commands : dict of str to ndarray, shape (rows,)
-        By channel: ``valve_command.flexor`` (V), ``supply_command`` (Pa, gauge).
+        By channel: ``valve_command.flexor`` (V), ``supply_command`` (Pa, gauge), ``length`` (m) of a load frame, which the
+        reference does not have.
     changes : dict of str to float
         Parameters of the rig that are others than in the package, by dotted name, SI.
     """
@@ -74,7 +75,10 @@ class Run:
         signals: dict[str, Any] = {}
         for name, values in self.commands.items():
             channel, _, block = name.partition(".")
-            signals.setdefault(channel, {})[block] = values
+            if channel == "length":
+                signals[channel] = values
+            else:
+                signals.setdefault(channel, {})[block] = values
         return signals or {"duration": (self.rows - 1) * self.sample_time}
 
     def core(self, step: float | None = None) -> pamrs.Simulation:
@@ -104,7 +108,9 @@ def misses(got: Mapping[str, Array], want: Mapping[str, Array]) -> dict[str, flo
     """
     found = {}
     for name, values in want.items():
-        scale = float(np.ptp(values)) or max(1.0, float(np.abs(values).max()))
+        most = float(np.abs(values).max())
+        # a range far below the magnitude is rounding's
+        scale = max(float(np.ptp(values)), 1e-5 * most) if np.ptp(values) else max(1.0, most)
         if name == "joint_work" and "muscle_work" in want:
             scale = max(float(np.ptp(want["muscle_work"])), scale)
         found[name] = float(np.abs(got[name] - values).max()) / scale

@@ -507,6 +507,10 @@ impl Progress {
             for (place, ..) in &ends {
                 held_mass(&stepper.plant, *place, &mut next.state);
             }
+            // Within a step they were found block by block.
+            if let Some(new) = out.events.get_mut(happened..) {
+                new.sort_by(|a, b| a.time.total_cmp(&b.time));
+            }
             next.samples += 1;
             if let Err(error) = next.observed(&stepper.plant, &mut stepper.scratch, timing, out) {
                 out.events.truncate(happened);
