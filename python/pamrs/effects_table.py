@@ -27,6 +27,9 @@ class EffectParameter:
         Values from which a fit starts, small to large.
     meaning : str
         What it is.
+    role : str
+        What it is to a fit: ``size`` (scales the effect), ``shape`` (tried from each of its starts, then fitted), ``choice`` (its
+        lower or its upper bound), ``start`` (a size that only a sealed hold can tell) or ``held`` (left at its default).
     """
 
     name: str
@@ -36,6 +39,7 @@ class EffectParameter:
     upper: float
     starts: tuple[float, ...]
     meaning: str
+    role: str = "size"
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,6 +100,7 @@ EFFECTS: Final[dict[str, EffectInfo]] = _table(
                 1.0,
                 (0.3,),
                 "0 for a hole (orifice), 1 for a porous wall or thin crack (laminar, referred to 500 kPa absolute)",
+                "choice",
             ),
         ),
         reference="Beater, Pneumatic Drives (2007); ISO 6358",
@@ -116,6 +121,7 @@ EFFECTS: Final[dict[str, EffectInfo]] = _table(
                 1e4,
                 (20.0, 120.0),
                 "coefficient at 1 bar and rest temperature",
+                "shape",
             ),
             EffectParameter(
                 "initial_temperature_rise",
@@ -123,8 +129,9 @@ EFFECTS: Final[dict[str, EffectInfo]] = _table(
                 0.0,
                 0.0,
                 200.0,
-                (0.0,),
+                (5.0,),
                 "gas above wall temperature where a recording begins (just after a fill)",
+                "start",
             ),
         ),
         reference="Carneiro & de Almeida (2006); Al-Ibrahim & Otis (1992)",
@@ -140,7 +147,9 @@ EFFECTS: Final[dict[str, EffectInfo]] = _table(
         parameters=(
             EffectParameter("friction_constant", "N", 5.0, 0.0, 1e4, (2.0,), "half width of one muscle's loop at zero pressure"),
             EffectParameter("friction_pressure", "m2", 5e-5, 0.0, 1.0, (2e-5,), "growth of the half width with gauge pressure"),
-            EffectParameter("presliding", "m", 1e-3, 1e-6, 0.1, (5e-4, 3e-3), "distance over which the loop closes after a reversal"),
+            EffectParameter(
+                "presliding", "m", 1e-3, 1e-6, 0.1, (5e-4, 3e-3), "distance over which the loop closes after a reversal", "shape"
+            ),
         ),
         reference="Vo-Minh et al. (2011); Al-Bender, Lampaert & Swevers (2005); Robinson (2014) (2.36) as a special case",
     ),
