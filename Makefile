@@ -24,7 +24,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export MPLBACKEND := Agg
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: help setup build demo test test-rust test-python lint format bench golden lock clean
+.PHONY: help setup build demo test test-rust test-python lint format bench convergence golden lock clean
 
 help:  ## this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -75,6 +75,9 @@ format:  ## rewrite the sources in the house's layout
 bench: build  ## this package and its reference side by side
 	cargo bench --quiet --package pam-core $(LOCKED)
 	$(BIN)/python -m benchmarks.bench
+
+convergence: build  ## order, stability and error of every packaged rig
+	$(BIN)/python -m benchmarks.convergence docs
 
 golden: build  ## the published golden values against this build
 	$(BIN)/python -m pytest -q tests/golden

@@ -118,7 +118,7 @@ def _rig_new(
     from pamrs import rigs
     from pamrs.writing import write_atomically
 
-    check_writable(file)
+    file.parent.mkdir(parents=True, exist_ok=True)
     if file.exists():
         raise FileExistsError(f"{file}: is there already; it is not overwritten")
     write_atomically(file, rigs.template(like, file.stem if name is None else name))

@@ -7,7 +7,7 @@ from typing import Annotated, Final
 
 import typer
 
-from pamrs.cli_shared import as_given, check_writable, exact, write
+from pamrs.cli_shared import as_given, check_writable, exact, rig_named, write
 
 __all__ = ["lift_command"]
 
@@ -26,13 +26,11 @@ def lift_command(
     check_writable(png, json)
     from pamrs.errors import ParameterError
     from pamrs.lifting import lift
-    from pamrs.rig import load_rig
-    from pamrs.rigs import named, names
 
-    loaded = named(str(rig)) if not rig.exists() and str(rig) in names() else load_rig(rig)
+    loaded = rig_named(rig)
     if payload is not None:
         mass = exact("payload", payload, "mass")
-        if "arm" in loaded.blocks:
+        if "arm.payload" in loaded.parameters:
             try:
                 loaded = loaded.with_parameters({"arm.payload": mass})
             except ParameterError as error:

@@ -95,15 +95,16 @@ def _steps(rig: Rig, hold: list[str], initial: list[str], duration: float, sampl
     from pamrs.errors import ParameterError
     from pamrs.simulation import simulate
 
-    if not (duration >= 0.0 and sample_time > 0.0 and duration / sample_time < 1e8):
-        raise ParameterError(
-            f"--duration = {duration:g} s with --sample-time = {sample_time:g} s is not allowed: two times > 0 s are needed"
-        )
+    if not (0.0 < sample_time <= duration and duration / sample_time < 1e8):
+        given = f"--duration = {duration:g} s with --sample-time = {sample_time:g} s"
+        raise ParameterError(f"{given} is not allowed: two times > 0 s are needed that give from 2 to 1e8 rows")
     time = np.asarray(np.arange(round(duration / sample_time) + 1) * sample_time, dtype=np.float64)
     drive: dict[str, Any] = {}
     for text in hold:
         name, values = _held(text, time)
         head, _, block = name.partition(".")
+        if (head == "length" and "length" in drive) or block in drive.get(head, {}):
+            raise ParameterError(f"--hold = {text!r} is not allowed: {name} is given twice")
         if head == "length":
             drive["length"] = values
         else:
@@ -129,12 +130,16 @@ def _held(text: str, time: NDArray[np.float64]) -> tuple[str, NDArray[np.float64
             f"--hold = {text!r} is not allowed: a signal like 'valve_command = 5 V, 8 V @ 1 s' is needed, "
             f"one of {', '.join(_DIMENSIONS)}, with the name of the block behind a dot where it has one"
         )
-    values = np.zeros(time.size)
+    values, last = np.zeros(time.size), 0.0
     for k, step in enumerate(steps.split(",")):
         value, at, when = step.partition("@")
         if (k > 0) != bool(at):
             raise ParameterError(f"--hold = {text!r} is not allowed: every value but the first needs its time, like '8 V @ 1 s'")
-        values[time >= (exact("hold", when, "time") - 1e-9 if at else -1.0)] = exact("hold", value, dimension)
+        begin = exact("hold", when, "time") if at else last
+        if k > 0 and not last < begin <= time[-1]:
+            raise ParameterError(f"--hold = {text!r} is not allowed: times that rise from 0 to {time[-1]:g} s are needed")
+        last = begin
+        values[time >= begin - 1e-9] = exact("hold", value, dimension)
     return name, values
 
 

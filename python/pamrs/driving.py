@@ -126,6 +126,8 @@ def _named(channel: str, given: Signals | None, names: list[str], block: str) ->
                 f"{channel} is one signal, and the rig has a {block} each of: {', '.join(names)}; give a mapping of names"
             )
         return {dotted(channel, names[0] if names else ""): given}
+    if set(given) == {""} and len(names) == 1:
+        return {dotted(channel, names[0]): given[""]}  # the only one is meant
     for name in given:
         if name not in names:
             raise ParameterError(

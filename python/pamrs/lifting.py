@@ -223,9 +223,12 @@ def lift(rig: Rig, *, pressure: float | None = None, to: float | None = None, po
     missing = [block for block in ("muscle", "joint", "arm") if block not in rig.blocks]
     if missing:
         raise ParameterError(f"rig {rig.name!r} has no [{missing[0]}]: lifting needs muscle, joint and arm")
+    if rig.tables("arm")[""]["kind"] != "one_link":
+        raise ParameterError(f"rig {rig.name!r} has an arm of several links: what it lifts is found for a one-link arm only")
     core_rig(rig)  # refuses lengths that the muscle cannot have, and angles that the tendon does not reach
     pressure = _pressure(rig, pressure)
-    low, high = (float(rig.parameter(f"joint.{name}").value) for name in ("min_angle", "max_angle"))
+    joint = next(iter(rig.tables("joint").values()))
+    low, high = float(joint["min_angle"]), float(joint["max_angle"])
     end = high if to is None else float(to)
     if not low < end <= high:
         allowed = f"above joint.min_angle = {_degrees(low)} deg, at most joint.max_angle = {_degrees(high)} deg"
@@ -270,27 +273,28 @@ class _Balance:
     """Torques of one rig at one pressure, as functions of the angle [rad] over arrays."""
 
     def __init__(self, rig: Rig, pressure: float) -> None:
-        model = rig.model
-        muscle = rig.muscle
-        assert muscle is not None
-        self.muscle, self.joint, self.arm = muscle, Joint.from_model(model["joint"]), model["arm"]
-        self.count = int(muscle.parameters["count"])
-        self.rest = float(muscle.parameters["rest_length"])
+        self.arm = rig.tables("arm")[""]
+        own, transmissions = next(iter(rig.tables("joint").values())), rig.tables("transmission")
+        self.groups = [(rig.muscle_of(name), Joint.from_model(transmissions.get(name, own))) for name in rig.tables("muscle")]
         self.pressure = pressure
         self.coulomb = float(self.arm["coulomb"])
-        self.hysteresis = 0.0  # of one muscle [N], the effect of the catalogue
-        for effect in model["effects"]:
+        self.hysteresis = (0.0, 0.0)  # of one muscle: constant [N], by pressure [N/Pa]; the effect of the catalogue
+        for effect in rig.effects:
             if effect["id"] == "muscle_hysteresis":
-                values = effect["parameters"]
-                self.hysteresis += values["friction_constant"] + values["friction_pressure"] * max(pressure, 0.0)
+                self.hysteresis = effect["parameters"]["friction_constant"], effect["parameters"]["friction_pressure"]
 
     def torque(self, angle: Array, direction: float) -> Array:
-        """Of the muscles, while they shorten or are about to be drawn out [N m]."""
-        arm = self.joint.torque_arm(angle)
-        # a muscle on the other side of the joint lengthens where the arm rises
-        way = direction * np.sign(np.where(arm == 0.0, 1.0, arm))
-        force = self.muscle.force(self.pressure, self.joint.shortening(angle) / self.rest, way) + way * self.hysteresis
-        return np.asarray(self.count * force * arm)
+        """Of the muscles, while they shorten or are about to be drawn out [N m]; those that would lower the arm are vented."""
+        total = np.zeros(angle.shape)
+        for muscle, joint in self.groups:
+            rest, count = float(muscle.parameters["rest_length"]), int(muscle.parameters["count"])
+            arm = joint.torque_arm(angle)
+            # a muscle on the other side of the joint lengthens where the arm rises
+            way = direction * np.sign(np.where(arm == 0.0, 1.0, arm))
+            pressure = np.where(arm < 0.0, 0.0, self.pressure) if len(self.groups) > 1 else np.full(angle.shape, self.pressure)
+            friction = self.hysteresis[0] + self.hysteresis[1] * np.maximum(pressure, 0.0)
+            total += count * (muscle.force(pressure, joint.shortening(angle) / rest, way) + way * friction) * arm
+        return total
 
     def weight(self, angle: Array) -> Array:
         """Torque of a kilogram at the tip [N m/kg]."""
@@ -338,7 +342,7 @@ def _pressure(rig: Rig, pressure: float | None) -> float:
     if pressure is None:
         if "supply" not in rig.blocks:
             raise ParameterError(f"pressure is missing: the rig {rig.name!r} has no [supply] whose pressure could be taken")
-        return float(rig.parameter("supply.initial_pressure").value)
+        return max(float(supply["initial_pressure"]) for supply in rig.tables("supply").values())
     if not (math.isfinite(pressure) and 0.0 <= pressure <= 1e8):
         raise ParameterError(f"pressure = {pressure} Pa is not allowed: a gauge pressure from 0 to 1e8 Pa")
     return float(pressure)

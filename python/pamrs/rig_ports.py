@@ -165,10 +165,16 @@ class _Connector:
         """The block of a kind that has a name, ``""`` if there is none."""
         return qualified(kind, name) if name in self.tables[kind] else ""
 
-    def only(self, kind: str, among: Iterable[str] | None = None) -> str:
-        """The only block of a kind, ``""`` if there is none or more."""
+    def only(self, kind: str, among: Iterable[str] | None = None, *, of: str = "") -> str:
+        """The only block of a kind, ``""`` if there is none or more; for a block with a name, ``of``, not another's partner."""
         names = list(self.tables[kind] if among is None else among)
-        return qualified(kind, names[0]) if len(names) == 1 else ""
+        if len(names) != 1 or (of and names[0] and names[0] != of and self._partnered(names[0])):
+            return ""
+        return qualified(kind, names[0])
+
+    def _partnered(self, name: str) -> bool:
+        """Whether a valve or a muscle has this name: blocks of the same name belong together."""
+        return name in self.tables["valve"] or name in self.tables["muscle"]
 
     # ------------------------------------------------------------------------- air
 
@@ -179,7 +185,7 @@ class _Connector:
         for name in self.tables["valve"]:
             start = self.settle("valve", name, "from", (self.same("supply", name), self.only("supply")), ("supply",))
             line = qualified("line", name) if name in inlets else ""
-            defaults = (line, self.same("chamber", name), self.only("line", inlets), self.only("chamber"))
+            defaults = (line, self.same("chamber", name), self.only("line", inlets, of=name), self.only("chamber", of=name))
             end = self.settle("valve", name, "to", defaults)
             self.two_ends("valve", name, start, end)
             fed = next((line for line in own if qualified("line", line) == end), None)
@@ -193,7 +199,7 @@ class _Connector:
         ends = [ports.get("to") for ports in self.ports["valve"].values()]
         for name, table in self.tables["line"].items():
             label = qualified("line", name)
-            end = self.settle("line", name, "to", (self.same("chamber", name), self.only("chamber")))
+            end = self.settle("line", name, "to", (self.same("chamber", name), self.only("chamber", of=name)))
             if "from" not in self.given.get(label, {}):
                 if label in ends:
                     self.ports["line"][name]["from"] = ""
@@ -225,7 +231,7 @@ class _Connector:
         transmissions, load = self.tables["transmission"], "load" if self.tables["load"] else ""
         for name in self.tables["muscle"]:
             label = qualified("muscle", name)
-            self.settle("muscle", name, "chamber", (self.same("chamber", name), self.only("chamber")))
+            self.settle("muscle", name, "chamber", (self.same("chamber", name), self.only("chamber", of=name)))
             if self.tables["arm"] and not self.tables["joint"]:
                 continue  # the joint that is missing has been noted
             joint = self.settle("muscle", name, "joint", (self.same("joint", name), self.only("joint"), load))

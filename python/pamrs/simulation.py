@@ -81,21 +81,32 @@ class Balance:
 
     @property
     def residual(self) -> float:
-        """Mass that is unaccounted for [kg]: rounding."""
+        """Mass that is unaccounted for by what flowed [kg]: rounding."""
         return self.supplied - self.vented - self.stored
 
     @property
+    def created(self) -> float:
+        """Mass that the gas coefficients make or lose [kg]: what pressure and volume say is stored, less what flowed in."""
+        return self.implied - self.stored
+
+    @property
     def efficiency(self) -> float:
-        """Work at the joints by energy supplied [1] (dissertation 6.4); NaN where nothing was supplied."""
+        """Lifting work by energy supplied [1] (dissertation 6.4); NaN where nothing was supplied.
+
+        An arm that swings is lifted again and again, and the spring of its muscles gives the work back: then it is above 1.
+        """
         return self.joint_work / self.energy if self.energy > 0.0 else math.nan
 
     def __str__(self) -> str:
+        air = f"air {1e3 * self.supplied:.4g} g supplied, {1e3 * self.vented:.4g} g vented, {1e3 * self.implied:.4g} g more stored"
+        if abs(self.created) > 1e-3 * max(self.supplied, self.vented, 1e-12):
+            reason = "the constant gas coefficients, which are no energy balance; the effect heat_transfer is"
+            air += f" ({1e3 * self.created:+.4g} g by {reason})"
+        share = f" ({100.0 * self.muscle_work / self.exergy:.1f} % of it)" if self.exergy > 0.0 else ""
         return (
-            f"air {1e3 * self.supplied:.4g} g supplied, {1e3 * self.vented:.4g} g vented, {1e3 * self.stored:.4g} g stored "
-            f"(residual {1e3 * self.residual:.1e} g; {1e3 * self.implied:.4g} g by pressure and volume at rest temperature); "
-            f"energy {self.energy:.4g} J, exergy {self.exergy:.4g} J; work of the muscles "
-            f"{self.muscle_work:.4g} J, positive work at the joints {self.joint_work:.4g} J"
-            + ("" if math.isnan(self.efficiency) else f", efficiency {100 * self.efficiency:.1f} %")
+            f"{air}\nair's energy R T m {self.energy:.4g} J, exergy {self.exergy:.4g} J; "
+            f"net work of the muscles {self.muscle_work:.4g} J"
+            f"{share}, lifting work {self.joint_work:.4g} J"
         )
 
 
@@ -183,7 +194,16 @@ class Simulation(Mapping[str, Array]):
             times = [event.time for event in self.events if (event.block, event.kind) == (block, kind)]
             often = "" if len(times) == 1 else f" and {len(times) - 1} times more"
             said.append(f"{block}: {kind.replace('_', ' ')} at {times[0]:.4g} s{often}")
-        return "\n".join([*said, str(self.balance)])
+        return "\n".join([*said, *self._fallen(), str(self.balance)])
+
+    def _fallen(self) -> list[str]:
+        """Joints that end on their lower stop although their muscles are under pressure."""
+        said = []
+        for name, joint in self.rig.tables("joint").items():
+            angle, torque = (self._channels[dotted(channel, name)] for channel in ("joint_angle", "joint_torque"))
+            if angle[-1] <= joint["min_angle"] + 1e-3 and torque[-1] > _TELLING_TORQUE:
+                said.append(f"{dotted('joint', name)}: ends on its lower stop; {torque[-1]:.3g} N m of its muscles do not lift the arm")
+        return said
 
     def to_pandas(self) -> pd.DataFrame:
         """All channels as a table indexed by time [s]."""
@@ -324,11 +344,13 @@ def simulate(
     """
     check_run(rig, sample_time)
     rows = _rows(sample_time, duration, valve_command, supply_command, length, pressure)
+    check_rows(rig, rows or 0)
     signals, count = signals_of(
         rig, valve_command=valve_command, supply_command=supply_command, length=length, pressure=pressure, rows=rows
     )
     if count is None:
         raise ParameterError("duration is missing: a finite time >= 0 s is needed (or give valve_command)")
+    check_rows(rig, count)
     start = initial_values(initial, rig)
     held = {name: signal for name, signal in signals.items() if name.partition(".")[0] in ("valve_command", "supply_command")}
     driven = {}
@@ -349,8 +371,18 @@ def check_run(rig: Rig, sample_time: float) -> None:
     """Refuse what is not a rig and a sample time [s] that is not a finite number above zero."""
     if not isinstance(rig, Rig):
         raise ParameterError(f"rig is a {type(rig).__name__}; a Rig is needed, for example pamrs.load_rig({rig!r})")
-    if not (np.isfinite(sample_time) and sample_time > 0):
+    if not (isinstance(sample_time, (int, float, np.number)) and np.isfinite(sample_time) and sample_time > 0):
         raise ParameterError(f"sample_time = {sample_time} is not allowed: a finite time > 0 s is needed")
+
+
+def check_rows(rig: Rig, rows: int) -> None:
+    """Refuse a simulation whose channels would not fit in memory, before it starts."""
+    channels = len(core_rig(rig).channels)
+    if rows * channels > _MOST_NUMBERS:
+        raise ParameterError(
+            f"{rows} rows of {channels} channels are not allowed: at most {_MOST_NUMBERS // channels} rows (2 GB); "
+            "give a longer sample_time, or run pamrs.Simulator piece by piece"
+        )
 
 
 def _rows(sample_time: float, duration: float | None, *given: Signals | None) -> int | None:
@@ -362,13 +394,15 @@ def _rows(sample_time: float, duration: float | None, *given: Signals | None) ->
         raise ParameterError(
             f"duration = {duration} is not allowed together with a signal that sets it (valve_command, length, pressure)"
         )
-    if not (np.isfinite(duration) and duration >= 0):
+    if not (isinstance(duration, (int, float, np.number)) and np.isfinite(duration) and duration >= 0):
         raise ParameterError(f"duration = {duration} is not allowed: a finite time >= 0 s (or give valve_command)")
     return round(duration / sample_time) + 1
 
 
 def chosen_step(sample_time: float, step: float | None) -> float:
     """The RK4 step [s] to begin with: the one given, or the longest that divides the sample time and is at most 1 ms."""
+    if step is not None and not isinstance(step, (int, float, np.number)):
+        raise ParameterError(f"step = {step!r} is not allowed: a time > 0 s is needed")
     return default_step(sample_time) if step is None else float(step)
 
 
@@ -377,5 +411,7 @@ def default_step(sample_time: float, longest: float = 1e-3) -> float:
     return sample_time / max(1, int(np.ceil(sample_time / longest - 1e-9)))
 
 
+_MOST_NUMBERS = 250_000_000
+_TELLING_TORQUE = 1.0  # N m
 #: Channels of the core that are sums since the start.
 _BOOKS = ("mass_supplied", "mass_vented", "energy_supplied", "exergy_supplied", "muscle_work", "joint_work")

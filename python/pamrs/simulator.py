@@ -12,7 +12,7 @@ from pamrs import _core
 from pamrs.driving import Signals, initial_values, signals_of
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
-from pamrs.simulation import Event, Simulation, check_run, chosen_step, core_rig
+from pamrs.simulation import Event, Simulation, check_rows, check_run, chosen_step, core_rig
 
 __all__ = ["Simulator"]
 
@@ -58,7 +58,7 @@ class Simulator:
         self._step = chosen_step(self.sample_time, step)
         self._initial = initial_values(initial, rig)
         self.events: list[Event] = []
-        """What happened since the start or the last :meth:`reset`, see :class:`pamrs.simulation.Event`."""
+        """What happened since the start or the last :meth:`reset` or :meth:`restore`, see :class:`pamrs.simulation.Event`."""
         self._core = self._started(self._initial)
 
     def _started(self, initial: Mapping[str, float]) -> _core.Simulator:
@@ -87,6 +87,7 @@ class Simulator:
         ParameterError
             If it has another length or a number that is not finite.
         """
+        self.events = []
         self._core.restore(np.ascontiguousarray(np.asarray(state, dtype=np.float64)))
 
     def reset(self, initial: Mapping[str, float] | None = None) -> dict[str, float]:
@@ -185,11 +186,13 @@ class Simulator:
         SimulationError
             As :meth:`step`.
         """
+        check_rows(self.rig, samples or 0)
         signals, count = signals_of(
             self.rig, valve_command=valve_command, supply_command=supply_command, length=length, pressure=pressure, rows=samples
         )
         if count is None:
             raise ParameterError("samples is missing: no signal says how many there are")
+        check_rows(self.rig, count)
         return self._advance(count, signals)
 
     def control(
@@ -226,20 +229,26 @@ class Simulator:
         SimulationError
             As :meth:`step`.
         """
+        if not callable(update):
+            raise ParameterError(f"update is a {type(update).__name__}; something that can be called with a sample is needed")
         every = self._samples("period", self.sample_time if period is None else period, least=1)
         total = self._samples("duration", duration, least=0)
-        rows = [self.observe()]
-        held: list[dict[str, float]] = []
-        began, happened = self.time, len(self.events)
-        signals: dict[str, Array] = {}
-        for k in range(total):
-            if k % every == 0:
-                signals, _ = signals_of(self.rig, **_keywords(update({"time": self.time, **rows[-1]})), rows=1)
-            rows.append(_single(self._advance(1, signals)))
-            held.append({name: float(values[0]) for name, values in signals.items()})
-        held.append(held[-1] if held else {})
-        inputs = {name: np.array([row[name] for row in held]) for name in held[0] if name not in rows[0]}
-        channels = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+        check_rows(self.rig, total + 1)
+        first, began, happened = self.observe(), self.time, len(self.events)
+        channels = {name: np.full(total + 1, value) for name, value in first.items()}
+        held: dict[str, Array] = {}
+        sample = first
+        for k in range(0, total, every):
+            count = min(every, total - k)
+            signals, _ = signals_of(self.rig, **_keywords(update({"time": self.time, **sample})), rows=count)
+            block = self._advance(count, signals)
+            for name, values in block.items():
+                channels[name][k + 1 : k + 1 + count] = values
+            for name, values in signals.items():
+                # what was held from the last row is what it would go on with
+                held.setdefault(name, np.full(total + 1, np.nan))[k : k + count + 1] = values[0]
+            sample = {name: float(values[-1]) for name, values in block.items()}
+        inputs = {name: values for name, values in held.items() if name not in channels}
         time = np.asarray(began + np.arange(total + 1) * self.sample_time, dtype=np.float64)
         return Simulation({"time": time, **inputs, **channels}, self.rig, self.events[happened:])
 
@@ -259,13 +268,14 @@ class Simulator:
 
     def __getstate__(self) -> dict[str, Any]:
         kept = {name: value for name, value in self.__dict__.items() if name != "_core"}
-        return {**kept, "state": self.state}
+        return {**kept, "events": list(self.events), "state": self.state}
 
     def __setstate__(self, kept: dict[str, Any]) -> None:
-        state = kept.pop("state")
+        state, events = kept.pop("state"), kept.pop("events")
         self.__dict__.update(kept)
         self._core = self._started(self._initial)
         self.restore(state)
+        self.events = list(events)
 
     def __repr__(self) -> str:
         return f"Simulator({self.rig.name}, time={self.time:.6g} s, sample_time={self.sample_time:g} s)"

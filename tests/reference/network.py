@@ -464,11 +464,13 @@ class Network:
             volume_rate[pull.chamber] += n * slope * moment_arm * rate[k] / rest
             force[k] += n * one * moment_arm
             work += n * one * moment_arm * rate[k]
-        supplied = exergy = 0.0
+        supplied = exergy = relieved = 0.0
         pressure_rate = []
         for i, node in enumerate(self.nodes[:-1]):
             net_out = outflow[i] - inflow[i]
-            if node.kind in SUPPLIES:
+            if node.kind == "regulator" and net_out < 0.0:
+                relieved -= net_out  # to the ambient
+            elif node.kind in SUPPLIES:
                 supplied += net_out
                 exergy += self.rt * math.log(pressure[i] / gas.ambient_pressure) * net_out
             if node.kind == "constant":
@@ -485,7 +487,7 @@ class Network:
             *rate,
             *self.body(position, rate, stopped),
             *(inflow[i] - outflow[i] for i in range(count - 1)),
-            supplied, inflow[-1] - outflow[-1], self.rt * supplied, exergy, work, joint_work,
+            supplied, inflow[-1] - outflow[-1] + relieved, self.rt * supplied, exergy, work, joint_work,
         ]  # fmt: skip
 
     def channels(self, states: Array) -> dict[str, Array]:

@@ -16,7 +16,7 @@ pub struct Drive<'a> {
 }
 
 /// Lowest absolute pressure that may be prescribed [Pa].
-const LEAST_PRESSURE: f64 = 1.0;
+pub(crate) const LEAST_PRESSURE: f64 = 1.0;
 
 impl<'a> Drive<'a> {
     /// A drive over a number of samples from signals by name: the rig's inputs (`valve_command` [V], `supply_command` [Pa,

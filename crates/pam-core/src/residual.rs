@@ -48,6 +48,14 @@ impl Block {
         })
     }
 
+    /// Longest stable step [s] while its neighbours are driven.
+    pub fn longest_step(self, rig: &Rig) -> f64 {
+        match self {
+            Self::Arm(_) => rig.body_step(),
+            Self::Supply(_) | Self::Chamber(_) => rig.gas_step(),
+        }
+    }
+
     /// Place of the predicted state.
     fn output(self, layout: &Layout) -> usize {
         match self {
@@ -77,7 +85,9 @@ impl Block {
         if let Self::Chamber(k) = self {
             places.push(layout.mass(k));
         }
-        places.extend(hidden(layout, measured));
+        if !matches!(self, Self::Arm(_)) {
+            places.extend(hidden(layout, measured));
+        }
         Simulated::only(layout, &places)
     }
 }
@@ -365,8 +375,15 @@ fn run<S: Scalar>(
     let mut stepper = Stepper::new(plant);
     let mut memory = vec![Memory::default(); rig.wiring.groups.len()];
     let mut state = vec![constant::<S>(0.0); stepper.plant.states()];
+    // What nobody measures begins at rest, and stays there unless it is a line's inlet.
     for (k, supply) in rig.spec().supplies.iter().enumerate() {
         state[layout.supply(k)] = constant(supply.initial_pressure + ambient);
+    }
+    for (k, gas) in rig.wiring.gases.iter().enumerate() {
+        state[layout.pressure(k)] = constant(gas.initial_pressure + ambient);
+    }
+    for (k, coordinate) in rig.wiring.coordinates.iter().enumerate() {
+        state[layout.angle(k)] = constant(coordinate.rest);
     }
     let mut contractions = [vec![constant::<S>(0.0); memory.len()], vec![constant::<S>(0.0); memory.len()]];
     let mut starts = starts.iter().peekable();

@@ -1,6 +1,6 @@
 //! Fixed-step simulation: commands are held over each sample, RK4 steps fill it.
 
-use crate::drive::Drive;
+use crate::drive::{Drive, LEAST_PRESSURE};
 use crate::error::check_range;
 use crate::events::{Event, Watch};
 use crate::integrate::Rk4;
@@ -42,7 +42,13 @@ impl Timing {
     /// The same with each step divided until it is at most as long as a rig allows.
     #[must_use]
     pub fn stable(self, rig: &Rig) -> Self {
-        let parts = (self.step() / rig.stable_step() - 1e-9).ceil().max(1.0);
+        self.at_most(rig.stable_step())
+    }
+
+    /// The same with each step divided until it is at most so long [s].
+    #[must_use]
+    pub fn at_most(self, longest: f64) -> Self {
+        let parts = (self.step() / longest - 1e-9).ceil().max(1.0);
         Self { substeps: self.substeps.saturating_mul(parts as usize), ..self }
     }
 
@@ -72,7 +78,8 @@ impl Initial {
             } else if place < layout.rate(0) && spec.load.is_some() {
                 wiring.groups[0].rest_length
             } else if place < layout.rate(0) {
-                wiring.coordinates[place - layout.angle(0)].rest
+                let coordinate = &wiring.coordinates[place - layout.angle(0)];
+                coordinate.stops.map_or(coordinate.rest, |s| coordinate.rest.clamp(s.min_angle, s.max_angle))
             } else {
                 0.0
             }
@@ -96,7 +103,7 @@ impl Initial {
         let (layout, place) = (&rig.layout, rig.names.initial[k].1);
         let full = format!("initial.{name}");
         if place < layout.angle(0) {
-            check_range(&full, value, -rig.gas.ambient_pressure, 1e8, "Pa (gauge)")?;
+            check_range(&full, value, LEAST_PRESSURE - rig.gas.ambient_pressure, 1e8, "Pa (gauge)")?;
         } else if place >= layout.rate(0) {
             check_range(&full, value, -1e4, 1e4, if rig.spec().load.is_some() { "m/s" } else { "rad/s" })?;
         } else if let Some(load) = &rig.spec().load {
@@ -139,6 +146,11 @@ impl Initial {
         state
     }
 }
+
+/// Steps between two looks outside: some ten milliseconds of a large rig.
+const STEPS_UNSEEN: usize = 8_000;
+/// Rows that room is made for at once.
+const MOST_ROOM: usize = 65_536;
 
 /// A plant with the memory that a step needs.
 pub(crate) struct Stepper<'a, S> {
@@ -246,7 +258,8 @@ impl Trajectory {
     /// Without rows.
     #[must_use]
     pub fn new(rig: &Rig, rows: usize) -> Self {
-        let channels = rig.names.channels.iter().map(|_| Vec::with_capacity(rows)).collect();
+        let room = rows.min(MOST_ROOM);
+        let channels = rig.names.channels.iter().map(|_| Vec::with_capacity(room)).collect();
         Self { channels, events: Vec::new() }
     }
 
@@ -364,10 +377,26 @@ impl Progress {
         drive: &Drive<'_>,
         out: &mut Trajectory,
     ) -> Result<()> {
+        self.advance_watched(rig, timing, drive, out, &mut || Ok(()))
+    }
+
+    /// As [`Self::advance`], with a look outside every few milliseconds: an error of `look` ends the run at the last sample.
+    ///
+    /// # Errors
+    /// As [`Self::advance`], and that of `look`.
+    pub fn advance_watched(
+        &mut self,
+        rig: &Rig,
+        timing: Timing,
+        drive: &Drive<'_>,
+        out: &mut Trajectory,
+        look: &mut dyn FnMut() -> Result<()>,
+    ) -> Result<()> {
         let mut stepper = Stepper::new(Plant::new(rig, rig.parameters().lift(), true)?);
         let simulated = Simulated::all_but(&rig.layout, &drive.places());
         let dt = timing.step();
         let (mut before, mut after) = (Watch::default(), Watch::default());
+        let mut unseen = 0;
         for k in 0..drive.samples {
             let controls = stepper.plant.controls(|input| drive.commands[input][k]);
             let mut next = self.clone();
@@ -391,6 +420,14 @@ impl Progress {
                 let time = began + (sub + 1) as f64 * dt;
                 after.report(rig, Some((&before, dt)), time, &mut next.flags, &mut out.events);
                 std::mem::swap(&mut before, &mut after);
+                unseen += 1;
+                if unseen >= STEPS_UNSEEN {
+                    unseen = 0;
+                    if let Err(error) = look() {
+                        out.events.truncate(happened);
+                        return Err(error);
+                    }
+                }
             }
             for (place, ..) in &ends {
                 held_mass(&stepper.plant, *place, &mut next.state);

@@ -422,3 +422,75 @@ fn what_does_not_fit_together_is_named() {
     }
     assert!(Rig::new(singular).unwrap_err().to_string().contains("mass matrix"));
 }
+
+#[test]
+fn light_bodies_on_stiff_muscles_are_stable_at_a_millisecond() {
+    // No friction, soft stops: only muscles and trapped air hold the arm.
+    for inertia in [1e-3, 5e-5] {
+        let mut spec = antagonists();
+        let arm = spec.arm.as_mut().unwrap();
+        (arm.payload, arm.first_moment, arm.viscous, arm.inertia) = (0.0, 0.0, 0.0, inertia);
+        (spec.joints[0].stop_stiffness, spec.joints[0].stop_damping) = (10.0, 0.0);
+        spec.chambers.iter_mut().for_each(|c| c.initial_pressure = 5e5);
+        let rig = Rig::new(spec).unwrap();
+        let (a, b) = (vec![7.0; 60], vec![6.5; 60]);
+        let signals: [(&str, &[f64]); 2] = [("valve_command.flexor", &a), ("valve_command.extensor", &b)];
+        let coarse = run(&rig, 60, &signals, 0.005, 1e-3);
+        let fine = run(&rig, 60, &signals, 0.005, 2e-6);
+        let (a, b) = (coarse.get(&rig, "joint_angle").unwrap(), fine.get(&rig, "joint_angle").unwrap());
+        let most = b.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+        let worst = a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(worst < 0.2 * most, "{inertia}: {worst} of {most}");
+    }
+}
+
+#[test]
+fn fast_leaks_and_walls_are_stable() {
+    let effect = |id: &str, values: &[(&str, f64)]| pam_core::rig::spec::EffectSpec {
+        id: id.into(),
+        at: String::new(),
+        parameters: values.iter().map(|(n, v)| ((*n).to_string(), *v)).collect(),
+    };
+    let mut leaking = gas(&[("", 1e-6, 5e5)], vec![]);
+    leaking.effects = vec![effect("leak_muscle", &[("conductance", 1e-7), ("laminar_share", 0.5)])];
+    let mut warm = gas(&[("", 1e-6, 5e5)], vec![orifice("chamber", "ambient", 1e-9)]);
+    warm.effects = vec![effect(
+        "heat_transfer",
+        &[("heat_transfer_coefficient", 1e3), ("initial_temperature_rise", 0.0)],
+    )];
+    for spec in [leaking, warm] {
+        let rig = Rig::new(spec).unwrap();
+        assert!(rig.stable_step() < 1e-2, "{}", rig.stable_step());
+        let (coarse, fine) = (run(&rig, 50, &[], 1e-3, 1e-3), run(&rig, 50, &[], 1e-3, 1e-6));
+        for (a, b) in coarse
+            .get(&rig, "muscle_pressure")
+            .unwrap()
+            .iter()
+            .zip(fine.get(&rig, "muscle_pressure").unwrap())
+        {
+            assert!((a - b).abs() < 2e3, "{a} {b}");
+        }
+    }
+}
+
+#[test]
+fn air_that_goes_back_through_a_valve_empties_its_chamber() {
+    let mut spec = gas(&[("", 1e-3, 6e5)], vec![]);
+    spec.chambers[0].alpha_in = 1.4;
+    spec.supplies = vec![SupplySpec {
+        name: String::new(),
+        kind: "constant".into(),
+        volume: 0.0,
+        initial_pressure: 0.0,
+        time_constant: 0.0,
+        droop: 0.0,
+    }];
+    let mut through_line = spec.clone();
+    through_line.lines = vec![orifice("supply", "chamber", 8.4e-6)];
+    spec.valves = shoulder().valves;
+    let (valve, line) = (Rig::new(spec).unwrap(), Rig::new(through_line).unwrap());
+    let open = vec![10.0; 40];
+    let (a, b) = (run(&valve, 40, &[("valve_command", &open)], 0.01, 1e-3), run(&line, 40, &[], 0.01, 1e-3));
+    assert_eq!(a.get(&valve, "muscle_pressure"), b.get(&line, "muscle_pressure"));
+    assert!(last(&valve, &a, "mass_supplied") < 0.0 && imbalance(&valve, &a) < 1e-12);
+}

@@ -138,7 +138,8 @@ impl Rig {
                 .map(|name| inner.parameters().find(name))
                 .collect::<pam_core::Result<Vec<_>>>()?;
             let block = Block::from_name(inner, block)?;
-            predict(inner, block, &measured, Timing::new(sample_time, step)?.stable(inner), &starts, &ids)
+            let timing = Timing::new(sample_time, step)?.at_most(block.longest_step(inner));
+            predict(inner, block, &measured, timing, &starts, &ids)
         });
         let p = found.map_err(|e| error(py, &e))?;
         let rows = p.value.len();

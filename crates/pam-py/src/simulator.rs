@@ -11,9 +11,6 @@ use pam_core::simulate::{Initial, Progress, Timing, Trajectory};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// RK4 steps between two looks at Ctrl-C: some 50 ms.
-const STEPS_AT_ONCE: usize = 80_000;
-
 /// Advance a progress without the interpreter, looking at Ctrl-C now and then.
 pub fn run(
     py: Python<'_>,
@@ -23,13 +20,19 @@ pub fn run(
     drive: &Drive<'_>,
     out: &mut Trajectory,
 ) -> PyResult<()> {
-    let at_once = (STEPS_AT_ONCE / timing.substeps).max(1);
-    for first in (0..drive.samples()).step_by(at_once) {
-        let part = drive.part(first..(first + at_once).min(drive.samples()));
-        py.detach(|| progress.advance(rig, timing, &part, out)).map_err(|e| error(py, &e))?;
-        py.check_signals()?;
+    let mut stopped = None;
+    let done = py.detach(|| {
+        progress.advance_watched(rig, timing, drive, out, &mut || {
+            Python::attach(|py| py.check_signals()).map_err(|signal| {
+                stopped = Some(signal);
+                pam_core::Error::Model("interrupted".into())
+            })
+        })
+    });
+    match (stopped, done) {
+        (Some(signal), _) => Err(signal),
+        (None, done) => done.map_err(|e| error(py, &e)),
     }
-    Ok(())
 }
 
 /// Channels of a trajectory by name.

@@ -80,6 +80,10 @@ def diagnose(case: Case | str | os.PathLike[str], *, progress: Callable[[str], N
         raise DiagnosisError(
             f"the rig of case {case.name!r} has named blocks ({', '.join(several)}); rigs of one chain can be diagnosed, without names"
         )
+    if any(supply["kind"] == "regulator" for supply in rig.tables("supply").values()):
+        raise DiagnosisError(
+            f"the rig of case {case.name!r} is fed by a regulator; rigs fed by a tank or a constant supply can be diagnosed"
+        )
     if "load" in rig.blocks:
         raise DiagnosisError(
             f"the rig of case {case.name!r} has a [load]; rigs with [joint] and [arm], or without a muscle, can be diagnosed"

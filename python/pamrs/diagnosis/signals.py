@@ -11,6 +11,7 @@ from scipy.signal import savgol_filter
 from pamrs.errors import DiagnosisError
 from pamrs.recording import Recording
 from pamrs.rig import Rig
+from pamrs.simulation import core_rig
 
 __all__ = ["Prepared", "binned", "noise_level", "prepare", "smoothed"]
 
@@ -155,9 +156,10 @@ def prepare(recording: Recording, rig: Rig) -> Prepared:
     if model["valve"] is not None and "valve_command" not in recording.channels:
         raise DiagnosisError(f"recording {recording.name!r} has no channel valve_command, and the rig has a valve")
     signals, noise = {}, {}
+    known = core_rig(rig).channels
     for name in DRIVES:
-        if name not in recording.channels:
-            continue
+        if name not in recording.channels or name not in known:
+            continue  # measured, but of a block that the rig does not have
         mask = recording.mask[name]
         if mask.sum() < max(16, 0.2 * mask.size):
             raise DiagnosisError(f"recording {recording.name!r}: only {int(mask.sum())} of {mask.size} samples of {name} are usable")

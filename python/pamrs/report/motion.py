@@ -41,6 +41,7 @@ _PANELS: Final = (
 _RECORDED_AS: Final = {"muscle_force": "force"}
 _NAMES: Final = {"supply_command": "set", "supply_pressure": "supply", "line_pressure": "line", "muscle_pressure": "muscle"}
 _FRAMES: Final = 150
+_SLOWEST: Final = 1e-3
 _FAINT: Final = "#9ca3af"
 #: Colours of the blocks of one channel; the first is the one of a rig without names.
 _OWN: Final = (COLOURS["after"], "#0f766e", "#b45309", "#7c3aed", "#be123c", "#4d7c0f")
@@ -145,6 +146,8 @@ def write_animation(result: Simulation, path: Path, *, speed: float = 1.0) -> Pa
         raise ParameterError(f"{result.time.size} sample is not enough to draw a motion: two at least")
     if not (math.isfinite(speed) and speed > 0.0):
         raise ParameterError(f"speed = {speed} is not allowed: a finite number above zero")
+    if not _SLOWEST <= speed <= 1.0 / _SLOWEST:
+        raise ParameterError(f"speed = {speed:g} is not allowed: from {_SLOWEST:g} to {1.0 / _SLOWEST:g}")
     duration = float(result.time[-1] - result.time[0]) / speed
     delay = max(2, math.ceil(100.0 * duration / _FRAMES))  # hundredths of a second: what a GIF knows, and players keep
     shown = np.arange(0.0, 100.0 * duration + 1e-9, delay) * 0.01 * speed + result.time[0]
@@ -194,7 +197,10 @@ class _Scene:
         self.result = result
         rig = result.rig
         self.angles = list(result.under("joint_angle").values())
-        links = rig.tables("link") or {name: table for name, table in rig.tables("arm").items() if self.angles}
+        own = rig.tables("link")
+        links = {name: own[name] for name in rig.ports("link")} or {
+            name: table for name, table in rig.tables("arm").items() if self.angles
+        }
         self.lengths = [float(link["length"]) for link in links.values()]
         groups = list(rig.tables("muscle"))
         rests = [float(rig.muscle_of(name).parameters["rest_length"]) for name in groups]

@@ -92,7 +92,7 @@ impl<S: Scalar, const N: usize> PlanarArm<S, N> {
             let why = "an arm has at least one".into();
             return Err(Error::Length { name: "arm.links".into(), found: 0, expected: 1, why });
         }
-        check_range("arm.gravity", gravity, 0.0, 1e3, "m/s2")?;
+        check_range("arm.gravity", gravity, -1e3, 1e3, "m/s2")?;
         for (k, link) in links.iter().enumerate() {
             link.check(k)?;
         }

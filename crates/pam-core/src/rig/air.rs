@@ -34,12 +34,10 @@ impl<S: Scalar> Plant<'_, S> {
                     self.pressure_at(unit.from, state),
                     pressure,
                 );
-                here.inflow[unit.to] += flow;
-                here.take(unit.from, flow);
+                here.pass(unit.from, Node::Gas(unit.to), flow);
             } else if spool.re() < 0.0 {
                 let flow = gas.mass_flow(valve.area * unit.table.eval(-*spool), pressure, ambient);
-                here.outflow[unit.to] += flow;
-                here.vented += flow;
+                here.pass(Node::Gas(unit.to), Node::Ambient, flow);
             }
         }
         for (unit, line) in self.rig.wiring.lines.iter().zip(&self.lines) {
@@ -48,11 +46,7 @@ impl<S: Scalar> Plant<'_, S> {
                 Line::Orifice(area) => gas.mass_flow(*area, from, to),
                 Line::Tube(tube) => tube.mass_flow(from, to),
             };
-            // What goes against the arrow goes out of its end and into its beginning.
-            let (giver, taker, flow) =
-                if flow.re() >= 0.0 { (unit.from, unit.to, flow) } else { (unit.to, unit.from, -flow) };
-            here.take(giver, flow);
-            here.give(taker, flow);
+            here.pass(unit.from, unit.to, flow);
         }
         if let Some([conductance, share]) = self.rig.wiring.effects.leak {
             for (k, _) in self.rig.wiring.gases.iter().enumerate().filter(|(_, unit)| unit.leak) {
@@ -102,6 +96,14 @@ impl<S: Scalar> Plant<'_, S> {
 }
 
 impl<S: Scalar> Scratch<S> {
+    /// A mass flow along the arrow; what goes against it goes out of its end and into its beginning.
+    #[inline]
+    fn pass(&mut self, from: Node, to: Node, flow: S) {
+        let (giver, taker, flow) = if flow.re() >= 0.0 { (from, to, flow) } else { (to, from, -flow) };
+        self.take(giver, flow);
+        self.give(taker, flow);
+    }
+
     #[inline]
     fn take(&mut self, node: Node, flow: S) {
         match node {
@@ -179,7 +181,9 @@ impl Plant<'_, f64> {
         let mut worst = (0.0, None);
         for (k, slope) in steepest.iter().enumerate() {
             let alpha = self.alphas[k].inflow.max(self.alphas[k].outflow).max(gas.gamma);
-            let rate = alpha * rt * slope / self.least_volume(k);
+            let (volume, wall) = self.least_volume(k);
+            let leak = self.steepest_leak(k);
+            let rate = alpha * rt * (slope + leak) / volume + self.wall_rate(k, volume, wall);
             if rate > worst.0 {
                 worst = (rate, Some(k));
             }
@@ -193,16 +197,50 @@ impl Plant<'_, f64> {
         worst
     }
 
-    /// Least volume of a gas over the range of its muscles [m3].
-    fn least_volume(&self, gas: usize) -> f64 {
-        let mut volume = self.fixed_volume[gas];
+    /// Largest change of a gas's leak per pressure [kg/(s Pa)].
+    fn steepest_leak(&self, gas: usize) -> f64 {
+        let (wiring, air) = (&self.rig.wiring, &self.rig.gas);
+        match wiring.effects.leak {
+            Some([conductance, share]) if wiring.gases[gas].leak => {
+                let (conductance, share) = (self.values[conductance], self.values[share]);
+                let area = air.area_of_conductance(conductance);
+                let high = self.rig.highest_pressure();
+                let laminar = 2.0 * air.choked_flow(area, high) / leak_muscle::REFERENCE_PRESSURE;
+                (1.0 - share) * air.steepest(area) + share * laminar
+            }
+            _ => 0.0,
+        }
+    }
+
+    /// Rate at which a gas takes the temperature of its wall [1/s], with the least of it: at ambient pressure.
+    fn wall_rate(&self, gas: usize, volume: f64, wall: f64) -> f64 {
+        let (wiring, air) = (&self.rig.wiring, &self.rig.gas);
+        match wiring.effects.heat {
+            Some([coefficient, _]) if wiring.gases[gas].heat => {
+                (air.gamma - 1.0) * self.values[coefficient] * wall * air.temperature
+                    / (air.ambient_pressure * volume)
+            }
+            _ => 0.0,
+        }
+    }
+
+    /// Least volume of a gas over the range of its muscles [m3], with the largest wall [m2].
+    fn least_volume(&self, gas: usize) -> (f64, f64) {
+        let (mut volume, mut wall) = (self.fixed_volume[gas], 0.0);
         for group in self.rig.wiring.groups.iter().filter(|g| g.chamber == gas) {
             let (low, high) = self.rig.range(group);
-            let least = (0..=32)
-                .map(|i| group.muscle.table.eval(low + (high - low) * f64::from(i) / 32.0).volume)
-                .fold(f64::INFINITY, f64::min);
-            volume += least.max(0.0) * group.count;
+            let (mut least, mut most) = (f64::INFINITY, 0.0_f64);
+            for i in 0..=32 {
+                let contraction = low + (high - low) * f64::from(i) / 32.0;
+                let here = group.muscle.table.eval(contraction).volume.max(0.0);
+                least = least.min(here);
+                let length = (1.0 - contraction) * group.rest_length;
+                most = most.max(heat_transfer::cylinder_area(group.count, here, length));
+            }
+            volume += least * group.count;
+            wall += most;
         }
-        volume.max(f64::MIN_POSITIVE)
+        let volume = volume.max(f64::MIN_POSITIVE);
+        (volume, if wall > 0.0 { wall } else { heat_transfer::cube_area(volume) })
     }
 }

@@ -88,11 +88,12 @@ impl<S: Scalar> Body<S> {
 }
 
 impl Body<f64> {
-    /// The body's fastest rates [1/s]: of its damping and of its stops.
-    pub fn fastest(&self, coordinates: &[Coordinate]) -> f64 {
+    /// The body's fastest rates [1/s]: of its damping, and on its stops and the springs that pull on each coordinate.
+    pub fn fastest(&self, springs: &[f64]) -> f64 {
         let one = |inertia: f64, damping: f64, stops: Option<Stops>| {
             let (stiffness, stop) = stops.map_or((0.0, 0.0), |s| (s.stiffness, s.damping));
-            ((damping + stop) / inertia).max((stiffness / inertia).sqrt())
+            let spring = springs.first().copied().unwrap_or(0.0);
+            ((damping + stop) / inertia).max(((stiffness + spring) / inertia).sqrt())
         };
         match self {
             Self::Fixed => 0.0,
@@ -102,10 +103,10 @@ impl Body<f64> {
             Self::Mass(load, stops) => {
                 one(load.mass, load.viscous + load.coulomb / load.coulomb_speed, *stops)
             }
-            Self::Planar1(arm) => planar_fastest(arm, coordinates),
-            Self::Planar2(arm) => planar_fastest(arm, coordinates),
-            Self::Planar3(arm) => planar_fastest(arm, coordinates),
-            Self::Planar4(arm) => planar_fastest(arm, coordinates),
+            Self::Planar1(arm) => planar_fastest(arm, springs),
+            Self::Planar2(arm) => planar_fastest(arm, springs),
+            Self::Planar3(arm) => planar_fastest(arm, springs),
+            Self::Planar4(arm) => planar_fastest(arm, springs),
         }
     }
 }
@@ -148,15 +149,14 @@ fn planar_accelerations<S: Scalar, const N: usize>(
     }
 }
 
-/// Over a grid of poses: the joints' damping and stops against what each pose lets a torque on one joint move.
-fn planar_fastest<const N: usize>(arm: &PlanarArm<f64, N>, coordinates: &[Coordinate]) -> f64 {
+/// Over a grid of poses: the joints' damping, stops and springs against what each pose lets a torque on one joint move.
+fn planar_fastest<const N: usize>(arm: &PlanarArm<f64, N>, springs: &[f64]) -> f64 {
     let mut fastest = 0.0_f64;
     for pose in 0..POSES.pow(N as u32) {
         let angle = SVector::<f64, N>::from_fn(|k, _| {
             let share = (pose / POSES.pow(k as u32) % POSES) as f64 / (POSES - 1) as f64;
-            let (low, high) = coordinates
-                .get(k)
-                .and_then(|c| c.stops)
+            let (low, high) = arm.links()[k]
+                .stops
                 .map_or((-std::f64::consts::PI, std::f64::consts::PI), |s| (s.min_angle, s.max_angle));
             low + (high - low) * share
         });
@@ -167,7 +167,7 @@ fn planar_fastest<const N: usize>(arm: &PlanarArm<f64, N>, coordinates: &[Coordi
         for (k, link) in arm.links().iter().enumerate() {
             let (spring, stop) = link.stops.map_or((0.0, 0.0), |s| (s.stiffness, s.damping));
             damping += mobility[(k, k)] * (link.viscous + link.coulomb / link.coulomb_speed + stop);
-            stiffness += mobility[(k, k)] * spring;
+            stiffness += mobility[(k, k)] * (spring + springs.get(k).copied().unwrap_or(0.0));
         }
         fastest = fastest.max(damping).max(stiffness.sqrt());
     }

@@ -17,6 +17,10 @@ use crate::gas::valve::spool_position;
 use crate::muscle::TablePoint;
 use crate::scalar::{constant, Scalar};
 use crate::Result;
+use num_dual::Dual64;
+
+/// Slope of the mean of a bank of slip elements where all of them stick, times the presliding distance.
+const BANK: f64 = 3.75;
 
 /// What is integrated; the other states are driven.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -35,7 +39,7 @@ impl Simulated {
         let driven: Vec<bool> = (0..layout.states()).map(|k| places.contains(&k)).collect();
         let (air, motion) = driven.split_at(layout.angle(0));
         let some = |part: &[bool]| part.iter().any(|d| !d);
-        Self { gas: some(&air[..layout.mass(0)]), motion: some(motion), driven }
+        Self { gas: some(air), motion: some(motion), driven }
     }
 
     /// Only the states of these places are integrated.
@@ -450,8 +454,57 @@ impl Plant<'_, f64> {
         }
     }
 
-    /// Fastest rate of the body [1/s].
+    /// Fastest rate of the body [1/s] on the springs that muscles, trapped air and presliding friction are.
     pub(crate) fn fastest_body(&self) -> f64 {
-        self.body.fastest(&self.rig.wiring.coordinates)
+        let springs: Vec<f64> = (0..self.layout.coordinates).map(|k| self.stiffness(k)).collect();
+        self.body.fastest(&springs)
+    }
+
+    /// Largest stiffness [N m/rad] of what pulls on a coordinate, over its range, at the highest pressure.
+    fn stiffness(&self, coordinate: usize) -> f64 {
+        let wiring = &self.rig.wiring;
+        let pressure = self.rig.highest_pressure();
+        let gauge = pressure - self.rig.gas.ambient_pressure;
+        let mut total = 0.0;
+        for (k, group) in wiring.groups.iter().enumerate().filter(|(_, g)| g.coordinate == coordinate) {
+            let (low, high) = self.rig.angles(group);
+            let mut most = 0.0_f64;
+            for i in 0..=32 {
+                let angle = Dual64::new(low + (high - low) * f64::from(i) / 32.0, 1.0);
+                let point = group.joint.eval(angle);
+                let table = group.muscle.table.eval(point.shortening / group.rest_length);
+                let torque =
+                    table.force(Dual64::from(gauge), Dual64::from(self.scales[k])) * point.torque_arm;
+                let arm = point.moment_arm.re.abs();
+                let volume = (self.fixed_volume[group.chamber] + table.volume.re.max(0.0) * group.count)
+                    .max(f64::MIN_POSITIVE);
+                let swept = table.volume_slope.re * arm * group.count / group.rest_length;
+                let air = self.alphas[group.chamber].volume * pressure * swept * swept / volume;
+                let friction = self.presliding_stiffness(
+                    group,
+                    table.force(Dual64::from(gauge), Dual64::from(1.0)).re.abs(),
+                    gauge,
+                );
+                most = most.max(group.count * (torque.eps.abs() + friction * arm * arm) + air);
+            }
+            total += most;
+        }
+        total
+    }
+
+    /// Stiffness of one muscle's friction before it slips [N/m]: every element of the bank still sticks.
+    fn presliding_stiffness(&self, group: &Group, force: f64, gauge: f64) -> f64 {
+        let mut total = 0.0;
+        if group.direction {
+            let spec = &group.muscle.exact.spec;
+            let width = spec.friction_coefficient.abs() + (spec.friction_pressure_slope * gauge).abs();
+            total += width.max(spec.friction_floor) * force * BANK / group.muscle.presliding();
+        }
+        if let (true, Some([constant, slope, presliding])) =
+            (group.hysteresis, self.rig.wiring.effects.hysteresis)
+        {
+            total += (self.values[constant] + self.values[slope] * gauge) * BANK / self.values[presliding];
+        }
+        total
     }
 }
