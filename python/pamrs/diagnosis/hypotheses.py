@@ -11,7 +11,7 @@ import numpy as np
 from pamrs.diagnosis.blocks import Block
 from pamrs.diagnosis.evidence import Excess, Floor, excess, floors, inflation
 from pamrs.diagnosis.fitting import FIT_BIN, Fit, Key, Problem, acts_in, fit, residuals
-from pamrs.diagnosis.screening import Screen, basis_of, screen
+from pamrs.diagnosis.screening import Screen, basis_of, by_effect, screen
 from pamrs.diagnosis.starts import Start
 from pamrs.effects_table import EFFECTS, find_parameter
 from pamrs.errors import SimulationError
@@ -31,6 +31,8 @@ LEAST_GAIN, LEAST_SHARE = 12.0, 0.03
 """Gain in chi-square, and share of the largest, from which an effect is fitted."""
 MOST_SINGLES, PAIRED, PARTNERS = 6, 2, 2
 """Singles that are fitted; of them those that get a partner, and how many each."""
+NEAR, STARTS, RICH = 0.6, 3, 3
+"""Share of an effect's best gain from which another of its starts is fitted, how many, and of how many effects."""
 CONSTANCY = 0.35
 """Relative scatter of an effect's size between recordings beyond which it is not that effect."""
 
@@ -58,6 +60,11 @@ class Candidate:
     held_out: dict[str, Excess]
     gap_closed: float
     scatter: float = 0.0
+
+    @property
+    def misfit(self) -> float:
+        """Sum over the blocks of the residual in units of its noise, squared, on the recordings to fit."""
+        return sum(float(((r.value[r.rows] / r.noise) ** 2).sum()) for r in self.fit.residuals.values())
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,16 +215,19 @@ class _Trial:
 
 def _singles(trial: _Trial, screened: Screen, baseline: Fit, say: Callable[[str], None]) -> list[Candidate]:
     """The effects that the screen finds worth it, fitted; the most telling first."""
-    scores = screened.scores()
-    most = scores[0].gain if scores else 0.0
-    chosen = [s for s in scores if s.gain > max(LEAST_GAIN, LEAST_SHARE * most)][:MOST_SINGLES]
-    say("screened: " + (", ".join(f"{s.effect} {s.gain:.3g}" for s in scores[:8]) or "no effect acts here"))
+    ranked = by_effect(screened.scores())
+    gains = {effect: scores[0].gain for effect, scores in ranked.items()}
+    most = max(gains.values(), default=0.0)
+    chosen = [e for e, gain in gains.items() if gain > max(LEAST_GAIN, LEAST_SHARE * most)][:MOST_SINGLES]
+    say("screened: " + (", ".join(f"{e} {gain:.3g}" for e, gain in list(gains.items())[:8]) or "no effect acts here"))
     white = dict.fromkeys((b.name for b in trial.inner.blocks), 1.0)
     found = []
-    for score in chosen:
-        candidate = trial.fitted([score.start.scaled(score.size)], baseline, white)
-        if candidate is not None:
-            found.append(candidate)
+    for place, effect in enumerate(chosen):
+        near = [s for s in ranked[effect] if s.gain > NEAR * gains[effect]]
+        tried = [trial.fitted([s.start.scaled(s.size)], baseline, white) for s in near[: STARTS if place < RICH else 1]]
+        fitted = [candidate for candidate in tried if candidate is not None]
+        if fitted:
+            found.append(min(fitted, key=lambda c: c.misfit))
     return found
 
 
@@ -229,8 +239,9 @@ def _pairs(trial: _Trial, screened: Screen, singles: list[Candidate], say: Calla
     found = []
     for single in ranked:
         rows, basis = basis_of(single.fit, trial.inner, white)
-        scores = screened.scores(rows, basis, without=single.effects)
-        for score in [s for s in scores if s.gain > LEAST_GAIN][:PARTNERS]:
+        partners = by_effect(screened.scores(rows, basis, without=single.effects))
+        best = [scores[0] for scores in partners.values() if scores[0].gain > LEAST_GAIN]
+        for score in best[:PARTNERS]:
             both = frozenset({*single.effects, score.effect})
             if both in tried:
                 continue

@@ -17,7 +17,7 @@ from pamrs.diagnosis.fitting import Fit, Problem, changes, stacked
 from pamrs.diagnosis.starts import Start, starts_of
 from pamrs.errors import SimulationError
 
-__all__ = ["Score", "Screen", "screen"]
+__all__ = ["Score", "Screen", "basis_of", "by_effect", "screen"]
 
 Array = NDArray[np.float64]
 MOST = 8.0
@@ -70,7 +70,7 @@ class Screen:
     signatures: list[tuple[str, Start, Array]]
 
     def scores(self, rows: Array | None = None, basis: Array | None = None, *, without: tuple[str, ...] = ()) -> list[Score]:
-        """The best start of each effect, the most telling first.
+        """Every start of every effect, the most telling first.
 
         Parameters
         ----------
@@ -82,7 +82,7 @@ class Screen:
         own = self.rows if rows is None else rows
         span = self.basis if basis is None else basis
         left = own - span @ (span.T @ own)
-        best: dict[str, Score] = {}
+        found = []
         for effect, start, signature in self.signatures:
             if effect in without:
                 continue
@@ -94,9 +94,16 @@ class Screen:
             low = -MOST if start.signed else LEAST
             size = float(np.clip(size, low, MOST)) if start.scalable else 1.0
             gain = -2.0 * size * along - size**2 * power
-            if effect not in best or gain > best[effect].gain:
-                best[effect] = Score(effect, start, gain, size, signature)
-        return sorted(best.values(), key=lambda s: -s.gain)
+            found.append(Score(effect, start, gain, size, signature))
+        return sorted(found, key=lambda s: -s.gain)
+
+
+def by_effect(scores: list[Score]) -> dict[str, list[Score]]:
+    """Scores of each effect, effects and starts in the order of their gain."""
+    found: dict[str, list[Score]] = {}
+    for score in scores:
+        found.setdefault(score.effect, []).append(score)
+    return found
 
 
 def basis_of(fitted: Fit, problem: Problem, inflation: dict[str, float]) -> tuple[Array, Array]:
