@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from pamrs.diagnosis.signals import Prepared
 from pamrs.rig import Rig
 from pamrs.simulation import default_step
 
-__all__ = ["Block", "Residual", "available_blocks"]
+__all__ = ["Block", "Residual", "available_blocks", "change", "residual"]
 
 Array = NDArray[np.float64]
 
@@ -110,6 +110,8 @@ class Residual:
         Usable rows.
     noise : float
         Noise of the channel.
+    starts : list of (a, b, q)
+        Windows with an orthonormal basis of what their start can do; what a residual without a jacobian is freed of.
     """
 
     value: Array
@@ -117,6 +119,48 @@ class Residual:
     prediction: Array
     rows: NDArray[np.bool_]
     noise: float
+    starts: list[tuple[int, int, Array]] = field(default_factory=list)
+
+
+def change(block: Block, core: _core.Rig, prepared: Prepared, base: Residual) -> Array:
+    """Residual under another model, freed of the same starts as one that was computed with its sensitivities.
+
+    Parameters
+    ----------
+    block : Block
+        Which block.
+    core : _core.Rig
+        The other model, compiled.
+    prepared : Prepared
+        The recording.
+    base : Residual
+        The residual of a model near to it.
+
+    Returns
+    -------
+    (n,) array
+        In the channel's unit; 0 in unusable rows.
+    """
+    prediction, _ = core.predict(
+        block.name,
+        _commands(core, prepared),
+        prepared.dt,
+        default_step(prepared.dt, longest=block.step),
+        prepared.starts(block.window, block.drives),
+        [],
+        prepared.signals,
+        prepared.n,
+    )
+    measured = np.where(prepared.recording.mask[block.channel], prepared.recording.channels[block.channel], 0.0)
+    value = np.where(base.rows, measured - prediction, 0.0)
+    for a, b, q in base.starts:
+        value[a:b] -= q @ (q.T @ value[a:b])
+    return np.where(base.rows, value, 0.0)
+
+
+def _commands(core: _core.Rig, prepared: Prepared) -> dict[str, Array]:
+    """The commands that a model takes."""
+    return {"valve_command": prepared.command} if core.inputs else {}
 
 
 def residual(block: Block, core: _core.Rig, prepared: Prepared, parameters: list[str]) -> Residual:
@@ -138,7 +182,7 @@ def residual(block: Block, core: _core.Rig, prepared: Prepared, parameters: list
     names = parameters or ["sensors.pressure_zero"]
     prediction, jacobian = core.predict(
         block.name,
-        {"valve_command": prepared.command} if core.inputs else {},
+        _commands(core, prepared),
         prepared.dt,
         default_step(prepared.dt, longest=block.step),
         starts,
@@ -153,6 +197,7 @@ def residual(block: Block, core: _core.Rig, prepared: Prepared, parameters: list
     value = np.where(rows, measured - prediction, 0.0)
     shifted = prediction.copy()
     k = len(names)
+    bases: list[tuple[int, int, Array]] = []
     for a, b in zip(starts, [*starts[1:], prepared.n], strict=True):
         used = rows[a:b]
         start = jacobian[a:b, k:]
@@ -161,6 +206,7 @@ def residual(block: Block, core: _core.Rig, prepared: Prepared, parameters: list
             value[a:b] = 0.0
             continue
         q, _ = np.linalg.qr(np.where(used[:, None], start, 0.0))
+        bases.append((a, b, q))
         correction = q @ (q.T @ value[a:b])
         value[a:b] -= correction
         shifted[a:b] += correction
@@ -168,4 +214,4 @@ def residual(block: Block, core: _core.Rig, prepared: Prepared, parameters: list
     jac = np.where(rows[:, None], jacobian[:, :k], 0.0) if parameters else None
     # a whole recording is shown from its measured start; a window from the start that suits it best
     shown = prediction if block.window is None else shifted
-    return Residual(value, jac, shown, rows, prepared.noise[block.channel])
+    return Residual(value, jac, shown, rows, prepared.noise[block.channel], bases)

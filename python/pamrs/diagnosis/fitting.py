@@ -5,27 +5,45 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from pamrs import _core
-from pamrs.diagnosis.blocks import Block, Residual, residual
+from pamrs.diagnosis.blocks import Block, Residual, change, residual
 from pamrs.diagnosis.signals import Prepared, binned
 from pamrs.effects_table import EFFECTS, find_parameter
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 from pamrs.simulation import core_rig
 
-__all__ = ["Fit", "Problem", "fit", "residuals"]
+__all__ = ["Fit", "Problem", "changes", "fit", "residuals", "stacked"]
 
 Array = NDArray[np.float64]
 Key = tuple[str, str]
 """Block and recording."""
 
-LOGARITHMIC = frozenset({"heat_transfer.heat_transfer_coefficient", "muscle_hysteresis.presliding"})
+LOGARITHMIC = frozenset(
+    f"{effect.id}.{parameter.name}"
+    for effect in EFFECTS.values()
+    for parameter in effect.parameters
+    if parameter.neutral != 0.0 and parameter.lower > 0.0
+)
+"""Shapes that are positive: fitted by their logarithm."""
+ACTS: dict[str, tuple[str, ...]] = {
+    "supply": ("supply",),
+    "valve": ("supply", "chamber"),
+    "line": ("supply", "chamber"),
+    "chamber": ("chamber",),
+    "muscle": ("arm",),
+    "joint": ("arm",),
+    "arm": ("arm",),
+    "pressure_lag": ("chamber", "arm"),
+    "clock_skew": ("supply", "chamber", "arm"),
+}
+"""Blocks of the cut chain in which the effects of a block of the rig, or one effect, act."""
 FIT_BIN = 0.02
 """Width of the bins over which residuals are averaged for fitting [s]."""
 
@@ -71,6 +89,8 @@ class Fit:
         Distance of each baseline parameter from nominal in tolerances.
     evaluations : int
         Number of evaluations.
+    scales : dict of str to float
+        Change of each free parameter per unit of its scaled one, SI.
     """
 
     effects: tuple[str, ...]
@@ -82,6 +102,7 @@ class Fit:
     residuals: dict[Key, Residual]
     moved: dict[str, float] = field(default_factory=dict)
     evaluations: int = 0
+    scales: dict[str, float] = field(default_factory=dict)
 
 
 def residuals(problem: Problem, rig: Rig, names: Sequence[str] = ()) -> dict[Key, Residual]:
@@ -98,7 +119,7 @@ def residuals(problem: Problem, rig: Rig, names: Sequence[str] = ()) -> dict[Key
         full = np.zeros((found.value.size, len(names)))
         for column, name in enumerate(relevant):
             full[:, list(names).index(name)] = found.jacobian[:, column]
-        return Residual(found.value, full, found.prediction, found.rows, found.noise)
+        return replace(found, jacobian=full)
 
     with ThreadPoolExecutor(max_workers=2) as pool:
         found = list(pool.map(one, tasks))
@@ -115,8 +136,7 @@ def depends(block: Block, name: str) -> bool:
 
 def acts_in(effect: str, block: Block) -> bool:
     """Whether an effect acts inside a block of the cut chain."""
-    home = EFFECTS[effect].block
-    return block.name == {"muscle": "arm", "joint": "arm"}.get(home, home)
+    return block.name in ACTS.get(effect, ACTS.get(EFFECTS[effect].block, ()))
 
 
 def free_baseline(problem: Problem, nominal: Rig) -> list[str]:
@@ -146,7 +166,7 @@ class _Scaling:
                 lower.append(math.log(max(info.lower, start * 1e-3) / start))
                 upper.append(math.log(min(info.upper, start * 1e3) / start))
             else:
-                self.scale[name] = start if start > 0 else 10.0
+                self.scale[name] = abs(start) if start != 0.0 else 10.0
                 lower.append(info.lower / self.scale[name])
                 upper.append(info.upper / self.scale[name])
         self.bounds = (np.array(lower), np.array(upper))
@@ -157,7 +177,7 @@ class _Scaling:
             return self.centre[name] + x * self.scale[name]
         if name in LOGARITHMIC:
             return self.starts[name] * math.exp(x)
-        return max(0.0, x * self.scale[name])
+        return max(find_parameter(name).lower, x * self.scale[name])
 
     def slope(self, name: str, x: float) -> float:
         return self.value(name, x) if name in LOGARITHMIC else self.scale[name]
@@ -175,6 +195,57 @@ class _Scaling:
 def bin_width(prepared: Prepared, seconds: float) -> int:
     """Number of samples in a bin."""
     return max(1, round(seconds / prepared.dt))
+
+
+def stacked(problem: Problem, found: dict[Key, Residual], inflation: dict[str, float]) -> tuple[Array, Array | None]:
+    """Residuals of all blocks and recordings as one vector of bin means in units of their standard deviation.
+
+    Parameters
+    ----------
+    problem : Problem
+        Blocks and recordings.
+    found : dict
+        Their residuals.
+    inflation : dict of str to float
+        As in :func:`fit`.
+
+    Returns
+    -------
+    rows : (n,) array
+    jacobian : (n, k) array or None
+        Derivative of the rows with respect to each parameter, SI; None without parameters.
+    """
+    rows, slopes = [], []
+    for prepared in problem.recordings:
+        for block in problem.blocks:
+            r = found[block.name, prepared.recording.name]
+            mean, counts = binned(r.value, r.rows, bin_width(prepared, FIT_BIN))
+            weight = np.sqrt(counts) / (r.noise * math.sqrt(inflation[block.name]))
+            rows.append(mean * weight)
+            if r.jacobian is not None:
+                slope, _ = binned(r.jacobian, r.rows, bin_width(prepared, FIT_BIN))
+                slopes.append(-slope * weight[:, None])
+    return np.concatenate(rows), np.concatenate(slopes) if slopes else None
+
+
+def changes(problem: Problem, rig: Rig, base: dict[Key, Residual]) -> dict[Key, Residual]:
+    """Residuals of a model near to another whose residuals (with the starts of their windows) are known; values alone.
+
+    Raises
+    ------
+    SimulationError
+        If the model leaves the range in which it holds.
+    """
+    core = problem.core.respecified(rig.to_json())
+    tasks = [(block, prepared) for prepared in problem.recordings for block in problem.blocks]
+
+    def one(task: tuple[Block, Prepared]) -> tuple[Key, Residual]:
+        block, prepared = task
+        key = (block.name, prepared.recording.name)
+        return key, replace(base[key], value=change(block, core, prepared, base[key]), jacobian=None)
+
+    with ThreadPoolExecutor(max_workers=2) as pool:
+        return dict(pool.map(one, tasks))
 
 
 def fit(
@@ -230,23 +301,11 @@ def fit(
                 return 1e3 * np.sign(last) * (1.0 + np.abs(last)), jacobian, kept
             memo.clear()
             slopes = np.array([scaling.slope(n, float(v)) for n, v in zip(scaling.names, x, strict=True)])
-            rows, jacs = [], []
-            for prepared in problem.recordings:
-                for block in problem.blocks:
-                    r = found[block.name, prepared.recording.name]
-                    assert r.jacobian is not None or not scaling.names
-                    width = bin_width(prepared, FIT_BIN)
-                    mean, counts = binned(r.value, r.rows, width)
-                    weight = np.sqrt(counts) / (r.noise * math.sqrt(inflation[block.name]))
-                    rows.append(mean * weight)
-                    if r.jacobian is not None:
-                        slope, _ = binned(r.jacobian, r.rows, width)
-                        jacs.append(-slope * slopes * weight[:, None])
+            rows, slope = stacked(problem, found, inflation)
             prior = np.zeros((count, len(scaling.names)))
             prior[:, :count] = np.eye(count)
-            rows.append(x[:count])
-            jacs.append(prior)
-            memo[key] = (np.concatenate(rows), np.concatenate(jacs), found)
+            jacobian = np.zeros((rows.size, 0)) if slope is None else slope * slopes
+            memo[key] = (np.concatenate([rows, x[:count]]), np.concatenate([jacobian, prior]), found)
         return memo[key]
 
     def weighted(x: Array) -> Array:
@@ -282,7 +341,8 @@ def fit(
         covariance = np.asarray(np.linalg.pinv(jacobian.T @ jacobian, hermitian=True), dtype=np.float64)
     spread = np.sqrt(np.clip(np.diag(covariance), 0.0, None))
     named = {n: scaling.value(n, float(v)) for n, v in zip(scaling.names, x, strict=True)}
-    std = {n: float(s) * scaling.slope(n, float(v)) for n, s, v in zip(scaling.names, spread, x, strict=True)}
+    scales = {n: scaling.slope(n, float(v)) for n, v in zip(scaling.names, x, strict=True)}
+    std = {n: float(s) * scales[n] for n, s in zip(scaling.names, spread, strict=True)}
     moved = {n: float(v) for n, v in zip(baseline, x[:count], strict=True)}
     rig = scaling.rig(x, fixed or {})
-    return Fit(effects, rig, named, std, covariance, 0.5 * float(values @ values), found, moved, spent)
+    return Fit(effects, rig, named, std, covariance, 0.5 * float(values @ values), found, moved, spent, scales)

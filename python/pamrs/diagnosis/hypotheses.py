@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -12,24 +11,13 @@ import numpy as np
 from pamrs.diagnosis.blocks import Block
 from pamrs.diagnosis.evidence import Excess, Floor, excess, floors, inflation
 from pamrs.diagnosis.fitting import FIT_BIN, Fit, Key, Problem, acts_in, fit, residuals
+from pamrs.diagnosis.screening import Screen, basis_of, by_effect, screen
+from pamrs.diagnosis.starts import Start
 from pamrs.effects_table import EFFECTS, find_parameter
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 
 __all__ = ["Candidate", "Group", "examine", "significant"]
-
-CANDIDATES = ("leak_muscle", "heat_transfer", "muscle_hysteresis")
-"""Effects of the catalogue that are tried for an explanation."""
-DETECTION_RATIO = 1.6
-"""Variance of bin means over the floor's from which a mismatch is taken as real."""
-NAMING_GAP = 0.72
-"""Share of the gap on held-out recordings that an effect must close to be named at even odds with ``unlisted``."""
-GAP_SOFTNESS = 0.05
-PAIR_GAP = 0.9
-"""Share of the gap from which, without held-out recordings, no second effect is asked for."""
-DRIFT_SHARE, DRIFT_DOUBT = 0.02, 3.0
-CONSTANCY = 0.35
-"""Relative scatter of an effect's size between recordings beyond which it is not that effect."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +43,11 @@ class Candidate:
     held_out: dict[str, Excess]
     gap_closed: float
     scatter: float = 0.0
+
+    @property
+    def misfit(self) -> float:
+        """Sum over the blocks of the residual in units of its noise, squared, on the recordings to fit."""
+        return sum(float(((r.value[r.rows] / r.noise) ** 2).sum()) for r in self.fit.residuals.values())
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,17 +121,14 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
         return Group(blocks, was, now, [start], {"": 1.0}, None, floor)
     mismatch = max(suspects, key=lambda b: out[b.name].ratio)
     say(f"{names}: {mismatch.name} keeps {now[mismatch.name].systematic:.2g} noise units after the refit")
-    acting = [e for e in CANDIDATES if any(acts_in(e, b) for b in suspects)]
-    sets = [s for k in (1, 2) for s in itertools.combinations(acting, k)]
-    candidates = [start]
-    for effects in sets:
-        settled = any(_explains(c, suspects) or (held is fitted and c.gap_closed > PAIR_GAP) for c in candidates if c.effects)
-        if settled and len(effects) > 1:
-            continue  # a single effect leaves only noise: a pair cannot be asked for by these data
-        say(f"{names}: trying {' + '.join(effects)}")
-        candidate = _try(effects, inner, outer, nominal, baseline, white, floor, held is fitted, out, suspects)
-        if candidate is not None:
-            candidates.append(candidate)
+    acting = [e for e in EFFECTS if any(acts_in(e, b) for b in suspects)]
+    trial = _Trial(inner, outer, nominal, floor, out, suspects)
+    screened = screen(inner, baseline, acting, white, sealed=nominal.model["valve"] is None)
+    singles = _singles(trial, screened, baseline, lambda text: say(f"{names}: {text}"))
+    settled = any(_explains(c, suspects) or (held is fitted and c.gap_closed > PAIR_GAP) for c in singles)
+    # a single effect that leaves only noise: a pair cannot be asked for by these data
+    pairs = [] if settled else _pairs(trial, screened, singles, lambda text: say(f"{names}: {text}"))
+    candidates = [start, *singles, *pairs]
     doubt = _doubt(fitted, held, mismatch, now[mismatch.name].rms)
     return Group(blocks, was, now, candidates, _weigh(candidates, suspects, outer, doubt), mismatch, floor)
 
@@ -164,68 +154,104 @@ def significant(found: Excess) -> bool:
     return found.ratio > DETECTION_RATIO and found.p_value < 0.01
 
 
-def _start_sets(effects: tuple[str, ...], sealed: bool) -> list[tuple[dict[str, float], dict[str, float]]]:
-    """Starts of the free parameters, and held ones, for each start of the multi-start."""
-    choices: list[list[tuple[str, float]]] = []
-    fixed: dict[str, float] = {}
-    alternatives: list[dict[str, float]] = [{}]
-    for effect in effects:
-        for parameter in EFFECTS[effect].parameters:
-            name = f"{effect}.{parameter.name}"
-            if parameter.name == "laminar_share":
-                # a hole or a porous wall: a mixture is not identifiable from a drift
-                alternatives = [{name: 0.0}, {name: 1.0}]
-            elif parameter.name == "initial_temperature_rise":
-                if sealed:
-                    choices.append([(name, 5.0)])
-                else:
-                    fixed[name] = 0.0
-            else:
-                choices.append([(name, value) for value in parameter.starts])
-    return [(dict(choice), fixed | other) for choice in itertools.product(*choices) for other in alternatives]
+@dataclass(frozen=True, eq=False)
+class _Trial:
+    """What every attempt at an explanation needs."""
 
+    inner: Problem
+    outer: Problem
+    nominal: Rig
+    floor: dict[Key, Floor]
+    out: dict[str, Excess]
+    suspects: list[Block]
 
-def _try(
-    effects: tuple[str, ...],
-    inner: Problem,
-    outer: Problem,
-    nominal: Rig,
-    baseline: Fit,
-    weights: dict[str, float],
-    floor: dict[Key, Floor],
-    same: bool,
-    out: dict[str, Excess],
-    suspects: list[Block],
-) -> Candidate | None:
-    sealed = nominal.model["valve"] is None
-    limit = 30 if sealed else 8
-    tried = []
-    for starts, fixed in _start_sets(effects, sealed):
+    @property
+    def same(self) -> bool:
+        return self.outer.recordings is self.inner.recordings
+
+    def judged(self, effects: tuple[str, ...], found: Fit) -> Candidate:
+        """A fitted set on the held-out recordings."""
+        outside = found.residuals if self.same else residuals(self.outer, found.rig)
+        after = {b.name: excess(b, self.outer.recordings, outside, self.floor) for b in self.inner.blocks}
+        gaps = [(self.out[b.name].ratio - 1.0, max(0.0, after[b.name].ratio - 1.0)) for b in self.suspects]
+        total = sum(math.sqrt(max(0.0, g)) for g, _ in gaps)
+        gap = 1.0 - sum(math.sqrt(a) for _, a in gaps) / total if total > 0 else 0.0
+        return Candidate(effects, found, after, gap, _scatter(effects, self.inner, found))
+
+    def fitted(self, starts: list[Start], warm: Fit, inflation_: dict[str, float]) -> Candidate | None:
+        """A set of effects fitted from one start of each, residuals weighted by their own colour; None where it cannot be run."""
+        effects = tuple(start.effect for start in starts)
+        free = {name: value for start in starts for name, value in start.free.items()}
+        held = {name: value for start in starts for name, value in start.held.items()}
+        limit = 30 if self.nominal.model["valve"] is None else 8
         try:
-            found = fit(inner, nominal, effects, starts, weights, fixed=fixed, warm=baseline.values, evaluations=limit)
+            best = fit(self.inner, self.nominal, effects, free, inflation_, fixed=held, warm=warm.values, evaluations=limit)
+            colour = {b.name: inflation(b, self.inner.recordings, best.residuals, FIT_BIN) for b in self.inner.blocks}
+            if max(colour.values()) > 2:
+                again = {n: v for n, v in best.values.items() if n.partition(".")[0] in EFFECTS}
+                again = {n: v if abs(v) > 1e-3 * _typical(n) else 1e-3 * _typical(n) for n, v in again.items()}
+                best = fit(self.inner, self.nominal, effects, again, colour, fixed=held, warm=best.values, evaluations=limit)
+            return self.judged(effects, best)
         except SimulationError:
-            continue  # this start leaves the range in which the model holds
-        tried.append((found, fixed))
-    if not tried:
-        return None
-    best, fixed = min(tried, key=lambda f: f[0].cost)
-    colour = {b.name: inflation(b, inner.recordings, best.residuals, FIT_BIN) for b in inner.blocks}
-    if max(colour.values()) > 2:
-        starts = {n: v for n, v in best.values.items() if n.partition(".")[0] in EFFECTS}
-        starts = {n: max(v, 1e-3 * _typical(n)) for n, v in starts.items()}
-        best = fit(inner, nominal, effects, starts, colour, fixed=fixed, warm=best.values, evaluations=limit)
-    outside = best.residuals if same else residuals(outer, best.rig)
-    after = {b.name: excess(b, outer.recordings, outside, floor) for b in inner.blocks}
-    gaps = [(out[b.name].ratio - 1.0, max(0.0, after[b.name].ratio - 1.0)) for b in suspects]
-    total = sum(math.sqrt(max(0.0, g)) for g, _ in gaps)
-    gap = 1.0 - sum(math.sqrt(a) for _, a in gaps) / total if total > 0 else 0.0
-    return Candidate(effects, best, after, gap, _scatter(effects, inner, best))
+            return None  # it leaves the range in which the model holds
+
+
+def _singles(trial: _Trial, screened: Screen, baseline: Fit, say: Callable[[str], None]) -> list[Candidate]:
+    """The effects that the screen finds worth it, fitted; the most telling first."""
+    ranked = by_effect(screened.scores())
+    gains = {effect: scores[0].gain for effect, scores in ranked.items()}
+    most = max(gains.values(), default=0.0)
+    chosen = [e for e, gain in gains.items() if gain > max(LEAST_GAIN, LEAST_SHARE * most)][:MOST_SINGLES]
+    say("screened: " + (", ".join(f"{e} {gain:.3g}" for e, gain in list(gains.items())[:8]) or "no effect acts here"))
+    white = dict.fromkeys((b.name for b in trial.inner.blocks), 1.0)
+    found = []
+    for place, effect in enumerate(chosen):
+        near = [s for s in ranked[effect] if s.gain > NEAR * gains[effect]]
+        tried = [trial.fitted([s.start.scaled(s.size)], baseline, white) for s in near[: STARTS if place < RICH else 1]]
+        fitted = [candidate for candidate in tried if candidate is not None]
+        if fitted:
+            found.append(min(fitted, key=lambda c: c.misfit))
+    return found
+
+
+def _pairs(trial: _Trial, screened: Screen, singles: list[Candidate], say: Callable[[str], None]) -> list[Candidate]:
+    """For the best singles that leave something: the effects that would take most of it, fitted together with them."""
+    ranked = sorted(singles, key=lambda c: sum(c.held_out[b.name].ratio for b in trial.suspects))[:PAIRED]
+    white = dict.fromkeys((b.name for b in trial.inner.blocks), 1.0)
+    tried: set[frozenset[str]] = set()
+    found = []
+    for single in ranked:
+        rows, basis = basis_of(single.fit, trial.inner, white)
+        partners = by_effect(screened.scores(rows, basis, without=single.effects))
+        best = [scores[0] for scores in partners.values() if scores[0].gain > LEAST_GAIN]
+        for score in best[:PARTNERS]:
+            both = frozenset({*single.effects, score.effect})
+            if both in tried:
+                continue
+            tried.add(both)
+            say(f"trying {' + '.join(sorted(both))}")
+            first = Start(single.effects[0], _own(single.fit, single.effects[0]), _held(single.fit, single.effects[0]), (), False)
+            candidate = trial.fitted([first, score.start.scaled(score.size)], single.fit, white)
+            if candidate is not None:
+                found.append(candidate)
+    return found
+
+
+def _own(found: Fit, effect: str) -> dict[str, float]:
+    """Fitted parameters of an effect."""
+    return {name: value for name, value in found.values.items() if name.partition(".")[0] == effect}
+
+
+def _held(found: Fit, effect: str) -> dict[str, float]:
+    """Parameters of an effect that the fit left."""
+    entry = next(e for e in found.rig.effects if e["id"] == effect)
+    return {f"{effect}.{n}": v for n, v in entry["parameters"].items() if f"{effect}.{n}" not in found.values}
 
 
 def _typical(name: str) -> float:
     """A typical size of an effect's parameter, at least its lower bound."""
     parameter = find_parameter(name)
-    return max(parameter.default, parameter.lower)
+    return max(parameter.default, parameter.lower, 1e-3 * parameter.starts[0])
 
 
 def _scatter(effects: tuple[str, ...], problem: Problem, best: Fit) -> float:

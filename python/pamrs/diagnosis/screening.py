@@ -1,0 +1,156 @@
+"""Which effects are worth a fit: the score of each, the baseline's own freedom taken away first.
+
+An effect at a typical size changes the residuals by a signature. What the baseline parameters (inside their tolerances) and the starts
+of the windows can do is projected out of the signature and of the residual; what is left of the residual along what is left of the
+signature is the gain in chi-square that the effect would bring (a score test, Rao 1948, with a finite change in the place
+of the derivative, since many effects have none at zero).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pamrs.diagnosis.fitting import Fit, Problem, changes, stacked
+from pamrs.diagnosis.starts import Start, starts_of
+from pamrs.errors import SimulationError
+
+__all__ = ["Score", "Screen", "basis_of", "by_effect", "screen"]
+
+Array = NDArray[np.float64]
+MOST = 8.0
+"""Largest multiple of the typical size that a linear gain is believed at."""
+LEAST = 0.02
+"""Smallest multiple that a fit starts from."""
+
+
+@dataclass(frozen=True, eq=False)
+class Score:
+    """What one effect, from one start, would bring.
+
+    Attributes
+    ----------
+    effect : str
+        Its id.
+    start : Start
+        Where it starts.
+    gain : float
+        Gain in chi-square.
+    size : float
+        Multiple of the start's size at which it is largest.
+    signature : (n,) array
+        Change of the stacked residuals at the start's size.
+    """
+
+    effect: str
+    start: Start
+    gain: float
+    size: float
+    signature: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Screen:
+    """Signatures of effects at a fitted model, to be scored against any residual near to it.
+
+    Attributes
+    ----------
+    rows : (n,) array
+        Stacked residuals of the model.
+    basis : (n, k) array
+        Orthonormal basis of what its free parameters can do, priors included.
+    signatures : list of (effect, start, (n,) array)
+        Each effect's, from each of its starts.
+    """
+
+    rows: Array
+    basis: Array
+    signatures: list[tuple[str, Start, Array]]
+
+    def scores(self, rows: Array | None = None, basis: Array | None = None, *, without: tuple[str, ...] = ()) -> list[Score]:
+        """Every start of every effect, the most telling first.
+
+        Parameters
+        ----------
+        rows, basis : array, optional
+            Residuals and basis of another model than the screen's own (a fitted effect).
+        without : tuple of str
+            Effects to leave out.
+        """
+        own = self.rows if rows is None else rows
+        span = self.basis if basis is None else basis
+        left = own - span @ (span.T @ own)
+        found = []
+        for effect, start, signature in self.signatures:
+            if effect in without:
+                continue
+            power = float(signature @ (signature - span @ (span.T @ signature)))
+            if power < 1e-6:
+                continue
+            along = float(left @ signature)
+            size = -along / power
+            low = -MOST if start.signed else LEAST
+            size = float(np.clip(size, low, MOST)) if start.scalable else 1.0
+            gain = -2.0 * size * along - size**2 * power
+            found.append(Score(effect, start, gain, size, signature))
+        return sorted(found, key=lambda s: -s.gain)
+
+
+def by_effect(scores: list[Score]) -> dict[str, list[Score]]:
+    """Scores of each effect, effects and starts in the order of their gain."""
+    found: dict[str, list[Score]] = {}
+    for score in scores:
+        found.setdefault(score.effect, []).append(score)
+    return found
+
+
+def basis_of(fitted: Fit, problem: Problem, inflation: dict[str, float]) -> tuple[Array, Array]:
+    """Stacked residuals of a fit, and an orthonormal basis of what its free parameters can do.
+
+    The priors enter as rows of their own, so that a parameter that its tolerance holds cannot explain anything away.
+    """
+    rows, jacobian = stacked(problem, fitted.residuals, inflation)
+    if jacobian is None or jacobian.shape[1] == 0:
+        return rows, np.zeros((rows.size, 0))
+    scales = np.array([fitted.scales[name] for name in fitted.values])
+    scaled = jacobian * scales
+    free = np.array([name in fitted.moved for name in fitted.values], dtype=np.float64)
+    # J (J'J + prior)^-1 J' is the projector that a prior leaves; its square root's columns are the basis
+    values, vectors = np.linalg.eigh(scaled.T @ scaled)
+    keep = values > 1e-10 * max(float(values[-1]), 1e-300)
+    u = scaled @ vectors[:, keep] / np.sqrt(values[keep])
+    inner = (vectors[:, keep] * np.sqrt(values[keep])).T
+    shrunk = inner @ np.linalg.solve(inner.T @ inner + np.diag(free) + 1e-12 * np.eye(free.size), inner.T)
+    weights, turn = np.linalg.eigh(0.5 * (shrunk + shrunk.T))
+    return rows, (u @ turn) * np.sqrt(np.clip(weights, 0.0, 1.0))
+
+
+def screen(problem: Problem, fitted: Fit, effects: list[str], inflation: dict[str, float], *, sealed: bool) -> Screen:
+    """Signatures of effects at a fitted model.
+
+    Parameters
+    ----------
+    problem : Problem
+        Blocks and recordings.
+    fitted : Fit
+        The model.
+    effects : list of str
+        Ids to screen.
+    inflation : dict of str to float
+        As in :func:`pamrs.diagnosis.fitting.fit`.
+    sealed : bool
+        Whether the rig has no valve.
+    """
+    rows, basis = basis_of(fitted, problem, inflation)
+    signatures = []
+    for effect in effects:
+        for start in starts_of(effect, sealed=sealed):
+            try:
+                found = changes(problem, start.applied(fitted.rig), fitted.residuals)
+            except SimulationError:
+                continue  # this size leaves the range in which the model holds
+            moved, _ = stacked(problem, found, inflation)
+            signatures.append((effect, start, moved - rows))
+    return Screen(rows, basis, signatures)

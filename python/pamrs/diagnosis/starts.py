@@ -1,0 +1,102 @@
+"""Where the fit of an effect begins: sizes that scale, shapes that are tried one by one, choices that are held."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass, replace
+
+from pamrs.effects_table import EFFECTS, EffectParameter
+from pamrs.rig import Rig
+
+__all__ = ["Start", "starts_of"]
+
+
+@dataclass(frozen=True)
+class Start:
+    """One start of one effect.
+
+    Attributes
+    ----------
+    effect : str
+        Its id.
+    free, held : dict of str to float
+        Dotted parameters that a fit moves, and those that it leaves, SI.
+    sizes : tuple of str
+        Those of ``free`` that scale the effect.
+    signed : bool
+        Whether it can turn its sign.
+    """
+
+    effect: str
+    free: dict[str, float]
+    held: dict[str, float]
+    sizes: tuple[str, ...]
+    signed: bool
+
+    @property
+    def scalable(self) -> bool:
+        """Whether a number scales the effect."""
+        return bool(self.sizes)
+
+    def applied(self, rig: Rig) -> Rig:
+        """The rig with the effect as it starts."""
+        values = {name.partition(".")[2]: value for name, value in (self.free | self.held).items()}
+        return rig.with_effect(self.effect, values)
+
+    def scaled(self, size: float) -> Start:
+        """The same start with its sizes multiplied, inside their bounds."""
+        bounds = {f"{self.effect}.{p.name}": p for p in EFFECTS[self.effect].parameters}
+        free = {
+            name: min(max(value * size, bounds[name].lower), bounds[name].upper) if name in self.sizes else value
+            for name, value in self.free.items()
+        }
+        return replace(self, free=free)
+
+
+def starts_of(effect: str, *, sealed: bool) -> list[Start]:
+    """Every start of an effect.
+
+    Parameters
+    ----------
+    effect : str
+        Its id.
+    sealed : bool
+        Whether the rig has no valve: a recording may then begin just after a fill.
+
+    Returns
+    -------
+    list of Start
+        One for each combination of shapes and choices; sizes at their typical value.
+    """
+    shapes: list[list[tuple[str, float]]] = []
+    sizes: dict[str, float] = {}
+    held: list[list[tuple[str, float]]] = []
+    signed = False
+    for parameter in EFFECTS[effect].parameters:
+        name = f"{effect}.{parameter.name}"
+        role = _role(parameter, sealed=sealed)
+        if role == "size":
+            sizes[name] = next((value for value in parameter.starts if value != 0.0), parameter.default)
+            signed = signed or parameter.lower < 0.0
+        elif role == "shape":
+            shapes.append([(name, value) for value in parameter.starts])
+        else:
+            held.append([(name, value) for value in ((parameter.lower, parameter.upper) if role == "choice" else (parameter.default,))])
+    return [
+        Start(effect, sizes | dict(shape), dict(fixed), tuple(sizes), signed)
+        for shape in itertools.product(*shapes)
+        for fixed in itertools.product(*held)
+    ]
+
+
+_CHOICES = frozenset({"laminar_share"})
+_STARTS = frozenset({"initial_temperature_rise"})
+
+
+def _role(parameter: EffectParameter, *, sealed: bool) -> str:
+    """What a parameter is to a fit: a size, a shape, a choice of two, or held."""
+    if parameter.name in _CHOICES:
+        return "choice"
+    if parameter.name in _STARTS:  # only a sealed hold can tell it
+        return "size" if sealed else "held"
+    return "size" if parameter.neutral == 0.0 else "shape"  # a tube of endless conductance is no restriction: no number scales it
