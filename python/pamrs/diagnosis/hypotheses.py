@@ -19,6 +19,23 @@ from pamrs.rig import Rig
 
 __all__ = ["Candidate", "Group", "examine", "significant"]
 
+DETECTION_RATIO = 1.6
+"""Variance of bin means over the floor's from which a mismatch is taken as real."""
+NAMING_GAP = 0.72
+"""Share of the gap on held-out recordings that an effect must close to be named at even odds with ``unlisted``."""
+GAP_SOFTNESS = 0.05
+PAIR_GAP = 0.9
+"""Share of the gap from which, without held-out recordings, no second effect is asked for."""
+DRIFT_SHARE, DRIFT_DOUBT = 0.02, 3.0
+LEAST_GAIN, LEAST_SHARE = 12.0, 0.03
+"""Gain in chi-square, and share of the largest, from which an effect is fitted."""
+MOST_SINGLES, PAIRED, PARTNERS = 6, 2, 2
+"""Singles that are fitted; of them those that get a partner, and how many each."""
+NEAR, STARTS, RICH = 0.6, 3, 3
+"""Share of an effect's best gain from which another of its starts is fitted, how many, and of how many effects."""
+CONSTANCY = 0.35
+"""Relative scatter of an effect's size between recordings beyond which it is not that effect."""
+
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
