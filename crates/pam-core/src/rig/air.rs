@@ -142,7 +142,7 @@ impl<S: Scalar> Plant<'_, S> {
         let rt = gas.gas_constant * gas.temperature;
         for (k, supply) in self.supplies.iter().enumerate() {
             let set = controls.set_pressure[k];
-            out[layout.supply(k)] = if self.rig.wiring.effects.on_supplies() {
+            out[layout.supply(k)] = if self.supplies_altered {
                 self.altered_supply(k, state, here.drawn[k], rt, set)
             } else {
                 supply.pressure_rate(state[layout.supply(k)], here.drawn[k], rt, set)

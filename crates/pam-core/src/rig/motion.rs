@@ -18,6 +18,7 @@ const BANK: f64 = 3.75;
 
 impl<S: Scalar> Plant<'_, S> {
     /// Accelerations of the coordinates and of what effects move beside them.
+    #[inline(never)]
     pub(super) fn altered_motion(&self, state: &[S], time: f64, here: &mut Scratch<S>, out: &mut [S]) {
         let (layout, wiring, values) = (&self.layout, &self.rig.wiring, &self.values);
         let units = &wiring.effects;

@@ -90,6 +90,9 @@ pub struct Plant<'a, S> {
     pub(super) body: Body<S>,
     /// Tube behind each valve, by the effect.
     pub(super) restriction: Option<Tube<S>>,
+    /// Effects act on supplies, on joints or arm.
+    pub(super) supplies_altered: bool,
+    motion_altered: bool,
 }
 
 /// What the equations need to write down on the way.
@@ -160,6 +163,8 @@ impl<'a, S: Scalar> Plant<'a, S> {
             lines,
             scales: wiring.groups.iter().map(|group| values[group.scale]).collect(),
             body: Body::new(&wiring.body, &wiring.coordinates, &values)?,
+            supplies_altered: wiring.effects.on_supplies(),
+            motion_altered: wiring.effects.on_motion(),
             restriction: (wiring.effects.restriction)
                 .filter(|[id]| values[*id].re() < tube_flow_restriction::NONE)
                 .map(|[id]| tube_flow_restriction::tube(values[id], rig.gas.temperature)),
@@ -294,7 +299,7 @@ impl<'a, S: Scalar> Plant<'a, S> {
         if simulated.motion && self.body.moves() {
             let (angles, rates) = state[angle..end].split_at(layout.coordinates);
             out[angle..rate].copy_from_slice(rates);
-            if self.rig.wiring.effects.on_motion() {
+            if self.motion_altered {
                 self.altered_motion(state, controls.time, here, out);
             } else {
                 self.body.accelerations(angles, rates, &here.torque, &mut out[rate..end]);
@@ -312,6 +317,7 @@ impl<'a, S: Scalar> Plant<'a, S> {
         }
     }
 
+    #[inline(always)]
     fn book(&self, state: &[S], here: &Scratch<S>, out: &mut [S]) {
         let (gas, layout) = (&self.rig.gas, &self.layout);
         let rt = gas.gas_constant * gas.temperature;

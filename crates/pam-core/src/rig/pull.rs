@@ -111,6 +111,7 @@ impl<S: Scalar> Plant<'_, S> {
     }
 
     /// Rates of what the effects on the muscles need; of the rest zero.
+    #[inline(never)]
     pub(super) fn extra_rates(&self, state: &[S], out: &mut [S]) {
         let layout = &self.layout;
         out[layout.extra(0)..layout.states()].fill(constant(0.0));
