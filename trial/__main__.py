@@ -8,12 +8,15 @@ import sys
 import time
 from pathlib import Path
 
-from .concealed import make_case
+from .concealed import make_case, write
 from .effects import KINDS, LISTED
 from .plan import specs, write_plan
 from .score import score
 from .selfcheck import selfcheck
-from .strength import STRENGTHS
+from .strength import MEASURES, STRENGTHS
+from .summary import figure, markdown
+
+_MEASURE = "what the multiple of the noise is of: all that the effect moves, or what a refit of the baseline leaves of it"
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -26,6 +29,7 @@ def _parser() -> argparse.ArgumentParser:
     whole.add_argument("--seed", type=int, required=True)
     whole.add_argument("--duration", type=float, help="seconds per recording (default: 30 to 40, small 12)")
     whole.add_argument("--jobs", type=int, default=1, help="processes (default 1)")
+    whole.add_argument("--measure", choices=MEASURES, default="reach", help=_MEASURE)
     whole.add_argument("--rig", type=Path, help="nominal rig file (default: the shoulder)")
     make = sub.add_parser("make", help="write concealed cases and their keys")
     make.add_argument("--out", type=Path, required=True, help="folder for the cases")
@@ -41,6 +45,7 @@ def _parser() -> argparse.ArgumentParser:
     make.add_argument("--first", type=int, default=1, help="number of the first case (default 1)")
     make.add_argument("--strength", type=float, default=1.0, help="size of the effects; 1 is moderate")
     make.add_argument("--wanted", choices=tuple(STRENGTHS), help="scale each effect to this multiple of the noise instead")
+    make.add_argument("--measure", choices=MEASURES, default="reach", help=_MEASURE)
     make.add_argument("--recordings", type=int, default=5, help="1 to 5 (default 5)")
     make.add_argument("--duration", type=float, default=40.0, help="seconds per recording (default 40)")
     make.add_argument("--rig", type=Path, help="nominal rig file (default: the shoulder)")
@@ -52,6 +57,8 @@ def _parser() -> argparse.ArgumentParser:
         default=",".join(LISTED),
         help="effect ids that the diagnosis may name, comma separated",
     )
+    mark.add_argument("--markdown", type=Path, help="write the tables here")
+    mark.add_argument("--figure", type=Path, help="draw the figure here (needs matplotlib)")
     check = sub.add_parser("selfcheck", help="compare the plant with finer steps and with another integrator")
     check.add_argument("--golden", type=Path, help="folder with golden vectors of the plant without effects")
     return parser
@@ -68,7 +75,7 @@ def main(argv: list[str] | None = None) -> int:
             def report(name: str, done: int, total: int) -> None:
                 print(f"{name} written, {done} of {total}", file=sys.stderr, flush=True)
 
-            wanted = specs(args.plan, args.seed, args.cases, args.duration)
+            wanted = specs(args.plan, args.seed, args.cases, args.duration, args.measure)
             manifest = write_plan(args.folder, wanted, jobs=args.jobs, rig=args.rig, progress=report)
             print(f"sha256 of the manifest: {hashlib.sha256(manifest.read_bytes()).hexdigest()}")
         elif args.command == "make":
@@ -83,11 +90,17 @@ def main(argv: list[str] | None = None) -> int:
 
                 make_case(
                     args.out, keys, kind, seed=args.seed + i, name=name, strength=args.strength, wanted=args.wanted,
+                    measure=args.measure,
                     recordings=args.recordings, duration=args.duration, rig=args.rig, publish=publish,
                 )  # fmt: skip
                 print(f"{name} written in {time.perf_counter() - start:.1f} s", file=sys.stderr, flush=True)
         elif args.command == "score":
-            print(score(args.keys, args.results, tuple(c for c in args.catalogue.split(",") if c)).text())
+            scores = score(args.keys, args.results, tuple(c for c in args.catalogue.split(",") if c))
+            print(scores.text())
+            if args.markdown is not None:
+                write(args.markdown, markdown(scores))
+            if args.figure is not None:
+                figure(scores, args.figure)
         else:
             print(selfcheck(args.golden))
     except (ValueError, OSError) as error:

@@ -17,10 +17,11 @@ import numpy as np
 
 from .effects import KINDS, LISTED, Effects, Setting, draw
 from .excitation import RECORDINGS, select
-from .plant import Parameters, Plant
-from .recording import ANGLE_STEP, Noise, Record, prepare, reach, run
+from .plant import Plant
+from .recording import ANGLE_STEP, Array, Noise, Record, follow, prepare, reach, run
+from .remainder import Remainder
 from .rigfile import default_rig, draw_parameters, read_rig, to_parameters
-from .strength import STRENGTHS, aim
+from .strength import FIRST, MEASURES, STRENGTHS, aim
 
 
 @dataclass(frozen=True)
@@ -28,7 +29,8 @@ class Spec:
     """What a case is made from.
 
     `kind` is "none", "parameters", an effect id, or ids joined by "+". With `wanted` (one label of
-    :data:`trial.strength.STRENGTHS` per effect) the effects are scaled to that reach, else by `strength`.
+    :data:`trial.strength.STRENGTHS` per effect) the effects are scaled to that reach, else by `strength`. `measure`
+    is what the multiple of the noise is of: "reach", or "left", what a refit of the baseline leaves of it.
     """
 
     name: str
@@ -38,6 +40,7 @@ class Spec:
     duration: float
     wanted: tuple[str, ...] = ()
     strength: float = 1.0
+    measure: str = "reach"
 
 
 @dataclass(frozen=True)
@@ -87,16 +90,19 @@ def _case_toml(recordings: Sequence[tuple[str, str]]) -> str:
     return "\n".join(blocks)
 
 
-#: a recording and its reach by channel
-Measured = tuple[Record, dict[str, float]]
+#: a recording and how far the effects move its channels, shape (n, 3)
+Measured = tuple[Record, Array]
 
 
 class _Bench:
     """The recordings of one case, to be run with any effects."""
 
-    def __init__(self, spec: Spec, par: Parameters, nominal: Plant, noise: Noise, supply_tol: float) -> None:
-        self.spec, self.par, self.noise = spec, par, noise
+    def __init__(self, spec: Spec, true: dict[str, Any], tolerance: dict[str, float], nominal: Plant, noise: Noise) -> None:
+        self.spec, self.true, self.tolerance, self.noise = spec, true, tolerance, noise
+        self.par = par = to_parameters(true)
+        supply_tol = tolerance.get("supply.initial_pressure", 0.0)
         self.bare = Plant(par)
+        self._remainder: Remainder | None = None
         roles = [role for _, role in spec.recordings]
         self.fit = [i for i, role in enumerate(roles) if role == "fit"] or list(range(len(roles)))
         self.prepared = []
@@ -114,23 +120,35 @@ class _Bench:
             if i in found or (fit_only and i not in self.fit):
                 continue
             record = run(plant, *made, supply, self.noise, np.random.default_rng([self.spec.seed, i, 78]), i)
-            found[i] = (record, reach(self.bare, record, self.noise, i) if effects.items else {})
+            found[i] = (record, record.clean - follow(self.bare, record, i) if effects.items else np.zeros((1, 3)))
         return found
 
     def most_moved(self, measured: dict[int, Measured]) -> tuple[str, float]:
         """Channel that moves most in a recording to fit, and its reach."""
-        tops = [max(measured[i][1].items(), key=lambda item: item[1]) for i in self.fit]
+        tops = [max(reach(measured[i][1], self.noise).items(), key=lambda item: item[1]) for i in self.fit]
         return max(tops, key=lambda item: item[1])
+
+    def left(self, measured: dict[int, Measured]) -> float:
+        """Reach that is left of the recordings to fit when the baseline is refitted within its tolerances.
+
+        The sensitivities are those of the recordings of the first call.
+        """
+        if self._remainder is None:
+            self._remainder = Remainder(self.true, self.tolerance, [(measured[i][0], i) for i in self.fit], self.noise)
+        found = self._remainder.of([measured[i][1] for i in self.fit])
+        return max(max(reach(moved, self.noise).values()) for moved in found)
 
     def scale(self, effects: Effects, name: str, target: float) -> tuple[float, float, dict[int, Measured]]:
         """Factor and reach of one effect alone, and its recordings to fit."""
         (effect,) = effects.only(name).items
+        left = self.spec.measure == "left"
 
         def simulate(factor: float) -> tuple[float, dict[int, Measured]]:
             measured = self.measure(Effects(effect.scaled(factor)), fit_only=True)
-            return self.most_moved(measured)[1], measured
+            return self.left(measured) if left else self.most_moved(measured)[1], measured
 
-        return aim(simulate, target, effect.most(), target / STRENGTHS["medium"])
+        start = FIRST.get(name, 1.0) * target / STRENGTHS["medium"]
+        return aim(simulate, target, effect.most(), 2.0 * start if left else start)
 
 
 def generate(spec: Spec, rig: Path) -> Case:
@@ -148,7 +166,7 @@ def generate(spec: Spec, rig: Path) -> Case:
         angle=math.radians(float(rng.uniform(0.01, 0.02))),
         angle_step=ANGLE_STEP,
     )
-    bench = _Bench(spec, par, _nominal(rig), noise, tolerance.get("supply.initial_pressure", 0.0))
+    bench = _Bench(spec, true, tolerance, _nominal(rig), noise)
     alone: dict[str, float] = {}
     known: dict[int, Measured] = {}
     if spec.wanted:
@@ -157,10 +175,13 @@ def generate(spec: Spec, rig: Path) -> Case:
             factors[name], alone[name], known = bench.scale(effects, name, STRENGTHS[label])
         effects = effects.scaled(factors)
     measured = bench.measure(effects, known if len(ids) == 1 else None)
-    channel, size = bench.most_moved(measured) if ids else (None, 0.0)
+    channel, size, left = None, 0.0, 0.0
+    if ids:
+        channel, size = bench.most_moved(measured)
+        left = bench.left(measured)
     runs: dict[str, Any] = {}
     for i, (name, role) in enumerate(spec.recordings):
-        runs[name] = {"role": role, "initial_supply_pressure": bench.supply[i], "reach": measured[i][1]}
+        runs[name] = {"role": role, "initial_supply_pressure": bench.supply[i], "reach": reach(measured[i][1], noise)}
     key = {
         "schema": "pamrs.trial-key/1",
         "case": spec.name,
@@ -171,9 +192,12 @@ def generate(spec: Spec, rig: Path) -> Case:
         "effect_parameters": effects.to_dict(),
         "strength": spec.strength,
         "wanted": dict(zip(ids, spec.wanted, strict=False)),
+        "measure": spec.measure,
+        "duration": spec.duration,
         "reach": size,
         "reach_channel": channel,
         "reach_alone": alone,
+        "reach_left": left,
         "parameters": {k: true[k.split(".")[0]][k.split(".")[1]] for k in moved},
         "moved_tolerances": moved,
         "noise": asdict(noise),
@@ -194,6 +218,7 @@ def make_case(
     name: str = "case_001",
     strength: float = 1.0,
     wanted: str | None = None,
+    measure: str = "reach",
     recordings: int = 5,
     duration: float = 40.0,
     rig: Path | None = None,
@@ -215,6 +240,8 @@ def make_case(
         Size of the effect; 1 is moderate.
     wanted : str, optional
         "weak", "medium" or "strong": scale every effect until it reaches that multiple of the noise.
+    measure : str
+        "reach", or "left": the multiple is of what a refit of the baseline leaves.
     recordings : int
         1 to 5 recordings.
     duration : float
@@ -243,6 +270,8 @@ def make_case(
         raise ValueError(f"strength must be positive, got {strength!r}")
     if wanted is not None and wanted not in STRENGTHS:
         raise ValueError(f"strength must be one of {', '.join(STRENGTHS)}, got {wanted!r}")
+    if measure not in MEASURES:
+        raise ValueError(f"measure must be one of {', '.join(MEASURES)}, got {measure!r}")
     chosen = tuple(select(recordings))
     if kind == "random":
         kind = str(np.random.default_rng([seed, 5]).choice(KINDS))
@@ -250,7 +279,7 @@ def make_case(
     if any(p not in KINDS for p in parts) or (len(parts) > 1 and {"none", "parameters"} & set(parts)):
         raise ValueError(f"unknown kind {kind!r}; known: {', '.join(KINDS)}, random, and effects joined by '+'")
     labels = (wanted,) * len(parts) if wanted and kind not in ("none", "parameters") else ()
-    spec = Spec(name, kind, seed, chosen, duration, labels, strength)
+    spec = Spec(name, kind, seed, chosen, duration, labels, strength, measure)
     case = generate(spec, (rig or default_rig()).resolve())
     write(keys / f"{name}.json", case.key)
     if publish is not None:

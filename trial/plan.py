@@ -81,7 +81,9 @@ def _recordings(rng: np.random.Generator) -> tuple[tuple[str, str], ...]:
     return tuple([(name, "fit") for name in fit] + [(name, "held_out") for name in held])
 
 
-def specs(plan: str, seed: int, cases: int | None = None, duration: float | None = None) -> list[Spec]:
+def specs(
+    plan: str, seed: int, cases: int | None = None, duration: float | None = None, measure: str = "reach"
+) -> list[Spec]:  # fmt: skip
     """Cases of a plan, shuffled so that their numbers say nothing; the first `cases` of them.
 
     Parameters
@@ -94,6 +96,8 @@ def specs(plan: str, seed: int, cases: int | None = None, duration: float | None
         How many; above the size of the plan it is repeated with other seeds.
     duration : float, optional
         Length of the recordings [s]; default 30 to 40 (full) or 12 (small).
+    measure : str
+        What the strengths are multiples of, see :class:`trial.concealed.Spec`.
     """
     found: list[Spec] = []
     turn = 0
@@ -106,9 +110,9 @@ def specs(plan: str, seed: int, cases: int | None = None, duration: float | None
             own = np.random.default_rng([seed, number, 815])
             chosen = _recordings(own)
             length = float(own.integers(30, 41)) if plan == "full" else 12.0
-            found.append(
-                Spec(f"case_{number:04d}", kind, int(own.integers(2**31)), chosen, length if duration is None else duration, labels)
-            )
+            length = length if duration is None else duration
+            seed_of_case = int(own.integers(2**31))
+            found.append(Spec(f"case_{number:04d}", kind, seed_of_case, chosen, length, labels, measure=measure))
         turn += 1
     return found[:cases]
 
@@ -123,7 +127,7 @@ def _complete(folder: Path, spec: Spec, digests: dict[str, str]) -> bool:
     if hashlib.sha256(content).hexdigest() != digests[spec.name]:
         return False
     told: dict[str, Any] = json.loads(content)
-    return bool(told["seed"] == spec.seed and told["kind"] == spec.kind)
+    return all(told.get(name) == getattr(spec, name) for name in ("kind", "seed", "duration", "measure"))
 
 
 def _work(task: tuple[Spec, Path]) -> Case:

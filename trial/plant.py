@@ -358,6 +358,16 @@ class Plant:
                 if h < 1.0e-9:
                     raise ArithmeticError(f"step below 1 ns at state {y!r}")
 
+    def classical(self, y: State, opening: float, span: float) -> State:
+        """One classical Runge-Kutta step over `span` [s]: quicker than :meth:`advance`, without error control."""
+        f, half = self._rhs, 0.5 * span
+        k1 = f(y, opening)
+        k2 = f([a + half * b for a, b in zip(y, k1, strict=False)], opening)
+        k3 = f([a + half * b for a, b in zip(y, k2, strict=False)], opening)
+        k4 = f([a + span * b for a, b in zip(y, k3, strict=False)], opening)
+        sixth = span / 6.0
+        return [a + sixth * (b + 2.0 * (c + d) + e) for a, b, c, d, e in zip(y, k1, k2, k3, k4, strict=False)]
+
     def tick(self, y: State) -> State:
         """State after what effects do once per sample (relays, largest values, play)."""
         if self.ticks:

@@ -31,7 +31,7 @@ class Leak(Effect):
     @classmethod
     def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
         # time constant of a sealed chamber of 1.5e-3 m3
-        tau = 400.0 / uniform(rng, 0.75, 1.3)
+        tau = 150.0 / uniform(rng, 0.75, 1.3)
         conductance = 1.5e-3 / (tau * REFERENCE_DENSITY * AIR_CONSTANT * REFERENCE_TEMPERATURE)
         form = str(rng.choice(["orifice", "crack", "laminar"]))
         if form == "laminar":
@@ -79,7 +79,7 @@ class HeatTransfer(Effect):
 
     @classmethod
     def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        return cls(uniform(rng, 25.0, 60.0), uniform(rng, 0.0, 0.8), 0.3)
+        return cls(uniform(rng, 25.0, 60.0), uniform(rng, 0.0, 0.8), 1.0)
 
     def most(self) -> float:
         return 1.0 / self.share if self.share else 1.0

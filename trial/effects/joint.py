@@ -139,7 +139,7 @@ class TendonCompliance(Effect):
 
     @classmethod
     def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        return cls(uniform(rng, 1.0e-7, 2.0e-7))
+        return cls(uniform(rng, 1.0e-6, 2.0e-6))
 
     def gear(self, env: Env) -> Port:
         c, pull = self.compliance, env.tables.pull

@@ -33,7 +33,7 @@ class Hysteresis(Effect):
     @classmethod
     def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
         reference = 4.0e5
-        total = 200.0 * uniform(rng, 0.75, 1.3)  # all muscles, at the reference pressure
+        total = 600.0 * uniform(rng, 0.75, 1.3)  # all muscles, at the reference pressure
         if rng.random() < 0.5:
             d = uniform(rng, 0.8e-3, 2.0e-3)
             return cls("bouc_wen", (total,), (d,), reference, uniform(rng, 1.0, 1.6), uniform(rng, 0.5, 0.7))
@@ -153,7 +153,7 @@ class ActivationPressure(Effect):
 
     @classmethod
     def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        return cls(uniform(rng, 2.0e3, 4.0e3))
+        return cls(uniform(rng, 5.0e3, 15.0e3))
 
     def lost_pressure(self, env: Env) -> Port:
         th = self.threshold

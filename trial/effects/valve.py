@@ -24,7 +24,7 @@ class DeadZone(Effect):
 
     @classmethod
     def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        return cls(uniform(rng, 0.002, 0.004), uniform(rng, 0.002, 0.004), uniform(rng, 0.08, 0.2))
+        return cls(uniform(rng, 0.02, 0.04), uniform(rng, 0.02, 0.04), uniform(rng, 0.08, 0.2))
 
     def most(self) -> float:
         return 0.3 / max(self.supply_width, self.exhaust_width, 1e-9)
@@ -128,7 +128,7 @@ class InputLag(Effect):
 
     @classmethod
     def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        return cls(uniform(rng, 2.0e-3, 4.0e-3), uniform(rng, 1.5e-3, 3.0e-3), uniform(rng, 30.0, 80.0))
+        return cls(uniform(rng, 8.0e-3, 14.0e-3), uniform(rng, 6.0e-3, 10.0e-3), uniform(rng, 30.0, 80.0))
 
     def most(self) -> float:
         return 0.25 / max(self.pure + self.lag, 1e-9)
