@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from .effects import KINDS, LISTED, Effects, Setting, draw
+from .effects import KINDS, LISTED, Effect, Effects, Setting, draw
 from .excitation import RECORDINGS, select
 from .plant import Plant
 from .recording import ANGLE_STEP, Array, Noise, Record, follow, prepare, reach, run
@@ -138,16 +138,15 @@ class _Bench:
         found = self._remainder.of([measured[i][1] for i in self.fit])
         return max(max(reach(moved, self.noise).values()) for moved in found)
 
-    def scale(self, effects: Effects, name: str, target: float) -> tuple[float, float, dict[int, Measured]]:
+    def scale(self, effect: Effect, target: float) -> tuple[float, float, dict[int, Measured]]:
         """Factor and reach of one effect alone, and its recordings to fit."""
-        (effect,) = effects.only(name).items
         left = self.spec.measure == "left"
 
         def simulate(factor: float) -> tuple[float, dict[int, Measured]]:
             measured = self.measure(Effects(effect.scaled(factor)), fit_only=True)
             return self.left(measured) if left else self.most_moved(measured)[1], measured
 
-        start = FIRST.get(name, 1.0) * target / STRENGTHS["medium"]
+        start = FIRST.get(effect.id, 1.0) * target / STRENGTHS["medium"]
         return aim(simulate, target, effect.most(), 2.0 * start if left else start)
 
 
@@ -157,9 +156,6 @@ def generate(spec: Spec, rig: Path) -> Case:
     rng = np.random.default_rng([spec.seed, 20140517])
     true, moved = draw_parameters(spec.kind, model, tolerance, rng)
     ids = [p for p in spec.kind.split("+") if p not in ("none", "parameters")]
-    par = to_parameters(true)
-    setting = Setting(len(spec.recordings), spec.duration, model["supply"]["initial_pressure"], par.payload, par.coulomb)
-    effects = Effects(*(draw(p, spec.strength, rng, setting) for p in ids))
     noise = Noise(
         pressure=float(rng.uniform(300.0, 600.0)),
         pressure_step=float(rng.choice([42.0, 84.0])),
@@ -167,13 +163,24 @@ def generate(spec: Spec, rig: Path) -> Case:
         angle_step=ANGLE_STEP,
     )
     bench = _Bench(spec, true, tolerance, _nominal(rig), noise)
+    start = float(np.median(bench.supply))
+    setting = Setting(len(spec.recordings), spec.duration, start, bench.par.payload, bench.par.coulomb)
     alone: dict[str, float] = {}
     known: dict[int, Measured] = {}
-    if spec.wanted:
-        factors = {}
-        for name, label in zip(ids, spec.wanted, strict=True):
-            factors[name], alone[name], known = bench.scale(effects, name, STRENGTHS[label])
-        effects = effects.scaled(factors)
+    chosen = []
+    for name, label in zip(ids, spec.wanted or [""] * len(ids), strict=True):
+        effect = draw(name, spec.strength, rng, setting)
+        if label:
+            # an effect that does not come into play in these recordings is drawn again
+            for attempt in range(4):
+                if attempt:
+                    effect = draw(name, spec.strength, rng, setting)
+                factor, alone[name], known = bench.scale(effect, STRENGTHS[label])
+                if alone[name] > 0.5 * STRENGTHS[label]:
+                    break
+            effect = effect.scaled(factor)
+        chosen.append(effect)
+    effects = Effects(*chosen)
     measured = bench.measure(effects, known if len(ids) == 1 else None)
     channel, size, left = None, 0.0, 0.0
     if ids:

@@ -6,7 +6,7 @@ rig is fed from a tank without a regulator.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -59,14 +59,6 @@ class Effects:
 
     def __iter__(self) -> Iterator[Effect]:
         return iter(self.items)
-
-    def scaled(self, factor: Mapping[str, float]) -> Effects:
-        """Every effect at the size `factor[id]` (1 when absent)."""
-        return Effects(*(e.scaled(factor.get(e.id, 1.0)) for e in self.items))
-
-    def only(self, name: str) -> Effects:
-        """The effect of one id alone."""
-        return Effects(*(e for e in self.items if e.id == name))
 
     def to_dict(self) -> dict[str, Any]:
         """Parameters of the effects that are present, by effect id."""

@@ -23,7 +23,10 @@ RECORDING_PERIOD = 1000.0
 
 @dataclass(frozen=True)
 class Setting:
-    """What a draw may depend on: recordings of the case, their length [s], tank [gauge Pa], payload [kg], friction [N m]."""
+    """What a draw may depend on.
+
+    Number and length [s] of the recordings, median start of the tank [gauge Pa], payload [kg], friction [N m].
+    """
 
     recordings: int = 5
     duration: float = 40.0

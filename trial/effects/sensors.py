@@ -35,8 +35,8 @@ class PressureLag(Effect):
         return [1.0e5]
 
     def follow(self, env: Env, first: int) -> Port:
-        # a lag below 0.1 ms cannot be seen and would only make the equations stiff
-        if self.lag < 1.0e-4:
+        # a lag below 0.3 ms cannot be seen and would only make the equations stiff
+        if self.lag < 3.0e-4:
             return None
         scale = 1.0 / (self.lag * self.pressure)
 
@@ -46,7 +46,7 @@ class PressureLag(Effect):
         return rate
 
     def read(self, env: Env, first: int) -> Port:
-        if self.lag < 1.0e-4:
+        if self.lag < 3.0e-4:
             return None
         pa = env.par.ambient
         return lambda p, ps, angle, y: (y[first] - pa, ps, angle)

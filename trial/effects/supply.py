@@ -68,7 +68,7 @@ class Compressor(Effect):
 
     @classmethod
     def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        on = setting.supply_pressure + 101325.0 - uniform(rng, 0.05e5, 0.45e5)
+        on = setting.supply_pressure + 101325.0 - uniform(rng, 0.02e5, 0.25e5)
         return cls(
             delivery=uniform(rng, 1.5e-4, 2.5e-4),
             on=on,

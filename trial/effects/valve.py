@@ -114,9 +114,9 @@ class CentreLeakage(Effect):
 
 @dataclass(frozen=True)
 class InputLag(Effect):
-    """Pure delay [s] of the command, then a spool that follows with a time constant `lag` [s], slowed for big steps.
+    """Pure delay [s] of the command, then a spool that follows with a time constant `lag` [s], slower for big steps.
 
-    ``xs' = v tanh((x - xs) / (lag v))`` with `speed` v [1/s].
+    ``xs' = (s/lag) tanh((x - xs)/s)`` with `stroke` s, a part of half the full stroke.
     """
 
     id: ClassVar[str] = "input_path_lag"
@@ -124,17 +124,21 @@ class InputLag(Effect):
     graded: ClassVar[tuple[str, ...]] = ("pure", "lag")
     pure: float
     lag: float
-    speed: float
+    stroke: float
 
     @classmethod
     def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        return cls(uniform(rng, 8.0e-3, 14.0e-3), uniform(rng, 6.0e-3, 10.0e-3), uniform(rng, 30.0, 80.0))
+        return cls(uniform(rng, 8.0e-3, 14.0e-3), uniform(rng, 6.0e-3, 10.0e-3), uniform(rng, 0.08, 0.3))
 
     def most(self) -> float:
         return 0.25 / max(self.pure + self.lag, 1e-9)
 
+    def _slow(self) -> bool:
+        # a shorter lag only makes the equations stiff: it acts as a delay
+        return self.lag >= 3.0e-4
+
     def delay(self) -> float:
-        return self.pure
+        return self.pure if self._slow() else self.pure + self.lag
 
     def start(self, at: Start) -> State:
         return [0.0]
@@ -143,14 +147,13 @@ class InputLag(Effect):
         return [1.0]
 
     def spool(self, env: Env, first: int) -> Port:
-        # a lag below 20 us cannot be seen and would only make the equations stiff
-        if self.lag < 2.0e-5:
+        if not self._slow():
             return None
-        v, lv, tanh = self.speed, self.lag * self.speed, math.tanh
+        s, rate, tanh = self.stroke, self.stroke / self.lag, math.tanh
 
         def slide(x: float, y: State, d: State) -> float:
             xs = y[first]
-            d[first] = v * tanh((x - xs) / lv)
+            d[first] = rate * tanh((x - xs) / s)
             return xs
 
         return slide
