@@ -1,21 +1,36 @@
-"""Command line of the trial: ``python -m trial make`` and ``python -m trial score``."""
+"""Command line of the trial: ``python -m trial write``, ``make``, ``score`` and ``selfcheck``."""
 
 from __future__ import annotations
 
 import argparse
+import hashlib
 import sys
 import time
 from pathlib import Path
 
-from .concealed import make_case
+from .concealed import make_case, write
 from .effects import KINDS, LISTED
+from .plan import specs, write_plan
 from .score import score
 from .selfcheck import selfcheck
+from .strength import MEASURES, STRENGTHS
+from .summary import figure, markdown
+
+_MEASURE = "what the multiple of the noise is of: all that the effect moves, or what a refit of the baseline leaves of it"
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m trial", description="Blinded trial of the diagnosis on concealed data.")
     sub = parser.add_subparsers(dest="command", required=True)
+    whole = sub.add_parser("write", help="write the cases, keys and manifest of a plan; goes on where it was stopped")
+    whole.add_argument("folder", type=Path, help="gets cases/, keys/ and manifest.json")
+    whole.add_argument("--plan", choices=("full", "small"), default="full")
+    whole.add_argument("--cases", type=int, help="how many (default: the whole plan)")
+    whole.add_argument("--seed", type=int, required=True)
+    whole.add_argument("--duration", type=float, help="seconds per recording (default: 30 to 40, small 12)")
+    whole.add_argument("--jobs", type=int, default=1, help="processes (default 1)")
+    whole.add_argument("--measure", choices=MEASURES, default="reach", help=_MEASURE)
+    whole.add_argument("--rig", type=Path, help="nominal rig file (default: the shoulder)")
     make = sub.add_parser("make", help="write concealed cases and their keys")
     make.add_argument("--out", type=Path, required=True, help="folder for the cases")
     make.add_argument("--keys-dir", type=Path, help="folder for the answer keys (default: OUT with '_keys' appended)")
@@ -28,7 +43,9 @@ def _parser() -> argparse.ArgumentParser:
     make.add_argument("--seed", type=int, required=True, help="seed of the first case; the following cases count up")
     make.add_argument("--repeat", type=int, default=1, help="cases per kind (default 1)")
     make.add_argument("--first", type=int, default=1, help="number of the first case (default 1)")
-    make.add_argument("--strength", type=float, default=1.0, help="size of the effects; 1 is typical")
+    make.add_argument("--strength", type=float, default=1.0, help="size of the effects; 1 is moderate")
+    make.add_argument("--wanted", choices=tuple(STRENGTHS), help="scale each effect to this multiple of the noise instead")
+    make.add_argument("--measure", choices=MEASURES, default="reach", help=_MEASURE)
     make.add_argument("--recordings", type=int, default=5, help="1 to 5 (default 5)")
     make.add_argument("--duration", type=float, default=40.0, help="seconds per recording (default 40)")
     make.add_argument("--rig", type=Path, help="nominal rig file (default: the shoulder)")
@@ -40,7 +57,10 @@ def _parser() -> argparse.ArgumentParser:
         default=",".join(LISTED),
         help="effect ids that the diagnosis may name, comma separated",
     )
-    sub.add_parser("selfcheck", help="compare the plant with an adaptive reference and with the golden vectors")
+    mark.add_argument("--markdown", type=Path, help="write the tables here")
+    mark.add_argument("--figure", type=Path, help="draw the figure here (needs matplotlib)")
+    check = sub.add_parser("selfcheck", help="compare the plant with finer steps and with another integrator")
+    check.add_argument("--golden", type=Path, help="folder with golden vectors of the plant without effects")
     return parser
 
 
@@ -48,7 +68,17 @@ def main(argv: list[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
     args = _parser().parse_args(argv)
     try:
-        if args.command == "make":
+        if args.command == "write":
+            if (args.cases is not None and args.cases < 1) or args.jobs < 1:
+                raise ValueError("--cases and --jobs must be at least 1")
+
+            def report(name: str, done: int, total: int) -> None:
+                print(f"{name} written, {done} of {total}", file=sys.stderr, flush=True)
+
+            wanted = specs(args.plan, args.seed, args.cases, args.duration, args.measure)
+            manifest = write_plan(args.folder, wanted, jobs=args.jobs, rig=args.rig, progress=report)
+            print(f"sha256 of the manifest: {hashlib.sha256(manifest.read_bytes()).hexdigest()}")
+        elif args.command == "make":
             keys = args.keys_dir or args.out.with_name(args.out.name + "_keys")
             kinds = [k for k in args.kind for _ in range(args.repeat)]
             for i, kind in enumerate(kinds):
@@ -59,14 +89,20 @@ def main(argv: list[str] | None = None) -> int:
                     print(f"{case} key sha256 {digest}", flush=True)
 
                 make_case(
-                    args.out, keys, kind, seed=args.seed + i, name=name, strength=args.strength,
+                    args.out, keys, kind, seed=args.seed + i, name=name, strength=args.strength, wanted=args.wanted,
+                    measure=args.measure,
                     recordings=args.recordings, duration=args.duration, rig=args.rig, publish=publish,
                 )  # fmt: skip
                 print(f"{name} written in {time.perf_counter() - start:.1f} s", file=sys.stderr, flush=True)
         elif args.command == "score":
-            print(score(args.keys, args.results, tuple(c for c in args.catalogue.split(",") if c)).text())
+            scores = score(args.keys, args.results, tuple(c for c in args.catalogue.split(",") if c))
+            print(scores.text())
+            if args.markdown is not None:
+                write(args.markdown, markdown(scores))
+            if args.figure is not None:
+                figure(scores, args.figure)
         else:
-            print(selfcheck())
+            print(selfcheck(args.golden))
     except (ValueError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 2

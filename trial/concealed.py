@@ -7,7 +7,6 @@ import json
 import math
 import os
 import tempfile
-import tomllib
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from functools import lru_cache
@@ -15,103 +14,46 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from .effects import KINDS, LISTED, Effects, draw
-from .excitation import Controller, build, select
-from .plant import Parameters, Plant, State
-
-Array = NDArray[np.floating]
-ROOT = Path(__file__).resolve().parents[1]
-SAMPLE_TIME = 0.005
-ANGLE_STEP = math.radians(180.0 / 16384.0)
-_UNIT = {"bar": 1.0e5, "deg": math.pi / 180.0}
+from .effects import KINDS, LISTED, Effect, Effects, Setting, draw
+from .excitation import RECORDINGS, select
+from .plant import Plant
+from .recording import ANGLE_STEP, Array, Noise, Record, follow, prepare, reach, run
+from .remainder import Remainder
+from .rigfile import default_rig, draw_parameters, read_rig, to_parameters
+from .strength import FIRST, MEASURES, STRENGTHS, aim
 
 
-def default_rig() -> Path:
-    """The nominal rig file: the copy in the package, else the shared one."""
-    for path in (
-        ROOT / "python" / "pamrs" / "rigs" / "shoulder.toml",
-        ROOT / ".." / "shared" / "rigs" / "shoulder.toml",
-    ):
-        if path.is_file():
-            return path
-    raise FileNotFoundError("no shoulder.toml found; give the nominal rig with --rig")
+@dataclass(frozen=True)
+class Spec:
+    """What a case is made from.
 
-
-def _si(entry: Any) -> Any:
-    """Value in SI of a TOML parameter table (or of a bare number)."""
-    if not isinstance(entry, dict):
-        return entry
-    factor = _UNIT.get(entry.get("unit", ""), 1.0)
-    value = entry["value"]
-    return [factor * v for v in value] if isinstance(value, list) else factor * value
-
-
-def read_rig(path: Path) -> tuple[dict[str, Any], dict[str, float]]:
-    """Nominal model and tolerances of a rig file.
-
-    Returns
-    -------
-    model : dict
-        Nested sections with SI values.
-    tolerance : dict
-        Standard deviation in SI by dotted name, for parameters that have one.
+    `kind` is "none", "parameters", an effect id, or ids joined by "+". With `wanted` (one label of
+    :data:`trial.strength.STRENGTHS` per effect) the effects are scaled to that reach, else by `strength`. `measure`
+    is what the multiple of the noise is of: "reach", or "left", what a refit of the baseline leaves of it.
     """
-    with path.open("rb") as stream:
-        raw = tomllib.load(stream)
-    model: dict[str, Any] = {}
-    tolerance: dict[str, float] = {}
-    for section, table in raw.items():
-        if not isinstance(table, dict):
-            continue
-        model[section] = {}
-        for key, entry in table.items():
-            if isinstance(entry, dict) and "value" not in entry:
-                model[section][key] = entry
-                continue
-            model[section][key] = _si(entry)
-            if isinstance(entry, dict) and "tol" in entry:
-                tolerance[f"{section}.{key}"] = _UNIT.get(entry.get("unit", ""), 1.0) * float(entry["tol"])
-    return model, tolerance
+
+    name: str
+    kind: str
+    seed: int
+    recordings: tuple[tuple[str, str], ...]
+    duration: float
+    wanted: tuple[str, ...] = ()
+    strength: float = 1.0
+    measure: str = "reach"
 
 
-def to_parameters(model: dict[str, Any]) -> Parameters:
-    """Plant parameters of a nested SI model as returned by :func:`read_rig`."""
-    gas, valve, arm, chamber = model["gas"], model["valve"], model["arm"], model["chamber"]
-    muscle = {k: v for k, v in model["muscle"].items() if k not in ("model", "count", "modulus_scale", "end_ratio")}
-    muscle.update(model["muscle"]["end_ratio"])
-    return Parameters(
-        ambient=gas["ambient_pressure"],
-        temperature=gas["temperature"],
-        gas_constant=gas["gas_constant"],
-        kappa=gas["heat_capacity_ratio"],
-        supply_volume=model["supply"]["volume"],
-        supply_pressure=model["supply"]["initial_pressure"],
-        area_max=valve["discharge_area_max"],
-        null_voltage=valve["null_voltage"],
-        half_range=valve["half_range"],
-        opening=tuple(valve["area_fraction"]["opening"]),
-        fraction=tuple(valve["area_fraction"]["fraction"]),
-        dead_volume=chamber["dead_volume"],
-        alpha_in=chamber["alpha_in"],
-        alpha_out=chamber["alpha_out"],
-        alpha=chamber["alpha"],
-        muscle=muscle,
-        count=int(model["muscle"]["count"]),
-        modulus_scale=model["muscle"]["modulus_scale"],
-        joint={k: v for k, v in model["joint"].items() if k != "kind"},
-        inertia=arm["inertia"],
-        first_moment=arm["first_moment"],
-        length=arm["length"],
-        payload=arm["payload"],
-        viscous=arm["viscous"],
-        coulomb=arm["coulomb"],
-        coulomb_speed=arm["coulomb_speed"],
-        gravity=arm["gravity"],
-        pressure_zero=model["sensors"]["pressure_zero"],
-        angle_zero=model["sensors"]["angle_zero"],
-    )
+@dataclass(frozen=True)
+class Case:
+    """A case in memory: its key and its files by name, the list of recordings last."""
+
+    name: str
+    key: str
+    files: dict[str, str]
+
+    def digest(self) -> str:
+        """SHA-256 of the key file."""
+        return hashlib.sha256(self.key.encode()).hexdigest()
 
 
 @lru_cache(maxsize=4)
@@ -119,105 +61,7 @@ def _nominal(rig: Path) -> Plant:
     return Plant(to_parameters(read_rig(rig)[0]))
 
 
-@dataclass(frozen=True)
-class Noise:
-    """Standard deviation and resolution of the transducers: pressures in Pa, angle in rad."""
-
-    pressure: float
-    pressure_step: float
-    angle: float
-    angle_step: float
-
-
-@dataclass(frozen=True)
-class Record:
-    """One recording: columns (n,) in V, gauge Pa and rad, and the true states at the samples."""
-
-    time: Array
-    command: Array
-    supply: Array
-    pressure: Array
-    angle: Array
-    states: list[State]
-
-
-class InputPath:
-    """Splits a sample into spans of constant command behind a pure delay."""
-
-    def __init__(self, delay: float, start: float) -> None:
-        self.whole = int(delay / SAMPLE_TIME)
-        self.part = delay - self.whole * SAMPLE_TIME
-        self.past = [start] * (self.whole + 1)
-
-    def spans(self, command: float) -> list[tuple[float, float]]:
-        """(command [V], duration [s]) pairs of the next sample."""
-        self.past.append(command)
-        old, new = self.past[-self.whole - 2], self.past[-self.whole - 1]
-        spans = [(old, self.part), (new, SAMPLE_TIME - self.part)]
-        return [s for s in spans if s[1] > 1.0e-9]
-
-
-def run(
-    plant: Plant,
-    nominal: Plant,
-    name: str,
-    duration: float,
-    supply: float,
-    noise: Noise,
-    rng: np.random.Generator,
-) -> Record:
-    """Closed-loop run of one recording; `supply` is the initial tank pressure [gauge Pa]."""
-    shape = build(name, duration, SAMPLE_TIME, rng)
-    control = Controller(nominal, SAMPLE_TIME, rng)
-    n = len(shape.reference)
-    white = rng.standard_normal((n, 3))
-    columns = np.empty((n, 4))
-    lag = plant.effects.input_path_lag
-    path = InputPath(lag.delay if lag else 0.0, plant.par.null_voltage)
-    y = plant.rest(supply + plant.par.ambient)
-    step = 1.0e-3
-    states: list[State] = []
-    for i in range(n):
-        states.append(y)
-        p, ps, angle = plant.reading(y)
-        p = round((p + noise.pressure * white[i, 0]) / noise.pressure_step) * noise.pressure_step
-        ps = round((ps + noise.pressure * white[i, 1]) / noise.pressure_step) * noise.pressure_step
-        angle = round((angle + noise.angle * white[i, 2]) / noise.angle_step) * noise.angle_step
-        u = control(float(shape.reference[i]), angle, p, float(shape.dither[i]), bool(shape.sealed[i]))
-        columns[i] = u, ps, p, angle
-        for command, span in path.spans(u):
-            y, step = plant.advance(y, plant.valve_opening(command), span, step)
-    return Record(SAMPLE_TIME * np.arange(n), columns[:, 0], columns[:, 1], columns[:, 2], columns[:, 3], states)
-
-
-def reach(plant: Plant, bare: Plant, record: Record, noise: Noise, window: float = 2.0) -> dict[str, float]:
-    """How far the effects move each channel, in units of its noise.
-
-    The plant without its effects gets the same commands in windows that start from the true state; returned
-    is the rms over the recording of the difference between the noise-free readings.
-    """
-    every = round(window / SAMPLE_TIME)
-    moved = np.zeros((len(record.states), 2))
-    step = 1.0e-3
-    y: State = []
-    for i, state in enumerate(record.states):
-        if i % every == 0:
-            y = bare.initial(state[0], state[1], state[2], state[3])
-        true, other = plant.reading(state), bare.reading(y)
-        moved[i] = true[0] - other[0], true[2] - other[2]
-        y, step = bare.advance(y, bare.valve_opening(float(record.command[i])), SAMPLE_TIME, step, rtol=1.0e-6)
-    lsb = math.sqrt(12.0)
-    floor = np.array(
-        [
-            math.hypot(noise.pressure, noise.pressure_step / lsb),
-            math.hypot(noise.angle, noise.angle_step / lsb),
-        ]
-    )
-    rms = np.sqrt((moved**2).mean(axis=0)) / floor
-    return {"muscle_pressure": float(rms[0]), "joint_angle": float(rms[1])}
-
-
-def _write(path: Path, text: str) -> None:
+def write(path: Path, text: str) -> None:
     """Write atomically: a temporary file in the same folder, then a rename."""
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
@@ -235,7 +79,7 @@ def _csv(record: Record) -> str:
     lines = ["time [s],valve_command [V],supply_pressure [bar],muscle_pressure [bar],joint_angle [deg]"]
     lines += [
         f"{t:.3f},{u:.4f},{ps / 1e5:.5f},{p / 1e5:.5f},{math.degrees(a):.3f}"
-        for t, u, ps, p, a in zip(record.time, record.command, record.supply, record.pressure, record.angle, strict=True)
+        for t, u, (p, ps, a) in zip(record.time.tolist(), record.command.tolist(), record.logged.tolist(), strict=True)
     ]
     return "\n".join(lines) + "\n"
 
@@ -246,38 +90,130 @@ def _case_toml(recordings: Sequence[tuple[str, str]]) -> str:
     return "\n".join(blocks)
 
 
-def draw_parameters(
-    kind: str, model: dict[str, Any], tolerance: dict[str, float], rng: np.random.Generator
-) -> tuple[dict[str, Any], dict[str, float]]:
-    """Draw the true baseline.
+#: a recording and how far the effects move its channels, shape (n, 3)
+Measured = tuple[Record, Array]
 
-    `none` keeps the nominal values, `parameters` moves four to six of them by one to two tolerances, and
-    everything else lies within one tolerance (normal, truncated).
 
-    Returns
-    -------
-    model : dict
-        The true nested model.
-    moved : dict
-        Deviation in tolerances, by dotted name.
-    """
-    true = {k: dict(v) for k, v in model.items()}
-    names = [k for k in tolerance if k != "supply.initial_pressure"]
-    moved = dict.fromkeys(names, 0.0)
-    if kind != "none":
-        for name in names:
-            z = 2.0
-            while abs(z) > 1.0:
-                z = float(rng.standard_normal())
-            moved[name] = z
-    if kind == "parameters":
-        loud = [k for k in names if not k.startswith("sensors.") and k not in ("supply.volume", "arm.coulomb")]
-        for name in rng.choice(loud, int(rng.integers(4, 7)), replace=False):
-            moved[str(name)] = float(rng.choice([-1.0, 1.0]) * rng.uniform(1.0, 2.0))
-    for name, z in moved.items():
-        section, key = name.split(".")
-        true[section][key] = model[section][key] + z * tolerance[name]
-    return true, moved
+class _Bench:
+    """The recordings of one case, to be run with any effects."""
+
+    def __init__(self, spec: Spec, true: dict[str, Any], tolerance: dict[str, float], nominal: Plant, noise: Noise) -> None:
+        self.spec, self.true, self.tolerance, self.noise = spec, true, tolerance, noise
+        self.par = par = to_parameters(true)
+        supply_tol = tolerance.get("supply.initial_pressure", 0.0)
+        self.bare = Plant(par)
+        self._remainder: Remainder | None = None
+        roles = [role for _, role in spec.recordings]
+        self.fit = [i for i, role in enumerate(roles) if role == "fit"] or list(range(len(roles)))
+        self.prepared = []
+        self.supply: list[float] = []
+        for index, (name, _) in enumerate(spec.recordings):
+            own = np.random.default_rng([spec.seed, index, 77])
+            self.supply.append(par.supply_pressure + float(own.uniform(-1.0, 1.0)) * supply_tol)
+            self.prepared.append(prepare(nominal, name, spec.duration, own))
+
+    def measure(self, effects: Effects, known: dict[int, Measured] | None = None, fit_only: bool = False) -> dict[int, Measured]:
+        """Record and reach of the recordings by number; those in `known` are kept."""
+        plant = Plant(self.par, effects)
+        found = dict(known or {})
+        for i, (made, supply) in enumerate(zip(self.prepared, self.supply, strict=True)):
+            if i in found or (fit_only and i not in self.fit):
+                continue
+            record = run(plant, *made, supply, self.noise, np.random.default_rng([self.spec.seed, i, 78]), i)
+            found[i] = (record, record.clean - follow(self.bare, record, i) if effects.items else np.zeros((1, 3)))
+        return found
+
+    def most_moved(self, measured: dict[int, Measured]) -> tuple[str, float]:
+        """Channel that moves most in a recording to fit, and its reach."""
+        tops = [max(reach(measured[i][1], self.noise).items(), key=lambda item: item[1]) for i in self.fit]
+        return max(tops, key=lambda item: item[1])
+
+    def left(self, measured: dict[int, Measured]) -> float:
+        """Reach that is left of the recordings to fit when the baseline is refitted within its tolerances.
+
+        The sensitivities are those of the recordings of the first call.
+        """
+        if self._remainder is None:
+            self._remainder = Remainder(self.true, self.tolerance, [(measured[i][0], i) for i in self.fit], self.noise)
+        found = self._remainder.of([measured[i][1] for i in self.fit])
+        return max(max(reach(moved, self.noise).values()) for moved in found)
+
+    def scale(self, effect: Effect, target: float) -> tuple[float, float, dict[int, Measured]]:
+        """Factor and reach of one effect alone, and its recordings to fit."""
+        left = self.spec.measure == "left"
+
+        def simulate(factor: float) -> tuple[float, dict[int, Measured]]:
+            measured = self.measure(Effects(effect.scaled(factor)), fit_only=True)
+            return self.left(measured) if left else self.most_moved(measured)[1], measured
+
+        start = FIRST.get(effect.id, 1.0) * target / STRENGTHS["medium"]
+        return aim(simulate, target, effect.most(), 2.0 * start if left else start)
+
+
+def generate(spec: Spec, rig: Path) -> Case:
+    """Make one case in memory; the same arguments give the same bytes."""
+    model, tolerance = read_rig(rig)
+    rng = np.random.default_rng([spec.seed, 20140517])
+    true, moved = draw_parameters(spec.kind, model, tolerance, rng)
+    ids = [p for p in spec.kind.split("+") if p not in ("none", "parameters")]
+    noise = Noise(
+        pressure=float(rng.uniform(300.0, 600.0)),
+        pressure_step=float(rng.choice([42.0, 84.0])),
+        angle=math.radians(float(rng.uniform(0.01, 0.02))),
+        angle_step=ANGLE_STEP,
+    )
+    bench = _Bench(spec, true, tolerance, _nominal(rig), noise)
+    start = float(np.median(bench.supply))
+    setting = Setting(len(spec.recordings), spec.duration, start, bench.par.payload, bench.par.coulomb)
+    alone: dict[str, float] = {}
+    known: dict[int, Measured] = {}
+    chosen = []
+    for name, label in zip(ids, spec.wanted or [""] * len(ids), strict=True):
+        effect = draw(name, spec.strength, rng, setting)
+        if label:
+            # an effect that does not come into play in these recordings is drawn again
+            for attempt in range(4):
+                if attempt:
+                    effect = draw(name, spec.strength, rng, setting)
+                factor, alone[name], known = bench.scale(effect, STRENGTHS[label])
+                if alone[name] > 0.5 * STRENGTHS[label]:
+                    break
+            effect = effect.scaled(factor)
+        chosen.append(effect)
+    effects = Effects(*chosen)
+    measured = bench.measure(effects, known if len(ids) == 1 else None)
+    channel, size, left = None, 0.0, 0.0
+    if ids:
+        channel, size = bench.most_moved(measured)
+        left = bench.left(measured)
+    runs: dict[str, Any] = {}
+    for i, (name, role) in enumerate(spec.recordings):
+        runs[name] = {"role": role, "initial_supply_pressure": bench.supply[i], "reach": reach(measured[i][1], noise)}
+    key = {
+        "schema": "pamrs.trial-key/1",
+        "case": spec.name,
+        "kind": spec.kind,
+        "verdict": spec.kind if not ids else ("effects" if all(i in LISTED for i in ids) else "unlisted"),
+        "effects": ids,
+        "blocks": {e.id: e.block for e in effects},
+        "effect_parameters": effects.to_dict(),
+        "strength": spec.strength,
+        "wanted": dict(zip(ids, spec.wanted, strict=False)),
+        "measure": spec.measure,
+        "duration": spec.duration,
+        "reach": size,
+        "reach_channel": channel,
+        "reach_alone": alone,
+        "reach_left": left,
+        "parameters": {k: true[k.split(".")[0]][k.split(".")[1]] for k in moved},
+        "moved_tolerances": moved,
+        "noise": asdict(noise),
+        "recordings": runs,
+        "seed": spec.seed,
+    }
+    files = {f"{name}.csv": _csv(measured[i][0]) for i, (name, _) in enumerate(spec.recordings)}
+    files = {"rig.toml": rig.read_text(encoding="utf-8"), **files, "case.toml": _case_toml(spec.recordings)}
+    return Case(spec.name, json.dumps(key, indent=1) + "\n", files)
 
 
 def make_case(
@@ -288,6 +224,8 @@ def make_case(
     seed: int,
     name: str = "case_001",
     strength: float = 1.0,
+    wanted: str | None = None,
+    measure: str = "reach",
     recordings: int = 5,
     duration: float = 40.0,
     rig: Path | None = None,
@@ -306,7 +244,11 @@ def make_case(
     name : str
         Folder name of the case.
     strength : float
-        Size of the effect; 1 is typical.
+        Size of the effect; 1 is moderate.
+    wanted : str, optional
+        "weak", "medium" or "strong": scale every effect until it reaches that multiple of the noise.
+    measure : str
+        "reach", or "left": the multiple is of what a refit of the baseline leaves.
     recordings : int
         1 to 5 recordings.
     duration : float
@@ -331,62 +273,32 @@ def make_case(
         raise ValueError("the keys must not lie inside a case folder")
     if not (math.isfinite(duration) and duration >= 2.0):
         raise ValueError(f"duration must be at least 2 s, got {duration!r}")
-    chosen = select(recordings)
-    rng = np.random.default_rng([seed, 20140517])
+    if not strength > 0.0:
+        raise ValueError(f"strength must be positive, got {strength!r}")
+    if wanted is not None and wanted not in STRENGTHS:
+        raise ValueError(f"strength must be one of {', '.join(STRENGTHS)}, got {wanted!r}")
+    if measure not in MEASURES:
+        raise ValueError(f"measure must be one of {', '.join(MEASURES)}, got {measure!r}")
+    chosen = tuple(select(recordings))
     if kind == "random":
-        kind = str(rng.choice(KINDS))
+        kind = str(np.random.default_rng([seed, 5]).choice(KINDS))
     parts = kind.split("+")
     if any(p not in KINDS for p in parts) or (len(parts) > 1 and {"none", "parameters"} & set(parts)):
         raise ValueError(f"unknown kind {kind!r}; known: {', '.join(KINDS)}, random, and effects joined by '+'")
-    rig = (rig or default_rig()).resolve()
-    model, tolerance = read_rig(rig)
-    true, moved = draw_parameters(kind, model, tolerance, rng)
-    ids = [p for p in parts if p not in ("none", "parameters")]
-    effects = Effects(**{p: draw(p, strength, rng) for p in ids})
-    noise = Noise(
-        pressure=float(rng.uniform(300.0, 600.0)),
-        pressure_step=float(rng.choice([42.0, 84.0])),
-        angle=math.radians(float(rng.uniform(0.01, 0.02))),
-        angle_step=ANGLE_STEP,
-    )
-    par = to_parameters(true)
-    plant = Plant(par, effects)
-    bare = Plant(par) if ids else None
-    nominal = _nominal(rig)
-    supply_tol = tolerance.get("supply.initial_pressure", 0.0)
-    files: dict[str, str] = {}
-    runs: dict[str, Any] = {}
-    for index, (recording, role) in enumerate(chosen):
-        own = np.random.default_rng([seed, index, 77])
-        supply = par.supply_pressure + float(own.uniform(-1.0, 1.0)) * supply_tol
-        record = run(plant, nominal, recording, duration, supply, noise, own)
-        files[f"{recording}.csv"] = _csv(record)
-        runs[recording] = {"role": role, "initial_supply_pressure": supply}
-        if bare is not None:
-            runs[recording]["reach"] = reach(plant, bare, record, noise)
-    verdict = kind if not ids else ("effects" if all(i in LISTED for i in ids) else "unlisted")
-    key = {
-        "schema": "pamrs.trial-key/1",
-        "case": name,
-        "kind": kind,
-        "verdict": verdict,
-        "effects": ids,
-        "effect_parameters": effects.to_dict(),
-        "parameters": {k: true[k.split(".")[0]][k.split(".")[1]] for k in moved},
-        "moved_tolerances": moved,
-        "noise": asdict(noise),
-        "recordings": runs,
-        "reach": max((max(r["reach"].values()) for r in runs.values() if "reach" in r), default=0.0),
-        "seed": seed,
-        "strength": strength,
-    }
-    text = json.dumps(key, indent=1) + "\n"
-    digest = hashlib.sha256(text.encode()).hexdigest()
-    _write(keys / f"{name}.json", text)
+    labels = (wanted,) * len(parts) if wanted and kind not in ("none", "parameters") else ()
+    spec = Spec(name, kind, seed, chosen, duration, labels, strength, measure)
+    case = generate(spec, (rig or default_rig()).resolve())
+    write(keys / f"{name}.json", case.key)
     if publish is not None:
-        publish(digest)
-    _write(out / name / "rig.toml", rig.read_text(encoding="utf-8"))
-    for file, content in files.items():
-        _write(out / name / file, content)
-    _write(out / name / "case.toml", _case_toml(chosen))
-    return digest
+        publish(case.digest())
+    store(case, out)
+    return case.digest()
+
+
+def store(case: Case, out: Path) -> None:
+    """Write the files of a case below `out`; its list of recordings comes last and says that it is complete."""
+    for file, content in case.files.items():
+        write(out / case.name / file, content)
+
+
+__all__ = ["RECORDINGS", "Case", "Spec", "generate", "make_case", "store", "write"]

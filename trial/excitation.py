@@ -20,6 +20,7 @@ RECORDINGS = (
     ("sealed_holds", "fit"),
     ("angle_steps", "held_out"),
     ("slow_triangle", "held_out"),
+    ("open_cycles", "fit"),
 )
 _SUBSETS = {1: (2,), 2: (2, 3), 3: (1, 2, 3), 4: (0, 1, 2, 3), 5: (0, 1, 2, 3, 4)}
 
@@ -33,11 +34,16 @@ def select(count: int) -> list[tuple[str, str]]:
 
 @dataclass(frozen=True)
 class Excitation:
-    """Reference angle [rad], mask of samples with the valve at its believed null, dither [V]; shapes (n,)."""
+    """Reference angle [rad], masks of samples with the valve at its believed null and wide open to vent, dither [V].
+
+    All of shape (n,). With `open_loop` the commands are found on the nominal plant and replayed.
+    """
 
     reference: Array
     sealed: NDArray[np.bool_]
     dither: Array
+    vent: NDArray[np.bool_]
+    open_loop: bool = False
 
 
 def _ramps(time: Array, points: list[tuple[float, float]], smooth: bool) -> Array:
@@ -71,6 +77,7 @@ def build(name: str, duration: float, sample_time: float, rng: np.random.Generat
     n = round(duration / sample_time)
     time = sample_time * np.arange(n)
     sealed = np.zeros(n, dtype=bool)
+    vent = np.zeros(n, dtype=bool)
     dither = np.zeros(n)
     points = [(0.0, 16.0)]
     if name == "lift_hold":
@@ -123,9 +130,21 @@ def build(name: str, duration: float, sample_time: float, rng: np.random.Generat
         points.append((points[-1][0] + (inner - middle) / 4.0, inner))
         points.append((max(duration, points[-1][0] + 5.0), 18.0))
         angle = _ramps(time, points, smooth=False)
+    elif name == "open_cycles":
+        # fill in one or two moves with sealed pauses, then vent: every cycle starts afresh, so that errors do not pile up
+        while points[-1][0] < duration:
+            t = points[-1][0]
+            for level in rng.uniform(30.0, 80.0, int(rng.integers(1, 3))).tolist():
+                move, hold = float(rng.uniform(0.8, 2.5)), float(rng.uniform(1.0, 2.5))
+                points += [(t + move, level), (t + move + hold, level)]
+                sealed |= (time >= t + move + 0.4) & (time < t + move + hold)
+                t += move + hold
+            points += [(t + 0.1, 15.5), (t + 2.2, 15.5)]
+            vent |= (time >= t) & (time < t + 2.2)
+        angle = _ramps(time, points, smooth=True)
     else:
         raise ValueError(f"unknown excitation {name!r}; known: {', '.join(r[0] for r in RECORDINGS)}")
-    return Excitation(np.radians(np.clip(angle, 15.5, 105.0)), sealed, dither)
+    return Excitation(np.radians(np.clip(angle, 15.5, 105.0)), sealed, dither, vent, name == "open_cycles")
 
 
 class Controller:
@@ -150,6 +169,10 @@ class Controller:
         self.hold = [nominal.holding_pressure(float(a)) for a in grid]
         self.step = sample_time
         self.smooth = 1.0 - math.exp(-2.0 * math.pi * 12.0 * sample_time)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the past."""
         self.sum = 0.0
         self.rate = 0.0
         self.last: float | None = None

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -161,49 +163,83 @@ class Tendon:
         return y - (self.offset - y) * x / math.sqrt(self.tendon**2 - (self.offset - y) ** 2)
 
 
+@lru_cache(maxsize=4)
+def _rows(muscle: str, tendon: str, count: int) -> tuple[Array, Array]:
+    """Knots [rad] and exact quantities of the joint, see :meth:`JointTables.exact`; the arguments are JSON."""
+    spec, joint = json.loads(muscle), json.loads(tendon)
+    shapes, pull = Muscle(spec), Tendon(joint)
+    knots = float(joint["rest_angle"]) + math.radians(STEP) * np.arange(-BELOW, ABOVE + 1)
+    return knots, np.array([JointTables.exact(shapes, pull, count, float(t)) for t in knots])
+
+
+#: knots per degree, and how many of them lie below and above the rest angle
+STEP, BELOW, ABOVE = 0.1, 80, 1160
+
+
 class JointTables:
     """Everything the plant needs as cubic pieces over the joint angle.
 
-    Rows of `cells`: one list of coefficients per cell, for the gas torque per pressure [m3], the elastic
-    torque [N m], the air volume of all muscles [m3], the contraction [m] and the wall area [m2]; each cubic
-    highest power first.
+    Rows of `cells`: coefficients of one cell, for the gas torque per pressure [m3], the elastic torque [N m], the
+    air volume of all muscles [m3], the contraction [m] and the wall area [m2]; each cubic highest power first.
 
     Parameters
     ----------
-    muscle, tendon : Muscle, Tendon
-        The geometry.
+    muscle, joint : dict
+        Geometry, see :class:`Muscle` and :class:`Tendon`.
     count : int
         Number of parallel muscles.
     modulus_scale : float
         Multiplies every modulus.
     """
 
-    def __init__(self, muscle: Muscle, tendon: Tendon, count: int, modulus_scale: float, rest_angle: float) -> None:
-        step = math.radians(0.1)
-        below, above = 80, 1160
-        self.start = rest_angle - below * step
-        self.step = step
-        self.knots = self.start + step * np.arange(below + above + 1)
-        rows = np.array([self.exact(muscle, tendon, count, modulus_scale, float(t)) for t in self.knots])
-        cells: list[list[float]] = []
-        for lo, hi, kind in ((0, below, PchipInterpolator), (below, below + above, CubicSpline)):
-            pieces = kind(self.knots[lo : hi + 1], rows[lo : hi + 1])
+    def __init__(self, muscle: dict[str, Any], joint: dict[str, float], count: int, modulus_scale: float) -> None:
+        knots, exact = _rows(json.dumps(muscle, sort_keys=True), json.dumps(joint, sort_keys=True), count)
+        self.step = math.radians(STEP)
+        self.knots = knots
+        self.start = float(knots[0])
+        rows = np.column_stack([exact[:, 0] + modulus_scale * exact[:, 1], modulus_scale * exact[:, 2], exact[:, 3:]])
+        cells: list[tuple[float, ...]] = []
+        for lo, hi, kind in ((0, BELOW, PchipInterpolator), (BELOW, BELOW + ABOVE, CubicSpline)):
+            pieces = kind(knots[lo : hi + 1], rows[lo : hi + 1])
             # c has shape (4, cells, quantities)
-            cells.extend(np.transpose(pieces.c, (1, 2, 0)).reshape(hi - lo, -1).tolist())
+            cells.extend(tuple(c) for c in np.transpose(pieces.c, (1, 2, 0)).reshape(hi - lo, -1).tolist())
         self.cells = cells
 
     @staticmethod
-    def exact(muscle: Muscle, tendon: Tendon, count: int, modulus_scale: float, angle: float) -> Array:
-        """The five tabulated quantities at one angle [rad], without interpolation."""
+    def exact(muscle: Muscle, tendon: Tendon, count: int, angle: float) -> Array:
+        """Quantities at one angle [rad] without interpolation.
+
+        Gas torque per pressure without and per modulus scale, elastic torque per modulus scale, air volume,
+        contraction, wall area.
+        """
         contraction = tendon.contraction(angle)
         shape = muscle.shape(contraction / muscle.rest_length)
-        first, second = muscle.force_terms(shape, modulus_scale)
+        gas, _ = muscle.force_terms(shape, 0.0)
+        first, second = muscle.force_terms(shape, 1.0)
         arm = count * tendon.arm(angle)
         wall = count * 2.0 * math.pi * (shape.radius - shape.thickness) * shape.length
-        return np.array([first * arm, second * arm, count * shape.volume, contraction, wall])
+        return np.array([gas * arm, (first - gas) * arm, second * arm, count * shape.volume, contraction, wall])
+
+    def cell(self, angle: float) -> tuple[tuple[float, ...], float]:
+        """Coefficients of the cell of an angle [rad] and the distance from its knot [rad]."""
+        i = min(max(int((angle - self.start) / self.step), 0), len(self.cells) - 1)
+        return self.cells[i], angle - self.start - i * self.step
 
     def at(self, angle: float) -> Array:
         """Interpolated quantities at one angle [rad]."""
-        i = min(max(int((angle - self.start) / self.step), 0), len(self.cells) - 1)
-        s = angle - float(self.knots[i])
-        return np.asarray(np.array(self.cells[i]).reshape(5, 4) @ np.array([s**3, s * s, s, 1.0]))
+        k, s = self.cell(angle)
+        return np.asarray(np.array(k).reshape(5, 4) @ np.array([s**3, s * s, s, 1.0]))
+
+    def contraction(self, angle: float) -> float:
+        """Contraction [m] at one angle [rad]."""
+        k, s = self.cell(angle)
+        return ((k[12] * s + k[13]) * s + k[14]) * s + k[15]
+
+    def pull(self, angle: float, gauge: float) -> tuple[float, float, float]:
+        """Force of all muscles [N], its slope over contraction [N/m] and the moment arm [m/rad]."""
+        k, s = self.cell(angle)
+        torque = gauge * (((k[0] * s + k[1]) * s + k[2]) * s + k[3]) + ((k[4] * s + k[5]) * s + k[6]) * s + k[7]
+        slope = gauge * ((3.0 * k[0] * s + 2.0 * k[1]) * s + k[2]) + (3.0 * k[4] * s + 2.0 * k[5]) * s + k[6]
+        arm = (3.0 * k[12] * s + 2.0 * k[13]) * s + k[14]
+        force = torque / arm
+        return force, (slope - force * (6.0 * k[12] * s + 2.0 * k[13])) / (arm * arm), arm

@@ -1,6 +1,7 @@
 """The independent plant: tank, valve, muscles, joint and arm under an adaptive Dormand-Prince 5(4) pair.
 
-The inner loop uses plain floats: one right-hand side costs a few microseconds, 40 s less than a second.
+The inner loop uses plain floats: one right-hand side costs two microseconds, 40 s a quarter of a second.
+Effects enter at the ports of :class:`.effects.Effect`; without any, none of them costs more than a test.
 """
 
 from __future__ import annotations
@@ -12,10 +13,12 @@ from typing import Any
 
 from scipy.optimize import brentq
 
-from .effects import Effects
-from .geometry import JointTables, Muscle, Tendon
+from .effects import Effects, Env, HeatTransfer, Start
+from .flows import area_of, orifice_of, settle
+from .geometry import JointTables
 
 State = list[float]
+Ports = list[Callable[..., Any]]
 
 
 @dataclass(frozen=True)
@@ -56,9 +59,8 @@ class Parameters:
 class Plant:
     """Plant with a set of effects.
 
-    The state is ``[p, p_supply, angle, rate, ...]`` in absolute Pa, rad and rad/s, followed by the gas mass
-    [kg], the opening of the lagged valve, the friction states, the creep states and the lagged pressure, each
-    only when its effect is there.
+    The state is ``[p, p_supply, angle, rate, ...]`` in absolute Pa, rad and rad/s, followed by the time [s] when an
+    effect needs it and by the states of the effects.
 
     Parameters
     ----------
@@ -66,62 +68,65 @@ class Plant:
         Baseline numbers.
     effects : Effects
         What the plant has besides.
+
+    Raises
+    ------
+    ValueError
+        Two effects that cannot be in one plant.
     """
 
     def __init__(self, parameters: Parameters, effects: Effects | None = None) -> None:
         self.par = parameters
-        self.effects = effects or Effects()
-        self.tables = JointTables(
-            Muscle(parameters.muscle),
-            Tendon(parameters.joint),
-            parameters.count,
-            parameters.modulus_scale,
-            parameters.joint["rest_angle"],
-        )
-        self._slots()
+        # an effect of no size would still cost time, and a share of zero divide by it
+        self.effects = Effects(*(e for e in effects or () if e.active()))
+        self.tables = JointTables(parameters.muscle, parameters.joint, parameters.count, parameters.modulus_scale)
+        self.scale = [1.0e5, 1.0e6, 1.0, 1.0]
+        self.i_clock = -1
+        if any(e.needs_clock for e in self.effects):
+            self.i_clock = 4
+            self.scale.append(1.0e9)  # exact: its derivative is 1
+        self.slots: list[int] = []
+        for effect in self.effects:
+            self.slots.append(len(self.scale))
+            self.scale += effect.sizes()
+        self.size = len(self.scale)
+        self.env = Env(parameters, self.tables, self.i_clock)
+        self.ticks = self._ports("tick")
+        self._reads = self._ports("read")
+        self.area = area_of(parameters)
+        self._line = self._port("line", False)
+        self._flows = self._valve()
         self._rhs = self._build()
 
-    def _slots(self) -> None:
-        n = 4
-        eff = self.effects
-        self.i_mass = self.i_valve = self.i_friction = self.i_creep = self.i_sensor = -1
-        if eff.heat_transfer:
-            self.i_mass, n = n, n + 1
-        if eff.input_path_lag:
-            self.i_valve, n = n, n + 1
-        if eff.muscle_hysteresis:
-            self.i_friction, n = n, n + len(eff.muscle_hysteresis.friction)
-        if eff.muscle_creep:
-            self.i_creep, n = n, n + len(eff.muscle_creep.stiffness)
-        if eff.pressure_lag:
-            self.i_sensor, n = n, n + 1
-        self.size = n
-        scale = [1.0e5, 1.0e6, 1.0, 1.0]
-        scale += [1.0e-3] * (self.i_mass >= 0)
-        scale += [1.0] * (self.i_valve >= 0)
-        scale += [1.0] * (len(eff.muscle_hysteresis.friction) if eff.muscle_hysteresis else 0)
-        scale += [0.05] * (len(eff.muscle_creep.stiffness) if eff.muscle_creep else 0)
-        scale += [1.0e5] * (self.i_sensor >= 0)
-        self.scale = scale
+    def _ports(self, name: str, own: bool = True) -> Ports:
+        """Functions of all effects at one port."""
+        found = (
+            getattr(e, name)(self.env, first) if own else getattr(e, name)(self.env)
+            for e, first in zip(self.effects, self.slots, strict=True)
+        )
+        return [f for f in found if f is not None]
 
-    def initial(self, pressure: float, supply: float, angle: float, rate: float = 0.0) -> State:
-        """State at absolute pressures [Pa] with every memory at rest."""
-        eff, par = self.effects, self.par
+    def _port(self, name: str, own: bool = True) -> Any:
+        """The function at a port that takes one effect; None when there is none."""
+        found = self._ports(name, own)
+        if len(found) > 1:
+            raise ValueError(f"two effects at the port {name!r}")
+        return found[0] if found else None
+
+    def initial(self, pressure: float, supply: float, angle: float, rate: float = 0.0, clock: float = 0.0) -> State:
+        """State at absolute pressures [Pa] and a time [s] with every memory at rest."""
+        par = self.par
         y = [pressure, supply, angle, rate]
-        values = self.tables.at(angle)
-        if eff.heat_transfer:
-            y.append(pressure * (float(values[2]) + par.dead_volume) / (par.gas_constant * par.temperature))
-        if eff.input_path_lag:
-            y.append(0.0)
-        if eff.muscle_hysteresis:
-            y.extend([0.0] * len(eff.muscle_hysteresis.friction))
-        if eff.muscle_creep:
-            y.extend([float(values[3])] * len(eff.muscle_creep.stiffness))
-        if eff.pressure_lag:
-            y.append(pressure)
+        if self.i_clock >= 0:
+            y.append(clock)
+        if self.effects.items:
+            weight = (par.first_moment + par.payload * par.length) * par.gravity * math.sin(angle)
+            at = Start(pressure, supply, angle, self.tables.contraction(angle), weight)
+            for effect in self.effects:
+                y.extend(effect.start(at))
         return y
 
-    def rest(self, supply: float) -> State:
+    def rest(self, supply: float, clock: float = 0.0) -> State:
         """Vented muscle, arm at rest on its lower stop."""
         par = self.par
         low = par.joint["min_angle"]
@@ -132,7 +137,7 @@ class Plant:
             return float(self.tables.at(angle)[1]) - weight * math.sin(angle) + stop
 
         angle = float(brentq(torque, low - math.radians(4.0), low + math.radians(20.0), xtol=1e-12))
-        return self.initial(par.ambient, supply, angle)
+        return self.initial(par.ambient, supply, angle, 0.0, clock)
 
     def holding_pressure(self, angle: float) -> float:
         """Gauge pressure [Pa] that holds the arm at an angle [rad]."""
@@ -141,126 +146,122 @@ class Plant:
         weight = (par.first_moment + par.payload * par.length) * par.gravity
         return float((weight * math.sin(angle) - values[1]) / values[0])
 
-    def valve_opening(self, command: float) -> float:
-        """Signed opening of the spool, -1..1, for a command [V], without its lag."""
-        x = min(max((command - self.par.null_voltage) / self.par.half_range, -1.0), 1.0)
-        zone = self.effects.valve_dead_zone
-        return zone.opening(x) if zone is not None else x
+    def normalised(self, command: float) -> float:
+        """Command [V] as a part of half the stroke, -1..1."""
+        return min(max((command - self.par.null_voltage) / self.par.half_range, -1.0), 1.0)
 
-    def _area(self) -> Callable[[float], float]:
-        opening, fraction, full = self.par.opening, self.par.fraction, self.par.area_max
+    def _valve(self) -> Callable[[float, float, float, float], tuple[float, float]]:
+        """Flows into and out of the muscles [kg/s] from opening, tank and muscle pressure and gas temperature."""
+        par, area, orifice = self.par, self.area, orifice_of(self.par)
+        ambient, t0 = par.ambient, par.temperature
+        jet = math.sqrt(2.0 / (par.gas_constant * t0))
+        line, exhaust, gap = self._port("line", False), self._port("exhaust", False), self._port("gap")
+        heat = next((e for e in self.effects if isinstance(e, HeatTransfer)), None)
+        share = heat.share if heat is not None else 0.0
+        sqrt = math.sqrt
+        last = [math.nan, 0.0]  # opening and its conductance: constant over most steps
 
-        def area(x: float) -> float:
-            for i in range(1, len(opening)):
-                if x <= opening[i]:
-                    s = (x - opening[i - 1]) / (opening[i] - opening[i - 1])
-                    return full * (fraction[i - 1] + s * (fraction[i] - fraction[i - 1]))
-            return full * fraction[-1]
+        def flows(x: float, ps: float, p: float, temperature: float) -> tuple[float, float]:
+            if x != last[0]:
+                last[0], last[1] = x, jet * area(abs(x))
+            c, m_in, m_out = last[1], 0.0, 0.0
+            if x > 0.0:
+                m_in = c * orifice(ps, p)
+                if line is not None:
+                    m_in = settle(lambda m: c * orifice(ps, line(m, p)), m_in)
+            elif x < 0.0:
+                if share:
+                    c *= 1.0 + share * (sqrt(t0 / temperature) - 1.0)
+                m_out = c * orifice(p, ambient)
+                if line is not None or exhaust is not None:
+                    m_out = settle(
+                        lambda m: c * orifice(p if line is None else line(-m, p), ambient if exhaust is None else exhaust(m)),
+                        m_out,
+                    )
+            if gap is not None:
+                to_muscle, to_ambient = gap(x, ps, p)
+                m_in += to_muscle
+                m_out += to_ambient
+            return m_in, m_out
 
-        return area
+        return flows
 
     def _build(self) -> Callable[[State, float], State]:
-        par, eff, tab = self.par, self.effects, self.tables
-        area = self._area()
+        par, tab = self.par, self.tables
         cells, start, step, last = tab.cells, tab.start, tab.step, len(tab.cells) - 1
         ambient, t0, gas, g = par.ambient, par.temperature, par.gas_constant, par.kappa
         rt0 = gas * t0
-        choke = (2.0 / (g + 1.0)) ** (g / (g - 1.0))
-        psi_choked: float = (2.0 / (g + 1.0)) ** (1.0 / (g - 1.0)) * math.sqrt(g / (g + 1.0))
-        e1, e2, lead = 2.0 / g, (g + 1.0) / g, g / (g - 1.0)
-        psi_end = math.sqrt(lead * (0.999**e1 - 0.999**e2))
-        jet = math.sqrt(2.0 / rt0)
         dead, vt = par.dead_volume, par.supply_volume
         a_in, a_out, a_vol = par.alpha_in, par.alpha_out, par.alpha
-        inertia = par.inertia + par.payload * par.length**2
-        weight = (par.first_moment + par.payload * par.length) * par.gravity
+        rest_inertia = par.inertia + par.payload * par.length**2
+        rest_weight = (par.first_moment + par.payload * par.length) * par.gravity
+        reach, pull = par.length**2, par.length * par.gravity
         viscous, coulomb, speed = par.viscous, par.coulomb, par.coulomb_speed
         low, high = par.joint["min_angle"], par.joint["max_angle"]
         ks, ds = par.joint["stop_stiffness"], par.joint["stop_damping"]
-        i_mass, i_valve, i_fric, i_creep, i_sensor = (
-            self.i_mass,
-            self.i_valve,
-            self.i_friction,
-            self.i_creep,
-            self.i_sensor,
-        )
-        leak, heat, fric, creep = eff.leak_muscle, eff.heat_transfer, eff.muscle_hysteresis, eff.muscle_creep
-        lag_valve = eff.input_path_lag.lag if eff.input_path_lag else 1.0
-        lag_sensor = eff.pressure_lag.lag if eff.pressure_lag else 1.0
+        clock, width = self.i_clock, self.size
+        tanks, leaks = self._ports("tank"), self._ports("leak", False)
+        spool, gear, lost = self._port("spool"), self._port("gear", False), self._port("lost_pressure", False)
+        elastics, forces, torques = self._ports("elastic"), self._ports("force"), self._ports("torque")
+        load, motion, follows = self._port("load", False), self._port("motion"), self._ports("follow")
+        heat, i_heat = None, -1
+        for effect, first in zip(self.effects, self.slots, strict=True):
+            if isinstance(effect, HeatTransfer):
+                heat, i_heat = effect, first
+        flows = self._valve()
+        muscular = bool(elastics or forces)
         tanh, sin, sqrt = math.tanh, math.sin, math.sqrt
-
-        def orifice(up: float, down: float) -> float:
-            """pu * psi, signed."""
-            if up < down:
-                return -orifice(down, up)
-            r: float = down / up
-            if r <= choke:
-                return up * psi_choked
-            if r <= 0.999:
-                return up * sqrt(lead * (math.pow(r, e1) - math.pow(r, e2)))
-            return up * psi_end * (1.0 - r) * 1000.0
 
         def rhs(y: State, x: float) -> State:
             p, ps, angle, rate = y[0], y[1], y[2], y[3]
-            i = int((angle - start) / step)
+            pg = p - ambient
+            d = [0.0] * width
+            if clock >= 0:
+                d[clock] = 1.0
+            # gear: angle at which the muscles are looked up
+            seen, ratio = angle, 1.0
+            if gear is not None:
+                seen, ratio = gear(angle, pg)
+            i = int((seen - start) / step)
             if i < 0:
                 i = 0
             elif i > last:
                 i = last
-            s = angle - start - i * step
-            k = cells[i]
-            torque = (p - ambient) * (((k[0] * s + k[1]) * s + k[2]) * s + k[3]) + ((k[4] * s + k[5]) * s + k[6]) * s + k[7]
-            volume = ((k[8] * s + k[9]) * s + k[10]) * s + k[11] + dead
-            v_rate = ((3.0 * k[8] * s + 2.0 * k[9]) * s + k[10]) * rate
-            d = [0.0] * len(y)
-            if i_valve >= 0:
-                d[i_valve] = (x - y[i_valve]) / lag_valve
-                x = y[i_valve]
-            temperature = t0
-            if i_mass >= 0:
-                temperature = p * volume / (y[i_mass] * gas)
-            m_in = m_out = 0.0
-            if x > 0.0:
-                m_in = area(x) * jet * orifice(ps, p)
-            elif x < 0.0:
-                m_out = area(-x) * jet * orifice(p, ambient)
-                if i_mass >= 0:
-                    m_out *= sqrt(t0 / temperature)
-            if leak is not None:
-                m_out += leak.flow(p, ambient, temperature)
+            s = seen - start - i * step
+            k0, k1, k2, k3, k4, k5, k6, k7, k8, k9, k10, k11, k12, k13, k14, k15, k16, k17, k18, k19 = cells[i]
+            push = pg if lost is None else pg - lost(pg)
+            springy = ((k4 * s + k5) * s + k6) * s + k7
+            torque = push * (((k0 * s + k1) * s + k2) * s + k3) + springy
+            volume = ((k8 * s + k9) * s + k10) * s + k11 + dead
+            v_rate = ((3.0 * k8 * s + 2.0 * k9) * s + k10) * ratio * rate
+            if spool is not None:
+                x = spool(x, y, d)
+            temperature = t0 if heat is None else y[i_heat]
+            m_in, m_out = flows(x, ps, p, temperature)
+            for leak in leaks:
+                m_out += leak(p, temperature)
             d[1] = -rt0 / vt * m_in
+            for tank in tanks:
+                d[1] += tank(ps, m_in, y, d)
+            change = (rt0 * (a_in * m_in - a_out * m_out) - a_vol * p * v_rate) / volume
             if heat is not None:
-                wall = ((k[16] * s + k[17]) * s + k[18]) * s + k[19]
-                h = heat.coefficient * sqrt(p * temperature / (ambient * t0))
-                d[0] = (
-                    g * gas * (m_in * t0 - m_out * temperature) - g * p * v_rate + (g - 1.0) * h * wall * (t0 - temperature)
-                ) / volume
-                d[i_mass] = m_in - m_out
-            else:
-                d[0] = (rt0 * (a_in * m_in - a_out * m_out) - a_vol * p * v_rate) / volume
-            if fric is not None or creep is not None:
-                arm = (3.0 * k[12] * s + 2.0 * k[13]) * s + k[14]
-                slide = arm * rate
-                force = 0.0
-                if fric is not None:
-                    back = slide < 0.0
-                    n, beta = fric.exponent, fric.beta
-                    for j, (w, dist) in enumerate(zip(fric.friction, fric.distance, strict=True), i_fric):
-                        z = y[j]
-                        if fric.form == "dahl_bank":
-                            d[j] = slide / dist * (1.0 + z if back else 1.0 - z)
-                        else:
-                            sign = -1.0 if (z < 0.0) != back else 1.0
-                            d[j] = slide / dist * (1.0 - abs(z) ** n * (beta * sign + 1.0 - beta))
-                        force += w * z
-                    force *= (p - ambient) / fric.reference_pressure if p > ambient else 0.0
-                if creep is not None:
-                    short = ((k[12] * s + k[13]) * s + k[14]) * s + k[15]
-                    for j, (stiff, tau) in enumerate(zip(creep.stiffness, creep.time_constant, strict=True), i_creep):
-                        gap = short - y[j]
-                        d[j] = gap / tau
-                        force += stiff * gap
-                torque -= arm * force
+                wall = ((k16 * s + k17) * s + k18) * s + k19
+                h = heat.coefficient * sqrt(p * temperature / (ambient * t0)) * (1.0 + heat.jet * m_in / 1.0e-3)
+                mass = p * volume / (gas * temperature)
+                warm = ((g * t0 - temperature) * m_in - (g - 1.0) * temperature * m_out) / mass
+                warm += (g - 1.0) * (h * wall * (t0 - temperature) / (mass * gas) - temperature * v_rate / volume)
+                d[i_heat] = warm
+                balance = gas * ((m_in - m_out) * temperature + mass * warm) / volume - p * v_rate / volume
+                change += heat.share * (balance - change)
+            d[0] = change
+            if muscular:
+                arm = (3.0 * k12 * s + 2.0 * k13) * s + k14
+                short = ((k12 * s + k13) * s + k14) * s + k15
+                for elastic in elastics:
+                    torque += elastic(short, springy, y)
+                for force in forces:
+                    torque -= arm * force(pg, short, arm * ratio * rate, y, d)
+            torque *= ratio
             stop = 0.0
             if angle < low:
                 stop = ks * (low - angle) - ds * rate
@@ -270,10 +271,21 @@ class Plant:
                 stop = ks * (high - angle) - ds * rate
                 if stop > 0.0:
                     stop = 0.0
+            torque += stop - viscous * rate - coulomb * tanh(rate / speed)
+            for more in torques:
+                torque += more(angle, rate, pg, y, d)
+            inertia, weight = rest_inertia, rest_weight
+            if load is not None:
+                mass = load(y[clock])
+                inertia += mass * reach
+                weight += mass * pull
             d[2] = rate
-            d[3] = (torque - viscous * rate - coulomb * tanh(rate / speed) - weight * sin(angle) + stop) / inertia
-            if i_sensor >= 0:
-                d[i_sensor] = (p - y[i_sensor]) / lag_sensor
+            if motion is None:
+                d[3] = (torque - weight * sin(angle)) / inertia
+            else:
+                d[3] = motion(torque, angle, rate, inertia, weight, y, d)
+            for follow in follows:
+                follow(p, y, d)
             return d
 
         return rhs
@@ -346,11 +358,34 @@ class Plant:
                 if h < 1.0e-9:
                     raise ArithmeticError(f"step below 1 ns at state {y!r}")
 
-    def reading(self, y: State) -> tuple[float, float, float]:
-        """Noise-free transducer values: muscle and supply pressure [gauge Pa], joint angle [rad]."""
-        p = y[self.i_sensor] if self.i_sensor >= 0 else y[0]
-        return (
-            p - self.par.ambient + self.par.pressure_zero,
-            y[1] - self.par.ambient,
-            y[2] + self.par.angle_zero,
-        )
+    def classical(self, y: State, opening: float, span: float) -> State:
+        """One classical Runge-Kutta step over `span` [s]: quicker than :meth:`advance`, without error control."""
+        f, half = self._rhs, 0.5 * span
+        k1 = f(y, opening)
+        k2 = f([a + half * b for a, b in zip(y, k1, strict=False)], opening)
+        k3 = f([a + half * b for a, b in zip(y, k2, strict=False)], opening)
+        k4 = f([a + span * b for a, b in zip(y, k3, strict=False)], opening)
+        sixth = span / 6.0
+        return [a + sixth * (b + 2.0 * (c + d) + e) for a, b, c, d, e in zip(y, k1, k2, k3, k4, strict=False)]
+
+    def tick(self, y: State) -> State:
+        """State after what effects do once per sample (relays, largest values, play)."""
+        if self.ticks:
+            y = list(y)
+            for change in self.ticks:
+                change(y)
+        return y
+
+    def reading(self, y: State, opening: float = 0.0) -> tuple[float, float, float]:
+        """Noise-free transducer values: muscle and supply pressure [gauge Pa], joint angle [rad].
+
+        `opening` is the signed opening of the valve; only a line between valve and muscle needs it.
+        """
+        par = self.par
+        p, ps, angle = y[0] - par.ambient, y[1] - par.ambient, y[2]
+        if self._line is not None:
+            m_in, m_out = self._flows(opening, y[1], y[0], par.temperature)
+            p = self._line(m_in - m_out, y[0]) - par.ambient
+        for read in self._reads:
+            p, ps, angle = read(p, ps, angle, y)
+        return p + par.pressure_zero, ps, angle + par.angle_zero

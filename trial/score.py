@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import mean, median
@@ -14,11 +14,16 @@ from .effects import LISTED
 
 SCHEMA = "pamrs.diagnosis/1"
 VERDICTS = ("none", "parameters", "effects", "unlisted")
+HEALTHY = ("none", "parameters")
 
 
 @dataclass(frozen=True)
 class Row:
-    """One scored case; `probability`, `gap`, `utility` and `seconds` are None when the result lacks them."""
+    """One scored case; `probability`, `gap`, `utility` and `seconds` are None when the result lacks them.
+
+    `wanted` is the strength ("weak", "medium", "strong", "pair" or ""), `first` what was named first, `claim` the
+    largest stated probability and whether its hypothesis is the truth.
+    """
 
     case: str
     truth: str
@@ -31,6 +36,21 @@ class Row:
     utility: float | None
     contains: bool
     seconds: float | None
+    ids: tuple[str, ...] = ()
+    wanted: str = ""
+    left: float | None = None
+    first: str = "-"
+    claim: tuple[float, bool] | None = None
+
+    @property
+    def detected(self) -> bool:
+        """Whether missing physics was claimed."""
+        return self.verdict in ("effects", "unlisted")
+
+    @property
+    def visible(self) -> float:
+        """Reach that a refit of the baseline leaves, or the plain reach when the key does not tell."""
+        return self.reach if self.left is None else self.left
 
 
 @dataclass(frozen=True)
@@ -39,6 +59,7 @@ class Scores:
 
     rows: list[Row]
     totals: dict[str, float | int | None] = field(default_factory=dict)
+    shares: dict[str, tuple[int, int]] = field(default_factory=dict)
 
     def text(self) -> str:
         """Table and totals as plain text."""
@@ -111,6 +132,20 @@ def _answer(verdict: str, effects: Sequence[str]) -> set[str]:
     return {"unlisted"} if verdict == "unlisted" else set()
 
 
+def _claim(truth: set[str], probabilities: dict[str, float]) -> tuple[float, bool] | None:
+    """Largest stated probability and whether it is on the truth; "none" and "parameters" count as one."""
+    pooled: dict[frozenset[str], float] = {}
+    for name, p in probabilities.items():
+        group = frozenset() if name in HEALTHY else frozenset(name.replace(",", "+").split("+"))
+        pooled[group] = pooled.get(group, 0.0) + p
+    if not pooled:
+        return None
+    best = max(pooled, key=lambda g: pooled[g])
+    # of a pair, either effect alone is a true claim
+    right = best <= truth and bool(best) if truth else not best
+    return min(pooled[best], 1.0), right
+
+
 def score_case(key: dict[str, Any], result: dict[str, Any] | None, catalogue: Sequence[str]) -> Row:
     """Score one case; a missing result is wrong.
 
@@ -119,10 +154,13 @@ def score_case(key: dict[str, Any], result: dict[str, Any] | None, catalogue: Se
     """
     case, kind, ids = str(key["case"]), str(key["kind"]), [str(i) for i in key["effects"]]
     reach = float(key.get("reach", 0.0))
+    labels = list(key.get("wanted", {}).values())
+    wanted = "pair" if len(ids) > 1 else str(labels[0]) if labels else ""
+    left = _number(key.get("reach_left"))
     if result is None:
-        return Row(case, kind, "missing", "-", None, "wrong", None, reach, None, False, None)
+        return Row(case, kind, "missing", "-", None, "wrong", None, reach, None, False, None, tuple(ids), wanted, left)
     verdict = str(result["verdict"])
-    probabilities = {str(k): float(v) for k, v in result.get("probabilities", {}).items()}
+    probabilities = {str(k): float(v) for k, v in result.get("probabilities", {}).items() if v is not None}
     known = {*catalogue, *(i for i in ids if i in probabilities)}
     # effects, best first: a single name is judged, a pair must be named whole
     named = [str(e["id"]) for e in result.get("effects", [])]
@@ -142,7 +180,8 @@ def score_case(key: dict[str, Any], result: dict[str, Any] | None, catalogue: Se
         outcome = "right" if right else ("ambiguous" if contains else "wrong")
     chance: float | None
     if not ids:
-        chance = probabilities.get(kind)
+        # both say that no physics is missing, and which of them is a matter of degree
+        chance = sum(probabilities.get(k, 0.0) for k in HEALTHY)
     elif len(truth) == 1:
         chance = probabilities.get(next(iter(truth)))
     else:
@@ -166,11 +205,17 @@ def score_case(key: dict[str, Any], result: dict[str, Any] | None, catalogue: Se
         mark,
         contains,
         _number(result.get("seconds")),
+        tuple(ids),
+        wanted,
+        left,
+        (named[0] if named else "effects") if verdict == "effects" else verdict,
+        _claim(truth, probabilities),
     )
 
 
-def _share(rows: Sequence[bool]) -> float | None:
-    return mean(1.0 if r else 0.0 for r in rows) if rows else None
+def _count(rows: Iterable[bool]) -> tuple[int, int]:
+    kept = list(rows)
+    return sum(kept), len(kept)
 
 
 def _median(values: Sequence[float | None]) -> float | None:
@@ -208,18 +253,24 @@ def score(keys: Path, results: Path, catalogue: Sequence[str] = LISTED) -> Score
         rows.append(row)
         ids = key["effects"]
         (healthy if not ids else listed if all(i in catalogue for i in ids) else unlisted).append(row)
-    said = ("effects", "unlisted")
-    clear = [r for r in (*listed, *unlisted) if r.reach >= 3.0]
+    sick = (*listed, *unlisted)
+    seen = [r for r in listed if r.visible >= 3.0]
+    shares = {
+        "false alarms (null and parameter cases)": _count(r.detected for r in healthy),
+        "detected (moves a channel by 3x noise)": _count(r.detected for r in sick if r.reach >= 3.0),
+        "detected (3x noise left after a refit)": _count(r.detected for r in sick if r.visible >= 3.0),
+        "right name first (catalogue effects)": _count(r.outcome == "right" for r in listed),
+        "right name first (3x noise left)": _count(r.outcome == "right" for r in seen),
+        "name or ambiguity set holds the truth": _count(r.contains for r in listed),
+        "name or set holds the truth (3x noise left)": _count(r.contains for r in seen),
+        "unlisted recognised": _count(r.outcome == "right" for r in unlisted),
+    }
     utilities = [r.utility if r.utility is not None else 0.0 for r in rows]
     totals: dict[str, float | int | None] = {
         "cases": len(rows),
         "without a result": sum(r.verdict == "missing" for r in rows),
-        "false alarms (null and parameter cases)": _share([r.verdict in said for r in healthy]),
-        "detected (effect moves a channel by 3x noise)": _share([r.verdict in said for r in clear]),
-        "right name first (catalogue effects)": _share([r.outcome == "right" for r in listed]),
-        "name or ambiguity set holds the truth": _share([r.contains for r in listed]),
+        **{name: k / n if n else None for name, (k, n) in shares.items()},
         "mean probability on the truth (all cases)": mean(r.probability or 0.0 for r in rows),
-        "unlisted recognised": _share([r.outcome == "right" for r in unlisted]),
         "median gap closed (cases with an effect)": _median([r.gap for r in (*listed, *unlisted)]),
         "ambiguity-group utility": mean(utilities),
         "median seconds": _median([r.seconds for r in rows]),
@@ -227,4 +278,4 @@ def score(keys: Path, results: Path, catalogue: Sequence[str] = LISTED) -> Score
         "ambiguous": sum(r.outcome == "ambiguous" for r in rows),
         "wrong": sum(r.outcome == "wrong" for r in rows),
     }
-    return Scores(rows, totals)
+    return Scores(rows, totals, shares)

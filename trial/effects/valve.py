@@ -1,0 +1,238 @@
+"""Effects in the valve, its command path and the line behind it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar, Self
+
+import numpy as np
+
+from .base import RECORDING_PERIOD, Effect, Env, Port, Setting, Start, State, log_uniform, uniform
+
+
+@dataclass(frozen=True)
+class DeadZone(Effect):
+    """Overlap of the spool, normalised widths of both edges; clearance rounds the corner over `rounding` widths."""
+
+    id: ClassVar[str] = "valve_dead_zone"
+    block: ClassVar[str] = "valve"
+    graded: ClassVar[tuple[str, ...]] = ("supply_width", "exhaust_width")
+    supply_width: float
+    exhaust_width: float
+    rounding: float
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
+        return cls(uniform(rng, 0.02, 0.04), uniform(rng, 0.02, 0.04), uniform(rng, 0.08, 0.2))
+
+    def most(self) -> float:
+        return 0.3 / max(self.supply_width, self.exhaust_width, 1e-9)
+
+    def opening(self, x: float) -> float:
+        """Effective opening, -1..1, of a normalised spool command."""
+        width = self.supply_width if x > 0.0 else self.exhaust_width
+        if width == 0.0:
+            return x
+        soft2 = (self.rounding * width) ** 2
+        s = abs(x) - width
+        soft = s + math.sqrt(s * s + soft2)
+        shut = -width + math.sqrt(width * width + soft2)
+        full = 1.0 - width + math.sqrt((1.0 - width) ** 2 + soft2)
+        return math.copysign((soft - shut) / (full - shut), x)
+
+    def shaper(self, env: Env) -> Port:
+        return lambda x, t: self.opening(x)
+
+
+@dataclass(frozen=True)
+class ValveHysteresis(Effect):
+    """Friction of the spool: it lags the command by up to `half_width` of half the stroke.
+
+    Dahl's law over the path of the command: ``dz = (1 - z sgn(dx)) |dx| / d sgn(dx)``, so the corner of the loop
+    is round, with `d` = `bend` half widths.
+    """
+
+    id: ClassVar[str] = "valve_hysteresis"
+    block: ClassVar[str] = "valve"
+    graded: ClassVar[tuple[str, ...]] = ("half_width",)
+    half_width: float
+    bend: float
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
+        return cls(uniform(rng, 0.0015, 0.003), uniform(rng, 1.2, 2.5))
+
+    def most(self) -> float:
+        return 0.1 / max(self.half_width, 1e-9)
+
+    def shaper(self, env: Env) -> Port:
+        half, path = self.half_width, self.bend * self.half_width
+        memory = [0.0, 0.0]  # command and friction
+
+        def follow(x: float, t: float) -> float:
+            if half == 0.0:
+                return x
+            step = x - memory[0]
+            if step:
+                sign = math.copysign(1.0, step)
+                memory[1] = sign + (memory[1] - sign) * math.exp(-abs(step) / path)
+            memory[0] = x
+            return x - half * memory[1]
+
+        return follow
+
+
+@dataclass(frozen=True)
+class CentreLeakage(Effect):
+    """Laminar leakage past the lands of the spool, ``k (pu^2 - pd^2) / (1 + |x| / x_l)``: the gap grows longer.
+
+    `supply_land` and `exhaust_land` are k of the two lands [kg/(s Pa2)], `reach` is x_l.
+    """
+
+    id: ClassVar[str] = "valve_centre_leakage"
+    block: ClassVar[str] = "valve"
+    graded: ClassVar[tuple[str, ...]] = ("supply_land", "exhaust_land")
+    supply_land: float
+    exhaust_land: float
+    reach: float
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
+        k = uniform(rng, 0.5e-17, 1.0e-17)
+        return cls(k, k * log_uniform(rng, 4.0, 9.0), uniform(rng, 0.01, 0.04))
+
+    def gap(self, env: Env, first: int) -> Port:
+        a, b, reach, pa2 = self.supply_land, self.exhaust_land, self.reach, env.par.ambient**2
+
+        def flows(x: float, ps: float, p: float) -> tuple[float, float]:
+            shape = 1.0 / (1.0 + abs(x) / reach)
+            return a * shape * (ps * ps - p * p), b * shape * (p * p - pa2)
+
+        return flows
+
+
+@dataclass(frozen=True)
+class InputLag(Effect):
+    """Pure delay [s] of the command, then a spool that follows with a time constant `lag` [s], slower for big steps.
+
+    ``xs' = (s/lag) tanh((x - xs)/s)`` with `stroke` s, a part of half the full stroke.
+    """
+
+    id: ClassVar[str] = "input_path_lag"
+    block: ClassVar[str] = "valve"
+    graded: ClassVar[tuple[str, ...]] = ("pure", "lag")
+    pure: float
+    lag: float
+    stroke: float
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
+        return cls(uniform(rng, 8.0e-3, 14.0e-3), uniform(rng, 6.0e-3, 10.0e-3), uniform(rng, 0.08, 0.3))
+
+    def most(self) -> float:
+        return 0.25 / max(self.pure + self.lag, 1e-9)
+
+    def _slow(self) -> bool:
+        # a shorter lag only makes the equations stiff: it acts as a delay
+        return self.lag >= 3.0e-4
+
+    def delay(self) -> float:
+        return self.pure if self._slow() else self.pure + self.lag
+
+    def start(self, at: Start) -> State:
+        return [0.0]
+
+    def sizes(self) -> State:
+        return [1.0]
+
+    def spool(self, env: Env, first: int) -> Port:
+        if not self._slow():
+            return None
+        s, rate, tanh = self.stroke, self.stroke / self.lag, math.tanh
+
+        def slide(x: float, y: State, d: State) -> float:
+            xs = y[first]
+            d[first] = rate * tanh((x - xs) / s)
+            return xs
+
+        return slide
+
+
+@dataclass(frozen=True)
+class TubeRestriction(Effect):
+    """Hose between the valve manifold, where the transducer sits, and the muscles.
+
+    Isothermal pipe flow with a laminar and a turbulent part: ``pv^2 - p^2 = a m + b m |m|``, with `laminar` a
+    [Pa2 s/kg] and `turbulent` b [Pa2 s2/kg2].
+    """
+
+    id: ClassVar[str] = "tube_flow_restriction"
+    block: ClassVar[str] = "line"
+    graded: ClassVar[tuple[str, ...]] = ("laminar", "turbulent")
+    laminar: float
+    turbulent: float
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
+        return cls(uniform(rng, 1.0e11, 4.0e11), uniform(rng, 4.0e14, 8.0e14))
+
+    def line(self, env: Env) -> Port:
+        a, b, sqrt = self.laminar, self.turbulent, math.sqrt
+
+        def port(m: float, p: float) -> float:
+            return sqrt(max(p * p + m * (a + b * abs(m)), 1.0e6))
+
+        return port
+
+
+@dataclass(frozen=True)
+class ExhaustBackPressure(Effect):
+    """Silencer behind the exhaust edge: ``pe^2 - pa^2 = b m^2`` with `resistance` b [Pa2 s2/kg2] (in no catalogue)."""
+
+    id: ClassVar[str] = "exhaust_back_pressure"
+    block: ClassVar[str] = "valve"
+    graded: ClassVar[tuple[str, ...]] = ("resistance",)
+    resistance: float
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
+        return cls(uniform(rng, 1.0e16, 2.0e16))
+
+    def exhaust(self, env: Env) -> Port:
+        b, pa2, sqrt = self.resistance, env.par.ambient**2, math.sqrt
+        return lambda m: sqrt(pa2 + b * m * abs(m)) if m > 0.0 else sqrt(pa2)
+
+
+@dataclass(frozen=True)
+class NullDrift(Effect):
+    """Null voltage that drifts with the temperature of the solenoid (in no catalogue).
+
+    A warm-up with `time_constant` [s] by `warm` of half the stroke, and a slow wave of `wave` with `period` [s].
+    """
+
+    id: ClassVar[str] = "valve_null_drift"
+    block: ClassVar[str] = "valve"
+    graded: ClassVar[tuple[str, ...]] = ("warm", "wave")
+    warm: float
+    wave: float
+    time_constant: float
+    period: float
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
+        sign = 1.0 if rng.random() < 0.5 else -1.0
+        return cls(
+            sign * uniform(rng, 0.0008, 0.0015),
+            uniform(rng, 0.0002, 0.0006),
+            uniform(rng, 6.0, 20.0),
+            uniform(rng, 14.0, 30.0),
+        )
+
+    def shaper(self, env: Env) -> Port:
+        def move(x: float, t: float) -> float:
+            local = t % RECORDING_PERIOD
+            warm = self.warm * (1.0 - math.exp(-local / self.time_constant))
+            return x - warm - self.wave * math.sin(2.0 * math.pi * t / self.period)
+
+        return move

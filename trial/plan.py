@@ -1,0 +1,206 @@
+"""Plans of many cases, and writing them so that an interrupted run can go on."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import multiprocessing
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .concealed import Case, Spec, generate, store, write
+from .effects import LISTED, TYPES, UNLISTED
+from .rigfile import default_rig
+from .strength import STRENGTHS
+
+MANIFEST = "manifest.json"
+SCHEMA = "pamrs.trial-manifest/1"
+#: nobody can tell these apart at 200 Hz, so no pair is made of them
+_FAST_LAGS = {"input_path_lag", "pressure_lag", "clock_skew"}
+_SMALL: tuple[tuple[str, tuple[str, ...]], ...] = (
+    ("none", ()),
+    ("parameters", ()),
+    ("supply_leak", ("medium",)),
+    ("valve_dead_zone", ("strong",)),
+    ("leak_muscle", ("strong",)),
+    ("heat_transfer", ("medium",)),
+    ("muscle_hysteresis", ("strong",)),
+    ("muscle_creep", ("weak",)),
+    ("payload_swing", ("strong",)),
+    ("pressure_lag", ("strong",)),
+    ("leak_muscle+muscle_hysteresis", ("strong", "strong")),
+    ("pressure_zero_drift", ("strong",)),
+)
+
+
+def _pair(rng: np.random.Generator) -> tuple[str, str]:
+    """Two effects of different blocks."""
+    while True:
+        one, two = (str(v) for v in rng.choice(LISTED, 2, replace=False))
+        if TYPES[one].block != TYPES[two].block and not {one, two} <= _FAST_LAGS:
+            return one, two
+
+
+def kinds(plan: str, rng: np.random.Generator) -> list[tuple[str, tuple[str, ...]]]:
+    """Kinds and wanted strengths of a plan, in no particular order.
+
+    `full`: 30 nulls, 30 with parameters only, every listed effect three times at each strength, 30 pairs, every
+    unlisted effect at medium and twice at strong. `small`: twelve cases.
+
+    Raises
+    ------
+    ValueError
+        Unknown plan.
+    """
+    if plan == "small":
+        return list(_SMALL)
+    if plan != "full":
+        raise ValueError(f"unknown plan {plan!r}; known: full, small")
+    found: list[tuple[str, tuple[str, ...]]] = []
+    for kind in ("none", "parameters"):
+        found.extend([(kind, ())] * 30)
+    found.extend((name, (label,)) for name in LISTED for label in STRENGTHS for _ in range(3))
+    for _ in range(30):
+        labels = tuple(str(v) for v in rng.choice(["medium", "strong"], 2))
+        found.append(("+".join(_pair(rng)), labels))
+    found.extend((name, (label,)) for name in UNLISTED for label in ("medium", "strong", "strong"))
+    return found
+
+
+def _recordings(rng: np.random.Generator) -> tuple[tuple[str, str], ...]:
+    """Three or four recordings to fit, one of them in open loop, and one or two held out of another excitation."""
+    fit = ["multisine", "sealed_holds", "open_cycles"]
+    if rng.random() < 0.3:
+        fit.append("lift_hold")
+    held = ["angle_steps", "slow_triangle"]
+    if len(fit) == 4 or rng.random() < 0.7:
+        held = [str(rng.choice(held))]
+    return tuple([(name, "fit") for name in fit] + [(name, "held_out") for name in held])
+
+
+def specs(
+    plan: str, seed: int, cases: int | None = None, duration: float | None = None, measure: str = "reach"
+) -> list[Spec]:  # fmt: skip
+    """Cases of a plan, shuffled so that their numbers say nothing; the first `cases` of them.
+
+    Parameters
+    ----------
+    plan : str
+        "full" or "small".
+    seed : int
+        Settles everything. Each case has its own seed, so that it comes out the same whatever is made with it.
+    cases : int, optional
+        How many; above the size of the plan it is repeated with other seeds.
+    duration : float, optional
+        Length of the recordings [s]; default 30 to 40 (full) or 12 (small).
+    measure : str
+        What the strengths are multiples of, see :class:`trial.concealed.Spec`.
+    """
+    found: list[Spec] = []
+    turn = 0
+    while not found or (cases is not None and len(found) < cases):
+        rng = np.random.default_rng([seed, turn, 4711])
+        wanted = kinds(plan, rng)
+        for i in rng.permutation(len(wanted)).tolist():
+            kind, labels = wanted[i]
+            number = len(found) + 1
+            own = np.random.default_rng([seed, number, 815])
+            chosen = _recordings(own)
+            length = float(own.integers(30, 41)) if plan == "full" else 12.0
+            length = length if duration is None else duration
+            seed_of_case = int(own.integers(2**31))
+            found.append(Spec(f"case_{number:04d}", kind, seed_of_case, chosen, length, labels, measure=measure))
+        turn += 1
+    return found[:cases]
+
+
+def _complete(folder: Path, spec: Spec, digests: dict[str, str]) -> bool:
+    """Whether a case, its key and its digest are there and belong together."""
+    key = folder / "keys" / f"{spec.name}.json"
+    files = [folder / "cases" / spec.name / f for f in ("case.toml", "rig.toml", *(f"{n}.csv" for n, _ in spec.recordings))]
+    if spec.name not in digests or not key.is_file() or not all(f.is_file() for f in files):
+        return False
+    content = key.read_bytes()
+    if hashlib.sha256(content).hexdigest() != digests[spec.name]:
+        return False
+    told: dict[str, Any] = json.loads(content)
+    return all(told.get(name) == getattr(spec, name) for name in ("kind", "seed", "duration", "measure"))
+
+
+def _work(task: tuple[Spec, Path]) -> Case:
+    return generate(*task)
+
+
+def write_plan(
+    folder: Path,
+    wanted: Sequence[Spec],
+    *,
+    jobs: int = 1,
+    rig: Path | None = None,
+    progress: Callable[[str, int, int], None] | None = None,
+) -> Path:
+    """Write the cases of a plan below ``folder/cases``, their keys below ``folder/keys``, and the manifest.
+
+    The digest of a key is in the manifest before any file of its case exists. A case that is there complete is not
+    made again.
+
+    Parameters
+    ----------
+    folder : Path
+        Where to.
+    wanted : sequence of Spec
+        From :func:`specs`.
+    jobs : int
+        Processes.
+    rig : Path, optional
+        Nominal rig file.
+    progress : callable, optional
+        Called with the name of each case made, the number done and the number of all.
+
+    Returns
+    -------
+    Path
+        The manifest.
+
+    Raises
+    ------
+    ValueError
+        The folder holds another manifest.
+    """
+    folder = Path(folder)
+    manifest = folder / MANIFEST
+    digests: dict[str, str] = {}
+    if manifest.is_file():
+        told = json.loads(manifest.read_text(encoding="utf-8"))
+        if told.get("schema") != SCHEMA:
+            raise ValueError(f"{manifest}: schema must be {SCHEMA!r}")
+        digests = told["keys"]
+    missing = [s for s in wanted if not _complete(folder, s, digests)]
+    rig = (rig or default_rig()).resolve()
+    done = len(wanted) - len(missing)
+
+    def keep(case: Case) -> None:
+        nonlocal done
+        digests[case.name] = case.digest()
+        text = json.dumps({"schema": SCHEMA, "keys": dict(sorted(digests.items()))}, indent=1)
+        write(manifest, text + "\n")
+        write(folder / "keys" / f"{case.name}.json", case.key)
+        store(case, folder / "cases")
+        done += 1
+        if progress is not None:
+            progress(case.name, done, len(wanted))
+
+    tasks = [(s, rig) for s in missing]
+    if jobs <= 1 or len(tasks) < 2:
+        for task in tasks:
+            keep(_work(task))
+    else:
+        with multiprocessing.get_context("spawn").Pool(min(jobs, len(tasks))) as pool:
+            for case in pool.imap_unordered(_work, tasks):
+                keep(case)
+    if not missing and not manifest.is_file():
+        raise ValueError("the plan has no case")
+    return manifest
