@@ -138,7 +138,7 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
         return Group(blocks, was, now, [start], {"": 1.0}, None, floor)
     mismatch = max(suspects, key=lambda b: out[b.name].ratio)
     say(f"{names}: {mismatch.name} keeps {now[mismatch.name].systematic:.2g} noise units after the refit")
-    acting = [e for e in EFFECTS if any(acts_in(e, b) for b in suspects)]
+    acting = [e for e in EFFECTS if _fits(nominal, e) and any(acts_in(e, b) for b in suspects)]
     trial = _Trial(inner, outer, nominal, floor, out, suspects)
     screened = screen(inner, baseline, acting, white, sealed=nominal.model["valve"] is None)
     singles = _singles(trial, screened, baseline, lambda text: say(f"{names}: {text}"))
@@ -148,6 +148,15 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
     candidates = [start, *singles, *pairs]
     doubt = _doubt(fitted, held, mismatch, now[mismatch.name].rms)
     return Group(blocks, was, now, candidates, _weigh(candidates, suspects, outer, doubt), mismatch, floor)
+
+
+def _fits(rig: Rig, effect: str) -> bool:
+    """Whether a rig has what an effect acts on."""
+    kinds = {supply["kind"] for supply in rig.tables("supply").values()}
+    if effect in ("compressor_cut_in", "supply_regulator_deadband"):
+        return ("tank" if effect == "compressor_cut_in" else "regulator") in kinds
+    needs = EFFECTS[effect].at or ("joint" if EFFECTS[effect].block == "arm" else "chamber")
+    return bool(rig.tables(needs))
 
 
 def _doubt(fitted: Problem, held: Problem, mismatch: Block, left: float) -> float:

@@ -160,7 +160,7 @@ AIR: Final[tuple[EffectInfo, ...]] = (
                 0.0,
                 0.0,
                 200.0,
-                (0.0,),
+                (5.0,),
                 "gas above wall temperature where a recording begins (just after a fill)",
             ),
         ),
