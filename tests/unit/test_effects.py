@@ -107,11 +107,13 @@ def test_the_core_takes_every_bound_of_the_table(effect: str) -> None:
                 with pytest.raises(ParameterError, match="no more can be taken away"):
                     _core.Rig(rig.to_json())
                 continue
+            refused = ""
             try:
                 _core.Rig(rig.to_json())
             except RigError as error:
-                # what would need a step of less than a tenth of a microsecond is refused by that name
-                assert "s would be needed" in str(error)
+                refused = str(error)
+            # what would need a step of less than a tenth of a microsecond is refused by that name
+            assert not refused or "s would be needed" in refused
 
 
 @pytest.mark.parametrize("effect", EFFECTS)
