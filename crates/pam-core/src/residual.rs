@@ -372,6 +372,7 @@ fn run<S: Scalar>(
     let drivers: Vec<Driven<'_, S>> = (measured.signals.iter())
         .map(|(place, signal)| Driven { place: *place, signal: *signal, zero: zero(&plant, *place) })
         .collect();
+    let driving: Vec<_> = drivers.iter().filter(|driver| !own.contains(&driver.place)).collect();
     let mut stepper = Stepper::new(plant);
     let mut memory = vec![Memory::default(); rig.wiring.groups.len()];
     let mut state = vec![constant::<S>(0.0); stepper.plant.states()];
@@ -426,7 +427,7 @@ fn run<S: Scalar>(
         let h = 1.0 / timing.substeps as f64;
         for i in 0..timing.substeps {
             stepper.step(&mut state, &mut memory, &controls, timing.step(), &simulated, |fraction, y| {
-                for driver in drivers.iter().filter(|d| !own.contains(&d.place)) {
+                for driver in &driving {
                     driver.write(rig, k, (i as f64 + fraction) * h, dt, y);
                 }
             });

@@ -292,12 +292,11 @@ impl Progress {
         for gas in 0..rig.layout.gases {
             state[rig.layout.mass(gas)] = plant.initial_mass(gas, &state);
         }
-        let stops: Vec<_> = rig.wiring.coordinates.iter().map(|c| c.stops).collect();
         let mut flags = Vec::new();
-        for (k, stops) in stops.iter().enumerate() {
+        for (k, coordinate) in rig.wiring.coordinates.iter().enumerate() {
             let x = state[rig.layout.angle(k)];
-            flags.push(stops.is_some_and(|s| x < s.min_angle));
-            flags.push(stops.is_some_and(|s| x > s.max_angle));
+            flags.push(coordinate.stops.is_some_and(|s| x < s.min_angle));
+            flags.push(coordinate.stops.is_some_and(|s| x > s.max_angle));
         }
         flags.extend(std::iter::repeat_n(false, rig.wiring.valves.len() + rig.wiring.lines.len()));
         Ok(Self { state, memory: vec![Memory::default(); rig.wiring.groups.len()], flags, samples: 0 })

@@ -81,7 +81,7 @@ impl Wiring {
         }
         let coordinates = coordinates(spec)?;
         let mut groups = groups(spec, known, &mut table)?;
-        let body = body(spec, &mut table)?;
+        let body = body(spec, &mut table);
         sensors(spec, &mut table, &mut gases)?;
         let coordinates = zeros(spec, &table, coordinates);
         let effects = effect_units(spec, &mut table, &mut gases, &mut groups)?;
