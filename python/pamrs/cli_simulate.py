@@ -81,10 +81,11 @@ def simulate_command(
 
 def _say_what_is_held(rig: Rig, recording: Recording, path: Path) -> None:
     """Name the inputs of which some samples cannot be used."""
-    frame = any(load["kind"] == "frame" for load in rig.tables("load").values())
+    from pamrs.driving import has_frame
+
+    driving = {"valve_command", "supply_command", *(["length"] if has_frame(rig) else [])}
     for name, rows in recording.mask.items():
-        driven = channel_of(name) in ("valve_command", "supply_command", *(["length"] if frame else []))
-        if driven and rows.any() and not rows.all():
+        if channel_of(name) in driving and rows.any() and not rows.all():
             typer.echo(f"{path}: {int((~rows).sum())} unusable samples of {name} hold the last usable one", err=True)
 
 

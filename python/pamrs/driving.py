@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pamrs.channels import dotted
+from pamrs.channels import channel_of, dotted
 from pamrs.errors import ParameterError
 
 if TYPE_CHECKING:
     from pamrs.rig import Rig
 
-__all__ = ["Signals", "initial_values", "signals_of"]
+__all__ = ["Signals", "has_frame", "initial_values", "regulators_of", "sensor_zero", "signals_of"]
 
 Array = NDArray[np.float64]
 #: One array for a block without a name or the only one of its kind, else one for each name.
@@ -71,7 +71,7 @@ def signals_of(
     ParameterError
         If a signal is missing, not taken by the rig, of another length or outside its range; the message names it.
     """
-    valves, regulators = rig.tables("valve"), _regulators(rig)
+    valves, regulators = rig.tables("valve"), regulators_of(rig)
     given = {
         **_named("valve_command", valve_command, list(valves), "valve"),
         **_named("supply_command", supply_command, regulators, "supply of kind regulator"),
@@ -112,8 +112,20 @@ def initial_values(initial: Mapping[str, float] | None, rig: Rig) -> dict[str, f
     return start
 
 
-def _regulators(rig: Rig) -> list[str]:
+def has_frame(rig: Rig) -> bool:
+    """Whether a load frame prescribes the length."""
+    return any(load["kind"] == "frame" for load in rig.tables("load").values())
+
+
+def regulators_of(rig: Rig) -> list[str]:
+    """Names of the supplies that are regulators."""
     return [name for name, table in rig.tables("supply").items() if table["kind"] == "regulator"]
+
+
+def sensor_zero(rig: Rig, key: str, block: str) -> float:
+    """Zero (``pressure_zero``, ``angle_zero``) of a block's sensor: its own, or the common one."""
+    sensors = rig.tables("sensors")
+    return float(sensors.get(block, sensors.get("", {})).get(key, 0.0))
 
 
 def _named(channel: str, given: Signals | None, names: list[str], block: str) -> dict[str, ArrayLike]:
@@ -138,7 +150,7 @@ def _named(channel: str, given: Signals | None, names: list[str], block: str) ->
 
 def _check_prescribed(rig: Rig, given: Mapping[str, ArrayLike]) -> None:
     """What may be prescribed follows from the blocks."""
-    frame = any(load["kind"] == "frame" for load in rig.tables("load").values())
+    frame = has_frame(rig)
     if frame and "length" not in given:
         raise ParameterError("length is missing: a load frame needs one value per sample [m]")
     if not frame and "length" in given:
@@ -148,7 +160,7 @@ def _check_prescribed(rig: Rig, given: Mapping[str, ArrayLike]) -> None:
         channel, _, chamber = name.partition(".")
         if channel == "pressure" and chamber in fed:
             raise ParameterError(f"{name} is given, which only a rig without [valve] takes: there the valve decides")
-        if channel == "supply_command" and not _regulators(rig):
+        if channel == "supply_command" and not regulators_of(rig):
             raise ParameterError('supply_command is given, which only a supply takes that is a regulator ([supply] kind = "regulator")')
 
 
@@ -172,7 +184,7 @@ def _signal(name: str, values: ArrayLike, rows: int | None, rig: Rig) -> Array:
 
 def _range(name: str, rig: Rig) -> tuple[float, float, str]:
     """Lowest and highest value of a signal, and the words for it."""
-    channel = name.partition(".")[0]
+    channel = channel_of(name)
     if channel == "valve_command":
         return -np.inf, np.inf, "a finite voltage is needed"
     if channel == "length":

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs.channels import dotted
+from pamrs.driving import has_frame, regulators_of, sensor_zero
 from pamrs.errors import RecordingError
 from pamrs.simulation import Simulation, simulate
 
@@ -62,7 +63,7 @@ def replay(rig: Rig, recording: Recording) -> Simulation:
     for channel, (block, _) in _STATES.items():
         own = prescribed.get(channel)
         for name in rig.tables(block):
-            if usable(recording, channel, name) and (own is None or (isinstance(own, dict) and name not in own)):
+            if _usable(recording, channel, name) and (own is None or (isinstance(own, dict) and name not in own)):
                 full = dotted(channel, name)
                 initial[full] = float(recording.channels[full][recording.mask[full]][0]) - _zero(rig, channel, name)
     if not drive:
@@ -73,24 +74,25 @@ def replay(rig: Rig, recording: Recording) -> Simulation:
 def _drive(rig: Rig, recording: Recording) -> dict[str, Any]:
     """The keywords of :func:`pamrs.simulate` that a recording gives."""
     drive: dict[str, Any] = {}
-    valves = {name: held(recording, dotted("valve_command", name)) for name in rig.tables("valve")}
+    valves = {name: _held(recording, dotted("valve_command", name)) for name in rig.tables("valve")}
     if valves:
         drive["valve_command"] = valves
-    regulators = [name for name, table in rig.tables("supply").items() if table["kind"] == "regulator"]
     commands = {
-        name: held(recording, dotted("supply_command", name)) for name in regulators if usable(recording, "supply_command", name)
+        name: _held(recording, dotted("supply_command", name))
+        for name in regulators_of(rig)
+        if _usable(recording, "supply_command", name)
     }
     if commands:
         drive["supply_command"] = commands
-    frame = any(load["kind"] == "frame" for load in rig.tables("load").values())
+    frame = has_frame(rig)
     if frame:
-        drive["length"] = held(recording, "length")
+        drive["length"] = _held(recording, "length")
     # Where muscles pull and nothing feeds them, their measured pressure is what moves them.
     if (frame or rig.tables("joint")) and not (valves or rig.tables("supply")):
-        given = [name for name in rig.tables("chamber") if usable(recording, "muscle_pressure", name)]
+        given = [name for name in rig.tables("chamber") if _usable(recording, "muscle_pressure", name)]
         full = {name: dotted("muscle_pressure", name) for name in given}
         if given:
-            drive["pressure"] = {name: held(recording, full[name]) - _zero(rig, "muscle_pressure", name) for name in given}
+            drive["pressure"] = {name: _held(recording, full[name]) - _zero(rig, "muscle_pressure", name) for name in given}
     return drive
 
 
@@ -123,15 +125,15 @@ def differences(result: Simulation, recording: Recording) -> dict[str, float]:
     return found
 
 
-def usable(recording: Recording, channel: str, name: str = "") -> bool:
+def _usable(recording: Recording, channel: str, name: str = "") -> bool:
     """Whether a recording has a usable sample of a block's channel."""
     full = dotted(channel, name)
     return full in recording.channels and bool(recording.mask[full].any())
 
 
-def held(recording: Recording, name: str) -> Array:
+def _held(recording: Recording, name: str) -> Array:
     """A channel whose unusable samples repeat the last usable one, as a valve does that hears nothing new."""
-    if not usable(recording, name):
+    if not _usable(recording, name):
         raise RecordingError(f"{recording.name}: no usable {name}, which the rig needs")
     rows = recording.mask[name]
     last = np.maximum.accumulate(np.where(rows, np.arange(rows.size), int(np.argmax(rows))))
@@ -140,8 +142,6 @@ def held(recording: Recording, name: str) -> Array:
 
 
 def _zero(rig: Rig, channel: str, name: str) -> float:
-    """Zero of the sensor of a block's channel: its own, or the common one."""
+    """Zero of the sensor of a block's channel; none where its sensor has none."""
     key = _STATES[channel][1]
-    sensors = rig.tables("sensors")
-    own = sensors.get(name, sensors.get("", {}))
-    return float(own.get(key, 0.0)) if key else 0.0
+    return sensor_zero(rig, key, name) if key else 0.0

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pamrs import _core
-from pamrs.channels import dotted
-from pamrs.driving import Signals, initial_values, signals_of
+from pamrs.channels import channel_of, dotted
+from pamrs.driving import Signals, initial_values, sensor_zero, signals_of
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
 
@@ -174,10 +174,10 @@ class Simulation(Mapping[str, Array]):
 
     def _implied(self) -> float:
         """Gain of mass by the gas law at the rest temperature [kg]."""
-        gas, sensors = self.rig.tables("gas")[""], self.rig.tables("sensors")
+        gas = self.rig.tables("gas")[""]
         total = sum(float(mass[-1] - mass[0]) for mass in self.under("line_mass").values())
         for name, volume in self.under("air_volume").items():
-            zero = float(sensors.get(name, sensors.get("", {})).get("pressure_zero", 0.0))
+            zero = sensor_zero(self.rig, "pressure_zero", name)
             absolute = self._channels[dotted("muscle_pressure", name)] - zero + gas["ambient_pressure"]
             total += float(absolute[-1] * volume[-1] - absolute[0] * volume[0]) / (gas["gas_constant"] * gas["temperature"])
         return total
@@ -352,7 +352,7 @@ def simulate(
         raise ParameterError("duration is missing: a finite time >= 0 s is needed (or give valve_command)")
     check_rows(rig, count)
     start = initial_values(initial, rig)
-    held = {name: signal for name, signal in signals.items() if name.partition(".")[0] in ("valve_command", "supply_command")}
+    held = {name: signal for name, signal in signals.items() if channel_of(name) in ("valve_command", "supply_command")}
     driven = {}
     for name, signal in signals.items():
         if name in held:

@@ -72,18 +72,15 @@ impl<'a> Drive<'a> {
         self.samples
     }
 
-    /// Some of the samples.
+    /// Some of the samples, borrowed.
     #[must_use]
-    pub fn part(&self, range: Range<usize>) -> Drive<'static> {
-        let cut = |values: &Cow<'a, [f64]>| values.get(range.clone()).unwrap_or(&[]).to_vec();
+    pub fn part(&self, range: Range<usize>) -> Drive<'_> {
+        let samples = range.len();
+        let cut = |values| Cow::Borrowed(<[f64]>::get(values, range.clone()).unwrap_or(&[]));
         Drive {
-            samples: range.len(),
-            commands: self.commands.iter().map(|values| Cow::Owned(cut(values))).collect(),
-            prescribed: self
-                .prescribed
-                .iter()
-                .map(|(place, values)| (*place, Cow::Owned(cut(values))))
-                .collect(),
+            samples,
+            commands: self.commands.iter().map(|values| cut(values)).collect(),
+            prescribed: self.prescribed.iter().map(|(place, values)| (*place, cut(values))).collect(),
         }
     }
 

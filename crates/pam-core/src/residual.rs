@@ -398,6 +398,7 @@ fn run<S: Scalar>(
         })
         .collect();
     let skewed = plant.skewed();
+    let driving: Vec<_> = drivers.iter().filter(|driver| !own.contains(&driver.place)).collect();
     let mut stepper = Stepper::new(plant);
     let mut memory = vec![Memory::default(); rig.wiring.groups.len()];
     let mut state = vec![constant::<S>(0.0); stepper.plant.states()];
@@ -472,7 +473,7 @@ fn run<S: Scalar>(
                 timing.step(),
                 &simulated,
                 |fraction, y| {
-                    for driver in drivers.iter().filter(|d| !own.contains(&d.place)) {
+                    for driver in &driving {
                         driver.write(rig, k, (i as f64 + fraction) * h, dt, y);
                     }
                 },

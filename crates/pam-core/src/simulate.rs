@@ -334,12 +334,11 @@ impl Progress {
         }
         plant.start_effects(&mut state);
         let memory = plant.fresh_memory(&state);
-        let stops: Vec<_> = rig.wiring.coordinates.iter().map(|c| c.stops).collect();
         let mut flags = Vec::new();
-        for (k, stops) in stops.iter().enumerate() {
+        for (k, coordinate) in rig.wiring.coordinates.iter().enumerate() {
             let x = state[rig.layout.angle(k)];
-            flags.push(stops.is_some_and(|s| x < s.min_angle));
-            flags.push(stops.is_some_and(|s| x > s.max_angle));
+            flags.push(coordinate.stops.is_some_and(|s| x < s.min_angle));
+            flags.push(coordinate.stops.is_some_and(|s| x > s.max_angle));
         }
         flags.extend(std::iter::repeat_n(false, rig.wiring.valves.len() + rig.wiring.lines.len()));
         let inputs = if plant.skewed() { rig.names.inputs.len() } else { 0 };

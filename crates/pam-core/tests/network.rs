@@ -301,19 +301,17 @@ fn a_rig_goes_on_from_its_numbers_bit_for_bit() {
     let rig = Rig::new(two_joints()).unwrap();
     let timing = Timing::new(0.005, 1e-3).unwrap().stable(&rig);
     let (a, b) = (wave(120, 0.0), wave(120, 1.0));
-    let drive = |range: std::ops::Range<usize>| {
-        let signals: [(&str, &[f64]); 2] = [("valve_command.elbow", &a), ("valve_command.wrist", &b)];
-        pam_core::drive::Drive::new(&rig, 120, &signals).unwrap().part(range)
-    };
+    let signals: [(&str, &[f64]); 2] = [("valve_command.elbow", &a), ("valve_command.wrist", &b)];
+    let drive = pam_core::drive::Drive::new(&rig, 120, &signals).unwrap();
     let mut whole = Progress::start(&rig, &Initial::rest(&rig)).unwrap();
     let mut out = Trajectory::new(&rig, 120);
-    whole.advance(&rig, timing, &drive(0..120), &mut out).unwrap();
+    whole.advance(&rig, timing, &drive.part(0..120), &mut out).unwrap();
     let mut first = Progress::start(&rig, &Initial::rest(&rig)).unwrap();
     let mut parts = Trajectory::new(&rig, 120);
-    first.advance(&rig, timing, &drive(0..50), &mut parts).unwrap();
+    first.advance(&rig, timing, &drive.part(0..50), &mut parts).unwrap();
     let fresh = Progress::start(&rig, &Initial::rest(&rig)).unwrap();
     let mut again = fresh.restored(&first.to_vec()).unwrap();
-    again.advance(&rig, timing, &drive(50..120), &mut parts).unwrap();
+    again.advance(&rig, timing, &drive.part(50..120), &mut parts).unwrap();
     assert_eq!(parts, out);
     assert!(fresh.restored(&[1.0]).unwrap_err().to_string().contains("state"));
 }

@@ -19,6 +19,7 @@ from pamrs.diagnosis.fitting import Problem
 from pamrs.diagnosis.hypotheses import examine
 from pamrs.diagnosis.result import Diagnosis
 from pamrs.diagnosis.signals import Prepared, prepare
+from pamrs.driving import regulators_of
 from pamrs.errors import DiagnosisError, SimulationError
 from pamrs.simulation import core_rig
 
@@ -80,7 +81,7 @@ def diagnose(case: Case | str | os.PathLike[str], *, progress: Callable[[str], N
         raise DiagnosisError(
             f"the rig of case {case.name!r} has named blocks ({', '.join(several)}); rigs of one chain can be diagnosed, without names"
         )
-    if any(supply["kind"] == "regulator" for supply in rig.tables("supply").values()):
+    if regulators_of(rig):
         raise DiagnosisError(
             f"the rig of case {case.name!r} is fed by a regulator; rigs fed by a tank or a constant supply can be diagnosed"
         )

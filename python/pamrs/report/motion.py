@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from pamrs.channels import dotted
+from pamrs.channels import channel_of, dotted
 from pamrs.errors import ParameterError
 from pamrs.report.figures import COLOURS, STYLE, decimate
 
@@ -69,9 +69,9 @@ def channels_png(result: Simulation, measured: Mapping[str, tuple[Array, Array]]
         figure = Figure(figsize=(10.0, 1.0 + 1.75 * len(moving)), dpi=110, layout="constrained")
         rows = figure.subplots(len(moving), 1, sharex=True, squeeze=False)[:, 0]
         for axes, (title, unit, factor, names) in zip(rows, moving, strict=True):
-            heads = [name.partition(".")[0] for name in names]
+            heads = [channel_of(name) for name in names]
             for name, head in zip(names, heads, strict=True):
-                label, nth = _label(name, len(set(heads)) > 1), [n for n in names if n.partition(".")[0] == head].index(name)
+                label, nth = _label(name, len(set(heads)) > 1), [n for n in names if channel_of(n) == head].index(name)
                 other = _recorded(name, given)
                 if other:
                     time, value = given[other]
@@ -93,7 +93,7 @@ def channels_png(result: Simulation, measured: Mapping[str, tuple[Array, Array]]
 
 def _of(result: Simulation, heads: tuple[str, ...]) -> list[str]:
     """The simulated channels of a panel."""
-    return [name for head in heads for name in result if name.partition(".")[0] == head]
+    return [name for head in heads for name in result if channel_of(name) == head]
 
 
 def _recorded(name: str, given: Mapping[str, Any]) -> str:

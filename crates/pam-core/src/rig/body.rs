@@ -21,7 +21,7 @@ pub(crate) enum Body<S> {
     Planar4(PlanarArm<S, 4>),
 }
 
-/// Rates of change that a body answers to, for the choice of a step [1/s].
+/// Angles of each joint in the grid of poses that an arm's fastest rate is looked for on.
 const POSES: usize = 9;
 
 impl<S: Scalar> Body<S> {

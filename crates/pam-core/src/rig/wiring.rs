@@ -80,7 +80,7 @@ impl Wiring {
         }
         let coordinates = coordinates(spec)?;
         let groups = groups(spec, known, &mut table)?;
-        let body = body(spec, &mut table)?;
+        let body = body(spec, &mut table);
         sensors(spec, &mut table, &mut gases)?;
         let coordinates = zeros(spec, &table, coordinates);
         let mut wiring = Self {

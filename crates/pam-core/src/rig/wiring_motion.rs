@@ -104,7 +104,7 @@ fn load_stops(load: &LoadSpec, rest: f64) -> Option<Stops> {
 }
 
 pub(super) fn groups(spec: &RigSpec, known: &[Group], table: &mut Parameters) -> Result<Vec<Group>> {
-    let mut units = Vec::new();
+    let mut units: Vec<Group> = Vec::new();
     for (k, group) in spec.muscles.iter().enumerate() {
         let block = dotted("muscle", &group.name);
         let chamber = spec.chambers.iter().position(|c| dotted("chamber", &c.name) == group.chamber);
@@ -142,7 +142,7 @@ pub(super) fn groups(spec: &RigSpec, known: &[Group], table: &mut Parameters) ->
         let muscle = match again {
             Some(muscle) => muscle,
             None => match spec.muscles[..k].iter().position(|m| m.muscle == group.muscle) {
-                Some(same) => Group::clone(&units[same]).muscle,
+                Some(same) => units[same].muscle.clone(),
                 None => CompiledMuscle::new(Muscle::new(&group.muscle)?)?,
             },
         };
@@ -164,21 +164,21 @@ pub(super) fn groups(spec: &RigSpec, known: &[Group], table: &mut Parameters) ->
     Ok(units)
 }
 
-pub(super) fn body(spec: &RigSpec, table: &mut Parameters) -> Result<BodyUnit> {
+pub(super) fn body(spec: &RigSpec, table: &mut Parameters) -> BodyUnit {
     if let Some(load) = spec.load.as_ref().filter(|load| !load.is_frame()) {
-        return Ok(BodyUnit::Mass(HangingMass {
+        return BodyUnit::Mass(HangingMass {
             mass: load.mass,
             viscous: load.viscous,
             coulomb: load.coulomb,
             coulomb_speed: load.coulomb_speed,
             gravity: load.gravity,
-        }));
+        });
     }
-    let Some(arm) = &spec.arm else { return Ok(BodyUnit::Fixed) };
+    let Some(arm) = &spec.arm else { return BodyUnit::Fixed };
     if arm.kind == "planar" {
-        return Ok(planar(arm, table));
+        return planar(arm, table);
     }
-    Ok(BodyUnit::OneLink {
+    BodyUnit::OneLink {
         inertia: table.add("arm.inertia".into(), arm.inertia),
         first_moment: table.add("arm.first_moment".into(), arm.first_moment),
         payload: table.add("arm.payload".into(), arm.payload),
@@ -187,7 +187,7 @@ pub(super) fn body(spec: &RigSpec, table: &mut Parameters) -> Result<BodyUnit> {
         length: arm.length,
         coulomb_speed: arm.coulomb_speed,
         gravity: arm.gravity,
-    })
+    }
 }
 
 fn planar(arm: &ArmSpec, table: &mut Parameters) -> BodyUnit {
