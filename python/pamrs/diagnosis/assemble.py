@@ -84,9 +84,31 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
         traces=_traces(fitted, held, fit_found, out_found),
         blocks=_block_table(groups),
         condition_map=picture.map,
+        tried=_tried(groups),
     )
     diagnosis.text = words.verdict(diagnosis, named, case, gap)
     return diagnosis
+
+
+def _tried(groups: list[Group]) -> list[dict[str, Any]]:
+    """Every set of effects that was fitted, with what it leaves of each block's excess."""
+    return [
+        {
+            "blocks": [b.name for b in group.blocks],
+            "effects": list(candidate.effects),
+            "fitted": {b: e.ratio for b, e in candidate.fitted.items()},
+            "held_out": {b: e.ratio for b, e in candidate.held_out.items()},
+            "gap_closed": candidate.gap_closed,
+            "scatter": candidate.scatter,
+            "values": {n: v for n, v in candidate.fit.values.items() if n.partition(".")[0] in EFFECTS},
+            "std": {n: v for n, v in candidate.fit.std.items() if n.partition(".")[0] in EFFECTS},
+            "prior": sum(v * v for v in candidate.fit.moved.values()),
+            "suspects": [b.name for b in group.suspects],
+            "gain": candidate.gain,
+        }
+        for group in groups
+        for candidate in group.candidates
+    ]
 
 
 def _named(group: Group) -> bool:
@@ -135,7 +157,7 @@ def _probabilities(groups: list[Group]) -> tuple[dict[str, float], dict[str, flo
     for choice in itertools.product(*(g.probabilities.items() for g in groups)):
         weight = math.prod(p for _, p in choice)
         names = [n for n, _ in choice if n]
-        key = "unlisted" if "unlisted" in names else "+".join(sorted(n for k in names for n in k.split("+")))
+        key = "unlisted" if "unlisted" in names else "+".join(sorted({n for k in names for n in k.split("+")}))
         out[key] = out.get(key, 0.0) + weight
     # a mismatch this significant leaves next to nothing for wrong parameters
     rest = 0.005

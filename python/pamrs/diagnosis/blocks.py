@@ -18,8 +18,8 @@ Array = NDArray[np.float64]
 
 STEP = 2.5e-3
 """Longest RK4 step of the cut chain [s]."""
-CHAMBER_STEP = 1.25e-3
-"""Same for the gas blocks, whose laminar zone is stiffer."""
+CHAMBER_STEP = 5e-3
+"""Same for the gas blocks, between measured angles and pressures; the core divides it until it is stable."""
 
 
 @dataclass(frozen=True)

@@ -9,10 +9,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from pamrs import _core
 from pamrs.diagnosis.blocks import Block, Residual, change, residual
+from pamrs.diagnosis.leastsquares import levenberg_marquardt
 from pamrs.diagnosis.signals import Prepared, binned
 from pamrs.effects_table import EFFECTS, find_parameter
 from pamrs.errors import SimulationError
@@ -114,10 +114,11 @@ def residuals(problem: Problem, rig: Rig, names: Sequence[str] = ()) -> dict[Key
         block, prepared = task
         relevant = [name for name in names if depends(block, name)]
         found = residual(block, core, prepared, relevant)
-        if found.jacobian is None or len(relevant) == len(names):
+        if len(relevant) == len(names):
             return found
         full = np.zeros((found.value.size, len(names)))
         for column, name in enumerate(relevant):
+            assert found.jacobian is not None
             full[:, list(names).index(name)] = found.jacobian[:, column]
         return replace(found, jacobian=full)
 
@@ -175,9 +176,9 @@ class _Scaling:
     def value(self, name: str, x: float) -> float:
         if name in self.centre:
             return self.centre[name] + x * self.scale[name]
-        if name in LOGARITHMIC:
-            return self.starts[name] * math.exp(x)
-        return max(find_parameter(name).lower, x * self.scale[name])
+        info = find_parameter(name)
+        found = self.starts[name] * math.exp(x) if name in LOGARITHMIC else x * self.scale[name]
+        return min(max(found, info.lower), info.upper)
 
     def slope(self, name: str, x: float) -> float:
         return self.value(name, x) if name in LOGARITHMIC else self.scale[name]
@@ -256,7 +257,8 @@ def fit(
     inflation: dict[str, float],
     *,
     fixed: dict[str, float] | None = None,
-    warm: dict[str, float] | None = None,
+    warm: Fit | None = None,
+    frozen: bool = False,
     evaluations: int = 12,
 ) -> Fit:
     """Fit baseline parameters (with their tolerances as priors) and effects to the recordings.
@@ -275,67 +277,40 @@ def fit(
         Variance of each block's binned residual relative to white sample noise (coloured residuals count less).
     fixed : dict of str to float, optional
         Effect parameters that are held.
-    warm : dict of str to float, optional
-        Baseline values to start from.
+    warm : Fit, optional
+        A fit of the same problem from whose baseline values to start.
+    frozen : bool, optional
+        Take the sensitivities of the baseline parameters from ``warm`` and compute those of the effects alone.
     evaluations : int, optional
         Limit on evaluations.
+
+    Raises
+    ------
+    SimulationError
+        If the model leaves the range in which it holds where the fit starts.
     """
     baseline = free_baseline(problem, nominal)
     scaling = _Scaling(nominal, baseline, starts)
     count = len(baseline)
-    memo: dict[bytes, tuple[Array, Array, dict[Key, Residual]]] = {}
-    spent = 0
+    kept = _jacobian_of(warm, baseline) if frozen and warm is not None else None
+    asked = scaling.names if kept is None else list(starts)
+    prior = np.zeros((count, len(scaling.names)))
+    prior[:, :count] = np.eye(count)
 
     def evaluate(x: Array) -> tuple[Array, Array, dict[Key, Residual]]:
-        nonlocal spent
-        key = x.tobytes()
-        if key not in memo:
-            spent += 1
-            try:
-                found = residuals(problem, scaling.rig(x, fixed or {}), scaling.names)
-            except SimulationError:
-                if not memo:
-                    raise
-                # beyond the model's range: a step that the optimiser must take back
-                last, jacobian, kept = next(iter(memo.values()))
-                return 1e3 * np.sign(last) * (1.0 + np.abs(last)), jacobian, kept
-            memo.clear()
-            slopes = np.array([scaling.slope(n, float(v)) for n, v in zip(scaling.names, x, strict=True)])
-            rows, slope = stacked(problem, found, inflation)
-            prior = np.zeros((count, len(scaling.names)))
-            prior[:, :count] = np.eye(count)
-            jacobian = np.zeros((rows.size, 0)) if slope is None else slope * slopes
-            memo[key] = (np.concatenate([rows, x[:count]]), np.concatenate([jacobian, prior]), found)
-        return memo[key]
-
-    def weighted(x: Array) -> Array:
-        return evaluate(x)[0]
-
-    def slopes_of(x: Array) -> Array:
-        return evaluate(x)[1]
+        found = residuals(problem, scaling.rig(x, fixed or {}), asked)
+        if kept is not None:
+            found = {key: replace(r, jacobian=_beside(kept[key], r.jacobian)) for key, r in found.items()}
+        rows, slope = stacked(problem, found, inflation)
+        slopes = np.array([scaling.slope(n, float(v)) for n, v in zip(scaling.names, x, strict=True)])
+        jacobian = np.zeros((rows.size, 0)) if slope is None else slope * slopes
+        return np.concatenate([rows, x[:count]]), np.concatenate([jacobian, prior]), found
 
     start = scaling.start.copy()
     for index, name in enumerate(baseline):
-        if warm and name in warm:
-            start[index] = (warm[name] - scaling.centre[name]) / scaling.scale[name]
-    margin = 1e-9 * (scaling.bounds[1] - scaling.bounds[0])
-    start = np.clip(start, scaling.bounds[0] + margin, scaling.bounds[1] - margin)
-    if start.size:
-        # a start on a bound makes the trust-region step overflow harmlessly inside SciPy
-        with np.errstate(all="ignore"):
-            solution = least_squares(
-                weighted,
-                start,
-                jac=slopes_of,
-                bounds=scaling.bounds,
-                max_nfev=evaluations,
-                ftol=1e-5,
-                xtol=1e-5,
-            )
-        x = solution.x
-    else:
-        x = start
-    values, jacobian, found = evaluate(x)
+        if warm is not None and name in warm.values:
+            start[index] = (warm.values[name] - scaling.centre[name]) / scaling.scale[name]
+    x, (values, jacobian, found), spent = levenberg_marquardt(evaluate, start, scaling.bounds, evaluations)
     covariance: Array = np.zeros((0, 0))
     if x.size:
         covariance = np.asarray(np.linalg.pinv(jacobian.T @ jacobian, hermitian=True), dtype=np.float64)
@@ -346,3 +321,13 @@ def fit(
     moved = {n: float(v) for n, v in zip(baseline, x[:count], strict=True)}
     rig = scaling.rig(x, fixed or {})
     return Fit(effects, rig, named, std, covariance, 0.5 * float(values @ values), found, moved, spent, scales)
+
+
+def _jacobian_of(fitted: Fit, names: Sequence[str]) -> dict[Key, Array]:
+    """Sensitivities that a fit ended with, for some of its parameters."""
+    columns = [list(fitted.values).index(name) for name in names]
+    return {key: r.jacobian[:, columns] for key, r in fitted.residuals.items() if r.jacobian is not None}
+
+
+def _beside(left: Array, right: Array | None) -> Array:
+    return left if right is None else np.concatenate([left, right], axis=1)

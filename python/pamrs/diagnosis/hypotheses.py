@@ -49,6 +49,8 @@ class Candidate:
         On the recordings to fit.
     held_out : dict of str to Excess
         By block, on held-out recordings (on the fitted ones if there are no others).
+    fitted : dict of str to Excess
+        By block, on the recordings to fit.
     gap_closed : float
         Share of the baseline's excess that it removes on held-out recordings.
     scatter : float
@@ -58,8 +60,10 @@ class Candidate:
     effects: tuple[str, ...]
     fit: Fit
     held_out: dict[str, Excess]
+    fitted: dict[str, Excess]
     gap_closed: float
     scatter: float = 0.0
+    gain: float = 0.0
 
     @property
     def misfit(self) -> float:
@@ -92,6 +96,7 @@ class Group:
     probabilities: dict[str, float]
     mismatch: Block | None
     floor: dict[Key, Floor]
+    suspects: list[Block]
 
     @property
     def best(self) -> Candidate:
@@ -126,16 +131,16 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
     if held is not fitted:
         floor |= floors(outer, outer.core.respecified(first.rig.to_json()))
     colour = {b.name: inflation(b, inner.recordings, first.residuals, FIT_BIN) for b in blocks}
-    baseline = fit(inner, nominal, (), {}, colour, warm=first.values) if max(colour.values()) > 2 else first
+    baseline = fit(inner, nominal, (), {}, colour, warm=first) if max(colour.values()) > 2 else first
     was = {b.name: excess(b, inner.recordings, before, floor) for b in blocks}
     now = {b.name: excess(b, inner.recordings, baseline.residuals, floor) for b in blocks}
     outside = residuals(outer, baseline.rig) if held is not fitted else baseline.residuals
     out = {b.name: excess(b, outer.recordings, outside, floor) for b in blocks}
-    start = Candidate((), baseline, out, 0.0)
+    start = Candidate((), baseline, out, now, 0.0)
     suspects = [b for b in blocks if significant(now[b.name]) and (held is fitted or out[b.name].ratio > 1.25)]
     if not suspects:
         # a parameter at the end of its plausible range is a symptom even where the fit is good
-        return Group(blocks, was, now, [start], {"": 1.0}, None, floor)
+        return Group(blocks, was, now, [start], {"": 1.0}, None, floor, [])
     mismatch = max(suspects, key=lambda b: out[b.name].ratio)
     say(f"{names}: {mismatch.name} keeps {now[mismatch.name].systematic:.2g} noise units after the refit")
     acting = [e for e in EFFECTS if _fits(nominal, e) and any(acts_in(e, b) for b in suspects)]
@@ -147,7 +152,7 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
     pairs = [] if settled else _pairs(trial, screened, singles, lambda text: say(f"{names}: {text}"))
     candidates = [start, *singles, *pairs]
     doubt = _doubt(fitted, held, mismatch, now[mismatch.name].rms)
-    return Group(blocks, was, now, candidates, _weigh(candidates, suspects, outer, doubt), mismatch, floor)
+    return Group(blocks, was, now, candidates, _weigh(candidates, suspects, outer, doubt), mismatch, floor, suspects)
 
 
 def _fits(rig: Rig, effect: str) -> bool:
@@ -199,10 +204,11 @@ class _Trial:
         """A fitted set on the held-out recordings."""
         outside = found.residuals if self.same else residuals(self.outer, found.rig)
         after = {b.name: excess(b, self.outer.recordings, outside, self.floor) for b in self.inner.blocks}
+        inside = after if self.same else {b.name: excess(b, self.inner.recordings, found.residuals, self.floor) for b in self.inner.blocks}
         gaps = [(self.out[b.name].ratio - 1.0, max(0.0, after[b.name].ratio - 1.0)) for b in self.suspects]
         total = sum(math.sqrt(max(0.0, g)) for g, _ in gaps)
         gap = 1.0 - sum(math.sqrt(a) for _, a in gaps) / total if total > 0 else 0.0
-        return Candidate(effects, found, after, gap, _scatter(effects, self.inner, found))
+        return Candidate(effects, found, after, inside, gap, _scatter(effects, self.inner, found))
 
     def fitted(self, starts: list[Start], warm: Fit, inflation_: dict[str, float]) -> Candidate | None:
         """A set of effects fitted from one start of each, residuals weighted by their own colour; None where it cannot be run."""
@@ -211,12 +217,12 @@ class _Trial:
         held = {name: value for start in starts for name, value in start.held.items()}
         limit = 30 if self.nominal.model["valve"] is None else 8
         try:
-            best = fit(self.inner, self.nominal, effects, free, inflation_, fixed=held, warm=warm.values, evaluations=limit)
+            best = fit(self.inner, self.nominal, effects, free, inflation_, fixed=held, warm=warm, frozen=True, evaluations=limit)
             colour = {b.name: inflation(b, self.inner.recordings, best.residuals, FIT_BIN) for b in self.inner.blocks}
             if max(colour.values()) > 2:
                 again = {n: v for n, v in best.values.items() if n.partition(".")[0] in EFFECTS}
                 again = {n: v if abs(v) > 1e-3 * _typical(n) else 1e-3 * _typical(n) for n, v in again.items()}
-                best = fit(self.inner, self.nominal, effects, again, colour, fixed=held, warm=best.values, evaluations=limit)
+                best = fit(self.inner, self.nominal, effects, again, colour, fixed=held, warm=best, frozen=True, evaluations=limit)
             return self.judged(effects, best)
         except SimulationError:
             return None  # it leaves the range in which the model holds
@@ -236,7 +242,7 @@ def _singles(trial: _Trial, screened: Screen, baseline: Fit, say: Callable[[str]
         tried = [trial.fitted([s.start.scaled(s.size)], baseline, white) for s in near[: STARTS if place < RICH else 1]]
         fitted = [candidate for candidate in tried if candidate is not None]
         if fitted:
-            found.append(min(fitted, key=lambda c: c.misfit))
+            found.append(replace(min(fitted, key=lambda c: c.misfit), gain=gains[effect]))
     return found
 
 

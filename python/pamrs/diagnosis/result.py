@@ -197,6 +197,7 @@ class Diagnosis:
     blocks: dict[str, dict[str, Any]] = field(default_factory=dict)
     condition_map: dict[str, Any] | None = None
     timings: dict[str, float] = field(default_factory=dict)
+    tried: list[dict[str, Any]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         if self.verdict not in VERDICTS:

@@ -1,0 +1,111 @@
+"""Bounded least squares by Levenberg and Marquardt on the normal equations.
+
+The residuals of a diagnosis are tens of thousands of rows of a dozen parameters, one evaluation gives rows and sensitivities together, and a
+gain that the noise could have made is worth no further evaluation. SciPy's `least_squares` decomposes the tall matrix at every step, evaluates
+rows and sensitivities apart, and its tolerances are relative: it took four times as long to the same end (docs/decisions/0014).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pamrs.errors import SimulationError
+
+__all__ = ["levenberg_marquardt"]
+
+Array = NDArray[np.float64]
+T = TypeVar("T")
+
+WORTH = 0.2
+"""Gain in chi-square below which a step is not worth an evaluation."""
+DAMPING, HARDEST = 1e-4, 1e8
+
+
+def levenberg_marquardt(
+    evaluate: Callable[[Array], tuple[Array, Array, T]], start: Array, bounds: tuple[Array, Array], evaluations: int
+) -> tuple[Array, tuple[Array, Array, T], int]:
+    """Minimise half the sum of squares inside a box.
+
+    Parameters
+    ----------
+    evaluate : callable
+        Rows (n,), their sensitivities (n, k) and whatever else is wanted of the best point. A `SimulationError` after the first
+        evaluation is a step that is taken back.
+    start : (k,) array
+        Where to begin; moved into the box.
+    bounds : (k,) arrays
+        The box.
+    evaluations : int
+        Limit, the first included.
+
+    Returns
+    -------
+    x : (k,) array
+        The best point.
+    best : tuple
+        What ``evaluate`` gave there.
+    spent : int
+        Evaluations.
+
+    Raises
+    ------
+    SimulationError
+        If the start cannot be evaluated.
+
+    References
+    ----------
+    Marquardt (1963); active bounds as in Kanzow, Yamashita & Fukushima (2004).
+    """
+    low, high = bounds
+    x = np.clip(start, low, high)
+    best = evaluate(x)
+    spent, damping = 1, DAMPING
+    while x.size and spent < evaluations:
+        rows, jacobian, _ = best
+        gradient = jacobian.T @ rows
+        normal = jacobian.T @ jacobian
+        step = _step(x, gradient, normal, damping, low, high)
+        if -2.0 * float(gradient @ step) - float(step @ normal @ step) < WORTH:
+            break
+        tried = np.clip(x + step, low, high)
+        spent += 1
+        try:
+            found = evaluate(tried)
+        except SimulationError:
+            damping = max(10.0 * damping, 1e-2)
+            continue
+        promised = -float(gradient @ step) - 0.5 * float(step @ normal @ step)
+        gained = 0.5 * float(rows @ rows - found[0] @ found[0])
+        if gained > 0.0:
+            x, best = tried, found
+            damping = damping * 0.1 if gained > 0.5 * promised else damping * (2.0 if gained < 0.1 * promised else 1.0)
+            damping = max(damping, 1e-9)
+        else:
+            damping = max(10.0 * damping, 1e-2)
+            if damping > HARDEST:
+                break
+    return x, best, spent
+
+
+def _step(x: Array, gradient: Array, normal: Array, damping: float, low: Array, high: Array) -> Array:
+    """Damped step of the free parameters; those that would leave the box go to its wall, and the others are solved again."""
+    step = np.zeros_like(x)
+    free = ~(((x <= low) & (gradient > 0.0)) | ((x >= high) & (gradient < 0.0)))
+    scale = np.diag(normal).copy()
+    scale[scale <= 0.0] = 1.0
+    for _ in range(x.size):
+        if not free.any():
+            break
+        inner = normal[np.ix_(free, free)] + np.diag(damping * scale[free])
+        right = -(gradient[free] + normal[np.ix_(free, ~free)] @ step[~free])
+        step[free] = np.linalg.lstsq(inner, right, rcond=1e-12)[0]
+        out = free & ((x + step < low) | (x + step > high))
+        if not out.any():
+            break
+        step[out] = np.where(x[out] + step[out] < low[out], low[out], high[out]) - x[out]
+        free &= ~out
+    return step
