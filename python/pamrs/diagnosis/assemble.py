@@ -11,9 +11,10 @@ import numpy as np
 from pamrs.case import Case
 from pamrs.channels import unit_of
 from pamrs.diagnosis import words
+from pamrs.diagnosis.blocks import Residual
 from pamrs.diagnosis.conditions import Picture, describe
 from pamrs.diagnosis.evidence import Floor
-from pamrs.diagnosis.fitting import Key, Problem, residuals
+from pamrs.diagnosis.fitting import Events, Key, Problem, residuals
 from pamrs.diagnosis.hypotheses import Candidate, Group, significant
 from pamrs.diagnosis.result import Diagnosis, Trace
 from pamrs.effects_table import EFFECTS
@@ -21,8 +22,10 @@ from pamrs.rig import Rig
 
 __all__ = ["assemble"]
 
-SYMPTOM = 3.5
+SYMPTOM = 2.9
 """Tolerances beyond which a refitted parameter is a symptom of missing physics, not a result."""
+SHARED = 6.0
+"""Odds of one effect that acts in two blocks to two effects."""
 SETTLED = 0.9
 """Probability from which an answer counts as settled."""
 
@@ -55,8 +58,9 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
         model = baseline
     floor = {k: v for g in groups for k, v in g.floor.items()}
     stages = {"before": nominal, "refit": baseline, "after": model}
-    fit_found = {s: residuals(fitted, rig) for s, rig in stages.items()}
-    out_found = fit_found if held is fitted else {s: residuals(held, rig) for s, rig in stages.items()}
+    events = next((c.fit.events for c in chosen if c.fit.events is not None), None) if verdict == "effects" else None
+    fit_found = {s: _run(fitted, rig, events if s == "after" else None) for s, rig in stages.items()}
+    out_found = fit_found if held is fitted else {s: _run(held, rig, events if s == "after" else None) for s, rig in stages.items()}
     located = _located(groups, symptoms)
     picture = Picture()
     if located is not None:
@@ -88,6 +92,11 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
     )
     diagnosis.text = words.verdict(diagnosis, named, case, gap)
     return diagnosis
+
+
+def _run(problem: Problem, rig: Rig, events: Events | None) -> dict[Key, Residual]:
+    """Residuals of a model; what happened in single recordings in the place of what its file says."""
+    return residuals(problem, rig if events is None else rig.without_effect(events.effect), (), events)
 
 
 def _tried(groups: list[Group]) -> list[dict[str, Any]]:
@@ -157,8 +166,12 @@ def _probabilities(groups: list[Group]) -> tuple[dict[str, float], dict[str, flo
     for choice in itertools.product(*(g.probabilities.items() for g in groups)):
         weight = math.prod(p for _, p in choice)
         names = [n for n, _ in choice if n]
+        apart = [n for k in names for n in k.split("+")]
+        weight *= SHARED ** (len(apart) - len(set(apart)))  # one effect seen in two places, not two
         key = "unlisted" if "unlisted" in names else "+".join(sorted({n for k in names for n in k.split("+")}))
         out[key] = out.get(key, 0.0) + weight
+    total = sum(out.values())
+    out = {k: p / total for k, p in out.items()}
     # a mismatch this significant leaves next to nothing for wrong parameters
     rest = 0.005
     out = {k: p * (1.0 - rest) for k, p in out.items()}

@@ -19,7 +19,7 @@ from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 from pamrs.simulation import core_rig
 
-__all__ = ["Fit", "Problem", "changes", "fit", "residuals", "stacked"]
+__all__ = ["Events", "Fit", "Problem", "changes", "fit", "residuals", "stacked"]
 
 Array = NDArray[np.float64]
 Key = tuple[str, str]
@@ -44,6 +44,8 @@ ACTS: dict[str, tuple[str, ...]] = {
     "clock_skew": ("supply", "chamber", "arm"),
 }
 """Blocks of the cut chain in which the effects of a block of the rig, or one effect, act."""
+WIDEST = 3.0
+"""Tolerances that a baseline parameter may move: farther out it would stand for physics that is missing."""
 FIT_BIN = 0.02
 """Width of the bins over which residuals are averaged for fitting [s]."""
 
@@ -65,6 +67,22 @@ class Problem:
     blocks: list[Block]
     recordings: list[Prepared]
     core: _core.Rig
+
+
+@dataclass(frozen=True)
+class Events:
+    """An effect that happens at times of its own in each recording.
+
+    Attributes
+    ----------
+    effect : str
+        Its id.
+    values : dict of str to dict
+        Its parameters (SI) by recording; a recording without an entry has none.
+    """
+
+    effect: str
+    values: dict[str, dict[str, float]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,6 +109,8 @@ class Fit:
         Number of evaluations.
     scales : dict of str to float
         Change of each free parameter per unit of its scaled one, SI.
+    events : Events or None
+        What happens in single recordings.
     """
 
     effects: tuple[str, ...]
@@ -103,17 +123,35 @@ class Fit:
     moved: dict[str, float] = field(default_factory=dict)
     evaluations: int = 0
     scales: dict[str, float] = field(default_factory=dict)
+    events: Events | None = None
 
 
-def residuals(problem: Problem, rig: Rig, names: Sequence[str] = ()) -> dict[Key, Residual]:
-    """Residuals of a model for every block and recording; jacobians for the names that a block depends on."""
+def residuals(problem: Problem, rig: Rig, names: Sequence[str] = (), events: Events | None = None) -> dict[Key, Residual]:
+    """Residuals of a model for every block and recording; jacobians for the names that a block depends on.
+
+    Parameters
+    ----------
+    problem : Problem
+        Blocks and recordings.
+    rig : Rig
+        The model.
+    names : sequence of str, optional
+        Dotted parameters to differentiate with respect to.
+    events : Events, optional
+        What happens in single recordings, beside the model.
+    """
     core = problem.core.respecified(rig.to_json())
+    own = {
+        prepared.recording.name: problem.core.respecified(rig.with_effect(events.effect, values).to_json())
+        for prepared in problem.recordings
+        if events is not None and (values := events.values.get(prepared.recording.name))
+    }
     tasks = [(block, prepared) for prepared in problem.recordings for block in problem.blocks]
 
     def one(task: tuple[Block, Prepared]) -> Residual:
         block, prepared = task
         relevant = [name for name in names if depends(block, name)]
-        found = residual(block, core, prepared, relevant)
+        found = residual(block, own.get(prepared.recording.name, core), prepared, relevant)
         if len(relevant) == len(names):
             return found
         full = np.zeros((found.value.size, len(names)))
@@ -159,8 +197,8 @@ class _Scaling:
         known = nominal.parameters
         self.scale = {n: known[n].tol for n in baseline}
         self.centre = {n: known[n].value for n in baseline}
-        lower = [max(-6.0, (known[n].lower - self.centre[n]) / self.scale[n]) for n in baseline]
-        upper = [min(6.0, (known[n].upper - self.centre[n]) / self.scale[n]) for n in baseline]
+        lower = [max(-WIDEST, (known[n].lower - self.centre[n]) / self.scale[n]) for n in baseline]
+        upper = [min(WIDEST, (known[n].upper - self.centre[n]) / self.scale[n]) for n in baseline]
         for name, start in starts.items():
             info = find_parameter(name)
             if name in LOGARITHMIC:
@@ -259,6 +297,7 @@ def fit(
     fixed: dict[str, float] | None = None,
     warm: Fit | None = None,
     frozen: bool = False,
+    events: Events | None = None,
     evaluations: int = 12,
 ) -> Fit:
     """Fit baseline parameters (with their tolerances as priors) and effects to the recordings.
@@ -281,6 +320,8 @@ def fit(
         A fit of the same problem from whose baseline values to start.
     frozen : bool, optional
         Take the sensitivities of the baseline parameters from ``warm`` and compute those of the effects alone.
+    events : Events, optional
+        What happens in single recordings, held.
     evaluations : int, optional
         Limit on evaluations.
 
@@ -298,7 +339,7 @@ def fit(
     prior[:, :count] = np.eye(count)
 
     def evaluate(x: Array) -> tuple[Array, Array, dict[Key, Residual]]:
-        found = residuals(problem, scaling.rig(x, fixed or {}), asked)
+        found = residuals(problem, scaling.rig(x, fixed or {}), asked, events)
         if kept is not None:
             found = {key: replace(r, jacobian=_beside(kept[key], r.jacobian)) for key, r in found.items()}
         rows, slope = stacked(problem, found, inflation)
@@ -320,7 +361,7 @@ def fit(
     std = {n: float(s) * scales[n] for n, s in zip(scaling.names, spread, strict=True)}
     moved = {n: float(v) for n, v in zip(baseline, x[:count], strict=True)}
     rig = scaling.rig(x, fixed or {})
-    return Fit(effects, rig, named, std, covariance, 0.5 * float(values @ values), found, moved, spent, scales)
+    return Fit(effects, rig, named, std, covariance, 0.5 * float(values @ values), found, moved, spent, scales, events)
 
 
 def _jacobian_of(fitted: Fit, names: Sequence[str]) -> dict[Key, Array]:

@@ -20,8 +20,8 @@ __all__ = ["levenberg_marquardt"]
 Array = NDArray[np.float64]
 T = TypeVar("T")
 
-WORTH = 0.2
-"""Gain in chi-square below which a step is not worth an evaluation."""
+WORTH, SHARE = 0.2, 2e-3
+"""Gain in chi-square, and share of what there is, below which a step is not worth an evaluation."""
 DAMPING, HARDEST = 1e-4, 1e8
 
 
@@ -69,7 +69,7 @@ def levenberg_marquardt(
         gradient = jacobian.T @ rows
         normal = jacobian.T @ jacobian
         step = _step(x, gradient, normal, damping, low, high)
-        if -2.0 * float(gradient @ step) - float(step @ normal @ step) < WORTH:
+        if -2.0 * float(gradient @ step) - float(step @ normal @ step) < max(WORTH, SHARE * float(rows @ rows)):
             break
         tried = np.clip(x + step, low, high)
         spent += 1

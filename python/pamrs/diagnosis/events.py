@@ -1,0 +1,233 @@
+"""Effects that happen at times of their own in every recording: pushes from outside, a payload that changes.
+
+No parameter that all recordings share can describe them. In each recording a pulse or a step of a typical size is moved through time; where its
+signature takes most of the residual a fit begins. On a held-out recording the times are looked for again, since nothing can predict them;
+what the event is (a mass) is not. Pushes have no property that carries over, so that they are believed only if little is left.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pamrs.diagnosis.blocks import Residual
+from pamrs.diagnosis.fitting import Events, Fit, Key, Problem, changes, fit, residuals, stacked
+from pamrs.diagnosis.leastsquares import levenberg_marquardt
+from pamrs.diagnosis.signals import Prepared
+from pamrs.effects_table import find_parameter
+from pamrs.errors import SimulationError
+from pamrs.rig import Rig
+
+__all__ = ["EVENTS", "fit_events", "look_for_events"]
+
+Array = NDArray[np.float64]
+
+EVENTS = {"external_torque": ("torque", 1.0, 3), "payload_change": ("mass_change", 0.3, 1)}
+"""Effects with times of their own: the parameter that scales them, a typical size, and how many can be told in one recording."""
+SPACING = 0.75
+"""Distance of the times that are tried [s]."""
+PUSH = 1.0
+"""Duration of the push that is moved through time [s]."""
+LEAST = 25.0
+"""Gain in chi-square from which an event counts."""
+SCALES = {"time": 0.2, "duration": 0.4}
+
+
+def fit_events(effect: str, problem: Problem, nominal: Rig, baseline: Fit, inflation: dict[str, float]) -> Fit | None:
+    """Find the events of an effect in every recording and refit the baseline beside them.
+
+    Parameters
+    ----------
+    effect : str
+        One of :data:`EVENTS`.
+    problem : Problem
+        Blocks and recordings.
+    nominal : Rig
+        Nominal model.
+    baseline : Fit
+        The refitted baseline.
+    inflation : dict of str to float
+        As in :func:`pamrs.diagnosis.fitting.fit`.
+
+    Returns
+    -------
+    Fit or None
+        With ``events``; its ``values`` hold the parameters of the first recording that has one. None where nothing was found.
+    """
+    found = look_for_events(effect, problem, baseline.rig, baseline.residuals, inflation)
+    if found is None:
+        return None
+    beside = fit(problem, nominal, (), {}, inflation, warm=baseline, frozen=True, events=found, evaluations=4)
+    again = _refined(found, problem, beside.rig, inflation)
+    if effect == "payload_change":
+        again = _of_one_mass(again, problem, beside.rig, inflation)
+    last = fit(problem, nominal, (), {}, inflation, warm=beside, frozen=True, events=again, evaluations=3)
+    first = next(iter(again.values.values()))
+    values = {f"{effect}.{name}": value for name, value in first.items()}
+    return replace(
+        last,
+        effects=(effect,),
+        rig=last.rig.with_effect(effect, first),
+        values=last.values | values,
+        std=last.std | dict.fromkeys(values, float("nan")),
+    )
+
+
+def look_for_events(
+    effect: str, problem: Problem, rig: Rig, base: dict[Key, Residual], inflation: dict[str, float], size: float | None = None
+) -> Events | None:
+    """The events of an effect in each recording, at a model that stays.
+
+    Parameters
+    ----------
+    effect : str
+        One of :data:`EVENTS`.
+    problem : Problem
+        Blocks and recordings.
+    rig : Rig
+        The model.
+    base : dict
+        Its residuals.
+    inflation : dict of str to float
+        As in :func:`pamrs.diagnosis.fitting.fit`.
+    size : float, optional
+        Size that is known; times alone are looked for.
+
+    Returns
+    -------
+    Events or None
+        None where no recording has one.
+    """
+    values = {}
+    for prepared in problem.recordings:
+        alone = replace(problem, recordings=[prepared])
+        own = {key: r for key, r in base.items() if key[1] == prepared.recording.name}
+        started = _scan(effect, alone, prepared, rig, own, inflation, size)
+        if started:
+            values[prepared.recording.name] = started
+    if not values:
+        return None
+    return _refined(Events(effect, values), problem, rig, inflation, keep_size=size is not None)
+
+
+def _scan(
+    effect: str,
+    problem: Problem,
+    prepared: Prepared,
+    rig: Rig,
+    base: dict[Key, Residual],
+    inflation: dict[str, float],
+    size: float | None,
+) -> dict[str, float]:
+    """Where the events of one recording begin, the most telling first; empty where none is worth it."""
+    leading, typical, slots = EVENTS[effect]
+    length = prepared.n * prepared.dt
+    times = np.arange(0.25, length - 0.5, SPACING)
+    rows, _ = stacked(problem, base, inflation)
+    signatures: dict[float, Array] = {}
+    for group in _apart(times, slots):
+        values = _numbered([(typical if size is None else size, float(t)) for t in group], leading, effect)
+        try:
+            moved, _ = stacked(problem, changes(problem, rig.with_effect(effect, values), base), inflation)
+        except SimulationError:
+            continue
+        change = moved - rows
+        share = np.arange(rows.size) % max(1, rows.size // len(problem.blocks)) / max(1, rows.size // len(problem.blocks)) * length
+        for place, t in enumerate(group):
+            end = group[place + 1] if place + 1 < len(group) else np.inf
+            signatures[float(t)] = np.where((share >= t - 0.1) & (share < end - 0.1), change, 0.0)
+    chosen: list[tuple[float, float]] = []
+    left = rows.copy()
+    for _ in range(slots):
+        best = None
+        for t, signature in signatures.items():
+            power = float(signature @ signature)
+            if power < 1e-9 or any(abs(t - s) < PUSH for _, s in chosen):
+                continue
+            factor = -float(left @ signature) / power if size is None else 1.0
+            gain = -2.0 * factor * float(left @ signature) - factor**2 * power
+            if best is None or gain > best[0]:
+                best = (gain, factor, t)
+        if best is None or best[0] < LEAST:
+            break
+        chosen.append((best[1] * (typical if size is None else size), best[2]))
+        left = left + best[1] * signatures[best[2]]
+    return _numbered(sorted(chosen, key=lambda c: c[1]), leading, effect) if chosen else {}
+
+
+def _apart(times: Array, slots: int) -> list[list[float]]:
+    """Times in groups that can be tried in one simulation, far from each other."""
+    if slots == 1:
+        return [[float(t)] for t in times]
+    stride = -(-times.size // slots)
+    return [[float(t) for t in times[k::stride]] for k in range(stride)]
+
+
+def _numbered(events: list[tuple[float, float]], leading: str, effect: str) -> dict[str, float]:
+    """Parameters of a few events of one recording."""
+    values = {}
+    for place, (size, time) in enumerate(events):
+        suffix = "" if place == 0 else f"_{place + 1}"
+        values |= {leading + suffix: size, "time" + suffix: time}
+        if effect == "external_torque":
+            values["duration" + suffix] = PUSH
+    return values
+
+
+def _refined(events: Events, problem: Problem, rig: Rig, inflation: dict[str, float], *, keep_size: bool = False) -> Events:
+    """Events of each recording fitted alone, at a model that stays."""
+    values = {}
+    for prepared in problem.recordings:
+        start = events.values.get(prepared.recording.name)
+        if start is not None:
+            alone = replace(problem, recordings=[prepared])
+            found = _fitted(events.effect, start, alone, prepared, rig, inflation, keep_size)
+            if found is not None:
+                values[prepared.recording.name] = found
+    return Events(events.effect, values)
+
+
+def _fitted(
+    effect: str, start: dict[str, float], alone: Problem, prepared: Prepared, rig: Rig, inflation: dict[str, float], keep_size: bool
+) -> dict[str, float] | None:
+    """Events of one recording; None where the model leaves its range."""
+    leading, typical, _ = EVENTS[effect]
+    free = [p for p in start if not (keep_size and p.startswith(leading))]
+    scale = np.array([SCALES.get(p.rstrip("_23"), typical) for p in free])
+    limits = [_limits(effect, p, prepared) for p in free]
+    low, high = (np.array([limit[k] for limit in limits]) / scale for k in (0, 1))
+
+    def told(x: Array) -> dict[str, float]:
+        return start | {p: float(v) for p, v in zip(free, x * scale, strict=True)}
+
+    def evaluate(x: Array) -> tuple[Array, Array, None]:
+        events = Events(effect, {prepared.recording.name: told(x)})
+        found = residuals(alone, rig, [f"{effect}.{p}" for p in free], events)
+        rows, slope = stacked(alone, found, inflation)
+        assert slope is not None
+        return rows, slope * scale, None
+
+    try:
+        x, _, _ = levenberg_marquardt(evaluate, np.array([start[p] for p in free]) / scale, (low, high), 8)
+    except SimulationError:
+        return None
+    return told(x)
+
+
+def _limits(effect: str, parameter: str, prepared: Prepared) -> tuple[float, float]:
+    kind = parameter.rstrip("_23")
+    if kind == "time":
+        return 0.0, prepared.n * prepared.dt
+    if kind == "duration":
+        return 0.05, 5.0
+    info = find_parameter(f"{effect}.{parameter}")
+    return max(info.lower, -1e3), min(info.upper, 1e3)
+
+
+def _of_one_mass(events: Events, problem: Problem, rig: Rig, inflation: dict[str, float]) -> Events:
+    """The same events with the median of their masses, times fitted again."""
+    mass = float(np.median([values["mass_change"] for values in events.values.values()]))
+    same = Events(events.effect, {name: values | {"mass_change": mass} for name, values in events.values.items()})
+    return _refined(same, problem, rig, inflation, keep_size=True)
