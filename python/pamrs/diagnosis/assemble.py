@@ -239,9 +239,24 @@ def _effects(groups: list[Group], probabilities: dict[str, float], model: Rig | 
                 "name": EFFECTS[effect].name,
                 "probability": min(1.0, p),
                 "parameters": _effect_parameters(effect, best),
+                "events": _events(effect, best),
             }
         )
     return out
+
+
+def _events(effect: str, candidate: Candidate) -> list[dict[str, Any]]:
+    """What happened in each recording, one entry for each event."""
+    events = candidate.fit.events
+    if events is None or events.effect != effect:
+        return []
+    found = []
+    for recording, values in events.values.items():
+        for suffix in ("", "_2", "_3"):
+            if "time" + suffix in values:
+                own = {name.removesuffix(suffix): v for name, v in values.items() if name.endswith(suffix) and (suffix or name[-2] != "_")}
+                found.append({"recording": recording, **own})
+    return found
 
 
 def _best_of(groups: list[Group], candidate: Candidate) -> Candidate | None:
@@ -261,7 +276,7 @@ def _effect_parameters(effect: str, candidate: Candidate) -> dict[str, Any]:
         if name not in candidate.fit.values:
             continue
         value, std = candidate.fit.values[name], candidate.fit.std[name]
-        out[parameter.name] = _entry(value, std, parameter.unit, not unknown_volume and std < max(value, 1e-300))
+        out[parameter.name] = _entry(value, std, parameter.unit, not unknown_volume and std < max(abs(value), 1e-300), parameter.lower)
     if effect == "leak_muscle" and rig.model["valve"] is None:
         gas, chamber = rig.model["gas"], rig.model["chamber"]
         value, std = candidate.fit.values["leak_muscle.conductance"], candidate.fit.std["leak_muscle.conductance"]
@@ -274,12 +289,12 @@ def _effect_parameters(effect: str, candidate: Candidate) -> dict[str, Any]:
     return out
 
 
-def _entry(value: float, std: float, unit: str, identifiable: bool) -> dict[str, Any]:
+def _entry(value: float, std: float, unit: str, identifiable: bool, lower: float = 0.0) -> dict[str, Any]:
     return {
         "value": value,
         "std": std,
         "unit": unit,
-        "interval": [max(0.0, value - 1.96 * std), value + 1.96 * std],
+        "interval": [max(lower, value - 1.96 * std), value + 1.96 * std],
         "identifiable": identifiable,
     }
 

@@ -64,14 +64,18 @@ def fit_events(effect: str, problem: Problem, nominal: Rig, baseline: Fit, infla
     if effect == "payload_change":
         again = _of_one_mass(again, problem, beside.rig, inflation)
     last = fit(problem, nominal, (), {}, inflation, warm=beside, frozen=True, events=again, evaluations=3)
-    first = next(iter(again.values.values()))
+    where, first = next(iter(again.values.items()))
     values = {f"{effect}.{name}": value for name, value in first.items()}
+    alone = replace(problem, recordings=[p for p in problem.recordings if p.recording.name == where])
+    _, slope = stacked(alone, residuals(alone, last.rig, list(values), again), inflation)
+    assert slope is not None
+    std = np.sqrt(np.clip(np.diag(np.linalg.pinv(slope.T @ slope, hermitian=True)), 0.0, None))
     return replace(
         last,
         effects=(effect,),
         rig=last.rig.with_effect(effect, first),
         values=last.values | values,
-        std=last.std | dict.fromkeys(values, float("nan")),
+        std=last.std | dict(zip(values, std.tolist(), strict=True)),
     )
 
 

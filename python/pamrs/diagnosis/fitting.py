@@ -46,6 +46,8 @@ ACTS: dict[str, tuple[str, ...]] = {
 """Blocks of the cut chain in which the effects of a block of the rig, or one effect, act."""
 WIDEST = 3.0
 """Tolerances that a baseline parameter may move: farther out it would stand for physics that is missing."""
+LEAST_STEP, STIFFEST = 4e-4, 0.2
+"""Stable step [s], or for a stiff rig the share of its own, below which a model is not tried."""
 FIT_BIN = 0.02
 """Width of the bins over which residuals are averaged for fitting [s]."""
 
@@ -140,9 +142,9 @@ def residuals(problem: Problem, rig: Rig, names: Sequence[str] = (), events: Eve
     events : Events, optional
         What happens in single recordings, beside the model.
     """
-    core = problem.core.respecified(rig.to_json())
+    core = _compiled(problem, rig)
     own = {
-        prepared.recording.name: problem.core.respecified(rig.with_effect(events.effect, values).to_json())
+        prepared.recording.name: _compiled(problem, rig.with_effect(events.effect, values))
         for prepared in problem.recordings
         if events is not None and (values := events.values.get(prepared.recording.name))
     }
@@ -163,6 +165,15 @@ def residuals(problem: Problem, rig: Rig, names: Sequence[str] = (), events: Eve
     with ThreadPoolExecutor(max_workers=2) as pool:
         found = list(pool.map(one, tasks))
     return {(b.name, p.recording.name): r for (b, p), r in zip(tasks, found, strict=True)}
+
+
+def _compiled(problem: Problem, rig: Rig) -> _core.Rig:
+    """A rig compiled, unless it is so stiff that no fit could afford it."""
+    core = problem.core.respecified(rig.to_json())
+    least = min(LEAST_STEP, STIFFEST * problem.core.stable_step)
+    if core.stable_step < least:
+        raise SimulationError(f"the model needs steps of {core.stable_step:.1e} s; to be fitted it may need {least:.1e} s at the least")
+    return core
 
 
 def depends(block: Block, name: str) -> bool:
@@ -275,7 +286,7 @@ def changes(problem: Problem, rig: Rig, base: dict[Key, Residual]) -> dict[Key, 
     SimulationError
         If the model leaves the range in which it holds.
     """
-    core = problem.core.respecified(rig.to_json())
+    core = _compiled(problem, rig)
     tasks = [(block, prepared) for prepared in problem.recordings for block in problem.blocks]
 
     def one(task: tuple[Block, Prepared]) -> tuple[Key, Residual]:

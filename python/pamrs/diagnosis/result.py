@@ -145,7 +145,8 @@ class Diagnosis:
         ``text``), ``text``; optionally ``recording``, to which the intervals belong.
     effects : list of dict
         ``id``, ``probability``, optional ``name`` (in words), ``parameters``
-        {name: {value, std, unit, interval?, identifiable?}}, most probable first; SI, 95 % intervals.
+        {name: {value, std, unit, interval?, identifiable?}}, most probable first; SI, 95 % intervals; optional ``events``, what
+        happened in single recordings (``recording``, ``time`` and the effect's other parameters, SI).
     ambiguity : list of list of str
         Sets of effects that the data cannot separate; empty when settled.
     probabilities : dict
@@ -173,6 +174,9 @@ class Diagnosis:
         residual in units of the noise, NaN where there are no data; ``block``.
     timings : dict
         Seconds of each stage, optional.
+    tried : list of dict
+        Every set of effects that was fitted: ``blocks``, ``effects``, what it leaves of each block's variance in units of the noise's
+        (``fitted``, ``held_out``), ``gap_closed``, its ``values``.
 
     Raises
     ------
@@ -236,6 +240,7 @@ class Diagnosis:
                         str(name): _pick(p, ("value", "std", "unit"), ("interval", "identifiable"))
                         for name, p in (effect.get("parameters") or {}).items()
                     },
+                    **({"events": _plain(effect["events"])} if effect.get("events") else {}),
                 }
                 for effect in self.effects
             ],

@@ -1,0 +1,80 @@
+"""The bounded least squares of the diagnosis, against SciPy's and by its promises."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from pamrs.diagnosis.leastsquares import levenberg_marquardt
+from pamrs.errors import SimulationError
+
+Array = NDArray[np.float64]
+WIDE = (np.full(2, -10.0), np.full(2, 10.0))
+
+
+def rosenbrock(x: Array) -> tuple[Array, Array, None]:
+    """Rows with a curved valley, scaled so that every gain counts."""
+    rows = 1e3 * np.array([10.0 * (x[1] - x[0] ** 2), 1.0 - x[0]])
+    return rows, 1e3 * np.array([[-20.0 * x[0], 10.0], [-1.0, 0.0]]), None
+
+
+def decay(x: Array, time: Array, data: Array) -> tuple[Array, Array, str]:
+    wave = np.exp(-x[1] * time)
+    return 1e2 * (x[0] * wave - data), 1e2 * np.stack([wave, -x[0] * time * wave], axis=1), "told"
+
+
+def test_the_end_of_a_valley_is_found() -> None:
+    x, (rows, _, _), spent = levenberg_marquardt(rosenbrock, np.array([-1.2, 1.0]), WIDE, 60)
+    # a step stops being worth it at a gain of 0.2 in chi-square, or of the two thousandth part
+    assert float(rows @ rows) < 1.0
+    assert np.allclose(x, 1.0, atol=2e-3)
+    assert spent < 60
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_same_end_as_scipy_in_a_box(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    time = np.linspace(0.0, 3.0, 200)
+    data = 2.0 * np.exp(-1.5 * time) + 0.01 * rng.standard_normal(200)
+    low, high = np.array([0.0, 0.1]), np.array([1.8, 5.0])  # the best amplitude lies beyond the wall
+    x, best, _ = levenberg_marquardt(lambda x: decay(x, time, data), np.array([0.5, 0.5]), (low, high), 40)
+    theirs = least_squares(
+        lambda x: decay(x, time, data)[0], np.array([0.5, 0.5]), jac=lambda x: decay(x, time, data)[1], bounds=(low, high)
+    )
+    assert best[2] == "told"
+    assert 0.5 * float(best[0] @ best[0]) <= theirs.cost * (1.0 + 2e-3) + 0.2
+    assert np.allclose(x, theirs.x, rtol=2e-2)
+    assert x[0] == 1.8
+
+
+def test_a_point_that_cannot_be_simulated_is_taken_back() -> None:
+    visited: list[float] = []
+
+    def evaluate(x: Array) -> tuple[Array, Array, None]:
+        visited.append(float(x[0]))
+        if x[0] > 1.5:
+            raise SimulationError("beyond the model's range")
+        return 10.0 * np.arctan(2.0 * (x - 1.0)), np.diag(20.0 / (1.0 + 4.0 * (x - 1.0) ** 2)), None
+
+    x, _, _ = levenberg_marquardt(evaluate, np.array([-1.0]), (np.array([-5.0]), np.array([5.0])), 30)
+    assert max(visited) > 1.5, "the first step overshoots: the case is empty otherwise"
+    assert abs(float(x[0]) - 1.0) < 0.02
+
+
+def test_a_start_that_cannot_be_simulated_is_an_error() -> None:
+    def evaluate(x: Array) -> tuple[Array, Array, None]:
+        raise SimulationError("no such plant")
+
+    with pytest.raises(SimulationError, match="no such plant"):
+        levenberg_marquardt(evaluate, np.zeros(1), (np.array([-1.0]), np.array([1.0])), 5)
+
+
+def test_noise_is_not_worth_an_evaluation() -> None:
+    rows = np.random.default_rng(1).standard_normal(1000)
+    rows += 0.02 - rows.mean()  # a gain of 0.4 in a chi-square of 1000
+    jacobian = np.ones((1000, 1))
+    found = levenberg_marquardt(lambda x: (rows + jacobian[:, 0] * x[0], jacobian, None), np.zeros(1), (WIDE[0][:1], WIDE[1][:1]), 9)
+    spent = found[2]
+    assert spent == 1
