@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from pamrs import simulate
+
 from fingerprints.sheet import BAR, QUIET, WITH, WITHOUT, Array, Sheet, angle, clock, flow, hold, label, pressure, supply, through
 
 __all__ = [
@@ -19,42 +21,45 @@ __all__ = [
     "supply_leak",
 ]
 
-#: A supply at 7 bar and a muscle at 3 bar: filling and venting are about as fast.
-MIDDLE = {"supply_pressure": 7e5, "muscle_pressure": 3e5, "joint_angle": 1.57}
+#: The arm between two stops, so that the muscle's volume does not change.
+LOCKED = {"joint.max_angle": np.radians(15.05), "joint.stop_stiffness": 1e6, "joint.stop_damping": 3e3}
+NAMES = ("without", "with the effect")
 
 
 def supply_leak(sheet: Sheet) -> None:
-    """Idle, one fill, idle."""
+    """Idle, one fill, idle, from a full and from a half empty tank."""
     time = clock(120.0, 0.05)
-    runs = sheet.run(valve_command=hold(time, (0.0, 5.0), (60.0, 5.5), (60.8, 5.0)), sample_time=0.05)
     axes = sheet.axes("sx;px", width_ratios=[1.25, 1])
-    sheet.both(axes["s"], runs, supply)
-    label(axes["s"], "supply: falls with the valve shut, before and after the fill", y="supply [bar]", legend="lower left")
-    sheet.both(axes["p"], runs, pressure)
-    label(axes["p"], "muscle: as modelled", y="muscle [bar]", legend="upper left")
-    idle = np.r_[20:1150, 1400:2390]
-    absolute = (supply(runs[1]) + 1.01325)[idle]
-    for run, colour, words in zip(runs, (WITHOUT, WITH), ("without", "with the effect"), strict=True):
-        axes["x"].plot((supply(run) + 1.01325)[idle], -1e5 * np.gradient(supply(run), 0.05)[idle], ".", ms=3, color=colour, label=words)
-    rate = np.polyfit(absolute, -1e5 * np.gradient(supply(runs[1]), 0.05)[idle], 1)
-    axes["x"].plot([0.0, 15.0], [0.0, 15.0 * np.polyval(rate, absolute.mean()) / absolute.mean()], ":", color=QUIET, label="through zero")
-    label(axes["x"], "idle: rate of fall, in proportion", "supply, absolute [bar]", "fall [Pa/s]", "center left")
+    idle = slice(400, -10)
+    for start, style in ((13.8e5, "-"), (5e5, "--")):
+        command = hold(time, (0.0, 5.0), (10.0, 5.5), (10.5, 5.0))
+        runs = sheet.run(LOCKED, valve_command=command, sample_time=0.05, initial={"supply_pressure": start})
+        for run, colour, words in zip(runs, (WITHOUT, WITH), NAMES, strict=True):
+            width, given = (2.2 if colour == WITHOUT else 1.3), words if style == "-" else None
+            axes["s"].plot(time, supply(run), style, lw=width, color=colour, label=given)
+            axes["p"].plot(time, pressure(run), style, lw=width, color=colour, label=given)
+            rate = -BAR * np.gradient(supply(run), 0.05)
+            axes["x"].plot((supply(run) + 1.01325)[idle], rate[idle], "o", ms=4, color=colour, label=given)
+    axes["x"].plot([0.0, 15.0], [0.0, 15.0 * rate[idle][0] / (supply(runs[1]) + 1.01325)[idle][0]], ":", color=QUIET, label="through zero")
+    label(axes["s"], "supply: falls, valve shut or not; a full tank, and a half empty one (dashed)", y="supply [bar]", legend="center left")
+    label(axes["p"], "muscle: as modelled", y="muscle [bar]", legend="center right")
+    label(axes["x"], "valve shut: in proportion to absolute pressure", "supply, absolute [bar]", "rate of fall [Pa/s]", "upper left")
 
 
 def compressor(sheet: Sheet) -> None:
     """Fills and vents in a row, then idle."""
-    time = clock(100.0, 0.05)
-    command = np.where((time % 4.0 < 1.0) & (time < 64.0), 5.6, np.where((time % 4.0 > 2.0) & (time < 64.0), 3.4, 5.0))
-    runs = sheet.run(valve_command=command, sample_time=0.05)
+    time, busy = clock(110.0, 0.05), 76.0
+    command = np.where(time > busy, 5.0, np.where(time % 2.0 < 0.5, 5.8, np.where(time % 2.0 > 1.0, 3.0, 5.0)))
+    runs = sheet.run(LOCKED, valve_command=command, sample_time=0.05, initial={"supply_pressure": 13e5})
     axes = sheet.axes("s;p", height_ratios=[2, 1], sharex=True)
     sheet.both(axes["s"], runs, supply)
-    values = {**{p: sheet.rigs[1].effects[0]["parameters"][p] for p in ("cut_in_pressure", "cut_out_pressure")}}
+    values = sheet.rigs[1].effects[0]["parameters"]
     for name, words in (("cut_out_pressure", "stops"), ("cut_in_pressure", "starts")):
         axes["s"].axhline(values[name] / BAR, color=QUIET, ls=":", lw=1.2)
-        axes["s"].text(99.0, values[name] / BAR, words, ha="right", va="bottom", color=QUIET)
-    label(axes["s"], "supply", "", "supply [bar]", "lower left")
+        axes["s"].text(0.0, values[name] / BAR, words, ha="left", va="bottom", color=QUIET)
+    label(axes["s"], "supply: rises evenly from one pressure to the other, again and again", "", "supply [bar]", "lower left")
     sheet.both(axes["p"], runs, pressure)
-    label(axes["p"], "muscle: what uses the air up; after 64 s nothing does, and the compressor goes on to its stop", y="muscle [bar]")
+    label(axes["p"], f"muscle: uses the air up to {busy:g} s; the compressor goes on to its stop without", y="muscle [bar]")
 
 
 def dead_band(sheet: Sheet) -> None:
@@ -73,7 +78,7 @@ def dead_band(sheet: Sheet) -> None:
     label(axes["a"], "joint: stands with it", y="angle [deg]")
     band = sheet.rigs[1].effects[0]["parameters"]["dead_band"] / BAR
     axes["x"].axhspan(-band, band, color="#dfe3e8", lw=0, label="dead band")
-    for run, colour, words in zip(runs, (WITHOUT, WITH), ("without", "with the effect"), strict=True):
+    for run, colour, words in zip(runs, (WITHOUT, WITH), NAMES, strict=True):
         axes["x"].plot(time, command / BAR - supply(run), color=colour, lw=1.3, label=words)
     axes["x"].set_ylim(-0.5, 0.5)
     label(axes["x"], "error: stays where it enters the band", y="set - outlet [bar]", legend="upper right")
@@ -87,13 +92,13 @@ def _triangle(time: Array, period: float, low: float, high: float) -> Array:
 
 def dead_zone(sheet: Sheet) -> None:
     """Slow ramps of the command through the null, both ways."""
-    time = clock(8.0, 0.005)
-    runs = sheet.run(valve_command=_triangle(time + 1.0, 4.0, 4.55, 5.35), sample_time=0.005, initial=MIDDLE)
+    time = clock(4.0, 0.005)
+    runs = sheet.run(LOCKED, valve_command=_triangle(time + 0.5, 2.0, 4.4, 5.3), sample_time=0.005, initial={"muscle_pressure": 3e5})
     axes = sheet.axes("ux;px", width_ratios=[1, 1.1])
     axes["u"].plot(time, runs[0]["valve_command"], color=QUIET)
     label(axes["u"], "command: ramps through the null", y="valve [V]")
     sheet.both(axes["p"], runs, pressure)
-    label(axes["p"], "muscle: flat tops, each turn waits", y="muscle [bar]", legend="lower left")
+    label(axes["p"], "muscle: stands at each change of direction", y="muscle [bar]", legend="lower left")
     sheet.both(axes["x"], runs, flow, lambda run: run["valve_command"], part=slice(2, -2))
     half = 5.0 * sheet.rigs[1].effects[0]["parameters"]["half_width"]
     axes["x"].axvspan(5.0 - half, 5.0 + half, color="#dfe3e8", lw=0, label="dead zone")
@@ -105,26 +110,26 @@ def play(sheet: Sheet) -> None:
     axes = sheet.axes("xy")
     ranges = (("x", 4.6, 5.4, "through the null"), ("y", 5.2, 5.6, "on one side of the null"))
     for letter, low, high, words in ranges:
-        for period, style in ((2.0, "-"), (0.4, "--")):
+        for period, style in ((0.6, "-"), (0.12, "--")):
             time = clock(3.0 * period, 0.001)
-            start = {**MIDDLE, "muscle_pressure": 1e5, "joint_angle": 0.45}
-            runs = sheet.run(valve_command=_triangle(time, period, low, high), sample_time=0.001, initial=start)
+            command = _triangle(time, period, low, high)
+            runs = sheet.run(LOCKED, valve_command=command, sample_time=0.001, initial={"muscle_pressure": 3e5})
             part = slice(int(1.25 * period / 0.001), int(2.25 * period / 0.001))
             of = {"part": part, "ls": style}
-            if period < 1.0:
-                sheet.both(axes[letter], runs, flow, lambda run: run["valve_command"], label="five times as fast", **of)
-            else:
-                sheet.both(axes[letter], runs, flow, lambda run: run["valve_command"], **of)
+            sheet.both(axes[letter], runs, flow, lambda run: run["valve_command"], **of)
+            if style == "--":
+                for line, name in zip(axes[letter].lines[-2:], NAMES, strict=True):
+                    line.set_label(f"{name}, five times as fast")
         label(axes[letter], words, "valve [V]", "air into the muscle [g/s]", "upper left")
 
 
 def centre_leakage(sheet: Sheet) -> None:
     """The valve at its null, from a low and from a high pressure."""
-    time = clock(240.0, 0.1)
+    time = clock(200.0, 0.1)
     axes = sheet.axes("px;sx", width_ratios=[1.25, 1])
-    for start, style in ((1e5, "-"), (6e5, "--")):
-        first = {"muscle_pressure": start, "supply_pressure": 7e5, "joint_angle": 0.45 if start < 2e5 else 2.09}
-        runs = sheet.run(valve_command=np.full(time.size, 5.0), sample_time=0.1, initial=first)
+    for start, style in ((1e5, "-"), (5.8e5, "--")):
+        first = {"muscle_pressure": start, "supply_pressure": 6e5}
+        runs = sheet.run(LOCKED, valve_command=np.full(time.size, 5.0), sample_time=0.1, initial=first)
         words = "from below" if style == "-" else "from above"
         for run, colour, which in zip(runs, (WITHOUT, WITH), ("without", "with"), strict=True):
             axes["p"].plot(time, pressure(run), style, color=colour, label=f"{which}, {words}")
@@ -140,8 +145,8 @@ def input_lag(sheet: Sheet) -> None:
     """A large fill, a small fill and a vent."""
     axes = sheet.axes("up;xx", height_ratios=[1, 1.2])
     time = clock(0.5, 0.0005)
-    command = hold(time, (0.0, 5.0), (0.05, 7.5), (0.15, 5.0), (0.25, 5.6), (0.35, 5.0), (0.4, 3.5))
-    runs = sheet.run(valve_command=command, sample_time=0.0005, initial={**MIDDLE, "supply_pressure": 9e5})
+    command = hold(time, (0.0, 5.0), (0.05, 6.2), (0.15, 5.0), (0.25, 5.3), (0.35, 5.0), (0.4, 3.8))
+    runs = sheet.run(LOCKED, valve_command=command, sample_time=0.0005, initial={"muscle_pressure": 3e5})
     axes["u"].plot(time, command, color=QUIET)
     label(axes["u"], "command", y="valve [V]")
     sheet.both(axes["p"], runs, flow)
@@ -158,25 +163,20 @@ def input_lag(sheet: Sheet) -> None:
 def restriction(sheet: Sheet) -> None:
     """Fills and vents at three openings, and the flow at every opening."""
     axes = sheet.axes("px;vx", width_ratios=[1, 1.1])
-    for letter, start, volts in (("p", 0.5e5, (5.8, 6.6, 10.0)), ("v", 6e5, (4.2, 3.4, 0.0))):
+    time = clock(0.6, 0.002)
+    for letter, start, volts in (("p", 0.5e5, (10.0, 7.0, 6.0)), ("v", 6e5, (0.0, 3.0, 4.0))):
         for k, volt in enumerate(volts):
-            time = clock(1.0, 0.005)
-            first = {"muscle_pressure": start, "joint_angle": 0.32 if start < 1e5 else 2.09}
-            command = hold(time, (0.0, 5.0), (0.05, volt), (0.05 + (2.0, 0.6, 0.12)[k] if letter == "p" else 9.0, 5.0))
-            runs = sheet.run(valve_command=command, sample_time=0.005, initial=first)
-            sheet.both(axes[letter], runs, pressure, label="_" if k else None)
-            at = (0.55, 0.35, 0.11)[k]
-            axes[letter].text(at, float(np.interp(at, time, pressure(runs[0]))), f" {volt:g} V", color=QUIET, ha="right", va="bottom")
-        axes[letter].lines[0].set_label("without")
-        axes[letter].lines[1].set_label("with the effect")
+            runs = sheet.run(LOCKED, valve_command=np.full(time.size, volt), sample_time=0.002, initial={"muscle_pressure": start})
+            sheet.both(axes[letter], runs, pressure)
+            at = (0.06, 0.16, 0.3)[k] if letter == "p" else 0.3
+            axes[letter].text(at, float(np.interp(at, time, pressure(runs[0]))), f"{volt:g} V ", color=QUIET, ha="right", va="bottom")
+        for line in axes[letter].lines[2:]:
+            line.set_label(None)
     label(axes["p"], "filling at three openings", y="muscle [bar]", legend="lower right")
     label(axes["v"], "venting at three openings", y="muscle [bar]", legend="upper right")
     volts = np.linspace(0.0, 10.0, 81)
-    first = {"muscle_pressure": 4e5, "joint_angle": 2.0}
-    for rig, colour, words in zip(sheet.rigs, (WITHOUT, WITH), ("without", "with the effect"), strict=True):
-        import pamrs
-
-        runs = [pamrs.simulate(rig, np.full(2, volt), sample_time=1e-4, initial=first) for volt in volts]
+    for rig, colour, words in zip(sheet.rigs, (WITHOUT, WITH), NAMES, strict=True):
+        runs = [simulate(rig, np.full(2, volt), sample_time=1e-4, initial={"muscle_pressure": 4e5}) for volt in volts]
         axes["x"].plot(volts, [flow(run)[0] for run in runs], color=colour, label=words)
     label(axes["x"], "flow at 4 bar: short at large openings, both ways", "valve [V]", "air into the muscle [g/s]", "upper left")
 
@@ -184,14 +184,14 @@ def restriction(sheet: Sheet) -> None:
 def muscle_leak(sheet: Sheet) -> None:
     """Fill, shut, hold, at three levels."""
     time = clock(100.0, 0.05)
-    command = hold(time, (0.0, 6.0), (0.25, 5.0), (33.0, 6.0), (33.25, 5.0), (66.0, 6.0), (66.25, 5.0))
+    command = hold(time, (0.0, 5.07), (4.0, 5.0), (33.0, 5.05), (37.0, 5.0), (66.0, 5.05), (70.0, 5.0))
     runs = sheet.run(valve_command=command, sample_time=0.05)
     axes = sheet.axes("px;ax", width_ratios=[1.25, 1])
     sheet.both(axes["p"], runs, pressure)
     label(axes["p"], "muscle: falls with the valve shut, without end", y="muscle [bar]", legend="upper left")
     sheet.both(axes["a"], runs, angle)
     label(axes["a"], "joint: sinks with it", y="angle [deg]")
-    for first, last in ((3.0, 32.0), (36.0, 65.0), (70.0, 99.0)):
+    for first, last in ((6.0, 32.0), (39.0, 65.0), (72.0, 99.0)):
         part = slice(round(first / 0.05), round(last / 0.05))
         for run, colour in zip(runs, (WITHOUT, WITH), strict=True):
             axes["x"].plot(pressure(run)[part] + 1.01325, -1e3 * flow(run)[part], ".", ms=3, color=colour)
@@ -203,13 +203,13 @@ def muscle_leak(sheet: Sheet) -> None:
 def heat(sheet: Sheet) -> None:
     """A fast fill and a fast vent, each with the valve shut after it; small ones and large ones."""
     time = clock(24.0)
-    command = hold(time, (0.0, 5.0), (1.0, 10.0), (1.2, 5.0), (7.0, 0.0), (7.25, 5.0), (13.0, 10.0), (13.06, 5.0), (19.0, 0.0), (19.08, 5.0))
-    runs = sheet.run(valve_command=command)
+    command = hold(time, (0.0, 5.0), (1.0, 10.0), (1.15, 5.0), (7.0, 0.0), (7.25, 5.0), (13.0, 10.0), (13.05, 5.0), (19.0, 0.0), (19.08, 5.0))
+    runs = sheet.run(LOCKED, valve_command=command)
     axes = sheet.axes("pp;fv")
     sheet.both(axes["p"], runs, pressure)
     label(axes["p"], "muscle: large and small, fast fills and vents, the valve shut in between", y="muscle [bar]", legend="upper right")
-    for letter, at, words in (("f", 1.2, "after the large fill: falls, then stays"), ("v", 7.25, "after the large vent: rises, then stays")):
-        part = slice(round((at + 0.6) / 0.01), round((at + 5.0) / 0.01))
+    for letter, at, words in (("f", 1.15, "after the large fill: falls, then stays"), ("v", 7.25, "after the large vent: rises, then stays")):
+        part = slice(round((at + 0.02) / 0.01), round((at + 5.0) / 0.01))
         for run, colour in zip(runs, (WITHOUT, WITH), strict=True):
             axes[letter].plot(time[part] - at, (pressure(run) - pressure(run)[part][-1])[part], color=colour)
         label(axes[letter], words, "time since the valve shut [s]", "muscle, less its end [bar]")
