@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from fingerprints.sheet import BAR, QUIET, WITH, WITHOUT, Array, Sheet, angle, clock, flow, hold, label, pressure, supply
 from pamrs import simulate
-
-from fingerprints.sheet import BAR, QUIET, WITH, WITHOUT, Array, Sheet, angle, clock, flow, hold, label, pressure, supply, through
 
 __all__ = [
     "centre_leakage",
@@ -40,8 +39,15 @@ def supply_leak(sheet: Sheet) -> None:
             axes["p"].plot(time, pressure(run), style, lw=width, color=colour, label=given)
             rate = -BAR * np.gradient(supply(run), 0.05)
             axes["x"].plot((supply(run) + 1.01325)[idle], rate[idle], "o", ms=4, color=colour, label=given)
-    axes["x"].plot([0.0, 15.0], [0.0, 15.0 * rate[idle][0] / (supply(runs[1]) + 1.01325)[idle][0]], ":", color=QUIET, label="through zero")
-    label(axes["s"], "supply: falls, valve shut or not; a full tank, and a half empty one (dashed)", y="supply [bar]", legend="center left")
+    axes["x"].plot(
+        [0.0, 15.0], [0.0, 15.0 * rate[idle][0] / (supply(runs[1]) + 1.01325)[idle][0]], ":", color=QUIET, label="through zero"
+    )
+    label(
+        axes["s"],
+        "supply: falls, valve shut or not; a full tank, and a half empty one (dashed)",
+        y="supply [bar]",
+        legend="center left",
+    )
     label(axes["p"], "muscle: as modelled", y="muscle [bar]", legend="center right")
     label(axes["x"], "valve shut: in proportion to absolute pressure", "supply, absolute [bar]", "rate of fall [Pa/s]", "upper left")
 
@@ -134,11 +140,11 @@ def centre_leakage(sheet: Sheet) -> None:
         for run, colour, which in zip(runs, (WITHOUT, WITH), ("without", "with"), strict=True):
             axes["p"].plot(time, pressure(run), style, color=colour, label=f"{which}, {words}")
             axes["s"].plot(time, supply(run), style, color=colour)
-            axes["x"].plot(pressure(run)[5:], 1e3 * flow(run)[5:], style, color=colour)
+            axes["x"].plot(pressure(run)[5:], 100.0 * np.gradient(pressure(run), 0.1)[5:], style, color=colour)
     label(axes["p"], "muscle: to one and the same value", y="muscle [bar]", legend="center right")
     label(axes["s"], "supply: air is used up all the time", y="supply [bar]")
     axes["x"].axhline(0.0, color=QUIET, lw=0.8)
-    label(axes["x"], "flow at the null: changes its sign", "muscle [bar]", "air into the muscle [mg/s]")
+    label(axes["x"], "at the null: up from below, down from above", "muscle [bar]", "rate of the muscle's pressure [kPa/s]")
 
 
 def input_lag(sheet: Sheet) -> None:
@@ -157,7 +163,13 @@ def input_lag(sheet: Sheet) -> None:
             edge = flow(run)[part]
             size = flow(run)[round((at + 0.08) / 0.0005)]
             axes["x"].plot(1e3 * (time[part] - at), edge / size, style, color=colour, label=f"{which}, {words}")
-    label(axes["x"], "each edge in parts of its size: all late by the same", "time since the edge of the command [ms]", "flow [1]", "lower right")
+    label(
+        axes["x"],
+        "each edge in parts of its size: all late by the same",
+        "time since the edge of the command [ms]",
+        "flow [1]",
+        "lower right",
+    )
 
 
 def restriction(sheet: Sheet) -> None:
@@ -165,19 +177,19 @@ def restriction(sheet: Sheet) -> None:
     axes = sheet.axes("px;vx", width_ratios=[1, 1.1])
     time = clock(0.6, 0.002)
     for letter, start, volts in (("p", 0.5e5, (10.0, 7.0, 6.0)), ("v", 6e5, (0.0, 3.0, 4.0))):
-        for k, volt in enumerate(volts):
+        for volt in volts:
             runs = sheet.run(LOCKED, valve_command=np.full(time.size, volt), sample_time=0.002, initial={"muscle_pressure": start})
             sheet.both(axes[letter], runs, pressure)
-            at = (0.06, 0.16, 0.3)[k] if letter == "p" else 0.3
-            axes[letter].text(at, float(np.interp(at, time, pressure(runs[0]))), f"{volt:g} V ", color=QUIET, ha="right", va="bottom")
+            axes[letter].text(0.61, pressure(runs[0])[-1], f"{volt:g} V", color=QUIET, va="center")
+        axes[letter].set_xlim(-0.02, 0.68)
         for line in axes[letter].lines[2:]:
             line.set_label(None)
     label(axes["p"], "filling at three openings", y="muscle [bar]", legend="lower right")
-    label(axes["v"], "venting at three openings", y="muscle [bar]", legend="upper right")
-    volts = np.linspace(0.0, 10.0, 81)
+    label(axes["v"], "venting at three openings", y="muscle [bar]", legend="lower left")
+    every = np.linspace(0.0, 10.0, 81)
     for rig, colour, words in zip(sheet.rigs, (WITHOUT, WITH), NAMES, strict=True):
-        runs = [simulate(rig, np.full(2, volt), sample_time=1e-4, initial={"muscle_pressure": 4e5}) for volt in volts]
-        axes["x"].plot(volts, [flow(run)[0] for run in runs], color=colour, label=words)
+        maps = [simulate(rig, np.full(2, volt), sample_time=1e-4, initial={"muscle_pressure": 4e5}) for volt in every]
+        axes["x"].plot(every, [flow(run)[0] for run in maps], color=colour, label=words)
     label(axes["x"], "flow at 4 bar: short at large openings, both ways", "valve [V]", "air into the muscle [g/s]", "upper left")
 
 
@@ -195,20 +207,25 @@ def muscle_leak(sheet: Sheet) -> None:
         part = slice(round(first / 0.05), round(last / 0.05))
         for run, colour in zip(runs, (WITHOUT, WITH), strict=True):
             axes["x"].plot(pressure(run)[part] + 1.01325, -1e3 * flow(run)[part], ".", ms=3, color=colour)
-    last = (pressure(runs[1])[-40] + 1.01325, -1e3 * flow(runs[1])[-40])
-    axes["x"].plot([0.0, last[0]], [0.0, last[1]], ":", color=QUIET, label="through zero")
+    end = (pressure(runs[1])[-40] + 1.01325, -1e3 * flow(runs[1])[-40])
+    axes["x"].plot([0.0, end[0]], [0.0, end[1]], ":", color=QUIET, label="through zero")
     label(axes["x"], "valve shut: loss in proportion to absolute pressure", "muscle, absolute [bar]", "air lost [mg/s]", "upper left")
 
 
 def heat(sheet: Sheet) -> None:
     """A fast fill and a fast vent, each with the valve shut after it; small ones and large ones."""
     time = clock(24.0)
-    command = hold(time, (0.0, 5.0), (1.0, 10.0), (1.15, 5.0), (7.0, 0.0), (7.25, 5.0), (13.0, 10.0), (13.05, 5.0), (19.0, 0.0), (19.08, 5.0))
+    command = hold(
+        time, (0.0, 5.0), (1.0, 10.0), (1.15, 5.0), (7.0, 0.0), (7.25, 5.0), (13.0, 10.0), (13.05, 5.0), (19.0, 0.0), (19.08, 5.0)
+    )
     runs = sheet.run(LOCKED, valve_command=command)
     axes = sheet.axes("pp;fv")
     sheet.both(axes["p"], runs, pressure)
     label(axes["p"], "muscle: large and small, fast fills and vents, the valve shut in between", y="muscle [bar]", legend="upper right")
-    for letter, at, words in (("f", 1.15, "after the large fill: falls, then stays"), ("v", 7.25, "after the large vent: rises, then stays")):
+    for letter, at, words in (
+        ("f", 1.15, "after the large fill: falls, then stays"),
+        ("v", 7.25, "after the large vent: rises, then stays"),
+    ):
         part = slice(round((at + 0.02) / 0.01), round((at + 5.0) / 0.01))
         for run, colour in zip(runs, (WITHOUT, WITH), strict=True):
             axes[letter].plot(time[part] - at, (pressure(run) - pressure(run)[part][-1])[part], color=colour)

@@ -29,10 +29,10 @@ def missing_torque(sheet: Sheet, run: Simulation) -> Array:
 
 def stiction(sheet: Sheet) -> None:
     """A very slow triangle of the pressure."""
-    time = clock(180.0, 0.02)
-    command = BAR * through(time, (0.0, 1.4), (40.0, 1.4), (75.0, 1.7), (110.0, 1.4), (145.0, 1.7), (180.0, 1.4))
-    runs = sheet.run(supply_command=command, sample_time=0.02, initial=begin(1.4, 34.0))
-    part = slice(round(38.0 / 0.02), None)
+    time = clock(90.0, 0.02)
+    command = BAR * through(time, (0.0, 1.1), (20.0, 1.7), (40.0, 1.3), (60.0, 1.7), (80.0, 1.3), (90.0, 1.5))
+    runs = sheet.run(supply_command=command, sample_time=0.02, initial=begin(1.1, 27.5))
+    part = slice(round(10.0 / 0.02), None)
     axes = sheet.axes("px;ax", width_ratios=[1.1, 1])
     sheet.both(axes["p"], runs, pressure, part=part)
     label(axes["p"], "muscle: moves on", y="muscle [bar]")
@@ -58,7 +58,7 @@ def end_stop(sheet: Sheet) -> None:
             axes["s"].plot(time, angle(run), style, color=colour, label=f"{name}, to {bar:g} bar")
             axes["d"].plot(time, run["joint_rate"], style, color=colour)
     axes["s"].axhline(stop, color=QUIET, ls=":")
-    label(axes["s"], "steps: the same angle at both pressures", y="angle [deg]", legend="center right")
+    label(axes["s"], "steps: the same angle at both pressures", y="angle [deg]", legend="lower right")
     label(axes["d"], "rate: rebounds", y="rate [rad/s]")
 
 
@@ -69,7 +69,9 @@ def swing(sheet: Sheet) -> None:
     command = BAR * hold(time, (0.0, 1.2), (1.0, 1.6), (12.0, 2.6))
     runs = sheet.run(supply_command=command, initial=begin(1.2, 30.0))
     sheet.both(axes["p"], runs, angle)
-    label(axes["p"], "joint: after each manoeuvre an oscillation that lasts, at constant pressure", y="angle [deg]", legend="lower right")
+    label(
+        axes["p"], "joint: after each manoeuvre an oscillation that lasts, at constant pressure", y="angle [deg]", legend="lower right"
+    )
     values = sheet.rigs[1].effects[0]["parameters"]
     cord = np.sqrt(9.80665 / values["length"]) / (2.0 * np.pi)
     for letter, first, words in (("l", 5.0, "1.6 bar"), ("h", 16.0, "2.6 bar")):
@@ -78,7 +80,7 @@ def swing(sheet: Sheet) -> None:
             axes[letter].plot(time[part], (angle(run) - angle(run)[part].mean())[part], color=colour, label=name)
         for k in range(8):
             if first + k / cord < first + 7.0:
-                axes[letter].axvline(first + k / cord, color=QUIET, lw=0.7, ls=":", label="period of the cord" if k == 0 else None)
+                axes[letter].axvline(first + k / cord, color=QUIET, lw=1.1, ls=":", label="period of the cord" if k == 0 else None)
         label(axes[letter], f"at {words}, about its mean", y="angle [deg]", legend="upper right")
 
 
@@ -93,7 +95,7 @@ def change(sheet: Sheet) -> None:
     label(axes["p"], "muscle: the same before and after", y="muscle [bar]")
     sheet.both(axes["a"], runs, angle)
     axes["a"].axvline(when, color=QUIET, ls=":")
-    label(axes["a"], "joint: from one moment on another angle", y="angle [deg]", legend="upper right")
+    label(axes["a"], "joint: from one moment on another angle", y="angle [deg]", legend="upper left")
     mass = sheet.rigs[1].effects[0]["parameters"]["mass_change"]
     torque = -missing_torque(sheet, runs[1])
     for part, colour, words in ((time < when, WITHOUT, "before"), (time > when + 0.5, WITH, "after")):
@@ -101,14 +103,20 @@ def change(sheet: Sheet) -> None:
     grid = np.linspace(25.0, 85.0, 50)
     lever = sheet.rigs[0].tables("arm")[""]["length"]
     axes["x"].plot(grid, mass * 9.80665 * lever * np.sin(np.radians(grid)), ":", color=QUIET, label="weight times lever")
-    label(axes["x"], "torque that the model lacks: follows the weight's lever", "angle [deg]", "more torque of the muscles [N m]", "center right")
+    label(
+        axes["x"],
+        "torque that the model lacks: follows the weight's lever",
+        "angle [deg]",
+        "more torque of the muscles [N m]",
+        "center right",
+    )
 
 
 def push(sheet: Sheet) -> None:
     """The same command twice, one push."""
     time = clock(32.0, 0.01)
     command = BAR * hold(time, (0.0, 1.2), (1.0, 2.0), (10.0, 1.2), (17.0, 2.0), (26.0, 1.2))
-    runs = sheet.run(supply_command=command, initial=begin(1.2, 30.0))
+    runs = sheet.run({"arm.coulomb": 0.0}, supply_command=command, initial=begin(1.2, 30.0))
     values = sheet.rigs[1].effects[0]["parameters"]
     axes = sheet.axes("p;a;t", sharex=True, height_ratios=[0.7, 1, 1])
     sheet.both(axes["p"], runs, pressure)
@@ -118,27 +126,32 @@ def push(sheet: Sheet) -> None:
     for run, colour, name in zip(runs, (WITHOUT, WITH), NAMES, strict=True):
         axes["t"].plot(time, missing_torque(sheet, run), color=colour, label=name)
     axes["t"].axvspan(values["time"], values["time"] + values["duration"], color="#dfe3e8", lw=0, zorder=0, label="push")
-    label(axes["t"], "torque that the model lacks (Coulomb friction is left in): begins and ends by itself", y="torque [N m]", legend="upper right")
+    label(axes["t"], "torque that the model lacks: begins and ends by itself", y="torque [N m]", legend="lower left")
 
 
 def mounting(sheet: Sheet) -> None:
-    """Fast random steps of the command about a pose."""
+    """Fast random steps of the set pressure about a pose."""
     step = 0.002
     time = clock(40.0, step)
-    level = np.random.default_rng(7).choice([-0.35, 0.35], size=round(40.0 / 0.04))
-    command = 5.0 + np.repeat(level, round(0.04 / step))[: time.size]
+    level = np.random.default_rng(7).choice([-1.0, 1.0], size=round(40.0 / 0.04))
+    command = BAR * (2.0 + np.repeat(level, round(0.04 / step))[: time.size])
     axes = sheet.axes("ax;bx", width_ratios=[1.1, 1])
-    first = {"muscle_pressure": 2e5, "joint_angle": np.radians(52.0)}
-    runs = sheet.run({"arm.coulomb": 0.0}, valve_command=command, sample_time=step, initial=first)
+    runs = sheet.run({"arm.coulomb": 0.0}, supply_command=command, sample_time=step, initial=begin(2.0, 52.0))
     for run, colour, name in zip(runs, (WITHOUT, WITH), NAMES, strict=True):
         axes["a"].plot(time[:1500], np.degrees(run["joint_rate"])[:1500], color=colour, label=name)
         axes["b"].plot(time[:1500], missing_torque(sheet, run)[:1500], color=colour, lw=1.0)
         frequency, gain = _gain(run, step)
-        axes["x"].semilogx(frequency, gain, color=colour, label=name)
-    axes["x"].axvline(sheet.rigs[1].effects[0]["parameters"]["natural_frequency"], color=QUIET, ls=":", label="base alone")
+        axes["x"].plot(frequency, gain, color=colour, label=name)
+    axes["x"].axvline(sheet.rigs[1].effects[0]["parameters"]["natural_frequency"], color=QUIET, ls=":", label="base without the arm")
     label(axes["a"], "joint under fast moves", y="rate [deg/s]", legend="upper right")
     label(axes["b"], "torque that the model lacks: rings", y="torque [N m]")
-    label(axes["x"], "inertia by frequency", "frequency [Hz]", "torque by acceleration [kg m2]", "upper left")
+    label(
+        axes["x"],
+        "inertia by frequency: too large, a peak, too small",
+        "frequency [Hz]",
+        "torque by acceleration [kg m2]",
+        "upper right",
+    )
 
 
 def _gain(run: Simulation, step: float) -> tuple[Array, Array]:
@@ -155,5 +168,5 @@ def _gain(run: Simulation, step: float) -> tuple[Array, Array]:
         top += np.fft.rfft(window * (torque[part] - torque[part].mean())) * np.conj(moved)
         bottom += np.abs(moved) ** 2
     frequency = np.fft.rfftfreq(size, step)
-    keep = (frequency > 1.0) & (frequency < 20.0)
-    return frequency[keep], np.abs(top[keep] / bottom[keep])
+    keep = (frequency > 0.9) & (frequency < 15.0)
+    return np.asarray(frequency[keep], dtype=np.float64), np.abs(top[keep] / bottom[keep])

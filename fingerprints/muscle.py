@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from fingerprints.sheet import BAR, QUIET, WITH, WITHOUT, Array, Sheet, angle, clock, hold, label, pressure, through
@@ -23,7 +25,11 @@ def bench(sheet: Sheet, contraction: Array, gauge: float, sample_time: float) ->
     effect = sheet.rigs[1].effects[0]
     plain = rigs.named("bench")
     pair = (plain, plain.with_effect(effect["id"], effect["parameters"]))
-    drive = {"length": REST * (1.0 - contraction), "pressure": np.full(contraction.size, gauge), "sample_time": sample_time}
+    drive: dict[str, Any] = {
+        "length": REST * (1.0 - contraction),
+        "pressure": np.full(contraction.size, gauge),
+        "sample_time": sample_time,
+    }
     without, with_ = (simulate(rig, **drive) for rig in pair)
     return without, with_
 
@@ -55,41 +61,65 @@ def hysteresis(sheet: Sheet) -> None:
             for run, colour, name in zip(pair, (WITHOUT, WITH), NAMES, strict=True):
                 given = f"{name}{words}" if gauge == 2e5 else None
                 axes["f"].plot(percent(run)[1000:], pull(run)[1000:], style, color=colour, label=given)
-        axes["f"].text(100 * place, float(np.interp(place, np.sort(wave), pull(pair[0])[np.argsort(wave)])) + 60.0, f"{gauge / BAR:g} bar")
+        axes["f"].text(
+            100 * place, float(np.interp(place, np.sort(wave), pull(pair[0])[np.argsort(wave)])) + 60.0, f"{gauge / BAR:g} bar"
+        )
     label(axes["f"], "one muscle on a frame: wider with pressure, not with speed", "contraction [%]", "pull [N]", "upper right")
 
 
 def creep(sheet: Sheet) -> None:
     """Steps of pressure with holds; a partial return."""
     time = clock(80.0, 0.02)
-    command = BAR * hold(time, (0.0, 1.0), (5.0, 2.4), (30.0, 1.0), (55.0, 2.4), (58.0, 2.0))
-    runs = sheet.run(supply_command=command, sample_time=0.02, initial={"supply_pressure": 1e5, "muscle_pressure": 1e5, "joint_angle": 0.45})
+    command = BAR * hold(time, (0.0, 1.0), (5.0, 2.4), (30.0, 1.0), (55.0, 2.4), (57.0, 2.1))
+    runs = sheet.run(
+        supply_command=command, sample_time=0.02, initial={"supply_pressure": 1e5, "muscle_pressure": 1e5, "joint_angle": 0.45}
+    )
     axes = sheet.axes("p;a;d", sharex=True, height_ratios=[0.8, 1, 1])
     sheet.both(axes["p"], runs, pressure)
     label(axes["p"], "muscle: constant in every hold", "", "muscle [bar]")
     sheet.both(axes["a"], runs, angle)
     label(axes["a"], "joint", "", "angle [deg]", "upper left")
-    for begin, end, words in ((10.0, 30.0, "goes on upward"), (35.0, 55.0, "goes on downward"), (62.0, 80.0, "after a partial return: back")):
+    for begin, end, words in (
+        (8.0, 30.0, "goes on upward"),
+        (33.0, 55.0, "goes on downward"),
+        (59.5, 80.0, "after a partial return: back up"),
+    ):
         part = slice(round(begin / 0.02), round(end / 0.02))
         for run, colour in zip(runs, (WITHOUT, WITH), strict=True):
             axes["d"].plot(time[part], (angle(run) - angle(run)[part][0])[part], color=colour)
-        axes["d"].text(begin, 0.35, words, color=QUIET)
+        axes["d"].text(begin + 3.0, -1.2, words, color=QUIET)
+    axes["d"].set_ylim(-1.5, 2.2)
     label(axes["d"], "joint in the holds, since their beginning", y="change [deg]")
 
 
 def damping(sheet: Sheet) -> None:
     """The muscle at two speeds and two pressures; the arm let go at two pressures."""
-    axes = sheet.axes("fl;fh", width_ratios=[1.1, 1])
+    axes = sheet.axes("fl;dh", width_ratios=[1.1, 1])
     for gauge in (1e5, 4e5):
-        for period, style in ((4.0, "--"), (1.0, "-")):
+        for period, style in ((2.0, "--"), (0.5, "-")):
             time = clock(2.0 * period, period / 1000.0)
             wave = 0.06 + 0.03 * np.sin(2.0 * np.pi * time / period)
             pair = bench(sheet, wave, gauge, period / 1000.0)
-            words = ", 1 Hz" if style == "-" else ", 0.25 Hz"
-            for run, colour, name in zip(pair, (WITHOUT, WITH), NAMES, strict=True):
-                axes["f"].plot(percent(run)[1000:], pull(run)[1000:], style, color=colour, label=f"{name}{words}" if gauge == 1e5 else None)
-        axes["f"].text(3.5, float(np.interp(0.035, np.sort(wave), pull(pair[0])[np.argsort(wave)])) + 90.0, f"{gauge / BAR:g} bar")
-    label(axes["f"], "one muscle: the loop grows with speed and pressure", "contraction [%]", "pull [N]", "upper right")
+            if gauge > 2e5:
+                for run, colour, name in zip(pair, (WITHOUT, WITH), NAMES, strict=True):
+                    axes["f"].plot(percent(run)[1000:], pull(run)[1000:], style, color=colour, label=f"{name}, {1.0 / period:g} Hz")
+        extra = (pull(pair[1]) - pull(pair[0]))[1000:]
+        axes["d"].plot(
+            1e3 * np.gradient(REST * (1.0 - wave), time)[1000:],
+            extra,
+            "--" if gauge < 2e5 else "-",
+            color=WITH,
+            label=f"{gauge / BAR:g} bar",
+        )
+    label(axes["f"], "one muscle at 4 bar: the loop grows with speed", "contraction [%]", "pull [N]", "upper right")
+    axes["d"].axhline(0.0, color=QUIET, lw=0.8)
+    label(
+        axes["d"],
+        "steeper at higher pressure, less while lengthening",
+        "speed of lengthening [mm/s]",
+        "with less without [N]",
+        "upper left",
+    )
     for letter, bar, start in (("l", 1.5, 60.0), ("h", 3.0, 70.0)):
         time = clock(4.0, 0.005)
         first = {"supply_pressure": bar * BAR, "muscle_pressure": bar * BAR, "joint_angle": np.radians(start)}
@@ -107,7 +137,7 @@ def activation(sheet: Sheet) -> None:
         runs = sheet.run({"arm.payload": payload}, supply_command=BAR * through(time, (0.0, 0.0), (60.0, 3.2)), sample_time=0.05)
         for run, colour, name in zip(runs, (WITHOUT, WITH), NAMES, strict=True):
             axes["x"].plot(pressure(run), angle(run), style, color=colour, label=f"{name}, {words}")
-        grid = np.linspace(18.0, 100.0, 100)
+        grid = np.linspace(18.0, min(118.0, angle(runs[1]).max()), 100)
         shift = [np.interp(grid, angle(run), pressure(run)) for run in runs]
         axes["d"].plot(grid, shift[1] - shift[0], style, color=WITH, label=words)
     threshold = sheet.rigs[1].effects[0]["parameters"]["threshold"] / BAR
@@ -124,18 +154,19 @@ def softening(sheet: Sheet) -> None:
     time = clock(8 * over, 0.05)
     levels = (0.0, 2.0, 0.0, 2.0, 0.0, 3.0, 0.0, 3.0, 0.0)
     runs = sheet.run({"arm.coulomb": 0.0}, supply_command=BAR * zigzag(time, *levels, over=over), sample_time=0.05)
-    axes = sheet.axes("px;ad", width_ratios=[1, 1.1])
+    axes = sheet.axes("px;ax", width_ratios=[1, 1.2])
     sheet.both(axes["p"], runs, pressure)
     label(axes["p"], "muscle: twice low, twice high", y="muscle [bar]")
     sheet.both(axes["a"], runs, angle)
     label(axes["a"], "joint", y="angle [deg]", legend="upper left")
-    styles = (("-", WITHOUT, "1st"), ("-", "#c79a00", "2nd"), ("-", "#7c3aed", "3rd, higher"), ("--", WITH, "4th"))
-    for letter, run in (("x", runs[0]), ("d", runs[1])):
-        for k, (style, colour, words) in enumerate(styles):
-            part = slice(round(2 * k * over / 0.05) + 10, round((2 * k + 1) * over / 0.05) - 10)
-            axes[letter].plot(pressure(run)[part], angle(run)[part], style, color=colour, lw=1.5, label=f"{words} stroke")
-    label(axes["x"], "without: every stroke the same", "muscle [bar]", "angle [deg]", "upper left")
-    label(axes["d"], "with: each first stroke is weaker, up to its end", "muscle [bar]", "angle [deg]", "upper left")
+    strokes = [slice(round(2 * k * over / 0.05) + 10, round((2 * k + 1) * over / 0.05) - 10) for k in range(4)]
+    axes["x"].plot(
+        pressure(runs[0])[strokes[3]], angle(runs[0])[strokes[3]], color=WITHOUT, lw=5.0, alpha=0.4, label="without, every stroke"
+    )
+    styles = ((":", "1st, to 2 bar"), ("--", "2nd, to 2 bar"), ("-.", "3rd, to 3 bar"), ("-", "4th, to 3 bar"))
+    for part, (style, words) in zip(strokes, styles, strict=True):
+        axes["x"].plot(pressure(runs[1])[part], angle(runs[1])[part], style, color=WITH, lw=1.8, label=f"with, {words}")
+    label(axes["x"], "strokes upward: as modelled where it never was, stronger later", "muscle [bar]", "angle [deg]", "upper left")
 
 
 def crowding(sheet: Sheet) -> None:
@@ -149,8 +180,15 @@ def crowding(sheet: Sheet) -> None:
             axes["f"].plot(percent(run), pull(run), style, color=colour, label=f"{name}, {gauge / BAR:g} bar")
         axes["d"].plot(percent(pair[0]), pull(pair[1]) - pull(pair[0]), style, color=WITH, label=f"{gauge / BAR:g} bar")
     label(axes["f"], "one muscle on a frame", "contraction [%]", "pull [N]", "upper right")
-    label(axes["d"], "what is missing: from one contraction on, more with pressure", "contraction [%]", "with less without [N]", "lower left")
+    label(
+        axes["d"],
+        "what is missing: from one contraction on, more with pressure",
+        "contraction [%]",
+        "with less without [N]",
+        "lower left",
+    )
     time = clock(80.0, 0.05)
     runs = sheet.run(supply_command=BAR * zigzag(time, 0.0, 4.5, 0.0, over=40.0), sample_time=0.05)
     sheet.both(axes["x"], runs, angle, pressure)
+    axes["x"].set(xlim=(2.0, 4.6), ylim=(50.0, 122.0))
     label(axes["x"], "joint: falls short the same way up and down", "muscle [bar]", "angle [deg]", "upper left")

@@ -29,7 +29,9 @@ def late_clock(sheet: Sheet) -> None:
     """The same pulse of the command at the start and at the end."""
     last = 60.0
     time = clock(last + 8.0, 0.002)
-    pulses = [pair for k in range(9) for pair in ((8.0 * k + 1.0, 5.6), (8.0 * k + 1.2, 5.0), (8.0 * k + 3.0, 4.2), (8.0 * k + 4.0, 5.0))]
+    pulses = [
+        pair for k in range(9) for pair in ((8.0 * k + 1.0, 5.6), (8.0 * k + 1.2, 5.0), (8.0 * k + 3.0, 4.2), (8.0 * k + 4.0, 5.0))
+    ]
     runs = sheet.run(valve_command=hold(time, (0.0, 5.0), *pulses), sample_time=0.002)
     axes = sheet.axes("pq;ab")
     for (top, low), begin, words in ((("p", "a"), 1.0, "at the start"), (("q", "b"), 57.0, "near the end")):

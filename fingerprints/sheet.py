@@ -52,7 +52,7 @@ PALETTE = 48
 
 def clock(duration: float, sample_time: float = 0.01) -> Array:
     """Times of the rows, shape (n,) [s]."""
-    return np.arange(round(duration / sample_time)) * sample_time
+    return np.asarray(np.arange(round(duration / sample_time)) * sample_time, dtype=np.float64)
 
 
 def hold(time: Array, *steps: tuple[float, float]) -> Array:
@@ -63,7 +63,7 @@ def hold(time: Array, *steps: tuple[float, float]) -> Array:
 
 def through(time: Array, *points: tuple[float, float]) -> Array:
     """A signal of straight lines through points (when [s], value), shape of `time`."""
-    return np.interp(time, *np.array(points).T)
+    return np.asarray(np.interp(time, *np.array(points).T), dtype=np.float64)
 
 
 # ------------------------------------------------------------------ channels
@@ -91,7 +91,7 @@ def angle(run: pamrs.Simulation) -> Array:
 
 def flow(run: pamrs.Simulation) -> Array:
     """Air that flows into the muscle [g/s]."""
-    return np.gradient(1e3 * run["air_mass"], run.time)
+    return np.asarray(np.gradient(1e3 * run["air_mass"], run.time), dtype=np.float64)
 
 
 # ------------------------------------------------------------------ pictures

@@ -96,7 +96,8 @@ MOTION: Final[tuple[EffectInfo, ...]] = (
         block="arm",
         at="",
         equation="q'' + 2 z w q' + w^2 q = -c w^2 tau_1; the first link stands at theta + q, sensor and muscles see theta",
-        fingerprint="a narrow peak at the base's frequency, excited by fast moves; the arm's inertia seems too small below it",
+        fingerprint="after fast moves a ringing in a narrow band, where base and arm swing together, below the base's own frequency; "
+        "the arm's inertia seems too large below it, too small above",
         separates="a swinging payload is slower and follows the posture; tendons ring faster at higher pressure",
         parameters=(
             Parameter("compliance", "rad/(N m)", 5e-5, 0.0, 1.0, (2e-5, 2e-4), "turn of the base by a torque", 0.0),
