@@ -48,7 +48,7 @@ def supply_leak(sheet: Sheet) -> None:
         y="supply [bar]",
         legend="center left",
     )
-    label(axes["p"], "muscle: as modelled", y="muscle [bar]", legend="center right")
+    label(axes["p"], "muscle: as modelled", y="muscle [bar]", legend="upper left")
     label(axes["x"], "valve shut: in proportion to absolute pressure", "supply, absolute [bar]", "rate of fall [Pa/s]", "upper left")
 
 
@@ -117,10 +117,11 @@ def play(sheet: Sheet) -> None:
     ranges = (("x", 4.6, 5.4, "through the null"), ("y", 5.2, 5.6, "on one side of the null"))
     for letter, low, high, words in ranges:
         for period, style in ((0.6, "-"), (0.12, "--")):
-            time = clock(3.0 * period, 0.001)
+            row = period / 600.0
+            time = clock(3.0 * period, row)
             command = _triangle(time, period, low, high)
-            runs = sheet.run(LOCKED, valve_command=command, sample_time=0.001, initial={"muscle_pressure": 3e5})
-            part = slice(int(1.25 * period / 0.001), int(2.25 * period / 0.001))
+            runs = sheet.run(LOCKED, valve_command=command, sample_time=row, initial={"muscle_pressure": 3e5})
+            part = slice(750, 1350)
             of = {"part": part, "ls": style}
             sheet.both(axes[letter], runs, flow, lambda run: run["valve_command"], **of)
             if style == "--":

@@ -74,7 +74,7 @@ def swing(sheet: Sheet) -> None:
     )
     values = sheet.rigs[1].effects[0]["parameters"]
     cord = np.sqrt(9.80665 / values["length"]) / (2.0 * np.pi)
-    for letter, first, words in (("l", 5.0, "1.6 bar"), ("h", 16.0, "2.6 bar")):
+    for letter, first, words in (("l", 3.5, "1.6 bar"), ("h", 14.5, "2.6 bar")):
         part = slice(round(first / 0.01), round((first + 7.0) / 0.01))
         for run, colour, name in zip(runs, (WITHOUT, WITH), NAMES, strict=True):
             axes[letter].plot(time[part], (angle(run) - angle(run)[part].mean())[part], color=colour, label=name)

@@ -60,7 +60,8 @@ def hysteresis(sheet: Sheet) -> None:
             words = "" if style == "-" else ", ten times as fast"
             for run, colour, name in zip(pair, (WITHOUT, WITH), NAMES, strict=True):
                 given = f"{name}{words}" if gauge == 2e5 else None
-                axes["f"].plot(percent(run)[1000:], pull(run)[1000:], style, color=colour, label=given)
+                wide = {} if style == "-" else {"lw": 5.0, "alpha": 0.35, "zorder": 1.5}
+                axes["f"].plot(percent(run)[1000:], pull(run)[1000:], color=colour, label=given, **wide)
         axes["f"].text(
             100 * place, float(np.interp(place, np.sort(wave), pull(pair[0])[np.argsort(wave)])) + 60.0, f"{gauge / BAR:g} bar"
         )
@@ -78,7 +79,7 @@ def creep(sheet: Sheet) -> None:
     sheet.both(axes["p"], runs, pressure)
     label(axes["p"], "muscle: constant in every hold", "", "muscle [bar]")
     sheet.both(axes["a"], runs, angle)
-    label(axes["a"], "joint", "", "angle [deg]", "upper left")
+    label(axes["a"], "joint", "", "angle [deg]", "upper center")
     for begin, end, words in (
         (8.0, 30.0, "goes on upward"),
         (33.0, 55.0, "goes on downward"),
@@ -163,9 +164,10 @@ def softening(sheet: Sheet) -> None:
     axes["x"].plot(
         pressure(runs[0])[strokes[3]], angle(runs[0])[strokes[3]], color=WITHOUT, lw=5.0, alpha=0.4, label="without, every stroke"
     )
-    styles = ((":", "1st, to 2 bar"), ("--", "2nd, to 2 bar"), ("-.", "3rd, to 3 bar"), ("-", "4th, to 3 bar"))
-    for part, (style, words) in zip(strokes, styles, strict=True):
-        axes["x"].plot(pressure(runs[1])[part], angle(runs[1])[part], style, color=WITH, lw=1.8, label=f"with, {words}")
+    styles = ((":", 1.8, 1.0), ("--", 1.8, 1.0), ("-", 5.0, 0.35), ("-", 1.8, 1.0))
+    for k, (part, (style, width, alpha)) in enumerate(zip(strokes, styles, strict=True)):
+        words = f"with, stroke {k + 1}, to {levels[2 * k + 1]:g} bar"
+        axes["x"].plot(pressure(runs[1])[part], angle(runs[1])[part], style, color=WITH, lw=width, alpha=alpha, label=words)
     label(axes["x"], "strokes upward: as modelled where it never was, stronger later", "muscle [bar]", "angle [deg]", "upper left")
 
 
