@@ -60,7 +60,7 @@ def hysteresis(sheet: Sheet) -> None:
             words = "" if style == "-" else ", ten times as fast"
             for run, colour, name in zip(pair, (WITHOUT, WITH), NAMES, strict=True):
                 given = f"{name}{words}" if gauge == 2e5 else None
-                wide = {} if style == "-" else {"lw": 5.0, "alpha": 0.35, "zorder": 1.5}
+                wide: dict[str, Any] = {} if style == "-" else {"lw": 5.0, "alpha": 0.35, "zorder": 1.5}
                 axes["f"].plot(percent(run)[1000:], pull(run)[1000:], color=colour, label=given, **wide)
         axes["f"].text(
             100 * place, float(np.interp(place, np.sort(wave), pull(pair[0])[np.argsort(wave)])) + 60.0, f"{gauge / BAR:g} bar"
@@ -134,7 +134,7 @@ def activation(sheet: Sheet) -> None:
     """A slow rise of the pressure from 0 bar, with the payload and without."""
     time = clock(60.0, 0.05)
     axes = sheet.axes("xd", width_ratios=[1.2, 1])
-    for payload, style, words in ((9.07, "-", "payload 9 kg"), (0.0, "--", "none")):
+    for payload, style, words in ((9.07, "-", "payload 9 kg"), (0.0, "--", "no payload")):
         runs = sheet.run({"arm.payload": payload}, supply_command=BAR * through(time, (0.0, 0.0), (60.0, 3.2)), sample_time=0.05)
         for run, colour, name in zip(runs, (WITHOUT, WITH), NAMES, strict=True):
             axes["x"].plot(pressure(run), angle(run), style, color=colour, label=f"{name}, {words}")

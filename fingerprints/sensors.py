@@ -41,7 +41,7 @@ def late_clock(sheet: Sheet) -> None:
             axes[low].plot(1e3 * (time[part] - begin), angle(run)[part], color=colour, label=name)
         for letter, channel, unit in ((top, "pressure", "muscle [bar]"), (low, "angle", "angle [deg]")):
             axes[letter].axvline(0.0, color="#6b7280", ls=":", lw=1.0, label="command")
-            label(axes[letter], f"{channel}, {words}", "time since the command [ms]", unit, "lower right")
+            label(axes[letter], f"{channel}, {words}", "time since the command [ms]", unit, "lower right" if letter == "p" else "")
     for letters in ("pq", "ab"):
         sizes = [np.ptp(axes[letter].get_ylim()) for letter in letters]
         for letter in letters:
