@@ -19,7 +19,8 @@ AIR: Final[tuple[EffectInfo, ...]] = (
         at="supply",
         equation="m_leak = C rho0 p psi(pa/p)/psi(0), out of the supply at all times",
         fingerprint="the supply falls in proportion to its absolute pressure, also with every valve shut; all else is as modelled",
-        separates="gas that cools after charging stops falling within minutes; centre leakage stops when the valve is shut off",
+        separates="gas that cools after charging stops falling within minutes; centre leakage stops when the valve is shut off; "
+        "a sensor's drift does not follow the pressure",
         parameters=(
             Parameter("conductance", _CONDUCTANCE, 1e-11, 0.0, 1e-6, (1e-11, 1e-9), "sonic conductance of the leak (ISO 6358)", 0.0),
         ),
@@ -120,7 +121,7 @@ AIR: Final[tuple[EffectInfo, ...]] = (
         at="valve",
         equation="m_v(p1, pn) = m_t(pn, p2), tube by ISO 6358 with C and b = 0.3; no volume at the node",
         fingerprint="large openings give less flow than they should, filling and venting alike; small ones are as modelled",
-        separates="a smaller valve is smaller at every opening, a larger volume slower too; "
+        separates="a smaller valve gives less at every opening, a larger volume slows every opening alike; "
         "a restricted supply line slows the filling only",
         parameters=(
             Parameter("conductance", _CONDUCTANCE, 1.2e-8, 1e-15, 1.0, (5e-9, 3e-8), "sonic conductance; at 1 no restriction", 1.0),

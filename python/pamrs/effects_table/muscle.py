@@ -66,7 +66,7 @@ MUSCLE: Final[tuple[EffectInfo, ...]] = (
         at="muscle",
         equation="F = F(p_e, L), p_e = max(pg - p_th, 0), rounded over a tenth of p_th",
         fingerprint="no motion up to a pressure, then as modelled with the pressure shifted",
-        separates="a constant torque shifts less under another payload or co-contraction; "
+        separates="a constant torque shifts each angle by another pressure, clearest with another payload or co-contraction; "
         "errors of the zeros show when vented, at a known angle",
         parameters=(Parameter("threshold", "Pa", 2e4, 0.0, 1e7, (1e4, 5e4), "gauge pressure that is lost", 0.0),),
         reference="Tsagarakis & Caldwell (2000); Hocking & Wereley (2013)",
