@@ -16,7 +16,7 @@ CASE_KIND := $(if $(KIND),--kind $(KIND))
 LOCKED := $(if $(CI),--locked)
 RUST_SOURCES := $(shell find crates -name '*.rs' -path '*/src/*' 2>/dev/null) \
                 $(shell find crates -name Cargo.toml 2>/dev/null) Cargo.toml $(wildcard Cargo.lock)
-PYTHON_SOURCES := python tests trial demo benchmarks
+PYTHON_SOURCES := python tests trial demo benchmarks fingerprints
 
 # The binding crate must see the same interpreter from cargo and from maturin, or it is rebuilt each time.
 export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
@@ -24,7 +24,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export MPLBACKEND := Agg
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: help setup build demo test test-rust test-python lint format bench convergence golden lock clean
+.PHONY: help setup build demo test test-rust test-python lint format bench convergence effects golden lock clean
 
 help:  ## this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -79,6 +79,9 @@ bench: build  ## this package and its reference side by side
 convergence: build  ## order, stability and error of every packaged rig
 	$(BIN)/python -m benchmarks.convergence docs
 
+effects: build  ## a page of every effect of the catalogue, its fingerprint drawn by the simulator
+	$(BIN)/python -m fingerprints docs/effects
+
 golden: build  ## the published golden values against this build
 	$(BIN)/python -m pytest -q tests/golden
 
@@ -90,5 +93,5 @@ lock:  ## pin the newest versions that pyproject.toml allows
 
 clean:  ## remove everything that was built
 	rm -rf $(VENV) target out .pytest_cache .mypy_cache .ruff_cache .hypothesis
-	find python trial tests benchmarks demo -name __pycache__ -type d -prune -exec rm -rf {} + 2>/dev/null || true
+	find python trial tests benchmarks demo fingerprints -name __pycache__ -type d -prune -exec rm -rf {} + 2>/dev/null || true
 	rm -f python/pamrs/_core*.so

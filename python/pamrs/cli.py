@@ -1,4 +1,4 @@
-"""The command line: ``pamrs diagnose``, ``fit``, ``library``, ``lift``, ``reproduce``, ``simulate``, ``size`` and ``rig check``.
+"""The command line: ``pamrs diagnose``, ``effects``, ``fit``, ``library``, ``lift``, ``reproduce``, ``simulate``, ``size``, ``rig``.
 
 Results go to standard output, progress and errors to standard error. The exit code is 0 when the
 command did its work (a diagnosis that finds nothing missing included), 2 when the input is wrong.
@@ -15,6 +15,7 @@ from typing import Annotated
 import typer
 
 from pamrs.cli_design import design_app
+from pamrs.cli_effects import effects_command
 from pamrs.cli_fit import fit_app
 from pamrs.cli_library import library_command, size_command
 from pamrs.cli_lift import lift_command
@@ -37,6 +38,7 @@ app.add_typer(rig_app, name="rig")
 app.add_typer(fit_app, name="fit")
 app.add_typer(design_app, name="design")
 app.command("simulate")(simulate_command)
+app.command("effects")(effects_command)
 app.command("library")(library_command)
 app.command("lift")(lift_command)
 app.command("reproduce")(reproduce_command)

@@ -54,6 +54,8 @@ class EffectInfo:
         Its parameters.
     reference : str
         Where it comes from.
+    rivals : tuple of str
+        What looks like it in recordings: ids of the catalogue first, then other causes in words. Of two effects each names the other.
     """
 
     id: str
@@ -65,6 +67,7 @@ class EffectInfo:
     separates: str
     parameters: tuple[EffectParameter, ...]
     reference: str
+    rivals: tuple[str, ...] = ()
 
     @property
     def everywhere(self) -> str:

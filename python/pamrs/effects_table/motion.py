@@ -17,12 +17,14 @@ MOTION: Final[tuple[EffectInfo, ...]] = (
         at="joint",
         equation="tau = -(f_s - f) exp(-(w/w_s)^2) tanh(10 w/w_s), beside f of the arm",
         fingerprint="the joint stands while the pressure moves, then breaks away; largest at each return, the same at all pressures",
-        separates="friction of the braid grows with pressure and doubles with co-contraction; a dead band holds the pressure itself",
+        separates="friction of the braid grows with pressure and doubles with co-contraction; "
+        "a dead band holds the pressure itself; a push from outside does not come again with the command",
         parameters=(
             Parameter("stiction", "N m", 1.0, 0.0, 1e6, (0.5, 3.0), "static friction above the Coulomb friction", 0.0),
             Parameter("stribeck_speed", "rad/s", 0.05, 1e-3, 1e3, (0.02, 0.1), "speed over which it fades"),
         ),
         reference="Armstrong-Helouvry, Dupont & Canudas de Wit (1994)",
+        rivals=("muscle_hysteresis", "supply_regulator_deadband", "external_torque"),
     ),
     EffectInfo(
         id="joint_end_stop",
@@ -38,6 +40,7 @@ MOTION: Final[tuple[EffectInfo, ...]] = (
             Parameter("dissipation", "s/rad", 0.5, 0.0, 1e4, (0.5,), "growth of its torque with the speed of the blow"),
         ),
         reference="Hunt & Crossley (1975)",
+        rivals=("pam_crowding_contact", "the end of the muscle's stroke"),
     ),
     EffectInfo(
         id="payload_swing",
@@ -46,13 +49,15 @@ MOTION: Final[tuple[EffectInfo, ...]] = (
         at="joint",
         equation="mu = s m_p on a cord l: l phi'' = -(a + g) t - 2 z sqrt(g/l) l phi', pull on the link along the cord",
         fingerprint="after each manoeuvre a slightly damped oscillation near sqrt(g/l)/(2 pi) that no pressure changes",
-        separates="a base that gives way rings faster and less by posture; the arm on its muscles rings faster at higher pressure",
+        separates="a base that gives way rings faster and depends less on the pose; "
+        "the arm on its muscles rings faster at higher pressure",
         parameters=(
             Parameter("swinging_share", "1", 0.5, 0.0, 1.0, (0.2, 0.8), "share of the payload that swings", 0.0),
             Parameter("length", "m", 0.3, 1e-3, 100.0, (0.15, 0.5), "of the cord"),
             Parameter("damping_ratio", "1", 0.02, 0.0, 10.0, (0.02,), "of the pendulum"),
         ),
         reference="Landau & Lifshitz, Mechanics, section 5 (double pendulum)",
+        rivals=("base_flexibility", "the arm's own swing on its muscles"),
     ),
     EffectInfo(
         id="payload_change",
@@ -67,6 +72,7 @@ MOTION: Final[tuple[EffectInfo, ...]] = (
             Parameter("time", "s", 5.0, -1e9, 1e9, (5.0, 15.0), "when, from the start of the recording"),
         ),
         reference="Spong, Hutchinson & Vidyasagar, Robot Modeling and Control, ch. 7",
+        rivals=("external_torque", "a payload that is off"),
     ),
     EffectInfo(
         id="external_torque",
@@ -75,7 +81,7 @@ MOTION: Final[tuple[EffectInfo, ...]] = (
         at="joint",
         equation="tau_ext from a time on, for a duration, edges over 20 ms; up to three times",
         fingerprint="a torque that begins and ends at moments which no command explains, and that does not repeat with the command",
-        separates="stiction and slack repeat with the command; a payload's change stays and follows the pose",
+        separates="stiction repeats with the command; a payload's change stays and follows the pose",
         parameters=(
             Parameter("torque", "N m", 5.0, -1e9, 1e9, (-5.0, 5.0), "of the push", 0.0),
             Parameter("time", "s", 5.0, -1e9, 1e9, (5.0, 15.0), "when it begins, from the start of the recording"),
@@ -88,6 +94,7 @@ MOTION: Final[tuple[EffectInfo, ...]] = (
             Parameter("duration_3", "s", 1.0, 0.0, 1e9, (1.0,), "how long the third lasts"),
         ),
         reference="Ohnishi, Shibata & Murakami (1996), disturbance torque",
+        rivals=("joint_coulomb_stribeck", "payload_change"),
     ),
     EffectInfo(
         id="base_flexibility",
@@ -95,7 +102,8 @@ MOTION: Final[tuple[EffectInfo, ...]] = (
         block="arm",
         at="",
         equation="q'' + 2 z w q' + w^2 q = -c w^2 tau_1; the first link stands at theta + q, sensor and muscles see theta",
-        fingerprint="a narrow peak at the base's frequency, excited by fast moves; the arm's inertia seems too small below it",
+        fingerprint="after fast moves a ringing in a narrow band, where base and arm swing together, below the base's own frequency; "
+        "the arm's inertia seems too large below it, too small above",
         separates="a swinging payload is slower and follows the posture; tendons ring faster at higher pressure",
         parameters=(
             Parameter("compliance", "rad/(N m)", 5e-5, 0.0, 1.0, (2e-5, 2e-4), "turn of the base by a torque", 0.0),
@@ -103,6 +111,7 @@ MOTION: Final[tuple[EffectInfo, ...]] = (
             Parameter("damping_ratio", "1", 0.03, 0.0, 10.0, (0.03,), "of the base"),
         ),
         reference="Spong (1987), elastic joint with the spring in the base",
+        rivals=("payload_swing", "tendons that give way"),
     ),
 )
 """In the order of the chain."""

@@ -18,13 +18,14 @@ MUSCLE: Final[tuple[EffectInfo, ...]] = (
         equation="F_h = (W0 + c pg) mean(clip(z_i)), z_i' = L'/d_i until |z_i| = 1; four elements, d/8 to d",
         fingerprint="less pull while contracting, more while extending; the loop does not depend on speed; after a "
         "reversal the force changes over a finite distance",
-        separates="joint Coulomb friction has neither presliding nor growth with pressure; creep depends on time",
+        separates="joint Coulomb friction has neither presliding nor growth with pressure; creep and damping depend on time and speed",
         parameters=(
             Parameter("friction_constant", "N", 5.0, 0.0, 1e4, (2.0,), "half width of one muscle's loop at zero pressure", 0.0),
             Parameter("friction_pressure", "m2", 5e-5, 0.0, 1.0, (2e-5,), "growth of the half width with gauge pressure", 0.0),
             Parameter("presliding", "m", 1e-3, 1e-6, 0.1, (5e-4, 3e-3), "distance over which the loop closes after a reversal"),
         ),
         reference="Vo-Minh et al. (2011); Al-Bender, Lampaert & Swevers (2005); Robinson (2014) (2.36) as a special case",
+        rivals=("joint_coulomb_stribeck", "muscle_creep", "muscle_rate_damping"),
     ),
     EffectInfo(
         id="muscle_creep",
@@ -39,6 +40,7 @@ MUSCLE: Final[tuple[EffectInfo, ...]] = (
             Parameter("time_constant", "s", 3.0, 1e-3, 1e6, (1.0, 10.0), "time in which it relaxes"),
         ),
         reference="Findley, Lai & Onaran (1976); Schulte (1961)",
+        rivals=("leak_muscle", "muscle_hysteresis", "mullins_softening"),
     ),
     EffectInfo(
         id="muscle_rate_damping",
@@ -47,13 +49,15 @@ MUSCLE: Final[tuple[EffectInfo, ...]] = (
         at="muscle",
         equation="F_v = (b0 + b1 pg) L', times s while lengthening",
         fingerprint="the loop grows with speed; oscillations die out faster at higher pressure and slower while lengthening",
-        separates="the joint's own viscous friction depends neither on pressure nor on the muscle's moment arm",
+        separates="the braid's friction does not depend on speed; "
+        "the joint's own viscous friction depends neither on pressure nor on moment arm",
         parameters=(
             Parameter("damping_constant", "N s/m", 200.0, 0.0, 1e7, (100.0,), "of one muscle without pressure", 0.0),
             Parameter("damping_pressure", "m s", 5e-4, 0.0, 10.0, (5e-4,), "growth with gauge pressure [N s/m by Pa]", 0.0),
             Parameter("lengthening_share", "1", 1.0, 0.0, 10.0, (1.0,), "damping while lengthening by that while contracting"),
         ),
         reference="Reynolds, Repperger, Phillips & Bandry (2003)",
+        rivals=("muscle_hysteresis", "viscous friction of the joint"),
     ),
     EffectInfo(
         id="activation_pressure",
@@ -62,9 +66,11 @@ MUSCLE: Final[tuple[EffectInfo, ...]] = (
         at="muscle",
         equation="F = F(p_e, L), p_e = max(pg - p_th, 0), rounded over a tenth of p_th",
         fingerprint="no motion up to a pressure, then as modelled with the pressure shifted",
-        separates="constant torque, zero errors of angle or pressure: by another payload, co-contraction, the zero when vented",
+        separates="a constant torque shifts each angle by another pressure, clearest with another payload or co-contraction; "
+        "errors of the zeros show when vented, at a known angle",
         parameters=(Parameter("threshold", "Pa", 2e4, 0.0, 1e7, (1e4, 5e4), "gauge pressure that is lost", 0.0),),
         reference="Tsagarakis & Caldwell (2000); Hocking & Wereley (2013)",
+        rivals=("a constant torque", "a pressure zero that is off", "an angle zero that is off"),
     ),
     EffectInfo(
         id="mullins_softening",
@@ -73,12 +79,13 @@ MUSCLE: Final[tuple[EffectInfo, ...]] = (
         at="muscle",
         equation="F_b -> F_b (1 - D tanh((e_m - e)/w)), e_m = largest contraction since the start",
         fingerprint="the first stroke of a recording is weaker than all later ones up to the same contraction",
-        separates="creep and heat recover in minutes; wrong moduli do not depend on the past",
+        separates="creep comes back within minutes and at any stretch; wrong moduli do not depend on the past",
         parameters=(
             Parameter("softening", "1", 0.2, 0.0, 1.0, (0.1, 0.3), "share of the bladder's force that is lost", 0.0),
             Parameter("contraction_width", "1", 0.03, 1e-4, 10.0, (0.03,), "contraction below the largest over which it is lost"),
         ),
         reference="Ogden & Roxburgh (1999); Diani, Fayolle & Gilormini (2009)",
+        rivals=("muscle_creep", "bladder moduli that are off"),
     ),
     EffectInfo(
         id="pam_crowding_contact",
@@ -93,6 +100,7 @@ MUSCLE: Final[tuple[EffectInfo, ...]] = (
             Parameter("onset_contraction", "1", 0.12, -1.0, 1.0, (0.08, 0.15), "contraction at which they touch"),
         ),
         reference="Robinson, Kothera & Wereley (2015)",
+        rivals=("joint_end_stop", "bladder moduli that are off"),
     ),
 )
 """In the order of the catalogue."""

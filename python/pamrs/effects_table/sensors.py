@@ -20,6 +20,7 @@ SENSORS: Final[tuple[EffectInfo, ...]] = (
         separates="a lag on the way in does not touch pressure that motion makes; a clock's shift moves the angle too",
         parameters=(Parameter("time_constant", "s", 0.005, 0.0, 100.0, (0.003, 0.02), "of transducer, snubber and its line", 0.0),),
         reference="Doebelin, Measurement Systems, ch. 6",
+        rivals=("input_path_lag", "clock_skew"),
     ),
     EffectInfo(
         id="clock_skew",
@@ -28,12 +29,14 @@ SENSORS: Final[tuple[EffectInfo, ...]] = (
         at="",
         equation="y(t) = s(t - d), d = max(d0 + r t, 0): commands act later by d on pressures and angles alike",
         fingerprint="all channels answer late to the command, by a time that grows through the recording",
-        separates="a lag on the way in is the same at the start and at the end and rounds the edges; a sensor's lag moves one channel",
+        separates="a lag on the way in is the same at the start and at the end and rounds the edges; "
+        "a sensor's lag moves one channel only",
         parameters=(
             Parameter("offset", "s", 0.01, 0.0, 10.0, (0.005, 0.03), "how late at the start", 0.0),
             Parameter("rate", "1", 1e-4, -0.01, 0.01, (0.0, 3e-4), "growth per time", 0.0),
         ),
         reference="Mills (1991), offset and skew of clocks",
+        rivals=("input_path_lag", "pressure_lag"),
     ),
 )
 """In the order of the catalogue."""

@@ -1,0 +1,1 @@
+"""Pages and pictures of the catalogue of effects: ``python -m fingerprints docs/effects`` (``make effects``)."""
