@@ -254,7 +254,9 @@ def _events(effect: str, candidate: Candidate) -> list[dict[str, Any]]:
     for recording, values in events.values.items():
         for suffix in ("", "_2", "_3"):
             if "time" + suffix in values:
-                own = {name.removesuffix(suffix): v for name, v in values.items() if name.endswith(suffix) and (suffix or name[-2] != "_")}
+                own = {
+                    name.removesuffix(suffix): v for name, v in values.items() if name.endswith(suffix) and (suffix or name[-2] != "_")
+                }
                 found.append({"recording": recording, **own})
     return found
 

@@ -1,8 +1,9 @@
 """Effects that happen at times of their own in every recording: pushes from outside, a payload that changes.
 
-No parameter that all recordings share can describe them. In each recording a pulse or a step of a typical size is moved through time; where its
-signature takes most of the residual a fit begins. On a held-out recording the times are looked for again, since nothing can predict them;
-what the event is (a mass) is not. Pushes have no property that carries over, so that they are believed only if little is left.
+No parameter that all recordings share can describe them. In each recording a pulse or a step of a typical size is moved through
+time; where its signature takes most of the residual a fit begins. On a held-out recording the times are looked for again, since
+nothing can predict them; what the event is (a mass) is not. Pushes have no property that carries over, so that they are believed
+only if little is left.
 """
 
 from __future__ import annotations
@@ -171,7 +172,7 @@ def _apart(times: Array, slots: int) -> list[list[float]]:
 
 def _numbered(events: list[tuple[float, float]], leading: str, effect: str) -> dict[str, float]:
     """Parameters of a few events of one recording."""
-    values = {}
+    values: dict[str, float] = {}
     for place, (size, time) in enumerate(events):
         suffix = "" if place == 0 else f"_{place + 1}"
         values |= {leading + suffix: size, "time" + suffix: time}

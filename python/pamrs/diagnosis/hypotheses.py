@@ -9,10 +9,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pamrs.diagnosis.blocks import Block, Residual
-from pamrs.diagnosis.evidence import Excess, Floor, excess, floors, inflation
 from pamrs.diagnosis.events import EVENTS, fit_events, look_for_events
-from pamrs.diagnosis.fitting import FIT_BIN, Fit, Key, Problem, acts_in, fit, residuals
+from pamrs.diagnosis.evidence import Excess, Floor, excess, floors, inflation
+from pamrs.diagnosis.fitting import FIT_BIN, Fit, Key, Problem, acts_in, bin_width, fit, residuals
 from pamrs.diagnosis.screening import Screen, basis_of, by_effect, screen
+from pamrs.diagnosis.signals import Prepared
 from pamrs.diagnosis.starts import Start
 from pamrs.effects_table import EFFECTS, find_parameter
 from pamrs.errors import SimulationError
@@ -130,7 +131,7 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
     names = " and ".join(b.name for b in blocks)
     say(f"{names}: refitting the baseline inside its tolerances")
     before = residuals(inner, nominal)
-    first = fit(inner, nominal, (), {}, white)
+    first = _refitted(inner, nominal, white)
     floor = floors(inner, inner.core.respecified(first.rig.to_json()))
     if held is not fitted:
         floor |= floors(outer, outer.core.respecified(first.rig.to_json()))
@@ -162,6 +163,22 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
     candidates = [start, *singles, *pairs]
     doubt = _doubt(fitted, held, mismatch, now[mismatch.name].rms)
     return Group(blocks, was, now, candidates, _weigh(candidates, suspects, doubt), mismatch, floor, suspects)
+
+
+def _refitted(problem: Problem, nominal: Rig, inflation: dict[str, float]) -> Fit:
+    """The baseline refitted from the nominal values and, where that leaves more than noise could, from the other side of them."""
+    first = fit(problem, nominal, (), {}, inflation)
+    rows = sum(int(r.rows.sum()) / bin_width(p, FIT_BIN) for p in problem.recordings for r in _of(p, first.residuals))
+    if 2.0 * first.cost < DETECTION_RATIO * rows:
+        return first
+    known = nominal.parameters
+    mirrored = {n: 2.0 * known[n].value - first.values[n] for n in first.moved}
+    second = fit(problem, nominal, (), {}, inflation, warm=replace(first, values=mirrored))
+    return min(first, second, key=lambda f: f.cost)
+
+
+def _of(prepared: Prepared, found: dict[Key, Residual]) -> list[Residual]:
+    return [r for (_, recording), r in found.items() if recording == prepared.recording.name]
 
 
 def _fits(rig: Rig, effect: str) -> bool:
@@ -233,7 +250,9 @@ class _Trial:
         events = look_for_events(effect, self.outer, bare, quiet, white, size)
         if events is None:
             return self.judged((effect,), found, quiet)
-        everywhere = replace(found, events=replace(events, values=found.events.values | events.values if found.events else events.values))
+        everywhere = replace(
+            found, events=replace(events, values=found.events.values | events.values if found.events else events.values)
+        )
         return self.judged((effect,), everywhere, residuals(self.outer, bare, events=events))
 
     def judged(self, effects: tuple[str, ...], found: Fit, outside: dict[Key, Residual] | None = None) -> Candidate:
@@ -241,7 +260,9 @@ class _Trial:
         if outside is None:
             outside = found.residuals if self.same else residuals(self.outer, found.rig)
         after = {b.name: excess(b, self.outer.recordings, outside, self.floor) for b in self.inner.blocks}
-        inside = after if self.same else {b.name: excess(b, self.inner.recordings, found.residuals, self.floor) for b in self.inner.blocks}
+        inside = (
+            after if self.same else {b.name: excess(b, self.inner.recordings, found.residuals, self.floor) for b in self.inner.blocks}
+        )
         gaps = [(self.out[b.name].ratio - 1.0, max(0.0, after[b.name].ratio - 1.0)) for b in self.suspects]
         total = sum(math.sqrt(max(0.0, g)) for g, _ in gaps)
         gap = 1.0 - sum(math.sqrt(a) for _, a in gaps) / total if total > 0 else 0.0
@@ -363,11 +384,11 @@ def _scatter(effects: tuple[str, ...], problem: Problem, best: Fit) -> float:
 def _weigh(candidates: list[Candidate], suspects: list[Block], doubt: float) -> dict[str, float]:
     """Probabilities over sets of effects and ``unlisted``.
 
-    Between sets: the logarithm of what each leaves of the mismatch, fitted and held out, on a nominal number of independent looks; what the
-    form of an equation may leave (``FORM``) is granted to all of them, so that no second effect is asked for to mend the form of the first.
-    Each parameter and each further effect has its price. Against ``unlisted``: the share of the mismatch that the set explains where it
-    explains least, and whether its size is the same in all recordings. The constants are those under which the stated probabilities came
-    true in a trial with other seeds than the published one (docs/decisions/0014).
+    Between sets: the logarithm of what each leaves of the mismatch, fitted and held out, on a nominal number of independent looks;
+    what the form of an equation may leave (``FORM``) is granted to all of them, so that no second effect is asked for to mend the
+    form of the first. Each parameter and each further effect has its price. Against ``unlisted``: the share of the mismatch that
+    the set explains where it explains least, and whether its size is the same in all recordings. The constants are those under
+    which the stated probabilities came true in a trial with other seeds than the published one (docs/decisions/0014).
     """
     named = [c for c in candidates if c.effects]
     if not named:

@@ -1,8 +1,9 @@
 """Bounded least squares by Levenberg and Marquardt on the normal equations.
 
-The residuals of a diagnosis are tens of thousands of rows of a dozen parameters, one evaluation gives rows and sensitivities together, and a
-gain that the noise could have made is worth no further evaluation. SciPy's `least_squares` decomposes the tall matrix at every step, evaluates
-rows and sensitivities apart, and its tolerances are relative: it took four times as long to the same end (docs/decisions/0014).
+The residuals of a diagnosis are tens of thousands of rows of a dozen parameters, one evaluation gives rows and sensitivities
+together, and a gain that the noise could have made is worth no further evaluation. SciPy's `least_squares` decomposes the tall
+matrix at every step, evaluates rows and sensitivities apart, and its tolerances are relative: it took four times as long to the
+same end (docs/decisions/0014).
 """
 
 from __future__ import annotations
