@@ -13,7 +13,7 @@ from pamrs.diagnosis.evidence import Excess, Floor, excess, floors, inflation
 from pamrs.diagnosis.fitting import FIT_BIN, Fit, Key, Problem, acts_in, fit, residuals
 from pamrs.diagnosis.screening import Screen, basis_of, by_effect, screen
 from pamrs.diagnosis.starts import Start
-from pamrs.effects_table import EFFECTS, find_parameter
+from pamrs.effects_table import CATALOGUE, EFFECTS, find_parameter
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 
@@ -143,7 +143,7 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
         return Group(blocks, was, now, [start], {"": 1.0}, None, floor, [])
     mismatch = max(suspects, key=lambda b: out[b.name].ratio)
     say(f"{names}: {mismatch.name} keeps {now[mismatch.name].systematic:.2g} noise units after the refit")
-    acting = [e for e in EFFECTS if _fits(nominal, e) and any(acts_in(e, b) for b in suspects)]
+    acting = [e for e in CATALOGUE if _fits(nominal, e) and any(acts_in(e, b) for b in suspects)]
     trial = _Trial(inner, outer, nominal, floor, out, suspects)
     screened = screen(inner, baseline, acting, white, sealed=nominal.model["valve"] is None)
     singles = _singles(trial, screened, baseline, lambda text: say(f"{names}: {text}"))

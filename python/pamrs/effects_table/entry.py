@@ -54,6 +54,8 @@ class EffectInfo:
         Its parameters.
     reference : str
         Where it comes from.
+    catalogue : bool
+        Whether it is a name for physics, which a diagnosis may give; a closure is none.
     """
 
     id: str
@@ -65,6 +67,7 @@ class EffectInfo:
     separates: str
     parameters: tuple[EffectParameter, ...]
     reference: str
+    catalogue: bool = True
 
     @property
     def everywhere(self) -> str:

@@ -1,0 +1,557 @@
+"""What a mismatch is a function of, where no catalogue entry explains it: a sparse closure at the located cut.
+
+A closure is linear in its coefficients, so that at zero (where it changes nothing) one evaluation gives what every term of its dictionary
+would do to the residuals, and a few more what those with memory would do at other memory times and angles. Terms are then chosen by orthogonal
+forward selection (Chen, Billings & Luo 1989) with the freedom of the baseline taken away, and only the chosen ones are fitted in the
+nonlinear model. Linearising again at that fit corrects a choice that was made far from it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pamrs.diagnosis.blocks import Block
+from pamrs.diagnosis.evidence import correlation_time
+from pamrs.diagnosis.fitting import Fit, Problem, fit, residuals, stacked
+from pamrs.effects_table import EFFECTS
+from pamrs.effects_table.closure import MEMORY_OF, TERMS, Term
+from pamrs.errors import DiagnosisError, SimulationError
+from pamrs.rig import Rig
+from pamrs.simulation import default_step
+
+__all__ = ["CLOSURE_OF", "describe_closure", "find_closure"]
+
+Array = NDArray[np.float64]
+
+CLOSURE_OF = {"supply": "closure_supply", "chamber": "closure_flow", "arm": "closure_torque"}
+"""Closure of each block of the cut chain."""
+MOST_TERMS = 6
+"""Terms that a closure may have: more is no form that a person reads."""
+EVALUATIONS = 5
+"""Limit on the evaluations of one fit of the chosen terms; there are at most two fits."""
+LEAST_POWER = 1e-6
+"""Share of a term's effect on the residuals that must be left beside the baseline and the terms before it."""
+SHRUNK = (1.0, 0.5, 0.2)
+"""Multiples of the linear estimate from which a fit is tried, where the first leaves the range in which the model holds."""
+
+
+@dataclass(frozen=True)
+class _Candidate:
+    """One term of one closure, with the shape of its memory."""
+
+    closure: str
+    term: Term
+    shape: float | None
+
+    @property
+    def name(self) -> str:
+        return f"{self.closure}.{self.term.name}"
+
+    @property
+    def memory(self) -> str:
+        """Dotted name of the shape it depends on, ``""`` for a term without memory."""
+        return f"{self.closure}.{MEMORY_OF[self.term.kind]}" if self.term.kind in MEMORY_OF else ""
+
+
+@dataclass(frozen=True, eq=False)
+class _Choice:
+    """Terms chosen, with their linear estimates.
+
+    Attributes
+    ----------
+    values : dict of str to float
+        Dotted coefficients, SI.
+    shapes : dict of str to float
+        Dotted shapes of the memories that they need.
+    criterion : float
+        What they gain on independent samples beyond their price.
+    """
+
+    values: dict[str, float]
+    shapes: dict[str, float]
+    criterion: float
+
+
+def find_closure(
+    problem: Problem, nominal: Rig, baseline: Fit, inflation: dict[str, float], blocks: list[Block], say: Callable[[str], None]
+) -> Fit | None:
+    """Fit a sparse closure where blocks keep an excess.
+
+    Sensitivities at zero coefficients are taken at four memory times and angles (the first evaluation with all terms, the others with those
+    that remember); all chosen terms of a closure share one memory time and one memory angle, which the fit then refines. A term is taken while the
+    logarithm of the misfit falls by more than its price, counted on independent samples of what is left, and while recordings left out are
+    predicted better with it (with one recording only the price decides). The whole choice is made a second time at the fit, and that of the
+    two which gains more is kept. In total at most fifteen evaluations of the problem.
+
+    Parameters
+    ----------
+    problem : Problem
+        Blocks and recordings.
+    nominal : Rig
+        Nominal model.
+    baseline : Fit
+        Its fit to the problem without effects, with sensitivities.
+    inflation : dict of str to float
+        Variance of each block's binned residual relative to white sample noise, as in :func:`pamrs.diagnosis.fitting.fit`.
+    blocks : list of Block
+        Blocks of the problem that keep an excess: ``supply``, ``chamber``, ``arm``.
+    say : callable
+        Receives progress.
+
+    Returns
+    -------
+    Fit or None
+        Model with the closure (effects ``closure_*``), baseline refitted beside it; None where no term is worth its price.
+
+    Raises
+    ------
+    DiagnosisError
+        For a block without a closure, or a baseline with effects.
+    """
+    if baseline.effects:
+        raise DiagnosisError(
+            f"baseline.effects = {', '.join(baseline.effects)} is not allowed: a closure needs the fit without effects"
+        )
+    closures = _closures(blocks)
+    say(f"{' and '.join(b.name for b in blocks)}: looking for a form of what is missing")
+    candidates, columns = _at_zero(problem, baseline, inflation, blocks, closures)
+    frame = _Frame.of(problem, baseline, baseline, inflation)
+    chosen = _select(frame, frame.rows, candidates, columns)
+    if chosen is None:
+        return None
+    found = _fitted(problem, nominal, baseline, inflation, chosen, say)
+    if found is None:
+        return None
+    candidates, columns = _again(problem, found, inflation, blocks, closures)
+    frame = _Frame.of(problem, baseline, found, inflation)
+    sizes = np.array([found.values.get(c.name, 0.0) for c in candidates])
+    second = _select(frame, frame.rows - columns @ sizes, candidates, columns)
+    if second is None or set(second.values) == {n for n in found.values if n in chosen.values}:
+        return found
+    other = _fitted(problem, nominal, baseline, inflation, second, say)
+    if other is None or _worth(problem, other, inflation, len(candidates)) <= _worth(problem, found, inflation, len(candidates)):
+        return found
+    return other
+
+
+def _closures(blocks: Sequence[Block]) -> dict[str, str]:
+    """Closures by the block that each acts in."""
+    unknown = [b.name for b in blocks if b.name not in CLOSURE_OF]
+    if unknown or not blocks:
+        raise DiagnosisError(f"blocks = {unknown} is not allowed: one or more of {', '.join(CLOSURE_OF)}")
+    return {b.name: CLOSURE_OF[b.name] for b in blocks}
+
+
+def _shapes(closure: str) -> dict[str, tuple[float, ...]]:
+    """Values of each memory shape of a closure that are tried."""
+    return {p.name: p.starts for p in EFFECTS[closure].parameters if p.neutral is None}
+
+
+def _columns(problem: Problem, base: Fit, rig: Rig, names: list[str], inflation: dict[str, float], blocks: list[Block]) -> Array:
+    """Derivative of the stacked residuals of the whole problem with respect to coefficients that act in some of its blocks."""
+    found = residuals(replace(problem, blocks=blocks), rig, names)
+    full = {key: replace(r, jacobian=np.zeros((r.value.size, len(names)))) for key, r in base.residuals.items()}
+    _, columns = stacked(problem, full | found, inflation)
+    assert columns is not None
+    return columns
+
+
+def _at_zero(
+    problem: Problem, baseline: Fit, inflation: dict[str, float], blocks: list[Block], closures: dict[str, str]
+) -> tuple[list[_Candidate], Array]:
+    """Every term at every shape of its memory, and what each does to the stacked residuals per unit of its coefficient (n, m)."""
+    tried = {closure: _shapes(closure) for closure in closures.values()}
+    rounds = max(len(values) for shapes in tried.values() for values in shapes.values())
+    candidates: list[_Candidate] = []
+    columns = []
+    for k in range(rounds):
+        rig = baseline.rig
+        now: list[_Candidate] = []
+        for closure, shapes in tried.items():
+            here = {name: values[min(k, len(values) - 1)] for name, values in shapes.items()}
+            rig = rig.with_effect(closure, here)
+            for term in TERMS[closure]:
+                shape = MEMORY_OF.get(term.kind)
+                if shape is not None or k == 0:
+                    now.append(_Candidate(closure, term, here[shape] if shape else None))
+        columns.append(_columns(problem, baseline, rig, [c.name for c in now], inflation, blocks))
+        candidates += now
+    return candidates, np.concatenate(columns, axis=1)
+
+
+def _again(
+    problem: Problem, found: Fit, inflation: dict[str, float], blocks: list[Block], closures: dict[str, str]
+) -> tuple[list[_Candidate], Array]:
+    """The same at a fitted closure, every memory as it is there."""
+    rig = found.rig
+    for closure in closures.values():
+        if closure not in found.effects:
+            rig = rig.with_effect(closure)
+    shapes = {e["id"]: e["parameters"] for e in rig.effects}
+    candidates = [
+        _Candidate(closure, term, shapes[closure][MEMORY_OF[term.kind]] if term.kind in MEMORY_OF else None)
+        for closure in closures.values()
+        for term in TERMS[closure]
+    ]
+    return candidates, _columns(problem, found, rig, [c.name for c in candidates], inflation, blocks)
+
+
+@dataclass(frozen=True, eq=False)
+class _Frame:
+    """Stacked residuals of a fit with what the baseline can do beside a closure.
+
+    Attributes
+    ----------
+    rows : (n,) array
+        Stacked residuals.
+    freedom : (n, b) array
+        Their derivative with respect to each baseline parameter in tolerances.
+    moved : (b,) array
+        Distance of each from nominal in tolerances, the residual of its prior.
+    recording : (n,) int array
+        Recording of each row.
+    series : list of slice
+        Rows of each block of each recording.
+    """
+
+    rows: Array
+    freedom: Array
+    moved: Array
+    recording: NDArray[np.int64]
+    series: list[slice]
+
+    @staticmethod
+    def of(problem: Problem, baseline: Fit, found: Fit, inflation: dict[str, float]) -> _Frame:
+        """Residuals of a fit, sensitivities of the baseline it grew from."""
+        rows, _ = stacked(problem, found.residuals, inflation)
+        _, jacobian = stacked(problem, baseline.residuals, inflation)
+        names = list(baseline.values)
+        scales = np.array([baseline.scales[name] for name in names])
+        freedom = np.zeros((rows.size, 0)) if jacobian is None or not names else jacobian * scales
+        recording, series, start = [], [], 0
+        for k, prepared in enumerate(problem.recordings):
+            for block in problem.blocks:
+                key = (block.name, prepared.recording.name)
+                size = stacked(replace(problem, blocks=[block], recordings=[prepared]), {key: found.residuals[key]}, inflation)[0].size
+                series.append(slice(start, start + size))
+                recording.append(np.full(size, k))
+                start += size
+        return _Frame(rows, freedom, np.array([found.moved[name] for name in names]), np.concatenate(recording), series)
+
+    def independent(self, rows: Array) -> float:
+        """Number of independent samples among residuals: rows over their correlation time."""
+        return max(4.0, sum((s.stop - s.start) / correlation_time(rows[s]) for s in self.series if s.stop - s.start >= 4))
+
+
+def _price(samples: float, among: int) -> float:
+    """What a term must gain in chi-square: BIC on independent samples, and the best of so many (risk inflation, Foster & George 1994)."""
+    return math.log(samples) + 2.0 * math.log(among)
+
+
+def _worth(problem: Problem, found: Fit, inflation: dict[str, float], among: int) -> float:
+    """Minus the criterion by which two fitted closures are compared, on the same number of samples; the larger the better."""
+    frame = _Frame.of(problem, found, found, inflation)
+    samples = frame.independent(frame.rows)
+    terms = sum(1 for name in found.values if name.partition(".")[0] in TERMS)
+    return -samples * math.log(max(2.0 * found.cost, 1e-300)) - terms * _price(samples, among)
+
+
+def _select(frame: _Frame, rows: Array, candidates: list[_Candidate], columns: Array) -> _Choice | None:
+    """Orthogonal forward selection of terms against stacked residuals without the closure.
+
+    The misfit is that of rows and priors together, the baseline moving freely inside its tolerances: both are orthogonalised against the baseline
+    first. A term that is not worth its price alone is still looked behind: the way goes on to `MOST_TERMS`, and as many of them are taken as
+    pay for themselves together.
+
+    Parameters
+    ----------
+    frame : _Frame
+        What the baseline can do.
+    rows : (n,) array
+        Residuals to explain.
+    candidates : list of _Candidate
+        Terms.
+    columns : (n, m) array
+        What each does to the residuals per unit of its coefficient.
+
+    Returns
+    -------
+    _Choice or None
+        None where nothing is worth its price.
+    """
+    size = np.linalg.norm(columns, axis=0)
+    usable = size > 1e-12 * max(float(size.max(initial=0.0)), 1e-300)
+    unit = columns / np.where(usable, size, 1.0)
+    b = frame.freedom.shape[1]
+    target = np.concatenate([rows, frame.moved])
+    wide = np.concatenate([unit, np.zeros((b, unit.shape[1]))])
+    if b:
+        q, _ = np.linalg.qr(np.concatenate([frame.freedom, np.eye(b)]))
+        target = target - q @ (q.T @ target)
+        wide = wide - q @ (q.T @ wide)
+    crossed = _Crossed.of(frame, rows, unit)
+    left, free = target.copy(), wide.copy()
+    order: list[int] = []
+    taken, misfit, proof = 0, float(left @ left), crossed.left_out([])
+    locked: dict[str, float | None] = {}
+    gained = 0.0
+    while len(order) < MOST_TERMS:
+        power = (free**2).sum(axis=0)
+        open_ = usable & (power > LEAST_POWER)
+        open_ &= np.array([c.memory not in locked or locked[c.memory] == c.shape for c in candidates])
+        open_[order] = False
+        if not open_.any():
+            break
+        gain = np.where(open_, (free.T @ left) ** 2 / np.where(open_, power, 1.0), -1.0)
+        best = int(np.argmax(gain))
+        order.append(best)
+        if candidates[best].memory:
+            locked.setdefault(candidates[best].memory, candidates[best].shape)
+        direction = free[:, best] / math.sqrt(power[best])
+        left = left - direction * float(direction @ left)
+        free = free - np.outer(direction, direction @ free)
+        samples = frame.independent(left[: rows.size])
+        new = len(order) - taken
+        worth = samples * math.log(misfit / max(float(left @ left), 1e-300)) - new * _price(samples, len(candidates))
+        outside = crossed.left_out(order)
+        if worth > 0.0 and outside < proof:
+            taken, misfit, proof, gained = len(order), float(left @ left), outside, gained + worth
+    if not taken:
+        return None
+    kept = order[:taken]
+    solution, *_ = np.linalg.lstsq(wide[:, kept], -target, rcond=1e-10)
+    values = {candidates[k].name: float(v) / float(size[k]) for k, v in zip(kept, solution, strict=True)}
+    shapes = {c.memory: c.shape for c in (candidates[k] for k in kept) if c.memory and c.shape is not None}
+    return _Choice(values, shapes, gained)
+
+
+@dataclass(frozen=True, eq=False)
+class _Crossed:
+    """Normal equations of baseline and terms by recording, to leave one out at a time.
+
+    Attributes
+    ----------
+    grams : (r, b + m + 1, b + m + 1) array
+        Inner products of baseline columns, terms and rows in each recording.
+    prior : (b,) array
+        Residual of each baseline parameter's prior.
+    """
+
+    grams: Array
+    prior: Array
+
+    @staticmethod
+    def of(frame: _Frame, rows: Array, unit: Array) -> _Crossed:
+        everything = np.concatenate([frame.freedom, unit, rows[:, None]], axis=1)
+        parts = [everything[frame.recording == k] for k in np.unique(frame.recording)]
+        return _Crossed(np.array([part.T @ part for part in parts]), frame.moved)
+
+    def left_out(self, terms: Sequence[int]) -> float:
+        """Misfit of each recording by the baseline and terms that the others ask for, summed; with one recording the misfit itself."""
+        b = self.prior.size
+        index = np.array([*range(b), *(b + t for t in terms)], dtype=np.int64)
+        total = self.grams.sum(axis=0)
+        misfit = 0.0
+        for own in self.grams:
+            rest = total - own if len(self.grams) > 1 else total
+            normal = rest[np.ix_(index, index)].copy()
+            right = -rest[index, -1].copy()
+            normal[np.arange(b), np.arange(b)] += 1.0
+            right[:b] -= self.prior
+            solution = np.linalg.lstsq(normal, right, rcond=1e-12)[0]
+            misfit += float(own[-1, -1] + 2.0 * solution @ own[index, -1] + solution @ own[np.ix_(index, index)] @ solution)
+        return misfit
+
+
+def _fitted(
+    problem: Problem, nominal: Rig, baseline: Fit, inflation: dict[str, float], chosen: _Choice, say: Callable[[str], None]
+) -> Fit | None:
+    """The chosen terms and the shapes of their memories in the nonlinear model; None where it cannot be run."""
+    effects = tuple(dict.fromkeys(name.partition(".")[0] for name in chosen.values))
+    every = {
+        name: parameter
+        for effect in effects
+        for name, parameter in zip(EFFECTS[effect].dotted(), EFFECTS[effect].parameters, strict=True)
+    }
+    held = {n: 0.0 if p.neutral == 0.0 else p.default for n, p in every.items() if n not in chosen.values and n not in chosen.shapes}
+    say(f"trying {' + '.join(name for name in chosen.values)}")
+    for share in SHRUNK:
+        starts = {name: share * value for name, value in chosen.values.items()} | chosen.shapes
+        try:
+            return fit(
+                problem, nominal, effects, starts, inflation, fixed=held, warm=baseline, frozen=True, evaluations=EVALUATIONS
+            )  # fmt: skip
+        except SimulationError:
+            continue
+    return None
+
+
+# ------------------------------------------------------------------------------------------------------------- words
+
+_UNITS = {"N m": ((1.0, "N m"),), "kg/s": ((1.0, "kg/s"), (1e-3, "g/s"), (1e-6, "mg/s"), (1e-9, "ug/s"))}
+_SYMBOLS = {
+    "closure_torque": "s: gauge pressure in bar, a: angle in rad, w: rate in rad/s",
+    "closure_flow": "p, ps: absolute pressures of chamber and supply in bar, x: valve opening from -1 to 1, V': rate of the volume in l/s",
+    "closure_supply": "p: absolute supply pressure in bar, x+: opening of the filling valve",
+}
+_LETTER = {"closure_torque": "tau", "closure_flow": "m", "closure_supply": "m"}
+_WHAT = {"closure_torque": "torque", "closure_flow": "flow into the chamber", "closure_supply": "flow into the supply"}
+_TURNS = {
+    "closure_torque": "the direction of motion",
+    "closure_flow": "the way in which the valve opens",
+    "closure_supply": "the valve",
+}
+SPOKEN = 0.05
+"""Share of a closure from which a kind of dependence is spoken of."""
+
+
+def describe_closure(found: Fit, problem: Problem, baseline: Fit) -> str:
+    """Say in words what a fitted closure is a function of.
+
+    A sentence or two for each block: how large the missing quantity is over the recordings (effective value and the 99th percentile of its size),
+    how much of the block's mismatch it takes, of which variables, which shares are even and odd, instantaneous or with memory, and
+    the form with its numbers and standard deviations. The share of a kind is its inner product with the whole over that of the whole with itself,
+    so that shares sum to one even where terms cancel.
+
+    Parameters
+    ----------
+    found : Fit
+        What :func:`find_closure` returned.
+    problem : Problem
+        The same problem.
+    baseline : Fit
+        The fit without the closure.
+
+    Returns
+    -------
+    str
+        Plain text, one paragraph for each block.
+
+    Raises
+    ------
+    DiagnosisError
+        If the fit has no closure.
+    """
+    if not set(found.effects) & set(TERMS):
+        raise DiagnosisError(f"found.effects = {found.effects} is not allowed: one of {', '.join(TERMS)} is needed")
+    blocks = [b for b in problem.blocks if CLOSURE_OF.get(b.name) in found.effects]
+    return "\n".join(_sentence(found, problem, baseline, block) for block in blocks)
+
+
+def _sentence(found: Fit, problem: Problem, baseline: Fit, block: Block) -> str:
+    closure = CLOSURE_OF[block.name]
+    parts = _parts(found, problem, block, closure)
+    used = {term.name: term for term in TERMS[closure] if f"{closure}.{term.name}" in found.values}
+    whole = np.sum([parts[name] for name in used], axis=0)
+    power = float(whole @ whole)
+    size, unit = _readable(math.sqrt(power / max(1, whole.size)), EFFECTS[closure].parameters[0].unit)
+    largest = float(np.quantile(np.abs(whole), 0.99)) / size if whole.size else 0.0
+    shares = {k: sum(float(parts[n] @ whole) for n, t in used.items() if t.kind == k) / power if power else 0.0 for k in _KINDS}
+    variables = list(dict.fromkeys(v for term in used.values() for v in term.variables)) or ["nothing: it is constant"]
+    shape = {kind: found.rig.effects[_index(found.rig, closure)]["parameters"].get(name) for kind, name in MEMORY_OF.items()}
+    words = [
+        _kind_in_words(kind, closure, share, shape) for kind, share in shares.items() if _present(kind, used) and abs(share) > SPOKEN
+    ]
+    text = (
+        f"In the block {block.name} ({block.covers}) a {_WHAT[closure]} is missing, {math.sqrt(power / max(1, whole.size)) / size:.3g} {unit} "
+        f"effective (99 % below {largest:.3g} {unit}); it takes {_percent(_taken(found, baseline, problem, block))} of the mismatch there. "
+        f"It is a function of {_listed(variables)}: {_listed(words)}. "
+        f"{_LETTER[closure]} = {_formula(found, closure, used, size)} {unit} ({_SYMBOLS[closure]}{_legend(used, shape)})"
+    )
+    return text + "."
+
+
+_KINDS = ("static", "even", "odd", "time", "distance")
+
+
+def _parts(found: Fit, problem: Problem, block: Block, closure: str) -> dict[str, Array]:
+    """Each term times its coefficient over all usable rows, along the measured signals."""
+    core = problem.core.respecified(found.rig.to_json())
+    rows = []
+    for prepared in problem.recordings:
+        starts = prepared.starts(block.window, block.drives)
+        terms = core.closure_terms(
+            block.name,
+            {"valve_command": prepared.command} if core.inputs else {},
+            prepared.dt,
+            default_step(prepared.dt, longest=block.step),
+            starts,
+            prepared.signals,
+            prepared.n,
+        )
+        rows.append(terms[found.residuals[block.name, prepared.recording.name].rows])
+    every = np.concatenate(rows)
+    return {t.name: every[:, k] * found.values.get(f"{closure}.{t.name}", 0.0) for k, t in enumerate(TERMS[closure])}
+
+
+def _taken(found: Fit, baseline: Fit, problem: Problem, block: Block) -> float:
+    """Share of a block's squared residual beyond its sample noise that the closure removes."""
+    left = []
+    for model in (baseline, found):
+        pairs = [model.residuals[block.name, p.recording.name] for p in problem.recordings]
+        left.append(sum(float(((r.value[r.rows] / r.noise) ** 2).sum()) - float(r.rows.sum()) for r in pairs))
+    return 1.0 - max(0.0, left[1]) / left[0] if left[0] > 0.0 else 0.0
+
+
+def _index(rig: Rig, closure: str) -> int:
+    return next(k for k, effect in enumerate(rig.effects) if effect["id"] == closure)
+
+
+def _present(kind: str, used: dict[str, Term]) -> bool:
+    return any(term.kind == kind for term in used.values())
+
+
+def _kind_in_words(kind: str, closure: str, share: float, shape: dict[str, float | None]) -> str:
+    if kind == "static":
+        return f"{_percent(share)} of it depends on where things are, not on how they move (even, without memory)"
+    if kind == "even":
+        return f"{_percent(share)} is the same for either sign of the opening (even, without memory)"
+    if kind == "odd":
+        return f"{_percent(share)} turns its sign with {_TURNS[closure]} (odd, without memory)"
+    if kind == "time":
+        return f"{_percent(share)} remembers and forgets in {shape['time']:.3g} s (rate dependent)"
+    return f"{_percent(share)} remembers the way and forgets over {shape['distance']:.3g} rad of it at any speed (rate independent, hysteresis)"
+
+
+def _readable(size: float, unit: str) -> tuple[float, str]:
+    """Scale and unit in which a size in SI is a handy number."""
+    for scale, name in _UNITS[unit]:
+        if size >= scale:
+            return scale, name
+    return _UNITS[unit][-1] if len(_UNITS[unit]) > 1 else _UNITS[unit][0]
+
+
+def _formula(found: Fit, closure: str, used: dict[str, Term], size: float) -> str:
+    text = ""
+    for name, term in used.items():
+        value, std = found.values[f"{closure}.{name}"] / size, found.std[f"{closure}.{name}"] / size
+        number = f"{abs(value):.3g}(+-{std:.1g})" + ("" if term.formula == "1" else f" {term.formula}")
+        sign = "-" if value < 0.0 else "+"
+        text += f" {sign} {number}" if text else (f"-{number}" if value < 0.0 else number)
+    return text
+
+
+def _legend(used: dict[str, Term], shape: dict[str, float | None]) -> str:
+    formulas = " ".join(term.formula for term in used.values())
+    notes = ""
+    if "_T" in formulas:
+        notes += f"; index T: what it was over the past T = {shape['time']:.3g} s"
+    if _present("distance", used):
+        notes += f"; q' = w/d (1 - q sgn w), d = {shape['distance']:.3g} rad"
+    if " n" in formulas or formulas.startswith("n"):
+        notes += "; n = exp(-(x/0.05)^2/2)"
+    return notes
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.0f} %"
+
+
+def _listed(words: Sequence[str]) -> str:
+    """Words with commas, the last with ``and``."""
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}" if words else "nothing"
