@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from pamrs.diagnosis.blocks import Block
 from pamrs.diagnosis.evidence import correlation_time
-from pamrs.diagnosis.fitting import Fit, Problem, fit, residuals, stacked
+from pamrs.diagnosis.evidence import inflation as _inflation
+from pamrs.diagnosis.fitting import FIT_BIN, Fit, Problem, fit, residuals, stacked
 from pamrs.effects_table import EFFECTS
 from pamrs.effects_table.closure import MEMORY_OF, TERMS, Term
 from pamrs.errors import DiagnosisError, SimulationError
@@ -36,8 +37,8 @@ EVALUATIONS = 5
 """Limit on the evaluations of one fit of the chosen terms; there are at most two fits."""
 LEAST_POWER = 1e-6
 """Share of a term's effect on the residuals that must be left beside the baseline and the terms before it."""
-SHRUNK = (1.0, 0.5, 0.2)
-"""Multiples of the linear estimate from which a fit is tried, where the first leaves the range in which the model holds."""
+SHRUNK = ((1.0, EVALUATIONS), (0.4, 3))
+"""Multiples of the linear estimate from which a fit is tried, with its limit of evaluations; the second where the first gains nothing."""
 
 
 @dataclass(frozen=True)
@@ -68,13 +69,13 @@ class _Choice:
         Dotted coefficients, SI.
     shapes : dict of str to float
         Dotted shapes of the memories that they need.
-    criterion : float
-        What they gain on independent samples beyond their price.
+    shift : (b,) array
+        What the baseline parameters move beside them, in tolerances.
     """
 
     values: dict[str, float]
     shapes: dict[str, float]
-    criterion: float
+    shift: Array
 
 
 def find_closure(
@@ -85,8 +86,8 @@ def find_closure(
     Sensitivities at zero coefficients are taken at four memory times and angles (the first evaluation with all terms, the others with those
     that remember); all chosen terms of a closure share one memory time and one memory angle, which the fit then refines. A term is taken while the
     logarithm of the misfit falls by more than its price, counted on independent samples of what is left, and while recordings left out are
-    predicted better with it (with one recording only the price decides). The whole choice is made a second time at the fit, and that of the
-    two which gains more is kept. In total at most fifteen evaluations of the problem.
+    predicted better with it (with one recording only the price decides). The choice is made a second time at the fit, residuals weighted by
+    the colour that they have there, and the best of the fits and the baseline is kept. This takes ten to fifteen evaluations of the problem.
 
     Parameters
     ----------
@@ -120,23 +121,15 @@ def find_closure(
     closures = _closures(blocks)
     say(f"{' and '.join(b.name for b in blocks)}: looking for a form of what is missing")
     candidates, columns = _at_zero(problem, baseline, inflation, blocks, closures)
-    frame = _Frame.of(problem, baseline, baseline, inflation)
-    chosen = _select(frame, frame.rows, candidates, columns)
-    if chosen is None:
-        return None
-    found = _fitted(problem, nominal, baseline, inflation, chosen, say)
+    chosen = _select(_Frame.of(problem, baseline, baseline, inflation), candidates, columns, {})
+    found = None if chosen is None else _fitted(problem, nominal, baseline, inflation, chosen, say)
     if found is None:
         return None
-    candidates, columns = _again(problem, found, inflation, blocks, closures)
-    frame = _Frame.of(problem, baseline, found, inflation)
-    sizes = np.array([found.values.get(c.name, 0.0) for c in candidates])
-    second = _select(frame, frame.rows - columns @ sizes, candidates, columns)
-    if second is None or set(second.values) == {n for n in found.values if n in chosen.values}:
-        return found
-    other = _fitted(problem, nominal, baseline, inflation, second, say)
-    if other is None or _worth(problem, other, inflation, len(candidates)) <= _worth(problem, found, inflation, len(candidates)):
-        return found
-    return other
+    colour = {b.name: _inflation(b, problem.recordings, found.residuals, FIT_BIN) for b in problem.blocks}
+    candidates, columns, warm = _again(problem, baseline, found, colour, blocks, closures)
+    second = _select(_Frame.of(problem, warm, found, colour), candidates, columns, found.values)
+    other = None if second is None else _fitted(problem, nominal, warm, colour, second, say)
+    return _better([baseline, found, *([] if other is None else [other])], problem, colour, len(candidates))
 
 
 def _closures(blocks: Sequence[Block]) -> dict[str, str]:
@@ -185,9 +178,9 @@ def _at_zero(
 
 
 def _again(
-    problem: Problem, found: Fit, inflation: dict[str, float], blocks: list[Block], closures: dict[str, str]
-) -> tuple[list[_Candidate], Array]:
-    """The same at a fitted closure, every memory as it is there."""
+    problem: Problem, baseline: Fit, found: Fit, inflation: dict[str, float], blocks: list[Block], closures: dict[str, str]
+) -> tuple[list[_Candidate], Array, Fit]:
+    """The same at a fitted closure, every memory as it is there; and its baseline with sensitivities that are computed beside the closure."""
     rig = found.rig
     for closure in closures.values():
         if closure not in found.effects:
@@ -198,7 +191,14 @@ def _again(
         for closure in closures.values()
         for term in TERMS[closure]
     ]
-    return candidates, _columns(problem, found, rig, [c.name for c in candidates], inflation, blocks)
+    names = list(baseline.values)
+    evaluated = residuals(problem, rig, [*names, *(c.name for c in candidates)])
+    own = {key: replace(r, jacobian=None if r.jacobian is None else r.jacobian[:, : len(names)]) for key, r in evaluated.items()}
+    values = {name: found.values[name] for name in names}
+    warm = replace(baseline, rig=found.rig, values=values, residuals=own, moved={name: found.moved[name] for name in names})
+    _, every = stacked(problem, evaluated, inflation)
+    assert every is not None
+    return candidates, every[:, len(names) :], warm
 
 
 @dataclass(frozen=True, eq=False)
@@ -253,16 +253,38 @@ def _price(samples: float, among: int) -> float:
     return math.log(samples) + 2.0 * math.log(among)
 
 
-def _worth(problem: Problem, found: Fit, inflation: dict[str, float], among: int) -> float:
-    """Minus the criterion by which two fitted closures are compared, on the same number of samples; the larger the better."""
-    frame = _Frame.of(problem, found, found, inflation)
+def _misfit(problem: Problem, found: Fit, inflation: dict[str, float]) -> float:
+    """Sum of squares of stacked residuals and priors under a weighting of its own."""
+    rows, _ = stacked(problem, found.residuals, inflation)
+    return float(rows @ rows) + sum(x * x for x in found.moved.values())
+
+
+def _better(models: list[Fit], problem: Problem, inflation: dict[str, float], among: int) -> Fit | None:
+    """The model that is worth most by misfit and price, all on the independent samples of that with the least misfit; None for the first.
+
+    Parameters
+    ----------
+    models : list of Fit
+        The baseline first.
+    problem : Problem
+        Blocks and recordings.
+    inflation : dict of str to float
+        One weighting for all.
+    among : int
+        Number of terms that there were to choose from.
+    """
+    misfits = [_misfit(problem, model, inflation) for model in models]
+    least = models[int(np.argmin(misfits))]
+    frame = _Frame.of(problem, models[0], least, inflation)
     samples = frame.independent(frame.rows)
-    terms = sum(1 for name in found.values if name.partition(".")[0] in TERMS)
-    return -samples * math.log(max(2.0 * found.cost, 1e-300)) - terms * _price(samples, among)
+    terms = [sum(1 for name in model.values if name.partition(".")[0] in TERMS) for model in models]
+    worth = [-samples * math.log(m) - k * _price(samples, among) for m, k in zip(misfits, terms, strict=True)]
+    best = int(np.argmax(worth))
+    return models[best] if best else None
 
 
-def _select(frame: _Frame, rows: Array, candidates: list[_Candidate], columns: Array) -> _Choice | None:
-    """Orthogonal forward selection of terms against stacked residuals without the closure.
+def _select(frame: _Frame, candidates: list[_Candidate], columns: Array, present: dict[str, float]) -> _Choice | None:
+    """Orthogonal forward selection of terms against the stacked residuals, the closure that is in them taken out.
 
     The misfit is that of rows and priors together, the baseline moving freely inside its tolerances: both are orthogonalised against the baseline
     first. A term that is not worth its price alone is still looked behind: the way goes on to `MOST_TERMS`, and as many of them are taken as
@@ -271,19 +293,20 @@ def _select(frame: _Frame, rows: Array, candidates: list[_Candidate], columns: A
     Parameters
     ----------
     frame : _Frame
-        What the baseline can do.
-    rows : (n,) array
-        Residuals to explain.
+        Residuals to explain and what the baseline can do.
     candidates : list of _Candidate
         Terms.
     columns : (n, m) array
         What each does to the residuals per unit of its coefficient.
+    present : dict of str to float
+        Coefficients with which the residuals were computed.
 
     Returns
     -------
     _Choice or None
         None where nothing is worth its price.
     """
+    rows = frame.rows - columns @ np.array([present.get(c.name, 0.0) for c in candidates])
     size = np.linalg.norm(columns, axis=0)
     usable = size > 1e-12 * max(float(size.max(initial=0.0)), 1e-300)
     unit = columns / np.where(usable, size, 1.0)
@@ -299,7 +322,6 @@ def _select(frame: _Frame, rows: Array, candidates: list[_Candidate], columns: A
     order: list[int] = []
     taken, misfit, proof = 0, float(left @ left), crossed.left_out([])
     locked: dict[str, float | None] = {}
-    gained = 0.0
     while len(order) < MOST_TERMS:
         power = (free**2).sum(axis=0)
         open_ = usable & (power > LEAST_POWER)
@@ -317,17 +339,19 @@ def _select(frame: _Frame, rows: Array, candidates: list[_Candidate], columns: A
         free = free - np.outer(direction, direction @ free)
         samples = frame.independent(left[: rows.size])
         new = len(order) - taken
-        worth = samples * math.log(misfit / max(float(left @ left), 1e-300)) - new * _price(samples, len(candidates))
         outside = crossed.left_out(order)
-        if worth > 0.0 and outside < proof:
-            taken, misfit, proof, gained = len(order), float(left @ left), outside, gained + worth
+        inner, outer = (samples * math.log(was / max(now, 1e-300)) for was, now in ((misfit, float(left @ left)), (proof, outside)))
+        price = new * _price(samples, len(candidates))
+        if outer > 0.0 and (inner > price or (outer > price and inner > new * math.log(samples))):
+            taken, misfit, proof = len(order), float(left @ left), outside
     if not taken:
         return None
     kept = order[:taken]
-    solution, *_ = np.linalg.lstsq(wide[:, kept], -target, rcond=1e-10)
-    values = {candidates[k].name: float(v) / float(size[k]) for k, v in zip(kept, solution, strict=True)}
+    design = np.concatenate([np.concatenate([frame.freedom, np.eye(b)]), np.concatenate([unit[:, kept], np.zeros((b, taken))])], axis=1)
+    solution, *_ = np.linalg.lstsq(design, -np.concatenate([rows, frame.moved]), rcond=1e-10)
+    values = {candidates[k].name: float(v) / float(size[k]) for k, v in zip(kept, solution[b:], strict=True)}
     shapes = {c.memory: c.shape for c in (candidates[k] for k in kept) if c.memory and c.shape is not None}
-    return _Choice(values, shapes, gained)
+    return _Choice(values, shapes, solution[:b])
 
 
 @dataclass(frozen=True, eq=False)
@@ -369,7 +393,7 @@ class _Crossed:
 
 
 def _fitted(
-    problem: Problem, nominal: Rig, baseline: Fit, inflation: dict[str, float], chosen: _Choice, say: Callable[[str], None]
+    problem: Problem, nominal: Rig, warm: Fit, inflation: dict[str, float], chosen: _Choice, say: Callable[[str], None]
 ) -> Fit | None:
     """The chosen terms and the shapes of their memories in the nonlinear model; None where it cannot be run."""
     effects = tuple(dict.fromkeys(name.partition(".")[0] for name in chosen.values))
@@ -380,15 +404,23 @@ def _fitted(
     }
     held = {n: 0.0 if p.neutral == 0.0 else p.default for n, p in every.items() if n not in chosen.values and n not in chosen.shapes}
     say(f"trying {' + '.join(name for name in chosen.values)}")
-    for share in SHRUNK:
+    names = list(warm.values)
+    best: Fit | None = None
+    for share, evaluations in SHRUNK:
         starts = {name: share * value for name, value in chosen.values.items()} | chosen.shapes
+        shifted = {n: warm.values[n] + share * float(x) * warm.scales[n] for n, x in zip(names, chosen.shift, strict=True)}
         try:
-            return fit(
-                problem, nominal, effects, starts, inflation, fixed=held, warm=baseline, frozen=True, evaluations=EVALUATIONS
+            tried = fit(
+                problem, nominal, effects, starts, inflation,
+                fixed=held, warm=replace(warm, values=shifted), frozen=True, evaluations=evaluations,
             )  # fmt: skip
         except SimulationError:
             continue
-    return None
+        if best is None or tried.cost < best.cost:
+            best = tried
+        if 2.0 * best.cost < _misfit(problem, warm, inflation):
+            break
+    return best
 
 
 # ------------------------------------------------------------------------------------------------------------- words
