@@ -288,7 +288,8 @@ def _select(frame: _Frame, candidates: list[_Candidate], columns: Array, present
 
     The misfit is that of rows and priors together, the baseline moving freely inside its tolerances: both are orthogonalised against the baseline
     first. A term that is not worth its price alone is still looked behind: the way goes on to `MOST_TERMS`, and as many of them are taken as
-    pay for themselves together.
+    pay for themselves together; then those are dropped that the others have made needless. A gain that the recordings left out confirm at the
+    full price need only be worth BIC's in the recordings themselves.
 
     Parameters
     ----------
@@ -299,7 +300,7 @@ def _select(frame: _Frame, candidates: list[_Candidate], columns: Array, present
     columns : (n, m) array
         What each does to the residuals per unit of its coefficient.
     present : dict of str to float
-        Coefficients with which the residuals were computed.
+        Coefficients with which the residuals were computed; their terms are taken first.
 
     Returns
     -------
@@ -320,8 +321,23 @@ def _select(frame: _Frame, candidates: list[_Candidate], columns: Array, present
     crossed = _Crossed.of(frame, rows, unit)
     left, free = target.copy(), wide.copy()
     order: list[int] = []
-    taken, misfit, proof = 0, float(left @ left), crossed.left_out([])
     locked: dict[str, float | None] = {}
+
+    def take(k: int) -> None:
+        """Add a term, and take what it explains out of everything."""
+        nonlocal left, free
+        order.append(k)
+        if candidates[k].memory:
+            locked.setdefault(candidates[k].memory, candidates[k].shape)
+        direction = free[:, k] / max(float(np.linalg.norm(free[:, k])), 1e-150)
+        left = left - direction * float(direction @ left)
+        free = free - np.outer(direction, direction @ free)
+
+    for k, candidate in enumerate(candidates):
+        if candidate.name in present and usable[k] and float(free[:, k] @ free[:, k]) > LEAST_POWER:
+            take(k)
+    taken, misfit, proof = len(order), float(left @ left), crossed.left_out(order)
+    samples = frame.independent(left[: rows.size])
     while len(order) < MOST_TERMS:
         power = (free**2).sum(axis=0)
         open_ = usable & (power > LEAST_POWER)
@@ -329,29 +345,39 @@ def _select(frame: _Frame, candidates: list[_Candidate], columns: Array, present
         open_[order] = False
         if not open_.any():
             break
-        gain = np.where(open_, (free.T @ left) ** 2 / np.where(open_, power, 1.0), -1.0)
-        best = int(np.argmax(gain))
-        order.append(best)
-        if candidates[best].memory:
-            locked.setdefault(candidates[best].memory, candidates[best].shape)
-        direction = free[:, best] / math.sqrt(power[best])
-        left = left - direction * float(direction @ left)
-        free = free - np.outer(direction, direction @ free)
-        samples = frame.independent(left[: rows.size])
+        take(int(np.argmax(np.where(open_, (free.T @ left) ** 2 / np.where(open_, power, 1.0), -1.0))))
+        now, outside = float(left @ left), crossed.left_out(order)
+        here = frame.independent(left[: rows.size])
+        inner, outer = here * math.log(misfit / max(now, 1e-300)), here * math.log(proof / max(outside, 1e-300))
         new = len(order) - taken
-        outside = crossed.left_out(order)
-        inner, outer = (samples * math.log(was / max(now, 1e-300)) for was, now in ((misfit, float(left @ left)), (proof, outside)))
-        price = new * _price(samples, len(candidates))
-        if outer > 0.0 and (inner > price or (outer > price and inner > new * math.log(samples))):
-            taken, misfit, proof = len(order), float(left @ left), outside
-    if not taken:
+        price = new * _price(here, len(candidates))
+        if outer > 0.0 and (inner > price or (outer > price and inner > new * math.log(here))):
+            taken, misfit, proof, samples = len(order), now, outside, here
+    kept = _pruned(target, wide, order[:taken], misfit, samples, _price(samples, len(candidates)))
+    if not kept:
         return None
-    kept = order[:taken]
-    design = np.concatenate([np.concatenate([frame.freedom, np.eye(b)]), np.concatenate([unit[:, kept], np.zeros((b, taken))])], axis=1)
+    design = np.concatenate([np.concatenate([frame.freedom, np.eye(b)]), np.concatenate([unit[:, kept], np.zeros((b, len(kept)))])], axis=1)
     solution, *_ = np.linalg.lstsq(design, -np.concatenate([rows, frame.moved]), rcond=1e-10)
     values = {candidates[k].name: float(v) / float(size[k]) for k, v in zip(kept, solution[b:], strict=True)}
     shapes = {c.memory: c.shape for c in (candidates[k] for k in kept) if c.memory and c.shape is not None}
     return _Choice(values, shapes, solution[:b])
+
+
+def _pruned(target: Array, wide: Array, kept: list[int], misfit: float, samples: float, price: float) -> list[int]:
+    """Terms without those that others have made needless: backward, the cheapest first, while its loss is less than its price."""
+
+    def without(k: int) -> float:
+        others = wide[:, [j for j in kept if j != k]]
+        solution, *_ = np.linalg.lstsq(others, target, rcond=1e-10)
+        return float(np.sum((target - others @ solution) ** 2))
+
+    while kept:
+        losses = {k: without(k) for k in kept}
+        cheapest = min(kept, key=lambda k: losses[k])
+        if samples * math.log(losses[cheapest] / max(misfit, 1e-300)) > price:
+            break
+        kept, misfit = [k for k in kept if k != cheapest], losses[cheapest]
+    return kept
 
 
 @dataclass(frozen=True, eq=False)
