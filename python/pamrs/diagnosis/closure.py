@@ -1,9 +1,9 @@
 """What a mismatch is a function of, where no catalogue entry explains it: a sparse closure at the located cut.
 
-A closure is linear in its coefficients, so that at zero (where it changes nothing) one evaluation gives what every term of its dictionary
-would do to the residuals, and a few more what those with memory would do at other memory times and angles. Terms are then chosen by orthogonal
-forward selection (Chen, Billings & Luo 1989) with the freedom of the baseline taken away, and only the chosen ones are fitted in the
-nonlinear model. Linearising again at that fit corrects a choice that was made far from it.
+A closure is linear in its coefficients, so that at zero (where it changes nothing) one evaluation gives what every term of its
+dictionary would do to the residuals, and a few more what those with memory would do at other memory times and angles. Terms are
+then chosen by orthogonal forward selection (Chen, Billings & Luo 1989) with the freedom of the baseline taken away, and only the
+chosen ones are fitted in the nonlinear model. Linearising again at that fit corrects a choice that was made far from it.
 """
 
 from __future__ import annotations
@@ -16,21 +16,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs.diagnosis.blocks import Block
+from pamrs.diagnosis.closure_words import describe_closure
 from pamrs.diagnosis.evidence import correlation_time
 from pamrs.diagnosis.evidence import inflation as _inflation
 from pamrs.diagnosis.fitting import FIT_BIN, Fit, Problem, fit, residuals, stacked
 from pamrs.effects_table import EFFECTS
-from pamrs.effects_table.closure import MEMORY_OF, TERMS, Term
+from pamrs.effects_table.closure import CLOSURE_OF, MEMORY_OF, TERMS, Term
 from pamrs.errors import DiagnosisError, SimulationError
 from pamrs.rig import Rig
-from pamrs.simulation import default_step
 
 __all__ = ["CLOSURE_OF", "describe_closure", "find_closure"]
 
 Array = NDArray[np.float64]
 
-CLOSURE_OF = {"supply": "closure_supply", "chamber": "closure_flow", "arm": "closure_torque"}
-"""Closure of each block of the cut chain."""
 MOST_TERMS = 6
 """Terms that a closure may have: more is no form that a person reads."""
 EVALUATIONS = 5
@@ -38,7 +36,8 @@ EVALUATIONS = 5
 LEAST_POWER = 1e-6
 """Share of a term's effect on the residuals that must be left beside the baseline and the terms before it."""
 SHRUNK = ((1.0, EVALUATIONS), (0.4, 3))
-"""Multiples of the linear estimate from which a fit is tried, with its limit of evaluations; the second where the first gains nothing."""
+"""Multiples of the linear estimate from which a fit is tried, with its limit of evaluations; the second where the first gains
+nothing."""
 
 
 @dataclass(frozen=True)
@@ -83,11 +82,12 @@ def find_closure(
 ) -> Fit | None:
     """Fit a sparse closure where blocks keep an excess.
 
-    Sensitivities at zero coefficients are taken at four memory times and angles (the first evaluation with all terms, the others with those
-    that remember); all chosen terms of a closure share one memory time and one memory angle, which the fit then refines. A term is taken while the
-    logarithm of the misfit falls by more than its price, counted on independent samples of what is left, and while recordings left out are
-    predicted better with it (with one recording only the price decides). The choice is made a second time at the fit, residuals weighted by
-    the colour that they have there, and the best of the fits and the baseline is kept. This takes ten to fifteen evaluations of the problem.
+    Sensitivities at zero coefficients are taken at four memory times and angles (the first evaluation with all terms, the others
+    with those that remember); all chosen terms of a closure share one memory time and one memory angle, which the fit then refines.
+    A term is taken while the logarithm of the misfit falls by more than its price, counted on independent samples of what is left,
+    and while recordings left out are predicted better with it (with one recording only the price decides). The choice is made a
+    second time at the fit, residuals weighted by the colour that they have there, and the best of the fits and the baseline is
+    kept. This takes ten to fifteen evaluations of the problem.
 
     Parameters
     ----------
@@ -180,7 +180,7 @@ def _at_zero(
 def _again(
     problem: Problem, baseline: Fit, found: Fit, inflation: dict[str, float], blocks: list[Block], closures: dict[str, str]
 ) -> tuple[list[_Candidate], Array, Fit]:
-    """The same at a fitted closure, every memory as it is there; and its baseline with sensitivities that are computed beside the closure."""
+    """The same at a fitted closure, every memory as it is there; and the baseline there, with sensitivities beside the closure."""
     rig = found.rig
     for closure in closures.values():
         if closure not in found.effects:
@@ -245,11 +245,11 @@ class _Frame:
 
     def independent(self, rows: Array) -> float:
         """Number of independent samples among residuals: rows over their correlation time."""
-        return max(4.0, sum((s.stop - s.start) / correlation_time(rows[s]) for s in self.series if s.stop - s.start >= 4))
+        return max(4.0, sum(float(s.stop - s.start) / correlation_time(rows[s]) for s in self.series if s.stop - s.start >= 4))
 
 
 def _price(samples: float, among: int) -> float:
-    """What a term must gain in chi-square: BIC on independent samples, and the best of so many (risk inflation, Foster & George 1994)."""
+    """Chi-square that a term must gain: BIC on independent samples, and risk inflation, the best of so many (Foster & George 1994)."""
     return math.log(samples) + 2.0 * math.log(among)
 
 
@@ -260,7 +260,8 @@ def _misfit(problem: Problem, found: Fit, inflation: dict[str, float]) -> float:
 
 
 def _better(models: list[Fit], problem: Problem, inflation: dict[str, float], among: int) -> Fit | None:
-    """The model that is worth most by misfit and price, all on the independent samples of that with the least misfit; None for the first.
+    """The model that is worth most by misfit and price, all on the independent samples of that with the least misfit; None for the
+    first.
 
     Parameters
     ----------
@@ -286,10 +287,10 @@ def _better(models: list[Fit], problem: Problem, inflation: dict[str, float], am
 def _select(frame: _Frame, candidates: list[_Candidate], columns: Array, present: dict[str, float]) -> _Choice | None:
     """Orthogonal forward selection of terms against the stacked residuals, the closure that is in them taken out.
 
-    The misfit is that of rows and priors together, the baseline moving freely inside its tolerances: both are orthogonalised against the baseline
-    first. A term that is not worth its price alone is still looked behind: the way goes on to `MOST_TERMS`, and as many of them are taken as
-    pay for themselves together; then those are dropped that the others have made needless. A gain that the recordings left out confirm at the
-    full price need only be worth BIC's in the recordings themselves.
+    The misfit is that of rows and priors together, the baseline moving freely inside its tolerances: both are orthogonalised
+    against the baseline first. A term that is not worth its price alone is still looked behind: the way goes on to `MOST_TERMS`,
+    and as many of them are taken as pay for themselves together; then those are dropped that the others have made needless. A gain
+    that the recordings left out confirm at the full price need only be worth BIC's in the recordings themselves.
 
     Parameters
     ----------
@@ -356,7 +357,9 @@ def _select(frame: _Frame, candidates: list[_Candidate], columns: Array, present
     kept = _pruned(target, wide, order[:taken], misfit, samples, _price(samples, len(candidates)))
     if not kept:
         return None
-    design = np.concatenate([np.concatenate([frame.freedom, np.eye(b)]), np.concatenate([unit[:, kept], np.zeros((b, len(kept)))])], axis=1)
+    design = np.concatenate(
+        [np.concatenate([frame.freedom, np.eye(b)]), np.concatenate([unit[:, kept], np.zeros((b, len(kept)))])], axis=1
+    )
     solution, *_ = np.linalg.lstsq(design, -np.concatenate([rows, frame.moved]), rcond=1e-10)
     values = {candidates[k].name: float(v) / float(size[k]) for k, v in zip(kept, solution[b:], strict=True)}
     shapes = {c.memory: c.shape for c in (candidates[k] for k in kept) if c.memory and c.shape is not None}
@@ -447,169 +450,3 @@ def _fitted(
         if 2.0 * best.cost < _misfit(problem, warm, inflation):
             break
     return best
-
-
-# ------------------------------------------------------------------------------------------------------------- words
-
-_UNITS = {"N m": ((1.0, "N m"),), "kg/s": ((1.0, "kg/s"), (1e-3, "g/s"), (1e-6, "mg/s"), (1e-9, "ug/s"))}
-_SYMBOLS = {
-    "closure_torque": "s: gauge pressure in bar, a: angle in rad, w: rate in rad/s",
-    "closure_flow": "p, ps: absolute pressures of chamber and supply in bar, x: valve opening from -1 to 1, V': rate of the volume in l/s",
-    "closure_supply": "p: absolute supply pressure in bar, x+: opening of the filling valve",
-}
-_LETTER = {"closure_torque": "tau", "closure_flow": "m", "closure_supply": "m"}
-_WHAT = {"closure_torque": "torque", "closure_flow": "flow into the chamber", "closure_supply": "flow into the supply"}
-_TURNS = {
-    "closure_torque": "the direction of motion",
-    "closure_flow": "the way in which the valve opens",
-    "closure_supply": "the valve",
-}
-SPOKEN = 0.05
-"""Share of a closure from which a kind of dependence is spoken of."""
-
-
-def describe_closure(found: Fit, problem: Problem, baseline: Fit) -> str:
-    """Say in words what a fitted closure is a function of.
-
-    A sentence or two for each block: how large the missing quantity is over the recordings (effective value and the 99th percentile of its size),
-    how much of the block's mismatch it takes, of which variables, which shares are even and odd, instantaneous or with memory, and
-    the form with its numbers and standard deviations. The share of a kind is its inner product with the whole over that of the whole with itself,
-    so that shares sum to one even where terms cancel.
-
-    Parameters
-    ----------
-    found : Fit
-        What :func:`find_closure` returned.
-    problem : Problem
-        The same problem.
-    baseline : Fit
-        The fit without the closure.
-
-    Returns
-    -------
-    str
-        Plain text, one paragraph for each block.
-
-    Raises
-    ------
-    DiagnosisError
-        If the fit has no closure.
-    """
-    if not set(found.effects) & set(TERMS):
-        raise DiagnosisError(f"found.effects = {found.effects} is not allowed: one of {', '.join(TERMS)} is needed")
-    blocks = [b for b in problem.blocks if CLOSURE_OF.get(b.name) in found.effects]
-    return "\n".join(_sentence(found, problem, baseline, block) for block in blocks)
-
-
-def _sentence(found: Fit, problem: Problem, baseline: Fit, block: Block) -> str:
-    closure = CLOSURE_OF[block.name]
-    parts = _parts(found, problem, block, closure)
-    used = {term.name: term for term in TERMS[closure] if f"{closure}.{term.name}" in found.values}
-    whole = np.sum([parts[name] for name in used], axis=0)
-    power = float(whole @ whole)
-    size, unit = _readable(math.sqrt(power / max(1, whole.size)), EFFECTS[closure].parameters[0].unit)
-    largest = float(np.quantile(np.abs(whole), 0.99)) / size if whole.size else 0.0
-    shares = {k: sum(float(parts[n] @ whole) for n, t in used.items() if t.kind == k) / power if power else 0.0 for k in _KINDS}
-    variables = list(dict.fromkeys(v for term in used.values() for v in term.variables)) or ["nothing: it is constant"]
-    shape = {kind: found.rig.effects[_index(found.rig, closure)]["parameters"].get(name) for kind, name in MEMORY_OF.items()}
-    words = [
-        _kind_in_words(kind, closure, share, shape) for kind, share in shares.items() if _present(kind, used) and abs(share) > SPOKEN
-    ]
-    text = (
-        f"In the block {block.name} ({block.covers}) a {_WHAT[closure]} is missing, {math.sqrt(power / max(1, whole.size)) / size:.3g} {unit} "
-        f"effective (99 % below {largest:.3g} {unit}); it takes {_percent(_taken(found, baseline, problem, block))} of the mismatch there. "
-        f"It is a function of {_listed(variables)}: {_listed(words)}. "
-        f"{_LETTER[closure]} = {_formula(found, closure, used, size)} {unit} ({_SYMBOLS[closure]}{_legend(used, shape)})"
-    )
-    return text + "."
-
-
-_KINDS = ("static", "even", "odd", "time", "distance")
-
-
-def _parts(found: Fit, problem: Problem, block: Block, closure: str) -> dict[str, Array]:
-    """Each term times its coefficient over all usable rows, along the measured signals."""
-    core = problem.core.respecified(found.rig.to_json())
-    rows = []
-    for prepared in problem.recordings:
-        starts = prepared.starts(block.window, block.drives)
-        terms = core.closure_terms(
-            block.name,
-            {"valve_command": prepared.command} if core.inputs else {},
-            prepared.dt,
-            default_step(prepared.dt, longest=block.step),
-            starts,
-            prepared.signals,
-            prepared.n,
-        )
-        rows.append(terms[found.residuals[block.name, prepared.recording.name].rows])
-    every = np.concatenate(rows)
-    return {t.name: every[:, k] * found.values.get(f"{closure}.{t.name}", 0.0) for k, t in enumerate(TERMS[closure])}
-
-
-def _taken(found: Fit, baseline: Fit, problem: Problem, block: Block) -> float:
-    """Share of a block's squared residual beyond its sample noise that the closure removes."""
-    left = []
-    for model in (baseline, found):
-        pairs = [model.residuals[block.name, p.recording.name] for p in problem.recordings]
-        left.append(sum(float(((r.value[r.rows] / r.noise) ** 2).sum()) - float(r.rows.sum()) for r in pairs))
-    return 1.0 - max(0.0, left[1]) / left[0] if left[0] > 0.0 else 0.0
-
-
-def _index(rig: Rig, closure: str) -> int:
-    return next(k for k, effect in enumerate(rig.effects) if effect["id"] == closure)
-
-
-def _present(kind: str, used: dict[str, Term]) -> bool:
-    return any(term.kind == kind for term in used.values())
-
-
-def _kind_in_words(kind: str, closure: str, share: float, shape: dict[str, float | None]) -> str:
-    if kind == "static":
-        return f"{_percent(share)} of it depends on where things are, not on how they move (even, without memory)"
-    if kind == "even":
-        return f"{_percent(share)} is the same for either sign of the opening (even, without memory)"
-    if kind == "odd":
-        return f"{_percent(share)} turns its sign with {_TURNS[closure]} (odd, without memory)"
-    if kind == "time":
-        return f"{_percent(share)} remembers and forgets in {shape['time']:.3g} s (rate dependent)"
-    return f"{_percent(share)} remembers the way and forgets over {shape['distance']:.3g} rad of it at any speed (rate independent, hysteresis)"
-
-
-def _readable(size: float, unit: str) -> tuple[float, str]:
-    """Scale and unit in which a size in SI is a handy number."""
-    for scale, name in _UNITS[unit]:
-        if size >= scale:
-            return scale, name
-    return _UNITS[unit][-1] if len(_UNITS[unit]) > 1 else _UNITS[unit][0]
-
-
-def _formula(found: Fit, closure: str, used: dict[str, Term], size: float) -> str:
-    text = ""
-    for name, term in used.items():
-        value, std = found.values[f"{closure}.{name}"] / size, found.std[f"{closure}.{name}"] / size
-        number = f"{abs(value):.3g}(+-{std:.1g})" + ("" if term.formula == "1" else f" {term.formula}")
-        sign = "-" if value < 0.0 else "+"
-        text += f" {sign} {number}" if text else (f"-{number}" if value < 0.0 else number)
-    return text
-
-
-def _legend(used: dict[str, Term], shape: dict[str, float | None]) -> str:
-    formulas = " ".join(term.formula for term in used.values())
-    notes = ""
-    if "_T" in formulas:
-        notes += f"; index T: what it was over the past T = {shape['time']:.3g} s"
-    if _present("distance", used):
-        notes += f"; q' = w/d (1 - q sgn w), d = {shape['distance']:.3g} rad"
-    if " n" in formulas or formulas.startswith("n"):
-        notes += "; n = exp(-(x/0.05)^2/2)"
-    return notes
-
-
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.0f} %"
-
-
-def _listed(words: Sequence[str]) -> str:
-    """Words with commas, the last with ``and``."""
-    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}" if words else "nothing"

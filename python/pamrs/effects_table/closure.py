@@ -1,7 +1,8 @@
 """Closures: what a located mismatch is a function of, where no entry of the catalogue explains it.
 
-A closure is a sum of coefficients times terms of a fixed dictionary (``crates/pam-core/src/effects/closure_*.rs``). It enters rig files,
-simulation and fits like an effect, and is never a name for the physics: ``catalogue`` is false, and the diagnosis gives it no probability.
+A closure is a sum of coefficients times terms of a fixed dictionary (``crates/pam-core/src/effects/closure_*.rs``). It enters rig
+files, simulation and fits like an effect, and is never a name for the physics: ``catalogue`` is false, and the diagnosis gives it
+no probability.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from typing import Final
 from pamrs.effects_table.entry import EffectInfo
 from pamrs.effects_table.entry import EffectParameter as Parameter
 
-__all__ = ["CLOSURES", "MEMORY_OF", "TERMS", "Term"]
+__all__ = ["CLOSURES", "CLOSURE_OF", "MEMORY_OF", "TERMS", "Term"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,8 +74,8 @@ _FLOW = (
     Term("opening_pressure", "x p", (_X, _P), "odd"),
     Term("abs_opening_pressure", "|x| p", (_X, _P), "even"),
     Term("filling", "x+ (ps - p)", (_X, _PS, _P), "odd"),
-    Term("null_filling", "20 x+ n ps", ("valve opening around its null", _PS), "odd"),
-    Term("null_venting", "20 x- n p", ("valve opening around its null", _P), "odd"),
+    Term("sign_filling", "sgn(x+) ps", ("side to which the valve is open", _PS), "odd"),
+    Term("sign_venting", "sgn(x-) p", ("side to which the valve is open", _P), "odd"),
     Term("at_null", "n", ("valve opening around its null",), "even"),
     Term("supply_difference", "(ps - p)", (_PS, _P), "static"),
     Term("volume_rate", "p V'", (_P, "rate of the volume"), "odd"),
@@ -91,6 +92,8 @@ _SUPPLY = (
 )
 TERMS: Final[dict[str, tuple[Term, ...]]] = {"closure_torque": _TORQUE, "closure_flow": _FLOW, "closure_supply": _SUPPLY}
 """Terms of each closure, in the order of its parameters; behind them stand the shapes of its memories."""
+CLOSURE_OF: Final[dict[str, str]] = {"supply": "closure_supply", "chamber": "closure_flow", "arm": "closure_torque"}
+"""Closure of each block of the cut chain."""
 MEMORY_OF: Final[dict[str, str]] = {"time": "memory_time", "distance": "memory_angle"}
 """Shape that a term of a kind with memory depends on."""
 
@@ -124,7 +127,8 @@ CLOSURES: Final[tuple[EffectInfo, ...]] = (
         block="chamber",
         at="chamber",
         equation=(
-            "m = sum c_k t_k(p, ps [bar abs], x, V' [l/s], memory); x+ = max(x, 0), x- = max(-x, 0), n = exp(-(x/0.05)^2/2); "
+            "m = sum c_k t_k(p, ps [bar abs], x, V' [l/s], memory); x+ = max(x, 0), x- = max(-x, 0), "
+            "n = exp(-(x/0.05)^2/2), sgn(x) = tanh(x/0.01); "
             "p_T' = (p - p_T)/T, x_T' = (x - x_T)/T"
         ),
         fingerprint=_PLACEHOLDER,

@@ -2,10 +2,11 @@
 //!
 //! `m = sum_k c_k t_k`, every coefficient in kg/s: `p` is the absolute pressure and `ps` that of the supply in bar, `x` the opening of the valve
 //! (-1 vents fully, 1 fills fully), `dV` the rate of the volume in l/s. Air that comes in is counted as inflow, air that goes out as outflow.
-//! Two memories, `z' = (p - z)/T` and `zx' = (x - zx)/T`; around the null, terms with `n = exp(-(x/0.05)^2/2)`. See `closure_torque`.
+//! Two memories, `z' = (p - z)/T` and `zx' = (x - zx)/T`; around the null `n = exp(-(x/0.05)^2/2)`, on one side of it
+//! `tanh(x/0.01)`. See `closure_torque`.
 
 use super::{EffectInfo, EffectParameter};
-use crate::scalar::{constant, Scalar};
+use crate::scalar::{constant, tanh, Scalar};
 
 /// Number of terms.
 pub const TERMS: usize = 16;
@@ -13,8 +14,10 @@ pub const TERMS: usize = 16;
 pub const PARAMETERS: usize = TERMS + 1;
 /// States of a chamber with it: `z`, `zx`.
 pub const STATES: usize = 2;
-/// Opening around the null in which the terms of the null count.
+/// Opening around the null in which its term counts.
 const NULL: f64 = 0.05;
+/// Opening over which the terms of a side turn on: what a dead zone or a lap takes is the same beyond it.
+const SIDE: f64 = 0.01;
 
 const fn term(name: &'static str) -> EffectParameter {
     EffectParameter::new(name, "kg/s").within(-1e6, 1e6)
@@ -34,8 +37,8 @@ pub const INFO: EffectInfo = EffectInfo {
         term("opening_pressure"),
         term("abs_opening_pressure"),
         term("filling"),
-        term("null_filling"),
-        term("null_venting"),
+        term("sign_filling"),
+        term("sign_venting"),
         term("at_null"),
         term("supply_difference"),
         term("volume_rate"),
@@ -79,8 +82,8 @@ impl<S: Scalar> Here<S> {
             x * p,
             size * p,
             fills * (supply - p),
-            fills * null / NULL * supply,
-            vents * null / NULL * p,
+            tanh(fills / SIDE) * supply,
+            tanh(vents / SIDE) * p,
             null,
             supply - p,
             p * volume_rate,
@@ -114,8 +117,8 @@ pub fn steepest(values: &[f64; PARAMETERS], pressure: f64) -> f64 {
         + c("opening_pressure")
         + c("abs_opening_pressure")
         + c("filling")
-        + c("null_filling")
-        + c("null_venting")
+        + c("sign_filling")
+        + c("sign_venting")
         + c("supply_difference")
         + c("volume_rate")
         + c("pressure_memory")
@@ -140,7 +143,8 @@ mod tests {
         assert!((of(&filling, "volume_rate") - 0.3).abs() < 1e-12);
         assert!((of(&filling, "opening_memory_pressure") - 1.2).abs() < 1e-12);
         assert_eq!((of(&filling, "pressure_memory"), of(&filling, "supply_difference")), (0.5, 5.0));
-        assert!((of(&venting, "null_venting") - 3.0 * (-0.5_f64).exp()).abs() < 1e-12);
+        assert!((of(&venting, "sign_venting") - 3.0 * 5.0_f64.tanh()).abs() < 1e-12);
+        assert_eq!((of(&venting, "sign_filling"), of(&filling, "sign_filling")), (0.0, 8.0));
         assert!(of(&filling, "at_null") < 1e-20);
         let mut coefficients = [0.0; TERMS];
         assert_eq!(filling.mass_flow(&coefficients), 0.0);
