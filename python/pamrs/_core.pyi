@@ -76,6 +76,16 @@ class Rig:
         measured: dict[str, _Signal],
         samples: int,
     ) -> tuple[_Array, _Array | None]: ...
+    def closure_terms(
+        self,
+        block: str,
+        commands: dict[str, _Array],
+        sample_time: float,
+        step: float,
+        starts: list[int],
+        measured: dict[str, _Signal],
+        samples: int,
+    ) -> _Array: ...
 
 @final
 class Simulator:

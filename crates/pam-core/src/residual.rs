@@ -4,10 +4,11 @@
 //! has a residual of its own. Integrating blocks run over windows that start from the (smoothed) measurement;
 //! the derivative with respect to the window's initial state comes along, so that its error can be projected out.
 
+use crate::effects::closure_flow;
 use crate::rig::parameters::unit;
-use crate::rig::plant::{Plant, Simulated};
+use crate::rig::plant::{Controls, Plant, Simulated};
 use crate::rig::spec::dotted;
-use crate::rig::{Channel, Layout, Memory, ParameterId, Rig};
+use crate::rig::{Channel, ClosureAt, Layout, Memory, ParameterId, Rig};
 use crate::scalar::{constant, Scalar};
 use crate::simulate::{check_state, Stepper, Timing};
 use crate::{Error, Result};
@@ -83,9 +84,15 @@ impl Block {
         let layout = rig.layout();
         let mut places = self.initial_states(layout);
         match self {
-            Self::Chamber(k) => places.push(layout.mass(k)),
+            Self::Chamber(k) => {
+                places.push(layout.mass(k));
+                let closure = rig.wiring.gases[k].closure.map(|place| layout.extra(place));
+                places.extend(closure.into_iter().flat_map(|first| first..first + closure_flow::STATES));
+            }
             Self::Arm(_) => places.extend(layout.extra(0)..layout.states()),
-            Self::Supply(_) => {}
+            Self::Supply(k) => {
+                places.extend(rig.wiring.supply_effects[k].closure.map(|place| layout.extra(place)));
+            }
         }
         if !matches!(self, Self::Arm(_)) {
             places.extend(hidden(layout, measured));
@@ -238,7 +245,7 @@ pub fn predict(
     let mut out = Prediction { value: vec![0.0; n], jacobian: Vec::new(), columns: 0 };
     if parameters.is_empty() {
         let plant = Plant::new(rig, rig.parameters().lift(), false)?;
-        run(plant, block, measured, timing, starts, &vec![0.0; initial], |k, y| out.value[k] = y)?;
+        run(plant, block, measured, timing, starts, &vec![0.0; initial], |k, y, _, _, _| out.value[k] = y)?;
         return Ok(out);
     }
     out.columns = parameters.len() + initial;
@@ -255,7 +262,7 @@ pub fn predict(
         }
         let plant = Plant::new(rig, values, false)?;
         let (value, jacobian, width) = (&mut out.value, &mut out.jacobian, out.columns);
-        run(plant, block, measured, timing, starts, &bumps, |k, y| {
+        run(plant, block, measured, timing, starts, &bumps, |k, y, _, _, _| {
             value[k] = y.re;
             let gradient = y.eps.unwrap_generic(Const::<LANES>, Const::<1>);
             for (column, slope) in chunk.iter().zip(gradient.iter()) {
@@ -264,6 +271,38 @@ pub fn predict(
         })?;
     }
     Ok(out)
+}
+
+/// Terms of the closure in a block at each sample of a prediction, row-major `samples x terms`, and their number: what its
+/// coefficients multiply.
+///
+/// # Errors
+/// As [`predict`]; [`Error::Model`] for a block without a closure.
+pub fn closure_terms(
+    rig: &Rig,
+    block: Block,
+    measured: &Measured<'_>,
+    timing: Timing,
+    starts: &[usize],
+) -> Result<(Vec<f64>, usize)> {
+    check(rig, block, measured, starts)?;
+    let (at, id) = match block {
+        Block::Supply(k) => (ClosureAt::Supply(k), "closure_supply"),
+        Block::Chamber(k) => (ClosureAt::Chamber(k), "closure_flow"),
+        Block::Arm(k) => (ClosureAt::Joint(k), "closure_torque"),
+    };
+    let plant = Plant::new(rig, rig.parameters().lift(), false)?;
+    let (mut found, mut count) = (Vec::new(), 0);
+    let bumps = vec![0.0; block.initial_count(rig)];
+    run(plant, block, measured, timing, starts, &bumps, |_, _, stepper, state, controls| {
+        let terms = stepper.plant.closure_terms(at, state, controls, &stepper.scratch);
+        count = terms.len();
+        found.extend(terms);
+    })?;
+    if count == 0 {
+        return Err(Error::Model(format!("block '{block:?}' has no closure: the effect {id} is not there")));
+    }
+    Ok((found, count))
 }
 
 fn check(rig: &Rig, block: Block, measured: &Measured<'_>, starts: &[usize]) -> Result<()> {
@@ -372,7 +411,7 @@ fn run<S: Scalar>(
     timing: Timing,
     starts: &[usize],
     bumps: &[S],
-    mut sink: impl FnMut(usize, S),
+    mut sink: impl FnMut(usize, S, &Stepper<'_, S>, &[S], &Controls<S>),
 ) -> Result<()> {
     let rig = plant.rig();
     let layout = rig.layout();
@@ -450,11 +489,11 @@ fn run<S: Scalar>(
             }
         }
         check_state(&stepper.plant, &state, k as f64 * dt)?;
-        sink(k, state[reading.unwrap_or(output)] + offset);
+        let mut controls = stepper.plant.controls(|input| measured.commands[input][k]);
+        sink(k, state[reading.unwrap_or(output)] + offset, &stepper, &state, &controls);
         if k + 1 == n {
             break;
         }
-        let mut controls = stepper.plant.controls(|input| measured.commands[input][k]);
         let h = 1.0 / timing.substeps as f64;
         for i in 0..timing.substeps {
             let time = (k as f64 + i as f64 * h) * dt;

@@ -451,3 +451,50 @@ fn fast_effects_shorten_the_step() {
     assert!(step(vec![effect("base_flexibility", &base)]) < 1e-3);
     assert_eq!(step(vec![effect("pressure_lag", &[("time_constant", 1e-6)])]), free);
 }
+
+/// A closure with a few of its parameters, the others at zero and as they are for its memories.
+fn closure(id: &str, parameters: &[(&str, f64)]) -> EffectSpec {
+    let mut found = TYPICAL.iter().find(|t| t.id == id).unwrap().off();
+    for (name, value) in parameters {
+        *found.parameters.get_mut(*name).unwrap() = *value;
+    }
+    found
+}
+
+#[test]
+fn closures_do_what_their_terms_say() {
+    // A flow in proportion to the absolute pressure empties a tank exponentially, and what it takes is booked.
+    let flow = closure("closure_supply", &[("pressure", -1e-4)]);
+    let run = Run::new(with(lone_tank(), vec![flow]), 101, 0.1, 10, |_| 0.0, &[]);
+    let expected = (1.38e6 + AMBIENT) * (-10.0 * 1e-4 / 1e5 * RT / 0.015_f64).exp() - AMBIENT;
+    assert!((run.last("supply_pressure") - expected).abs() < 1.0, "{}", run.last("supply_pressure"));
+    assert!((run.last("mass_supplied") - run.last("mass_vented")).abs() < 1e-15);
+    // A constant flow into a rigid chamber with its valve shut: as inflow, and out of it as outflow.
+    let rise = |flow: f64| {
+        let rig = with(rigid_chamber(1e-3), vec![closure("closure_flow", &[("constant", flow)])]);
+        Run::new(rig, 101, 0.01, 10, |_| 5.0, &[("muscle_pressure", 3e5)]).last("muscle_pressure") - 3e5
+    };
+    let unit = 1e-6 * RT / 1e-3;
+    assert!((rise(1e-6) / (1.4 * unit) - 1.0).abs() < 1e-9 && (rise(-1e-6) / unit + 1.0).abs() < 1e-9);
+    // A constant torque is a push that lasts, and friction by the way that it went is hysteresis: it outlives the motion.
+    let angle = |effects| pendulum(effects, 400, 5e-3, 1.0, 0.0).last("joint_angle");
+    let push = effect("external_torque", &[("torque", 3.0), ("time", -10.0), ("duration", 1e3)]);
+    assert_eq!(angle(vec![closure("closure_torque", &[("constant", 3.0)])]), angle(vec![push]));
+    let (free, held) = (angle(vec![]), angle(vec![closure("closure_torque", &[("slip", -2.0)])]));
+    assert!((free - held).abs() > 1e-3);
+}
+
+#[test]
+fn closures_shorten_the_step_where_they_are_steep() {
+    let step = |effects: Vec<EffectSpec>| with(shoulder(), effects).stable_step();
+    let free = step(vec![]);
+    for (id, name, value) in [
+        ("closure_torque", "rate", -1e5),
+        ("closure_torque", "pressure_sign", -2e3),
+        ("closure_flow", "pressure", -50.0),
+        ("closure_supply", "pressure", -1e4),
+    ] {
+        assert!(step(vec![closure(id, &[(name, value)])]) < 0.5 * free, "{id}.{name}");
+        assert_eq!(step(vec![closure(id, &[])]), free, "{id}");
+    }
+}

@@ -7,7 +7,7 @@ use crate::convert::{array, error, values};
 use crate::simulator::{channels, events, initial, run, EventRow};
 use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray1};
 use pam_core::drive::Drive;
-use pam_core::residual::{predict, Block, Measured, Signal};
+use pam_core::residual::{closure_terms, predict, Block, Measured, Signal};
 use pam_core::rig::RigSpec;
 use pam_core::simulate::{Progress, Timing, Trajectory};
 use pyo3::prelude::*;
@@ -146,6 +146,36 @@ impl Rig {
         let jacobian =
             if p.columns > 0 { Some(array(py, p.jacobian).reshape([rows, p.columns])?) } else { None };
         Ok((array(py, p.value), jacobian))
+    }
+
+    /// Terms of the closure in a block at each sample of a prediction, one column for each of its coefficients.
+    #[allow(clippy::too_many_arguments)]
+    fn closure_terms<'py>(
+        &self,
+        py: Python<'py>,
+        block: &str,
+        commands: Signals<'py>,
+        sample_time: f64,
+        step: f64,
+        starts: Vec<usize>,
+        measured: BTreeMap<String, Pair<'py>>,
+        samples: usize,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let commands = owned(&commands);
+        let signals: Vec<_> =
+            measured.iter().map(|(name, (value, slope))| (name, values(value), values(slope))).collect();
+        let inner = &*self.inner;
+        let found = py.detach(|| {
+            let signals: Vec<_> = (signals.iter())
+                .map(|(name, value, slope)| (name.as_str(), Signal { value, slope }))
+                .collect();
+            let measured = Measured::new(inner, samples, &borrowed(&commands), &signals)?;
+            let block = Block::from_name(inner, block)?;
+            let timing = Timing::new(sample_time, step)?.at_most(block.longest_step(inner));
+            closure_terms(inner, block, &measured, timing, &starts)
+        });
+        let (terms, columns) = found.map_err(|e| error(py, &e))?;
+        array(py, terms).reshape([samples, columns])
     }
 }
 

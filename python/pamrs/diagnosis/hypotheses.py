@@ -15,7 +15,7 @@ from pamrs.diagnosis.fitting import FIT_BIN, Fit, Key, Problem, acts_in, bin_wid
 from pamrs.diagnosis.screening import Screen, basis_of, by_effect, screen
 from pamrs.diagnosis.signals import Prepared
 from pamrs.diagnosis.starts import Start
-from pamrs.effects_table import EFFECTS, find_parameter
+from pamrs.effects_table import CATALOGUE, EFFECTS, find_parameter
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 
@@ -148,7 +148,7 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
         return Group(blocks, was, now, [start], {"": 1.0}, None, floor, [])
     mismatch = max(suspects, key=lambda b: out[b.name].ratio)
     say(f"{names}: {mismatch.name} keeps {now[mismatch.name].systematic:.2g} noise units after the refit")
-    acting = [e for e in EFFECTS if _fits(nominal, e) and any(acts_in(e, b) for b in suspects)]
+    acting = [e for e in CATALOGUE if _fits(nominal, e) and any(acts_in(e, b) for b in suspects)]
     happening = [e for e in acting if e in EVENTS]
     acting = [e for e in acting if e not in EVENTS]
     trial = _Trial(inner, outer, nominal, floor, out, suspects)

@@ -8,15 +8,18 @@ from __future__ import annotations
 from typing import Final
 
 from pamrs.effects_table.air import AIR
+from pamrs.effects_table.closure import CLOSURES
 from pamrs.effects_table.entry import EffectInfo, EffectParameter
 from pamrs.effects_table.motion import MOTION
 from pamrs.effects_table.muscle import MUSCLE
 from pamrs.effects_table.sensors import SENSORS
 
-__all__ = ["EFFECTS", "EffectInfo", "EffectParameter", "find_parameter"]
+__all__ = ["CATALOGUE", "EFFECTS", "EffectInfo", "EffectParameter", "find_parameter"]
 
-EFFECTS: Final[dict[str, EffectInfo]] = {effect.id: effect for effect in (*AIR, *MUSCLE, *MOTION, *SENSORS)}
-"""Every effect by its id, in the order of the chain."""
+EFFECTS: Final[dict[str, EffectInfo]] = {effect.id: effect for effect in (*AIR, *MUSCLE, *MOTION, *SENSORS, *CLOSURES)}
+"""Every effect by its id, in the order of the chain; closures last."""
+CATALOGUE: Final[dict[str, EffectInfo]] = {name: effect for name, effect in EFFECTS.items() if effect.catalogue}
+"""Those that a diagnosis may name."""
 
 
 def find_parameter(name: str) -> EffectParameter:

@@ -56,6 +56,8 @@ class EffectInfo:
         Where it comes from.
     rivals : tuple of str
         What looks like it in recordings: ids of the catalogue first, then other causes in words. Of two effects each names the other.
+    catalogue : bool
+        Whether it is a name for physics, which a diagnosis may give; a closure is none.
     """
 
     id: str
@@ -68,6 +70,7 @@ class EffectInfo:
     parameters: tuple[EffectParameter, ...]
     reference: str
     rivals: tuple[str, ...] = ()
+    catalogue: bool = True
 
     @property
     def everywhere(self) -> str:

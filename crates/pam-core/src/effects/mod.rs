@@ -6,6 +6,9 @@
 pub mod activation_pressure;
 pub mod base_flexibility;
 pub mod clock_skew;
+pub mod closure_flow;
+pub mod closure_supply;
+pub mod closure_torque;
 pub mod compressor_cut_in;
 pub mod external_torque;
 pub mod heat_transfer;
@@ -70,7 +73,7 @@ pub struct EffectInfo {
     pub parameters: &'static [EffectParameter],
 }
 
-/// Every effect of the core, in the order of the chain.
+/// Every effect of the core, in the order of the chain; behind them the closures, which model a mismatch without naming it.
 pub const EFFECTS: &[EffectInfo] = &[
     supply_leak::INFO,
     compressor_cut_in::INFO,
@@ -96,6 +99,9 @@ pub const EFFECTS: &[EffectInfo] = &[
     base_flexibility::INFO,
     pressure_lag::INFO,
     clock_skew::INFO,
+    closure_supply::INFO,
+    closure_flow::INFO,
+    closure_torque::INFO,
 ];
 
 /// Time that a sudden change takes [s]: short for an arm, long enough for a step, so that its moment can be fitted.
@@ -147,7 +153,9 @@ mod tests {
         ids.sort_unstable();
         ids.dedup();
         assert_eq!(ids.len(), EFFECTS.len());
-        assert!(EFFECTS.iter().all(|e| (1..=3).contains(&e.parameters.len())));
+        let named = EFFECTS.iter().filter(|e| !e.id.starts_with("closure_"));
+        assert!(named.clone().all(|e| (1..=3).contains(&e.parameters.len())));
+        assert_eq!(named.count() + 3, EFFECTS.len());
         assert!(EFFECTS.iter().flat_map(|e| e.parameters).all(|p| p.lower < p.upper));
     }
 }

@@ -80,6 +80,9 @@ impl<S: Scalar> Plant<'_, S> {
                 here.vented += flow;
             }
         }
+        if self.rig.wiring.effects.closes_air() {
+            self.closing_flows(state, controls, here);
+        }
     }
 
     /// Flows around the null of the valves, from the supply and to the ambient.
@@ -173,7 +176,7 @@ impl<S: Scalar> Plant<'_, S> {
 impl<S: Scalar> Scratch<S> {
     /// A mass flow along the arrow; what goes against it goes out of its end and into its beginning.
     #[inline]
-    fn pass(&mut self, from: Node, to: Node, flow: S) {
+    pub(super) fn pass(&mut self, from: Node, to: Node, flow: S) {
         let (giver, taker, flow) = if flow.re() >= 0.0 { (from, to, flow) } else { (to, from, -flow) };
         self.take(giver, flow);
         self.give(taker, flow);
@@ -261,18 +264,18 @@ impl Plant<'_, f64> {
                 add(Node::Gas(unit.to), Node::Ambient, slope);
             }
         }
-        let mut worst = (0.0, None);
+        let mut worst = (self.closure_air_memory(), None);
         for (k, slope) in steepest.iter().enumerate() {
             let alpha = self.alphas[k].inflow.max(self.alphas[k].outflow).max(gas.gamma);
             let (volume, wall) = self.least_volume(k);
-            let leak = self.steepest_leak(k);
+            let leak = self.steepest_leak(k) + self.steepest_closure(k);
             let rate = alpha * rt * (slope + leak) / volume + self.wall_rate(k, volume, wall);
             if rate > worst.0 {
                 worst = (rate, Some(k));
             }
         }
-        for (supply, slope) in self.supplies.iter().zip(&drawn) {
-            let rate = supply.fastest(*slope, rt);
+        for (k, (supply, slope)) in self.supplies.iter().zip(&drawn).enumerate() {
+            let rate = supply.fastest(*slope + self.steepest_supply(k), rt);
             if rate > worst.0 {
                 worst = (rate, None);
             }

@@ -196,6 +196,7 @@ impl<S: Scalar> Plant<'_, S> {
         }
         self.settle_dampers(state);
         self.settle_arm(state);
+        self.settle_closures(state);
         for (k, gas) in wiring.gases.iter().enumerate() {
             if let Some(lag) = gas.lag {
                 state[layout.extra(lag)] = state[layout.pressure(k)];

@@ -4,6 +4,7 @@ mod air;
 mod between;
 mod body;
 mod check;
+mod closures;
 pub mod layout;
 pub mod memory;
 mod motion;
@@ -17,6 +18,7 @@ mod wiring;
 mod wiring_effects;
 mod wiring_motion;
 
+pub(crate) use closures::ClosureAt;
 pub use layout::{Channel, Layout, Names};
 pub use memory::Memory;
 pub use parameters::{ParameterId, Parameters, Values};

@@ -36,6 +36,9 @@ impl<S: Scalar> Plant<'_, S> {
             {
                 load[k] += joint_end_stop::torque(stop.map(|id| values[id]), upper, angles[k], rates[k]);
             }
+            if coordinate.effects.closure.is_some() {
+                load[k] += self.closing_torque(k, state);
+            }
         }
         let base = wiring.arm_effects.base.zip(units.base);
         let reaction = base.map(|(place, ids)| {
@@ -181,7 +184,7 @@ impl Plant<'_, f64> {
         if let Some([_, time_constant]) = units.creep {
             fastest = fastest.max(1.0 / value(time_constant));
         }
-        fastest
+        fastest.max(self.closure_memory())
     }
 
     /// Largest stiffness [N m/rad] of what pulls on a coordinate, over its range, at the highest pressure.
@@ -237,7 +240,7 @@ impl Plant<'_, f64> {
         let (wiring, units) = (&self.rig.wiring, &self.rig.wiring.effects);
         let value = |id| self.values[id];
         let own = &wiring.coordinates[coordinate].effects;
-        let (mut damping, mut stiffness) = (0.0, 0.0);
+        let (mut damping, mut stiffness) = self.closure_resistance(coordinate);
         if let (true, Some([stiction, speed])) = (own.stribeck, units.stribeck) {
             damping += joint_coulomb_stribeck::steepest(value(stiction), value(speed));
         }

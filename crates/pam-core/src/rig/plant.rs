@@ -294,7 +294,7 @@ impl<'a, S: Scalar> Plant<'a, S> {
         let (angle, rate) = (layout.angle(0), layout.rate(0));
         let end = layout.extra(0);
         if simulated.extras {
-            self.extra_rates(state, out);
+            self.extra_rates(state, controls, here, out);
         }
         if simulated.motion && self.body.moves() {
             let (angles, rates) = state[angle..end].split_at(layout.coordinates);

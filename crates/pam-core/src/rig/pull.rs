@@ -1,7 +1,7 @@
 //! What the muscles pull, with what they remember and what effects make of it.
 
 use super::memory::Memory;
-use super::plant::Plant;
+use super::plant::{Controls, Plant, Scratch};
 use super::units::Group;
 use crate::effects::{
     activation_pressure, mullins_softening, muscle_creep, muscle_hysteresis, muscle_rate_damping,
@@ -110,11 +110,12 @@ impl<S: Scalar> Plant<'_, S> {
         force
     }
 
-    /// Rates of what the effects on the muscles need; of the rest zero.
+    /// Rates of what the effects on the muscles and the closures need; of the rest zero.
     #[inline(never)]
-    pub(super) fn extra_rates(&self, state: &[S], out: &mut [S]) {
+    pub(super) fn extra_rates(&self, state: &[S], controls: &Controls<S>, here: &Scratch<S>, out: &mut [S]) {
         let layout = &self.layout;
         out[layout.extra(0)..layout.states()].fill(constant(0.0));
+        self.closure_rates(state, controls, here, out);
         let Some([_, time_constant]) = self.rig.wiring.effects.creep else { return };
         for group in &self.rig.wiring.groups {
             let Some(damper) = group.effects.creep.map(|k| layout.extra(k)) else { continue };

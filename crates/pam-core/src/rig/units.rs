@@ -80,6 +80,8 @@ pub(crate) struct GasUnit {
     pub heat: bool,
     /// Reading of its lagging sensor among the extras.
     pub lag: Option<usize>,
+    /// First of what its closure remembers, among the extras.
+    pub closure: Option<usize>,
 }
 
 /// Muscles of one kind that share a chamber and a joint.

@@ -1,6 +1,7 @@
 //! Effects that are switched on: their parameters, and the blocks on which they act.
 
 use super::parameters::ParameterId as Id;
+use crate::effects::{closure_flow, closure_supply, closure_torque};
 
 /// Parameters of the effects that are switched on, in the order of [`crate::effects::EFFECTS`].
 #[derive(Debug, Clone, Copy, Default)]
@@ -29,6 +30,9 @@ pub(crate) struct EffectUnits {
     pub base: Option<[Id; 3]>,
     pub pressure_lag: Option<[Id; 1]>,
     pub clock: Option<[Id; 2]>,
+    pub closure_supply: Option<[Id; closure_supply::PARAMETERS]>,
+    pub closure_flow: Option<[Id; closure_flow::PARAMETERS]>,
+    pub closure_torque: Option<[Id; closure_torque::PARAMETERS]>,
 }
 
 impl EffectUnits {
@@ -39,11 +43,16 @@ impl EffectUnits {
 
     /// Some effect acts on joints, arm or load.
     pub fn on_motion(&self) -> bool {
-        self.stribeck.is_some() || self.stop.is_some() || self.on_arm()
+        self.stribeck.is_some() || self.stop.is_some() || self.closure_torque.is_some() || self.on_arm()
     }
 
     fn on_arm(&self) -> bool {
         self.swing.is_some() || self.payload.is_some() || self.torque.is_some() || self.base.is_some()
+    }
+
+    /// A closure acts somewhere on the air.
+    pub fn closes_air(&self) -> bool {
+        self.closure_flow.is_some() || self.closure_supply.is_some()
     }
 
     /// Spools move within a sample.
@@ -69,6 +78,8 @@ pub(crate) struct SupplyEffects {
     /// Its relay among the extras.
     pub compressor: Option<usize>,
     pub dead_band: bool,
+    /// What its closure remembers, among the extras.
+    pub closure: Option<usize>,
 }
 
 /// Effects on a valve.
@@ -106,6 +117,8 @@ pub(crate) struct JointEffects {
     pub stribeck: bool,
     pub stop: bool,
     pub torque: bool,
+    /// First of what its closure remembers, among the extras.
+    pub closure: Option<usize>,
 }
 
 /// Effects on the arm.

@@ -221,6 +221,7 @@ fn gases(spec: &RigSpec, inlets: &[(usize, Node)], table: &mut Parameters) -> Ve
         leak: false,
         heat: false,
         lag: None,
+        closure: None,
     };
     for chamber in &spec.chambers {
         let name = |key: &str| format!("{}.{key}", dotted("chamber", &chamber.name));

@@ -6,7 +6,7 @@ use super::units::{BodyUnit, SupplyUnit, Wiring};
 use super::units_effects::{EffectUnits, SPOOL_EXTRAS};
 use super::wiring::model;
 use super::wiring_motion::coordinate_names;
-use crate::effects::{EffectInfo, EFFECTS};
+use crate::effects::{closure_flow, closure_torque, EffectInfo, EFFECTS};
 use crate::{Error, Result};
 
 /// Switch on every effect of a description.
@@ -130,6 +130,9 @@ fn units(units: &mut EffectUnits, id: &str, ids: &[ParameterId]) -> bool {
         "base_flexibility" => set(&mut units.base, ids),
         "pressure_lag" => set(&mut units.pressure_lag, ids),
         "clock_skew" => set(&mut units.clock, ids),
+        "closure_supply" => set(&mut units.closure_supply, ids),
+        "closure_flow" => set(&mut units.closure_flow, ids),
+        "closure_torque" => set(&mut units.closure_torque, ids),
         _ => false,
     }
 }
@@ -161,7 +164,7 @@ impl Place<'_> {
         };
         let mut found = true;
         match id {
-            "supply_leak" | "compressor_cut_in" | "supply_regulator_deadband" => {
+            "supply_leak" | "compressor_cut_in" | "supply_regulator_deadband" | "closure_supply" => {
                 let blocks = wiring.supply_effects.iter_mut().zip(&wiring.supplies).zip(&self.names);
                 found = false;
                 for ((unit, supply), _) in blocks.filter(|(_, name)| self.here(name)) {
@@ -176,6 +179,10 @@ impl Place<'_> {
                         }
                         ("supply_leak", _) => {
                             unit.leak = true;
+                            true
+                        }
+                        ("closure_supply", _) => {
+                            unit.closure = Some(take(1));
                             true
                         }
                         _ => false,
@@ -203,11 +210,12 @@ impl Place<'_> {
                     }
                 }
             }
-            "leak_muscle" | "heat_transfer" | "pressure_lag" => {
+            "leak_muscle" | "heat_transfer" | "pressure_lag" | "closure_flow" => {
                 for (gas, _) in wiring.gases.iter_mut().zip(&self.names).filter(|(_, name)| self.here(name)) {
                     match id {
                         "leak_muscle" => gas.leak = true,
                         "heat_transfer" => gas.heat = true,
+                        "closure_flow" => gas.closure = Some(take(closure_flow::STATES)),
                         _ => gas.lag = Some(take(1)),
                     }
                 }
@@ -232,13 +240,14 @@ impl Place<'_> {
                     }
                 }
             }
-            "joint_coulomb_stribeck" | "joint_end_stop" | "external_torque" => {
+            "joint_coulomb_stribeck" | "joint_end_stop" | "external_torque" | "closure_torque" => {
                 let blocks =
                     wiring.coordinates.iter_mut().zip(&self.names).filter(|(_, name)| self.here(name));
                 for (coordinate, _) in blocks {
                     match id {
                         "joint_coulomb_stribeck" => coordinate.effects.stribeck = true,
                         "joint_end_stop" => coordinate.effects.stop = true,
+                        "closure_torque" => coordinate.effects.closure = Some(take(closure_torque::STATES)),
                         _ => coordinate.effects.torque = true,
                     }
                 }

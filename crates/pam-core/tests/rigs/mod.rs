@@ -174,7 +174,71 @@ pub const TYPICAL: &[Typical] = &[
     ),
     typical("pressure_lag", &[("time_constant", 0.01)], &[("time_constant", 0.0)]),
     typical("clock_skew", &[("offset", 0.012), ("rate", 1e-3)], &[("offset", 0.0), ("rate", 0.0)]),
+    closure("closure_supply", CLOSURE_SUPPLY),
+    closure("closure_flow", CLOSURE_FLOW),
+    closure("closure_torque", CLOSURE_TORQUE),
 ];
+
+const CLOSURE_SUPPLY: &[(&str, f64)] = &[
+    ("constant", 1e-4),
+    ("pressure", -2e-5),
+    ("opening", -3e-3),
+    ("filling", 1e-4),
+    ("pressure_memory", 2e-4),
+    ("memory_time", 0.4),
+];
+
+const CLOSURE_FLOW: &[(&str, f64)] = &[
+    ("constant", 1e-5),
+    ("pressure", -4e-6),
+    ("pressure_squared", -1e-6),
+    ("opening", 2e-4),
+    ("abs_opening", -1e-4),
+    ("opening_pressure", 3e-5),
+    ("abs_opening_pressure", 2e-5),
+    ("filling", 2e-5),
+    ("sign_filling", -2e-6),
+    ("sign_venting", 1e-6),
+    ("at_null", 2e-5),
+    ("supply_difference", 1e-6),
+    ("volume_rate", -5e-5),
+    ("pressure_memory", -3e-5),
+    ("opening_memory", 1e-4),
+    ("opening_memory_pressure", 1e-5),
+    ("memory_time", 0.3),
+];
+
+const CLOSURE_TORQUE: &[(&str, f64)] = &[
+    ("constant", 2.0),
+    ("angle", -1.0),
+    ("angle_squared", 0.5),
+    ("sine_4", 0.3),
+    ("cosine_4", -0.2),
+    ("sine_8", 0.2),
+    ("cosine_8", 0.1),
+    ("pressure", -0.5),
+    ("pressure_squared", 0.05),
+    ("pressure_angle", 0.2),
+    ("pressure_angle_squared", -0.1),
+    ("rate", -0.6),
+    ("angle_rate", -0.2),
+    ("rate_quadratic", -0.1),
+    ("pressure_rate", -0.2),
+    ("sign", -0.3),
+    ("pressure_sign", -0.05),
+    ("creep", -2.0),
+    ("pressure_creep", -0.4),
+    ("pressure_memory", 0.5),
+    ("slip", -0.8),
+    ("pressure_slip", -0.2),
+    ("memory_time", 0.3),
+    ("memory_angle", 0.05),
+];
+
+/// A closure, and how it is switched off: every coefficient zero.
+const fn closure(id: &'static str, parameters: &'static [(&'static str, f64)]) -> Typical {
+    Typical { id, parameters, neutral: parameters }
+}
 
 const fn typical(
     id: &'static str,
@@ -194,7 +258,8 @@ impl Typical {
     pub fn off(&self) -> EffectSpec {
         let mut off = self.on();
         for (name, value) in self.neutral {
-            off.parameters.insert((*name).into(), *value);
+            let coefficient = self.id.starts_with("closure_") && !name.starts_with("memory_");
+            off.parameters.insert((*name).into(), if coefficient { 0.0 } else { *value });
         }
         off
     }
