@@ -383,7 +383,7 @@ fn fast_leaks_and_walls_are_stable() {
     let mut warm = gas(&[("", 1e-6, 5e5)], vec![orifice("chamber", "ambient", 1e-9)]);
     warm.effects = vec![effect(
         "heat_transfer",
-        &[("heat_transfer_coefficient", 1e3), ("initial_temperature_rise", 0.0)],
+        &[("heat_transfer_coefficient", 1e3), ("initial_temperature_rise", 0.0), ("share", 1.0)],
     )];
     for spec in [leaking, warm] {
         let rig = Rig::new(spec).unwrap();

@@ -17,7 +17,7 @@ from pamrs.diagnosis.evidence import Floor
 from pamrs.diagnosis.fitting import Events, Key, Problem, residuals
 from pamrs.diagnosis.hypotheses import Candidate, Group, significant
 from pamrs.diagnosis.result import Diagnosis, Trace
-from pamrs.effects_table import EFFECTS
+from pamrs.effects_table import CATALOGUE, EFFECTS
 from pamrs.rig import Rig
 
 __all__ = ["assemble"]
@@ -54,8 +54,9 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
         model = nominal if verdict == "none" else baseline
         named = []
     elif verdict == "unlisted":
-        # the most probable catalogue effects stay in the list with their (small) probability, not in the model
-        model = baseline
+        # the most probable catalogue effects stay in the list with their (small) probability; the model gets the form that was found
+        chosen = [g.closure or g.candidates[0] for g in groups]
+        model = _merged(nominal, chosen)
     floor = {k: v for g in groups for k, v in g.floor.items()}
     stages = {"before": nominal, "refit": baseline, "after": model}
     events = next((c.fit.events for c in chosen if c.fit.events is not None), None) if verdict == "effects" else None
@@ -81,16 +82,17 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
         ambiguity=ambiguity,
         probabilities=probabilities,
         parameters=parameters,
-        fit={"channels": fit_table, "held_out": held_table, "gap_closed": gap if verdict == "effects" else None},
+        fit={"channels": fit_table, "held_out": held_table, "gap_closed": gap if model.effects else None},
         next_experiment=words.next_experiment(verdict, probabilities, ambiguity, nominal),
         warnings=words.warnings(case, groups, symptoms, held is fitted),
-        rig=_with_std(model, chosen) if verdict == "effects" else model,
+        rig=_with_std(model, chosen) if model.effects else model,
         traces=_traces(fitted, held, fit_found, out_found),
         blocks=_block_table(groups),
         condition_map=picture.map,
         tried=_tried(groups),
     )
-    diagnosis.text = words.verdict(diagnosis, named, case, gap)
+    forms = [g.form for g in groups if g.closure is not None] if verdict == "unlisted" else []
+    diagnosis.text = words.verdict(diagnosis, named, case, gap, forms)
     return diagnosis
 
 
@@ -224,7 +226,7 @@ def _effects(groups: list[Group], probabilities: dict[str, float], model: Rig | 
     marginal: dict[str, float] = {}
     for key, p in probabilities.items():
         for effect in key.split("+"):
-            if effect in EFFECTS:
+            if effect in CATALOGUE:
                 marginal[effect] = marginal.get(effect, 0.0) + p
     chosen = {e["id"] for e in model.effects} if model is not None else set()
     out = []

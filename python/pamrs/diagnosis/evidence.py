@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 BIN = 0.1
 """Width of the bins in which an excess is looked for [s]; at least five samples."""
-MARGIN = 1.25
+MARGIN = 1.1
 """Factor by which the variance must exceed its floor before it counts: floors are estimates."""
 REPLICATES = 3
 """Synthetic noise realisations for the part of a floor that the drives bring."""

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pamrs.diagnosis.blocks import Block, Residual
+from pamrs.diagnosis.closure import describe_closure, find_closure
 from pamrs.diagnosis.events import EVENTS, fit_events, look_for_events
 from pamrs.diagnosis.evidence import Excess, Floor, excess, floors, inflation
 from pamrs.diagnosis.fitting import FIT_BIN, Fit, Key, Problem, acts_in, bin_width, fit, residuals
@@ -21,14 +22,19 @@ from pamrs.rig import Rig
 
 __all__ = ["Candidate", "Group", "examine", "significant"]
 
-DETECTION_RATIO = 1.6
-"""Variance of bin means over the floor's from which a mismatch is taken as real."""
-EVEN, SOFTNESS = 0.85, 0.4
-"""Logarithm of the odds of explained to unexplained variance at which a set is named at even odds with ``unlisted``, and its width."""
+DETECTION_RATIO, HELD_RATIO = 1.35, 2.0
+"""Variance of bin means over the floor's from which a mismatch is taken as real, on recordings that were fitted and on others."""
+EVEN, EVEN_PUSH, SOFTNESS = 0.85, 2.9, 0.4
+"""Logarithm of the odds of explained to unexplained variance at which a set is named at even odds with ``unlisted`` (pushes, which
+take up a good part of anything, need more), and its width."""
 LOOKS, PRICE, SECOND = 8.0, 0.3, 2.0
 """Independent looks that a block's residual counts for, price of a parameter, price of a further effect."""
+LIKELY, CARRIES = 0.3, 0.8
+"""Probability of ``unlisted`` from which a form of what is missing is looked for, and the share of the mismatch that it may leave."""
 DOUBTFUL = 0.15
 """Share that every effect of lasting kind leaves, from which events are looked for."""
+TELLING = 0.5
+"""Excess variance, in units of the floor's, from which recordings are asked how much an effect leaves."""
 FORM = 0.04
 """Share of a mismatch's variance that the difference between a catalogue's equation and the truth may leave."""
 DRIFT_SHARE, DRIFT_DOUBT = 0.02, 3.0
@@ -92,6 +98,14 @@ class Group:
         Over the sets (ids joined by ``+``), ``unlisted`` and ``""`` (nothing missing here).
     mismatch : Block or None
         The block with the largest significant excess after the refit.
+    floor : dict
+        Noise floors.
+    suspects : list of Block
+        Blocks that keep an excess.
+    closure : Candidate or None
+        Where no name is likely: a form of what is missing that predicts held-out recordings better than the baseline.
+    form : str
+        That in words.
     """
 
     blocks: list[Block]
@@ -102,6 +116,8 @@ class Group:
     mismatch: Block | None
     floor: dict[Key, Floor]
     suspects: list[Block]
+    closure: Candidate | None = None
+    form: str = ""
 
     @property
     def best(self) -> Candidate:
@@ -142,11 +158,11 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
     outside = residuals(outer, baseline.rig) if held is not fitted else baseline.residuals
     out = {b.name: excess(b, outer.recordings, outside, floor) for b in blocks}
     start = Candidate((), baseline, out, now, 0.0)
-    suspects = [b for b in blocks if significant(now[b.name]) and (held is fitted or out[b.name].ratio > 1.25)]
+    suspects = [b for b in blocks if significant(now[b.name]) or significant(out[b.name], HELD_RATIO)]
     if not suspects:
         # a parameter at the end of its plausible range is a symptom even where the fit is good
         return Group(blocks, was, now, [start], {"": 1.0}, None, floor, [])
-    mismatch = max(suspects, key=lambda b: out[b.name].ratio)
+    mismatch = max(suspects, key=lambda b: out[b.name].ratio + now[b.name].ratio)
     say(f"{names}: {mismatch.name} keeps {now[mismatch.name].systematic:.2g} noise units after the refit")
     acting = [e for e in CATALOGUE if _fits(nominal, e) and any(acts_in(e, b) for b in suspects)]
     happening = [e for e in acting if e in EVENTS]
@@ -162,7 +178,18 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
     pairs = [] if settled else _pairs(trial, screened, singles, lambda text: say(f"{names}: {text}"))
     candidates = [start, *singles, *pairs]
     doubt = _doubt(fitted, held, mismatch, now[mismatch.name].rms)
-    return Group(blocks, was, now, candidates, _weigh(candidates, suspects, doubt), mismatch, floor, suspects)
+    weighed = _weigh(candidates, suspects, doubt)
+    group = Group(blocks, was, now, candidates, weighed, mismatch, floor, suspects)
+    if weighed["unlisted"] < LIKELY:
+        return group
+    closed = find_closure(inner, nominal, baseline, colour, suspects, say)
+    if closed is None:
+        return group
+    judged = trial.judged(closed.effects, closed)
+    # what does not carry over to recordings that were held out is no form of anything
+    if _share_left(judged, start, suspects) > CARRIES:
+        return group
+    return replace(group, closure=judged, form=describe_closure(closed, inner, baseline))
 
 
 def _refitted(problem: Problem, nominal: Rig, inflation: dict[str, float]) -> Fit:
@@ -203,22 +230,27 @@ def _doubt(fitted: Problem, held: Problem, mismatch: Block, left: float) -> floa
 
 
 def _share_left(candidate: Candidate, baseline: Candidate, suspects: list[Block]) -> float:
-    """Share of the baseline's excess variance that a set of effects leaves, the larger of fitted and held-out recordings."""
+    """Share of the baseline's excess variance that a set of effects leaves, the larger of fitted and held-out recordings.
+
+    Recordings that hardly show the mismatch do not count, as long as the effect does not bring one into them.
+    """
     shares = []
     for was, now in ((baseline.fitted, candidate.fitted), (baseline.held_out, candidate.held_out)):
         before = sum(max(0.0, was[b.name].ratio - 1.0) for b in suspects)
         after = sum(max(0.0, now[b.name].ratio - 1.0) for b in suspects)
-        shares.append(after / before if before > 0.0 else 1.0)
-    return max(shares)
+        if before > TELLING or after > max(before, TELLING):
+            shares.append(after / before if before > 0.0 else math.inf)
+    return max(shares, default=1.0)
 
 
 def _explains(candidate: Candidate, suspects: list[Block]) -> bool:
-    return all(candidate.held_out[b.name].ratio < DETECTION_RATIO for b in suspects)
+    """Whether only noise is left, fitted and held out."""
+    return all(e[b.name].ratio < DETECTION_RATIO for b in suspects for e in (candidate.fitted, candidate.held_out))
 
 
-def significant(found: Excess) -> bool:
+def significant(found: Excess, ratio: float = DETECTION_RATIO) -> bool:
     """Whether a block keeps more than its noise."""
-    return found.ratio > DETECTION_RATIO and found.p_value < 0.01
+    return found.ratio > ratio and found.p_value < 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -403,7 +435,7 @@ def _weigh(candidates: list[Candidate], suspects: list[Block], doubt: float) -> 
     for c, weight in weights.items():
         share = weight / total
         left = min(max(_share_left(c, start, suspects), 1e-6), 1.0 - 1e-6)
-        odds = (math.log((1.0 - left) / left) - EVEN) / SOFTNESS
+        odds = (math.log((1.0 - left) / left) - (EVEN_PUSH if "external_torque" in c.effects else EVEN)) / SOFTNESS
         if _explains(c, suspects):
             odds = max(odds, 3.0)
         odds -= max(0.0, c.scatter - CONSTANCY) / 0.1

@@ -90,6 +90,7 @@ def starts_of(effect: str, *, sealed: bool) -> list[Start]:
 
 
 _CHOICES = frozenset({"laminar_share"})
+_SHARES = frozenset({"share"})
 _STARTS = frozenset({"initial_temperature_rise"})
 
 
@@ -99,6 +100,8 @@ def _role(parameter: EffectParameter, *, sealed: bool) -> str:
         return "held"
     if parameter.name in _CHOICES:
         return "choice"
+    if parameter.name in _SHARES:  # of a sealed hold nothing but the relaxation is seen
+        return "held" if sealed else "size"
     if parameter.name in _STARTS:  # only a sealed hold can tell it
         return "size" if sealed else "held"
     return "size" if parameter.neutral == 0.0 else "shape"  # a tube of endless conductance is no restriction: no number scales it

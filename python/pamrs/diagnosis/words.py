@@ -50,8 +50,8 @@ def where(located: str | None, problem: Problem, groups: list[Group], picture: P
     }
 
 
-def verdict(diagnosis: Diagnosis, named: list[str], case: Case, gap: float | None) -> str:
-    """The verdict in a few sentences."""
+def verdict(diagnosis: Diagnosis, named: list[str], case: Case, gap: float | None, forms: list[str]) -> str:
+    """The verdict in a few sentences; ``forms`` say what a mismatch without a name is a function of."""
     kind = diagnosis.verdict
     if kind == "none":
         return "Nothing is missing that these recordings could show: the nominal model predicts every block to its noise."
@@ -65,10 +65,14 @@ def verdict(diagnosis: Diagnosis, named: list[str], case: Case, gap: float | Non
     place = diagnosis.where["text"]
     if kind == "unlisted":
         tried = ", ".join(f"{e['id']} ({e['probability']:.0%})" for e in diagnosis.effects)
-        return (
+        text = (
             f"Physics is missing that is not in the catalogue, or no effect of the catalogue explains the data well enough to be "
             f"named. {place}" + (f" Closest: {tried}." if tried else "")
         )
+        if not forms:
+            return text + " No form of it was found that carries over to other recordings: the model stays the refitted one."
+        closes = "" if gap is None else f" With it in the model, {100 * gap:.0f} % of the gap between refitted model and noise closes."
+        return text + "\n\nWhat is missing, as a form without a name. " + " ".join(forms) + closes
     names = " and ".join(f"{EFFECTS[n].name} ({n})" for n in named)
     p = diagnosis.probabilities.get("+".join(sorted(named)), 0.0)
     where_proved = "held-out recordings" if case.held_out and case.fit else "the fitted recording (no other was given)"

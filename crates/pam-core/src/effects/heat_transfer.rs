@@ -4,6 +4,8 @@
 //! `dm/dt = m_in - m_out` and `h = h0 sqrt(p T/(p0 T0))`, in place of the constant polytropic coefficients. The wall stays
 //! at the rest temperature. The gas mass is the state, so that the temperature cannot drift. Wall area: the cylinder
 //! of each muscle's volume and length; the cube of the chamber's volume when it is rigid.
+//! Only a `share` of the gas may follow the balance, while the rest keeps the coefficients: a nominal model whose coefficients are
+//! nearly right is left by a little, not by all. The mass then is the one that the gas temperature stands for, and not what flowed.
 //! A recording may begin just after a fill: the gas is then warmer than the wall by an initial rise.
 //! Carneiro & de Almeida (2006); Al-Ibrahim & Otis (1992).
 
@@ -20,6 +22,7 @@ pub const INFO: EffectInfo = EffectInfo {
     parameters: &[
         EffectParameter::new("heat_transfer_coefficient", "W/(m2 K)"),
         EffectParameter::new("initial_temperature_rise", "K"),
+        EffectParameter::new("share", "1").within(0.0, 1.0),
     ],
 };
 

@@ -161,11 +161,17 @@ impl<S: Scalar> Plant<'_, S> {
             };
             out[layout.mass(k)] = chamber.inflow - chamber.outflow;
             out[layout.pressure(k)] = match self.rig.wiring.effects.heat {
-                Some([coefficient, _]) if unit.heat => {
+                Some([coefficient, _, share]) if unit.heat => {
                     let mass = state[layout.mass(k)];
                     let temperature = heat_transfer::temperature(gas, chamber.pressure, chamber.volume, mass);
                     let coefficient = self.values[coefficient];
-                    heat_transfer::pressure_rate(gas, &chamber, temperature, here.wall[k], coefficient)
+                    let balance =
+                        heat_transfer::pressure_rate(gas, &chamber, temperature, here.wall[k], coefficient);
+                    let rest = (-self.values[share] + 1.0)
+                        * (pressure_rate(&chamber, &self.alphas[k], rt) - balance);
+                    // The temperature follows the balance, whatever the pressure does.
+                    out[layout.mass(k)] += mass * rest / chamber.pressure;
+                    balance + rest
                 }
                 _ => pressure_rate(&chamber, &self.alphas[k], rt),
             };
@@ -302,7 +308,7 @@ impl Plant<'_, f64> {
     fn wall_rate(&self, gas: usize, volume: f64, wall: f64) -> f64 {
         let (wiring, air) = (&self.rig.wiring, &self.rig.gas);
         match wiring.effects.heat {
-            Some([coefficient, _]) if wiring.gases[gas].heat => {
+            Some([coefficient, ..]) if wiring.gases[gas].heat => {
                 (air.gamma - 1.0) * self.values[coefficient] * wall * air.temperature
                     / (air.ambient_pressure * volume)
             }

@@ -262,7 +262,7 @@ impl<'a, S: Scalar> Plant<'a, S> {
     pub fn initial_mass(&self, gas: usize, state: &[S]) -> S {
         let rest = self.rest_mass(gas, state);
         match self.rig.wiring.effects.heat {
-            Some([_, rise]) if self.rig.wiring.gases[gas].heat => {
+            Some([_, rise, _]) if self.rig.wiring.gases[gas].heat => {
                 let temperature = self.rig.gas.temperature;
                 rest * temperature / (self.values[rise] + temperature)
             }

@@ -15,7 +15,7 @@ pub(crate) struct EffectUnits {
     pub path: Option<[Id; 2]>,
     pub restriction: Option<[Id; 1]>,
     pub leak: Option<[Id; 2]>,
-    pub heat: Option<[Id; 2]>,
+    pub heat: Option<[Id; 3]>,
     pub hysteresis: Option<[Id; 3]>,
     pub creep: Option<[Id; 2]>,
     pub damping: Option<[Id; 3]>,
