@@ -88,7 +88,7 @@ def available_blocks(rig: Rig, channels: tuple[str, ...]) -> list[Block]:
     if motion and {"muscle_pressure", "joint_angle"} <= has:
         blocks.append(
             Block(
-                "arm", "joint_angle", ("muscle_pressure",), 5.0, _ARM | _SENSORS, STEP, "muscle, joint and arm",
+                "arm", "joint_angle", ("muscle_pressure",), 2.5, _ARM | _SENSORS, STEP, "muscle, joint and arm",
             )
         )  # fmt: skip
     return blocks
