@@ -1,7 +1,7 @@
 """``python -m benchmarks.baselines FOLDER --results DIR --jobs N``: the baselines on the cases of a trial, resumable.
 
-Writes ``DIR/baselines/NAME.json`` for each case. The keys are opened after the last case only, where there are some, for the table of the gap
-closed by every method, that of ``pamrs prove`` beside them.
+Writes ``DIR/baselines/NAME.json`` for each case. The keys are opened after the last case only, where there are some, for the table
+of the gap closed by every method, that of ``pamrs prove`` beside them.
 """
 
 from __future__ import annotations

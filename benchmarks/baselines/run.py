@@ -30,7 +30,8 @@ def examined(folder: Path) -> dict[str, Any]:
     Returns
     -------
     dict
-        Schema ``pamrs.baselines/1``: by channel the held-out errors [SI], the gap closed by method, whether refitting alone raises an alarm.
+        Schema ``pamrs.baselines/1``: by channel the held-out errors [SI], the gap closed by method, whether refitting
+        alone raises an alarm.
     """
     from benchmarks.baselines import gaussian, sindy
 

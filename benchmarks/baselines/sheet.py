@@ -130,7 +130,9 @@ def _signals(prepared: Prepared, rig: Rig) -> dict[str, Array]:
     return out
 
 
-def _stretch(r: Residual, floor: Floor, prepared: Prepared, signals: dict[str, Array], scales: dict[str, tuple[float, float]]) -> Stretch:
+def _stretch(
+    r: Residual, floor: Floor, prepared: Prepared, signals: dict[str, Array], scales: dict[str, tuple[float, float]]
+) -> Stretch:
     width = max(1, round(STEP / prepared.dt))
     y, _ = binned(r.value / floor.sample, r.rows, width)
     every = np.ones(prepared.n, dtype=bool)
