@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -195,10 +194,6 @@ def _chance(block: Block, recordings: list[Prepared], found: dict[Key, Residual]
         total += float(((means[counts > 0] / floor[key].binned) ** 2).sum())
         count += int((counts > 0).sum())
     return float(chi2.sf(total, max(1, count)))
-
-
-Corrections = Callable[[Column], list[Array]]
-"""Gives a correction (m,) for each held-out stretch of a block, in units of its noise."""
 
 
 def errors(column: Column, corrections: list[Array] | None = None) -> tuple[float, float]:

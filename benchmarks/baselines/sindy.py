@@ -1,11 +1,12 @@
 """SINDy on the residual: a sparse equation of motion for it in measured signals, with its own memory.
 
-Brunton, Proctor & Kutz (2016), with pysindy's sequentially thresholded least squares. For a residual r in units of its noise and measured
-signals u, the candidates of r itself (order 0), of dr/dt (1) or of the rate of dr/dt (2) are 1, u, |u|, sign u, u|u|, all products of two signals, and
-r (and dr/dt) times 1 and u. Size of the library, order and threshold are chosen by leaving out one recording to fit at a time; "no correction"
-takes part in that choice. Rates and candidates are averaged over 0.2 s before they are compared (the weak form with a box as test function,
-after Schaeffer & McCalla 2017), or noise would drown the rates. The equation is integrated over the diagnosis' windows, from the smoothed residual at the start of each; where its
-memory would grow by itself, it is held at neither growing nor decaying.
+Brunton, Proctor & Kutz (2016), with pysindy's sequentially thresholded least squares. For a residual r in units of its noise and
+measured signals u, the candidates of r itself (order 0), of dr/dt (1) or of the rate of dr/dt (2) are 1, u, |u|, sign u, u|u|, all
+products of two signals, and r (and dr/dt) times 1 and u. Size of the library, order and threshold are chosen by leaving out one
+recording to fit at a time; "no correction" takes part in that choice. Rates and candidates are averaged over 0.2 s before they are
+compared (the weak form with a box as test function, after Schaeffer & McCalla 2017), or noise would drown the rates. The equation is
+integrated over the diagnosis' windows, from the smoothed residual at the start of each; where its memory would grow by itself, it is
+held at neither growing nor decaying.
 """
 
 from __future__ import annotations
@@ -202,7 +203,7 @@ def correct(column: Column) -> tuple[list[Array], str]:
             if total < least:
                 best, least = (size, order, threshold), total
     equation = None if best is None else learnt(column.inner, tables[best[0]], *best[1:])
-    if best is None or equation is None:
+    if best is None or equation is None or not (equation.a.any() or equation.memory.any()):
         return [np.zeros(len(s.y)) for s in column.outer], "no correction"
     called = library(column.outer[0].u, column.names, best[0])[1]
     return [equation.run(s, library(s.u, column.names, best[0])[0]) for s in column.outer], equation.text(called, column.names)
