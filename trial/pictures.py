@@ -9,7 +9,7 @@ from statistics import median
 from typing import Any
 
 from .score import HEALTHY, Row, Scores
-from .sidebyside import METHODS, Compared, medians
+from .sidebyside import CLASSES, METHODS, Compared, medians
 from .strength import STRENGTHS
 from .summary import confusion, gaps, reliability
 from .targets import SEEN, wilson
@@ -52,9 +52,8 @@ def draw_strength(axes: Any, rows: Sequence[Row]) -> None:
         )  # fmt: skip
     false = [r.detected for r in rows if not r.ids]
     if false:
-        axes.axhline(
-            sum(false) / len(false), color=_GREY, linestyle=":", linewidth=1.2, label=f"false alarms ({sum(false)} of {len(false)})"
-        )
+        word = f"false alarms ({sum(false)} of {len(false)})"
+        axes.axhline(sum(false) / len(false), color=_GREY, linestyle=":", linewidth=1.2, label=word)
     axes.set_xscale("log")
     ticks = [t for t in (0.5, 1, 1.5, 2, 3, 5, 10, 20, 50) if not effects or t <= 1.3 * max(r.visible for r in effects)]
     axes.set_xticks(ticks, [f"{t:g}" for t in ticks])
@@ -131,11 +130,8 @@ def draw_gaps(axes: Any, rows: Sequence[Row]) -> None:
 
 def draw_baselines(axes: Any, rows: Sequence[Compared]) -> None:
     """Median gap closed by every method, by class of case."""
-    kinds = sorted(
-        {c.kind for c in rows if c.row.ids},
-        key=lambda k: (k.split(",")[0], list(STRENGTHS).index(k.split(", ")[1]) if ", " in k else 9),
-    )
-    told = [(k, *medians(c for c in rows if c.kind == k)) for k in kinds]
+    present = {c.kind for c in rows if c.row.ids}
+    told = [(k, *medians(c for c in rows if c.kind == k)) for k in CLASSES if k in present]
     told = [t for t in told if t[2]]
     shades = ("0.75", _GREEN, _ORANGE, _BLUE)
     for m, (method, word) in enumerate(METHODS.items()):

@@ -77,18 +77,16 @@ def _about(folder: Path, digest: str, count: int, run: dict[str, Any], command: 
     machine = run.get("machine", {})
     recordings = len(list((folder / "cases").glob("*/*.csv")))
     lines = [
-        f"{count} cases with {recordings} recordings by the independent plant of [trial](../../trial/README.md). Every key has the SHA-256 that was "
-        "published before its case was written; each case was diagnosed in a process of its own that was given that case's folder only; "
-        "then the keys were opened.\n",
+        f"{count} cases with {recordings} recordings by the independent plant of [trial](../../trial/README.md). Every key has the "
+        "SHA-256 that was published before its case was written; each case was diagnosed in a process of its own that was given that "
+        "case's folder only; then the keys were opened.\n",
         f"- SHA-256 of the manifest: `{digest}`",
     ]
     if run:
         ended = f"; {errors} of the cases could not be diagnosed" if errors else ""
         lines.append(f"- pamrs {run.get('version')}, code `{'`, `'.join(codes) or '-'}`{ended}")
-        processor = (
-            f"{machine.get('processor') or 'unknown processor'}, {machine.get('cores')} cores, {run.get('jobs')} cases at a time"
-        )
-        lines.append(f"- {processor}; Python {machine.get('python')}")
+        processor = machine.get("processor") or "unknown processor"
+        lines.append(f"- {processor}, {machine.get('cores')} cores, {run.get('jobs')} cases at a time; Python {machine.get('python')}")
         spent = sum(float(e.get("cpu_seconds", 0.0)) for e in entries)
         lines.append(f"- {spent / 3600.0:.1f} h of processor time for the diagnoses")
         if len(codes) > 1:
@@ -129,11 +127,8 @@ def report(folder: Path, results: Path, out: Path, command: str, catalogue: Sequ
     drawn = pictures(scores, others, out)
     images = {p.stem: f"![{_CAPTIONS[p.stem]}]({p.name})\n\n*{_CAPTIONS[p.stem]}.*" for p in drawn}
     text = "\n".join(["# Blinded trial\n", *_about(folder, digest, count, run, command), markdown(scores, catalogue)])
-    for heading, name in (
-        ("## Measures", "strength"),
-        ("## What was named first", "gap"),
-        ("## Calibration of the leading", "confusion"),
-    ):
+    closes = {"## Measures": "strength", "## What was named first": "gap", "## Calibration of the leading": "confusion"}
+    for heading, name in closes.items():
         text = text.replace(heading, f"{images[name]}\n\n{heading}", 1)  # a picture closes the part before it
     parts = [text, images["calibration"], "\n## Other methods on the same cases\n"]
     parts.append(side_by_side(others) if others else "The baselines were not run (`python -m benchmarks.baselines`).")

@@ -16,12 +16,12 @@ from .targets import SEEN, wilson
 
 SCHEMA = "pamrs.baselines/1"
 METHODS = {"refit": "refit only", "sindy": "SINDy", "gp": "Gaussian process", "pamrs": "pamrs"}
-_CLASSES = (
+CLASSES = (
     *(f"catalogue, {label}" for label in STRENGTHS),
+    "catalogue",
     "pair",
     *(f"unlisted, {label}" for label in STRENGTHS),
     "unlisted",
-    "catalogue",
 )
 
 
@@ -78,8 +78,9 @@ def compared(keys: Path, results: Path, catalogue: Sequence[str] = LISTED) -> li
 
 def medians(rows: Iterable[Compared]) -> tuple[dict[str, float], int]:
     """Median gap closed by method, over the cases in which every method has one, and their number."""
-    full = [c.gaps for c in rows if all(g is not None for g in c.gaps.values())]
-    return ({m: median([g[m] for g in full if g[m] is not None]) for m in METHODS} if full else {}), len(full)
+    whole = [{m: g for m, g in c.gaps.items() if g is not None} for c in rows]
+    whole = [g for g in whole if len(g) == len(METHODS)]
+    return ({m: median([g[m] for g in whole]) for m in METHODS} if whole else {}), len(whole)
 
 
 def _share(rows: Iterable[Compared], hit: Callable[[Compared], bool | None]) -> str:
@@ -97,7 +98,7 @@ def side_by_side(rows: Sequence[Compared]) -> str:
         "| class | cases | " + " | ".join(METHODS.values()) + " |",
         "|---|---|" + "---|" * len(METHODS),
     ]
-    for name in (*_CLASSES, "all"):
+    for name in (*CLASSES, "all"):
         middle, count = medians(c for c in rows if c.row.ids and name in ("all", c.kind))
         if count:
             lines.append(f"| {name} | {count} | " + " | ".join(f"{middle[m]:.2f}" for m in METHODS) + " |")
@@ -108,8 +109,8 @@ def side_by_side(rows: Sequence[Compared]) -> str:
     refit = (_share(healthy, lambda c: c.alarm), _share(seen, lambda c: c.alarm))
     mine = (_share(healthy, lambda c: c.row.detected), _share(seen, lambda c: c.row.detected))
     lines += [
-        "\nThe refit raises an alarm by chi-square (1 %, its residual's means over 0.1 s against the diagnosis' own noise floor). SINDy and the "
-        "Gaussian process predict; they neither test nor name a cause.\n",
+        "\nThe refit raises an alarm by chi-square (1 %, its residual's means over 0.1 s against the diagnosis' own noise floor). "
+        "SINDy and the Gaussian process predict; they neither test nor name a cause.\n",
         "| | refit, chi-square | SINDy | Gaussian process | pamrs |",
         "|---|---|---|---|---|",
         f"| false alarms | {refit[0]} | - | - | {mine[0]} |",

@@ -91,7 +91,8 @@ def target_table(found: Sequence[Target]) -> str:
     """Markdown: every target beside what was measured, with intervals of 95 %."""
     body = []
     for t in found:
-        bound = f"{'at least' if t.least else 'at most'} {f'{100 * t.wanted:g} %' if t.share is not None else f'{t.wanted:g} {t.unit}'.strip()}"
+        bound = f"{100 * t.wanted:g} %" if t.share is not None else f"{t.wanted:g} {t.unit}".strip()
+        bound = f"{'at least' if t.least else 'at most'} {bound}"
         if t.measured is None:
             body.append((t.name, t.over, bound, "-", "-", "0", "no case"))
             continue

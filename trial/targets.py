@@ -133,6 +133,8 @@ def targets(scores: Scores, catalogue: Sequence[str] = LISTED) -> list[Target]:
         (r for r in unlisted if r.visible >= SEEN),
         lambda r: r.outcome == "right",
     )
+    plain = [r for r in unlisted if r.visible >= SEEN]
+    share("unlisted recognised", f"effects of no catalogue, {lost}", 0.85, plain, lambda r: r.outcome == "right")
     share("unlisted recognised", "effects of no catalogue, all", 0.85, unlisted, lambda r: r.outcome == "right")
     middle("median held-out gap closed", f"catalogue effects, {lost}", 0.90, [r.gap for r in seen if r.gap is not None])
     middle("median held-out gap closed", "catalogue effects, every strength", 0.90, [r.gap for r in listed if r.gap is not None])

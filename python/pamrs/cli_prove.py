@@ -19,6 +19,7 @@ def prove_command(
     jobs: Annotated[int, typer.Option(help="Cases at a time.")] = 1,
     limit: Annotated[int | None, typer.Option(help="Only the first so many cases.")] = None,
     fresh: Annotated[bool, typer.Option("--fresh", help="Diagnose again what has a result.")] = False,
+    timeout: Annotated[float, typer.Option(help="Seconds after which a case is given up.")] = 1800.0,
 ) -> None:
     """Diagnose every case of a folder, each in a process that is given that case alone; answer keys are not opened.
 
@@ -26,7 +27,10 @@ def prove_command(
     """
     from pamrs.prove import prove
 
-    proof = prove(folder, results=results, jobs=jobs, limit=limit, fresh=fresh, say=lambda text: typer.echo(text, err=True))
+    def say(text: str) -> None:
+        typer.echo(text, err=True)
+
+    proof = prove(folder, results=results, jobs=jobs, limit=limit, fresh=fresh, timeout=timeout, say=say)
     typer.echo(proof.table())
     for name, error in proof.failed.items():
         typer.echo(f"{name}: {error}")

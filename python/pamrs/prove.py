@@ -30,6 +30,8 @@ SCHEMA: Final = "pamrs.prove/1"
 MANIFEST: Final = "manifest.json"
 _RESULT: Final = "pamrs.diagnosis/1"
 _VERDICTS: Final = ("none", "parameters", "effects", "unlisted")
+TIMEOUT: Final = 1800.0
+"""Time after which a case is given up [s]."""
 _POLL: Final = 0.05
 """Time between two looks at the workers [s]."""
 
@@ -182,6 +184,7 @@ class _Running:
     process: subprocess.Popen[bytes]
     home: tempfile.TemporaryDirectory[str]
     began: float
+    late: bool = False
 
     def text(self, name: str) -> str:
         return (Path(self.home.name) / name).read_text(encoding="utf-8", errors="replace").strip()
@@ -211,6 +214,8 @@ def _ended(running: _Running, out: Path) -> dict[str, Any]:
     """The entry of a case whose worker has ended."""
     result = valid_result(out) if running.process.returncode == 0 else None
     wall = round(time.perf_counter() - running.began, 2)
+    if running.late:
+        return {"error": f"given up after {wall:.0f} s", "wall_seconds": wall}
     if result is None:
         lines = running.text("stderr").splitlines()
         code = running.process.returncode
@@ -251,6 +256,7 @@ def prove(
     jobs: int = 1,
     limit: int | None = None,
     fresh: bool = False,
+    timeout: float = TIMEOUT,
     say: Callable[[str], None] | None = None,
     command: Sequence[str] | None = None,
 ) -> Proof:
@@ -268,6 +274,8 @@ def prove(
         Only the first so many cases.
     fresh : bool
         Diagnose again what has a result.
+    timeout : float
+        Time after which a case is given up [s].
     say : callable, optional
         Called with a line of text for each case.
     command : sequence of str, optional
@@ -283,8 +291,10 @@ def prove(
     CaseError
         If there is no case, or the manifest lists others.
     ParameterError
-        If `jobs` or `limit` is less than 1.
+        If `jobs` or `limit` is less than 1, or `timeout` not positive.
     """
+    if not timeout > 0.0:
+        raise ParameterError(f"timeout = {timeout} s is not allowed: it must be positive")
     for name, value in (("jobs", jobs), ("limit", limit)):
         if value is not None and value < 1:
             raise ParameterError(f"{name} = {value} is not allowed: it must be at least 1")
@@ -332,6 +342,10 @@ def prove(
                 out.parent.mkdir(exist_ok=True)
                 out.unlink(missing_ok=True)
                 running.append(_launch(words, case, out))
+            for slow in (r for r in running if time.perf_counter() - r.began > timeout):
+                slow.process.kill()
+                slow.process.wait()
+                slow.late = True
             ended = [r for r in running if r.process.poll() is not None]
             for one in ended:
                 running.remove(one)

@@ -142,6 +142,12 @@ def test_interrupted_workers_are_ended(tmp_path):
         os.kill(int((home / "results" / "pid").read_text()), 0)
 
 
+def test_a_case_that_takes_too_long_is_given_up(tmp_path):
+    home = make(tmp_path / "trial", "a")
+    proof = prove(home, timeout=0.2, command=[sys.executable, "-c", "import time; time.sleep(60)"])
+    assert proof.failed == {"a": "given up after 0 s"}
+
+
 @pytest.mark.parametrize(("listed", "words"), [(["a"], "does not list b"), (["a", "b", "c"], "not there: c")])
 def test_the_manifest_lists_the_cases(tmp_path, listed, words):
     home = make(tmp_path / "trial", "a", "b")
