@@ -126,13 +126,6 @@ def targets(scores: Scores, catalogue: Sequence[str] = LISTED) -> list[Target]:
     visible = [*healthy, *(r for r in sick if r.visible >= SEEN)]
     average("mean probability on the truth", f"healthy cases, and effects with {lost}", 0.85, [r.probability or 0.0 for r in visible])
     average("mean probability on the truth", "all cases", 0.85, [r.probability or 0.0 for r in rows])
-    share(
-        "unlisted recognised",
-        f"effects of no catalogue, {lost}",
-        0.85,
-        (r for r in unlisted if r.visible >= SEEN),
-        lambda r: r.outcome == "right",
-    )
     plain = [r for r in unlisted if r.visible >= SEEN]
     share("unlisted recognised", f"effects of no catalogue, {lost}", 0.85, plain, lambda r: r.outcome == "right")
     share("unlisted recognised", "effects of no catalogue, all", 0.85, unlisted, lambda r: r.outcome == "right")

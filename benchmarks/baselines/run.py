@@ -13,6 +13,7 @@ from typing import Any
 
 from benchmarks.baselines.sheet import errors, gap_closed, sheet
 from pamrs.errors import PamrsError
+from pamrs.prove import case_digest
 from pamrs.writing import write_atomically
 
 SCHEMA = "pamrs.baselines/1"
@@ -54,6 +55,7 @@ def examined(folder: Path) -> dict[str, Any]:
     return {
         "schema": SCHEMA,
         "case": laid.name,
+        "case_sha256": case_digest(folder),
         "held_out": table,
         "gap_closed": {method: gap_closed(table, method) for method in METHODS},
         "detected": {"refit": laid.detected},
@@ -65,13 +67,13 @@ def examined(folder: Path) -> dict[str, Any]:
     }
 
 
-def valid(path: Path) -> bool:
-    """Whether a result is there whole."""
+def valid(path: Path, case: Path) -> bool:
+    """Whether the result of a case is there whole."""
     try:
         told = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return False
-    return isinstance(told, dict) and told.get("schema") == SCHEMA and "gap_closed" in told
+    return isinstance(told, dict) and told.get("schema") == SCHEMA and told.get("case_sha256") == case_digest(case)
 
 
 def _work(folder: Path, out: Path) -> str | None:
@@ -85,7 +87,7 @@ def _work(folder: Path, out: Path) -> str | None:
 def run(cases: list[Path], out: Path, jobs: int, say: Callable[[str], None]) -> dict[str, str]:
     """Every case that has no result yet; those that failed, with what they said."""
     out.mkdir(parents=True, exist_ok=True)
-    waiting = [c for c in cases if not valid(out / f"{c.name}.json")]
+    waiting = [c for c in cases if not valid(out / f"{c.name}.json", c)]
     done, failed, began = len(cases) - len(waiting), {}, time.perf_counter()
     if done:
         say(f"{done} of {len(cases)} results are there")

@@ -24,7 +24,7 @@ from typing import Any, Final
 from pamrs.errors import CaseError, ParameterError
 from pamrs.writing import write_atomically
 
-__all__ = ["MANIFEST", "SCHEMA", "Proof", "cases_of", "code_digest", "prove", "valid_result", "worker"]
+__all__ = ["MANIFEST", "SCHEMA", "Proof", "case_digest", "cases_of", "code_digest", "prove", "valid_result", "worker"]
 
 SCHEMA: Final = "pamrs.prove/1"
 MANIFEST: Final = "manifest.json"
@@ -129,12 +129,20 @@ def valid_result(path: Path) -> dict[str, Any] | None:
     return told if good else None
 
 
+def case_digest(folder: Path) -> str:
+    """SHA-256 over every file of a case, so that a result of another case of the same name is not kept."""
+    return _digest(Path(folder).resolve(), lambda path: True)
+
+
 def code_digest() -> str:
     """SHA-256 over every file of the installed package, so that results of different code can be told apart."""
-    home = Path(__file__).parent
+    return _digest(Path(__file__).parent, lambda path: path.suffix in (".py", ".so", ".pyd", ".toml", ".json"))
+
+
+def _digest(home: Path, wanted: Callable[[Path], bool]) -> str:
     total = hashlib.sha256()
     for path in sorted(home.rglob("*")):
-        if path.is_file() and path.suffix in (".py", ".so", ".pyd", ".toml", ".json"):
+        if path.is_file() and wanted(path):
             total.update(path.relative_to(home).as_posix().encode() + b"\0" + hashlib.sha256(path.read_bytes()).digest())
     return total.hexdigest()
 
@@ -305,15 +313,16 @@ def prove(
     target = Path(folder) / "results" if results is None else Path(results)
     target.mkdir(parents=True, exist_ok=True)
     tell = say or (lambda text: None)
-    code, earlier = code_digest(), _before(target)
+    code, earlier, digests = code_digest(), _before(target), {case.name: case_digest(case) for case in found}
     proof = Proof(target)
     waiting: list[Path] = []
     for case in found:
         result = None if fresh else valid_result(target / case.name / "out.json")
-        if result is None:
+        known = earlier.get(case.name, {})
+        if result is None or known.get("case_sha256", digests[case.name]) != digests[case.name]:
             waiting.append(case)
         else:
-            proof.cases[case.name] = {**_entry(result), **{k: v for k, v in earlier.get(case.name, {}).items() if k != "error"}}
+            proof.cases[case.name] = {**_entry(result), **{k: v for k, v in known.items() if k != "error"}}
     proof = Proof(target, proof.cases, len(proof.cases))
     other = sum(entry.get("code") != code for entry in proof.cases.values())
     if proof.kept:
@@ -352,7 +361,7 @@ def prove(
                 entry = _ended(one, target / one.case.name / "out.json")
                 one.close()
                 done += 1
-                proof.cases[one.case.name] = {**entry, "version": __version__, "code": code}
+                proof.cases[one.case.name] = {**entry, "version": __version__, "code": code, "case_sha256": digests[one.case.name]}
                 record()
                 left = (time.perf_counter() - began) / done * (todo - done)
                 told = f"error: {entry['error']}" if "error" in entry else entry["verdict"]

@@ -105,6 +105,14 @@ def test_a_run_goes_on_where_it_was(tmp_path, fake):
     assert (home / "results" / "leak_a" / "out.json").read_bytes() != first
 
 
+def test_a_result_of_another_case_of_that_name_is_not_kept(tmp_path, fake):
+    home = make(tmp_path / "trial", "leak_a", "leak_b")
+    prove(home, command=fake)
+    (home / "cases" / "leak_b" / "case.toml").write_text("# another\n")
+    assert prove(home, command=fake).kept == 1
+    assert prove(home, command=fake).kept == 2
+
+
 def test_results_of_other_code_are_pointed_out(tmp_path, fake):
     home = make(tmp_path / "trial", "leak_a")
     prove(home, command=fake)
