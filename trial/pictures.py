@@ -60,7 +60,7 @@ def draw_strength(axes: Any, rows: Sequence[Row]) -> None:
     axes.minorticks_off()
     axes.axvline(SEEN, color=_GREY, linewidth=0.8)
     axes.set(xlabel="effect left after a refit / noise of the channel", ylabel="share of cases", ylim=(-0.03, 1.03))
-    axes.legend(loc="center right", frameon=False, fontsize=9)
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, frameon=False, fontsize=9)
     _plain(axes)
 
 
@@ -72,8 +72,9 @@ def draw_calibration(axes: Any, rows: Sequence[Row]) -> None:
         bottom, top = wilson(hits, cases)
         true = hits / cases
         axes.errorbar([stated], [true], yerr=([max(true - bottom, 0.0)], [max(top - true, 0.0)]), marker="o", color=_BLUE, capsize=3)
-        axes.annotate(str(cases), (stated, true), textcoords="offset points", xytext=(-6, 4), fontsize=8, ha="right", color="0.3")
-    axes.set(xlabel="stated probability of the leading hypothesis", ylabel="share true", xlim=(0, 1.02), ylim=(-0.03, 1.05))
+        axes.annotate(str(cases), (stated, bottom), textcoords="offset points", xytext=(0, -12), fontsize=8, ha="center", color="0.3")
+    least = min((b[2] for b in bins), default=0.5)
+    axes.set(xlabel="stated probability of the leading hypothesis", ylabel="share true", xlim=(least - 0.05, 1.01), ylim=(-0.08, 1.05))
     if brier is not None:
         axes.set_title(f"numbers: cases; Brier score {brier:.3f}", fontsize=10)
     _plain(axes)

@@ -98,9 +98,12 @@ def target_table(found: Sequence[Target]) -> str:
             continue
         interval = "-" if t.interval is None else f"{_number(t, t.interval[0])} to {_number(t, t.interval[1])}"
         count = str(t.cases) if t.share is None else f"{t.share[0]} of {t.share[1]}"
-        verdict = ("met" if t.met else "**missed**") + ("" if t.settled else ", within the interval")
+        verdict = ("met" if t.met else "**missed**") + ("" if t.settled else ", not settled")
         body.append((t.name, t.over, bound, _number(t, t.measured), interval, count, verdict))
-    return table(("measure", "over", "target", "measured", "95 % interval", "cases", ""), body)
+    text = table(("measure", "over", "target", "measured", "95 % interval", "cases", ""), body)
+    return (
+        f"{text}\n\nNot settled: the interval reaches over the target, and another trial of this size might come out on its other side."
+    )
 
 
 def markdown(scores: Scores, catalogue: Sequence[str] = LISTED) -> str:

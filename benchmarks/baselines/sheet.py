@@ -169,7 +169,7 @@ def sheet(folder: str | os.PathLike[str]) -> Sheet:
         outer = Problem(members, held, core) if held else inner
         model, distances = _refitted(inner, rig)
         for name, value in distances.items():
-            moved[name] = value if abs(value) > abs(moved.get(name, 0.0)) else moved[name]
+            moved[name] = max(value, moved.get(name, 0.0), key=abs)
         floor = floors(inner, core.respecified(model.to_json())) | (floors(outer, core.respecified(model.to_json())) if held else {})
         found = residuals(inner, model)
         outside = residuals(outer, model) if held else found
