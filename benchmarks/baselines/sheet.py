@@ -68,6 +68,12 @@ class Stretch:
             value[a:b] -= q @ (q.T @ value[a:b])
         return np.where(r.rows, value, 0.0)
 
+    def error(self, correction: Array | None = None) -> float:
+        """Root mean square of the residual, a correction taken off, in units of the noise."""
+        rows = self.residual.rows
+        value = self.residual.value if correction is None else self.corrected(correction)
+        return float(np.sqrt(np.mean(value[rows] ** 2))) / self.noise if rows.any() else 0.0
+
 
 @dataclass(frozen=True, eq=False)
 class Column:

@@ -181,15 +181,10 @@ def learnt(stretches: list[Stretch], terms: list[Array], order: int, threshold: 
     return Equation(order, found[:n], found[n:].reshape(order, -1) if order else np.zeros((0, 1)), limit)
 
 
-def _error(stretch: Stretch, value: Array) -> float:
-    rows = stretch.residual.rows
-    return float(np.sqrt(np.mean(value[rows] ** 2))) / stretch.noise if rows.any() else 0.0
-
-
 def correct(column: Column) -> tuple[list[Array], str]:
     """Corrections for the held-out stretches of a block, and the equation that gave them."""
     tables = {size: [library(s.u, column.names, size)[0] for s in column.inner] for size in LIBRARIES}
-    before = [_error(s, s.residual.value) for s in column.inner]
+    before = [s.error() for s in column.inner]
     best: tuple[str, int, float] | None = None
     least = 1.0
     if len(column.inner) > 1:
@@ -199,7 +194,7 @@ def correct(column: Column) -> tuple[list[Array], str]:
                 rest = [i for i in range(len(terms)) if i != left]
                 equation = learnt([column.inner[i] for i in rest], [terms[i] for i in rest], order, threshold)
                 change = np.zeros(len(stretch.y)) if equation is None else equation.run(stretch, terms[left])
-                total += _error(stretch, stretch.corrected(change)) / max(before[left], 1e-9) / len(terms)
+                total += stretch.error(change) / max(before[left], 1e-9) / len(terms)
             if total < least:
                 best, least = (size, order, threshold), total
     equation = None if best is None else learnt(column.inner, tables[best[0]], *best[1:])
