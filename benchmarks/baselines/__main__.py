@@ -43,8 +43,8 @@ def main(words: list[str] | None = None) -> int:
     except (PamrsError, ValueError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
-    for name, error in failed.items():
-        print(f"{name}: {error}")
+    for name, why in failed.items():
+        print(f"{name}: {why}")
     return 3 if failed else 0
 
 

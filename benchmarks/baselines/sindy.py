@@ -140,7 +140,7 @@ def _boxed(values: Array) -> Array:
 
 
 def _full(terms: Array, u: Array) -> bool:
-    return terms.shape[1] > 1 + 4 * u.shape[1]
+    return bool(terms.shape[1] > 1 + 4 * u.shape[1])
 
 
 def _rows(stretches: list[Stretch], terms: list[Array], order: int) -> tuple[Array, Array]:
