@@ -18,13 +18,20 @@ RUST_SOURCES := $(shell find crates -name '*.rs' -path '*/src/*' 2>/dev/null) \
                 $(shell find crates -name Cargo.toml 2>/dev/null) Cargo.toml $(wildcard Cargo.lock)
 PYTHON_SOURCES := python tests trial demo benchmarks fingerprints
 
+# A blinded trial: where it is, which cases, and where its page goes (a trial of a few cases does not replace the published page).
+FOLDER ?= prove_out
+JOBS ?= 2
+PAGE ?= $(if $(CASES),$(FOLDER)/proof,docs/proof)
+PROVE_SEED := $(or $(SEED),7)
+PROVE_COMMAND := make prove SEED=$(PROVE_SEED)$(if $(CASES), CASES=$(CASES)) JOBS=$(JOBS) FOLDER=$(FOLDER)
+
 # The binding crate must see the same interpreter from cargo and from maturin, or it is rebuilt each time.
 export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export MPLBACKEND := Agg
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: help setup build demo test test-rust test-python lint format bench convergence effects golden lock clean
+.PHONY: help setup build demo prove test test-rust test-python lint format bench convergence effects golden lock clean
 
 help:  ## this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -49,6 +56,13 @@ build: $(VENV)/.built  ## the package, its Rust core compiled, in .venv
 
 demo: build  ## conceal an effect, diagnose it, open the key (KIND=leak_muscle SEED=7 to choose)
 	$(BIN)/python demo/run.py $(CASE_KIND) $(CASE_SEED)
+
+# Each stage goes on where it was stopped. Exit code 3: some case could not be diagnosed, which the page says.
+prove: build  ## blinded trial from cases to docs/proof/trial.md, hours (SEED=7 CASES=12 JOBS=2 FOLDER=prove_out to choose)
+	$(BIN)/python -m trial write $(FOLDER) --plan full --measure left --seed $(PROVE_SEED) $(if $(CASES),--cases $(CASES)) --jobs $(JOBS)
+	$(BIN)/pamrs prove $(FOLDER) --jobs $(JOBS) || test $$? -eq 3
+	$(BIN)/python -m benchmarks.baselines $(FOLDER) --jobs $(JOBS) || test $$? -eq 3
+	$(BIN)/python -m trial report $(FOLDER) --out $(PAGE) --command "$(PROVE_COMMAND)"
 
 test: build lint test-rust test-python  ## everything that CI checks
 

@@ -10,11 +10,14 @@ from pathlib import Path
 
 from .concealed import make_case, write
 from .effects import KINDS, LISTED
+from .pictures import figure
 from .plan import specs, write_plan
+from .report import report
 from .score import score
 from .selfcheck import selfcheck
 from .strength import MEASURES, STRENGTHS
-from .summary import figure, markdown
+from .summary import markdown, target_table
+from .targets import targets
 
 _MEASURE = "what the multiple of the noise is of: all that the effect moves, or what a refit of the baseline leaves of it"
 
@@ -59,6 +62,11 @@ def _parser() -> argparse.ArgumentParser:
     )
     mark.add_argument("--markdown", type=Path, help="write the tables here")
     mark.add_argument("--figure", type=Path, help="draw the figure here (needs matplotlib)")
+    page = sub.add_parser("report", help="score a whole trial and write its page, trial.md, with pictures (needs matplotlib)")
+    page.add_argument("folder", type=Path, help="the trial: cases/, keys/ and manifest.json")
+    page.add_argument("--results", type=Path, help="results of `pamrs prove` and of the baselines (default: FOLDER/results)")
+    page.add_argument("--out", type=Path, required=True, help="folder for the page and the pictures")
+    page.add_argument("--command", dest="words", default="python -m trial report", help="what makes the page, as it says")
     check = sub.add_parser("selfcheck", help="compare the plant with finer steps and with another integrator")
     check.add_argument("--golden", type=Path, help="folder with golden vectors of the plant without effects")
     return parser
@@ -72,11 +80,11 @@ def main(argv: list[str] | None = None) -> int:
             if (args.cases is not None and args.cases < 1) or args.jobs < 1:
                 raise ValueError("--cases and --jobs must be at least 1")
 
-            def report(name: str, done: int, total: int) -> None:
+            def told(name: str, done: int, total: int) -> None:
                 print(f"{name} written, {done} of {total}", file=sys.stderr, flush=True)
 
             wanted = specs(args.plan, args.seed, args.cases, args.duration, args.measure)
-            manifest = write_plan(args.folder, wanted, jobs=args.jobs, rig=args.rig, progress=report)
+            manifest = write_plan(args.folder, wanted, jobs=args.jobs, rig=args.rig, progress=told)
             print(f"sha256 of the manifest: {hashlib.sha256(manifest.read_bytes()).hexdigest()}")
         elif args.command == "make":
             keys = args.keys_dir or args.out.with_name(args.out.name + "_keys")
@@ -95,12 +103,16 @@ def main(argv: list[str] | None = None) -> int:
                 )  # fmt: skip
                 print(f"{name} written in {time.perf_counter() - start:.1f} s", file=sys.stderr, flush=True)
         elif args.command == "score":
-            scores = score(args.keys, args.results, tuple(c for c in args.catalogue.split(",") if c))
+            catalogue = tuple(c for c in args.catalogue.split(",") if c)
+            scores = score(args.keys, args.results, catalogue)
             print(scores.text())
+            print(f"\n{target_table(targets(scores, catalogue))}")
             if args.markdown is not None:
-                write(args.markdown, markdown(scores))
+                write(args.markdown, markdown(scores, catalogue))
             if args.figure is not None:
                 figure(scores, args.figure)
+        elif args.command == "report":
+            print(f"written: {report(args.folder, args.results or args.folder / 'results', args.out, args.words)}")
         else:
             print(selfcheck(args.golden))
     except (ValueError, OSError) as error:

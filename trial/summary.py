@@ -1,33 +1,17 @@
-"""Tables and one figure of a scored trial."""
+"""Tables of a scored trial."""
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from pathlib import Path
+from statistics import median
 
-from .score import HEALTHY, Row, Scores
+from .effects import LISTED
+from .score import Row, Scores
 from .strength import STRENGTHS
+from .targets import Target, targets, wilson
 
 BINS = (0.0, 0.5, 0.7, 0.8, 0.9, 0.95, 0.99, 1.0)
-
-
-def wilson(hits: int, cases: int, z: float = 1.959964) -> tuple[float, float]:
-    """Wilson interval of a share; 95 % by default.
-
-    Raises
-    ------
-    ValueError
-        More hits than cases, or no case.
-    """
-    if not 0 <= hits <= cases or cases == 0:
-        raise ValueError(f"{hits} of {cases} is no share")
-    share, zz = hits / cases, z * z
-    middle = (share + zz / (2.0 * cases)) / (1.0 + zz / cases)
-    half = z / (1.0 + zz / cases) * math.sqrt(share * (1.0 - share) / cases + zz / (4.0 * cases * cases))
-    low = 0.0 if hits == 0 else max(middle - half, 0.0)
-    return low, 1.0 if hits == cases else min(middle + half, 1.0)
 
 
 def _percent(hits: int, cases: int) -> str:
@@ -87,22 +71,61 @@ def by_strength(rows: Sequence[Row]) -> dict[str, dict[str, tuple[int, int, int]
     return found
 
 
-def markdown(scores: Scores) -> str:
+def gaps(rows: Sequence[Row]) -> dict[str, dict[str, list[float]]]:
+    """Gaps closed by effect and strength, as in :func:`by_strength`; cases without a gap are left out."""
+    found: dict[str, dict[str, list[float]]] = {}
+    for row in rows:
+        if row.ids and row.wanted and row.gap is not None:
+            name = "pair" if len(row.ids) > 1 else row.ids[0]
+            found.setdefault(name, {}).setdefault(row.wanted, []).append(row.gap)
+    return found
+
+
+def _number(target: Target, value: float) -> str:
+    if target.share is not None:
+        return f"{100.0 * value:.1f} %"
+    return f"{value:.0f} s" if target.unit == "s" else f"{value:.3f}"
+
+
+def target_table(found: Sequence[Target]) -> str:
+    """Markdown: every target beside what was measured, with intervals of 95 %."""
+    body = []
+    for t in found:
+        bound = f"{100 * t.wanted:g} %" if t.share is not None else f"{t.wanted:g} {t.unit}".strip()
+        bound = f"{'at least' if t.least else 'at most'} {bound}"
+        if t.measured is None:
+            body.append((t.name, t.over, bound, "-", "-", "0", "no case"))
+            continue
+        interval = "-" if t.interval is None else f"{_number(t, t.interval[0])} to {_number(t, t.interval[1])}"
+        count = str(t.cases) if t.share is None else f"{t.share[0]} of {t.share[1]}"
+        verdict = ("met" if t.met else "**missed**") + ("" if t.settled else ", not settled")
+        body.append((t.name, t.over, bound, _number(t, t.measured), interval, count, verdict))
+    text = table(("measure", "over", "target", "measured", "95 % interval", "cases", ""), body)
+    return (
+        f"{text}\n\nNot settled: the interval reaches over the target, and another trial of this size might come out on its other side."
+    )
+
+
+def markdown(scores: Scores, catalogue: Sequence[str] = LISTED) -> str:
     """All tables of a trial."""
     rows = scores.rows
-    parts = ["## Measures\n"]
+    parts = ["## Targets\n", target_table(targets(scores, catalogue)), "\n## Measures\n"]
     body = [(name, _percent(*share), f"{share[0]} of {share[1]}") for name, share in scores.shares.items()]
     for name, value in scores.totals.items():
         if name not in scores.shares:
             body.append((name, "-" if value is None else f"{value}" if isinstance(value, int) else f"{value:.3f}", ""))
     parts.append(table(("measure", "value (95 % interval)", "count"), body))
     labels = (*STRENGTHS, "pair")
-    parts.append("\n## Detected and rightly named, by effect and strength\n")
+    parts.append("\n## Detected, rightly named and gap closed, by effect and strength\n")
+    parts.append("Detected, right name first, of so many; median share of the gap to the noise closed on held-out recordings.\n")
+    closed = gaps(rows)
     split = by_strength(rows)
     lines = []
     for name in sorted(split):
         cells = [split[name].get(label) for label in labels]
-        lines.append((name, *("-" if c is None else f"{c[0]}, {c[1]} of {c[2]}" for c in cells)))
+        texts = ["-" if c is None else f"{c[0]}, {c[1]} of {c[2]}" for c in cells]
+        middles = [closed.get(name, {}).get(label) for label in labels]
+        lines.append((name, *(f"{t}; {median(m):.2f}" if m else t for t, m in zip(texts, middles, strict=True))))
     every = []
     for label in labels:
         hit = [c[label] for c in split.values() if label in c]
@@ -127,56 +150,3 @@ def markdown(scores: Scores) -> str:
     )
     parts.append(f"\nBrier score: {'-' if brier is None else f'{brier:.4f}'}")
     return "\n".join(parts) + "\n"
-
-
-def figure(scores: Scores, path: Path) -> None:
-    """Draw detection over strength, the calibration and what was named for what.
-
-    Needs matplotlib; the file type follows the suffix.
-    """
-    from matplotlib.figure import Figure
-
-    rows = scores.rows
-    page = Figure(figsize=(11.0, 9.5), layout="constrained")
-    grid = page.add_gridspec(2, 2, height_ratios=(1.0, 2.2))
-    curve, trust, picture = page.add_subplot(grid[0, 0]), page.add_subplot(grid[0, 1]), page.add_subplot(grid[1, :])
-    effects = [r for r in rows if r.ids]
-    edges = (0.0, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0, 30.0, math.inf)
-    for key, word in (("detected", "detected"), ("right", "right name first")):
-        at, share, below, above = [], [], [], []
-        for low, high in zip(edges, edges[1:], strict=False):
-            inside = [r for r in effects if low <= r.visible < high]
-            if inside:
-                hits = sum(r.detected if key == "detected" else r.outcome == "right" for r in inside)
-                bottom, top = wilson(hits, len(inside))
-                at.append(sum(r.visible for r in inside) / len(inside))
-                share.append(hits / len(inside))
-                below.append(max(share[-1] - bottom, 0.0))
-                above.append(max(top - share[-1], 0.0))
-        curve.errorbar(at, share, yerr=(below, above), marker="o", capsize=3, label=word)
-    curve.set_xscale("symlog", linthresh=0.5)
-    curve.set(xlabel="effect in a channel / its noise", ylabel="share of cases", ylim=(-0.03, 1.03))
-    curve.axvline(3.0, color="0.7", linewidth=0.8)
-    if effects:
-        curve.legend(loc="lower right")
-    bins, brier = reliability(rows)
-    trust.plot((0, 1), (0, 1), color="0.7", linewidth=0.8)
-    for _, _, stated, hits, cases in bins:
-        bottom, top = wilson(hits, cases)
-        share_true = hits / cases
-        error = ([max(share_true - bottom, 0.0)], [max(top - share_true, 0.0)])
-        trust.errorbar([stated], [share_true], yerr=error, marker="o", color="C0", capsize=3)
-    trust.set(xlabel="stated probability", ylabel="share true", xlim=(0, 1.02), ylim=(-0.03, 1.03))
-    if brier is not None:
-        trust.set_title(f"Brier score {brier:.3f}", fontsize=10)
-    matrix = confusion(rows)
-    truths = sorted(matrix, key=lambda t: (t in HEALTHY, t))
-    names = sorted({n for c in matrix.values() for n in c}, key=lambda n: (n in (*HEALTHY, "unlisted", "no result"), n))
-    cells = [[matrix[t][n] / matrix[t].total() for n in names] for t in truths]
-    if cells:
-        picture.imshow(cells, cmap="Blues", vmin=0.0, vmax=1.0, aspect="auto")
-    picture.set_xticks(range(len(names)), names, rotation=70, ha="right", fontsize=7)
-    picture.set_yticks(range(len(truths)), truths, fontsize=7)
-    picture.set(xlabel="named first", ylabel="truth")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    page.savefig(path, dpi=130)

@@ -1,7 +1,8 @@
-"""The command line: ``pamrs diagnose``, ``effects``, ``fit``, ``library``, ``lift``, ``reproduce``, ``simulate``, ``size``, ``rig``.
+"""The command line: ``pamrs diagnose``, ``effects``, ``prove``, ``fit``, ``library``, ``lift``, ``reproduce``, ``simulate``, ``size``, ``rig``.
 
 Results go to standard output, progress and errors to standard error. The exit code is 0 when the
-command did its work (a diagnosis that finds nothing missing included), 2 when the input is wrong.
+command did its work (a diagnosis that finds nothing missing included), 2 when the input is wrong,
+3 when ``prove`` has a case without a result.
 Everything heavy is imported inside the command that needs it, so that ``pamrs --help`` answers at once.
 """
 
@@ -19,6 +20,7 @@ from pamrs.cli_effects import effects_command
 from pamrs.cli_fit import fit_app
 from pamrs.cli_library import library_command, size_command
 from pamrs.cli_lift import lift_command
+from pamrs.cli_prove import prove_command
 from pamrs.cli_reproduce import reproduce_command
 from pamrs.cli_shared import check_writable, progress, rig_named
 from pamrs.cli_simulate import simulate_command
@@ -41,6 +43,7 @@ app.command("simulate")(simulate_command)
 app.command("effects")(effects_command)
 app.command("library")(library_command)
 app.command("lift")(lift_command)
+app.command("prove")(prove_command)
 app.command("reproduce")(reproduce_command)
 app.command("size")(size_command)
 
@@ -146,7 +149,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        Exit code: 0 done, 1 interrupted, 2 wrong input (one line on standard error says what).
+        Exit code: 0 done, 1 interrupted, 2 wrong input (one line on standard error says what), 3 a case without a result.
 
     Examples
     --------

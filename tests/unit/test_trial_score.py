@@ -6,8 +6,10 @@ import pytest
 
 from trial.__main__ import main
 from trial.effects import LISTED
+from trial.pictures import figure
 from trial.score import score, utility
-from trial.summary import by_strength, confusion, figure, markdown, reliability, wilson
+from trial.summary import by_strength, confusion, markdown, reliability
+from trial.targets import wilson
 
 
 def key(case, ids=(), kind=None, wanted=(), reach=4.0, left=4.0):
@@ -92,8 +94,8 @@ def test_totals(scored):
     # none and parameters count as one; a pair by its less probable half
     truth = [0.98, 0.95, 0.3, 0.1, 0.95, 0.45, 0.8, 0.8, 0.0, 0.0]
     assert totals["mean probability on the truth (all cases)"] == pytest.approx(sum(truth) / 10)
-    # the gaps of cases with an effect: 0, 0.96, 0.9, 0.92, 0.5, 0.4
-    assert totals["median gap closed (cases with an effect)"] == pytest.approx(0.7)
+    # the gaps of cases with an effect: 0, 0.96, 0.9, 0.92, 0.5, 0.4, and 0 without a result
+    assert totals["median gap closed (cases with an effect)"] == pytest.approx(0.5)
     assert (totals["right"], totals["wrong"]) == (5, 4)
     assert "c06" in scored.text()
 
@@ -151,7 +153,7 @@ def test_wilson_wants_a_share():
 def test_report(scored, tmp_path):
     pytest.importorskip("matplotlib")
     text = markdown(scored)
-    assert "| leak_muscle | 0, 0 of 1 | - | 1, 1 of 2 | - |" in text
+    assert "| leak_muscle | 0, 0 of 1; 0.00 | - | 1, 1 of 2; 0.48 | - |" in text
     assert "33.3 % (6.1 to 79.2)" in text
     assert "Brier score" in text
     figure(scored, tmp_path / "trial.png")
@@ -162,7 +164,7 @@ def test_command_line(scored, tmp_path, capsys):
     told = ["score", "--keys", str(tmp_path / "keys"), "--results", str(tmp_path / "results"), "--markdown", str(tmp_path / "t.md")]
     assert main(told) == 0
     assert "false alarms" in capsys.readouterr().out
-    assert (tmp_path / "t.md").read_text().startswith("## Measures")
+    assert (tmp_path / "t.md").read_text().startswith("## Targets")
     assert main(["score", "--keys", str(tmp_path / "none"), "--results", str(tmp_path)]) == 2
 
 

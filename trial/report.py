@@ -1,0 +1,138 @@
+"""The page of a trial: targets against measurements, tables, pictures, and the commands that make it."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from .concealed import write
+from .effects import LISTED
+from .pictures import pictures
+from .plan import MANIFEST
+from .plan import SCHEMA as MANIFEST_SCHEMA
+from .score import score
+from .sidebyside import compared, side_by_side
+from .summary import markdown
+
+_CAPTIONS = {
+    "strength": "Detection and naming against what the effect leaves after a refit, with Wilson intervals of 95 %",
+    "calibration": "How often the leading hypothesis was true, against its stated probability",
+    "confusion": "What was named first for what; pairs are left out",
+    "gap": "Gap closed on held-out recordings by effect and strength: every case, and the median",
+    "baselines": "Median gap closed by every method",
+}
+
+
+def checked(folder: Path) -> tuple[str, int]:
+    """Compare every key with the digest that was published before its case was written.
+
+    Parameters
+    ----------
+    folder : Path
+        Holds ``manifest.json`` and ``keys``.
+
+    Returns
+    -------
+    digest : str
+        SHA-256 of the manifest.
+    count : int
+        Number of keys.
+
+    Raises
+    ------
+    ValueError
+        A key that is missing, not in the manifest, or not the one that was published.
+    """
+    content = (folder / MANIFEST).read_bytes()
+    told = json.loads(content)
+    if told.get("schema") != MANIFEST_SCHEMA:
+        raise ValueError(f"{folder / MANIFEST}: schema must be {MANIFEST_SCHEMA!r}")
+    found = {p.stem: hashlib.sha256(p.read_bytes()).hexdigest() for p in (folder / "keys").glob("*.json")}
+    for name, digest in told["keys"].items():
+        if found.get(name) != digest:
+            raise ValueError(f"{folder / 'keys' / name}.json: {'missing' if name not in found else 'not the key that was published'}")
+    if more := sorted(set(found) - set(told["keys"])):
+        raise ValueError(f"{folder / 'keys'}: not in the manifest: {', '.join(more[:3])}")
+    return hashlib.sha256(content).hexdigest(), len(found)
+
+
+def _run(results: Path, digest: str) -> dict[str, Any]:
+    """What ``pamrs prove`` says of its run; it must be of this manifest."""
+    file = results / "run.json"
+    if not file.is_file():
+        return {}
+    told: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
+    if told.get("manifest_sha256") not in (None, digest):
+        raise ValueError(f"{file}: of another manifest; run `pamrs prove` again")
+    return told
+
+
+def _about(folder: Path, digest: str, count: int, run: dict[str, Any], command: str) -> list[str]:
+    entries = run.get("cases", {}).values()
+    codes = sorted({str(e["code"])[:12] for e in entries if "code" in e})
+    errors = sum("error" in e for e in entries)
+    machine = run.get("machine", {})
+    recordings = len(list((folder / "cases").glob("*/*.csv")))
+    lines = [
+        f"{count} cases with {recordings} recordings by the independent plant of [trial](../../trial/README.md). Every key has the "
+        "SHA-256 that was published before its case was written; each case was diagnosed in a process of its own that was given that "
+        "case's folder only; then the keys were opened.\n",
+        f"- SHA-256 of the manifest: `{digest}`",
+    ]
+    if run:
+        ended = f"; {errors} of the cases could not be diagnosed" if errors else ""
+        lines.append(f"- pamrs {run.get('version')}, code `{'`, `'.join(codes) or '-'}`{ended}")
+        processor = machine.get("processor") or "unknown processor"
+        lines.append(f"- {processor}, {machine.get('cores')} cores, {run.get('jobs')} cases at a time; Python {machine.get('python')}")
+        spent = sum(float(e.get("cpu_seconds", 0.0)) for e in entries)
+        lines.append(f"- {spent / 3600.0:.1f} h of processor time for the diagnoses")
+        if len(codes) > 1:
+            lines.append("- **The results were made by different code: run `pamrs prove --fresh` before they are quoted.**")
+    return [*lines, f"\nMade by\n\n```\n{command}\n```\n"]
+
+
+def report(folder: Path, results: Path, out: Path, command: str, catalogue: Sequence[str] = LISTED) -> Path:
+    """Score a trial and write its page ``trial.md`` with its pictures.
+
+    Parameters
+    ----------
+    folder : Path
+        The trial: ``cases``, ``keys``, ``manifest.json``.
+    results : Path
+        From ``pamrs prove`` and ``python -m benchmarks.baselines``.
+    out : Path
+        Folder for the page and the pictures.
+    command : str
+        What makes the page, as the page says.
+    catalogue : sequence of str
+        As in :func:`trial.score.score`.
+
+    Returns
+    -------
+    Path
+        The page.
+
+    Raises
+    ------
+    ValueError
+        The keys are not those that were published, or the results are of another trial.
+    """
+    digest, count = checked(folder)
+    run = _run(results, digest)
+    scores = score(folder / "keys", results, catalogue)
+    others = compared(folder / "keys", results, catalogue)
+    drawn = pictures(scores, others, out)
+    images = {p.stem: f"![{_CAPTIONS[p.stem]}]({p.name})\n\n*{_CAPTIONS[p.stem]}.*" for p in drawn}
+    text = "\n".join(["# Blinded trial\n", *_about(folder, digest, count, run, command), markdown(scores, catalogue)])
+    closes = {"## Measures": "strength", "## What was named first": "gap", "## Calibration of the leading": "confusion"}
+    for heading, name in closes.items():
+        text = text.replace(heading, f"{images[name]}\n\n{heading}", 1)  # a picture closes the part before it
+    parts = [text, images["calibration"], "\n## Other methods on the same cases\n"]
+    parts.append(side_by_side(others) if others else "The baselines were not run (`python -m benchmarks.baselines`).")
+    if "baselines" in images:
+        parts.append("\n" + images["baselines"])
+    write(out / "trial.md", "\n".join(parts) + "\n")
+    return out / "trial.md"
