@@ -1,6 +1,6 @@
 """Diagnosis: locate a mismatch between model and recordings, name the omitted physics or say that it is not listed.
 
-The chain of a rig is cut at every measured channel, so that each block has a residual of its own. The baseline is refitted
+A rig is cut at every measured channel, so that each tank, chamber and joint has a residual of its own. The baseline is refitted
 inside its tolerances first; what then exceeds the noise floor is located by block and condition, and the effects of the
 catalogue compete with each other and with "unlisted" on held-out recordings.
 """
@@ -13,14 +13,16 @@ import time
 from collections.abc import Callable
 
 from pamrs.case import Case, load_case
+from pamrs.channels import dotted
 from pamrs.diagnosis import assemble
 from pamrs.diagnosis.blocks import Block, available_blocks
 from pamrs.diagnosis.fitting import Problem
 from pamrs.diagnosis.hypotheses import examine
+from pamrs.diagnosis.plausible import check_plausible, check_sense
 from pamrs.diagnosis.result import Diagnosis
 from pamrs.diagnosis.signals import Prepared, prepare
-from pamrs.driving import regulators_of
 from pamrs.errors import DiagnosisError, SimulationError
+from pamrs.rig import Rig
 from pamrs.simulation import core_rig
 
 __all__ = ["Diagnosis", "diagnose"]
@@ -33,6 +35,14 @@ def _usable_share(block: Block, recordings: list[Prepared]) -> float:
     """Share of a block's rows that may be used, over all recordings."""
     rows = [p.usable(block.channel, block.drives, p.starts(block.window, block.drives)) for p in recordings]
     return float(sum(r.sum() for r in rows)) / sum(r.size for r in rows)
+
+
+def _wanted(rig: Rig) -> str:
+    """Channels that surround a rig's blocks, by name."""
+    names = [dotted("muscle_pressure", name) for name in rig.tables("chamber")]
+    names += [dotted("supply_pressure", name) for name in rig.tables("supply")]
+    names += [dotted("joint_angle", name) for name in rig.tables("joint")]
+    return ", ".join([*names, *core_rig(rig).inputs])
 
 
 def _quiet(message: str) -> None:
@@ -57,7 +67,8 @@ def diagnose(case: Case | str | os.PathLike[str], *, progress: Callable[[str], N
     Raises
     ------
     DiagnosisError
-        If the recordings are too short or lack the channels that any block needs.
+        If the recordings are too short, lack the channels that any block needs, or cannot be of this rig (units, swapped columns,
+        dead sensors); the message says what was found and what is allowed.
     CaseError
         If the folder is not a case.
 
@@ -76,19 +87,11 @@ def diagnose(case: Case | str | os.PathLike[str], *, progress: Callable[[str], N
         raise DiagnosisError(
             f"the nominal rig of case {case.name!r} already has the effect {rig.effects[0]['id']!r}; diagnose a rig without effects"
         )
-    several = [block for block in rig.blocks if "" not in rig.tables(block)]
-    if several:
-        raise DiagnosisError(
-            f"the rig of case {case.name!r} has named blocks ({', '.join(several)}); rigs of one chain can be diagnosed, without names"
-        )
-    if regulators_of(rig):
-        raise DiagnosisError(
-            f"the rig of case {case.name!r} is fed by a regulator; rigs fed by a tank or a constant supply can be diagnosed"
-        )
     if "load" in rig.blocks:
         raise DiagnosisError(
             f"the rig of case {case.name!r} has a [load]; rigs with [joint] and [arm], or without a muscle, can be diagnosed"
         )
+    check_plausible(case.recordings, rig, case.name)
     say(f"{case.name}: preparing {len(case.recordings)} recordings")
     fitted = [prepare(r, rig) for r in case.fit or case.recordings]
     held = [prepare(r, rig) for r in case.held_out if case.fit]
@@ -105,13 +108,14 @@ def diagnose(case: Case | str | os.PathLike[str], *, progress: Callable[[str], N
     if not blocks:
         raise DiagnosisError(
             f"case {case.name!r}: its channels ({', '.join(channels)}) do not surround any block of the rig "
-            f"({', '.join(rig.blocks)}); measure muscle_pressure, and supply_pressure and joint_angle where the rig has them"
+            f"({', '.join(rig.blocks)}); measure {_wanted(rig)}"
         )
     nominal_core = core_rig(rig)
+    check_sense(blocks, [*fitted, *held], nominal_core, case.name)
     inner = Problem(blocks, fitted, nominal_core)
     outer = Problem(blocks, held, nominal_core) if held else inner
-    gas = [b for b in blocks if b.name != "arm"]
-    motion = [b for b in blocks if b.name == "arm"]
+    gas = [b for b in blocks if b.kind != "arm"]
+    motion = [b for b in blocks if b.kind == "arm"]
     try:
         groups = [examine(inner, outer, rig, members, say) for members in (gas, motion) if members]
         say("putting the answer together")

@@ -15,7 +15,6 @@ from pamrs.diagnosis.blocks import Block, Residual, change, residual
 from pamrs.diagnosis.leastsquares import levenberg_marquardt
 from pamrs.diagnosis.signals import Prepared, binned
 from pamrs.effects_table import EFFECTS, find_parameter
-from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 from pamrs.simulation import core_rig
 
@@ -43,7 +42,12 @@ ACTS: dict[str, tuple[str, ...]] = {
     "pressure_lag": ("chamber", "arm"),
     "clock_skew": ("supply", "chamber", "arm"),
 }
-"""Blocks of the cut chain in which the effects of a block of the rig, or one effect, act."""
+"""Kinds of block of the cut rig in which the effects of a block of the rig, or one effect, act.
+
+Of several tanks, chambers or joints an effect acts on every one, with the same parameters: so the core has it where the effect has no
+``at``, and one parameter that all recordings and blocks share is what they can decide. An effect of one muscle alone shows as a block
+that keeps its mismatch while its neighbours lose theirs; ``Rig.with_effect(..., at="flexor")`` then has it.
+"""
 FIT_BIN = 0.02
 """Width of the bins over which residuals are averaged for fitting [s]."""
 
@@ -137,7 +141,7 @@ def depends(block: Block, name: str) -> bool:
 
 def acts_in(effect: str, block: Block) -> bool:
     """Whether an effect acts inside a block of the cut chain."""
-    return block.name in ACTS.get(effect, ACTS.get(EFFECTS[effect].block, ()))
+    return block.kind in ACTS.get(effect, ACTS.get(EFFECTS[effect].block, ()))
 
 
 def free_baseline(problem: Problem, nominal: Rig) -> list[str]:
