@@ -12,15 +12,18 @@ import os
 import time
 from collections.abc import Callable
 
+from pamrs import _core
 from pamrs.case import Case, load_case
 from pamrs.channels import dotted
 from pamrs.diagnosis import assemble
 from pamrs.diagnosis.blocks import Block, available_blocks
+from pamrs.diagnosis.evidence import floors
 from pamrs.diagnosis.fitting import Problem
 from pamrs.diagnosis.hypotheses import examine
 from pamrs.diagnosis.plausible import check_plausible, check_sense
 from pamrs.diagnosis.result import Diagnosis
 from pamrs.diagnosis.signals import Prepared, prepare
+from pamrs.driving import regulators_of
 from pamrs.errors import DiagnosisError, SimulationError
 from pamrs.rig import Rig
 from pamrs.simulation import core_rig
@@ -29,12 +32,35 @@ __all__ = ["Diagnosis", "diagnose"]
 
 LEAST_SHARE = 0.2
 """Share of usable samples below which a block is left out of the diagnosis."""
+MOST_PULL = 3.0
+"""Standard deviations by which the noise of a regulator's drives may move its droop."""
 
 
 def _usable_share(block: Block, recordings: list[Prepared]) -> float:
     """Share of a block's rows that may be used, over all recordings."""
     rows = [p.usable(block.channel, block.drives, p.starts(block.window, block.drives)) for p in recordings]
     return float(sum(r.sum() for r in rows)) / sum(r.size for r in rows)
+
+
+def _drowned(rig: Rig, blocks: list[Block], recordings: list[Prepared], core: _core.Rig) -> dict[str, str]:
+    """Regulators whose outflow only the difference of two measured pressures tells, where that is mostly noise; why, by block.
+
+    That noise grows with the droop, so that a fit would take the droop towards zero to be rid of it (errors in variables).
+    """
+    tables = rig.tables("supply")
+    drooping = [name for name in regulators_of(rig) if tables[name]["droop"] > 0.0]
+    regulated = [b for b in blocks if b.kind == "supply" and b.name.partition(".")[2] in drooping]
+    found = {}
+    floor = floors(Problem(regulated, recordings, core), core) if regulated else {}
+    for block in regulated:
+        gains = [(floor[block.name, p.recording.name].sample / p.noise[block.channel]) ** 2 - 1.0 for p in recordings]
+        pull = math.sqrt(sum(max(0.0, gain) * p.n for gain, p in zip(gains, recordings, strict=True)))
+        if pull > MOST_PULL:
+            found[block.name] = (
+                f"block {block.name} was left out: only the difference of two measured pressures tells the regulator's flow, and their noise "
+                f"would move its droop by {pull:.2g} standard deviations; at most {MOST_PULL:g} is allowed (a flow meter would settle it)"
+            )
+    return found
 
 
 def _wanted(rig: Rig) -> str:
@@ -111,6 +137,10 @@ def diagnose(case: Case | str | os.PathLike[str], *, progress: Callable[[str], N
             f"({', '.join(rig.blocks)}); measure {_wanted(rig)}"
         )
     nominal_core = core_rig(rig)
+    drowned = _drowned(rig, blocks, fitted, nominal_core)
+    blocks = [b for b in blocks if b.name not in drowned]
+    if not blocks:
+        raise DiagnosisError(f"case {case.name!r}: {'; '.join(drowned.values())}")
     check_sense(blocks, [*fitted, *held], nominal_core, case.name)
     inner = Problem(blocks, fitted, nominal_core)
     outer = Problem(blocks, held, nominal_core) if held else inner
@@ -127,6 +157,7 @@ def diagnose(case: Case | str | os.PathLike[str], *, progress: Callable[[str], N
         ) from error
     for name, share in thin.items():
         diagnosis.warnings.append(f"block {name} was left out: only {100 * share:.0f} % of its samples are usable")
+    diagnosis.warnings += drowned.values()
     diagnosis.seconds = round(time.perf_counter() - began, 3)
     if not math.isfinite(sum(diagnosis.probabilities.values())):
         raise DiagnosisError("the probabilities are not finite: please report this case")

@@ -15,6 +15,7 @@ from pamrs.diagnosis.blocks import Block, Residual, change, residual
 from pamrs.diagnosis.leastsquares import levenberg_marquardt
 from pamrs.diagnosis.signals import Prepared, binned
 from pamrs.effects_table import EFFECTS, find_parameter
+from pamrs.errors import ParameterError, SimulationError
 from pamrs.rig import Rig
 from pamrs.simulation import core_rig
 
@@ -111,7 +112,7 @@ class Fit:
 
 def residuals(problem: Problem, rig: Rig, names: Sequence[str] = ()) -> dict[Key, Residual]:
     """Residuals of a model for every block and recording; jacobians for the names that a block depends on."""
-    core = problem.core.respecified(rig.to_json())
+    core = _compiled(problem, rig)
     tasks = [(block, prepared) for prepared in problem.recordings for block in problem.blocks]
 
     def one(task: tuple[Block, Prepared]) -> Residual:
@@ -129,6 +130,14 @@ def residuals(problem: Problem, rig: Rig, names: Sequence[str] = ()) -> dict[Key
     with ThreadPoolExecutor(max_workers=2) as pool:
         found = list(pool.map(one, tasks))
     return {(b.name, p.recording.name): r for (b, p), r in zip(tasks, found, strict=True)}
+
+
+def _compiled(problem: Problem, rig: Rig) -> _core.Rig:
+    """Another model compiled; one that cannot be (more payload taken away than there is) is outside the model's range."""
+    try:
+        return problem.core.respecified(rig.to_json())
+    except ParameterError as error:
+        raise SimulationError(str(error)) from error
 
 
 def depends(block: Block, name: str) -> bool:
@@ -241,7 +250,7 @@ def changes(problem: Problem, rig: Rig, base: dict[Key, Residual]) -> dict[Key, 
     SimulationError
         If the model leaves the range in which it holds.
     """
-    core = problem.core.respecified(rig.to_json())
+    core = _compiled(problem, rig)
     tasks = [(block, prepared) for prepared in problem.recordings for block in problem.blocks]
 
     def one(task: tuple[Block, Prepared]) -> tuple[Key, Residual]:

@@ -319,11 +319,12 @@ def _sense(block: Block, core: _core.Rig, prepared: Prepared) -> str | None:
     others: list[tuple[float, float, dict[str, tuple[Array, Array]], str]] = [
         (DEGREES, 0.0, {}, f"{DEGREES:.3g} times that would: are its values in rad under a heading in deg?"),
         (1.0 / DEGREES, 0.0, {}, f"{1.0 / DEGREES:.3g} times that would: are its values in deg under a heading in rad?"),
-        (-1.0, turned, {}, "it moves opposite to the model throughout: is its sign that of the rig?"),
+        (-1.0, turned, {}, "it moves opposite to the model throughout: is its sign that of the rig, or are two muscles swapped?"),
     ]
     for one, two in itertools.combinations([d for d in block.drives if d in signals], 2):
         text = f"with {one} and {two} in each other's place it would: are these columns swapped?"
         others.append((1.0, 0.0, {one: signals[two], two: signals[one]}, text))
+    found = []
     for factor, offset, swapped, text in others:
         other = replace(prepared, signals={**signals, **swapped, name: (offset + factor * value, factor * slope)})
         try:
@@ -333,9 +334,9 @@ def _sense(block: Block, core: _core.Rig, prepared: Prepared) -> str | None:
         expected = offset + factor * measured
         if factor < 0.0:  # where it turns about is not known
             expected, model = expected - expected.mean(), model - model.mean()
-        if _misfit(expected, model) < RIGHT:
-            return f"{shown}; {text}"
-    return None
+        found.append((_misfit(expected, model), text))
+    best, text = min(found, default=(math.inf, ""))
+    return f"{shown}; {text}" if best < RIGHT else None
 
 
 def _misfit(measured: Array, model: Array) -> float:
