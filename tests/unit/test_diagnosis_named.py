@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 import pamrs
+from pamrs.diagnosis import _doubted, _unsettled
 from pamrs.diagnosis.blocks import available_blocks
+from pamrs.diagnosis.hypotheses import Group
 from pamrs.recording import Recording
 
 ROOT = Path(__file__).parents[2]
@@ -30,9 +32,11 @@ def recorded(rig: pamrs.Rig, seed: int, role: str, *, pressures_only: bool = Fal
     return Recording(f"{role}_{seed}", role, run.time, 0.005, channels, mask, [], dict.fromkeys(names, "SI"))
 
 
-def case(truth: pamrs.Rig, nominal: pamrs.Rig, **options: bool) -> pamrs.Case:
+def case(truth: pamrs.Rig, nominal: pamrs.Rig, *, pressures_only: bool = False, n: int = 1600) -> pamrs.Case:
     """Two recordings to fit and one held out."""
-    recordings = [recorded(truth, seed, role, **options) for seed, role in ((1, "fit"), (2, "fit"), (3, "held_out"))]
+    recordings = [
+        recorded(truth, seed, role, pressures_only=pressures_only, n=n) for seed, role in ((1, "fit"), (2, "fit"), (3, "held_out"))
+    ]
     return pamrs.Case("antagonist", nominal, recordings, ROOT)
 
 
@@ -100,6 +104,22 @@ def test_pressures_alone_tell_the_friction_of_the_muscles(rig: pamrs.Rig, bare: 
     assert found.where["block"] == "arm.elbow"
     assert found.verdict == "effects"
     assert found.effects[0]["id"] == "muscle_hysteresis"
+
+
+def test_no_confident_name_beside_unknown_geometry(rig: pamrs.Rig, bare: pamrs.Rig, tmp_path: Path) -> None:
+    text = bare.to_toml_text()
+    line = next(x for x in text.splitlines() if x.startswith("radius"))
+    (tmp_path / "rig.toml").write_text(
+        text.replace(line, line.split(", tol")[0].rstrip(" }") + ", unknown = true }", 1), encoding="utf-8"
+    )
+    assert _unsettled(bare) == []
+    assert _unsettled(pamrs.load_rig(tmp_path / "rig.toml")) == ["transmission.flexor.radius"]
+    arm = available_blocks(bare, tuple(recorded(rig, 1, "fit", pressures_only=True, n=40).channels))[0]
+    group = Group([arm], {}, {}, [], {"muscle_hysteresis": 0.9, "muscle_creep": 0.05, "unlisted": 0.05}, arm, {}, [arm])
+    doubted = _doubted(group).probabilities
+    assert doubted["muscle_hysteresis"] < 0.5
+    assert sum(doubted.values()) == pytest.approx(1.0)
+    assert doubted["unlisted"] > 0.5
 
 
 def test_swapped_muscles_are_seen(rig: pamrs.Rig, bare: pamrs.Rig) -> None:

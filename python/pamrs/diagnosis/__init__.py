@@ -11,6 +11,7 @@ import math
 import os
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
 from pamrs import _core
 from pamrs.case import Case, load_case
@@ -19,7 +20,7 @@ from pamrs.diagnosis import assemble
 from pamrs.diagnosis.blocks import Block, available_blocks
 from pamrs.diagnosis.evidence import floors
 from pamrs.diagnosis.fitting import Problem
-from pamrs.diagnosis.hypotheses import examine
+from pamrs.diagnosis.hypotheses import Group, examine
 from pamrs.diagnosis.plausible import check_plausible, check_sense
 from pamrs.diagnosis.result import Diagnosis
 from pamrs.diagnosis.signals import Prepared, prepare
@@ -32,6 +33,8 @@ __all__ = ["Diagnosis", "diagnose"]
 
 LEAST_SHARE = 0.2
 """Share of usable samples below which a block is left out of the diagnosis."""
+MOST_BELIEVED = 0.4
+"""Probability of effects on a joint beside geometry that is marked unknown."""
 MOST_PULL = 3.0
 """Standard deviations by which the noise of a regulator's drives may move its droop."""
 
@@ -40,6 +43,23 @@ def _usable_share(block: Block, recordings: list[Prepared]) -> float:
     """Share of a block's rows that may be used, over all recordings."""
     rows = [p.usable(block.channel, block.drives, p.starts(block.window, block.drives)) for p in recordings]
     return float(sum(r.sum() for r in rows)) / sum(r.size for r in rows)
+
+
+def _unsettled(rig: Rig) -> list[str]:
+    """Parameters of what moves that the rig file marks unknown and that no fit moves."""
+    moving = ("muscle", "transmission", "joint", "arm", "link")
+    return [
+        n for n, p in rig.parameters.items() if not p.known and n.partition(".")[0] in moving and (math.isinf(p.tol) or n not in free)
+    ]
+
+
+def _doubted(group: Group) -> Group:
+    """A group of joints whose names are believed less, the rest going to ``unlisted``."""
+    if group.mismatch is None or group.mismatch.kind != "arm":
+        return group
+    kept = {k: p if k in ("", "unlisted") else MOST_BELIEVED * p for k, p in group.probabilities.items()}
+    kept["unlisted"] = kept.get("unlisted", 0.0) + 1.0 - sum(kept.values())
+    return replace(group, probabilities=kept)
 
 
 def _drowned(rig: Rig, blocks: list[Block], recordings: list[Prepared], core: _core.Rig) -> dict[str, str]:
@@ -57,8 +77,9 @@ def _drowned(rig: Rig, blocks: list[Block], recordings: list[Prepared], core: _c
         pull = math.sqrt(sum(max(0.0, gain) * p.n for gain, p in zip(gains, recordings, strict=True)))
         if pull > MOST_PULL:
             found[block.name] = (
-                f"block {block.name} was left out: only the difference of two measured pressures tells the regulator's flow, and their noise "
-                f"would move its droop by {pull:.2g} standard deviations; at most {MOST_PULL:g} is allowed (a flow meter would settle it)"
+                f"block {block.name} was left out: only the difference of two measured pressures tells the regulator's flow, and their "
+                f"noise would move its droop by {pull:.2g} standard deviations; at most {MOST_PULL:g} is allowed (a flow meter would "
+                "settle it)"
             )
     return found
 
@@ -148,6 +169,9 @@ def diagnose(case: Case | str | os.PathLike[str], *, progress: Callable[[str], N
     motion = [b for b in blocks if b.kind == "arm"]
     try:
         groups = [examine(inner, outer, rig, members, say) for members in (gas, motion) if members]
+        unsettled = _unsettled(rig) if motion else []
+        if unsettled:
+            groups = [_doubted(group) for group in groups]
         say("putting the answer together")
         diagnosis = assemble.assemble(case, inner, outer, groups)
     except SimulationError as error:
@@ -158,6 +182,11 @@ def diagnose(case: Case | str | os.PathLike[str], *, progress: Callable[[str], N
     for name, share in thin.items():
         diagnosis.warnings.append(f"block {name} was left out: only {100 * share:.0f} % of its samples are usable")
     diagnosis.warnings += drowned.values()
+    if unsettled:
+        diagnosis.warnings.append(
+            f"{', '.join(unsettled)}: marked unknown, and no fit moves them; a wrong one bends the angle as an effect would, so that no "
+            f"effect of muscles, joints and arm is believed by more than {100 * MOST_BELIEVED:.0f} %"
+        )
     diagnosis.seconds = round(time.perf_counter() - began, 3)
     if not math.isfinite(sum(diagnosis.probabilities.values())):
         raise DiagnosisError("the probabilities are not finite: please report this case")

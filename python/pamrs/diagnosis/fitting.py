@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -15,7 +16,7 @@ from pamrs.diagnosis.blocks import Block, Residual, change, residual
 from pamrs.diagnosis.leastsquares import levenberg_marquardt
 from pamrs.diagnosis.signals import Prepared, binned
 from pamrs.effects_table import EFFECTS, find_parameter
-from pamrs.errors import ParameterError, SimulationError
+from pamrs.errors import ParameterError, RigError, SimulationError
 from pamrs.rig import Rig
 from pamrs.simulation import core_rig
 
@@ -49,6 +50,8 @@ Of several tanks, chambers or joints an effect acts on every one, with the same 
 ``at``, and one parameter that all recordings and blocks share is what they can decide. An effect of one muscle alone shows as a block
 that keeps its mismatch while its neighbours lose theirs; ``Rig.with_effect(..., at="flexor")`` then has it.
 """
+STIFFEST = 1e-6
+"""Shortest stable step of a trial model [s]."""
 FIT_BIN = 0.02
 """Width of the bins over which residuals are averaged for fitting [s]."""
 
@@ -127,17 +130,29 @@ def residuals(problem: Problem, rig: Rig, names: Sequence[str] = ()) -> dict[Key
             full[:, list(names).index(name)] = found.jacobian[:, column]
         return replace(found, jacobian=full)
 
-    with ThreadPoolExecutor(max_workers=2) as pool:
+    with _inside_range(), ThreadPoolExecutor(max_workers=2) as pool:
         found = list(pool.map(one, tasks))
     return {(b.name, p.recording.name): r for (b, p), r in zip(tasks, found, strict=True)}
 
 
-def _compiled(problem: Problem, rig: Rig) -> _core.Rig:
-    """Another model compiled; one that cannot be (more payload taken away than there is) is outside the model's range."""
+@contextmanager
+def _inside_range() -> Iterator[None]:
+    """A trial model that cannot be (more payload taken away than there is, next to no inertia) is outside the model's range."""
     try:
-        return problem.core.respecified(rig.to_json())
-    except ParameterError as error:
+        yield
+    except (ParameterError, RigError) as error:
         raise SimulationError(str(error)) from error
+
+
+def _compiled(problem: Problem, rig: Rig) -> _core.Rig:
+    """Another model compiled; one that would take a thousand times the steps of the nominal one is outside the range."""
+    with _inside_range():
+        core = problem.core.respecified(rig.to_json())
+    if core.stable_step < min(STIFFEST, 1e-3 * problem.core.stable_step):
+        raise SimulationError(
+            f"the trial model is too stiff: a step of {core.stable_step:.2g} s would be needed, {STIFFEST:g} s is allowed"
+        )
+    return core
 
 
 def depends(block: Block, name: str) -> bool:
@@ -258,7 +273,7 @@ def changes(problem: Problem, rig: Rig, base: dict[Key, Residual]) -> dict[Key, 
         key = (block.name, prepared.recording.name)
         return key, replace(base[key], value=change(block, core, prepared, base[key]), jacobian=None)
 
-    with ThreadPoolExecutor(max_workers=2) as pool:
+    with _inside_range(), ThreadPoolExecutor(max_workers=2) as pool:
         return dict(pool.map(one, tasks))
 
 
