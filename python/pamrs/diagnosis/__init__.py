@@ -48,9 +48,8 @@ def _usable_share(block: Block, recordings: list[Prepared]) -> float:
 def _unsettled(rig: Rig) -> list[str]:
     """Parameters of what moves that the rig file marks unknown and that no fit moves."""
     moving = ("muscle", "transmission", "joint", "arm", "link")
-    return [
-        n for n, p in rig.parameters.items() if not p.known and n.partition(".")[0] in moving and (math.isinf(p.tol) or n not in free)
-    ]
+    unknown = [name for name, parameter in rig.parameters.items() if not parameter.known]
+    return [name for name in unknown if name.partition(".")[0] in moving]
 
 
 def _doubted(group: Group) -> Group:
