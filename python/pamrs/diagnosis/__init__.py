@@ -183,8 +183,8 @@ def diagnose(case: Case | str | os.PathLike[str], *, progress: Callable[[str], N
     diagnosis.warnings += drowned.values()
     if unsettled:
         diagnosis.warnings.append(
-            f"{', '.join(unsettled)}: marked unknown, and no fit moves them; a wrong one bends the angle as an effect would, so that no "
-            f"effect of muscles, joints and arm is believed by more than {100 * MOST_BELIEVED:.0f} %"
+            f"{', '.join(unsettled)}: marked unknown, and no fit moves them; a wrong one bends the angle as an effect would, so that "
+            f"no effect of muscles, joints and arm is believed by more than {100 * MOST_BELIEVED:.0f} %"
         )
     diagnosis.seconds = round(time.perf_counter() - began, 3)
     if not math.isfinite(sum(diagnosis.probabilities.values())):
