@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from pamrs.errors import RecordingError
+from pamrs.fit.cylinder.compare import COMPARED, compare_friction_laws
 from pamrs.fit.cylinder.figure import plot_cylinders
 from pamrs.fit.cylinder.friction import CylinderFriction, HeldOut, fit_cylinder_friction
 from pamrs.fit.cylinder.record import FrictionRecord, load_friction_folder
@@ -79,6 +80,14 @@ def main(folder: Path) -> None:
     print("\n| cylinder, all runs | f0 [N] | f1 [N/bar] | breakaway ratio | area [mm2] | force zero [N] | " + " | ".join(LAWS) + " |")
     print("|---|---|---|---|---|---|" + "---|" * len(LAWS))
     print("\n".join(crossed))
+    print("\n| cylinder | depends on pressure (range) | " + " | ".join(COMPARED) + " |")
+    print("|---|---|" + "---|" * len(COMPARED))
+    for name, records in groups(found.cylinders).items():
+        compared = compare_friction_laws(records, name=name)
+        shares = " | ".join(f"{compared.probabilities[law]:.3f} ({compared.held_out[law]:+.1f})" for law in COMPARED)
+        low, high = compared.range
+        print(f"| {name} | {compared.pressure:.3f} ({low:.2f} to {high:.2f}){', named' if compared.settled else ''} | {shares} |")
+        report += ["", compared.statement()]
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "report.txt").write_text("\n".join(report) + "\n", encoding="utf-8")
     plot_cylinders(fits).savefig(folder / "friction.png", dpi=130)

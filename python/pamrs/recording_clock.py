@@ -108,10 +108,16 @@ def lay_grid(stamps: Array, source: str, sample_time: float | None) -> Grid:
     Raises
     ------
     RecordingError
-        If there are fewer than two different time stamps.
+        If there are fewer than two different time stamps, or most of them run backwards.
     """
     intervals = np.diff(stamps)
     forward = intervals[intervals > 0.0]
+    back = int(np.sum(intervals < 0.0))
+    if back > max(1, len(forward)):
+        raise RecordingError(
+            f"{source}: column 'time' runs backwards: {back} of its {len(intervals)} steps are negative, from {stamps[0]:.6g} s to "
+            f"{stamps[-1]:.6g} s; time that rises from row to row is needed (sort the rows, or correct the column)"
+        )
     if not len(forward):
         raise RecordingError(f"{source}: column 'time': two rows at least, at different times, are needed")
     usual = float(np.median(forward))

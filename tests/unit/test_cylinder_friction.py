@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from pamrs.errors import ParameterError, RecordingError
+from pamrs.fit.cylinder.compare import compare_friction_laws
 from pamrs.fit.cylinder.figure import plot_cylinders
 from pamrs.fit.cylinder.friction import fit_cylinder_friction
 from pamrs.fit.cylinder.record import FrictionRecord, load_friction_folder, load_friction_record
@@ -347,3 +348,31 @@ def test_real_cylinders():
     rest = {level.name: level.rest.status for level in whole.levels if level.rest is not None}
     assert rest["X-ring257_7bar"] == "seen"
     assert rest["X-ring257_5bar"] == "missed"
+
+
+# --------------------------------------------------------------- what it depends on
+
+
+def test_pressure_is_named_where_speed_does_not_go_with_it():
+    speeds = [(0.02, 0.03), (0.03, 0.045), (0.018, 0.026), (0.028, 0.04), (0.022, 0.03)]
+    records = [run(p, scatter=0.01, between=0.01, speeds=s) for p, s in zip(PRESSURES, speeds, strict=True)]
+    found = compare_friction_laws(records, name="made")
+    assert found.settled
+    assert found.pressure > 0.98
+    assert sum(found.probabilities.values()) == pytest.approx(1.0)
+    assert found.probabilities["coulomb_pressure"] > 0.5
+    assert "made: friction depends on pressure" in found.statement()
+
+
+def test_pressure_is_not_named_where_speed_falls_with_it():
+    records = [run(p, scatter=0.01, speeds=(0.04 - 8e-8 * p, 0.05 - 1e-7 * p)) for p in (2e5, 3e5, 4e5)]
+    found = compare_friction_laws(records)
+    assert not found.settled
+    assert found.probabilities["stribeck"] > 0.03
+    assert "not settled" in found.statement()
+    assert "speed goes with pressure" in found.statement()
+
+
+def test_two_pressures_compare_nothing():
+    with pytest.raises(RecordingError, match="at least 3 are needed"):
+        compare_friction_laws([run(p) for p in (1e5, 4e5)])

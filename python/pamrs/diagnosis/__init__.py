@@ -1,6 +1,6 @@
 """Diagnosis: locate a mismatch between model and recordings, name the omitted physics or say that it is not listed.
 
-The chain of a rig is cut at every measured channel, so that each block has a residual of its own. The baseline is refitted
+A rig is cut at every measured channel, so that each tank, chamber and joint has a residual of its own. The baseline is refitted
 inside its tolerances first; what then exceeds the noise floor is located by block and condition, and the effects of the
 catalogue compete with each other and with "unlisted" on held-out recordings.
 """
@@ -11,28 +11,84 @@ import math
 import os
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
+from pamrs import _core
 from pamrs.case import Case, load_case
+from pamrs.channels import dotted
 from pamrs.diagnosis import assemble
 from pamrs.diagnosis.blocks import Block, available_blocks
+from pamrs.diagnosis.evidence import floors
 from pamrs.diagnosis.fitting import Problem
-from pamrs.diagnosis.hypotheses import examine
+from pamrs.diagnosis.hypotheses import Group, examine
+from pamrs.diagnosis.plausible import check_plausible, check_sense
 from pamrs.diagnosis.result import Diagnosis
 from pamrs.diagnosis.signals import Prepared, prepare
 from pamrs.driving import regulators_of
 from pamrs.errors import DiagnosisError, SimulationError
+from pamrs.rig import Rig
 from pamrs.simulation import core_rig
 
 __all__ = ["Diagnosis", "diagnose"]
 
 LEAST_SHARE = 0.2
 """Share of usable samples below which a block is left out of the diagnosis."""
+MOST_BELIEVED = 0.4
+"""Probability of effects on a joint beside geometry that is marked unknown."""
+MOST_PULL = 3.0
+"""Standard deviations by which the noise of a regulator's drives may move its droop."""
 
 
 def _usable_share(block: Block, recordings: list[Prepared]) -> float:
     """Share of a block's rows that may be used, over all recordings."""
     rows = [p.usable(block.channel, block.drives, p.starts(block.window, block.drives)) for p in recordings]
     return float(sum(r.sum() for r in rows)) / sum(r.size for r in rows)
+
+
+def _unsettled(rig: Rig) -> list[str]:
+    """Parameters of what moves that the rig file marks unknown and that no fit moves."""
+    moving = ("muscle", "transmission", "joint", "arm", "link")
+    unknown = [name for name, parameter in rig.parameters.items() if not parameter.known]
+    return [name for name in unknown if name.partition(".")[0] in moving]
+
+
+def _doubted(group: Group) -> Group:
+    """A group of joints whose names are believed less, the rest going to ``unlisted``."""
+    if group.mismatch is None or group.mismatch.kind != "arm":
+        return group
+    kept = {k: p if k in ("", "unlisted") else MOST_BELIEVED * p for k, p in group.probabilities.items()}
+    kept["unlisted"] = kept.get("unlisted", 0.0) + 1.0 - sum(kept.values())
+    return replace(group, probabilities=kept)
+
+
+def _drowned(rig: Rig, blocks: list[Block], recordings: list[Prepared], core: _core.Rig) -> dict[str, str]:
+    """Regulators whose outflow only the difference of two measured pressures tells, where that is mostly noise; why, by block.
+
+    That noise grows with the droop, so that a fit would take the droop towards zero to be rid of it (errors in variables).
+    """
+    tables = rig.tables("supply")
+    drooping = [name for name in regulators_of(rig) if tables[name]["droop"] > 0.0]
+    regulated = [b for b in blocks if b.kind == "supply" and b.name.partition(".")[2] in drooping]
+    found = {}
+    floor = floors(Problem(regulated, recordings, core), core) if regulated else {}
+    for block in regulated:
+        gains = [(floor[block.name, p.recording.name].sample / p.noise[block.channel]) ** 2 - 1.0 for p in recordings]
+        pull = math.sqrt(sum(max(0.0, gain) * p.n for gain, p in zip(gains, recordings, strict=True)))
+        if pull > MOST_PULL:
+            found[block.name] = (
+                f"block {block.name} was left out: only the difference of two measured pressures tells the regulator's flow, and their "
+                f"noise would move its droop by {pull:.2g} standard deviations; at most {MOST_PULL:g} is allowed (a flow meter would "
+                "settle it)"
+            )
+    return found
+
+
+def _wanted(rig: Rig) -> str:
+    """Channels that surround a rig's blocks, by name."""
+    names = [dotted("muscle_pressure", name) for name in rig.tables("chamber")]
+    names += [dotted("supply_pressure", name) for name in rig.tables("supply")]
+    names += [dotted("joint_angle", name) for name in rig.tables("joint")]
+    return ", ".join([*names, *core_rig(rig).inputs])
 
 
 def _quiet(message: str) -> None:
@@ -57,7 +113,8 @@ def diagnose(case: Case | str | os.PathLike[str], *, progress: Callable[[str], N
     Raises
     ------
     DiagnosisError
-        If the recordings are too short or lack the channels that any block needs.
+        If the recordings are too short, lack the channels that any block needs, or cannot be of this rig (units, swapped columns,
+        dead sensors); the message says what was found and what is allowed.
     CaseError
         If the folder is not a case.
 
@@ -76,19 +133,11 @@ def diagnose(case: Case | str | os.PathLike[str], *, progress: Callable[[str], N
         raise DiagnosisError(
             f"the nominal rig of case {case.name!r} already has the effect {rig.effects[0]['id']!r}; diagnose a rig without effects"
         )
-    several = [block for block in rig.blocks if "" not in rig.tables(block)]
-    if several:
-        raise DiagnosisError(
-            f"the rig of case {case.name!r} has named blocks ({', '.join(several)}); rigs of one chain can be diagnosed, without names"
-        )
-    if regulators_of(rig):
-        raise DiagnosisError(
-            f"the rig of case {case.name!r} is fed by a regulator; rigs fed by a tank or a constant supply can be diagnosed"
-        )
     if "load" in rig.blocks:
         raise DiagnosisError(
             f"the rig of case {case.name!r} has a [load]; rigs with [joint] and [arm], or without a muscle, can be diagnosed"
         )
+    check_plausible(case.recordings, rig, case.name)
     say(f"{case.name}: preparing {len(case.recordings)} recordings")
     fitted = [prepare(r, rig) for r in case.fit or case.recordings]
     held = [prepare(r, rig) for r in case.held_out if case.fit]
@@ -105,15 +154,23 @@ def diagnose(case: Case | str | os.PathLike[str], *, progress: Callable[[str], N
     if not blocks:
         raise DiagnosisError(
             f"case {case.name!r}: its channels ({', '.join(channels)}) do not surround any block of the rig "
-            f"({', '.join(rig.blocks)}); measure muscle_pressure, and supply_pressure and joint_angle where the rig has them"
+            f"({', '.join(rig.blocks)}); measure {_wanted(rig)}"
         )
     nominal_core = core_rig(rig)
+    drowned = _drowned(rig, blocks, fitted, nominal_core)
+    blocks = [b for b in blocks if b.name not in drowned]
+    if not blocks:
+        raise DiagnosisError(f"case {case.name!r}: {'; '.join(drowned.values())}")
+    check_sense(blocks, [*fitted, *held], nominal_core, case.name)
     inner = Problem(blocks, fitted, nominal_core)
     outer = Problem(blocks, held, nominal_core) if held else inner
-    gas = [b for b in blocks if b.name != "arm"]
-    motion = [b for b in blocks if b.name == "arm"]
+    gas = [b for b in blocks if b.kind != "arm"]
+    motion = [b for b in blocks if b.kind == "arm"]
     try:
         groups = [examine(inner, outer, rig, members, say) for members in (gas, motion) if members]
+        unsettled = _unsettled(rig) if motion else []
+        if unsettled:
+            groups = [_doubted(group) for group in groups]
         say("putting the answer together")
         diagnosis = assemble.assemble(case, inner, outer, groups)
     except SimulationError as error:
@@ -123,6 +180,12 @@ def diagnose(case: Case | str | os.PathLike[str], *, progress: Callable[[str], N
         ) from error
     for name, share in thin.items():
         diagnosis.warnings.append(f"block {name} was left out: only {100 * share:.0f} % of its samples are usable")
+    diagnosis.warnings += drowned.values()
+    if unsettled:
+        diagnosis.warnings.append(
+            f"{', '.join(unsettled)}: marked unknown, and no fit moves them; a wrong one bends the angle as an effect would, so that "
+            f"no effect of muscles, joints and arm is believed by more than {100 * MOST_BELIEVED:.0f} %"
+        )
     diagnosis.seconds = round(time.perf_counter() - began, 3)
     if not math.isfinite(sum(diagnosis.probabilities.values())):
         raise DiagnosisError("the probabilities are not finite: please report this case")

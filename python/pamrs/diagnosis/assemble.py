@@ -269,7 +269,7 @@ def _best_of(groups: list[Group], candidate: Candidate) -> Candidate | None:
 
 def _effect_parameters(effect: str, candidate: Candidate) -> dict[str, Any]:
     rig = candidate.fit.rig
-    unknown_volume = not rig.parameter("chamber.dead_volume").known
+    unknown_volume = bool(words.unknown_volumes(rig))
     out: dict[str, Any] = {}
     for parameter in EFFECTS[effect].parameters:
         name = f"{effect}.{parameter.name}"
@@ -281,7 +281,7 @@ def _effect_parameters(effect: str, candidate: Candidate) -> dict[str, Any]:
             continue
         value, std = candidate.fit.values[name], candidate.fit.std[name]
         out[parameter.name] = _entry(value, std, parameter.unit, not unknown_volume and std < max(abs(value), 1e-300), parameter.lower)
-    if effect == "leak_muscle" and rig.model["valve"] is None:
+    if effect == "leak_muscle" and rig.model["valve"] is None and "" in rig.tables("chamber"):
         gas, chamber = rig.model["gas"], rig.model["chamber"]
         value, std = candidate.fit.values["leak_muscle.conductance"], candidate.fit.std["leak_muscle.conductance"]
         volume = chamber["dead_volume"]

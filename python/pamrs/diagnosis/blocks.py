@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pamrs import _core
+from pamrs.channels import dotted
 from pamrs.diagnosis.signals import Prepared
 from pamrs.rig import Rig
+from pamrs.rig_schema import qualified
 from pamrs.simulation import default_step
 
-__all__ = ["Block", "Residual", "available_blocks", "change", "residual"]
+__all__ = ["Block", "Residual", "available_blocks", "change", "predicted", "residual"]
 
 Array = NDArray[np.float64]
 
+ARM_WINDOW = 2.5
+"""Length of a joint's windows [s]: what its start does is gone within one, and a break-away that is told wrongly spoils no more."""
 STEP = 2.5e-3
 """Longest RK4 step of the cut chain [s]."""
 CHAMBER_STEP = 5e-3
@@ -29,7 +34,7 @@ class Block:
     Attributes
     ----------
     name, channel : str
-        Name of the block and of the channel that it predicts.
+        Name of the block as the core has it (``chamber``, ``chamber.flexor``, ``arm.elbow``) and of the channel that it predicts.
     drives : tuple of str
         Measured channels that drive it.
     window : float or None
@@ -50,48 +55,167 @@ class Block:
     step: float
     covers: str
 
+    @property
+    def kind(self) -> str:
+        """``supply``, ``chamber`` or ``arm``: its name without that of the tank, chamber or joint."""
+        return self.name.partition(".")[0]
 
-_SENSORS = frozenset({"sensors.pressure_zero", "sensors.angle_zero"})
-_CHAMBER = frozenset({"chamber.dead_volume", "chamber.alpha_in", "chamber.alpha_out", "chamber.alpha"})
-_VALVE = frozenset({"valve.discharge_area_max", "valve.null_voltage"})
-_ARM = frozenset({"arm.inertia", "arm.first_moment", "arm.payload", "arm.viscous", "arm.coulomb", "muscle.modulus_scale"})
+
+_SUPPLY = ("volume", "time_constant", "droop")
+_VALVE = ("discharge_area_max", "null_voltage")
+_LINE = ("length", "diameter", "discharge_area")
+_CHAMBER = ("dead_volume", "alpha_in", "alpha_out", "alpha")
+_MUSCLE = ("modulus_scale",)
+_ARM = ("inertia", "first_moment", "payload", "viscous", "coulomb")
+_LINK = ("length", "mass", "centre", "inertia", "payload", "viscous", "coulomb")
+
+
+@dataclass(frozen=True)
+class _Way:
+    """A valve or a line: its own full name, what it leads from and to (chambers and supplies in full), the command that opens it."""
+
+    name: str
+    ends: tuple[str, str]
+    command: tuple[str, ...]
+    between: tuple[str, ...]
+
+
+def _ways(rig: Rig) -> list[_Way]:
+    """Every way of the air, a valve and the line behind it being one."""
+    valves, lines = rig.ports("valve"), rig.ports("line")
+    behind = {qualified("line", name): ends["to"] for name, ends in lines.items()}
+    found = []
+    for name, ends in valves.items():
+        line = (ends["to"],) if ends["to"] in behind else ()
+        end = behind.get(ends["to"], ends["to"])
+        found.append(_Way(qualified("valve", name), (ends["from"], end), (dotted("valve_command", name),), line))
+    found += [_Way(qualified("line", name), (ends["from"], ends["to"]), (), ()) for name, ends in lines.items() if ends["from"]]
+    return found
+
+
+class _Map:
+    """Which channels and parameters belong to which block of a rig."""
+
+    def __init__(self, rig: Rig, channels: tuple[str, ...]) -> None:
+        self.rig, self.has, self.ways = rig, frozenset(channels), _ways(rig)
+        self.angles = tuple(dotted("joint_angle", name) for name in rig.tables("joint"))
+        self.pulling = {name: ends["chamber"].partition(".")[2] for name, ends in rig.ports("muscle").items()}
+        self.joint_of = {name: ends["joint"].partition(".")[2] for name, ends in rig.ports("muscle").items()}
+
+    def pressure(self, block: str) -> str:
+        """Channel of a supply's or chamber's pressure by its full name."""
+        kind, _, name = block.partition(".")
+        return dotted("supply_pressure" if kind == "supply" else "muscle_pressure", name)
+
+    def around(self, block: str) -> list[_Way]:
+        """The ways that begin or end at a supply or chamber."""
+        return [way for way in self.ways if block in way.ends]
+
+    def neighbours(self, block: str) -> tuple[str, ...]:
+        """Channels of the pressures next to a block; that of a constant supply is known without measuring it."""
+        others = [end for way in self.around(block) for end in way.ends if end not in (block, "ambient")]
+        inlets = [dotted("line_pressure", name.partition(".")[2]) for way in self.around(block) for name in way.between]
+        known = [end for end in others if self._constant(end) and self.pressure(end) not in self.has]
+        wanted = [self.pressure(end) for end in others if end not in known]
+        return tuple(dict.fromkeys([*wanted, *(name for name in inlets if name in self.has)]))
+
+    def _constant(self, block: str) -> bool:
+        kind, _, name = block.partition(".")
+        return kind == "supply" and self.rig.tables("supply")[name]["kind"] == "constant"
+
+    def commands(self, block: str) -> tuple[str, ...]:
+        """Commands of the valves at a block."""
+        return tuple(dict.fromkeys(command for way in self.around(block) for command in way.command))
+
+    def zero(self, key: str, name: str) -> str:
+        """Dotted name of the zero of a block's sensor, its own or the common one."""
+        own = self.rig.tables("sensors")
+        return f"sensors.{name}.{key}" if name and name in own else f"sensors.{key}"
+
+    def zeros(self, chambers: Iterable[str], joints: Iterable[str]) -> set[str]:
+        """Those of the sensors of some chambers and joints."""
+        return {self.zero("pressure_zero", c) for c in chambers} | {self.zero("angle_zero", j) for j in joints}
+
+    def of_ways(self, block: str) -> set[str]:
+        """Parameters of the valves and lines at a block."""
+        names: set[str] = set()
+        for way in self.around(block):
+            for full in (way.name, *way.between):
+                names |= {f"{full}.{key}" for key in (_VALVE if full.partition(".")[0] == "valve" else _LINE)}
+        return names
+
+    def chambers_at(self, block: str) -> set[str]:
+        """Names of the chambers that a block's ways lead to, its own included."""
+        ends = {block, *(end for way in self.around(block) for end in way.ends)}
+        return {end.partition(".")[2] for end in ends if end.partition(".")[0] == "chamber"}
+
+    def supply(self, name: str) -> Block | None:
+        """The block of one supply."""
+        full, table = qualified("supply", name), self.rig.tables("supply")[name]
+        commands = (*self.commands(full), *((dotted("supply_command", name),) if table["kind"] == "regulator" else ()))
+        drives = (*self.neighbours(full), *commands)
+        if not self.around(full) or not {self.pressure(full), *drives, *self.angles} <= self.has:
+            return None
+        names = self.of_ways(full) | {f"{full}.{key}" for key in _SUPPLY} | self.zeros(self.chambers_at(full), ())
+        covers = "regulator" if table["kind"] == "regulator" else "supply"
+        covers += " and valve" if self.commands(full) else (" and line" if table["kind"] != "regulator" else "")
+        return Block(full, self.pressure(full), drives, 4.0, frozenset(names), CHAMBER_STEP, covers + _called(name))
+
+    def chamber(self, name: str) -> Block | None:
+        """The block of one chamber; none where nothing feeds it although it moves a joint: its pressure is then what is given."""
+        full = qualified("chamber", name)
+        fed = bool(self.neighbours(full) or self.commands(full))
+        joints = tuple(dict.fromkeys(self.joint_of[m] for m, chamber in self.pulling.items() if chamber == name))
+        if self.angles and not self.rig.tables("valve") and not self.rig.tables("supply"):
+            return None
+        drives = (*self.neighbours(full), *self.commands(full), *(a for a in self.angles if a.partition(".")[2] in joints))
+        if not {self.pressure(full), *drives, *self.angles} <= self.has:
+            return None
+        names = self.of_ways(full) | {f"{full}.{key}" for key in _CHAMBER} | self.zeros(self.chambers_at(full), joints or [""])
+        covers = ("valve, line and chamber" if self.commands(full) else "line and chamber") if fed else "chamber"
+        step = CHAMBER_STEP if fed else 0.025
+        return Block(full, self.pressure(full), drives, 2.0 if fed else None, frozenset(names), step, covers + _called(name))
+
+    def arm(self, joint: str) -> Block | None:
+        """The block of one joint: muscles' pressures to its angle."""
+        drives = tuple(dict.fromkeys(dotted("muscle_pressure", chamber) for chamber in self.pulling.values()))
+        if not {*drives, *self.angles} <= self.has:
+            return None
+        names = {f"arm.{key}" for key in _ARM} | {f"{qualified('muscle', m)}.{key}" for m in self.pulling for key in _MUSCLE}
+        names |= {f"{qualified('link', link)}.{key}" for link in self.rig.tables("link") for key in _LINK}
+        names |= self.zeros(self.pulling.values(), self.rig.tables("joint"))
+        name = qualified("arm", joint)
+        covers = "muscle, joint and arm" + _called(joint)
+        return Block(name, dotted("joint_angle", joint), drives, ARM_WINDOW, frozenset(names), STEP, covers)
+
+
+def _called(name: str) -> str:
+    return f" of {name}" if name else ""
 
 
 def available_blocks(rig: Rig, channels: tuple[str, ...]) -> list[Block]:
-    """The blocks that these channels can tell apart, in the order of the chain."""
-    model = rig.model
-    blocks = []
-    motion = ("joint_angle",) if model["arm"] is not None else ()
-    has = set(channels)
-    fed = model["valve"] is not None
-    if fed and {"supply_pressure", "muscle_pressure", "valve_command", *motion} <= has:
-        blocks.append(
-            Block(
-                "supply",
-                "supply_pressure",
-                ("muscle_pressure", "valve_command"),
-                4.0,
-                _VALVE | {"supply.volume", "sensors.pressure_zero"},
-                CHAMBER_STEP,
-                "supply and valve",
-            )
-        )
-    drives = (("supply_pressure", "valve_command") if fed else ()) + motion
-    if "muscle_pressure" in has and set(drives) <= has:
-        names = _CHAMBER | _SENSORS | (_VALVE if fed else frozenset())
-        blocks.append(
-            Block(
-                "chamber", "muscle_pressure", drives, 2.0 if fed else None, names, CHAMBER_STEP if fed else 0.025,
-                "valve, line and chamber" if fed else "chamber",
-            )
-        )  # fmt: skip
-    if motion and {"muscle_pressure", "joint_angle"} <= has:
-        blocks.append(
-            Block(
-                "arm", "joint_angle", ("muscle_pressure",), 2.5, _ARM | _SENSORS, STEP, "muscle, joint and arm",
-            )
-        )  # fmt: skip
-    return blocks
+    """The blocks that these channels can tell apart: supplies, chambers, then joints, each in the order of the rig file.
+
+    Every tank (or regulator), chamber and joint is a block of its own, driven by the measured channels next to it, with the baseline
+    parameters of what it stands for. A rig with joints and without valves and supplies is driven by the pressures of its muscles: these
+    are given, and only its joints are judged.
+
+    Parameters
+    ----------
+    rig : Rig
+        The nominal model.
+    channels : tuple of str
+        What every recording has, by the names of the core.
+
+    Returns
+    -------
+    list of Block
+    """
+    have = _Map(rig, channels)
+    found = [have.supply(name) for name in rig.tables("supply")]
+    found += [have.chamber(name) for name in rig.tables("chamber")]
+    found += [have.arm(name) for name in rig.tables("joint")] if rig.tables("arm") else []
+    return [block for block in found if block is not None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,16 +265,7 @@ def change(block: Block, core: _core.Rig, prepared: Prepared, base: Residual) ->
     (n,) array
         In the channel's unit; 0 in unusable rows.
     """
-    prediction, _ = core.predict(
-        block.name,
-        _commands(core, prepared),
-        prepared.dt,
-        default_step(prepared.dt, longest=block.step),
-        prepared.starts(block.window, block.drives),
-        [],
-        prepared.signals,
-        prepared.n,
-    )
+    prediction = predicted(block, core, prepared)
     measured = np.where(prepared.recording.mask[block.channel], prepared.recording.channels[block.channel], 0.0)
     value = np.where(base.rows, measured - prediction, 0.0)
     for a, b, q in base.starts:
@@ -158,9 +273,34 @@ def change(block: Block, core: _core.Rig, prepared: Prepared, base: Residual) ->
     return np.where(base.rows, value, 0.0)
 
 
-def _commands(core: _core.Rig, prepared: Prepared) -> dict[str, Array]:
-    """The commands that a model takes."""
-    return {"valve_command": prepared.command} if core.inputs else {}
+def predicted(block: Block, core: _core.Rig, prepared: Prepared) -> Array:
+    """A block's output over a recording, every window from its measured start.
+
+    Parameters
+    ----------
+    block : Block
+        Which block.
+    core : _core.Rig
+        The compiled model.
+    prepared : Prepared
+        The recording.
+
+    Returns
+    -------
+    (n,) array
+        In the channel's unit.
+    """
+    prediction, _ = core.predict(
+        block.name,
+        prepared.commands,
+        prepared.dt,
+        default_step(prepared.dt, longest=block.step),
+        prepared.starts(block.window, block.drives),
+        [],
+        prepared.signals,
+        prepared.n,
+    )
+    return prediction
 
 
 def residual(block: Block, core: _core.Rig, prepared: Prepared, parameters: list[str]) -> Residual:
@@ -179,10 +319,10 @@ def residual(block: Block, core: _core.Rig, prepared: Prepared, parameters: list
     """
     starts = prepared.starts(block.window, block.drives)
     # without parameters a free null direction is still wanted for the window's start: ask for one parameter
-    names = parameters or ["sensors.pressure_zero"]
+    names = parameters or [next((n for n in core.parameter_names if n.endswith("pressure_zero")), core.parameter_names[0])]
     prediction, jacobian = core.predict(
         block.name,
-        _commands(core, prepared),
+        prepared.commands,
         prepared.dt,
         default_step(prepared.dt, longest=block.step),
         starts,

@@ -134,10 +134,10 @@ def find_closure(
 
 def _closures(blocks: Sequence[Block]) -> dict[str, str]:
     """Closures by the block that each acts in."""
-    unknown = [b.name for b in blocks if b.name not in CLOSURE_OF]
+    unknown = [b.name for b in blocks if b.kind not in CLOSURE_OF]
     if unknown or not blocks:
         raise DiagnosisError(f"blocks = {unknown} is not allowed: one or more of {', '.join(CLOSURE_OF)}")
-    return {b.name: CLOSURE_OF[b.name] for b in blocks}
+    return {b.name: CLOSURE_OF[b.kind] for b in blocks}
 
 
 def _shapes(closure: str) -> dict[str, tuple[float, ...]]:

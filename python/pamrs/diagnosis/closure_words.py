@@ -66,12 +66,12 @@ def describe_closure(found: Fit, problem: Problem, baseline: Fit) -> str:
     """
     if not set(found.effects) & set(TERMS):
         raise DiagnosisError(f"found.effects = {found.effects} is not allowed: one of {', '.join(TERMS)} is needed")
-    blocks = [b for b in problem.blocks if CLOSURE_OF.get(b.name) in found.effects]
+    blocks = [b for b in problem.blocks if CLOSURE_OF.get(b.kind) in found.effects]
     return "\n".join(_sentence(found, problem, baseline, block) for block in blocks)
 
 
 def _sentence(found: Fit, problem: Problem, baseline: Fit, block: Block) -> str:
-    closure = CLOSURE_OF[block.name]
+    closure = CLOSURE_OF[block.kind]
     parts = _parts(found, problem, block, closure)
     used = {term.name: term for term in TERMS[closure] if f"{closure}.{term.name}" in found.values}
     whole = np.sum([parts[name] for name in used], axis=0)
@@ -105,7 +105,7 @@ def _parts(found: Fit, problem: Problem, block: Block, closure: str) -> dict[str
         starts = prepared.starts(block.window, block.drives)
         terms = core.closure_terms(
             block.name,
-            {"valve_command": prepared.command} if core.inputs else {},
+            {name: prepared.commands[name] for name in core.inputs},
             prepared.dt,
             default_step(prepared.dt, longest=block.step),
             starts,

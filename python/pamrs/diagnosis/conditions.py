@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs.channels import channel_of, dotted
 from pamrs.diagnosis.blocks import Block
 from pamrs.diagnosis.evidence import Floor, bins_of
 from pamrs.diagnosis.fitting import Key
@@ -46,20 +47,29 @@ def _binned(values: Array, rows: NDArray[np.bool_], width: int) -> Array:
     return binned(values, rows, width)[0]
 
 
+def _named(quantity: str, channel: str, unit: str) -> str:
+    """A condition's label: ``muscle pressure of flexor [bar]``."""
+    name = channel.partition(".")[2]
+    return f"{quantity} of {name} [{unit}]" if name else f"{quantity} [{unit}]"
+
+
 def _conditions(block: Block, prepared: Prepared, rig: Rig, width: int) -> dict[str, Array]:
     """Continuous conditions of each bin, by name."""
     all_rows = np.ones(prepared.n, dtype=bool)
     out = {}
-    pressure = prepared.signals["muscle_pressure"][0]
-    out["muscle pressure [bar]"] = _binned(pressure, all_rows, width) / 1e5
-    model = rig.model
-    if model["valve"] is not None:
-        opening = np.clip((prepared.command - model["valve"]["null_voltage"]) / model["valve"]["half_range"], -1, 1)
-        out["valve opening [1]"] = _binned(opening, all_rows, width)
-    if "joint_angle" in prepared.signals:
-        angle, rate = prepared.signals["joint_angle"]
-        out["joint angle [deg]"] = np.degrees(_binned(angle, all_rows, width))
-        out["joint rate [deg/s]"] = np.degrees(_binned(rate, all_rows, width))
+    involved = (block.channel, *block.drives)
+    pressures = [name for name in prepared.signals if channel_of(name) == "muscle_pressure" and name in involved]
+    for name in pressures or [name for name in prepared.signals if channel_of(name) == "muscle_pressure"]:
+        out[_named("muscle pressure", name, "bar")] = _binned(prepared.signals[name][0], all_rows, width) / 1e5
+    for valve, table in rig.tables("valve").items():
+        name = dotted("valve_command", valve)
+        if name in prepared.recording.channels and (name in involved or block.kind == "arm"):
+            opening = np.clip((prepared.commands[name] - table["null_voltage"]) / table["half_range"], -1, 1)
+            out[_named("valve opening", name, "1")] = _binned(opening, all_rows, width)
+    for name, (angle, rate) in prepared.signals.items():
+        if channel_of(name) == "joint_angle":
+            out[_named("joint angle", name, "deg")] = np.degrees(_binned(angle, all_rows, width))
+            out[_named("joint rate", name, "deg/s")] = np.degrees(_binned(rate, all_rows, width))
     out["time [s]"] = _binned(prepared.recording.time, all_rows, width)
     return out
 
@@ -67,20 +77,20 @@ def _conditions(block: Block, prepared: Prepared, rig: Rig, width: int) -> dict[
 def _regimes(c: dict[str, Array]) -> dict[str, NDArray[np.bool_]]:
     """Named yes/no conditions of each bin."""
     out: dict[str, NDArray[np.bool_]] = {}
-    if "valve opening [1]" in c:
-        x = c["valve opening [1]"]
-        out |= {"valve closed": np.abs(x) < 0.01, "valve filling": x >= 0.01, "valve venting": x <= -0.01}
-    if "joint rate [deg/s]" in c:
-        rate = c["joint rate [deg/s]"]
-        still = np.abs(rate) < 0.5
-        out |= {"joint at rest": still, "muscle contracting": ~still & (rate > 0), "muscle extending": ~still & (rate < 0)}
-    pressure = c["muscle pressure [bar]"]
-    low, high = np.quantile(pressure, [1 / 3, 2 / 3])
-    if high - low > 0.05:
-        out |= {
-            f"pressure below {low:.2g} bar": pressure < low,
-            f"pressure above {high:.2g} bar": pressure > high,
-        }
+    for name, values in c.items():
+        quantity, _, _ = name.partition(" [")
+        of = " of" + quantity.partition(" of")[2] if " of " in quantity else ""
+        if quantity.startswith("valve opening"):
+            shut = np.abs(values) < 0.01
+            out |= {f"valve{of} closed": shut, f"valve{of} filling": values >= 0.01, f"valve{of} venting": values <= -0.01}
+        elif quantity.startswith("joint rate"):
+            still = np.abs(values) < 0.5
+            words = ("muscle contracting", "muscle extending") if not of else (f"joint{of} rising", f"joint{of} falling")
+            out |= {f"joint{of} at rest": still, words[0]: ~still & (values > 0), words[1]: ~still & (values < 0)}
+        elif quantity.startswith("muscle pressure"):
+            low, high = np.quantile(values, [1 / 3, 2 / 3])
+            if high - low > 0.05:
+                out |= {f"pressure{of} below {low:.2g} bar": values < low, f"pressure{of} above {high:.2g} bar": values > high}
     return out
 
 

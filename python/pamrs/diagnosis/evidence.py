@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,7 +112,7 @@ def _shaken(prepared: Prepared, names: Iterable[str], rng: np.random.Generator) 
         value, slope = signals[name]
         more, steeper = smoothed(raw, prepared.dt)
         signals[name] = (value + more, slope + steeper)
-    return Prepared(prepared.recording, prepared.command, signals, prepared.noise)
+    return replace(prepared, signals=signals)
 
 
 def correlation_time(values: Array) -> float:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -15,7 +16,7 @@ from pamrs.diagnosis.blocks import Block, Residual, change, residual
 from pamrs.diagnosis.leastsquares import levenberg_marquardt
 from pamrs.diagnosis.signals import Prepared, binned
 from pamrs.effects_table import EFFECTS, find_parameter
-from pamrs.errors import SimulationError
+from pamrs.errors import ParameterError, RigError, SimulationError
 from pamrs.rig import Rig
 from pamrs.simulation import core_rig
 
@@ -43,7 +44,12 @@ ACTS: dict[str, tuple[str, ...]] = {
     "pressure_lag": ("chamber", "arm"),
     "clock_skew": ("supply", "chamber", "arm"),
 }
-"""Blocks of the cut chain in which the effects of a block of the rig, or one effect, act."""
+"""Kinds of block of the cut rig in which the effects of a block of the rig, or one effect, act.
+
+Of several tanks, chambers or joints an effect acts on every one, with the same parameters: so the core has it where the effect has no
+``at``, and one parameter that all recordings and blocks share is what they can decide. An effect of one muscle alone shows as a block
+that keeps its mismatch while its neighbours lose theirs; ``Rig.with_effect(..., at="flexor")`` then has it.
+"""
 WIDEST = 3.0
 """Tolerances that a baseline parameter may move: farther out it would stand for physics that is missing."""
 LEAST_STEP, STIFFEST = 4e-4, 0.2
@@ -162,14 +168,24 @@ def residuals(problem: Problem, rig: Rig, names: Sequence[str] = (), events: Eve
             full[:, list(names).index(name)] = found.jacobian[:, column]
         return replace(found, jacobian=full)
 
-    with ThreadPoolExecutor(max_workers=2) as pool:
+    with _inside_range(), ThreadPoolExecutor(max_workers=2) as pool:
         found = list(pool.map(one, tasks))
     return {(b.name, p.recording.name): r for (b, p), r in zip(tasks, found, strict=True)}
 
 
+@contextmanager
+def _inside_range() -> Iterator[None]:
+    """A trial model that cannot be (more payload taken away than there is, next to no inertia) is outside the model's range."""
+    try:
+        yield
+    except (ParameterError, RigError) as error:
+        raise SimulationError(str(error)) from error
+
+
 def _compiled(problem: Problem, rig: Rig) -> _core.Rig:
-    """A rig compiled, unless it is so stiff that no fit could afford it."""
-    core = problem.core.respecified(rig.to_json())
+    """Another model compiled; one so stiff that no fit could afford it is outside the range."""
+    with _inside_range():
+        core = problem.core.respecified(rig.to_json())
     least = min(LEAST_STEP, STIFFEST * problem.core.stable_step)
     if core.stable_step < least:
         raise SimulationError(f"the model needs steps of {core.stable_step:.1e} s; to be fitted it may need {least:.1e} s at the least")
@@ -186,7 +202,7 @@ def depends(block: Block, name: str) -> bool:
 
 def acts_in(effect: str, block: Block) -> bool:
     """Whether an effect acts inside a block of the cut chain."""
-    return block.name in ACTS.get(effect, ACTS.get(EFFECTS[effect].block, ()))
+    return block.kind in ACTS.get(effect, ACTS.get(EFFECTS[effect].block, ()))
 
 
 def free_baseline(problem: Problem, nominal: Rig) -> list[str]:
@@ -294,7 +310,7 @@ def changes(problem: Problem, rig: Rig, base: dict[Key, Residual]) -> dict[Key, 
         key = (block.name, prepared.recording.name)
         return key, replace(base[key], value=change(block, core, prepared, base[key]), jacobian=None)
 
-    with ThreadPoolExecutor(max_workers=2) as pool:
+    with _inside_range(), ThreadPoolExecutor(max_workers=2) as pool:
         return dict(pool.map(one, tasks))
 
 

@@ -180,8 +180,8 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
     doubt = _doubt(fitted, held, mismatch, now[mismatch.name].rms)
     weighed = _weigh(candidates, suspects, doubt)
     group = Group(blocks, was, now, candidates, weighed, mismatch, floor, suspects)
-    if weighed["unlisted"] < LIKELY:
-        return group
+    if weighed["unlisted"] < LIKELY or len({b.kind for b in suspects}) < len(suspects):
+        return group  # of two chambers one form would have to serve both
     closed = find_closure(inner, nominal, baseline, colour, suspects, say)
     if closed is None:
         return group

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
+from pamrs.channels import channel_of, dotted
 from pamrs.errors import DiagnosisError
 from pamrs.recording import Recording
 from pamrs.rig import Rig
@@ -22,7 +23,9 @@ SMOOTHING_TIME = 0.06
 """Length of the smoothing filter for drive signals [s]; at least seven samples."""
 BRIDGED = 3
 """Longest hole in a drive signal that is bridged [samples]."""
-DRIVES = ("supply_pressure", "muscle_pressure", "joint_angle")
+DRIVES = ("supply_pressure", "line_pressure", "muscle_pressure", "joint_angle")
+"""Channels at which a rig is cut; of a block with a name its name stands behind it."""
+COMMANDS = ("valve_command", "supply_command")
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,16 +36,17 @@ class Prepared:
     ----------
     recording : Recording
         As loaded.
-    command : (n,) array
-        Valve command [V], holes filled with the last value.
+    commands : dict of str to (n,) array
+        Commands by the names of the core, of valves [V] and regulators [Pa], holes filled with the last value; a command that was
+        not recorded stays at rest, and no block that it drives is judged.
     signals : dict of str to (value, slope)
-        Smoothed channels and their time derivatives, holes bridged.
+        Smoothed channels and their time derivatives, holes bridged, by the names of the core (``muscle_pressure.flexor``).
     noise : dict of str to float
         Standard deviation of each channel's sample noise, quantisation included.
     """
 
     recording: Recording
-    command: Array
+    commands: dict[str, Array]
     signals: dict[str, tuple[Array, Array]]
     noise: dict[str, float]
 
@@ -142,9 +146,10 @@ def prepare(recording: Recording, rig: Rig) -> Prepared:
     DiagnosisError
         If the recording is too short, or lacks a channel that the rig's blocks need.
     """
-    if "muscle_pressure" not in recording.channels:
+    wanted = [dotted("muscle_pressure", name) for name in rig.tables("chamber")]
+    if not set(wanted) & set(recording.channels):
         raise DiagnosisError(
-            f"recording {recording.name!r} has no channel muscle_pressure, without which no block can be cut out; "
+            f"recording {recording.name!r} has no channel {' or '.join(wanted)}, without which no block can be cut out; "
             f"it has: {', '.join(recording.channels)}"
         )
     length = filter_length(recording.sample_time)
@@ -152,14 +157,12 @@ def prepare(recording: Recording, rig: Rig) -> Prepared:
         raise DiagnosisError(
             f"recording {recording.name!r} has {len(recording)} samples; at least {max(32, length)} are needed for a diagnosis"
         )
-    model = rig.model
-    if model["valve"] is not None and "valve_command" not in recording.channels:
-        raise DiagnosisError(f"recording {recording.name!r} has no channel valve_command, and the rig has a valve")
+    core = core_rig(rig)
+    _check_commands(recording, rig, core.inputs)
     signals, noise = {}, {}
-    known = core_rig(rig).channels
-    for name in DRIVES:
-        if name not in recording.channels or name not in known:
-            continue  # measured, but of a block that the rig does not have
+    for name in core.channels:
+        if channel_of(name) not in DRIVES or name not in recording.channels:
+            continue  # what is measured of a block that the rig does not have is left alone
         mask = recording.mask[name]
         if mask.sum() < max(16, 0.2 * mask.size):
             raise DiagnosisError(f"recording {recording.name!r}: only {int(mask.sum())} of {mask.size} samples of {name} are usable")
@@ -168,16 +171,35 @@ def prepare(recording: Recording, rig: Rig) -> Prepared:
         noise[name] = noise_level(recording.channels[name], mask)
         if noise[name] <= 0:
             noise[name] = max(1e-9, 1e-6 * float(np.ptp(filled)))
-    if "valve_command" in recording.channels:
-        mask = recording.mask["valve_command"]
-        if not mask.any():
-            raise DiagnosisError(f"recording {recording.name!r}: no usable sample of valve_command")
-        held = np.maximum.accumulate(np.where(mask, np.arange(mask.size), 0))
-        held[: int(np.argmax(mask))] = int(np.argmax(mask))
-        command = np.ascontiguousarray(recording.channels["valve_command"][held])
-    else:
-        command = np.zeros(len(recording))
-    return Prepared(recording, command, signals, noise)
+    commands = {name: _command(recording, rig, name) for name in core.inputs}
+    return Prepared(recording, commands, signals, noise)
+
+
+def _check_commands(recording: Recording, rig: Rig, inputs: list[str]) -> None:
+    """Refuse a recording without a command, unless what moves a joint was measured past the valves."""
+    missing = [name for name in inputs if name not in recording.channels]
+    joints = [dotted("joint_angle", name) for name in rig.tables("joint")]
+    pulling = [dotted("muscle_pressure", ends["chamber"].partition(".")[2]) for ends in rig.ports("muscle").values()]
+    if missing and not (joints and {*joints, *pulling} <= set(recording.channels)):
+        what = "valve" if channel_of(missing[0]) == "valve_command" else "regulator"
+        raise DiagnosisError(
+            f"recording {recording.name!r} has no channel {missing[0]}, and the rig has a {what}; "
+            f"it has: {', '.join(recording.channels)}"
+        )
+
+
+def _command(recording: Recording, rig: Rig, name: str) -> Array:
+    """A command with its holes filled; at rest where it was not recorded."""
+    channel, _, block = name.partition(".")
+    if name not in recording.channels:
+        table, key = ("valve", "null_voltage") if channel == "valve_command" else ("supply", "initial_pressure")
+        return np.full(len(recording), float(rig.tables(table)[block][key]))
+    mask = recording.mask[name]
+    if not mask.any():
+        raise DiagnosisError(f"recording {recording.name!r}: no usable sample of {name}")
+    held = np.maximum.accumulate(np.where(mask, np.arange(mask.size), 0))
+    held[: int(np.argmax(mask))] = int(np.argmax(mask))
+    return np.ascontiguousarray(recording.channels[name][held])
 
 
 def binned(values: Array, rows: Mask, width: int) -> tuple[Array, Array]:

@@ -8,14 +8,22 @@ from typing import Any
 import numpy as np
 
 from pamrs.case import Case
+from pamrs.channels import channel_of
 from pamrs.diagnosis.conditions import Picture
 from pamrs.diagnosis.fitting import Problem
 from pamrs.diagnosis.hypotheses import Group
 from pamrs.diagnosis.result import Diagnosis
 from pamrs.effects_table import EFFECTS
 from pamrs.rig import Rig
+from pamrs.rig_schema import qualified
 
-__all__ = ["next_experiment", "verdict", "warnings", "where"]
+__all__ = ["next_experiment", "unknown_volumes", "verdict", "warnings", "where"]
+
+
+def unknown_volumes(rig: Rig) -> list[str]:
+    """Dotted names of the chambers' volumes that the rig file marks unknown."""
+    names = [f"{qualified('chamber', name)}.dead_volume" for name in rig.tables("chamber")]
+    return [name for name in names if not rig.parameter(name).known]
 
 
 def where(located: str | None, problem: Problem, groups: list[Group], picture: Picture) -> dict[str, Any]:
@@ -79,7 +87,7 @@ def verdict(diagnosis: Diagnosis, named: list[str], case: Case, gap: float | Non
     text = f"The model leaves out: {names}; probability {p:.2f}. {place}"
     if gap is not None:
         text += f" With it, {100 * gap:.0f} % of the gap between refitted model and noise closes on {where_proved}."
-    if not case.rig.parameter("chamber.dead_volume").known:
+    if unknown_volumes(case.rig):
         text += (
             " The chamber's volume is not known: what the recording fixes is the time constant (and the conductance per volume); "
             "the conductance itself holds for the placeholder volume of the rig file only."
@@ -126,7 +134,7 @@ def next_experiment(kind: str, probabilities: dict[str, float], ambiguity: list[
         return {"text": text, "excitation": {}, "expected_information_bits": 0.0}
     key = next((k for s in [leading.split("+"), *ambiguity] for k in s if k in _SEPARATE), "unlisted")
     text, excitation = _SEPARATE[key]
-    if rig.model["valve"] is None:
+    if not (rig.tables("valve") or rig.tables("muscle")):
         text = (
             "Repeat the hold at a third of the pressure and with the chamber removed (transducer and fittings alone): a leak of the "
             "chamber scales with absolute pressure and goes with it; cooling, the bench's own loss and the transducer's drift stay."
@@ -145,9 +153,8 @@ def warnings(case: Case, groups: list[Group], symptoms: dict[str, float], no_hel
         if len(recording.issues) > 8:
             out.append(f"{recording.name}: {len(recording.issues) - 8} more issues of this kind")
     for recording in case.recordings:
-        for channel in ("muscle_pressure", "supply_pressure"):
-            values = recording.channels.get(channel)
-            if values is None or not recording.mask[channel].any():
+        for channel, values in recording.channels.items():
+            if channel_of(channel) not in ("muscle_pressure", "supply_pressure") or not recording.mask[channel].any():
                 continue
             largest = float(np.nanmax(np.abs(values[recording.mask[channel]])))
             if largest < 1e4:
@@ -163,6 +170,6 @@ def warnings(case: Case, groups: list[Group], symptoms: dict[str, float], no_hel
         best = group.best
         if best.effects and best.scatter > 0.35:
             out.append(f"the size of {'+'.join(best.effects)} scatters by {100 * best.scatter:.0f} % between recordings")
-    if not case.rig.parameter("chamber.dead_volume").known:
-        out.append("chamber.dead_volume is marked unknown: values that scale with it hold for the placeholder only")
+    for name in unknown_volumes(case.rig):
+        out.append(f"{name} is marked unknown: values that scale with it hold for the placeholder only")
     return out

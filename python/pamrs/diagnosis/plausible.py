@@ -1,0 +1,344 @@
+"""What a recording cannot be: units, swapped columns and dead sensors that are seen before anything is fitted.
+
+A mismatch that a wrong heading makes is not physics. What is looked at needs no fit: sizes against the rig file, the order
+of pressures, the range of joints, the sense in which a pressure follows its valve and an angle its pressures. Each finding says what
+was found and what is allowed; nothing is repaired.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pamrs import _core
+from pamrs.channels import channel_of, dotted
+from pamrs.diagnosis.blocks import Block, predicted
+from pamrs.diagnosis.signals import Prepared
+from pamrs.errors import DiagnosisError, SimulationError, joined
+from pamrs.recording import Recording
+from pamrs.rig import Rig
+
+__all__ = ["check_plausible", "check_sense", "implausible"]
+
+Array = NDArray[np.float64]
+
+LEAST_PRESSURE = 100.0
+"""Gauge pressure that a channel exceeds somewhere, or it is in another unit [Pa]."""
+MOST_PRESSURE = 1e7
+"""Gauge pressure of air that no muscle sees [Pa], unless the rig file has a fifth of what was measured."""
+SUPPLY_RANGE = (0.05, 5.0)
+"""Highest measured supply pressure over that of the rig file."""
+ORDER_MARGIN, ORDER_SHARE = 0.05, 0.5
+"""Share of the supply's pressure by which a muscle's may exceed it, and share of the time for which it may do so by more."""
+ANGLE_MARGIN, ANGLE_SHARE = 0.05, 0.2
+"""Share of a joint's range (and at least 0.1 rad) by which an angle may leave it, and share of the time."""
+MOST_RATE = 200.0
+"""Joint rate that one sample in a hundred may exceed [rad/s]."""
+LONGEST_SAMPLE = 0.25
+"""Sample time at which a joint's motion can still be followed [s]."""
+FROZEN_WHILE = 2e4
+"""Change of a muscle's pressure while which a tank that feeds it cannot read one and the same value [Pa]."""
+OPPOSED, OPPOSITE = 0.6, -0.2
+"""Share of a chamber's change of pressure that may go against its valve's command, if the two are also correlated below this."""
+DEGREES = 180.0 / math.pi
+WRONG, RIGHT = 1.0, 0.4
+"""Misfit in standard deviations of the angle as recorded, and as it would be in another unit, from which the unit is wrong."""
+_TELLING = 12
+
+
+def check_plausible(recordings: Sequence[Recording], rig: Rig, case: str) -> None:
+    """Refuse recordings whose units or columns cannot be right.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        As loaded.
+    rig : Rig
+        The nominal model.
+    case : str
+        Name of the case, for the message.
+
+    Raises
+    ------
+    DiagnosisError
+        With every finding: recording, channel, what was found, what is allowed.
+    """
+    found = [f"recording {r.name!r}: {text}" for r in recordings for text in implausible(r, rig)]
+    _refuse(case, found)
+
+
+def _refuse(case: str, found: list[str]) -> None:
+    if not found:
+        return
+    told = found[:_TELLING] + ([f"and {len(found) - _TELLING} more of this kind"] if len(found) > _TELLING else [])
+    raise DiagnosisError(joined(f"case {case!r}: these recordings cannot be of this rig; nothing was fitted", told))
+
+
+def implausible(recording: Recording, rig: Rig) -> list[str]:
+    """Everything about a recording that cannot be, in words.
+
+    Parameters
+    ----------
+    recording : Recording
+        SI values with masks.
+    rig : Rig
+        The nominal model.
+
+    Returns
+    -------
+    list of str
+        One line for each finding; empty for a sound recording.
+    """
+    return [
+        *_clock(recording, rig),
+        *_pressures(recording, rig),
+        *_order(recording, rig),
+        *_angles(recording, rig),
+        *_valves(recording, rig),
+    ]
+
+
+def _values(recording: Recording, name: str) -> Array:
+    """Usable samples of a channel; none where it was not measured."""
+    if name not in recording.channels:
+        return np.zeros(0)
+    return np.asarray(recording.channels[name][recording.mask[name]], dtype=np.float64)
+
+
+def _clock(recording: Recording, rig: Rig) -> Iterator[str]:
+    if rig.tables("joint") and recording.sample_time > LONGEST_SAMPLE:
+        yield (
+            f"a sample every {recording.sample_time:g} s is too slow for a joint: at most {LONGEST_SAMPLE:g} s; is the unit of "
+            "'time' (ms, us) the one its values are in?"
+        )
+
+
+def _pressures(recording: Recording, rig: Rig) -> Iterator[str]:
+    """Sizes of pressures, by themselves and beside the rig file."""
+    rated = {dotted("supply_pressure", name): float(table["initial_pressure"]) for name, table in rig.tables("supply").items()}
+    largest = max([*rated.values(), *(float(t["initial_pressure"]) for t in rig.tables("chamber").values())], default=0.0)
+    for name in recording.channels:
+        values = _values(recording, name)
+        if channel_of(name) not in ("supply_pressure", "line_pressure", "muscle_pressure") or values.size < 3:
+            continue
+        high = float(np.quantile(np.abs(values), 0.995))
+        top = max(MOST_PRESSURE, 5.0 * largest)
+        if 0.0 < high < LEAST_PRESSURE and np.ptp(values) > 0.0:
+            yield (
+                f"{name} never exceeds {high:.3g} Pa gauge; a pressure of air exceeds {LEAST_PRESSURE:g} Pa somewhere: are its "
+                "values in bar (or is it another column, an angle or a voltage) under a heading in Pa?"
+            )
+        elif high > top:
+            yield (
+                f"{name} reaches {high:.3g} Pa gauge; at most {top:.3g} Pa is allowed: are its values in Pa, kPa or psi under a "
+                "heading in bar?"
+            )
+        elif name in rated and rated[name] > 0.0 and not SUPPLY_RANGE[0] <= high / rated[name] <= SUPPLY_RANGE[1]:
+            yield (
+                f"{name} is at most {high:.3g} Pa and the rig file has {rated[name]:.3g} Pa; "
+                f"{SUPPLY_RANGE[0] * rated[name]:.3g} to {SUPPLY_RANGE[1] * rated[name]:.3g} Pa is allowed: right column and unit?"
+            )
+    valves = rig.ports("valve")
+    for supply, table in rig.tables("supply").items():
+        name = dotted("supply_pressure", supply)
+        values, drawn = _values(recording, name), any(ends["from"] == dotted("supply", supply) for ends in valves.values())
+        if table["kind"] != "tank" or not drawn or values.size < 16 or np.ptp(values) > 0.0:
+            continue
+        moved = [v for c in rig.tables("chamber") if (v := _values(recording, dotted("muscle_pressure", c))).size]
+        if any(float(np.ptp(v)) > FROZEN_WHILE for v in moved):
+            yield (
+                f"{name} has the one value {values[0]:.6g} Pa throughout although its tank is drawn from: a frozen transducer; leave "
+                'the column out, or say [supply] kind = "constant" if it is one'
+            )
+
+
+def fed_by(rig: Rig) -> dict[str, list[str]]:
+    """Names of the supplies that feed each chamber through valves or lines."""
+    ports = {block: rig.ports(block) for block in ("valve", "line")}
+    into = [(e["from"], e["to"]) for block in ports.values() for e in block.values() if e["from"]]
+    inlets = {dotted("line", name): e["to"] for name, e in ports["line"].items()}
+    found: dict[str, list[str]] = {name: [] for name in rig.tables("chamber")}
+    for start, end in into:
+        kind, _, supply = start.partition(".")
+        other, _, chamber = inlets.get(end, end).partition(".")
+        if kind == "supply" and other == "chamber":
+            found[chamber].append(supply)
+    return found
+
+
+def _order(recording: Recording, rig: Rig) -> Iterator[str]:
+    """A muscle is not at a higher pressure than what feeds it."""
+    for chamber, supplies in fed_by(rig).items():
+        name = dotted("muscle_pressure", chamber)
+        for supply in supplies:
+            full = dotted("supply_pressure", supply)
+            if name not in recording.channels:
+                continue
+            if full in recording.channels:
+                rows = recording.valid(name, full)
+                source, limit = full, recording.channels[full][rows]
+            else:
+                rows = recording.mask[name]
+                source, limit = (
+                    f"{full} of the rig file",
+                    np.full(int(rows.sum()), float(rig.tables("supply")[supply]["initial_pressure"])),
+                )
+            if rows.sum() < 16:
+                continue
+            above = recording.channels[name][rows] > limit + ORDER_MARGIN * np.abs(limit) + 1e4
+            share = float(np.mean(above))
+            if share > ORDER_SHARE:
+                yield (
+                    f"{name} is above {source} for {100 * share:.0f} % of the time (medians "
+                    f"{float(np.median(recording.channels[name][rows])):.3g} and {float(np.median(limit)):.3g} Pa); at most "
+                    f"{100 * ORDER_SHARE:.0f} % is allowed: are the two columns swapped, or one of their units wrong?"
+                )
+
+
+def _angles(recording: Recording, rig: Rig) -> Iterator[str]:
+    """Range, rate and life of joint angles."""
+    for joint, table in rig.tables("joint").items():
+        name = dotted("joint_angle", joint)
+        values = _values(recording, name)
+        if values.size < 3:
+            continue
+        low, high = float(table["min_angle"]), float(table["max_angle"])
+        margin = max(0.1, ANGLE_MARGIN * (high - low))
+        share = float(np.mean((values < low - margin) | (values > high + margin)))
+        if share > ANGLE_SHARE:
+            yield (
+                f"{name} is outside its joint's range for {100 * share:.0f} % of the time: from {values.min():.3g} to "
+                f"{values.max():.3g} rad, where {low:.3g} to {high:.3g} rad are possible: right column, unit (deg or rad) and sign?"
+            )
+        rows = recording.mask[name]
+        steps = np.abs(np.diff(recording.channels[name]))[rows[1:] & rows[:-1]] / recording.sample_time
+        fast = float(np.quantile(steps, 0.99)) if steps.size >= 16 else 0.0
+        if fast > MOST_RATE:
+            yield (
+                f"{name} turns with {fast:.3g} rad/s, one sample in a hundred faster; at most {MOST_RATE:g} rad/s is allowed: are the "
+                "units of 'time' (s, ms, us) and of the angle those that their values are in?"
+            )
+        pulled = [e["chamber"].partition(".")[2] for e in rig.ports("muscle").values() if e["joint"] == dotted("joint", joint)]
+        pressures = [v for c in pulled if (v := _values(recording, dotted("muscle_pressure", c))).size]
+        if (
+            values.size >= 16
+            and np.ptp(values) == 0.0
+            and any(float(np.ptp(v)) > 0.1 * float(np.abs(v).max()) > 1e3 for v in pressures)
+        ):
+            yield (
+                f"{name} has the one value {values[0]:.4g} rad throughout while its muscles' pressures change: a frozen encoder and a "
+                "joint that is held cannot be told apart, and neither is in the model; leave the recording out"
+            )
+
+
+def _valves(recording: Recording, rig: Rig) -> Iterator[str]:
+    """Commands inside the valve's range, and pressures that rise when they say fill."""
+    inlets = {dotted("line", name): e["to"] for name, e in rig.ports("line").items()}
+    for valve, ends in rig.ports("valve").items():
+        name, table = dotted("valve_command", valve), rig.tables("valve")[valve]
+        chamber = inlets.get(ends["to"], ends["to"]).partition(".")[2]
+        pressure = dotted("muscle_pressure", chamber)
+        if name not in recording.channels or pressure not in recording.channels:
+            continue
+        both = recording.valid(name, pressure)
+        if both.sum() < 32:
+            continue
+        opening = (recording.channels[name] - table["null_voltage"]) / table["half_range"]
+        beyond = float(np.mean(np.abs(opening[both]) > 2.0))
+        if beyond > 0.5:
+            yield (
+                f"{name} is beyond twice its valve's range for {100 * beyond:.0f} % of the time (median "
+                f"{float(np.median(recording.channels[name][both])):.3g} V); {table['null_voltage']:g} +- {table['half_range']:g} V is "
+                "the range: right column and unit?"
+            )
+            continue
+        if sum(e["to"] == ends["to"] for e in rig.ports("valve").values()) > 1:
+            continue  # another valve may fill while this one vents
+        width = max(2, round(0.1 / recording.sample_time))
+        rows = np.flatnonzero(both[:-width] & both[width // 2 : -width + width // 2] & both[width:])
+        change = recording.channels[pressure][rows + width] - recording.channels[pressure][rows]
+        towards, moved = opening[rows + width // 2], float(np.ptp(recording.channels[pressure][both]))
+        if rows.size < 32 or moved < 2e4 or not np.ptp(towards) > 0.0 or not np.ptp(change) > 0.0:
+            continue
+        against = float(np.abs(change)[towards * change < 0.0].sum() / np.abs(change).sum())
+        if against > OPPOSED and float(np.corrcoef(towards, change)[0, 1]) < OPPOSITE:
+            yield (
+                f"{100 * against:.0f} % of the change of {pressure} goes against {name} (rises while it says vent, falls while it says "
+                f"fill); at most {100 * OPPOSED:.0f} % is allowed: is the command's sign, unit or column right?"
+            )
+
+
+def check_sense(blocks: Sequence[Block], recordings: Sequence[Prepared], core: _core.Rig, case: str) -> None:
+    """Refuse joint angles that are the model's own in another unit, or that go the opposite way throughout.
+
+    Parameters
+    ----------
+    blocks : sequence of Block
+        Those whose output is an angle are looked at.
+    recordings : sequence of Prepared
+        Recordings with drives.
+    core : _core.Rig
+        The nominal rig, compiled.
+    case : str
+        Name of the case, for the message.
+
+    Raises
+    ------
+    DiagnosisError
+        With every finding.
+    """
+    found = []
+    for block in (b for b in blocks if b.kind == "arm"):
+        for prepared in recordings:
+            try:
+                text = _sense(block, core, prepared)
+            except SimulationError:
+                continue
+            if text:
+                found.append(f"recording {prepared.recording.name!r}: {text}")
+    # one recording may be odd; a heading is wrong in all of them
+    if found and len(found) * 2 > len(recordings):
+        _refuse(case, found)
+
+
+def _sense(block: Block, core: _core.Rig, prepared: Prepared) -> str | None:
+    """What would make the model's angle that of the recording: another unit, the other sign, two pressures in each other's place."""
+    rows = prepared.usable(block.channel, block.drives, [0])
+    measured, model = prepared.recording.channels[block.channel][rows], predicted(block, core, prepared)[rows]
+    if rows.sum() < 64 or float(np.std(measured)) < 3.0 * prepared.noise[block.channel] or _misfit(measured, model) < WRONG:
+        return None
+    signals, name = prepared.signals, block.channel
+    value, slope = signals[name]
+    shown = f"{name} goes from {measured.min():.3g} to {measured.max():.3g} rad, not as the model says"
+    turned = float(np.median(measured + model))
+    others: list[tuple[float, float, dict[str, tuple[Array, Array]], str]] = [
+        (DEGREES, 0.0, {}, f"{DEGREES:.3g} times that would: are its values in rad under a heading in deg?"),
+        (1.0 / DEGREES, 0.0, {}, f"{1.0 / DEGREES:.3g} times that would: are its values in deg under a heading in rad?"),
+        (-1.0, turned, {}, "it moves opposite to the model throughout: is its sign that of the rig, or are two muscles swapped?"),
+    ]
+    for one, two in itertools.combinations([d for d in block.drives if d in signals], 2):
+        text = f"with {one} and {two} in each other's place it would: are these columns swapped?"
+        others.append((1.0, 0.0, {one: signals[two], two: signals[one]}, text))
+    found = []
+    for factor, offset, swapped, text in others:
+        other = replace(prepared, signals={**signals, **swapped, name: (offset + factor * value, factor * slope)})
+        try:
+            model = predicted(block, core, other)[rows]
+        except SimulationError:
+            continue
+        expected = offset + factor * measured
+        if factor < 0.0:  # where it turns about is not known
+            expected, model = expected - expected.mean(), model - model.mean()
+        found.append((_misfit(expected, model), text))
+    best, text = min(found, default=(math.inf, ""))
+    return f"{shown}; {text}" if best < RIGHT else None
+
+
+def _misfit(measured: Array, model: Array) -> float:
+    """Root mean square of measured minus model in standard deviations of the measured."""
+    return float(np.sqrt(np.mean((measured - model) ** 2))) / max(float(np.std(measured)), 1e-300)
