@@ -1,4 +1,4 @@
-"""The command line: ``pamrs diagnose``, ``effects``, ``prove``, ``fit``, ``library``, ``lift``, ``simulate``, ``size``, ``rig`` and more.
+"""The command line: ``pamrs diagnose``, ``effects``, ``prove``, ``fit``, ``library``, ``lift``, ``simulate``, ``size``, ``rig``, ...
 
 Results go to standard output, progress and errors to standard error. The exit code is 0 when the
 command did its work (a diagnosis that finds nothing missing included), 2 when the input is wrong,

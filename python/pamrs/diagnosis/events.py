@@ -31,8 +31,8 @@ SPACING = 0.75
 """Distance of the times that are tried [s]."""
 PUSH = 1.0
 """Duration of the push that is moved through time [s]."""
-LEAST = 25.0
-"""Gain in chi-square from which an event counts."""
+LEAST, LEAST_SHARE = 25.0, 0.03
+"""Gain in chi-square, and share of what the recording's residual is, from which an event counts."""
 SCALES = {"time": 0.2, "duration": 0.4}
 
 
@@ -155,7 +155,7 @@ def _scan(
             gain = -2.0 * factor * float(left @ signature) - factor**2 * power
             if best is None or gain > best[0]:
                 best = (gain, factor, t)
-        if best is None or best[0] < LEAST:
+        if best is None or best[0] < max(LEAST, LEAST_SHARE * float(rows @ rows)):
             break
         chosen.append((best[1] * (typical if size is None else size), best[2]))
         left = left + best[1] * signatures[best[2]]
