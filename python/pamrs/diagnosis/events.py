@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs.diagnosis.blocks import Residual
-from pamrs.diagnosis.fitting import Events, Fit, Key, Problem, changes, fit, residuals, stacked
+from pamrs.diagnosis.fitting import Events, Fit, Key, Problem, Scaling, changes, residuals, stacked
 from pamrs.diagnosis.leastsquares import levenberg_marquardt
 from pamrs.diagnosis.signals import Prepared
 from pamrs.effects_table import find_parameter
@@ -60,11 +60,10 @@ def fit_events(effect: str, problem: Problem, nominal: Rig, baseline: Fit, infla
     found = look_for_events(effect, problem, baseline.rig, baseline.residuals, inflation)
     if found is None:
         return None
-    beside = fit(problem, nominal, (), {}, inflation, warm=baseline, frozen=True, events=found, evaluations=4)
-    again = _refined(found, problem, beside.rig, inflation)
-    if effect == "payload_change":
-        again = _of_one_mass(again, problem, beside.rig, inflation)
-    last = fit(problem, nominal, (), {}, inflation, warm=beside, frozen=True, events=again, evaluations=3)
+    last = _jointly(found, problem, nominal, baseline, inflation)
+    if last is None or last.events is None:
+        return None
+    again = last.events
     where, first = next(iter(again.values.items()))
     values = {f"{effect}.{name}": value for name, value in first.items()}
     alone = replace(problem, recordings=[p for p in problem.recordings if p.recording.name == where])
@@ -231,8 +230,68 @@ def _limits(effect: str, parameter: str, prepared: Prepared) -> tuple[float, flo
     return max(info.lower, -1e3), min(info.upper, 1e3)
 
 
-def _of_one_mass(events: Events, problem: Problem, rig: Rig, inflation: dict[str, float]) -> Events:
-    """The same events with the median of their masses, times fitted again."""
-    mass = float(np.median([values["mass_change"] for values in events.values.values()]))
-    same = Events(events.effect, {name: values | {"mass_change": mass} for name, values in events.values.items()})
-    return _refined(same, problem, rig, inflation, keep_size=True)
+def _jointly(events: Events, problem: Problem, nominal: Rig, baseline: Fit, inflation: dict[str, float]) -> Fit | None:
+    """Baseline and events of every recording in one fit, a changed mass the same in all; None where the model leaves its range.
+
+    One after the other would creep: a baseline that was fitted without the events holds half of what a mass does.
+    """
+    effect, (leading, typical, _) = events.effect, EVENTS[events.effect]
+    names = list(baseline.moved)
+    scaling = Scaling(nominal, names, {})
+    shared = effect == "payload_change"
+    places = [(name, p) for name, values in events.values.items() for p in values if not (shared and p == leading)]
+    places = ([("", leading)] if shared else []) + places
+    by_name = {p.recording.name: p for p in problem.recordings}
+    scale = np.array([SCALES.get(p.rstrip("_23"), typical) for _, p in places])
+    kept = [stacked(replace(problem, recordings=[p]), baseline.residuals, inflation)[1] for p in problem.recordings]
+    count = len(names)
+
+    def told(x: Array) -> Events:
+        values = {name: dict(own) for name, own in events.values.items()}
+        for (name, p), value in zip(places, x[count:] * scale, strict=True):
+            for own in values.values() if name == "" else [values[name]]:
+                own[p] = float(value)
+        return Events(effect, values)
+
+    def evaluate(x: Array) -> tuple[Array, Array, dict[Key, Residual]]:
+        happened = told(x)
+        wanted = sorted({p for own in events.values.values() for p in own})
+        found = residuals(problem, scaling.rig(x[:count], {}), [f"{effect}.{p}" for p in wanted], happened)
+        slopes = np.array([scaling.slope(n, float(v)) for n, v in zip(names, x[:count], strict=True)])
+        parts, columns = [], []
+        for prepared, fixed in zip(problem.recordings, kept, strict=True):
+            rows, slope = stacked(replace(problem, recordings=[prepared]), found, inflation)
+            assert slope is not None
+            assert fixed is not None
+            own = events.values.get(prepared.recording.name, {})
+            block = np.zeros((rows.size, len(places)))
+            for k, (name, p) in enumerate(places):
+                if p in own and name in ("", prepared.recording.name):
+                    block[:, k] = slope[:, wanted.index(p)] * scale[k]
+            parts.append(rows)
+            columns.append(np.concatenate([fixed[:, : len(slopes)] * slopes, block], axis=1))
+        prior = np.eye(count, count + len(places))
+        return np.concatenate([*parts, x[:count]]), np.concatenate([*columns, prior]), found
+
+    start = [(baseline.values[n] - scaling.centre[n]) / scaling.scale[n] for n in names]
+    sizes = [own[leading] for own in events.values.values()]
+    first = [float(np.median(sizes)) if name == "" else events.values[name][p] for name, p in places]
+    limits = [_limits(effect, p, by_name[name] if name else problem.recordings[0]) for name, p in places]
+    low = np.concatenate([scaling.bounds[0], np.array([limit[0] for limit in limits]) / scale])
+    high = np.concatenate([scaling.bounds[1], np.array([limit[1] for limit in limits]) / scale])
+    try:
+        x, (values, _, found), spent = levenberg_marquardt(evaluate, np.concatenate([start, np.array(first) / scale]), (low, high), 12)
+    except SimulationError:
+        return None
+    return replace(
+        baseline,
+        effects=(effect,),
+        rig=scaling.rig(x[:count], {}),
+        values={n: scaling.value(n, float(v)) for n, v in zip(names, x[:count], strict=True)},
+        std={n: baseline.std[n] for n in names},
+        cost=0.5 * float(values @ values),
+        residuals=found,
+        moved={n: float(v) for n, v in zip(names, x[:count], strict=True)},
+        evaluations=spent,
+        events=told(x),
+    )

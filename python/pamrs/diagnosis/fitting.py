@@ -20,7 +20,7 @@ from pamrs.errors import ParameterError, RigError, SimulationError
 from pamrs.rig import Rig
 from pamrs.simulation import core_rig
 
-__all__ = ["Events", "Fit", "Problem", "changes", "fit", "residuals", "stacked"]
+__all__ = ["Events", "Fit", "Problem", "Scaling", "changes", "fit", "residuals", "stacked"]
 
 Array = NDArray[np.float64]
 Key = tuple[str, str]
@@ -215,7 +215,7 @@ def free_baseline(problem: Problem, nominal: Rig) -> list[str]:
     ]
 
 
-class _Scaling:
+class Scaling:
     """Free parameters as numbers of order one: tolerances for the baseline, starts or logarithms for effects."""
 
     def __init__(self, nominal: Rig, baseline: Sequence[str], starts: dict[str, float]) -> None:
@@ -239,6 +239,7 @@ class _Scaling:
         self.start = np.array([0.0] * len(self.baseline) + [0.0 if n in LOGARITHMIC else s / self.scale[n] for n, s in starts.items()])
 
     def value(self, name: str, x: float) -> float:
+        """A parameter [SI] from its scaled number."""
         if name in self.centre:
             return self.centre[name] + x * self.scale[name]
         info = find_parameter(name)
@@ -246,9 +247,11 @@ class _Scaling:
         return min(max(found, info.lower), info.upper)
 
     def slope(self, name: str, x: float) -> float:
+        """Change of a parameter [SI] with its scaled number."""
         return self.value(name, x) if name in LOGARITHMIC else self.scale[name]
 
     def rig(self, x: Array, fixed: dict[str, float]) -> Rig:
+        """The model of scaled numbers, with effect parameters that are held."""
         values = {n: self.value(n, float(v)) for n, v in zip(self.names, x, strict=True)}
         rig = self.nominal.with_parameters({n: values[n] for n in self.baseline})
         chosen = {**fixed, **{n: v for n, v in values.items() if n not in self.centre}}
@@ -358,7 +361,7 @@ def fit(
         If the model leaves the range in which it holds where the fit starts.
     """
     baseline = free_baseline(problem, nominal)
-    scaling = _Scaling(nominal, baseline, starts)
+    scaling = Scaling(nominal, baseline, starts)
     count = len(baseline)
     kept = _jacobian_of(warm, baseline) if frozen and warm is not None else None
     asked = scaling.names if kept is None else list(starts)
