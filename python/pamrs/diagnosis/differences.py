@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.diagnosis.blocks import available_blocks
+from pamrs.diagnosis.blocks import Residual, available_blocks, change
 from pamrs.diagnosis.evidence import bins_of, floors
 from pamrs.diagnosis.fitting import FIT_BIN, Key, Problem, bin_width, free_baseline, residuals
 from pamrs.diagnosis.signals import Prepared, binned, prepare
@@ -25,7 +25,20 @@ from pamrs.recording import Recording
 from pamrs.rig import Rig
 from pamrs.simulation import Simulation, core_rig
 
-__all__ = ["EFFECTIVE", "MEASURABLE", "NOISE", "Left", "checked_channels", "compare", "problem_of", "taken", "weights_of"]
+__all__ = [
+    "EFFECTIVE",
+    "MEASURABLE",
+    "NOISE",
+    "Left",
+    "Linear",
+    "checked_channels",
+    "difference",
+    "linear",
+    "misfit",
+    "problem_of",
+    "taken",
+    "weights_of",
+]
 
 Array = NDArray[np.float64]
 
@@ -158,46 +171,80 @@ def _free(problem: Problem, rig: Rig) -> dict[str, float]:
     return out
 
 
-def compare(problem: Problem, rig: Rig, weights: Mapping[Key, float], *, base: Mapping[Key, Array] | None = None) -> Left:
-    """What a model leaves of some recordings after its free parameters have moved as far as they may.
+@dataclass(frozen=True, eq=False)
+class Linear:
+    """A model near to some recordings.
+
+    Attributes
+    ----------
+    rig : Rig
+        The model.
+    free : dict of str to float
+        Parameters that may move, with the standard deviation of what is known [SI].
+    found : dict
+        Residuals by block and recording, with sensitivities to them.
+    """
+
+    rig: Rig
+    free: dict[str, float]
+    found: dict[Key, Residual]
+
+
+def linear(problem: Problem, rig: Rig) -> Linear:
+    """Residuals of a model and their sensitivities to all that is free."""
+    free = _free(problem, rig)
+    return Linear(rig, free, residuals(problem, rig, list(free)))
+
+
+def misfit(problem: Problem, model: Linear, weights: Mapping[Key, float]) -> Left:
+    """What a model leaves of recordings after its free parameters have moved as far as they may."""
+    return _left(problem, {key: r.value for key, r in model.found.items()}, model, weights)
+
+
+def difference(problem: Problem, truth: Linear, other: Linear, weights: Mapping[Key, float]) -> Left:
+    """What a model leaves of the recordings that another one makes.
 
     Parameters
     ----------
     problem : Problem
-        Blocks and recordings.
-    rig : Rig
-        The model.
+        Blocks, and recordings without noise that ``truth`` makes.
+    truth : Linear
+        The model that makes them; what it leaves itself (smoothing and the longer step of the cut chain) is taken off.
+    other : Linear
+        The model that is to explain them, with its sensitivities along recordings of its own: where two models are hard to tell
+        apart, theirs are alike.
     weights : mapping
         As :func:`weights_of`.
-    base : mapping, optional
-        Residual, by sample, of the model that made the recordings, which is taken off: smoothing and the longer step of the cut
-        chain leave a trace of their own.
     """
-    free = _free(problem, rig)
-    found = residuals(problem, rig, list(free))
-    spread = np.array(list(free.values()))
-    rows, slopes, scales, sizes = [], [], [], []
+    core = problem.core.respecified(other.rig.to_json())
+    values = {}
+    for prepared in problem.recordings:
+        for block in problem.blocks:
+            key = (block.name, prepared.recording.name)
+            values[key] = change(block, core, prepared, truth.found[key]) - truth.found[key].value
+    return _left(problem, values, other, weights)
+
+
+def _left(problem: Problem, values: Mapping[Key, Array], model: Linear, weights: Mapping[Key, float]) -> Left:
+    spread = np.array(list(model.free.values()))
+    rows, slopes, scales = [], [], []
     keys: list[Key] = []
     for prepared in problem.recordings:
         width = bin_width(prepared, FIT_BIN)
         for block in problem.blocks:
             key = (block.name, prepared.recording.name)
-            r = found[key]
-            value = r.value if base is None else np.where(r.rows, r.value - base[key], 0.0)
-            mean, counts = binned(value, r.rows, width)
-            jacobian = np.zeros((value.size, 0)) if r.jacobian is None else r.jacobian
-            slope, _ = binned(jacobian, r.rows, width)
+            r = model.found[key]
+            mean, counts = binned(np.where(r.rows, values[key], 0.0), r.rows, width)
+            slope, _ = binned(np.zeros((values[key].size, 0)) if r.jacobian is None else r.jacobian, r.rows, width)
             floor = weights[key] * prepared.noise[block.channel] / math.sqrt(bins_of(prepared))
-            used = max(1, int((counts > 0).sum()))
-            # fine bins are smooth over a coarse one: a mean square of fine ones in units of the coarse floor
-            scale = math.sqrt(EFFECTIVE / used) / floor
+            # what differs is smooth over a bin of 0.1 s: its mean square in fine bins is that in coarse ones
+            scale = math.sqrt(EFFECTIVE / max(1, int((counts > 0).sum()))) / floor
             rows.append(mean * scale)
             slopes.append(-slope * spread * scale)
             scales.append(scale)
-            sizes.append(used)
             keys.append(key)
     stacked, jacobian = np.concatenate(rows), np.concatenate(slopes)
-    moved = np.linalg.solve(jacobian.T @ jacobian + np.eye(spread.size), jacobian.T @ stacked) if spread.size else np.zeros(0)
+    moved = np.linalg.solve(jacobian.T @ jacobian + np.eye(spread.size), jacobian.T @ stacked)
     left = stacked - jacobian @ moved
     rms, kept = {}, {}
     start = 0
