@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.diagnosis.blocks import Residual, available_blocks, change
+from pamrs.diagnosis.blocks import Residual, available_blocks
 from pamrs.diagnosis.evidence import bins_of, floors
 from pamrs.diagnosis.fitting import FIT_BIN, Key, Problem, bin_width, free_baseline, residuals
 from pamrs.diagnosis.signals import Prepared, binned, prepare
@@ -201,28 +201,22 @@ def misfit(problem: Problem, model: Linear, weights: Mapping[Key, float]) -> Lef
     return _left(problem, {key: r.value for key, r in model.found.items()}, model, weights)
 
 
-def difference(problem: Problem, truth: Linear, other: Linear, weights: Mapping[Key, float]) -> Left:
+def difference(problem: Problem, truth: Mapping[Key, Residual], other: Rig, weights: Mapping[Key, float]) -> Left:
     """What a model leaves of the recordings that another one makes.
 
     Parameters
     ----------
     problem : Problem
-        Blocks, and recordings without noise that ``truth`` makes.
-    truth : Linear
-        The model that makes them; what it leaves itself (smoothing and the longer step of the cut chain) is taken off.
-    other : Linear
-        The model that is to explain them, with its sensitivities along recordings of its own: where two models are hard to tell
-        apart, theirs are alike.
+        Blocks, and recordings without noise.
+    truth : mapping
+        Residuals of the model that makes them; what it leaves itself (smoothing and the longer step of the cut chain) is taken off.
+    other : Rig
+        The model that is to explain them.
     weights : mapping
         As :func:`weights_of`.
     """
-    core = problem.core.respecified(other.rig.to_json())
-    values = {}
-    for prepared in problem.recordings:
-        for block in problem.blocks:
-            key = (block.name, prepared.recording.name)
-            values[key] = change(block, core, prepared, truth.found[key]) - truth.found[key].value
-    return _left(problem, values, other, weights)
+    model = linear(problem, other)
+    return _left(problem, {key: r.value - truth[key].value for key, r in model.found.items()}, model, weights)
 
 
 def _left(problem: Problem, values: Mapping[Key, Array], model: Linear, weights: Mapping[Key, float]) -> Left:

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs.channels import unit_of
-from pamrs.diagnosis.differences import EFFECTIVE, MEASURABLE, NOISE, Left, difference, linear, problem_of, taken, weights_of
-from pamrs.diagnosis.fitting import FIT_BIN, Key, Problem, acts_in, bin_width
+from pamrs.diagnosis.differences import EFFECTIVE, MEASURABLE, NOISE, Left, difference, problem_of, taken, weights_of
+from pamrs.diagnosis.fitting import FIT_BIN, Key, Problem, acts_in, bin_width, residuals
 from pamrs.diagnosis.protocols import SAMPLE_TIME, SEALED_SAMPLE_TIME, Experiment, library
 from pamrs.diagnosis.signals import Prepared
 from pamrs.effects_table import EFFECTS
@@ -27,7 +27,7 @@ from pamrs.recording import Recording
 from pamrs.rig import Rig
 from pamrs.simulation import Simulation, core_rig
 
-__all__ = ["Outcome", "entropy", "information", "outcome_of", "propose"]
+__all__ = ["Outcome", "entropy", "information", "outcome_of", "propose", "ranked"]
 
 Array = NDArray[np.float64]
 Hypothesis = tuple[str, Rig, float]
@@ -90,6 +90,8 @@ class Outcome:
         One for each hypothesis.
     left : dict of (int, int) to Left
         What hypothesis j leaves of the outcome of hypothesis i.
+    distance : (h, h) array
+        Its sum of squares on the effective number of samples.
     problem : Problem
         Blocks, and the recording of the leading hypothesis.
     weights : dict
@@ -101,6 +103,7 @@ class Outcome:
     bits: float
     runs: list[Simulation]
     left: dict[tuple[int, int], Left]
+    distance: Array
     problem: Problem
     weights: dict[Key, float]
 
@@ -152,13 +155,26 @@ def outcome_of(
         for rig, run in zip(rigs, runs, strict=True)
     ]
     weights = weights_of(problems[0], rigs[0])
-    models = [linear(problem, rig) for problem, rig in zip(problems, rigs, strict=True)]
-    left = {(i, j): difference(problems[i], models[i], models[j], weights) for i, j in itertools.permutations(range(len(rigs)), 2)}
+    own = [residuals(problem, rig) for problem, rig in zip(problems, rigs, strict=True)]
+    left = {(i, j): difference(problems[i], own[i], rigs[j], weights) for i, j in itertools.permutations(range(len(rigs)), 2)}
     distance = np.zeros((len(rigs), len(rigs)))
     for pair, found in left.items():
         distance[pair] = found.total
     bits = information([p for _, _, p in hypotheses], distance)
-    return Outcome(experiment, sensor, bits, runs, left, problems[0], weights)
+    return Outcome(experiment, sensor, bits, runs, left, distance, problems[0], weights)
+
+
+def ranked(outcomes: Sequence[Outcome], probabilities: Sequence[float]) -> list[Outcome]:
+    """Outcomes by what they tell, the most telling first; of those that tell the same, the cheapest.
+
+    Parameters
+    ----------
+    outcomes : sequence of Outcome
+        Of the same hypotheses.
+    probabilities : sequence of float
+        Of these hypotheses, which may have changed since.
+    """
+    return sorted(outcomes, key=lambda o: (-round(information(probabilities, o.distance) / RESOLUTION), o.effort))
 
 
 def propose(
@@ -220,9 +236,11 @@ def propose(
         text = "One hypothesis is left; no experiment can add to that."
         return {"text": text, "excitation": {}, "expected_information_bits": 0.0, "ranking": [], "curves": None}
     pool = _library(nominal, records) if experiments is None else list(experiments)
-    found = []
+    found: list[Outcome] = []
     for sensor in ("", *_missing(nominal, own)):
-        for experiment in pool:
+        for experiment in sorted(pool, key=lambda e: e.effort):
+            if len(found) >= SHOWN and max(o.bits for o in found) > doubt - 0.5 * RESOLUTION:
+                break  # what is left costs more and cannot tell more
             try:
                 found.append(outcome_of(experiment, chosen, sound, own, sensor))
             except (SimulationError, DiagnosisError):
@@ -232,8 +250,8 @@ def propose(
             f"no experiment of rig {nominal.name!r} can be simulated with all of {', '.join(label for label, _, _ in chosen)} and "
             f"measured by {', '.join(own) or 'no channel'}"
         )
-    ranked = sorted(found, key=lambda o: (-round(o.bits / RESOLUTION), o.effort))
-    best = ranked[0]
+    best_first = ranked(found, [p for _, _, p in chosen])
+    best = best_first[0]
     return {
         "text": _text(best, chosen, doubt),
         "excitation": {**best.experiment.excitation, **({"sensor": best.sensor} if best.sensor else {})},
@@ -246,7 +264,7 @@ def propose(
                 "bits": round(o.bits, 3),
                 "effort_s": round(o.effort, 1),
             }
-            for o in ranked[:SHOWN]
+            for o in best_first[:SHOWN]
         ],
         "curves": _curves(best, chosen),
     }

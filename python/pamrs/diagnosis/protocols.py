@@ -320,7 +320,7 @@ class _Maker:
         return self.driven("long_hold", text, excitation, _through(points, self.dt))
 
     def step_and_shut(self) -> Experiment:
-        base, small, large = self.span.at(0.1), self.span.at(0.4), self.span.at(1.0)
+        base, small, large = self.span.at(0.05), self.span.at(0.3), self.span.at(0.8)
         points: Points = _then([(0.0, 0.0)], (1.5, base), (0.5, base))
         closed = []
         for goal in (small, base, large, base):
@@ -334,10 +334,10 @@ class _Maker:
             shut |= (time >= a) & (time < b)
         text = (
             f"step from {_bar(base):g} bar to {_bar(small):g} bar and back, then to {_bar(large):g} bar and back (sizes 1:3), with the "
-            "valve wide open, shut it 0.35 s after each step and watch for 4 s"
+            "valve far open, shut it 0.35 s after each step and watch for 4 s"
         )
         excitation = {"levels_bar": [_bar(base), _bar(small), _bar(large)], "watch_s": 4.0}
-        return self.driven("step_and_shut", text, excitation, reference, shut=shut, bandwidth=60.0)
+        return self.driven("step_and_shut", text, excitation, reference, shut=shut, bandwidth=30.0)
 
     def nested(self) -> Experiment:
         middle, reach = self.span.at(0.5), 0.45 * (self.span.high - self.span.low)
@@ -348,7 +348,8 @@ class _Maker:
                     points, (0.25 * period, middle + share * reach), (0.5 * period, middle - share * reach), (0.25 * period, middle)
                 )
         text = (
-            f"drive nested triangles around {_bar(middle):g} bar of {_bar(reach):g}, {_bar(0.6 * reach):g} and {_bar(0.3 * reach):g} bar, "
+            f"drive nested triangles around {_bar(middle):g} bar, of ±{_bar(reach):g}, ±{_bar(0.6 * reach):g} and "
+            f"±{_bar(0.3 * reach):g} bar, "
             "first with a period of 12 s, then of 1.2 s"
         )
         excitation = {"middle_bar": _bar(middle), "reach_bar": [_bar(s * reach) for s in (1.0, 0.6, 0.3)], "periods_s": [12.0, 1.2]}
@@ -433,8 +434,18 @@ def library(rig: Rig, *, sample_time: float | None = None, highest: float | None
     if rig.model["valve"] is None:
         return _sealed_library(rig, SEALED_SAMPLE_TIME if sample_time is None else sample_time, span)
     make = _Maker(rig, SAMPLE_TIME if sample_time is None else sample_time, span)
-    makers: list[Callable[[], Experiment | None]] = [make.multisine, make.sealed, lambda: make.triangle("slow_triangle", 15.0, 2), make.step_and_shut, make.staircase,
-              make.long_hold, make.nested, lambda: make.triangle("fast_triangle", 1.5, 10), make.null_ramp, make.both_sides]  # fmt: skip
+    makers: list[Callable[[], Experiment | None]] = [
+        make.multisine,
+        make.sealed,
+        lambda: make.triangle("slow_triangle", 15.0, 2),
+        make.step_and_shut,
+        make.staircase,
+        make.long_hold,
+        make.nested,
+        lambda: make.triangle("fast_triangle", 1.5, 10),
+        make.null_ramp,
+        make.both_sides,
+    ]
     if rig.model["arm"] is not None:
         makers += [make.other_payload, make.free_decay]
     out = []
