@@ -117,7 +117,7 @@ def _plan(rig: Path, channels: str | None, pressure_noise: str | None, angle_noi
     from pamrs.simulation import core_rig
 
     loaded = rig_named(rig)
-    noise = {}
+    noise: dict[str, float] = {}
     if pressure_noise is not None:
         noise |= dict.fromkeys(("supply_pressure", "muscle_pressure"), exact("pressure_noise", pressure_noise, "pressure"))
     if angle_noise is not None:

@@ -204,9 +204,7 @@ class _Trial:
         """A fitted set on the held-out recordings."""
         outside = found.residuals if self.same else residuals(self.outer, found.rig)
         after = {b.name: excess(b, self.outer.recordings, outside, self.floor) for b in self.inner.blocks}
-        inside = (
-            after if self.same else {b.name: excess(b, self.inner.recordings, found.residuals, self.floor) for b in self.inner.blocks}
-        )
+        inside = after if self.same else {b.name: excess(b, self.inner.recordings, found.residuals, self.floor) for b in self.inner.blocks}
         gaps = [(self.out[b.name].ratio - 1.0, max(0.0, after[b.name].ratio - 1.0)) for b in self.suspects]
         total = sum(math.sqrt(max(0.0, g)) for g, _ in gaps)
         gap = 1.0 - sum(math.sqrt(a) for _, a in gaps) / total if total > 0 else 0.0

@@ -229,7 +229,11 @@ class Plan:
             lines += ["", "Experiments assumed"]
             for experiment in self.experiments:
                 lines += _wrapped(f"{experiment['name']}: {experiment['text']} ({experiment['duration']:.0f} s)", 2)
-        lines += ["", "Effects at their typical size, after the baseline has moved inside its tolerances (noise units of 0.1 s)"]
+        return "\n".join([*lines, *(self._effects() if self.blocks else ["", "No effect can be seen"]), *self._gains()])
+
+    def _effects(self) -> list[str]:
+        """The table of the effects, and what is not told apart."""
+        lines = ["", "Effects at their typical size, after the baseline has moved inside its tolerances (noise units of 0.1 s)"]
         lines += [
             f"  {'effect':<25}{'':<8}{'left':>7}  {'in':<9}{'recording':<17}{'typical':>10}{'seen from':>11}  {'unit':<13}taken for"
         ]
@@ -243,7 +247,15 @@ class Plan:
                 f"  {sight.effect:<25}{sight.verdict:<8}{sight.left:>7.2g}  {where}{typical:>10}"
                 f"{smallest:>11}  {'' if unit == '1' else unit:<13}{', '.join(rivals)}".rstrip()
             )
-        lines += ["", "Not told apart: " + ("; ".join(", ".join(g) for g in self.groups) if self.groups else "none of those seen")]
+        return [
+            *lines,
+            "",
+            "Not told apart: " + ("; ".join(", ".join(g) for g in self.groups) if self.groups else "none of those seen"),
+        ]
+
+    def _gains(self) -> list[str]:
+        """What would add most."""
+        lines = []
         if self.additions:
             lines += ["", "What would add most"]
             for addition in self.additions:
@@ -251,7 +263,7 @@ class Plan:
                 gains += [f"tells {', '.join(f'{a} from {b}' for a, b in addition.separated)}"] if addition.separated else []
                 gains += [] if gains else ["sharper, nothing new"]
                 lines += _wrapped(f"{addition.kind} {addition.name}: {'; '.join(gains)} (+{addition.bits:.0f} bit)", 2)
-        return "\n".join(lines)
+        return lines
 
     def __repr__(self) -> str:
         return (
@@ -382,7 +394,7 @@ def plan_diagnosis(
         noise={c: sound[c] for c in own if c in sound},
         blocks=[_described(block) for block in blocks],
         missing=[
-            {"name": b.name, "covers": b.covers, "needs": [c for c in (*b.drives, b.channel) if c not in own]}
+            {"name": b.name, "covers": b.covers, "needs": _needed(rig, b.name, own, every)}
             for b in whole
             if b.name not in {own_block.name for own_block in blocks}
         ],
@@ -392,6 +404,16 @@ def plan_diagnosis(
         groups=_joined([(a, b) for a, b, _ in pairs], order),
         additions=additions,
     )
+
+
+def _needed(rig: Rig, block: str, own: tuple[str, ...], every: tuple[str, ...]) -> list[str]:
+    """The fewest channels that, added to those at hand, surround a block."""
+    lacking = [c for c in every if c not in own]
+    for count in range(1, len(lacking) + 1):
+        for several in itertools.combinations(lacking, count):
+            if any(b.name == block for b in available_blocks(rig, (*own, *several))):
+                return list(several)
+    return lacking
 
 
 def _check_rig(rig: Rig) -> None:
