@@ -28,6 +28,7 @@ from pamrs.rig import Rig
 
 Array = NDArray[np.float64]
 DECIDED = 0.95
+OPEN = 0.9
 ORDERS = 20
 SEED = 20260101
 
@@ -43,15 +44,26 @@ class Question:
 
 
 QUESTIONS = (
-    Question("slow_triangle", "valve_centre_leakage", {"conductance": 2e-11}, ("leak_muscle", "valve_dead_zone")),
+    Question("slow_triangle", "valve_centre_leakage", {"conductance": 4e-12}, ("leak_muscle", "valve_dead_zone")),
     Question("slow_triangle", "muscle_creep", {"stiffness": 60.0, "time_constant": 2.0}, ("muscle_hysteresis", "muscle_rate_damping")),
-    Question("staircase", "muscle_hysteresis", {"friction_constant": 0.3, "friction_pressure": 3e-6}, ("joint_coulomb_stribeck", "muscle_creep")),
-    Question("slow_triangle", "pressure_lag", {"time_constant": 0.02}, ("input_path_lag", "clock_skew")),
-    Question("slow_triangle", "mullins_softening", {"softening": 0.04}, ("muscle_creep", "muscle_hysteresis")),
-    Question("slow_triangle", "pam_crowding_contact", {"contact_area": 3e-4, "onset_contraction": 0.1}, ("joint_end_stop", "activation_pressure")),
-    Question("staircase", "valve_hysteresis", {"half_width": 0.0008}, ("valve_dead_zone", "input_path_lag")),
-    Question("slow_triangle", "heat_transfer", {"heat_transfer_coefficient": 60.0}, ("leak_muscle", "valve_centre_leakage")),
-)  # fmt: skip
+    Question(
+        "staircase",
+        "muscle_hysteresis",
+        {"friction_constant": 0.1, "friction_pressure": 1e-6},
+        ("joint_coulomb_stribeck", "muscle_creep"),
+    ),
+    Question("slow_triangle", "pressure_lag", {"time_constant": 0.004}, ("input_path_lag", "clock_skew")),
+    Question("slow_triangle", "mullins_softening", {"softening": 0.01}, ("muscle_creep", "muscle_hysteresis")),
+    Question(
+        "slow_triangle",
+        "pam_crowding_contact",
+        {"contact_area": 5e-5, "onset_contraction": 0.1},
+        ("joint_end_stop", "activation_pressure"),
+    ),
+    Question("staircase", "valve_hysteresis", {"half_width": 0.0002}, ("valve_dead_zone", "input_path_lag")),
+    Question("slow_triangle", "leak_muscle", {"conductance": 1e-11}, ("valve_centre_leakage", "supply_leak")),
+)
+"""Sizes are halved until one recording does leave the question open."""
 
 
 def drawn(rig: Rig, rng: np.random.Generator) -> Rig:
@@ -68,12 +80,10 @@ def fitted(problem: Problem, nominal: Rig, effect: str, weights: dict[tuple[str,
     inflation = {b.name: weights[b.name, prepared.recording.name] ** 2 * bins / (5.0 * EFFECTIVE) for b in problem.blocks}
     found = []
     for start in starts_of(effect, sealed=False):
-        for size in (1.0, 0.2):
-            try:
-                free = start.scaled(size).free
-                found.append(fit(problem, nominal, (effect,), free, inflation, fixed=start.held, evaluations=8))
-            except SimulationError:
-                continue
+        try:
+            found.append(fit(problem, nominal, (effect,), start.scaled(0.2).free, inflation, fixed=start.held, evaluations=8))
+        except SimulationError:
+            continue
     return min(found, key=lambda f: f.cost) if found else None
 
 
@@ -98,22 +108,30 @@ def run(question: Question, nominal: Rig, experiments: list[Experiment], seed: i
     """One line."""
     began = time.perf_counter()
     rng = np.random.default_rng(seed)
-    truth = drawn(nominal, rng).with_effect(question.truth, question.parameters)
+    plant = drawn(nominal, rng)
     first = next(e for e in experiments if e.name == question.first)
-    seen = taken(first.simulate(truth), truth, first.name, NOISE, rng=rng)
-    problem = problem_of(nominal, [seen], MEASURABLE)
-    weights = weights_of(problem, nominal)
-    hypotheses: list[Hypothesis] = []
-    logs = []
-    for effect in (question.truth, *question.rivals):
-        found = fitted(problem, nominal, effect, weights)
-        if found is None:
-            continue
-        entry = next(e for e in found.rig.effects if e["id"] == effect)
-        std = {n.partition(".")[2]: s for n, s in found.std.items() if n.partition(".")[0] == effect}
-        hypotheses.append((effect, found.rig.with_effect(effect, entry["parameters"], std=std), 0.5))
-        logs.append(-found.cost)
-    prior = normalised(np.array(logs))
+    size = 2.0
+    while True:
+        size *= 0.5
+        scaled = {n.partition(".")[2] for s in starts_of(question.truth, sealed=False) for n in s.sizes}
+        parameters = {n: v * size if n in scaled else v for n, v in question.parameters.items()}
+        truth = plant.with_effect(question.truth, parameters)
+        seen = taken(first.simulate(truth), truth, first.name, NOISE, rng=rng)
+        problem = problem_of(nominal, [seen], MEASURABLE)
+        weights = weights_of(problem, nominal)
+        hypotheses: list[Hypothesis] = []
+        logs = []
+        for effect in (question.truth, *question.rivals):
+            found = fitted(problem, nominal, effect, weights)
+            if found is None:
+                continue
+            entry = next(e for e in found.rig.effects if e["id"] == effect)
+            std = {n.partition(".")[2]: s for n, s in found.std.items() if n.partition(".")[0] == effect}
+            hypotheses.append((effect, found.rig.with_effect(effect, entry["parameters"], std=std), 0.5))
+            logs.append(-found.cost)
+        prior = normalised(np.array(logs))
+        if prior.max() <= OPEN or size < 0.1:
+            break
     hypotheses = [(label, rig, float(p)) for (label, rig, _), p in zip(hypotheses, prior, strict=True)]
     outcomes: list[Outcome] = []
     gains: dict[str, Array] = {}
@@ -140,7 +158,7 @@ def run(question: Question, nominal: Rig, experiments: list[Experiment], seed: i
     best = ranked(outcomes, list(prior))[0].experiment.name if outcomes else "-"
     worst = max(r[0] for r in random)
     print(
-        f"{question.truth:<22} {question.first:<14} {' '.join(f'{p:.2f}' for p in prior):<15} {best:<17} "
+        f"{question.truth:<21} x {size:<5g} {question.first:<14} {' '.join(f'{p:.2f}' for p in prior):<15} {best:<17} "
         f"{ours[0]:>2} {'right' if ours[2] else 'wrong'} {ours[1]:>5.1f} min   "
         f"{np.mean([r[0] for r in random]):>5.2f} (at most {worst}) {100 * np.mean([r[2] for r in random]):>4.0f} % right "
         f"{np.mean([r[1] for r in random]):>5.1f} min   [{time.perf_counter() - began:.0f} s]",
@@ -152,7 +170,7 @@ def main() -> None:
     nominal = pamrs.rigs.shoulder()
     experiments = library(nominal)
     print(f"library: {', '.join(e.name for e in experiments)}")
-    print("truth                  first          after it        proposed first    recordings to p > 0.95: proposed, random")
+    print("truth and its size            first          after it        proposed first    recordings to p > 0.95: proposed, random")
     chosen = [int(a) for a in sys.argv[1:]] or range(len(QUESTIONS))
     for index in chosen:
         run(QUESTIONS[index], nominal, experiments, SEED + index)

@@ -70,8 +70,9 @@ def information(probabilities: Sequence[float], distance: Array) -> float:
     """
     p = np.asarray(probabilities, dtype=np.float64)
     p = p / p.sum()
+    there = p > 0.0
     mixed = np.exp(-0.125 * np.clip(distance, 0.0, None)) @ p
-    return min(max(0.0, -float(p @ np.log2(mixed))), entropy(list(p)))
+    return min(max(0.0, -float(p[there] @ np.log2(mixed[there]))), entropy(list(p)))
 
 
 @dataclass(frozen=True, eq=False)
