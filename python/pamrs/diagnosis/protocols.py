@@ -8,7 +8,7 @@ every hypothesis answers to the same ones.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -413,7 +413,9 @@ def _sealed_library(rig: Rig, sample_time: float, span: Range) -> list[Experimen
     return out
 
 
-def library(rig: Rig, *, sample_time: float | None = None, highest: float | None = None) -> list[Experiment]:
+def library(
+    rig: Rig, *, sample_time: float | None = None, highest: float | None = None, only: Collection[str] | None = None
+) -> list[Experiment]:
     """The standard experiments that a rig can do.
 
     Parameters
@@ -424,6 +426,8 @@ def library(rig: Rig, *, sample_time: float | None = None, highest: float | None
         Time between samples [s].
     highest : float, optional
         Gauge pressure that is not to be exceeded [Pa].
+    only : collection of str, optional
+        Names of those to make; all by default.
 
     Returns
     -------
@@ -432,24 +436,27 @@ def library(rig: Rig, *, sample_time: float | None = None, highest: float | None
     """
     span = pressure_range(rig, highest=highest)
     if rig.model["valve"] is None:
-        return _sealed_library(rig, SEALED_SAMPLE_TIME if sample_time is None else sample_time, span)
+        sealed = _sealed_library(rig, SEALED_SAMPLE_TIME if sample_time is None else sample_time, span)
+        return [e for e in sealed if only is None or e.name in only]
     make = _Maker(rig, SAMPLE_TIME if sample_time is None else sample_time, span)
-    makers: list[Callable[[], Experiment | None]] = [
-        make.multisine,
-        make.sealed,
-        lambda: make.triangle("slow_triangle", 15.0, 2),
-        make.step_and_shut,
-        make.staircase,
-        make.long_hold,
-        make.nested,
-        lambda: make.triangle("fast_triangle", 1.5, 10),
-        make.null_ramp,
-        make.both_sides,
-    ]
+    makers: dict[str, Callable[[], Experiment | None]] = {
+        "multisine": make.multisine,
+        "sealed_hold": make.sealed,
+        "slow_triangle": lambda: make.triangle("slow_triangle", 15.0, 2),
+        "step_and_shut": make.step_and_shut,
+        "staircase": make.staircase,
+        "long_hold": make.long_hold,
+        "nested_triangles": make.nested,
+        "fast_triangle": lambda: make.triangle("fast_triangle", 1.5, 10),
+        "null_ramp": make.null_ramp,
+        "holds_both_sides": make.both_sides,
+    }
     if rig.model["arm"] is not None:
-        makers += [make.other_payload, make.free_decay]
+        makers |= {"other_payload": make.other_payload, "free_decay": make.free_decay}
     out = []
-    for maker in makers:
+    for name, maker in makers.items():
+        if only is not None and name not in only:
+            continue
         try:
             found = maker()
         except SimulationError:
