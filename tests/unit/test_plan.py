@@ -118,7 +118,7 @@ def test_holds_on_both_sides_separate_a_leak_from_centre_leakage(monkeypatch: py
     monkeypatch.setattr(plan, "library", lambda rig: pool)
     leaks = {name: EFFECTS[name] for name in ("leak_muscle", "valve_centre_leakage")}
     monkeypatch.setattr(plan, "EFFECTS", leaks)
-    quiet = {"muscle_pressure": 50.0, "supply_pressure": 50.0}
+    quiet = {"muscle_pressure": 20.0, "supply_pressure": 20.0, "joint_angle": 1e-4}
     found = pamrs.plan_diagnosis(rig, ALL, experiments=["holds_both_sides"], noise=quiet)
     assert found.separable("leak_muscle", "valve_centre_leakage")
     leaking, still = both.simulate(rig.with_effect("valve_centre_leakage", {"conductance": 3e-10})), both.simulate(rig)
