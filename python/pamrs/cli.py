@@ -82,7 +82,7 @@ def _diagnose(
         _plan(plan, channels, pressure_noise, angle_noise, json)
         return
     if case is None:
-        raise typer.BadParameter("give a case folder, or a rig by --plan")
+        raise typer.BadParameter("the argument CASE is missing: a case folder is needed, or a rig by --plan")
     if not (channels is None and pressure_noise is None and angle_noise is None):
         raise typer.BadParameter("--channels, --pressure-noise and --angle-noise need --plan")
     from pamrs.case import load_case
