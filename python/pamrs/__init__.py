@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from pamrs import fit, library, rigs, sizing
     from pamrs.case import Case, load_case
     from pamrs.diagnosis import diagnose
+    from pamrs.diagnosis.plan import Plan, plan_diagnosis
     from pamrs.diagnosis.result import Diagnosis
     from pamrs.errors import (
         CaseError,
@@ -46,6 +47,7 @@ __all__ = [
     "PamrsError",
     "Parameter",
     "ParameterError",
+    "Plan",
     "Recording",
     "RecordingError",
     "Rig",
@@ -61,6 +63,7 @@ __all__ = [
     "load_case",
     "load_recording",
     "load_rig",
+    "plan_diagnosis",
     "rigs",
     "simulate",
     "sizing",
@@ -80,6 +83,7 @@ _HOMES: Final[dict[str, str]] = {
     "PamrsError": "pamrs.errors",
     "Parameter": "pamrs.rig",
     "ParameterError": "pamrs.errors",
+    "Plan": "pamrs.diagnosis.plan",
     "Recording": "pamrs.recording",
     "RecordingError": "pamrs.errors",
     "Rig": "pamrs.rig",
@@ -92,6 +96,7 @@ _HOMES: Final[dict[str, str]] = {
     "load_case": "pamrs.case",
     "load_recording": "pamrs.recording",
     "load_rig": "pamrs.rig",
+    "plan_diagnosis": "pamrs.diagnosis.plan",
     "simulate": "pamrs.simulation",
 }
 

@@ -22,7 +22,7 @@ from pamrs.cli_library import library_command, size_command
 from pamrs.cli_lift import lift_command
 from pamrs.cli_prove import prove_command
 from pamrs.cli_reproduce import reproduce_command
-from pamrs.cli_shared import check_writable, progress, rig_named
+from pamrs.cli_shared import check_writable, exact, progress, rig_named, write
 from pamrs.cli_simulate import simulate_command
 from pamrs.rig_files import packaged
 
@@ -65,14 +65,31 @@ def _root(
 
 @app.command("diagnose")
 def _diagnose(
-    case: Annotated[Path, typer.Argument(help="Folder with case.toml, rig.toml and the recordings.")],
+    case: Annotated[Path | None, typer.Argument(help="Folder with case.toml, rig.toml and the recordings.")] = None,
     report: Annotated[Path | None, typer.Option(help="Write the report, one HTML file.")] = None,
     json: Annotated[Path | None, typer.Option(help="Write the result (schema pamrs.diagnosis/1).")] = None,
     png: Annotated[Path | None, typer.Option(help="Write the summary picture.")] = None,
     model: Annotated[Path | None, typer.Option(help="Write the rig with the named effect in it.")] = None,
+    plan: Annotated[
+        Path | None, typer.Option(help="Instead of a case: a rig file or a rig of the package; say what a diagnosis could tell.")
+    ] = None,
+    channels: Annotated[str | None, typer.Option(help="With --plan: channels at hand, joined by commas; all by default.")] = None,
+    pressure_noise: Annotated[str | None, typer.Option(help="With --plan: sample noise of the pressures, like '200 Pa'.")] = None,
+    angle_noise: Annotated[str | None, typer.Option(help="With --plan: sample noise of the angle, like '0.03 deg'.")] = None,
 ) -> None:
-    """Find the physics that the rig's model leaves out of a case's recordings."""
+    """Find the physics that the rig's model leaves out of a case's recordings; with --plan, what could be found at all."""
     check_writable(report, json, png, model)
+    if plan is not None:
+        if case is not None:
+            raise typer.BadParameter("give a case or --plan, not both")
+        if report is not None or png is not None or model is not None:
+            raise typer.BadParameter("--plan writes text and --json only")
+        _plan(plan, channels, pressure_noise, angle_noise, json)
+        return
+    if case is None:
+        raise typer.BadParameter("the argument CASE is missing: a case folder is needed, or a rig by --plan")
+    if not (channels is None and pressure_noise is None and angle_noise is None):
+        raise typer.BadParameter("--channels, --pressure-noise and --angle-noise need --plan")
     from pamrs.case import load_case
 
     loaded = load_case(case)
@@ -94,6 +111,30 @@ def _diagnose(
     for path in (report, json, png, model):
         if path is not None:
             typer.echo(f"written: {path}", err=True)
+
+
+def _plan(rig: Path, channels: str | None, pressure_noise: str | None, angle_noise: str | None, json: Path | None) -> None:
+    """What a diagnosis could tell, to standard output and a file."""
+    from json import dumps
+
+    from pamrs.diagnosis.differences import MEASURABLE
+    from pamrs.diagnosis.plan import plan_diagnosis
+    from pamrs.simulation import core_rig
+
+    loaded = rig_named(rig)
+    noise: dict[str, float] = {}
+    if pressure_noise is not None:
+        noise |= dict.fromkeys(("supply_pressure", "muscle_pressure"), exact("pressure_noise", pressure_noise, "pressure"))
+    if angle_noise is not None:
+        noise["joint_angle"] = exact("angle_noise", angle_noise, "angle")
+    core = core_rig(loaded)
+    every = [name for name in MEASURABLE if name in {*core.inputs, *core.channels}]
+    given = every if channels is None else [name.strip() for name in channels.split(",") if name.strip()]
+    with progress(f"planning for {loaded.name}"):
+        result = plan_diagnosis(loaded, given, noise=noise)
+    if json is not None:
+        write({json: dumps(result.to_dict(), indent=2) + "\n"})
+    typer.echo(result.text())
 
 
 @rig_app.command("check")

@@ -37,6 +37,7 @@ __all__ = [
     "decimate",
     "legend_above",
     "map_svg",
+    "separating_curves",
     "summary_png",
     "svg_text",
     "telling_trace",
@@ -258,6 +259,67 @@ def traces_svg(diagnosis: Diagnosis, traces: Sequence[Trace], prefix: str) -> st
         axes[-1].set_xlabel("time [s]")
         figure.align_ylabels(list(axes))
         return svg_text(figure, prefix)
+
+
+HYPOTHESES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#c79a00", "#56b4e9")
+"""Colours of hypotheses, the leading one first (Okabe and Ito)."""
+
+
+def separating_curves(curves: dict[str, Any], prefix: str = "next") -> str:
+    """The next experiment as every hypothesis predicts it, and what each cannot explain of the leading one's outcome.
+
+    Parameters
+    ----------
+    curves : dict
+        ``curves`` of :func:`pamrs.diagnosis.experiment.propose`: ``channel``, ``unit``, ``time`` (n,), ``values`` {label: (n,)},
+        ``leading``, ``bin_time`` (m,), ``left`` {label: (m,)}, ``noise``.
+    prefix : str
+        Prefix of the element ids.
+
+    Returns
+    -------
+    str
+        SVG element.
+    """
+    with mpl.rc_context(STYLE):
+        return svg_text(_separating(curves), prefix)
+
+
+def _separating(curves: dict[str, Any]) -> Figure:
+    """Two panels over time: the channel, and what is left of it."""
+    time, values, left = np.asarray(curves["time"]), curves["values"], curves["left"]
+    colours = dict(zip(values, HYPOTHESES, strict=False))
+    figure = Figure(figsize=(10.0, 5.0), layout="constrained")
+    upper, lower = figure.subplots(2, 1, sharex=True, gridspec_kw={"height_ratios": [1.5, 1.2]})
+    unit, factor = display_unit(curves["unit"], _largest(*values.values()))
+    for place, (name, curve) in enumerate(values.items()):
+        x, y = decimate(time, np.asarray(curve, dtype=np.float64))
+        # the leading one is broad, the others are dashed over it: they often lie on it
+        style: dict[str, Any] = {"lw": 2.6, "alpha": 0.75} if place == 0 else {"lw": 1.2, "ls": (0, (4 + place, 2))}
+        upper.plot(x, factor * y, color=colours[name], label=hypothesis_label(name), **style)
+    upper.set_ylabel(f"{label(curves['channel'])} [{unit}]" if unit else label(curves["channel"]))
+    upper.set_title("predicted from the same commands")
+    legend_above(upper)
+    unit, factor = display_unit(curves["unit"], _largest(*left.values()))
+    noise = float(curves["noise"]) * factor
+    lower.axhspan(-2.0 * noise, 2.0 * noise, color="#dfe3e8", lw=0, label="noise (± 2 std)")
+    lower.axhline(0.0, color="#6b7280", lw=0.7)
+    for name, curve in left.items():
+        x, y = decimate(np.asarray(curves["bin_time"]), np.asarray(curve, dtype=np.float64))
+        lower.plot(x, factor * y, color=colours[name], lw=1.1, label=hypothesis_label(name))
+    lower.set_ylabel(f"cannot explain [{unit}]" if unit else "cannot explain")
+    lower.set_title(f"what is left if it is {hypothesis_label(curves['leading'])}")
+    lower.set_xlabel("time [s]")
+    legend_above(lower)
+    for panel in (upper, lower):
+        panel.margins(x=0.005)
+    figure.align_ylabels([upper, lower])
+    return figure
+
+
+def hypothesis_label(name: str) -> str:
+    """A set of effects joined by ``+`` in words."""
+    return " + ".join(label(part) for part in name.split("+"))
 
 
 def _block_rows(diagnosis: Diagnosis) -> list[tuple[str, float, bool]]:

@@ -212,6 +212,24 @@ def _excitation(diagnosis: Diagnosis) -> list[tuple[str, str]]:
     ]
 
 
+def _separating(diagnosis: Diagnosis) -> str | None:
+    """The curves of the next experiment, where it was simulated."""
+    curves = diagnosis.next_experiment.get("curves")
+    return figures.separating_curves(curves) if curves else None
+
+
+def _ranking(diagnosis: Diagnosis) -> list[dict[str, str]]:
+    """The experiments that were compared, the most telling first."""
+    return [
+        {
+            "name": words.label(str(entry["name"])) + (f" with {words.label(str(entry['sensor']))}" if entry.get("sensor") else ""),
+            "bits": words.format_number(entry["bits"], 2),
+            "effort": f"{float(entry['effort_s']) / 60.0:.1f} min",
+        }
+        for entry in diagnosis.next_experiment.get("ranking") or []
+    ]
+
+
 def render(diagnosis: Diagnosis) -> str:
     """Return the report of a diagnosis as one HTML page without references to anything outside it.
 
@@ -246,6 +264,8 @@ def render(diagnosis: Diagnosis) -> str:
         experiment=str(diagnosis.next_experiment.get("text") or ""),
         excitation=_excitation(diagnosis),
         bits=words.format_number(bits, 2) if words.is_number(bits) else "",
+        separating=_markup(_separating(diagnosis)),
+        ranking=_ranking(diagnosis),
         fits=[
             (title, rows)
             for title, rows in (

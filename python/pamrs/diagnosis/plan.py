@@ -1,0 +1,567 @@
+"""Before any data: which blocks some channels tell apart, which effects they show, and which they cannot tell from each other.
+
+The rig is simulated under a few standard experiments. Each effect of the catalogue, at a typical size, changes the residuals of the
+cut chain by a signature; what the baseline can do inside its tolerances, and the starts of the windows, are taken off it. What is
+left, in units of the noise, says whether the effect would be seen, and the angle between what is left of two effects whether one
+would be taken for the other (Ding, Model-Based Fault Diagnosis Techniques, 2013, isolability by projected signatures).
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import textwrap
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pamrs.diagnosis.blocks import Block, available_blocks
+from pamrs.diagnosis.differences import EFFECTIVE, MEASURABLE, NOISE, checked_channels, taken, weights_of
+from pamrs.diagnosis.evidence import bins_of
+from pamrs.diagnosis.fitting import FIT_BIN, Key, Problem, acts_in, bin_width, changes, free_baseline, residuals
+from pamrs.diagnosis.protocols import Experiment, library
+from pamrs.diagnosis.signals import binned
+from pamrs.diagnosis.starts import Start, starts_of
+from pamrs.driving import regulators_of
+from pamrs.effects_table import EFFECTS, find_parameter
+from pamrs.errors import DiagnosisError, ParameterError, SimulationError
+from pamrs.rig import Rig
+from pamrs.simulation import core_rig
+
+__all__ = ["Addition", "Plan", "Sight", "plan_diagnosis"]
+
+Array = NDArray[np.float64]
+
+SEEN = 3.0
+"""Signature left, in noise units of a bin of 0.1 s, from which an effect counts as seen."""
+FAINT = 0.77
+"""Same from which the excess of a block would be called significant (a variance of 1.6 floors)."""
+ALIKE = 0.95
+"""Cosine between signatures from which two effects are one."""
+APART = 1.0
+"""Noise units that must be left of an effect when the other one explains all that it can."""
+BASIC = ("multisine", "sealed_hold", "slow_triangle", "step_and_shut", "hold_low", "hold_high")
+"""Experiments that a plan assumes by default, those of them that the rig can do."""
+LARGEST = 1e4
+"""Largest multiple of the typical size that is worth telling."""
+_LUMPED = {
+    "supply": "what leaves the tank by itself and what the valve takes are one sum in its pressure; only that follows the command",
+    "chamber": "no pressure is measured between the valve's outlet and the muscle, nor the temperature of the gas",
+    "arm": "neither force nor torque is measured between the muscle and the arm",
+}
+
+
+@dataclass(frozen=True)
+class Sight:
+    """How an effect would show.
+
+    Attributes
+    ----------
+    effect : str
+        Its id.
+    left : float
+        What is left of its signature, root mean square over the recording where that is largest [noise units].
+    block, recording : str
+        Where; empty when it acts in no block that the channels surround.
+    size : str
+        Dotted name of the parameter that scales it; empty where no number does.
+    typical, smallest : float
+        Typical value of that parameter and the smallest one that leaves three noise units [SI]; NaN without one.
+    """
+
+    effect: str
+    left: float
+    block: str = ""
+    recording: str = ""
+    size: str = ""
+    typical: float = math.nan
+    smallest: float = math.nan
+
+    @property
+    def verdict(self) -> str:
+        """``seen``, ``faint`` or ``hidden`` at the typical size."""
+        return "seen" if self.left >= SEEN else "faint" if self.left >= FAINT else "hidden"
+
+
+@dataclass(frozen=True)
+class Addition:
+    """What one more channel or experiment would add.
+
+    Attributes
+    ----------
+    kind, name, text : str
+        ``channel`` or ``experiment``, which one, and in words.
+    seen : tuple of str
+        Effects that are seen only with it.
+    separated : tuple of (str, str)
+        Pairs that are told apart only with it.
+    bits : float
+        Gain of half the logarithm of the determinant of the effects' information at their typical sizes [bit].
+    """
+
+    kind: str
+    name: str
+    text: str
+    seen: tuple[str, ...]
+    separated: tuple[tuple[str, str], ...]
+    bits: float
+
+
+@dataclass(frozen=True, repr=False)
+class Plan:
+    """What some channels and experiments can tell of a rig.
+
+    Attributes
+    ----------
+    rig : str
+        Its name.
+    channels : tuple of str
+        Measured ones.
+    noise : dict of str to float
+        Sample noise of each [SI].
+    blocks : list of dict
+        ``name``, ``channel``, ``drives``, ``covers``, ``why`` its parts are lumped.
+    missing : list of dict
+        Blocks that would be there with more channels: ``name``, ``covers``, ``needs``.
+    experiments : list of dict
+        ``name``, ``text``, ``duration`` [s] of those assumed.
+    sights : list of Sight
+        One for each effect that the rig can have, in the order of the catalogue.
+    pairs : list of (str, str, float)
+        Effects seen that are not told apart, with the cosine of their signatures.
+    groups : list of tuple of str
+        The same, joined.
+    additions : list of Addition
+        What would add most, first.
+    """
+
+    rig: str
+    channels: tuple[str, ...]
+    noise: dict[str, float]
+    blocks: list[dict[str, Any]]
+    missing: list[dict[str, Any]]
+    experiments: list[dict[str, Any]]
+    sights: list[Sight]
+    pairs: list[tuple[str, str, float]]
+    groups: list[tuple[str, ...]]
+    additions: list[Addition] = field(default_factory=list)
+
+    @property
+    def seen(self) -> tuple[str, ...]:
+        """Effects that would be seen at their typical size."""
+        return tuple(s.effect for s in self.sights if s.verdict == "seen")
+
+    def sight(self, effect: str) -> Sight:
+        """How one effect would show.
+
+        Raises
+        ------
+        ParameterError
+            If the plan does not have it.
+        """
+        found = next((s for s in self.sights if s.effect == effect), None)
+        if found is None:
+            raise ParameterError(f"effect = {effect!r} is not allowed: one of {', '.join(s.effect for s in self.sights)}")
+        return found
+
+    def separable(self, first: str, second: str) -> bool:
+        """Whether two effects that are seen would be told apart; False when one of them is not seen."""
+        both = {self.sight(first).effect, self.sight(second).effect}
+        return both <= set(self.seen) and not any({a, b} == both for a, b, _ in self.pairs)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The plan as plain values, null for no number."""
+
+        def number(value: float) -> float | None:
+            return value if math.isfinite(value) else None
+
+        return {
+            "schema": "pamrs.plan/1",
+            "rig": self.rig,
+            "channels": list(self.channels),
+            "noise": dict(self.noise),
+            "blocks": self.blocks,
+            "missing": self.missing,
+            "experiments": self.experiments,
+            "effects": [
+                {
+                    "id": s.effect,
+                    "verdict": s.verdict,
+                    "left": number(s.left),
+                    "block": s.block or None,
+                    "recording": s.recording or None,
+                    "size": s.size or None,
+                    "typical": number(s.typical),
+                    "smallest": number(s.smallest),
+                }
+                for s in self.sights
+            ],
+            "pairs": [{"effects": [a, b], "cosine": round(c, 4)} for a, b, c in self.pairs],
+            "groups": [list(group) for group in self.groups],
+            "additions": [
+                {
+                    "kind": a.kind,
+                    "name": a.name,
+                    "text": a.text,
+                    "seen": list(a.seen),
+                    "separated": [list(pair) for pair in a.separated],
+                    "bits": round(a.bits, 3),
+                }
+                for a in self.additions
+            ],
+        }
+
+    def text(self) -> str:
+        """The plan as a page for a terminal."""
+        lines = [f"Plan of a diagnosis of {self.rig}, with {', '.join(self.channels) or 'no channel'}", ""]
+        lines += ["Blocks that these channels tell apart"]
+        for block in self.blocks:
+            lines.append(f"  {block['name']:<8} {', '.join(block['drives']) or '(its start)'} -> {block['channel']}")
+            lines += _wrapped(f"lumps {block['covers']}: {block['why']}" if block["why"] else block["covers"], 11)
+        lines += [] if self.blocks else ["  none"]
+        for block in self.missing:
+            needs = ", ".join(block["needs"])
+            lines += _wrapped(f"not {block['name']} ({block['covers']}): without {needs} nothing drives or shows it", 2)
+        if self.experiments:
+            lines += ["", "Experiments assumed"]
+            for experiment in self.experiments:
+                lines += _wrapped(f"{experiment['name']}: {experiment['text']} ({experiment['duration']:.0f} s)", 2)
+        return "\n".join([*lines, *(self._effects() if self.blocks else ["", "No effect can be seen"]), *self._gains()])
+
+    def _effects(self) -> list[str]:
+        """The table of the effects, and what is not told apart."""
+        lines = ["", "Effects at their typical size, after the baseline has moved inside its tolerances (noise units of 0.1 s)"]
+        lines += [
+            f"  {'effect':<25}{'':<8}{'left':>7}  {'in':<9}{'recording':<17}{'typical':>10}{'seen from':>11}  {'unit':<13}taken for"
+        ]
+        for sight in self.sights:
+            rivals = [b if a == sight.effect else a for a, b, _ in self.pairs if sight.effect in (a, b)]
+            unit = find_parameter(sight.size).unit if sight.size else ""
+            typical = f"{sight.typical:.3g}" if math.isfinite(sight.typical) else ""
+            smallest = f"{sight.smallest:.2g}" if math.isfinite(sight.smallest) else ""
+            where = f"{sight.block or '-':<9}{sight.recording or '-':<17}"
+            lines.append(
+                f"  {sight.effect:<25}{sight.verdict:<8}{sight.left:>7.2g}  {where}{typical:>10}"
+                f"{smallest:>11}  {'' if unit == '1' else unit:<13}{', '.join(rivals)}".rstrip()
+            )
+        return [
+            *lines,
+            "",
+            "Not told apart: " + ("; ".join(", ".join(g) for g in self.groups) if self.groups else "none of those seen"),
+        ]
+
+    def _gains(self) -> list[str]:
+        """What would add most."""
+        lines = []
+        if self.additions:
+            lines += ["", "What would add most"]
+            for addition in self.additions:
+                gains = [f"shows {', '.join(addition.seen)}"] if addition.seen else []
+                gains += [f"tells {', '.join(f'{a} from {b}' for a, b in addition.separated)}"] if addition.separated else []
+                gains += [] if gains else ["sharper, nothing new"]
+                lines += _wrapped(f"{addition.kind} {addition.name}: {'; '.join(gains)} (+{addition.bits:.0f} bit)", 2)
+        return lines
+
+    def __repr__(self) -> str:
+        return (
+            f"Plan({self.rig}: {len(self.blocks)} blocks, {len(self.seen)} of {len(self.sights)} effects seen, "
+            f"{len(self.groups)} groups not told apart)"
+        )
+
+
+def _wrapped(text: str, indent: int) -> list[str]:
+    return textwrap.wrap(text, 130, initial_indent=" " * indent, subsequent_indent=" " * (indent + 2))
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """What one block over one experiment says: products of baseline sensitivities and signatures, which add up.
+
+    Attributes
+    ----------
+    baseline : (k, k) array
+        Of the baseline's sensitivities.
+    mixed : (k, m) array
+        Of these with the signatures.
+    signatures : (m, m) array
+        Of the signatures.
+    """
+
+    baseline: Array
+    mixed: Array
+    signatures: Array
+
+
+@dataclass(frozen=True, eq=False)
+class _Picture:
+    """What a choice of blocks and experiments shows: of each effect, and between every two."""
+
+    sights: dict[str, Sight]
+    cosine: dict[tuple[str, str], float]
+    unseparated: frozenset[tuple[str, str]]
+    bits: float
+
+
+def plan_diagnosis(
+    rig: Rig,
+    channels: Iterable[str],
+    *,
+    noise: Mapping[str, float] | None = None,
+    experiments: Sequence[str] | None = None,
+    progress: Callable[[str], None] | None = None,
+) -> Plan:
+    """What a diagnosis could tell of a rig from some channels, before anything is recorded.
+
+    Parameters
+    ----------
+    rig : Rig
+        Nominal model, one that can be diagnosed: a tank or a constant supply, valve, chamber and arm without names, or a part.
+    channels : iterable of str
+        Channels at hand, of ``valve_command``, ``supply_pressure``, ``muscle_pressure`` and ``joint_angle``.
+    noise : mapping of str to float, optional
+        Sample noise by channel [SI]; that of typical transducers by default (:data:`pamrs.diagnosis.differences.NOISE`).
+    experiments : sequence of str, optional
+        Names of the experiments that will be made; multisine, sealed holds, slow triangle and steps by default.
+    progress : callable, optional
+        Called with a line of text now and then.
+
+    Returns
+    -------
+    Plan
+        Blocks, effects seen, groups that are not told apart, what would add most.
+
+    Raises
+    ------
+    ParameterError
+        For an unknown channel or experiment, or a noise that is not above zero.
+    DiagnosisError
+        If rigs of this kind cannot be diagnosed.
+
+    Examples
+    --------
+    >>> import pamrs
+    >>> plan = pamrs.plan_diagnosis(pamrs.rigs.sealed_chamber(), ["muscle_pressure"])
+    >>> plan.sight("leak_muscle").verdict
+    'seen'
+    """
+    _check_rig(rig)
+    own = checked_channels(rig, tuple(channels))
+    sound = _noise(noise)
+    say = progress or (lambda _: None)
+    every = tuple(c for c in MEASURABLE if c in {*core_rig(rig).inputs, *core_rig(rig).channels})
+    whole = available_blocks(rig, every)
+    pool = {e.name: e for e in library(rig)}
+    chosen = [name for name in BASIC if name in pool] if experiments is None else list(experiments)
+    for name in chosen:
+        if name not in pool:
+            raise ParameterError(f"experiments has {name!r}, which is not allowed: of rig {rig.name!r} one of {', '.join(pool)}")
+    starts = [s for e in EFFECTS if _applies(rig, e, whole) for s in starts_of(e, sealed=rig.model["valve"] is None)]
+    parts: dict[Key, _Part] = {}
+    usable = {}
+    for name, experiment in pool.items():
+        say(f"{name}: {experiment.duration:.0f} s with {len(starts)} starts of {len({s.effect for s in starts})} effects")
+        try:
+            parts |= _parts(rig, whole, experiment, starts, sound)
+            usable[name] = experiment
+        except SimulationError:
+            continue  # the cut chain leaves the range of the model there
+    chosen = [name for name in chosen if name in usable]
+    blocks = available_blocks(rig, own)
+    now = _picture(parts, blocks, chosen, starts)
+    additions = []
+    for channel in [c for c in every if c not in own]:
+        more = available_blocks(rig, checked_channels(rig, (*own, channel)))
+        additions.append(_addition("channel", channel, channel.replace("_", " "), now, _picture(parts, more, chosen, starts)))
+    pairs_needed = [c for c in every if c not in own]
+    if not blocks and len(pairs_needed) > 1:
+        for several in itertools.combinations(pairs_needed, 2):
+            more = available_blocks(rig, checked_channels(rig, (*own, *several)))
+            text = " and ".join(c.replace("_", " ") for c in several)
+            additions.append(_addition("channels", "+".join(several), text, now, _picture(parts, more, chosen, starts)))
+    for name in [n for n in usable if n not in chosen]:
+        if blocks:
+            additions.append(_addition("experiment", name, usable[name].text, now, _picture(parts, blocks, [*chosen, name], starts)))
+    additions.sort(key=lambda a: (-(len(a.seen) + len(a.separated)), -a.bits))
+    order = [e for e in EFFECTS if e in now.sights]
+    unseparated = sorted(now.unseparated, key=lambda p: (order.index(p[0]), order.index(p[1])))
+    pairs = [(a, b, now.cosine[a, b]) for a, b in unseparated]
+    return Plan(
+        rig=rig.name,
+        channels=own,
+        noise={c: sound[c] for c in own if c in sound},
+        blocks=[_described(block) for block in blocks],
+        missing=[
+            {"name": b.name, "covers": b.covers, "needs": _needed(rig, b.name, own, every)}
+            for b in whole
+            if b.name not in {own_block.name for own_block in blocks}
+        ],
+        experiments=[{"name": n, "text": usable[n].text, "duration": usable[n].duration} for n in chosen],
+        sights=[now.sights[e] for e in order],
+        pairs=pairs,
+        groups=_joined([(a, b) for a, b, _ in pairs], order),
+        additions=additions,
+    )
+
+
+def _needed(rig: Rig, block: str, own: tuple[str, ...], every: tuple[str, ...]) -> list[str]:
+    """The fewest channels that, added to those at hand, surround a block."""
+    lacking = [c for c in every if c not in own]
+    for count in range(1, len(lacking) + 1):
+        for several in itertools.combinations(lacking, count):
+            if any(b.name == block for b in available_blocks(rig, (*own, *several))):
+                return list(several)
+    return lacking
+
+
+def _check_rig(rig: Rig) -> None:
+    """Refuse rigs that a diagnosis refuses."""
+    if not isinstance(rig, Rig):
+        raise ParameterError(f"rig is a {type(rig).__name__}; a Rig is needed, for example pamrs.load_rig({rig!r})")
+    several = [block for block in rig.blocks if "" not in rig.tables(block)]
+    reasons = {
+        f"it already has the effect {rig.effects[0]['id']!r}; plan with a rig without effects" if rig.effects else "",
+        f"it has named blocks ({', '.join(several)}); rigs of one chain can be diagnosed, without names" if several else "",
+        "it is fed by a regulator; rigs fed by a tank or a constant supply can be diagnosed" if regulators_of(rig) else "",
+        "it has a [load]; rigs with [joint] and [arm], or without a muscle, can be diagnosed" if "load" in rig.blocks else "",
+    } - {""}
+    if reasons:
+        raise DiagnosisError(f"rig {rig.name!r}: {'; '.join(sorted(reasons))}")
+
+
+def _noise(given: Mapping[str, float] | None) -> dict[str, float]:
+    """Sample noise of every channel [SI]."""
+    for name, value in (given or {}).items():
+        if name not in NOISE:
+            raise ParameterError(f"noise has {name!r}, which is not allowed: one of {', '.join(NOISE)}")
+        if not (math.isfinite(value) and value > 0.0):
+            raise ParameterError(f"noise of {name} = {value} is not allowed: a finite number > 0 is needed")
+    return {**NOISE, **{name: float(value) for name, value in (given or {}).items()}}
+
+
+def _applies(rig: Rig, effect: str, blocks: list[Block]) -> bool:
+    """Whether a rig has what an effect acts on, and a block of the cut chain in which it could show."""
+    kinds = {supply["kind"] for supply in rig.tables("supply").values()}
+    if effect in ("compressor_cut_in", "supply_regulator_deadband"):
+        return ("tank" if effect == "compressor_cut_in" else "regulator") in kinds
+    needs = EFFECTS[effect].at or ("joint" if EFFECTS[effect].block == "arm" else "chamber")
+    return bool(rig.tables(needs)) and any(acts_in(effect, block) for block in blocks)
+
+
+def _described(block: Block) -> dict[str, Any]:
+    lumped = block.covers != block.name
+    return {
+        "name": block.name,
+        "channel": block.channel,
+        "drives": list(block.drives),
+        "covers": block.covers,
+        "why": _LUMPED.get(block.name, "") if lumped else "",
+    }
+
+
+def _parts(rig: Rig, blocks: list[Block], experiment: Experiment, starts: list[Start], noise: Mapping[str, float]) -> dict[Key, _Part]:
+    """Products of everything that one experiment shows, by block."""
+    stands = experiment.changed(rig)
+    prepared = taken(experiment.simulate(rig), stands, experiment.name, noise)
+    problem = Problem(blocks, [prepared], core_rig(stands))
+    baseline = free_baseline(problem, stands)
+    base = residuals(problem, stands, baseline)
+    weights = weights_of(problem, stands)
+    spread = np.array([stands.parameter(name).tol for name in baseline])
+    width = bin_width(prepared, FIT_BIN)
+    scale, slopes, moved = {}, {}, {}
+    for block in blocks:
+        key = (block.name, experiment.name)
+        r = base[key]
+        slope, counts = binned(np.zeros((r.value.size, 0)) if r.jacobian is None else r.jacobian, r.rows, width)
+        floor = weights[key] * noise[block.channel] / math.sqrt(bins_of(prepared))
+        scale[key] = math.sqrt(EFFECTIVE / max(1, int((counts > 0).sum()))) / floor
+        slopes[key] = slope * spread * scale[key]
+        moved[key] = np.zeros((slope.shape[0], len(starts)))
+    for index, start in enumerate(starts):
+        acting = [b for b in blocks if acts_in(start.effect, b)]
+        try:
+            found = changes(Problem(acting, [prepared], problem.core), start.applied(stands), base)
+        except SimulationError:
+            continue  # this size leaves the range in which the model holds
+        for block in acting:
+            key = (block.name, experiment.name)
+            mean, _ = binned(found[key].value - base[key].value, base[key].rows, width)
+            moved[key][:, index] = mean * scale[key]
+    return {k: _Part(slopes[k].T @ slopes[k], slopes[k].T @ moved[k], moved[k].T @ moved[k]) for k in slopes}
+
+
+def _picture(parts: Mapping[Key, _Part], blocks: list[Block], experiments: Sequence[str], starts: list[Start]) -> _Picture:
+    """What some blocks over some experiments show."""
+    used = {key: part for key, part in parts.items() if key[0] in {b.name for b in blocks} and key[1] in experiments}
+    effects = list(dict.fromkeys(s.effect for s in starts))
+    if not used:
+        return _Picture({e: Sight(e, 0.0) for e in effects}, {}, frozenset(), 0.0)
+    total = _Part(sum(p.baseline for p in used.values()), sum(p.mixed for p in used.values()), sum(p.signatures for p in used.values()))  # type: ignore[arg-type]
+    freed = np.linalg.solve(total.baseline + np.eye(len(total.baseline)), total.mixed)
+    gram = total.signatures - total.mixed.T @ freed
+    sizes = {
+        key: np.sqrt(
+            np.clip(
+                np.diag(p.signatures)
+                - 2.0 * np.einsum("km,km->m", p.mixed, freed)
+                + np.einsum("km,kl,lm->m", freed, p.baseline, freed),
+                0.0,
+                None,
+            )
+            / EFFECTIVE
+        )
+        for key, p in used.items()
+    }
+    power = np.sqrt(np.clip(np.diag(gram), 1e-12, None))
+    cosines = np.abs(gram) / np.outer(power, power)
+    sights: dict[str, Sight] = {}
+    best: dict[str, int] = {}
+    for effect in effects:
+        own = [k for k, s in enumerate(starts) if s.effect == effect]
+        index, key = max(((k, key) for k in own for key in sizes), key=lambda pair: float(sizes[pair[1]][pair[0]]))
+        best[effect] = index
+        sights[effect] = _sight(starts[index], float(sizes[key][index]), key)
+    cosine, unseparated = {}, set()
+    for first, second in itertools.combinations(effects, 2):
+        mine, theirs = best[first], best[second]
+        shapes = {e: [k for k, s in enumerate(starts) if s.effect == e] for e in (first, second)}
+        forward = float(max(cosines[mine, k] for k in shapes[second]))
+        backward = float(max(cosines[theirs, k] for k in shapes[first]))
+        cosine[first, second] = min(1.0, max(forward, backward))
+        left = min(
+            sights[first].left * math.sqrt(max(0.0, 1.0 - forward**2)), sights[second].left * math.sqrt(max(0.0, 1.0 - backward**2))
+        )
+        if min(sights[first].left, sights[second].left) >= SEEN and (cosine[first, second] > ALIKE or left < APART):
+            unseparated.add((first, second))
+    chosen = [best[e] for e in effects]
+    _, logarithm = np.linalg.slogdet(np.eye(len(chosen)) + gram[np.ix_(chosen, chosen)])
+    return _Picture(sights, cosine, frozenset(unseparated), 0.5 * float(logarithm) / math.log(2.0))
+
+
+def _sight(start: Start, left: float, key: Key) -> Sight:
+    """How an effect shows from the start that shows most."""
+    if left < 1e-6:
+        return Sight(start.effect, 0.0)
+    if not start.scalable:
+        return Sight(start.effect, left, *key)
+    typical = abs(start.free[start.sizes[0]])
+    smallest = typical * SEEN / left if SEEN / left < LARGEST else math.nan
+    return Sight(start.effect, left, *key, start.sizes[0], typical, smallest)
+
+
+def _addition(kind: str, name: str, text: str, now: _Picture, then: _Picture) -> Addition:
+    seen = tuple(e for e, s in then.sights.items() if s.verdict == "seen" and now.sights[e].verdict != "seen")
+    separated = tuple(sorted(now.unseparated - then.unseparated))
+    return Addition(kind, name, text, seen, separated, then.bits - now.bits)
+
+
+def _joined(pairs: list[tuple[str, str]], order: list[str]) -> list[tuple[str, ...]]:
+    """Groups out of pairs that share a member."""
+    groups: list[set[str]] = []
+    for pair in pairs:
+        touching = [g for g in groups if g & set(pair)]
+        groups = [g for g in groups if g not in touching] + [set(pair).union(*touching)]
+    return sorted((tuple(sorted(g, key=order.index)) for g in groups), key=lambda g: order.index(g[0]))

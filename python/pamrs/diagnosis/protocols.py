@@ -1,0 +1,466 @@
+"""Standard experiments that a rig can do, each as the commands that a person sends, with its numbers in words.
+
+The levels follow from the rig: the lowest pressure at which its arm leaves the stop and the highest that keeps it off the other
+one. Commands are found on the model by a loop over its muscle pressure that inverts the valve, and then sent as they are, so that
+every hypothesis answers to the same ones.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pamrs.errors import SimulationError
+from pamrs.rig import Rig
+from pamrs.simulation import Simulation, simulate
+from pamrs.simulator import Simulator
+
+__all__ = ["Experiment", "Range", "library", "pressure_range", "trial_of"]
+
+Array = NDArray[np.float64]
+Points = list[tuple[float, float]]
+
+SAMPLE_TIME = 0.005
+"""Time between samples where no recording says it [s]."""
+SEALED_SAMPLE_TIME = 0.1
+"""Same for a chamber without a valve, which changes slowly."""
+BANDWIDTH = 15.0
+"""Of the pressure loop [rad/s]."""
+_CRITICAL = 0.528
+_CHOKED = 0.0404  # sqrt(k/R) (2/(k+1))^((k+1)/(2(k-1))) of air
+
+
+@dataclass(frozen=True)
+class Range:
+    """Pressures between which an experiment moves, gauge [Pa].
+
+    Attributes
+    ----------
+    low, high : float
+        At which the arm just moves, and at which it nears its upper stop.
+    """
+
+    low: float
+    high: float
+
+    def at(self, share: float) -> float:
+        """The pressure at a share of the range [Pa]."""
+        return self.low + share * (self.high - self.low)
+
+
+@dataclass(frozen=True, eq=False)
+class Experiment:
+    """One experiment, ready to be simulated.
+
+    Attributes
+    ----------
+    name : str
+        Its kind, ``"sealed_hold"``.
+    text : str
+        What to do, with numbers.
+    excitation : dict
+        The same for a program: ``kind`` and numbers with their unit in the name.
+    command : (n,) array or None
+        Valve command [V]; None for a chamber without a valve.
+    rows : int
+        Number of samples.
+    sample_time : float
+        Time between them [s].
+    initial : dict of str to float
+        As for :func:`pamrs.simulate`.
+    changes : dict of str to float
+        Parameters of the rig that the person changes (another payload), SI.
+    effort : float
+        What it costs, as time [s]: its length and what must be changed by hand.
+    """
+
+    name: str
+    text: str
+    excitation: dict[str, Any]
+    command: Array | None
+    rows: int
+    sample_time: float
+    initial: dict[str, float] = field(default_factory=dict)
+    changes: dict[str, float] = field(default_factory=dict)
+    effort: float = 0.0
+
+    @property
+    def duration(self) -> float:
+        """Length [s]."""
+        return (self.rows - 1) * self.sample_time
+
+    def changed(self, rig: Rig) -> Rig:
+        """The rig as it stands in this experiment."""
+        return rig.with_parameters(self.changes) if self.changes else rig
+
+    def simulate(self, rig: Rig) -> Simulation:
+        """The experiment on a rig, every hypothesis from the same commands.
+
+        Raises
+        ------
+        SimulationError
+            If the state leaves the range in which the model holds.
+        """
+        length = {"duration": self.duration} if self.command is None else {}
+        return simulate(self.changed(rig), self.command, sample_time=self.sample_time, initial=self.initial, **length)
+
+
+def trial_of(rig: Rig, reference: Array, *, sample_time: float, **options: Any) -> Array:
+    """Valve commands that make the muscle pressure of a rig follow a reference.
+
+    Parameters
+    ----------
+    rig : Rig
+        A rig of one chain with a valve.
+    reference : (n,) array
+        Gauge pressure [Pa].
+    sample_time : float
+        Time between samples [s].
+    **options
+        ``shut`` ((n,) bool array: samples at which the command is the null voltage), ``dither`` ((n,) array added to the
+        command [V]), ``bandwidth`` (of the loop [rad/s]), ``initial`` (as for :func:`pamrs.simulate`).
+
+    Returns
+    -------
+    (n,) array
+        Command [V].
+    """
+    n = reference.size
+    shut = options.get("shut", np.zeros(n, dtype=bool))
+    dither = options.get("dither", np.zeros(n))
+    bandwidth = float(options.get("bandwidth", BANDWIDTH))
+    model = rig.model
+    valve, gas = model["valve"], model["gas"]
+    ambient, warm = gas["ambient_pressure"], gas["gas_constant"] * gas["temperature"]
+    flow = _CHOKED * valve["discharge_area_max"] / math.sqrt(gas["temperature"])
+    fractions, openings = np.asarray(valve["fraction"]), np.asarray(valve["opening"])
+    null, half = valve["null_voltage"], valve["half_range"]
+    slope = np.gradient(reference, sample_time)
+
+    def update(sample: Mapping[str, float]) -> float:
+        k = min(n - 1, round(sample["time"] / sample_time))
+        if shut[k]:
+            return float(null)
+        wanted = bandwidth * (reference[k] - sample["muscle_pressure"]) + slope[k]
+        mass = wanted * sample["air_volume"] / warm
+        inside, supply = sample["muscle_pressure"] + ambient, sample["supply_pressure"] + ambient
+        up, down = (supply, inside) if mass > 0.0 else (inside, ambient)
+        ratio = min(down / up, 0.999)
+        share = 1.0 if ratio <= _CRITICAL else math.sqrt(max(0.02, 1.0 - ((ratio - _CRITICAL) / (1.0 - _CRITICAL)) ** 2))
+        opening = float(np.interp(abs(mass) / (flow * up * share), fractions, openings))
+        return float(np.clip(null + math.copysign(half * opening, mass) + dither[k], null - half, null + half))
+
+    simulator = Simulator(rig, sample_time=sample_time, initial=options.get("initial"))
+    every = max(1, round(0.01 / sample_time))
+    total = (n - 1 + every - 1) // every * every
+    found = simulator.control(update, total * sample_time, period=every * sample_time)
+    return np.ascontiguousarray(found["valve_command"][:n])
+
+
+def pressure_range(rig: Rig, *, highest: float | None = None) -> Range:
+    """Pressures between which a rig is worth exciting.
+
+    Parameters
+    ----------
+    rig : Rig
+        A rig of one chain.
+    highest : float, optional
+        Gauge pressure that is not to be exceeded [Pa], for example the highest that was recorded.
+
+    Returns
+    -------
+    Range
+        With an arm, from where it leaves a twentieth of its range to nine tenths of it; without one, from a tenth to six tenths
+        of the supply's pressure.
+    """
+    model = rig.model
+    if model["valve"] is None:
+        top = 7.0e5 if highest is None else highest
+        return Range(0.35 * top, top)
+    top = min(0.8 * model["supply"]["initial_pressure"], math.inf if highest is None else highest)
+    if model["arm"] is None:
+        return Range(0.1 * top, min(0.75 * top, 7.0e5))
+    joint = model["joint"]
+    ramp = np.linspace(0.0, top, 1501)
+    found = simulate(rig, trial_of(rig, ramp, sample_time=0.01), sample_time=0.01)
+    share = (found["joint_angle"] - joint["rest_angle"]) / (joint["max_angle"] - joint["rest_angle"])
+    pressure = np.maximum.accumulate(found["muscle_pressure"])
+    low = float(pressure[np.argmax(share > 0.05)]) if (share > 0.05).any() else 0.2 * top
+    high = float(pressure[np.argmax(share > 0.85)]) if (share > 0.85).any() else top
+    return Range(low, max(high, 1.2 * low)) if high > low else Range(0.3 * top, top)
+
+
+def _through(points: Points, sample_time: float) -> Array:
+    """Straight lines through (time, value) points."""
+    end = points[-1][0]
+    time = np.arange(round(end / sample_time) + 1) * sample_time
+    return np.asarray(np.interp(time, [p[0] for p in points], [p[1] for p in points]), dtype=np.float64)
+
+
+def _then(points: Points, *legs: tuple[float, float]) -> Points:
+    """Points continued by (duration, value) legs."""
+    out = list(points)
+    for duration, value in legs:
+        out.append((out[-1][0] + duration, value))
+    return out
+
+
+def _bar(pressure: float) -> float:
+    return round(pressure * 1e-5, 2)
+
+
+class _Maker:
+    """Builds the experiments of one rig."""
+
+    def __init__(self, rig: Rig, sample_time: float, span: Range) -> None:
+        self.rig, self.dt, self.span = rig, sample_time, span
+
+    def driven(self, name: str, text: str, excitation: dict[str, Any], reference: Array, **options: Any) -> Experiment:
+        changes, initial = options.pop("changes", {}), options.pop("initial", {})
+        extra = options.pop("extra", 0.0)
+        rig = self.rig.with_parameters(changes) if changes else self.rig
+        command = trial_of(rig, reference, sample_time=self.dt, initial=initial, **options)
+        seconds = (reference.size - 1) * self.dt
+        done = {"kind": name, **excitation, "duration_s": round(seconds, 1)}
+        return Experiment(name, text, done, command, reference.size, self.dt, initial, changes, seconds + extra)
+
+    def levels(self, *shares: float) -> tuple[list[float], str]:
+        pressures = [self.span.at(s) for s in shares]
+        return pressures, ", ".join(f"{_bar(p):g}" for p in pressures[:-1]) + f" and {_bar(pressures[-1]):g} bar"
+
+    def triangle(self, name: str, period: float, cycles: int, **options: Any) -> Experiment:
+        low, high = self.span.at(0.05), self.span.at(0.95)
+        points: Points = _then([(0.0, 0.0)], (2.0, low))
+        for _ in range(cycles):
+            points = _then(points, (0.5 * period, high), (0.5 * period, low))
+        text = options.pop("text", "") + (
+            f"drive the muscle pressure as a triangle between {_bar(low):g} and {_bar(high):g} bar with a period of {period:g} s, "
+            f"{cycles} cycles, the first one kept"
+        )
+        excitation = {"levels_bar": [_bar(low), _bar(high)], "period_s": period, "cycles": cycles, **options.pop("also", {})}
+        return self.driven(name, text, excitation, _through(points, self.dt), **options)
+
+    def sealed(self, hold: float = 16.0) -> Experiment:
+        pressures, words = self.levels(0.15, 0.55, 0.95)
+        return self._holds("sealed_hold", pressures, hold, f"fill to {words}, shut the valve at each and hold it for {hold:g} s")
+
+    def both_sides(self, hold: float = 16.0) -> Experiment:
+        """Holds above and below the pressure at which equal leaks from the supply and to the ambient balance."""
+        ambient = self.rig.model["gas"]["ambient_pressure"]
+        middle = self.span.at(0.5) + ambient
+        supply = max(middle / 0.8 - ambient, 1.15 * self.span.at(0.8))  # x = psi(x) of ISO 6358: 0.76 to 0.81
+        pressures, words = self.levels(0.1, 0.8)
+        text = (
+            f"turn the supply down to {_bar(supply):g} bar, so that leaks through the valve's centre would balance near "
+            f"{_bar(middle - ambient):g} bar; fill to {words}, on both sides of it, shut the valve at each and hold it for {hold:g} s"
+        )
+        also = {"supply_bar": _bar(supply), "balance_bar": _bar(middle - ambient)}
+        return self._holds("holds_both_sides", pressures, hold, text, also, {"supply_pressure": supply}, extra=60.0)
+
+    def _holds(
+        self,
+        name: str,
+        pressures: list[float],
+        hold: float,
+        text: str,
+        also: dict[str, Any] | None = None,
+        initial: dict[str, float] | None = None,
+        extra: float = 0.0,
+    ) -> Experiment:
+        points: Points = [(0.0, 0.0)]
+        closed: list[tuple[float, float]] = []
+        for pressure in pressures:
+            points = _then(points, (1.0, pressure), (1.0, pressure))
+            closed.append((points[-1][0], points[-1][0] + hold))
+            points = _then(points, (hold, pressure))
+        reference = _through(points, self.dt)
+        time = np.arange(reference.size) * self.dt
+        shut = np.zeros(reference.size, dtype=bool)
+        for a, b in closed:
+            shut |= (time >= a) & (time < b)
+        excitation = {"levels_bar": [_bar(p) for p in pressures], "hold_s": hold, **(also or {})}
+        return self.driven(name, text, excitation, reference, shut=shut, initial=initial or {}, extra=extra)
+
+    def multisine(self) -> Experiment:
+        frequencies = [0.1, 0.23, 0.41, 0.73, 1.13, 1.9, 3.1]
+        time = np.arange(round(30.0 / self.dt) + 1) * self.dt
+        size = 1.0 / np.sqrt(1.0 + (np.array(frequencies) / 0.6) ** 2)
+        phase = -np.pi * np.arange(len(frequencies)) * np.arange(1, len(frequencies) + 1) / len(frequencies)
+        wave = (size[:, None] * np.sin(2 * np.pi * np.array(frequencies)[:, None] * time + phase[:, None])).sum(axis=0)
+        wave *= 0.4 / np.abs(wave).max()
+        reference = np.clip(time / 3.0, 0.0, 1.0) * (self.span.at(0.5) + wave * (self.span.high - self.span.low))
+        low, high = self.span.at(0.1), self.span.at(0.9)
+        text = (
+            f"drive the muscle pressure as a multisine of {frequencies[0]:g} to {frequencies[-1]:g} Hz between {_bar(low):g} and "
+            f"{_bar(high):g} bar for 30 s"
+        )
+        excitation = {"frequencies_hz": frequencies, "levels_bar": [_bar(low), _bar(high)]}
+        return self.driven("multisine", text, excitation, reference)
+
+    def staircase(self) -> Experiment:
+        shares = [0.1, 0.35, 0.6, 0.85, 0.6, 0.35, 0.1]
+        points: Points = [(0.0, 0.0)]
+        for share in shares:
+            points = _then(points, (0.5, self.span.at(share)), (4.5, self.span.at(share)))
+        _, words = self.levels(*shares[:4])
+        text = f"climb to {words} and down again, with the pressure regulated and held for 4.5 s at each step"
+        excitation = {"levels_bar": [_bar(self.span.at(s)) for s in shares], "hold_s": 4.5}
+        return self.driven("staircase", text, excitation, _through(points, self.dt))
+
+    def long_hold(self) -> Experiment:
+        up, back = self.span.at(0.9), self.span.at(0.45)
+        points = _then([(0.0, 0.0)], (2.0, self.span.at(0.05)), (0.3, up), (25.0, up), (0.3, back), (25.0, back))
+        text = f"step to {_bar(up):g} bar, then back to {_bar(back):g} bar, and keep the pressure regulated for 25 s after each"
+        excitation = {"levels_bar": [_bar(up), _bar(back)], "hold_s": 25.0}
+        return self.driven("long_hold", text, excitation, _through(points, self.dt))
+
+    def step_and_shut(self) -> Experiment:
+        base, small, large = self.span.at(0.05), self.span.at(0.3), self.span.at(0.8)
+        points: Points = _then([(0.0, 0.0)], (1.5, base), (0.5, base))
+        closed = []
+        for goal in (small, base, large, base):
+            points = _then(points, (0.02, goal), (0.35, goal))
+            closed.append((points[-1][0], points[-1][0] + 4.0))
+            points = _then(points, (4.0, goal))
+        reference = _through(points, self.dt)
+        time = np.arange(reference.size) * self.dt
+        shut = np.zeros(reference.size, dtype=bool)
+        for a, b in closed:
+            shut |= (time >= a) & (time < b)
+        text = (
+            f"step from {_bar(base):g} bar to {_bar(small):g} bar and back, then to {_bar(large):g} bar and back (sizes 1:3), with the "
+            "valve far open, shut it 0.35 s after each step and watch for 4 s"
+        )
+        excitation = {"levels_bar": [_bar(base), _bar(small), _bar(large)], "watch_s": 4.0}
+        return self.driven("step_and_shut", text, excitation, reference, shut=shut, bandwidth=30.0)
+
+    def nested(self) -> Experiment:
+        middle, reach = self.span.at(0.5), 0.45 * (self.span.high - self.span.low)
+        points: Points = _then([(0.0, 0.0)], (2.0, middle))
+        for period in (12.0, 1.2):
+            for share in (1.0, 0.6, 0.3):
+                points = _then(
+                    points, (0.25 * period, middle + share * reach), (0.5 * period, middle - share * reach), (0.25 * period, middle)
+                )
+        text = (
+            f"drive nested triangles around {_bar(middle):g} bar, of ±{_bar(reach):g}, ±{_bar(0.6 * reach):g} and "
+            f"±{_bar(0.3 * reach):g} bar, "
+            "first with a period of 12 s, then of 1.2 s"
+        )
+        excitation = {"middle_bar": _bar(middle), "reach_bar": [_bar(s * reach) for s in (1.0, 0.6, 0.3)], "periods_s": [12.0, 1.2]}
+        return self.driven("nested_triangles", text, excitation, _through(points, self.dt))
+
+    def null_ramp(self) -> Experiment:
+        middle = self.span.at(0.5)
+        half = self.rig.model["valve"]["half_range"]
+        reach, period, seconds = 0.03 * half, 2.0, 24.0
+        time = np.arange(round((seconds + 2.0) / self.dt) + 1) * self.dt
+        phase = np.clip(time - 2.0, 0.0, None) / period % 1.0
+        dither = reach * (1.0 - 4.0 * np.abs(((phase + 0.25) % 1.0) - 0.5)) * (time >= 2.0)
+        reference = np.clip(time / 2.0, 0.0, 1.0) * middle
+        text = (
+            f"hold {_bar(middle):g} bar by slow corrections and ramp the valve command through its null by "
+            f"±{1e3 * reach:.0f} mV in both directions, period {period:g} s, for {seconds:g} s"
+        )
+        excitation = {"level_bar": _bar(middle), "reach_v": round(reach, 4), "period_s": period}
+        return self.driven("null_ramp", text, excitation, reference, dither=dither, bandwidth=1.5)
+
+    def free_decay(self) -> Experiment | None:
+        pressure = self.span.at(0.5)
+        joint = self.rig.model["joint"]
+        reference = _through([(0.0, pressure), (8.0, pressure)], self.dt)
+        shut = np.ones(reference.size, dtype=bool)
+        rest = simulate(self.rig, trial_of(self.rig, _through([(0.0, 0.0), (3.0, pressure), (6.0, pressure)], 0.01), sample_time=0.01),
+                        sample_time=0.01)["joint_angle"][-1]  # fmt: skip
+        turned = min(float(rest) + 0.15 * (joint["max_angle"] - joint["min_angle"]), joint["max_angle"] - 0.05)
+        shown = round(math.degrees(turned - float(rest)), 0)
+        initial = {"muscle_pressure": pressure, "joint_angle": turned}
+        text = (
+            f"at {_bar(pressure):g} bar with the valve shut, lift the arm by hand by {shown:g} deg, let it go and record 8 s from "
+            "the release"
+        )
+        excitation = {"level_bar": _bar(pressure), "deflection_deg": shown}
+        try:
+            return self.driven("free_decay", text, excitation, reference, shut=shut, initial=initial, extra=30.0)
+        except SimulationError:
+            return None
+
+    def other_payload(self) -> Experiment:
+        payload = self.rig.model["arm"]["payload"]
+        other = 0.5 * payload
+        text = f"change the payload to {other:.3g} kg and "
+        also = {"payload_kg": round(other, 3)}
+        return self.triangle("other_payload", 12.0, 2, text=text, also=also, changes={"arm.payload": other}, extra=90.0)
+
+
+def _sealed_library(rig: Rig, sample_time: float, span: Range) -> list[Experiment]:
+    out = []
+    for name, pressure, seconds in (
+        ("hold_low", span.low, 600.0),
+        ("hold_high", span.high, 600.0),
+        ("hold_short", span.high, 120.0),
+        ("hold_long", span.high, 1800.0),
+    ):
+        text = f"fill the chamber to {_bar(pressure):g} bar, shut it off and record {seconds:g} s from that moment"
+        excitation = {"kind": name, "levels_bar": [_bar(pressure)], "duration_s": seconds}
+        rows = round(seconds / sample_time) + 1
+        out.append(Experiment(name, text, excitation, None, rows, sample_time, {"muscle_pressure": pressure}, {}, seconds))
+    return out
+
+
+def library(
+    rig: Rig, *, sample_time: float | None = None, highest: float | None = None, only: Collection[str] | None = None
+) -> list[Experiment]:
+    """The standard experiments that a rig can do.
+
+    Parameters
+    ----------
+    rig : Rig
+        A rig of one chain: with a valve and an arm, with a valve alone, or a sealed chamber.
+    sample_time : float, optional
+        Time between samples [s].
+    highest : float, optional
+        Gauge pressure that is not to be exceeded [Pa].
+    only : collection of str, optional
+        Names of those to make; all by default.
+
+    Returns
+    -------
+    list of Experiment
+        Those that the rig survives in simulation.
+    """
+    span = pressure_range(rig, highest=highest)
+    if rig.model["valve"] is None:
+        sealed = _sealed_library(rig, SEALED_SAMPLE_TIME if sample_time is None else sample_time, span)
+        return [e for e in sealed if only is None or e.name in only]
+    make = _Maker(rig, SAMPLE_TIME if sample_time is None else sample_time, span)
+    makers: dict[str, Callable[[], Experiment | None]] = {
+        "multisine": make.multisine,
+        "sealed_hold": make.sealed,
+        "slow_triangle": lambda: make.triangle("slow_triangle", 15.0, 2),
+        "step_and_shut": make.step_and_shut,
+        "staircase": make.staircase,
+        "long_hold": make.long_hold,
+        "nested_triangles": make.nested,
+        "fast_triangle": lambda: make.triangle("fast_triangle", 1.5, 10),
+        "null_ramp": make.null_ramp,
+        "holds_both_sides": make.both_sides,
+    }
+    if rig.model["arm"] is not None:
+        makers |= {"other_payload": make.other_payload, "free_decay": make.free_decay}
+    out = []
+    for name, maker in makers.items():
+        if only is not None and name not in only:
+            continue
+        try:
+            found = maker()
+        except SimulationError:
+            continue  # the model does not hold there: nothing to propose to anyone
+        if found is not None:
+            out.append(found)
+    return out
