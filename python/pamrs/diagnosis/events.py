@@ -29,11 +29,11 @@ EVENTS = {"external_torque": ("torque", 1.0, 3), "payload_change": ("mass_change
 """Effects with times of their own: the parameter that scales them, a typical size, and how many can be told in one recording."""
 SPACING = 0.75
 """Distance of the times that are tried [s]."""
-PUSH = 1.0
-"""Duration of the push that is moved through time [s]."""
+PUSH, RISE = 1.0, 0.1
+"""Duration of the push that is moved through time, and its edges [s]."""
 LEAST, LEAST_SHARE = 25.0, 0.03
 """Gain in chi-square, and share of what the recording's residual is, from which an event counts."""
-SCALES = {"time": 0.2, "duration": 0.4}
+SCALES = {"time": 0.2, "duration": 0.4, "rise": 0.2}
 
 
 def fit_events(effect: str, problem: Problem, nominal: Rig, baseline: Fit, inflation: dict[str, float]) -> Fit | None:
@@ -177,6 +177,8 @@ def _numbered(events: list[tuple[float, float]], leading: str, effect: str) -> d
         values |= {leading + suffix: size, "time" + suffix: time}
         if effect == "external_torque":
             values["duration" + suffix] = PUSH
+    if effect == "external_torque" and values:
+        values["rise"] = RISE
     return values
 
 
@@ -226,6 +228,8 @@ def _limits(effect: str, parameter: str, prepared: Prepared) -> tuple[float, flo
         return 0.0, prepared.n * prepared.dt
     if kind == "duration":
         return 0.05, 5.0
+    if kind == "rise":
+        return 0.02, 2.0
     info = find_parameter(f"{effect}.{parameter}")
     return max(info.lower, -1e3), min(info.upper, 1e3)
 

@@ -24,10 +24,10 @@ __all__ = ["Candidate", "Group", "examine", "significant"]
 
 DETECTION_RATIO, HELD_RATIO = 1.35, 2.0
 """Variance of bin means over the floor's from which a mismatch is taken as real, on recordings that were fitted and on others."""
-EVEN, EVEN_PUSH, SOFTNESS = 0.85, 2.9, 0.4
+EVEN, EVEN_PUSH, SOFTNESS = 0.5, 2.6, 0.4
 """Logarithm of the odds of explained to unexplained variance at which a set is named at even odds with ``unlisted`` (pushes, which
 take up a good part of anything, need more), and its width."""
-LOOKS, PRICE, SECOND = 8.0, 0.3, 2.0
+LOOKS, PRICE, SECOND = 12.0, 0.5, 3.0
 """Independent looks that a block's residual counts for, price of a parameter, price of a further effect."""
 LIKELY, CARRIES = 0.3, 0.8
 """Probability of ``unlisted`` from which a form of what is missing is looked for, and the share of the mismatch that it may leave."""

@@ -96,7 +96,7 @@ _STARTS = frozenset({"initial_temperature_rise"})
 
 def _role(parameter: EffectParameter, *, sealed: bool) -> str:
     """What a parameter is to a fit: a size, a shape, a choice of two, or held."""
-    if parameter.name.endswith(("_2", "_3")):  # more of the same: what a recording holds, see events.py
+    if parameter.name.endswith(("_2", "_3")) or parameter.name == "rise":  # more of the same: what a recording holds, see events.py
         return "held"
     if parameter.name in _CHOICES:
         return "choice"

@@ -79,7 +79,7 @@ MOTION: Final[tuple[EffectInfo, ...]] = (
         name="push from outside",
         block="arm",
         at="joint",
-        equation="tau_ext from a time on, for a duration, edges over 20 ms; up to three times",
+        equation="tau_ext from a time on, for a duration, edges over a rise; up to three times",
         fingerprint="a torque that begins and ends at moments which no command explains, and that does not repeat with the command",
         separates="stiction repeats with the command; a payload's change stays and follows the pose",
         parameters=(
@@ -92,6 +92,7 @@ MOTION: Final[tuple[EffectInfo, ...]] = (
             Parameter("torque_3", "N m", 0.0, -1e9, 1e9, (0.0,), "of a third push", 0.0),
             Parameter("time_3", "s", 0.0, -1e9, 1e9, (0.0,), "when the third begins"),
             Parameter("duration_3", "s", 1.0, 0.0, 1e9, (1.0,), "how long the third lasts"),
+            Parameter("rise", "s", 0.02, 0.02, 1e9, (0.02,), "of each edge: short for a blow, long for a hand"),
         ),
         reference="Ohnishi, Shibata & Murakami (1996), disturbance torque",
         rivals=("joint_coulomb_stribeck", "payload_change"),

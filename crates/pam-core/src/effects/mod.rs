@@ -110,7 +110,13 @@ pub const RISE: f64 = 0.02;
 /// From 0 before a time to 1 after it [s], along `3 s^2 - 2 s^3` over [`RISE`].
 #[inline]
 pub fn risen<S: Scalar>(now: f64, time: S) -> S {
-    let share = (-time + now) / RISE;
+    risen_over(now, time, constant(RISE))
+}
+
+/// From 0 before a time to 1 a rise after it [s], along `3 s^2 - 2 s^3`.
+#[inline]
+pub fn risen_over<S: Scalar>(now: f64, time: S, rise: S) -> S {
+    let share = (-time + now) / rise;
     if share.re() <= 0.0 {
         constant(0.0)
     } else if share.re() >= 1.0 {

@@ -26,7 +26,7 @@ pub(crate) struct EffectUnits {
     pub stop: Option<[Id; 3]>,
     pub swing: Option<[Id; 3]>,
     pub payload: Option<[Id; 2]>,
-    pub torque: Option<[Id; 9]>,
+    pub torque: Option<[Id; 10]>,
     pub base: Option<[Id; 3]>,
     pub pressure_lag: Option<[Id; 1]>,
     pub clock: Option<[Id; 2]>,
