@@ -127,14 +127,8 @@ def test_a_hidden_flow_is_modelled(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("names", [("arm",), ("supply", "chamber")])
 def test_a_null_stays_without_terms(names: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:
     case = Case(NOMINAL, names)
-    found = case.found(monkeypatch, case.blocks)
-    if found is None:
-        assert case.evaluations <= 4
-        return
-    # terms may mend what the smoothing of the drives does, far below the noise
-    for key, r in found.residuals.items():
-        change = r.value - case.baseline.residuals[key].value
-        assert float(np.sqrt(np.mean(change[r.rows] ** 2))) < 0.25 * r.noise
+    assert case.found(monkeypatch, case.blocks) is None
+    assert case.evaluations <= 18
 
 
 def test_what_does_not_fit_together_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import math
 from typing import Any
@@ -14,10 +15,12 @@ from pamrs.diagnosis import words
 from pamrs.diagnosis.blocks import Residual
 from pamrs.diagnosis.conditions import Picture, describe
 from pamrs.diagnosis.evidence import Floor
+from pamrs.diagnosis.experiment import propose
 from pamrs.diagnosis.fitting import Events, Key, Problem, residuals
 from pamrs.diagnosis.hypotheses import Candidate, Group, significant
 from pamrs.diagnosis.result import Diagnosis, Trace
 from pamrs.effects_table import CATALOGUE, EFFECTS
+from pamrs.errors import DiagnosisError, ParameterError, SimulationError
 from pamrs.rig import Rig
 
 __all__ = ["assemble"]
@@ -26,6 +29,8 @@ SYMPTOM = 2.9
 """Tolerances beyond which a refitted parameter is a symptom of missing physics, not a result."""
 SHARED = 6.0
 """Odds of one effect that acts in two blocks to two effects."""
+SIMULATED = 0.03
+"""Probability from which a hypothesis is simulated in the search for the next experiment."""
 SETTLED = 0.9
 """Probability from which an answer counts as settled."""
 
@@ -83,7 +88,7 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
         probabilities=probabilities,
         parameters=parameters,
         fit={"channels": fit_table, "held_out": held_table, "gap_closed": gap if model.effects else None},
-        next_experiment=words.next_experiment(verdict, probabilities, ambiguity, nominal),
+        next_experiment=_next(verdict, probabilities, ambiguity, nominal, groups, fitted, held),
         warnings=words.warnings(case, groups, symptoms, held is fitted),
         rig=_with_std(model, chosen) if model.effects else model,
         traces=_traces(fitted, held, fit_found, out_found),
@@ -120,6 +125,42 @@ def _tried(groups: list[Group]) -> list[dict[str, Any]]:
         for group in groups
         for candidate in group.candidates
     ]
+
+
+def _next(
+    verdict: str,
+    probabilities: dict[str, float],
+    ambiguity: list[list[str]],
+    nominal: Rig,
+    groups: list[Group],
+    fitted: Problem,
+    held: Problem,
+) -> dict[str, Any]:
+    """What to record next: simulated with every hypothesis that has a model, where two or more are left; else in words."""
+    left = _hypotheses(groups, probabilities, nominal)
+    recordings = [*fitted.recordings, *(held.recordings if held is not fitted else [])]
+    if ambiguity and len(left) > 1:
+        noise = {channel: float(np.median([p.noise[channel] for p in recordings])) for channel in recordings[0].noise}
+        with contextlib.suppress(DiagnosisError, ParameterError, SimulationError):  # a rig that no experiment of the library suits
+            return propose(nominal, left, noise, recordings)
+    return words.next_experiment(verdict, probabilities, ambiguity, nominal)
+
+
+def _hypotheses(groups: list[Group], probabilities: dict[str, float], nominal: Rig) -> list[tuple[str, Rig, float]]:
+    """The likely hypotheses that have a model, as fitted; those of an effect with times of its own can predict no other recording."""
+    found = []
+    for key, p in probabilities.items():
+        wanted = frozenset(key.split("+"))
+        if p < SIMULATED or not wanted <= set(CATALOGUE):
+            continue
+        chosen = []
+        for group in groups:
+            own = [c for c in group.candidates if set(c.effects) <= wanted and c.fit.events is None]
+            weights = [(len(c.effects), group.probabilities.get("+".join(c.effects), 0.0)) for c in own]
+            chosen.append(own[weights.index(max(weights))])
+        if {e for c in chosen for e in c.effects} == wanted:
+            found.append((key, _with_std(_merged(nominal, chosen), chosen), p))
+    return found
 
 
 def _named(group: Group) -> bool:
@@ -256,10 +297,8 @@ def _events(effect: str, candidate: Candidate) -> list[dict[str, Any]]:
     for recording, values in events.values.items():
         for suffix in ("", "_2", "_3"):
             if "time" + suffix in values:
-                own = {
-                    name.removesuffix(suffix): v for name, v in values.items() if name.endswith(suffix) and (suffix or name[-2] != "_")
-                }
-                found.append({"recording": recording, **own})
+                own = {name: values[name + suffix] for name in ("torque", "mass_change", "time", "duration") if name + suffix in values}
+                found.append({"recording": recording, **own, **({"rise": values["rise"]} if "rise" in values else {})})
     return found
 
 

@@ -33,6 +33,8 @@ MOST_TERMS = 6
 """Terms that a closure may have: more is no form that a person reads."""
 EVALUATIONS = 5
 """Limit on the evaluations of one fit of the chosen terms; there are at most two fits."""
+SPEAKING = 0.75
+"""Share of the misfit that a closure must leave at most: with less gain it mends what the smoothing of the drives does."""
 LEAST_POWER = 1e-6
 """Share of a term's effect on the residuals that must be left beside the baseline and the terms before it."""
 SHRUNK = ((1.0, EVALUATIONS), (0.4, 3))
@@ -281,7 +283,7 @@ def _better(models: list[Fit], problem: Problem, inflation: dict[str, float], am
     terms = [sum(1 for name in model.values if name.partition(".")[0] in TERMS) for model in models]
     worth = [-samples * math.log(m) - k * _price(samples, among) for m, k in zip(misfits, terms, strict=True)]
     best = int(np.argmax(worth))
-    return models[best] if best else None
+    return models[best] if best and misfits[best] < SPEAKING * misfits[0] else None
 
 
 def _select(frame: _Frame, candidates: list[_Candidate], columns: Array, present: dict[str, float]) -> _Choice | None:

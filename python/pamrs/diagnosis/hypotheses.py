@@ -22,8 +22,9 @@ from pamrs.rig import Rig
 
 __all__ = ["Candidate", "Group", "examine", "significant"]
 
-DETECTION_RATIO, HELD_RATIO = 1.35, 2.0
-"""Variance of bin means over the floor's from which a mismatch is taken as real, on recordings that were fitted and on others."""
+DETECTION_RATIO, HELD_RATIO, HINT = 1.35, 2.0, 1.15
+"""Variance of bin means over the floor's from which a mismatch is taken as real: on recordings that were fitted; on others, where the
+fitted ones give a hint of it."""
 EVEN, EVEN_PUSH, SOFTNESS = 0.5, 2.6, 0.4
 """Logarithm of the odds of explained to unexplained variance at which a set is named at even odds with ``unlisted`` (pushes, which
 take up a good part of anything, need more), and its width."""
@@ -158,7 +159,9 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
     outside = residuals(outer, baseline.rig) if held is not fitted else baseline.residuals
     out = {b.name: excess(b, outer.recordings, outside, floor) for b in blocks}
     start = Candidate((), baseline, out, now, 0.0)
-    suspects = [b for b in blocks if significant(now[b.name]) or significant(out[b.name], HELD_RATIO)]
+    # what parameters could not be told from the fitted recordings shows in the others alone, and is no mismatch
+    apart = [b for b in blocks if significant(out[b.name], HELD_RATIO) and now[b.name].ratio > HINT]
+    suspects = [b for b in blocks if significant(now[b.name]) or b in apart]
     if not suspects:
         # a parameter at the end of its plausible range is a symptom even where the fit is good
         return Group(blocks, was, now, [start], {"": 1.0}, None, floor, [])
