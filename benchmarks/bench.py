@@ -8,6 +8,7 @@ wrong answer is worth nothing. Run with ``make bench``; names as arguments choos
 from __future__ import annotations
 
 import argparse
+import json
 import subprocess
 import sys
 import tempfile
@@ -147,26 +148,20 @@ def cylinder_force(muscle: pamrs.Muscle, pressure: np.ndarray, contraction: np.n
 
 
 def diagnosis() -> None:
-    """One diagnosis of a shoulder with a concealed leak, five recordings of 40 s at 200 Hz."""
-    with tempfile.TemporaryDirectory() as folder:
-        make = [
-            "make",
-            "--kind",
-            "leak_muscle",
-            "--seed",
-            "7",
-            "--out",
-            f"{folder}/cases",
-            "--keys-dir",
-            f"{folder}/keys",
-        ]
-        subprocess.run([sys.executable, "-m", "trial", *make], cwd=ROOT, check=True, capture_output=True)
-        case = pamrs.load_case(Path(folder) / "cases" / "case_001")
-        start = time.perf_counter()
-        result = pamrs.diagnose(case)
-        seconds = time.perf_counter() - start
-    named = " + ".join(str(effect["id"]) for effect in result.effects)
-    print(f"{'diagnose 5 recordings of 40 s':<34} {seconds:>11.3g} s    verdict: {result.verdict} {named}")
+    """A diagnosis of a shoulder, five recordings of 40 s at 200 Hz: one effect concealed, two, one of no catalogue; peak memory too."""
+    code = (
+        "import json, resource, sys, time, pamrs; case = pamrs.load_case(sys.argv[1]); start = time.perf_counter(); "
+        "found = pamrs.diagnose(case); seconds = time.perf_counter() - start; names = [e['id'] for e in found.effects]; "
+        "print(json.dumps([seconds, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024, found.verdict, names]))"
+    )
+    for number, kind in enumerate(("leak_muscle", "leak_muscle+muscle_hysteresis", "hose_torque"), 1):
+        with tempfile.TemporaryDirectory() as folder:
+            made = ["--out", f"{folder}/cases", "--keys-dir", f"{folder}/keys", "--kind", kind, "--seed", str(6 + number)]
+            subprocess.run([sys.executable, "-m", "trial", "make", *made], cwd=ROOT, check=True, capture_output=True)
+            run = subprocess.run([sys.executable, "-c", code, f"{folder}/cases/case_001"], check=True, capture_output=True, text=True)
+        seconds, memory, verdict, names = json.loads(run.stdout)
+        said = f"verdict: {verdict} {' + '.join(names)}".rstrip()
+        print(f"{'diagnose ' + kind:<40} {seconds:>9.3g} s {memory:>9.4g} MiB    {said}")
 
 
 def start_up() -> None:
