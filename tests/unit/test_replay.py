@@ -115,12 +115,12 @@ def test_a_controller_is_asked_at_its_own_rate() -> None:
             one.control(update, **{"duration": 0.1, "period": 0.01, name: value})
 
 
-def test_a_case_of_named_blocks_is_refused_by_name(tmp_path: Path) -> None:
+def test_a_case_of_named_blocks_that_lacks_a_command_is_refused_by_its_name(tmp_path: Path) -> None:
     rig = pamrs.rigs.named("antagonistic_joint")
     rig.to_toml(tmp_path / "rig.toml")
     run = pamrs.simulate(rig, {"flexor": wave(300), "extensor": 10.0 - wave(300)}, sample_time=0.01)
     write(tmp_path / "run.csv", run, "valve_command.flexor", "muscle_pressure.flexor", "joint_angle.elbow")
     case = 'schema = "pamrs.case/1"\nrig = "rig.toml"\n[[recording]]\nfile = "run.csv"\nrole = "fit"\n'
     (tmp_path / "case.toml").write_text(case, encoding="utf-8")
-    with pytest.raises(pamrs.DiagnosisError, match=r"named blocks \(valve, chamber"):
+    with pytest.raises(pamrs.DiagnosisError, match=r"no channel valve_command\.extensor"):
         pamrs.diagnose(tmp_path)
