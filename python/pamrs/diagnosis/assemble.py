@@ -198,9 +198,9 @@ def _probabilities(groups: list[Group]) -> tuple[dict[str, float], dict[str, flo
     if quiet:
         shifted = any(significant(e) for g in groups for e in g.nominal.values())
         if symptoms:
-            worst = max(abs(v) for v in symptoms.values())
-            out["unlisted"] = min(0.95, 0.5 + 0.25 * (worst - SYMPTOM))
-            out["parameters"] = 1.0 - out["unlisted"]
+            # everything is explained to its noise, at the price of a parameter that its owner would not have believed
+            out["unlisted"] = 0.25
+            out["parameters"] = 0.75
         else:
             out["parameters" if shifted else "none"] = 0.96
             out["none" if shifted else "parameters"] = 0.03
@@ -306,15 +306,19 @@ def _best_of(groups: list[Group], candidate: Candidate) -> Candidate | None:
     return next((g.best for g in groups if candidate in g.candidates), None)
 
 
+_CHOSEN = frozenset({"laminar_share", "cut_in_pressure", "cut_out_pressure"})
+"""Parameters that are tried and chosen, not fitted."""
+
+
 def _effect_parameters(effect: str, candidate: Candidate) -> dict[str, Any]:
     rig = candidate.fit.rig
     unknown_volume = bool(words.unknown_volumes(rig))
     out: dict[str, Any] = {}
     for parameter in EFFECTS[effect].parameters:
         name = f"{effect}.{parameter.name}"
-        if parameter.name == "laminar_share":
-            chosen = next(e["parameters"] for e in rig.effects if e["id"] == effect)["laminar_share"]
-            out[parameter.name] = {"value": chosen, "std": None, "unit": "1"}
+        if parameter.name in _CHOSEN:
+            chosen = next(e["parameters"] for e in rig.effects if e["id"] == effect)[parameter.name]
+            out[parameter.name] = {"value": chosen, "std": None, "unit": parameter.unit}
             continue
         if name not in candidate.fit.values:
             continue

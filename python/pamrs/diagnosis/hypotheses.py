@@ -22,7 +22,7 @@ from pamrs.rig import Rig
 
 __all__ = ["Candidate", "Group", "examine", "significant"]
 
-DETECTION_RATIO, HELD_RATIO, HINT = 1.35, 2.0, 1.15
+DETECTION_RATIO, HELD_RATIO, HINT = 1.45, 2.0, 1.15
 """Variance of bin means over the floor's from which a mismatch is taken as real: on recordings that were fitted; on others, where the
 fitted ones give a hint of it."""
 EVEN, EVEN_PUSH, SOFTNESS = 0.5, 2.6, 0.4

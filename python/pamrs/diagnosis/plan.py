@@ -157,6 +157,16 @@ class Plan:
     def sight(self, effect: str) -> Sight:
         """How one effect would show.
 
+        Parameters
+        ----------
+        effect : str
+            Its id.
+
+        Returns
+        -------
+        Sight
+            What is left of it beside the baseline's freedom.
+
         Raises
         ------
         ParameterError
@@ -168,7 +178,17 @@ class Plan:
         return found
 
     def separable(self, first: str, second: str) -> bool:
-        """Whether two effects that are seen would be told apart; False when one of them is not seen."""
+        """Whether two effects that are seen would be told apart; False when one of them is not seen.
+
+        Parameters
+        ----------
+        first, second : str
+            Their ids.
+
+        Returns
+        -------
+        bool
+        """
         both = {self.sight(first).effect, self.sight(second).effect}
         return both <= set(self.seen) and not any({a, b} == both for a, b, _ in self.pairs)
 

@@ -8,12 +8,14 @@ of the derivative, since many effects have none at zero).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.diagnosis.fitting import Fit, Problem, changes, stacked
+from pamrs.diagnosis.fitting import WIDEST, Fit, Problem, changes, stacked
 from pamrs.diagnosis.starts import Start, starts_of
 from pamrs.errors import SimulationError
 
@@ -22,6 +24,8 @@ __all__ = ["Score", "Screen", "basis_of", "by_effect", "screen"]
 Array = NDArray[np.float64]
 MOST = 8.0
 """Largest multiple of the typical size that a linear gain is believed at."""
+LEVELS = 6
+"""Levels of the tank's pressure that are tried for the thresholds of a compressor."""
 LEAST = 0.02
 """Smallest multiple that a fit starts from."""
 
@@ -114,9 +118,11 @@ def basis_of(fitted: Fit, problem: Problem, inflation: dict[str, float]) -> tupl
     rows, jacobian = stacked(problem, fitted.residuals, inflation)
     if jacobian is None or jacobian.shape[1] == 0:
         return rows, np.zeros((rows.size, 0))
-    scales = np.array([fitted.scales[name] for name in fitted.values])
-    scaled = jacobian * scales
-    free = np.array([name in fitted.moved for name in fitted.values], dtype=np.float64)
+    # a parameter at the end of its range cannot go on: what it would explain is left for an effect
+    names = [n for n in fitted.values if abs(fitted.moved.get(n, 0.0)) < WIDEST - 1e-3]
+    scales = np.array([fitted.scales[name] for name in names])
+    scaled = jacobian[:, [list(fitted.values).index(name) for name in names]] * scales
+    free = np.array([name in fitted.moved for name in names], dtype=np.float64)
     # J (J'J + prior)^-1 J' is the projector that a prior leaves; its square root's columns are the basis
     values, vectors = np.linalg.eigh(scaled.T @ scaled)
     keep = values > 1e-10 * max(float(values[-1]), 1e-300)
@@ -144,13 +150,54 @@ def screen(problem: Problem, fitted: Fit, effects: list[str], inflation: dict[st
         Whether the rig has no valve.
     """
     rows, basis = basis_of(fitted, problem, inflation)
-    signatures = []
+    signatures: list[tuple[str, Start, Array]] = []
+
+    def try_(start: Start) -> float:
+        """Add the signature of a start; what it would bring."""
+        try:
+            found = changes(problem, start.applied(fitted.rig), fitted.residuals)
+        except SimulationError:
+            return -math.inf  # this size leaves the range in which the model holds
+        moved, _ = stacked(problem, found, inflation)
+        signatures.append((start.effect, start, moved - rows))
+        return max((score.gain for score in Screen(rows, basis, signatures[-1:]).scores()), default=-math.inf)
+
     for effect in effects:
-        for start in starts_of(effect, sealed=sealed):
-            try:
-                found = changes(problem, start.applied(fitted.rig), fitted.residuals)
-            except SimulationError:
-                continue  # this size leaves the range in which the model holds
-            moved, _ = stacked(problem, found, inflation)
-            signatures.append((effect, start, moved - rows))
+        starts = starts_of(effect, sealed=sealed)
+        if effect == "compressor_cut_in":
+            before = len(signatures)
+            best = _switched(starts[0], problem, try_)
+            signatures[before:] = [entry for entry in signatures[before:] if entry[1] is best]
+        else:
+            for start in starts:
+                try_(start)
     return Screen(rows, basis, signatures)
+
+
+def _switched(start: Start, problem: Problem, try_: Callable[[Start], float]) -> Start | None:
+    """The pressures between which a compressor switches: over the range that the tank was seen in, then closer and closer.
+
+    A relay that is asked once a step has no slope in its thresholds, so that no fit can move them.
+    """
+    seen = [p.signals[name][0] for p in problem.recordings for name in p.signals if name.startswith("supply_pressure")]
+    if not seen:
+        return None
+    low, high = (float(f(np.concatenate(seen))) for f in (np.min, np.max))
+    step = (high - low) / LEVELS
+    if step <= 0.0:
+        return None
+
+    def at(cut_in: float, cut_out: float) -> Start:
+        own = {f"{start.effect}.cut_in_pressure": cut_in, f"{start.effect}.cut_out_pressure": cut_out}
+        return replace(start, free={n: v for n, v in start.free.items() if n not in own}, held=start.held | own)
+
+    levels = [low + (k + 0.5) * step for k in range(LEVELS)]
+    tried = [(try_(s), a, b, s) for a in levels for b in (*levels, high + step) if b > a for s in [at(a, b)]]
+    best = max(tried, key=lambda t: t[0])
+    while step > 1e-3 * (high - low):
+        step *= 0.5
+        _, a, b, _ = best
+        around = [(a - step, b), (a + step, b), (a, b - step), (a, b + step)]
+        tried = [(try_(s), c, d, s) for c, d in around if 0.0 < c < d for s in [at(c, d)]]
+        best = max([best, *tried], key=lambda t: t[0])
+    return best[3]
