@@ -260,10 +260,18 @@ fn a_change_of_payload_changes_mass_and_weight() {
     }
 }
 
+/// A push [N m] at a time for a duration [s], the other two without torque.
+fn one_push(torque: f64, time: f64, duration: f64) -> EffectSpec {
+    let own = [("torque", torque), ("time", time), ("duration", duration), ("rise", 0.02)];
+    let others =
+        ["torque_2", "time_2", "duration_2", "torque_3", "time_3", "duration_3"].map(|name| (name, 0.0));
+    effect("external_torque", &[&own[..], &others[..]].concat())
+}
+
 #[test]
 fn a_push_is_torque_times_duration() {
     let push = |torque: f64| {
-        let push = effect("external_torque", &[("torque", torque), ("time", 0.01), ("duration", 0.03)]);
+        let push = one_push(torque, 0.01, 0.03);
         pendulum(vec![push], 101, 1e-3, 0.8, 0.0).last("joint_rate")
     };
     let gained = (push(5.0) - push(0.0)) * (0.634 + 9.07 * 0.81);
@@ -478,7 +486,7 @@ fn closures_do_what_their_terms_say() {
     assert!((rise(1e-6) / (1.4 * unit) - 1.0).abs() < 1e-9 && (rise(-1e-6) / unit + 1.0).abs() < 1e-9);
     // A constant torque is a push that lasts, and friction by the way that it went is hysteresis: it outlives the motion.
     let angle = |effects| pendulum(effects, 400, 5e-3, 1.0, 0.0).last("joint_angle");
-    let push = effect("external_torque", &[("torque", 3.0), ("time", -10.0), ("duration", 1e3)]);
+    let push = one_push(3.0, -10.0, 1e3);
     assert_eq!(angle(vec![closure("closure_torque", &[("constant", 3.0)])]), angle(vec![push]));
     let (free, held) = (angle(vec![]), angle(vec![closure("closure_torque", &[("slip", -2.0)])]));
     assert!((free - held).abs() > 1e-3);

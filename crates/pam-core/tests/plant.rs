@@ -72,7 +72,7 @@ fn sensitivities_agree_with_differences() {
     let mut heated = with_effects.clone();
     heated.effects = vec![effect(
         "heat_transfer",
-        &[("heat_transfer_coefficient", 60.0), ("initial_temperature_rise", 3.0), ("share", 1.0)],
+        &[("heat_transfer_coefficient", 60.0), ("initial_temperature_rise", 3.0), ("share", 0.4)],
     )];
     let cases: [(&RigSpec, Block, &[&str]); 4] = [
         (
@@ -106,7 +106,11 @@ fn sensitivities_agree_with_differences() {
         (
             &heated,
             Block::Chamber(0),
-            &["heat_transfer.heat_transfer_coefficient", "heat_transfer.initial_temperature_rise"],
+            &[
+                "heat_transfer.heat_transfer_coefficient",
+                "heat_transfer.initial_temperature_rise",
+                "heat_transfer.share",
+            ],
         ),
     ];
     let base = Rig::new(with_effects.clone()).unwrap();

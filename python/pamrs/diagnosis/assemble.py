@@ -49,22 +49,22 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
     """
     nominal = case.rig
     baseline = _merged(nominal, [g.candidates[0] for g in groups])
-    chosen = [g.best if _named(g) else g.candidates[0] for g in groups]
-    model = _merged(nominal, chosen)
     probabilities, symptoms = _probabilities(groups)
     top = max(probabilities, key=lambda k: probabilities[k])
     verdict = top if top in ("none", "parameters", "unlisted") else "effects"
-    named = [e for c in chosen for e in c.effects]
+    chosen = _chosen(groups, frozenset(top.split("+"))) if verdict == "effects" else [g.candidates[0] for g in groups]
+    model = _merged(nominal, chosen)
+    named = list(dict.fromkeys(e for c in chosen for e in c.effects))
     if verdict in ("none", "parameters"):
         model = nominal if verdict == "none" else baseline
         named = []
     elif verdict == "unlisted":
         # the most probable catalogue effects stay in the list with their (small) probability; the model gets the form that was found
-        chosen = [g.closure or g.candidates[0] for g in groups]
+        chosen = [g.closure or (g.best if _named(g) else g.candidates[0]) for g in groups]
         model = _merged(nominal, chosen)
     floor = {k: v for g in groups for k, v in g.floor.items()}
     stages = {"before": nominal, "refit": baseline, "after": model}
-    events = next((c.fit.events for c in chosen if c.fit.events is not None), None) if verdict == "effects" else None
+    events = next((c.fit.events for c in chosen if c.fit.events is not None), None) if model.effects else None
     fit_found = {s: _run(fitted, rig, events if s == "after" else None) for s, rig in stages.items()}
     out_found = fit_found if held is fitted else {s: _run(held, rig, events if s == "after" else None) for s, rig in stages.items()}
     located = _located(groups, symptoms)
@@ -97,7 +97,7 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
         tried=_tried(groups),
     )
     forms = [g.form for g in groups if g.closure is not None] if verdict == "unlisted" else []
-    diagnosis.text = words.verdict(diagnosis, named, case, gap, forms)
+    diagnosis.text = words.verdict(diagnosis, named, case, gap, forms, sought=any(g.sought for g in groups))
     return diagnosis
 
 
@@ -140,10 +140,25 @@ def _next(
     left = _hypotheses(groups, probabilities, nominal)
     recordings = [*fitted.recordings, *(held.recordings if held is not fitted else [])]
     if ambiguity and len(left) > 1:
-        noise = {channel: float(np.median([p.noise[channel] for p in recordings])) for channel in recordings[0].noise}
+        common = set.intersection(*(set(p.noise) for p in recordings))
+        noise = {channel: float(np.median([p.noise[channel] for p in recordings])) for channel in sorted(common)}
         with contextlib.suppress(DiagnosisError, ParameterError, SimulationError):  # a rig that no experiment of the library suits
             return propose(nominal, left, noise, recordings)
     return words.next_experiment(verdict, probabilities, ambiguity, nominal)
+
+
+def _chosen(groups: list[Group], wanted: frozenset[str]) -> list[Candidate]:
+    """The candidate of each group that belongs to a set of effects: of those inside it, the most probable of the group.
+
+    A group that keeps nothing has the baseline alone.
+    """
+    found = []
+    for group in groups:
+        own = [c for c in group.candidates if set(c.effects) <= wanted]
+        named = [c for c in own if c.effects] if group.mismatch is not None else []
+        weights = [group.probabilities.get("+".join(c.effects), 0.0) for c in named]
+        found.append(named[weights.index(max(weights))] if named else group.candidates[0])
+    return found
 
 
 def _hypotheses(groups: list[Group], probabilities: dict[str, float], nominal: Rig) -> list[tuple[str, Rig, float]]:
@@ -153,11 +168,9 @@ def _hypotheses(groups: list[Group], probabilities: dict[str, float], nominal: R
         wanted = frozenset(key.split("+"))
         if p < SIMULATED or not wanted <= set(CATALOGUE):
             continue
-        chosen = []
-        for group in groups:
-            own = [c for c in group.candidates if set(c.effects) <= wanted and c.fit.events is None]
-            weights = [(len(c.effects), group.probabilities.get("+".join(c.effects), 0.0)) for c in own]
-            chosen.append(own[weights.index(max(weights))])
+        chosen = _chosen(groups, wanted)
+        if any(c.fit.events is not None for c in chosen):
+            continue
         if {e for c in chosen for e in c.effects} == wanted:
             found.append((key, _with_std(_merged(nominal, chosen), chosen), p))
     return found
@@ -350,7 +363,8 @@ def _ambiguity(probabilities: dict[str, float]) -> list[list[str]]:
     top = max(probabilities.values())
     if top >= SETTLED:
         return []
-    return [sorted(k.split("+")) for k, p in sorted(probabilities.items(), key=lambda kv: -kv[1]) if p >= 0.05]
+    found = [sorted(k.split("+")) for k, p in sorted(probabilities.items(), key=lambda kv: -kv[1]) if p >= 0.05]
+    return found if len(found) > 1 else []
 
 
 def _parameters(nominal: Rig, candidates: list[Candidate]) -> dict[str, dict[str, Any]]:

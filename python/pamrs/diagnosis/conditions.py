@@ -140,7 +140,8 @@ def describe(
             worst = power
             picture.recording = prepared.recording.name
             picture.intervals = _intervals(np.abs(score) > 3.0, width * prepared.dt)
-    joined = {name: np.concatenate(parts) for name, parts in columns.items()}
+    # a channel that one of the recordings lacks is no condition of them all
+    joined = {name: np.concatenate(parts) for name, parts in columns.items() if len(parts) == len(recordings)}
     z = np.concatenate(scaled)
     total = float(np.sum(np.maximum(z**2 - 1.0, 0.0)))
     for name, mask in _regimes(joined).items():

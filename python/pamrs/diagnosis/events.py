@@ -8,6 +8,7 @@ only if little is left.
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -64,18 +65,13 @@ def fit_events(effect: str, problem: Problem, nominal: Rig, baseline: Fit, infla
     if last is None or last.events is None:
         return None
     again = last.events
-    where, first = next(iter(again.values.items()))
+    first = next(iter(again.values.values()))
     values = {f"{effect}.{name}": value for name, value in first.items()}
-    alone = replace(problem, recordings=[p for p in problem.recordings if p.recording.name == where])
-    _, slope = stacked(alone, residuals(alone, last.rig, list(values), again), inflation)
-    assert slope is not None
-    std = np.sqrt(np.clip(np.diag(np.linalg.pinv(slope.T @ slope, hermitian=True)), 0.0, None))
     return replace(
         last,
         effects=(effect,),
         rig=last.rig.with_effect(effect, first),
         values=last.values | values,
-        std=last.std | dict(zip(values, std.tolist(), strict=True)),
     )
 
 
@@ -113,7 +109,8 @@ def look_for_events(
             values[prepared.recording.name] = started
     if not values:
         return None
-    return _refined(Events(effect, values), problem, rig, inflation, keep_size=size is not None)
+    found = _refined(Events(effect, values), problem, rig, inflation, keep_size=size is not None)
+    return found if found.values else None
 
 
 def _scan(
@@ -247,8 +244,11 @@ def _jointly(events: Events, problem: Problem, nominal: Rig, baseline: Fit, infl
     places = ([("", leading)] if shared else []) + places
     by_name = {p.recording.name: p for p in problem.recordings}
     scale = np.array([SCALES.get(p.rstrip("_23"), typical) for _, p in places])
-    kept = [stacked(replace(problem, recordings=[p]), baseline.residuals, inflation)[1] for p in problem.recordings]
     count = len(names)
+    kept = []
+    for prepared in problem.recordings:
+        rows, slope = stacked(replace(problem, recordings=[prepared]), baseline.residuals, inflation)
+        kept.append(np.zeros((rows.size, 0)) if slope is None else slope[:, :count])
 
     def told(x: Array) -> Events:
         values = {name: dict(own) for name, own in events.values.items()}
@@ -266,33 +266,38 @@ def _jointly(events: Events, problem: Problem, nominal: Rig, baseline: Fit, infl
         for prepared, fixed in zip(problem.recordings, kept, strict=True):
             rows, slope = stacked(replace(problem, recordings=[prepared]), found, inflation)
             assert slope is not None
-            assert fixed is not None
             own = events.values.get(prepared.recording.name, {})
             block = np.zeros((rows.size, len(places)))
             for k, (name, p) in enumerate(places):
                 if p in own and name in ("", prepared.recording.name):
                     block[:, k] = slope[:, wanted.index(p)] * scale[k]
             parts.append(rows)
-            columns.append(np.concatenate([fixed[:, : len(slopes)] * slopes, block], axis=1))
+            columns.append(np.concatenate([fixed * slopes, block], axis=1))
         prior = np.eye(count, count + len(places))
         return np.concatenate([*parts, x[:count]]), np.concatenate([*columns, prior]), found
 
     start = [(baseline.values[n] - scaling.centre[n]) / scaling.scale[n] for n in names]
     sizes = [own[leading] for own in events.values.values()]
-    first = [float(np.median(sizes)) if name == "" else events.values[name][p] for name, p in places]
+    begun = [float(np.median(sizes)) if name == "" else events.values[name][p] for name, p in places]
     limits = [_limits(effect, p, by_name[name] if name else problem.recordings[0]) for name, p in places]
     low = np.concatenate([scaling.bounds[0], np.array([limit[0] for limit in limits]) / scale])
     high = np.concatenate([scaling.bounds[1], np.array([limit[1] for limit in limits]) / scale])
     try:
-        x, (values, _, found), spent = levenberg_marquardt(evaluate, np.concatenate([start, np.array(first) / scale]), (low, high), 12)
+        x, (values, jacobian, found), spent = levenberg_marquardt(
+            evaluate, np.concatenate([start, np.array(begun) / scale]), (low, high), 12
+        )
     except SimulationError:
         return None
+    spread = np.sqrt(np.clip(np.diag(np.linalg.pinv(jacobian.T @ jacobian, hermitian=True)), 0.0, None))
+    told_std = {place: float(s) for place, s in zip(places, spread[count:] * scale, strict=True)}
+    first = next(iter(events.values))
+    own_std = {p: told_std.get((first, p), told_std.get(("", p), math.nan)) for p in events.values[first]}
     return replace(
         baseline,
         effects=(effect,),
         rig=scaling.rig(x[:count], {}),
         values={n: scaling.value(n, float(v)) for n, v in zip(names, x[:count], strict=True)},
-        std={n: baseline.std[n] for n in names},
+        std={n: baseline.std[n] for n in names} | {f"{effect}.{p}": s for p, s in own_std.items()},
         cost=0.5 * float(values @ values),
         residuals=found,
         moved={n: float(v) for n, v in zip(names, x[:count], strict=True)},

@@ -241,7 +241,8 @@ class Scaling:
     def value(self, name: str, x: float) -> float:
         """A parameter [SI] from its scaled number."""
         if name in self.centre:
-            return self.centre[name] + x * self.scale[name]
+            known = self.nominal.parameter(name)
+            return min(max(self.centre[name] + x * self.scale[name], known.lower), known.upper)
         info = find_parameter(name)
         found = self.starts[name] * math.exp(x) if name in LOGARITHMIC else x * self.scale[name]
         return min(max(found, info.lower), info.upper)
@@ -397,7 +398,7 @@ def fit(
 def _jacobian_of(fitted: Fit, names: Sequence[str]) -> dict[Key, Array]:
     """Sensitivities that a fit ended with, for some of its parameters."""
     columns = [list(fitted.values).index(name) for name in names]
-    return {key: r.jacobian[:, columns] for key, r in fitted.residuals.items() if r.jacobian is not None}
+    return {key: np.zeros((r.value.size, 0)) if r.jacobian is None else r.jacobian[:, columns] for key, r in fitted.residuals.items()}
 
 
 def _beside(left: Array, right: Array | None) -> Array:

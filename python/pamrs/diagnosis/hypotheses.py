@@ -67,6 +67,8 @@ class Candidate:
         Share of the baseline's excess that it removes on held-out recordings.
     scatter : float
         Relative scatter of its size between recordings, beyond its uncertainty.
+    gain : float
+        Gain in chi-square that the screen promised of a single effect.
     """
 
     effects: tuple[str, ...]
@@ -107,6 +109,8 @@ class Group:
         Where no name is likely: a form of what is missing that predicts held-out recordings better than the baseline.
     form : str
         That in words.
+    sought : bool
+        Whether one was looked for.
     """
 
     blocks: list[Block]
@@ -119,6 +123,7 @@ class Group:
     suspects: list[Block]
     closure: Candidate | None = None
     form: str = ""
+    sought: bool = False
 
     @property
     def best(self) -> Candidate:
@@ -185,10 +190,14 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
     group = Group(blocks, was, now, candidates, weighed, mismatch, floor, suspects)
     if weighed["unlisted"] < LIKELY or len({b.kind for b in suspects}) < len(suspects):
         return group  # of two chambers one form would have to serve both
+    group = replace(group, sought=True)
     closed = find_closure(inner, nominal, baseline, colour, suspects, say)
     if closed is None:
         return group
-    judged = trial.judged(closed.effects, closed)
+    try:
+        judged = trial.judged(closed.effects, closed)
+    except SimulationError:
+        return group
     # what does not carry over to recordings that were held out is no form of anything
     if _share_left(judged, start, suspects) > CARRIES:
         return group
@@ -203,7 +212,10 @@ def _refitted(problem: Problem, nominal: Rig, inflation: dict[str, float]) -> Fi
         return first
     known = nominal.parameters
     mirrored = {n: 2.0 * known[n].value - first.values[n] for n in first.moved}
-    second = fit(problem, nominal, (), {}, inflation, warm=replace(first, values=mirrored))
+    try:
+        second = fit(problem, nominal, (), {}, inflation, warm=replace(first, values=mirrored))
+    except SimulationError:
+        return first
     return min(first, second, key=lambda f: f.cost)
 
 
@@ -273,6 +285,12 @@ class _Trial:
 
     def eventful(self, effect: str, baseline: Fit) -> Candidate | None:
         """An effect with times of its own in every recording, held-out ones included."""
+        try:
+            return self._eventful(effect, baseline)
+        except SimulationError:
+            return None  # it leaves the range in which the model holds
+
+    def _eventful(self, effect: str, baseline: Fit) -> Candidate | None:
         white = dict.fromkeys((b.name for b in self.inner.blocks), 1.0)
         found = fit_events(effect, self.inner, self.nominal, baseline, white)
         if found is None:

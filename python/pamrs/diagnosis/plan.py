@@ -22,11 +22,12 @@ from pamrs.diagnosis.blocks import Block, available_blocks
 from pamrs.diagnosis.differences import EFFECTIVE, MEASURABLE, NOISE, checked_channels, taken, weights_of
 from pamrs.diagnosis.evidence import bins_of
 from pamrs.diagnosis.fitting import FIT_BIN, Key, Problem, acts_in, bin_width, changes, free_baseline, residuals
+from pamrs.diagnosis.hypotheses import DETECTION_RATIO
 from pamrs.diagnosis.protocols import Experiment, library
 from pamrs.diagnosis.signals import binned
 from pamrs.diagnosis.starts import Start, starts_of
 from pamrs.driving import regulators_of
-from pamrs.effects_table import EFFECTS, find_parameter
+from pamrs.effects_table import CATALOGUE, EFFECTS, find_parameter
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError
 from pamrs.rig import Rig
 from pamrs.simulation import core_rig
@@ -37,8 +38,8 @@ Array = NDArray[np.float64]
 
 SEEN = 3.0
 """Signature left, in noise units of a bin of 0.1 s, from which an effect counts as seen."""
-FAINT = 0.77
-"""Same from which the excess of a block would be called significant (a variance of 1.6 floors)."""
+FAINT = math.sqrt(DETECTION_RATIO - 1.0)
+"""Same from which the excess of a block would be called significant (hypotheses.DETECTION_RATIO)."""
 ALIKE = 0.95
 """Cosine between signatures from which two effects are one."""
 APART = 1.0
@@ -378,7 +379,7 @@ def plan_diagnosis(
     for name in chosen:
         if name not in pool:
             raise ParameterError(f"experiments has {name!r}, which is not allowed: of rig {rig.name!r} one of {', '.join(pool)}")
-    starts = [s for e in EFFECTS if _applies(rig, e, whole) for s in starts_of(e, sealed=rig.model["valve"] is None)]
+    starts = [s for e in CATALOGUE if _applies(rig, e, whole) for s in starts_of(e, sealed=rig.model["valve"] is None)]
     parts: dict[Key, _Part] = {}
     usable = {}
     for name, experiment in pool.items():
@@ -437,15 +438,15 @@ def _needed(rig: Rig, block: str, own: tuple[str, ...], every: tuple[str, ...]) 
 
 
 def _check_rig(rig: Rig) -> None:
-    """Refuse rigs that a diagnosis refuses."""
+    """Refuse rigs that no experiment is made for."""
     if not isinstance(rig, Rig):
         raise ParameterError(f"rig is a {type(rig).__name__}; a Rig is needed, for example pamrs.load_rig({rig!r})")
     several = [block for block in rig.blocks if "" not in rig.tables(block)]
     reasons = {
         f"it already has the effect {rig.effects[0]['id']!r}; plan with a rig without effects" if rig.effects else "",
-        f"it has named blocks ({', '.join(several)}); rigs of one chain can be diagnosed, without names" if several else "",
-        "it is fed by a regulator; rigs fed by a tank or a constant supply can be diagnosed" if regulators_of(rig) else "",
-        "it has a [load]; rigs with [joint] and [arm], or without a muscle, can be diagnosed" if "load" in rig.blocks else "",
+        f"it has named blocks ({', '.join(several)}); rigs of one chain can be planned, without names" if several else "",
+        "it is fed by a regulator; rigs fed by a tank or a constant supply can be planned" if regulators_of(rig) else "",
+        "it has a [load]; rigs with [joint] and [arm], or without a muscle, can be planned" if "load" in rig.blocks else "",
     } - {""}
     if reasons:
         raise DiagnosisError(f"rig {rig.name!r}: {'; '.join(sorted(reasons))}")

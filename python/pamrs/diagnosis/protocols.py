@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.errors import SimulationError
+from pamrs.errors import DiagnosisError, SimulationError
 from pamrs.rig import Rig
 from pamrs.simulation import Simulation, simulate
 from pamrs.simulator import Simulator
@@ -434,6 +434,11 @@ def library(
     list of Experiment
         Those that the rig survives in simulation.
     """
+    several = [block for block in rig.blocks if "" not in rig.tables(block)]
+    if several:
+        raise DiagnosisError(f"rig {rig.name!r} has named blocks ({', '.join(several)}); experiments are made for rigs of one chain")
+    if not rig.tables("valve") and (rig.tables("supply") or rig.tables("muscle")):
+        raise DiagnosisError(f"rig {rig.name!r} has no valve that a person could command; experiments need one, or a sealed chamber")
     span = pressure_range(rig, highest=highest)
     if rig.model["valve"] is None:
         sealed = _sealed_library(rig, SEALED_SAMPLE_TIME if sample_time is None else sample_time, span)

@@ -26,6 +26,8 @@ MOST = 8.0
 """Largest multiple of the typical size that a linear gain is believed at."""
 LEVELS = 6
 """Levels of the tank's pressure that are tried for the thresholds of a compressor."""
+REACHED = (0.05, 0.6, 0.85, 0.97)
+"""Quantiles of the angles that were seen at which a stop is tried."""
 LEAST = 0.02
 """Smallest multiple that a fit starts from."""
 
@@ -163,7 +165,7 @@ def screen(problem: Problem, fitted: Fit, effects: list[str], inflation: dict[st
         return max((score.gain for score in Screen(rows, basis, signatures[-1:]).scores()), default=-math.inf)
 
     for effect in effects:
-        starts = starts_of(effect, sealed=sealed)
+        starts = _placed(starts_of(effect, sealed=sealed), problem)
         if effect == "compressor_cut_in":
             before = len(signatures)
             best = _switched(starts[0], problem, try_)
@@ -172,6 +174,16 @@ def screen(problem: Problem, fitted: Fit, effects: list[str], inflation: dict[st
             for start in starts:
                 try_(start)
     return Screen(rows, basis, signatures)
+
+
+def _placed(starts: list[Start], problem: Problem) -> list[Start]:
+    """Starts whose place is an angle, moved into the range that was seen: a stop nobody came to changes nothing."""
+    place = "joint_end_stop.angle"
+    seen = [p.signals[name][0] for p in problem.recordings for name in p.signals if name.startswith("joint_angle")]
+    if not seen or not starts or place not in starts[0].free:
+        return starts
+    angles = np.quantile(np.concatenate(seen), REACHED)
+    return [replace(starts[0], free=starts[0].free | {place: float(angle)}) for angle in angles]
 
 
 def _switched(start: Start, problem: Problem, try_: Callable[[Start], float]) -> Start | None:

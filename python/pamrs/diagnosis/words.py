@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -58,8 +57,8 @@ def where(located: str | None, problem: Problem, groups: list[Group], picture: P
     }
 
 
-def verdict(diagnosis: Diagnosis, named: list[str], case: Case, gap: float | None, forms: list[str]) -> str:
-    """The verdict in a few sentences; ``forms`` say what a mismatch without a name is a function of."""
+def verdict(diagnosis: Diagnosis, named: list[str], case: Case, gap: float | None, forms: list[str], *, sought: bool) -> str:
+    """The verdict in a few sentences; ``forms`` say what a mismatch without a name is a function of, if that was ``sought``."""
     kind = diagnosis.verdict
     if kind == "none":
         return "Nothing is missing that these recordings could show: the nominal model predicts every block to its noise."
@@ -77,6 +76,8 @@ def verdict(diagnosis: Diagnosis, named: list[str], case: Case, gap: float | Non
             f"Physics is missing that is not in the catalogue, or no effect of the catalogue explains the data well enough to be "
             f"named. {place}" + (f" Closest: {tried}." if tried else "")
         )
+        if not forms and not sought:
+            return text
         if not forms:
             return text + " No form of it was found that carries over to other recordings: the model stays the refitted one."
         closes = "" if gap is None else f" With it in the model, {100 * gap:.0f} % of the gap between refitted model and noise closes."
@@ -125,9 +126,8 @@ _SEPARATE = {
 def next_experiment(kind: str, probabilities: dict[str, float], ambiguity: list[list[str]], rig: Rig) -> dict[str, Any]:
     """What to record next: the experiment that separates the leading hypotheses.
 
-    The information is the entropy of the present probabilities [bits]: what a decisive experiment would bring.
+    It is not simulated, so that nothing is said of how much it would tell.
     """
-    entropy = -sum(p * math.log2(p) for p in probabilities.values() if p > 0)
     leading = max(probabilities, key=lambda k: probabilities[k])
     if not ambiguity and kind != "unlisted":
         text = "The question is settled by these recordings; nothing further is needed."
@@ -140,7 +140,7 @@ def next_experiment(kind: str, probabilities: dict[str, float], ambiguity: list[
             "chamber scales with absolute pressure and goes with it; cooling, the bench's own loss and the transducer's drift stay."
         )
         excitation = {"kind": "sealed_hold", "levels_bar": [2.5, 7.5], "hold_s": 600.0}
-    return {"text": text, "excitation": excitation, "expected_information_bits": round(entropy, 3)}
+    return {"text": text, "excitation": excitation, "expected_information_bits": None}
 
 
 def warnings(case: Case, groups: list[Group], symptoms: dict[str, float], no_held_out: bool) -> list[str]:

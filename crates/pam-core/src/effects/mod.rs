@@ -160,7 +160,7 @@ mod tests {
         ids.dedup();
         assert_eq!(ids.len(), EFFECTS.len());
         let named = EFFECTS.iter().filter(|e| !e.id.starts_with("closure_"));
-        assert!(named.clone().all(|e| (1..=3).contains(&e.parameters.len())));
+        assert!(named.clone().all(|e| (1..=10).contains(&e.parameters.len())));
         assert_eq!(named.count() + 3, EFFECTS.len());
         assert!(EFFECTS.iter().flat_map(|e| e.parameters).all(|p| p.lower < p.upper));
     }

@@ -222,7 +222,9 @@ impl Plant<'_, f64> {
         match (wiring.effects.closure_flow, wiring.gases[gas].closure) {
             (Some(ids), Some(_)) => {
                 let pressure = self.rig.highest_pressure() / BAR;
-                closure_flow::steepest(&ids.map(|id| self.values[id]), pressure) / BAR
+                // Openings of several valves add up.
+                let valves = wiring.valves.iter().filter(|v| v.to == gas).count().max(1);
+                closure_flow::steepest(&ids.map(|id| self.values[id]), pressure) * valves as f64 / BAR
             }
             _ => 0.0,
         }

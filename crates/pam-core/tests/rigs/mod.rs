@@ -166,7 +166,22 @@ pub const TYPICAL: &[Typical] = &[
         &[("swinging_share", 0.0)],
     ),
     typical("payload_change", &[("mass_change", 1.5), ("time", 0.35)], &[("mass_change", 0.0)]),
-    typical("external_torque", &[("torque", 12.0), ("time", 0.2), ("duration", 0.25)], &[("torque", 0.0)]),
+    typical(
+        "external_torque",
+        &[
+            ("torque", 12.0),
+            ("time", 0.2),
+            ("duration", 0.25),
+            ("torque_2", -5.0),
+            ("time_2", 0.3),
+            ("duration_2", 0.2),
+            ("torque_3", 4.0),
+            ("time_3", 0.42),
+            ("duration_3", 0.1),
+            ("rise", 0.06),
+        ],
+        &[("torque", 0.0), ("torque_2", 0.0), ("torque_3", 0.0)],
+    ),
     typical(
         "base_flexibility",
         &[("compliance", 1e-4), ("natural_frequency", 8.0), ("damping_ratio", 0.03)],
