@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import quad
 from scipy.interpolate import CubicSpline, PchipInterpolator
 from scipy.optimize import brentq
 
@@ -124,17 +123,6 @@ class Muscle:
         first = sum(m * (ez**k * axial - ec**k * hoop) for k, m in enumerate(self.slope, 1))
         second = sum(m * (ez**k * axial - ec**k * hoop) for k, m in enumerate(self.offset, 1))
         return gas + modulus_scale * first, modulus_scale * second
-
-    def volume_by_quadrature(self, shape: Shape) -> float:
-        """Air volume [m3] by adaptive quadrature of the profile, for the self-check."""
-        contraction = 1.0 - shape.length / self.rest_length
-        a, b, c, reach, last, _ = self._ends(contraction, shape.radius)
-
-        def ring(v: float) -> float:
-            return float((c + a * math.cos(v) - shape.thickness) ** 2 * b * math.cos(v))
-
-        ends = 2.0 * quad(ring, 0.0, last, epsabs=0.0, epsrel=1e-12)[0]
-        return math.pi * ((shape.length - 2.0 * reach) * (shape.radius - shape.thickness) ** 2 + ends)
 
 
 class Tendon:

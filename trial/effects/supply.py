@@ -8,7 +8,7 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from .base import REFERENCE_DENSITY, Effect, Env, Port, Setting, Start, State, log_uniform, uniform
+from .base import Effect, Env, Port, Setting, Start, State, log_uniform, uniform
 
 
 @dataclass(frozen=True)
@@ -152,7 +152,3 @@ class SupplyCooling(Effect):
             return float(share * ps / t0 * change)
 
         return rate
-
-
-#: density that turns normal litres per minute into kg/s
-NORMAL_LITRE_PER_MINUTE = REFERENCE_DENSITY / 60000.0
