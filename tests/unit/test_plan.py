@@ -117,7 +117,7 @@ def test_holds_on_both_sides_separate_a_leak_from_centre_leakage(monkeypatch: py
     (both,) = pool = library(rig, sample_time=0.01, only=["holds_both_sides"])
     monkeypatch.setattr(plan, "library", lambda rig: pool)
     leaks = {name: EFFECTS[name] for name in ("leak_muscle", "valve_centre_leakage")}
-    monkeypatch.setattr(plan, "EFFECTS", leaks)
+    monkeypatch.setattr(plan, "CATALOGUE", leaks)
     quiet = {"muscle_pressure": 20.0, "supply_pressure": 20.0, "joint_angle": 1e-4}
     found = pamrs.plan_diagnosis(rig, ALL, experiments=["holds_both_sides"], noise=quiet)
     assert found.separable("leak_muscle", "valve_centre_leakage")
