@@ -38,13 +38,17 @@ TELLING = 0.5
 """Excess variance, in units of the floor's, from which recordings are asked how much an effect leaves."""
 FORM = 0.04
 """Share of a mismatch's variance that the difference between a catalogue's equation and the truth may leave."""
-DRIFT_SHARE, DRIFT_DOUBT = 0.02, 3.0
+DRIFT_SHARE, DRIFT_BELIEVED = 0.02, 0.45
+"""Share of the pressure below which a drift that no other recording confirms may as well be the bench's own, and how far a name of it
+is believed at most."""
 LEAST_GAIN, LEAST_SHARE = 12.0, 0.08
 """Gain in chi-square, and share of the largest, from which an effect is fitted."""
 MOST_SINGLES, PAIRED, PARTNERS = 5, 2, 2
 """Singles that are fitted; of them those that get a partner, and how many each."""
 NEAR, STARTS, RICH = 0.6, 2, 3
 """Share of an effect's best gain from which another of its starts is fitted, how many, and of how many effects."""
+BELIEVED = 0.985
+"""How far a name is believed at most."""
 CONSTANCY = 0.35
 """Relative scatter of an effect's size between recordings beyond which it is not that effect."""
 
@@ -185,8 +189,8 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
     # what a single effect leaves may be no more than the difference between its equation and the truth: a pair cannot be asked for
     pairs = [] if settled else _pairs(trial, screened, singles, lambda text: say(f"{names}: {text}"))
     candidates = [start, *singles, *pairs]
-    doubt = _doubt(fitted, held, mismatch, now[mismatch.name].rms)
-    weighed = _weigh(candidates, suspects, doubt)
+    most = _most_believed(fitted, held, mismatch, now[mismatch.name].rms)
+    weighed = _weigh(candidates, suspects, most)
     group = Group(blocks, was, now, candidates, weighed, mismatch, floor, suspects)
     if weighed["unlisted"] < LIKELY or len({b.kind for b in suspects}) < len(suspects):
         return group  # of two chambers one form would have to serve both
@@ -232,16 +236,16 @@ def _fits(rig: Rig, effect: str) -> bool:
     return bool(rig.tables(needs))
 
 
-def _doubt(fitted: Problem, held: Problem, mismatch: Block, left: float) -> float:
-    """Odds against every name where the proof is weak.
+def _most_believed(fitted: Problem, held: Problem, mismatch: Block, left: float) -> float:
+    """How far any name is believed at most, which is less where the proof is weak.
 
     A slow drift of less than two percent of the pressure, with no held-out recording, may as well be the bench's own loss,
     creep of a wall or the transducer's drift.
     """
     if held is not fitted or mismatch.channel != "muscle_pressure":
-        return 0.0
+        return BELIEVED
     typical = np.mean([np.mean(np.abs(p.signals["muscle_pressure"][0])) for p in fitted.recordings])
-    return DRIFT_DOUBT if left < DRIFT_SHARE * float(typical) else 0.0
+    return DRIFT_BELIEVED if left < DRIFT_SHARE * float(typical) else BELIEVED
 
 
 def _share_left(candidate: Candidate, baseline: Candidate, suspects: list[Block]) -> float:
@@ -434,7 +438,7 @@ def _scatter(effects: tuple[str, ...], problem: Problem, best: Fit) -> float:
     return float(max(beyond))
 
 
-def _weigh(candidates: list[Candidate], suspects: list[Block], doubt: float) -> dict[str, float]:
+def _weigh(candidates: list[Candidate], suspects: list[Block], most: float) -> dict[str, float]:
     """Probabilities over sets of effects and ``unlisted``.
 
     Between sets: the logarithm of what each leaves of the mismatch, fitted and held out, on a nominal number of independent looks;
@@ -460,8 +464,7 @@ def _weigh(candidates: list[Candidate], suspects: list[Block], doubt: float) -> 
         if _explains(c, suspects):
             odds = max(odds, 3.0)
         odds -= max(0.0, c.scatter - CONSTANCY) / 0.1
-        odds -= doubt
-        believed = 0.985 / (1.0 + math.exp(-min(60.0, max(-60.0, odds))))
+        believed = most / (1.0 + math.exp(-min(60.0, max(-60.0, odds))))
         key = "+".join(c.effects)
         out[key] = out.get(key, 0.0) + share * believed
         unlisted += share * (1.0 - believed)
