@@ -131,7 +131,7 @@ def _signals(prepared: Prepared, rig: Rig) -> dict[str, Array]:
                 out[f"d{short}"] = slope
     if rig.model["valve"] is not None:
         null, half = rig.parameter("valve.null_voltage").value, rig.model["valve"]["half_range"]
-        out["x"] = (prepared.command - null) / half
+        out["x"] = (prepared.commands["valve_command"] - null) / half
     return out
 
 

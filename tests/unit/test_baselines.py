@@ -12,7 +12,9 @@ pytest.importorskip("sklearn")
 
 from benchmarks.baselines import sindy  # noqa: E402
 from benchmarks.baselines.__main__ import main  # noqa: E402
-from benchmarks.baselines.sheet import gap_closed  # noqa: E402
+from benchmarks.baselines.sheet import _signals, gap_closed  # noqa: E402
+from pamrs.diagnosis.signals import prepare  # noqa: E402
+from pamrs.recording import Recording  # noqa: E402
 
 
 def hold(folder, conductance, *starts):
@@ -77,3 +79,17 @@ def test_the_library_grows():
     terms, called = sindy.library(u, ("p", "q", "x"), "full")
     assert len(called) == terms.shape[1]
     assert np.allclose(terms[:, called.index("q|q|")], u[:, 1] * np.abs(u[:, 1]))
+
+
+def test_the_features_of_a_whole_arm_have_the_valves_opening():
+    rig = pamrs.rigs.shoulder()
+    command = 5.0 + 0.5 * np.sin(0.005 * np.arange(400))
+    run = pamrs.simulate(rig, valve_command=command, sample_time=0.005)
+    names = ("supply_pressure", "muscle_pressure", "joint_angle")
+    channels = {"valve_command": command, **{n: run[n] for n in names}}
+    mask = {n: np.ones(command.size, dtype=bool) for n in channels}
+    units = dict.fromkeys(channels, "")
+    prepared = prepare(Recording("r", "fit", run.time, 0.005, channels, mask, [], units), rig)
+    found = _signals(prepared, rig)
+    assert set(found) == {"p", "dp", "q", "dq", "ps", "x"}
+    assert np.allclose(found["x"], (command - 5.0) / rig.model["valve"]["half_range"])
