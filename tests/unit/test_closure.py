@@ -11,7 +11,7 @@ from pamrs.diagnosis.blocks import Block, available_blocks
 from pamrs.diagnosis.closure import MOST_TERMS, describe_closure, find_closure
 from pamrs.diagnosis.evidence import Floor, excess, floors, inflation
 from pamrs.diagnosis.fitting import FIT_BIN, Fit, Key, Problem, fit, residuals
-from pamrs.diagnosis.hypotheses import _fits
+from pamrs.diagnosis.hypotheses import fits
 from pamrs.diagnosis.signals import prepare
 from pamrs.effects_table import CATALOGUE, EFFECTS
 from pamrs.effects_table.closure import CLOSURES, MEMORY_OF, TERMS
@@ -84,7 +84,7 @@ def test_closures_are_no_names_and_their_dictionaries_are_those_of_the_core() ->
         kinds = {term.kind for term in TERMS[closure.id]}
         assert {p.name for p in closure.parameters if p.neutral is None} == {MEMORY_OF[k] for k in kinds & set(MEMORY_OF)}
         assert kinds <= {"static", "even", "odd", *MEMORY_OF}
-        assert _fits(NOMINAL, closure.id)
+        assert fits(NOMINAL, closure.id)
 
 
 def test_a_hidden_torque_is_modelled_and_predicts_what_was_held_out(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs.channels import unit_of
-from pamrs.diagnosis.differences import EFFECTIVE, MEASURABLE, NOISE, Left, difference, problem_of, taken, weights_of
+from pamrs.diagnosis.differences import EFFECTIVE, MEASURABLE, NOISE, Left, checked_channels, difference, problem_of, taken, weights_of
 from pamrs.diagnosis.fitting import FIT_BIN, Key, Problem, acts_in, bin_width, residuals
 from pamrs.diagnosis.protocols import SAMPLE_TIME, SEALED_SAMPLE_TIME, Experiment, library
 from pamrs.diagnosis.signals import Prepared
@@ -285,14 +285,11 @@ def _checked(hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
 
 
 def _channels(rig: Rig, records: Sequence[Recording], channels: tuple[str, ...] | None) -> tuple[str, ...]:
-    has = {*core_rig(rig).inputs, *core_rig(rig).channels}
-    possible = [name for name in MEASURABLE if name in has]
     if channels is not None:
-        for name in channels:
-            if name not in possible:
-                raise ParameterError(f"channels has {name!r}, which is not allowed: of rig {rig.name!r} one of {', '.join(possible)}")
+        checked_channels(rig, channels)
         return tuple(channels)
-    return tuple(name for name in possible if all(name in record.channels for record in records))
+    has = {*core_rig(rig).inputs, *core_rig(rig).channels}
+    return tuple(name for name in MEASURABLE if name in has and all(name in record.channels for record in records))
 
 
 def _missing(rig: Rig, own: tuple[str, ...]) -> list[str]:

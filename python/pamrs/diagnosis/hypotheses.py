@@ -20,7 +20,7 @@ from pamrs.effects_table import CATALOGUE, EFFECTS, find_parameter
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 
-__all__ = ["Candidate", "Group", "examine", "significant"]
+__all__ = ["Candidate", "Group", "examine", "fits", "significant"]
 
 DETECTION_RATIO, HELD_RATIO, HINT = 1.45, 2.0, 1.15
 """Variance of bin means over the floor's from which a mismatch is taken as real: on recordings that were fitted; on others, where the
@@ -176,7 +176,7 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
         return Group(blocks, was, now, [start], {"": 1.0}, None, floor, [])
     mismatch = max(suspects, key=lambda b: out[b.name].ratio + now[b.name].ratio)
     say(f"{names}: {mismatch.name} keeps {now[mismatch.name].systematic:.2g} noise units after the refit")
-    acting = [e for e in CATALOGUE if _fits(nominal, e) and any(acts_in(e, b) for b in suspects)]
+    acting = [e for e in CATALOGUE if fits(nominal, e) and any(acts_in(e, b) for b in suspects)]
     happening = [e for e in acting if e in EVENTS]
     acting = [e for e in acting if e not in EVENTS]
     trial = _Trial(inner, outer, nominal, floor, out, suspects)
@@ -227,7 +227,7 @@ def _of(prepared: Prepared, found: dict[Key, Residual]) -> list[Residual]:
     return [r for (_, recording), r in found.items() if recording == prepared.recording.name]
 
 
-def _fits(rig: Rig, effect: str) -> bool:
+def fits(rig: Rig, effect: str) -> bool:
     """Whether a rig has what an effect acts on."""
     kinds = {supply["kind"] for supply in rig.tables("supply").values()}
     if effect in ("compressor_cut_in", "supply_regulator_deadband"):

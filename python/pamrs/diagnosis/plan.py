@@ -22,12 +22,12 @@ from pamrs.diagnosis.blocks import Block, available_blocks
 from pamrs.diagnosis.differences import EFFECTIVE, MEASURABLE, NOISE, checked_channels, taken, weights_of
 from pamrs.diagnosis.evidence import bins_of
 from pamrs.diagnosis.fitting import FIT_BIN, Key, Problem, acts_in, bin_width, changes, free_baseline, residuals
-from pamrs.diagnosis.hypotheses import DETECTION_RATIO
+from pamrs.diagnosis.hypotheses import DETECTION_RATIO, fits
 from pamrs.diagnosis.protocols import Experiment, library
 from pamrs.diagnosis.signals import binned
 from pamrs.diagnosis.starts import Start, starts_of
 from pamrs.driving import regulators_of
-from pamrs.effects_table import CATALOGUE, EFFECTS, find_parameter
+from pamrs.effects_table import CATALOGUE, find_parameter
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError
 from pamrs.rig import Rig
 from pamrs.simulation import core_rig
@@ -406,7 +406,7 @@ def plan_diagnosis(
         if blocks:
             additions.append(_addition("experiment", name, usable[name].text, now, _picture(parts, blocks, [*chosen, name], starts)))
     additions.sort(key=lambda a: (-(len(a.seen) + len(a.separated)), -a.bits))
-    order = [e for e in EFFECTS if e in now.sights]
+    order = [e for e in CATALOGUE if e in now.sights]
     unseparated = sorted(now.unseparated, key=lambda p: (order.index(p[0]), order.index(p[1])))
     pairs = [(a, b, now.cosine[a, b]) for a, b in unseparated]
     return Plan(
@@ -464,11 +464,7 @@ def _noise(given: Mapping[str, float] | None) -> dict[str, float]:
 
 def _applies(rig: Rig, effect: str, blocks: list[Block]) -> bool:
     """Whether a rig has what an effect acts on, and a block of the cut chain in which it could show."""
-    kinds = {supply["kind"] for supply in rig.tables("supply").values()}
-    if effect in ("compressor_cut_in", "supply_regulator_deadband"):
-        return ("tank" if effect == "compressor_cut_in" else "regulator") in kinds
-    needs = EFFECTS[effect].at or ("joint" if EFFECTS[effect].block == "arm" else "chamber")
-    return bool(rig.tables(needs)) and any(acts_in(effect, block) for block in blocks)
+    return fits(rig, effect) and any(acts_in(effect, block) for block in blocks)
 
 
 def _described(block: Block) -> dict[str, Any]:

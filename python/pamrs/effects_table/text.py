@@ -7,7 +7,7 @@ import textwrap
 from collections.abc import Mapping
 from typing import Final
 
-from pamrs.effects_table import EFFECTS
+from pamrs.effects_table import CATALOGUE
 from pamrs.effects_table.entry import EffectInfo, EffectParameter
 from pamrs.errors import ParameterError
 
@@ -19,7 +19,7 @@ _ORDER: Final = ("supply", "valve", "line", "chamber", "muscle", "joint", "arm",
 
 def catalogue() -> dict[str, list[EffectInfo]]:
     """The effects of the catalogue by block, blocks and effects in the order of the chain."""
-    listed = [info for info in EFFECTS.values() if getattr(info, "catalogue", True)]
+    listed = CATALOGUE.values()
     return {block: [info for info in listed if info.block == block] for block in _ORDER if any(i.block == block for i in listed)}
 
 
