@@ -86,7 +86,7 @@ def test_all_at_once_run_and_restart() -> None:
 
 def test_the_table_can_be_read_by_a_fit() -> None:
     for effect in EFFECTS.values():
-        assert 1 <= len({p.name.rstrip("_23") for p in effect.parameters}) <= (4 if effect.catalogue else 24)
+        assert 1 <= len({p.name.rstrip("_23") for p in effect.parameters}) <= (5 if effect.catalogue else 24)
         assert all((effect.name, effect.equation, effect.fingerprint, effect.separates, effect.reference))
         for parameter in effect.parameters:
             assert parameter.lower <= parameter.default <= parameter.upper

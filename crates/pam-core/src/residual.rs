@@ -134,6 +134,22 @@ impl Signal<'_> {
         Ok(())
     }
 
+    /// Cubic Hermite value, slope and curvature some time [s] after a fraction of sample `k`: inside the recording.
+    fn later<S: Scalar>(&self, k: usize, fraction: f64, dt: f64, shift: S) -> (S, S) {
+        let last = (self.value.len() - 1) as f64;
+        let wanted = k as f64 + fraction + shift.re() / dt;
+        let place = wanted.clamp(0.0, last);
+        let cell = place.floor().min((last - 1.0).max(0.0)) as usize;
+        let t = place - cell as f64;
+        let (value, slope) = self.at(cell, t, dt);
+        let (p0, m0) = (self.value[cell], self.slope[cell] * dt);
+        let next = (cell + 1).min(self.value.len() - 1);
+        let (p1, m1) = (self.value[next], self.slope[next] * dt);
+        let curvature = (p1 - p0) * (6.0 - 12.0 * t) + m0 * (6.0 * t - 4.0) + m1 * (6.0 * t - 2.0);
+        let more = if wanted == place { shift - shift.re() } else { constant(0.0) };
+        (more * slope + value, more * (curvature / (dt * dt)) + slope)
+    }
+
     /// Cubic Hermite value and derivative at a fraction of sample `k`.
     #[inline]
     fn at(&self, k: usize, fraction: f64, dt: f64) -> (f64, f64) {
@@ -362,19 +378,26 @@ struct Driven<'a, S> {
     zero: S,
     /// Time constant of its sensor [s].
     lag: S,
+    /// Whether another clock than the block's records it.
+    shifted: bool,
 }
 
 impl<S: Scalar> Driven<'_, S> {
-    /// True state at a fraction of sample `k`; an angle brings its rate along.
+    /// True state at a fraction of sample `k`, read so much later [s] where another clock records it; an angle brings its rate along.
     #[inline]
-    fn write(&self, rig: &Rig, k: usize, fraction: f64, dt: f64, state: &mut [S]) {
+    fn write(&self, rig: &Rig, k: usize, fraction: f64, dt: f64, shift: S, state: &mut [S]) {
         let layout = rig.layout();
-        let (value, slope) = self.signal.at(k, fraction, dt);
+        let (value, slope) = if self.shifted {
+            self.signal.later(k, fraction, dt, shift)
+        } else {
+            let (value, slope) = self.signal.at(k, fraction, dt);
+            (constant(value), constant(slope))
+        };
         if self.place < layout.angle(0) {
             state[self.place] = -self.zero + (value + rig.gas.ambient_pressure) + self.lag * slope;
         } else {
             state[self.place] = -self.zero + value;
-            state[self.place + layout.coordinates] = constant(slope);
+            state[self.place + layout.coordinates] = slope;
         }
     }
 }
@@ -434,9 +457,19 @@ fn run<S: Scalar>(
             signal: *signal,
             zero: zero(&plant, *place),
             lag: lag(&plant, *place),
+            // a block's own clock is that of what it predicts
+            shifted: plant.skewed() && (*place < layout.angle(0)) == matches!(block, Block::Arm(_)),
         })
         .collect();
     let skewed = plant.skewed();
+    // How much later a shifted neighbour is read than it is recorded, and how late a command acts.
+    let clocks = |plant: &Plant<'_, S>, time: f64| {
+        let (pressures, angles) = plant.skew(time);
+        match block {
+            Block::Arm(_) => (pressures - angles, angles),
+            Block::Supply(_) | Block::Chamber(_) => (angles - pressures, pressures),
+        }
+    };
     let driving: Vec<_> = drivers.iter().filter(|driver| !own.contains(&driver.place)).collect();
     let mut stepper = Stepper::new(plant);
     let mut memory = vec![Memory::default(); rig.wiring.groups.len()];
@@ -457,7 +490,8 @@ fn run<S: Scalar>(
         if starts.next_if(|s| **s == k).is_some() {
             let before = state.clone();
             let plant = &stepper.plant;
-            drivers.iter().for_each(|driver| driver.write(rig, k, 0.0, dt, &mut state));
+            let (shift, _) = clocks(plant, k as f64 * dt);
+            drivers.iter().for_each(|driver| driver.write(rig, k, 0.0, dt, shift, &mut state));
             for (place, bump) in own.iter().zip(bumps) {
                 state[*place] += *bump;
             }
@@ -497,12 +531,13 @@ fn run<S: Scalar>(
         let h = 1.0 / timing.substeps as f64;
         for i in 0..timing.substeps {
             let time = (k as f64 + i as f64 * h) * dt;
+            let (shift, late) = clocks(&stepper.plant, time);
             if skewed {
                 let command = |input: usize, sample: i64| {
                     let row = sample.clamp(0, n as i64 - 1) as usize;
                     measured.commands[input][row]
                 };
-                controls = stepper.plant.skewed_controls(time, timing.step(), dt, command);
+                controls = stepper.plant.skewed_controls(late, time, timing.step(), dt, command);
             }
             stepper.step(
                 &mut state,
@@ -513,7 +548,7 @@ fn run<S: Scalar>(
                 &simulated,
                 |fraction, y| {
                     for driver in &driving {
-                        driver.write(rig, k, (i as f64 + fraction) * h, dt, y);
+                        driver.write(rig, k, (i as f64 + fraction) * h, dt, shift, y);
                     }
                 },
             );

@@ -1,12 +1,13 @@
 //! Fixed-step simulation: commands are held over each sample, RK4 steps fill it.
 
 use crate::drive::{Drive, LEAST_PRESSURE};
+use crate::effects::clock_skew;
 use crate::error::check_range;
 use crate::events::{Event, Watch};
 use crate::integrate::Rk4;
 use crate::rig::plant::{Controls, Plant, Scratch, Simulated};
 use crate::rig::spec::dotted;
-use crate::rig::{Memory, Rig};
+use crate::rig::{Channel, Memory, Rig};
 use crate::scalar::{constant, Scalar};
 use crate::{Error, Result};
 
@@ -315,10 +316,10 @@ pub struct Progress {
     /// Conditions that an event ends, see [`Watch`].
     flags: Vec<bool>,
     samples: u64,
-    /// Commands of the samples before, newest last, as far back as the effect `clock_skew` reaches.
+    /// Commands and pressure readings of the samples before, newest last, as far back as the effect `clock_skew` reaches.
     past: Vec<f64>,
-    /// Commands of a sample that are kept: those of all inputs, or none.
-    inputs: usize,
+    /// How many of them a sample has: all commands and readings, or none.
+    kept: usize,
 }
 
 impl Progress {
@@ -341,8 +342,8 @@ impl Progress {
             flags.push(coordinate.stops.is_some_and(|s| x > s.max_angle));
         }
         flags.extend(std::iter::repeat_n(false, rig.wiring.valves.len() + rig.wiring.lines.len()));
-        let inputs = if plant.skewed() { rig.names.inputs.len() } else { 0 };
-        Ok(Self { state, memory, flags, samples: 0, past: Vec::new(), inputs })
+        let kept = if plant.skewed() { rig.names.inputs.len() + gauges(rig).count() } else { 0 };
+        Ok(Self { state, memory, flags, samples: 0, past: Vec::new(), kept })
     }
 
     /// Samples since the start.
@@ -368,7 +369,7 @@ impl Progress {
         let parts = [self.state.len(), self.memory.len() * Memory::<f64>::NUMBERS, self.flags.len(), 1];
         let expected: usize = parts.iter().sum();
         let past = numbers.len().wrapping_sub(expected);
-        let whole = past == 0 || (past < numbers.len() && self.inputs > 0 && past % self.inputs == 0);
+        let whole = past == 0 || (past < numbers.len() && self.kept > 0 && past % self.kept == 0);
         if !whole {
             let why = "as it was read".into();
             return Err(Error::Length { name: "state".into(), found: numbers.len(), expected, why });
@@ -382,7 +383,7 @@ impl Progress {
         let (samples, past) = rest.split_at(1);
         Ok(Self {
             past: past.to_vec(),
-            inputs: self.inputs,
+            kept: self.kept,
             state: state.to_vec(),
             memory: memory.chunks(Memory::<f64>::NUMBERS).map(Memory::from_slice).collect(),
             flags: flags.iter().map(|f| *f > 0.5).collect(),
@@ -409,24 +410,48 @@ impl Progress {
     ) -> Result<()> {
         check_state(plant, &self.state, self.samples as f64 * timing.sample_time)?;
         plant.observe(&self.state, &self.memory, scratch, &mut out.channels);
+        if self.kept > 0 {
+            let (pressures, angles) = plant.skew(self.samples as f64 * timing.sample_time);
+            let later = (pressures.max(0.0) - angles.max(0.0)) / timing.sample_time;
+            let first = plant.rig().names.inputs.len();
+            for (column, channel) in gauges(plant.rig()).enumerate() {
+                let rows = || self.past.chunks(self.kept).rev();
+                if let Some(reading) = out.channels[channel].last_mut() {
+                    *reading =
+                        clock_skew::late(|ago| rows().nth(ago).map(|r| r[first + column]), *reading, later);
+                }
+            }
+        }
         Ok(())
     }
 
-    /// Note the commands of a sample, and forget those that no step asks for any more.
-    fn remember(&mut self, drive: &Drive<'_>, sample: usize, skew: f64, timing: Timing) {
-        self.past.extend((0..self.inputs).map(|input| drive.commands[input][sample]));
-        let kept = self.inputs * (2 + (skew / timing.sample_time).ceil() as usize);
-        self.past.drain(..self.past.len().saturating_sub(kept));
+    /// Note the commands and the pressures of a sample, and forget what nobody asks for any more.
+    fn remember(
+        &mut self,
+        plant: &Plant<'_, f64>,
+        scratch: &mut Scratch<f64>,
+        drive: &Drive<'_>,
+        sample: usize,
+        timing: Timing,
+    ) {
+        let mut readings = vec![Vec::new(); plant.rig().names.channels.len()];
+        plant.observe(&self.state, &self.memory, scratch, &mut readings);
+        self.past.extend(drive.commands.iter().map(|commands| commands[sample]));
+        self.past.extend(gauges(plant.rig()).flat_map(|channel| readings[channel].last().copied()));
+        let (skew, _) = plant.skew(self.samples as f64 * timing.sample_time);
+        let most = self.kept * (2 + (skew.max(0.0) / timing.sample_time).ceil() as usize);
+        self.past.drain(..self.past.len().saturating_sub(most));
     }
 
-    /// Commands over the step that begins at a time, the newest being those of the present sample.
+    /// Commands over the step that begins at a time, the newest being those of the present sample: as late as the angles.
     fn skewed(&self, plant: &Plant<'_, f64>, time: f64, timing: Timing) -> Controls<f64> {
-        let rows = self.past.len() / self.inputs;
+        let rows = self.past.len() / self.kept;
         let command = |input: usize, sample: i64| {
             let back = (self.samples as i64 - sample).clamp(0, rows as i64 - 1) as usize;
-            self.past[(rows - 1 - back) * self.inputs + input]
+            self.past[(rows - 1 - back) * self.kept + input]
         };
-        plant.skewed_controls(time, timing.step(), timing.sample_time, command)
+        let (_, shift) = plant.skew(time);
+        plant.skewed_controls(shift.max(0.0), time, timing.step(), timing.sample_time, command)
     }
 
     /// Hold the commands of each sample and append the sample after it. What is prescribed moves evenly to its value for the
@@ -468,8 +493,8 @@ impl Progress {
             let happened = out.events.len();
             let ends = drive.ends(rig, &self.state, k);
             let began = self.samples as f64 * timing.sample_time;
-            if self.inputs > 0 {
-                next.remember(drive, k, stepper.plant.skew(began), timing);
+            if self.kept > 0 {
+                next.remember(&stepper.plant, &mut stepper.scratch, drive, k, timing);
                 controls = next.skewed(&stepper.plant, began, timing);
             }
             stepper.begin(&next.state, &controls, began);
@@ -477,7 +502,7 @@ impl Progress {
             before.report(rig, None, began, &mut next.flags, &mut out.events);
             for sub in 0..timing.substeps {
                 let from = began + sub as f64 * dt;
-                if self.inputs > 0 {
+                if self.kept > 0 {
                     controls = next.skewed(&stepper.plant, from, timing);
                 }
                 let (state, memory) = (&mut next.state, &mut next.memory);
@@ -519,6 +544,12 @@ impl Progress {
         }
         Ok(())
     }
+}
+
+/// Channels that are readings of pressures.
+fn gauges(rig: &Rig) -> impl Iterator<Item = usize> + '_ {
+    let pressure = |channel: &Channel| matches!(channel, Channel::Supply(_) | Channel::Pressure(_));
+    rig.names.channels.iter().enumerate().filter(move |(_, (_, c))| pressure(c)).map(|(k, _)| k)
 }
 
 /// The gas of a prescribed pressure is at the temperature of the room, and what that takes was supplied from outside (or,

@@ -131,7 +131,9 @@ fn a_lag_in_the_path_costs_its_time() {
         let expected = (time_constant + delay) / 0.49;
         assert!((missing / expected - 1.0).abs() < 0.01, "{time_constant} {delay}: {missing} {expected}");
     }
-    let shift = 1.0 - filled(vec![effect("clock_skew", &[("offset", 0.0123), ("rate", 0.0)])]) / free;
+    let shift = 1.0
+        - filled(vec![effect("clock_skew", &[("offset", 0.0123), ("rate", 0.0), ("angle_share", 1.0)])])
+            / free;
     assert!((shift * 0.49 - 0.0123).abs() < 1e-4, "{shift}");
 }
 
@@ -280,7 +282,10 @@ fn a_push_is_torque_times_duration() {
 
 #[test]
 fn a_stop_in_the_way_carries_the_arm() {
-    let stop = effect("joint_end_stop", &[("stiffness", 2000.0), ("angle", 0.6), ("dissipation", 2.0)]);
+    let stop = effect(
+        "joint_end_stop",
+        &[("stiffness", 2000.0), ("angle", 0.6), ("dissipation", 2.0), ("exponent", 1.0), ("side", -1.0)],
+    );
     let run = pendulum(vec![stop], 4000, 5e-3, 0.9, 0.0);
     let (angle, torque) = (run.last("joint_angle"), run.last("joint_torque"));
     let weight = (1.8 + 9.07 * 0.9) * 9.80665 * angle.sin();
@@ -451,7 +456,7 @@ fn fast_effects_shorten_the_step() {
     let lag = step(vec![effect("input_path_lag", &[("time_constant", 1e-4), ("delay", 0.0)])]);
     assert!((lag - 2e-4).abs() < 1e-12, "{lag} {free}");
     assert_eq!(step(vec![effect("input_path_lag", &[("time_constant", 1e-5), ("delay", 1e-5)])]), free);
-    let stiff = [("stiffness", 1e9), ("angle", 1.0), ("dissipation", 0.0)];
+    let stiff = [("stiffness", 1e9), ("angle", 1.0), ("dissipation", 0.0), ("exponent", 1.0), ("side", 1.0)];
     let expected = 2.0 / ((1e9 + 2e4) / (0.634 + 9.07 * 0.81_f64)).sqrt();
     // the muscles are springs beside it, a thousand times softer
     assert!((step(vec![effect("joint_end_stop", &stiff)]) / expected - 1.0).abs() < 1e-3);

@@ -224,6 +224,15 @@ fn sensitivities(typical: &Typical, spec: &RigSpec, truth: &Trajectory, block: &
     }
 }
 
+/// Parameters without an influence: the compressor's cut-out is not reached, a stop's side is one or the other.
+fn blind(id: &str) -> &'static [&'static str] {
+    match id {
+        "compressor_cut_in" => &["cut_out_pressure"],
+        "joint_end_stop" => &["side"],
+        _ => &[],
+    }
+}
+
 #[test]
 fn sensitivities_are_those_of_differences() {
     for typical in TYPICAL {
@@ -235,8 +244,7 @@ fn sensitivities_are_those_of_differences() {
             "valve" | "line" | "chamber" | "sensors" => "chamber",
             _ => "arm",
         };
-        // The upper stop and the compressor's cut-out are not reached.
-        let blind: &[&str] = if typical.id == "compressor_cut_in" { &["cut_out_pressure"] } else { &[] };
+        let blind = blind(typical.id);
         sensitivities(typical, &spec, &truth, block, blind);
         if typical.id == "pressure_lag" {
             sensitivities(typical, &spec, &truth, "arm", &[]);
@@ -257,7 +265,13 @@ fn sensitivities_hold_on_two_joints() {
         }
         let truth = run(&with(spec.clone(), vec![typical.on()]), ROWS);
         let arm = !["valve", "line", "chamber"].contains(&info.block);
-        sensitivities(typical, &spec, &truth, if arm { "arm.wrist" } else { "chamber.elbow" }, &[]);
+        sensitivities(
+            typical,
+            &spec,
+            &truth,
+            if arm { "arm.wrist" } else { "chamber.elbow" },
+            blind(typical.id),
+        );
     }
 }
 
@@ -282,6 +296,58 @@ fn predictions_repeat_what_was_simulated() {
                 was.iter().copied().fold(f64::MIN, f64::max) - was.iter().copied().fold(f64::MAX, f64::min);
             let gap = found.iter().zip(was).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
             assert!(gap < 0.05 * span, "{}: {name} differs by {gap} of {span}", typical.id);
+        }
+    }
+}
+
+#[test]
+fn a_clock_ahead_is_read_from_a_recording() {
+    // Both pressures were logged three samples early, or late; angle and command were not.
+    let free = Rig::new(shoulder()).unwrap();
+    let truth = run(&free, ROWS);
+    let inputs = signals(&free, ROWS);
+    let names = ["supply_pressure", "muscle_pressure", "joint_angle"];
+    for late in [-3_i64, 3] {
+        let moved = |name: &str| -> Vec<f64> {
+            let by = if name == "joint_angle" { 0 } else { late };
+            let was = truth.get(&free, name).unwrap();
+            (0..ROWS as i64).map(|k| was[(k - by).clamp(0, ROWS as i64 - 1) as usize]).collect()
+        };
+        let values = names.map(moved);
+        let rates = values.each_ref().map(|v| slopes(v));
+        let signal = |k: usize| (names[k], Signal { value: &values[k], slope: &rates[k] });
+        let all = [signal(0), signal(1), signal(2)];
+        let offset = late as f64 * TIMING.sample_time;
+        let clock = effect_at("clock_skew", "", &[("offset", offset), ("rate", 0.0), ("angle_share", 0.0)]);
+        let gaps = |rig: &Rig, name: &str, k: usize| {
+            let measured = Measured::new(rig, ROWS, &borrowed(&inputs), &all).unwrap();
+            let block = Block::from_name(rig, name).unwrap();
+            let found = predict(rig, block, &measured, TIMING, &[0, 4], &[]).unwrap().value;
+            // the ends, which were not recorded, apart
+            (4..ROWS - 4).map(|i| (found[i] - values[k][i]).powi(2)).sum::<f64>().sqrt()
+        };
+        let skewed = with(shoulder(), vec![clock]);
+        for (name, k) in [("chamber", 1), ("arm", 2)] {
+            let (with_clock, without) = (gaps(&skewed, name, k), gaps(&free, name, k));
+            assert!(with_clock < 0.2 * without, "{name} {late}: {with_clock} {without}");
+        }
+    }
+}
+
+#[test]
+fn late_pressures_do_not_move_the_arm() {
+    let free = run(&Rig::new(shoulder()).unwrap(), ROWS);
+    let dt = TIMING.sample_time;
+    let clock = [("offset", 2.25 * dt), ("rate", 0.0), ("angle_share", 0.0)];
+    let rig = with(shoulder(), vec![effect_at("clock_skew", "", &clock)]);
+    let late = run(&rig, ROWS);
+    assert_eq!(free.get(&rig, "joint_angle"), late.get(&rig, "joint_angle"));
+    for name in ["muscle_pressure", "supply_pressure"] {
+        let (was, seen) = (free.get(&rig, name).unwrap(), late.get(&rig, name).unwrap());
+        assert_eq!(seen[0], was[0]);
+        for k in 3..ROWS {
+            let expected = was[k - 2] + 0.25 * (was[k - 3] - was[k - 2]);
+            assert!((seen[k] - expected).abs() <= 1e-9 * was[0].abs().max(1e5), "{name} {k}");
         }
     }
 }

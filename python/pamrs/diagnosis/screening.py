@@ -26,10 +26,12 @@ MOST = 8.0
 """Largest multiple of the typical size that a linear gain is believed at."""
 LEVELS = 6
 """Levels of the tank's pressure that are tried for the thresholds of a compressor."""
-REACHED = (0.05, 0.6, 0.85, 0.97)
-"""Quantiles of the angles that were seen at which a stop is tried."""
+REACHED = (0.5, 0.75, 0.93)
+"""Quantiles of the angles that were seen at which an upper stop is tried; a lower one at the others."""
 LEAST = 0.02
 """Smallest multiple that a fit starts from."""
+FAR, REFINED = 0.3, 3
+"""Multiple of a size below which the signature is taken again at the size that is wanted, and how often at most."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,21 +156,29 @@ def screen(problem: Problem, fitted: Fit, effects: list[str], inflation: dict[st
     rows, basis = basis_of(fitted, problem, inflation)
     signatures: list[tuple[str, Start, Array]] = []
 
-    def try_(start: Start) -> float:
+    def try_(start: Start, looks: int = REFINED) -> float:
         """Add the signature of a start; what it would bring."""
-        try:
-            found = changes(problem, start.applied(fitted.rig), fitted.residuals)
-        except SimulationError:
-            return -math.inf  # this size leaves the range in which the model holds
-        moved, _ = stacked(problem, found, inflation)
-        signatures.append((start.effect, start, moved - rows))
-        return max((score.gain for score in Screen(rows, basis, signatures[-1:]).scores()), default=-math.inf)
+        tried = start
+        for _ in range(looks):
+            try:
+                found = changes(problem, tried.applied(fitted.rig), fitted.residuals)
+            except SimulationError:
+                return -math.inf  # this size leaves the range in which the model holds
+            moved, _ = stacked(problem, found, inflation)
+            entry = (start.effect, tried, moved - rows)
+            score = max(Screen(rows, basis, [entry]).scores(), key=lambda s: s.gain, default=None)
+            if score is None or score.gain <= 0.0 or not start.scalable or abs(score.size) >= FAR:
+                break
+            # what a stop or a threshold does is not in proportion to its size: it is looked at where it would be
+            tried = tried.scaled(abs(score.size))
+        signatures.append(entry)
+        return -math.inf if score is None else score.gain
 
     for effect in effects:
         starts = _placed(starts_of(effect, sealed=sealed), problem)
         if effect == "compressor_cut_in":
             before = len(signatures)
-            best = _switched(starts[0], problem, try_)
+            best = _switched(starts[0], problem, lambda start: try_(start, 1))
             signatures[before:] = [entry for entry in signatures[before:] if entry[1] is best]
         else:
             for start in starts:
@@ -182,8 +192,13 @@ def _placed(starts: list[Start], problem: Problem) -> list[Start]:
     seen = [p.signals[name][0] for p in problem.recordings for name in p.signals if name.startswith("joint_angle")]
     if not seen or not starts or place not in starts[0].free:
         return starts
-    angles = np.quantile(np.concatenate(seen), REACHED)
-    return [replace(starts[0], free=starts[0].free | {place: float(angle)}) for angle in angles]
+    angles = np.concatenate(seen)
+
+    def at(start: Start, share: float) -> Start:
+        lower = start.held["joint_end_stop.side"] < 0.0
+        return replace(start, free=start.free | {place: float(np.quantile(angles, 1.0 - share if lower else share))})
+
+    return [at(start, share) for start in starts for share in REACHED]
 
 
 def _switched(start: Start, problem: Problem, try_: Callable[[Start], float]) -> Start | None:

@@ -27,13 +27,14 @@ SENSORS: Final[tuple[EffectInfo, ...]] = (
         name="recorded by another clock than the commands",
         block="sensors",
         at="",
-        equation="y(t) = s(t - d), d = max(d0 + r t, 0): commands act later by d on pressures and angles alike",
-        fingerprint="all channels answer late to the command, by a time that grows through the recording",
+        equation="p recorded at t was there at t - d, the angle at t - a d, d = d0 + r t: commands act later by d on the recording",
+        fingerprint="pressures, or all channels, answer late to the command, or early, by a time that grows through the recording",
         separates="a lag on the way in is the same at the start and at the end and rounds the edges; "
         "a sensor's lag moves one channel only",
         parameters=(
-            Parameter("offset", "s", 0.01, 0.0, 10.0, (0.005, 0.03), "how late at the start", 0.0),
+            Parameter("offset", "s", 0.01, -10.0, 10.0, (0.005, 0.03), "how late at the start; early if negative", 0.0),
             Parameter("rate", "1", 1e-4, -0.01, 0.01, (0.0, 3e-4), "growth per time", 0.0),
+            Parameter("angle_share", "1", 1.0, 0.0, 1.0, (0.0, 1.0), "1: the angle is on the pressures' clock, 0: on the command's"),
         ),
         reference="Mills (1991), offset and skew of clocks",
         rivals=("input_path_lag", "pressure_lag"),

@@ -1,12 +1,14 @@
-//! `clock_skew`: pressures and angles are recorded by another clock than the commands.
+//! `clock_skew`: pressures, and angles too or not, are recorded by another clock than the commands.
 //!
-//! What is recorded at `t` was there at `t - d(t)` of the commands' clock, `d = d_0 + r t`, never less than zero: the commands act on the
-//! recording later by `d`. Within a step the held commands are averaged over the shifted time, so that an edge moves through it
-//! continuously and the shift can be differentiated. The rate of some 1e-4 changes no other time.
+//! A pressure that is recorded at `t` was there at `t - d(t)` of the commands' clock, `d = d_0 + r t`, an angle at `t - a d(t)`: the share `a`
+//! is 1 where one logger records both and 0 where the angle is on the commands' clock. Commands act on the recording later by `d`. Within a
+//! step the held commands are averaged over the shifted time, so that an edge moves through it continuously and the shift can be
+//! differentiated. The rate of some 1e-4 changes no other time. A clock that is ahead (`d < 0`) is known to a prediction from recordings; a
+//! simulation, which cannot answer a command that is still to come, takes it as no shift.
 //! D. L. Mills, "Internet time synchronization: the network time protocol", IEEE Trans. Communications 39, 1991 (offset and skew).
 
 use super::{EffectInfo, EffectParameter};
-use crate::scalar::{constant, Scalar};
+use crate::scalar::Scalar;
 
 /// Table entry.
 pub const INFO: EffectInfo = EffectInfo {
@@ -14,20 +16,32 @@ pub const INFO: EffectInfo = EffectInfo {
     block: "sensors",
     at: "",
     parameters: &[
-        EffectParameter::new("offset", "s").within(0.0, 10.0),
+        EffectParameter::new("offset", "s").within(-10.0, 10.0),
         EffectParameter::new("rate", "1").within(-0.01, 0.01),
+        EffectParameter::new("angle_share", "1").within(0.0, 1.0),
     ],
 };
 
-/// How late a command acts at a time [s].
+/// How late a pressure is recorded at a time [s].
 #[inline]
 pub fn shift<S: Scalar>(offset: S, rate: S, time: f64) -> S {
-    let shift = offset + rate * time;
-    if shift.re() > 0.0 {
-        shift
-    } else {
-        constant(0.0)
+    offset + rate * time
+}
+
+/// A reading so late [samples], from the readings of the samples before (newest last) and the present one.
+pub fn late(past: impl Fn(usize) -> Option<f64>, present: f64, shift: f64) -> f64 {
+    if shift <= 0.0 {
+        return present;
     }
+    let back = shift.floor() as usize;
+    // Readings by how many samples ago; before the first one it stood still.
+    let ago = |n: usize| match n.checked_sub(1) {
+        None => Some(present),
+        Some(k) => past(k),
+    };
+    let oldest = |n: usize| (0..=n).rev().find_map(ago).unwrap_or(present);
+    let (near, far) = (oldest(back), oldest(back + 1));
+    near + (far - near) * (shift - back as f64)
 }
 
 /// Mean over a step [s] that begins at a time of values that are held over each sample, seen later by a shift.
@@ -65,8 +79,18 @@ mod tests {
     }
 
     #[test]
-    fn a_shift_grows_and_is_never_negative() {
+    fn a_shift_grows() {
         assert!((shift(1e-2, 1e-4, 100.0) - 2e-2_f64).abs() < 1e-15);
-        assert_eq!((shift(0.0, 0.0, 50.0), shift(0.0, -1e-3, 50.0)), (0.0, 0.0));
+        assert_eq!((shift(0.0, 0.0, 50.0), shift(0.0, -1e-3, 50.0)), (0.0, -0.05));
+    }
+
+    #[test]
+    fn a_reading_comes_late() {
+        let before = [7.0, 5.0, 2.0];
+        let at = |shift: f64| late(|k| before.iter().rev().nth(k).copied(), 1.0, shift);
+        assert_eq!(
+            [at(-1.0), at(0.0), at(0.25), at(1.0), at(2.5), at(3.0), at(9.0)],
+            [1.0, 1.0, 1.25, 2.0, 6.0, 7.0, 7.0]
+        );
     }
 }

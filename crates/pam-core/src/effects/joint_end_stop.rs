@@ -1,7 +1,8 @@
 //! `joint_end_stop`: a stop of the joint before the nominal one.
 //!
-//! `tau = -k d (1 + c d')` for a depth `d` beyond the stop's angle, never a pull, the corner rounded over 0.2 deg; above the middle of the
-//! joint's range it is an upper stop, below a lower one. K. H. Hunt & F. R. E. Crossley, "Coefficient of restitution interpreted as damping
+//! `tau = -k d (d/d_0)^(n-1) (1 + c d')` for a depth `d` beyond the stop's angle, never a pull, the corner rounded over 0.2 deg; `k` is the
+//! stop's secant stiffness at a depth of `d_0` = 10 deg, so that the exponent `n` (1 metal, 2 to 3 rubber) leaves its unit alone. It is
+//! an upper stop where `side` is positive, a lower one where it is negative. K. H. Hunt & F. R. E. Crossley, "Coefficient of restitution interpreted as damping
 //! in vibroimpact", ASME J. Applied Mechanics 42, 1975.
 
 use super::{beyond, EffectInfo, EffectParameter};
@@ -16,35 +17,77 @@ pub const INFO: EffectInfo = EffectInfo {
         EffectParameter::new("stiffness", "N m/rad"),
         EffectParameter::new("angle", "rad").within(-7.0, 7.0),
         EffectParameter::new("dissipation", "s/rad"),
+        EffectParameter::new("exponent", "1").within(1.0, 4.0),
+        EffectParameter::new("side", "1").within(-1.0, 1.0),
     ],
 };
 
 /// Width of the round corner [rad].
 const CORNER: f64 = 0.2 * std::f64::consts::PI / 180.0;
 
-/// Torque [N m] at a joint angle and rate; `upper` tells from which side the stop is met.
+/// Depth at which the stiffness is a secant [rad].
+const SECANT: f64 = 10.0 * std::f64::consts::PI / 180.0;
+
+/// Depth of the softest contact that is told from none [rad]: a logarithm needs one.
+const LEAST: f64 = 1e-12;
+
+/// Torque [N m] at a joint angle and rate.
 #[inline]
-pub fn torque<S: Scalar>(stop: [S; 3], upper: bool, angle: S, rate: S) -> S {
-    let [stiffness, limit, dissipation] = stop;
-    let sign = if upper { 1.0 } else { -1.0 };
+pub fn torque<S: Scalar>(stop: [S; 5], angle: S, rate: S) -> S {
+    let [stiffness, limit, dissipation, exponent, side] = stop;
+    let sign = if side.re() >= 0.0 { 1.0 } else { -1.0 };
     let depth = beyond((angle - limit) * sign, CORNER);
     let share = dissipation * rate * sign + 1.0;
     let held = if share.re() > 0.0 { share } else { constant(0.0) };
-    -(stiffness * depth * held) * sign
+    if depth.re() < LEAST {
+        return -(stiffness * depth * held) * sign * if exponent.re() > 1.0 { 0.0 } else { 1.0 };
+    }
+    let progress = ((depth / SECANT).ln() * (exponent - 1.0)).exp();
+    -(stiffness * depth * progress * held) * sign
+}
+
+/// Stiffness at a depth [N m/rad]: the tangent.
+pub fn tangent(stiffness: f64, exponent: f64, depth: f64) -> f64 {
+    stiffness * exponent * (depth / SECANT).powf(exponent - 1.0)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use num_dual::Dual64;
 
     #[test]
     fn it_pushes_back_inside_and_never_pulls() {
-        let stop = [500.0, 1.2, 0.5];
-        assert_eq!(torque(stop, true, 1.1, 1.0), 0.0);
-        assert!((torque(stop, true, 1.3, 0.0) + 500.0 * (0.1 - 0.5 * CORNER)).abs() < 1e-10);
-        assert!(torque(stop, true, 1.3, 1.0) < torque(stop, true, 1.3, 0.0));
-        assert_eq!(torque(stop, true, 1.3, -5.0), 0.0);
-        assert!(torque(stop, false, 1.1, 0.0) > 0.0 && torque(stop, false, 1.3, 0.0) == 0.0);
-        assert_eq!(torque([0.0, 1.2, 0.5], true, 1.5, 0.3), 0.0);
+        let stop = [500.0, 1.2, 0.5, 1.0, 1.0];
+        let lower = [500.0, 1.2, 0.5, 1.0, -1.0];
+        assert_eq!(torque(stop, 1.1, 1.0), 0.0);
+        assert!((torque(stop, 1.3, 0.0) + 500.0 * (0.1 - 0.5 * CORNER)).abs() < 1e-10);
+        assert!(torque(stop, 1.3, 1.0) < torque(stop, 1.3, 0.0));
+        assert_eq!(torque(stop, 1.3, -5.0), 0.0);
+        assert!(torque(lower, 1.1, 0.0) > 0.0 && torque(lower, 1.3, 0.0) == 0.0);
+        assert_eq!(torque([0.0, 1.2, 0.5, 1.0, 1.0], 1.5, 0.3), 0.0);
+    }
+
+    #[test]
+    fn rubber_grows_stiffer() {
+        let at = |degrees: f64| -torque([500.0, 1.2, 0.0, 3.0, 1.0], 1.2 + degrees.to_radians(), 0.0);
+        let depth = |degrees: f64| degrees.to_radians() - 0.5 * CORNER;
+        let power = |degrees: f64| 500.0 * depth(degrees).powi(3) / SECANT.powi(2);
+        assert!((at(15.0) / power(15.0) - 1.0).abs() < 1e-12 && (at(2.0) / power(2.0) - 1.0).abs() < 1e-12);
+        let slope = (at(10.0001) - at(9.9999)) / 0.0002_f64.to_radians();
+        assert!((slope / tangent(500.0, 3.0, depth(10.0)) - 1.0).abs() < 1e-6);
+        // neither a logarithm of nothing nor its slope
+        let touch = torque(
+            [
+                Dual64::from(500.0),
+                Dual64::from(1.2),
+                Dual64::from(0.0),
+                Dual64::new(1.0, 1.0),
+                Dual64::from(1.0),
+            ],
+            Dual64::from(1.2),
+            Dual64::from(0.0),
+        );
+        assert_eq!((touch.re, touch.eps), (0.0, 0.0));
     }
 }

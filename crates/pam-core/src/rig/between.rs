@@ -55,23 +55,24 @@ impl<S: Scalar> Plant<'_, S> {
         self.rig.wiring.effects.clock.is_some()
     }
 
-    /// How late commands act at a time [s].
-    pub fn skew(&self, time: f64) -> S {
+    /// How late pressures and angles are recorded at a time [s]; negative where their clock is ahead.
+    pub fn skew(&self, time: f64) -> (S, S) {
         let clock = self.rig.wiring.effects.clock;
-        clock.map_or(constant(0.0), |[offset, rate]| {
-            clock_skew::shift(self.values[offset], self.values[rate], time)
+        clock.map_or((constant(0.0), constant(0.0)), |[offset, rate, share]| {
+            let shift = clock_skew::shift(self.values[offset], self.values[rate], time);
+            (shift, shift * self.values[share])
         })
     }
 
-    /// Commands over a step that begins at a time [s], as another clock has them; `command` gives those of a sample.
+    /// Commands over a step that begins at a time [s], later by a shift [s]; `command` gives those of a sample.
     pub fn skewed_controls(
         &self,
+        shift: S,
         time: f64,
         step: f64,
         sample_time: f64,
         command: impl Fn(usize, i64) -> f64,
     ) -> Controls<S> {
-        let shift = self.skew(time);
         let wiring = &self.rig.wiring;
         let mut controls = self.controls(|_| 0.0);
         for (k, spool) in controls.spool.iter_mut().enumerate() {

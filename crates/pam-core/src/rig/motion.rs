@@ -31,10 +31,8 @@ impl<S: Scalar> Plant<'_, S> {
             if let (true, Some([stiction, speed])) = (coordinate.effects.stribeck, units.stribeck) {
                 load[k] -= joint_coulomb_stribeck::torque(values[stiction], values[speed], rates[k]);
             }
-            if let (true, Some(stop), Some(upper)) =
-                (coordinate.effects.stop, units.stop, self.stop_is_upper(k))
-            {
-                load[k] += joint_end_stop::torque(stop.map(|id| values[id]), upper, angles[k], rates[k]);
+            if let (true, Some(stop)) = (coordinate.effects.stop, units.stop) {
+                load[k] += joint_end_stop::torque(stop.map(|id| values[id]), angles[k], rates[k]);
             }
             if coordinate.effects.closure.is_some() {
                 load[k] += self.closing_torque(k, state);
@@ -76,13 +74,6 @@ impl<S: Scalar> Plant<'_, S> {
             out[layout.rate(0)] -= acceleration;
             (out[place], out[place + 1]) = (state[place + 1], acceleration);
         }
-    }
-
-    /// Whether the stop of the effect is met from below.
-    fn stop_is_upper(&self, coordinate: usize) -> Option<bool> {
-        let ([_, angle, _], stops) =
-            (self.rig.wiring.effects.stop?, self.rig.wiring.coordinates[coordinate].stops?);
-        Some(self.values[angle].re() > 0.5 * (stops.min_angle + stops.max_angle))
     }
 
     /// Payload at the end of a link [kg] (the mass of a linear load) at a time [s].
@@ -244,10 +235,14 @@ impl Plant<'_, f64> {
         if let (true, Some([stiction, speed])) = (own.stribeck, units.stribeck) {
             damping += joint_coulomb_stribeck::steepest(value(stiction), value(speed));
         }
-        if let (true, Some([k, _, dissipation])) = (own.stop, units.stop) {
-            let range = wiring.coordinates[coordinate].stops.map_or(0.0, |s| s.max_angle - s.min_angle);
-            stiffness += value(k);
-            damping += value(k) * value(dissipation) * range.min(0.1);
+        if let (true, Some([k, angle, dissipation, exponent, side])) = (own.stop, units.stop) {
+            let (low, high) =
+                wiring.coordinates[coordinate].stops.map_or((0.0, 0.0), |s| (s.min_angle, s.max_angle));
+            let depth = if value(side) >= 0.0 { high - value(angle) } else { value(angle) - low }.max(0.0);
+            let (k, n) = (value(k), value(exponent));
+            stiffness += joint_end_stop::tangent(k, n, depth);
+            let blow = (high - low).min(0.1);
+            damping += joint_end_stop::tangent(k, n, blow) / n * blow * value(dissipation);
         }
         if let Some(ids) = units.damping {
             let spec = self.rig.spec();

@@ -157,7 +157,7 @@ pub const TYPICAL: &[Typical] = &[
     typical("joint_coulomb_stribeck", &[("stiction", 3.0), ("stribeck_speed", 0.08)], &[("stiction", 0.0)]),
     typical(
         "joint_end_stop",
-        &[("stiffness", 800.0), ("angle", 0.95), ("dissipation", 0.3)],
+        &[("stiffness", 800.0), ("angle", 0.95), ("dissipation", 0.3), ("exponent", 1.7), ("side", 0.5)],
         &[("stiffness", 0.0)],
     ),
     typical(
@@ -188,7 +188,11 @@ pub const TYPICAL: &[Typical] = &[
         &[("compliance", 0.0)],
     ),
     typical("pressure_lag", &[("time_constant", 0.01)], &[("time_constant", 0.0)]),
-    typical("clock_skew", &[("offset", 0.012), ("rate", 1e-3)], &[("offset", 0.0), ("rate", 0.0)]),
+    typical(
+        "clock_skew",
+        &[("offset", 0.012), ("rate", 1e-3), ("angle_share", 0.4)],
+        &[("offset", 0.0), ("rate", 0.0)],
+    ),
     closure("closure_supply", CLOSURE_SUPPLY),
     closure("closure_flow", CLOSURE_FLOW),
     closure("closure_torque", CLOSURE_TORQUE),
