@@ -1,5 +1,56 @@
-"""Controllers of the joint angle, sampled, for one arm or a batch of them; trajectories, metrics, tuning and stability."""
+"""Controllers of the joint angle, sampled, for one arm or a batch of them; trajectories, metrics, tuning and stability.
+
+Names are loaded when they are first used; what needs an extra says so then.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any, Final
 
 from pamrs.control.protocol import Controller, Measurement, Reference, Value
 
-__all__ = ["Controller", "Measurement", "Reference", "Value"]
+if TYPE_CHECKING:
+    from pamrs.control import metrics, trajectories
+    from pamrs.control.loop import ClosedLoop, closed_loop
+    from pamrs.control.metrics import Metrics
+    from pamrs.control.sensors import Sensors
+    from pamrs.control.trajectories import Trajectory
+
+__all__ = [
+    "ClosedLoop",
+    "Controller",
+    "Measurement",
+    "Metrics",
+    "Reference",
+    "Sensors",
+    "Trajectory",
+    "Value",
+    "closed_loop",
+    "metrics",
+    "trajectories",
+]
+
+_MODULES: Final = ("metrics", "trajectories")
+_HOMES: Final[dict[str, str]] = {
+    "ClosedLoop": "pamrs.control.loop",
+    "Metrics": "pamrs.control.metrics",
+    "Sensors": "pamrs.control.sensors",
+    "Trajectory": "pamrs.control.trajectories",
+    "closed_loop": "pamrs.control.loop",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name in _MODULES:
+        value: Any = importlib.import_module(f"pamrs.control.{name}")
+    elif name in _HOMES:
+        value = getattr(importlib.import_module(_HOMES[name]), name)
+    else:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})
