@@ -108,15 +108,21 @@ def test_a_regulator_and_named_blocks_are_driven_by_name():
         def update(self, time, measurement, reference):
             return 5.5
 
+    with pytest.raises(ParameterError, match="measured"):
+        closed_loop(rig, Still(), step(0.0, 0.1), 0.1, actuation=lambda u: {})
     with pytest.raises(ParameterError, match="actuation"):
         closed_loop(rig, Still(), step(0.0, 0.1), 0.1)
     named = {name: 5.5 if k == 0 else 4.5 for k, name in enumerate(inputs)}
-    run = closed_loop(
-        rig, Still(), step(0.0, 0.1), 0.5, actuation=lambda u: {n: u if k == 0 else 10.0 - u for k, n in enumerate(inputs)}
-    )
+
+    def split_up(command):
+        return {name: command if k == 0 else 10.0 - command for k, name in enumerate(inputs)}
+
+    measured = {"joint_angle": "joint_angle.elbow"}
+    run = closed_loop(rig, Still(), step(0.0, 0.1), 0.5, actuation=split_up, measured=measured)
     split = {name.partition(".")[2]: np.full(501, value) for name, value in named.items()}
     alone = pamrs.simulate(rig, split, sample_time=0.001)
-    assert (run.angle == alone["joint_angle"]).all()
+    assert (run.angle == alone["joint_angle.elbow"]).all()
+    assert np.ptp(run.angle) > 0.01
     assert np.ptp(run.angle) > 0.01
 
 

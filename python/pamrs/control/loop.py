@@ -225,16 +225,8 @@ def closed_loop(
     tracked = alias.get("joint_angle", "joint_angle")
     time = np.asarray(np.arange(total + 1) * dt, dtype=np.float64)
     out = record.finished()
-    return ClosedLoop(
-        time,
-        trajectory(np.asarray((began + np.arange(total + 1)) * dt, dtype=np.float64)),
-        commands,
-        out,
-        trajectory,
-        simulator.rig,
-        simulator.events[happened:],
-        tracked,
-    )
+    wanted = trajectory(np.asarray((began + np.arange(total + 1)) * dt, dtype=np.float64))
+    return ClosedLoop(time, wanted, commands, out, trajectory, simulator.rig, simulator.events[happened:], tracked)
 
 
 class _Sample(Mapping[str, float]):
