@@ -8,7 +8,12 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any, Final
 
+from pamrs.control.fuzzy import FUZZY_SETS, Fuzzy, fuzzy_rules, fuzzy_surface
+from pamrs.control.joint_sensor import JointSensor
+from pamrs.control.parts import ANTI_WINDUP, FilteredDerivative, Integrator, LowPass
+from pamrs.control.pid import PID, PIDLaw
 from pamrs.control.protocol import Controller, Measurement, Reference, Value
+from pamrs.control.sampled import SampledController
 
 if TYPE_CHECKING:
     from pamrs.control import metrics, trajectories
@@ -18,15 +23,27 @@ if TYPE_CHECKING:
     from pamrs.control.trajectories import Trajectory
 
 __all__ = [
+    "ANTI_WINDUP",
+    "FUZZY_SETS",
+    "PID",
     "ClosedLoop",
     "Controller",
+    "FilteredDerivative",
+    "Fuzzy",
+    "Integrator",
+    "JointSensor",
+    "LowPass",
     "Measurement",
     "Metrics",
+    "PIDLaw",
     "Reference",
+    "SampledController",
     "Sensors",
     "Trajectory",
     "Value",
     "closed_loop",
+    "fuzzy_rules",
+    "fuzzy_surface",
     "metrics",
     "trajectories",
 ]
