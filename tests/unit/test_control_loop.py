@@ -41,6 +41,7 @@ def test_the_command_is_held_from_one_sample_of_the_controller_to_the_next(rig):
         assert time == pytest.approx(0.008 * k)
         assert (run.command[8 * k : 8 * k + 8] == command).all()
         assert reference == LIFT(time)
+        assert sample.pop("time") == pytest.approx(time)
         for name, value in sample.items():
             assert run.channels[name][8 * k] == value
     # the plant under these commands, without a controller, is the same to the last bit
@@ -115,7 +116,7 @@ def test_a_regulator_and_named_blocks_are_driven_by_name():
     named = {name: 5.5 if k == 0 else 4.5 for k, name in enumerate(inputs)}
 
     def split_up(command):
-        return {name: command if k == 0 else 10.0 - command for k, name in enumerate(inputs)}
+        return {"valve_command": {name.partition(".")[2]: command if k == 0 else 10.0 - command for k, name in enumerate(inputs)}}
 
     measured = {"joint_angle": "joint_angle.elbow"}
     run = closed_loop(rig, Still(), step(0.0, 0.1), 0.5, actuation=split_up, measured=measured)

@@ -16,10 +16,11 @@ from pamrs.control.protocol import Controller, Measurement, Reference, Value
 from pamrs.control.sampled import SampledController
 
 if TYPE_CHECKING:
-    from pamrs.control import metrics, trajectories
+    from pamrs.control import linear, metrics, stability, trajectories, tuning
     from pamrs.control.loop import ClosedLoop, closed_loop
     from pamrs.control.metrics import Metrics
     from pamrs.control.sensors import Sensors
+    from pamrs.control.sweep import Sweep, sweep
     from pamrs.control.trajectories import Trajectory
 
 __all__ = [
@@ -39,22 +40,29 @@ __all__ = [
     "Reference",
     "SampledController",
     "Sensors",
+    "Sweep",
     "Trajectory",
     "Value",
     "closed_loop",
     "fuzzy_rules",
     "fuzzy_surface",
+    "linear",
     "metrics",
+    "stability",
+    "sweep",
     "trajectories",
+    "tuning",
 ]
 
-_MODULES: Final = ("metrics", "trajectories")
+_MODULES: Final = ("linear", "metrics", "stability", "trajectories", "tuning")
 _HOMES: Final[dict[str, str]] = {
     "ClosedLoop": "pamrs.control.loop",
     "Metrics": "pamrs.control.metrics",
     "Sensors": "pamrs.control.sensors",
+    "Sweep": "pamrs.control.sweep",
     "Trajectory": "pamrs.control.trajectories",
     "closed_loop": "pamrs.control.loop",
+    "sweep": "pamrs.control.sweep",
 }
 
 

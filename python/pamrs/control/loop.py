@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs.channels import channel_of
 from pamrs.control.metrics import Metrics, evaluate
-from pamrs.control.protocol import Controller, Reference, Value
+from pamrs.control.protocol import Controller, Reference
 from pamrs.control.sensors import Sensors
 from pamrs.control.trajectories import Trajectory
 from pamrs.errors import ParameterError
@@ -25,8 +26,8 @@ if TYPE_CHECKING:
 __all__ = ["Actuation", "ClosedLoop", "actuation_of", "closed_loop", "multiple"]
 
 Array = NDArray[np.float64]
-#: From a controller's command to the signals that a rig takes, by name: ``lambda u: {"valve_command.flexor": u, ...}``.
-Actuation: TypeAlias = "Callable[[Value], Mapping[str, Value]]"
+#: From a controller's command to the keywords of :meth:`pamrs.Simulator.step`: ``lambda u: {"valve_command": {"flexor": u, ...}}``.
+Actuation: TypeAlias = "Callable[[Any], Mapping[str, Any]]"
 
 
 @dataclass(frozen=True)
@@ -153,8 +154,8 @@ def closed_loop(
     sensors : Sensors, optional
         What the controller is told; the truth by default.
     actuation : callable, optional
-        From the command to the rig's inputs by name, a mapping of ``valve_command...`` or ``supply_command...``. By default the
-        command is that of the only valve, or of the only regulator of a rig without valves.
+        From the command to the keywords of :meth:`pamrs.Simulator.step`: ``lambda u: {"valve_command": {"flexor": u, "extensor":
+        10.0 - u}}``. By default the command is that of the only valve, or of the only regulator of a rig without valves.
     measured : mapping of str to str, optional
         What the controller calls a channel -> the rig's name of it, for rigs with named blocks:
         ``{"joint_angle": "joint_angle.elbow"}``. The other channels keep their names.
@@ -203,78 +204,31 @@ def closed_loop(
     read = None if sensors is None else sensors.started(controller.period)
     if reset:
         controller.reset()
-    block = {name: np.array([value]) for name, value in simulator.observe().items()}
-    record = _Record(block, names)
     commands = np.full(total + 1, np.nan)
-    happened = len(simulator.events)
-    update, alias = controller.update, dict(measured or {})
-    for k in range(0, total, every):
-        count = min(every, total - k)
+    alias = dict(measured or {})
+    k = 0
+
+    def answer(sample: dict[str, float]) -> Any:
+        nonlocal k
         now = (began + k) * dt
-        sample = _Sample(block, alias)
-        command = update(now, sample if read is None else read(sample), trajectory(now))
+        for called, name in alias.items():
+            sample[called] = sample[name]
+        command = controller.update(now, sample if read is None else read(sample), trajectory(now))
         try:
             value = float(command)
         except (TypeError, ValueError):
             value = math.nan
         if not math.isfinite(value):
             raise ParameterError(f"the controller's command at {now:g} s is {command!r}: one finite number is needed")
-        commands[k : k + count + 1] = value  # the last row is what it would go on with
-        block = simulator._advance(count, {name: np.array([float(u)] * count) for name, u in act(value).items()})
-        record.add(block)
-    tracked = alias.get("joint_angle", "joint_angle")
+        commands[k : k + every + 1] = value  # the last row is what it would go on with
+        k += every
+        return act(value)
+
+    run = simulator.control(answer, total * dt, period=every * dt)
     time = np.asarray(np.arange(total + 1) * dt, dtype=np.float64)
-    out = record.finished()
     wanted = trajectory(np.asarray((began + np.arange(total + 1)) * dt, dtype=np.float64))
-    return ClosedLoop(time, wanted, commands, out, trajectory, simulator.rig, simulator.events[happened:], tracked)
-
-
-class _Sample(Mapping[str, float]):
-    """The last row of a block as a mapping; a channel becomes a float when it is asked for, as most controllers want two of sixteen."""
-
-    __slots__ = ("_alias", "_block")
-
-    def __init__(self, block: Mapping[str, Array], alias: Mapping[str, str]) -> None:
-        self._block, self._alias = block, alias
-
-    def __getitem__(self, name: str) -> float:
-        values = self._block.get(self._alias.get(name, name) if self._alias else name)
-        if values is None:
-            raise KeyError(name)
-        return float(values.item(-1))
-
-    def __contains__(self, name: object) -> bool:
-        return name in self._block or name in self._alias
-
-    def __iter__(self) -> Iterator[str]:
-        yield from self._block
-        yield from (name for name in self._alias if name not in self._block)
-
-    def __len__(self) -> int:
-        return sum(1 for _ in self)
-
-
-class _Record:
-    """Rows of channels as they come; joined now and then, so that a long run is not a million small arrays."""
-
-    def __init__(self, first: Mapping[str, Array], names: list[str]) -> None:
-        self._names, self._new = names, [first]
-        self._joined: dict[str, list[Array]] = {name: [] for name in names}
-
-    def add(self, block: Mapping[str, Array]) -> None:
-        self._new.append(block)
-        if len(self._new) >= 4096:
-            self._join()
-
-    def _join(self) -> None:
-        for name in self._names:
-            self._joined[name].append(np.concatenate([block[name] for block in self._new]))
-        self._new = []
-
-    def finished(self) -> dict[str, Array]:
-        if self._new:
-            self._join()
-        return {name: np.concatenate(parts) for name, parts in self._joined.items()}
+    out = {name: run[name] for name in names}
+    return ClosedLoop(time, wanted, commands, out, trajectory, simulator.rig, run.events, alias.get("joint_angle", "joint_angle"))
 
 
 def _simulator(
@@ -331,10 +285,11 @@ def actuation_of(rig: Rig) -> Actuation:
     found = [name for name in inputs if name.startswith("valve_command")] or [n for n in inputs if n.startswith("supply_command")]
     if len(found) != 1:
         raise ParameterError(
-            f"the rig {rig.name!r} has the inputs {', '.join(inputs) or 'none'}: give actuation, from one command to a mapping of them"
+            f"the rig {rig.name!r} has the inputs {', '.join(inputs) or 'none'}: "
+            "give actuation, from one command to the keywords of Simulator.step"
         )
-    name = found[0]
-    return lambda command: {name: command}
+    kind = channel_of(found[0])
+    return lambda command: {kind: command}
 
 
 def multiple(name: str, value: Any, unit: float) -> int:

@@ -100,7 +100,7 @@ def squared_error(time: ArrayLike, reference: ArrayLike, angle: ArrayLike, *, un
         If shapes do not fit, time does not rise, or the unit is unknown.
     """
     t, e = _error(time, reference, angle)
-    return plain(_factor(unit) ** 2 * integral(t, e * e))
+    return plain(angle_factor(unit) ** 2 * integral(t, e * e))
 
 
 def curvature(time: ArrayLike, angle: ArrayLike, *, rate: ArrayLike | None = None, unit: str = "rad") -> Array:
@@ -374,7 +374,8 @@ def evaluate(
     )
 
 
-def _factor(unit: str) -> float:
+def angle_factor(unit: str) -> float:
+    """How many of a unit, ``"rad"`` or ``"deg"``, are in a radian; a ParameterError for another one."""
     if unit not in _PER_RADIAN:
         raise ParameterError(f"unit = {unit!r} is not allowed: one of {', '.join(_PER_RADIAN)}")
     return _PER_RADIAN[unit]
@@ -391,7 +392,7 @@ def _error(time: ArrayLike, reference: ArrayLike, angle: ArrayLike) -> tuple[Arr
 
 def _rate(time: ArrayLike, angle: ArrayLike, rate: ArrayLike | None, unit: str) -> tuple[Array, Array]:
     """Checked time and rate in the unit per second."""
-    factor = _factor(unit)
+    factor = angle_factor(unit)
     t, y = checked(time, "angle", angle)
     if t.size < 3:
         raise ParameterError(f"time has {t.size} samples; a curvature needs three at least")
