@@ -17,10 +17,11 @@ from pamrs.control.sampled import SampledController
 
 if TYPE_CHECKING:
     from pamrs.control import linear, metrics, stability, trajectories, tuning
+    from pamrs.control.live import LiveRun, run_live
     from pamrs.control.loop import ClosedLoop, closed_loop
     from pamrs.control.metrics import Metrics
     from pamrs.control.sensors import Sensors
-    from pamrs.control.sweep import Sweep, sweep
+    from pamrs.control.sweeping import Sweep, sweep
     from pamrs.control.trajectories import Trajectory
 
 __all__ = [
@@ -33,6 +34,7 @@ __all__ = [
     "Fuzzy",
     "Integrator",
     "JointSensor",
+    "LiveRun",
     "LowPass",
     "Measurement",
     "Metrics",
@@ -48,6 +50,7 @@ __all__ = [
     "fuzzy_surface",
     "linear",
     "metrics",
+    "run_live",
     "stability",
     "sweep",
     "trajectories",
@@ -57,12 +60,14 @@ __all__ = [
 _MODULES: Final = ("linear", "metrics", "stability", "trajectories", "tuning")
 _HOMES: Final[dict[str, str]] = {
     "ClosedLoop": "pamrs.control.loop",
+    "LiveRun": "pamrs.control.live",
     "Metrics": "pamrs.control.metrics",
     "Sensors": "pamrs.control.sensors",
-    "Sweep": "pamrs.control.sweep",
+    "Sweep": "pamrs.control.sweeping",
     "Trajectory": "pamrs.control.trajectories",
     "closed_loop": "pamrs.control.loop",
-    "sweep": "pamrs.control.sweep",
+    "run_live": "pamrs.control.live",
+    "sweep": "pamrs.control.sweeping",
 }
 
 

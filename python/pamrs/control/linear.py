@@ -77,7 +77,8 @@ class LinearModel:
         """
         library = python_control()
         d = np.zeros((len(self.outputs), len(self.inputs)))
-        names = {"states": list(self.states), "inputs": list(self.inputs), "outputs": list(self.outputs)}
+        labels = {"states": self.states, "inputs": self.inputs, "outputs": self.outputs}
+        names = {kind: [channel.replace(".", "_") for channel in channels] for kind, channels in labels.items()}  # it allows no dot
         return library.ss(self.a, self.b, self.c, d, **names)
 
     def driven_by(self, state: str) -> LinearModel:

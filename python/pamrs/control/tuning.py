@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from pamrs.control.metrics import WEIGHTS, combined
 from pamrs.control.protocol import Controller
-from pamrs.control.sweep import sweep
+from pamrs.control.sweeping import sweep
 from pamrs.control.trajectories import Trajectory
 from pamrs.design.search import missing
 from pamrs.errors import ParameterError
