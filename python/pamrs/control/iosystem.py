@@ -48,7 +48,7 @@ def iosystem(
     Returns
     -------
     control.NonlinearIOSystem
-        Inputs and outputs have the names of the channels, of a block with a name ``joint_angle_elbow``, as python-control allows no dot.
+        Inputs and outputs have the names of the channels, of a named block ``joint_angle_elbow``, as python-control allows no dot.
         Its states are ``x[0] ...``: the physical ones first (absolute pressures), then memories and books; :func:`initial_state` makes
         them from initial values by name.
 
