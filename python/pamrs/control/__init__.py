@@ -5,6 +5,7 @@ from pamrs.control.air import AirModel, OrificeInverse
 from pamrs.control.cascade import Cascade, PressureLoop, cascaded_pid
 from pamrs.control.feedforward import Feedforward, Parallel
 from pamrs.control.fuzzy import FUZZY_SETS, Fuzzy, fuzzy_rules, fuzzy_surface
+from pamrs.control.hysteresis import DeadZoneCompensation, HysteresisCompensation, HystereticTorque, SlipMemory
 from pamrs.control.joint_sensor import JointSensor
 from pamrs.control.model import ArmModel, FullTorque, GaylordTorque, SimplifiedTorque, TorqueModel, torque_line
 from pamrs.control.neural import NETWORKS, Neural
@@ -24,11 +25,14 @@ __all__ = [
     "ArmModel",
     "Cascade",
     "Controller",
+    "DeadZoneCompensation",
     "Feedforward",
     "FilteredDerivative",
     "FullTorque",
     "Fuzzy",
     "GaylordTorque",
+    "HysteresisCompensation",
+    "HystereticTorque",
     "Integrator",
     "JointSensor",
     "LowPass",
@@ -43,6 +47,7 @@ __all__ = [
     "SimplifiedTorque",
     "Sliding",
     "SlidingController",
+    "SlipMemory",
     "TorqueModel",
     "Value",
     "cascaded_pid",
