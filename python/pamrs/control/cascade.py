@@ -26,8 +26,8 @@ class PressureLoop(SampledController):
     Parameters
     ----------
     kp, ki : float or ndarray, shape (n,)
-        Gains [V/Pa, V/(Pa s)]; not printed. With the shoulder's valve (0.55 to 0.8 MPa/s and volt near its null) the default crosses
-        over at some 30 rad/s.
+        Gains [V/Pa, V/(Pa s)]; not printed. With the shoulder's valve (some 0.55 MPa/s per volt near its null) the default crosses over
+        at about 100 rad/s; a quarter of it made the adaptive laws oscillate.
     period : float
         Time between two updates [s].
     limits, null, anti_windup, tracking_time
@@ -45,8 +45,8 @@ class PressureLoop(SampledController):
 
     def __init__(
         self,
-        kp: Value = 5e-5,
-        ki: Value = 5e-5,
+        kp: Value = 2e-4,
+        ki: Value = 2e-4,
         *,
         period: float = 1e-3,
         limits: tuple[float, float] = (0.0, 10.0),

@@ -66,7 +66,7 @@ class SlidingController(SampledController):
         switching: Value = 2e4,
         boundary_layer: Value = 0.2,
         period: float = 1e-3,
-        rate_filter: Value = 0.02,
+        rate_filter: Value = 0.01,
         angle_filter: Value = 0.0,
         measured_rate: bool = False,
         gains: tuple[Any, ...] = (),
