@@ -8,12 +8,20 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any, Final
 
+from pamrs.control.adaptive import AdaptiveSliding
+from pamrs.control.air import AirModel, OrificeInverse
+from pamrs.control.cascade import Cascade, PressureLoop, cascaded_pid
+from pamrs.control.feedforward import Feedforward, Parallel
 from pamrs.control.fuzzy import FUZZY_SETS, Fuzzy, fuzzy_rules, fuzzy_surface
+from pamrs.control.hysteresis import DeadZoneCompensation, HysteresisCompensation, HystereticTorque, SlipMemory
 from pamrs.control.joint_sensor import JointSensor
+from pamrs.control.model import ArmModel, FullTorque, GaylordTorque, SimplifiedTorque, TorqueModel, torque_line
+from pamrs.control.neural import NETWORKS, Neural
 from pamrs.control.parts import ANTI_WINDUP, FilteredDerivative, Integrator, LowPass
 from pamrs.control.pid import PID, PIDLaw
 from pamrs.control.protocol import Controller, Measurement, Reference, Value
 from pamrs.control.sampled import SampledController
+from pamrs.control.sliding import Sliding, SlidingController
 
 if TYPE_CHECKING:
     from pamrs.control import linear, metrics, stability, trajectories, tuning
@@ -27,24 +35,45 @@ if TYPE_CHECKING:
 __all__ = [
     "ANTI_WINDUP",
     "FUZZY_SETS",
+    "NETWORKS",
     "PID",
+    "AdaptiveSliding",
+    "AirModel",
+    "ArmModel",
+    "Cascade",
     "ClosedLoop",
     "Controller",
+    "DeadZoneCompensation",
+    "Feedforward",
     "FilteredDerivative",
+    "FullTorque",
     "Fuzzy",
+    "GaylordTorque",
+    "HysteresisCompensation",
+    "HystereticTorque",
     "Integrator",
     "JointSensor",
     "LiveRun",
     "LowPass",
     "Measurement",
     "Metrics",
+    "Neural",
+    "OrificeInverse",
     "PIDLaw",
+    "Parallel",
+    "PressureLoop",
     "Reference",
     "SampledController",
     "Sensors",
+    "SimplifiedTorque",
+    "Sliding",
+    "SlidingController",
+    "SlipMemory",
     "Sweep",
+    "TorqueModel",
     "Trajectory",
     "Value",
+    "cascaded_pid",
     "closed_loop",
     "fuzzy_rules",
     "fuzzy_surface",
@@ -53,6 +82,7 @@ __all__ = [
     "run_live",
     "stability",
     "sweep",
+    "torque_line",
     "trajectories",
     "tuning",
 ]

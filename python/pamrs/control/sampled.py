@@ -182,7 +182,8 @@ class SampledController(Stateful, Controller):
                 f"measurement has no channel {channel!r}, which {type(self).__name__} needs; it has: {', '.join(map(str, measurement))}"
             ) from None
         if value.__class__ is float and value - value == 0.0:
-            return value
+            # in a batch everything is one: the answer has its length from the first sample on
+            return value if self._batch is None else np.full(self._batch, value)
         return self._sized(channel, value)
 
     def _aim(self, reference: Reference) -> Reference:

@@ -10,7 +10,7 @@ import numpy as np
 from pamrs.control.protocol import Value
 from pamrs.errors import ParameterError
 
-__all__ = ["as_value", "clip", "positive_gain", "sign"]
+__all__ = ["as_value", "clip", "positive_gain", "sign", "sin"]
 
 
 def as_value(name: str, value: Any, *, lower: float = -math.inf, upper: float = math.inf, above: bool = False) -> Value:
@@ -71,3 +71,10 @@ def sign(value: Value) -> Value:
     if value.__class__ is float:
         return 1.0 if value > 0.0 else -1.0 if value < 0.0 else 0.0
     return np.sign(value)
+
+
+def sin(value: Value) -> Value:
+    """Sine; that of an array may differ from that of a float in the last bit."""
+    if value.__class__ is float:
+        return math.sin(value)
+    return np.sin(value)
