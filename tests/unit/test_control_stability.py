@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.control import PID, closed_loop
+from pamrs.control import PID, cascaded_pid, closed_loop
 from pamrs.control.linear import LinearController, LinearModel, equilibrium, linear_controller, linearise
 from pamrs.control.stability import loop_matrix, margins, spectral_radius, stable_region
 from pamrs.control.trajectories import step
@@ -164,6 +164,22 @@ def test_a_controller_made_linear_answers_as_itself(rig):
         answer = controller.update(0.01 * k, {**point, "joint_angle": point["joint_angle"] + moved}, reference)
         assert answer - 5.0 == pytest.approx((linear.c @ x + linear.d @ y)[0], abs=1e-7)
         x = linear.a @ x + linear.b @ y
+
+
+def test_a_cascade_is_made_linear_where_it_holds_the_arm(rig):
+    point = linearise(rig, ANGLE).point
+    with pytest.raises(ParameterError, match="at a limit"):
+        linear_controller(cascaded_pid(1.2e6, period=0.005), point)
+    controller = cascaded_pid(1.2e6, period=0.005)
+    closed_loop(rig, controller, step(ANGLE, ANGLE), 25.0, initial=equilibrium(rig, ANGLE))
+    linear = linear_controller(controller, point, state=controller.state)
+    assert linear.command == pytest.approx(5.0, abs=0.05)
+    assert linear.inputs == ("joint_angle", "joint_rate", "muscle_pressure")
+    models = [linearise(rig, ANGLE, side=side) for side in ("fill", "vent")]
+    assert all(spectral_radius(model, linear) < 1.0 for model in models)
+    # the inner loop alone is proportional at high frequency: volts per pascal, low-passed
+    pressure = linear.d[0, 2] + sum((linear.c @ np.linalg.matrix_power(linear.a, k) @ linear.b)[0, 2] for k in range(8))
+    assert pressure == pytest.approx(-2e-4 * (1 + 8 * 0.005), rel=0.05)
 
 
 def test_both_sides_of_the_boundary_are_what_the_arm_does(rig):

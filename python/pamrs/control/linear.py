@@ -278,7 +278,9 @@ def linearise(
     return LinearModel(continuous[:n, :n], continuous[:n, n:], np.eye(n), *names, {**first, **commands}, side)
 
 
-def linear_controller(controller: Controller, point: Mapping[str, float], angle: float | None = None) -> LinearController:
+def linear_controller(
+    controller: Controller, point: Mapping[str, float], angle: float | None = None, *, state: Mapping[str, Any] | None = None
+) -> LinearController:
     """Any controller with a state of floats about an operating point, by central differences of one update.
 
     Exact for a controller that is linear inside its limits (PID, cascade). What does not reach the command (a clock), or is never
@@ -292,6 +294,10 @@ def linear_controller(controller: Controller, point: Mapping[str, float], angle:
         Channels at the operating point; the reference rests at its ``joint_angle``.
     angle : float, optional
         Another reference [rad].
+    state : mapping, optional
+        The controller's state at the operating point, for one whose integrals have to hold the arm up (a cascade, whose outer integral
+        is the pressure): ``controller.state`` after a closed loop that has come to rest there. By default that of a controller which
+        has seen the point three times.
 
     Returns
     -------
@@ -301,14 +307,19 @@ def linear_controller(controller: Controller, point: Mapping[str, float], angle:
     Raises
     ------
     ParameterError
-        If the controller answers what is not a finite number.
+        If the controller answers what is not a finite number, or no measurement reaches its command: it is at a limit.
     """
     inputs = tuple(name for name in ("joint_angle", "joint_rate", "muscle_pressure") if name in point)
     reference = Reference(point["joint_angle"] if angle is None else angle)
     controller.reset()
-    for k in range(3):  # filters and differences have seen something
-        controller.update(k * controller.period, point, reference)
-    start, now = controller.state, 3.0 * controller.period
+    if state is None:
+        for k in range(3):  # filters and differences have seen something
+            controller.update(k * controller.period, point, reference)
+    else:
+        controller.restore(state)
+    start = controller.state
+    clocks = [value for path, value in _floats(start) if path[-1] == "time"]  # of the parts too
+    now = max(clocks, default=2.0 * controller.period) + controller.period
     paths = [path for path, value in _floats(start) if path[-1] != "time"]
 
     def answered(state: Mapping[str, Any], sample: Mapping[str, float]) -> Array:
@@ -332,6 +343,10 @@ def linear_controller(controller: Controller, point: Mapping[str, float], angle:
     whole = np.array(columns).T
     if not (np.isfinite(whole).all() and math.isfinite(command)):
         raise ParameterError("the controller's command is not finite at the operating point: no linear model is there")
+    if not whole[n].any() or not whole[:, n:].any():
+        raise ParameterError(
+            f"the controller answers {command:g} whatever it measures: it is at a limit; give the state in which it holds the arm here"
+        )
     # an integral with a gain of zero is heard, but nothing moves it; it would count as a motion that never dies out
     heard, moved = _heard(whole[:n, :n], whole[n, :n]), _heard(whole[:n, :n].T, np.abs(whole[:n, n:]).sum(axis=1))
     kept = sorted(set(heard) & set(moved))
