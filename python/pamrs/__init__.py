@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
     from pamrs import fit, library, rigs, sizing
+    from pamrs.batch import Batch, BatchRun
     from pamrs.case import Case, load_case
     from pamrs.diagnosis import diagnose
     from pamrs.diagnosis.plan import Plan, plan_diagnosis
@@ -35,6 +36,8 @@ if TYPE_CHECKING:
     __version__: str
 
 __all__ = [
+    "Batch",
+    "BatchRun",
     "Case",
     "CaseError",
     "Diagnosis",
@@ -71,6 +74,8 @@ __all__ = [
 
 _MODULES: Final = ("fit", "library", "rigs", "sizing")
 _HOMES: Final[dict[str, str]] = {
+    "Batch": "pamrs.batch",
+    "BatchRun": "pamrs.batch",
     "Case": "pamrs.case",
     "CaseError": "pamrs.errors",
     "Diagnosis": "pamrs.diagnosis.result",

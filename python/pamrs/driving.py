@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,7 +15,7 @@ from pamrs.errors import ParameterError
 if TYPE_CHECKING:
     from pamrs.rig import Rig
 
-__all__ = ["Signals", "has_frame", "initial_values", "regulators_of", "sensor_zero", "signals_of"]
+__all__ = ["Inputs", "Signals", "has_frame", "initial_values", "keywords", "regulators_of", "sensor_zero", "signals_of"]
 
 Array = NDArray[np.float64]
 #: One array for a block without a name or the only one of its kind, else one for each name.
@@ -71,24 +72,142 @@ def signals_of(
     ParameterError
         If a signal is missing, not taken by the rig, of another length or outside its range; the message names it.
     """
-    valves, regulators = rig.tables("valve"), regulators_of(rig)
-    given = {
-        **_named("valve_command", valve_command, list(valves), "valve"),
-        **_named("supply_command", supply_command, regulators, "supply of kind regulator"),
-        **({} if length is None else {"length": length}),
-        **_named("pressure", pressure, list(rig.tables("chamber")), "chamber"),
-    }
-    for name in valves:
-        if dotted("valve_command", name) not in given:
-            raise ParameterError(f"{dotted('valve_command', name)} is missing: a rig with a valve needs one value per sample [V]")
-    _check_prescribed(rig, given)
+    inputs = Inputs(rig)
+    given = inputs.named(valve_command=valve_command, supply_command=supply_command, length=length, pressure=pressure)
     sizes = {name: np.size(values) for name, values in given.items() if np.ndim(values) > 0}
     count = rows if rows is not None else (next(iter(sizes.values())) if sizes else None)
     signals = {}
     for name, values in given.items():
-        signals[name] = _signal(name, values, count, rig)
+        signals[name] = _signal(name, values, count, inputs.range(name))
         count = signals[name].size
     return signals, count
+
+
+class Inputs:
+    """What a rig takes, looked up once: for loops that ask at every sample.
+
+    Parameters
+    ----------
+    rig : Rig
+        The model.
+    """
+
+    def __init__(self, rig: Rig) -> None:
+        self._names = {
+            "valve_command": (list(rig.tables("valve")), "valve"),
+            "supply_command": (regulators_of(rig), "supply of kind regulator"),
+            "pressure": (list(rig.tables("chamber")), "chamber"),
+        }
+        self._valves = [dotted("valve_command", name) for name in self._names["valve_command"][0]]
+        self._frame = has_frame(rig)
+        self._fed = {valve["to"].partition(".")[2] for valve in rig.ports("valve").values() if valve["to"].startswith("chamber")}
+        self._ranges: dict[str, tuple[float, float, str]] = {}
+        self._load = rig.tables("load").get("", {})
+        self._ambient = float(rig.tables("gas")[""]["ambient_pressure"])
+        # One valve and nothing else that must be given: what most loops answer.
+        self._only = self._valves[0] if len(self._valves) == 1 and not self._frame else None
+
+    def named(
+        self,
+        *,
+        valve_command: Signals | None = None,
+        supply_command: Signals | None = None,
+        length: ArrayLike | None = None,
+        pressure: Signals | None = None,
+    ) -> dict[str, ArrayLike]:
+        """A user's arguments by the core's names, as they were given; arguments and errors as of :func:`signals_of`."""
+        given: dict[str, ArrayLike] = {}
+        for channel, signal in (("valve_command", valve_command), ("supply_command", supply_command)):
+            if signal is not None:
+                given |= _named(channel, signal, *self._names[channel])
+        if length is not None:
+            given["length"] = length
+        if pressure is not None:
+            given |= _named("pressure", pressure, *self._names["pressure"])
+        for name in self._valves:
+            if name not in given:
+                raise ParameterError(f"{name} is missing: a rig with a valve needs one value per sample [V]")
+        self._check_prescribed(given)
+        return given
+
+    def numbers(
+        self,
+        valve_command: float | Mapping[str, float] | None = None,
+        supply_command: float | Mapping[str, float] | None = None,
+        length: float | None = None,
+        pressure: float | Mapping[str, float] | None = None,
+    ) -> dict[str, float]:
+        """Commands of one sample, checked, by the core's names; arguments and errors as of :func:`signals_of`."""
+        if (
+            self._only is not None
+            and isinstance(valve_command, float)
+            and math.isfinite(valve_command)
+            and supply_command is length is pressure is None
+        ):
+            return {self._only: valve_command}
+        given = self.named(valve_command=valve_command, supply_command=supply_command, length=length, pressure=pressure)
+        numbers: dict[str, float] = {}
+        for name, value in given.items():
+            low, high, allowed = self.range(name)
+            if isinstance(value, float) and low <= value <= high and math.isfinite(value):
+                numbers[name] = value
+            else:
+                numbers[name] = float(_signal(name, value, 1, (low, high, allowed))[0])
+        return numbers
+
+    def rows(self, rows: int, **signals: Any) -> dict[str, Array]:
+        """Commands of one sample of several plants, one number for each; whether the numbers are possible is not looked at."""
+        given = {}
+        for name, values in self.named(**signals).items():
+            try:
+                array = np.asarray(values, dtype=np.float64)
+            except (TypeError, ValueError):
+                raise ParameterError(f"{name} is not allowed: numbers are needed") from None
+            if array.ndim == 0:
+                array = np.full(rows, float(array))
+            if array.shape != (rows,):
+                raise ParameterError(f"{name} has the shape {array.shape}; ({rows},) is needed, one value for each plant")
+            given[name] = array
+        return given
+
+    def range(self, name: str) -> tuple[float, float, str]:
+        """Lowest and highest value of a signal, and the words for it."""
+        if name not in self._ranges:
+            self._ranges[name] = self._found_range(name)
+        return self._ranges[name]
+
+    def _found_range(self, name: str) -> tuple[float, float, str]:
+        channel = channel_of(name)
+        if channel == "valve_command":
+            return -np.inf, np.inf, "a finite voltage is needed"
+        if channel == "length":
+            low, high, unit = self._load["min_length"], self._load["max_length"], "m"
+        else:
+            low, high, unit = _LEAST_PRESSURE - self._ambient, _MOST_PRESSURE, "Pa (gauge)"
+        return low, high, f"a number from {low:g} to {high:g} {unit}"
+
+    def _check_prescribed(self, given: Mapping[str, ArrayLike]) -> None:
+        """What may be prescribed follows from the blocks."""
+        if self._frame and "length" not in given:
+            raise ParameterError("length is missing: a load frame needs one value per sample [m]")
+        if not self._frame and "length" in given:
+            raise ParameterError('length is given, which only a rig with a load frame takes ([load] kind = "frame")')
+        for name in given:
+            channel, _, chamber = name.partition(".")
+            if channel == "pressure" and chamber in self._fed:
+                raise ParameterError(f"{name} is given, which only a rig without [valve] takes: there the valve decides")
+            if channel == "supply_command" and not self._names["supply_command"][0]:
+                raise ParameterError(
+                    'supply_command is given, which only a supply takes that is a regulator ([supply] kind = "regulator")'
+                )
+
+
+def keywords(answer: Any) -> dict[str, Any]:
+    """What a controller answers as keywords of :meth:`pamrs.Simulator.step`."""
+    known = ("valve_command", "supply_command", "length", "pressure")
+    if not isinstance(answer, (float, np.ndarray)) and isinstance(answer, Mapping) and any(name in known for name in answer):
+        return dict(answer)
+    return {"valve_command": answer}
 
 
 def initial_values(initial: Mapping[str, float] | None, rig: Rig) -> dict[str, float]:
@@ -148,23 +267,7 @@ def _named(channel: str, given: Signals | None, names: list[str], block: str) ->
     return {dotted(channel, name): values for name, values in given.items()}
 
 
-def _check_prescribed(rig: Rig, given: Mapping[str, ArrayLike]) -> None:
-    """What may be prescribed follows from the blocks."""
-    frame = has_frame(rig)
-    if frame and "length" not in given:
-        raise ParameterError("length is missing: a load frame needs one value per sample [m]")
-    if not frame and "length" in given:
-        raise ParameterError('length is given, which only a rig with a load frame takes ([load] kind = "frame")')
-    fed = {valve["to"].partition(".")[2] for valve in rig.ports("valve").values() if valve["to"].startswith("chamber")}
-    for name in given:
-        channel, _, chamber = name.partition(".")
-        if channel == "pressure" and chamber in fed:
-            raise ParameterError(f"{name} is given, which only a rig without [valve] takes: there the valve decides")
-        if channel == "supply_command" and not regulators_of(rig):
-            raise ParameterError('supply_command is given, which only a supply takes that is a regulator ([supply] kind = "regulator")')
-
-
-def _signal(name: str, values: ArrayLike, rows: int | None, rig: Rig) -> Array:
+def _signal(name: str, values: ArrayLike, rows: int | None, allowed_range: tuple[float, float, str]) -> Array:
     """One signal as a checked array; a number stays the same in every row."""
     try:
         signal = np.asarray(values, dtype=np.float64)
@@ -175,21 +278,8 @@ def _signal(name: str, values: ArrayLike, rows: int | None, rig: Rig) -> Array:
     if signal.ndim != 1 or signal.size == 0 or (rows is not None and signal.size != rows):
         needed = "(n,) with n >= 1" if rows is None else f"({rows},)"
         raise ParameterError(f"{name} has the shape {signal.shape}; {needed} is needed, one value for each row")
-    low, high, allowed = _range(name, rig)
+    low, high, allowed = allowed_range
     bad = np.flatnonzero(~((signal >= low) & (signal <= high) & np.isfinite(signal)))
     if bad.size:
         raise ParameterError(f"{name}[{bad[0]}] = {signal[bad[0]]:g} is not allowed: {allowed}")
     return np.ascontiguousarray(signal)
-
-
-def _range(name: str, rig: Rig) -> tuple[float, float, str]:
-    """Lowest and highest value of a signal, and the words for it."""
-    channel = channel_of(name)
-    if channel == "valve_command":
-        return -np.inf, np.inf, "a finite voltage is needed"
-    if channel == "length":
-        load = rig.tables("load")[""]
-        low, high, unit = load["min_length"], load["max_length"], "m"
-    else:
-        low, high, unit = _LEAST_PRESSURE - rig.tables("gas")[""]["ambient_pressure"], _MOST_PRESSURE, "Pa (gauge)"
-    return low, high, f"a number from {low:g} to {high:g} {unit}"

@@ -273,11 +273,14 @@ def _motion() -> ModuleType:
         raise ImportError("pictures need matplotlib: pip install 'pamrs[plot]'") from error
 
 
-def core_rig(rig: Rig) -> _core.Rig:
-    """The compiled rig of a description, kept with it so that a second simulation costs no compilation."""
+def core_rig(rig: Rig, like: _core.Rig | None = None) -> _core.Rig:
+    """The compiled rig of a description, kept with it so that a second simulation costs no compilation.
+
+    Muscles that are those of ``like`` are not compiled again.
+    """
     cached: Any = rig.__dict__.get("_compiled")
     if cached is None:
-        cached = _core.Rig(rig.to_json())
+        cached = _core.Rig(rig.to_json()) if like is None else like.respecified(rig.to_json())
         object.__setattr__(rig, "_compiled", cached)
     compiled: _core.Rig = cached
     return compiled
@@ -378,11 +381,21 @@ def check_run(rig: Rig, sample_time: float) -> None:
 def check_rows(rig: Rig, rows: int) -> None:
     """Refuse a simulation whose channels would not fit in memory, before it starts."""
     channels = len(core_rig(rig).channels)
-    if rows * channels > _MOST_NUMBERS:
+    if rows * channels > MOST_NUMBERS:
         raise ParameterError(
-            f"{rows} rows of {channels} channels are not allowed: at most {_MOST_NUMBERS // channels} rows (2 GB); "
+            f"{rows} rows of {channels} channels are not allowed: at most {MOST_NUMBERS // channels} rows (2 GB); "
             "give a longer sample_time, or run pamrs.Simulator piece by piece"
         )
+
+
+def whole_samples(name: str, value: float, sample_time: float, least: int) -> int:
+    """A time [s] as a whole number of samples, ``least`` at least; an error names it."""
+    count = round(value / sample_time) if isinstance(value, (int, float, np.number)) and np.isfinite(value) else -1
+    if count < least or abs(count * sample_time - value) > 1e-6 * sample_time:
+        raise ParameterError(
+            f"{name} = {value} s is not allowed: a multiple of sample_time = {sample_time} s, {least} at least, is needed"
+        )
+    return count
 
 
 def _rows(sample_time: float, duration: float | None, *given: Signals | None) -> int | None:
@@ -411,7 +424,8 @@ def default_step(sample_time: float, longest: float = 1e-3) -> float:
     return sample_time / max(1, int(np.ceil(sample_time / longest - 1e-9)))
 
 
-_MOST_NUMBERS = 250_000_000
+#: Numbers that one run may keep: 2 GB.
+MOST_NUMBERS = 250_000_000
 _TELLING_TORQUE = 1.0  # N m
 #: Channels of the core that are sums since the start.
 _BOOKS = ("mass_supplied", "mass_vented", "energy_supplied", "exergy_supplied", "muscle_work", "joint_work")

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pamrs import _core
-from pamrs.driving import Signals, initial_values, signals_of
+from pamrs.driving import Inputs, Signals, initial_values, keywords, signals_of
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
-from pamrs.simulation import Event, Simulation, check_rows, check_run, chosen_step, core_rig
+from pamrs.simulation import Event, Simulation, check_rows, check_run, chosen_step, core_rig, whole_samples
 
 __all__ = ["Simulator"]
 
@@ -57,6 +57,7 @@ class Simulator:
         self.sample_time = float(sample_time)
         self._step = chosen_step(self.sample_time, step)
         self._initial = initial_values(initial, rig)
+        self._inputs = Inputs(rig)
         self.events: list[Event] = []
         """What happened since the start or the last :meth:`reset` or :meth:`restore`, see :class:`pamrs.simulation.Event`."""
         self._core = self._started(self._initial)
@@ -115,7 +116,7 @@ class Simulator:
         -------
         dict of str to float
         """
-        return _single(self._core.observe())
+        return self._core.observe()
 
     def step(
         self,
@@ -149,10 +150,10 @@ class Simulator:
         SimulationError
             If the state leaves the range in which the model holds; the simulator then stays at the last good sample.
         """
-        signals, _ = signals_of(
-            self.rig, valve_command=valve_command, supply_command=supply_command, length=length, pressure=pressure, rows=1
-        )
-        return _single(self._advance(1, signals))
+        sample, events = self._core.hold(1, self._inputs.numbers(valve_command, supply_command, length, pressure))
+        if events:
+            self.events += [Event(*event) for event in events]
+        return sample
 
     def run(
         self,
@@ -231,35 +232,28 @@ class Simulator:
         """
         if not callable(update):
             raise ParameterError(f"update is a {type(update).__name__}; something that can be called with a sample is needed")
-        every = self._samples("period", self.sample_time if period is None else period, least=1)
-        total = self._samples("duration", duration, least=0)
+        every = whole_samples("period", self.sample_time if period is None else period, self.sample_time, least=1)
+        total = whole_samples("duration", duration, self.sample_time, least=0)
         check_rows(self.rig, total + 1)
-        first, began, happened = self.observe(), self.time, len(self.events)
-        channels = {name: np.full(total + 1, value) for name, value in first.items()}
+        sample, began, happened = self.observe(), self.time, len(self.events)
+        rows = np.empty((len(sample), total + 1))
+        rows[:, 0] = list(sample.values())
+        channels = dict(zip(sample, rows, strict=True))
         held: dict[str, Array] = {}
-        sample = first
         for k in range(0, total, every):
             count = min(every, total - k)
-            signals, _ = signals_of(self.rig, **_keywords(update({"time": self.time, **sample})), rows=count)
-            block = self._advance(count, signals)
-            for name, values in block.items():
-                channels[name][k + 1 : k + 1 + count] = values
-            for name, values in signals.items():
+            numbers = self._inputs.numbers(**keywords(update({"time": self.time, **sample})))
+            sample, events = self._core.hold(count, numbers, rows, k + 1)
+            if events:
+                self.events += [Event(*event) for event in events]
+            for name, value in numbers.items():
+                if name not in held:
+                    held[name] = np.full(total + 1, np.nan)
                 # what was held from the last row is what it would go on with
-                held.setdefault(name, np.full(total + 1, np.nan))[k : k + count + 1] = values[0]
-            sample = {name: float(values[-1]) for name, values in block.items()}
+                held[name][k : k + count + 1] = value
         inputs = {name: values for name, values in held.items() if name not in channels}
         time = np.asarray(began + np.arange(total + 1) * self.sample_time, dtype=np.float64)
         return Simulation({"time": time, **inputs, **channels}, self.rig, self.events[happened:])
-
-    def _samples(self, name: str, value: float, least: int) -> int:
-        """A time as a whole number of samples."""
-        count = round(value / self.sample_time) if np.isfinite(value) else -1
-        if count < least or abs(count * self.sample_time - value) > 1e-6 * self.sample_time:
-            raise ParameterError(
-                f"{name} = {value} s is not allowed: a multiple of sample_time = {self.sample_time} s, {least} at least, is needed"
-            )
-        return count
 
     def _advance(self, count: int, signals: dict[str, Array]) -> dict[str, Array]:
         channels, events = self._core.advance(count, signals)
@@ -279,15 +273,3 @@ class Simulator:
 
     def __repr__(self) -> str:
         return f"Simulator({self.rig.name}, time={self.time:.6g} s, sample_time={self.sample_time:g} s)"
-
-
-def _single(channels: Mapping[str, Array]) -> dict[str, float]:
-    return {name: float(values[0]) for name, values in channels.items()}
-
-
-def _keywords(answer: Any) -> dict[str, Any]:
-    """What a controller answers as keywords of :meth:`Simulator.step`."""
-    known = ("valve_command", "supply_command", "length", "pressure")
-    if isinstance(answer, Mapping) and any(name in known for name in answer):
-        return dict(answer)
-    return {"valve_command": answer}

@@ -32,24 +32,14 @@ impl<'a> Drive<'a> {
         for (k, name) in names.inputs.iter().enumerate() {
             commands.push(match find(name) {
                 Some(values) => {
-                    let (low, high, unit) = if k < spec.valves.len() {
-                        (f64::MIN, f64::MAX, "V")
-                    } else {
-                        (-rig.gas.ambient_pressure, 1e8, "Pa (gauge)")
-                    };
+                    let (low, high, unit) = input_range(rig, k);
                     check_signal(name, values, samples, (low, high), unit)?;
                     Cow::Borrowed(values)
                 }
                 None if k < spec.valves.len() => {
-                    return Err(Error::Model(format!(
-                        "{name} is missing: a rig with a valve needs one value per sample [V]"
-                    )));
+                    return Err(command_missing(name));
                 }
-                None => {
-                    let supply =
-                        spec.supplies.iter().filter(|s| s.kind == "regulator").nth(k - spec.valves.len());
-                    Cow::Owned(vec![supply.map_or(0.0, |s| s.initial_pressure); samples])
-                }
+                None => Cow::Owned(vec![set_pressure(rig, k); samples]),
             });
         }
         let mut prescribed = Vec::new();
@@ -58,11 +48,7 @@ impl<'a> Drive<'a> {
             check_signal(name, values, samples, (low, high), unit)?;
             prescribed.push((place, Cow::Borrowed(*values)));
         }
-        if spec.load.as_ref().is_some_and(|l| l.is_frame()) && find("length").is_none() {
-            return Err(Error::Model(
-                "length is missing: a load frame needs one value per sample [m]".into(),
-            ));
-        }
+        check_frame(rig, find("length").is_some())?;
         Ok(Self { samples, commands, prescribed })
     }
 
@@ -84,8 +70,17 @@ impl<'a> Drive<'a> {
         }
     }
 
-    pub(crate) fn places(&self) -> Vec<usize> {
-        self.prescribed.iter().map(|(place, _)| *place).collect()
+    /// A drive of commands in the order of the rig's inputs, and of what is prescribed, by its place, that were checked.
+    pub(crate) fn checked(
+        samples: usize,
+        commands: Vec<Cow<'a, [f64]>>,
+        prescribed: Vec<(usize, Cow<'a, [f64]>)>,
+    ) -> Self {
+        Self { samples, commands, prescribed }
+    }
+
+    pub(crate) fn places(&self) -> impl Iterator<Item = usize> + '_ {
+        self.prescribed.iter().map(|(place, _)| *place)
     }
 
     /// Where one sample begins and ends: place, from, to.
@@ -103,8 +98,37 @@ impl<'a> Drive<'a> {
     }
 }
 
+/// Range and unit of an input.
+pub(crate) fn input_range(rig: &Rig, input: usize) -> (f64, f64, &'static str) {
+    if input < rig.spec().valves.len() {
+        (f64::MIN, f64::MAX, "V")
+    } else {
+        (-rig.gas.ambient_pressure, 1e8, "Pa (gauge)")
+    }
+}
+
+/// What a regulator is set to that nobody sets [Pa, gauge].
+pub(crate) fn set_pressure(rig: &Rig, input: usize) -> f64 {
+    let spec = rig.spec();
+    let supply = spec.supplies.iter().filter(|s| s.kind == "regulator").nth(input - spec.valves.len());
+    supply.map_or(0.0, |s| s.initial_pressure)
+}
+
+/// What is missing where a valve has no command.
+pub(crate) fn command_missing(name: &str) -> Error {
+    Error::Model(format!("{name} is missing: a rig with a valve needs one value per sample [V]"))
+}
+
+/// A load frame needs a length.
+pub(crate) fn check_frame(rig: &Rig, given: bool) -> Result<()> {
+    if rig.spec().load.as_ref().is_some_and(|l| l.is_frame()) && !given {
+        return Err(Error::Model("length is missing: a load frame needs one value per sample [m]".into()));
+    }
+    Ok(())
+}
+
 /// Place of a state that can be prescribed, with the range and unit of its signal.
-fn prescribable(rig: &Rig, name: &str) -> Result<(usize, f64, f64, &'static str)> {
+pub(crate) fn prescribable(rig: &Rig, name: &str) -> Result<(usize, f64, f64, &'static str)> {
     let spec = rig.spec();
     if name == "length" {
         return match spec.load.as_ref().filter(|load| load.is_frame()) {
@@ -140,14 +164,25 @@ fn check_signal(
         return Err(Error::Length { name: name.into(), found: values.len(), expected: samples, why });
     }
     for (k, value) in values.iter().enumerate() {
-        if !(value.is_finite() && *value >= low && *value <= high) {
-            let allowed = if low == f64::MIN {
-                "a finite voltage".into()
-            } else {
-                format!("a number from {low} to {high} {unit}")
-            };
-            return Err(Error::parameter(format!("{name}[{k}]"), *value, allowed));
-        }
+        check_value(|| format!("{name}[{k}]"), *value, (low, high), unit)?;
     }
     Ok(())
+}
+
+/// One value of a signal.
+pub(crate) fn check_value(
+    name: impl Fn() -> String,
+    value: f64,
+    (low, high): (f64, f64),
+    unit: &str,
+) -> Result<()> {
+    if value.is_finite() && value >= low && value <= high {
+        return Ok(());
+    }
+    let allowed = if low == f64::MIN {
+        "a finite voltage".into()
+    } else {
+        format!("a number from {low} to {high} {unit}")
+    };
+    Err(Error::parameter(name(), value, allowed))
 }

@@ -12,17 +12,20 @@
 #![warn(missing_docs)]
 
 pub mod arm;
+pub mod batch;
 pub mod drive;
 pub mod effects;
 pub mod error;
 pub mod events;
 pub mod gas;
 pub mod geometry;
+mod initial;
 pub mod integrate;
 pub mod joint;
 pub mod muscle;
 pub mod residual;
 pub mod rig;
+pub mod run;
 pub mod scalar;
 pub mod simulate;
 

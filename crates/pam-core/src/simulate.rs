@@ -1,15 +1,18 @@
 //! Fixed-step simulation: commands are held over each sample, RK4 steps fill it.
 
-use crate::drive::{Drive, LEAST_PRESSURE};
+use crate::drive::Drive;
 use crate::effects::clock_skew;
 use crate::error::check_range;
-use crate::events::{Event, Watch};
+use crate::events::Event;
+pub use crate::initial::Initial;
 use crate::integrate::Rk4;
 use crate::rig::plant::{Controls, Plant, Scratch, Simulated};
 use crate::rig::spec::dotted;
 use crate::rig::{Channel, Memory, Rig};
+use crate::run::Run;
 use crate::scalar::{constant, Scalar};
 use crate::{Error, Result};
+use std::ops::Range;
 
 /// Sample time and step.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -56,95 +59,6 @@ impl Timing {
     /// Step [s].
     pub fn step(&self) -> f64 {
         self.sample_time / self.substeps as f64
-    }
-}
-
-/// Initial state as a user states it, by the names of [`crate::rig::Names::initial`]: gauge pressures [Pa], angles [rad],
-/// rates [rad/s], length [m]; true values, not sensor readings.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Initial {
-    values: Vec<f64>,
-    given: Vec<bool>,
-}
-
-impl Initial {
-    /// The rig at rest: every pressure its initial one, joints at their rest angle, a loaded muscle at its rest length.
-    pub fn rest(rig: &Rig) -> Self {
-        let (spec, wiring, layout) = (rig.spec(), &rig.wiring, &rig.layout);
-        let of = |place: usize| {
-            if place < layout.supplies {
-                spec.supplies[place].initial_pressure
-            } else if place < layout.mass(0) {
-                wiring.gases[place - layout.supplies].initial_pressure
-            } else if place < layout.rate(0) && spec.load.is_some() {
-                wiring.groups[0].rest_length
-            } else if place < layout.rate(0) {
-                let coordinate = &wiring.coordinates[place - layout.angle(0)];
-                coordinate.stops.map_or(coordinate.rest, |s| coordinate.rest.clamp(s.min_angle, s.max_angle))
-            } else {
-                0.0
-            }
-        };
-        let values: Vec<f64> = rig.names.initial.iter().map(|(_, place)| of(*place)).collect();
-        Self { given: vec![false; values.len()], values }
-    }
-
-    /// The same with one value more, by its name.
-    ///
-    /// # Errors
-    /// [`Error::Model`] for a name that the rig does not have, [`Error::Parameter`] for an impossible value.
-    pub fn with(mut self, rig: &Rig, name: &str, value: f64) -> Result<Self> {
-        let Some(k) = rig.names.initial.iter().position(|(n, _)| n == name) else {
-            let names: Vec<_> = rig.names.initial.iter().map(|(n, _)| n.as_str()).collect();
-            return Err(Error::Model(format!(
-                "initial has the unknown entry '{name}'; there are: {}",
-                names.join(", ")
-            )));
-        };
-        let (layout, place) = (&rig.layout, rig.names.initial[k].1);
-        let full = format!("initial.{name}");
-        if place < layout.angle(0) {
-            check_range(&full, value, LEAST_PRESSURE - rig.gas.ambient_pressure, 1e8, "Pa (gauge)")?;
-        } else if place >= layout.rate(0) {
-            check_range(&full, value, -1e4, 1e4, if rig.spec().load.is_some() { "m/s" } else { "rad/s" })?;
-        } else if let Some(load) = &rig.spec().load {
-            check_range(&full, value, load.min_length, load.max_length, "m")?;
-        } else {
-            let stops = rig.wiring.coordinates[place - layout.angle(0)].stops;
-            let (low, high) = stops.map_or((-7.0, 7.0), |s| (s.min_angle - 0.2, s.max_angle + 0.2));
-            check_range(&full, value, low, high, "rad")?;
-        }
-        (self.values[k], self.given[k]) = (value, true);
-        Ok(self)
-    }
-
-    /// The state, its masses and books still zero.
-    fn state(&self, rig: &Rig, states: usize) -> Vec<f64> {
-        let (layout, wiring) = (&rig.layout, &rig.wiring);
-        let mut state = vec![0.0; states];
-        let ambient = rig.gas.ambient_pressure;
-        for ((_, place), value) in rig.names.initial.iter().zip(&self.values) {
-            state[*place] = if *place < layout.mass(0) {
-                value + ambient
-            } else if rig.spec().load.is_some() {
-                if *place < layout.rate(0) {
-                    wiring.groups[0].rest_length - value
-                } else {
-                    0.0 - value
-                }
-            } else {
-                *value
-            };
-        }
-        for (k, (_, end)) in wiring.inlets.iter().enumerate() {
-            let place = layout.pressure(wiring.chambers + k);
-            let given =
-                rig.names.initial.iter().zip(&self.given).any(|((_, p), given)| *p == place && *given);
-            if let (false, Some(end)) = (given, end.place(layout)) {
-                state[place] = state[end];
-            }
-        }
-        state
     }
 }
 
@@ -309,7 +223,7 @@ impl Trajectory {
 }
 
 /// A running simulation at a sample: all that its future depends on.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Default, PartialEq)]
 pub struct Progress {
     state: Vec<f64>,
     memory: Vec<Memory<f64>>,
@@ -320,6 +234,24 @@ pub struct Progress {
     past: Vec<f64>,
     /// How many of them a sample has: all commands and readings, or none.
     kept: usize,
+}
+
+impl Clone for Progress {
+    fn clone(&self) -> Self {
+        let (state, memory) = (self.state.clone(), self.memory.clone());
+        let (flags, past) = (self.flags.clone(), self.past.clone());
+        Self { state, memory, flags, past, ..*self }
+    }
+
+    /// Without new memory: what every sample begins with.
+    fn clone_from(&mut self, other: &Self) {
+        let Self { state, memory, flags, samples, past, kept } = self;
+        state.clone_from(&other.state);
+        memory.clone_from(&other.memory);
+        flags.clone_from(&other.flags);
+        past.clone_from(&other.past);
+        (*samples, *kept) = (other.samples, other.kept);
+    }
 }
 
 impl Progress {
@@ -399,6 +331,14 @@ impl Progress {
         let plant = Plant::new(rig, rig.parameters().lift(), true)?;
         let mut scratch = plant.scratch();
         self.observed(&plant, &mut scratch, timing, out)
+    }
+
+    /// As [`Self::observe`], with a run of the same rig.
+    ///
+    /// # Errors
+    /// As [`Self::observe`].
+    pub fn observe_in(&self, run: &mut Run<'_>, timing: Timing, out: &mut Trajectory) -> Result<()> {
+        self.observed(&run.stepper.plant, &mut run.stepper.scratch, timing, out)
     }
 
     fn observed(
@@ -482,14 +422,29 @@ impl Progress {
         out: &mut Trajectory,
         look: &mut dyn FnMut() -> Result<()>,
     ) -> Result<()> {
-        let mut stepper = Stepper::new(Plant::new(rig, rig.parameters().lift(), true)?);
-        let simulated = Simulated::all_but(&rig.layout, &drive.places());
+        self.advance_in(&mut Run::new(rig)?, timing, drive, 0..drive.samples, out, look)
+    }
+
+    /// As [`Self::advance_watched`] over some samples of a drive, with a run of the same rig.
+    ///
+    /// # Errors
+    /// As [`Self::advance_watched`].
+    pub fn advance_in(
+        &mut self,
+        run: &mut Run<'_>,
+        timing: Timing,
+        drive: &Drive<'_>,
+        samples: Range<usize>,
+        out: &mut Trajectory,
+        look: &mut dyn FnMut() -> Result<()>,
+    ) -> Result<()> {
+        run.prescribe(drive);
+        let Run { stepper, simulated, before, after, next, unseen, .. } = run;
+        let rig = stepper.plant.rig();
         let dt = timing.step();
-        let (mut before, mut after) = (Watch::default(), Watch::default());
-        let mut unseen = 0;
-        for k in 0..drive.samples {
+        for k in samples {
             let mut controls = stepper.plant.controls(|input| drive.commands[input][k]);
-            let mut next = self.clone();
+            next.clone_from(self);
             let happened = out.events.len();
             let ends = drive.ends(rig, &self.state, k);
             let began = self.samples as f64 * timing.sample_time;
@@ -506,7 +461,7 @@ impl Progress {
                     controls = next.skewed(&stepper.plant, from, timing);
                 }
                 let (state, memory) = (&mut next.state, &mut next.memory);
-                stepper.step(state, memory, &controls, from, dt, &simulated, |fraction, y| {
+                stepper.step(state, memory, &controls, from, dt, simulated, |fraction, y| {
                     let share = (sub as f64 + fraction) / timing.substeps as f64;
                     for (place, from, to) in &ends {
                         y[*place] = from + (to - from) * share;
@@ -517,11 +472,11 @@ impl Progress {
                 });
                 after.look(&stepper.plant, &next.state, stepper.controls(&controls, 2));
                 let time = began + (sub + 1) as f64 * dt;
-                after.report(rig, Some((&before, dt)), time, &mut next.flags, &mut out.events);
-                std::mem::swap(&mut before, &mut after);
-                unseen += 1;
-                if unseen >= STEPS_UNSEEN {
-                    unseen = 0;
+                after.report(rig, Some((before, dt)), time, &mut next.flags, &mut out.events);
+                std::mem::swap(before, after);
+                *unseen += 1;
+                if *unseen >= STEPS_UNSEEN {
+                    *unseen = 0;
                     if let Err(error) = look() {
                         out.events.truncate(happened);
                         return Err(error);
@@ -540,7 +495,7 @@ impl Progress {
                 out.events.truncate(happened);
                 return Err(error);
             }
-            *self = next;
+            std::mem::swap(self, next);
         }
         Ok(())
     }

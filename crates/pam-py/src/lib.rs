@@ -1,5 +1,6 @@
 //! Python bindings of `pam-core`: convert arguments, release the GIL, map errors. No physics here.
 
+mod batch;
 mod convert;
 mod gas;
 mod joint;
@@ -18,6 +19,7 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<gas::Gas>()?;
     m.add_class::<joint::Joint>()?;
     m.add_class::<simulator::Simulator>()?;
+    m.add_class::<batch::Batch>()?;
     m.add_function(wrap_pyfunction!(rig::effects, m)?)?;
     Ok(())
 }

@@ -5,11 +5,12 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::convert::{array, error, values};
 use crate::rig::{borrowed, owned, Rig, Signals};
-use numpy::{PyArray1, PyReadonlyArray1};
+use numpy::{PyArray1, PyReadonlyArray1, PyReadwriteArray2};
 use pam_core::drive::Drive;
+use pam_core::run::OwnedRun;
 use pam_core::simulate::{Initial, Progress, Timing, Trajectory};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyString};
 
 /// Advance a progress without the interpreter, looking at Ctrl-C now and then.
 pub fn run(
@@ -20,9 +21,17 @@ pub fn run(
     drive: &Drive<'_>,
     out: &mut Trajectory,
 ) -> PyResult<()> {
+    watched(py, |look| progress.advance_watched(rig, timing, drive, out, look))
+}
+
+/// Do something without the interpreter that looks at Ctrl-C now and then.
+pub fn watched(
+    py: Python<'_>,
+    work: impl FnOnce(&mut dyn FnMut() -> pam_core::Result<()>) -> pam_core::Result<()> + Send,
+) -> PyResult<()> {
     let mut stopped = None;
     let done = py.detach(|| {
-        progress.advance_watched(rig, timing, drive, out, &mut || {
+        work(&mut || {
             Python::attach(|py| py.check_signals()).map_err(|signal| {
                 stopped = Some(signal);
                 pam_core::Error::Model("interrupted".into())
@@ -57,17 +66,62 @@ pub fn initial(rig: &pam_core::Rig, given: &BTreeMap<String, f64>) -> pam_core::
     given.iter().try_fold(Initial::rest(rig), |start, (name, value)| start.with(rig, name, *value))
 }
 
+/// What a sample is worked out with, kept from one to the next.
+struct Work {
+    run: OwnedRun,
+    out: Trajectory,
+}
+
 /// A simulation of a rig that waits for its next command.
 #[pyclass(frozen, module = "pamrs._core")]
 pub struct Simulator {
     rig: Arc<pam_core::Rig>,
     timing: Timing,
     progress: Mutex<Progress>,
+    /// Gone while a call uses it; another thread that calls meanwhile makes its own.
+    work: Mutex<Option<Work>>,
+    names: Vec<Py<PyString>>,
 }
 
 impl Simulator {
     fn progress(&self) -> MutexGuard<'_, Progress> {
         self.progress.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn work(&self) -> MutexGuard<'_, Option<Work>> {
+        self.work.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Do something with what a sample is worked out with.
+    fn with_work<T>(
+        &self,
+        py: Python<'_>,
+        act: impl FnOnce(&mut OwnedRun, &mut Trajectory) -> PyResult<T>,
+    ) -> PyResult<T> {
+        let kept = self.work().take();
+        let mut work = match kept {
+            Some(work) => work,
+            None => Work {
+                run: OwnedRun::new(Arc::clone(&self.rig)).map_err(|e| error(py, &e))?,
+                out: Trajectory::new(&self.rig, 1),
+            },
+        };
+        let done = act(&mut work.run, &mut work.out);
+        work.out.channels.iter_mut().for_each(Vec::clear);
+        work.out.events.clear();
+        *self.work() = Some(work);
+        done
+    }
+
+    /// The last sample of a trajectory, a number for each channel.
+    fn last<'py>(&self, py: Python<'py>, out: &Trajectory) -> PyResult<Bound<'py, PyDict>> {
+        let sample = PyDict::new(py);
+        for (name, values) in self.names.iter().zip(&out.channels) {
+            if let Some(value) = values.last() {
+                sample.set_item(name, *value)?;
+            }
+        }
+        Ok(sample)
     }
 }
 
@@ -85,7 +139,9 @@ impl Simulator {
         let made = Timing::new(sample_time, step)
             .and_then(|t| Ok((t.stable(&rig), Progress::start(&rig, &initial(&rig, &start)?)?)));
         let (timing, progress) = made.map_err(|e| error(py, &e))?;
-        Ok(Self { rig, timing, progress: Mutex::new(progress) })
+        let names =
+            rig.names().channels.iter().map(|(name, _)| PyString::intern(py, name).unbind()).collect();
+        Ok(Self { rig, timing, progress: Mutex::new(progress), work: Mutex::new(None), names })
     }
 
     /// Hold each command for one sample; the samples after them as channels by name, and what happened on the way.
@@ -106,12 +162,52 @@ impl Simulator {
         Ok((channels(py, &self.rig, out)?, happened))
     }
 
-    /// The present sample as channels by name, one value each.
+    /// Hold one command for some samples: the last of them as numbers by name, and what happened on the way. All of them are
+    /// written to `rows`, one line for each channel, from a column on, where it is given.
+    #[pyo3(signature = (samples, signals, rows=None, column=0))]
+    fn hold<'py>(
+        &self,
+        py: Python<'py>,
+        samples: usize,
+        signals: &Bound<'py, PyDict>,
+        rows: Option<PyReadwriteArray2<'py, f64>>,
+        column: usize,
+    ) -> PyResult<(Bound<'py, PyDict>, Vec<EventRow>)> {
+        let given =
+            signals.iter().map(|(name, value)| Ok((name.cast_into::<PyString>()?, value.extract::<f64>()?)));
+        let given = given.collect::<PyResult<Vec<_>>>()?;
+        let named = given.iter().map(|(name, value)| Ok((name.to_str()?, std::slice::from_ref(value))));
+        let named = named.collect::<PyResult<Vec<_>>>()?;
+        let drive = Drive::new(&self.rig, 1, &named).map_err(|e| error(py, &e))?;
+        self.with_work(py, |run, out| {
+            let mut progress = self.progress().clone();
+            let done = watched(py, |look| {
+                run.with(|run| {
+                    (0..samples)
+                        .try_for_each(|_| progress.advance_in(run, self.timing, &drive, 0..1, out, look))
+                })
+            });
+            *self.progress() = progress;
+            done?;
+            if let Some(mut rows) = rows {
+                let mut rows = rows.as_array_mut();
+                for (mut row, values) in rows.outer_iter_mut().zip(&out.channels) {
+                    for (to, value) in row.iter_mut().skip(column).zip(values) {
+                        *to = *value;
+                    }
+                }
+            }
+            Ok((self.last(py, out)?, events(out)))
+        })
+    }
+
+    /// The present sample as numbers by name.
     fn observe<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let mut out = Trajectory::new(&self.rig, 1);
-        let progress = self.progress().clone();
-        progress.observe(&self.rig, self.timing, &mut out).map_err(|e| error(py, &e))?;
-        channels(py, &self.rig, out)
+        self.with_work(py, |run, out| {
+            let progress = self.progress().clone();
+            run.with(|run| progress.observe_in(run, self.timing, out)).map_err(|e| error(py, &e))?;
+            self.last(py, out)
+        })
     }
 
     /// Numbers of the state that restore it bit for bit.

@@ -109,6 +109,8 @@ pub struct Scratch<S> {
     pub(super) muscle_work: S,
     /// Poses, rates and torques that effects on the arm change.
     pub(super) arm: [Vec<S>; 4],
+    /// Contraction ratio of each group at a sample.
+    now: Vec<S>,
 }
 
 impl<'a, S: Scalar> Plant<'a, S> {
@@ -203,6 +205,7 @@ impl<'a, S: Scalar> Plant<'a, S> {
             vented: constant(0.0),
             muscle_work: constant(0.0),
             arm: std::array::from_fn(|_| zeros(coordinates)),
+            now: zeros(self.rig.wiring.groups.len()),
         }
     }
 
@@ -354,9 +357,12 @@ impl Plant<'_, f64> {
         here: &mut Scratch<f64>,
         out: &mut [Vec<f64>],
     ) {
+        if out.is_empty() {
+            return; // nobody looks
+        }
         let (layout, wiring) = (&self.layout, &self.rig.wiring);
         let ambient = self.rig.gas.ambient_pressure;
-        let mut now = vec![0.0; wiring.groups.len()];
+        let mut now = std::mem::take(&mut here.now);
         self.contractions(state, &mut now);
         self.mechanics(state, memory, &now, here);
         let zero = |id: Option<super::ParameterId>| id.map_or(0.0, |id| self.values[id]);
@@ -386,5 +392,6 @@ impl Plant<'_, f64> {
                 Channel::Book(k) => state.get(layout.book(k)).copied().unwrap_or(f64::NAN),
             });
         }
+        here.now = now;
     }
 }

@@ -1,0 +1,116 @@
+"""Controllers of the joint angle, sampled, for one arm or a batch of them; trajectories, metrics, tuning and stability.
+
+Names are loaded when they are first used; what needs an extra says so then.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any, Final
+
+from pamrs.control.adaptive import AdaptiveSliding
+from pamrs.control.air import AirModel, OrificeInverse
+from pamrs.control.cascade import Cascade, PressureLoop, cascaded_pid
+from pamrs.control.feedforward import Feedforward, Parallel
+from pamrs.control.fuzzy import FUZZY_SETS, Fuzzy, fuzzy_rules, fuzzy_surface
+from pamrs.control.hysteresis import DeadZoneCompensation, HysteresisCompensation, HystereticTorque, SlipMemory
+from pamrs.control.joint_sensor import JointSensor
+from pamrs.control.model import ArmModel, FullTorque, GaylordTorque, SimplifiedTorque, TorqueModel, torque_line
+from pamrs.control.neural import NETWORKS, Neural
+from pamrs.control.parts import ANTI_WINDUP, FilteredDerivative, Integrator, LowPass
+from pamrs.control.pid import PID, PIDLaw
+from pamrs.control.protocol import Controller, Measurement, Reference, Value
+from pamrs.control.sampled import SampledController
+from pamrs.control.sliding import Sliding, SlidingController
+
+if TYPE_CHECKING:
+    from pamrs.control import linear, metrics, stability, trajectories, tuning
+    from pamrs.control.live import LiveRun, run_live
+    from pamrs.control.loop import ClosedLoop, closed_loop
+    from pamrs.control.metrics import Metrics
+    from pamrs.control.sensors import Sensors
+    from pamrs.control.sweeping import Sweep, sweep
+    from pamrs.control.trajectories import Trajectory
+
+__all__ = [
+    "ANTI_WINDUP",
+    "FUZZY_SETS",
+    "NETWORKS",
+    "PID",
+    "AdaptiveSliding",
+    "AirModel",
+    "ArmModel",
+    "Cascade",
+    "ClosedLoop",
+    "Controller",
+    "DeadZoneCompensation",
+    "Feedforward",
+    "FilteredDerivative",
+    "FullTorque",
+    "Fuzzy",
+    "GaylordTorque",
+    "HysteresisCompensation",
+    "HystereticTorque",
+    "Integrator",
+    "JointSensor",
+    "LiveRun",
+    "LowPass",
+    "Measurement",
+    "Metrics",
+    "Neural",
+    "OrificeInverse",
+    "PIDLaw",
+    "Parallel",
+    "PressureLoop",
+    "Reference",
+    "SampledController",
+    "Sensors",
+    "SimplifiedTorque",
+    "Sliding",
+    "SlidingController",
+    "SlipMemory",
+    "Sweep",
+    "TorqueModel",
+    "Trajectory",
+    "Value",
+    "cascaded_pid",
+    "closed_loop",
+    "fuzzy_rules",
+    "fuzzy_surface",
+    "linear",
+    "metrics",
+    "run_live",
+    "stability",
+    "sweep",
+    "torque_line",
+    "trajectories",
+    "tuning",
+]
+
+_MODULES: Final = ("linear", "metrics", "stability", "trajectories", "tuning")
+_HOMES: Final[dict[str, str]] = {
+    "ClosedLoop": "pamrs.control.loop",
+    "LiveRun": "pamrs.control.live",
+    "Metrics": "pamrs.control.metrics",
+    "Sensors": "pamrs.control.sensors",
+    "Sweep": "pamrs.control.sweeping",
+    "Trajectory": "pamrs.control.trajectories",
+    "closed_loop": "pamrs.control.loop",
+    "run_live": "pamrs.control.live",
+    "sweep": "pamrs.control.sweeping",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name in _MODULES:
+        value: Any = importlib.import_module(f"pamrs.control.{name}")
+    elif name in _HOMES:
+        value = getattr(importlib.import_module(_HOMES[name]), name)
+    else:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -1,0 +1,404 @@
+"""How well a loop follows: the metrics of 4.4.1 and the usual ones of a step; for one run ``(samples,)`` or a batch ``(n, samples)``.
+
+The curvature (4.16) of the graph of angle over time adds a rate squared to one, so its value, and with it the optimum by (4.18),
+depends on the units that the axes carry: in degrees and seconds a moving arm counts for almost nothing, in radians for nearly as much
+as a resting one. The dissertation does not say which it used. Everything here takes ``unit`` (``"rad"`` by default) for it; time is in
+seconds. The curvature is taken in absolute value, as a signed integral would cancel oscillation.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pamrs.control.signals import checked, integral, plain
+from pamrs.control.step_metrics import overshoot, rise_time, settling_time
+from pamrs.errors import ParameterError
+
+__all__ = [
+    "Metrics",
+    "WEIGHTS",
+    "combined",
+    "curvature",
+    "evaluate",
+    "lag",
+    "overshoot",
+    "phases",
+    "rise_time",
+    "rms",
+    "settling_time",
+    "squared_error",
+    "steady_error",
+    "total_curvature",
+]
+
+Array = NDArray[np.float64]
+
+#: Of (4.18): squared error, curvature.
+WEIGHTS: Final = (0.25, 0.75)
+#: How many of a unit are in a radian.
+_PER_RADIAN: Final[dict[str, float]] = {"rad": 1.0, "deg": 180.0 / math.pi}
+
+
+@dataclass(frozen=True)
+class Metrics:
+    """What :func:`evaluate` found; floats for one run, arrays of shape (n,) for a batch.
+
+    Attributes
+    ----------
+    squared_error : float or ndarray
+        nu (4.15) [unit^2 s].
+    curvature : float or ndarray
+        omega (4.17), absolute, of the measured angle in ``unit`` over seconds.
+    rms, largest : float or ndarray
+        Root of the mean squared and largest absolute error [rad].
+    final : float or ndarray
+        Error at the end [rad].
+    lag : float or ndarray
+        See :func:`lag` [s].
+    phases : mapping of str to mapping of str to float or ndarray
+        ``rms``, ``largest``, ``mean`` and ``final`` error [rad] of each phase of the trajectory.
+    unit : str
+        Of the angle in ``squared_error`` and ``curvature``.
+    """
+
+    squared_error: float | Array
+    curvature: float | Array
+    rms: float | Array
+    largest: float | Array
+    final: float | Array
+    lag: float | Array
+    phases: Mapping[str, Mapping[str, float | Array]]
+    unit: str
+
+
+def squared_error(time: ArrayLike, reference: ArrayLike, angle: ArrayLike, *, unit: str = "rad") -> float | Array:
+    """Integral of the squared error, nu (4.15), by the trapezoidal rule.
+
+    Parameters
+    ----------
+    time : array_like, shape (samples,)
+        Rising [s].
+    reference, angle : array_like, shape (samples,) or (n, samples)
+        [rad]
+    unit : {"rad", "deg"}
+        Of the error in the result.
+
+    Returns
+    -------
+    float or ndarray, shape (n,)
+        [unit^2 s]
+
+    Raises
+    ------
+    ParameterError
+        If shapes do not fit, time does not rise, or the unit is unknown.
+    """
+    t, e = _error(time, reference, angle)
+    return plain(angle_factor(unit) ** 2 * integral(t, e * e))
+
+
+def curvature(time: ArrayLike, angle: ArrayLike, *, rate: ArrayLike | None = None, unit: str = "rad") -> Array:
+    """Absolute curvature of the graph of the angle over time, ``|y''| / (1 + y'^2)^(3/2)`` (4.16).
+
+    Parameters
+    ----------
+    time : array_like, shape (samples,)
+        Rising [s], three samples at least.
+    angle : array_like, shape (samples,) or (n, samples)
+        [rad]
+    rate : array_like, like ``angle``, optional
+        [rad/s], where it is known; else central differences of the angle.
+    unit : {"rad", "deg"}
+        Of the angle's axis.
+
+    Returns
+    -------
+    ndarray, like ``angle``
+        [1/unit] where one unit of angle is drawn as long as a second.
+
+    Raises
+    ------
+    ParameterError
+        As :func:`squared_error`.
+    """
+    t, v = _rate(time, angle, rate, unit)
+    acceleration = np.gradient(v, t, axis=-1)
+    return np.asarray(np.abs(acceleration) / (1.0 + v * v) ** 1.5, dtype=np.float64)
+
+
+def total_curvature(time: ArrayLike, angle: ArrayLike, *, rate: ArrayLike | None = None, unit: str = "rad") -> float | Array:
+    """Integral of the absolute curvature over time, omega (4.17).
+
+    ``y'' / (1 + y'^2)^(3/2)`` is the time derivative of ``y' / sqrt(1 + y'^2)``, so omega is the total variation of that: exact
+    between samples wherever the rate is monotone between them, and no second derivative is taken. Noise of the angle adds to it at
+    every sample: give a simulated or smoothed one.
+
+    Parameters
+    ----------
+    time, angle, rate, unit
+        As for :func:`curvature`.
+
+    Returns
+    -------
+    float or ndarray, shape (n,)
+
+    Raises
+    ------
+    ParameterError
+        As :func:`squared_error`.
+    """
+    _, v = _rate(time, angle, rate, unit)
+    return plain(np.abs(np.diff(slope_sine(v), axis=-1)).sum(axis=-1))
+
+
+def slope_sine(rate: Array) -> Array:
+    """Sine of the slope's angle, ``y' / sqrt(1 + y'^2)``: its total variation is omega.
+
+    Parameters
+    ----------
+    rate : ndarray
+        y' in the unit of the curvature per second.
+
+    Returns
+    -------
+    ndarray
+    """
+    return np.asarray(rate / np.sqrt(1.0 + rate * rate), dtype=np.float64)
+
+
+def combined(
+    error: ArrayLike, curve: ArrayLike, *, weights: tuple[float, float] = WEIGHTS, axis: int | tuple[int, ...] | None = None
+) -> Array:
+    """J (4.18) of each of a set of runs: ``W_nu nu / min(nu) + W_omega omega / min(omega)``; at least the sum of the weights.
+
+    J compares the runs of one set; it says nothing across sets.
+
+    Parameters
+    ----------
+    error, curve : array_like, the same shape
+        nu and omega of each run; NaN or infinite where a run failed.
+    weights : (float, float)
+        W_nu and W_omega, not negative.
+    axis : int or tuple of int, optional
+        Axes over which the runs are one set, for example those of the gains where another is the payload; all by default.
+
+    Returns
+    -------
+    ndarray, the same shape
+        Infinite where a run failed.
+
+    Raises
+    ------
+    ParameterError
+        If shapes differ, a weight is negative, a value is not above zero, or every run of a set failed.
+    """
+    nu, omega = (np.asarray(values, dtype=np.float64) for values in (error, curve))
+    if nu.shape != omega.shape or nu.size == 0:
+        raise ParameterError(f"error and curve have the shapes {nu.shape} and {omega.shape}; the same one, not empty, is needed")
+    if not all(math.isfinite(w) and w >= 0.0 for w in weights) or len(weights) != 2:
+        raise ParameterError(f"weights = {weights} is not allowed: two numbers from 0 on are needed")
+    failed = ~(np.isfinite(nu) & np.isfinite(omega))
+    total = np.zeros(nu.shape)
+    for name, values, weight in (("error", nu, weights[0]), ("curve", omega, weights[1])):
+        kept = np.where(failed, np.inf, values)
+        least = kept.min(axis=axis, keepdims=True)
+        if np.isinf(least).any():
+            raise ParameterError("every run of a set failed: there is nothing to compare")
+        if (least <= 0.0).any():
+            raise ParameterError(f"{name} = {least.min():g} is not allowed: above zero is needed, as it divides")
+        total += weight * np.where(failed, 0.0, values) / least
+    return np.where(failed, np.inf, total)
+
+
+def rms(time: ArrayLike, reference: ArrayLike, angle: ArrayLike) -> float | Array:
+    """Root of the time mean of the squared error.
+
+    Parameters
+    ----------
+    time, reference, angle
+        As for :func:`squared_error`.
+
+    Returns
+    -------
+    float or ndarray, shape (n,)
+        [rad]
+
+    Raises
+    ------
+    ParameterError
+        As :func:`squared_error`.
+    """
+    t, e = _error(time, reference, angle)
+    return plain(np.sqrt(integral(t, e * e) / (t[-1] - t[0])))
+
+
+def lag(time: ArrayLike, reference: ArrayLike, angle: ArrayLike) -> float | Array:
+    """By how much the angle is late: least squares of ``reference - angle = lag * reference'``, to first order in the lag.
+
+    Parameters
+    ----------
+    time, reference, angle
+        As for :func:`squared_error`.
+
+    Returns
+    -------
+    float or ndarray, shape (n,)
+        [s]; zero where the reference never moves.
+
+    Raises
+    ------
+    ParameterError
+        As :func:`squared_error`.
+    """
+    t, e = _error(time, reference, angle)
+    change = np.diff(np.asarray(reference, dtype=np.float64), axis=-1)
+    moved = (change * change / np.diff(t)).sum(axis=-1)
+    shared = (change * 0.5 * (e[..., 1:] + e[..., :-1])).sum(axis=-1)
+    return plain(np.where(moved > 0.0, shared / np.where(moved > 0.0, moved, 1.0), 0.0))
+
+
+def steady_error(time: ArrayLike, reference: ArrayLike, angle: ArrayLike, *, window: float = 1.0) -> float | Array:
+    """Mean error over the end of a record.
+
+    Parameters
+    ----------
+    time, reference, angle
+        As for :func:`squared_error`.
+    window : float
+        Length of the end [s], above zero and no longer than the record.
+
+    Returns
+    -------
+    float or ndarray, shape (n,)
+        Reference minus angle [rad].
+
+    Raises
+    ------
+    ParameterError
+        As :func:`squared_error`, or if the window is not allowed.
+    """
+    t, e = _error(time, reference, angle)
+    if not 0.0 < window <= t[-1] - t[0]:
+        raise ParameterError(f"window = {window} s is not allowed: above 0 and at most {t[-1] - t[0]:g} s is needed")
+    return plain(e[..., t >= t[-1] - window * (1.0 + 1e-12)].mean(axis=-1))
+
+
+def phases(
+    time: ArrayLike, reference: ArrayLike, angle: ArrayLike, parts: Mapping[str, tuple[float, float]]
+) -> dict[str, dict[str, float | Array]]:
+    """Errors in each part of a record, for example of lift, hold and return.
+
+    Parameters
+    ----------
+    time, reference, angle
+        As for :func:`squared_error`.
+    parts : mapping of str to (float, float)
+        Begin and end [s], as :attr:`pamrs.control.Trajectory.phases`; parts without two samples are left out.
+
+    Returns
+    -------
+    dict of str to dict of str to float or ndarray, shape (n,)
+        ``rms``, ``largest``, ``mean`` and ``final`` error [rad], reference minus angle.
+
+    Raises
+    ------
+    ParameterError
+        As :func:`squared_error`.
+    """
+    t, e = _error(time, reference, angle)
+    found: dict[str, dict[str, float | Array]] = {}
+    for name, (begin, end) in parts.items():
+        inside = np.flatnonzero((t >= begin - 1e-9) & (t <= end + 1e-9))
+        if inside.size < 2:
+            continue
+        part, when = e[..., inside], t[inside]
+        length = when[-1] - when[0]
+        found[name] = {
+            "rms": plain(np.sqrt(integral(when, part * part) / length)),
+            "largest": plain(np.abs(part).max(axis=-1)),
+            "mean": plain(integral(when, part) / length),
+            "final": plain(part[..., -1]),
+        }
+    return found
+
+
+def evaluate(
+    time: ArrayLike,
+    reference: ArrayLike,
+    angle: ArrayLike,
+    *,
+    rate: ArrayLike | None = None,
+    parts: Mapping[str, tuple[float, float]] | None = None,
+    unit: str = "rad",
+) -> Metrics:
+    """Every metric of a tracked trajectory at once.
+
+    Parameters
+    ----------
+    time : array_like, shape (samples,)
+        Rising [s].
+    reference, angle : array_like, shape (samples,) or (n, samples)
+        [rad]
+    rate : array_like, like ``angle``, optional
+        Of the angle [rad/s], for the curvature.
+    parts : mapping of str to (float, float), optional
+        As for :func:`phases`.
+    unit : {"rad", "deg"}
+        Of the angle in nu and omega.
+
+    Returns
+    -------
+    Metrics
+
+    Raises
+    ------
+    ParameterError
+        As :func:`squared_error`.
+    """
+    _, e = _error(time, reference, angle)
+    return Metrics(
+        squared_error=squared_error(time, reference, angle, unit=unit),
+        curvature=total_curvature(time, angle, rate=rate, unit=unit),
+        rms=rms(time, reference, angle),
+        largest=plain(np.abs(e).max(axis=-1)),
+        final=plain(e[..., -1]),
+        lag=lag(time, reference, angle),
+        phases=phases(time, reference, angle, parts or {}),
+        unit=unit,
+    )
+
+
+def angle_factor(unit: str) -> float:
+    """How many of a unit, ``"rad"`` or ``"deg"``, are in a radian; a ParameterError for another one."""
+    if unit not in _PER_RADIAN:
+        raise ParameterError(f"unit = {unit!r} is not allowed: one of {', '.join(_PER_RADIAN)}")
+    return _PER_RADIAN[unit]
+
+
+def _error(time: ArrayLike, reference: ArrayLike, angle: ArrayLike) -> tuple[Array, Array]:
+    """Checked time and reference minus angle."""
+    t, y = checked(time, "angle", angle)
+    r = np.asarray(reference, dtype=np.float64)
+    if r.shape not in (y.shape, t.shape):
+        raise ParameterError(f"reference has the shape {r.shape}; that of angle {y.shape} or of time {t.shape} is needed")
+    return t, np.asarray(r - y, dtype=np.float64)
+
+
+def _rate(time: ArrayLike, angle: ArrayLike, rate: ArrayLike | None, unit: str) -> tuple[Array, Array]:
+    """Checked time and rate in the unit per second."""
+    factor = angle_factor(unit)
+    t, y = checked(time, "angle", angle)
+    if t.size < 3:
+        raise ParameterError(f"time has {t.size} samples; a curvature needs three at least")
+    if rate is None:
+        return t, factor * np.gradient(y, t, axis=-1)
+    _, v = checked(time, "rate", rate)
+    if v.shape != y.shape:
+        raise ParameterError(f"rate has the shape {v.shape}; that of angle {y.shape} is needed")
+    return t, factor * v

@@ -1,0 +1,248 @@
+"""Proportional-integral-derivative control (dissertation (4.9)): the law, and the controller of the joint angle."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, ClassVar, Final
+
+from pamrs.control.joint_sensor import JointSensor
+from pamrs.control.parts import Integrator, LowPass
+from pamrs.control.protocol import Measurement, Reference, Value
+from pamrs.control.sampled import SampledController, Stateful
+from pamrs.control.values import as_value, clip
+from pamrs.errors import ParameterError
+
+__all__ = ["PID", "PIDLaw", "angle_scale"]
+
+_UNITS: Final = {"rad": 1.0, "deg": 180.0 / math.pi}
+
+#: Gains as printed: 4.4.2 (with feedforward, kM 1.0), 4.5.1.2 (best combined at 23 kg), Fig. 4.9 (about, at 11 kg).
+_PUBLISHED: Final[Mapping[str, Mapping[str, float]]] = {
+    "feedforward": {"kp": 5.0, "ki": 2.0, "kd": 0.0},
+    "experiment_23kg": {"kp": 1.4, "ki": 2.5, "kd": 0.0},
+    "optimal_11kg": {"kp": 1.1, "ki": 4.0, "kd": 0.0},
+}
+
+
+def angle_scale(unit: str) -> float:
+    """How many of a unit a radian has.
+
+    Raises
+    ------
+    ParameterError
+        If the unit is neither ``"rad"`` nor ``"deg"``.
+    """
+    if unit not in _UNITS:
+        raise ParameterError(f"unit = {unit!r} is not allowed: 'rad' or 'deg' is needed")
+    return _UNITS[unit]
+
+
+class PIDLaw(Stateful):
+    """``u = offset + kP e + kI int e dt + kD e'``, limited, then low-passed.
+
+    The integral counts from the next sample on, as if the error were held. The limits come before the low-pass, whose output then never
+    leaves them, and the anti-windup looks at the limits alone.
+
+    Parameters
+    ----------
+    kp, ki, kd : float or ndarray, shape (n,)
+        Gains, per unit of error.
+    period : float
+        Time between two updates [s].
+    limits : tuple of (float, float)
+        Smallest and largest output.
+    offset : float
+        Output for no error.
+    anti_windup, tracking_time
+        As for :class:`pamrs.control.Integrator`.
+    output_filter : float or ndarray, shape (n,)
+        Time constant of the low-pass on the output [s]; 0: none.
+
+    Raises
+    ------
+    ParameterError
+        If a number is not finite or the limits do not have the offset between them.
+    """
+
+    _PARTS: ClassVar[tuple[str, ...]] = ("integrator", "low_pass")
+
+    def __init__(
+        self,
+        kp: Value,
+        ki: Value,
+        kd: Value,
+        *,
+        period: float,
+        limits: tuple[float, float],
+        offset: float = 0.0,
+        anti_windup: str = "clamping",
+        tracking_time: Value = 0.5,
+        output_filter: Value = 0.0,
+    ) -> None:
+        self.kp, self.ki, self.kd = as_value("kp", kp), as_value("ki", ki), as_value("kd", kd)
+        low, high = float(limits[0]), float(limits[1])
+        if not (math.isfinite(low) and math.isfinite(high) and low <= offset <= high and low < high):
+            raise ParameterError(f"limits = {limits} are not allowed: finite, the first below the second, {offset:g} between them")
+        self.limits, self.offset = (low, high), float(offset)
+        self._low, self._high = low - self.offset, high - self.offset
+        self.output_filter = as_value("output_filter", output_filter, lower=0.0)
+        self._through = self.output_filter.__class__ is float and self.output_filter == 0.0
+        self.low_pass = LowPass(self.output_filter, period, initial=0.0)
+        self.integrator = Integrator(period, anti_windup=anti_windup, tracking_time=tracking_time)
+        self.derives = bool((self.kd != 0.0) if isinstance(self.kd, float) else (self.kd != 0.0).any())
+
+    @property
+    def gains(self) -> tuple[Value, ...]:
+        """Everything that may be an array."""
+        return self.kp, self.ki, self.kd, self.output_filter, self.integrator._tracking
+
+    def update(self, error: Value, error_rate: Value = 0.0, bias: Value = 0.0) -> Value:
+        """Output for a sample.
+
+        Parameters
+        ----------
+        error, error_rate : float or ndarray
+            ``e`` and ``e'``.
+        bias : float or ndarray
+            Added to the output before its limits, past the low-pass: a feedforward.
+
+        Returns
+        -------
+        float or ndarray
+            Within the limits.
+        """
+        low, high = self._low, self._high
+        integrator = self.integrator
+        wanted = self.kp * error + integrator._integral + bias
+        if self.derives:
+            wanted = wanted + self.kd * error_rate
+        limited = clip(wanted, low, high)
+        integrator.update(self.ki * error, wanted - limited)
+        if not self._through:
+            limited = clip(self.low_pass.update(limited - bias) + bias, low, high)
+        return limited + self.offset
+
+
+class PID(SampledController):
+    """PID control of the joint angle by the valve (dissertation 4.3.1.1), volts around the closed valve.
+
+    ``e = theta_d - theta``, ``e' = theta_d' - theta'``; a low-pass on the output as in 4.3.1.1. A gain may be an array: each plant of a
+    batch then has its own.
+
+    The printed gains are taken as volts per **radian**: 5 V open the valve wholly, which with degrees kP = 1.4 would do at an error of
+    3.6 deg and kI = 2.5 after a second at 2 deg, a switch rather than the slow, winding-up loop that 4.5 describes; and the fuzzy
+    controller tuned on the same rig has the slope h/g1 = 0.65/0.45 = 1.44 V/rad, almost kP = 1.4, with g1 surely in radians.
+
+    Parameters
+    ----------
+    kp, ki, kd : float or ndarray, shape (n,)
+        Gains [V/unit, V/(unit s), V s/unit].
+    period : float
+        Time between two updates [s].
+    unit : {"rad", "deg"}
+        Unit of the angle in the gains.
+    limits : tuple of (float, float)
+        Smallest and largest output [V].
+    null : float
+        Output for no error: the valve is closed [V].
+    anti_windup : {"clamping", "back_calculation", "none"}
+        What keeps the integral bounded at a limit; the dissertation had none.
+    tracking_time : float or ndarray, shape (n,)
+        Of the back-calculation [s].
+    output_filter : float or ndarray, shape (n,)
+        Time constant of the low-pass on the output [s].
+    rate_filter, angle_filter : float or ndarray, shape (n,)
+        Time constants on rate and angle [s].
+    measured_rate : bool
+        Whether ``joint_rate`` is measured; else it is the filtered derivative of the angle.
+
+    Raises
+    ------
+    ParameterError
+        If a number is not finite or not allowed; the message names it.
+
+    Examples
+    --------
+    >>> from pamrs.control import PID, Reference
+    >>> controller = PID(2.0, 1.0, 0.0, output_filter=0.0)
+    >>> controller.update(0.0, {"joint_angle": 0.3}, Reference(0.5))
+    5.4
+    """
+
+    _PARTS: ClassVar[tuple[str, ...]] = ("law", "sensor")
+
+    def __init__(
+        self,
+        kp: Value,
+        ki: Value = 0.0,
+        kd: Value = 0.0,
+        *,
+        period: float = 1e-3,
+        unit: str = "rad",
+        limits: tuple[float, float] = (0.0, 10.0),
+        null: float = 5.0,
+        anti_windup: str = "clamping",
+        tracking_time: Value = 0.5,
+        output_filter: Value = 0.05,
+        rate_filter: Value = 0.02,
+        angle_filter: Value = 0.0,
+        measured_rate: bool = False,
+    ) -> None:
+        self.unit, self._scale = unit, angle_scale(unit)
+        self.sensor = JointSensor(period, angle_filter=angle_filter, rate_filter=rate_filter, measured_rate=measured_rate)
+        self.law = PIDLaw(
+            kp,
+            ki,
+            kd,
+            period=period,
+            limits=limits,
+            offset=null,
+            anti_windup=anti_windup,
+            tracking_time=tracking_time,
+            output_filter=output_filter,
+        )
+        super().__init__(period, (*self.law.gains, self.sensor.low_pass.time_constant, self.sensor.slope.time_constant))
+        self._simple = not self.law.derives and self.sensor._through
+        self.null = self.law.offset
+        self.reset()
+
+    @classmethod
+    def published(cls, name: str, **others: Any) -> PID:
+        """With gains as printed, volts per radian (see the class).
+
+        Parameters
+        ----------
+        name : {"feedforward", "experiment_23kg", "optimal_11kg"}
+            4.4.2, to be used beside a feedforward of kM = 1.0; 4.5.1.2, best combined; Fig. 4.9, kP just above 1 and kI near 4.
+        **others
+            The other arguments; ``anti_windup="none"`` as in the dissertation.
+
+        Returns
+        -------
+        PID
+
+        Raises
+        ------
+        ParameterError
+            If there is no such set of gains.
+        """
+        if name not in _PUBLISHED:
+            raise ParameterError(f"name = {name!r} is not allowed: one of {', '.join(_PUBLISHED)}")
+        return cls(**{**_PUBLISHED[name], "unit": "rad", **others})
+
+    def update(self, time: float, measurement: Measurement, reference: Reference) -> Value:
+        """Valve command [V] for a sample; see :meth:`pamrs.control.Controller.update`."""
+        return self.answer(time, measurement, reference, 0.0)
+
+    def answer(self, time: float, measurement: Measurement, reference: Reference, bias: Value) -> Value:
+        """As :meth:`update`, with ``bias`` [V] added before the limits, so that the anti-windup knows of a feedforward beside it."""
+        aim = self._aim(reference)
+        if self._simple:
+            angle = self._read(measurement, "joint_angle")
+            self._tick(time)
+            return self.law.update(self._scale * (aim.angle - angle), 0.0, bias)
+        angle, rate = self.sensor.read(self, measurement)
+        self._tick(time)
+        angle, rate = self.sensor.update(angle, rate)
+        return self.law.update(self._scale * (aim.angle - angle), self._scale * (aim.rate - rate), bias)

@@ -1,0 +1,99 @@
+"""What every controller is: sampled, with a state of its own, for one plant or for a batch of them.
+
+A controller is made once, with its gains and its period, and is then called at each of its samples::
+
+    controller.reset()
+    command = controller.update(time, measurement, reference)
+
+``measurement`` maps channels to values in SI units (``joint_angle`` [rad], ``muscle_pressure`` [Pa, gauge], ...), as
+:meth:`pamrs.Simulator.observe` and a live device give them. Every value, gain and reference is a float, or an array of shape ``(n,)``
+for a batch of n plants at once: the same code does both, and the answer has the shape of what went in.
+"""
+
+from __future__ import annotations
+
+import abc
+from collections.abc import Mapping
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Controller", "Measurement", "Reference", "Value"]
+
+#: A float, or one number for each plant of a batch.
+Value: TypeAlias = "float | NDArray[np.float64]"
+#: Channel -> value.
+Measurement: TypeAlias = "Mapping[str, Value]"
+
+
+class Reference(NamedTuple):
+    """Where the joint should be."""
+
+    angle: Value
+    """[rad]"""
+    rate: Value = 0.0
+    """[rad/s]"""
+    acceleration: Value = 0.0
+    """[rad/s^2]"""
+
+
+class Controller(abc.ABC):
+    """A sampled controller.
+
+    Attributes
+    ----------
+    period : float
+        Time between two updates [s].
+    """
+
+    period: float
+
+    @abc.abstractmethod
+    def reset(self) -> None:
+        """Forget what was seen: begin at rest, at time zero, for whatever batch comes next."""
+
+    @abc.abstractmethod
+    def update(self, time: float, measurement: Measurement, reference: Reference) -> Value:
+        """Answer a sample.
+
+        Parameters
+        ----------
+        time : float
+            Time of the sample [s].
+        measurement : mapping of str to float or ndarray, shape (n,)
+            Channels in SI units.
+        reference : Reference
+            Where the joint should be now.
+
+        Returns
+        -------
+        float or ndarray, shape (n,)
+            What is held until the next sample: a valve command [V], or a desired gauge pressure [Pa] where a
+            pressure loop follows.
+
+        Raises
+        ------
+        ParameterError
+            If a channel that the controller needs is missing or not finite; the message names it.
+        """
+
+    @property
+    @abc.abstractmethod
+    def state(self) -> dict[str, Any]:
+        """The numbers that everything to come depends on (copies); give them back to :meth:`restore`."""
+
+    @abc.abstractmethod
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Go on from a state, bit for bit.
+
+        Parameters
+        ----------
+        state : mapping
+            :attr:`state` of a controller of the same kind.
+
+        Raises
+        ------
+        ParameterError
+            If it is not one; the message says what is missing or too much.
+        """

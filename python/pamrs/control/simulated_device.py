@@ -1,0 +1,140 @@
+"""A rig that behaves like hardware on a bus: it goes on while nobody looks, readings fail, and time is not even. For rehearsals."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Final
+
+import numpy as np
+
+from pamrs.control.live import Clock
+from pamrs.errors import ParameterError
+from pamrs.rig import Rig
+from pamrs.simulator import Simulator
+
+__all__ = ["FAULTS", "SimulatedDevice", "VirtualClock"]
+
+#: Ways in which a reading fails.
+FAULTS: Final = ("exception", "none", "nan", "stale")
+
+
+class VirtualClock:
+    """A clock that only moves when somebody waits, a little late each time; a minute of a loop takes no longer than its arithmetic.
+
+    Parameters
+    ----------
+    jitter : float
+        Mean lateness of a wait [s], exponentially distributed.
+    stalls : mapping of float to float
+        Time -> how long the machine then stands still [s], once.
+    seed : int
+        Of the lateness.
+
+    Raises
+    ------
+    ParameterError
+        If a time is negative or not finite.
+    """
+
+    def __init__(self, jitter: float = 0.0, *, stalls: Mapping[float, float] | None = None, seed: int = 0) -> None:
+        for name, value in (("jitter", jitter), *(("stalls", v) for pair in (stalls or {}).items() for v in pair)):
+            if not (math.isfinite(value) and value >= 0.0):
+                raise ParameterError(f"{name} has {value} s, which is not allowed: zero or more is needed")
+        self._jitter, self._time = jitter, 0.0
+        self._stalls = sorted((stalls or {}).items())
+        self._random = np.random.default_rng(seed)
+
+    def now(self) -> float:
+        """Seconds since the clock was made."""
+        return self._time
+
+    def sleep(self, seconds: float) -> None:
+        """Move on, a little too far."""
+        late = float(self._random.exponential(self._jitter)) if self._jitter > 0.0 else 0.0
+        self._time += max(seconds, 0.0) + late
+        while self._stalls and self._time >= self._stalls[0][0]:
+            self._time += self._stalls.pop(0)[1]
+
+
+class SimulatedDevice:
+    """A rig with one valve behind ``read()`` and ``write(command)``; it moves with its clock, whatever the loop does.
+
+    Parameters
+    ----------
+    rig : Rig
+        The plant.
+    clock : Clock
+        Shared with the loop.
+    sample_time : float
+        Resolution in time [s]: readings and commands act at its multiples.
+    dropouts : float
+        Probability that a reading fails, from 0 to 1.
+    faults : sequence of str
+        Some of :data:`FAULTS`, equally often.
+    lost_from : float
+        Time from which every reading fails [s].
+    seed : int
+        Of the failures.
+    initial : mapping of str to float, optional
+        As for :func:`pamrs.simulate`.
+
+    Raises
+    ------
+    ParameterError
+        If an argument is not allowed.
+    """
+
+    def __init__(
+        self,
+        rig: Rig,
+        clock: Clock,
+        *,
+        sample_time: float = 1e-3,
+        dropouts: float = 0.0,
+        faults: tuple[str, ...] = FAULTS,
+        lost_from: float = math.inf,
+        seed: int = 0,
+        initial: Mapping[str, float] | None = None,
+    ) -> None:
+        if not 0.0 <= dropouts <= 1.0:
+            raise ParameterError(f"dropouts = {dropouts} is not allowed: a probability from 0 to 1 is needed")
+        if not faults or any(fault not in FAULTS for fault in faults):
+            raise ParameterError(f"faults = {faults} is not allowed: some of {', '.join(FAULTS)}")
+        self.simulator = Simulator(rig, sample_time=sample_time, initial=initial)
+        self.clock, self.command = clock, float(rig.tables("valve")[""]["null_voltage"])
+        self.written: list[tuple[float, float]] = []
+        """Time [s] and value of every command that was written."""
+        self._began = clock.now()
+        self._dropouts, self._faults, self._lost_from = dropouts, faults, lost_from
+        self._random = np.random.default_rng(seed)
+        self._last = self._sample()
+
+    def read(self) -> Mapping[str, float] | None:
+        """The channels now, with the plant's own ``time`` [s]; or a failure."""
+        self._advance()
+        lost = self.clock.now() - self._began >= self._lost_from
+        if lost or self._random.random() < self._dropouts:
+            fault = self._faults[int(self._random.integers(len(self._faults)))]
+            if fault == "exception":
+                raise OSError("the sensor did not answer")
+            if fault == "nan":
+                return {**self._sample(), "joint_angle": math.nan}
+            return None if fault == "none" else self._last
+        self._last = self._sample()
+        return self._last
+
+    def write(self, command: float) -> None:
+        """Hold a command from now on."""
+        self._advance()
+        self.command = float(command)
+        self.written.append((self.clock.now() - self._began, self.command))
+
+    def _sample(self) -> dict[str, float]:
+        return {"time": self.simulator.time, **self.simulator.observe()}
+
+    def _advance(self) -> None:
+        """Let the plant live until now."""
+        behind = round((self.clock.now() - self._began - self.simulator.time) / self.simulator.sample_time)
+        if behind > 0:
+            self.simulator.run(np.full(behind, self.command))

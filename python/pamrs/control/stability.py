@@ -1,0 +1,288 @@
+"""Stability of a sampled loop about an operating point: margins, closed-loop spectrum, and the gains that are stable over payload.
+
+Everything here is the discrete loop itself, with the exact hold and the delay in it, not a continuous approximation. It speaks of small
+motions about one point: see :func:`pamrs.control.linear.linearise` for what that leaves out.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pamrs.control.linear import SIDES, LinearController, LinearModel, linear_controller, linearise, python_control
+from pamrs.control.protocol import Controller
+from pamrs.errors import ParameterError
+from pamrs.rig import Rig
+
+__all__ = ["Margins", "StableRegion", "loop_matrix", "margins", "spectral_radius", "stable_region"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Margins:
+    """Margins of a loop that is opened at the command.
+
+    Attributes
+    ----------
+    gain : float
+        The factor nearest to one by which all gains may change until the loop is at its boundary: above one how far they may grow,
+        below one how far an unstable loop has to be taken back; infinite if there is none.
+    phase : float
+        [rad]; infinite without a crossing of gain one.
+    gain_frequency, phase_frequency : float
+        Where they are found [rad/s]: phase -180 deg, and gain one.
+    delay : float
+        How much more delay the loop bears [s].
+    radius : float
+        Largest absolute eigenvalue of the closed loop from sample to sample; stable below one.
+    """
+
+    gain: float
+    phase: float
+    gain_frequency: float
+    phase_frequency: float
+    delay: float
+    radius: float
+
+    @property
+    def stable(self) -> bool:
+        """Whether the closed loop is."""
+        return self.radius < 1.0
+
+
+@dataclass(frozen=True)
+class StableRegion:
+    """Closed-loop spectral radius over payload and gains.
+
+    Attributes
+    ----------
+    payloads : ndarray, shape (p,)
+        [kg]
+    axes : mapping of str to ndarray
+        Gains, in the order of the other dimensions.
+    radius : ndarray, shape (p, ...)
+        Per sample; the larger one of filling and venting.
+    period : float
+        [s]
+    """
+
+    payloads: Array
+    axes: Mapping[str, Array]
+    radius: Array = field(repr=False)
+    period: float = 0.0
+
+    @property
+    def stable(self) -> NDArray[np.bool_]:
+        """Where every small motion dies out."""
+        return np.asarray(self.radius < 1.0)
+
+    @property
+    def growth(self) -> Array:
+        """Rate at which the slowest small motion grows [1/s]; negative where it dies out."""
+        return np.asarray(np.log(np.maximum(self.radius, 1e-300)) / self.period, dtype=np.float64)
+
+
+def loop_matrix(model: LinearModel, controller: LinearController, *, delay: float = 0.0) -> Array:
+    """The closed loop from one sample of the controller to the next.
+
+    Parameters
+    ----------
+    model : LinearModel
+        With one input.
+    controller : LinearController
+        Reads channels that are outputs of the model; others stay as they are.
+    delay : float
+        Between sampling and the command's effect [s]: computation, transport; any number from 0 on.
+
+    Returns
+    -------
+    ndarray, shape (n, n)
+        Of the plant's states, the commands on their way, and the controller's states.
+
+    Raises
+    ------
+    ParameterError
+        If the model has several inputs, or the delay is negative.
+    """
+    phi, gamma, c = _delayed(model, controller.period, delay)
+    b_c, d_c = _by_outputs(model, controller)
+    n, k = phi.shape[0], controller.a.shape[0]
+    out = np.zeros((n + k, n + k))
+    out[:n, :n] = phi + gamma @ d_c @ c
+    out[:n, n:] = gamma @ controller.c
+    out[n:, :n] = b_c @ c
+    out[n:, n:] = controller.a
+    return out
+
+
+def spectral_radius(model: LinearModel, controller: LinearController, *, delay: float = 0.0) -> float:
+    """Largest absolute eigenvalue of :func:`loop_matrix`.
+
+    Parameters
+    ----------
+    model, controller, delay
+        As there.
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    ParameterError
+        As :func:`loop_matrix`.
+    """
+    return float(np.abs(np.linalg.eigvals(loop_matrix(model, controller, delay=delay))).max())
+
+
+def margins(model: LinearModel, controller: Controller | LinearController, *, delay: float = 0.0, points: int = 4000) -> Margins:
+    """Gain and phase margin of a sampled loop, opened at the command, by python-control.
+
+    Parameters
+    ----------
+    model : LinearModel
+        With one input.
+    controller : Controller or LinearController
+        A controller is made linear about the model's point.
+    delay : float
+        As for :func:`loop_matrix` [s].
+    points : int
+        Frequencies between a millionth of the Nyquist frequency and itself, evenly on a logarithmic axis.
+
+    Returns
+    -------
+    Margins
+
+    Raises
+    ------
+    ParameterError
+        As :func:`loop_matrix`.
+    MissingPackageError
+        If python-control is not installed.
+    """
+    library = python_control()
+    linear = controller if isinstance(controller, LinearController) else linear_controller(controller, model.point)
+    phi, gamma, c = _delayed(model, linear.period, delay)
+    b_c, d_c = _by_outputs(model, linear)
+    period = linear.period
+    plant = library.ss(phi, gamma, c, np.zeros((c.shape[0], 1)), period)
+    feedback = library.ss(linear.a, b_c, linear.c, d_c, period) if linear.a.size else library.ss([], [], [], d_c, period)
+    frequencies = np.geomspace(1e-6, 1.0, points) * math.pi / period
+    z = np.exp(1j * frequencies * period)
+    response = np.array([-(feedback(point, squeeze=False) @ plant(point, squeeze=False))[0, 0] for point in z])
+    opened = library.frd(response, frequencies, smooth=True)
+    gain, phase, _, at_gain, at_phase, _ = library.stability_margins(opened)
+    last = float(response[-1].real)
+    nyquist = 1.0 / abs(last) if last < 0.0 else math.inf  # the curve ends there on the real axis, which no crossing shows
+    if abs(math.log(nyquist)) < (math.inf if gain is None or math.isinf(gain) else abs(math.log(gain))):
+        gain, at_gain = nyquist, math.pi / period
+    gain, phase = (float(value) if value is not None else math.inf for value in (gain, phase))
+    spare = math.radians(phase) / float(at_phase) if math.isfinite(phase) and at_phase else math.inf
+    return Margins(gain, math.radians(phase), _number(at_gain), _number(at_phase), spare, spectral_radius(model, linear, delay=delay))
+
+
+def stable_region(
+    rig: Rig,
+    controller: Callable[..., Controller],
+    axes: Mapping[str, Sequence[float]],
+    *,
+    payloads: Sequence[float],
+    angle: float,
+    delay: float = 0.0,
+    sides: Sequence[str] = ("fill", "vent"),
+) -> StableRegion:
+    """Which gains are stable for small motions, payload by payload.
+
+    A valve has another slope when it fills than when it vents: a pair of gains counts as stable if it is with either.
+
+    Parameters
+    ----------
+    rig : Rig
+        With ``arm.payload``.
+    controller : callable
+        Makes a controller from one gain each by name: ``lambda kp, ki: PID(kp, ki)``.
+    axes : mapping of str to sequence of float
+        Values of each gain.
+    payloads : sequence of float
+        [kg]
+    angle : float
+        At which the arm is held [rad].
+    delay : float
+        As for :func:`loop_matrix` [s].
+    sides : sequence of str
+        As for :func:`pamrs.control.linear.linearise`.
+
+    Returns
+    -------
+    StableRegion
+
+    Raises
+    ------
+    ParameterError
+        As :func:`pamrs.control.linear.linearise`, or if an axis is empty.
+    """
+    grid = {name: np.asarray(values, dtype=np.float64) for name, values in axes.items()}
+    masses = np.asarray(payloads, dtype=np.float64)
+    for name, values in {**grid, "payloads": masses}.items():
+        if values.ndim != 1 or values.size == 0:
+            raise ParameterError(f"{name} has the shape {values.shape}; (n,) with n >= 1 is needed")
+    if not sides or any(side not in SIDES for side in sides):
+        raise ParameterError(f"sides = {tuple(sides)} is not allowed: some of {', '.join(SIDES)}")
+    radius = np.zeros((masses.size, *(values.size for values in grid.values())))
+    period = 0.0
+    for p, mass in enumerate(masses):
+        loaded = rig.with_parameters({"arm.payload": float(mass)})
+        models = [linearise(loaded, angle, side=side) for side in sides]
+        for index in itertools.product(*(range(values.size) for values in grid.values())):
+            made = controller(**{name: float(values[i]) for (name, values), i in zip(grid.items(), index, strict=True)})
+            linear = linear_controller(made, models[0].point)
+            radius[(p, *index)] = max(spectral_radius(model, linear, delay=delay) for model in models)
+            period = linear.period
+    return StableRegion(masses, grid, radius, period)
+
+
+def _delayed(model: LinearModel, period: float, delay: float) -> tuple[Array, Array, Array]:
+    """The sampled plant with the commands on their way as states: state, input and output matrix."""
+    if len(model.inputs) != 1:
+        raise ParameterError(f"the model has the inputs {', '.join(model.inputs)}; one is needed")
+    if not (math.isfinite(delay) and delay >= 0.0):
+        raise ParameterError(f"delay = {delay} s is not allowed: zero or more is needed")
+    phi, gamma = model.sampled(period)
+    count = math.ceil(delay / period - 1e-9)
+    if count == 0:
+        return phi, gamma, model.c
+    # over one period the command before last acts first, the last one from then on
+    late = delay - (count - 1) * period
+    last = model.sampled(period - late)[1] if period - late > 1e-12 * period else np.zeros_like(gamma)
+    before = gamma - last
+    n = phi.shape[0]
+    out, into = np.zeros((n + count, n + count)), np.zeros((n + count, 1))
+    out[:n, :n] = phi
+    out[:n, n + count - 1] = before[:, 0]  # the oldest on its way
+    if count == 1:
+        into[:n, 0] = last[:, 0]
+    else:
+        out[:n, n + count - 2] = last[:, 0]
+    for k in range(1, count):
+        out[n + k, n + k - 1] = 1.0
+    into[n, 0] = 1.0
+    return out, into, np.hstack([model.c, np.zeros((model.c.shape[0], count))])
+
+
+def _by_outputs(model: LinearModel, controller: LinearController) -> tuple[Array, Array]:
+    """The controller's input matrices by the outputs of the model."""
+    pick = np.zeros((len(controller.inputs), len(model.outputs)))
+    for row, name in enumerate(controller.inputs):
+        if name in model.outputs:
+            pick[row, model.outputs.index(name)] = 1.0
+    return controller.b @ pick, controller.d @ pick
+
+
+def _number(value: float | None) -> float:
+    return math.nan if value is None else float(value)

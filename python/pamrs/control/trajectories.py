@@ -1,0 +1,443 @@
+"""Where the joint should be over time: the trajectories of chapters 4, 5 and 6, steps, and a user's table.
+
+All angles are radians in and out (``numpy.deg2rad`` or :func:`pamrs.control.trajectories.degrees` for the printed ones), rates and
+accelerations are the analytic derivatives of the angle. Where the angle has a corner (a ramp that begins or ends, a triangle's tip, a
+step) the derivative does not exist: **the rate there is that of what follows** (right-continuous, as a command is held), and **the
+acceleration is that of the smooth pieces**, without the impulses between them. A controller that needs the impulse does not exist;
+one that is fed a ramp's corner sees its rate jump.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pamrs.control.protocol import Reference, Value
+from pamrs.errors import ParameterError
+
+__all__ = ["TABLE_5_1", "Trajectory", "compound", "cosine_cycles", "degrees", "from_samples", "lift_hold_return", "step"]
+
+Array = NDArray[np.float64]
+
+#: Amplitude [deg] and angular frequency [rad/s] of the sinusoids of (5.24).
+TABLE_5_1 = ((20.0, 0.70), (13.0, 0.95), (7.0, 1.55), (5.0, 0.80))
+
+
+class _Shape(Protocol):
+    """An angle over time with two derivatives."""
+
+    def at(self, time: float) -> tuple[float, float, float]:
+        """Angle, rate, acceleration at one time."""
+
+    def over(self, time: Array) -> tuple[Array, Array, Array]:
+        """The same at many."""
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """A reference over time, made by the functions of this module.
+
+    Calling it with a time [s] gives a :class:`pamrs.control.Reference` of floats, with an array of times one of arrays of that shape.
+
+    Attributes
+    ----------
+    name : str
+        What it is, for tables and legends.
+    duration : float
+        Length of the record [s]. Past it a trajectory goes on as its function says (it holds, or repeats).
+    phases : mapping of str to (float, float)
+        Named parts of the record: begin and end [s].
+    """
+
+    name: str
+    duration: float
+    _shape: _Shape = field(repr=False)
+    phases: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+
+    def __call__(self, time: float | Array) -> Reference:
+        """The reference at a time or at many [s].
+
+        Parameters
+        ----------
+        time : float or ndarray
+            Finite [s].
+
+        Returns
+        -------
+        Reference
+
+        Raises
+        ------
+        ParameterError
+            If a time is not finite.
+        """
+        if isinstance(time, np.ndarray):
+            if not np.isfinite(time).all():
+                raise ParameterError("time is not finite: every entry has to be a finite number of seconds")
+            return Reference(*self._shape.over(time))
+        if not math.isfinite(time):
+            raise ParameterError(f"time = {time} is not allowed: a finite number of seconds is needed")
+        return Reference(*self._shape.at(time))
+
+    def sampled(self, sample_time: float, duration: float | None = None) -> tuple[Array, Reference]:
+        """The times of a record and the reference at each.
+
+        Parameters
+        ----------
+        sample_time : float
+            Time between two samples [s], above zero.
+        duration : float, optional
+            How long [s]; the trajectory's own by default.
+
+        Returns
+        -------
+        time : ndarray, shape (n,)
+            ``k * sample_time`` from 0 to the last at or before the end [s].
+        reference : Reference of ndarrays, shape (n,)
+
+        Raises
+        ------
+        ParameterError
+            If a time is not allowed.
+        """
+        sample_time = _positive("sample_time", sample_time)
+        length = self.duration if duration is None else _least_zero("duration", duration)
+        time = np.asarray(np.arange(math.floor(length / sample_time + 1e-9) + 1) * sample_time, dtype=np.float64)
+        return time, self(time)
+
+
+@dataclass(frozen=True)
+class _Pieces:
+    """Cubics one after the other; before the first and behind the last the angle rests."""
+
+    starts: tuple[float, ...]
+    cubics: tuple[tuple[float, float, float, float], ...]  # constant first, in the time since the piece's start; the last rests
+
+    def at(self, time: float) -> tuple[float, float, float]:
+        k = bisect_right(self.starts, time) - 1
+        if k < 0:
+            return self.cubics[0][0], 0.0, 0.0
+        a, b, c, d = self.cubics[k]
+        s = time - self.starts[k]
+        return a + s * (b + s * (c + s * d)), b + s * (2.0 * c + s * 3.0 * d), 2.0 * c + 6.0 * d * s
+
+    def over(self, time: Array) -> tuple[Array, Array, Array]:
+        starts, cubics = self._arrays
+        found = np.searchsorted(starts, time, side="right") - 1
+        k = np.maximum(found, 0)
+        a, b, c, d = np.moveaxis(cubics[k], -1, 0)
+        s = time - starts[k]
+        inside = found >= 0
+        angle = np.where(inside, a + s * (b + s * (c + s * d)), cubics[0, 0])
+        return angle, np.where(inside, b + s * (2.0 * c + s * 3.0 * d), 0.0), np.where(inside, 2.0 * c + 6.0 * d * s, 0.0)
+
+    @cached_property
+    def _arrays(self) -> tuple[Array, Array]:
+        return np.asarray(self.starts, dtype=np.float64), np.asarray(self.cubics, dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class _Waves:
+    """Cosines, a triangle wave and a bias; goes on for ever."""
+
+    cosines: tuple[tuple[float, float], ...]  # rad, rad/s
+    bias: float  # rad, the triangle's mean within
+    height: float  # rad, peak to peak
+    frequency: float  # Hz
+
+    def at(self, time: float) -> tuple[float, float, float]:
+        angle, rate, acceleration = self.bias, 0.0, 0.0
+        for size, w in self.cosines:
+            c = size * math.cos(w * time)
+            angle += c
+            rate -= size * w * math.sin(w * time)
+            acceleration -= w * w * c
+        turn = self.frequency * time % 1.0
+        rising = turn < 0.5
+        angle += self.height * ((2.0 * turn if rising else 2.0 - 2.0 * turn) - 0.5)
+        return angle, rate + (2.0 if rising else -2.0) * self.height * self.frequency, acceleration
+
+    def over(self, time: Array) -> tuple[Array, Array, Array]:
+        angle, rate, acceleration = (np.full(time.shape, start) for start in (self.bias, 0.0, 0.0))
+        for size, w in self.cosines:
+            c = size * np.cos(w * time)
+            angle += c
+            rate -= size * w * np.sin(w * time)
+            acceleration -= w * w * c
+        turn = self.frequency * time % 1.0
+        rising = turn < 0.5
+        angle += self.height * (np.where(rising, 2.0 * turn, 2.0 - 2.0 * turn) - 0.5)
+        return angle, rate + np.where(rising, 2.0, -2.0) * self.height * self.frequency, acceleration
+
+
+@dataclass(frozen=True)
+class _Cycles:
+    """Half cosines up and down with rests between, a number of times, then at rest below."""
+
+    low: float
+    high: float
+    rise: float
+    hold: float
+    count: int
+
+    def at(self, time: float) -> tuple[float, float, float]:
+        one = 2.0 * (self.rise + self.hold)
+        if not 0.0 <= time < self.count * one:
+            return self.low, 0.0, 0.0
+        s = time % one
+        back = s >= self.rise + self.hold
+        s -= (self.rise + self.hold) if back else 0.0
+        start, swing = (self.high, self.low - self.high) if back else (self.low, self.high - self.low)
+        if s >= self.rise:
+            return start + swing, 0.0, 0.0
+        w = math.pi / self.rise
+        c, n = math.cos(w * s), math.sin(w * s)
+        return start + 0.5 * swing * (1.0 - c), 0.5 * swing * w * n, 0.5 * swing * w * w * c
+
+    def over(self, time: Array) -> tuple[Array, Array, Array]:
+        rows = np.array([self.at(float(t)) for t in time.ravel()], dtype=np.float64).reshape(-1, 3)
+        angle, rate, acceleration = (rows[:, k].reshape(time.shape) for k in range(3))
+        return angle, rate, acceleration
+
+
+def degrees(*values: float) -> tuple[float, ...]:
+    """Angles in degrees as radians, for the printed numbers.
+
+    Parameters
+    ----------
+    *values : float
+        [deg]
+
+    Returns
+    -------
+    tuple of float
+        [rad]
+
+    Examples
+    --------
+    >>> lift_hold_return(*degrees(15, 60)).duration
+    25.0
+    """
+    return tuple(math.radians(value) for value in values)
+
+
+def lift_hold_return(
+    low: float, high: float, *, ramp: float = 5.0, hold: float = 5.0, duration: float = 25.0, delay: float = 0.0
+) -> Trajectory:
+    """Ramp up, hold, ramp back, rest: the trajectory of 4.4 and 4.5, and one of 5.5.
+
+    Parameters
+    ----------
+    low, high : float
+        Angle at rest and of the hold [rad].
+    ramp, hold : float
+        Length of each ramp and of the hold [s]; both above zero.
+    duration : float
+        Length of the record [s]; what is left after the return is rest.
+    delay : float
+        Rest before the lift [s].
+
+    Returns
+    -------
+    Trajectory
+        With the phases ``lift``, ``hold``, ``return`` and, where the record is longer, ``rest``. At a corner the rate is that of what
+        follows; the acceleration is zero throughout.
+
+    Raises
+    ------
+    ParameterError
+        If a number is not finite, or a time is outside its range.
+    """
+    low, high = _finite("low", low), _finite("high", high)
+    ramp, hold, delay = _positive("ramp", ramp), _positive("hold", hold), _least_zero("delay", delay)
+    ends = [delay, delay + ramp, delay + ramp + hold, delay + 2.0 * ramp + hold]
+    length = _positive("duration", duration)
+    if length < ends[-1]:
+        raise ParameterError(f"duration = {duration} s is not allowed: the return ends at {ends[-1]:g} s")
+    slope = (high - low) / ramp
+    pieces = _Pieces(tuple(ends), ((low, slope, 0.0, 0.0), (high, 0.0, 0.0, 0.0), (high, -slope, 0.0, 0.0), (low, 0.0, 0.0, 0.0)))
+    phases = {"lift": (ends[0], ends[1]), "hold": (ends[1], ends[2]), "return": (ends[2], ends[3])}
+    if length > ends[-1]:
+        phases["rest"] = (ends[3], length)
+    return Trajectory("lift-hold-return", length, pieces, phases)
+
+
+def step(before: float, after: float, *, at: float = 0.0, duration: float = 5.0) -> Trajectory:
+    """A step; its rate and acceleration are zero throughout, the impulse of the jump left out.
+
+    Parameters
+    ----------
+    before, after : float
+        Angle before and from the step on [rad].
+    at : float
+        Time of the step [s].
+    duration : float
+        Length of the record [s].
+
+    Returns
+    -------
+    Trajectory
+
+    Raises
+    ------
+    ParameterError
+        If a number is not finite, or a time is outside its range.
+    """
+    before, after, at = _finite("before", before), _finite("after", after), _least_zero("at", at)
+    length = _positive("duration", duration)
+    if at > length:
+        raise ParameterError(f"at = {at} s is not allowed: the record ends at {length:g} s")
+    rest, moved = (before, 0.0, 0.0, 0.0), (after, 0.0, 0.0, 0.0)
+    # a piece of its own before the step, so that "before" is what holds until then
+    pieces = _Pieces((-1.0, at), (rest, moved))
+    return Trajectory("step", length, pieces, {"step": (at, length)})
+
+
+def compound(
+    *,
+    cosines: Sequence[tuple[float, float]] | None = None,
+    bias: float = math.radians(50.0),
+    triangle: float = math.radians(20.0),
+    triangle_bias: float = math.radians(10.0),
+    triangle_frequency: float = 0.16,
+    duration: float = 100.0,
+) -> Trajectory:
+    """The compound trajectory (5.24) of chapter 5: ``sum A_i cos(w_i t) + triangle + bias``; it goes on for ever.
+
+    The triangle begins at its lowest value and rises; the dissertation prints frequency, height and bias of it, not its phase.
+
+    Parameters
+    ----------
+    cosines : sequence of (float, float), optional
+        Amplitude [rad] and angular frequency [rad/s] of each; Table 5.1 by default.
+    bias : float
+        [rad]
+    triangle, triangle_bias : float
+        Peak to peak and mean of the triangle [rad].
+    triangle_frequency : float
+        [Hz], at least 0.
+    duration : float
+        Length of the record [s].
+
+    Returns
+    -------
+    Trajectory
+        At the triangle's tips the rate is that of what follows, and the acceleration that of the cosines.
+
+    Raises
+    ------
+    ParameterError
+        If a number is not finite or outside its range.
+    """
+    given = [(math.radians(a), w) for a, w in TABLE_5_1] if cosines is None else cosines
+    waves = tuple((_finite("cosines amplitude", a), _finite("cosines frequency", w)) for a, w in given)
+    mean = _finite("bias", bias) + _finite("triangle_bias", triangle_bias)
+    shape = _Waves(waves, mean, _finite("triangle", triangle), _least_zero("triangle_frequency", triangle_frequency))
+    return Trajectory("compound", _positive("duration", duration), shape)
+
+
+def cosine_cycles(low: float, high: float, *, rise: float = 6.0, hold: float = 5.0, cycles: int = 8) -> Trajectory:
+    """Half-cosine lifts and returns with holds between: the cycles of 6.4.2; at rest below before and behind them.
+
+    Parameters
+    ----------
+    low, high : float
+        [rad]; 15 and 50 or 90 deg in the dissertation.
+    rise, hold : float
+        Length of each half cosine and of each rest [s].
+    cycles : int
+        How many, at least one.
+
+    Returns
+    -------
+    Trajectory
+        The rate is continuous; the acceleration jumps where a rest begins or ends, and there is that of what follows.
+
+    Raises
+    ------
+    ParameterError
+        If a number is not finite or outside its range.
+    """
+    low, high = _finite("low", low), _finite("high", high)
+    rise, hold = _positive("rise", rise), _least_zero("hold", hold)
+    if isinstance(cycles, bool) or not isinstance(cycles, (int, np.integer)) or cycles < 1:
+        raise ParameterError(f"cycles = {cycles!r} is not allowed: a whole number from 1 on is needed")
+    shape = _Cycles(low, high, rise, hold, int(cycles))
+    return Trajectory("cosine cycles", 2.0 * (rise + hold) * int(cycles), shape)
+
+
+def from_samples(time: ArrayLike, angle: ArrayLike, *, smoothing: float | None = 0.0, name: str = "table") -> Trajectory:
+    """A trajectory through a table of times and angles, by a natural cubic spline; outside the table it rests at the ends.
+
+    Parameters
+    ----------
+    time : array_like, shape (n,)
+        Rising times [s], n >= 5; the trajectory's time counts from the first.
+    angle : array_like, shape (n,)
+        [rad]
+    smoothing : float or None
+        Weight [s^3] of the integral of the squared acceleration [rad^2/s^3] against the sum of squared deviations [rad^2]
+        (``scipy.interpolate.make_smoothing_spline``): 0 goes through every point; None chooses by generalised cross-validation, for a
+        table with noise.
+    name : str
+        For tables and legends.
+
+    Returns
+    -------
+    Trajectory
+        Rate and acceleration are those of the spline.
+
+    Raises
+    ------
+    ParameterError
+        If the table is too short, not finite, not rising, or the weight is negative.
+    """
+    t, y = (np.asarray(values, dtype=np.float64) for values in (time, angle))
+    if t.ndim != 1 or t.shape != y.shape or t.size < 5:
+        raise ParameterError(f"time and angle have the shapes {t.shape} and {y.shape}; (n,) with n >= 5 is needed for both")
+    if not (np.isfinite(t).all() and np.isfinite(y).all()):
+        raise ParameterError("time or angle is not finite: every entry has to be a finite number")
+    if not (np.diff(t) > 0.0).all():
+        k = int(np.argmin(np.diff(t)))
+        raise ParameterError(f"time[{k + 1}] = {t[k + 1]:g} s is not allowed: times have to rise, and time[{k}] is {t[k]:g} s")
+    weight = None if smoothing is None else _least_zero("smoothing", smoothing)
+    from scipy.interpolate import CubicSpline, PPoly, make_smoothing_spline
+
+    t = t - t[0]
+    spline = CubicSpline(t, y, bc_type="natural") if weight == 0.0 else PPoly.from_spline(make_smoothing_spline(t, y, lam=weight).tck)
+    inside = np.flatnonzero(np.diff(spline.x) > 0.0)
+    cubics = [(float(c[3]), float(c[2]), float(c[1]), float(c[0])) for c in spline.c[:, inside].T]
+    end = float(spline(t[-1]))
+    starts = (*(float(x) for x in spline.x[inside]), float(t[-1]))
+    return Trajectory(name, float(t[-1]), _Pieces(starts, (*cubics, (end, 0.0, 0.0, 0.0))))
+
+
+def _finite(name: str, value: Value) -> float:
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        number = math.nan
+    if not math.isfinite(number):
+        raise ParameterError(f"{name} = {value!r} is not allowed: a finite number is needed")
+    return number
+
+
+def _positive(name: str, value: float) -> float:
+    number = _finite(name, value)
+    if number <= 0.0:
+        raise ParameterError(f"{name} = {value!r} is not allowed: a number above zero is needed")
+    return number
+
+
+def _least_zero(name: str, value: float) -> float:
+    number = _finite(name, value)
+    if number < 0.0:
+        raise ParameterError(f"{name} = {value!r} is not allowed: zero or more is needed")
+    return number

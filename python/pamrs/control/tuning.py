@@ -1,0 +1,398 @@
+"""Gains by the combined metric J (4.18): whole grids at once, and the same J by CMA-ES or Optuna; on plants that the model is not.
+
+Every evaluation is a closed loop of :func:`pamrs.control.sweep`; a grid, over payloads too, is one call of it, a generation of a search
+is another.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pamrs.control.metrics import WEIGHTS, combined
+from pamrs.control.protocol import Controller
+from pamrs.control.sweeping import sweep
+from pamrs.control.trajectories import Trajectory
+from pamrs.design.search import missing
+from pamrs.errors import ParameterError
+from pamrs.rig import Rig
+
+__all__ = ["METHODS", "GainMap", "GainSearch", "gain_map", "perturbed", "search_gains"]
+
+Array = NDArray[np.float64]
+Factory = Callable[..., Controller]
+
+#: CMA-ES, and the tree-structured Parzen estimator of Optuna.
+METHODS: Final = ("cma", "optuna")
+#: What a run that failed counts as, in a search that needs a number.
+_FAILED: Final = 1e3
+
+
+@dataclass(frozen=True)
+class GainMap:
+    """Metrics over a grid of gains, for each payload.
+
+    Attributes
+    ----------
+    axes : mapping of str to ndarray
+        Values of each gain, in the order of the dimensions behind the first.
+    payloads : ndarray, shape (p,)
+        [kg]
+    squared_error, curvature : ndarray, shape (p, ...)
+        nu and omega; NaN where a run failed.
+    j : ndarray, shape (p, ...)
+        J (4.18), each payload a set of its own; infinite where a run failed.
+    unit : str
+        Of the angle in nu and omega.
+    """
+
+    axes: Mapping[str, Array]
+    payloads: Array
+    squared_error: Array = field(repr=False)
+    curvature: Array = field(repr=False)
+    j: Array = field(repr=False)
+    unit: str = "rad"
+
+    def best(self, by: str = "j") -> list[dict[str, float]]:
+        """The gains with the smallest metric, payload by payload.
+
+        Parameters
+        ----------
+        by : {"j", "squared_error", "curvature"}
+            Which one.
+
+        Returns
+        -------
+        list of dict of str to float
+            ``payload`` [kg], each gain, and ``j``, ``squared_error`` and ``curvature`` there.
+
+        Raises
+        ------
+        ParameterError
+            If there is no such metric.
+        """
+        if by not in ("j", "squared_error", "curvature"):
+            raise ParameterError(f"by = {by!r} is not allowed: one of j, squared_error, curvature")
+        found = []
+        for p, mass in enumerate(self.payloads):
+            values = getattr(self, by)[p]
+            index = np.unravel_index(int(np.argmin(np.where(np.isnan(values), np.inf, values))), values.shape)
+            row = {"payload": float(mass)}
+            row |= {name: float(axis[i]) for (name, axis), i in zip(self.axes.items(), index, strict=True)}
+            row |= {name: float(getattr(self, name)[(p, *index)]) for name in ("j", "squared_error", "curvature")}
+            found.append(row)
+        return found
+
+    @property
+    def scale(self) -> Array:
+        """min(nu) and min(omega) of each payload, shape (p, 2): what J divides by, to compare a search with the map."""
+        ok = np.isfinite(self.squared_error) & np.isfinite(self.curvature)
+        axes = tuple(range(1, ok.ndim))
+        return np.stack([np.where(ok, m, np.inf).min(axis=axes) for m in (self.squared_error, self.curvature)], axis=1)
+
+
+@dataclass(frozen=True)
+class GainSearch:
+    """What a search found.
+
+    Attributes
+    ----------
+    gains : dict of str to float
+        The best ones.
+    j : float
+        J of them, by ``scale``.
+    scale : (float, float)
+        nu and omega that J divides by.
+    tried : ndarray, shape (evaluations, gains)
+        Every point in the order it was evaluated.
+    values : ndarray, shape (evaluations,)
+        J of each; infinite where a run failed.
+    squared_error, curvature : ndarray, shape (evaluations,)
+    method : str
+    seed : int
+    """
+
+    gains: dict[str, float]
+    j: float
+    scale: tuple[float, float]
+    tried: Array = field(repr=False)
+    values: Array = field(repr=False)
+    squared_error: Array = field(repr=False)
+    curvature: Array = field(repr=False)
+    method: str = "cma"
+    seed: int = 0
+
+
+def gain_map(
+    plant: Rig,
+    controller: Factory,
+    axes: Mapping[str, Sequence[float]],
+    trajectory: Trajectory,
+    *,
+    payloads: Sequence[float] | None = None,
+    weights: tuple[float, float] = WEIGHTS,
+    unit: str = "rad",
+    **loop: Any,
+) -> GainMap:
+    """nu, omega and J over every combination of gains and payloads, in one batch.
+
+    Parameters
+    ----------
+    plant : Rig
+        What is controlled; the model that the controller has may be another, see :func:`perturbed`.
+    controller : callable
+        Makes the controller of all plants from arrays of gains by name: ``lambda kp, ki: PID(kp, ki)``.
+    axes : mapping of str to sequence of float
+        Values of each gain.
+    trajectory : Trajectory
+    payloads : sequence of float, optional
+        ``arm.payload`` [kg]; the plant's own by default. The controller is told none of them.
+    weights : (float, float)
+        Of (4.18).
+    unit : {"rad", "deg"}
+        Of the angle in nu and omega.
+    **loop
+        As for :func:`pamrs.control.sweep`: ``duration``, ``sample_time``, ``sensors``, ``initial`` of numbers, ``threads``.
+
+    Returns
+    -------
+    GainMap
+
+    Raises
+    ------
+    ParameterError
+        As :func:`pamrs.control.sweep`, if an axis is empty, or every run of a payload failed.
+    """
+    grid = {name: np.asarray(values, dtype=np.float64) for name, values in axes.items()}
+    if not grid:
+        raise ParameterError("axes is empty: values of one gain at least are needed")
+    for name, values in grid.items():
+        if values.ndim != 1 or values.size == 0 or not np.isfinite(values).all():
+            raise ParameterError(f"axes {name} with the shape {values.shape} is not allowed: (n,) finite numbers, n >= 1, are needed")
+    masses = np.array([plant.parameter("arm.payload").value]) if payloads is None else np.asarray(payloads, dtype=np.float64)
+    if masses.ndim != 1 or masses.size == 0:
+        raise ParameterError(f"payloads has the shape {masses.shape}; (n,) with n >= 1 is needed")
+    shape = (masses.size, *(values.size for values in grid.values()))
+    points = np.meshgrid(*grid.values(), indexing="ij")
+    gains = {name: np.tile(values.ravel(), masses.size) for name, values in zip(grid, points, strict=True)}
+    loaded = [plant if payloads is None else plant.with_parameters({"arm.payload": float(mass)}) for mass in masses]
+    rigs = [rig for rig in loaded for _ in range(points[0].size)]
+    done = sweep(rigs, controller(**gains), trajectory, unit=unit, **loop)
+    nu, omega = done.squared_error.reshape(shape), done.curvature.reshape(shape)
+    j = combined(nu, omega, weights=weights, axis=tuple(range(1, len(shape))))
+    return GainMap(grid, masses, nu, omega, j, unit)
+
+
+def search_gains(
+    plant: Rig,
+    controller: Factory,
+    bounds: Mapping[str, tuple[float, float]],
+    trajectory: Trajectory,
+    *,
+    method: str = "cma",
+    evaluations: int = 200,
+    population: int = 16,
+    seed: int = 0,
+    scale: tuple[float, float] | None = None,
+    weights: tuple[float, float] = WEIGHTS,
+    unit: str = "rad",
+    **loop: Any,
+) -> GainSearch:
+    """The gains with the smallest J by a search, a population at a time.
+
+    J divides by the smallest nu and omega of a set of runs, which a search does not know beforehand: it takes ``scale``, for example a
+    row of :attr:`GainMap.scale`, or else the smallest ones of a first population of random gains, which counts as evaluations.
+
+    Parameters
+    ----------
+    plant, controller, trajectory, weights, unit, **loop
+        As for :func:`gain_map`.
+    bounds : mapping of str to (float, float)
+        Lowest and highest value of each gain.
+    method : {"cma", "optuna"}
+        CMA-ES, or Optuna's tree-structured Parzen estimator.
+    evaluations : int
+        Most closed loops, the first population too.
+    population : int
+        Loops in one batch.
+    seed : int
+        The same seed gives the same result; the random numbers of the caller stay as they are.
+    scale : (float, float), optional
+        nu and omega that J divides by.
+
+    Returns
+    -------
+    GainSearch
+
+    Raises
+    ------
+    ParameterError
+        If an argument is not allowed, or every run failed.
+    MissingPackageError
+        If cma or optuna is not installed.
+    """
+    low, high = _box(bounds)
+    if method not in METHODS:
+        raise ParameterError(f"method = {method!r} is not allowed: one of {', '.join(METHODS)}")
+    if not 4 <= population <= evaluations:
+        raise ParameterError(f"population = {population} is not allowed: from 4 to evaluations = {evaluations} is needed")
+    if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed < 2**32:
+        raise ParameterError(f"seed = {seed!r} is not allowed: a whole number from 0 to 2**32 - 1 is needed")
+    if scale is not None and not all(math.isfinite(s) and s > 0.0 for s in scale):
+        raise ParameterError(f"scale = {scale} is not allowed: two numbers above zero are needed")
+    tried: list[Array] = []
+    metrics: list[tuple[Array, Array]] = []
+
+    def runs(points: Array) -> tuple[Array, Array]:
+        """Nu and omega of points in the unit cube."""
+        gains = low + points * (high - low)
+        named = {name: np.ascontiguousarray(gains[:, k]) for k, name in enumerate(bounds)}
+        done = sweep([plant] * len(gains), controller(**named), trajectory, unit=unit, **loop)
+        tried.append(gains)
+        metrics.append((done.squared_error, done.curvature))
+        return metrics[-1]
+
+    rng = np.random.default_rng(seed)
+    if scale is None:
+        first = runs(rng.random((population, low.size)))
+        ok = np.isfinite(first[0]) & np.isfinite(first[1])
+        if not ok.any():
+            raise ParameterError("every run of the first population failed: there is nothing to compare; narrow the bounds")
+        scale = float(first[0][ok].min()), float(first[1][ok].min())
+    by = scale
+
+    def objective(points: Array) -> Array:
+        nu, omega = runs(points)
+        value = weights[0] * nu / by[0] + weights[1] * omega / by[1]
+        return np.where(np.isfinite(value), np.minimum(value, _FAILED), _FAILED)
+
+    left = evaluations - sum(map(len, tried))
+    (_cma if method == "cma" else _optuna)(objective, low.size, left, population, rng)
+    nu, omega = (np.concatenate([pair[k] for pair in metrics]) for k in range(2))
+    values = weights[0] * nu / by[0] + weights[1] * omega / by[1]
+    values = np.where(np.isfinite(values), values, np.inf)
+    points = np.concatenate(tried)
+    best = int(np.argmin(values))
+    if math.isinf(values[best]):
+        raise ParameterError("every run failed: there is nothing to compare; narrow the bounds")
+    gains = {name: float(points[best, k]) for k, name in enumerate(bounds)}
+    return GainSearch(gains, float(values[best]), by, points, values, nu, omega, method, seed)
+
+
+def perturbed(
+    rig: Rig,
+    seed: int | None = None,
+    *,
+    spread: float = 0.05,
+    force: float | None = None,
+    friction: float | None = None,
+    inertia: float | None = None,
+) -> Rig:
+    """A plant that the controller's model is not quite: muscle force, friction and arm inertia off by a few per cent, as in 4.4.2.
+
+    Parameters
+    ----------
+    rig : Rig
+        The controller's model, with an arm and a tendon-driven muscle with a diameter.
+    seed : int, optional
+        Factors that are not given are ``1 +- spread * (0.5 to 1)``, so that each is really off; without a seed they are one.
+    spread : float
+        From 0 to 0.5.
+    force : float, optional
+        Factor on the muscles' cross-section, and so on what pressure pulls with; their volume goes with it. The bladder's elastic
+        force, a smaller part, keeps its modulus.
+    friction : float, optional
+        On the arm's viscous and Coulomb friction.
+    inertia : float, optional
+        On the arm's inertia; the payload is known.
+
+    Returns
+    -------
+    Rig
+
+    Raises
+    ------
+    ParameterError
+        If a factor is not above zero, the spread is not allowed, or the rig has no such parameters.
+
+    Examples
+    --------
+    >>> import pamrs
+    >>> plant = perturbed(pamrs.rigs.shoulder(), friction=1.1)
+    >>> round(plant.parameter("arm.viscous").value, 6)
+    3.3
+    """
+    if not (math.isfinite(spread) and 0.0 <= spread <= 0.5):
+        raise ParameterError(f"spread = {spread} is not allowed: a number from 0 to 0.5 is needed")
+    chosen = [1.0, 1.0, 1.0]
+    if seed is not None:
+        if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
+            raise ParameterError(f"seed = {seed!r} is not allowed: a whole number from 0 on is needed")
+        rng = np.random.default_rng(seed)
+        chosen = (1.0 + spread * rng.choice([-1.0, 1.0], 3) * rng.uniform(0.5, 1.0, 3)).tolist()
+    factors = {}
+    for (name, given), drawn in zip((("force", force), ("friction", friction), ("inertia", inertia)), chosen, strict=True):
+        factors[name] = drawn if given is None else float(given)
+        if not (math.isfinite(factors[name]) and factors[name] > 0.0):
+            raise ParameterError(f"{name} = {given} is not allowed: a factor above zero is needed")
+    names = {"muscle.rest_diameter": math.sqrt(factors["force"]), "arm.inertia": factors["inertia"]}
+    names |= {"arm.viscous": factors["friction"], "arm.coulomb": factors["friction"]}
+    return rig.with_parameters({name: factor * rig.parameter(name).value for name, factor in names.items() if factor != 1.0})
+
+
+def _box(bounds: Mapping[str, tuple[float, float]]) -> tuple[Array, Array]:
+    if not bounds:
+        raise ParameterError("bounds is empty: one gain at least is needed")
+    for name, (low, high) in bounds.items():
+        if not (math.isfinite(low) and math.isfinite(high) and low < high):
+            raise ParameterError(f"bounds of {name} = ({low}, {high}) are not allowed: two rising finite numbers are needed")
+    return np.array([b[0] for b in bounds.values()], dtype=np.float64), np.array([b[1] for b in bounds.values()], dtype=np.float64)
+
+
+def _cma(objective: Callable[[Array], Array], size: int, budget: int, population: int, rng: np.random.Generator) -> None:
+    """CMA-ES from the middle, and from random places when it has converged, until the budget is spent."""
+    try:
+        import cma  # type: ignore[import-untyped]
+    except ImportError as error:
+        raise missing(error) from None
+    if size == 1:
+        raise ParameterError("bounds has one gain; CMA-ES needs two at least: take optuna, or a gain_map")
+    # its own random numbers: numpy's global ones stay as they are
+    options = {"bounds": [0.0, 1.0], "verbose": -9, "seed": np.nan, "randn": lambda *shape: rng.standard_normal(shape)}
+    start = np.full(size, 0.5)
+    while budget >= population:
+        strategy = cma.CMAEvolutionStrategy(start, 0.3, {**options, "popsize": population})
+        while budget >= population and not strategy.stop():
+            points = strategy.ask()
+            strategy.tell(points, objective(np.asarray(points, dtype=np.float64)).tolist())
+            budget -= population
+        start = rng.random(size)
+
+
+def _optuna(objective: Callable[[Array], Array], size: int, budget: int, population: int, rng: np.random.Generator) -> None:
+    """Optuna's Parzen estimator, asked for a population at a time (points that wait count as bad ones)."""
+    try:
+        import optuna
+    except ImportError as error:
+        raise missing(error) from None
+    before = optuna.logging.get_verbosity()
+    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", optuna.exceptions.ExperimentalWarning)  # of constant_liar
+            sampler = optuna.samplers.TPESampler(seed=int(rng.integers(2**31)), constant_liar=True)
+        study = optuna.create_study(sampler=sampler)
+        while budget > 0:
+            trials = [study.ask() for _ in range(min(population, budget))]
+            points = np.array([[trial.suggest_float(str(k), 0.0, 1.0) for k in range(size)] for trial in trials])
+            for trial, value in zip(trials, objective(points), strict=True):
+                study.tell(trial, float(value))
+            budget -= len(trials)
+    finally:
+        optuna.logging.set_verbosity(before)

@@ -1,0 +1,80 @@
+"""Numbers of one plant or of a batch: the few operations that need a word for both, lean for plain floats."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from pamrs.control.protocol import Value
+from pamrs.errors import ParameterError
+
+__all__ = ["as_value", "clip", "positive_gain", "sign", "sin"]
+
+
+def as_value(name: str, value: Any, *, lower: float = -math.inf, upper: float = math.inf, above: bool = False) -> Value:
+    """A finite float, or a finite array of shape (n,), within bounds.
+
+    Parameters
+    ----------
+    name : str
+        What it is, for messages.
+    value : float or array_like, shape (n,)
+        What was given.
+    lower, upper : float
+        What is allowed.
+    above : bool
+        Whether ``lower`` itself is refused.
+
+    Returns
+    -------
+    float or ndarray, shape (n,)
+        Never a numpy scalar, whose arithmetic is slow.
+
+    Raises
+    ------
+    ParameterError
+        If it is not of that form; the message names it.
+    """
+    try:
+        array = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ParameterError(f"{name} = {value!r} is not allowed: a number or an array of shape (n,) is needed") from None
+    if array.ndim > 1 or array.size == 0:
+        raise ParameterError(f"{name} has shape {array.shape}: a number or an array of shape (n,) is needed")
+    wrong = ~(np.isfinite(array) & (array >= lower) & (array <= upper))
+    if above:
+        wrong |= array == lower
+    if np.any(wrong):
+        first = np.atleast_1d(array)[np.atleast_1d(wrong)][0]
+        bound = f"above {lower:g}" if above else f"from {lower:g}"
+        allowed = "finite" if lower == -math.inf and upper == math.inf else f"finite, {bound} to {upper:g}"
+        raise ParameterError(f"{name} = {first:g} is not allowed: {allowed} is needed")
+    return float(array) if array.ndim == 0 else array.copy()
+
+
+def positive_gain(name: str, value: Any) -> Value:
+    """A gain above zero, see :func:`as_value`."""
+    return as_value(name, value, lower=0.0, above=True)
+
+
+def clip(value: Value, low: Value, high: Value) -> Value:
+    """``value`` within ``low`` and ``high``, which are not checked against each other."""
+    if value.__class__ is float and low.__class__ is float and high.__class__ is float:
+        return low if value < low else high if value > high else value
+    return np.minimum(np.maximum(value, low), high)
+
+
+def sign(value: Value) -> Value:
+    """-1, 0 or 1."""
+    if value.__class__ is float:
+        return 1.0 if value > 0.0 else -1.0 if value < 0.0 else 0.0
+    return np.sign(value)
+
+
+def sin(value: Value) -> Value:
+    """Sine; that of an array may differ from that of a float in the last bit."""
+    if value.__class__ is float:
+        return math.sin(value)
+    return np.sin(value)

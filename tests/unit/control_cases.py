@@ -1,0 +1,101 @@
+"""Every controller, made new, for one plant or with gains of a batch."""
+
+import math
+
+import numpy as np
+
+import pamrs
+from pamrs.control import (
+    PID,
+    AdaptiveSliding,
+    AirModel,
+    ArmModel,
+    Cascade,
+    DeadZoneCompensation,
+    Feedforward,
+    Fuzzy,
+    HysteresisCompensation,
+    Neural,
+    Parallel,
+    PressureLoop,
+    Reference,
+    Sliding,
+    cascaded_pid,
+)
+
+SHOULDER = pamrs.rigs.shoulder()
+FULL = ArmModel.from_rig(SHOULDER)
+SIMPLIFIED = ArmModel.from_rig(SHOULDER, torque="simplified")
+GAYLORD = ArmModel.from_rig(SHOULDER, torque="gaylord")
+AIR = AirModel(SHOULDER)
+DIAGNOSED = SHOULDER.with_effect(
+    "muscle_hysteresis", {"friction_constant": 15.0, "friction_pressure": 8e-5, "presliding": 1e-3}
+).with_effect("valve_dead_zone", {"half_width": 0.04})
+PERIOD = 0.005
+
+# name -> a function of a factor on its gains (a float or an array)
+CONTROLLERS = {
+    "pid": lambda x: PID(2.0 * x, 1.5, 0.1, period=PERIOD),
+    "pid back-calculation": lambda x: PID(9.0 * x, 5.0, anti_windup="back_calculation", period=PERIOD, angle_filter=0.01),
+    "pid measured rate": lambda x: PID(2.0, 1.5, 0.2 * x, period=PERIOD, measured_rate=True),
+    "fuzzy": lambda x: Fuzzy(0.4 * x, 0.3, 0.7, period=PERIOD),
+    "fuzzy quoted": lambda x: Fuzzy(0.4, 0.3 * x, 0.7 * x, table="quoted", period=PERIOD),
+    "feedforward": lambda x: Feedforward(FULL, AIR, 1.0 * x, period=PERIOD),
+    "feedforward friction": lambda x: Feedforward(FULL.scaled(x), AIR, 5.0, friction=True, pressure_filter=0.01, period=PERIOD),
+    "feedforward + pid": lambda x: Parallel(
+        Feedforward(FULL, AIR, 1.0, period=PERIOD), PID.published("experiment_23kg", kp=x, period=PERIOD)
+    ),
+    "feedforward + fuzzy": lambda x: Parallel(
+        Feedforward(FULL, AIR, 0.5 * x, period=PERIOD), Fuzzy.published("feedforward", period=PERIOD)
+    ),
+    "feedforward + cascade": lambda x: Parallel(
+        Feedforward(FULL, AIR, 0.5, period=PERIOD), cascaded_pid(1.38e6, kp=6e5 * x, period=PERIOD)
+    ),
+    "cascaded pid": lambda x: cascaded_pid(1.38e6, kp=6e5 * x, period=PERIOD),
+    "cascaded pi": lambda x: cascaded_pid(1.38e6, kp=1e5 * x, ki=1e5, kd=0.0, period=PERIOD),
+    "pressure loop": lambda x: PressureLoop(2e-4 * x, 2e-4, period=PERIOD),
+    "sliding": lambda x: Cascade(Sliding(SIMPLIFIED, slope=5.0 * x, period=PERIOD)),
+    "sliding signum": lambda x: Cascade(Sliding(FULL, boundary_layer=0.0, switching=2e4 * x, period=PERIOD)),
+    "sliding estimates": lambda x: Cascade(Sliding(SIMPLIFIED.scaled(x), period=PERIOD)),
+    "adaptive": lambda x: Cascade(AdaptiveSliding(SIMPLIFIED, (1.0, 5.0, 300.0 * x), period=PERIOD)),
+    "adaptive free": lambda x: Cascade(AdaptiveSliding(SIMPLIFIED, (x, x, x), bounds=None, hold_at_limit=False, period=PERIOD)),
+    "adaptive published": lambda x: Cascade(AdaptiveSliding.published(SIMPLIFIED, 1, slope=4.0 * x, period=PERIOD)),
+    "neural zero": lambda x: Cascade(Neural(SIMPLIFIED, slope=3.0 * x, period=PERIOD)),
+    "neural model": lambda x: Cascade(Neural(FULL, start="model", gains=(300.0, 5e4, 3e5 * x), period=PERIOD)),
+    "neural gaylord": lambda x: Cascade(Neural(GAYLORD, start="model", bounds=None, switching=4e5 * x, period=PERIOD)),
+    "hysteresis sliding": lambda x: HysteresisCompensation(Cascade(Sliding(FULL, slope=5.0 * x, period=PERIOD)), DIAGNOSED),
+    "hysteresis feedforward": lambda x: HysteresisCompensation(
+        Feedforward(FULL, AIR, 5.0 * x, period=PERIOD), DIAGNOSED, source="measured"
+    ),
+    "dead zone": lambda x: DeadZoneCompensation(PID(2.0 * x, 1.5, 0.1, period=PERIOD), DIAGNOSED),
+}
+
+
+def smooth(time):
+    """From the stop at 15 deg smoothly up to 75 deg in 4 s, then slow waves about there."""
+    low, high, rise = math.radians(15.0), math.radians(75.0), 4.0
+    if time < rise:
+        w = math.pi / rise
+        half = 0.5 * (high - low)
+        return Reference(low + half * (1.0 - math.cos(w * time)), half * w * math.sin(w * time), half * w * w * math.cos(w * time))
+    a, w, since = math.radians(10.0), 1.2, time - rise
+    return Reference(high - a * (1.0 - math.cos(w * since)), -a * w * math.sin(w * since), -a * w * w * math.cos(w * since))
+
+
+def samples(count, seed=0, shape=()):
+    """Made-up measurements that move like an arm, for tests without a plant."""
+    rng = np.random.default_rng(seed)
+    offset, noise = rng.normal(scale=0.2, size=shape), rng.normal(scale=1e-3, size=(count, *shape))
+    for k in range(count):
+        t = k * PERIOD
+        yield {
+            "joint_angle": 0.9 + offset + 0.5 * np.sin(1.3 * t) + noise[k],
+            "joint_rate": 0.65 * np.cos(1.3 * t) + 0.0 * offset,
+            "muscle_pressure": 4e5 * (1.0 + 0.5 * np.sin(1.1 * t + offset)),
+            "supply_pressure": 1.3e6 + 0.0 * offset,
+        }
+
+
+def singles(measurement, row=None):
+    """One plant of a batch of measurements, as floats."""
+    return {name: float(value if row is None else value[row]) for name, value in measurement.items()}

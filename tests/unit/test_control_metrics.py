@@ -1,0 +1,154 @@
+"""Metrics against closed forms, one run and a batch alike."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import trapezoid
+
+from pamrs.control import metrics as m
+from pamrs.errors import ParameterError
+
+
+def second_order(zeta, w, time):
+    """Step response of ``w^2 / (s^2 + 2 zeta w s + w^2)`` and its rate."""
+    d = w * math.sqrt(1 - zeta**2)
+    decay = np.exp(-zeta * w * time)
+    return 1 - decay * (np.cos(d * time) + zeta * w / d * np.sin(d * time)), decay * w * w / d * np.sin(d * time)
+
+
+def test_curvature_of_a_circle_is_one_over_its_radius():
+    radius = 2.0
+    time = np.linspace(-1.2, 1.2, 4001)
+    angle = np.sqrt(radius**2 - time**2)
+    inner = slice(5, -5)
+    assert m.curvature(time, angle)[inner] == pytest.approx(1 / radius, rel=1e-5)
+    assert m.curvature(time, angle, rate=-time / angle)[inner] == pytest.approx(1 / radius, rel=1e-5)
+    # the integral over time of a circle's curvature is the change of the slope's sine: here time / radius
+    assert m.total_curvature(time, angle, rate=-time / angle) == pytest.approx(2.4 / radius, rel=1e-12)
+    assert m.total_curvature(time, angle) == pytest.approx(2.4 / radius, rel=1e-3)
+    assert trapezoid(m.curvature(time, angle), time) == pytest.approx(2.4 / radius, rel=1e-3)
+
+
+def test_curvature_depends_on_the_unit_and_does_not_cancel():
+    time = np.linspace(0.0, 2 * math.pi, 20001)
+    angle, rate = 0.5 * np.sin(time), 0.5 * np.cos(time)
+    # the sine of the slope goes from v/sqrt(1+v^2) to its negative and back: four times its largest value
+    for unit, scale in (("rad", 1.0), ("deg", 180 / math.pi)):
+        v = 0.5 * scale
+        assert m.total_curvature(time, angle, rate=rate, unit=unit) == pytest.approx(4 * v / math.sqrt(1 + v * v), rel=1e-9)
+    # a moving arm's wiggle counts less in degrees: same wiggle at rest and on a ramp of 10 deg/s
+    wiggle, ramp = 1e-3 * np.sin(20 * time), math.radians(10) * time
+    ratio = {u: m.total_curvature(time, ramp + wiggle, unit=u) / m.total_curvature(time, wiggle, unit=u) for u in ("rad", "deg")}
+    assert ratio["rad"] > 0.9
+    assert ratio["deg"] < 0.02
+
+
+def test_squared_error_rms_and_lag_of_known_signals():
+    time = np.linspace(0.0, 10.0, 10001)
+    reference = 0.1 * time
+    late = 0.1 * (time - 0.75)
+    assert m.squared_error(time, reference, late) == pytest.approx(10 * 0.075**2)
+    assert m.squared_error(time, reference, late, unit="deg") == pytest.approx(10 * math.degrees(0.075) ** 2)
+    assert m.rms(time, reference, late) == pytest.approx(0.075)
+    assert m.lag(time, reference, late) == pytest.approx(0.75)
+    assert m.steady_error(time, reference, late) == pytest.approx(0.075)
+    sine = np.sin(2 * math.pi * time)
+    assert m.squared_error(time, 0 * time, 0.3 * sine) == pytest.approx(0.09 * 5.0)
+    assert m.lag(time, np.ones_like(time), 0 * time) == 0.0
+
+
+@pytest.mark.parametrize(("zeta", "w"), [(0.2, 5.0), (0.5, 3.0), (0.7, 8.0)])
+def test_step_of_a_damped_second_order(zeta, w):
+    time = np.linspace(0.0, 60.0 / w, 60001)
+    y, rate = second_order(zeta, w, time)
+    angle = 0.3 + 0.5 * y
+    peak = math.exp(-math.pi * zeta / math.sqrt(1 - zeta**2))
+    assert m.overshoot(time, angle, 0.3, 0.8) == pytest.approx(peak, rel=1e-6)
+    falling = 0.8 - 0.5 * y
+    assert m.overshoot(time, falling, 0.8, 0.3) == pytest.approx(peak, rel=1e-6)
+    # crossings by fine bisection of the closed form
+    from scipy.optimize import brentq
+
+    def first(level):
+        return brentq(lambda t: float(second_order(zeta, w, t)[0]) - level, 0.0, math.pi / w / math.sqrt(1 - zeta**2))
+
+    assert m.rise_time(time, angle, 0.3, 0.8) == pytest.approx(first(0.9) - first(0.1), rel=1e-5)
+    settled = m.settling_time(time, angle, 0.3, 0.8)
+    assert abs(float(second_order(zeta, w, settled)[0]) - 1) == pytest.approx(0.02, rel=1e-3)
+    later = time > settled + 1e-6
+    assert (np.abs(y[later] - 1) <= 0.02).all()
+    # omega of the step: the rate rises and falls once per half wave, so its extremes are enough
+    assert m.total_curvature(time, angle, rate=0.5 * rate) == pytest.approx(total_variation(zeta, w), rel=1e-4)
+
+
+def total_variation(zeta, w):
+    """Sum of the changes of ``v / sqrt(1 + v^2)`` between the extremes of the rate, which are where tan(d t) = d / (zeta w)."""
+    d = w * math.sqrt(1 - zeta**2)
+    when = (math.atan2(d, zeta * w) + math.pi * np.arange(60)) / d
+    extremes = np.concatenate([[0.0], 0.5 * second_order(zeta, w, when)[1]])
+    return np.abs(np.diff(extremes / np.sqrt(1 + extremes**2))).sum()
+
+
+def test_a_step_that_never_arrives_or_settles():
+    time = np.linspace(0.0, 10.0, 1001)
+    assert m.rise_time(time, 0.5 * np.ones_like(time), 0.0, 1.0) == math.inf
+    assert m.settling_time(time, 0.5 * np.ones_like(time), 0.0, 1.0) == math.inf
+    assert m.settling_time(time, np.ones_like(time), 0.0, 1.0) == 0.0
+    assert m.overshoot(time, 0.5 * np.ones_like(time), 0.0, 1.0) == 0.0
+
+
+def test_a_batch_is_its_runs():
+    time = np.linspace(0.0, 12.0, 1201)
+    runs = [second_order(z, 3.0, time) for z in (0.2, 0.5, 0.8, 0.3)]
+    angle, rate = (np.stack([run[k] for run in runs]) for k in range(2))
+    reference = np.minimum(time, 1.0)
+    parts = {"first": (0.0, 1.0), "later": (1.0, 12.0), "beyond": (20.0, 30.0)}
+    together = m.evaluate(time, reference, angle, rate=rate, parts=parts)
+    assert set(together.phases) == {"first", "later"}
+    for k in range(4):
+        one = m.evaluate(time, reference, angle[k], rate=rate[k], parts=parts)
+        for name in ("squared_error", "curvature", "rms", "largest", "final", "lag"):
+            assert isinstance(getattr(one, name), float)
+            assert getattr(together, name)[k] == pytest.approx(getattr(one, name), rel=1e-12)
+        for part, values in one.phases.items():
+            assert {n: together.phases[part][n][k] for n in values} == pytest.approx(values, rel=1e-12)
+        for f in (m.rise_time, m.overshoot, m.settling_time):
+            assert f(time, angle, 0.0, 1.0)[k] == pytest.approx(f(time, angle[k], 0.0, 1.0), rel=1e-12)
+    # squared errors of the parts add up to that of the whole
+    whole = together.phases["first"]["rms"] ** 2 * 1.0 + together.phases["later"]["rms"] ** 2 * 11.0
+    assert whole == pytest.approx(together.squared_error)
+
+
+def test_combined_is_one_at_best_and_ranks_by_weights():
+    nu, omega = np.array([[1.0, 2.0], [4.0, np.nan]]), np.array([[3.0, 1.0], [1.0, 1.0]])
+    j = m.combined(nu, omega)
+    assert j == pytest.approx(np.array([[0.25 + 2.25, 0.5 + 0.75], [1.0 + 0.75, np.inf]]))
+    assert m.combined([2.0, 4.0], [1.0, 5.0]).min() == pytest.approx(1.0)  # one run best in both
+    per_row = m.combined(nu, omega, axis=1)
+    assert per_row == pytest.approx(np.array([[2.5, 1.25], [1.0, np.inf]]))
+    assert m.combined(nu, omega, weights=(1.0, 0.0))[0, 0] == 1.0
+
+
+@pytest.mark.parametrize(
+    ("call", "word"),
+    [
+        (lambda: m.squared_error([0, 1, 1], [0, 0, 0], [0, 0, 0]), "time"),
+        (lambda: m.squared_error([0, 1], [0, 0], [0, 0, 0]), "angle"),
+        (lambda: m.squared_error([0, 1], [0, 0, 0], [0, 0]), "reference"),
+        (lambda: m.squared_error([0, 1], [0, 0], [0, 0], unit="grad"), "unit"),
+        (lambda: m.curvature([0, 1], [0, 0]), "three"),
+        (lambda: m.total_curvature([0, 1, 2], [0, 0, 0], rate=[0, 0]), "rate"),
+        (lambda: m.combined([1.0], [1.0, 2.0]), "shapes"),
+        (lambda: m.combined([1.0], [1.0], weights=(-1.0, 1.0)), "weights"),
+        (lambda: m.combined([math.nan], [1.0]), "failed"),
+        (lambda: m.combined([0.0, 1.0], [1.0, 1.0]), "error = 0"),
+        (lambda: m.rise_time([0, 1], [0, 1], 1.0, 1.0), "target"),
+        (lambda: m.rise_time([0, 1], [0, 1], 0.0, 1.0, shares=(0.9, 0.1)), "shares"),
+        (lambda: m.settling_time([0, 1], [0, 1], 0.0, 1.0, band=0.0), "band"),
+        (lambda: m.steady_error([0, 1], [0, 1], [0, 1], window=2.0), "window"),
+    ],
+)
+def test_bad_input_is_named(call, word):
+    with pytest.raises(ParameterError, match=word):
+        call()

@@ -1,0 +1,116 @@
+"""Parts of controllers against exact answers."""
+
+import copy
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pamrs.control import FilteredDerivative, Integrator, LowPass, PIDLaw
+from pamrs.errors import ParameterError
+
+
+@given(st.floats(1e-3, 1.0), st.floats(1e-4, 0.1))
+def test_low_pass_step_response_is_exact_at_samples(tau, period):
+    filtered = LowPass(tau, period, initial=0.0)
+    answers = [filtered.update(1.0) for _ in range(50)]
+    exact = [-math.expm1(-(k + 1) * period / tau) for k in range(50)]
+    assert answers == pytest.approx(exact, rel=1e-9)
+
+
+def test_low_pass_against_scipy():
+    from scipy.signal import cont2discrete, lfilter
+
+    tau, period = 0.07, 0.004
+    numerator, denominator, _ = cont2discrete(([1.0], [tau, 1.0]), period, method="zoh")
+    u = np.random.default_rng(1).normal(size=200)
+    # the answer is that of the end of the held period, so scipy's of the next sample
+    reference = lfilter(numerator[0], denominator, np.append(u, 0.0))[1:]
+    filtered = LowPass(tau, period, initial=0.0)
+    assert [filtered.update(float(value)) for value in u] == pytest.approx(reference, abs=1e-12)
+
+
+def test_low_pass_begins_without_a_transient_and_zero_passes():
+    filtered = LowPass(0.5, 0.01)
+    assert [filtered.update(3.0) for _ in range(3)] == [3.0, 3.0, 3.0]
+    through = LowPass(0.0, 0.01)
+    assert [through.update(x) for x in (1.0, -2.0, 5.0)] == [1.0, -2.0, 5.0]
+    mixed = LowPass(np.array([0.0, 0.5]), 0.01, initial=0.0)
+    assert mixed.update(1.0) == pytest.approx([1.0, -math.expm1(-0.02)])
+
+
+def test_filtered_derivative_of_a_ramp_is_exact():
+    tau, period, slope = 0.05, 0.002, -3.0
+    derivative = FilteredDerivative(tau, period)
+    answers = [derivative.update(slope * k * period) for k in range(200)]
+    assert answers == pytest.approx([-slope * math.expm1(-k * period / tau) for k in range(200)], abs=1e-11)
+
+
+@pytest.mark.parametrize("mode", ["clamping", "back_calculation", "none"])
+def test_anti_windup(mode):
+    law = PIDLaw(2.0, 4.0, 0.0, period=0.01, limits=(-1.0, 1.0), anti_windup=mode, tracking_time=0.05)
+    for _ in range(1000):
+        assert law.update(3.0) == 1.0
+    after = [law.update(-0.1) for _ in range(1000)]
+    left = next((k for k, value in enumerate(after) if value < 1.0), None)
+    if mode == "none":
+        # 4 * 3 * 10 s of windup are taken back by 0.4 per second: still at the limit after ten seconds
+        assert left is None
+    else:
+        assert left == 0
+
+
+def test_back_calculation_drives_the_integral_to_what_the_limit_allows():
+    law = PIDLaw(2.0, 4.0, 0.0, period=0.001, limits=(-1.0, 1.0), anti_windup="back_calculation", tracking_time=0.1)
+    for _ in range(5000):
+        law.update(1.0)
+    # ki e = excess/Tt in balance: 2 + I - 1 = 0.4
+    assert law.integrator.value == pytest.approx(-0.6, abs=1e-6)
+
+
+def test_clamping_lets_the_integral_come_back():
+    integral = Integrator(0.1)
+    integral.update(1.0, 0.5)
+    assert integral.value == 0.0
+    integral.update(-1.0, 0.5)
+    assert integral.value == pytest.approx(-0.1)
+    batch = Integrator(0.1)
+    batch.update(np.array([1.0, -1.0, 1.0]), np.array([0.5, 0.5, 0.0]))
+    assert batch.value == pytest.approx([0.0, -0.1, 0.1])
+
+
+@pytest.mark.parametrize(
+    ("make", "name"),
+    [
+        (lambda: LowPass(-1.0, 0.1), "time_constant"),
+        (lambda: LowPass(math.nan, 0.1), "time_constant"),
+        (lambda: LowPass(1.0, 0.0), "period"),
+        (lambda: FilteredDerivative(1.0, -1.0), "period"),
+        (lambda: Integrator(0.1, anti_windup="some"), "anti_windup"),
+        (lambda: Integrator(0.1, tracking_time=0.01), "tracking_time"),
+        (lambda: PIDLaw(1.0, 0.0, 0.0, period=0.1, limits=(1.0, 2.0)), "limits"),
+        (lambda: PIDLaw(math.inf, 0.0, 0.0, period=0.1, limits=(-1.0, 2.0)), "kp"),
+        (lambda: PIDLaw([[1.0]], 0.0, 0.0, period=0.1, limits=(-1.0, 2.0)), "kp"),
+        (lambda: PIDLaw("a", 0.0, 0.0, period=0.1, limits=(-1.0, 2.0)), "kp"),
+    ],
+)
+def test_wrong_arguments_are_named(make, name):
+    with pytest.raises(ParameterError, match=name):
+        make()
+
+
+def test_state_of_parts_goes_on_bit_for_bit():
+    law = PIDLaw(1.3, 0.7, 0.0, period=0.01, limits=(-5.0, 5.0), output_filter=0.1)
+    signal = np.random.default_rng(2).normal(size=100).tolist()
+    for value in signal[:50]:
+        law.update(value)
+    state = copy.deepcopy(law.state)
+    rest = [law.update(value) for value in signal[50:]]
+    law.restore(state)
+    assert [law.update(value) for value in signal[50:]] == rest
+    with pytest.raises(ParameterError, match="missing"):
+        law.restore({"integrator": state["integrator"]})
+    with pytest.raises(ParameterError, match="integral is not finite"):
+        law.restore({**state, "integrator": {"integral": math.nan}})
