@@ -134,6 +134,9 @@ class Batch:
         for each in {id(each): each for each in given}.values():
             check_run(each, sample_time)
         count = _plants(n, len(given) if many else None, initial)
+        channels = len(core_rig(given[0]).channels)
+        if count * channels > MOST_NUMBERS:
+            raise ParameterError(f"n = {count} is not allowed: at most {MOST_NUMBERS // channels} plants of {channels} channels (2 GB)")
         self.rigs: tuple[Rig, ...] = tuple(given) if many else (given[0],) * count
         """The rig of each plant."""
         self.sample_time = float(sample_time)
@@ -148,11 +151,6 @@ class Batch:
         core = core_rig(self.rigs[0])
         self._channels = tuple(core.channels)
         self._commands = tuple(core.inputs)
-        if len(self.rigs) * len(self._channels) > MOST_NUMBERS:
-            raise ParameterError(
-                f"n = {len(self.rigs)} is not allowed: at most {MOST_NUMBERS // len(self._channels)} plants of "
-                f"{len(self._channels)} channels fit in 2 GB"
-            )
 
     def _starting(self, initial: Mapping[str, ArrayLike] | None) -> dict[str, Array]:
         names = initial_values(dict.fromkeys(initial or {}, 0.0), self.rigs[0])

@@ -106,6 +106,41 @@ def test_ctrl_c_ends_a_long_run() -> None:
     assert ended > pressed
 
 
+def test_a_loop_is_the_run_of_its_commands_whatever_kind_of_number_they_are() -> None:
+    one, kinds = simulator(), [float, np.float64, lambda u: np.array([u]), lambda u: {"": u}, lambda u: {"valve_command": u}]
+    run = one.control(lambda sample: kinds[round(sample["time"] / 0.01) % 5](COMMAND[round(sample["time"] / 0.005)]), 0.5, period=0.01)
+    held = np.repeat(COMMAND[:100:2], 2)
+    np.testing.assert_array_equal(run["valve_command"], [*held, held[-1]])
+    again = simulator()
+    for name, values in again.run(held).items():
+        np.testing.assert_array_equal(run[name][1:], values, err_msg=name)
+    assert run.events == again.events == one.events
+    np.testing.assert_array_equal(one.state, again.state)
+    assert one.observe() == {name: run[name][-1] for name in again.observe()}
+
+
+@pytest.mark.parametrize(
+    ("answer", "message"),
+    [
+        (float("nan"), r"valve_command\[0\] = nan"),
+        (float("-inf"), r"valve_command\[0\] = -inf"),
+        (None, "valve_command is missing"),
+        ([5.0, 6.0], r"valve_command has the shape \(2,\)"),
+        ({"extensor": 5.0}, "valve_command has 'extensor'"),
+        ({"valve_command": 5.0, "length": 0.2}, "length is given"),
+        ({"valve_command": 5.0, "pressure": 2e5}, "pressure is given"),
+        ("five", "numbers are needed"),
+    ],
+)
+def test_an_answer_that_cannot_be_is_named_and_stops_the_loop_at_its_sample(answer: object, message: str) -> None:
+    one, usual = simulator(), simulator()
+    with pytest.raises(pamrs.ParameterError, match=message):
+        one.control(lambda sample: answer if sample["time"] > 0.0099 else 5.5, 0.05)
+    assert one.time == pytest.approx(0.01)
+    usual.run([5.5, 5.5])
+    np.testing.assert_array_equal(one.state, usual.state)
+
+
 def test_a_reset_that_fails_leaves_the_simulator_alone() -> None:
     one = simulator()
     one.run(COMMAND[:20])

@@ -352,7 +352,8 @@ fn same_ports(first: &Rig, rig: &Rig) -> Result<()> {
 }
 
 /// An error of one row, which it then names.
-fn of_row(row: usize, error: Error) -> Error {
+#[must_use]
+pub fn of_row(row: usize, error: Error) -> Error {
     let named = |name: String| format!("row {row}: {name}");
     match error {
         Error::Parameter { name, value, allowed } => Error::Parameter { name: named(name), value, allowed },

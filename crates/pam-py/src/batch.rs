@@ -7,7 +7,7 @@ use crate::convert::{array, error, values};
 use crate::rig::{borrowed, owned, Rig, Signals};
 use crate::simulator::watched;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1};
-use pam_core::batch::{Batch as Plants, Failure};
+use pam_core::batch::{of_row, Batch as Plants, Failure};
 use pam_core::simulate::{Initial, Timing};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
@@ -60,7 +60,7 @@ impl Batch {
                 let given = |initial: Initial, (name, values): &(&String, Vec<f64>)| {
                     initial.with(rig, name, values.get(row).copied().unwrap_or(f64::NAN))
                 };
-                start.iter().try_fold(Initial::rest(rig), given)
+                start.iter().try_fold(Initial::rest(rig), given).map_err(|e| of_row(row, e))
             });
             let initial = initial.collect::<pam_core::Result<Vec<_>>>()?;
             Plants::new(&rigs, Timing::new(sample_time, step)?, &initial, threads)

@@ -109,7 +109,10 @@ pub struct Scratch<S> {
     pub(super) muscle_work: S,
     /// Poses, rates and torques that effects on the arm change.
     pub(super) arm: [Vec<S>; 4],
-    /// Contraction ratio of each group at a sample.
+    /// Contraction ratio and force of each group.
+    contraction: Vec<S>,
+    force: Vec<S>,
+    /// Contraction ratio that each group has come to, where a muscle remembers its motion.
     now: Vec<S>,
 }
 
@@ -205,6 +208,8 @@ impl<'a, S: Scalar> Plant<'a, S> {
             vented: constant(0.0),
             muscle_work: constant(0.0),
             arm: std::array::from_fn(|_| zeros(coordinates)),
+            contraction: zeros(self.rig.wiring.groups.len()),
+            force: zeros(self.rig.wiring.groups.len()),
             now: zeros(self.rig.wiring.groups.len()),
         }
     }
@@ -224,6 +229,7 @@ impl<'a, S: Scalar> Plant<'a, S> {
         for (k, group) in self.rig.wiring.groups.iter().enumerate() {
             let pull = self.pull(k, group, state, &memory[k], start[k]);
             let rate = state[self.layout.rate(group.coordinate)];
+            (here.contraction[k], here.force[k]) = (pull.contraction, pull.force);
             here.volume[group.chamber] += pull.table.volume * group.count;
             here.volume_rate[group.chamber] +=
                 pull.table.volume_slope * pull.moment_arm * rate * (group.count / group.rest_length);
@@ -363,7 +369,9 @@ impl Plant<'_, f64> {
         let (layout, wiring) = (&self.layout, &self.rig.wiring);
         let ambient = self.rig.gas.ambient_pressure;
         let mut now = std::mem::take(&mut here.now);
-        self.contractions(state, &mut now);
+        if self.remembers() {
+            self.contractions(state, &mut now);
+        }
         self.mechanics(state, memory, &now, here);
         let zero = |id: Option<super::ParameterId>| id.map_or(0.0, |id| self.values[id]);
         for ((_, channel), out) in self.rig.names.channels.iter().zip(out) {
@@ -377,8 +385,8 @@ impl Plant<'_, f64> {
                 Channel::Rate(k) => state[layout.rate(k)],
                 Channel::Length => wiring.groups[0].rest_length - state[layout.angle(0)],
                 Channel::LengthRate => -state[layout.rate(0)],
-                Channel::Contraction(k) => now[k],
-                Channel::Force(k) => self.pull(k, &wiring.groups[k], state, &memory[k], now[k]).force,
+                Channel::Contraction(k) => here.contraction[k],
+                Channel::Force(k) => here.force[k],
                 Channel::Torque(k) => here.torque[k],
                 Channel::Volume(k) => here.volume[k],
                 Channel::Mass(k) => state[layout.mass(k)],

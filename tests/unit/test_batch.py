@@ -1,0 +1,375 @@
+"""A batch is so many simulators, to the last bit; a plant that ends takes none along."""
+
+from __future__ import annotations
+
+import copy
+import os
+import pickle
+import subprocess
+import sys
+import textwrap
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pamrs
+from pamrs.simulation import core_rig
+
+DT = 0.002
+
+
+def shoulders(n: int, **changes: Any) -> pamrs.Batch:
+    return pamrs.Batch(pamrs.rigs.shoulder(), n=n, **{"sample_time": DT, **changes})
+
+
+def commands(n: int, sample: int) -> np.ndarray:
+    return 5.2 + 0.5 * np.sin(0.37 * np.arange(n) + 0.05 * sample)
+
+
+def signals(rig: pamrs.Rig, n: int, sample: int) -> dict[str, Any]:
+    """Commands of n plants of any packaged rig, other ones for each."""
+    given: dict[str, Any] = {}
+    for name in core_rig(rig).inputs:
+        channel, _, block = name.partition(".")
+        shift = 0.7 * len(given.get(channel, ()))
+        values = commands(n, sample + int(20 * shift)) if channel == "valve_command" else 3e5 + 2e4 * commands(n, sample)
+        given.setdefault(channel, {})[block] = values
+    for load in rig.tables("load").values():
+        if load["kind"] == "frame":
+            middle, half = 0.5 * (load["max_length"] + load["min_length"]), 0.2 * (load["max_length"] - load["min_length"])
+            given["length"] = middle + half * np.sin(0.1 * sample + np.arange(n))
+            given["pressure"] = 2e5 + 1e4 * np.arange(n) + 1e3 * sample
+    return given
+
+
+def row_of(given: dict[str, Any], row: int) -> dict[str, Any]:
+    one = {
+        name: {b: float(v[row]) for b, v in values.items()} if isinstance(values, dict) else float(values[row])
+        for name, values in given.items()
+    }
+    return one
+
+
+def same(one: Any, other: Any) -> None:
+    assert one["samples"] == other["samples"]
+    assert one["status"] == other["status"]
+    for row, (a, b) in enumerate(zip(one["rows"], other["rows"], strict=True)):
+        np.testing.assert_array_equal(a, b, err_msg=f"row {row}")
+
+
+@pytest.mark.parametrize("name", pamrs.rigs.names())
+def test_every_row_is_the_simulator_of_its_commands(name: str) -> None:
+    rig = pamrs.rigs.named(name)
+    n, samples = 4, 40
+    batch = pamrs.Batch(rig, n=n, sample_time=0.005, threads=2)
+    ones = [pamrs.Simulator(rig, sample_time=0.005) for _ in range(n)]
+    seen = batch.observe()
+    for k in range(samples):
+        given = signals(rig, n, k)
+        seen = batch.step(**given)
+        for row, one in enumerate(ones):
+            alone = one.step(**row_of(given, row))
+            assert list(alone) == list(seen)
+            for channel, value in alone.items():
+                assert seen[channel][row] == value, (channel, row, k)
+    assert batch.time == ones[0].time
+    for row, one in enumerate(ones):
+        np.testing.assert_array_equal(batch.state["rows"][row], one.state)
+    if len(core_rig(rig).inputs) and name != "blow_down_tank":
+        assert any(np.ptp(values) > 0.0 for values in seen.values())
+
+
+def test_what_has_a_memory_is_kept_apart() -> None:
+    friction = {"friction_constant": 2.0, "friction_pressure": 2e-5, "presliding": 1e-3}
+    rig = (
+        pamrs.rigs.shoulder()
+        .with_effect("muscle_hysteresis", friction)
+        .with_effect("heat_transfer")
+        .with_effect("clock_skew", {"offset": 0.013, "rate": 0.001})
+    )
+    batch = pamrs.Batch(rig, n=3, sample_time=DT)
+    ones = [pamrs.Simulator(rig, sample_time=DT) for _ in range(3)]
+    for k in range(60):
+        seen = batch.step(commands(3, k))
+        alone = [one.step(float(u)) for one, u in zip(ones, commands(3, k), strict=True)]
+    for channel, values in seen.items():
+        np.testing.assert_array_equal(values, [one[channel] for one in alone], err_msg=channel)
+
+
+def test_threads_and_company_change_no_bit() -> None:
+    n = 130
+    start = {"muscle_pressure": 1e5 + 1e3 * np.arange(n)}
+    states = []
+    for threads in (1, 2, 3):
+        batch = shoulders(n, initial=start, threads=threads)
+        for k in range(30):
+            batch.step(commands(n, k))
+        states.append(batch.state)
+    same(states[0], states[1])
+    same(states[0], states[2])
+    few = shoulders(2, initial={"muscle_pressure": start["muscle_pressure"][[77, 129]]})
+    for k in range(30):
+        few.step(commands(n, k)[[77, 129]])
+    for mine, row in enumerate((77, 129)):
+        np.testing.assert_array_equal(few.state["rows"][mine], states[0]["rows"][row])
+
+
+def test_a_sweep_over_payloads_is_the_rigs_one_by_one() -> None:
+    base = pamrs.rigs.shoulder()
+    rigs = [base.with_parameters({"arm.payload": payload}) for payload in (0.0, 4.5, 9.07, 20.0)]
+    batch = pamrs.Batch(rigs, sample_time=DT, initial={"joint_angle": 0.5})
+    ones = [pamrs.Simulator(rig, sample_time=DT, initial={"joint_angle": 0.5}) for rig in rigs]
+    for k in range(50):
+        seen = batch.step(5.6 + 0.01 * k)
+        alone = [one.step(5.6 + 0.01 * k) for one in ones]
+    for channel, values in seen.items():
+        np.testing.assert_array_equal(values, [one[channel] for one in alone], err_msg=channel)
+    assert len(set(seen["joint_angle"])) == 4
+    assert batch.rigs == tuple(rigs)
+    with pytest.raises(pamrs.RigError, match="row 1: its inputs are"):
+        pamrs.Batch([base, pamrs.rigs.named("regulated_joint")], sample_time=DT)
+
+
+def test_a_regulator_without_a_command_keeps_its_own_pressure() -> None:
+    base = pamrs.rigs.named("regulated_joint")
+    rigs = [base.with_parameters({"supply.initial_pressure": pressure}) for pressure in (2e5, 3e5)]
+    batch, ones = pamrs.Batch(rigs, sample_time=DT), [pamrs.Simulator(rig, sample_time=DT) for rig in rigs]
+    for _ in range(20):
+        seen, alone = batch.step(), [one.step() for one in ones]
+    for channel, values in seen.items():
+        np.testing.assert_array_equal(values, [one[channel] for one in alone], err_msg=channel)
+    assert seen["supply_pressure"][0] != seen["supply_pressure"][1]
+
+
+def failing() -> pamrs.Batch:
+    """Row 1 is thrown out of the muscle's range within a few milliseconds."""
+    return shoulders(3, sample_time=0.001, initial={"joint_rate": np.array([0.0, -500.0, 0.0])})
+
+
+def test_a_row_that_fails_says_why_and_the_others_go_on() -> None:
+    batch, alone = failing(), pamrs.Simulator(pamrs.rigs.shoulder(), sample_time=0.001, initial={"joint_rate": -500.0})
+    healthy = shoulders(3, sample_time=0.001)
+    good, message = alone.observe(), ""
+    for k in range(20):
+        try:
+            good = alone.step(float(commands(3, k)[1]))
+        except pamrs.SimulationError as error:
+            message = str(error)
+            break
+    for k in range(20):
+        seen, usual = batch.step(commands(3, k)), healthy.step(commands(3, k))
+    status = batch.status
+    assert status[0] is status[2] is None
+    assert status[1] is not None
+    assert status[1].message == message != ""
+    assert status[1].time == pytest.approx(alone.time + 0.001)
+    for channel, values in seen.items():
+        assert np.isfinite(values).all(), channel
+        assert values[1] == good[channel], channel
+        assert (values[[0, 2]] == usual[channel][[0, 2]]).all(), channel
+    assert batch.time == pytest.approx(0.02)
+    batch.reset({"joint_rate": 0.0})
+    assert batch.status == (None, None, None)
+    assert batch.time == 0.0
+
+
+def test_a_restart_is_exact_and_keeps_what_has_ended() -> None:
+    batch = failing()
+    for k in range(20):
+        batch.step(commands(3, k))
+    state = pickle.loads(pickle.dumps(batch.state))
+    others = [pickle.loads(pickle.dumps(batch)), copy.deepcopy(batch), failing()]
+    others[2].restore(state)
+    for k in range(20, 40):
+        straight = batch.step(commands(3, k))
+    for other in others:
+        assert other.time == pytest.approx(0.02)
+        for k in range(20, 40):
+            again = other.step(commands(3, k))
+        same(other.state, batch.state)
+        for channel, values in again.items():
+            np.testing.assert_array_equal(values, straight[channel], err_msg=channel)
+
+
+class Loop:
+    """A PI controller of one plant or of many, the same operations for both."""
+
+    def __init__(self, gain: Any, rate: Any) -> None:
+        self.gain, self.rate, self.sum = gain, rate, 0.0 * np.asarray(gain)
+        self.asked: list[float] = []
+
+    def __call__(self, sample: dict[str, Any]) -> Any:
+        self.asked.append(sample["time"])
+        error = 0.8 - sample["joint_angle"]
+        self.sum = self.sum + error * 0.004
+        return np.clip(5.0 + self.gain * error + self.rate * self.sum, 0.0, 10.0)
+
+
+def test_a_closed_loop_is_that_of_each_simulator() -> None:
+    gains, rates = np.array([0.5, 2.0, 8.0]), np.array([0.0, 1.0, 3.0])
+    loop = Loop(gains, rates)
+    run = shoulders(3, threads=2).control(loop, 0.2, period=0.004)
+    assert run["joint_angle"].shape == (3, 101)
+    assert run.status == (None, None, None)
+    assert not run.failed.any()
+    np.testing.assert_allclose(loop.asked, 0.004 * np.arange(50), atol=1e-12)
+    for row in range(3):
+        one = pamrs.Simulator(pamrs.rigs.shoulder(), sample_time=DT)
+        alone = one.control(Loop(gains[row], rates[row]), 0.2, period=0.004)
+        assert set(run) == set(alone) - {"time"}
+        np.testing.assert_array_equal(alone.time, run.time)
+        for channel in run:
+            np.testing.assert_array_equal(run[channel][row], alone[channel], err_msg=channel)
+    few = shoulders(3).control(Loop(gains, rates), 0.2, period=0.004, channels=("joint_angle", "valve_command"), record_every=7)
+    assert set(few) == {"joint_angle", "valve_command"}
+    np.testing.assert_array_equal(few.time, run.time[::7])
+    for channel in few:
+        np.testing.assert_array_equal(few[channel], run[channel][:, ::7], err_msg=channel)
+    with pytest.raises(KeyError, match="was not recorded"):
+        few["muscle_pressure"]
+
+
+def test_a_loop_goes_on_where_the_last_one_ended() -> None:
+    whole, parts = shoulders(2), shoulders(2)
+    run = whole.control(Loop(np.array([1.0, 2.0]), 0.5), 0.1, period=0.004)
+    loop = Loop(np.array([1.0, 2.0]), 0.5)
+    one, two = parts.control(loop, 0.04, period=0.004), parts.control(loop, 0.06, period=0.004)
+    np.testing.assert_array_equal(np.hstack([one["joint_angle"], two["joint_angle"][:, 1:]]), run["joint_angle"])
+    np.testing.assert_allclose(two.time, run.time[20:], atol=1e-12)
+
+
+def test_an_answer_that_is_not_finite_ends_its_row_alone() -> None:
+    def update(sample: dict[str, Any]) -> dict[str, Any]:
+        late = sample["time"] > 0.0099
+        return {"valve_command": np.array([5.5, np.nan if late else 5.5, 5.5, -np.inf if late else 5.5])}
+
+    run = shoulders(4).control(update, 0.04)
+    assert run.failed.tolist() == [False, True, False, True]
+    ended = run.status[1]
+    assert ended is not None
+    assert ended.time == pytest.approx(0.01)
+    assert ended.message.startswith("valve_command[1] = NaN is not allowed")
+    angle = run["muscle_pressure"]
+    assert np.isfinite(angle).all()
+    assert (angle[1, 5:] == angle[1, 5]).all()
+    assert (angle[0] == angle[2]).all()
+    assert angle[0, -1] != angle[0, 5]
+
+
+def test_names_of_several_valves_and_keywords_are_answers() -> None:
+    rig = pamrs.rigs.named("antagonistic_joint")
+    answer = {"flexor": np.array([5.5, 6.0]), "extensor": 4.8}
+    one = pamrs.Batch(rig, n=2, sample_time=DT).control(lambda sample: answer, 0.02)
+    two = pamrs.Batch(rig, n=2, sample_time=DT).control(lambda sample: {"valve_command": answer}, 0.02)
+    np.testing.assert_array_equal(one["joint_angle.elbow"], two["joint_angle.elbow"])
+    np.testing.assert_array_equal(one["valve_command.extensor"], np.full((2, 11), 4.8))
+
+
+def test_bad_input_is_named_and_leaves_the_batch_alone() -> None:
+    batch = shoulders(3)
+    batch.step(5.5)
+    before = batch.state
+    with pytest.raises(pamrs.ParameterError, match=r"valve_command\[1\] = NaN"):
+        batch.step([5.0, np.nan, 5.0])
+    with pytest.raises(pamrs.ParameterError, match=r"valve_command has the shape \(2,\); \(3,\) is needed"):
+        batch.step([5.0, 5.0])
+    with pytest.raises(pamrs.ParameterError, match="valve_command is missing"):
+        batch.step()
+    with pytest.raises(pamrs.ParameterError, match="valve_command is not allowed: numbers"):
+        batch.step(["a", "b", "c"])
+    with pytest.raises(pamrs.ParameterError, match="supply_command is given"):
+        batch.step(5.0, supply_command=1e5)
+    for name, value in (("period", 0.003), ("duration", -1.0), ("duration", np.nan), ("record_every", 0), ("channels", ["angle"])):
+        with pytest.raises(pamrs.ParameterError, match=f"{name} (= |has )"):
+            batch.control(lambda sample: 5.0, **{"duration": 0.1, name: value})
+    with pytest.raises(pamrs.ParameterError, match="update is a float"):
+        batch.control(5.0, 0.1)  # type: ignore[arg-type]
+    with pytest.raises(pamrs.ParameterError, match="2 GB"):
+        batch.control(lambda sample: 5.0, 1e5)
+    for state, message in (
+        ({**before, "rows": before["rows"][:2]}, "state has 2 values"),
+        ({**before, "rows": [*before["rows"][:2], before["rows"][2][:-1]]}, "row 2: state"),
+        ({**before, "rows": [before["rows"][0], np.full_like(before["rows"][1], np.nan), before["rows"][2]]}, r"row 1: state\[0\]"),
+        ({**before, "samples": 7}, "row 0: state.samples = 1"),
+        ({**before, "samples": -1}, "state.samples = -1"),
+        ({**before, "status": (None,)}, "status has 1 values"),
+        ({**before, "status": (1, 2, 3)}, "state is not one of a batch"),
+        ({"rows": 1}, "state has rows; samples, rows and status"),
+        (3, "state is a int"),
+    ):
+        with pytest.raises(pamrs.ParameterError, match=message):
+            batch.restore(state)  # type: ignore[arg-type]
+    with pytest.raises(pamrs.ParameterError, match="muscle_pressure"):
+        batch.reset({"muscle_pressure": [1e5, -1e9, 1e5]})
+    same(batch.state, before)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"n": 0}, "n = 0 is not allowed"),
+        ({"n": 2.5}, "n = 2.5 is not allowed"),
+        ({"n": None}, "n is missing"),
+        ({"n": 10**9}, "n = 1000000000 is not allowed: at most"),
+        ({"threads": 0}, "threads = 0"),
+        ({"sample_time": 0.0}, "sample_time = 0"),
+        ({"step": 0.0003}, "step = 0.0003"),
+        ({"initial": {"muscle_pressure": [1e5, 2e5]}}, "initial muscle_pressure is for 2 plants, n for 3"),
+        ({"initial": {"muscle_pressure": [1e5, np.inf, 2e5]}}, r"initial muscle_pressure\[1\] = inf"),
+        ({"initial": {"muscle_pressure": [[1e5, 1e5, 2e5]]}}, "shape"),
+        ({"initial": {"pressure": 1e5}}, "unknown entry 'pressure'"),
+        ({"initial": {"joint_angle": [0.5, 40.0, 0.5]}}, "row 1: initial.joint_angle = 40"),
+    ],
+)
+def test_a_batch_that_cannot_be_says_why(changes: dict[str, Any], message: str) -> None:
+    with pytest.raises(pamrs.ParameterError, match=message):
+        pamrs.Batch(pamrs.rigs.shoulder(), **{"n": 3, "sample_time": DT, **changes})
+
+
+def test_only_rigs_make_a_batch() -> None:
+    for wrong, message in (([], "empty"), ("shoulder", "rig is a str"), (5, "rig is a int")):
+        with pytest.raises(pamrs.ParameterError, match=message):
+            pamrs.Batch(wrong, n=1, sample_time=DT)  # type: ignore[arg-type]
+
+
+def script(code: str) -> list[str]:
+    done = subprocess.run([sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr
+    return done.stdout.split()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals as on POSIX")
+def test_ctrl_c_ends_a_long_advance_at_a_sample() -> None:
+    said = script("""
+        import os, signal, threading, time, numpy as np, pamrs
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        batch = pamrs.Batch(pamrs.rigs.shoulder(), n=40, sample_time=0.001)
+        def press():
+            time.sleep(0.3)
+            os.kill(os.getpid(), signal.SIGINT)
+        threading.Thread(target=press).start()
+        try:
+            batch.control(lambda sample: 5.5, 1e4, period=1e4, channels=["joint_angle"], record_every=10_000_000)
+        except KeyboardInterrupt:
+            again = pamrs.Batch(pamrs.rigs.shoulder(), n=40, sample_time=0.001)
+            again.control(lambda sample: 5.5, batch.time, channels=["joint_angle"], period=batch.time)
+            print(batch.time > 0.0, all((a == b).all() for a, b in zip(batch.state["rows"], again.state["rows"])))
+    """)
+    assert said == ["True", "True"]
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork")
+def test_a_batch_goes_on_in_a_forked_process() -> None:
+    """Whose threads are not those of its parent."""
+    said = script("""
+        import os, warnings, numpy as np, pamrs
+        warnings.simplefilter("ignore")
+        batch = pamrs.Batch(pamrs.rigs.shoulder(), n=300, sample_time=0.001, threads=2)
+        batch.step(5.5)
+        if (child := os.fork()) == 0:
+            batch.step(5.6)
+            os._exit(0 if batch.time > 0.0015 else 1)
+        print(os.waitpid(child, 0)[1])
+    """)
+    assert said == ["0"]
