@@ -106,10 +106,11 @@ class HystereticTorque(Stateful):
         self.memory = SlipMemory(float(friction["presliding"]))
         self.reset()
 
+    _shortening: Value | None
+
     def follow(self, angle: Value) -> None:
         """Move the memory to an angle [rad]."""
-        last: Value | None = self._shortening
-        self._shortening: Value | None = self._travel(angle)
+        last, self._shortening = self._shortening, self._travel(angle)
         if last is not None:
             self.memory.moved(last - self._shortening)
 
@@ -162,12 +163,14 @@ class HysteresisCompensation(SampledController):
     def update(self, time: float, measurement: Measurement, reference: Reference) -> Value:
         """What the controller answers with the memory moved to the sample; see :meth:`pamrs.control.Controller.update`."""
         angle = self._aim(reference).angle if self.source == "desired" else self._read(measurement, "joint_angle")
-        before = self.torque.state
-        self.torque.follow(angle)
+        torque, memory = self.torque, self.torque.memory
+        before = torque._shortening, memory._a, memory._b, memory._c, memory._d
+        torque.follow(angle)
         try:
             answer: Value = self.controller.update(time, measurement, reference)
         except ParameterError:
-            self.torque.restore(before)
+            # a refused sample has not moved the muscle either
+            torque._shortening, memory._a, memory._b, memory._c, memory._d = before
             raise
         return answer
 

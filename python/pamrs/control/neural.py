@@ -53,9 +53,9 @@ class Neural(SlidingController):
     gains : sequence of three float or ndarray, shape (n,)
         ``gamma_H, gamma_C, gamma_G``, SI with radians [Pa ... per second].
     deadband : float or ndarray, shape (n,)
-        Of s [rad/s]; 0.02 as printed for 5.3.2.
+        Of s [rad/s]. Printed is 0.02, for 5.3.2; see the notes.
     bounds : sequence of three float, or None
-        Largest absolute weight of each network; by default what the whole pressure does at 20 rad/s2 and 5 rad/s, and that pressure.
+        Largest absolute weight of each network; by default the pressure limit over 20 rad/s2, over 50 rad/s, and itself.
         None: free.
     hold_at_limit : bool
         As for :class:`pamrs.control.AdaptiveSliding`.
@@ -78,8 +78,8 @@ class Neural(SlidingController):
         *,
         start: str = "zero",
         nodes: int = 22,
-        gains: tuple[Value, Value, Value] = (300.0, 5e4, 3e5),
-        deadband: Value = 0.02,
+        gains: tuple[Value, Value, Value] = (30.0, 2e3, 1e5),
+        deadband: Value = 0.1,
         bounds: tuple[float, float, float] | str | None = "default",
         hold_at_limit: bool = True,
         **others: Any,
@@ -95,7 +95,7 @@ class Neural(SlidingController):
         self.deadband, self.nodes = as_value("deadband", deadband, lower=0.0), nodes
         self.hold_at_limit = bool(hold_at_limit)
         limit = arm.pressure_limit
-        chosen = (limit / 20.0, limit / 5.0, limit) if bounds == "default" else bounds
+        chosen = (limit / 20.0, limit / 50.0, limit) if bounds == "default" else bounds
         if chosen is not None and not (len(chosen) == 3 and all(isinstance(b, (int, float)) and b > 0.0 for b in chosen)):
             raise ParameterError(f"bounds = {bounds!r} is not allowed: 'default', three numbers above zero or None")
         self.bounds: tuple[float, ...] | None = None if chosen is None else tuple(float(b) for b in chosen)
