@@ -57,7 +57,7 @@ CONTROLLERS = {
     "adaptive free": lambda x: Cascade(AdaptiveSliding(SIMPLIFIED, (x, x, x), bounds=None, hold_at_limit=False, period=PERIOD)),
     "adaptive published": lambda x: Cascade(AdaptiveSliding.published(SIMPLIFIED, 1, slope=4.0 * x, period=PERIOD)),
     "neural zero": lambda x: Cascade(Neural(SIMPLIFIED, slope=3.0 * x, period=PERIOD)),
-    "neural model": lambda x: Cascade(Neural(FULL, start="model", gains=(300.0, 5e4, 3e5 * x), period=PERIOD)),
+    "neural model": lambda x: Cascade(Neural(FULL, start="model", gains=(300.0, 2e4, 3e5 * x), period=PERIOD)),
     "neural gaylord": lambda x: Cascade(Neural(GAYLORD, start="model", bounds=None, switching=4e5 * x, period=PERIOD)),
     "hysteresis sliding": lambda x: HysteresisCompensation(Cascade(Sliding(FULL, slope=5.0 * x, period=PERIOD)), DIAGNOSED),
     "hysteresis feedforward": lambda x: HysteresisCompensation(

@@ -198,9 +198,7 @@ def test_the_start_from_the_model_is_the_sliding_law():
 
 
 def test_networks_learn_from_zero_on_their_plant():
-    controller = Neural(
-        SIMPLIFIED, slope=LAMBDA, gains=(300.0, 5e4, 3e5), deadband=0.02, measured_rate=True, rate_filter=0.0, period=STEP
-    )
+    controller = Neural(SIMPLIFIED, slope=LAMBDA, measured_rate=True, rate_filter=0.0, period=STEP)
     arm = SIMPLIFIED
     rows = run(controller, 12.0, arm=arm)
     error = np.abs(rows[:, 1] - [aim(t).angle for t in rows[:, 0]])

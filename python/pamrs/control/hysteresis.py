@@ -110,7 +110,9 @@ class HystereticTorque(Stateful):
 
     def follow(self, angle: Value) -> None:
         """Move the memory to an angle [rad]."""
-        last, self._shortening = self._shortening, self._travel(angle)
+        # the arm sinks a little into its stops, and the muscle moves with it
+        inside = clip(angle, self._travel.low, self._travel.high)
+        last, self._shortening = self._shortening, self._travel(inside) + self._travel.slope(inside) * (angle - inside)
         if last is not None:
             self.memory.moved(last - self._shortening)
 
