@@ -66,11 +66,11 @@ class Neural(SlidingController):
 
     Notes
     -----
-    The gains are not printed. With the defaults the start from zero learns the simulated shoulder (9 kg, waves between 28 and 82 deg)
-    from 9 deg rms in the first 20 s to 0.3 deg after 300 s. Without the bound on C, or with one two and a half times as large, it
-    bursts after some 80 s. The switching term suits an arm with its payload (I of 8 to 20 kg m2): without one, at 0.6 kg m2, it is too
-    stiff for the pressure loop and the arm oscillates; it must fall with I. A tank that runs empty is learnt as well: the shoulder's
-    15 l last some 250 s of such motion, so that long training needs a larger supply.
+    The gains are not printed. With the defaults and a large supply the start from zero learns the simulated shoulder (9 kg, waves
+    between 28 and 82 deg) from 9 deg rms in the first 20 s to 0.3 deg after 300 s, with or without bounds. A tank that runs empty is
+    learnt as well: on the shoulder's own 15 l the error grows after some 220 s, and with wider bounds than the default bursts came after
+    80 s; long training needs a larger supply. The switching term suits an arm with its payload (I of 8 to 20 kg m2): without one, at
+    0.6 kg m2, it is too stiff for the pressure loop and the arm oscillates; it must fall with I.
 
     Raises
     ------
