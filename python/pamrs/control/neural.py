@@ -68,9 +68,10 @@ class Neural(SlidingController):
     -----
     The gains are not printed. With the defaults and a large supply the start from zero learns the simulated shoulder (9 kg, waves
     between 28 and 82 deg) from 9 deg rms in the first 20 s to 0.3 deg after 300 s, with or without bounds. A tank that runs empty is
-    learnt as well: on the shoulder's own 15 l the error grows after some 220 s, and with wider bounds than the default bursts came after
-    80 s; long training needs a larger supply. The switching term suits an arm with its payload (I of 8 to 20 kg m2): without one, at
-    0.6 kg m2, it is too stiff for the pressure loop and the arm oscillates; it must fall with I.
+    learnt as well: on the shoulder's own 15 l the error grows after some 220 s, and with wider bounds than the default bursts came
+    after 80 s; long training needs a larger supply.
+    The switching term suits an arm with its payload (I of 8 to 20 kg m2): with none, 0.6,
+    it is too stiff for the pressure loop and the arm oscillates; it must fall with I.
 
     Raises
     ------
