@@ -36,18 +36,14 @@ PERIOD = 0.005
 # name -> a function of a factor on its gains (a float or an array)
 CONTROLLERS = {
     "pid": lambda x: PID(2.0 * x, 1.5, 0.1, period=PERIOD),
-    "pid back-calculation": lambda x: PID(9.0 * x, 5.0, anti_windup="back_calculation", period=PERIOD, angle_filter=0.01),
+    "pid back-calculation": lambda x: PID(1.0 * x, 0.3, 0.05, anti_windup="back_calculation", period=PERIOD, angle_filter=0.01),
     "pid measured rate": lambda x: PID(2.0, 1.5, 0.2 * x, period=PERIOD, measured_rate=True),
-    "fuzzy": lambda x: Fuzzy(0.4 * x, 0.3, 0.7, period=PERIOD),
-    "fuzzy quoted": lambda x: Fuzzy(0.4, 0.3 * x, 0.7 * x, table="quoted", period=PERIOD),
+    "fuzzy": lambda x: Fuzzy(1.0 * x, 0.5, 0.5, period=PERIOD, output_filter=0.02),
+    "fuzzy quoted": lambda x: Fuzzy(1.0, 0.5 * x, 0.5 * x, table="quoted", period=PERIOD, output_filter=0.02),
     "feedforward": lambda x: Feedforward(FULL, AIR, 1.0 * x, period=PERIOD),
     "feedforward friction": lambda x: Feedforward(FULL.scaled(x), AIR, 5.0, friction=True, pressure_filter=0.01, period=PERIOD),
-    "feedforward + pid": lambda x: Parallel(
-        Feedforward(FULL, AIR, 1.0, period=PERIOD), PID.published("experiment_23kg", kp=x, period=PERIOD)
-    ),
-    "feedforward + fuzzy": lambda x: Parallel(
-        Feedforward(FULL, AIR, 0.5 * x, period=PERIOD), Fuzzy.published("feedforward", period=PERIOD)
-    ),
+    "feedforward + pid": lambda x: Parallel(Feedforward(FULL, AIR, 1.0, period=PERIOD), PID(x, 0.3, period=PERIOD)),
+    "feedforward + fuzzy": lambda x: Parallel(Feedforward(FULL, AIR, 2.0 * x, period=PERIOD), Fuzzy(0.8, 0.5, 0.5, period=PERIOD)),
     "feedforward + cascade": lambda x: Parallel(
         Feedforward(FULL, AIR, 0.5, period=PERIOD), cascaded_pid(1.38e6, kp=6e5 * x, period=PERIOD)
     ),
@@ -61,7 +57,7 @@ CONTROLLERS = {
     "adaptive free": lambda x: Cascade(AdaptiveSliding(SIMPLIFIED, (x, x, x), bounds=None, hold_at_limit=False, period=PERIOD)),
     "adaptive published": lambda x: Cascade(AdaptiveSliding.published(SIMPLIFIED, 1, slope=4.0 * x, period=PERIOD)),
     "neural zero": lambda x: Cascade(Neural(SIMPLIFIED, slope=3.0 * x, period=PERIOD)),
-    "neural model": lambda x: Cascade(Neural(FULL, start="model", gains=(300.0, 5e4, 3e5 * x), period=PERIOD)),
+    "neural model": lambda x: Cascade(Neural(FULL, start="model", gains=(300.0, 2e4, 3e5 * x), period=PERIOD)),
     "neural gaylord": lambda x: Cascade(Neural(GAYLORD, start="model", bounds=None, switching=4e5 * x, period=PERIOD)),
     "hysteresis sliding": lambda x: HysteresisCompensation(Cascade(Sliding(FULL, slope=5.0 * x, period=PERIOD)), DIAGNOSED),
     "hysteresis feedforward": lambda x: HysteresisCompensation(

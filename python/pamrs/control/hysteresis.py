@@ -106,10 +106,13 @@ class HystereticTorque(Stateful):
         self.memory = SlipMemory(float(friction["presliding"]))
         self.reset()
 
+    _shortening: Value | None
+
     def follow(self, angle: Value) -> None:
         """Move the memory to an angle [rad]."""
-        last: Value | None = self._shortening
-        self._shortening: Value | None = self._travel(angle)
+        # the arm sinks a little into its stops, and the muscle moves with it
+        inside = clip(angle, self._travel.low, self._travel.high)
+        last, self._shortening = self._shortening, self._travel(inside) + self._travel.slope(inside) * (angle - inside)
         if last is not None:
             self.memory.moved(last - self._shortening)
 
@@ -162,12 +165,14 @@ class HysteresisCompensation(SampledController):
     def update(self, time: float, measurement: Measurement, reference: Reference) -> Value:
         """What the controller answers with the memory moved to the sample; see :meth:`pamrs.control.Controller.update`."""
         angle = self._aim(reference).angle if self.source == "desired" else self._read(measurement, "joint_angle")
-        before = self.torque.state
-        self.torque.follow(angle)
+        torque, memory = self.torque, self.torque.memory
+        before = torque._shortening, memory._a, memory._b, memory._c, memory._d
+        torque.follow(angle)
         try:
             answer: Value = self.controller.update(time, measurement, reference)
         except ParameterError:
-            self.torque.restore(before)
+            # a refused sample has not moved the muscle either
+            torque._shortening, memory._a, memory._b, memory._c, memory._d = before
             raise
         return answer
 

@@ -55,7 +55,7 @@ class Neural(SlidingController):
     deadband : float or ndarray, shape (n,)
         Of s [rad/s]; 0.02 as printed for 5.3.2.
     bounds : sequence of three float, or None
-        Largest absolute weight of each network; by default what the whole pressure does at 20 rad/s2 and 5 rad/s, and that pressure.
+        Largest absolute weight of each network; by default the pressure limit over 20 rad/s2, over 50 rad/s, and itself.
         None: free.
     hold_at_limit : bool
         As for :class:`pamrs.control.AdaptiveSliding`.
@@ -63,6 +63,15 @@ class Neural(SlidingController):
         As for :class:`pamrs.control.sliding.SlidingController`, with defaults of its own: while the networks know nothing the switching
         term alone carries the arm, so that ``switching`` is 0.4 MPa over a ``boundary_layer`` of 2 rad/s, ``slope`` 3 /s. With the
         20 kPa over 0.2 rad/s that serve the other laws the start from zero oscillates on the simulated shoulder and learns nothing.
+
+    Notes
+    -----
+    The gains are not printed. With the defaults and a large supply the start from zero learns the simulated shoulder (9 kg, waves
+    between 28 and 82 deg) from 9 deg rms in the first 20 s to 0.3 deg after 300 s, with or without bounds. A tank that runs empty is
+    learnt as well: on the shoulder's own 15 l the error grows after some 220 s, and with wider bounds than the default bursts came
+    after 80 s; long training needs a larger supply.
+    The switching term suits an arm with its payload (I of 8 to 20 kg m2): with none, 0.6,
+    it is too stiff for the pressure loop and the arm oscillates; it must fall with I.
 
     Raises
     ------
@@ -78,7 +87,7 @@ class Neural(SlidingController):
         *,
         start: str = "zero",
         nodes: int = 22,
-        gains: tuple[Value, Value, Value] = (300.0, 5e4, 3e5),
+        gains: tuple[Value, Value, Value] = (300.0, 2e4, 3e5),
         deadband: Value = 0.02,
         bounds: tuple[float, float, float] | str | None = "default",
         hold_at_limit: bool = True,
@@ -95,7 +104,7 @@ class Neural(SlidingController):
         self.deadband, self.nodes = as_value("deadband", deadband, lower=0.0), nodes
         self.hold_at_limit = bool(hold_at_limit)
         limit = arm.pressure_limit
-        chosen = (limit / 20.0, limit / 5.0, limit) if bounds == "default" else bounds
+        chosen = (limit / 20.0, limit / 50.0, limit) if bounds == "default" else bounds
         if chosen is not None and not (len(chosen) == 3 and all(isinstance(b, (int, float)) and b > 0.0 for b in chosen)):
             raise ParameterError(f"bounds = {bounds!r} is not allowed: 'default', three numbers above zero or None")
         self.bounds: tuple[float, ...] | None = None if chosen is None else tuple(float(b) for b in chosen)
