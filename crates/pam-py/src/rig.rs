@@ -41,6 +41,37 @@ pub fn borrowed(signals: &Owned) -> Vec<(&str, &[f64])> {
     signals.iter().map(|(name, signal)| (name.as_str(), signal.as_slice())).collect()
 }
 
+impl Rig {
+    /// A block with what was measured around it, for some work without the interpreter.
+    #[allow(clippy::too_many_arguments)]
+    fn cut<T: Send>(
+        &self,
+        py: Python<'_>,
+        block: &str,
+        commands: &Signals<'_>,
+        sample_time: f64,
+        step: f64,
+        measured: &BTreeMap<String, Pair<'_>>,
+        samples: usize,
+        work: impl FnOnce(Block, &Measured<'_>, Timing) -> pam_core::Result<T> + Send,
+    ) -> PyResult<T> {
+        let commands = owned(commands);
+        let signals: Vec<_> =
+            measured.iter().map(|(name, (value, slope))| (name, values(value), values(slope))).collect();
+        let inner = &*self.inner;
+        let found = py.detach(|| {
+            let signals: Vec<_> = (signals.iter())
+                .map(|(name, value, slope)| (name.as_str(), Signal { value, slope }))
+                .collect();
+            let measured = Measured::new(inner, samples, &borrowed(&commands), &signals)?;
+            let block = Block::from_name(inner, block)?;
+            let timing = Timing::new(sample_time, step)?.at_most(block.longest_step(inner));
+            work(block, &measured, timing)
+        });
+        found.map_err(|e| error(py, &e))
+    }
+}
+
 #[pymethods]
 impl Rig {
     #[new]
@@ -125,23 +156,21 @@ impl Rig {
         measured: BTreeMap<String, Pair<'py>>,
         samples: usize,
     ) -> PyResult<(Bound<'py, numpy::PyArray1<f64>>, Option<Bound<'py, PyArray2<f64>>>)> {
-        let commands = owned(&commands);
-        let signals: Vec<_> =
-            measured.iter().map(|(name, (value, slope))| (name, values(value), values(slope))).collect();
-        let inner = &*self.inner;
-        let found = py.detach(|| {
-            let signals: Vec<_> = (signals.iter())
-                .map(|(name, value, slope)| (name.as_str(), Signal { value, slope }))
-                .collect();
-            let measured = Measured::new(inner, samples, &borrowed(&commands), &signals)?;
-            let ids = (parameters.iter())
-                .map(|name| inner.parameters().find(name))
-                .collect::<pam_core::Result<Vec<_>>>()?;
-            let block = Block::from_name(inner, block)?;
-            let timing = Timing::new(sample_time, step)?.at_most(block.longest_step(inner));
-            predict(inner, block, &measured, timing, &starts, &ids)
-        });
-        let p = found.map_err(|e| error(py, &e))?;
+        let p = self.cut(
+            py,
+            block,
+            &commands,
+            sample_time,
+            step,
+            &measured,
+            samples,
+            |block, measured, timing| {
+                let ids = (parameters.iter())
+                    .map(|name| self.inner.parameters().find(name))
+                    .collect::<pam_core::Result<Vec<_>>>()?;
+                predict(&self.inner, block, measured, timing, &starts, &ids)
+            },
+        )?;
         let rows = p.value.len();
         let jacobian =
             if p.columns > 0 { Some(array(py, p.jacobian).reshape([rows, p.columns])?) } else { None };
@@ -161,20 +190,16 @@ impl Rig {
         measured: BTreeMap<String, Pair<'py>>,
         samples: usize,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let commands = owned(&commands);
-        let signals: Vec<_> =
-            measured.iter().map(|(name, (value, slope))| (name, values(value), values(slope))).collect();
-        let inner = &*self.inner;
-        let found = py.detach(|| {
-            let signals: Vec<_> = (signals.iter())
-                .map(|(name, value, slope)| (name.as_str(), Signal { value, slope }))
-                .collect();
-            let measured = Measured::new(inner, samples, &borrowed(&commands), &signals)?;
-            let block = Block::from_name(inner, block)?;
-            let timing = Timing::new(sample_time, step)?.at_most(block.longest_step(inner));
-            closure_terms(inner, block, &measured, timing, &starts)
-        });
-        let (terms, columns) = found.map_err(|e| error(py, &e))?;
+        let (terms, columns) = self.cut(
+            py,
+            block,
+            &commands,
+            sample_time,
+            step,
+            &measured,
+            samples,
+            |block, measured, timing| closure_terms(&self.inner, block, measured, timing, &starts),
+        )?;
         array(py, terms).reshape([samples, columns])
     }
 }

@@ -10,7 +10,8 @@ from __future__ import annotations
 import math
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 
 from pamrs import _core
@@ -59,6 +60,18 @@ def _doubted(group: Group) -> Group:
     kept = {k: p if k in ("", "unlisted") else MOST_BELIEVED * p for k, p in group.probabilities.items()}
     kept["unlisted"] = kept.get("unlisted", 0.0) + 1.0 - sum(kept.values())
     return replace(group, probabilities=kept)
+
+
+@contextmanager
+def _in_range(name: str) -> Iterator[None]:
+    """What leaves the model's range is said of the case."""
+    try:
+        yield
+    except SimulationError as error:
+        raise DiagnosisError(
+            f"case {name!r}: the model, driven by the recordings, leaves the range in which it holds ({error}); check the "
+            "rig's geometry and the recordings' units and columns"
+        ) from error
 
 
 def _drowned(rig: Rig, blocks: list[Block], recordings: list[Prepared], core: _core.Rig) -> dict[str, str]:
@@ -157,7 +170,8 @@ def diagnose(case: Case | str | os.PathLike[str], *, progress: Callable[[str], N
             f"({', '.join(rig.blocks)}); measure {_wanted(rig)}"
         )
     nominal_core = core_rig(rig)
-    drowned = _drowned(rig, blocks, fitted, nominal_core)
+    with _in_range(case.name):
+        drowned = _drowned(rig, blocks, fitted, nominal_core)
     blocks = [b for b in blocks if b.name not in drowned]
     if not blocks:
         raise DiagnosisError(f"case {case.name!r}: {'; '.join(drowned.values())}")
@@ -166,18 +180,13 @@ def diagnose(case: Case | str | os.PathLike[str], *, progress: Callable[[str], N
     outer = Problem(blocks, held, nominal_core) if held else inner
     gas = [b for b in blocks if b.kind != "arm"]
     motion = [b for b in blocks if b.kind == "arm"]
-    try:
+    with _in_range(case.name):
         groups = [examine(inner, outer, rig, members, say) for members in (gas, motion) if members]
         unsettled = _unsettled(rig) if motion else []
         if unsettled:
             groups = [_doubted(group) for group in groups]
         say("putting the answer together")
         diagnosis = assemble.assemble(case, inner, outer, groups)
-    except SimulationError as error:
-        raise DiagnosisError(
-            f"case {case.name!r}: the model, driven by the recordings, leaves the range in which it holds ({error}); check the "
-            "rig's geometry and the recordings' units and columns"
-        ) from error
     for name, share in thin.items():
         diagnosis.warnings.append(f"block {name} was left out: only {100 * share:.0f} % of its samples are usable")
     diagnosis.warnings += drowned.values()
