@@ -8,6 +8,7 @@ import pickle
 import subprocess
 import sys
 import textwrap
+import threading
 
 import numpy as np
 import pytest
@@ -162,3 +163,25 @@ def test_an_animation_lasts_as_long_as_it_says(tmp_path, duration: float, speed:
             picture.seek(frame)
             lasts += picture.info["duration"] / 1e3
     assert lasts == pytest.approx(duration / speed, abs=0.06)
+
+
+def test_two_threads_lose_no_sample() -> None:
+    simulator = pamrs.Simulator(pamrs.rigs.shoulder(), sample_time=0.001)
+    refused: list[str] = []
+    done: list[int] = []
+
+    def work() -> None:
+        for _ in range(300):
+            try:
+                simulator.run(np.full(20, 6.0))
+                done.append(20)
+            except RuntimeError as error:
+                refused.append(str(error))
+
+    threads = [threading.Thread(target=work) for _ in range(2)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert round(simulator.time / 0.001) == sum(done)
+    assert all("one thread at a time" in text for text in refused)

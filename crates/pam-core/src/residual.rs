@@ -523,7 +523,16 @@ fn run<S: Scalar>(
             }
         }
         check_state(&stepper.plant, &state, k as f64 * dt)?;
+        let command = |input: usize, sample: i64| {
+            let row = sample.clamp(0, n as i64 - 1) as usize;
+            measured.commands[input][row]
+        };
         let mut controls = stepper.plant.controls(|input| measured.commands[input][k]);
+        if skewed {
+            let began = k as f64 * dt;
+            let (_, late) = clocks(&stepper.plant, began);
+            controls = stepper.plant.skewed_controls(late, began, timing.step(), dt, command);
+        }
         sink(k, state[reading.unwrap_or(output)] + offset, &stepper, &state, &controls);
         if k + 1 == n {
             break;
@@ -533,10 +542,6 @@ fn run<S: Scalar>(
             let time = (k as f64 + i as f64 * h) * dt;
             let (shift, late) = clocks(&stepper.plant, time);
             if skewed {
-                let command = |input: usize, sample: i64| {
-                    let row = sample.clamp(0, n as i64 - 1) as usize;
-                    measured.commands[input][row]
-                };
                 controls = stepper.plant.skewed_controls(late, time, timing.step(), dt, command);
             }
             stepper.step(

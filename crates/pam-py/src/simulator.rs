@@ -1,6 +1,7 @@
 //! `_core.Simulator`: a simulation that goes on sample by sample, and the one way both it and `Rig.simulate` run.
 
 use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::convert::{array, error, values};
@@ -9,6 +10,7 @@ use numpy::{PyArray1, PyReadonlyArray1, PyReadwriteArray2};
 use pam_core::drive::Drive;
 use pam_core::run::OwnedRun;
 use pam_core::simulate::{Initial, Progress, Timing, Trajectory};
+use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
 
@@ -78,6 +80,8 @@ pub struct Simulator {
     rig: Arc<pam_core::Rig>,
     timing: Timing,
     progress: Mutex<Progress>,
+    /// Whether a call is advancing it.
+    busy: AtomicBool,
     /// Gone while a call uses it; another thread that calls meanwhile makes its own.
     work: Mutex<Option<Work>>,
     names: Vec<Py<PyString>>,
@@ -90,6 +94,18 @@ impl Simulator {
 
     fn work(&self) -> MutexGuard<'_, Option<Work>> {
         self.work.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Advance what another call does not advance meanwhile.
+    fn alone<T>(&self, act: impl FnOnce() -> PyResult<T>) -> PyResult<T> {
+        if self.busy.swap(true, Ordering::AcqRel) {
+            return Err(PyRuntimeError::new_err(
+                "this Simulator is being advanced by another thread: it belongs to one thread at a time",
+            ));
+        }
+        let done = act();
+        self.busy.store(false, Ordering::Release);
+        done
     }
 
     /// Do something with what a sample is worked out with.
@@ -141,7 +157,14 @@ impl Simulator {
         let (timing, progress) = made.map_err(|e| error(py, &e))?;
         let names =
             rig.names().channels.iter().map(|(name, _)| PyString::intern(py, name).unbind()).collect();
-        Ok(Self { rig, timing, progress: Mutex::new(progress), work: Mutex::new(None), names })
+        Ok(Self {
+            rig,
+            timing,
+            progress: Mutex::new(progress),
+            busy: AtomicBool::new(false),
+            work: Mutex::new(None),
+            names,
+        })
     }
 
     /// Hold each command for one sample; the samples after them as channels by name, and what happened on the way.
@@ -154,10 +177,12 @@ impl Simulator {
         let signals = owned(&signals);
         let drive = Drive::new(&self.rig, samples, &borrowed(&signals)).map_err(|e| error(py, &e))?;
         let mut out = Trajectory::new(&self.rig, samples);
-        let mut progress = self.progress().clone();
-        let done = run(py, &self.rig, self.timing, &mut progress, &drive, &mut out);
-        *self.progress() = progress;
-        done?;
+        self.alone(|| {
+            let mut progress = self.progress().clone();
+            let done = run(py, &self.rig, self.timing, &mut progress, &drive, &mut out);
+            *self.progress() = progress;
+            done
+        })?;
         let happened = events(&out);
         Ok((channels(py, &self.rig, out)?, happened))
     }
@@ -180,15 +205,17 @@ impl Simulator {
         let named = named.collect::<PyResult<Vec<_>>>()?;
         let drive = Drive::new(&self.rig, 1, &named).map_err(|e| error(py, &e))?;
         self.with_work(py, |run, out| {
-            let mut progress = self.progress().clone();
-            let done = watched(py, |look| {
-                run.with(|run| {
-                    (0..samples)
-                        .try_for_each(|_| progress.advance_in(run, self.timing, &drive, 0..1, out, look))
-                })
-            });
-            *self.progress() = progress;
-            done?;
+            self.alone(|| {
+                let mut progress = self.progress().clone();
+                let done = watched(py, |look| {
+                    run.with(|run| {
+                        (0..samples)
+                            .try_for_each(|_| progress.advance_in(run, self.timing, &drive, 0..1, out, look))
+                    })
+                });
+                *self.progress() = progress;
+                done
+            })?;
             if let Some(mut rows) = rows {
                 let mut rows = rows.as_array_mut();
                 for (mut row, values) in rows.outer_iter_mut().zip(&out.channels) {
