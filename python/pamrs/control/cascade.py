@@ -152,4 +152,5 @@ def cascaded_pid(
         As :class:`pamrs.control.PID` and :class:`Cascade`.
     """
     outer = PID(kp, ki, kd, period=period, **{"output_filter": 0.0, "limits": (0.0, pressure_limit), "null": 0.0, **others})
+    outer.answers = "pressure"
     return Cascade(outer, PressureLoop(period=period) if inner is None else inner)

@@ -8,7 +8,7 @@ from pamrs.control.air import AirModel
 from pamrs.control.joint_sensor import JointSensor
 from pamrs.control.model import ArmModel
 from pamrs.control.parts import LowPass
-from pamrs.control.protocol import Controller, Measurement, Reference, Value
+from pamrs.control.protocol import Controller, Measurement, Reference, Value, check_drives_valve
 from pamrs.control.sampled import SampledController
 from pamrs.control.values import as_value, clip, sin
 from pamrs.errors import ParameterError
@@ -137,12 +137,13 @@ class Parallel(SampledController):
     Raises
     ------
     ParameterError
-        If the two have not the same period.
+        If the two have not the same period, or the feedback answers a pressure.
     """
 
     _PARTS: ClassVar[tuple[str, ...]] = ("feedforward", "feedback")
 
     def __init__(self, feedforward: Feedforward, feedback: Controller) -> None:
+        check_drives_valve(feedback)
         if feedforward.period != feedback.period:
             raise ParameterError(f"feedback.period = {feedback.period} s is not the feedforward's {feedforward.period} s")
         self.feedforward, self.feedback = feedforward, feedback

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final
 import numpy as np
 
 from pamrs.control.model import TorqueModel, _parts
-from pamrs.control.protocol import Controller, Measurement, Reference, Value
+from pamrs.control.protocol import Controller, Measurement, Reference, Value, check_drives_valve
 from pamrs.control.sampled import SampledController, Stateful
 from pamrs.control.spline import Spline
 from pamrs.control.values import clip
@@ -159,6 +159,7 @@ class HysteresisCompensation(SampledController):
         self.torque = HystereticTorque(owner.arm.torque, rig)
         owner.arm = owner.arm.replace(torque=self.torque)
         super().__init__(controller.period)
+        self.answers = controller.answers
         self.null = getattr(controller, "null", None)
         self.reset()
 
@@ -195,12 +196,14 @@ class DeadZoneCompensation(SampledController):
     Raises
     ------
     ParameterError
-        If the rig has not the effect on its one valve, or ``blend`` is not within 0 (left out) and 1.
+        If the controller answers a pressure, the rig has not the effect on its one valve, or ``blend`` is not within 0 (left out) and
+        1.
     """
 
     _PARTS: ClassVar[tuple[str, ...]] = ("controller",)
 
     def __init__(self, controller: Controller, rig: Rig, *, blend: float = 0.005) -> None:
+        check_drives_valve(controller)
         found = [entry for entry in rig.effects if entry["id"] == "valve_dead_zone"]
         valves = rig.tables("valve")
         if len(found) != 1 or len(valves) != 1:

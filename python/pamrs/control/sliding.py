@@ -56,6 +56,7 @@ class SlidingController(SampledController):
         As for :class:`pamrs.control.PID`.
     """
 
+    answers = "pressure"
     _PARTS: ClassVar[tuple[str, ...]] = ("sensor",)
 
     def __init__(

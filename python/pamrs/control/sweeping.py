@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pamrs.control.loop import Actuation, actuation_of, multiple
+from pamrs.control.loop import Actuation, actuation_of
 from pamrs.control.metrics import angle_factor, slope_sine
-from pamrs.control.protocol import Controller
+from pamrs.control.protocol import Controller, check_controller
 from pamrs.control.sensors import Sensors
 from pamrs.control.trajectories import Trajectory
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
-from pamrs.simulation import default_step
+from pamrs.simulation import default_step, whole_samples
 
 if TYPE_CHECKING:
     from pamrs.batch import BatchRun
@@ -129,12 +129,13 @@ def sweep(
     from pamrs.batch import Batch
 
     factor = angle_factor(unit)
+    check_controller(controller)
     period = controller.period
     dt = default_step(period) if sample_time is None else sample_time
     batch = Batch(plants, n=n, sample_time=dt, step=step, initial=initial, threads=threads)
-    every = multiple("controller.period", period, dt)
-    total = multiple("duration", trajectory.duration if duration is None else duration, dt)
-    act = actuation_of(batch.rigs[0]) if actuation is None else actuation
+    every = whole_samples("controller.period", period, dt, least=1)
+    total = whole_samples("duration", trajectory.duration if duration is None else duration, dt, least=1)
+    act = actuation_of(batch.rigs[0], controller) if actuation is None else actuation
     read = None if sensors is None else sensors.started(period)
     controller.reset()
     sums = _Sums(len(batch), factor)
