@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pamrs.channels import channel_of
 from pamrs.control.metrics import Metrics, evaluate
 from pamrs.control.protocol import Controller, Reference, check_controller, check_drives_valve
-from pamrs.control.sensors import Sensors
+from pamrs.control.sensors import Reader, Sensors, reader_of
 from pamrs.control.trajectories import Trajectory
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
@@ -23,7 +23,7 @@ from pamrs.simulator import Simulator
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Actuation", "ClosedLoop", "actuation_of", "closed_loop"]
+__all__ = ["Actuation", "ClosedLoop", "actuation_of", "closed_loop", "tracked_of"]
 
 Array = NDArray[np.float64]
 #: From a controller's command to the keywords of :meth:`pamrs.Simulator.step`: ``lambda u: {"valve_command": {"flexor": u, ...}}``.
@@ -124,7 +124,7 @@ def closed_loop(
     sample_time: float | None = None,
     step: float | None = None,
     initial: Mapping[str, float] | None = None,
-    sensors: Sensors | None = None,
+    sensors: Sensors | Reader | None = None,
     actuation: Actuation | None = None,
     measured: Mapping[str, str] | None = None,
     channels: Iterable[str] | None = None,
@@ -151,8 +151,9 @@ def closed_loop(
         simulator.
     step, initial : optional
         As for :class:`pamrs.Simulator`; not for a simulator.
-    sensors : Sensors, optional
-        What the controller is told; the truth by default.
+    sensors : Sensors or Reader, optional
+        What the controller is told; the truth by default. A reader, ``sensors.started(controller.period)``, goes on from loop to loop,
+        where sensors begin again, with their noise and their delay.
     actuation : callable, optional
         From the command to the keywords of :meth:`pamrs.Simulator.step`: ``lambda u: {"valve_command": {"flexor": u, "extensor":
         10.0 - u}}``. By default the command is that of the only valve, or of the only regulator of a rig without valves.
@@ -196,7 +197,7 @@ def closed_loop(
     act = actuation_of(simulator.rig, controller) if actuation is None else actuation
     began = round(start / dt) if abs(round(start / dt) * dt - start) < 1e-9 * dt else start / dt  # a restart at the same float
     names = _recorded(simulator.rig, channels, measured)
-    read = None if sensors is None else sensors.started(controller.period)
+    read = reader_of(sensors, controller.period)
     if reset:
         controller.reset()
     commands = np.full(total + 1, np.nan)
@@ -242,20 +243,42 @@ def _simulator(
 
 def _recorded(rig: Rig, channels: Iterable[str] | None, measured: Mapping[str, str] | None) -> list[str]:
     """Names of the channels that are kept; the tracked ones always are."""
-    known = core_rig(rig).channels
-    for name in (measured or {}).values():
-        if name not in known:
-            raise ParameterError(f"measured has {name!r}, and the rig has no such channel; it has: {', '.join(known)}")
-    tracked = (measured or {}).get("joint_angle", "joint_angle")
-    if tracked not in known:
-        raise ParameterError(f"the rig {rig.name!r} has no channel {tracked!r}; name the joint by measured; it has: {', '.join(known)}")
+    known, tracked = core_rig(rig).channels, tracked_of(rig, measured)
     if channels is None:
         return known
-    wanted = list(dict.fromkeys([tracked, tracked.replace("joint_angle", "joint_rate", 1), *channels]))
+    wanted = list(dict.fromkeys([*tracked, *channels]))
     for name in wanted:
         if name not in known:
             raise ParameterError(f"channels has {name!r}, and the rig has no such channel; it has: {', '.join(known)}")
     return wanted
+
+
+def tracked_of(rig: Rig, measured: Mapping[str, str] | None) -> tuple[str, str]:
+    """The rig's names of angle and rate of the joint that is tracked.
+
+    Parameters
+    ----------
+    rig : Rig
+    measured : mapping of str to str, optional
+        As for :func:`closed_loop`.
+
+    Returns
+    -------
+    tuple of (str, str)
+
+    Raises
+    ------
+    ParameterError
+        If a channel is not known, or there is no such joint.
+    """
+    known = core_rig(rig).channels
+    for name in (measured or {}).values():
+        if name not in known:
+            raise ParameterError(f"measured has {name!r}, and the rig has no such channel; it has: {', '.join(known)}")
+    angle = (measured or {}).get("joint_angle", "joint_angle")
+    if angle not in known:
+        raise ParameterError(f"the rig {rig.name!r} has no channel {angle!r}; name the joint by measured; it has: {', '.join(known)}")
+    return angle, angle.replace("joint_angle", "joint_rate", 1)
 
 
 def actuation_of(rig: Rig, controller: Controller) -> Actuation:
