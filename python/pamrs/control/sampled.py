@@ -69,10 +69,17 @@ class Stateful:
         for part in self._PARTS:
             getattr(self, part).restore(state[part])
 
-    def _leaves(self) -> list[tuple[Any, str]]:
-        """Every attribute in which a number of the state is kept, with its owner."""
-        own: list[tuple[Any, str]] = [(self, f"_{name}") for name in self._STATE]
-        return [*own, *(leaf for part in self._PARTS for leaf in _leaves_of(getattr(self, part)))]
+    def _leaves(self) -> dict[str, bool]:
+        """Every attribute in which a number of the state is kept, dotted, and whether it is changed in place."""
+        found = {f"_{name}": isinstance(start, list) for name, start in self._start().items()}
+        for part in self._PARTS:
+            one = getattr(self, part)
+            # another's controller has its state and restore only
+            found |= {
+                f"{part}.{name}": changed
+                for name, changed in (one._leaves() if isinstance(one, Stateful) else {"state": False}).items()
+            }
+        return found
 
     def _check_state(self, state: Mapping[str, Any], where: str = "state", batch: int | None = -1) -> None:
         """Refuse what is no state for a batch of a size, None being one plant and -1 any."""
@@ -104,11 +111,6 @@ class Stateful:
                 one._check_state(state[part], f"{where}.{part}", batch)
 
 
-def _leaves_of(part: Any) -> list[tuple[Any, str]]:
-    # another's controller has its state and restore
-    return part._leaves() if isinstance(part, Stateful) else [(part, "")]
-
-
 class Fixed:
     """What a controller was made with: it can be read, not set, since what follows from it is worked out once.
 
@@ -132,29 +134,39 @@ class Fixed:
 
 
 class Restorer:
-    """Numbers of parts that are put back when a later part refuses the sample, so that the whole refuses it.
+    """Numbers of a part that are put back when a later part refuses the sample, so that the whole refuses it.
 
     Parameters
     ----------
-    *parts : Stateful or Controller
-        Those that answer first.
+    part : Stateful or Controller
+        The one that answers first.
     """
 
-    def __init__(self, *parts: Any) -> None:
-        self._leaves = [leaf for part in parts for leaf in _leaves_of(part)]
+    def __init__(self, part: Any) -> None:
+        leaves = part._leaves() if isinstance(part, Stateful) else {"state": False}
+        self._part, self._names = part, tuple(leaves)
+        # one look at all of them costs less than a microsecond, which state does not
+        self._get = operator.attrgetter(*self._names)
+        self._in_place = tuple(k for k, changed in enumerate(leaves.values()) if changed)
 
-    def take(self) -> list[Any]:
+    def take(self) -> Any:
         """The numbers now."""
-        found = [getattr(owner, name) if name else owner.state for owner, name in self._leaves]
-        return [value if value.__class__ is float or value is None else _copied(value) for value in found]
+        found: Any = self._get(self._part)
+        if self._in_place:
+            found = list(found)
+            for k in self._in_place:
+                found[k] = found[k].copy()
+        return found
 
-    def put_back(self, taken: list[Any]) -> None:
+    def put_back(self, taken: Any) -> None:
         """As they were when they were taken."""
-        for (owner, name), value in zip(self._leaves, taken, strict=True):
-            if name:
-                setattr(owner, name, value)
-            else:
+        for name, value in zip(self._names, taken if len(self._names) > 1 else (taken,), strict=True):
+            where, _, last = name.rpartition(".")
+            owner = operator.attrgetter(where)(self._part) if where else self._part
+            if last == "state":
                 owner.restore(value)
+            else:
+                setattr(owner, last, value)
 
 
 class SampledController(Stateful, Controller):
@@ -219,8 +231,8 @@ class SampledController(Stateful, Controller):
         self._last = None if state["time"] is None else float(state["time"])
         self._batch = self._size = None if state["batch"] is None else int(state["batch"])
 
-    def _leaves(self) -> list[tuple[Any, str]]:
-        return [(self, "_last"), (self, "_batch"), (self, "_size"), *super()._leaves()]
+    def _leaves(self) -> dict[str, bool]:
+        return {"_last": False, "_batch": False, "_size": False, **super()._leaves()}
 
     def _check_state(self, state: Mapping[str, Any], where: str = "state", batch: int | None = -1) -> None:
         if not isinstance(state, Mapping) or "time" not in state or "batch" not in state:
