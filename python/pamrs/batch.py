@@ -20,6 +20,8 @@ __all__ = ["Batch", "BatchRun", "Failure"]
 
 Array = NDArray[np.float64]
 _MOST_THREADS = 256
+#: What is made from the rest, and not pickled.
+_MADE = ("_core", "_first", "_inputs", "_channels", "_commands")
 
 
 class Failure(NamedTuple):
@@ -143,8 +145,13 @@ class Batch:
         self._step = chosen_step(self.sample_time, step)
         self._threads = _threads(threads)
         self._prepare()
-        self._initial = self._starting(initial)
-        self._core = self._started(self._initial)
+        self._begin(self._starting(initial))
+
+    def _begin(self, initial: dict[str, Array]) -> None:
+        """A core for initial values, and its first state, to begin again from without new threads."""
+        self._initial = initial
+        self._core = self._started(initial)
+        self._first = self._core.states
 
     def _prepare(self) -> None:
         self._inputs = Inputs(self.rigs[0])
@@ -220,8 +227,10 @@ class Batch:
         dict of str to ndarray, shape (n,)
             The first sample.
         """
-        start = self._initial if initial is None else self._starting(initial)
-        self._core, self._initial = self._started(start), start
+        if initial is None:
+            self._core.restore(0, self._first, [None] * len(self))
+        else:
+            self._begin(self._starting(initial))
         return self.observe()
 
     def observe(self) -> dict[str, Array]:
@@ -283,7 +292,7 @@ class Batch:
         Parameters
         ----------
         update : callable
-            Takes the sample (channel -> values of all plants, shape (n,), in SI units, and ``time`` [s]); returns the valve
+            Takes the sample (channel -> values of all plants, shape (n,), in SI units, read-only, and ``time`` [s]); returns the valve
             commands [V], shape (n,) or one for all, of several valves a mapping of names, or a mapping of the keywords of
             :meth:`step`.
         duration : float
@@ -312,7 +321,8 @@ class Batch:
         every = whole_samples("period", self.sample_time if period is None else period, self.sample_time, least=1)
         total = whole_samples("duration", duration, self.sample_time, least=0)
         book = self._book(total, channels, record_every)
-        began, sample, k = self.time, self.observe(), 0
+        # what is recorded is what was, whatever the controller does with its sample
+        began, sample, k = self.time, self._named(self._core.observe(), writeable=False), 0
         signals: dict[str, Array] = {}
         while True:
             if k % every == 0 and k < total:
@@ -323,7 +333,7 @@ class Batch:
                 break
             # up to where there is something to do
             stop = min(k + every - k % every, k + book.every - k % book.every, total)
-            sample = self._named(self._core.advance(stop - k, signals, False))
+            sample = self._named(self._core.advance(stop - k, signals, False), writeable=False)
             k = stop
         time = np.asarray(began + np.arange(0, total + 1, book.every) * self.sample_time, dtype=np.float64)
         return BatchRun(time, {name: rows.T for name, rows in book.rows.items()}, self.status)
@@ -345,18 +355,19 @@ class Batch:
             )
         return _Book({name: np.full((rows, len(self)), np.nan) for name in names}, int(every))
 
-    def _named(self, sample: Array) -> dict[str, Array]:
+    def _named(self, sample: Array, *, writeable: bool = True) -> dict[str, Array]:
+        sample.flags.writeable = writeable
         return dict(zip(self._channels, sample, strict=True))
 
     def __getstate__(self) -> dict[str, Any]:
-        kept = {name: value for name, value in self.__dict__.items() if name not in ("_core", "_inputs", "_channels", "_commands")}
+        kept = {name: value for name, value in self.__dict__.items() if name not in _MADE}
         return {**kept, "state": self.state}
 
     def __setstate__(self, kept: dict[str, Any]) -> None:
         state = kept.pop("state")
         self.__dict__.update(kept)
         self._prepare()
-        self._core = self._started(self._initial)
+        self._begin(self._initial)
         self.restore(state)
 
     def __repr__(self) -> str:

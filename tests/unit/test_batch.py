@@ -373,3 +373,39 @@ def test_a_batch_goes_on_in_a_forked_process() -> None:
         print(os.waitpid(child, 0)[1])
     """)
     assert said == ["0"]
+
+
+def test_a_controller_cannot_change_what_is_recorded():
+    """Nor what sensors with a delay have on their way."""
+    batch = pamrs.Batch(pamrs.rigs.shoulder(), n=2, sample_time=0.005)
+
+    def update(sample):
+        with pytest.raises(ValueError, match="read-only"):
+            sample["joint_angle"] -= 1.0
+        return 6.0
+
+    run = batch.control(update, 0.1)
+    assert (run["joint_angle"] > 0.0).all()
+    sample = batch.observe()
+    sample["joint_angle"] -= 1.0  # a sample of one's own may be
+
+
+def test_a_reset_is_a_new_batch_and_keeps_its_threads():
+    rigs = [pamrs.rigs.shoulder().with_parameters({"arm.payload": m}) for m in (2.0, 9.0)]
+    used, new = (pamrs.Batch(rigs, sample_time=0.005, initial={"joint_angle": [0.4, 0.6]}, threads=2) for _ in range(2))
+    core = used._core
+    for _ in range(50):
+        used.step([9.0, 6.0])
+    used.reset()
+    assert used._core is core
+    assert used.time == 0.0
+    for _ in range(50):
+        one, other = used.step([7.0, 3.0]), new.step([7.0, 3.0])
+        assert all((one[name] == other[name]).all() for name in one)
+    again = pickle.loads(pickle.dumps(used))
+    again.reset()
+    new.reset({"joint_angle": [0.5, 0.5]})
+    assert again.observe()["joint_angle"] == pytest.approx([0.4, 0.6])
+    assert new.observe()["joint_angle"] == pytest.approx([0.5, 0.5])
+    new.step(5.0)
+    assert new.reset()["joint_angle"] == pytest.approx([0.5, 0.5])

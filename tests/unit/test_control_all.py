@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.control import Reference
+from pamrs.control import PID, Cascade, Feedforward, Parallel, Reference, cascaded_pid
 from pamrs.errors import ParameterError
 
-from .control_cases import CONTROLLERS, DIAGNOSED, PERIOD, SHOULDER, samples, singles, smooth
+from .control_cases import AIR, CONTROLLERS, DIAGNOSED, FULL, PERIOD, SHOULDER, samples, singles, smooth
 
 ALL = pytest.mark.parametrize("name", CONTROLLERS)
 
@@ -94,6 +94,103 @@ def test_a_refused_sample_changes_nothing(name):
         with pytest.raises(ParameterError, match="time"):
             controller.update(time, rows[20], aim_of(name, 20 * PERIOD))
         assert controller.state == state
+
+
+@ALL
+@pytest.mark.parametrize("first", [True, False])
+def test_a_refused_sample_changes_nothing_whatever_refuses_it(name, first):
+    controller = CONTROLLERS[name](1.0)
+    rows = [singles(sample) for sample in samples(30)]
+    for k in range(0 if first else 20):
+        controller.update(k * PERIOD, rows[k], aim_of(name, k * PERIOD))
+    k = 0 if first else 20
+    time, good, aim = k * PERIOD, rows[k], aim_of(name, k * PERIOD)
+    state = controller.state
+    wrong = [({n: v for n, v in good.items() if n != channel}, aim) for channel in good]
+    wrong += [({**good, channel: np.array([1.0, math.nan, 1.0])}, aim) for channel in good]
+    # two lengths in one sample, of which the first is good by itself
+    wrong += [({**good, "joint_angle": np.zeros(3), "muscle_pressure": np.zeros(4)}, aim)]
+    arrays = Reference(aim.angle + np.zeros(3), aim.rate + np.zeros(3), math.nan)
+    wrong += [(good, arrays), (good, (1.0,)), (good, 1.0), ({**good, "joint_angle": np.zeros(4)}, arrays._replace(acceleration=0.0))]
+    refused = 0
+    for measurement, reference in wrong:
+        try:
+            controller.update(time, measurement, reference)
+        except ParameterError:
+            refused += 1
+            assert controller.state == state
+        else:
+            controller.restore(state)  # it does not read that channel
+    assert refused >= 5
+    # and nothing is left of the refused ones where a state does not show it
+    fresh = CONTROLLERS[name](1.0)
+    fresh.restore(state)
+    both = [{n: v + np.zeros(2) for n, v in good.items()}, good] if first else [good]
+    for measurement in both:
+        answers = [one.update(time, measurement, aim) for one in (controller, fresh)]
+        assert np.array_equal(*answers)
+        controller.restore(state)
+        fresh.restore(state)
+
+
+@pytest.mark.parametrize("feedback", ["pid", "cascade"])
+def test_a_rate_that_only_the_feedback_needs_is_refused_by_the_whole(feedback):
+    inner = PID(2.0, 1.0, 0.1, period=PERIOD, measured_rate=True)
+    parallel = Parallel(Feedforward(FULL, AIR, 1.0, period=PERIOD), inner if feedback == "pid" else cascaded_pid(1e6, period=PERIOD))
+    sample = {**singles(next(samples(1))), **({} if feedback == "pid" else {"joint_angle": math.nan})}
+    state = parallel.state
+    with pytest.raises(ParameterError, match="joint"):
+        parallel.update(0.0, {n: v for n, v in sample.items() if n != "joint_rate"}, smooth(0.0))
+    assert parallel.state == state
+    assert state["feedforward"]["time"] is None
+
+
+def test_parts_for_different_batches_are_refused():
+    with pytest.raises(ParameterError, match="lengths"):
+        Parallel(CONTROLLERS["feedforward"](np.ones(2)), CONTROLLERS["pid"](np.ones(3)))
+    with pytest.raises(ParameterError, match="lengths"):
+        Cascade(CONTROLLERS["sliding"](np.ones(2)).outer, CONTROLLERS["pressure loop"](np.ones(3)))
+
+
+@ALL
+def test_what_is_not_a_state_is_refused_and_changes_nothing(name):
+    batch, single = CONTROLLERS[name](np.array([0.5, 1.0, 1.5])), CONTROLLERS[name](1.0)
+    for k, sample in enumerate(samples(5)):
+        for one in (batch, single):
+            one.update(k * PERIOD, singles(sample), aim_of(name, k * PERIOD))
+    kept = pickle.dumps((batch.state, single.state))
+
+    def leaves(state, path=()):
+        for key, value in state.items():
+            if isinstance(value, dict):
+                yield from leaves(value, (*path, key))
+            else:
+                yield (*path, key), value
+
+    def changed(state, path, value):
+        state = copy.deepcopy(state)
+        inner = state
+        for key in path[:-1]:
+            inner = inner[key]
+        inner[path[-1]] = value
+        return state
+
+    def at(state, path):
+        return at(state[path[0]], path[1:]) if path else state
+
+    for one, fresh in ((batch, CONTROLLERS[name](np.ones(3)).state), (single, CONTROLLERS[name](1.0).state)):
+        state = one.state
+        for path, _ in leaves(state):
+            wrong = ["x", "1.0", [1.0, "a"], np.zeros((2, 3, 4)), np.zeros(5), [[1.0], [1.0, 2.0]]]
+            if at(fresh, path) is not None:
+                wrong.append(None)
+            for bad in wrong:
+                with pytest.raises(ParameterError, match="state"):
+                    one.restore(changed(state, path, bad))
+    # a state of three plants does not fit one of five, gains of three nothing else
+    with pytest.raises(ParameterError, match="state"):
+        CONTROLLERS[name](np.ones(5)).restore(batch.state)
+    assert pickle.dumps((batch.state, single.state)) == kept
 
 
 #: Root mean square and largest absolute error [deg] from 6 s on, on a shoulder some per cent off its model: measured, and 15 % more.

@@ -1,16 +1,22 @@
 """A live loop: what it does at jitter, dropouts, overruns, lost sensors, Ctrl-C and failures; the safe command comes last, always."""
 
 import math
+import os
+import signal
+import subprocess
+import sys
+import threading
 
 import numpy as np
 import pytest
 
 import pamrs
-from pamrs.control import PID, closed_loop
+from pamrs.control import PID, Cascade, DeadZoneCompensation, HysteresisCompensation, Parallel, closed_loop, sweep
 from pamrs.control.live import LiveError, SystemClock, run_live
 from pamrs.control.simulated_device import FAULTS, SimulatedDevice, VirtualClock
 from pamrs.control.trajectories import degrees, lift_hold_return
 from pamrs.errors import ParameterError
+from tests.unit.control_cases import CONTROLLERS, DIAGNOSED
 from tests.unit.control_helpers import SmallPid
 
 LIFT = lift_hold_return(*degrees(15, 50), ramp=2.0, hold=1.0, duration=5.0)
@@ -60,12 +66,45 @@ def test_a_missed_reading_holds_the_command_and_the_controller_keeps_its_time(ri
     assert 0.1 < gone.mean() < 0.2
     for k in np.flatnonzero(gone):
         assert run.command[k] == (run.command[k - 1] if k else 5.0)
-    assert len(device.written) == (~gone).sum() + 1
+    assert len(device.written) == (~gone).sum() + 2  # the safe command before and after
 
 
-def test_a_stale_reading_is_only_seen_by_its_stamp(rig):
-    run, _ = live(rig, device={"dropouts": 0.2, "faults": ("stale",), "seed": 1})
-    assert run.missed == 0
+class Altered(SimulatedDevice):
+    """A device whose readings pass through a function."""
+
+    def __init__(self, rig, clock, change, **options):
+        super().__init__(rig, clock, **options)
+        self.change = change
+
+    def read(self):
+        return self.change(super().read())
+
+
+def test_a_stale_reading_is_seen_by_its_time_or_a_counter(rig):
+    stale = {"dropouts": 0.2, "faults": ("stale",), "seed": 1}
+    for stamp, change, seen in (
+        (None, dict, True),
+        (None, lambda m: {n: v for n, v in m.items() if n != "time"}, False),
+        ("frame", lambda m: {**{n: v for n, v in m.items() if n != "time"}, "frame": round(1e3 * m["time"])}, True),
+    ):
+        clock = VirtualClock()
+        run = run_live(Altered(rig, clock, change, **stale), SmallPid(period=0.01), LIFT, clock=clock, stamp=stamp)
+        assert (50 < run.missed < 150) == seen
+        assert seen or run.missed == 0
+
+
+def test_what_cannot_be_is_no_reading(rig):
+    def change(m):
+        return {**m, "joint_angle": m["joint_angle"] + (7.0 if 1.0 < m["time"] < 1.03 else 0.0)}
+
+    clock = VirtualClock()
+    device = Altered(rig, clock, change)
+    run = run_live(device, SmallPid(period=0.01), LIFT, clock=clock, plausible={"joint_angle": (0.0, 2.2)})
+    assert run.missed == 2
+    assert (np.flatnonzero(np.isnan(run.channels["joint_angle"])) == [101, 102]).all()
+    clock = VirtualClock()
+    run = run_live(SimulatedDevice(rig, clock), SmallPid(period=0.01), LIFT, clock=clock, plausible={"elbow": (0.0, 1.0)})
+    assert (run.reason, run.missed) == ("lost_sensor", 6)
 
 
 @pytest.mark.parametrize("safe", [5.0, 0.0])
@@ -92,7 +131,71 @@ def test_no_reading_at_all_commands_nothing_but_the_safe_value(rig):
     run, device = live(rig, device={"lost_from": 0.0, "faults": ("none",)}, most_missed=5, safe=5.0)
     assert run.reason == "lost_sensor"
     assert run.time.size == 6
-    assert [command for _, command in device.written] == [5.0]
+    assert [command for _, command in device.written] == [5.0, 5.0]
+
+
+def test_the_safe_command_is_written_before_the_first_reading(rig):
+    _, device = live(rig, device={"lost_from": 0.0, "faults": ("none",)}, safe=0.0)
+    assert device.written[0] == (0.0, 0.0)
+    assert device.command == 0.0
+
+
+class Slow(SimulatedDevice):
+    """One call takes its time."""
+
+    def __init__(self, rig, clock, at, takes):
+        super().__init__(rig, clock)
+        self.at, self.takes = at, takes
+
+    def read(self):
+        reading = super().read()
+        if self.clock.now() >= self.at:
+            self.at = math.inf
+            self.clock.sleep(self.takes)
+        return reading
+
+
+def test_a_reading_that_hung_is_not_acted_on(rig):
+    for takes, reason, missed in ((0.025, "finished", 1), (1.0, "lost_sensor", 1)):
+        clock = VirtualClock()
+        device = Slow(rig, clock, 0.995, takes)
+        run = run_live(device, SmallPid(period=0.01), LIFT, clock=clock, safe=0.0)
+        assert (run.reason, run.missed) == (reason, missed)
+        assert np.isnan(run.channels["joint_angle"][100])
+        after = [pair for pair in device.written if pair[0] > 0.9951]
+        # the first command after it is of a new reading, or the safe one
+        assert after[0] == ((pytest.approx(1.025), after[0][1]) if reason == "finished" else (pytest.approx(2.0), 0.0))
+
+
+def test_an_answer_that_took_too_long_is_not_written(rig):
+    clock = VirtualClock()
+
+    class Thinking(SmallPid):
+        def update(self, time, measurement, reference):
+            if time == 1.0:
+                clock.sleep(0.015)
+            return super().update(time, measurement, reference)
+
+    device = SimulatedDevice(rig, clock)
+    run = run_live(device, Thinking(period=0.01), LIFT, clock=clock)
+    assert (run.reason, run.missed, run.overruns) == ("finished", 1, 0)
+    assert run.command[100] == run.command[99]
+    # at 1.015 s only the answer to the sample of that moment
+    assert [when for when, _ in device.written if 0.995 < when < 1.018] == [pytest.approx(1.015)]
+
+
+def test_a_clock_that_goes_back_is_an_error_and_no_long_sleep(rig):
+    class Jumping(VirtualClock):
+        def now(self):
+            return super().now() - (3600.0 if super().now() >= 1.0 else 0.0)
+
+    clock = Jumping()
+    device = SimulatedDevice(rig, clock)
+    with pytest.raises(LiveError, match="went back") as caught:
+        run_live(device, SmallPid(period=0.01), LIFT, clock=clock, safe=0.0)
+    assert device.written[-1][1] == 0.0
+    assert caught.value.run.reason == "failed"
+    assert caught.value.run.time.size == 100
 
 
 def test_overruns_are_counted_and_left_out(rig):
@@ -129,9 +232,11 @@ def test_ctrl_c_gives_the_record_and_the_safe_command(rig):
 def test_a_controller_that_fails_is_an_error_after_the_safe_command(rig, error):
     clock = VirtualClock()
     device = SimulatedDevice(rig, clock)
-    with pytest.raises(LiveError, match="at 1 s"):
+    with pytest.raises(LiveError, match="at 1 s") as caught:
         run_live(device, Failing(error), LIFT, clock=clock, safe=0.0)
     assert device.written[-1] == (pytest.approx(1.0), 0.0)
+    assert caught.value.run.time.size == 100
+    assert np.isfinite(caught.value.run.channels["joint_angle"]).all()
 
 
 def test_what_is_no_exception_goes_on_after_the_safe_command(rig):
@@ -140,6 +245,106 @@ def test_what_is_no_exception_goes_on_after_the_safe_command(rig):
     with pytest.raises(SystemExit):
         run_live(device, Failing(SystemExit()), LIFT, clock=clock, safe=0.0)
     assert device.written[-1][1] == 0.0
+
+
+def test_a_way_out_whose_safe_command_fails_says_so(rig):
+    class Dead(SimulatedDevice):
+        def write(self, command):
+            if self.clock.now() >= 1.0:
+                raise OSError("bus")
+            super().write(command)
+
+    clock = VirtualClock()
+    with pytest.raises(SystemExit) as caught:
+        run_live(Dead(rig, clock), Failing(SystemExit(3)), LIFT, clock=clock, safe=0.0)
+    assert "could not be written: OSError bus" in caught.value.__notes__[0]
+
+
+TERMINATED = """
+import sys, pamrs
+from pamrs.control import PID, run_live
+from pamrs.control.trajectories import step
+
+class Device:
+    def read(self):
+        return {"joint_angle": 0.3}
+    def write(self, command):
+        print(command, flush=True)
+
+run_live(Device(), PID(2.0, period=0.01), step(0.3, 1.0, duration=30.0), safe=0.0)
+"""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP"])
+def test_a_signal_that_ends_the_program_leaves_the_safe_command(name):
+    number = getattr(signal, name)
+    with subprocess.Popen([sys.executable, "-c", TERMINATED], stdout=subprocess.PIPE, text=True) as child:
+        first = [child.stdout.readline() for _ in range(5)]
+        child.send_signal(number)
+        rest = child.stdout.read().split()
+        assert child.wait(30) == 128 + number
+    assert float(first[0]) == 0.0
+    assert float(first[4]) > 5.0
+    assert float(rest[-1]) == 0.0
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+def test_signals_are_the_programs_own_again_and_never_interrupt_the_safe_command(rig):
+    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    before = [signal.getsignal(number) for number in numbers]
+
+    class Signalled(SimulatedDevice):
+        """It gets a signal while its last command is written."""
+
+        def write(self, command):
+            if self.clock.now() >= 4.9999:
+                os.kill(os.getpid(), signal.SIGTERM)
+            super().write(command)
+
+    clock = VirtualClock()
+    device = Signalled(rig, clock)
+    with pytest.raises(SystemExit) as caught:
+        run_live(device, SmallPid(period=0.01), LIFT, clock=clock, safe=0.0)
+    assert caught.value.code == 128 + signal.SIGTERM
+    assert device.written[-1][1] == 0.0
+    assert [signal.getsignal(number) for number in numbers] == before
+    # what the program ignores stays ignored
+    old = signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    try:
+        clock = VirtualClock()
+        assert run_live(Signalled(rig, clock), SmallPid(period=0.01), LIFT, clock=clock).reason == "finished"
+    finally:
+        signal.signal(signal.SIGTERM, old)
+
+
+def test_a_loop_runs_in_any_thread(rig):
+    found = []
+    thread = threading.Thread(target=lambda: found.append(live(rig)[0].reason))
+    thread.start()
+    thread.join()
+    assert found == ["finished"]
+
+
+def test_a_pressure_is_no_valve_command(rig):
+    sliding = CONTROLLERS["sliding"](1.0).outer
+    assert sliding.answers == "pressure"
+    clock = VirtualClock()
+    for call in (
+        lambda: run_live(SimulatedDevice(rig, clock), sliding, LIFT, clock=clock),
+        lambda: closed_loop(rig, sliding, LIFT, 0.1),
+        lambda: sweep(rig, sliding, LIFT, 0.1, n=2),
+        lambda: DeadZoneCompensation(sliding, DIAGNOSED),
+        lambda: Parallel(CONTROLLERS["feedforward"](1.0), sliding),
+        lambda: closed_loop(rig, CONTROLLERS["cascaded pid"](1.0).outer, LIFT, 0.1),
+        lambda: closed_loop(rig, HysteresisCompensation(sliding, DIAGNOSED), LIFT, 0.1),
+    ):
+        with pytest.raises(ParameterError, match="Cascade"):
+            call()
+    assert closed_loop(rig, Cascade(sliding), LIFT, 0.1).command.max() <= 10.0
+    # with an actuation that knows what to do with it it is allowed
+    run = closed_loop(rig, sliding, LIFT, 0.1, actuation=lambda pressure: {"valve_command": 5.0 + 1e-7 * pressure})
+    assert run.command.max() > 10.0
 
 
 def test_a_write_that_fails_is_tried_again_for_the_safe_command(rig):
@@ -175,14 +380,22 @@ def test_the_machines_clock_runs_in_real_time(rig):
     [
         ({"safe": 11.0}, "safe"),
         ({"limits": (5.0, 1.0)}, "limits"),
+        ({"limits": (0.0, 1.0, 2.0)}, "limits"),
+        ({"limits": 5.0}, "limits"),
+        ({"plausible": {"joint_angle": (1.0, 0.0)}}, "plausible"),
+        ({"controller": 3}, "controller"),
+        ({"controller": SmallPid(period=0.0)}, "period"),
         ({"most_missed": -1}, "most_missed"),
         ({"duration": 0.005}, "duration"),
     ],
 )
 def test_bad_input_is_named(rig, change, word):
     clock = VirtualClock()
+    options = {"controller": SmallPid(period=0.01), **change}
     with pytest.raises(ParameterError, match=word):
-        run_live(SimulatedDevice(rig, clock), SmallPid(period=0.01), LIFT, clock=clock, **change)
+        run_live(SimulatedDevice(rig, clock), options.pop("controller"), LIFT, clock=clock, **options)
+    with pytest.raises(ParameterError, match="2 valves"):
+        SimulatedDevice(pamrs.rigs.named("antagonistic_joint"), clock)
     for wrong in ({"dropouts": 2.0}, {"faults": ("smoke",)}):
         with pytest.raises(ParameterError, match=next(iter(wrong))):
             SimulatedDevice(rig, clock, **wrong)

@@ -1,12 +1,13 @@
 """A closed loop is the simulator with a controller: period, hold, sensors, restart."""
 
+import copy
 import math
 
 import numpy as np
 import pytest
 
 import pamrs
-from pamrs.control import Controller, Sensors, closed_loop
+from pamrs.control import Controller, Sensors, closed_loop, sweep
 from pamrs.control.trajectories import degrees, lift_hold_return, step
 from pamrs.errors import ParameterError
 from tests.unit.control_helpers import SmallPid
@@ -73,6 +74,36 @@ def test_a_restarted_loop_is_the_whole_one(rig):
     assert (np.concatenate([first.command[:-1], second.command]) == whole.command).all()
 
 
+def test_a_restarted_loop_with_noise_and_delay_is_the_whole_one(rig):
+    sensors = Sensors(noise={"joint_angle": 2e-3}, delay=0.02, seed=4)
+    whole = closed_loop(rig, SmallPid(), LIFT, 3.0, sample_time=0.005, sensors=sensors)
+    simulator, controller, reader = pamrs.Simulator(rig, sample_time=0.005), SmallPid(), sensors.started(0.005)
+    first = closed_loop(simulator, controller, LIFT, 1.5, sensors=reader)
+    kept = copy.deepcopy(reader.state)
+    state = simulator.state
+    second = closed_loop(simulator, controller, LIFT, 1.5, start=1.5, reset=False, sensors=reader)
+    assert (np.concatenate([first.command[:-1], second.command]) == whole.command).all()
+    # and from the state alone, in another process so to say
+    simulator.restore(state)
+    controller, other = SmallPid(), Sensors(noise={"joint_angle": 2e-3}, delay=0.02).started(0.005)
+    controller.restore(closed_loop_state(rig, sensors))
+    other.restore(kept)
+    again = closed_loop(simulator, controller, LIFT, 1.5, start=1.5, reset=False, sensors=other)
+    assert (again.command == second.command).all()
+    for wrong in ({}, {"late": 3, "random": kept["random"]}, {**kept, "random": {}}, {**kept, "late": kept["late"] * 3}):
+        with pytest.raises(ParameterError, match="state"):
+            other.restore(wrong)
+    with pytest.raises(ParameterError, match="period"):
+        closed_loop(rig, SmallPid(period=0.01), LIFT, 0.1, sensors=reader)
+
+
+def closed_loop_state(rig, sensors):
+    """State of the controller after 1.5 s."""
+    controller = SmallPid()
+    closed_loop(rig, controller, LIFT, 1.5, sample_time=0.005, sensors=sensors)
+    return controller.state
+
+
 def test_sensors_delay_round_and_are_noisy_as_said(rig):
     sensors = Sensors(noise={"joint_angle": 2e-3}, resolution={"muscle_pressure": 5e3}, delay=0.02, seed=4)
     controller = Listening()
@@ -124,7 +155,14 @@ def test_a_regulator_and_named_blocks_are_driven_by_name():
     alone = pamrs.simulate(rig, split, sample_time=0.001)
     assert (run.angle == alone["joint_angle.elbow"]).all()
     assert np.ptp(run.angle) > 0.01
-    assert np.ptp(run.angle) > 0.01
+    # a sweep names them as well
+    many = sweep(
+        rig, Still(), step(0.0, 0.1), 0.5, n=2, actuation=split_up, measured=measured, channels=["joint_angle.elbow"], sample_time=0.001
+    )
+    assert (many.run["joint_angle.elbow"][0] == run.angle).all()
+    assert many.largest[1] == pytest.approx(np.abs(run.error[::5]).max())
+    with pytest.raises(ParameterError, match="measured"):
+        sweep(rig, Still(), step(0.0, 0.1), 0.5, n=2, actuation=split_up)
 
 
 def test_a_table_has_a_column_for_everything(rig):
@@ -144,6 +182,7 @@ def test_a_table_has_a_column_for_everything(rig):
         ({"controller": SmallPid(kp=np.ones(3))}, "command"),
         ({"controller": SmallPid(kp=math.nan)}, "command at 0 s"),
         ({"controller": 3}, "controller"),
+        ({"sensors": 3}, "sensors"),
         ({"controller": SmallPid(period=0.0)}, "controller.period"),
         ({"sensors": Sensors(delay=0.0031)}, "delay"),
         ({"sensors": Sensors(noise={"angle": 1.0})}, "angle"),
@@ -155,7 +194,18 @@ def test_bad_input_is_named(rig, change, word):
         closed_loop(rig, arguments.pop("controller"), LIFT, **arguments)
 
 
-@pytest.mark.parametrize("bad", [{"noise": {"joint_angle": -1.0}}, {"resolution": {"joint_angle": 0.0}}, {"delay": -1.0}, {"seed": -1}])
+@pytest.mark.parametrize(
+    "bad",
+    [
+        {"noise": {"joint_angle": -1.0}},
+        {"resolution": {"joint_angle": 0.0}},
+        {"delay": -1.0},
+        {"seed": -1},
+        {"noise": "a"},
+        {"noise": {"a": "b"}},
+        {"delay": "a"},
+    ],
+)
 def test_bad_sensors_are_named(bad):
     with pytest.raises(ParameterError, match=next(iter(bad))):
         Sensors(**bad)

@@ -152,3 +152,35 @@ def test_combined_is_one_at_best_and_ranks_by_weights():
 def test_bad_input_is_named(call, word):
     with pytest.raises(ParameterError, match=word):
         call()
+
+
+def test_what_is_not_finite_is_refused_or_a_run_that_failed():
+    time = np.linspace(0.0, 2.0, 201)
+    good = 1.0 - np.exp(-3.0 * time)
+    bad = good.copy()
+    bad[50] = math.nan
+    late = good.copy()
+    late[5] = math.inf
+    reference = np.ones_like(time)
+    functions = {
+        "nu": lambda y: m.squared_error(time, reference, y),
+        "omega": lambda y: m.total_curvature(time, y),
+        "rms": lambda y: m.rms(time, reference, y),
+        "lag": lambda y: m.lag(time, time, y),
+        "lag of rest": lambda y: m.lag(time, reference, y),
+        "steady": lambda y: m.steady_error(time, reference, y),
+        "rise": lambda y: m.rise_time(time, y, 0.0, 1.0),
+        "overshoot": lambda y: m.overshoot(time, y, 0.0, 0.9),
+        "settling": lambda y: m.settling_time(time, y, 0.0, 1.0),
+        "final": lambda y: m.evaluate(time, reference, y).final,
+        "phase": lambda y: m.phases(time, reference, y, {"end": (1.0, 2.0)})["end"]["rms"],
+    }
+    for name, function in functions.items():
+        for wrong in (bad, late):
+            with pytest.raises(ParameterError, match="angle is not finite"):
+                function(wrong)
+        found = function(np.stack([good, bad, late]))
+        assert found[0] == pytest.approx(function(good)), name
+        assert np.isnan(found[1:]).all(), name
+    with pytest.raises(ParameterError, match="reference"):
+        m.rms(time, bad, good)

@@ -8,7 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pamrs.control import FilteredDerivative, Integrator, LowPass, PIDLaw
+import pamrs
+from pamrs.control import PID, FilteredDerivative, Fuzzy, Integrator, LowPass, PIDLaw, sweep
+from pamrs.control.trajectories import step
 from pamrs.errors import ParameterError
 
 
@@ -87,6 +89,12 @@ def test_clamping_lets_the_integral_come_back():
         (lambda: LowPass(-1.0, 0.1), "time_constant"),
         (lambda: LowPass(math.nan, 0.1), "time_constant"),
         (lambda: LowPass(1.0, 0.0), "period"),
+        (lambda: LowPass(1.0, np.ones(2)), "period"),
+        (lambda: PID(1.0, period=np.ones(2)), "period"),
+        (lambda: Fuzzy(1.0, 1.0, 1.0, limits=(0.0,)), "limits"),
+        (lambda: PID(1.0, limits=(0.0,)), "limits"),
+        (lambda: PID(1.0, limits="ab"), "limits"),
+        (lambda: sweep(pamrs.rigs.shoulder(), 3, step(0.3, 0.5), 0.1, n=2), "controller"),
         (lambda: FilteredDerivative(1.0, -1.0), "period"),
         (lambda: Integrator(0.1, anti_windup="some"), "anti_windup"),
         (lambda: Integrator(0.1, tracking_time=0.01), "tracking_time"),
@@ -114,3 +122,15 @@ def test_state_of_parts_goes_on_bit_for_bit():
         law.restore({"integrator": state["integrator"]})
     with pytest.raises(ParameterError, match="integral is not finite"):
         law.restore({**state, "integrator": {"integral": math.nan}})
+
+
+def test_a_low_pass_of_no_time_constant_passes_its_input_to_the_last_bit():
+    rng = np.random.default_rng(4)
+    values = rng.normal(scale=10.0 ** rng.integers(-9, 9, (200, 3)))
+    mixed = LowPass(np.array([0.0, 0.1, 0.0]), 0.01)
+    single, other = LowPass(0.0, 0.01), LowPass(0.1, 0.01)
+    for row in values:
+        passed = mixed.update(row)
+        assert (passed[[0, 2]] == row[[0, 2]]).all()
+        assert single.update(float(row[0])) == row[0]
+        assert passed[1] == other.update(float(row[1]))

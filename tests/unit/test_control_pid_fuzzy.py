@@ -7,8 +7,23 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pamrs.control import FUZZY_SETS, PID, Fuzzy, PIDLaw, Reference, fuzzy_rules, fuzzy_surface
+from pamrs.control import (
+    FUZZY_SETS,
+    PID,
+    AdaptiveSliding,
+    Feedforward,
+    Fuzzy,
+    Neural,
+    PIDLaw,
+    PressureLoop,
+    Reference,
+    Sliding,
+    fuzzy_rules,
+    fuzzy_surface,
+)
 from pamrs.errors import ParameterError
+
+from .control_cases import AIR, FULL
 
 
 def surface(x, y, table="anti_diagonal"):
@@ -189,3 +204,26 @@ def test_lengths_of_a_batch_must_agree():
     with pytest.raises(ParameterError, match="batch of 3"):
         controller.update(0.0, {"joint_angle": np.zeros(4)}, Reference(0.0))
     assert controller.update(0.0, {"joint_angle": 0.0}, Reference(0.0)).shape == (3,)
+
+
+def test_gains_can_be_read_and_not_changed():
+    for made, names in (
+        (PID(1.0, 2.0, 3.0), {"kp": 1.0, "ki": 2.0, "kd": 3.0, "null": 5.0, "limits": (0.0, 10.0), "unit": "rad"}),
+        (Fuzzy(0.4, 0.3, 0.7), {"g1": 0.4, "g2": 0.3, "h": 0.7, "null": 5.0, "limits": (0.0, 10.0), "unit": "rad"}),
+        (PressureLoop(1.0, 2.0), {"kp": 1.0, "ki": 2.0, "null": 5.0}),
+        (Feedforward(FULL, AIR, 0.7), {"km": 0.7, "null": 5.0}),
+        (Sliding(FULL), {"slope": 5.0, "switching": 2e4, "boundary_layer": 0.2}),
+        (AdaptiveSliding(FULL), {"gains": (1.0, 5.0, 300.0), "deadband": 0.02}),
+        (Neural(FULL), {"gains": (300.0, 2e4, 3e5), "deadband": 0.02, "nodes": 22}),
+    ):
+        for name, value in names.items():
+            assert getattr(made, name) == value
+            with pytest.raises(AttributeError, match=f"{name} of a {type(made).__name__}"):
+                setattr(made, name, 50.0)
+    with pytest.raises(ValueError, match="read-only"):
+        PID(np.ones(3)).kp[0] = 2.0
+
+
+def test_a_feedforward_of_no_gain_closes_the_valve():
+    sample = {"joint_angle": 0.5, "muscle_pressure": 3e5}
+    assert Feedforward(FULL, AIR, 0.0).update(0.0, sample, Reference(1.0, 0.5)) == 5.0

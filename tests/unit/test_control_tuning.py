@@ -16,8 +16,6 @@ from tests.unit.control_helpers import SmallPid
 LIFT = lift_hold_return(*degrees(15, 50), ramp=2.0, hold=1.0, duration=6.0)
 FAST = {"duration": 3.0, "sample_time": 0.01}
 
-needs_batch = pytest.mark.skipif("Batch" not in pamrs.__all__, reason="pamrs.Batch is not there yet")
-
 
 @pytest.fixture(scope="module")
 def rig():
@@ -28,7 +26,6 @@ def pid(kp, ki):
     return PID(kp, ki, 0.0, period=0.01)
 
 
-@needs_batch
 @pytest.mark.parametrize("unit", ["rad", "deg"])
 def test_a_sweep_is_its_single_runs(rig, unit):
     kp, ki = np.array([1.0, 2.0, 1.5, 0.5]), np.array([0.5, 1.0, 0.0, 2.0])
@@ -49,7 +46,6 @@ def test_a_sweep_is_its_single_runs(rig, unit):
         assert all_of_them.final[k] == pytest.approx(single.final, rel=1e-12)
 
 
-@needs_batch
 def test_a_map_is_a_sweep_of_every_combination(rig):
     axes = {"kp": [0.5, 1.0, 2.0], "ki": [0.0, 1.0]}
     found = gain_map(rig, pid, axes, LIFT, payloads=[2.0, 9.0], **FAST)
@@ -67,10 +63,10 @@ def test_a_map_is_a_sweep_of_every_combination(rig):
         assert found.j[p] == pytest.approx(j)
         assert row["j"] == pytest.approx(j.min())
         assert found.scale[p] == pytest.approx([nu.min(), omega.min()])
+    assert found.best("rms")[0]["rms"] == found.rms[0].min() == pytest.approx(math.sqrt(found.squared_error[0].min() / 3.0))
     assert found.best("squared_error")[0]["squared_error"] == found.squared_error[0].min()
 
 
-@needs_batch
 @pytest.mark.parametrize("method", ["cma", "optuna"])
 def test_a_search_is_at_least_as_good_as_the_grid_and_seeded(rig, method):
     pytest.importorskip({"cma": "cma", "optuna": "optuna"}[method])
@@ -88,7 +84,6 @@ def test_a_search_is_at_least_as_good_as_the_grid_and_seeded(rig, method):
     assert found[0].j == pytest.approx(0.25 * run.squared_error / scale[0] + 0.75 * run.curvature / scale[1])
 
 
-@needs_batch
 def test_a_search_without_a_scale_takes_that_of_its_first_population(rig):
     pytest.importorskip("cma")
     found = search_gains(rig, pid, {"kp": (0.2, 4.0), "ki": (0.0, 3.0)}, LIFT, evaluations=24, population=8, seed=1, **FAST)
@@ -96,7 +91,6 @@ def test_a_search_without_a_scale_takes_that_of_its_first_population(rig):
     assert found.values.size == 24
 
 
-@needs_batch
 def test_a_controller_for_another_model_controls_the_perturbed_plant(rig):
     plant = perturbed(rig, seed=2)
     same, other = (gain_map(r, pid, {"kp": [2.0], "ki": [1.0]}, LIFT, **FAST).squared_error[0, 0, 0] for r in (rig, plant))
@@ -131,6 +125,7 @@ def test_perturbed_is_off_by_what_it_says(rig):
         (lambda r: search_gains(r, pid, {"kp": (1.0, 1.0)}, LIFT), "kp"),
         (lambda r: search_gains(r, pid, {"kp": (1.0, 2.0)}, LIFT, method="ga"), "method"),
         (lambda r: search_gains(r, pid, {"kp": (1.0, 2.0)}, LIFT, evaluations=8), "population"),
+        (lambda r: search_gains(r, pid, {"kp": (1.0, 2.0)}, LIFT, evaluations=30, population=16), "evaluations"),
         (lambda r: search_gains(r, pid, {"kp": (1.0, 2.0)}, LIFT, seed=-1), "seed"),
         (lambda r: search_gains(r, pid, {"kp": (1.0, 2.0)}, LIFT, scale=(0.0, 1.0)), "scale"),
         (lambda r: search_gains(r, pid, {"kp": (1.0, math.nan)}, LIFT), "kp"),

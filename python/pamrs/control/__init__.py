@@ -24,13 +24,14 @@ from pamrs.control.sampled import SampledController
 from pamrs.control.sliding import Sliding, SlidingController
 
 if TYPE_CHECKING:
-    from pamrs.control import linear, metrics, stability, trajectories, tuning
-    from pamrs.control.live import LiveRun, run_live
+    from pamrs.control import gym, iosystem, linear, live, metrics, simulated_device, stability, trajectories, tuning
+    from pamrs.control.live import Device, LiveError, LiveRun, SystemClock, run_live
     from pamrs.control.loop import ClosedLoop, closed_loop
     from pamrs.control.metrics import Metrics
     from pamrs.control.sensors import Sensors
     from pamrs.control.sweeping import Sweep, sweep
     from pamrs.control.trajectories import Trajectory
+    from pamrs.control.tuning import GainMap
 
 __all__ = [
     "ANTI_WINDUP",
@@ -44,15 +45,18 @@ __all__ = [
     "ClosedLoop",
     "Controller",
     "DeadZoneCompensation",
+    "Device",
     "Feedforward",
     "FilteredDerivative",
     "FullTorque",
     "Fuzzy",
+    "GainMap",
     "GaylordTorque",
     "HysteresisCompensation",
     "HystereticTorque",
     "Integrator",
     "JointSensor",
+    "LiveError",
     "LiveRun",
     "LowPass",
     "Measurement",
@@ -70,6 +74,7 @@ __all__ = [
     "SlidingController",
     "SlipMemory",
     "Sweep",
+    "SystemClock",
     "TorqueModel",
     "Trajectory",
     "Value",
@@ -77,9 +82,13 @@ __all__ = [
     "closed_loop",
     "fuzzy_rules",
     "fuzzy_surface",
+    "gym",
+    "iosystem",
     "linear",
+    "live",
     "metrics",
     "run_live",
+    "simulated_device",
     "stability",
     "sweep",
     "torque_line",
@@ -87,13 +96,17 @@ __all__ = [
     "tuning",
 ]
 
-_MODULES: Final = ("linear", "metrics", "stability", "trajectories", "tuning")
+_MODULES: Final = ("gym", "iosystem", "linear", "live", "metrics", "simulated_device", "stability", "trajectories", "tuning")
 _HOMES: Final[dict[str, str]] = {
     "ClosedLoop": "pamrs.control.loop",
+    "Device": "pamrs.control.live",
+    "GainMap": "pamrs.control.tuning",
+    "LiveError": "pamrs.control.live",
     "LiveRun": "pamrs.control.live",
     "Metrics": "pamrs.control.metrics",
     "Sensors": "pamrs.control.sensors",
     "Sweep": "pamrs.control.sweeping",
+    "SystemClock": "pamrs.control.live",
     "Trajectory": "pamrs.control.trajectories",
     "closed_loop": "pamrs.control.loop",
     "run_live": "pamrs.control.live",

@@ -18,6 +18,7 @@ import numpy as np
 
 from pamrs.control.model import ArmModel
 from pamrs.control.protocol import Measurement, Reference, Value
+from pamrs.control.sampled import Fixed
 from pamrs.control.sliding import SlidingController
 from pamrs.control.values import as_value, clip, sin
 from pamrs.errors import ParameterError
@@ -71,6 +72,8 @@ class AdaptiveSliding(SlidingController):
 
     _STATE: ClassVar[Mapping[str, Any]] = {"inertia": 0.0, "viscous": 0.0, "weight": 0.0}
 
+    gains, deadband, bounds = Fixed(), Fixed(), Fixed()
+
     def __init__(
         self,
         arm: ArmModel,
@@ -84,12 +87,12 @@ class AdaptiveSliding(SlidingController):
         if len(gains) != 3:
             raise ParameterError(f"gains has {len(gains)} entries: three are needed, for I, b and m g r")
         pairs = zip(_NAMES, gains, strict=True)
-        self.gains: tuple[Value, ...] = tuple(as_value(f"gains[{name}]", value, lower=0.0) for name, value in pairs)
-        self.deadband = as_value("deadband", deadband, lower=0.0)
+        self._gains: tuple[Value, ...] = tuple(as_value(f"gains[{name}]", value, lower=0.0) for name, value in pairs)
+        self._deadband = as_value("deadband", deadband, lower=0.0)
         self.hold_at_limit = bool(hold_at_limit)
-        self.bounds = _bounds(arm, bounds)
-        super().__init__(arm, gains=(*self.gains, self.deadband), **others)
-        self._rates = tuple(gain * self.period for gain in self.gains)
+        self._bounds = _bounds(arm, bounds)
+        super().__init__(arm, gains=(*self._gains, self._deadband), **others)
+        self._rates = tuple(gain * self.period for gain in self._gains)
         self.reset()
 
     @classmethod
@@ -140,7 +143,7 @@ class AdaptiveSliding(SlidingController):
         sine = sin(angle)
         wanted = self.arm.pressure(inertia * acceleration + viscous * rate + weight * sine, angle) - switching
         pressure = clip(wanted, 0.0, self._limit)
-        error = dead(s, self.deadband)
+        error = dead(s, self._deadband)
         if self.hold_at_limit:
             error = held(error, wanted - pressure)
         if error.__class__ is not float or error != 0.0:
@@ -150,8 +153,8 @@ class AdaptiveSliding(SlidingController):
                 viscous - g[1] * rate * error,
                 weight - g[2] * sine * error,
             )
-            if self.bounds is not None:
-                (a, b), (c, d), (e, f) = self.bounds
+            if self._bounds is not None:
+                (a, b), (c, d), (e, f) = self._bounds
                 inertia, viscous, weight = clip(inertia, a, b), clip(viscous, c, d), clip(weight, e, f)
             self._inertia, self._viscous, self._weight = inertia, viscous, weight
         return pressure

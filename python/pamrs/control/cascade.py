@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, ClassVar, Final
 
+import numpy as np
+
 from pamrs.control.parts import LowPass
 from pamrs.control.pid import PID, PIDLaw
 from pamrs.control.protocol import Controller, Measurement, Reference, Value
-from pamrs.control.sampled import SampledController
+from pamrs.control.sampled import Fixed, Restorer, SampledController
 from pamrs.errors import ParameterError
 
 __all__ = ["Cascade", "PressureLoop", "cascaded_pid"]
@@ -43,6 +45,8 @@ class PressureLoop(SampledController):
 
     _PARTS: ClassVar[tuple[str, ...]] = ("law", "desired_filter", "pressure_filter")
 
+    kp, ki, limits, null = Fixed("law.kp"), Fixed("law.ki"), Fixed("law.limits"), Fixed("law.offset")
+
     def __init__(
         self,
         kp: Value = 2e-4,
@@ -58,7 +62,6 @@ class PressureLoop(SampledController):
         self.law = PIDLaw(kp, ki, 0.0, period=period, limits=limits, offset=null, anti_windup=anti_windup, tracking_time=tracking_time)
         self.desired_filter, self.pressure_filter = LowPass(pressure_filter, period), LowPass(pressure_filter, period)
         super().__init__(period, (*self.law.gains, self.pressure_filter.time_constant))
-        self.null = self.law.offset
         self.reset()
 
     def update(self, time: float, measurement: Measurement, reference: Reference) -> Value:
@@ -67,6 +70,8 @@ class PressureLoop(SampledController):
 
     def track(self, time: float, measurement: Measurement, desired: Value) -> Value:
         """Valve command [V] for a desired gauge pressure [Pa]."""
+        if desired.__class__ is not float:
+            desired = self._sized("desired pressure", desired)
         pressure = self._read(measurement, "muscle_pressure")
         self._tick(time)
         return self.law.update(self.desired_filter.update(desired) - self.pressure_filter.update(pressure))
@@ -101,7 +106,8 @@ class Cascade(SampledController):
         self.inner = PressureLoop(period=outer.period) if inner is None else inner
         if self.inner.period != outer.period:
             raise ParameterError(f"inner.period = {self.inner.period} s is not the outer's {outer.period} s")
-        super().__init__(outer.period)
+        super().__init__(outer.period, parts=(outer, self.inner))
+        self._before = Restorer(outer)
         self.reset()
 
     @property
@@ -111,10 +117,16 @@ class Cascade(SampledController):
 
     def update(self, time: float, measurement: Measurement, reference: Reference) -> Value:
         """Valve command [V] for a sample; see :meth:`pamrs.control.Controller.update`."""
-        # read first what the inner loop needs: a sample that is refused then changes nothing
-        self.inner._read(measurement, "muscle_pressure")
-        self._asked: Value | None = self.outer.update(time, measurement, reference)
-        return self.inner.track(time, measurement, self._asked)
+        before = self._before.take()
+        asked = self.outer.update(time, measurement, reference)
+        try:
+            command = self.inner.track(time, measurement, asked)
+        except ParameterError:
+            self._before.put_back(before)
+            raise
+        self._asked: Value | None = asked
+        self._batch = None if asked.__class__ is float else np.size(asked)
+        return command
 
 
 def cascaded_pid(
@@ -152,4 +164,5 @@ def cascaded_pid(
         As :class:`pamrs.control.PID` and :class:`Cascade`.
     """
     outer = PID(kp, ki, kd, period=period, **{"output_filter": 0.0, "limits": (0.0, pressure_limit), "null": 0.0, **others})
+    outer.answers = "pressure"
     return Cascade(outer, PressureLoop(period=period) if inner is None else inner)

@@ -8,8 +8,8 @@ from pamrs.control.air import AirModel
 from pamrs.control.joint_sensor import JointSensor
 from pamrs.control.model import ArmModel
 from pamrs.control.parts import LowPass
-from pamrs.control.protocol import Controller, Measurement, Reference, Value
-from pamrs.control.sampled import SampledController
+from pamrs.control.protocol import Controller, Measurement, Reference, Value, check_drives_valve
+from pamrs.control.sampled import Fixed, Restorer, SampledController
 from pamrs.control.values import as_value, clip, sin
 from pamrs.errors import ParameterError
 
@@ -32,7 +32,7 @@ class Feedforward(SampledController):
     air : AirModel
         Its model of valve and chamber.
     km : float or ndarray, shape (n,)
-        ``kM`` [1/s]: 0 leaves the valve to hold the pressure while the volume changes; 0.5 was best in the dissertation, 1.0 simulated.
+        ``kM`` [1/s]: 0.5 was best in the dissertation, 1.0 simulated; with 0 the feedforward is off, and the valve closed (5 V).
     period : float
         Time between two updates [s].
     friction : bool
@@ -45,7 +45,8 @@ class Feedforward(SampledController):
     Notes
     -----
     The supply's pressure is that of the channel ``supply_pressure`` where there is one, else the rig's initial one. With ``km = 0`` the
-    whole feedforward is switched off, as in the dissertation's series (kM = 0 is pure feedback there).
+    whole feedforward is switched off, also what would hold the pressure while the volume changes, as in the dissertation's series
+    (kM = 0 is pure feedback there).
 
     Raises
     ------
@@ -54,6 +55,8 @@ class Feedforward(SampledController):
     """
 
     _PARTS: ClassVar[tuple[str, ...]] = ("sensor", "low_pass")
+
+    km, limits, null = Fixed(), Fixed(), Fixed()
 
     def __init__(
         self,
@@ -69,14 +72,14 @@ class Feedforward(SampledController):
         measured_rate: bool = False,
     ) -> None:
         self.arm, self.air = arm, air
-        self.km = as_value("km", km, lower=0.0)
-        self._on: Value = (1.0 if self.km > 0.0 else 0.0) if isinstance(self.km, float) else (self.km > 0.0).astype(float)
+        self._km = as_value("km", km, lower=0.0)
+        self._on: Value = (1.0 if self._km > 0.0 else 0.0) if isinstance(self._km, float) else (self._km > 0.0).astype(float)
         self._friction = bool(friction)
         self.sensor = JointSensor(period, angle_filter=angle_filter, rate_filter=rate_filter, measured_rate=measured_rate)
         self.low_pass = LowPass(pressure_filter, period)
         filters = (self.low_pass.time_constant, self.sensor.low_pass.time_constant, self.sensor.slope.time_constant)
-        super().__init__(period, (self.km, *arm.gains, *filters))
-        self.limits, self.null = (air.null - air.half_range, air.null + air.half_range), air.null
+        super().__init__(period, (self._km, *arm.gains, *filters))
+        self._limits, self._null = (air.null - air.half_range, air.null + air.half_range), air.null
         self.reset()
 
     @classmethod
@@ -108,7 +111,7 @@ class Feedforward(SampledController):
 
     def update(self, time: float, measurement: Measurement, reference: Reference) -> Value:
         """Valve command [V] for a sample; see :meth:`pamrs.control.Controller.update`."""
-        return clip(self.null + self.offset(time, measurement, reference), self.limits[0], self.limits[1])
+        return clip(self._null + self.offset(time, measurement, reference), self._limits[0], self._limits[1])
 
     def offset(self, time: float, measurement: Measurement, reference: Reference) -> Value:
         """As :meth:`update`, less the valve's null [V]."""
@@ -119,7 +122,7 @@ class Feedforward(SampledController):
         self._tick(time)
         angle, rate = self.sensor.update(angle, rate)
         pressure = self.low_pass.update(pressure)
-        change = self.km * (self.desired_pressure(aim) - pressure)
+        change = self._km * (self.desired_pressure(aim) - pressure)
         return self._on * self.air.command(change, pressure, supply, angle, rate)
 
 
@@ -137,25 +140,32 @@ class Parallel(SampledController):
     Raises
     ------
     ParameterError
-        If the two have not the same period.
+        If the two have not the same period, or the feedback answers a pressure.
     """
 
     _PARTS: ClassVar[tuple[str, ...]] = ("feedforward", "feedback")
 
     def __init__(self, feedforward: Feedforward, feedback: Controller) -> None:
+        check_drives_valve(feedback)
         if feedforward.period != feedback.period:
             raise ParameterError(f"feedback.period = {feedback.period} s is not the feedforward's {feedforward.period} s")
         self.feedforward, self.feedback = feedforward, feedback
-        super().__init__(feedforward.period)
+        super().__init__(feedforward.period, parts=(feedforward, feedback))
         self._answer = getattr(feedback, "answer", None) is not None
-        self.null = feedforward.null
+        self._before = Restorer(feedforward)
+        self.null, self._limits = feedforward.null, feedforward.limits
         self.reset()
 
     def update(self, time: float, measurement: Measurement, reference: Reference) -> Value:
         """Valve command [V] for a sample; see :meth:`pamrs.control.Controller.update`."""
+        before = self._before.take()
         offset = self.feedforward.offset(time, measurement, reference)
-        if self._answer:
-            command: Value = self.feedback.answer(time, measurement, reference, offset)  # type: ignore[attr-defined]
-        else:
-            command = self.feedback.update(time, measurement, reference) + offset
-        return clip(command, self.feedforward.limits[0], self.feedforward.limits[1])
+        try:
+            if self._answer:
+                command: Value = self.feedback.answer(time, measurement, reference, offset)  # type: ignore[attr-defined]
+            else:
+                command = self.feedback.update(time, measurement, reference) + offset
+        except ParameterError:
+            self._before.put_back(before)
+            raise
+        return clip(command, self._limits[0], self._limits[1])

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, Final
+from typing import ClassVar, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pamrs.control.joint_sensor import JointSensor
+from pamrs.control.output_feedback import OutputFeedback
 from pamrs.control.parts import LowPass
-from pamrs.control.pid import angle_scale
 from pamrs.control.protocol import Measurement, Reference, Value
-from pamrs.control.sampled import SampledController
+from pamrs.control.sampled import Fixed
 from pamrs.control.values import as_value, clip, positive_gain
 from pamrs.errors import ParameterError
 
@@ -24,7 +22,7 @@ FUZZY_SETS: Final = ("NB", "NM", "NS", "ZE", "PS", "PM", "PB")
 _HALF: Final = 3  # sets on each side of zero
 
 #: Gains as printed: 4.4.1.2 (optimum at 23 kg), 4.4.2 and Fig. 4.13 (beside a feedforward), Fig. 4.14 (series of kM).
-_PUBLISHED: Final[Mapping[str, Mapping[str, float]]] = {
+_PRINTED: Final[Mapping[str, Mapping[str, float]]] = {
     "optimal_23kg": {"g1": 0.45, "g2": 0.6, "h": 0.65},
     "feedforward": {"g1": 0.4, "g2": 0.3, "h": 0.7},
     "feedforward_gain_series": {"g1": 0.45, "g2": 0.3, "h": 0.7},
@@ -122,7 +120,7 @@ def _surface(x: NDArray[np.float64], y: NDArray[np.float64], rules_array: NDArra
     return np.asarray(total / (w00 + w01 + w10 + w11))
 
 
-class Fuzzy(SampledController):
+class Fuzzy(OutputFeedback):
     """Fuzzy control of the joint angle by the valve, volts around the closed valve.
 
     ``u = null + h f(e/g1, e'/g2)``, low-passed, with ``f`` the surface of :func:`fuzzy_surface`; ``e = theta_d - theta``.
@@ -166,6 +164,9 @@ class Fuzzy(SampledController):
     """
 
     _PARTS: ClassVar[tuple[str, ...]] = ("sensor", "low_pass")
+    _PUBLISHED = _PRINTED
+
+    g1, g2, h, output_filter = Fixed(), Fixed(), Fixed(), Fixed("low_pass.time_constant")
 
     def __init__(
         self,
@@ -183,54 +184,31 @@ class Fuzzy(SampledController):
         angle_filter: Value = 0.0,
         measured_rate: bool = False,
     ) -> None:
-        self.unit, scale = unit, angle_scale(unit)
-        self.g1, self.g2, self.h = positive_gain("g1", g1), positive_gain("g2", g2), as_value("h", h, lower=0.0)
-        self._error_scale, self._rate_scale = scale / self.g1, scale / self.g2
-        if not (math.isfinite(limits[0]) and math.isfinite(limits[1]) and limits[0] < null < limits[1]):
-            raise ParameterError(f"limits = {limits} are not allowed: finite, null = {null:g} between them")
-        self.limits, self.null = (float(limits[0]), float(limits[1])), float(null)
+        self._g1, self._g2, self._h = positive_gain("g1", g1), positive_gain("g2", g2), as_value("h", h, lower=0.0)
         self.rules = fuzzy_rules(table)
         self._rows: list[list[float]] = self.rules.tolist()
-        self.sensor = JointSensor(period, angle_filter=angle_filter, rate_filter=rate_filter, measured_rate=measured_rate)
         self.low_pass = LowPass(output_filter, period, initial=0.0)
-        filters = (self.low_pass.time_constant, self.sensor.low_pass.time_constant, self.sensor.slope.time_constant)
-        super().__init__(period, (self.g1, self.g2, self.h, *filters))
+        super().__init__(
+            period,
+            (self._g1, self._g2, self._h, self.low_pass.time_constant),
+            unit=unit,
+            limits=limits,
+            null=null,
+            rate_filter=rate_filter,
+            angle_filter=angle_filter,
+            measured_rate=measured_rate,
+        )
+        self._error_scale, self._rate_scale = self._scale / self._g1, self._scale / self._g2
         self.reset()
-
-    @classmethod
-    def published(cls, name: str, **others: Any) -> Fuzzy:
-        """With gains as printed, radians and volts (see the class).
-
-        Parameters
-        ----------
-        name : {"optimal_23kg", "feedforward", "feedforward_gain_series"}
-            4.4.1.2; 4.4.2 and Fig. 4.13, beside a feedforward; Fig. 4.14.
-        **others
-            The other arguments.
-
-        Returns
-        -------
-        Fuzzy
-
-        Raises
-        ------
-        ParameterError
-            If there is no such set of gains.
-        """
-        if name not in _PUBLISHED:
-            raise ParameterError(f"name = {name!r} is not allowed: one of {', '.join(_PUBLISHED)}")
-        return cls(**{**_PUBLISHED[name], "unit": "rad", **others})
-
-    def update(self, time: float, measurement: Measurement, reference: Reference) -> Value:
-        """Valve command [V] for a sample; see :meth:`pamrs.control.Controller.update`."""
-        return self.answer(time, measurement, reference, 0.0)
 
     def answer(self, time: float, measurement: Measurement, reference: Reference, bias: Value) -> Value:
         """As :meth:`update`, with ``bias`` [V] added before the limits."""
         aim = self._aim(reference)
+        if bias.__class__ is not float:
+            bias = self._sized("bias", bias)
         angle, rate = self.sensor.read(self, measurement)
         self._tick(time)
         angle, rate = self.sensor.update(angle, rate)
         error, error_rate = (aim.angle - angle) * self._error_scale, (aim.rate - rate) * self._rate_scale
-        output = self.low_pass.update(self.h * fuzzy_surface(error, error_rate, self._rows, self.rules))
-        return clip(self.null + output + bias, self.limits[0], self.limits[1])
+        output = self.low_pass.update(self._h * fuzzy_surface(error, error_rate, self._rows, self.rules))
+        return clip(self._null + output + bias, self._limits[0], self._limits[1])

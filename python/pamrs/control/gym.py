@@ -6,8 +6,9 @@ Importing this module registers ``pamrs/Shoulder-v0``; ``gymnasium.make("pamrs.c
 
 **Action.** Opening of the valve, from -1 (venting, 0 V) over 0 (closed) to 1 (filling, 10 V), held for one sample.
 
-**Observation.** Joint angle [rad], joint rate [rad/s], muscle pressure [Pa, gauge], reference angle [rad] and its rate [rad/s], kept
-within the bounds of the space: the stops with 0.2 rad of give, 30 rad/s, vacuum and twice the supply.
+**Observation.** Joint angle [rad], joint rate [rad/s], muscle pressure [Pa, gauge], reference angle [rad] and its rate [rad/s], and the
+opening that was held last, which the reward asks for; kept within the bounds of the space: the stops with 0.2 rad of give, 30 rad/s,
+vacuum and twice the supply.
 
 **Reward.** ``-(error^2 + effort * change^2)`` for each sample: error [rad] after the step, change of the opening since the last one. A
 plant that leaves the range of its model costs ``penalty`` more.
@@ -24,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs.control.trajectories import Trajectory, lift_hold_return
+from pamrs.control.values import positive_number
 from pamrs.design.search import missing
 from pamrs.errors import ParameterError, SimulationError
 from pamrs.rig import Rig
@@ -73,6 +75,7 @@ class _Task:
             raise ParameterError(f"targets = {targets} is not allowed: rising, from {self.low:g} to {self.high:g} rad")
         if not (math.isfinite(effort) and effort >= 0.0 and math.isfinite(penalty) and penalty >= 0.0):
             raise ParameterError(f"effort = {effort} and penalty = {penalty} are not allowed: zero or more is needed")
+        sample_time = positive_number("sample_time", sample_time)
         self.trajectory, self.sample_time, self.effort, self.penalty = trajectory, sample_time, effort, penalty
         self.null, self.range = (float(valves[""][key]) for key in ("null_voltage", "half_range"))
         length = 15.0 if trajectory is None else trajectory.duration
@@ -81,8 +84,8 @@ class _Task:
             raise ParameterError(f"sample_time = {sample_time} s is not allowed: the record of {length:g} s needs one sample at least")
         supply = max(float(table["initial_pressure"]) for table in self.rig.tables("supply").values())
         ambient = float(self.rig.tables("gas")[""]["ambient_pressure"])
-        least = [self.low - 0.2, -30.0, -ambient, self.low - 0.2, -30.0]
-        most = [self.high + 0.2, 30.0, 2.0 * supply, self.high + 0.2, 30.0]
+        least = [self.low - 0.2, -30.0, -ambient, self.low - 0.2, -30.0, -1.0]
+        most = [self.high + 0.2, 30.0, 2.0 * supply, self.high + 0.2, 30.0, 1.0]
         self.observed = gymnasium.spaces.Box(np.array(least, dtype=np.float32), np.array(most, dtype=np.float32), dtype=np.float32)
         self.acted = gymnasium.spaces.Box(-1.0, 1.0, (1,), dtype=np.float32)
 
@@ -93,9 +96,9 @@ class _Task:
             return self.trajectory
         return lift_hold_return(self.rest, target, duration=15.0)
 
-    def seen(self, sample: dict[str, Any], angle: Any, rate: Any) -> Array32:
+    def seen(self, sample: dict[str, Any], angle: Any, rate: Any, opening: Any) -> Array32:
         """The observation, kept in its space."""
-        values = [sample["joint_angle"], sample["joint_rate"], sample["muscle_pressure"], angle, rate]
+        values = [sample["joint_angle"], sample["joint_rate"], sample["muscle_pressure"], angle, rate, opening]
         space = self.observed
         return np.clip(np.stack(values, axis=-1).astype(np.float32), space.low, space.high)
 
@@ -165,16 +168,16 @@ class ShoulderEnv(gymnasium.Env[Array32, Array32]):
 
         Returns
         -------
-        observation : ndarray, shape (5,)
+        observation : ndarray, shape (6,)
         info : dict
             ``target`` [rad], the highest angle of the trajectory.
         """
-        super().reset(seed=seed)
+        super().reset(seed=None if seed is None else int(seed))
         self._trajectory = self._task.draw(self.np_random)
         self._k, self._opening = 0, 0.0
         sample = self._simulator.reset()
         wanted = self._trajectory(0.0)
-        return self._task.seen(sample, wanted.angle, wanted.rate), {"target": _target(self._trajectory)}
+        return self._task.seen(sample, wanted.angle, wanted.rate, self._opening), {"target": _target(self._trajectory)}
 
     def step(self, action: Array32) -> tuple[Array32, float, bool, bool, dict[str, Any]]:
         """Hold an opening for one sample.
@@ -208,7 +211,8 @@ class ShoulderEnv(gymnasium.Env[Array32, Array32]):
         reward = float(self._task.worth(error, opening - self._opening)) - (self._task.penalty if failed else 0.0)
         self._opening = opening
         info = {"error": error, "valve_command": self._task.volts(opening)}
-        return self._task.seen(sample, wanted.angle, wanted.rate), reward, failed, not failed and self._k >= self._task.samples, info
+        seen = self._task.seen(sample, wanted.angle, wanted.rate, opening)
+        return seen, reward, failed, not failed and self._k >= self._task.samples, info
 
 
 class ShoulderVectorEnv(gymnasium.vector.VectorEnv[Array32, Array32, Any]):
@@ -274,17 +278,17 @@ class ShoulderVectorEnv(gymnasium.vector.VectorEnv[Array32, Array32, Any]):
 
         Returns
         -------
-        observations : ndarray, shape (n, 5)
+        observations : ndarray, shape (n, 6)
         infos : dict
             ``target`` [rad], shape (n,).
         """
         if seed is not None:
-            seeds = [seed + i for i in range(self.num_envs)] if isinstance(seed, int) else list(seed)
+            seeds = [int(seed) + i for i in range(self.num_envs)] if isinstance(seed, (int, np.integer)) else list(seed)
             if len(seeds) != self.num_envs:
                 raise ParameterError(f"seed has {len(seeds)} entries; one for each of {self.num_envs} arms is needed")
             for i, own in enumerate(seeds):
                 if own is not None:
-                    self._randoms[i] = gymnasium.utils.seeding.np_random(own)[0]
+                    self._randoms[i] = gymnasium.utils.seeding.np_random(int(own))[0]
         return self._begin()
 
     def _begin(self) -> tuple[Array32, dict[str, Any]]:
@@ -293,7 +297,8 @@ class ShoulderVectorEnv(gymnasium.vector.VectorEnv[Array32, Array32, Any]):
         self._openings = np.zeros(self.num_envs)
         angle, rate = self._wanted()
         targets = np.array([_target(trajectory) for trajectory in self._trajectories])
-        return self._task.seen(self._batch.reset(), angle, rate), {"target": targets, "_target": np.ones(self.num_envs, dtype=np.bool_)}
+        seen = self._task.seen(self._batch.reset(), angle, rate, self._openings)
+        return seen, {"target": targets, "_target": np.ones(self.num_envs, dtype=np.bool_)}
 
     def _wanted(self) -> tuple[Array, Array]:
         now = self._k * self._task.sample_time
@@ -334,7 +339,7 @@ class ShoulderVectorEnv(gymnasium.vector.VectorEnv[Array32, Array32, Any]):
         truncated = ~failed if self._over else none
         there = np.ones(self.num_envs, dtype=np.bool_)
         info = {"error": error, "_error": there, "valve_command": self._task.volts(openings), "_valve_command": there}
-        return self._task.seen(sample, angle, rate), reward, failed, truncated, info
+        return self._task.seen(sample, angle, rate, openings), reward, failed, truncated, info
 
 
 def _target(trajectory: Trajectory) -> float:

@@ -21,8 +21,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final
 import numpy as np
 
 from pamrs.control.model import TorqueModel, _parts
-from pamrs.control.protocol import Controller, Measurement, Reference, Value
-from pamrs.control.sampled import SampledController, Stateful
+from pamrs.control.protocol import Controller, Measurement, Reference, Value, check_drives_valve
+from pamrs.control.sampled import Restorer, SampledController, Stateful
 from pamrs.control.spline import Spline
 from pamrs.control.values import clip
 from pamrs.errors import ParameterError
@@ -158,22 +158,24 @@ class HysteresisCompensation(SampledController):
             raise ParameterError(f"controller is a {type(controller).__name__} without a model that is inverted: nothing to compensate")
         self.torque = HystereticTorque(owner.arm.torque, rig)
         owner.arm = owner.arm.replace(torque=self.torque)
-        super().__init__(controller.period)
+        super().__init__(controller.period, parts=(self.controller,))
+        self._before = Restorer(self.torque)
+        self.answers = controller.answers
         self.null = getattr(controller, "null", None)
         self.reset()
 
     def update(self, time: float, measurement: Measurement, reference: Reference) -> Value:
         """What the controller answers with the memory moved to the sample; see :meth:`pamrs.control.Controller.update`."""
         angle = self._aim(reference).angle if self.source == "desired" else self._read(measurement, "joint_angle")
-        torque, memory = self.torque, self.torque.memory
-        before = torque._shortening, memory._a, memory._b, memory._c, memory._d
-        torque.follow(angle)
+        before = self._before.take()
+        self.torque.follow(angle)
         try:
             answer: Value = self.controller.update(time, measurement, reference)
-        except ParameterError:
+        except ParameterError as error:
             # a refused sample has not moved the muscle either
-            torque._shortening, memory._a, memory._b, memory._c, memory._d = before
-            raise
+            self._before.put_back(before)
+            raise self._refusal(str(error)) from None
+        self._batch = self._size
         return answer
 
 
@@ -195,12 +197,14 @@ class DeadZoneCompensation(SampledController):
     Raises
     ------
     ParameterError
-        If the rig has not the effect on its one valve, or ``blend`` is not within 0 (left out) and 1.
+        If the controller answers a pressure, the rig has not the effect on its one valve, or ``blend`` is not within 0 (left out) and
+        1.
     """
 
     _PARTS: ClassVar[tuple[str, ...]] = ("controller",)
 
     def __init__(self, controller: Controller, rig: Rig, *, blend: float = 0.005) -> None:
+        check_drives_valve(controller)
         found = [entry for entry in rig.effects if entry["id"] == "valve_dead_zone"]
         valves = rig.tables("valve")
         if len(found) != 1 or len(valves) != 1:
@@ -211,7 +215,7 @@ class DeadZoneCompensation(SampledController):
         self.half_width = float(found[0]["parameters"]["half_width"])
         valve = next(iter(valves.values()))
         self.null, self.half_range = float(valve["null_voltage"]), float(valve["half_range"])
-        super().__init__(controller.period)
+        super().__init__(controller.period, parts=(controller,))
         self.reset()
 
     def update(self, time: float, measurement: Measurement, reference: Reference) -> Value:

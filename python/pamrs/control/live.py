@@ -1,13 +1,15 @@
 """Controllers on a live loop: anything that can be read and written, with a safe stop whatever happens.
 
-The controller is called for every period of its own clock, as if it were in a simulation: a tick that brought no usable reading, or
-that the machine was too late for, is answered with the last good reading, and **its answer is not written**: the plant keeps the last
-command. So filters and integrals keep their time, and nothing new is commanded on what was not seen.
+Before the first reading the safe command is written. The controller is called for every period of its own clock, as if it were in a
+simulation: a tick that brought no usable reading, or that the machine was too late for, is answered with the last good reading, and
+**its answer is not written**: the plant keeps the last command. A reading that took longer than a period, or one whose answer did, is
+not usable either: the plant has moved on. So filters and integrals keep their time, and nothing new is commanded on what was not seen.
 """
 
 from __future__ import annotations
 
 import math
+import signal
 import time as _time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -16,9 +18,11 @@ from typing import Any, Final, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.control.protocol import Controller
+from pamrs.control.protocol import Controller, Reference, check_controller, check_drives_valve
+from pamrs.control.termination import Termination
 from pamrs.control.trajectories import Trajectory
 from pamrs.errors import PamrsError, ParameterError
+from pamrs.simulation import whole_samples
 
 __all__ = ["Clock", "Device", "LiveError", "LiveRun", "SystemClock", "run_live"]
 
@@ -28,11 +32,27 @@ _SAFE_ATTEMPTS: Final = 3
 
 
 class LiveError(PamrsError, RuntimeError):
-    """The safe command could not be written, or the device or the controller failed; the plant may need a hand."""
+    """The safe command could not be written, or the device or the controller failed; the plant may need a hand.
+
+    Attributes
+    ----------
+    run : LiveRun or None
+        What was recorded until then; its reason is ``"failed"`` where something failed before the end.
+    """
+
+    def __init__(self, message: str, run: LiveRun | None = None) -> None:
+        super().__init__(message)
+        self.run = run
 
 
 class Device(Protocol):
-    """A plant as a live loop sees it."""
+    """A plant as a live loop sees it.
+
+    Both calls must come back, or raise, within a fraction of the controller's period: give the driver its timeouts. While one hangs
+    nobody can write, as a driver is seldom safe to use from a second thread; what a call that hung brings is not acted on, and the safe
+    command follows as soon as it is back. That the valve closes when its program hangs, is killed (SIGKILL) or loses its power is the
+    device's own task: a watchdog in its firmware, or a valve that rests where it is safe.
+    """
 
     def read(self) -> Mapping[str, float] | None:
         """The channels now in SI units; None, an exception or a value that is not finite count as a missed reading."""
@@ -69,8 +89,8 @@ class LiveRun:
 
     Attributes
     ----------
-    reason : {"finished", "lost_sensor", "interrupted"}
-        Why it ended; interrupted by Ctrl-C.
+    reason : {"finished", "lost_sensor", "interrupted", "failed"}
+        Why it ended; interrupted by Ctrl-C, failed in :attr:`LiveError.run` only.
     time : ndarray, shape (rows,)
         Nominal time of each period [s].
     reference, command : ndarray, shape (rows,)
@@ -120,18 +140,22 @@ def run_live(
     limits: tuple[float, float] = (0.0, 10.0),
     most_missed: int = 5,
     stamp: str | None = None,
+    plausible: Mapping[str, tuple[float, float]] | None = None,
     clock: Clock | None = None,
 ) -> LiveRun:
     """Let a controller follow a trajectory with a live device.
 
-    The safe command is written at the end, at a lost sensor, at Ctrl-C and before any exception goes on.
+    The safe command is written before the first reading, at the end, at a lost sensor, at Ctrl-C and before any exception goes on. In
+    the main thread SIGTERM, SIGHUP and SIGBREAK are such exceptions while the loop runs, ``SystemExit(128 + number)``, unless the
+    program handles or ignores them itself. For what no program can answer see :class:`Device`.
 
     Parameters
     ----------
     device : Device
         Anything with ``read()`` and ``write(command)``.
     controller : Controller
-        For one plant; it is reset first.
+        For one plant; it is reset first. It answers what the device takes, volts: one that answers a pressure belongs in a
+        :class:`pamrs.control.Cascade`.
     trajectory : Trajectory
     duration : float, optional
         [s], a multiple of the controller's period; the trajectory's by default.
@@ -142,7 +166,10 @@ def run_live(
     most_missed : int
         Readings missed in a row that are borne; one more is a lost sensor. Periods left out by an overrun count too.
     stamp : str, optional
-        Channel that rises with every new reading, a time or a counter: one that does not rise is stale, and counts as missed.
+        Channel that rises with every new reading, a time or a counter: one that does not rise is stale, and counts as missed. By
+        default ``time``, if the first reading has it.
+    plausible : mapping of str to (float, float), optional
+        Channel -> lowest and highest value [SI] that can be: a reading outside, or without the channel, counts as missed.
     clock : Clock, optional
         The machine's by default.
 
@@ -156,24 +183,30 @@ def run_live(
     ParameterError
         If an argument is not allowed.
     LiveError
-        If ``write`` or the controller failed, or the controller answered what is not a finite number; the cause is chained. The safe
-        command was written, unless the message says that it could not be.
+        If ``write`` or the controller failed, the clock went back, or the controller answered what is not a finite number; the cause is
+        chained, the record so far is :attr:`LiveError.run`. The safe command was written, unless the message says that it could not be.
     """
-    loop = _Loop(device, controller, trajectory, duration, safe, limits, most_missed, stamp, clock or SystemClock())
-    reason, failed = "", None
-    try:
-        reason = loop.run()
-    except KeyboardInterrupt:
-        reason = "interrupted"
-    except Exception as error:
-        failed = error
-    finally:
-        # also on the way out of what is no Exception, SystemExit for example
+    loop = _Loop(device, controller, trajectory, duration, safe, limits, most_missed, stamp, plausible, clock or SystemClock())
+    reason, failed = "failed", None
+    with Termination() as termination:
+        try:
+            reason = loop.run(termination)
+        except BaseException as error:  # SystemExit too goes on only after the safe command
+            failed = error
         unsafe = loop.stop()
+    if isinstance(failed, KeyboardInterrupt) or (failed is None and termination.late == signal.SIGINT):
+        reason, failed = "interrupted", None
+    if isinstance(failed, Exception):
+        text = f"the live loop failed at {loop.k * loop.period:g} s: {failed}{unsafe}"
+        raise LiveError(text, loop.result(reason)) from failed
+    if failed is None and termination.late not in (None, signal.SIGINT):
+        failed = SystemExit(128 + termination.late)
     if failed is not None:
-        raise LiveError(f"the live loop failed at {loop.k * loop.period:g} s: {failed}{unsafe}") from failed
+        if unsafe:
+            failed.add_note(f"the live loop ended{unsafe}")
+        raise failed
     if unsafe:
-        raise LiveError(f"the live loop ended ({reason}){unsafe}")
+        raise LiveError(f"the live loop ended ({reason}){unsafe}", loop.result(reason))
     return loop.result(reason)
 
 
@@ -190,38 +223,43 @@ class _Loop:
         limits: tuple[float, float],
         most_missed: int,
         stamp: str | None,
+        plausible: Mapping[str, tuple[float, float]] | None,
         clock: Clock,
     ) -> None:
-        from pamrs.control.loop import multiple
-
-        low, high = limits
-        if not (math.isfinite(low) and math.isfinite(high) and low < high):
-            raise ParameterError(f"limits = {limits} is not allowed: two rising finite numbers are needed")
+        check_controller(controller)
+        check_drives_valve(controller)
+        low, high = _pair("limits", limits)
         if not low <= safe <= high:
             raise ParameterError(f"safe = {safe} is not allowed: from {low:g} to {high:g} is needed")
         if isinstance(most_missed, bool) or not isinstance(most_missed, int) or most_missed < 0:
             raise ParameterError(f"most_missed = {most_missed!r} is not allowed: a whole number from 0 on is needed")
         self.device, self.controller, self.trajectory, self.clock = device, controller, trajectory, clock
         self.safe, self.low, self.high, self.most_missed, self.stamp = float(safe), low, high, most_missed, stamp
+        self.plausible = {name: _pair(f"plausible[{name}]", pair) for name, pair in (plausible or {}).items()}
         self.period = controller.period
-        self.total = multiple("duration", trajectory.duration if duration is None else duration, self.period)
+        self.total = whole_samples("duration", trajectory.duration if duration is None else duration, self.period, least=1)
         self.k = 0
         self.held = self.safe
         self.last: Mapping[str, float] | None = None
         self.seen = -math.inf
         self.missed = self.in_a_row = self.overruns = 0
-        self.rows: list[tuple[float, float, float, Mapping[str, float] | None]] = []
+        self.rows: list[tuple[float, float, float, float, Mapping[str, float] | None]] = []
 
-    def run(self) -> str:
-        """To the end or until the sensor is lost."""
+    def run(self, termination: Termination) -> str:
+        """To the end or until the sensor is lost; only in here a signal may raise."""
+        termination.armed = True
+        try:
+            return self._run()
+        finally:
+            termination.armed = False
+
+    def _run(self) -> str:
         self.controller.reset()
+        # until something is seen the plant holds what is safe, not what was left on it
+        self.device.write(self.safe)
         begin = self.clock.now()
         while self.k < self.total:
-            due = begin + self.k * self.period
-            ahead = due - self.clock.now()
-            if ahead > 0.0:
-                self.clock.sleep(ahead)
-            late = self.clock.now() - due
+            late = self._wait(begin + self.k * self.period)
             for _ in range(min(math.floor(late / self.period), self.total - self.k)):
                 self.overruns += 1
                 self._without_reading(math.nan)
@@ -230,39 +268,58 @@ class _Loop:
                     return "lost_sensor"
             if self.k == self.total:
                 break
+            begun = self.clock.now()
             reading = self._read()
-            if reading is None:
+            if reading is None or self.clock.now() - begun > self.period:
                 self.missed += 1
                 self._without_reading(late)
-                if self.in_a_row > self.most_missed:
-                    return "lost_sensor"
             else:
-                self.in_a_row, self.last = 0, reading
-                command = float(self._asked(reading))
-                if not math.isfinite(command):
-                    raise ParameterError(f"the controller's command is {command}: a finite number is needed")
-                self.held = min(max(command, self.low), self.high)
-                self.device.write(self.held)
-                self._note(late, reading)
+                self._with_reading(reading, begun, late)
+            if self.in_a_row > self.most_missed:
+                return "lost_sensor"
         # the last command is held for its period too, as every other
-        ahead = begin + self.total * self.period - self.clock.now()
-        if ahead > 0.0:
-            self.clock.sleep(ahead)
+        self._wait(begin + self.total * self.period)
         return "finished"
 
-    def _asked(self, reading: Mapping[str, float]) -> Any:
-        now = self.k * self.period
-        return self.controller.update(now, reading, self.trajectory(now))
+    def _wait(self, due: float) -> float:
+        """By how much it is past a time, which is waited for."""
+        ahead = due - self.clock.now()
+        if 0.0 < ahead < 2.0 * self.period:
+            self.clock.sleep(ahead)
+        late = self.clock.now() - due
+        # after a tick that was on time a period is waited, never two
+        if late < -2.0 * self.period:
+            raise ParameterError(f"the clock went back, to {-late:.4g} s before the next sample: one that never does is needed")
+        return late
+
+    def _wanted(self) -> Reference:
+        return self.trajectory(self.k * self.period)
+
+    def _with_reading(self, reading: Mapping[str, float], begun: float, late: float) -> None:
+        """A period with a usable reading; its answer is written unless it took too long."""
+        self.last, wanted = reading, self._wanted()
+        command = float(self.controller.update(self.k * self.period, reading, wanted))
+        if not math.isfinite(command):
+            raise ParameterError(f"the controller's command is {command}: a finite number is needed")
+        if self.clock.now() - begun > self.period:
+            self.missed += 1
+            self.in_a_row += 1
+            self._note(wanted, late, None)
+            return
+        self.in_a_row, self.held = 0, min(max(command, self.low), self.high)
+        self.device.write(self.held)
+        self._note(wanted, late, reading)
 
     def _without_reading(self, late: float) -> None:
         """A period that the controller lives through with the last reading, and the plant with the last command."""
         self.in_a_row += 1
+        wanted = self._wanted()
         if self.last is not None:
-            self._asked(self.last)
-        self._note(late, None)
+            self.controller.update(self.k * self.period, self.last, wanted)
+        self._note(wanted, late, None)
 
-    def _note(self, late: float, reading: Mapping[str, float] | None) -> None:
-        self.rows.append((self.k * self.period, self.held, late, reading))
+    def _note(self, wanted: Reference, late: float, reading: Mapping[str, float] | None) -> None:
+        self.rows.append((self.k * self.period, float(wanted.angle), self.held, late, reading))
         self.k += 1
 
     def _read(self) -> Mapping[str, float] | None:
@@ -274,7 +331,11 @@ class _Loop:
             return None
         if not reading or not all(map(math.isfinite, reading.values())):
             return None
-        if self.stamp is not None:
+        if any(not low <= reading.get(name, math.nan) <= high for name, (low, high) in self.plausible.items()):
+            return None
+        if self.stamp is None:
+            self.stamp = "time" if "time" in reading else ""
+        if self.stamp:
             if not reading.get(self.stamp, -math.inf) > self.seen:
                 return None
             self.seen = reading[self.stamp]
@@ -294,8 +355,18 @@ class _Loop:
 
     def result(self, reason: str) -> LiveRun:
         """What happened."""
-        when, command, late = (np.array([row[i] for row in self.rows], dtype=np.float64) for i in range(3))
-        names = dict.fromkeys(name for row in self.rows for name in (row[3] or ()))
-        channels = {n: np.array([math.nan if r[3] is None else r[3].get(n, math.nan) for r in self.rows]) for n in names}
-        wanted = np.asarray(self.trajectory(when).angle, dtype=np.float64)
+        when, wanted, command, late = (np.array([row[i] for row in self.rows], dtype=np.float64) for i in range(4))
+        names = dict.fromkeys(name for row in self.rows for name in (row[4] or ()))
+        channels = {n: np.array([math.nan if r[4] is None else r[4].get(n, math.nan) for r in self.rows]) for n in names}
         return LiveRun(reason, when, wanted, command, channels, late, self.missed, self.overruns, self.safe)
+
+
+def _pair(name: str, given: Any) -> tuple[float, float]:
+    """Two rising finite numbers."""
+    try:
+        low, high = (float(value) for value in given)
+    except (TypeError, ValueError):
+        low = high = math.nan
+    if not (math.isfinite(low) and math.isfinite(high) and low < high):
+        raise ParameterError(f"{name} = {given} is not allowed: two rising finite numbers are needed")
+    return low, high

@@ -12,18 +12,18 @@ from numpy.typing import NDArray
 
 from pamrs.channels import channel_of
 from pamrs.control.metrics import Metrics, evaluate
-from pamrs.control.protocol import Controller, Reference
-from pamrs.control.sensors import Sensors
+from pamrs.control.protocol import Controller, Reference, check_controller, check_drives_valve
+from pamrs.control.sensors import Reader, Sensors, reader_of
 from pamrs.control.trajectories import Trajectory
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
-from pamrs.simulation import Event, core_rig, default_step
+from pamrs.simulation import Event, core_rig, default_step, whole_samples
 from pamrs.simulator import Simulator
 
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Actuation", "ClosedLoop", "actuation_of", "closed_loop", "multiple"]
+__all__ = ["Actuation", "ClosedLoop", "actuation_of", "closed_loop", "tracked_of"]
 
 Array = NDArray[np.float64]
 #: From a controller's command to the keywords of :meth:`pamrs.Simulator.step`: ``lambda u: {"valve_command": {"flexor": u, ...}}``.
@@ -124,7 +124,7 @@ def closed_loop(
     sample_time: float | None = None,
     step: float | None = None,
     initial: Mapping[str, float] | None = None,
-    sensors: Sensors | None = None,
+    sensors: Sensors | Reader | None = None,
     actuation: Actuation | None = None,
     measured: Mapping[str, str] | None = None,
     channels: Iterable[str] | None = None,
@@ -151,8 +151,9 @@ def closed_loop(
         simulator.
     step, initial : optional
         As for :class:`pamrs.Simulator`; not for a simulator.
-    sensors : Sensors, optional
-        What the controller is told; the truth by default.
+    sensors : Sensors or Reader, optional
+        What the controller is told; the truth by default. A reader, ``sensors.started(controller.period)``, goes on from loop to loop,
+        where sensors begin again, with their noise and their delay.
     actuation : callable, optional
         From the command to the keywords of :meth:`pamrs.Simulator.step`: ``lambda u: {"valve_command": {"flexor": u, "extensor":
         10.0 - u}}``. By default the command is that of the only valve, or of the only regulator of a rig without valves.
@@ -173,7 +174,8 @@ def closed_loop(
     Raises
     ------
     ParameterError
-        If times do not fit together, a name is unknown, or the controller answers what is not a finite number.
+        If times do not fit together, a name is unknown, the controller answers what is not a finite number, or a pressure where a
+        valve is driven.
     SimulationError
         If the plant's state leaves the range in which the model holds.
 
@@ -188,14 +190,14 @@ def closed_loop(
     """
     simulator = _simulator(plant, controller, sample_time, step, initial)
     dt = simulator.sample_time
-    every = multiple("controller.period", controller.period, dt)
-    total = multiple("duration", trajectory.duration if duration is None else duration, dt)
+    every = whole_samples("controller.period", controller.period, dt, least=1)
+    total = whole_samples("duration", trajectory.duration if duration is None else duration, dt, least=1)
     if not math.isfinite(start):
         raise ParameterError(f"start = {start} s is not allowed: a finite number is needed")
-    act = actuation_of(simulator.rig) if actuation is None else actuation
+    act = actuation_of(simulator.rig, controller) if actuation is None else actuation
     began = round(start / dt) if abs(round(start / dt) * dt - start) < 1e-9 * dt else start / dt  # a restart at the same float
     names = _recorded(simulator.rig, channels, measured)
-    read = None if sensors is None else sensors.started(controller.period)
+    read = reader_of(sensors, controller.period)
     if reset:
         controller.reset()
     commands = np.full(total + 1, np.nan)
@@ -229,42 +231,64 @@ def _simulator(
     plant: Rig | Simulator, controller: Controller, sample_time: float | None, step: float | None, initial: Mapping[str, float] | None
 ) -> Simulator:
     """The simulator that a run goes on with."""
-    if not isinstance(controller, Controller):
-        raise ParameterError(f"controller is a {type(controller).__name__}; a pamrs.control.Controller is needed")
-    period = getattr(controller, "period", math.nan)
-    if not (isinstance(period, (int, float)) and math.isfinite(period) and period > 0.0):
-        raise ParameterError(f"controller.period = {period!r} is not allowed: a number of seconds above zero is needed")
+    check_controller(controller)
     if isinstance(plant, Simulator):
         if not (sample_time is None and step is None and initial is None):
             raise ParameterError("sample_time, step or initial is given, and the simulator has its own: give a Rig instead")
         return plant
-    return Simulator(plant, sample_time=default_step(period) if sample_time is None else sample_time, step=step, initial=initial)
+    return Simulator(
+        plant, sample_time=default_step(controller.period) if sample_time is None else sample_time, step=step, initial=initial
+    )
 
 
 def _recorded(rig: Rig, channels: Iterable[str] | None, measured: Mapping[str, str] | None) -> list[str]:
     """Names of the channels that are kept; the tracked ones always are."""
-    known = core_rig(rig).channels
-    for name in (measured or {}).values():
-        if name not in known:
-            raise ParameterError(f"measured has {name!r}, and the rig has no such channel; it has: {', '.join(known)}")
-    tracked = (measured or {}).get("joint_angle", "joint_angle")
-    if tracked not in known:
-        raise ParameterError(f"the rig {rig.name!r} has no channel {tracked!r}; name the joint by measured; it has: {', '.join(known)}")
+    known, tracked = core_rig(rig).channels, tracked_of(rig, measured)
     if channels is None:
         return known
-    wanted = list(dict.fromkeys([tracked, tracked.replace("joint_angle", "joint_rate", 1), *channels]))
+    wanted = list(dict.fromkeys([*tracked, *channels]))
     for name in wanted:
         if name not in known:
             raise ParameterError(f"channels has {name!r}, and the rig has no such channel; it has: {', '.join(known)}")
     return wanted
 
 
-def actuation_of(rig: Rig) -> Actuation:
+def tracked_of(rig: Rig, measured: Mapping[str, str] | None) -> tuple[str, str]:
+    """The rig's names of angle and rate of the joint that is tracked.
+
+    Parameters
+    ----------
+    rig : Rig
+    measured : mapping of str to str, optional
+        As for :func:`closed_loop`.
+
+    Returns
+    -------
+    tuple of (str, str)
+
+    Raises
+    ------
+    ParameterError
+        If a channel is not known, or there is no such joint.
+    """
+    known = core_rig(rig).channels
+    for name in (measured or {}).values():
+        if name not in known:
+            raise ParameterError(f"measured has {name!r}, and the rig has no such channel; it has: {', '.join(known)}")
+    angle = (measured or {}).get("joint_angle", "joint_angle")
+    if angle not in known:
+        raise ParameterError(f"the rig {rig.name!r} has no channel {angle!r}; name the joint by measured; it has: {', '.join(known)}")
+    return angle, angle.replace("joint_angle", "joint_rate", 1)
+
+
+def actuation_of(rig: Rig, controller: Controller) -> Actuation:
     """What a single command drives: the only valve, or the only regulator of a rig without valves.
 
     Parameters
     ----------
     rig : Rig
+    controller : Controller
+        Whose command it is.
 
     Returns
     -------
@@ -273,7 +297,7 @@ def actuation_of(rig: Rig) -> Actuation:
     Raises
     ------
     ParameterError
-        If there is no such input, or more than one.
+        If there is no such input, or more than one, or a valve would be given a pressure.
     """
     inputs = core_rig(rig).inputs
     found = [name for name in inputs if name.startswith("valve_command")] or [n for n in inputs if n.startswith("supply_command")]
@@ -283,29 +307,6 @@ def actuation_of(rig: Rig) -> Actuation:
             "give actuation, from one command to the keywords of Simulator.step"
         )
     kind = channel_of(found[0])
+    if kind == "valve_command":
+        check_drives_valve(controller)
     return lambda command: {kind: command}
-
-
-def multiple(name: str, value: Any, unit: float) -> int:
-    """A time as a whole number of samples, one at least.
-
-    Parameters
-    ----------
-    name : str
-        For the message.
-    value, unit : float
-        [s]
-
-    Returns
-    -------
-    int
-
-    Raises
-    ------
-    ParameterError
-        If it is not one.
-    """
-    count = round(value / unit) if isinstance(value, (int, float)) and math.isfinite(value) else 0
-    if count < 1 or abs(count * unit - value) > 1e-6 * unit:
-        raise ParameterError(f"{name} = {value!r} s is not allowed: a multiple of the sample time = {unit:g} s, above zero, is needed")
-    return count

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pamrs.control.signals import checked, integral, plain
 from pamrs.control.step_metrics import overshoot, rise_time, settling_time
+from pamrs.control.values import angle_factor
 from pamrs.errors import ParameterError
 
 __all__ = [
@@ -41,8 +42,6 @@ Array = NDArray[np.float64]
 
 #: Of (4.18): squared error, curvature.
 WEIGHTS: Final = (0.25, 0.75)
-#: How many of a unit are in a radian.
-_PER_RADIAN: Final[dict[str, float]] = {"rad": 1.0, "deg": 180.0 / math.pi}
 
 
 @dataclass(frozen=True)
@@ -97,7 +96,8 @@ def squared_error(time: ArrayLike, reference: ArrayLike, angle: ArrayLike, *, un
     Raises
     ------
     ParameterError
-        If shapes do not fit, time does not rise, or the unit is unknown.
+        If shapes do not fit, time does not rise, a value is not finite (in a batch that run failed, and its result is NaN), or the
+        unit is unknown.
     """
     t, e = _error(time, reference, angle)
     return plain(angle_factor(unit) ** 2 * integral(t, e * e))
@@ -260,7 +260,8 @@ def lag(time: ArrayLike, reference: ArrayLike, angle: ArrayLike) -> float | Arra
     change = np.diff(np.asarray(reference, dtype=np.float64), axis=-1)
     moved = (change * change / np.diff(t)).sum(axis=-1)
     shared = (change * 0.5 * (e[..., 1:] + e[..., :-1])).sum(axis=-1)
-    return plain(np.where(moved > 0.0, shared / np.where(moved > 0.0, moved, 1.0), 0.0))
+    # nothing moved: zero, or NaN where a run failed
+    return plain(np.where(moved > 0.0, shared / np.where(moved > 0.0, moved, 1.0), 0.0 * shared))
 
 
 def steady_error(time: ArrayLike, reference: ArrayLike, angle: ArrayLike, *, window: float = 1.0) -> float | Array:
@@ -374,19 +375,13 @@ def evaluate(
     )
 
 
-def angle_factor(unit: str) -> float:
-    """How many of a unit, ``"rad"`` or ``"deg"``, are in a radian; a ParameterError for another one."""
-    if unit not in _PER_RADIAN:
-        raise ParameterError(f"unit = {unit!r} is not allowed: one of {', '.join(_PER_RADIAN)}")
-    return _PER_RADIAN[unit]
-
-
 def _error(time: ArrayLike, reference: ArrayLike, angle: ArrayLike) -> tuple[Array, Array]:
     """Checked time and reference minus angle."""
     t, y = checked(time, "angle", angle)
     r = np.asarray(reference, dtype=np.float64)
     if r.shape not in (y.shape, t.shape):
         raise ParameterError(f"reference has the shape {r.shape}; that of angle {y.shape} or of time {t.shape} is needed")
+    _, r = checked(time, "reference", r)
     return t, np.asarray(r - y, dtype=np.float64)
 
 

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from pamrs.control.adaptive import dead, held
 from pamrs.control.model import ArmModel
 from pamrs.control.protocol import Measurement, Reference, Value
+from pamrs.control.sampled import Fixed
 from pamrs.control.sliding import SlidingController
 from pamrs.control.values import as_value, clip
 from pamrs.errors import ParameterError
@@ -81,6 +82,8 @@ class Neural(SlidingController):
 
     _STATE: ClassVar[Mapping[str, Any]] = {"H": None, "C": None, "G": None}
 
+    gains, deadband, bounds, nodes = Fixed(), Fixed(), Fixed(), Fixed()
+
     def __init__(
         self,
         arm: ArmModel,
@@ -95,37 +98,36 @@ class Neural(SlidingController):
     ) -> None:
         if start not in ("zero", "model"):
             raise ParameterError(f"start = {start!r} is not allowed: 'zero' or 'model' is needed")
-        if not (isinstance(nodes, int) and 2 <= nodes <= 10_000):
+        if not (isinstance(nodes, int) and not isinstance(nodes, bool) and 2 <= nodes <= 10_000):
             raise ParameterError(f"nodes = {nodes} is not allowed: a whole number from 2 to 10000 is needed")
         if len(gains) != 3:
             raise ParameterError(f"gains has {len(gains)} entries: three are needed, for H, C and G")
         pairs = zip(NETWORKS, gains, strict=True)
-        self.gains: tuple[Value, ...] = tuple(as_value(f"gains[{name}]", value, lower=0.0) for name, value in pairs)
-        self.deadband, self.nodes = as_value("deadband", deadband, lower=0.0), nodes
+        self._gains: tuple[Value, ...] = tuple(as_value(f"gains[{name}]", value, lower=0.0) for name, value in pairs)
+        self._deadband, self._nodes = as_value("deadband", deadband, lower=0.0), nodes
         self.hold_at_limit = bool(hold_at_limit)
         limit = arm.pressure_limit
         chosen = (limit / 20.0, limit / 50.0, limit) if bounds == "default" else bounds
         if chosen is not None and not (len(chosen) == 3 and all(isinstance(b, (int, float)) and b > 0.0 for b in chosen)):
             raise ParameterError(f"bounds = {bounds!r} is not allowed: 'default', three numbers above zero or None")
-        self.bounds: tuple[float, ...] | None = None if chosen is None else tuple(float(b) for b in chosen)
+        self._bounds: tuple[float, ...] | None = None if chosen is None else tuple(float(b) for b in chosen)
         self._first, last = float(arm.angle_range[0]), float(arm.angle_range[1])
         self._density = (nodes - 1) / (last - self._first)
         self._initial = self._of_model(arm, last) if start == "model" else {name: [0.0] * nodes for name in NETWORKS}
         defaults: dict[str, Any] = {"slope": 3.0, "switching": 4e5, "boundary_layer": 2.0}
-        super().__init__(arm, gains=(*self.gains, self.deadband), **{**defaults, **others})
-        if self._gain_batch is None and any(isinstance(value, np.ndarray) for values in self._initial.values() for value in values):
-            raise ParameterError("arm has arrays: estimates of a batch are started by gains of a batch")
-        self._rates = tuple(gain * self.period for gain in self.gains)
+        super().__init__(arm, gains=(*self._gains, self._deadband), **{**defaults, **others})
+        self._given_batch = self._gain_batch
+        self._rates = tuple(gain * self.period for gain in self._gains)
         self.reset()
 
     def _of_model(self, arm: ArmModel, last: float) -> dict[str, list[float]]:
         if not all(isinstance(value, float) for value in arm.gains):
             raise ParameterError("arm has arrays for estimates: networks start from one arm, whose numbers are floats")
-        angle = np.linspace(self._first, last, self.nodes)
+        angle = np.linspace(self._first, last, self._nodes)
         c1, c2 = (np.broadcast_to(value, angle.shape) for value in arm.torque.at(angle))
         started = {"H": arm.inertia / c1, "C": arm.viscous / c1, "G": (arm.weight * np.sin(angle) - c2) / c1}
-        if self.bounds is not None:
-            started = {name: np.clip(w, -b, b) for (name, w), b in zip(started.items(), self.bounds, strict=True)}
+        if self._bounds is not None:
+            started = {name: np.clip(w, -b, b) for (name, w), b in zip(started.items(), self._bounds, strict=True)}
         return {name: weights.tolist() for name, weights in started.items()}
 
     def _start(self) -> dict[str, Any]:
@@ -134,7 +136,7 @@ class Neural(SlidingController):
     @property
     def angles(self) -> Array:
         """Angles of the nodes [rad]."""
-        return self._first + np.arange(self.nodes) / self._density
+        return self._first + np.arange(self._nodes) / self._density
 
     @property
     def weights(self) -> dict[str, Array]:
@@ -143,8 +145,8 @@ class Neural(SlidingController):
 
     def basis(self, angle: Value) -> Array:
         """``phi`` of every node [1] at angles [rad], shape (nodes,) or (n, nodes)."""
-        place = np.clip((np.asarray(angle) - self._first) * self._density, 0.0, self.nodes - 1.0)
-        return np.maximum(1.0 - np.abs(place[..., None] - np.arange(self.nodes)), 0.0)
+        place = np.clip((np.asarray(angle) - self._first) * self._density, 0.0, self._nodes - 1.0)
+        return np.maximum(1.0 - np.abs(place[..., None] - np.arange(self._nodes)), 0.0)
 
     def update(self, time: float, measurement: Measurement, reference: Reference) -> Value:
         """Desired gauge pressure [Pa] for a sample, within 0 and the limit; see :meth:`pamrs.control.Controller.update`."""
@@ -153,11 +155,11 @@ class Neural(SlidingController):
             return self._of_batch(*(np.broadcast_to(value, self._batch) for value in surface))
         angle, rate, acceleration, s, switching = surface
         h, c, g = self._H, self._C, self._G
-        place, top = (angle - self._first) * self._density, self.nodes - 1.0
+        place, top = (angle - self._first) * self._density, self._nodes - 1.0
         place = 0.0 if place < 0.0 else top if place > top else place
         k = int(place)
-        if k > self.nodes - 2:
-            k = self.nodes - 2
+        if k > self._nodes - 2:
+            k = self._nodes - 2
         after = place - k
         before = 1.0 - after
         j = k + 1
@@ -168,7 +170,7 @@ class Neural(SlidingController):
             - switching
         )
         pressure = clip(wanted, 0.0, self._limit)
-        error: Any = dead(s, self.deadband)
+        error: Any = dead(s, self._deadband)
         if self.hold_at_limit:
             error = held(error, wanted - pressure)
         if error != 0.0:
@@ -185,7 +187,7 @@ class Neural(SlidingController):
 
     @property
     def _tops(self) -> tuple[float, ...]:
-        return (math.inf, math.inf, math.inf) if self.bounds is None else self.bounds
+        return (math.inf, math.inf, math.inf) if self._bounds is None else self._bounds
 
     def _of_batch(self, angle: Array, rate: Array, acceleration: Array, s: Array, switching: Array) -> Array:
         """The same for a batch, each plant with weights of its own."""
@@ -195,15 +197,15 @@ class Neural(SlidingController):
             weights = np.asarray(getattr(self, f"_{name}"), dtype=np.float64)
             networks.append(np.tile(weights, (n, 1)) if weights.ndim == 1 else weights)
             setattr(self, f"_{name}", networks[-1])
-        place = np.minimum(np.maximum((angle - self._first) * self._density, 0.0), self.nodes - 1.0)
-        k = np.minimum(place.astype(np.intp), self.nodes - 2)
+        place = np.minimum(np.maximum((angle - self._first) * self._density, 0.0), self._nodes - 1.0)
+        k = np.minimum(place.astype(np.intp), self._nodes - 2)
         after = place - k
         before = 1.0 - after
         j, row = k + 1, np.arange(n)
         h, c, g = (before * w[row, k] + after * w[row, j] for w in networks)
         wanted = h * acceleration + c * rate + g - switching
         pressure = np.asarray(clip(wanted, 0.0, self._limit))
-        error = dead(s, self.deadband)
+        error = dead(s, self._deadband)
         if self.hold_at_limit:
             error = held(error, wanted - pressure)
         factors: tuple[Any, ...] = (acceleration, rate, 1.0)
@@ -228,7 +230,7 @@ class Neural(SlidingController):
         Path
             The file written.
         """
-        content = {"schema": _SCHEMA, "angle_range": list(self.arm.angle_range), "nodes": self.nodes}
+        content = {"schema": _SCHEMA, "angle_range": list(self.arm.angle_range), "nodes": self._nodes}
         weights = {name: array.tolist() for name, array in self.weights.items()}
         return write_atomically(path, json.dumps({**content, "weights": weights}) + "\n")
 
@@ -238,7 +240,8 @@ class Neural(SlidingController):
         Parameters
         ----------
         path : path-like
-            Written by :meth:`save` of a controller with the same nodes over the same range.
+            Written by :meth:`save` of a controller with the same nodes over the same range. Weights of a batch make this a controller
+        of such a batch, as gains in arrays do.
 
         Raises
         ------
@@ -255,12 +258,18 @@ class Neural(SlidingController):
             raise
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise ParameterError(f"{path}: no networks of pamrs ({error})") from error
-        if nodes != self.nodes or span != tuple(self.arm.angle_range):
-            own = f"{self.nodes} nodes over {tuple(self.arm.angle_range)} rad"
+        if nodes != self._nodes or span != tuple(self.arm.angle_range):
+            own = f"{self._nodes} nodes over {tuple(self.arm.angle_range)} rad"
             raise ParameterError(f"{path}: {nodes} nodes over {span} rad; this controller has {own}")
         shapes = {array.shape for array in weights.values()}
         if len(shapes) != 1 or (shape := shapes.pop())[-1:] != (nodes,) or len(shape) > 2:
             raise ParameterError(f"{path}: weights of the shapes {sorted(shapes)} for {nodes} nodes")
+        plants = shape[0] if len(shape) == 2 else None
+        for size in (self._given_batch, self._batch):
+            if plants is not None and size not in (None, plants):
+                raise ParameterError(f"{path}: weights of {plants} plants; this controller is one of a batch of {size}")
+        self._gain_batch = self._given_batch if plants is None else plants
+        self._batch = self._size = self._batch if plants is None else plants
         if not all(np.all(np.isfinite(array)) for array in weights.values()):
             raise ParameterError(f"{path}: a weight is not finite")
         self._initial = {name: array.tolist() for name, array in weights.items()}

@@ -12,7 +12,7 @@ import numpy as np
 
 from pamrs.control.protocol import Value
 from pamrs.control.sampled import Stateful
-from pamrs.control.values import as_value, positive_gain
+from pamrs.control.values import as_value, positive_number
 from pamrs.errors import ParameterError
 
 __all__ = ["ANTI_WINDUP", "FilteredDerivative", "Integrator", "LowPass"]
@@ -54,8 +54,10 @@ class LowPass(Stateful):
 
     def __init__(self, time_constant: Value, period: float, *, initial: float | None = None) -> None:
         self.time_constant = as_value("time_constant", time_constant, lower=0.0)
-        pole = _pole(self.time_constant, float(positive_gain("period", period)))
+        pole = _pole(self.time_constant, positive_number("period", period))
         self._share = 1.0 - pole
+        # last + 1 (value - last) is not always the value in floating point
+        self._passes = bool(np.any(np.asarray(self._share) == 1.0))
         self._initial = None if initial is None else as_value("initial", initial)
         self.reset()
 
@@ -65,8 +67,14 @@ class LowPass(Stateful):
     def update(self, value: Value) -> Value:
         """Output at the end of the period over which ``value`` is held."""
         last: Value | None = self._output
-        self._output: Value | None = value if last is None else last + self._share * (value - last)
-        return self._output
+        if last is None:
+            self._output: Value | None = value
+            return value
+        output = last + self._share * (value - last)
+        if self._passes:
+            output = value if self._share.__class__ is float else np.where(self._share == 1.0, value, output)
+        self._output = output
+        return output
 
 
 class FilteredDerivative(Stateful):
@@ -92,9 +100,9 @@ class FilteredDerivative(Stateful):
 
     def __init__(self, time_constant: Value, period: float) -> None:
         self.time_constant = as_value("time_constant", time_constant, lower=0.0)
-        pole = _pole(self.time_constant, float(positive_gain("period", period)))
-        self._pole = pole
-        self._slope = (1.0 - pole) / period
+        length = positive_number("period", period)
+        self._pole = _pole(self.time_constant, length)
+        self._slope = (1.0 - self._pole) / length
         self.reset()
 
     def update(self, value: Value) -> Value:
@@ -130,7 +138,7 @@ class Integrator(Stateful):
     def __init__(self, period: float, *, anti_windup: str = "clamping", tracking_time: Value = 0.5) -> None:
         if anti_windup not in ANTI_WINDUP:
             raise ParameterError(f"anti_windup = {anti_windup!r} is not allowed: one of {', '.join(ANTI_WINDUP)}")
-        self._period = float(positive_gain("period", period))
+        self._period = positive_number("period", period)
         self._mode = ANTI_WINDUP.index(anti_windup)
         # from one sample to the next not more than the whole excess is taken off
         self._tracking = as_value("tracking_time", tracking_time, lower=self._period)

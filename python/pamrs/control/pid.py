@@ -2,40 +2,23 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
-from typing import Any, ClassVar, Final
+from typing import ClassVar, Final
 
-from pamrs.control.joint_sensor import JointSensor
+from pamrs.control.output_feedback import OutputFeedback
 from pamrs.control.parts import Integrator, LowPass
 from pamrs.control.protocol import Measurement, Reference, Value
-from pamrs.control.sampled import SampledController, Stateful
-from pamrs.control.values import as_value, clip
-from pamrs.errors import ParameterError
+from pamrs.control.sampled import Fixed, Stateful
+from pamrs.control.values import as_value, clip, limits_around
 
-__all__ = ["PID", "PIDLaw", "angle_scale"]
-
-_UNITS: Final = {"rad": 1.0, "deg": 180.0 / math.pi}
+__all__ = ["PID", "PIDLaw"]
 
 #: Gains as printed: 4.4.2 (with feedforward, kM 1.0), 4.5.1.2 (best combined at 23 kg), Fig. 4.9 (about, at 11 kg).
-_PUBLISHED: Final[Mapping[str, Mapping[str, float]]] = {
+_PRINTED: Final[Mapping[str, Mapping[str, float]]] = {
     "feedforward": {"kp": 5.0, "ki": 2.0, "kd": 0.0},
     "experiment_23kg": {"kp": 1.4, "ki": 2.5, "kd": 0.0},
     "optimal_11kg": {"kp": 1.1, "ki": 4.0, "kd": 0.0},
 }
-
-
-def angle_scale(unit: str) -> float:
-    """How many of a unit a radian has.
-
-    Raises
-    ------
-    ParameterError
-        If the unit is neither ``"rad"`` nor ``"deg"``.
-    """
-    if unit not in _UNITS:
-        raise ParameterError(f"unit = {unit!r} is not allowed: 'rad' or 'deg' is needed")
-    return _UNITS[unit]
 
 
 class PIDLaw(Stateful):
@@ -67,6 +50,8 @@ class PIDLaw(Stateful):
 
     _PARTS: ClassVar[tuple[str, ...]] = ("integrator", "low_pass")
 
+    kp, ki, kd, output_filter, limits, offset = Fixed(), Fixed(), Fixed(), Fixed(), Fixed(), Fixed()
+
     def __init__(
         self,
         kp: Value,
@@ -80,22 +65,20 @@ class PIDLaw(Stateful):
         tracking_time: Value = 0.5,
         output_filter: Value = 0.0,
     ) -> None:
-        self.kp, self.ki, self.kd = as_value("kp", kp), as_value("ki", ki), as_value("kd", kd)
-        low, high = float(limits[0]), float(limits[1])
-        if not (math.isfinite(low) and math.isfinite(high) and low <= offset <= high and low < high):
-            raise ParameterError(f"limits = {limits} are not allowed: finite, the first below the second, {offset:g} between them")
-        self.limits, self.offset = (low, high), float(offset)
-        self._low, self._high = low - self.offset, high - self.offset
-        self.output_filter = as_value("output_filter", output_filter, lower=0.0)
-        self._through = self.output_filter.__class__ is float and self.output_filter == 0.0
-        self.low_pass = LowPass(self.output_filter, period, initial=0.0)
+        self._kp, self._ki, self._kd = as_value("kp", kp), as_value("ki", ki), as_value("kd", kd)
+        low, high, self._offset = limits_around(limits, offset)
+        self._limits = low, high
+        self._low, self._high = low - self._offset, high - self._offset
+        self._output_filter = as_value("output_filter", output_filter, lower=0.0)
+        self._through = self._output_filter.__class__ is float and self._output_filter == 0.0
+        self.low_pass = LowPass(self._output_filter, period, initial=0.0)
         self.integrator = Integrator(period, anti_windup=anti_windup, tracking_time=tracking_time)
-        self.derives = bool((self.kd != 0.0) if isinstance(self.kd, float) else (self.kd != 0.0).any())
+        self.derives = bool((self._kd != 0.0) if isinstance(self._kd, float) else (self._kd != 0.0).any())
 
     @property
     def gains(self) -> tuple[Value, ...]:
         """Everything that may be an array."""
-        return self.kp, self.ki, self.kd, self.output_filter, self.integrator._tracking
+        return self._kp, self._ki, self._kd, self._output_filter, self.integrator._tracking
 
     def update(self, error: Value, error_rate: Value = 0.0, bias: Value = 0.0) -> Value:
         """Output for a sample.
@@ -114,17 +97,17 @@ class PIDLaw(Stateful):
         """
         low, high = self._low, self._high
         integrator = self.integrator
-        wanted = self.kp * error + integrator._integral + bias
+        wanted = self._kp * error + integrator._integral + bias
         if self.derives:
-            wanted = wanted + self.kd * error_rate
+            wanted = wanted + self._kd * error_rate
         limited = clip(wanted, low, high)
-        integrator.update(self.ki * error, wanted - limited)
+        integrator.update(self._ki * error, wanted - limited)
         if not self._through:
             limited = clip(self.low_pass.update(limited - bias) + bias, low, high)
-        return limited + self.offset
+        return limited + self._offset
 
 
-class PID(SampledController):
+class PID(OutputFeedback):
     """PID control of the joint angle by the valve (dissertation 4.3.1.1), volts around the closed valve.
 
     ``e = theta_d - theta``, ``e' = theta_d' - theta'``; a low-pass on the output as in 4.3.1.1. A gain may be an array: each plant of a
@@ -171,6 +154,9 @@ class PID(SampledController):
     """
 
     _PARTS: ClassVar[tuple[str, ...]] = ("law", "sensor")
+    _PUBLISHED = _PRINTED
+
+    kp, ki, kd, output_filter = Fixed("law.kp"), Fixed("law.ki"), Fixed("law.kd"), Fixed("law.output_filter")
 
     def __init__(
         self,
@@ -189,8 +175,6 @@ class PID(SampledController):
         angle_filter: Value = 0.0,
         measured_rate: bool = False,
     ) -> None:
-        self.unit, self._scale = unit, angle_scale(unit)
-        self.sensor = JointSensor(period, angle_filter=angle_filter, rate_filter=rate_filter, measured_rate=measured_rate)
         self.law = PIDLaw(
             kp,
             ki,
@@ -202,42 +186,24 @@ class PID(SampledController):
             tracking_time=tracking_time,
             output_filter=output_filter,
         )
-        super().__init__(period, (*self.law.gains, self.sensor.low_pass.time_constant, self.sensor.slope.time_constant))
+        super().__init__(
+            period,
+            self.law.gains,
+            unit=unit,
+            limits=limits,
+            null=null,
+            rate_filter=rate_filter,
+            angle_filter=angle_filter,
+            measured_rate=measured_rate,
+        )
         self._simple = not self.law.derives and self.sensor._through
-        self.null = self.law.offset
         self.reset()
-
-    @classmethod
-    def published(cls, name: str, **others: Any) -> PID:
-        """With gains as printed, volts per radian (see the class).
-
-        Parameters
-        ----------
-        name : {"feedforward", "experiment_23kg", "optimal_11kg"}
-            4.4.2, to be used beside a feedforward of kM = 1.0; 4.5.1.2, best combined; Fig. 4.9, kP just above 1 and kI near 4.
-        **others
-            The other arguments; ``anti_windup="none"`` as in the dissertation.
-
-        Returns
-        -------
-        PID
-
-        Raises
-        ------
-        ParameterError
-            If there is no such set of gains.
-        """
-        if name not in _PUBLISHED:
-            raise ParameterError(f"name = {name!r} is not allowed: one of {', '.join(_PUBLISHED)}")
-        return cls(**{**_PUBLISHED[name], "unit": "rad", **others})
-
-    def update(self, time: float, measurement: Measurement, reference: Reference) -> Value:
-        """Valve command [V] for a sample; see :meth:`pamrs.control.Controller.update`."""
-        return self.answer(time, measurement, reference, 0.0)
 
     def answer(self, time: float, measurement: Measurement, reference: Reference, bias: Value) -> Value:
         """As :meth:`update`, with ``bias`` [V] added before the limits, so that the anti-windup knows of a feedforward beside it."""
         aim = self._aim(reference)
+        if bias.__class__ is not float:
+            bias = self._sized("bias", bias)
         if self._simple:
             angle = self._read(measurement, "joint_angle")
             self._tick(time)

@@ -13,13 +13,16 @@ for a batch of n plants at once: the same code does both, and the answer has the
 from __future__ import annotations
 
 import abc
+import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Controller", "Measurement", "Reference", "Value"]
+from pamrs.errors import ParameterError
+
+__all__ = ["Controller", "Measurement", "Reference", "Value", "check_controller", "check_drives_valve"]
 
 #: A float, or one number for each plant of a batch.
 Value: TypeAlias = "float | NDArray[np.float64]"
@@ -45,9 +48,12 @@ class Controller(abc.ABC):
     ----------
     period : float
         Time between two updates [s].
+    answers : {"valve", "pressure"}
+        What :meth:`update` gives: a valve command [V], or a desired gauge pressure [Pa] that a :class:`pamrs.control.Cascade` makes.
     """
 
     period: float
+    answers: str = "valve"
 
     @abc.abstractmethod
     def reset(self) -> None:
@@ -97,3 +103,43 @@ class Controller(abc.ABC):
         ParameterError
             If it is not one; the message says what is missing or too much.
         """
+
+
+def check_controller(controller: Any) -> None:
+    """Refuse what no loop can call.
+
+    Parameters
+    ----------
+    controller : Controller
+        What was given.
+
+    Raises
+    ------
+    ParameterError
+        If it is no controller, or its period is not above zero.
+    """
+    if not isinstance(controller, Controller):
+        raise ParameterError(f"controller is a {type(controller).__name__}; a pamrs.control.Controller is needed")
+    period = getattr(controller, "period", math.nan)
+    if not (isinstance(period, (int, float, np.number)) and math.isfinite(period) and period > 0.0):
+        raise ParameterError(f"controller.period = {period!r} is not allowed: a number of seconds above zero is needed")
+
+
+def check_drives_valve(controller: Controller) -> None:
+    """Refuse a controller whose pascals would be taken for volts.
+
+    Parameters
+    ----------
+    controller : Controller
+        What drives a valve.
+
+    Raises
+    ------
+    ParameterError
+        If it answers a pressure.
+    """
+    if controller.answers != "valve":
+        raise ParameterError(
+            f"controller is a {type(controller).__name__}, which answers a {controller.answers} [Pa], no valve command: "
+            "put it in a pamrs.control.Cascade"
+        )

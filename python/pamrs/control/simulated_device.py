@@ -101,8 +101,11 @@ class SimulatedDevice:
             raise ParameterError(f"dropouts = {dropouts} is not allowed: a probability from 0 to 1 is needed")
         if not faults or any(fault not in FAULTS for fault in faults):
             raise ParameterError(f"faults = {faults} is not allowed: some of {', '.join(FAULTS)}")
+        valves = rig.tables("valve")
+        if len(valves) != 1:
+            raise ParameterError(f"rig {rig.name!r} is not allowed: it has {len(valves)} valves, and one is needed")
         self.simulator = Simulator(rig, sample_time=sample_time, initial=initial)
-        self.clock, self.command = clock, float(rig.tables("valve")[""]["null_voltage"])
+        self.clock, self.command = clock, float(next(iter(valves.values()))["null_voltage"])
         self.written: list[tuple[float, float]] = []
         """Time [s] and value of every command that was written."""
         self._began = clock.now()

@@ -16,7 +16,7 @@ from typing import Any, ClassVar, NamedTuple
 from pamrs.control.joint_sensor import JointSensor
 from pamrs.control.model import ArmModel
 from pamrs.control.protocol import Measurement, Reference, Value
-from pamrs.control.sampled import SampledController
+from pamrs.control.sampled import Fixed, SampledController
 from pamrs.control.values import as_value, clip, positive_gain, sign, sin
 
 __all__ = ["Sliding", "SlidingController", "Surface"]
@@ -56,7 +56,10 @@ class SlidingController(SampledController):
         As for :class:`pamrs.control.PID`.
     """
 
+    answers = "pressure"
     _PARTS: ClassVar[tuple[str, ...]] = ("sensor",)
+
+    slope, switching, boundary_layer = Fixed(), Fixed(), Fixed()
 
     def __init__(
         self,
@@ -72,14 +75,14 @@ class SlidingController(SampledController):
         gains: tuple[Any, ...] = (),
     ) -> None:
         self.arm = arm
-        self.slope, self.switching = positive_gain("slope", slope), as_value("switching", switching, lower=0.0)
-        self.boundary_layer = as_value("boundary_layer", boundary_layer, lower=0.0)
+        self._slope, self._switching = positive_gain("slope", slope), as_value("switching", switching, lower=0.0)
+        self._boundary_layer = as_value("boundary_layer", boundary_layer, lower=0.0)
         # a layer of a billionth of a rad/s is the signum, and needs no case of its own in a batch
-        self._layer = clip(self.boundary_layer, 1e-12, 1e300)
-        self._sharp = isinstance(self.boundary_layer, float) and self.boundary_layer == 0.0
+        self._layer = clip(self._boundary_layer, 1e-12, 1e300)
+        self._sharp = isinstance(self._boundary_layer, float) and self._boundary_layer == 0.0
         self.sensor = JointSensor(period, angle_filter=angle_filter, rate_filter=rate_filter, measured_rate=measured_rate)
         filters = (self.sensor.low_pass.time_constant, self.sensor.slope.time_constant)
-        super().__init__(period, (self.slope, self.switching, self.boundary_layer, *arm.gains, *filters, *gains))
+        super().__init__(period, (self._slope, self._switching, self._boundary_layer, *arm.gains, *filters, *gains))
         self._limit = arm.pressure_limit
 
     def _surface(self, time: float, measurement: Measurement, reference: Reference) -> Surface:
@@ -88,11 +91,11 @@ class SlidingController(SampledController):
         angle, rate = self.sensor.read(self, measurement)
         self._tick(time)
         angle, rate = self.sensor.update(angle, rate)
-        wanted = aim.rate - self.slope * (angle - aim.angle)
-        acceleration = aim.acceleration - self.slope * (rate - aim.rate)
+        wanted = aim.rate - self._slope * (angle - aim.angle)
+        acceleration = aim.acceleration - self._slope * (rate - aim.rate)
         s = rate - wanted
         side = sign(s) if self._sharp else clip(s / self._layer, -1.0, 1.0)
-        return Surface(angle, wanted, acceleration, s, self.switching * side)
+        return Surface(angle, wanted, acceleration, s, self._switching * side)
 
 
 class Sliding(SlidingController):

@@ -45,7 +45,7 @@ def rise_time(
     t, y = _normalised(time, angle, start, target)
     first, second = (_crossing(t, y, share) for share in shares)
     reached = np.isfinite(second)
-    return plain(np.where(reached, second - np.where(reached, first, 0.0), np.inf))
+    return plain(_of_good(y, np.where(reached, second - np.where(reached, first, 0.0), np.inf)))
 
 
 def overshoot(time: ArrayLike, angle: ArrayLike, start: float, target: float) -> float | Array:
@@ -100,7 +100,7 @@ def settling_time(time: ArrayLike, angle: ArrayLike, start: float, target: float
     a, b = (np.take_along_axis(away, k[..., None], axis=-1)[..., 0] for k in (last, next_one))
     share = np.where(a > b, a / np.where(a > b, a - b, 1.0), 0.0)
     found = t[last] + share * (t[next_one] - t[last]) - t[0]
-    return plain(np.where(~outside.any(axis=-1), 0.0, np.where(outside[..., -1], np.inf, found)))
+    return plain(_of_good(y, np.where(~outside.any(axis=-1), 0.0, np.where(outside[..., -1], np.inf, found))))
 
 
 def _normalised(time: ArrayLike, angle: ArrayLike, start: float, target: float) -> tuple[Array, Array]:
@@ -109,6 +109,11 @@ def _normalised(time: ArrayLike, angle: ArrayLike, start: float, target: float) 
     if not (math.isfinite(start) and math.isfinite(target) and start != target):
         raise ParameterError(f"start = {start} and target = {target} are not allowed: two different finite angles are needed")
     return t, np.asarray((y - start) / (target - start), dtype=np.float64)
+
+
+def _of_good(y: Array, found: Array) -> Array:
+    """What was found, NaN for runs that failed."""
+    return np.where(np.isnan(y[..., 0]), np.nan, found)
 
 
 def _crossing(t: Array, y: Array, share: float) -> Array:

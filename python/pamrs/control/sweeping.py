@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pamrs.control.loop import Actuation, actuation_of, multiple
-from pamrs.control.metrics import angle_factor, slope_sine
-from pamrs.control.protocol import Controller
-from pamrs.control.sensors import Sensors
+from pamrs.control.loop import Actuation, actuation_of, tracked_of
+from pamrs.control.metrics import slope_sine
+from pamrs.control.protocol import Controller, check_controller
+from pamrs.control.sensors import Reader, Sensors, reader_of
 from pamrs.control.trajectories import Trajectory
-from pamrs.errors import ParameterError
+from pamrs.control.values import angle_factor
 from pamrs.rig import Rig
-from pamrs.simulation import default_step
+from pamrs.simulation import default_step, whole_samples
 
 if TYPE_CHECKING:
     from pamrs.batch import BatchRun
@@ -87,8 +87,9 @@ def sweep(
     sample_time: float | None = None,
     step: float | None = None,
     initial: Mapping[str, ArrayLike] | None = None,
-    sensors: Sensors | None = None,
+    sensors: Sensors | Reader | None = None,
     actuation: Actuation | None = None,
+    measured: Mapping[str, str] | None = None,
     channels: Sequence[str] = (),
     record_every: int = 1,
     unit: str = "rad",
@@ -102,7 +103,7 @@ def sweep(
         One for all, or one for each: the same blocks, other parameters.
     controller : Controller
         Its gains are numbers or arrays of shape (n,); it sees arrays and answers one.
-    trajectory, duration, sample_time, step, sensors, actuation
+    trajectory, duration, sample_time, step, sensors, actuation, measured
         As for :func:`pamrs.control.closed_loop`.
     n : int, optional
         Number of plants where one rig is given for all.
@@ -129,14 +130,17 @@ def sweep(
     from pamrs.batch import Batch
 
     factor = angle_factor(unit)
+    check_controller(controller)
     period = controller.period
     dt = default_step(period) if sample_time is None else sample_time
     batch = Batch(plants, n=n, sample_time=dt, step=step, initial=initial, threads=threads)
-    every = multiple("controller.period", period, dt)
-    total = multiple("duration", trajectory.duration if duration is None else duration, dt)
-    act = actuation_of(batch.rigs[0]) if actuation is None else actuation
-    read = None if sensors is None else sensors.started(period)
+    every = whole_samples("controller.period", period, dt, least=1)
+    total = whole_samples("duration", trajectory.duration if duration is None else duration, dt, least=1)
+    act = actuation_of(batch.rigs[0], controller) if actuation is None else actuation
+    read = reader_of(sensors, period)
     controller.reset()
+    alias = dict(measured or {})
+    angle, rate = tracked_of(batch.rigs[0], alias)
     sums = _Sums(len(batch), factor)
     k = 0
 
@@ -144,17 +148,16 @@ def sweep(
         nonlocal k
         now = k * dt
         wanted = trajectory(now)
-        if "joint_angle" not in sample:
-            raise ParameterError(f"the plants have no channel 'joint_angle'; they have: {', '.join(sample)}")
-        sums.add(now, float(wanted.angle), sample["joint_angle"], sample["joint_rate"])
+        sums.add(now, float(wanted.angle), sample[angle], sample[rate])
+        sample |= {called: sample[name] for called, name in alias.items()}
         k += every
         return act(controller.update(now, sample if read is None else read(sample), wanted))
 
     # a channel is always recorded: with none asked for, the first and the last row of the angle
-    names, stride = (tuple(channels), record_every) if channels else (("joint_angle",), total)
+    names, stride = (tuple(channels), record_every) if channels else ((angle,), total)
     run = batch.control(answer, total * dt, period=every * dt, channels=names, record_every=stride)
     last = batch.observe()
-    sums.add(total * dt, float(trajectory(total * dt).angle), last["joint_angle"], last["joint_rate"])
+    sums.add(total * dt, float(trajectory(total * dt).angle), last[angle], last[rate])
     failed = run.failed
     found = [
         np.where(failed, np.nan, values)

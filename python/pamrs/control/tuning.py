@@ -48,6 +48,8 @@ class GainMap:
         nu and omega; NaN where a run failed.
     j : ndarray, shape (p, ...)
         J (4.18), each payload a set of its own; infinite where a run failed.
+    rms : ndarray, shape (p, ...)
+        Error [rad]; NaN where a run failed.
     unit : str
         Of the angle in nu and omega.
     """
@@ -57,6 +59,7 @@ class GainMap:
     squared_error: Array = field(repr=False)
     curvature: Array = field(repr=False)
     j: Array = field(repr=False)
+    rms: Array = field(repr=False)
     unit: str = "rad"
 
     def best(self, by: str = "j") -> list[dict[str, float]]:
@@ -64,28 +67,29 @@ class GainMap:
 
         Parameters
         ----------
-        by : {"j", "squared_error", "curvature"}
+        by : {"j", "squared_error", "curvature", "rms"}
             Which one.
 
         Returns
         -------
         list of dict of str to float
-            ``payload`` [kg], each gain, and ``j``, ``squared_error`` and ``curvature`` there.
+            ``payload`` [kg], each gain, and ``j``, ``squared_error``, ``curvature`` and ``rms`` there.
 
         Raises
         ------
         ParameterError
             If there is no such metric.
         """
-        if by not in ("j", "squared_error", "curvature"):
-            raise ParameterError(f"by = {by!r} is not allowed: one of j, squared_error, curvature")
+        metrics = ("j", "squared_error", "curvature", "rms")
+        if by not in metrics:
+            raise ParameterError(f"by = {by!r} is not allowed: one of {', '.join(metrics)}")
         found = []
         for p, mass in enumerate(self.payloads):
             values = getattr(self, by)[p]
             index = np.unravel_index(int(np.argmin(np.where(np.isnan(values), np.inf, values))), values.shape)
             row = {"payload": float(mass)}
             row |= {name: float(axis[i]) for (name, axis), i in zip(self.axes.items(), index, strict=True)}
-            row |= {name: float(getattr(self, name)[(p, *index)]) for name in ("j", "squared_error", "curvature")}
+            row |= {name: float(getattr(self, name)[(p, *index)]) for name in metrics}
             found.append(row)
         return found
 
@@ -186,7 +190,7 @@ def gain_map(
     done = sweep(rigs, controller(**gains), trajectory, unit=unit, **loop)
     nu, omega = done.squared_error.reshape(shape), done.curvature.reshape(shape)
     j = combined(nu, omega, weights=weights, axis=tuple(range(1, len(shape))))
-    return GainMap(grid, masses, nu, omega, j, unit)
+    return GainMap(grid, masses, nu, omega, j, done.rms.reshape(shape), unit)
 
 
 def search_gains(
@@ -218,7 +222,8 @@ def search_gains(
     method : {"cma", "optuna"}
         CMA-ES, or Optuna's tree-structured Parzen estimator.
     evaluations : int
-        Most closed loops, the first population too.
+        Most closed loops, the first population too; without a scale two populations at least. CMA-ES leaves a rest that is no whole
+        population.
     population : int
         Loops in one batch.
     seed : int
@@ -242,6 +247,11 @@ def search_gains(
         raise ParameterError(f"method = {method!r} is not allowed: one of {', '.join(METHODS)}")
     if not 4 <= population <= evaluations:
         raise ParameterError(f"population = {population} is not allowed: from 4 to evaluations = {evaluations} is needed")
+    if scale is None and evaluations < 2 * population:
+        raise ParameterError(
+            f"evaluations = {evaluations} is not allowed: without a scale two populations = {2 * population} are needed, as the first "
+            "finds it"
+        )
     if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed < 2**32:
         raise ParameterError(f"seed = {seed!r} is not allowed: a whole number from 0 to 2**32 - 1 is needed")
     if scale is not None and not all(math.isfinite(s) and s > 0.0 for s in scale):

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
 from pamrs.control.protocol import Value
 from pamrs.errors import ParameterError
 
-__all__ = ["as_value", "clip", "positive_gain", "sign", "sin"]
+__all__ = ["angle_factor", "as_value", "clip", "limits_around", "positive_gain", "positive_number", "sign", "sin"]
+
+#: How many of a unit are in a radian.
+_PER_RADIAN: Final[dict[str, float]] = {"rad": 1.0, "deg": 180.0 / math.pi}
 
 
 def as_value(name: str, value: Any, *, lower: float = -math.inf, upper: float = math.inf, above: bool = False) -> Value:
@@ -51,12 +54,44 @@ def as_value(name: str, value: Any, *, lower: float = -math.inf, upper: float = 
         bound = f"above {lower:g}" if above else f"from {lower:g}"
         allowed = "finite" if lower == -math.inf and upper == math.inf else f"finite, {bound} to {upper:g}"
         raise ParameterError(f"{name} = {first:g} is not allowed: {allowed} is needed")
-    return float(array) if array.ndim == 0 else array.copy()
+    if array.ndim == 0:
+        return float(array)
+    # whoever could write into it would change some of what follows from it
+    kept = array.copy()
+    kept.flags.writeable = False
+    return kept
 
 
 def positive_gain(name: str, value: Any) -> Value:
     """A gain above zero, see :func:`as_value`."""
     return as_value(name, value, lower=0.0, above=True)
+
+
+def positive_number(name: str, value: Any) -> float:
+    """One number above zero for the whole batch, see :func:`as_value`."""
+    checked = positive_gain(name, value)
+    if isinstance(checked, np.ndarray):
+        raise ParameterError(f"{name} is an array: one number for the whole batch is needed")
+    return checked
+
+
+def limits_around(limits: Any, null: Any) -> tuple[float, float, float]:
+    """Limits of an output and what is put out for no error, checked: two finite numbers, the first below the second, null within."""
+    try:
+        low, high = (float(limit) for limit in limits)
+        middle = float(null)
+    except (TypeError, ValueError):
+        low = high = middle = math.nan
+    if not (math.isfinite(low) and math.isfinite(high) and low <= middle <= high and low < high):
+        raise ParameterError(f"limits = {limits!r} are not allowed: two finite numbers are needed, rising, with {null!r} between them")
+    return low, high, middle
+
+
+def angle_factor(unit: str) -> float:
+    """How many of a unit, ``"rad"`` or ``"deg"``, are in a radian; a ParameterError for another one."""
+    if unit not in _PER_RADIAN:
+        raise ParameterError(f"unit = {unit!r} is not allowed: one of {', '.join(_PER_RADIAN)} is needed")
+    return _PER_RADIAN[unit]
 
 
 def clip(value: Value, low: Value, high: Value) -> Value:
