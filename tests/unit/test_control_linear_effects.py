@@ -247,3 +247,24 @@ def test_a_loop_is_judged_with_its_lag(rig):
     late = rig.with_effect("input_path_lag", {"time_constant": 0.02})
     radii = [max(spectral_radius(linearise(plant, ANGLE, side=side), law) for side in ("fill", "vent")) for plant in (rig, late)]
     assert radii[0] < 1.0 < radii[1]
+
+
+def test_effects_at_one_of_several_blocks_are_named_after_it():
+    rig = pamrs.rigs.named("antagonistic_joint")
+    for effect, values, at in (
+        ("closure_flow", {"pressure_memory": -1e-5, "memory_time": 0.1}, "flexor"),
+        ("input_path_lag", {"time_constant": 0.02}, "extensor"),
+        ("muscle_creep", {"stiffness": 2e4, "time_constant": 0.05}, "extensor"),
+        ("pressure_lag", {"time_constant": 0.02}, "flexor"),
+    ):
+        rig = rig.with_effect(effect, values, at=at)
+    start = equilibrium(rig, 0.7, joint="elbow", chamber="flexor", initial={"muscle_pressure.extensor": 2e5})
+    model = linearise(rig, 0.7, joint="elbow", chamber="flexor", initial=start, side="fill")
+    assert model.states[-4:] == (
+        "closure_flow.pressure.flexor",
+        "input_path_lag.lag.extensor",
+        "muscle_creep.extensor",
+        "pressure_lag.flexor",
+    )
+    start = equilibrium(rig, 0.7, joint="elbow", chamber="flexor", initial=start)
+    moves_alike(rig, model, start, lambda t, k: (1e-3 + 1e-3 * k) * np.sin(30.0 * t) ** 2, low=5e-3)
