@@ -15,11 +15,14 @@ import tempfile
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 import pamrs
+from pamrs.control import PID, ClosedLoop, Value
+from pamrs.control import closed_loop as run_closed_loop
+from pamrs.control.trajectories import step
+from pamrs.control.tuning import gain_map
 from pamrs.muscle_models import GEOMETRIES, MODELS
 from tests.reference import GeometryReference, MuscleReference
 from tests.reference import plant as reference
@@ -69,65 +72,73 @@ def simulation() -> None:
 
 
 class Loop:
-    """A PID controller of the shoulder as a user writes it, of one arm or of many: the same operations for both."""
+    """A PID controller as a user writes it in ten lines: beside ``PID``, it shows what the controller's own parts cost."""
 
-    def __init__(self, gain: Any, rate: Any, clip: Callable[[Any], Any]) -> None:
-        self.gain, self.rate, self.clip = gain, rate, clip
+    def __init__(self, gain: float, rate: float) -> None:
+        self.gain, self.rate = gain, rate
         self.sum, self.last = 0.0, 0.0
 
-    def __call__(self, sample: Mapping[str, Any]) -> Any:
+    def __call__(self, sample: Mapping[str, float]) -> float:
         """The valve command [V] for a sample."""
         error = 0.8 - sample["joint_angle"]
-        self.sum = self.sum + error * 1e-3
+        self.sum += error * 1e-3
         slope, self.last = (error - self.last) * 1e3, error
-        return self.clip(5.0 + self.gain * error + self.rate * self.sum + 0.2 * slope)
+        return min(max(5.0 + self.gain * error + self.rate * self.sum + 0.2 * slope, 0.0), 10.0)
 
 
 def closed_loop() -> None:
-    """25 s at 1 kHz under a PID written in Python: one loop, then a map of 40 x 40 gains."""
-    rig, duration, step = pamrs.rigs.shoulder(), 25.0, 1e-3
+    """25 s at 1 kHz under ``PID``: one ``closed_loop``, and ``gain_map`` over 40 x 40 gains; a loop of ten lines beside the first."""
+    rig, duration, period = pamrs.rigs.shoulder(), 25.0, 1e-3
+    angle = rig.model["joint"]["rest_angle"]
+    wanted = step(angle, 0.8, duration=duration)
 
-    def one(gain: float, rate: float, seconds: float = duration) -> pamrs.Simulation:
-        loop = Loop(gain, rate, lambda volts: min(max(volts, 0.0), 10.0))
-        return pamrs.Simulator(rig, sample_time=step).control(loop, seconds)
+    def made(kp: Value, ki: Value) -> PID:
+        return PID(kp, ki, 0.2, period=period)
+
+    def one(kp: float, ki: float, seconds: float = duration) -> ClosedLoop:
+        return run_closed_loop(rig, made(kp, ki), wanted, seconds)
 
     peer, few = reference.shoulder(), 200  # samples that the reference is given the time for
-    supply, angle = rig.model["supply"]["initial_pressure"] + AMBIENT, rig.model["joint"]["rest_angle"]
+    supply = rig.model["supply"]["initial_pressure"] + AMBIENT
     start = {"muscle_pressure": AMBIENT, "supply_pressure": supply, "joint_angle": angle, "joint_rate": 0.0}
-    peer.simulate(np.full(2, 5.0), step, start)  # builds the reference's table outside the clock
+    peer.simulate(np.full(2, 5.0), period, start)  # builds the reference's table outside the clock
 
     def by_reference() -> float:
-        state, loop = dict(start), Loop(4.0, 1.0, lambda volts: min(max(volts, 0.0), 10.0))
-        for _ in range(few):
-            run = peer.simulate(np.full(2, loop(state)), step, state)
+        state, controller = dict(start), made(4.0, 1.0)
+        for k in range(few):
+            now = k * period
+            run = peer.simulate(np.full(2, controller.update(now, state, wanted(now))), period, state)
             state = {name: float(getattr(run, name)[-1]) for name in start}
         return state["joint_angle"]
 
-    apart = np.degrees(abs(one(4.0, 1.0, few * step)["joint_angle"][-1] - by_reference()))
-    rows = round(duration / step)
-    theirs = best_of(by_reference, 0.0) * rows / few
+    apart = np.degrees(abs(one(4.0, 1.0, few * period).angle[-1] - by_reference()))
+    theirs = best_of(by_reference, 0.0) * round(duration / period) / few
+    used, calls = time.process_time(), 3
+    for _ in range(calls):
+        one(4.0, 1.0)
+    used = (time.process_time() - used) / calls
     show(
-        "loop 25 s, 1 kHz, sample by sample",
+        "closed_loop 25 s, 1 kHz, PID",
         best_of(lambda: one(4.0, 1.0)),
         theirs,
-        f"{apart:.2g} deg apart; reference from {few} of {rows}",
+        f"{apart:.2g} deg apart; {used:.3g} s of processor; reference from {few} of {round(duration / period)}",
     )
+    lean = best_of(lambda: pamrs.Simulator(rig, sample_time=period).control(Loop(4.0, 1.0), duration))
+    print(f"{'  beside it a loop of ten lines':<34} {lean * 1e3:>11.4g} ms")
 
-    gains, rates = (axis.ravel() for axis in np.meshgrid(np.linspace(0.5, 20.0, 40), np.linspace(0.0, 20.0, 40)))
-    batch = pamrs.Batch(rig, n=gains.size, sample_time=step)
+    axes = {"kp": np.linspace(0.5, 20.0, 40), "ki": np.linspace(0.0, 20.0, 40)}
     used, began = time.process_time(), time.perf_counter()
-    run = batch.control(
-        Loop(gains, rates, lambda volts: np.clip(volts, 0.0, 10.0)), duration, channels=("joint_angle",), record_every=10
-    )
+    found = gain_map(rig, made, axes, wanted)
     wall, used = time.perf_counter() - began, time.process_time() - used
-    chosen = (0, 817, 1599)
-    singles = [one(float(gains[row]), float(rates[row])) for row in chosen]
-    apart = max(
-        float(np.abs(run["joint_angle"][row] - alone["joint_angle"][::10]).max()) for row, alone in zip(chosen, singles, strict=True)
+    chosen = ((0, 0), (20, 17), (39, 39))
+    gains = [(float(axes["kp"][i]), float(axes["ki"][j])) for i, j in chosen]
+    off = max(
+        abs(found.squared_error[(0, *index)] / one(*pair).metrics().squared_error - 1.0)
+        for index, pair in zip(chosen, gains, strict=True)
     )
-    each = min(best_of(lambda row=row: one(float(gains[row]), float(rates[row])), 0.0) for row in chosen)
-    said = f"{apart:.2g} rad apart; {used:.3g} s of processors; peer: single loops, {len(chosen)} of {gains.size}"
-    show("gain map 40 x 40 of 25 s, 1 kHz", wall, each * gains.size, said)
+    each = min(best_of(lambda pair=pair: one(*pair), 0.0) for pair in gains)
+    said = f"nu {off:.2g} apart; {used:.3g} s of processors; peer: closed_loop, {len(chosen)} of {found.squared_error.size}"
+    show("gain_map 40 x 40, 25 s, 1 kHz, PID", wall, each * found.squared_error.size, said)
 
 
 def per_point(name: str, ours: float, theirs: float, points: int, apart: float) -> None:

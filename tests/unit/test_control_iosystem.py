@@ -50,6 +50,7 @@ def test_named_inputs_and_a_loop_in_python_control():
     [
         (lambda: iosystem(pamrs.rigs.shoulder(), sample_time=0.0), "sample_time"),
         (lambda: iosystem(pamrs.rigs.shoulder(), sample_time=0.01, outputs=["angle"]), "outputs"),
+        (lambda: iosystem(pamrs.rigs.shoulder().with_effect("clock_skew"), sample_time=0.01), "clock_skew"),
     ],
 )
 def test_bad_input_is_named(call, word):

@@ -55,11 +55,15 @@ def iosystem(
     Raises
     ------
     ParameterError
-        If an argument is not allowed, or the rig has no command.
+        If an argument is not allowed, the rig has no command, or it has the effect ``clock_skew``, whose state grows.
     MissingPackageError
         If python-control is not installed.
     """
     library = python_control()
+    if any(effect["id"] == "clock_skew" for effect in rig.effects):
+        raise ParameterError(
+            "clock_skew is not allowed here: it keeps the samples before, a state that grows; delay the inputs instead"
+        )
     compiled = core_rig(rig)
     simulator = Simulator(rig, sample_time=sample_time, step=step)
     inputs = list(compiled.inputs)

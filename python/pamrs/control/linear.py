@@ -1,9 +1,9 @@
-"""Linear models about an operating point: of a rig, and of any sampled controller, by differences of what they do."""
+"""Linear models of rigs about an operating point, by differences of what they do; those of controllers are in ``controller_model``."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs.channels import channel_of, dotted
-from pamrs.control.protocol import Controller, Reference
+from pamrs.control.controller_model import LinearController, heard, linear_controller
+from pamrs.control.rig_state import COMMAND, Place, RigState, check_smooth, resting, without_dry_friction
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
-from pamrs.simulation import core_rig
 from pamrs.simulator import Simulator
 
 if TYPE_CHECKING:
@@ -24,19 +24,10 @@ __all__ = ["LinearController", "LinearModel", "equilibrium", "linear_controller"
 
 Array = NDArray[np.float64]
 
-#: Half width of the differences [SI of the channel]; the rate's is small beside any speed at which Coulomb friction turns round.
-_WIDTHS: Final[dict[str, float]] = {
-    "supply_pressure": 100.0,
-    "line_pressure": 10.0,
-    "muscle_pressure": 10.0,
-    "joint_angle": 1e-5,
-    "joint_rate": 1e-5,
-    "length": 1e-6,
-    "length_rate": 1e-6,
-}
-_COMMAND: Final = 1e-3  # V
 _SAMPLE: Final = 2.5e-4  # s
+_REST: Final = 1e-5  # rad/s, what a joint at rest may have after a sample; as small as the differences in the rate
 SIDES: Final = ("mean", "fill", "vent")
+FRICTIONS: Final = ("rest", "moving")
 
 
 @dataclass(frozen=True)
@@ -47,9 +38,10 @@ class LinearModel:
     ----------
     a, b, c : ndarray, shapes (n, n), (n, m), (p, n)
     states, inputs, outputs : tuple of str
-        Channels of the rig.
+        Channels of the rig; among the states also what effects move, by the effect's name (``input_path_lag.lag``, with the block
+        behind another dot where it has a name). A state is the true value, an output what the sensor reads.
     point : mapping of str to float
-        Values of all channels and inputs at the operating point.
+        Values of all channels, as the sensors read them (zeros included), and of the inputs at the operating point.
     side : str
         Which way the valve opens, see :func:`linearise`.
     """
@@ -135,31 +127,6 @@ class LinearModel:
         return moved[:n, :n], moved[:n, n:]
 
 
-@dataclass(frozen=True)
-class LinearController:
-    """``x+ = A x + B y, u = C x + D y`` from one sample to the next, about an operating point; y are :attr:`inputs`.
-
-    Attributes
-    ----------
-    a, b, c, d : ndarray
-        Shapes (n, n), (n, p), (1, n), (1, p).
-    inputs : tuple of str
-        Channels that the controller reads.
-    period : float
-        [s]
-    command : float
-        What it answers at the operating point.
-    """
-
-    a: Array = field(repr=False)
-    b: Array = field(repr=False)
-    c: Array = field(repr=False)
-    d: Array = field(repr=False)
-    inputs: tuple[str, ...]
-    period: float
-    command: float = 0.0
-
-
 def equilibrium(
     rig: Rig, angle: float, *, joint: str = "", chamber: str = "", initial: Mapping[str, float] | None = None
 ) -> dict[str, float]:
@@ -211,6 +178,7 @@ def linearise(
     angle: float,
     *,
     side: str = "mean",
+    friction: str = "rest",
     held: tuple[str, ...] = ("supply_pressure",),
     joint: str = "",
     chamber: str = "",
@@ -220,138 +188,158 @@ def linearise(
 
     The core simulates a quarter of a millisecond from states and commands on both sides of the point; the central differences are
     the sampled matrices, whose logarithm is A and B. That is exact for a linear plant up to the integrator's error, and takes whatever
-    effects are in the rig.
+    effects are in the rig: what they move (a lag, a delay, a creeping strain, a mounting that gives way, the air's mass where its
+    temperature counts) are states like the others. Memories of direction (``muscle_hysteresis``) are as they are in presliding, springs
+    about the point. What begins later (``payload_change``, ``external_torque``) has not begun.
 
     Two things have no derivative or a local one. **A valve** lets air in on one side of its null and out on the other, with different
-    slopes: ``side`` chooses. **Coulomb friction** ``f tanh(rate/w)`` counts at rest with its slope ``f/w``, as a strong viscous damping
-    that a moving arm does not have: linearise a rig with ``arm.coulomb = 0`` to see that one.
+    slopes: ``side`` chooses. **Coulomb friction** ``f tanh(rate/w)`` is at rest a viscous damping with the slope ``f/w``, which no
+    motion beyond ``w`` has: ``friction`` chooses.
 
     Parameters
     ----------
     rig : Rig
-        As for :func:`equilibrium`. States that only some effects have (memory of muscles and valves) stay at their rest values.
-    angle : float
-        [rad]
-    side : {"mean", "fill", "vent"}
-        Slope by the command above, below, or on both sides of the valve's null.
-    held : tuple of str
-        Kinds of states that are regarded as constant; the tank's pressure by default, a slow one with an eigenvalue of zero.
-    joint, chamber, initial
         As for :func:`equilibrium`.
+    angle : float
+        The true one [rad], whatever the zero of its sensor.
+    side : {"mean", "fill", "vent"}
+        Slope by the opening above, below, or on both sides of the valve's null.
+    friction : {"rest", "moving"}
+        Dry friction as it is at rest, or as in a motion that does not turn round: without Coulomb friction, ``joint_coulomb_stribeck``
+        and ``muscle_hysteresis``.
+    held : tuple of str
+        Kinds of states (or effects) that are regarded as constant; the tank's pressure by default, a slow one with an eigenvalue of
+        zero.
+    joint, chamber, initial
+        As for :func:`equilibrium`; of several joints each has to rest, so that ``initial`` must hold the others.
 
     Returns
     -------
     LinearModel
-        All states that are not held are outputs too.
+        All named states that are not held are outputs too.
 
     Raises
     ------
     ParameterError
-        As :func:`equilibrium`, or if the side is unknown.
+        As :func:`equilibrium`, or if the side or the friction is unknown, the rig has an effect without a linear model (play, dead
+        zone, relay: the message names it), another joint does not rest, a command moves nothing, or the sampled motion belongs to
+        no continuous one.
     """
-    from scipy.linalg import logm
-
     if side not in SIDES:
         raise ParameterError(f"side = {side!r} is not allowed: one of {', '.join(SIDES)}")
+    if friction not in FRICTIONS:
+        raise ParameterError(f"friction = {friction!r} is not allowed: one of {', '.join(FRICTIONS)}")
+    check_smooth(rig, supplies="supply_pressure" not in held)
+    rig = resting(without_dry_friction(rig) if friction == "moving" else rig)
     start = equilibrium(rig, angle, joint=joint, chamber=chamber, initial=initial)
-    compiled, commands = core_rig(rig), _closed(rig)
-    first = Simulator(rig, sample_time=_SAMPLE, initial=start).observe()
-    point = {name: first[name] for name in compiled.states}
-    moving = [name for name in compiled.states if channel_of(name) not in held]
-    n, m = len(moving), len(commands)
-    sampled = np.eye(n + m)
+    simulator, commands = Simulator(rig, sample_time=_SAMPLE, initial=start), _closed(rig)
+    first = simulator.observe()
+    _check_rest(simulator, commands)
+    plant = _Differences(simulator, commands, side)
+    named, extra = (
+        [place for place in some if channel_of(place.name) not in held] for some in (plant.places.named, plant.places.extra)
+    )
+    places, outputs = [*named, *extra], tuple(place.name for place in named)
+    sampled, read = plant.sampled(places, outputs)
+    n, m = len(places), len(commands)
+    for k, name in enumerate(commands, n):
+        if not set(heard(sampled[:n, :n].T, sampled[:n, k])) & set(range(len(named))):
+            raise ParameterError(f"{name} moves nothing about {commands[name]:g} V (side = {side!r}): no linear model is there")
+    # what an effect moves and nothing feels (a lag of no time, a share of nothing) is no state
+    felt = np.abs(read).sum(axis=0) + (np.arange(n) < len(named))
+    kept = heard(sampled[:n, :n], felt)
+    continuous, size = _logarithm(sampled[np.ix_([*kept, *range(n, n + m)], [*kept, *range(n, n + m)])]), len(kept)
+    widths = np.array([plant.width(places[k]) for k in kept])
+    a, b = (continuous[:size, :size] * widths[:, None] / widths, continuous[:size, size:] * widths[:, None] / COMMAND)
+    names = tuple(places[k].name for k in kept), tuple(commands), outputs
+    return LinearModel(a, b, read[:, kept] / widths, *names, {**first, **commands}, side)
 
-    def reached(states: Mapping[str, float], inputs: Mapping[str, float]) -> Array:
-        after = _after(rig, states, inputs)
-        return np.array([after[name] for name in moving])
 
-    for k, name in enumerate(moving):
-        width = _WIDTHS[channel_of(name)]
-        up, down = (reached({**point, name: point[name] + s * width}, commands) for s in (1.0, -1.0))
-        sampled[:n, k] = (up - down) / (2.0 * width)
-    up_to, down_to = {"mean": (1.0, -1.0), "fill": (1.0, 0.0), "vent": (0.0, -1.0)}[side]
-    for k, name in enumerate(commands):
-        up, down = (reached(point, {**commands, name: commands[name] + s * _COMMAND}) for s in (up_to, down_to))
-        sampled[:n, n + k] = (up - down) / ((up_to - down_to) * _COMMAND)
-    continuous = np.real(np.asarray(logm(sampled))) / _SAMPLE
-    names = tuple(moving), tuple(commands), tuple(moving)
-    return LinearModel(continuous[:n, :n], continuous[:n, n:], np.eye(n), *names, {**first, **commands}, side)
+class _Differences:
+    """Differences of short samples about a state, everything in half widths."""
+
+    def __init__(self, simulator: Simulator, commands: Mapping[str, float], side: str) -> None:
+        self._simulator, self._commands = simulator, commands
+        self._sides = {"mean": (1.0, -1.0), "fill": (1.0, 0.0), "vent": (0.0, -1.0)}[side]
+        self._at = simulator.state
+        self.places = RigState(simulator.rig, self._at.size)
+        self._at[self.places.begun] = 1.0  # valves that hold their null, not ones that wait for a first command
+        self._follow = self._followed()
+
+    def width(self, place: Place) -> float:
+        """Half width of a place [SI]."""
+        return place.width * (float(self._at[place.index]) if place.relative else 1.0)
+
+    def sampled(self, places: Sequence[Place], outputs: Sequence[str]) -> tuple[Array, Array]:
+        """State and input matrix of a sample, the inputs staying; and what the sensors read [SI] by half width of each state."""
+        n, m = len(places), len(self._commands)
+        index, widths = [place.index for place in places], np.array([self.width(place) for place in places])
+        out, read = np.eye(n + m), np.zeros((len(outputs), n))
+        for k, place in enumerate(places):
+            above, below = self._sides if place.spool else (1.0, -1.0)
+            up, down = (self._moved(place, sign * widths[k]) for sign in (above, below))
+            out[:n, k] = (self._after(up) - self._after(down))[index] / ((above - below) * widths)
+            read[:, k] = (self._read(up, outputs) - self._read(down, outputs)) / (above - below)
+        above, below = self._sides
+        for k, (name, null) in enumerate(self._commands.items(), n):
+            up, down = (self._after(self._at, **{name: null + sign * COMMAND}) for sign in (above, below))
+            out[:n, k] = (up - down)[index] / ((above - below) * widths)
+        return out, read
+
+    def _moved(self, place: Place, change: float) -> Array:
+        """The state with a place changed, and with it what follows the motion of a joint."""
+        state = self._at.copy()
+        state[place.index] += change
+        if place.index in self.places.angles:
+            state[self.places.slaved] += self._follow[:, self.places.angles.index(place.index)] * change
+        return state
+
+    def _after(self, state: Array, **changed: float) -> Array:
+        """The state a sample later, with valves closed but for some commands."""
+        self._simulator.restore(state)
+        self._simulator._advance(1, {name: np.array([value]) for name, value in {**self._commands, **changed}.items()})
+        return self._simulator.state
+
+    def _read(self, state: Array, channels: Sequence[str]) -> Array:
+        self._simulator.restore(state)
+        sample = self._simulator.observe()
+        return np.array([sample[channel] for channel in channels])
+
+    def _followed(self) -> Array:
+        """What memories of the motion change by per angle of each joint, from a slow motion of each."""
+        places = self.places
+        rest = self._after(self._at)
+        moved, turned = [], []
+        for rate in places.rates:
+            state = self._at.copy()
+            state[rate] += 1e-3
+            change = self._after(state) - rest
+            moved.append(change[places.slaved])
+            turned.append(change[places.angles])
+        return np.linalg.solve(np.array(turned), np.array(moved)).T
 
 
-def linear_controller(
-    controller: Controller, point: Mapping[str, float], angle: float | None = None, *, state: Mapping[str, Any] | None = None
-) -> LinearController:
-    """Any controller with a state of floats about an operating point, by central differences of one update.
+def _check_rest(simulator: Simulator, commands: Mapping[str, float]) -> None:
+    """Refuse a state in which a joint does not rest."""
+    state = simulator.state
+    block = simulator._advance(1, {name: np.array([value]) for name, value in commands.items()})
+    simulator.restore(state)
+    for name, values in block.items():
+        if channel_of(name) == "joint_rate" and not abs(values[0]) < _REST:
+            raise ParameterError(
+                f"{name} is {values[0]:.3g} rad/s a quarter of a millisecond after the start: the joint does not rest; give initial "
+                "values that hold it: those of equilibrium for each joint in turn, until none moves"
+            )
 
-    Exact for a controller that is linear inside its limits (PID, cascade). What does not reach the command (a clock), or is never
-    moved by a measurement (an integral without a gain), is left out.
 
-    Parameters
-    ----------
-    controller : Controller
-        For one plant; it is reset before and after.
-    point : mapping of str to float
-        Channels at the operating point; the reference rests at its ``joint_angle``.
-    angle : float, optional
-        Another reference [rad].
-    state : mapping, optional
-        The controller's state at the operating point, for one whose integrals have to hold the arm up (a cascade, whose outer integral
-        is the pressure): ``controller.state`` after a closed loop that has come to rest there. By default that of a controller which
-        has seen the point three times.
+def _logarithm(sampled: Array) -> Array:
+    """Continuous matrices of sampled ones."""
+    from scipy.linalg import logm
 
-    Returns
-    -------
-    LinearController
-        From ``joint_angle``, ``joint_rate`` and ``muscle_pressure``, those of them that are in ``point``.
-
-    Raises
-    ------
-    ParameterError
-        If the controller answers what is not a finite number, or no measurement reaches its command: it is at a limit.
-    """
-    inputs = tuple(name for name in ("joint_angle", "joint_rate", "muscle_pressure") if name in point)
-    reference = Reference(point["joint_angle"] if angle is None else angle)
-    controller.reset()
-    if state is None:
-        for k in range(3):  # filters and differences have seen something
-            controller.update(k * controller.period, point, reference)
-    else:
-        controller.restore(state)
-    start = controller.state
-    clocks = [value for path, value in _floats(start) if path[-1] == "time"]  # of the parts too
-    now = max(clocks, default=2.0 * controller.period) + controller.period
-    paths = [path for path, value in _floats(start) if path[-1] != "time"]
-
-    def answered(state: Mapping[str, Any], sample: Mapping[str, float]) -> Array:
-        controller.restore(state)
-        command = float(controller.update(now, sample, reference))
-        after = controller.state
-        return np.array([*(_at(after, path) for path in paths), command])
-
-    columns = []
-    for path in paths:
-        width = 1e-4 * max(1.0, abs(_at(start, path)))
-        up, down = (answered(_changed(start, path, s * width), point) for s in (1.0, -1.0))
-        columns.append((up - down) / (2.0 * width))
-    for name in inputs:
-        width = _WIDTHS[name]
-        up, down = (answered(start, {**point, name: point[name] + s * width}) for s in (1.0, -1.0))
-        columns.append((up - down) / (2.0 * width))
-    command = float(answered(start, point)[-1])
-    controller.reset()
-    n = len(paths)
-    whole = np.array(columns).T
-    if not (np.isfinite(whole).all() and math.isfinite(command)):
-        raise ParameterError("the controller's command is not finite at the operating point: no linear model is there")
-    if not whole[n].any() or not whole[:, n:].any():
-        raise ParameterError(
-            f"the controller answers {command:g} whatever it measures: it is at a limit; give the state in which it holds the arm here"
-        )
-    # an integral with a gain of zero is heard, but nothing moves it; it would count as a motion that never dies out
-    heard, moved = _heard(whole[:n, :n], whole[n, :n]), _heard(whole[:n, :n].T, np.abs(whole[:n, n:]).sum(axis=1))
-    kept = sorted(set(heard) & set(moved))
-    a, b = whole[np.ix_(kept, kept)], whole[np.ix_(kept, range(n, n + len(inputs)))]
-    return LinearController(a, b, whole[[n]][:, kept], whole[[n]][:, n:], inputs, controller.period, command)
+    found = np.asarray(logm(sampled), dtype=np.complex128)
+    if not np.isfinite(found).all() or float(np.abs(found.imag).max()) > 1e-6 * max(1.0, float(np.abs(found.real).max())):
+        raise ParameterError("the rig's motion over a quarter of a millisecond belongs to no linear one in continuous time")
+    return np.asarray(found.real / _SAMPLE, dtype=np.float64)
 
 
 def python_control() -> Any:
@@ -383,45 +371,3 @@ def _filled(rig: Rig, start: Mapping[str, float], chamber: str, pressure: float)
     if len(rig.tables("chamber")) == 1:
         filled.update({dotted("line_pressure", name): pressure for name in rig.tables("line")})
     return filled
-
-
-def _heard(a: Array, c: Array) -> list[int]:
-    """Indices of the states that reach the output, at once or by way of another."""
-    heard = set(np.flatnonzero(c).tolist())
-    while True:
-        more = {int(j) for i in heard for j in np.flatnonzero(a[i])} - heard
-        if not more:
-            return sorted(heard)
-        heard |= more
-
-
-Path = tuple[Any, ...]
-
-
-def _floats(state: Any, path: Path = ()) -> Iterator[tuple[Path, float]]:
-    """Every float in nested mappings and arrays, with the way to it."""
-    if isinstance(state, Mapping):
-        for key, value in state.items():
-            yield from _floats(value, (*path, key))
-    elif isinstance(state, np.ndarray):
-        for index in np.ndindex(state.shape):
-            yield (*path, index), float(state[index])
-    elif isinstance(state, float):
-        yield path, float(state)
-
-
-def _at(state: Any, path: Path) -> float:
-    for key in path:
-        state = state[key]
-    return float(state)
-
-
-def _changed(state: Any, path: Path, change: float) -> Any:
-    """A copy with one float changed."""
-    if not path:
-        return state + change
-    if isinstance(state, np.ndarray):
-        copied = state.copy()
-        copied[path[0]] += change
-        return copied
-    return {key: _changed(value, path[1:], change) if key == path[0] else value for key, value in state.items()}
