@@ -191,12 +191,12 @@ class Lifts:
     @property
     def overshoot(self) -> Array:
         """Above the angle of the hold [deg], zero for none."""
-        return np.maximum(self.between(0.0, 25.0).max(axis=1) - HIGH, 0.0)
+        return np.asarray(np.maximum(self.between(0.0, 25.0).max(axis=1) - HIGH, 0.0), dtype=np.float64)
 
     @property
     def undershoot(self) -> Array:
         """Below the angle of rest after the return [deg], zero for none."""
-        return np.maximum(LOW - self.between(15.0, 25.0).min(axis=1), 0.0)
+        return np.asarray(np.maximum(LOW - self.between(15.0, 25.0).min(axis=1), 0.0), dtype=np.float64)
 
     @property
     def swing(self) -> Array:
