@@ -108,8 +108,20 @@ def test_a_plant_hides_its_effects_and_shares_its_valve():
     for one in (rig, model):
         assert one.parameter("valve.discharge_area_max").value == pytest.approx(4.2e-6)
     assert rig.parameter("arm.inertia").value != model.parameter("arm.inertia").value
+    fed = lift.plant(VARIANTS["regulated supply, dead band 50 kPa"], 20.0)
+    assert fed.model["supply"]["kind"] == "regulator"
+    assert fed.model["supply"]["initial_pressure"] == model.model["supply"]["initial_pressure"]
     with pytest.raises(ParameterError, match=r"names has 'no such plant'; the plants are: the rig"):
         lift.lifts(["no such plant"])
+
+
+def test_every_trial_changes_what_the_arm_does():
+    """An effect that a rig has no part for would be a trial of nothing."""
+    gains = {"FF+fuzzy": GAINS["FF+fuzzy"]}
+    found = lift.lifts(list(VARIANTS), gains, payloads=PAYLOADS[1:2], duration=6.5)
+    plain = found.pop("the rig")["FF+fuzzy"].angle
+    for name, runs in found.items():
+        assert np.abs(runs["FF+fuzzy"].angle - plain).max() > 1e-4, name
 
 
 def test_a_map_has_the_metrics_of_its_loops_in_both_units():

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs.control import PID, AirModel, ArmModel, Feedforward, Fuzzy, Metrics, Parallel, Trajectory, sweep
+from pamrs.control.loop import Actuation
 from pamrs.control.metrics import combined, evaluate
 from pamrs.control.trajectories import degrees, lift_hold_return
 from pamrs.control.tuning import perturbed
@@ -82,11 +83,14 @@ class Variant:
         Parameters that it has not.
     effects : mapping of str to mapping of str to float
         Effects of the catalogue that it has not.
+    regulated : bool
+        Whether a regulator with the lag and droop of the rig ``regulated_joint`` feeds it; the model has a supply that holds.
     """
 
     known: Mapping[str, float] = field(default_factory=dict)
     hidden: Mapping[str, float] = field(default_factory=dict)
     effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    regulated: bool = False
 
 
 def _valve(square_millimetres: float) -> dict[str, float]:
@@ -108,7 +112,7 @@ VARIANTS: Final[Mapping[str, Variant]] = {
     "valve 4.2 mm2": Variant(known=_valve(4.2)),
     "valve 2.44 mm2": Variant(known=_valve(2.44)),
     "supply 0.45 MPa": Variant(known={"supply.initial_pressure": 0.45e6}),
-    "regulator's dead band 50 kPa": Variant(effects={"supply_regulator_deadband": {"dead_band": 5e4}}),
+    "regulated supply, dead band 50 kPa": Variant(effects={"supply_regulator_deadband": {"dead_band": 5e4}}, regulated=True),
     "input lag 50 ms": Variant(effects={"input_path_lag": {"time_constant": 0.05}}),
     "pressure lag 50 ms": Variant(effects={"pressure_lag": {"time_constant": 0.05}}),
     "tube 2e-9 m3/(s Pa)": Variant(effects={"tube_flow_restriction": {"conductance": 2e-9}}),
@@ -155,6 +159,10 @@ def plant(variant: Variant = VARIANTS["the rig"], payload: float = PAYLOADS[1], 
     Rig
     """
     rig = perturbed(believed(variant).with_parameters({"arm.payload": payload}), seed).with_parameters(variant.hidden)
+    if variant.regulated:
+        model = rig.model
+        fed = {**named("regulated_joint").model["supply"], "initial_pressure": model["supply"]["initial_pressure"]}
+        rig = Rig(rig.name, {**model, "supply": fed})
     for name, values in variant.effects.items():
         rig = rig.with_effect(name, values)
     return rig
@@ -268,9 +276,9 @@ def lifts(
     for name in names:
         if name not in VARIANTS:
             raise ParameterError(f"names has {name!r}; the plants are: {', '.join(VARIANTS)}")
-    groups: dict[tuple[tuple[str, float], ...], list[str]] = {}
+    groups: dict[tuple[Any, ...], list[str]] = {}
     for name in names:
-        groups.setdefault(tuple(sorted(VARIANTS[name].known.items())), []).append(name)
+        groups.setdefault((VARIANTS[name].regulated, *sorted(VARIANTS[name].known.items())), []).append(name)
     found: dict[str, dict[str, Lifts]] = {name: {} for name in names}
     for members in groups.values():
         for size in (3, 4):
@@ -296,15 +304,16 @@ def _run(
         rigs += made[i * len(payloads) : (i + 1) * len(payloads)] * len(gains)
     each = [values for _ in members for values in gains.values() for _ in payloads]
     mass = np.array([m for _ in members for _ in gains for m in payloads])
-    path = trajectory()
+    path, base = trajectory(), believed(VARIANTS[members[0]])
     run = sweep(
         rigs,
-        _controller(each, believed(VARIANTS[members[0]]), mass, anti_windup),
+        _controller(each, base, mass, anti_windup),
         path,
         duration,
         sample_time=PERIOD,
         step=_STEP,
         initial=_at_rest(rigs),
+        actuation=_fed(float(base.parameter("supply.initial_pressure").value)) if VARIANTS[members[0]].regulated else None,
         channels=("joint_angle", "joint_rate", "muscle_pressure"),
         record_every=round(_ROW / PERIOD),
     ).run
@@ -320,6 +329,11 @@ def _run(
             angle, rate, pressure = (np.array(run[c][rows]) for c in ("joint_angle", "joint_rate", "muscle_pressure"))
             metrics = evaluate(run.time, reference, angle, rate=rate, parts=path.phases)
             found[name][label] = Lifts(run.time, reference, angle, rate, pressure, metrics)
+
+
+def _fed(pressure: float) -> Actuation:
+    """The command to the valve, the regulator set to a pressure [Pa]."""
+    return lambda command: {"valve_command": command, "supply_command": pressure}
 
 
 def _at_rest(rigs: Sequence[Rig]) -> dict[str, Array]:
