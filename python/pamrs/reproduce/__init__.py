@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["check", "names", "section"]
 
 #: Chapter -> its module; the one of its pictures has the same name and ``_figures``.
-_CHAPTERS: Final = {"ch3": "chapter3"}
+_CHAPTERS: Final = {"ch3": "chapter3", "ch4": "chapter4"}
 
 
 def names() -> list[str]:
@@ -54,7 +54,8 @@ def section(name: str, *, search: bool = True, pictures: bool = True, progress: 
     name : str
         One of :func:`names`.
     search : bool
-        Whether searches that take minutes run too (extra ``search``).
+        Whether searches that take minutes run too: in chapter 3 those of joints (extra ``search``), in chapter 4 finer maps of gains
+        and the diagnoses.
     pictures : bool
         Whether its pictures are drawn (extra ``plot``).
     progress : callable, optional
