@@ -166,7 +166,7 @@ def _sliding(plan: Plan) -> list[Comparison]:
     group, run = Group("sliding"), plan.estimates()
     end = float(run.time[-1])
     rms = run.rms().reshape(len(PAYLOADS), len(WRONG))
-    later, ripple = run.rms(0.5 * end) / run.rms(SETTLED, 0.5 * end), run.ripple()
+    later, ripple = run.rms(0.5 * end) / run.rms(min(SETTLED, 0.1 * end), 0.5 * end), run.ripple()
     for k, factor in ((1, "0.1"), (2, "10")):
         for p, payload in enumerate(PAYLOADS):
             row = p * len(WRONG) + k

@@ -73,11 +73,20 @@ def compound(plan: Plan) -> list[Comparison]:
         group.smaller(fact.removeprefix("compound: ") + f", {MIDDLE:g} lb", _CURVE, ratio, note)
     end = float(runs["neural"].time[-1])
     group.smaller(
-        f"neural over sliding in the last half of the record, {MIDDLE:g} lb", _CURVE,
+        f"neural over sliding in the last half of the record, {MIDDLE:g} lb",
+        _CURVE,
         float((runs["neural"].rms(0.5 * end) / runs["sliding"].rms(0.5 * end))[k]),
-        "the record begins with a move from rest at 15 deg to 95 deg, in which the networks unlearn; at the end of the training itself "
-        f"their error is {_end_of_training(plan, k)} deg",
-    )  # fmt: skip
+        "the record begins with a move from rest at 15 deg to 95 deg, in which the networks unlearn what they knew of high angles",
+    )
+    training = plan.trained("neural")
+    if training is not None:
+        last = training.rms(0.9 * float(training.time[-1]))[k]
+        group.smaller(
+            f"neural at the end of its training over sliding, {MIDDLE:g} lb",
+            _CURVE,
+            float(last / runs["sliding"].rms()[k]),
+            f"last tenth of {plan.training:g} s, {last:.2f} deg: the order of the chapter, but for that move",
+        )
     ripple = {kind: float(run.ripple()[k]) for kind, run in runs.items()}
     for kind in ("sliding", "adaptive sliding"):
         group.say(
@@ -86,11 +95,6 @@ def compound(plan: Plan) -> list[Comparison]:
             note=f"{ripple[kind]:.3f} and {ripple['neural']:.3f} deg, most of it the triangle's corners; the three have one KD here",
         )  # fmt: skip
     return group.rows + _table_of(group.title, runs, plan, SETTLED)
-
-
-def _end_of_training(plan: Plan, row: int) -> str:
-    run = plan.trained("neural")
-    return "unknown" if run is None else f"{run.rms(0.9 * float(run.time[-1]))[row]:.2f}"
 
 
 def _table_of(title: str, runs: dict[str, Track], plan: Plan, begin: float) -> list[Comparison]:
