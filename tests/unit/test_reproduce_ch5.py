@@ -1,6 +1,9 @@
 """Chapter 5 beside ours: what the experiments vary, how they are read, and that the short plan fills the whole page."""
 
+import csv
 import math
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +18,7 @@ from pamrs.reproduce.facts import table, to_csv
 from pamrs.reproduce.tracking import KINDS, PERIOD, Track, arm_model, controller, follow, plant, waves
 from pamrs.reproduce.tracking_runs import EFFECTS, MIDDLE, SHORT, STARTS, WRONG, Plan
 
+DOCS = Path(__file__).parents[2] / "docs" / "reproduction"
 #: Shorter still than the short plan: a few samples of everything.
 TINY = Plan(record=12.0, training=12.0, cases=((MIDDLE, ""), (MIDDLE, "muscle_hysteresis")))
 
@@ -161,3 +165,19 @@ def test_the_chapter_is_there():
     assert "ch5" in reproduce.names()
     reproduce.check("ch5")
     assert len(chapter5.chosen()) == len({name for name, _, _ in chapter5.chosen()}) > 5
+
+
+def test_page_in_the_documentation_is_of_the_full_plan(rows):
+    lines = (DOCS / "chapter5" / "facts.csv").read_text(encoding="utf-8").splitlines()
+    stored = {(row["group"], row["fact"]): row for row in csv.DictReader(lines)}
+    assert {group for group, _ in stored} == set(GROUPS.values())
+    known = {row.fact: row for row in rows}
+    for fact in ("inertia with 50 lb over that without", "largest frequency", "simplified torque (5.1) against the full model"):
+        assert float(stored[GROUPS["rig"], fact]["ours"]) == pytest.approx(known[fact].ours, rel=1e-4)
+    effects = {fact for group, fact in stored if group == GROUPS["effects"]}
+    assert {f"orders of 5.5 that hold, {name}" for name in (*EFFECTS, "nothing left out")} == effects
+    text = (DOCS / "chapter5.md").read_text(encoding="utf-8")
+    assert "`pamrs reproduce ch5 --output docs/reproduction/chapter5 --page docs/reproduction/chapter5.md`" in text.splitlines()[2]
+    links = re.findall(r"\]\(([^)]+\.png)\)", text)
+    assert len(links) == 10
+    assert all((DOCS / link).is_file() for link in links)
