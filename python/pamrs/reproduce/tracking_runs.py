@@ -26,8 +26,8 @@ Parameters = tuple[tuple[str, float], ...]
 
 #: The payload of the tables where the dissertation names none [lb].
 MIDDLE: Final = 25.0
-#: Friction of the braid as large as the loops of Fig. 5.2 suggest: with it the six muscles' torque at 60 deg and 50 psi differs by some
-#: 15 % between contraction and extension.
+#: Friction of the braid: torque at 60 deg and 50 psi then differs by 7 % between contraction and extension, at 90 deg by 10 %
+#: (Fig. 5.2 has such a loop; how large it is cannot be read from the text).
 HYSTERESIS: Final[Parameters] = (("friction_constant", 15.0), ("friction_pressure", 8e-5), ("presliding", 1e-3))
 #: What the plant may have that no controller knows of, one at a time.
 EFFECTS: Final[Mapping[str, Parameters]] = {
