@@ -92,7 +92,7 @@ def compound(plan: Plan) -> list[Comparison]:
         group.say(
             f"error above 1.5 Hz, {kind} over neural", "5.5: 'low-amplitude, high-frequency content'", 1.0,
             ripple[kind] / ripple["neural"], relation="above",
-            note=f"{ripple[kind]:.3f} and {ripple['neural']:.3f} deg, most of it the triangle's corners; the three have one KD here",
+            note=f"{ripple[kind]:.3f} and {ripple['neural']:.3f} deg; the three have one KD here, and the networks relearn high angles",
         )  # fmt: skip
     return group.rows + _table_of(group.title, runs, plan, SETTLED)
 
@@ -138,7 +138,7 @@ def lift(plan: Plan) -> list[Comparison]:
         note = _numbers(numbers[which], runs, k, 3) + "".join(f"; {payload:g} lb {value:.2f}" for payload, value in others.items())
         if fact.startswith("lift: sliding"):
             later = {kind: run.rms(2.0)[k] for kind, run in runs.items()}
-            note += f"; in the chapter, as here, by the networks' begin alone: from 2 s on {later['sliding'] / later['neural']:.2f}"
+            note += f"; the networks lose most at the begin, in the chapter too: from 2 s on {later['sliding'] / later['neural']:.2f}"
         group.smaller(fact.removeprefix("lift: ") + f", {MIDDLE:g} lb", _LIFT, ratio, note)
     return group.rows + _table_of(group.title, runs, plan, 0.0)
 
