@@ -15,11 +15,12 @@ __all__ = ["reproduce_command"]
 
 
 def reproduce_command(
-    chapter: Annotated[list[str], typer.Argument(help="Chapters of the 2014 dissertation: ch3, ch4.")],
+    chapter: Annotated[list[str], typer.Argument(help="Chapters of the 2014 dissertation: ch3, ch4, ch5.")],
     output: Annotated[Path, typer.Option(help="Folder for facts.csv, facts.md and one PNG for each figure; made if it is not there.")],
     page: Annotated[Path | None, typer.Option(help="Where to write the Markdown page, instead of facts.md in the folder.")] = None,
     search: Annotated[
-        bool, typer.Option(help="Also run what takes minutes: joint searches (ch3, extra search), finer maps, diagnoses (ch4).")
+        bool,
+        typer.Option(help="Also run what takes minutes: joint searches (ch3, extra search), fine gain maps, diagnoses (ch4, ch5)."),
     ] = True,
 ) -> None:
     """Set what a chapter of the dissertation states beside what this package gives, with a verdict for each statement."""

@@ -356,7 +356,7 @@ def test_command_refuses_chapters_that_there_are_not(capsys, tmp_path):
     assert code == 2
     assert "the folder" in err
     assert not folder.exists()
-    assert reproduce.names() == ["ch3", "ch4"]
+    assert reproduce.names() == ["ch3", "ch4", "ch5"]
 
 
 def test_missing_plot_package_is_named(capsys, tmp_path, monkeypatch):
