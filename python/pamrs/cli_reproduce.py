@@ -20,7 +20,7 @@ def reproduce_command(
     page: Annotated[Path | None, typer.Option(help="Where to write the Markdown page, instead of facts.md in the folder.")] = None,
     search: Annotated[
         bool,
-        typer.Option(help="Also run what takes minutes: joint searches (ch3, extra search), fine gain maps, diagnoses (ch4, ch5)."),
+        typer.Option(help="Also run what takes minutes: joint searches (ch3, extra search), fine gain maps, diagnoses."),
     ] = True,
 ) -> None:
     """Set what a chapter of the dissertation states beside what this package gives, with a verdict for each statement."""
