@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,10 @@ import pytest
 from numpy.typing import NDArray
 
 import pamrs
+from pamrs.control import trajectories
 from pamrs.diagnosis.plausible import implausible
+from pamrs.reproduce import lift
+from pamrs.reproduce.lift_diagnosis import recorded
 
 Array = NDArray[np.float64]
 Table = dict[str, Array]
@@ -148,3 +152,15 @@ def test_every_finding_is_told_at_once(plain: Table, tmp_path: Path) -> None:
     with pytest.raises(pamrs.DiagnosisError) as told:
         pamrs.diagnose(loaded(tmp_path, table))
     assert all(word in str(told.value) for word in ("'run'", "joint_angle", "muscle_pressure", "allowed"))
+
+
+def test_an_arm_whose_swing_moves_the_pressure_is_not_refused() -> None:
+    # a limit cycle: most of the pressure's change is the volume's, against the valve
+    name, payload = "the rig", lift.PAYLOADS[1]
+    truth = lift.plant(lift.VARIANTS[name], payload, seed=None)
+    model = lift.believed(lift.VARIANTS[name]).with_parameters({"arm.payload": payload})
+    record = recorded(truth, model, trajectories.compound(), "fit", 0, 25.0)
+    assert np.ptp(record.channels["joint_angle"]) > 1.0
+    assert implausible(record, model) == []
+    turned = replace(record, channels=record.channels | {"valve_command": 10.0 - record.channels["valve_command"]})
+    assert any("goes against valve_command" in text for text in implausible(turned, model))

@@ -45,6 +45,8 @@ FROZEN_WHILE = 2e4
 """Change of a muscle's pressure while which a tank that feeds it cannot read one and the same value [Pa]."""
 OPPOSED, OPPOSITE = 0.6, -0.2
 """Share of a chamber's change of pressure that may go against its valve's command, if the two are also correlated below this."""
+STILL = 0.02
+"""Change of a joint's angle up to which its muscles' volume hardly moves their pressure [rad]."""
 DEGREES = 180.0 / math.pi
 WRONG, RIGHT = 1.0, 0.4
 """Misfit in standard deviations of the angle as recorded, and as it would be in another unit, from which the unit is wrong."""
@@ -261,6 +263,9 @@ def _valves(recording: Recording, rig: Rig) -> Iterator[str]:
             continue  # another valve may fill while this one vents
         width = max(2, round(0.1 / recording.sample_time))
         rows = np.flatnonzero(both[:-width] & both[width // 2 : -width + width // 2] & both[width:])
+        # a joint that swings moves the pressure by its volume, whatever the valve does
+        for angle in (v for c, v in recording.channels.items() if channel_of(c) == "joint_angle"):
+            rows = rows[~(np.abs(angle[rows + width] - angle[rows]) > STILL)]
         change = recording.channels[pressure][rows + width] - recording.channels[pressure][rows]
         towards, moved = opening[rows + width // 2], float(np.ptp(recording.channels[pressure][both]))
         if rows.size < 32 or moved < 2e4 or not np.ptp(towards) > 0.0 or not np.ptp(change) > 0.0:
