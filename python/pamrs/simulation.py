@@ -373,7 +373,7 @@ def simulate(
 def check_run(rig: Rig, sample_time: float) -> None:
     """Refuse what is not a rig and a sample time [s] that is not a finite number above zero."""
     if not isinstance(rig, Rig):
-        raise ParameterError(f"rig is a {type(rig).__name__}; a Rig is needed, for example pamrs.load_rig({rig!r})")
+        raise ParameterError(f"rig is a {type(rig).__name__}; a Rig is needed: pamrs.rigs.shoulder(), pamrs.load_rig(path)")
     if not (isinstance(sample_time, (int, float, np.number)) and np.isfinite(sample_time) and sample_time > 0):
         raise ParameterError(f"sample_time = {sample_time} is not allowed: a finite time > 0 s is needed")
 

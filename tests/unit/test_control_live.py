@@ -156,11 +156,12 @@ class Slow(SimulatedDevice):
 
 
 def test_a_reading_that_hung_is_not_acted_on(rig):
-    for takes, reason, missed in ((0.025, "finished", 1), (1.0, "lost_sensor", 1)):
+    for takes, reason, missed in ((0.025, "finished", 1), (1.0, "overrun", 1)):
         clock = VirtualClock()
         device = Slow(rig, clock, 0.995, takes)
         run = run_live(device, SmallPid(period=0.01), LIFT, clock=clock, safe=0.0)
         assert (run.reason, run.missed) == (reason, missed)
+        assert run.stall == pytest.approx(takes - 0.01, abs=0.006)
         assert np.isnan(run.channels["joint_angle"][100])
         after = [pair for pair in device.written if pair[0] > 0.9951]
         # the first command after it is of a new reading, or the safe one
@@ -205,7 +206,7 @@ def test_overruns_are_counted_and_left_out(rig):
     assert run.time == pytest.approx(0.01 * np.arange(500))
     assert np.isnan(run.late).sum() == 4
     lost, _ = live(rig, None, VirtualClock(stalls={1.0: 0.5}), most_missed=4)
-    assert lost.reason == "lost_sensor"
+    assert lost.reason == "overrun"
 
 
 class Failing(SmallPid):
@@ -401,3 +402,14 @@ def test_bad_input_is_named(rig, change, word):
             SimulatedDevice(rig, clock, **wrong)
     with pytest.raises(ParameterError, match="jitter"):
         VirtualClock(-1.0)
+
+
+def test_a_channel_that_goes_is_a_missed_reading(rig):
+    class Loses(SimulatedDevice):
+        def read(self):
+            reading = super().read()
+            return {"muscle_pressure": reading["muscle_pressure"]} if self.clock.now() > 0.5 else reading
+
+    clock = VirtualClock()
+    run = run_live(Loses(rig, clock), SmallPid(period=0.01), LIFT, clock=clock)
+    assert (run.reason, run.missed) == ("lost_sensor", 6)

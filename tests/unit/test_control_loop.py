@@ -209,3 +209,25 @@ def test_bad_input_is_named(rig, change, word):
 def test_bad_sensors_are_named(bad):
     with pytest.raises(ParameterError, match=next(iter(bad))):
         Sensors(**bad)
+
+
+def test_degrees_for_radians_and_pressures_for_volts_are_refused():
+    rig = pamrs.rigs.shoulder()
+    with pytest.raises(ParameterError, match="goes to 60 rad.*degrees converts"):
+        closed_loop(rig, SmallPid(period=0.005), lift_hold_return(20.0, 60.0, ramp=2.0))
+
+    class Pascals(Controller):
+        period = 0.005
+        state: dict[str, float] = {}
+
+        def reset(self):
+            """Nothing to forget."""
+
+        def restore(self, state):
+            """Nothing to go on from."""
+
+        def update(self, time, measurement, reference):
+            return 2e5
+
+    with pytest.raises(ParameterError, match="answered 2e.05 V.*put it in a pamrs.control.Cascade"):
+        closed_loop(rig, Pascals(), step(0.3, 0.4, duration=0.1))

@@ -325,3 +325,11 @@ def test_the_package_offers_what_it_says() -> None:
     assert isinstance(pamrs.__version__, str)
     with pytest.raises(AttributeError, match="nonsense"):
         _ = pamrs.nonsense
+
+
+def test_every_packaged_rig_is_a_function() -> None:
+    for name in pamrs.rigs.names():
+        if name != "bench":  # takes a muscle
+            assert getattr(pamrs.rigs, name)().name == pamrs.rigs.named(name).name
+    with pytest.raises(AttributeError, match="knee"):
+        pamrs.rigs.knee()

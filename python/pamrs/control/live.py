@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from pamrs.control.protocol import Controller, Reference, check_controller, check_drives_valve
 from pamrs.control.termination import Termination
-from pamrs.control.trajectories import Trajectory
+from pamrs.control.trajectories import Trajectory, check_angles
 from pamrs.errors import PamrsError, ParameterError
 from pamrs.simulation import whole_samples
 
@@ -89,8 +89,9 @@ class LiveRun:
 
     Attributes
     ----------
-    reason : {"finished", "lost_sensor", "interrupted", "failed"}
-        Why it ended; interrupted by Ctrl-C, failed in :attr:`LiveError.run` only.
+    reason : {"finished", "lost_sensor", "overrun", "interrupted", "failed"}
+        Why it ended; overrun if too many periods in a row were left out as the machine, or ``read`` and ``write``, were too slow: a
+        longer period helps (5 to 10 ms on an ordinary operating system). Interrupted by Ctrl-C, failed in :attr:`LiveError.run` only.
     time : ndarray, shape (rows,)
         Nominal time of each period [s].
     reference, command : ndarray, shape (rows,)
@@ -105,6 +106,8 @@ class LiveRun:
         Periods left out because the loop came more than a period late.
     safe_command : float
         What was written at the end.
+    stall : float
+        Largest lateness of all, periods that were left out included [s].
     """
 
     reason: str
@@ -116,6 +119,7 @@ class LiveRun:
     missed: int
     overruns: int
     safe_command: float
+    stall: float
 
     @property
     def jitter(self) -> float:
@@ -238,11 +242,13 @@ class _Loop:
         self.plausible = {name: _pair(f"plausible[{name}]", pair) for name, pair in (plausible or {}).items()}
         self.period = controller.period
         self.total = whole_samples("duration", trajectory.duration if duration is None else duration, self.period, least=1)
+        check_angles(trajectory, self.total * self.period)
         self.k = 0
         self.held = self.safe
         self.last: Mapping[str, float] | None = None
         self.seen = -math.inf
         self.missed = self.in_a_row = self.overruns = 0
+        self.stall = 0.0
         self.rows: list[tuple[float, float, float, float, Mapping[str, float] | None]] = []
 
     def run(self, termination: Termination) -> str:
@@ -260,12 +266,13 @@ class _Loop:
         begin = self.clock.now()
         while self.k < self.total:
             late = self._wait(begin + self.k * self.period)
+            self.stall = max(self.stall, late)
             for _ in range(min(math.floor(late / self.period), self.total - self.k)):
                 self.overruns += 1
                 self._without_reading(math.nan)
                 late -= self.period
                 if self.in_a_row > self.most_missed:
-                    return "lost_sensor"
+                    return "overrun"
             if self.k == self.total:
                 break
             begun = self.clock.now()
@@ -331,6 +338,8 @@ class _Loop:
             return None
         if not reading or not all(map(math.isfinite, reading.values())):
             return None
+        if self.last is not None and not self.last.keys() <= reading.keys():
+            return None  # a channel that was there is gone
         if any(not low <= reading.get(name, math.nan) <= high for name, (low, high) in self.plausible.items()):
             return None
         if self.stamp is None:
@@ -358,7 +367,7 @@ class _Loop:
         when, wanted, command, late = (np.array([row[i] for row in self.rows], dtype=np.float64) for i in range(4))
         names = dict.fromkeys(name for row in self.rows for name in (row[4] or ()))
         channels = {n: np.array([math.nan if r[4] is None else r[4].get(n, math.nan) for r in self.rows]) for n in names}
-        return LiveRun(reason, when, wanted, command, channels, late, self.missed, self.overruns, self.safe)
+        return LiveRun(reason, when, wanted, command, channels, late, self.missed, self.overruns, self.safe, self.stall)
 
 
 def _pair(name: str, given: Any) -> tuple[float, float]:

@@ -14,7 +14,7 @@ from pamrs.channels import channel_of
 from pamrs.control.metrics import Metrics, evaluate
 from pamrs.control.protocol import Controller, Reference, check_controller, check_drives_valve
 from pamrs.control.sensors import Reader, Sensors, reader_of
-from pamrs.control.trajectories import Trajectory
+from pamrs.control.trajectories import Trajectory, check_angles
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
 from pamrs.simulation import Event, core_rig, default_step, whole_samples
@@ -28,6 +28,8 @@ __all__ = ["Actuation", "ClosedLoop", "actuation_of", "closed_loop", "tracked_of
 Array = NDArray[np.float64]
 #: From a controller's command to the keywords of :meth:`pamrs.Simulator.step`: ``lambda u: {"valve_command": {"flexor": u, ...}}``.
 Actuation: TypeAlias = "Callable[[Any], Mapping[str, Any]]"
+#: Beyond any valve's command [V]: what answers more answers something else.
+MOST_VOLTS = 1000.0
 
 
 @dataclass(frozen=True)
@@ -192,6 +194,7 @@ def closed_loop(
     dt = simulator.sample_time
     every = whole_samples("controller.period", controller.period, dt, least=1)
     total = whole_samples("duration", trajectory.duration if duration is None else duration, dt, least=1)
+    check_angles(trajectory, total * dt)
     if not math.isfinite(start):
         raise ParameterError(f"start = {start} s is not allowed: a finite number is needed")
     act = actuation_of(simulator.rig, controller) if actuation is None else actuation
@@ -221,10 +224,22 @@ def closed_loop(
         return act(value)
 
     run = simulator.control(answer, total * dt, period=every * dt)
+    if actuation is None:
+        _check_volts(simulator.rig, commands)
     time = np.asarray(np.arange(total + 1) * dt, dtype=np.float64)
     wanted = trajectory(np.asarray((began + np.arange(total + 1)) * dt, dtype=np.float64))
     out = {name: run[name] for name in names}
     return ClosedLoop(time, wanted, commands, out, trajectory, simulator.rig, run.events, alias.get("joint_angle", "joint_angle"))
+
+
+def _check_volts(rig: Rig, commands: Array) -> None:
+    """Refuse commands that are no volts of a valve."""
+    largest = float(np.nanmax(np.abs(commands)))
+    if rig.tables("valve") and largest > MOST_VOLTS:
+        raise ParameterError(
+            f"the controller answered {largest:.3g} V: if that is a pressure [Pa], set its answers = 'pressure' and put it in a "
+            "pamrs.control.Cascade"
+        )
 
 
 def _simulator(

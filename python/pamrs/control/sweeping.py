@@ -13,7 +13,7 @@ from pamrs.control.loop import Actuation, actuation_of, tracked_of
 from pamrs.control.metrics import slope_sine
 from pamrs.control.protocol import Controller, check_controller
 from pamrs.control.sensors import Reader, Sensors, reader_of
-from pamrs.control.trajectories import Trajectory
+from pamrs.control.trajectories import Trajectory, check_angles
 from pamrs.control.values import angle_factor
 from pamrs.rig import Rig
 from pamrs.simulation import default_step, whole_samples
@@ -136,6 +136,7 @@ def sweep(
     batch = Batch(plants, n=n, sample_time=dt, step=step, initial=initial, threads=threads)
     every = whole_samples("controller.period", period, dt, least=1)
     total = whole_samples("duration", trajectory.duration if duration is None else duration, dt, least=1)
+    check_angles(trajectory, total * dt)
     act = actuation_of(batch.rigs[0], controller) if actuation is None else actuation
     read = reader_of(sensors, period)
     controller.reset()

@@ -22,12 +22,26 @@ from numpy.typing import ArrayLike, NDArray
 from pamrs.control.protocol import Reference, Value
 from pamrs.errors import ParameterError
 
-__all__ = ["TABLE_5_1", "Trajectory", "compound", "cosine_cycles", "degrees", "from_samples", "lift_hold_return", "step"]
+__all__ = [
+    "TABLE_5_1",
+    "Trajectory",
+    "check_angles",
+    "compound",
+    "cosine_cycles",
+    "degrees",
+    "from_samples",
+    "lift_hold_return",
+    "step",
+]
 
 Array = NDArray[np.float64]
 
 #: Amplitude [deg] and angular frequency [rad/s] of the sinusoids of (5.24).
 TABLE_5_1 = ((20.0, 0.70), (13.0, 0.95), (7.0, 1.55), (5.0, 0.80))
+
+
+#: No joint of a rig turns farther either way [rad].
+MOST_ANGLE = 7.0
 
 
 class _Shape(Protocol):
@@ -226,6 +240,28 @@ def degrees(*values: float) -> tuple[float, ...]:
     25.0
     """
     return tuple(math.radians(value) for value in values)
+
+
+def check_angles(trajectory: Trajectory, duration: float) -> None:
+    """Refuse a reference that no joint can follow: degrees given for radians, most of the time.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+    duration : float
+        How much of it is looked at [s].
+
+    Raises
+    ------
+    ParameterError
+        If an angle is beyond 7 rad either way.
+    """
+    largest = float(np.max(np.abs(trajectory(np.linspace(0.0, duration, 257)).angle)))
+    if largest > MOST_ANGLE:
+        raise ParameterError(
+            f"the trajectory goes to {largest:.4g} rad, and {MOST_ANGLE:g} rad either way is allowed: if these are degrees, "
+            "pamrs.control.trajectories.degrees converts them"
+        )
 
 
 def lift_hold_return(

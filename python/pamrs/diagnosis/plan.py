@@ -440,7 +440,7 @@ def _needed(rig: Rig, block: str, own: tuple[str, ...], every: tuple[str, ...]) 
 def _check_rig(rig: Rig) -> None:
     """Refuse rigs that no experiment is made for."""
     if not isinstance(rig, Rig):
-        raise ParameterError(f"rig is a {type(rig).__name__}; a Rig is needed, for example pamrs.load_rig({rig!r})")
+        raise ParameterError(f"rig is a {type(rig).__name__}; a Rig is needed: pamrs.rigs.shoulder(), pamrs.load_rig(path)")
     several = [block for block in rig.blocks if "" not in rig.tables(block)]
     reasons = {
         f"it already has the effect {rig.effects[0]['id']!r}; plan with a rig without effects" if rig.effects else "",

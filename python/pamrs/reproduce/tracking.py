@@ -145,7 +145,8 @@ class _Watched(Controller):
         self.cascade.reset()
         if self.learnt is not None:
             fresh = self.cascade.state
-            self.cascade.restore({**fresh, "outer": {**fresh["outer"], **self.learnt}})
+            batch = {"batch": next(len(v) for v in self.learnt.values())} if all(np.ndim(v) for v in self.learnt.values()) else {}
+            self.cascade.restore({**fresh, "outer": {**fresh["outer"], **batch, **self.learnt}})
         self.times, self.notes, self._samples = [], {name: [] for name in self.names}, 0
 
     @property

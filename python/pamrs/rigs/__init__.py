@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import json
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Final
 
 from pamrs.errors import ParameterError
@@ -119,3 +121,10 @@ def bench(muscle: Muscle, name: str = "bench") -> Rig:
 def sealed_chamber() -> Rig:
     """A rigid chamber of one decilitre behind a shut valve, with a pressure transducer."""
     return named("sealed_chamber")
+
+
+def __getattr__(name: str) -> Callable[[], Rig]:
+    """Every rig of the package as a function, as ``shoulder``: ``pamrs.rigs.elbow()``."""
+    if name.startswith("_") or name not in names():
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return functools.partial(named, name)
