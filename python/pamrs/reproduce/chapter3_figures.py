@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
-import io
 import math
 from collections.abc import Callable
 from functools import partial
 from typing import Any, Final
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pamrs.lifting import lift
-from pamrs.report.figures import COLOURS, STYLE, decimate
-from pamrs.reproduce import elbow
+from pamrs.report.figures import COLOURS, decimate
+from pamrs.reproduce import drawing, elbow
 from pamrs.reproduce.chapter3 import GROUPS, step_by_area
 from pamrs.reproduce.elbow import FOOT_POUND, PSI
 from pamrs.reproduce.page import Picture
 
 __all__ = ["pictures"]
 
+#: Colours of a picture.
+_KEPT: Final = 64
 _COLOUR: Final = {"conserving": COLOURS["after"], "printed": COLOURS["before"]}
 _NAMES: Final = {"conserving": "torque that conserves power", "printed": "torque as printed (3.6)-(3.8)"}
 _GREEN, _PURPLE, _INK, _FAINT = "#009e73", "#cc79a7", "#1f1f1f", "#9ca3af"
@@ -35,7 +35,7 @@ def pictures() -> list[Picture]:
     -------
     list of Picture
     """
-    return [Picture(name, GROUPS[group], caption, _png(draw)) for name, group, draw, caption in _pictures()]
+    return [Picture(name, GROUPS[group], caption, drawing.png(draw, _KEPT)) for name, group, draw, caption in _pictures()]
 
 
 def _pictures() -> list[tuple[str, str, Callable[[], Figure], str]]:
@@ -88,24 +88,6 @@ def _pictures() -> list[tuple[str, str, Callable[[], Figure], str]]:
     ]
 
 
-def _png(draw: Callable[[], Figure]) -> bytes:
-    """A picture of 64 colours: a third of the size, no difference to the eye."""
-    from PIL import Image
-
-    with mpl.rc_context(STYLE):
-        stream = io.BytesIO()
-        draw().savefig(stream, format="png")
-    image = Image.open(stream).convert("RGB").quantize(64, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
-    small = io.BytesIO()
-    image.save(small, format="png", optimize=True)
-    return small.getvalue()
-
-
-def _figure(rows: int = 1, columns: int = 1, height: float = 3.6, **more: Any) -> tuple[Figure, Any]:
-    figure = Figure(figsize=(8.0, height), dpi=110, layout="constrained")
-    return figure, figure.subplots(rows, columns, **more)
-
-
 def _feet(axes: Axes) -> None:
     """A second scale in ft lbf beside one in N m."""
     _second_scale(axes, FOOT_POUND, "[ft lbf]")
@@ -132,7 +114,7 @@ def _degrees(result: Any) -> Any:
 
 
 def _torque() -> Figure:
-    figure, axes = _figure(height=3.9)
+    figure, axes = drawing.figure(height=3.9)
     rotation = np.linspace(0.0, 110.0, 331)
     for law in elbow.LAWS:
         axes.plot(rotation, elbow.elbow_torque(np.radians(rotation), law=law), color=_COLOUR[law], lw=1.8, label=_NAMES[law])
@@ -150,7 +132,7 @@ def _torque() -> Figure:
 
 
 def _muscles() -> Figure:
-    figure, axes = _figure(height=3.2)
+    figure, axes = drawing.figure(height=3.2)
     counts = range(4, 13)
     for law, shift in (("conserving", -0.14), ("printed", 0.14)):
         for count in counts:
@@ -167,7 +149,7 @@ def _muscles() -> Figure:
 
 
 def _payload() -> Figure:
-    figure, axes = _figure(height=3.9)
+    figure, axes = drawing.figure(height=3.9)
     angle = np.radians(np.linspace(0.0, 120.0, 361))
     rest = elbow.rest_angle()
     above = angle[angle >= rest]
@@ -197,7 +179,7 @@ def _payload() -> Figure:
 
 
 def _lift() -> Figure:
-    figure, axes = _figure(height=3.6)
+    figure, axes = drawing.figure(height=3.6)
     rest = elbow.rest_angle()
     for psi, colour in ((60.0, "#9ecae1"), (90.0, "#6baed6"), (120.0, "#3182bd"), (150.0, "#08519c")):
         result = lift(elbow.arm_rig(coulomb=0.0), pressure=psi * PSI)
@@ -224,7 +206,7 @@ def _mark(axes: Axes, level: float, text: str, *, at: float = 1.0) -> None:
 
 
 def _step() -> Figure:
-    figure, (angle, rate, pressure) = _figure(3, 1, 6.0, sharex=True)
+    figure, (angle, rate, pressure) = drawing.figure(3, 1, 6.0, sharex=True)
     area = elbow.valve_for_peak(math.radians(200.0))
     slow = max((item for item in step_by_area() if item.mean < math.radians(57.3)), key=lambda item: item.area)
     for item, colour, words in (
@@ -251,7 +233,7 @@ def _step() -> Figure:
 
 
 def _valve() -> Figure:
-    figure, axes = _figure(height=3.3)
+    figure, axes = drawing.figure(height=3.3)
     for law, style in (("conserving", "-"), ("printed", (0, (4, 2)))):
         steps = step_by_area(law)
         area = np.array([1e6 * item.area for item in steps])
@@ -271,7 +253,7 @@ def _valve() -> Figure:
 
 
 def _triangle() -> Figure:
-    figure, (pressure, angle) = _figure(2, 1, 4.4, sharex=True)
+    figure, (pressure, angle) = drawing.figure(2, 1, 4.4, sharex=True)
     for hysteresis, colour, words in ((False, COLOURS["after"], "without hysteresis"), (True, _PURPLE, "with hysteresis (2.36)")):
         result = elbow.triangle(hysteresis=hysteresis)
         angle.plot(*decimate(result.time, _degrees(result)), color=colour, lw=1.5, label=words)
@@ -287,7 +269,7 @@ def _triangle() -> Figure:
 
 
 def _loop() -> Figure:
-    figure, axes = _figure(height=3.6)
+    figure, axes = drawing.figure(height=3.6)
     for hysteresis, colour, words in ((False, COLOURS["after"], "without hysteresis"), (True, _PURPLE, "with hysteresis (2.36)")):
         result = elbow.triangle(hysteresis=hysteresis)
         psi, torque = result["muscle_pressure"] / PSI, elbow.payload_torque(135.0, result["joint_angle"])
@@ -312,7 +294,7 @@ def _loop() -> Figure:
 
 
 def _ramp() -> Figure:
-    figure, (pressure, torque, angle) = _figure(3, 1, 6.0, sharex=True)
+    figure, (pressure, torque, angle) = drawing.figure(3, 1, 6.0, sharex=True)
     for law in elbow.LAWS:
         result = elbow.ramp_and_hold(law=law)
         for axes, values in ((torque, result["joint_torque"]), (angle, _degrees(result))):

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Callable
 from functools import partial
 from typing import Any, Final
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
-from pamrs.report.figures import COLOURS, STYLE
-from pamrs.reproduce import lift
+from pamrs.report.figures import COLOURS
+from pamrs.reproduce import drawing, lift
 from pamrs.reproduce.chapter4 import DAMPED, GROUPS, RESTORED, RIG, agreeing, latest
 from pamrs.reproduce.chapter4_statements import SERIES
 from pamrs.reproduce.lift import Lifts
@@ -22,6 +20,8 @@ from pamrs.reproduce.page import Picture
 
 __all__ = ["pictures"]
 
+#: Colours of a picture.
+_KEPT: Final = 64
 _PAYLOAD: Final = ("#56b4e9", "#0072b2", "#d55e00", "#1f1f1f")
 _NAMES: Final = ("11 kg", "23 kg", "34 kg", "45 kg")
 _REFERENCE: Final[dict[str, Any]] = {"color": "#9ca3af", "lw": 2.4, "zorder": 0}
@@ -35,7 +35,7 @@ def pictures() -> list[Picture]:
     -------
     list of Picture
     """
-    return [Picture(name, GROUPS[group], caption, _png(draw)) for name, group, draw, caption in _pictures()]
+    return [Picture(name, GROUPS[group], caption, drawing.png(draw, _KEPT)) for name, group, draw, caption in _pictures()]
 
 
 def _pictures() -> list[tuple[str, str, Callable[[], Figure], str]]:
@@ -84,31 +84,13 @@ def _pictures() -> list[tuple[str, str, Callable[[], Figure], str]]:
     ]
 
 
-def _png(draw: Callable[[], Figure]) -> bytes:
-    """A picture of 64 colours: a third of the size, no difference to the eye."""
-    from PIL import Image
-
-    with mpl.rc_context(STYLE):
-        stream = io.BytesIO()
-        draw().savefig(stream, format="png")
-    image = Image.open(stream).convert("RGB").quantize(64, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
-    small = io.BytesIO()
-    image.save(small, format="png", optimize=True)
-    return small.getvalue()
-
-
-def _figure(rows: int, columns: int, height: float, **more: Any) -> tuple[Figure, Any]:
-    figure = Figure(figsize=(8.0, height), dpi=110, layout="constrained")
-    return figure, figure.subplots(rows, columns, squeeze=False, **more)
-
-
 def _reference(axes: Axes, run: Lifts) -> None:
     axes.plot(run.time, np.degrees(run.reference), **_REFERENCE, label="reference")
 
 
 def _lifts(plant: str, controllers: tuple[str, str]) -> Figure:
     """Angle and pressure of two controllers, every payload."""
-    figure, axes = _figure(2, 2, 5.2, sharex=True, sharey="row")
+    figure, axes = drawing.figure(2, 2, 5.2, sharex=True, sharey="row", squeeze=False)
     runs = latest().lifts[plant]
     for column, name in enumerate(controllers):
         upper, lower = axes[0][column], axes[1][column]
@@ -129,7 +111,7 @@ def _lifts(plant: str, controllers: tuple[str, str]) -> Figure:
 
 def _series() -> Figure:
     """The series of kM, three plants."""
-    figure, axes = _figure(1, 3, 3.4, sharey=True)
+    figure, axes = drawing.figure(1, 3, 3.4, sharey=True, squeeze=False)
     for cell, plant in zip(axes[0], (RIG, DAMPED, RESTORED), strict=True):
         runs = latest().lifts[plant]
         _reference(cell, runs["series, kM 0"])
@@ -147,7 +129,7 @@ def _series() -> Figure:
 
 def _maps(plant: str) -> Figure:
     """nu, omega and J over their least with 23 kg, of fuzzy and PID; J in degrees too."""
-    figure, axes = _figure(2, 4, 5.0)
+    figure, axes = drawing.figure(2, 4, 5.0, squeeze=False)
     done = latest()
     for line, (kind, published) in enumerate((("fuzzy", (0.45, 0.65)), ("pid", (1.4, 2.5)))):
         gains = done.maps[plant, kind]
@@ -175,7 +157,7 @@ def _maps(plant: str) -> Figure:
 
 def _optima() -> Figure:
     """Gains of the smallest J over the payload, two plants, both units."""
-    figure, axes = _figure(1, 4, 2.8)
+    figure, axes = drawing.figure(1, 4, 2.8, squeeze=False)
     done, kilograms = latest(), (11, 23, 34)
     printed = {"kP": ((11, 1.1), (23, 1.4)), "kI": ((11, 4.0), (23, 2.5)), "g1": ((23, 0.45),), "h": ((23, 0.65),)}
     cells = zip(axes[0], (("pid", 0, "kP"), ("pid", 1, "kI"), ("fuzzy", 0, "g1"), ("fuzzy", 1, "h")), strict=True)
@@ -197,7 +179,7 @@ def _effects() -> Figure:
     """Statements that agree, by plant."""
     counts = {name: agreeing(runs) for name, runs in latest().lifts.items()}
     names = list(counts)[::-1]
-    figure, axes = _figure(1, 1, 0.26 * len(names) + 0.8)
+    figure, axes = drawing.figure(1, 1, 0.26 * len(names) + 0.8, squeeze=False)
     cell = axes[0][0]
     colours = [COLOURS["after"] if counts[name][0] > counts[RIG][0] + 2 else COLOURS["quiet"] for name in names]
     cell.barh(names, [counts[name][0] for name in names], color=colours)

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Callable, Sequence
-from typing import Any, Final
+from typing import Final
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from pamrs.report.figures import STYLE, decimate
-from pamrs.reproduce import tracking
+from pamrs.report.figures import decimate
+from pamrs.reproduce import drawing, tracking
 from pamrs.reproduce.chapter5_comparison import orders
 from pamrs.reproduce.chapter5_statements import GROUPS
 from pamrs.reproduce.page import Picture
@@ -21,6 +20,8 @@ from pamrs.reproduce.tracking_runs import FULL, LATER, MIDDLE, STARTS, TRIALS, W
 
 __all__ = ["pictures"]
 
+#: Colours of a picture.
+_KEPT: Final = 160
 _INK: Final = "#1f1f1f"
 _COLOURS: Final = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#8c6d1f")
 _BY_KIND: Final = dict(zip(KINDS, ("#8c6d1f", "#0072b2", "#009e73", "#d55e00"), strict=True))
@@ -40,7 +41,7 @@ def pictures(plan: Plan = FULL) -> list[Picture]:
     -------
     list of Picture
     """
-    return [Picture(name, GROUPS[group], caption, _png(draw)) for name, group, draw, caption in _pictures(plan)]
+    return [Picture(name, GROUPS[group], caption, drawing.png(draw, _KEPT)) for name, group, draw, caption in _pictures(plan)]
 
 
 def _pictures(plan: Plan) -> list[tuple[str, str, Callable[[], Figure], str]]:
@@ -69,24 +70,6 @@ def _pictures(plan: Plan) -> list[tuple[str, str, Callable[[], Figure], str]]:
     ]  # fmt: skip
 
 
-def _png(draw: Callable[[], Figure]) -> bytes:
-    """A picture of 160 colours: half the size, no difference to the eye."""
-    from PIL import Image
-
-    with mpl.rc_context(STYLE):
-        stream = io.BytesIO()
-        draw().savefig(stream, format="png")
-    image = Image.open(stream).convert("RGB").quantize(160, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
-    small = io.BytesIO()
-    image.save(small, format="png", optimize=True)
-    return small.getvalue()
-
-
-def _figure(rows: int = 1, columns: int = 1, height: float = 3.6, **more: Any) -> tuple[Figure, Any]:
-    figure = Figure(figsize=(8.0, height), dpi=110, layout="constrained")
-    return figure, figure.subplots(rows, columns, **more)
-
-
 def _angles(axes: Axes, curves: Sequence[Curve]) -> None:
     run = curves[0][0]
     for track, row, _, colour in curves:
@@ -113,7 +96,7 @@ def _squares(axes: Axes, curves: Sequence[Curve], *, log: bool = True) -> None:
 
 def _three(curves: Sequence[Curve], limit: float) -> Figure:
     """Angle, error and mean squared error so far, as the chapter draws every experiment."""
-    figure, (angle, error, square) = _figure(3, 1, 6.0, sharex=True)
+    figure, (angle, error, square) = drawing.figure(3, 1, 6.0, sharex=True)
     _angles(angle, curves)
     _errors(error, curves, limit)
     _squares(square, curves)
@@ -124,7 +107,7 @@ def _three(curves: Sequence[Curve], limit: float) -> Figure:
 def _sliding(plan: Plan) -> Figure:
     run, words = plan.estimates(), ("exact", "times 0.1", "times 10")
     free = [(run, k, words[k], _COLOURS[k]) for k in range(len(WRONG))]
-    figure, (angle, error, square) = _figure(3, 1, 6.4, sharex=True)
+    figure, (angle, error, square) = drawing.figure(3, 1, 6.4, sharex=True)
     _angles(angle, free)
     _errors(error, free, 40.0)
     for p, (payload, style) in enumerate(zip(PAYLOADS, ("-", (0, (4, 2)), (0, (1, 1.5))), strict=True)):
@@ -142,7 +125,7 @@ def _sliding(plan: Plan) -> Figure:
 
 def _estimates(plan: Plan) -> Figure:
     run = plan.adaptation()
-    figure, rows = _figure(3, 1, 6.0, sharex=True)
+    figure, rows = drawing.figure(3, 1, 6.0, sharex=True)
     arm = tracking.arm_model([MIDDLE])
     labels = {"inertia": "I [kg m²]", "viscous": "b [N m s/rad]", "weight": "m g r [N m]"}
     for axes, (name, label) in zip(rows, labels.items(), strict=True):
@@ -180,7 +163,7 @@ def _payloads(plan: Plan) -> Figure:
 
 def _networks(plan: Plan) -> Figure:
     zero, later = plan.learning(), plan.prepared()
-    figure, grid = _figure(3, 3, 6.0, sharex=True, sharey="row")
+    figure, grid = drawing.figure(3, 3, 6.0, sharex=True, sharey="row")
     low, high = np.degrees(tracking.arm_model([0.0]).angle_range)
     for column, (track, row, words) in enumerate(
         ((zero, _row(50.0), "from zero"), (later, 0, "from the model"), (later, 1, f"after {LATER[1][0]}"))
@@ -202,7 +185,7 @@ def _networks(plan: Plan) -> Figure:
 
 
 def _training(plan: Plan) -> Figure:
-    figure, axes = _figure(1, 2, 3.2, sharey=True)
+    figure, axes = drawing.figure(1, 2, 3.2, sharey=True)
     for one, kind in zip(axes, ("adaptive sliding", "neural"), strict=True):
         run = plan.trained(kind)
         assert run is not None
@@ -228,7 +211,7 @@ def _orders(plan: Plan) -> Figure:
     shown = [(k, effect) for k, (payload, effect) in enumerate(plan.cases) if payload == MIDDLE]
     ratios = {effect or "nothing left out": orders(plan, k) for k, effect in shown}
     facts = list(next(iter(ratios.values())))
-    figure, axes = _figure(height=0.55 * len(facts) + 1.4)
+    figure, axes = drawing.figure(height=0.55 * len(facts) + 1.4)
     palette = mpl.colormaps["tab10"]
     for k, (words, found) in enumerate(ratios.items()):
         places = np.arange(len(facts)) + 0.09 * (k - 0.5 * (len(ratios) - 1))
@@ -245,7 +228,7 @@ def _orders(plan: Plan) -> Figure:
 
 
 def _hysteresis(plan: Plan) -> Figure:
-    figure, (over_time, over_angle) = _figure(1, 2, 3.2, sharey=True)
+    figure, (over_time, over_angle) = drawing.figure(1, 2, 3.2, sharey=True)
     for known, colour, words in ((False, _COLOURS[1], "without"), (True, _COLOURS[2], "with compensation")):
         run = plan.compensated(known)
         part = run.time >= tracking.SETTLED
