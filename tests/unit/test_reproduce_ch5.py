@@ -104,6 +104,24 @@ def test_what_was_learnt_is_what_the_next_run_starts_from(kind):
     assert changed, "it goes on learning"
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_one_plant_has_one_row_of_what_it_learnt(kind):
+    first = follow(kind, [plant(25.0)], arm_model([25.0]), waves(0.1))
+    assert all(values.shape[0] == 1 for values in first.learnt.values())
+    assert bool(first.learnt) == (kind in ("adaptive sliding", "neural"))
+    again = follow(kind, [plant(25.0)], arm_model([25.0]), waves(0.1), learnt=first.learnt)
+    assert {name: values.shape for name, values in again.learnt.items()} == {name: v.shape for name, v in first.learnt.items()}
+
+
+def test_what_was_learnt_needs_a_row_for_each_plant():
+    weights = follow("neural", [plant(25.0)], arm_model([25.0]), waves(0.1)).learnt
+    one = {name: values[0] for name, values in weights.items()}
+    with pytest.raises(ParameterError, match=r"learnt\['H'\] has the shape \(22,\); one row for each of 1 plants is needed"):
+        follow("neural", [plant(25.0)], arm_model([25.0]), waves(0.1), learnt=one)
+    with pytest.raises(ParameterError, match="one row for each of 2 plants"):
+        follow("neural", [plant(25.0)] * 2, arm_model([25.0] * 2), waves(0.1), learnt=weights)
+
+
 def test_the_source_does_not_run_empty():
     run = follow("cascaded PID", [plant(50.0)], arm_model([50.0]), waves(5.0))
     assert not run.failed.any()

@@ -131,9 +131,9 @@ def _one(arm: ArmModel) -> ArmModel:
 
 
 class _Watched(Controller):
-    """A cascade that starts from what it has learnt, and whose estimates are noted now and then."""
+    """A cascade that starts from what it has learnt (one row for each plant; empty: nothing), and notes its estimates now and then."""
 
-    def __init__(self, cascade: Any, learnt: Mapping[str, Any] | None, every: int) -> None:
+    def __init__(self, cascade: Any, learnt: Mapping[str, Array], every: int) -> None:
         self.cascade, self.learnt, self.every, self.period = cascade, learnt, every, cascade.period
         self.outer: Any = getattr(cascade, "controller", cascade).outer
         self.times: list[float] = []
@@ -143,10 +143,9 @@ class _Watched(Controller):
     def reset(self) -> None:
         """Begin, with what was learnt before."""
         self.cascade.reset()
-        if self.learnt is not None:
-            fresh = self.cascade.state
-            batch = {"batch": next(len(v) for v in self.learnt.values())} if all(np.ndim(v) for v in self.learnt.values()) else {}
-            self.cascade.restore({**fresh, "outer": {**fresh["outer"], **batch, **self.learnt}})
+        if self.learnt:
+            fresh, plants = self.cascade.state, len(next(iter(self.learnt.values())))
+            self.cascade.restore({**fresh, "outer": {**fresh["outer"], "batch": plants, **self.learnt}})
         self.times, self.notes, self._samples = [], {name: [] for name in self.names}, 0
 
     @property
@@ -163,11 +162,16 @@ class _Watched(Controller):
         """What is learnt."""
         return tuple(self.outer._STATE) if isinstance(self.outer, (AdaptiveSliding, Neural)) else ()
 
+    @property
+    def known(self) -> dict[str, Array]:
+        """What is known now; after a first sample with one row for each plant."""
+        return {name: np.array(getattr(self.outer, f"_{name}"), dtype=np.float64) for name in self.names}
+
     def note(self, time: float) -> None:
         """Take note of what is known now."""
         self.times.append(time)
-        for name in self.names:
-            self.notes[name].append(np.array(getattr(self.outer, f"_{name}"), dtype=np.float64))
+        for name, values in self.known.items():
+            self.notes[name].append(values)
 
     def update(self, time: float, measurement: Measurement, reference: Reference) -> Value:
         """The cascade's answer."""
@@ -192,8 +196,8 @@ class Track:
         Of the joint [rad, rad/s].
     failed : ndarray of bool, shape (n,)
         Which plants left the range of the model.
-    learnt : mapping of str to ndarray
-        Estimates or weights at the end.
+    learnt : mapping of str to ndarray, shape (n,) or (n, nodes)
+        Estimates or weights at the end; empty of a controller that learns nothing.
     noted_at : ndarray, shape (notes,)
         When estimates were noted [s].
     noted : mapping of str to list of ndarray
@@ -317,8 +321,8 @@ def follow(
     arm : ArmModel
         What the controller knows of each.
     trajectory : Trajectory
-    learnt : mapping, optional
-        :attr:`Track.learnt` of a training with as many plants.
+    learnt : mapping of str to ndarray, shape (n,) or (n, nodes), optional
+        :attr:`Track.learnt` of a training with as many plants; empty: nothing.
     note_every : float
         Time between two notes of the estimates [s]; 0: none.
     wrap : callable, optional
@@ -333,17 +337,20 @@ def follow(
     Raises
     ------
     ParameterError
-        If there is no such controller, or numbers do not fit together.
+        If there is no such controller, or numbers do not fit together: what was learnt needs one row for each plant.
     """
+    taught = {name: np.asarray(values, dtype=np.float64) for name, values in (learnt or {}).items()}
+    for name, values in taught.items():
+        if values.shape[:1] != (len(plants),):
+            raise ParameterError(f"learnt[{name!r}] has the shape {values.shape}; one row for each of {len(plants)} plants is needed")
     made = controller(kind, arm, **changes)
-    watched = _Watched(made if wrap is None else wrap(made), learnt, round(note_every / PERIOD))
+    watched = _Watched(made if wrap is None else wrap(made), taught, round(note_every / PERIOD))
     done = sweep(plants, watched, trajectory, sample_time=PERIOD, channels=("joint_angle", "joint_rate", "muscle_pressure"))
     if note_every:
         watched.note(trajectory.duration)
     run = done.run
-    last = {name: np.array(getattr(watched.outer, f"_{name}"), dtype=np.float64) for name in watched.names}
     wanted = np.asarray(trajectory(run.time).angle)
     return Track(
-        run.time, wanted, run["joint_angle"], run["joint_rate"], done.failed, last, np.array(watched.times), watched.notes,
+        run.time, wanted, run["joint_angle"], run["joint_rate"], done.failed, watched.known, np.array(watched.times), watched.notes,
         run["muscle_pressure"],
     )  # fmt: skip
