@@ -139,6 +139,7 @@ def test_the_vector_is_made_by_its_name():
         (lambda: gym_module.ShoulderEnv(sample_time="a"), "sample_time"),
         (lambda: gym_module.ShoulderEnv(trajectory=SHORT, sample_time=1.0), "sample_time"),
         (lambda: gym_module.ShoulderEnv(render_mode="human"), "render_mode"),
+        (lambda: gym_module.ShoulderVectorEnv(2, render_mode="human"), "render_mode"),
         (lambda: gym_module.ShoulderEnv().step(np.zeros(1)), "before reset"),
     ],
 )

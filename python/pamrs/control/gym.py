@@ -148,8 +148,7 @@ class ShoulderEnv(gymnasium.Env[Array32, Array32]):
         penalty: float = 100.0,
         render_mode: str | None = None,
     ) -> None:
-        if render_mode is not None:
-            raise ParameterError(f"render_mode = {render_mode!r} is not allowed: there is none; Simulation.animate draws an arm")
+        _check_render_mode(render_mode)
         self.render_mode = None
         self._task = _Task(rig, trajectory, targets, sample_time, effort, penalty)
         self.observation_space, self.action_space = self._task.observed, self._task.acted
@@ -251,8 +250,7 @@ class ShoulderVectorEnv(gymnasium.vector.VectorEnv[Array32, Array32, Any]):
     ) -> None:
         from pamrs.batch import Batch
 
-        if render_mode is not None:
-            raise ParameterError(f"render_mode = {render_mode!r} is not allowed: there is none; Simulation.animate draws an arm")
+        _check_render_mode(render_mode)
         self.render_mode = None
         self._task = _Task(rig, trajectory, targets, sample_time, effort, penalty)
         self._batch = Batch(self._task.rig, n=num_envs, sample_time=sample_time)
@@ -340,6 +338,12 @@ class ShoulderVectorEnv(gymnasium.vector.VectorEnv[Array32, Array32, Any]):
         there = np.ones(self.num_envs, dtype=np.bool_)
         info = {"error": error, "_error": there, "valve_command": self._task.volts(openings), "_valve_command": there}
         return self._task.seen(sample, angle, rate, openings), reward, failed, truncated, info
+
+
+def _check_render_mode(render_mode: str | None) -> None:
+    """Refuse what ``gymnasium.make`` passes on, where it is not None."""
+    if render_mode is not None:
+        raise ParameterError(f"render_mode = {render_mode!r} is not allowed: there is none; Simulation.animate draws an arm")
 
 
 def _target(trajectory: Trajectory) -> float:

@@ -241,7 +241,7 @@ class Neural(SlidingController):
         ----------
         path : path-like
             Written by :meth:`save` of a controller with the same nodes over the same range. Weights of a batch make this a controller
-        of such a batch, as gains in arrays do.
+            of such a batch, as gains in arrays do.
 
         Raises
         ------
