@@ -20,7 +20,7 @@ from pamrs.lifting import lift
 from pamrs.muscle import Muscle
 from pamrs.reproduce import elbow
 from pamrs.reproduce.elbow import FOOT_POUND, INCH, POUND, PSI
-from pamrs.reproduce.facts import Comparison, judge
+from pamrs.reproduce.facts import Comparison, Told, judge
 from pamrs.simulation import Simulation
 from pamrs.units import parse_unit, to_si
 
@@ -134,14 +134,9 @@ def in_short(rows: list[Comparison]) -> list[str]:
     -------
     list of str
     """
-    by = {(row.group, row.fact): row.ours for row in rows}
-
-    def ours(group: str, fact: str, digits: int = 0, printed: bool = False) -> str:
-        words = f", {_PRINTED}" if printed else ""
-        return f"{by[GROUPS.get(group, group), fact + words]:.{digits}f}"
-
+    ours = Told(rows, GROUPS, 0).ours
     blocked, stroke = "blocked force at 150 psi", "stroke of Table 3.5 over the range"
-    printed = [ours(group, fact, digits, True) for group, fact, digits in _LAWS_TOLD]
+    printed = [ours(group, f"{fact}, {_PRINTED}", digits) for group, fact, digits in _LAWS_TOLD]
     conserving = [ours(group, fact, digits) for group, fact, digits in _LAWS_TOLD]
     return [
         "With angles read as rotations from the rest angle and joint torque as printed in (3.6)-(3.8), 200 ft lbf last to "

@@ -16,7 +16,7 @@ import numpy as np
 from pamrs.control import metrics
 from pamrs.reproduce import lift
 from pamrs.reproduce.chapter4_statements import statements
-from pamrs.reproduce.facts import Comparison, judge
+from pamrs.reproduce.facts import Comparison, Told, judge
 from pamrs.reproduce.lift import Lifts, Map
 
 __all__ = ["CHOSEN", "DAMPED", "GROUPS", "RESTORED", "RIG", "TITLE", "chosen", "experiments", "facts", "headings", "in_short", "latest"]
@@ -445,22 +445,19 @@ def in_short(rows: list[Comparison]) -> list[str]:
     -------
     list of str
     """
-    by = {(row.group, row.fact): row for row in rows}
-
-    def ours(group: str, fact: str, digits: int = 1) -> str:
-        return f"{by[GROUPS[group], fact].ours:.{digits}f}"
-
-    count = int(by[GROUPS["effects"], RIG].published)
-    tried = {name: int(by[GROUPS["effects"], name].ours) for name in lift.VARIANTS}
+    told = Told(rows, GROUPS, 1)
+    ours = told.ours
+    count = int(told.row("effects", RIG).published)
+    tried = {name: int(told.row("effects", name).ours) for name in lift.VARIANTS}
     damping, valve = "muscle damping 3000 N s/m", "valve 2.44 mm2"
-    nearer = [by[GROUPS["unit"], f"{name}: {_DISTANCE}"].note.partition("together: ")[2] for name in (RIG, RESTORED)]
+    nearer = [told.row("unit", f"{name}: {_DISTANCE}").note.partition("together: ")[2] for name in (RIG, RESTORED)]
     return [
         f"On the rig as it is {tried[RIG]} of {count} statements about lift, hold and return agree: with the printed gains fuzzy "
         f"control overshoots by {ours('rig', 'fuzzy: largest overshoot')} deg and feedforward with PID swings by "
         f"{ours('rig', 'FF+PID: swing in the last 2 s of the hold', 0)} deg, where the dissertation has no overshoot.",
         "What restores most is damping, which 4.6 names ('the large passive damping component inherent to pneumatic muscles'): with "
-        f"3000 N s/m in each muscle {tried[damping]} agree, fuzzy control lags by {_lag(by, damping)} s (published 0.75), does "
-        f"not overshoot. The valve of 2.44 mm2 that chapter 3's step asks for has {tried[valve]}, but a lag of {_lag(by, valve)} s. "
+        f"3000 N s/m in each muscle {tried[damping]} agree, fuzzy control lags by {_lag(told, damping)} s (published 0.75), does "
+        f"not overshoot. The valve of 2.44 mm2 that chapter 3's step asks for has {tried[valve]}, but a lag of {_lag(told, valve)} s. "
         "Dry friction does some of it; dead zone, lags, regulator, stiction and heat transfer next to nothing. It is 15 times the "
         "usual 200 N s/m, 5 to 32 N m s/rad at this joint.",
         "kM = 0.5 as the best, and a steady error at rest that grows with kM, come out when the muscles also pull less at low "
@@ -472,21 +469,21 @@ def in_short(rows: list[Comparison]) -> list[str]:
         f"(distance from the published ones) it is {nearer[0]} on the rig and {nearer[1]} "
         "on the damped plant, where the PID's optimum in degrees has no integral gain. The least omega is where the arm hardly moves: "
         "J and its optimum depend on the borders of the map too, which are not printed.",
-        *_diagnosed(by),
+        *_diagnosed(rows),
     ]
 
 
-def _lag(by: Mapping[tuple[str, str], Comparison], name: str) -> str:
+def _lag(told: Told, name: str) -> str:
     """The fuzzy lag in the remark of a trial."""
-    return by[GROUPS["effects"], name].note.partition("lags ")[2].partition(" s")[0]
+    return told.row("effects", name).note.partition("lags ")[2].partition(" s")[0]
 
 
-def _diagnosed(by: Mapping[tuple[str, str], Comparison]) -> list[str]:
+def _diagnosed(rows: list[Comparison]) -> list[str]:
     """What the diagnoses come to, where they ran."""
     words = []
-    for (group, fact), row in by.items():
-        if group != GROUPS["diagnosis"] or not fact.endswith("muscle_rate_damping"):
+    for row in rows:
+        if row.group != GROUPS["diagnosis"] or not row.fact.endswith("muscle_rate_damping"):
             continue
         verdict = row.note.partition(";")[0].removeprefix("verdict ")
-        words.append(f"{verdict!r} for {fact.partition(':')[0]}, with a probability of {row.ours:.2f} for the damping")
+        words.append(f"{verdict!r} for {row.fact.partition(':')[0]}, with a probability of {row.ours:.2f} for the damping")
     return [f"The diagnosis of closed-loop records has the verdict {', and '.join(words)}."] if words else []

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from pamrs.reproduce import chapter5_comparison, tracking
 from pamrs.reproduce.chapter5_statements import GROUPS, Group, listed
-from pamrs.reproduce.facts import Comparison
+from pamrs.reproduce.facts import Comparison, Told
 from pamrs.reproduce.tracking import KINDS, PAYLOADS, SETTLED, Track
 from pamrs.reproduce.tracking_runs import FULL, MIDDLE, STARTS, TRIALS, WRONG, Plan
 
@@ -428,11 +428,7 @@ def in_short(rows: list[Comparison]) -> list[str]:
     -------
     list of str
     """
-    by = {(row.group, row.fact): row for row in rows}
-
-    def ours(group: str, fact: str, digits: int = 2) -> str:
-        return f"{by[GROUPS[group], fact].ours:.{digits}f}"
-
+    ours = Told(rows, GROUPS, 2).ours
     held = [row for row in rows if row.group == GROUPS["effects"]]
     tells = [f"{row.fact.removeprefix('orders of 5.5 that hold, ')} {row.ours:.0f}" for row in held]
     restored = [

@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from pamrs.errors import ParameterError
 
-__all__ = ["RELATIONS", "VERDICTS", "Comparison", "judge", "markdown", "table", "to_csv", "verdicts"]
+__all__ = ["RELATIONS", "VERDICTS", "Comparison", "Told", "judge", "markdown", "table", "to_csv", "verdicts"]
 
 #: How ours must stand to the published value.
 RELATIONS: Final = ("equals", "above", "below")
@@ -76,6 +76,32 @@ class Comparison:
     def to_dict(self) -> dict[str, Any]:
         """The fields as a dictionary."""
         return asdict(self)
+
+
+class Told:
+    """Statements by the short name of their group, for sentences about them.
+
+    Parameters
+    ----------
+    rows : sequence of Comparison
+        The statements.
+    groups : mapping of str to str
+        Short name -> group; a group that is not in it is its own name.
+    digits : int
+        Decimals of a number, unless told.
+    """
+
+    def __init__(self, rows: Sequence[Comparison], groups: Mapping[str, str], digits: int) -> None:
+        self._rows = {(row.group, row.fact): row for row in rows}
+        self._groups, self._digits = groups, digits
+
+    def row(self, group: str, fact: str) -> Comparison:
+        """One statement; KeyError if it is not there."""
+        return self._rows[self._groups.get(group, group), fact]
+
+    def ours(self, group: str, fact: str, digits: int | None = None) -> str:
+        """Our number in words; KeyError if the statement is not there."""
+        return f"{self.row(group, fact).ours:.{self._digits if digits is None else digits}f}"
 
 
 def judge(
