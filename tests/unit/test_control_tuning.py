@@ -84,6 +84,37 @@ def test_a_search_is_at_least_as_good_as_the_grid_and_seeded(rig, method):
     assert found[0].j == pytest.approx(0.25 * run.squared_error / scale[0] + 0.75 * run.curvature / scale[1])
 
 
+@pytest.mark.parametrize("method", ["cma", "optuna"])
+@pytest.mark.parametrize("scaled", [True, False])
+def test_a_search_is_never_worse_than_its_start(rig, method, scaled):
+    pytest.importorskip(method)
+    # one population of a wide box: without the start there is nothing as good as the best of a map
+    bounds = {"kp": (0.1, 400.0), "ki": (0.0, 300.0)}
+    grid = gain_map(rig, pid, {"kp": [0.7, 2.1], "ki": [0.0, 0.9]}, LIFT, **FAST)
+    best = grid.best()[0]
+    start = {name: best[name] for name in ("ki", "kp")}  # in any order
+    more = {"evaluations": 8, "scale": tuple(grid.scale[0])} if scaled else {"evaluations": 16}
+    alone, found = (
+        search_gains(rig, pid, bounds, LIFT, method=method, population=8, seed=4, start=s, **more, **FAST) for s in (None, start)
+    )
+    first = 0 if scaled else 8
+    assert found.tried.shape == alone.tried.shape
+    assert found.tried[first].tolist() == [best["kp"], best["ki"]]
+    assert found.squared_error[first] == pytest.approx(best["squared_error"], rel=1e-12)
+    assert found.j <= found.values[first]
+    assert found.tried[:first].tolist() == alone.tried[:first].tolist()
+    if scaled:
+        assert found.values[0] == pytest.approx(best["j"])
+        assert found.j < alone.j
+
+
+def test_a_start_may_be_on_its_bounds(rig):
+    pytest.importorskip("cma")
+    start = {"kp": 4.0, "ki": 0.0}
+    found = search_gains(rig, pid, {"kp": (0.2, 4.0), "ki": (0.0, 3.0)}, LIFT, evaluations=16, population=8, start=start, **FAST)
+    assert found.tried[8].tolist() == [4.0, 0.0]
+
+
 def test_a_search_without_a_scale_takes_that_of_its_first_population(rig):
     pytest.importorskip("cma")
     found = search_gains(rig, pid, {"kp": (0.2, 4.0), "ki": (0.0, 3.0)}, LIFT, evaluations=24, population=8, seed=1, **FAST)
@@ -129,6 +160,10 @@ def test_perturbed_is_off_by_what_it_says(rig):
         (lambda r: search_gains(r, pid, {"kp": (1.0, 2.0)}, LIFT, seed=-1), "seed"),
         (lambda r: search_gains(r, pid, {"kp": (1.0, 2.0)}, LIFT, scale=(0.0, 1.0)), "scale"),
         (lambda r: search_gains(r, pid, {"kp": (1.0, math.nan)}, LIFT), "kp"),
+        (lambda r: search_gains(r, pid, {"kp": (1.0, 2.0)}, LIFT, start={"kp": 2.5}), "start of kp = 2.5 .* 1.0 to 2.0"),
+        (lambda r: search_gains(r, pid, {"kp": (1.0, 2.0)}, LIFT, start={"kp": math.nan}), "start of kp = nan"),
+        (lambda r: search_gains(r, pid, {"kp": (1.0, 2.0)}, LIFT, start={"kp": "a"}), "start of kp = 'a'"),
+        (lambda r: search_gains(r, pid, {"kp": (1.0, 2.0)}, LIFT, start={"ki": 1.0}), "start = .*: one value each of kp"),
     ],
 )
 def test_bad_input_is_named(rig, call, word):

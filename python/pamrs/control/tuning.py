@@ -7,6 +7,7 @@ is another.
 from __future__ import annotations
 
 import math
+import numbers
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -203,6 +204,7 @@ def search_gains(
     evaluations: int = 200,
     population: int = 16,
     seed: int = 0,
+    start: Mapping[str, float] | None = None,
     scale: tuple[float, float] | None = None,
     weights: tuple[float, float] = WEIGHTS,
     unit: str = "rad",
@@ -212,6 +214,8 @@ def search_gains(
 
     J divides by the smallest nu and omega of a set of runs, which a search does not know beforehand: it takes ``scale``, for example a
     row of :attr:`GainMap.scale`, or else the smallest ones of a first population of random gains, which counts as evaluations.
+
+    A search of few evaluations may end worse than a map or a guess that is at hand already: given as ``start``, it is one of the runs.
 
     Parameters
     ----------
@@ -228,6 +232,10 @@ def search_gains(
         Loops in one batch.
     seed : int
         The same seed gives the same result; the random numbers of the caller stay as they are.
+    start : mapping of str to float, optional
+        One value of each gain, within its bounds, for example the gains of a row of :meth:`GainMap.best`. The search begins there: its
+        first evaluation, after the population that finds a scale, is the start itself, so that the result is never worse. By default
+        CMA-ES begins in the middle of the bounds, Optuna anywhere.
     scale : (float, float), optional
         nu and omega that J divides by.
 
@@ -243,6 +251,7 @@ def search_gains(
         If cma or optuna is not installed.
     """
     low, high = _box(bounds)
+    given = None if start is None else _within(start, bounds)
     if method not in METHODS:
         raise ParameterError(f"method = {method!r} is not allowed: one of {', '.join(METHODS)}")
     if not 4 <= population <= evaluations:
@@ -256,12 +265,15 @@ def search_gains(
         raise ParameterError(f"seed = {seed!r} is not allowed: a whole number from 0 to 2**32 - 1 is needed")
     if scale is not None and not all(math.isfinite(s) and s > 0.0 for s in scale):
         raise ParameterError(f"scale = {scale} is not allowed: two numbers above zero are needed")
+    begin = None if given is None else (given - low) / (high - low)
     tried: list[Array] = []
     metrics: list[tuple[Array, Array]] = []
 
     def runs(points: Array) -> tuple[Array, Array]:
         """Nu and omega of points in the unit cube."""
         gains = low + points * (high - low)
+        if begin is not None and given is not None:
+            gains[np.all(points == begin, axis=1)] = given  # to the last bit
         named = {name: np.ascontiguousarray(gains[:, k]) for k, name in enumerate(bounds)}
         done = sweep([plant] * len(gains), controller(**named), trajectory, unit=unit, **loop)
         tried.append(gains)
@@ -283,7 +295,7 @@ def search_gains(
         return np.where(np.isfinite(value), np.minimum(value, _FAILED), _FAILED)
 
     left = evaluations - sum(map(len, tried))
-    (_cma if method == "cma" else _optuna)(objective, low.size, left, population, rng)
+    (_cma if method == "cma" else _optuna)(objective, low.size, left, population, rng, begin)
     nu, omega = (np.concatenate([pair[k] for pair in metrics]) for k in range(2))
     values = weights[0] * nu / by[0] + weights[1] * omega / by[1]
     values = np.where(np.isfinite(values), values, np.inf)
@@ -365,8 +377,21 @@ def _box(bounds: Mapping[str, tuple[float, float]]) -> tuple[Array, Array]:
     return np.array([b[0] for b in bounds.values()], dtype=np.float64), np.array([b[1] for b in bounds.values()], dtype=np.float64)
 
 
-def _cma(objective: Callable[[Array], Array], size: int, budget: int, population: int, rng: np.random.Generator) -> None:
-    """CMA-ES from the middle, and from random places when it has converged, until the budget is spent."""
+def _within(start: Mapping[str, float], bounds: Mapping[str, tuple[float, float]]) -> Array:
+    """A start in the order of the bounds, checked."""
+    if not isinstance(start, Mapping) or set(start) != set(bounds):
+        raise ParameterError(f"start = {start} is not allowed: one value each of {', '.join(bounds)} is needed, as in bounds")
+    for name, (low, high) in bounds.items():
+        value = start[name]
+        if not isinstance(value, numbers.Real) or isinstance(value, bool) or not low <= value <= high:
+            raise ParameterError(f"start of {name} = {value!r} is not allowed: a number within its bounds, {low} to {high}, is needed")
+    return np.array([start[name] for name in bounds], dtype=np.float64)
+
+
+def _cma(
+    objective: Callable[[Array], Array], size: int, budget: int, population: int, rng: np.random.Generator, begin: Array | None
+) -> None:
+    """CMA-ES from a start or the middle, and from random places when it has converged, until the budget is spent."""
     try:
         import cma  # type: ignore[import-untyped]
     except ImportError as error:
@@ -375,18 +400,22 @@ def _cma(objective: Callable[[Array], Array], size: int, budget: int, population
         raise ParameterError("bounds has one gain; CMA-ES needs two at least: take optuna, or a gain_map")
     # its own random numbers: numpy's global ones stay as they are
     options = {"bounds": [0.0, 1.0], "verbose": -9, "seed": np.nan, "randn": lambda *shape: rng.standard_normal(shape)}
-    start = np.full(size, 0.5)
+    start, given = (np.full(size, 0.5), None) if begin is None else (begin, begin)
     while budget >= population:
         strategy = cma.CMAEvolutionStrategy(start, 0.3, {**options, "popsize": population})
         while budget >= population and not strategy.stop():
             points = strategy.ask()
+            if given is not None:
+                points[0], given = given, None  # CMA-ES itself never tries where it begins
             strategy.tell(points, objective(np.asarray(points, dtype=np.float64)).tolist())
             budget -= population
         start = rng.random(size)
 
 
-def _optuna(objective: Callable[[Array], Array], size: int, budget: int, population: int, rng: np.random.Generator) -> None:
-    """Optuna's Parzen estimator, asked for a population at a time (points that wait count as bad ones)."""
+def _optuna(
+    objective: Callable[[Array], Array], size: int, budget: int, population: int, rng: np.random.Generator, begin: Array | None
+) -> None:
+    """Optuna's Parzen estimator, from a start if there is one, a population at a time (points that wait count as bad ones)."""
     try:
         import optuna
     except ImportError as error:
@@ -398,6 +427,8 @@ def _optuna(objective: Callable[[Array], Array], size: int, budget: int, populat
             warnings.simplefilter("ignore", optuna.exceptions.ExperimentalWarning)  # of constant_liar
             sampler = optuna.samplers.TPESampler(seed=int(rng.integers(2**31)), constant_liar=True)
         study = optuna.create_study(sampler=sampler)
+        if begin is not None:
+            study.enqueue_trial({str(k): float(value) for k, value in enumerate(begin)})
         while budget > 0:
             trials = [study.ask() for _ in range(min(population, budget))]
             points = np.array([[trial.suggest_float(str(k), 0.0, 1.0) for k in range(size)] for trial in trials])
