@@ -118,6 +118,32 @@ def test_a_sampled_integrator_is_stable_up_to_two_over_its_period(gain):
         assert found.phase == pytest.approx(math.pi / 2 - crossing * 0.05, rel=1e-3)
 
 
+def test_an_unstable_loop_has_no_phase_or_delay_to_spare():
+    pytest.importorskip("control")
+    model, law = integrator(1.0), proportional(3.0, 0.1)
+    spare = margins(model, law).delay
+    stable, unstable = (margins(model, law, delay=delay) for delay in (0.9 * spare, spare + 0.05))
+    assert stable.stable
+    assert stable.phase > 0.0
+    assert 0.0 < stable.delay < 0.2 * spare
+    assert str(stable).startswith("stable (largest eigenvalue 0.")
+    assert "delay to spare" in str(stable)
+    assert not unstable.stable
+    assert unstable.phase is None
+    assert unstable.delay is None
+    assert unstable.gain < 1.0
+    assert str(unstable).startswith("unstable (largest eigenvalue 1.")
+    assert "no margin of phase or delay; nearest boundary: all gains times 0." in str(unstable)
+    # a gain so small that no gain of one is crossed
+    assert "None" not in str(margins(integrator(1.0), proportional(1e-9, 0.1)))
+
+
+def test_margins_of_an_unstable_arm_are_not_positive(rig):
+    pytest.importorskip("control")
+    found = margins(linearise(rig, ANGLE, friction="moving"), PID(1.4, 2.5, period=0.005))
+    assert (found.stable, found.phase, found.delay) == (False, None, None)
+
+
 @pytest.mark.parametrize("delay", [0.03, 0.1, 0.14, 0.25])
 def test_delay_of_part_of_a_period_is_exact(delay):
     model, law = integrator(1.0), proportional(3.0, 0.1)

@@ -26,34 +26,45 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Margins:
-    """Margins of a loop that is opened at the command.
+    """Margins of a loop that is opened at the command; printed, a sentence with units.
 
     Attributes
     ----------
     gain : float
         The factor nearest to one by which all gains may change until the loop is at its boundary: above one how far they may grow,
         below one how far an unstable loop has to be taken back; infinite if there is none.
-    phase : float
-        [rad]; infinite without a crossing of gain one.
+    phase : float or None
+        [rad]; infinite without a crossing of gain one. None if the closed loop is unstable: whatever its curve crosses, it has no phase
+        to lose.
     gain_frequency, phase_frequency : float
         Where they are found [rad/s]: phase -180 deg, and gain one.
-    delay : float
-        How much more delay the loop bears [s].
+    delay : float or None
+        How much more delay the loop bears [s]; None if it is unstable without any.
     radius : float
         Largest absolute eigenvalue of the closed loop from sample to sample; stable below one.
     """
 
     gain: float
-    phase: float
+    phase: float | None
     gain_frequency: float
     phase_frequency: float
-    delay: float
+    delay: float | None
     radius: float
 
     @property
     def stable(self) -> bool:
         """Whether the closed loop is."""
         return self.radius < 1.0
+
+    def __str__(self) -> str:
+        """What the margins say, with units."""
+        factor = f"all gains times {self.gain:.3g} (at {self.gain_frequency:.3g} rad/s)" if math.isfinite(self.gain) else "no gain"
+        eigenvalue = f"largest eigenvalue {self.radius:.6g} per sample"
+        if self.phase is None or self.delay is None:
+            return f"unstable ({eigenvalue}): no margin of phase or delay; nearest boundary: {factor}"
+        phase = f"{math.degrees(self.phase):.3g} deg (at {self.phase_frequency:.3g} rad/s)" if math.isfinite(self.phase) else "any"
+        delay = f"{self.delay:.3g} s" if math.isfinite(self.delay) else "any"
+        return f"stable ({eigenvalue}): phase to spare {phase}, delay to spare {delay}; nearest boundary: {factor}"
 
 
 @dataclass(frozen=True)
@@ -187,7 +198,9 @@ def margins(model: LinearModel, controller: Controller | LinearController, *, de
         gain, at_gain = nyquist, math.pi / period
     gain, phase = (float(value) if value is not None else math.inf for value in (gain, phase))
     spare = math.radians(phase) / float(at_phase) if math.isfinite(phase) and at_phase else math.inf
-    return Margins(gain, math.radians(phase), _number(at_gain), _number(at_phase), spare, spectral_radius(model, linear, delay=delay))
+    radius = spectral_radius(model, linear, delay=delay)
+    left = (math.radians(phase), spare) if radius < 1.0 else (None, None)
+    return Margins(gain, left[0], _number(at_gain), _number(at_phase), left[1], radius)
 
 
 def stable_region(
