@@ -343,6 +343,10 @@ def test_a_pressure_is_no_valve_command(rig):
         with pytest.raises(ParameterError, match="Cascade"):
             call()
     assert closed_loop(rig, Cascade(sliding), LIFT, 0.1).command.max() <= 10.0
+    # nor is a valve command a pressure, which 5 of 10 V would hardly be
+    for name in ("pid", "sliding"):
+        with pytest.raises(ParameterError, match="outer is a .* with answers = 'valve', which is not allowed: 'pressure' is needed"):
+            Cascade(CONTROLLERS[name](1.0))
     # with an actuation that knows what to do with it it is allowed
     run = closed_loop(rig, sliding, LIFT, 0.1, actuation=lambda pressure: {"valve_command": 5.0 + 1e-7 * pressure})
     assert run.command.max() > 10.0

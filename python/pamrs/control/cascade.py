@@ -9,7 +9,7 @@ import numpy as np
 
 from pamrs.control.parts import LowPass
 from pamrs.control.pid import PID, PIDLaw
-from pamrs.control.protocol import Controller, Measurement, Reference, Value
+from pamrs.control.protocol import Controller, Measurement, Reference, Value, check_answers_pressure
 from pamrs.control.sampled import Fixed, Restorer, SampledController
 from pamrs.errors import ParameterError
 
@@ -83,7 +83,7 @@ class Cascade(SampledController):
     Parameters
     ----------
     outer : Controller
-        Sliding, adaptive, neural, a PID with pressure limits.
+        Sliding, adaptive, neural, one of your own with ``answers = "pressure"``; a PID of the angle is in :func:`cascaded_pid`.
     inner : PressureLoop, optional
         By default one with the gains and the period that it has by itself.
 
@@ -95,13 +95,14 @@ class Cascade(SampledController):
     Raises
     ------
     ParameterError
-        If the two have not the same period.
+        If the outer controller answers valve volts, or the two have not the same period.
     """
 
     _PARTS: ClassVar[tuple[str, ...]] = ("outer", "inner")
     _STATE: ClassVar[Mapping[str, Any]] = {"asked": None}
 
     def __init__(self, outer: Controller, inner: PressureLoop | None = None) -> None:
+        check_answers_pressure(outer)
         self.outer = outer
         self.inner = PressureLoop(period=outer.period) if inner is None else inner
         if self.inner.period != outer.period:

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from pamrs.errors import ParameterError
 
-__all__ = ["Controller", "Measurement", "Reference", "Value", "check_controller", "check_drives_valve"]
+__all__ = ["Controller", "Measurement", "Reference", "Value", "check_answers_pressure", "check_controller", "check_drives_valve"]
 
 #: A float, or one number for each plant of a batch.
 Value: TypeAlias = "float | NDArray[np.float64]"
@@ -142,4 +142,24 @@ def check_drives_valve(controller: Controller) -> None:
         raise ParameterError(
             f"controller is a {type(controller).__name__}, which answers a {controller.answers} [Pa], no valve command: "
             "put it in a pamrs.control.Cascade"
+        )
+
+
+def check_answers_pressure(outer: Controller) -> None:
+    """Refuse an outer controller whose volts would be taken for pascals.
+
+    Parameters
+    ----------
+    outer : Controller
+        What a pressure loop follows.
+
+    Raises
+    ------
+    ParameterError
+        If it answers a valve command.
+    """
+    if outer.answers != "pressure":
+        raise ParameterError(
+            f"outer is a {type(outer).__name__} with answers = {outer.answers!r}, which is not allowed: 'pressure' is needed, a "
+            "desired gauge pressure [Pa] (an angle PID is in cascaded_pid; a controller of your own says answers = 'pressure')"
         )
