@@ -5,6 +5,7 @@ import io
 import math
 import re
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,9 +14,10 @@ import pytest
 from pamrs import cli, library, reproduce, rigs
 from pamrs.errors import ParameterError
 from pamrs.joint import Joint
-from pamrs.reproduce import chapter3, elbow
+from pamrs.reproduce import chapter3, elbow, names
 from pamrs.reproduce.facts import judge, markdown, table, to_csv, verdicts
 from pamrs.reproduce.page import Picture, Section, page
+from pamrs.reproduce.symbols import symbols
 
 DOCS = Path(__file__).parents[2] / "docs" / "reproduction"
 AXIAL, OFFSET, TENDON = 1.56 * 0.0254, 0.42 * 0.0254, 3.04 * 0.0254
@@ -113,14 +115,31 @@ def test_text_markdown_and_csv_have_every_fact():
 
 def test_page_shows_command_numbers_and_pictures_from_where_it_stands():
     row = judge("group", "fact", "3.2", 1.0, 1.0)
-    section = Section(
-        "Title", [row], {}, ["In short."], [("a.b", "1 m", "the reason")], [Picture("one", "group", "What it shows", b"")]
-    )
+    pictures = [Picture("one", "group", "What it shows", b"")]
+    section = Section("Title", [row], {}, ["In short."], [("a.b", "1 m", "the reason")], pictures, [("nu", "error squared", "rad2 s")])
     text = page([section], "pamrs reproduce x", "pictures/here")
     assert text.splitlines()[2].startswith("Made by `pamrs reproduce x`")
     assert "![What it shows](pictures/here/one.png)" in text
     assert "| `a.b` | 1 m | the reason |" in text
     assert "- In short." in text
+    assert "| nu | error squared | rad2 s |" in text
+    assert "Symbols" not in page([replace(section, symbols=[])], "pamrs reproduce x")
+
+
+@pytest.mark.parametrize("name", names())
+def test_page_in_the_documentation_explains_the_symbols_that_it_uses(name):
+    text = (DOCS / f"{name.replace('ch', 'chapter')}.md").read_text(encoding="utf-8")
+    table = [f"| {' | '.join(row)} |" for row in symbols(name)]
+    assert "\n".join(["### Symbols and abbreviations", "", "| symbol | meaning | unit |", "|---|---|---|", *table, "", "### "]) in text
+    rest = text.replace("\n".join(table), "")
+    for symbol in (word.strip() for row in symbols(name) for word in row[0].split(",")):
+        assert re.search(rf"\b{re.escape(symbol.removeprefix('effects such as ').strip('`'))}\b", rest), symbol
+    assert [line for line in page([], "x").splitlines()[4:] if line not in text] == []
+
+
+def test_symbols_of_no_chapter_are_refused():
+    with pytest.raises(ParameterError, match="chapter = 'ch9' is not allowed: one of ch3, ch4, ch5"):
+        symbols("ch9")
 
 
 # ----------------------------------------------------------------------- experiments

@@ -73,6 +73,7 @@ def section(name: str, *, search: bool = True, pictures: bool = True, progress: 
         If an extra is missing; the message names it.
     """
     from pamrs.reproduce.page import Section
+    from pamrs.reproduce.symbols import symbols
 
     check(name)
     if pictures:
@@ -93,4 +94,5 @@ def section(name: str, *, search: bool = True, pictures: bool = True, progress: 
         in_short=chapter.in_short(rows),
         chosen=chapter.chosen(),
         pictures=drawn.pictures() if pictures else [],
+        symbols=symbols(name),
     )

@@ -52,6 +52,8 @@ class Section:
         Name, value and reason of each number that the source does not give.
     pictures : sequence of Picture
         Its pictures.
+    symbols : sequence of (str, str, str)
+        Name, meaning and unit of the symbols and abbreviations that it uses.
     """
 
     title: str
@@ -60,6 +62,7 @@ class Section:
     in_short: Sequence[str]
     chosen: Sequence[tuple[str, str, str]]
     pictures: Sequence[Picture]
+    symbols: Sequence[tuple[str, str, str]] = ()
 
 
 def page(sections: Sequence[Section], command: str, folder: str | os.PathLike[str] = ".") -> str:
@@ -88,11 +91,13 @@ def page(sections: Sequence[Section], command: str, folder: str | os.PathLike[st
         'Each statement stands beside our number with a verdict: "agree" and "differs" by the criterion of its line, "cannot tell"',
         'where the source or the model leaves it open. "Used to identify" means that the statement chose one of our numbers, so that',
         "agreement proves nothing.",
+        'Under "where", 3.2.4 is a section of the source and (3.24) an equation; [1] is a remark below its table.',
         "",
     ]
     for section in sections:
         lines += [f"## {section.title}", "", f"{verdicts(list(section.rows))}.", ""]
         lines += [f"- {sentence}" for sentence in section.in_short] + [""]
+        lines += _symbols(section)
         if section.chosen:
             lines += ["### Numbers that the source does not give", "", "| number | value | from |", "|---|---|---|"]
             lines += [f"| `{name}` | {value} | {reason} |" for name, value, reason in section.chosen] + [""]
@@ -102,3 +107,11 @@ def page(sections: Sequence[Section], command: str, folder: str | os.PathLike[st
             below[picture.group] = below.get(picture.group, "") + f"![{picture.caption}]({file})\n\n*{picture.caption}*\n\n"
         lines += [markdown(section.rows, headings=section.headings, below=below)]
     return "\n".join(lines).rstrip() + "\n"
+
+
+def _symbols(section: Section) -> list[str]:
+    """The table of a chapter's symbols, with an empty line behind; nothing where there are none."""
+    if not section.symbols:
+        return []
+    rows = [f"| {name} | {meaning} | {unit} |" for name, meaning, unit in section.symbols]
+    return ["### Symbols and abbreviations", "", "| symbol | meaning | unit |", "|---|---|---|", *rows, ""]
