@@ -10,7 +10,7 @@ import pytest
 import pamrs
 from pamrs.diagnosis import _doubted, _unsettled
 from pamrs.diagnosis.blocks import available_blocks
-from pamrs.diagnosis.hypotheses import Group
+from pamrs.diagnosis.candidates import Group
 from pamrs.recording import Recording
 
 ROOT = Path(__file__).parents[2]

@@ -19,9 +19,10 @@ from pamrs.case import Case, load_case
 from pamrs.channels import dotted
 from pamrs.diagnosis import assemble
 from pamrs.diagnosis.blocks import Block, available_blocks
+from pamrs.diagnosis.candidates import Group
 from pamrs.diagnosis.evidence import floors
 from pamrs.diagnosis.fitting import Problem
-from pamrs.diagnosis.hypotheses import Group, examine
+from pamrs.diagnosis.hypotheses import examine
 from pamrs.diagnosis.plausible import check_plausible, check_sense
 from pamrs.diagnosis.result import Diagnosis
 from pamrs.diagnosis.signals import Prepared, prepare

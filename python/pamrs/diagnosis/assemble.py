@@ -13,11 +13,11 @@ from pamrs.case import Case
 from pamrs.channels import unit_of
 from pamrs.diagnosis import words
 from pamrs.diagnosis.blocks import Residual
+from pamrs.diagnosis.candidates import Candidate, Group, significant
 from pamrs.diagnosis.conditions import Picture, describe
 from pamrs.diagnosis.evidence import Floor
 from pamrs.diagnosis.experiment import propose
 from pamrs.diagnosis.fitting import Events, Key, Problem, residuals
-from pamrs.diagnosis.hypotheses import Candidate, Group, significant
 from pamrs.diagnosis.result import Diagnosis, Trace
 from pamrs.effects_table import CATALOGUE, EFFECTS
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError

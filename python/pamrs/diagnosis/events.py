@@ -28,9 +28,9 @@ Array = NDArray[np.float64]
 
 EVENTS = {"external_torque": ("torque", 1.0, 3), "payload_change": ("mass_change", 0.3, 1)}
 """Effects with times of their own: the parameter that scales them, a typical size, and how many can be told in one recording."""
-SPACING = 0.75
+SPACING = 0.5
 """Distance of the times that are tried [s]."""
-PUSH, RISE = 1.0, 0.1
+PUSH, RISE = 1.0, 0.4
 """Duration of the push that is moved through time, and its edges [s]."""
 LEAST, LEAST_SHARE = 25.0, 0.03
 """Gain in chi-square, and share of what the recording's residual is, from which an event counts."""
@@ -64,8 +64,7 @@ def fit_events(effect: str, problem: Problem, nominal: Rig, baseline: Fit, infla
     last = _jointly(found, problem, nominal, baseline, inflation)
     if last is None or last.events is None:
         return None
-    again = last.events
-    first = next(iter(again.values.values()))
+    first = next(iter(last.events.values.values()))
     values = {f"{effect}.{name}": value for name, value in first.items()}
     return replace(
         last,
@@ -131,7 +130,7 @@ def _scan(
     for group in _apart(times, slots):
         values = _numbered([(typical if size is None else size, float(t)) for t in group], leading, effect)
         try:
-            moved, _ = stacked(problem, changes(problem, rig.with_effect(effect, values), base), inflation)
+            moved, _ = stacked(problem, changes(problem, rig.with_effect(effect, values), base, effect), inflation)
         except SimulationError:
             continue
         change = moved - rows
@@ -139,23 +138,37 @@ def _scan(
         for place, t in enumerate(group):
             end = group[place + 1] if place + 1 < len(group) else np.inf
             signatures[float(t)] = np.where((share >= t - 0.1) & (share < end - 0.1), change, 0.0)
-    chosen: list[tuple[float, float]] = []
-    left = rows.copy()
-    for _ in range(slots):
-        best = None
-        for t, signature in signatures.items():
-            power = float(signature @ signature)
-            if power < 1e-9 or any(abs(t - s) < PUSH for _, s in chosen):
-                continue
-            factor = -float(left @ signature) / power if size is None else 1.0
-            gain = -2.0 * factor * float(left @ signature) - factor**2 * power
-            if best is None or gain > best[0]:
-                best = (gain, factor, t)
-        if best is None or best[0] < max(LEAST, LEAST_SHARE * float(rows @ rows)):
+    chosen: list[float] = []
+    span, sizes = np.zeros((rows.size, 0)), np.zeros(0)
+    left = rows
+    while len(chosen) < slots:
+        gains = {
+            t: _gain(left, signature - span @ (span.T @ signature), scaled=size is None)
+            for t, signature in signatures.items()
+            if all(abs(t - s) >= PUSH for s in chosen)
+        }
+        best = max(gains, key=lambda t: gains[t], default=0.0)
+        if gains.get(best, 0.0) < max(LEAST, LEAST_SHARE * float(rows @ rows)):
             break
-        chosen.append((best[1] * (typical if size is None else size), best[2]))
-        left = left + best[1] * signatures[best[2]]
-    return _numbered(sorted(chosen, key=lambda c: c[1]), leading, effect) if chosen else {}
+        chosen.append(best)
+        columns = np.stack([signatures[t] for t in chosen], axis=1)
+        if size is None:
+            # what the events that were found can still do is no gain of another one
+            span, sizes = np.linalg.qr(columns)[0], np.asarray(np.linalg.lstsq(columns, -rows, rcond=None)[0])
+        else:
+            sizes = np.ones(len(chosen))
+        left = rows + columns @ sizes
+    events = [(float(factor) * (typical if size is None else size), t) for factor, t in zip(sizes, chosen, strict=True)]
+    return _numbered(sorted(events, key=lambda c: c[1]), leading, effect) if events else {}
+
+
+def _gain(left: Array, signature: Array, *, scaled: bool) -> float:
+    """Gain in the sum of squares by a signature, of the best size or of its own."""
+    power = float(signature @ signature)
+    if power < 1e-9:
+        return 0.0
+    along = float(left @ signature)
+    return along**2 / power if scaled else -2.0 * along - power
 
 
 def _apart(times: Array, slots: int) -> list[list[float]]:

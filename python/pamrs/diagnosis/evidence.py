@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from pamrs import _core
-from pamrs.diagnosis.blocks import Block, Residual, residual
+from pamrs.diagnosis.blocks import Block, Residual, change, residual
 from pamrs.diagnosis.fitting import Key, Problem, bin_width
 from pamrs.diagnosis.signals import Prepared, binned, smoothed
 
@@ -91,10 +91,10 @@ def floors(problem: Problem, core: _core.Rig) -> dict[Key, Floor]:
             noisy = [name for name in block.drives if name in prepared.signals]
             replicates = REPLICATES if noisy else 0
             for _ in range(replicates):
-                change = residual(block, core, _shaken(prepared, noisy, rng), []).value - base.value
+                shaken = change(block, core, _shaken(prepared, noisy, rng), base) - base.value
                 rows = base.rows
-                sample += float(np.mean(change[rows] ** 2)) / replicates if rows.any() else 0.0
-                means, counts = binned(change, rows, width)
+                sample += float(np.mean(shaken[rows] ** 2)) / replicates if rows.any() else 0.0
+                means, counts = binned(shaken, rows, width)
                 mean += float(np.mean(means[counts > 0] ** 2)) / replicates if (counts > 0).any() else 0.0
             _, counts = binned(base.value, base.rows, width)
             white = float(np.mean(1.0 / counts[counts > 0])) if (counts > 0).any() else 1.0

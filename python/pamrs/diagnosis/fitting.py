@@ -159,6 +159,8 @@ def residuals(problem: Problem, rig: Rig, names: Sequence[str] = (), events: Eve
     def one(task: tuple[Block, Prepared]) -> Residual:
         block, prepared = task
         relevant = [name for name in names if depends(block, name)]
+        if events is not None and prepared.recording.name not in own:  # nothing happens here that could be differentiated
+            relevant = [name for name in relevant if name.partition(".")[0] != events.effect]
         found = residual(block, own.get(prepared.recording.name, core), prepared, relevant)
         if len(relevant) == len(names):
             return found
@@ -298,8 +300,10 @@ def stacked(problem: Problem, found: dict[Key, Residual], inflation: dict[str, f
     return np.concatenate(rows), np.concatenate(slopes) if slopes else None
 
 
-def changes(problem: Problem, rig: Rig, base: dict[Key, Residual]) -> dict[Key, Residual]:
+def changes(problem: Problem, rig: Rig, base: dict[Key, Residual], effect: str) -> dict[Key, Residual]:
     """Residuals of a model near to another whose residuals (with the starts of their windows) are known; values alone.
+
+    Only blocks in which the effect that makes the difference acts are predicted again.
 
     Raises
     ------
@@ -312,6 +316,8 @@ def changes(problem: Problem, rig: Rig, base: dict[Key, Residual]) -> dict[Key, 
     def one(task: tuple[Block, Prepared]) -> tuple[Key, Residual]:
         block, prepared = task
         key = (block.name, prepared.recording.name)
+        if not acts_in(effect, block):
+            return key, replace(base[key], jacobian=None)
         return key, replace(base[key], value=change(block, core, prepared, base[key]), jacobian=None)
 
     with _inside_range(), ThreadPoolExecutor(max_workers=2) as pool:

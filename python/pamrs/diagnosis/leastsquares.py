@@ -69,8 +69,13 @@ def levenberg_marquardt(
         rows, jacobian, _ = best
         gradient = jacobian.T @ rows
         normal = jacobian.T @ jacobian
+        worth = max(WORTH, SHARE * float(rows @ rows))
         step = _step(x, gradient, normal, damping, low, high)
-        if -2.0 * float(gradient @ step) - float(step @ normal @ step) < max(WORTH, SHARE * float(rows @ rows)):
+        # a long step that the walls bend may lead uphill: a shorter one meets fewer of them
+        while (gain := _promise(step, gradient, normal)) < worth and damping < HARDEST:
+            damping = 10.0 * damping
+            step = _step(x, gradient, normal, damping, low, high)
+        if gain < worth:
             break
         tried = np.clip(x + step, low, high)
         spent += 1
@@ -79,17 +84,21 @@ def levenberg_marquardt(
         except SimulationError:
             damping = max(10.0 * damping, 1e-2)
             continue
-        promised = -float(gradient @ step) - 0.5 * float(step @ normal @ step)
-        gained = 0.5 * float(rows @ rows - found[0] @ found[0])
+        gained = float(rows @ rows - found[0] @ found[0])
         if gained > 0.0:
             x, best = tried, found
-            damping = damping * 0.1 if gained > 0.5 * promised else damping * (2.0 if gained < 0.1 * promised else 1.0)
+            damping = damping * 0.1 if gained > 0.5 * gain else damping * (2.0 if gained < 0.1 * gain else 1.0)
             damping = max(damping, 1e-9)
         else:
             damping = max(10.0 * damping, 1e-2)
             if damping > HARDEST:
                 break
     return x, best, spent
+
+
+def _promise(step: Array, gradient: Array, normal: Array) -> float:
+    """Gain in the sum of squares that a step promises."""
+    return -2.0 * float(gradient @ step) - float(step @ normal @ step)
 
 
 def _step(x: Array, gradient: Array, normal: Array, damping: float, low: Array, high: Array) -> Array:

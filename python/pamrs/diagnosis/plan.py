@@ -19,10 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs.diagnosis.blocks import Block, available_blocks
+from pamrs.diagnosis.candidates import DETECTION_RATIO
 from pamrs.diagnosis.differences import EFFECTIVE, MEASURABLE, NOISE, checked_channels, taken, weights_of
 from pamrs.diagnosis.evidence import bins_of
 from pamrs.diagnosis.fitting import FIT_BIN, Key, Problem, acts_in, bin_width, changes, free_baseline, residuals
-from pamrs.diagnosis.hypotheses import DETECTION_RATIO, fits
+from pamrs.diagnosis.hypotheses import fits
 from pamrs.diagnosis.protocols import Experiment, library
 from pamrs.diagnosis.signals import binned
 from pamrs.diagnosis.starts import Start, starts_of
@@ -500,7 +501,7 @@ def _parts(rig: Rig, blocks: list[Block], experiment: Experiment, starts: list[S
     for index, start in enumerate(starts):
         acting = [b for b in blocks if acts_in(start.effect, b)]
         try:
-            found = changes(Problem(acting, [prepared], problem.core), start.applied(stands), base)
+            found = changes(Problem(acting, [prepared], problem.core), start.applied(stands), base, start.effect)
         except SimulationError:
             continue  # this size leaves the range in which the model holds
         for block in acting:

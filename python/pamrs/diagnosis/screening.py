@@ -28,7 +28,9 @@ LEVELS = 6
 """Levels of the tank's pressure that are tried for the thresholds of a compressor."""
 REACHED = (0.5, 0.75, 0.93)
 """Quantiles of the angles that were seen at which an upper stop is tried; a lower one at the others."""
-LEAST = 0.02
+CORDS, BROAD = (0.06, 1.5, 14), 0.08
+"""Shortest and longest cord [m] of a swinging payload that are tried, how many, and the damping ratio that they are tried with."""
+LEAST = 0.002
 """Smallest multiple that a fit starts from."""
 FAR, REFINED = 0.3, 3
 """Multiple of a size below which the signature is taken again at the size that is wanted, and how often at most."""
@@ -161,7 +163,7 @@ def screen(problem: Problem, fitted: Fit, effects: list[str], inflation: dict[st
         tried = start
         for _ in range(looks):
             try:
-                found = changes(problem, tried.applied(fitted.rig), fitted.residuals)
+                found = changes(problem, tried.applied(fitted.rig), fitted.residuals, start.effect)
             except SimulationError:
                 return -math.inf  # this size leaves the range in which the model holds
             moved, _ = stacked(problem, found, inflation)
@@ -176,7 +178,10 @@ def screen(problem: Problem, fitted: Fit, effects: list[str], inflation: dict[st
 
     for effect in effects:
         starts = _placed(starts_of(effect, sealed=sealed), problem)
-        if effect == "compressor_cut_in":
+        if effect == "payload_swing":
+            for start in _nearest(starts, lambda start: try_(start, 1), signatures):
+                try_(start)
+        elif effect == "compressor_cut_in":
             before = len(signatures)
             best = _switched(starts[0], problem, lambda start: try_(start, 1))
             signatures[before:] = [entry for entry in signatures[before:] if entry[1] is best]
@@ -199,6 +204,22 @@ def _placed(starts: list[Start], problem: Problem) -> list[Start]:
         return replace(start, free=start.free | {place: float(np.quantile(angles, 1.0 - share if lower else share))})
 
     return [at(start, share) for start in starts for share in REACHED]
+
+
+def _nearest(starts: list[Start], try_: Callable[[Start], float], signatures: list[tuple[str, Start, Array]]) -> list[Start]:
+    """The cords that tell most among many lengths: what swings long has to be met within a few percent of its frequency.
+
+    They are tried with more damping than a payload has, which makes the resonance broader than the distance between two lengths.
+    """
+    length, damping = "payload_swing.length", "payload_swing.damping_ratio"
+    before = len(signatures)
+    tried = [replace(starts[0], free=starts[0].free | {length: float(x), damping: BROAD}) for x in np.geomspace(*CORDS)]
+    gains = [try_(start) for start in tried]
+    del signatures[before:]
+    order = sorted(range(len(tried)), key=lambda k: -gains[k])
+    # the best and the best that is no neighbour of it
+    far = [k for k in order[1:] if abs(k - order[0]) > 1]
+    return [tried[k] for k in (order[0], *far[:1])]
 
 
 def _switched(start: Start, problem: Problem, try_: Callable[[Start], float]) -> Start | None:

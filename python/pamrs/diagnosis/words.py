@@ -8,9 +8,9 @@ import numpy as np
 
 from pamrs.case import Case
 from pamrs.channels import channel_of
+from pamrs.diagnosis.candidates import Group
 from pamrs.diagnosis.conditions import Picture
 from pamrs.diagnosis.fitting import Problem
-from pamrs.diagnosis.hypotheses import Group
 from pamrs.diagnosis.result import Diagnosis
 from pamrs.effects_table import EFFECTS
 from pamrs.rig import Rig

@@ -1,0 +1,267 @@
+"""Sets of effects that are tried: what each is, how it is fitted, and how it is judged on held-out recordings."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+from pamrs.diagnosis.blocks import Block, Residual
+from pamrs.diagnosis.events import fit_events, look_for_events
+from pamrs.diagnosis.evidence import Excess, Floor, excess, inflation
+from pamrs.diagnosis.fitting import FIT_BIN, Fit, Key, Problem, acts_in, fit, residuals
+from pamrs.diagnosis.starts import Start
+from pamrs.effects_table import EFFECTS, find_parameter
+from pamrs.errors import SimulationError
+from pamrs.rig import Rig
+
+__all__ = ["Attempts", "Candidate", "Group", "significant", "start_of"]
+
+DETECTION_RATIO = 1.45
+"""Variance of bin means over the floor's from which a mismatch is taken as real, on recordings that were fitted."""
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A set of effects, fitted.
+
+    Attributes
+    ----------
+    effects : tuple of str
+        Its effects; empty for the baseline.
+    fit : Fit
+        On the recordings to fit.
+    held_out : dict of str to Excess
+        By block, on held-out recordings (on the fitted ones if there are no others).
+    fitted : dict of str to Excess
+        By block, on the recordings to fit.
+    gap_closed : float
+        Share of the baseline's excess that it removes on held-out recordings.
+    scatter : float
+        Relative scatter of its size between recordings, beyond its uncertainty.
+    gain : float
+        Gain in chi-square that the screen promised of a single effect.
+    """
+
+    effects: tuple[str, ...]
+    fit: Fit
+    held_out: dict[str, Excess]
+    fitted: dict[str, Excess]
+    gap_closed: float
+    scatter: float = 0.0
+    gain: float = 0.0
+
+    @property
+    def misfit(self) -> float:
+        """Sum over the blocks of the residual in units of its noise, squared, on the recordings to fit."""
+        return sum(float(((r.value[r.rows] / r.noise) ** 2).sum()) for r in self.fit.residuals.values())
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Blocks that are judged together, with everything found out about them.
+
+    Attributes
+    ----------
+    blocks : list of Block
+        Gas blocks (supply, chamber) or the arm.
+    nominal, baseline : dict of str to Excess
+        Excess by block before and after the refit, on fitted recordings.
+    candidates : list of Candidate
+        The baseline first, then every set of effects tried.
+    probabilities : dict of str to float
+        Over the sets (ids joined by ``+``), ``unlisted`` and ``""`` (nothing missing here).
+    mismatch : Block or None
+        The block with the largest significant excess after the refit.
+    floor : dict
+        Noise floors.
+    suspects : list of Block
+        Blocks that keep an excess.
+    closure : Candidate or None
+        Where no name is likely: a form of what is missing that predicts held-out recordings better than the baseline.
+    form : str
+        That in words.
+    sought : bool
+        Whether one was looked for.
+    """
+
+    blocks: list[Block]
+    nominal: dict[str, Excess]
+    baseline: dict[str, Excess]
+    candidates: list[Candidate]
+    probabilities: dict[str, float]
+    mismatch: Block | None
+    floor: dict[Key, Floor]
+    suspects: list[Block]
+    closure: Candidate | None = None
+    form: str = ""
+    sought: bool = False
+
+    @property
+    def best(self) -> Candidate:
+        """The most probable set of effects (the baseline when none is)."""
+        named = [c for c in self.candidates if c.effects]
+        if self.mismatch is None or not named:
+            return self.candidates[0]
+        return max(named, key=lambda c: self.probabilities.get("+".join(c.effects), 0.0))
+
+
+def significant(found: Excess, ratio: float = DETECTION_RATIO) -> bool:
+    """Whether a block keeps more than its noise."""
+    return found.ratio > ratio and found.p_value < 0.01
+
+
+@dataclass(frozen=True, eq=False)
+class Attempts:
+    """What every attempt at an explanation needs: recordings to fit and held out, model, floors, blocks that keep an excess."""
+
+    inner: Problem
+    outer: Problem
+    nominal: Rig
+    floor: dict[Key, Floor]
+    out: dict[str, Excess]
+    suspects: list[Block]
+
+    @property
+    def same(self) -> bool:
+        """Whether there is no held-out recording."""
+        return self.outer.recordings is self.inner.recordings
+
+    def eventful(self, effect: str, beside: Candidate) -> Candidate | None:
+        """An effect with times of its own in every recording, held-out ones included, beside the effects of a candidate."""
+        try:
+            return self._eventful(effect, beside)
+        except SimulationError:
+            return None  # it leaves the range in which the model holds
+
+    def _eventful(self, effect: str, beside: Candidate) -> Candidate | None:
+        white = dict.fromkeys((b.name for b in self.inner.blocks), 1.0)
+        model = self.nominal
+        for entry in beside.fit.rig.effects:
+            model = model.with_effect(entry["id"], entry["parameters"])
+        found = fit_events(effect, self.inner, model, beside.fit, white)
+        if found is None:
+            return None
+        if beside.effects:
+            found = self._beside(found, beside, white)
+        effects = (*beside.effects, effect)
+        if self.same:
+            return self.judged(effects, found)
+        bare = found.rig.without_effect(effect)
+        size = found.values["payload_change.mass_change"] if effect == "payload_change" else None
+        quiet = residuals(self.outer, bare)
+        events = look_for_events(effect, self.outer, bare, quiet, white, size)
+        if events is None:
+            return self.judged(effects, found, quiet)
+        everywhere = replace(
+            found, events=replace(events, values=found.events.values | events.values if found.events else events.values)
+        )
+        return self.judged(effects, everywhere, residuals(self.outer, bare, events=events))
+
+    def _beside(self, found: Fit, beside: Candidate, inflation_: dict[str, float]) -> Fit:
+        """The lasting effects of a candidate fitted again, with the events that were found beside them held."""
+        assert found.events is not None
+        effect = found.events.effect
+        starts = [start_of(beside.fit, e) for e in beside.effects]
+        own = {n: v for start in starts for n, v in start.free.items()}
+        kept = {n: v for start in starts for n, v in start.held.items()}
+        warm = replace(beside.fit, values=beside.fit.values | {n: found.values[n] for n in beside.fit.moved})
+        again = fit(
+            self.inner,
+            self.nominal,
+            beside.effects,
+            own,
+            inflation_,
+            fixed=kept,
+            warm=warm,
+            frozen=True,
+            events=found.events,
+            evaluations=6,
+        )
+        happened = next(iter(found.events.values.values()))
+        parts = {n: (found.values[n], found.std[n]) for n in found.values if n.partition(".")[0] == effect}
+        return replace(
+            again,
+            effects=(*beside.effects, effect),
+            rig=again.rig.with_effect(effect, happened),
+            values=again.values | {n: v for n, (v, _) in parts.items()},
+            std=again.std | {n: s for n, (_, s) in parts.items()},
+        )
+
+    def judged(self, effects: tuple[str, ...], found: Fit, outside: dict[Key, Residual] | None = None) -> Candidate:
+        """A fitted set on the held-out recordings."""
+        if outside is None:
+            outside = found.residuals if self.same else residuals(self.outer, found.rig)
+        after = {b.name: excess(b, self.outer.recordings, outside, self.floor) for b in self.inner.blocks}
+        inside = (
+            after if self.same else {b.name: excess(b, self.inner.recordings, found.residuals, self.floor) for b in self.inner.blocks}
+        )
+        gaps = [(self.out[b.name].ratio - 1.0, max(0.0, after[b.name].ratio - 1.0)) for b in self.suspects]
+        total = sum(math.sqrt(max(0.0, g)) for g, _ in gaps)
+        gap = 1.0 - sum(math.sqrt(a) for _, a in gaps) / total if total > 0 else 0.0
+        return Candidate(effects, found, after, inside, gap, _scatter(effects, self.inner, found))
+
+    def fitted(self, starts: list[Start], warm: Fit, inflation_: dict[str, float]) -> Candidate | None:
+        """A set of effects fitted from one start of each, residuals weighted by their own colour; None where it cannot be run."""
+        effects = tuple(start.effect for start in starts)
+        free = {name: value for start in starts for name, value in start.free.items()}
+        held = {name: value for start in starts for name, value in start.held.items()}
+        limit = 30 if self.nominal.model["valve"] is None else 8
+        try:
+            best = fit(self.inner, self.nominal, effects, free, inflation_, fixed=held, warm=warm, frozen=True, evaluations=limit)
+            colour = {b.name: inflation(b, self.inner.recordings, best.residuals, FIT_BIN) for b in self.inner.blocks}
+            if max(colour.values()) > 2:
+                again = {n: v for n, v in best.values.items() if n.partition(".")[0] in EFFECTS}
+                again = {n: v if abs(v) > 1e-3 * _typical(n) else 1e-3 * _typical(n) for n, v in again.items()}
+                best = fit(self.inner, self.nominal, effects, again, colour, fixed=held, warm=best, frozen=True, evaluations=limit)
+            return self.judged(effects, best)
+        except SimulationError:
+            return None  # it leaves the range in which the model holds
+
+
+def start_of(found: Fit, effect: str) -> Start:
+    """Where another fit goes on from an effect as it was fitted, held parameters included."""
+    own = {name: value for name, value in found.values.items() if name.partition(".")[0] == effect}
+    entry = next(e for e in found.rig.effects if e["id"] == effect)
+    held = {f"{effect}.{n}": v for n, v in entry["parameters"].items() if f"{effect}.{n}" not in found.values}
+    return Start(effect, own, held, (), False)
+
+
+def _typical(name: str) -> float:
+    """A typical size of an effect's parameter, at least its lower bound."""
+    parameter = find_parameter(name)
+    return max(parameter.default, parameter.lower, 1e-3 * parameter.starts[0])
+
+
+def _scatter(effects: tuple[str, ...], problem: Problem, best: Fit) -> float:
+    """Relative scatter of a single effect's size between recordings, beyond its uncertainty.
+
+    One Gauss-Newton step of the effect's leading parameter alone in each recording: a wrong effect needs another size in
+    every regime.
+    """
+    if len(effects) != 1 or len(problem.recordings) < 2:
+        return 0.0
+    leading = {
+        "leak_muscle": "leak_muscle.conductance",
+        "muscle_hysteresis": "muscle_hysteresis.friction_pressure",
+    }.get(effects[0])
+    if leading is None or best.values.get(leading, 0.0) <= 0:
+        return 0.0
+    found = residuals(problem, best.rig, [leading])
+    steps, errors = [], []
+    for prepared in problem.recordings:
+        num = den = 0.0
+        for block in problem.blocks:
+            r = found[block.name, prepared.recording.name]
+            if r.jacobian is None or not acts_in(effects[0], block):
+                continue
+            slope = r.jacobian[:, 0] / r.noise
+            unit = inflation(block, [prepared], found, FIT_BIN)
+            num += float(slope @ (r.value / r.noise)) / unit
+            den += float(slope @ slope) / unit
+        if den > 0:
+            steps.append(num / den / best.values[leading])
+            errors.append(1.0 / math.sqrt(den) / best.values[leading])
+    if len(steps) < 2:
+        return 0.0
+    beyond = [max(0.0, abs(s) - 2.0 * e) for s, e in zip(steps, errors, strict=True)]
+    return float(max(beyond))

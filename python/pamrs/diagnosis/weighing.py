@@ -1,0 +1,122 @@
+"""Probabilities of sets of effects, and of ``unlisted``, from what each leaves of the mismatch."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pamrs.diagnosis.blocks import Block
+from pamrs.diagnosis.candidates import DETECTION_RATIO, Candidate
+from pamrs.diagnosis.fitting import Problem
+from pamrs.effects_table import EFFECTS
+
+__all__ = ["FORM", "PRICE", "explains", "most_believed", "share_left", "weigh"]
+
+EVEN, EVEN_PUSH, SOFTNESS = 0.5, 2.6, 0.4
+"""Logarithm of the odds of explained to unexplained variance at which a set is named at even odds with ``unlisted`` (pushes, which
+take up a good part of anything, need more), and its width."""
+LOOKS, PRICE, SECOND = 12.0, 0.5, 3.0
+"""Independent looks that a block's residual counts for, price of a parameter, price of a further effect."""
+TELLING = 0.5
+"""Excess variance, in units of the floor's, from which recordings are asked how much an effect leaves."""
+FORM = 0.04
+"""Share of a mismatch's variance that the difference between a catalogue's equation and the truth may leave."""
+DRIFT_SHARE, DRIFT_BELIEVED = 0.02, 0.45
+"""Share of the pressure below which a drift that no other recording confirms may as well be the bench's own, and how far a name of it
+is believed at most."""
+BELIEVED = 0.985
+"""How far a name is believed at most."""
+STANDING, UNSEEN = 2.0, 3.0
+"""Price of a clock that is late but does not drift; recordings' lengths beyond which a time constant was not seen."""
+CONSTANCY = 0.35
+"""Relative scatter of an effect's size between recordings beyond which it is not that effect."""
+
+
+def most_believed(fitted: Problem, held: Problem, mismatch: Block, left: float) -> float:
+    """How far any name is believed at most, which is less where the proof is weak.
+
+    A slow drift of less than two percent of the pressure, with no held-out recording, may as well be the bench's own loss,
+    creep of a wall or the transducer's drift.
+    """
+    if held is not fitted or mismatch.channel != "muscle_pressure":
+        return BELIEVED
+    typical = np.mean([np.mean(np.abs(p.signals["muscle_pressure"][0])) for p in fitted.recordings])
+    return DRIFT_BELIEVED if left < DRIFT_SHARE * float(typical) else BELIEVED
+
+
+def share_left(candidate: Candidate, baseline: Candidate, suspects: list[Block]) -> float:
+    """Share of the baseline's excess variance that a set of effects leaves, the larger of fitted and held-out recordings.
+
+    Recordings that hardly show the mismatch do not count, as long as the effect does not bring one into them.
+    """
+    shares = []
+    for was, now in ((baseline.fitted, candidate.fitted), (baseline.held_out, candidate.held_out)):
+        before = sum(max(0.0, was[b.name].ratio - 1.0) for b in suspects)
+        after = sum(max(0.0, now[b.name].ratio - 1.0) for b in suspects)
+        if before > TELLING or after > max(before, TELLING):
+            shares.append(after / before if before > 0.0 else math.inf)
+    return max(shares, default=1.0)
+
+
+def explains(candidate: Candidate, suspects: list[Block]) -> bool:
+    """Whether only noise is left, fitted and held out."""
+    return all(e[b.name].ratio < DETECTION_RATIO for b in suspects for e in (candidate.fitted, candidate.held_out))
+
+
+def weigh(candidates: list[Candidate], suspects: list[Block], most: float, seconds: float) -> dict[str, float]:
+    """Probabilities over sets of effects and ``unlisted``.
+
+    Between sets: the logarithm of what each leaves of the mismatch, fitted and held out, on a nominal number of independent looks;
+    what the form of an equation may leave (``FORM``) is granted to all of them, so that no second effect is asked for to mend the
+    form of the first. Each parameter and each further effect has its price, and a clock that does not drift. Against ``unlisted``:
+    the share of the mismatch that the set explains where it explains least, and whether its size is the same in all recordings; sets
+    that are not believed themselves say nothing against one that is. The constants are those under which the stated probabilities
+    came true in a trial with other seeds than the published one (docs/decisions/0014).
+
+    ``seconds`` is the length of the longest recording.
+    """
+    named = [c for c in candidates if c.effects]
+    if not named:
+        return {"unlisted": 1.0}
+    start = candidates[0]
+    scores = {c: _score(c, start, suspects) - STANDING * _stands(c, seconds) for c in named}
+    believed = {c: _believed(c, start, suspects, most, seconds) for c in named}
+    top = max(scores.values())
+    weights = {c: believed[c] * math.exp(max(-60.0, s - top)) for c, s in scores.items()}
+    total = sum(weights.values())
+    out: dict[str, float] = {}
+    for c, weight in weights.items():
+        key = "+".join(c.effects)
+        out[key] = out.get(key, 0.0) + weight / total * believed[c]
+    out["unlisted"] = max(0.0, 1.0 - sum(out.values()))
+    return out
+
+
+def _believed(candidate: Candidate, baseline: Candidate, suspects: list[Block], most: float, seconds: float) -> float:
+    """Probability of a set against ``unlisted``."""
+    left = min(max(share_left(candidate, baseline, suspects), 1e-6), 1.0 - 1e-6)
+    odds = (math.log((1.0 - left) / left) - (EVEN_PUSH if "external_torque" in candidate.effects else EVEN)) / SOFTNESS
+    if explains(candidate, suspects):
+        odds = max(odds, 3.0)
+    odds -= max(0.0, candidate.scatter - CONSTANCY) / 0.1
+    if candidate.fit.values.get("muscle_creep.time_constant", 0.0) > UNSEEN * seconds:
+        odds -= 5.0  # what takes that long was not seen to creep
+    return most / (1.0 + math.exp(-min(60.0, max(-60.0, odds))))
+
+
+def _stands(candidate: Candidate, seconds: float) -> bool:
+    """Whether a clock of a set does not drift: two free clocks do, and what is late by the same time always is a lag or a delay."""
+    offset, rate = (candidate.fit.values.get(f"clock_skew.{name}", 0.0) for name in ("offset", "rate"))
+    return abs(rate) * seconds < abs(offset)
+
+
+def _score(candidate: Candidate, baseline: Candidate, suspects: list[Block]) -> float:
+    """Logarithm of the weight of a set of effects, up to a constant."""
+    total = 0.0
+    for was, now in ((baseline.fitted, candidate.fitted), (baseline.held_out, candidate.held_out)):
+        for block in suspects:
+            granted = FORM * max(0.0, was[block.name].ratio - 1.0)
+            total -= 0.25 * LOOKS * math.log(max(1.0, now[block.name].ratio) + granted)
+    size = sum(1 for n in candidate.fit.values if n.partition(".")[0] in EFFECTS and not n.endswith(("_2", "_3")))
+    return total - PRICE * size - SECOND * (len(candidate.effects) - 1)
