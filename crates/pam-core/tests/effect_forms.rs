@@ -157,7 +157,7 @@ fn centre_leakage_settles_where_both_flows_are_equal() {
 
 #[test]
 fn a_narrow_tube_decides_how_fast_a_chamber_fills() {
-    let tube = vec![effect("tube_flow_restriction", &[("conductance", 1e-9)])];
+    let tube = vec![effect("tube_flow_restriction", &[("conductance", 1e-9), ("tap", 0.0)])];
     let run = Run::new(with(rigid_chamber(0.01), tube), 101, 0.01, 10, |_| 10.0, &[]);
     let rate = 1e-9 * 1.185 * (1.38e6 + AMBIENT) * RT / 0.01 * 1.4;
     let ratio = run.last("muscle_pressure") / (rate * 1.0);

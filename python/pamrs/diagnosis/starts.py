@@ -89,7 +89,7 @@ def starts_of(effect: str, *, sealed: bool) -> list[Start]:
     ]
 
 
-_CHOICES = frozenset({"laminar_share", "angle_share", "side"})
+_CHOICES = frozenset({"laminar_share", "angle_share", "side", "tap"})
 _SHARES = frozenset({"share"})
 _STARTS = frozenset({"initial_temperature_rise"})
 
