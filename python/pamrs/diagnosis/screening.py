@@ -15,9 +15,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs import _core
 from pamrs.diagnosis.fitting import WIDEST, Fit, Problem, changes, stacked
 from pamrs.diagnosis.starts import Start, starts_of
 from pamrs.errors import SimulationError
+from pamrs.rig import Rig
+from pamrs.rig_schema import BLOCKS, qualified
 
 __all__ = ["Score", "Screen", "basis_of", "by_effect", "screen"]
 
@@ -28,6 +31,8 @@ LEVELS = 6
 """Levels of the tank's pressure that are tried for the thresholds of a compressor."""
 REACHED = (0.5, 0.75, 0.93)
 """Quantiles of the angles that were seen at which an upper stop is tried; a lower one at the others."""
+TUBES = (0.6, 3.0)
+"""Parts of the valve's conductance at which a tube is tried."""
 LEAST = 0.02
 """Smallest multiple that a fit starts from."""
 FAR, REFINED = 0.3, 3
@@ -175,7 +180,7 @@ def screen(problem: Problem, fitted: Fit, effects: list[str], inflation: dict[st
         return -math.inf if score is None else score.gain
 
     for effect in effects:
-        starts = _placed(starts_of(effect, sealed=sealed), problem)
+        starts = _placed(starts_of(effect, sealed=sealed), problem, fitted.rig)
         if effect == "compressor_cut_in":
             before = len(signatures)
             best = _switched(starts[0], problem, lambda start: try_(start, 1))
@@ -186,8 +191,10 @@ def screen(problem: Problem, fitted: Fit, effects: list[str], inflation: dict[st
     return Screen(rows, basis, signatures)
 
 
-def _placed(starts: list[Start], problem: Problem) -> list[Start]:
-    """Starts whose place is an angle, moved into the range that was seen: a stop nobody came to changes nothing."""
+def _placed(starts: list[Start], problem: Problem, rig: Rig) -> list[Start]:
+    """Starts moved to where they act: a stop to angles that were seen, a tube to the valve's own conductance."""
+    if starts and starts[0].effect == "tube_flow_restriction":
+        return _behind_valve(starts, problem, rig)
     place = "joint_end_stop.angle"
     seen = [p.signals[name][0] for p in problem.recordings for name in p.signals if name.startswith("joint_angle")]
     if not seen or not starts or place not in starts[0].free:
@@ -199,6 +206,19 @@ def _placed(starts: list[Start], problem: Problem) -> list[Start]:
         return replace(start, free=start.free | {place: float(np.quantile(angles, 1.0 - share if lower else share))})
 
     return [at(start, share) for start in starts for share in REACHED]
+
+
+def _behind_valve(starts: list[Start], problem: Problem, rig: Rig) -> list[Start]:
+    """Tubes in parts of the largest valve's conductance; an arm, driven by what is read, sees no other than one behind the transducer."""
+    areas = [rig.parameter(f"{qualified('valve', name)}.discharge_area_max").value for name in rig.tables("valve")]
+    unit = _core.Gas(*(rig.model["gas"][key.name] for key in BLOCKS["gas"])).area_of_conductance(1.0)
+    arm = all(block.kind == "arm" for block in problem.blocks)
+    return [
+        replace(start, free=start.free | {"tube_flow_restriction.conductance": part * max(areas) / unit})
+        for start in starts
+        for part in TUBES
+        if start.held["tube_flow_restriction.tap"] or not arm
+    ]
 
 
 def _switched(start: Start, problem: Problem, try_: Callable[[Start], float]) -> Start | None:

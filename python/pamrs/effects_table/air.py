@@ -124,7 +124,7 @@ AIR: Final[tuple[EffectInfo, ...]] = (
         separates="a smaller valve gives less at every opening, a larger volume slows every opening alike; "
         "a restricted supply line slows the filling only",
         parameters=(
-            Parameter("conductance", _CONDUCTANCE, 1.2e-8, 1e-15, 1.0, (5e-9, 1.5e-8, 5e-8), "sonic conductance; at 1 no restriction", 1.0),
+            Parameter("conductance", _CONDUCTANCE, 1.2e-8, 1e-15, 1.0, (1.2e-8,), "sonic conductance; at 1 no restriction", 1.0),
             Parameter("tap", "1", 0.0, 0.0, 1.0, (0.0, 1.0), "0: the pressure is read at the muscle, 1 (from 0.5): at the valve"),
         ),
         reference="ISO 6358-3; Eckersten (1975)",
