@@ -168,7 +168,7 @@ def test_a_lagging_sensor_is_inverted_where_it_drives() -> None:
 
 
 def test_a_transducer_at_the_valve_reads_what_the_air_leaves_in_the_tube() -> None:
-    tube = {"conductance": 2e-8}
+    tube = {"conductance": 2e-9}
     bare, muscle, valve = (
         run(rig)
         for rig in (

@@ -209,7 +209,7 @@ def _placed(starts: list[Start], problem: Problem, rig: Rig) -> list[Start]:
 
 
 def _behind_valve(starts: list[Start], problem: Problem, rig: Rig) -> list[Start]:
-    """Tubes in parts of the largest valve's conductance; an arm, driven by what is read, sees no other than one behind the transducer."""
+    """Tubes in parts of the largest valve's conductance; an arm, driven by what is read, sees only one behind the transducer."""
     areas = [rig.parameter(f"{qualified('valve', name)}.discharge_area_max").value for name in rig.tables("valve")]
     unit = _core.Gas(*(rig.model["gas"][key.name] for key in BLOCKS["gas"])).area_of_conductance(1.0)
     arm = all(block.kind == "arm" for block in problem.blocks)

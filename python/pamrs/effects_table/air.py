@@ -119,7 +119,7 @@ AIR: Final[tuple[EffectInfo, ...]] = (
         name="hose that restricts the flow between valve and muscle",
         block="line",
         at="valve",
-        equation="m_v(p1, pn) = m_t(pn, p2), tube by ISO 6358 with C and b = 0.3; no volume at the node; read is p2, or pn with a tap of 1",
+        equation="m_v(p1, pn) = m_t(pn, p2), tube by ISO 6358 with C and b = 0.3; no volume at the node; read is p2, at tap 1 pn",
         fingerprint="large openings give less flow than they should, filling and venting alike; small ones are as modelled; "
         "read at the valve, the pressure jumps with the opening and leads the joint",
         separates="a smaller valve gives less at every opening, a larger volume slows every opening alike; "
