@@ -402,21 +402,16 @@ impl<S: Scalar> Driven<'_, S> {
     }
 }
 
-/// Gases whose measured pressure is that in front of a tube, of which the pressure behind can be told: what feeds their valve is
-/// measured, constant or the block's own.
+/// Gases (and their valves) whose measured pressure is that in front of a tube, where what feeds the valve is measured, constant or
+/// the block's own: the pressure behind can then be told.
 fn taps<S: Scalar>(plant: &Plant<'_, S>, block: Block, measured: &Measured<'_>) -> Vec<(usize, usize)> {
     let (rig, layout) = (plant.rig(), plant.rig().layout());
     let known = |place: usize| {
         let constant = rig.spec().supplies.get(place).is_some_and(|s| s.kind == "constant");
         constant || place == block.output(layout) || measured.signal(place).is_some()
     };
-    let all = rig.wiring.gases.iter().enumerate();
-    let fed = all.filter_map(|(gas, unit)| unit.tap.filter(|_| plant.taps()).map(|(valve, _)| (gas, valve)));
-    fed.filter(|(gas, valve)| {
-        measured.signal(layout.pressure(*gas)).is_some()
-            && rig.wiring.valves[*valve].from.place(layout).is_none_or(known)
-    })
-    .collect()
+    let fed = plant.taps().filter(|(gas, _)| measured.signal(layout.pressure(*gas)).is_some());
+    fed.filter(|(_, valve)| rig.wiring.valves[*valve].from.place(layout).is_none_or(known)).collect()
 }
 
 /// Zero of the sensor of a state.

@@ -187,9 +187,10 @@ impl<'a, S: Scalar> Plant<'a, S> {
         &self.values
     }
 
-    /// Whether transducers sit in front of tubes.
-    pub fn taps(&self) -> bool {
-        self.tapped().is_some()
+    /// Gases whose transducers sit in front of tubes, with the valves there.
+    pub fn taps(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        let gases = self.rig.wiring.gases.iter().enumerate().filter(|_| self.tapped().is_some());
+        gases.filter_map(|(gas, unit)| unit.tap.map(|(valve, _)| (gas, valve)))
     }
 
     /// The tube in front of which transducers sit.
