@@ -8,7 +8,7 @@ import pytest
 import pamrs
 from pamrs import _core
 from pamrs.diagnosis.fitting import ACTS
-from pamrs.diagnosis.starts import starts_of
+from pamrs.diagnosis.starts import RESTRICTIONS, starts_of
 from pamrs.effects_table import EFFECTS
 from pamrs.errors import ParameterError, RigError
 from pamrs.rig import parse_rig
@@ -126,7 +126,9 @@ def test_the_diagnosis_knows_where_an_effect_acts_and_where_to_begin(effect: str
             assert {*start.free, *start.held} == set(EFFECTS[effect].dotted())
             assert all(value != 0.0 for name, value in start.free.items() if name in start.sizes)
             half = start.scaled(0.5)
-            assert all(half.free[name] == pytest.approx(0.5 * start.free[name]) for name in start.sizes)
+            assert all(
+                half.free[name] == pytest.approx(start.free[name] * (2.0**0.5 if name in RESTRICTIONS else 0.5)) for name in start.sizes
+            )
 
 
 def test_unknown_places_and_parameters_are_named() -> None:
@@ -163,3 +165,25 @@ def test_a_lagging_sensor_is_inverted_where_it_drives() -> None:
     inner = slice(3, -3)
     assert np.abs(behind - truth["muscle_pressure"])[inner].max() < 0.2 * np.ptp(truth["muscle_pressure"])
     assert np.abs(lagging["muscle_pressure"] - truth["muscle_pressure"]).max() > 1e3
+
+
+def test_a_transducer_at_the_valve_reads_what_the_air_leaves_in_the_tube() -> None:
+    tube = {"conductance": 2e-9}
+    bare, muscle, valve = (
+        run(rig)
+        for rig in (
+            pamrs.rigs.shoulder(),
+            pamrs.rigs.shoulder().with_effect("tube_flow_restriction", tube),
+            pamrs.rigs.shoulder().with_effect("tube_flow_restriction", tube | {"tap": 1.0}),
+        )
+    )
+    assert not np.allclose(bare["joint_angle"], muscle["joint_angle"], rtol=1e-6)
+    assert np.array_equal(muscle["joint_angle"], valve["joint_angle"]), "the transducer moves nothing"
+    lead = valve["muscle_pressure"] - muscle["muscle_pressure"]
+    before = np.concatenate([[5.0], COMMAND[:-1]])[: lead.size]  # a sample is read under the command before it
+    assert np.all(lead[before > 5.0] >= 0.0)
+    assert np.all(lead[before < 5.0] <= 0.0)
+    assert np.all(lead[before == 5.0] == 0.0), "shut: the muscle's own"
+    assert np.abs(lead).max() > 1e3
+    with pytest.raises(ParameterError, match=r"tap = 2"):
+        pamrs.rigs.shoulder().with_effect("tube_flow_restriction", {"tap": 2.0})

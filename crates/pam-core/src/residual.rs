@@ -402,6 +402,18 @@ impl<S: Scalar> Driven<'_, S> {
     }
 }
 
+/// Gases (and their valves) whose measured pressure is that in front of a tube, where what feeds the valve is measured, constant or
+/// the block's own: the pressure behind can then be told.
+fn taps<S: Scalar>(plant: &Plant<'_, S>, block: Block, measured: &Measured<'_>) -> Vec<(usize, usize)> {
+    let (rig, layout) = (plant.rig(), plant.rig().layout());
+    let known = |place: usize| {
+        let constant = rig.spec().supplies.get(place).is_some_and(|s| s.kind == "constant");
+        constant || place == block.output(layout) || measured.signal(place).is_some()
+    };
+    let fed = plant.taps().filter(|(gas, _)| measured.signal(layout.pressure(*gas)).is_some());
+    fed.filter(|(_, valve)| rig.wiring.valves[*valve].from.place(layout).is_none_or(known)).collect()
+}
+
 /// Zero of the sensor of a state.
 #[inline]
 fn zero<S: Scalar>(plant: &Plant<'_, S>, place: usize) -> S {
@@ -445,10 +457,10 @@ fn run<S: Scalar>(
         Block::Arm(_) => zero(&plant, output),
         Block::Supply(_) | Block::Chamber(_) => zero(&plant, output) - ambient,
     };
-    // What a lagging sensor reads, in the place of the pressure.
-    let reading = match block {
-        Block::Chamber(k) => rig.wiring.gases[k].lag.map(|lag| layout.extra(lag)),
-        _ => None,
+    // What is read in the place of the pressure, and by a lagging sensor.
+    let (reading, lagging) = match block {
+        Block::Chamber(k) => (plant.reading(k), rig.wiring.gases[k].lag.map(|lag| layout.extra(lag))),
+        _ => (output, None),
     };
     let n = measured.samples;
     let drivers: Vec<Driven<'_, S>> = (measured.signals.iter())
@@ -471,7 +483,14 @@ fn run<S: Scalar>(
         }
     };
     let driving: Vec<_> = drivers.iter().filter(|driver| !own.contains(&driver.place)).collect();
+    let taps = taps(&plant, block, measured);
+    let driving_taps: Vec<_> =
+        taps.iter().copied().filter(|(gas, _)| !own.contains(&layout.pressure(*gas))).collect();
     let mut stepper = Stepper::new(plant);
+    stepper.reads = matches!(block, Block::Chamber(_));
+    // The controls under which a sample was read: those before it.
+    let mut last = stepper.plant.controls(|_| 0.0);
+    last.spool.fill(constant(0.0));
     let mut memory = vec![Memory::default(); rig.wiring.groups.len()];
     let mut state = vec![constant::<S>(0.0); stepper.plant.states()];
     // What nobody measures begins at rest, and stays there unless it is a line's inlet.
@@ -492,6 +511,10 @@ fn run<S: Scalar>(
             let plant = &stepper.plant;
             let (shift, _) = clocks(plant, k as f64 * dt);
             drivers.iter().for_each(|driver| driver.write(rig, k, 0.0, dt, shift, &mut state));
+            for (gas, valve) in &taps {
+                let place = layout.pressure(*gas);
+                state[place] = plant.behind_tube(*gas, state[place], &state, last.spool[*valve]);
+            }
             for (place, bump) in own.iter().zip(bumps) {
                 state[*place] += *bump;
             }
@@ -518,7 +541,8 @@ fn run<S: Scalar>(
                 plant.contractions(&state, to);
                 plant.advance_memory(&mut memory, from, to);
             }
-            if let (Some(reading), Some(signal)) = (reading, measured.signal(output)) {
+            plant.read_taps(&mut state, &last);
+            if let (Some(reading), Some(signal)) = (lagging, measured.signal(output)) {
                 state[reading] = bumps[0] - offset + signal.value[k];
             }
         }
@@ -533,7 +557,7 @@ fn run<S: Scalar>(
             let (_, late) = clocks(&stepper.plant, began);
             controls = stepper.plant.skewed_controls(late, began, timing.step(), dt, command);
         }
-        sink(k, state[reading.unwrap_or(output)] + offset, &stepper, &state, &controls);
+        sink(k, state[reading] + offset, &stepper, &state, &controls);
         if k + 1 == n {
             break;
         }
@@ -551,12 +575,22 @@ fn run<S: Scalar>(
                 time,
                 timing.step(),
                 &simulated,
-                |fraction, y| {
+                |plant, controls, fraction, y| {
+                    let share = (i as f64 + fraction) * h;
                     for driver in &driving {
-                        driver.write(rig, k, (i as f64 + fraction) * h, dt, shift, y);
+                        driver.write(rig, k, share, dt, shift, y);
+                    }
+                    for (gas, valve) in &driving_taps {
+                        // a smooth signal goes from one reading to the next, and so do the commands that they were read under
+                        let (place, was) = (layout.pressure(*gas), last.spool[*valve]);
+                        let spool = was + (controls.spool[*valve] - was) * share;
+                        y[place] = plant.behind_tube(*gas, y[place], y, spool);
                     }
                 },
             );
+        }
+        if !taps.is_empty() {
+            last.spool.clone_from(&stepper.controls(&controls, 2).spool);
         }
     }
     Ok(())

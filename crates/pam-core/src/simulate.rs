@@ -79,6 +79,8 @@ pub(crate) struct Stepper<'a, S> {
     stages: Option<[Controls<S>; 3]>,
     /// State before a step, where something happens between steps.
     before: Option<Vec<S>>,
+    /// Whether anybody asks what the sensors read.
+    pub reads: bool,
 }
 
 impl<'a, S: Scalar> Stepper<'a, S> {
@@ -91,6 +93,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         Self {
             stages,
             before,
+            reads: true,
             scratch: plant.scratch(),
             method: Rk4::new(plant.states()),
             start: zeros(),
@@ -112,7 +115,8 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         }
     }
 
-    /// One RK4 step from a time [s] on; driven states are written by `drive(fraction, state)`.
+    /// One RK4 step from a time [s] on; driven states are written by `drive(plant, controls, fraction, state)`, the controls being
+    /// those of that instant.
     #[inline]
     #[allow(clippy::too_many_arguments)]
     pub fn step(
@@ -123,30 +127,35 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         time: f64,
         dt: f64,
         simulated: &Simulated,
-        mut drive: impl FnMut(f64, &mut [S]),
+        mut drive: impl FnMut(&Plant<'a, S>, &Controls<S>, f64, &mut [S]),
     ) {
-        let Self { plant, scratch, method, start, end, remembers, stages, before } = self;
-        if *remembers {
-            drive(0.0, state);
-            plant.contractions(state, start);
-        }
+        let Self { plant, scratch, method, start, end, remembers, stages, before, reads } = self;
         if let Some(stages) = stages {
             for (k, stage) in stages.iter_mut().enumerate() {
                 plant.stage(state, controls, time, 0.5 * k as f64 * dt, stage);
             }
         }
+        let held = controls;
+        let at = |stage: usize| stages.as_ref().map_or(held, |stages| &stages[stage]);
+        if *remembers {
+            drive(plant, at(0), 0.0, state);
+            plant.contractions(state, start);
+        }
         if let Some(before) = before {
-            drive(0.0, state);
+            drive(plant, at(0), 0.0, state);
             before.copy_from_slice(state);
         }
         method.step(state, dt, |fraction, y, out| {
-            drive(fraction, y);
-            let controls = stages.as_ref().map_or(controls, |stages| &stages[(2.0 * fraction) as usize]);
+            let controls = at((2.0 * fraction) as usize);
+            drive(plant, controls, fraction, y);
             plant.rates(y, controls, memory, start, simulated, scratch, out);
         });
-        drive(1.0, state);
+        drive(plant, at(2), 1.0, state);
         if let Some(before) = before {
-            plant.between_steps(before, state, controls, dt);
+            plant.between_steps(before, state, held, dt);
+            if *reads {
+                plant.read(before, state, [at(0), at(2)], dt);
+            }
         }
         if *remembers {
             plant.contractions(state, end);
@@ -461,7 +470,7 @@ impl Progress {
                     controls = next.skewed(&stepper.plant, from, timing);
                 }
                 let (state, memory) = (&mut next.state, &mut next.memory);
-                stepper.step(state, memory, &controls, from, dt, simulated, |fraction, y| {
+                stepper.step(state, memory, &controls, from, dt, simulated, |_, _, fraction, y| {
                     let share = (sub as f64 + fraction) / timing.substeps as f64;
                     for (place, from, to) in &ends {
                         y[*place] = from + (to - from) * share;

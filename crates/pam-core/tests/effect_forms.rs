@@ -157,11 +157,55 @@ fn centre_leakage_settles_where_both_flows_are_equal() {
 
 #[test]
 fn a_narrow_tube_decides_how_fast_a_chamber_fills() {
-    let tube = vec![effect("tube_flow_restriction", &[("conductance", 1e-9)])];
+    let tube = vec![effect("tube_flow_restriction", &[("conductance", 1e-9), ("tap", 0.0)])];
     let run = Run::new(with(rigid_chamber(0.01), tube), 101, 0.01, 10, |_| 10.0, &[]);
     let rate = 1e-9 * 1.185 * (1.38e6 + AMBIENT) * RT / 0.01 * 1.4;
     let ratio = run.last("muscle_pressure") / (rate * 1.0);
     assert!((ratio - 1.0).abs() < 0.01, "{ratio}");
+}
+
+#[test]
+fn a_transducer_at_the_valve_reads_the_node_of_the_tube() {
+    let tube = |tap: f64| vec![effect("tube_flow_restriction", &[("conductance", 2e-8), ("tap", tap)])];
+    let command = |k: usize| [5.0, 8.0, 5.0, 2.0, 5.0][k / 10];
+    let start = [("muscle_pressure", 2e5)];
+    let at = |tap: f64| Run::new(with(rigid_chamber(2e-3), tube(tap)), 50, 0.01, 10, command, &start);
+    let (valve, muscle) = (at(1.0), at(0.0));
+    for name in ["air_mass", "supply_pressure"] {
+        assert_eq!(valve.get(name), muscle.get(name));
+    }
+    let gas = pam_core::gas::orifice::Gas::new(AMBIENT, 293.15, 287.05, 1.4);
+    let hose = pam_core::gas::tube::Tube::<f64>::of_conductance(2e-8, 0.3, 293.15);
+    let area = |k: usize| {
+        let free = Run::new(with(rigid_chamber(1.0), vec![]), 2, 0.001, 1, |_| command(k), &[]);
+        let flow = (free.last("air_mass") - free.get("air_mass")[0]) / 0.001;
+        flow / gas.mass_flow(1.0, 1.38e6 + AMBIENT, AMBIENT)
+    };
+    let (p, node) = (muscle.get("muscle_pressure"), valve.get("muscle_pressure"));
+    assert_eq!(p[0], node[0]);
+    for k in 1..50 {
+        // a sample is read under the command before it
+        let (inside, there) = (p[k] + AMBIENT, node[k] + AMBIENT);
+        match command(k - 1) {
+            8.0 => {
+                assert!(there > 1.005 * inside, "{k}: {there} {inside}");
+                let supply = muscle.get("supply_pressure")[k] + AMBIENT;
+                let through = gas.mass_flow(area(k - 1), supply, there);
+                assert!((through / hose.mass_flow(there, inside) - 1.0).abs() < 1e-3, "{k}");
+            }
+            2.0 => {
+                assert!(there < 0.995 * inside, "{k}: {there} {inside}");
+                let (out, from) = (hose.mass_flow(inside, there), gas.mass_flow(1.0, there, AMBIENT));
+                assert!(out > 0.0 && from > 0.0);
+            }
+            _ => assert_eq!(there, inside, "shut, the muscle's own"),
+        }
+    }
+    // a lagging transducer lags the node
+    let mut both = tube(1.0);
+    both.push(effect("pressure_lag", &[("time_constant", 0.0)]));
+    let same = Run::new(with(rigid_chamber(2e-3), both), 50, 0.01, 10, command, &start);
+    assert_eq!(same.get("muscle_pressure"), node);
 }
 
 #[test]

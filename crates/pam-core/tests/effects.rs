@@ -8,7 +8,7 @@ use pam_core::effects::EFFECTS;
 use pam_core::residual::{predict, Block, Measured, Signal};
 use pam_core::simulate::{Initial, Progress, Timing, Trajectory};
 use pam_core::{Rig, RigSpec};
-use rigs::{antagonists, effect_at, lone_tank, regulated, shoulder, two_joints, Typical, TYPICAL};
+use rigs::{antagonists, effect, effect_at, lone_tank, regulated, shoulder, two_joints, Typical, TYPICAL};
 
 const DT: f64 = 0.01;
 const TIMING: Timing = Timing { sample_time: DT, substeps: 10 };
@@ -224,11 +224,12 @@ fn sensitivities(typical: &Typical, spec: &RigSpec, truth: &Trajectory, block: &
     }
 }
 
-/// Parameters without an influence: the compressor's cut-out is not reached, a stop's side is one or the other.
+/// Parameters without an influence: the compressor's cut-out is not reached, a stop's side and a tap are one or the other.
 fn blind(id: &str) -> &'static [&'static str] {
     match id {
         "compressor_cut_in" => &["cut_out_pressure"],
         "joint_end_stop" => &["side"],
+        "tube_flow_restriction" => &["tap"],
         _ => &[],
     }
 }
@@ -253,6 +254,54 @@ fn sensitivities_are_those_of_differences() {
             sensitivities(typical, &spec, &truth, "supply", &[]);
         }
     }
+}
+
+/// A tube behind the transducer, close to the valve's own conductance.
+const TAPPED: Typical = Typical {
+    id: "tube_flow_restriction",
+    parameters: &[("conductance", 1.5e-9), ("tap", 0.75)],
+    neutral: &[("conductance", 1.0)],
+};
+
+#[test]
+fn sensitivities_to_a_tube_behind_the_transducer() {
+    // Of the supply, the flow is told by the valve alone: no tube changes what it predicts.
+    for (spec, blocks) in [(shoulder(), ["chamber", "arm"]), (two_joints(), ["chamber.elbow", "arm.wrist"])] {
+        let truth = run(&with(spec.clone(), vec![TAPPED.on()]), ROWS);
+        for block in blocks {
+            sensitivities(&TAPPED, &spec, &truth, block, &["tap"]);
+        }
+    }
+}
+
+#[test]
+fn predictions_repeat_what_a_transducer_at_the_valve_reads() {
+    // wide enough for no flow to be choked in it: such a flow tells nothing of the muscle
+    let wide = effect("tube_flow_restriction", &[("conductance", 6e-9), ("tap", 1.0)]);
+    let rig = with(shoulder(), vec![wide]);
+    let wrong = with(shoulder(), vec![]);
+    let truth = run(&rig, ROWS);
+    let inputs = signals(&rig, ROWS);
+    let names = ["supply_pressure", "muscle_pressure", "joint_angle"];
+    let rates = names.map(|n| slopes(truth.get(&rig, n).unwrap()));
+    let gap = |rig: &Rig, block: &str, name: &str, known: &[usize]| {
+        let signal =
+            |k: &usize| (names[*k], Signal { value: truth.get(rig, names[*k]).unwrap(), slope: &rates[*k] });
+        let signals: Vec<_> = known.iter().map(signal).collect();
+        let measured = Measured::new(rig, ROWS, &borrowed(&inputs), &signals).unwrap();
+        let block = Block::from_name(rig, block).unwrap();
+        let found = predict(rig, block, &measured, TIMING.stable(rig), &[0], &[]).unwrap().value;
+        let was = truth.get(rig, name).unwrap();
+        let span =
+            was.iter().copied().fold(f64::MIN, f64::max) - was.iter().copied().fold(f64::MAX, f64::min);
+        found.iter().zip(was).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / span
+    };
+    for (block, name) in [("supply", names[0]), ("chamber", names[1]), ("arm", names[2])] {
+        let (with, without) = (gap(&rig, block, name, &[0, 1, 2]), gap(&wrong, block, name, &[0, 1, 2]));
+        assert!(with < 0.05 && (with < 0.02 * without || block != "arm"), "{block}: {with} {without}");
+    }
+    // what is not known of the valve's other side, is not told of the muscle's
+    assert_eq!(gap(&rig, "arm", names[2], &[1, 2]), gap(&wrong, "arm", names[2], &[1, 2]));
 }
 
 #[test]

@@ -159,6 +159,9 @@ class RigState:
             for block in blocks(self._chambers if lag else list(rig.tables("muscle"))):
                 yield placed(0, "", block, _WIDTHS["muscle_pressure"] if lag else _WIDTHS["length"])
                 self._next += 1
+        elif name == "tube_flow_restriction":  # a reading for each gas behind its valves, which moves nothing
+            ports = rig.ports("valve")
+            self._next += len({ports[block]["to"] for block in blocks(list(ports))})
         elif name in ("payload_swing", "base_flexibility"):
             yield placed(0, "angle", "", 1e-5)
             yield placed(1, "rate", "", 1e-5)
@@ -208,7 +211,8 @@ def check_smooth(rig: Rig, *, supplies: bool) -> None:
 
 
 def resting(rig: Rig) -> Rig:
-    """The rig with its air as warm as the wall, and without a sensor's lag that is shorter than any sample.
+    """The rig with its air as warm as the wall, without a sensor's lag that is shorter than any sample, and with the transducers of
+    its tubes at the muscles: at either end they read the same while a valve is shut.
 
     Parameters
     ----------
@@ -225,6 +229,8 @@ def resting(rig: Rig) -> Rig:
             rig = rig.with_effect("heat_transfer", values, at=effect.get("at", ""))
         elif effect["id"] == "pressure_lag" and effect["parameters"]["time_constant"] < _SHORTEST:
             rig = rig.without_effect("pressure_lag")
+        elif effect["id"] == "tube_flow_restriction":
+            rig = rig.with_effect("tube_flow_restriction", {**effect["parameters"], "tap": 0.0}, at=effect.get("at", ""))
     return rig
 
 

@@ -41,6 +41,7 @@ ACTS: dict[str, tuple[str, ...]] = {
     "muscle": ("arm",),
     "joint": ("arm",),
     "arm": ("arm",),
+    "tube_flow_restriction": ("supply", "chamber", "arm"),
     "pressure_lag": ("chamber", "arm"),
     "clock_skew": ("supply", "chamber", "arm"),
 }

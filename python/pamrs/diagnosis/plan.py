@@ -566,7 +566,7 @@ def _sight(start: Start, left: float, key: Key) -> Sight:
     if not start.scalable:
         return Sight(start.effect, left, *key)
     typical = abs(start.free[start.sizes[0]])
-    smallest = typical * SEEN / left if SEEN / left < LARGEST else math.nan
+    smallest = abs(start.scaled(SEEN / left).free[start.sizes[0]]) if SEEN / left < LARGEST else math.nan
     return Sight(start.effect, left, *key, start.sizes[0], typical, smallest)
 
 

@@ -15,9 +15,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs import _core
 from pamrs.diagnosis.fitting import WIDEST, Fit, Problem, changes, stacked
 from pamrs.diagnosis.starts import Start, starts_of
 from pamrs.errors import SimulationError
+from pamrs.rig import Rig
+from pamrs.rig_schema import BLOCKS, qualified
 
 __all__ = ["Score", "Screen", "basis_of", "by_effect", "screen"]
 
@@ -30,6 +33,8 @@ REACHED = (0.5, 0.75, 0.93)
 """Quantiles of the angles that were seen at which an upper stop is tried; a lower one at the others."""
 CORDS, BROAD = (0.06, 1.5, 14), 0.08
 """Shortest and longest cord [m] of a swinging payload that are tried, how many, and the damping ratio that they are tried with."""
+TUBES = (0.6, 3.0)
+"""Parts of the valve's conductance at which a tube is tried."""
 LEAST = 0.002
 """Smallest multiple that a fit starts from."""
 FAR, REFINED = 0.3, 3
@@ -177,7 +182,7 @@ def screen(problem: Problem, fitted: Fit, effects: list[str], inflation: dict[st
         return -math.inf if score is None else score.gain
 
     for effect in effects:
-        starts = _placed(starts_of(effect, sealed=sealed), problem)
+        starts = _placed(starts_of(effect, sealed=sealed), problem, fitted.rig)
         if effect == "payload_swing":
             for start in _nearest(starts, lambda start: try_(start, 1), signatures):
                 try_(start)
@@ -191,8 +196,10 @@ def screen(problem: Problem, fitted: Fit, effects: list[str], inflation: dict[st
     return Screen(rows, basis, signatures)
 
 
-def _placed(starts: list[Start], problem: Problem) -> list[Start]:
-    """Starts whose place is an angle, moved into the range that was seen: a stop nobody came to changes nothing."""
+def _placed(starts: list[Start], problem: Problem, rig: Rig) -> list[Start]:
+    """Starts moved to where they act: a stop to angles that were seen, a tube to the valve's own conductance."""
+    if starts and starts[0].effect == "tube_flow_restriction":
+        return _behind_valve(starts, problem, rig)
     place = "joint_end_stop.angle"
     seen = [p.signals[name][0] for p in problem.recordings for name in p.signals if name.startswith("joint_angle")]
     if not seen or not starts or place not in starts[0].free:
@@ -220,6 +227,19 @@ def _nearest(starts: list[Start], try_: Callable[[Start], float], signatures: li
     # the best and the best that is no neighbour of it
     far = [k for k in order[1:] if abs(k - order[0]) > 1]
     return [tried[k] for k in (order[0], *far[:1])]
+
+
+def _behind_valve(starts: list[Start], problem: Problem, rig: Rig) -> list[Start]:
+    """Tubes in parts of the largest valve's conductance; an arm, driven by what is read, sees only one behind the transducer."""
+    areas = [rig.parameter(f"{qualified('valve', name)}.discharge_area_max").value for name in rig.tables("valve")]
+    unit = _core.Gas(*(rig.model["gas"][key.name] for key in BLOCKS["gas"])).area_of_conductance(1.0)
+    arm = all(block.kind == "arm" for block in problem.blocks)
+    return [
+        replace(start, free=start.free | {"tube_flow_restriction.conductance": part * max(areas) / unit})
+        for start in starts
+        for part in TUBES
+        if start.held["tube_flow_restriction.tap"] or not arm
+    ]
 
 
 def _switched(start: Start, problem: Problem, try_: Callable[[Start], float]) -> Start | None:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import itertools
+import math
 from dataclasses import dataclass, replace
 
 from pamrs.effects_table import EFFECTS, EffectParameter
 from pamrs.rig import Rig
 
-__all__ = ["Start", "starts_of"]
+__all__ = ["RESTRICTIONS", "Start", "starts_of"]
 
 
 @dataclass(frozen=True)
@@ -44,12 +45,14 @@ class Start:
         return rig.with_effect(self.effect, values)
 
     def scaled(self, size: float) -> Start:
-        """The same start with its sizes multiplied, inside their bounds."""
+        """The same start with its sizes multiplied (a restriction divided by the root), inside their bounds."""
         bounds = {f"{self.effect}.{p.name}": p for p in EFFECTS[self.effect].parameters}
-        free = {
-            name: min(max(value * size, bounds[name].lower), bounds[name].upper) if name in self.sizes else value
-            for name, value in self.free.items()
-        }
+
+        def sized(name: str, value: float) -> float:
+            moved = value / math.sqrt(size) if name in RESTRICTIONS else value * size
+            return min(max(moved, bounds[name].lower), bounds[name].upper)
+
+        free = {name: sized(name, value) if name in self.sizes else value for name, value in self.free.items()}
         return replace(self, free=free)
 
 
@@ -74,7 +77,7 @@ def starts_of(effect: str, *, sealed: bool) -> list[Start]:
     signed = False
     for parameter in EFFECTS[effect].parameters:
         name = f"{effect}.{parameter.name}"
-        role = _role(parameter, sealed=sealed)
+        role = "size" if name in RESTRICTIONS else _role(parameter, sealed=sealed)
         if role == "size":
             sizes[name] = next((value for value in parameter.starts if value != 0.0), parameter.default)
             signed = signed or parameter.lower < 0.0
@@ -89,7 +92,9 @@ def starts_of(effect: str, *, sealed: bool) -> list[Start]:
     ]
 
 
-_CHOICES = frozenset({"laminar_share", "angle_share", "side"})
+RESTRICTIONS = frozenset({"tube_flow_restriction.conductance"})
+"""Sizes that take the less effect the larger they are: a pressure loss goes with their inverse square."""
+_CHOICES = frozenset({"laminar_share", "angle_share", "side", "tap"})
 _SHARES = frozenset({"share"})
 _STARTS = frozenset({"initial_temperature_rise"})
 
@@ -104,4 +109,4 @@ def _role(parameter: EffectParameter, *, sealed: bool) -> str:
         return "held" if sealed else "size"
     if parameter.name in _STARTS:  # only a sealed hold can tell it
         return "size" if sealed else "held"
-    return "size" if parameter.neutral == 0.0 else "shape"  # a tube of endless conductance is no restriction: no number scales it
+    return "size" if parameter.neutral == 0.0 else "shape"

@@ -119,15 +119,17 @@ AIR: Final[tuple[EffectInfo, ...]] = (
         name="hose that restricts the flow between valve and muscle",
         block="line",
         at="valve",
-        equation="m_v(p1, pn) = m_t(pn, p2), tube by ISO 6358 with C and b = 0.3; no volume at the node",
-        fingerprint="large openings give less flow than they should, filling and venting alike; small ones are as modelled",
+        equation="m_v(p1, pn) = m_t(pn, p2), tube by ISO 6358 with C and b = 0.3; no volume at the node; read is p2, at tap 1 pn",
+        fingerprint="large openings give less flow than they should, filling and venting alike; small ones are as modelled; "
+        "read at the valve, the pressure jumps with the opening and leads the joint",
         separates="a smaller valve gives less at every opening, a larger volume slows every opening alike; "
-        "a restricted supply line slows the filling only",
+        "a restricted supply line slows the filling only; a clock that is ahead does so with the valve shut too",
         parameters=(
-            Parameter("conductance", _CONDUCTANCE, 1.2e-8, 1e-15, 1.0, (5e-9, 3e-8), "sonic conductance; at 1 no restriction", 1.0),
+            Parameter("conductance", _CONDUCTANCE, 1.2e-8, 1e-15, 1.0, (1.2e-8,), "sonic conductance; at 1 no restriction", 1.0),
+            Parameter("tap", "1", 0.0, 0.0, 1.0, (0.0, 1.0), "0: the pressure is read at the muscle, 1 (from 0.5): at the valve"),
         ),
         reference="ISO 6358-3; Eckersten (1975)",
-        rivals=("a smaller valve", "a larger dead volume", "a restricted supply line"),
+        rivals=("a smaller valve", "a larger dead volume", "a restricted supply line", "clock_skew"),
     ),
     EffectInfo(
         id="leak_muscle",

@@ -37,7 +37,7 @@ SENSORS: Final[tuple[EffectInfo, ...]] = (
             Parameter("angle_share", "1", 1.0, 0.0, 1.0, (0.0, 1.0), "1: the angle is on the pressures' clock, 0: on the command's"),
         ),
         reference="Mills (1991), offset and skew of clocks",
-        rivals=("input_path_lag", "pressure_lag"),
+        rivals=("input_path_lag", "pressure_lag", "tube_flow_restriction"),
     ),
 )
 """In the order of the catalogue."""

@@ -5,6 +5,10 @@
 //! Newton steps inside a bracket; one more step in the scalar's own arithmetic gives it its exact derivatives. Not stiff: nothing is
 //! stored at the node (a volume there is a `[line]`'s inlet volume). ISO 6358-3 (2014); W. Eckersten, "Simplified flow calculations for
 //! pneumatic components", 1975. A conductance of [`NONE`] or more restricts nothing.
+//!
+//! With a `tap` of [`AT_VALVE`] or more the transducer of what the valve feeds sits at the valve's end of the tube and reads the node,
+//! which leads the muscle's pressure while air flows. Where such a reading drives a block, it gives the valve's flow, and the muscle's
+//! pressure is that to which the tube passes it ([`Tube::other_end`]); see [`crate::rig`]'s `tap.rs`.
 
 use super::{EffectInfo, EffectParameter};
 use crate::gas::orifice::Gas;
@@ -17,11 +21,16 @@ pub const INFO: EffectInfo = EffectInfo {
     id: "tube_flow_restriction",
     block: "line",
     at: "valve",
-    parameters: &[EffectParameter::new("conductance", "m3/(s Pa)").within(1e-15, NONE)],
+    parameters: &[
+        EffectParameter::new("conductance", "m3/(s Pa)").within(1e-15, NONE),
+        EffectParameter::new("tap", "1").within(0.0, 1.0),
+    ],
 };
 
 /// Conductance that restricts nothing [m3/(s Pa)].
 pub const NONE: f64 = 1.0;
+/// Tap from which on the transducer sits at the valve's end of the tube [1].
+pub const AT_VALVE: f64 = 0.5;
 const CRITICAL_RATIO: f64 = 0.3;
 const MOST_STEPS: usize = 60;
 
@@ -43,13 +52,23 @@ pub fn mass_flow<S: Scalar>(
     if upstream.re() < downstream.re() {
         return -mass_flow(gas, area, tube, downstream, upstream, !tube_first);
     }
-    let start = Series::<f64> { gas, area: area.re(), tube: tube.re(), tube_first };
-    let (node, slope) = start.node(upstream.re(), downstream.re());
-    let all = Series { gas, area, tube: *tube, tube_first };
-    let fixed = constant::<S>(node);
-    let (a, b) = all.flows(upstream, fixed, downstream);
-    let exact = if slope < 0.0 { fixed - (a - b) / slope } else { fixed };
-    all.flows(upstream, exact, downstream).1
+    let series = Series { gas, area, tube: *tube, tube_first };
+    series.flows(upstream, series.exact_node(upstream, downstream), downstream).1
+}
+
+/// Absolute pressure [Pa] between an area and a tube, of the same arguments as [`mass_flow`].
+pub fn node<S: Scalar>(
+    gas: &Gas,
+    area: S,
+    tube: &Tube<S>,
+    upstream: S,
+    downstream: S,
+    tube_first: bool,
+) -> S {
+    if upstream.re() < downstream.re() {
+        return node(gas, area, tube, downstream, upstream, !tube_first);
+    }
+    Series { gas, area, tube: *tube, tube_first }.exact_node(upstream, downstream)
 }
 
 struct Series<'a, S> {
@@ -66,6 +85,20 @@ impl<S: Scalar> Series<'_, S> {
             (self.tube.mass_flow(upstream, node), self.gas.mass_flow(self.area, node, downstream))
         } else {
             (self.gas.mass_flow(self.area, upstream, node), self.tube.mass_flow(node, downstream))
+        }
+    }
+
+    /// Pressure at the node [Pa] with its derivatives.
+    fn exact_node(&self, upstream: S, downstream: S) -> S {
+        let Self { gas, tube_first, .. } = *self;
+        let start = Series::<f64> { gas, area: self.area.re(), tube: self.tube.re(), tube_first };
+        let (node, slope) = start.node(upstream.re(), downstream.re());
+        let fixed = constant::<S>(node);
+        let (a, b) = self.flows(upstream, fixed, downstream);
+        if slope < 0.0 {
+            fixed - (a - b) / slope
+        } else {
+            fixed
         }
     }
 }

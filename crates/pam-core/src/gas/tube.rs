@@ -12,6 +12,8 @@ pub const REFERENCE_DENSITY: f64 = 1.185;
 /// Reference temperature [K].
 pub const REFERENCE_TEMPERATURE: f64 = 293.15;
 const HIGHEST_RATIO: f64 = 0.9;
+/// Share of the choked flow up to which a flow tells the pressure that it goes to [1].
+pub const MOST_TOLD: f64 = 0.99;
 
 /// A tube at one gas temperature.
 #[derive(Debug, Clone, Copy)]
@@ -75,6 +77,32 @@ impl<S: Scalar> Tube<S> {
         }
     }
 
+    /// Absolute pressure [Pa] at the other end, from that at this one and the mass flow from here to there [kg/s]: the inverse of
+    /// [`Self::mass_flow`] in closed form. A flow away from here says less and less of the other end the closer it is to choking:
+    /// from [`MOST_TOLD`] of it on, the other end is held at the pressure that this share belongs to.
+    pub fn other_end(&self, here: S, flow: S) -> S {
+        let share = flow / (self.flow_factor * here);
+        let (b, rest) = (self.critical_ratio, -self.critical_ratio + 1.0);
+        let (edge, span) = (self.psi(constant(LAMINAR_RATIO)), 1.0 - LAMINAR_RATIO);
+        if share.re() >= 0.0 {
+            if share.re() <= edge.re() {
+                return here * (-share * span / edge + 1.0);
+            }
+            let told = if share.re() < MOST_TOLD { share } else { constant(MOST_TOLD) };
+            return here * (b + rest * (-told * told + 1.0).sqrt());
+        }
+        // psi(r)/r = g with the ratio r of the pressure here to the one there
+        let g = -share;
+        if g.re() * LAMINAR_RATIO <= edge.re() {
+            here * (edge + g * span) / edge
+        } else if g.re() * b.re() <= 1.0 {
+            let wide = g * g * rest * rest + 1.0;
+            here * wide / (b + (b * b + wide * (-b * 2.0 + 1.0)).sqrt())
+        } else {
+            here * g
+        }
+    }
+
     /// Largest change of mass flow per pressure [kg/(s Pa)]: next to equal pressures.
     pub fn steepest(&self) -> f64 {
         let psi = self.psi(constant(LAMINAR_RATIO)).re();
@@ -93,6 +121,7 @@ impl Tube<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use num_dual::Dual64;
 
     #[test]
     fn a_metre_of_four_millimetres_has_the_tabulated_conductance() {
@@ -100,6 +129,28 @@ mod tests {
         assert!((tube.flow_factor / REFERENCE_DENSITY - 1.2e-8).abs() < 0.02e-8);
         assert!((tube.critical_ratio() - 0.354).abs() < 0.002);
         assert!((tube.mass_flow(6e5, 1e5) / (1.2e-8 * 1.185 * 6e5) - 1.0).abs() < 0.01, "choked");
+    }
+
+    #[test]
+    fn a_flow_tells_the_other_end() {
+        let tube = Tube::<f64>::of_conductance(1.2e-8, 0.3, 293.15);
+        let here = 4e5;
+        for there in [1e3, 1e5, 1.3e5, 2e5, 3.9e5, 3.9999e5, 4e5, 4.001e5, 5e5, 1.3e6, 1.4e6, 9e6] {
+            let found = tube.other_end(here, tube.mass_flow(here, there));
+            let told = here * (0.3 + 0.7 * (1.0 - MOST_TOLD * MOST_TOLD).sqrt());
+            assert!((found / f64::max(there, told) - 1.0).abs() < 1e-10, "{there}: {found}");
+        }
+        assert_eq!(tube.other_end(here, 0.0), here);
+        for flow in [-1.0, -1e-3, -1e-5, 1e-5, 1e-3, 2e-3, 1.0] {
+            let exact = tube.lift::<Dual64>().other_end(here.into(), Dual64::new(flow, 1.0));
+            let h = 1e-6 * flow;
+            let difference = (tube.other_end(here, flow + h) - tube.other_end(here, flow - h)) / (2.0 * h);
+            assert!(
+                (exact.eps - difference).abs() <= 1e-6 * difference.abs(),
+                "{flow}: {} {difference}",
+                exact.eps
+            );
+        }
     }
 
     #[test]

@@ -11,7 +11,7 @@ use crate::scalar::{constant, Scalar};
 
 impl<S: Scalar> Plant<'_, S> {
     #[inline]
-    fn pressure_at(&self, node: Node, state: &[S]) -> S {
+    pub(super) fn pressure_at(&self, node: Node, state: &[S]) -> S {
         match node {
             Node::Ambient => constant(self.rig.gas.ambient_pressure),
             Node::Supply(k) => state[self.layout.supply(k)],

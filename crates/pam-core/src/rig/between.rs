@@ -157,10 +157,16 @@ impl<S: Scalar> Plant<'_, S> {
         if let Some(ids) = wiring.effects.compressor {
             self.compressors(ids.map(|id| self.values[id]), before, state, step);
         }
+    }
+
+    /// What sensors read at the end of a step [s], written to the state; `ends` are the controls at its beginning and its end.
+    pub fn read(&self, before: &[S], state: &mut [S], ends: [&Controls<S>; 2], step: f64) {
+        let (wiring, layout) = (&self.rig.wiring, &self.layout);
+        self.read_taps(state, ends[1]);
         if let Some([time_constant]) = wiring.effects.pressure_lag {
             for (k, gas) in wiring.gases.iter().enumerate() {
                 let Some(reading) = gas.lag.map(|lag| layout.extra(lag)) else { continue };
-                let (from, to) = (before[layout.pressure(k)], state[layout.pressure(k)]);
+                let (from, to) = (self.at_sensor(k, before, ends[0]), self.at_sensor(k, state, ends[1]));
                 let time_constant = self.values[time_constant];
                 state[reading] = pressure_lag::read(before[reading], from, to, time_constant, step);
             }
@@ -199,8 +205,8 @@ impl<S: Scalar> Plant<'_, S> {
         self.settle_arm(state);
         self.settle_closures(state);
         for (k, gas) in wiring.gases.iter().enumerate() {
-            if let Some(lag) = gas.lag {
-                state[layout.extra(lag)] = state[layout.pressure(k)];
+            for place in gas.lag.into_iter().chain(gas.tap.map(|(_, place)| place)) {
+                state[layout.extra(place)] = state[layout.pressure(k)];
             }
         }
         if let Some([_, cut_in, _]) = wiring.effects.compressor {

@@ -12,6 +12,7 @@ pub mod parameters;
 pub mod plant;
 mod pull;
 pub mod spec;
+mod tap;
 mod units;
 mod units_effects;
 mod wiring;

@@ -90,6 +90,8 @@ pub struct Plant<'a, S> {
     pub(super) body: Body<S>,
     /// Tube behind each valve, by the effect.
     pub(super) restriction: Option<Tube<S>>,
+    /// Transducers sit at the valve's end of those tubes.
+    tapped: bool,
     /// Effects act on supplies, on joints or arm.
     pub(super) supplies_altered: bool,
     motion_altered: bool,
@@ -171,8 +173,10 @@ impl<'a, S: Scalar> Plant<'a, S> {
             supplies_altered: wiring.effects.on_supplies(),
             motion_altered: wiring.effects.on_motion(),
             restriction: (wiring.effects.restriction)
-                .filter(|[id]| values[*id].re() < tube_flow_restriction::NONE)
-                .map(|[id]| tube_flow_restriction::tube(values[id], rig.gas.temperature)),
+                .filter(|[id, _]| values[*id].re() < tube_flow_restriction::NONE)
+                .map(|[id, _]| tube_flow_restriction::tube(values[id], rig.gas.temperature)),
+            tapped: (wiring.effects.restriction)
+                .is_some_and(|[_, tap]| values[tap].re() >= tube_flow_restriction::AT_VALVE),
             rig,
             values,
         })
@@ -181,6 +185,17 @@ impl<'a, S: Scalar> Plant<'a, S> {
     /// Parameter values.
     pub fn values(&self) -> &Values<S> {
         &self.values
+    }
+
+    /// Gases whose transducers sit in front of tubes, with the valves there.
+    pub fn taps(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        let gases = self.rig.wiring.gases.iter().enumerate().filter(|_| self.tapped().is_some());
+        gases.filter_map(|(gas, unit)| unit.tap.map(|(valve, _)| (gas, valve)))
+    }
+
+    /// The tube in front of which transducers sit.
+    pub(super) fn tapped(&self) -> Option<&Tube<S>> {
+        self.restriction.as_ref().filter(|_| self.tapped)
     }
 
     /// The rig.
@@ -378,8 +393,7 @@ impl Plant<'_, f64> {
             out.push(match *channel {
                 Channel::Supply(k) => state[layout.supply(k)] - ambient,
                 Channel::Pressure(k) => {
-                    let place = wiring.gases[k].lag.map_or(layout.pressure(k), |lag| layout.extra(lag));
-                    state[place] - ambient + zero(wiring.gases[k].pressure_zero)
+                    state[self.reading(k)] - ambient + zero(wiring.gases[k].pressure_zero)
                 }
                 Channel::Angle(k) => state[layout.angle(k)] + zero(wiring.coordinates[k].zero),
                 Channel::Rate(k) => state[layout.rate(k)],

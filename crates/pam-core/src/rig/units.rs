@@ -78,6 +78,8 @@ pub(crate) struct GasUnit {
     pub initial_pressure: f64,
     pub leak: bool,
     pub heat: bool,
+    /// Valve whose tube its sensor sits in front of, where one has the effect, and the pressure there among the extras.
+    pub tap: Option<(usize, usize)>,
     /// Reading of its lagging sensor among the extras.
     pub lag: Option<usize>,
     /// First of what its closure remembers, among the extras.

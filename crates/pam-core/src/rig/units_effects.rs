@@ -13,7 +13,7 @@ pub(crate) struct EffectUnits {
     pub play: Option<[Id; 1]>,
     pub centre_leak: Option<[Id; 2]>,
     pub path: Option<[Id; 2]>,
-    pub restriction: Option<[Id; 1]>,
+    pub restriction: Option<[Id; 2]>,
     pub leak: Option<[Id; 2]>,
     pub heat: Option<[Id; 3]>,
     pub hysteresis: Option<[Id; 3]>,
@@ -67,7 +67,12 @@ impl EffectUnits {
 
     /// Something happens between steps.
     pub fn between_steps(&self) -> bool {
-        self.moves_spools() || self.compressor.is_some() || self.pressure_lag.is_some()
+        self.moves_spools() || self.compressor.is_some() || self.reads()
+    }
+
+    /// Some reading of a pressure may not be that of the gas.
+    fn reads(&self) -> bool {
+        self.pressure_lag.is_some() || self.restriction.is_some()
     }
 }
 

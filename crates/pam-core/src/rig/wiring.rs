@@ -220,6 +220,7 @@ fn gases(spec: &RigSpec, inlets: &[(usize, Node)], table: &mut Parameters) -> Ve
         pressure_zero: None,
         leak: false,
         heat: false,
+        tap: None,
         lag: None,
         closure: None,
     };

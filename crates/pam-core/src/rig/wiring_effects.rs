@@ -195,15 +195,19 @@ impl Place<'_> {
             | "valve_centre_leakage"
             | "input_path_lag"
             | "tube_flow_restriction" => {
-                let blocks = wiring.valves.iter_mut().zip(&self.names).filter(|(_, name)| self.here(name));
-                for (valve, _) in blocks {
+                let blocks = wiring.valves.iter_mut().zip(&self.names).enumerate();
+                for (k, (valve, _)) in blocks.filter(|(_, (_, name))| self.here(name)) {
                     let unit = &mut valve.effects;
                     match id {
                         "valve_dead_zone" => unit.dead_zone = true,
                         "valve_hysteresis" => unit.play = true,
                         "valve_centre_leakage" => unit.centre_leak = true,
                         "input_path_lag" => unit.path = true,
-                        _ => unit.restriction = true,
+                        _ => {
+                            unit.restriction = true;
+                            let tap = &mut wiring.gases[valve.to].tap;
+                            *tap = tap.or_else(|| Some((k, take(1))));
+                        }
                     }
                     if (unit.play || unit.path) && unit.spool.is_none() {
                         unit.spool = Some(take(SPOOL_EXTRAS));

@@ -130,7 +130,7 @@ pub const TYPICAL: &[Typical] = &[
         &[("time_constant", 0.012), ("delay", 0.015)],
         &[("time_constant", 0.0), ("delay", 0.0)],
     ),
-    typical("tube_flow_restriction", &[("conductance", 3e-9)], &[("conductance", 1.0)]),
+    typical("tube_flow_restriction", &[("conductance", 3e-9), ("tap", 0.25)], &[("conductance", 1.0)]),
     typical(
         "leak_muscle",
         &[("conductance", 2e-10), ("laminar_share", 0.4)],
