@@ -2,7 +2,8 @@
 //! eight sensitivities.
 
 use criterion::{criterion_main, Criterion};
-use pam_core::residual::{predict, Block, Measured, Signal};
+use pam_core::measured::{Measured, Signal};
+use pam_core::residual::{predict, Block};
 use pam_core::simulate::{simulate, Initial, Timing};
 use pam_core::{Rig, RigSpec};
 use std::hint::black_box;

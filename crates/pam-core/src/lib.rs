@@ -22,6 +22,7 @@ pub mod geometry;
 mod initial;
 pub mod integrate;
 pub mod joint;
+pub mod measured;
 pub mod muscle;
 pub mod residual;
 pub mod rig;

@@ -5,10 +5,11 @@
 //! the derivative with respect to the window's initial state comes along, so that its error can be projected out.
 
 use crate::effects::closure_flow;
+use crate::measured::{Measured, Signal};
 use crate::rig::parameters::unit;
 use crate::rig::plant::{Controls, Plant, Simulated};
 use crate::rig::spec::dotted;
-use crate::rig::{Channel, ClosureAt, Layout, Memory, ParameterId, Rig};
+use crate::rig::{ClosureAt, Layout, Memory, ParameterId, Rig};
 use crate::scalar::{constant, Scalar};
 use crate::simulate::{check_state, Stepper, Timing};
 use crate::{Error, Result};
@@ -105,124 +106,6 @@ impl Block {
 fn hidden(layout: &Layout, measured: &Measured<'_>) -> Vec<usize> {
     let inlets = (layout.chambers..layout.gases).map(|k| layout.pressure(k));
     inlets.filter(|place| measured.signal(*place).is_none()).collect()
-}
-
-/// A measured signal, smoothed, with its time derivative at each sample; as the sensor reads it, SI, gauge.
-#[derive(Debug, Clone, Copy)]
-pub struct Signal<'a> {
-    /// Values, one per sample.
-    pub value: &'a [f64],
-    /// Time derivatives, one per sample.
-    pub slope: &'a [f64],
-}
-
-impl Signal<'_> {
-    fn check(&self, name: &str, n: usize) -> Result<()> {
-        for (part, data) in [("value", self.value), ("slope", self.slope)] {
-            if data.len() != n {
-                return Err(Error::Length {
-                    name: format!("{name}.{part}"),
-                    found: data.len(),
-                    expected: n,
-                    why: "one per sample of valve_command".into(),
-                });
-            }
-            if let Some((k, v)) = data.iter().enumerate().find(|(_, v)| !v.is_finite()) {
-                return Err(Error::parameter(format!("{name}.{part}[{k}]"), *v, "a finite value"));
-            }
-        }
-        Ok(())
-    }
-
-    /// Cubic Hermite value, slope and curvature some time [s] after a fraction of sample `k`: inside the recording.
-    fn later<S: Scalar>(&self, k: usize, fraction: f64, dt: f64, shift: S) -> (S, S) {
-        let last = (self.value.len() - 1) as f64;
-        let wanted = k as f64 + fraction + shift.re() / dt;
-        let place = wanted.clamp(0.0, last);
-        let cell = place.floor().min((last - 1.0).max(0.0)) as usize;
-        let t = place - cell as f64;
-        let (value, slope) = self.at(cell, t, dt);
-        let (p0, m0) = (self.value[cell], self.slope[cell] * dt);
-        let next = (cell + 1).min(self.value.len() - 1);
-        let (p1, m1) = (self.value[next], self.slope[next] * dt);
-        let curvature = (p1 - p0) * (6.0 - 12.0 * t) + m0 * (6.0 * t - 4.0) + m1 * (6.0 * t - 2.0);
-        let more = if wanted == place { shift - shift.re() } else { constant(0.0) };
-        (more * slope + value, more * (curvature / (dt * dt)) + slope)
-    }
-
-    /// Cubic Hermite value and derivative at a fraction of sample `k`.
-    #[inline]
-    fn at(&self, k: usize, fraction: f64, dt: f64) -> (f64, f64) {
-        let (p0, m0) = (self.value[k], self.slope[k] * dt);
-        let next = (k + 1).min(self.value.len() - 1);
-        let (p1, m1) = (self.value[next], self.slope[next] * dt);
-        let (t, t2) = (fraction, fraction * fraction);
-        let t3 = t2 * t;
-        let value = p0 + m0 * (t - 2.0 * t2 + t3) + (p1 - p0) * (3.0 * t2 - 2.0 * t3) + m1 * (t3 - t2);
-        let slope = m0 * (1.0 - 4.0 * t + 3.0 * t2) + (p1 - p0) * 6.0 * (t - t2) + m1 * (3.0 * t2 - 2.0 * t);
-        (value, slope / dt)
-    }
-}
-
-/// Measured signals around a block.
-#[derive(Debug, Clone)]
-pub struct Measured<'a> {
-    samples: usize,
-    commands: Vec<&'a [f64]>,
-    /// Place of the state and its signal.
-    signals: Vec<(usize, Signal<'a>)>,
-}
-
-impl<'a> Measured<'a> {
-    /// Commands (one for each input of the rig, held over each sample) and measured channels by name: `supply_pressure`,
-    /// `muscle_pressure`, `line_pressure`, `joint_angle`, each with the name of its block behind it where it has one.
-    ///
-    /// # Errors
-    /// [`Error::Length`] or [`Error::Parameter`] for bad arrays; [`Error::Model`] for a name that the rig does not have, or a
-    /// command that is missing.
-    pub fn new(
-        rig: &Rig,
-        samples: usize,
-        commands: &[(&str, &'a [f64])],
-        signals: &[(&str, Signal<'a>)],
-    ) -> Result<Self> {
-        let mut own = Vec::new();
-        for name in &rig.names().inputs {
-            let Some((_, values)) = commands.iter().find(|(n, _)| n == name) else {
-                return Err(Error::Model(format!("{name} is missing: one value per sample is needed")));
-            };
-            if values.len() != samples {
-                let why = "one per sample".into();
-                let (found, expected) = (values.len(), samples);
-                return Err(Error::Length { name: name.clone(), found, expected, why });
-            }
-            if let Some((k, u)) = values.iter().enumerate().find(|(_, u)| !u.is_finite()) {
-                return Err(Error::parameter(format!("{name}[{k}]"), *u, "a finite value"));
-            }
-            own.push(*values);
-        }
-        let layout = rig.layout();
-        let mut places = Vec::new();
-        for (name, signal) in signals {
-            let place = rig.names().channels.iter().find(|(n, _)| n == name).and_then(|(_, c)| match *c {
-                Channel::Supply(k) => Some(layout.supply(k)),
-                Channel::Pressure(k) => Some(layout.pressure(k)),
-                Channel::Angle(k) => Some(layout.angle(k)),
-                _ => None,
-            });
-            let Some(place) = place else {
-                return Err(Error::Model(format!("{name} is not a channel at which this rig can be cut")));
-            };
-            signal.check(name, samples)?;
-            places.push((place, *signal));
-        }
-        Ok(Self { samples, commands: own, signals: places })
-    }
-
-    #[inline]
-    fn signal(&self, place: usize) -> Option<&Signal<'a>> {
-        self.signals.iter().find(|(p, _)| *p == place).map(|(_, signal)| signal)
-    }
 }
 
 /// Prediction of a block's output with its sensitivities.
@@ -387,17 +270,25 @@ impl<S: Scalar> Driven<'_, S> {
     #[inline]
     fn write(&self, rig: &Rig, k: usize, fraction: f64, dt: f64, shift: S, state: &mut [S]) {
         let layout = rig.layout();
-        let (value, slope) = if self.shifted {
-            self.signal.later(k, fraction, dt, shift)
-        } else {
-            let (value, slope) = self.signal.at(k, fraction, dt);
-            (constant(value), constant(slope))
-        };
-        if self.place < layout.angle(0) {
+        let (cell, t, inside) =
+            if self.shifted { self.signal.later(k, fraction, dt, shift.re()) } else { (k, fraction, false) };
+        let (value, slope) = self.signal.at(cell, t, dt);
+        let pressure = self.place < layout.angle(0);
+        if pressure {
             state[self.place] = -self.zero + (value + rig.gas.ambient_pressure) + self.lag * slope;
         } else {
             state[self.place] = -self.zero + value;
-            state[self.place + layout.coordinates] = slope;
+            state[self.place + layout.coordinates] = constant(slope);
+        }
+        if inside {
+            // what the shift's own derivatives add
+            let (more, bend) = (shift - shift.re(), self.signal.curvature(cell, t, dt));
+            if pressure {
+                state[self.place] += more * slope + self.lag * more * bend;
+            } else {
+                state[self.place] += more * slope;
+                state[self.place + layout.coordinates] += more * bend;
+            }
         }
     }
 }
@@ -476,6 +367,9 @@ fn run<S: Scalar>(
     let skewed = plant.skewed();
     // How much later a shifted neighbour is read than it is recorded, and how late a command acts.
     let clocks = |plant: &Plant<'_, S>, time: f64| {
+        if !skewed {
+            return (constant(0.0), constant(0.0));
+        }
         let (pressures, angles) = plant.skew(time);
         match block {
             Block::Arm(_) => (pressures - angles, angles),
@@ -552,10 +446,9 @@ fn run<S: Scalar>(
             measured.commands[input][row]
         };
         let mut controls = stepper.plant.controls(|input| measured.commands[input][k]);
+        let (mut shift, mut late) = clocks(&stepper.plant, k as f64 * dt);
         if skewed {
-            let began = k as f64 * dt;
-            let (_, late) = clocks(&stepper.plant, began);
-            controls = stepper.plant.skewed_controls(late, began, timing.step(), dt, command);
+            controls = stepper.plant.skewed_controls(late, k as f64 * dt, timing.step(), dt, command);
         }
         sink(k, state[reading] + offset, &stepper, &state, &controls);
         if k + 1 == n {
@@ -564,8 +457,8 @@ fn run<S: Scalar>(
         let h = 1.0 / timing.substeps as f64;
         for i in 0..timing.substeps {
             let time = (k as f64 + i as f64 * h) * dt;
-            let (shift, late) = clocks(&stepper.plant, time);
-            if skewed {
+            if skewed && i > 0 {
+                (shift, late) = clocks(&stepper.plant, time);
                 controls = stepper.plant.skewed_controls(late, time, timing.step(), dt, command);
             }
             stepper.step(

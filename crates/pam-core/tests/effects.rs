@@ -5,7 +5,8 @@ mod rigs;
 
 use pam_core::drive::Drive;
 use pam_core::effects::EFFECTS;
-use pam_core::residual::{predict, Block, Measured, Signal};
+use pam_core::measured::{Measured, Signal};
+use pam_core::residual::{predict, Block};
 use pam_core::simulate::{Initial, Progress, Timing, Trajectory};
 use pam_core::{Rig, RigSpec};
 use rigs::{antagonists, effect, effect_at, lone_tank, regulated, shoulder, two_joints, Typical, TYPICAL};

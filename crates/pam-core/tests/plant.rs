@@ -1,6 +1,7 @@
 //! Laws of the composed plant: order, sensitivities against differences, typed errors, determinism.
 
-use pam_core::residual::{predict, Block, Measured, Signal};
+use pam_core::measured::{Measured, Signal};
+use pam_core::residual::{predict, Block};
 use pam_core::rig::spec::EffectSpec;
 use pam_core::simulate::{simulate, Initial, Timing, Trajectory};
 use pam_core::{Error, Rig, RigSpec};

@@ -262,7 +262,7 @@ def _switched(start: Start, problem: Problem, try_: Callable[[Start], float]) ->
     levels = [low + (k + 0.5) * step for k in range(LEVELS)]
     tried = [(try_(s), a, b, s) for a in levels for b in (*levels, high + step) if b > a for s in [at(a, b)]]
     best = max(tried, key=lambda t: t[0])
-    while step > 1e-3 * (high - low):
+    while step > 5e-3 * (high - low):
         step *= 0.5
         _, a, b, _ = best
         around = [(a - step, b), (a + step, b), (a, b - step), (a, b + step)]

@@ -2,8 +2,8 @@
 //!
 //! `tau = -k d (d/d_0)^(n-1) (1 + c d')` for a depth `d` beyond the stop's angle, never a pull, the corner rounded over 0.2 deg; `k` is the
 //! stop's secant stiffness at a depth of `d_0` = 10 deg, so that the exponent `n` (1 metal, 2 to 3 rubber) leaves its unit alone. It is
-//! an upper stop where `side` is positive, a lower one where it is negative. K. H. Hunt & F. R. E. Crossley, "Coefficient of restitution interpreted as damping
-//! in vibroimpact", ASME J. Applied Mechanics 42, 1975.
+//! an upper stop where `side` is positive, a lower one where it is negative. K. H. Hunt & F. R. E. Crossley, "Coefficient of
+//! restitution interpreted as damping in vibroimpact", ASME J. Applied Mechanics 42, 1975.
 
 use super::{beyond, EffectInfo, EffectParameter};
 use crate::scalar::{constant, Scalar};
@@ -39,10 +39,11 @@ pub fn torque<S: Scalar>(stop: [S; 5], angle: S, rate: S) -> S {
     let depth = beyond((angle - limit) * sign, CORNER);
     let share = dissipation * rate * sign + 1.0;
     let held = if share.re() > 0.0 { share } else { constant(0.0) };
-    if depth.re() < LEAST {
-        return -(stiffness * depth * held) * sign * if exponent.re() > 1.0 { 0.0 } else { 1.0 };
-    }
-    let progress = ((depth / SECANT).ln() * (exponent - 1.0)).exp();
+    let progress = if depth.re() < LEAST {
+        constant(if exponent.re() > 1.0 { 0.0 } else { 1.0 })
+    } else {
+        ((depth / SECANT).ln() * (exponent - 1.0)).exp()
+    };
     -(stiffness * depth * progress * held) * sign
 }
 
