@@ -87,9 +87,11 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
     if all(share_left(c, start, suspects) > DOUBTFUL for c in singles):
         say(f"{names}: looking for what happens at times of its own ({', '.join(happening)})")
         singles += [c for e in happening if (c := trial.eventful(e, start)) is not None]
-    settled = any(explains(c, suspects) or share_left(c, start, suspects) < FORM for c in singles)
+    settled = any(
+        explains(c, suspects) or (share_left(c, start, suspects) < FORM and not _untouched(c, start, suspects)) for c in singles
+    )
     # what a single effect leaves may be no more than the difference between its equation and the truth: a pair cannot be asked for
-    pairs = [] if settled else _pairs(trial, screened, singles, lambda text: say(f"{names}: {text}"))
+    pairs = [] if settled else _pairs(trial, screened, start, singles, lambda text: say(f"{names}: {text}"))
     lasting = [c for c in singles if c.fit.events is None]
     best = min(lasting, key=lambda c: share_left(c, start, suspects), default=start)
     if not settled and BESIDE < share_left(best, start, suspects) < MAIN:
@@ -172,7 +174,15 @@ def _singles(trial: Attempts, screened: Screen, baseline: Fit, say: Callable[[st
     return found
 
 
-def _pairs(trial: Attempts, screened: Screen, singles: list[Candidate], say: Callable[[str], None]) -> list[Candidate]:
+def _untouched(candidate: Candidate, start: Candidate, suspects: list[Block]) -> list[Block]:
+    """Blocks in which a set leaves most of what was too much there."""
+    left = {b.name: candidate.fitted[b.name] for b in suspects}
+    return [b for b in suspects if significant(left[b.name]) and left[b.name].ratio - 1.0 > MAIN * (start.fitted[b.name].ratio - 1.0)]
+
+
+def _pairs(
+    trial: Attempts, screened: Screen, start: Candidate, singles: list[Candidate], say: Callable[[str], None]
+) -> list[Candidate]:
     """For the best singles that leave something: the effects that would take most of it, fitted together with them."""
     lasting = [c for c in singles if c.fit.events is None]
     ranked = sorted(lasting, key=lambda c: sum(c.held_out[b.name].ratio for b in trial.suspects))[:PAIRED]
@@ -181,10 +191,14 @@ def _pairs(trial: Attempts, screened: Screen, singles: list[Candidate], say: Cal
     found = []
     for single in ranked:
         rows, basis = basis_of(single.fit, trial.inner, white)
-        partners = by_effect(screened.scores(rows, basis, without=single.effects))
+        partners = [scores[0] for scores in by_effect(screened.scores(rows, basis, without=single.effects)).values()]
         least = max(LEAST_GAIN, PARTNER * float(screened.rows @ screened.rows))
-        best = [scores[0] for scores in partners.values() if scores[0].gain > least]
-        for score in best[:PARTNERS]:
+        best = [score for score in partners if score.gain > least][:PARTNERS]
+        # what one block keeps may be little beside what another one had: an effect of that block alone is asked for by itself
+        for block in _untouched(single, start, trial.suspects):
+            own = [s for s in partners if s.gain > LEAST_GAIN and [b for b in trial.suspects if acts_in(s.effect, b)] == [block]]
+            best += [score for score in own[:1] if score not in best]
+        for score in best:
             both = frozenset({*single.effects, score.effect})
             if both in tried:
                 continue
