@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
+from scipy.optimize import least_squares, lsq_linear
 
 from pamrs.diagnosis.leastsquares import levenberg_marquardt
 from pamrs.errors import SimulationError
@@ -78,3 +78,19 @@ def test_noise_is_not_worth_an_evaluation() -> None:
     found = levenberg_marquardt(lambda x: (rows + jacobian[:, 0] * x[0], jacobian, None), np.zeros(1), (WIDE[0][:1], WIDE[1][:1]), 9)
     spent = found[2]
     assert spent == 1
+
+
+def test_a_step_that_walls_bend_uphill_is_shortened() -> None:
+    # the long way to the minimum leaves the box through both parameters, and the corner where it leaves lies uphill
+    normal = np.array([[1.0, 0.999], [0.999, 1.0]])
+    root = np.linalg.cholesky(normal).T
+    aim = np.array([50.0, -45.0])
+
+    def evaluate(x: Array) -> tuple[Array, Array, None]:
+        return 10.0 * root @ (x - aim), 10.0 * root, None
+
+    low, high = np.array([-1.0, -40.0]), np.array([1.0, 1.0])
+    x, (rows, _, _), _ = levenberg_marquardt(evaluate, np.zeros(2), (low, high), 40)
+    theirs = lsq_linear(10.0 * root, 10.0 * root @ aim, (low, high))
+    assert 0.5 * float(rows @ rows) <= theirs.cost * (1.0 + 2e-3)
+    assert np.allclose(x, theirs.x, atol=1e-2)
