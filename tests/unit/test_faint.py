@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -79,11 +80,11 @@ def candidate(effects: tuple[str, ...], left: float, **values: float) -> Candida
     return Candidate(effects, fit, ratio, ratio, 0.0)
 
 
-def weighed(*sets: Candidate) -> dict[str, float]:
+def weighed(*sets: Candidate, start: Candidate | None = None) -> dict[str, float]:
     """Probabilities beside a baseline that leaves ten times the noise's variance in the chamber, of recordings of 30 s."""
     rig = pamrs.rigs.shoulder()
     blocks = available_blocks(rig, ("supply_pressure", "muscle_pressure", "valve_command", "joint_angle"))
-    return weigh([candidate((), 10.0), *sets], [b for b in blocks if b.name == "chamber"], 0.985, 30.0)
+    return weigh([start or candidate((), 10.0), *sets], [b for b in blocks if b.name == "chamber"], 0.985, 30.0)
 
 
 def test_a_set_that_explains_nothing_says_nothing_against_one_that_does() -> None:
@@ -111,3 +112,17 @@ def test_creep_slower_than_any_recording_is_not_believed() -> None:
     unseen = candidate(("muscle_creep",), 1.0, **{"muscle_creep.stiffness": 1e3, "muscle_creep.time_constant": 300.0})
     assert weighed(seen)["muscle_creep"] > 0.95
     assert weighed(unseen)["unlisted"] > 0.5
+
+
+def test_held_out_recordings_that_hardly_show_a_mismatch_do_not_veto_its_effect() -> None:
+    def uneven(effects: tuple[str, ...], fitted: float, held: float, **values: float) -> Candidate:
+        ratio = {left: {"chamber": Excess(1.0 + left, 0.0, 0.0, 1.0, 1.0)} for left in (fitted, held)}
+        return replace(candidate(effects, fitted, **values), fitted=ratio[fitted], held_out=ratio[held])
+
+    def named(fitted: float, held: float) -> float:
+        swing = uneven(("payload_swing",), fitted, held, **{"payload_swing.swinging_share": 0.04})
+        return weighed(swing, start=uneven((), 14.8, 0.35))["payload_swing"]
+
+    assert named(0.0, 0.65) > 0.9  # noise of a floor
+    assert named(0.0, 20.0) < 0.1  # a mismatch of its own making
+    assert named(13.0, 0.1) < 0.1  # it explains nothing

@@ -476,7 +476,10 @@ fn run<S: Scalar>(
                     for (gas, valve) in &driving_taps {
                         // a smooth signal goes from one reading to the next, and so do the commands that they were read under
                         let (place, was) = (layout.pressure(*gas), last.spool[*valve]);
-                        let spool = was + (controls.spool[*valve] - was) * share;
+                        let now = controls.spool[*valve];
+                        // a spool with a motion of its own is already where it is at that instant
+                        let moves = rig.wiring.valves[*valve].effects.spool.is_some();
+                        let spool = if moves { now } else { was + (now - was) * share };
                         y[place] = plant.behind_tube(*gas, y[place], y, spool);
                     }
                 },

@@ -176,11 +176,11 @@ fn a_transducer_at_the_valve_reads_the_node_of_the_tube() {
     }
     let gas = pam_core::gas::orifice::Gas::new(AMBIENT, 293.15, 287.05, 1.4);
     let hose = pam_core::gas::tube::Tube::<f64>::of_conductance(2e-8, 0.3, 293.15);
-    let area = |k: usize| {
-        let free = Run::new(with(rigid_chamber(1.0), vec![]), 2, 0.001, 1, |_| command(k), &[]);
-        let flow = (free.last("air_mass") - free.get("air_mass")[0]) / 0.001;
-        flow / gas.mass_flow(1.0, 1.38e6 + AMBIENT, AMBIENT)
-    };
+    // it opens as far at 2 V as at 8 V
+    let free = Run::new(with(rigid_chamber(1.0), vec![]), 2, 0.001, 1, |_| 8.0, &[]);
+    let area = (free.last("air_mass") - free.get("air_mass")[0])
+        / 0.001
+        / gas.mass_flow(1.0, 1.38e6 + AMBIENT, AMBIENT);
     let (p, node) = (muscle.get("muscle_pressure"), valve.get("muscle_pressure"));
     assert_eq!(p[0], node[0]);
     for k in 1..50 {
@@ -190,13 +190,13 @@ fn a_transducer_at_the_valve_reads_the_node_of_the_tube() {
             8.0 => {
                 assert!(there > 1.005 * inside, "{k}: {there} {inside}");
                 let supply = muscle.get("supply_pressure")[k] + AMBIENT;
-                let through = gas.mass_flow(area(k - 1), supply, there);
+                let through = gas.mass_flow(area, supply, there);
                 assert!((through / hose.mass_flow(there, inside) - 1.0).abs() < 1e-3, "{k}");
             }
             2.0 => {
                 assert!(there < 0.995 * inside, "{k}: {there} {inside}");
-                let (out, from) = (hose.mass_flow(inside, there), gas.mass_flow(1.0, there, AMBIENT));
-                assert!(out > 0.0 && from > 0.0);
+                let out = gas.mass_flow(area, there, AMBIENT);
+                assert!((out / hose.mass_flow(inside, there) - 1.0).abs() < 1e-3, "{k}");
             }
             _ => assert_eq!(there, inside, "shut, the muscle's own"),
         }

@@ -19,6 +19,7 @@ from pamrs.diagnosis.evidence import Floor
 from pamrs.diagnosis.experiment import propose
 from pamrs.diagnosis.fitting import Events, Key, Problem, residuals
 from pamrs.diagnosis.result import Diagnosis, Trace
+from pamrs.diagnosis.starts import CHOICES
 from pamrs.effects_table import CATALOGUE, EFFECTS
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError
 from pamrs.rig import Rig
@@ -319,7 +320,7 @@ def _best_of(groups: list[Group], candidate: Candidate) -> Candidate | None:
     return next((g.best for g in groups if candidate in g.candidates), None)
 
 
-_CHOSEN = frozenset({"laminar_share", "cut_in_pressure", "cut_out_pressure"})
+_CHOSEN = CHOICES | {"cut_in_pressure", "cut_out_pressure"}
 """Parameters that are tried and chosen, not fitted."""
 
 

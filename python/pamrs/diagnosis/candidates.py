@@ -9,12 +9,13 @@ from pamrs.diagnosis.blocks import Block, Residual
 from pamrs.diagnosis.events import fit_events, look_for_events
 from pamrs.diagnosis.evidence import Excess, Floor, excess, inflation
 from pamrs.diagnosis.fitting import FIT_BIN, Fit, Key, Problem, acts_in, fit, residuals
+from pamrs.diagnosis.leastsquares import SHARE
 from pamrs.diagnosis.starts import Start
 from pamrs.effects_table import EFFECTS, find_parameter
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 
-__all__ = ["Attempts", "Candidate", "Group", "significant", "start_of"]
+__all__ = ["DETECTION_RATIO", "Attempts", "Candidate", "Group", "significant", "start_of"]
 
 DETECTION_RATIO = 1.45
 """Variance of bin means over the floor's from which a mismatch is taken as real, on recordings that were fitted."""
@@ -82,6 +83,8 @@ class Group:
         That in words.
     sought : bool
         Whether one was looked for.
+    faint : bool
+        Whether no block keeps an excess, and an effect was found by its signature: ``mismatch`` is then where that signature is.
     """
 
     blocks: list[Block]
@@ -95,6 +98,7 @@ class Group:
     closure: Candidate | None = None
     form: str = ""
     sought: bool = False
+    faint: bool = False
 
     @property
     def best(self) -> Candidate:
@@ -122,6 +126,11 @@ class Attempts:
     suspects: list[Block]
 
     @property
+    def white(self) -> dict[str, float]:
+        """Weights of noise without colour."""
+        return dict.fromkeys((b.name for b in self.inner.blocks), 1.0)
+
+    @property
     def same(self) -> bool:
         """Whether there is no held-out recording."""
         return self.outer.recordings is self.inner.recordings
@@ -134,7 +143,7 @@ class Attempts:
             return None  # it leaves the range in which the model holds
 
     def _eventful(self, effect: str, beside: Candidate) -> Candidate | None:
-        white = dict.fromkeys((b.name for b in self.inner.blocks), 1.0)
+        white = self.white
         model = self.nominal
         for entry in beside.fit.rig.effects:
             model = model.with_effect(entry["id"], entry["parameters"])
@@ -157,7 +166,7 @@ class Attempts:
         )
         return self.judged(effects, everywhere, residuals(self.outer, bare, events=events))
 
-    def _beside(self, found: Fit, beside: Candidate, inflation_: dict[str, float]) -> Fit:
+    def _beside(self, found: Fit, beside: Candidate, colour: dict[str, float]) -> Fit:
         """The lasting effects of a candidate fitted again, with the events that were found beside them held."""
         assert found.events is not None
         effect = found.events.effect
@@ -170,7 +179,7 @@ class Attempts:
             self.nominal,
             beside.effects,
             own,
-            inflation_,
+            colour,
             fixed=kept,
             warm=warm,
             frozen=True,
@@ -200,19 +209,25 @@ class Attempts:
         gap = 1.0 - sum(math.sqrt(a) for _, a in gaps) / total if total > 0 else 0.0
         return Candidate(effects, found, after, inside, gap, _scatter(effects, self.inner, found))
 
-    def fitted(self, starts: list[Start], warm: Fit, inflation_: dict[str, float]) -> Candidate | None:
-        """A set of effects fitted from one start of each, residuals weighted by their own colour; None where it cannot be run."""
+    def fitted(self, starts: list[Start], warm: Fit, colour: dict[str, float], share: float = SHARE) -> Candidate | None:
+        """A set of effects fitted from one start of each, residuals weighted by their own colour; None where it cannot be run.
+
+        ``share`` is the share of the sum of squares below which a step is not worth it.
+        """
         effects = tuple(start.effect for start in starts)
         free = {name: value for start in starts for name, value in start.free.items()}
         held = {name: value for start in starts for name, value in start.held.items()}
         limit = 30 if self.nominal.model["valve"] is None else 8
         try:
-            best = fit(self.inner, self.nominal, effects, free, inflation_, fixed=held, warm=warm, frozen=True, evaluations=limit)
+            best = fit(
+                self.inner, self.nominal, effects, free, colour, fixed=held, warm=warm, frozen=True, evaluations=limit, share=share
+            )
             colour = {b.name: inflation(b, self.inner.recordings, best.residuals, FIT_BIN) for b in self.inner.blocks}
             if max(colour.values()) > 2:
-                again = {n: v for n, v in best.values.items() if n.partition(".")[0] in EFFECTS}
-                again = {n: v if abs(v) > 1e-3 * _typical(n) else 1e-3 * _typical(n) for n, v in again.items()}
-                best = fit(self.inner, self.nominal, effects, again, colour, fixed=held, warm=best, frozen=True, evaluations=limit)
+                again = {n: _off_zero(n, v) for n, v in best.values.items() if n.partition(".")[0] in EFFECTS}
+                best = fit(
+                    self.inner, self.nominal, effects, again, colour, fixed=held, warm=best, frozen=True, evaluations=limit, share=share
+                )
             return self.judged(effects, best)
         except SimulationError:
             return None  # it leaves the range in which the model holds
@@ -220,10 +235,16 @@ class Attempts:
 
 def start_of(found: Fit, effect: str) -> Start:
     """Where another fit goes on from an effect as it was fitted, held parameters included."""
-    own = {name: value for name, value in found.values.items() if name.partition(".")[0] == effect}
+    own = {name: _off_zero(name, value) for name, value in found.values.items() if name.partition(".")[0] == effect}
     entry = next(e for e in found.rig.effects if e["id"] == effect)
     held = {f"{effect}.{n}": v for n, v in entry["parameters"].items() if f"{effect}.{n}" not in found.values}
     return Start(effect, own, held, (), False)
+
+
+def _off_zero(name: str, value: float) -> float:
+    """A parameter to start from: one that a fit left at zero tells nothing of its scale."""
+    least = 1e-3 * _typical(name)
+    return value if abs(value) > least else least
 
 
 def _typical(name: str) -> float:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from pamrs import _core
 from pamrs.diagnosis.blocks import Block, Residual, change, residual
-from pamrs.diagnosis.leastsquares import levenberg_marquardt
+from pamrs.diagnosis.leastsquares import SHARE, levenberg_marquardt
 from pamrs.diagnosis.signals import Prepared, binned
 from pamrs.effects_table import EFFECTS, find_parameter
 from pamrs.errors import ParameterError, RigError, SimulationError
@@ -337,6 +337,7 @@ def fit(
     frozen: bool = False,
     events: Events | None = None,
     evaluations: int = 12,
+    share: float = SHARE,
 ) -> Fit:
     """Fit baseline parameters (with their tolerances as priors) and effects to the recordings.
 
@@ -362,6 +363,8 @@ def fit(
         What happens in single recordings, held.
     evaluations : int, optional
         Limit on evaluations.
+    share : float, optional
+        As in :func:`pamrs.diagnosis.leastsquares.levenberg_marquardt`.
 
     Raises
     ------
@@ -389,7 +392,7 @@ def fit(
     for index, name in enumerate(baseline):
         if warm is not None and name in warm.values:
             start[index] = (warm.values[name] - scaling.centre[name]) / scaling.scale[name]
-    x, (values, jacobian, found), spent = levenberg_marquardt(evaluate, start, scaling.bounds, evaluations)
+    x, (values, jacobian, found), spent = levenberg_marquardt(evaluate, start, scaling.bounds, evaluations, share)
     covariance: Array = np.zeros((0, 0))
     if x.size:
         covariance = np.asarray(np.linalg.pinv(jacobian.T @ jacobian, hermitian=True), dtype=np.float64)

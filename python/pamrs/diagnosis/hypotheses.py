@@ -70,13 +70,20 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
     # what parameters could not be told from the fitted recordings shows in the others alone, and is no mismatch
     apart = [b for b in blocks if significant(out[b.name], HELD_RATIO) and now[b.name].ratio > HINT]
     suspects = [b for b in blocks if significant(now[b.name]) or b in apart]
-    if apart and not any(significant(now[b.name]) for b in suspects) and _together(inner, outer, nominal, baseline, floor):
-        suspects = []
+    if apart and not any(significant(now[b.name]) for b in suspects):
+        common = _together(inner, outer, nominal, start, floor)
+        if common is not None:
+            say(f"{names}: one baseline leaves noise in all recordings")
+            # what the nominal model leaves in the held-out ones is what the parameters are moved for
+            quiet = residuals(outer, nominal)
+            ever = {b.name: max(was[b.name], excess(b, outer.recordings, quiet, floor), key=lambda e: e.ratio) for b in blocks}
+            return Group(blocks, ever, common.fitted, [common], {"": 1.0}, None, floor, [])
     acting = [e for e in CATALOGUE if fits(nominal, e) and any(acts_in(e, b) for b in suspects or blocks)]
     if not suspects:
         # a parameter at the end of its plausible range is a symptom even where the fit is good
-        quiet = Group(blocks, was, now, [start], {"": 1.0}, None, floor, [])
-        return faint(Attempts(inner, outer, nominal, floor, out, blocks), quiet, [e for e in acting if e not in EVENTS], say) or quiet
+        nothing = Group(blocks, was, now, [start], {"": 1.0}, None, floor, [])
+        lasting = [e for e in acting if e not in EVENTS]
+        return faint(Attempts(inner, outer, nominal, floor, out, blocks), nothing, lasting, say) or nothing
     mismatch = max(suspects, key=lambda b: out[b.name].ratio + now[b.name].ratio)
     say(f"{names}: {mismatch.name} keeps {now[mismatch.name].systematic:.2g} noise units after the refit")
     happening = [e for e in acting if e in EVENTS]
@@ -84,7 +91,7 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
     trial = Attempts(inner, outer, nominal, floor, out, suspects)
     screened = screen(inner, baseline, acting, white, sealed=nominal.model["valve"] is None)
     singles = _singles(trial, screened, baseline, lambda text: say(f"{names}: {text}"))
-    if all(share_left(c, start, suspects) > DOUBTFUL for c in singles):
+    if happening and all(share_left(c, start, suspects) > DOUBTFUL for c in singles):
         say(f"{names}: looking for what happens at times of its own ({', '.join(happening)})")
         singles += [c for e in happening if (c := trial.eventful(e, start)) is not None]
     settled = any(
@@ -92,9 +99,9 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
     )
     # what a single effect leaves may be no more than the difference between its equation and the truth: a pair cannot be asked for
     pairs = [] if settled else _pairs(trial, screened, start, singles, lambda text: say(f"{names}: {text}"))
-    lasting = [c for c in singles if c.fit.events is None]
-    best = min(lasting, key=lambda c: share_left(c, start, suspects), default=start)
-    if not settled and BESIDE < share_left(best, start, suspects) < MAIN:
+    steady = [c for c in singles if c.fit.events is None]
+    best = min(steady, key=lambda c: share_left(c, start, suspects), default=start)
+    if happening and not settled and BESIDE < share_left(best, start, suspects) < MAIN:
         say(f"{names}: looking for what happens beside {best.effects[0]} at times of its own")
         pairs += [c for e in happening if (c := trial.eventful(e, best)) is not None]
     candidates = [start, *singles, *pairs]
@@ -117,15 +124,17 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
     return replace(group, closure=judged, form=describe_closure(closed, inner, baseline))
 
 
-def _together(inner: Problem, outer: Problem, nominal: Rig, baseline: Fit, floor: dict[Key, Floor]) -> bool:
-    """Whether one baseline inside its tolerances leaves only noise in fitted and held-out recordings, taken together."""
+def _together(inner: Problem, outer: Problem, nominal: Rig, start: Candidate, floor: dict[Key, Floor]) -> Candidate | None:
+    """One baseline inside its tolerances that leaves only noise in fitted and held-out recordings, taken together, if there is one."""
     both = replace(inner, recordings=[*inner.recordings, *outer.recordings])
     try:
-        found = fit(both, nominal, (), {}, dict.fromkeys((b.name for b in inner.blocks), 1.0), warm=baseline).residuals
+        found = fit(both, nominal, (), {}, dict.fromkeys((b.name for b in inner.blocks), 1.0), warm=start.fit)
     except SimulationError:
-        return False
-    parts = (inner.recordings, outer.recordings)
-    return not any(significant(excess(b, part, found, floor)) for b in inner.blocks for part in parts)
+        return None
+    fitted, held = ({b.name: excess(b, part.recordings, found.residuals, floor) for b in inner.blocks} for part in (inner, outer))
+    if any(significant(e[b.name]) for b in inner.blocks for e in (fitted, held)):
+        return None
+    return Candidate((), found, held, fitted, 0.0)
 
 
 def _refitted(problem: Problem, nominal: Rig, inflation: dict[str, float]) -> Fit:
@@ -163,7 +172,7 @@ def _singles(trial: Attempts, screened: Screen, baseline: Fit, say: Callable[[st
     most = max(gains.values(), default=0.0)
     chosen = [e for e, gain in gains.items() if gain > max(LEAST_GAIN, LEAST_SHARE * most)][:MOST_SINGLES]
     say("screened: " + (", ".join(f"{e} {gain:.3g}" for e, gain in list(gains.items())[:8]) or "no effect acts here"))
-    white = dict.fromkeys((b.name for b in trial.inner.blocks), 1.0)
+    white = trial.white
     found = []
     for place, effect in enumerate(chosen):
         near = [s for s in ranked[effect] if s.gain > NEAR * gains[effect]]
@@ -175,9 +184,13 @@ def _singles(trial: Attempts, screened: Screen, baseline: Fit, say: Callable[[st
 
 
 def _untouched(candidate: Candidate, start: Candidate, suspects: list[Block]) -> list[Block]:
-    """Blocks in which a set leaves most of what was too much there."""
-    left = {b.name: candidate.fitted[b.name] for b in suspects}
-    return [b for b in suspects if significant(left[b.name]) and left[b.name].ratio - 1.0 > MAIN * (start.fitted[b.name].ratio - 1.0)]
+    """Blocks in which a set leaves most of what was too much there, in recordings that were fitted or held out."""
+    stages = ((start.fitted, candidate.fitted), (start.held_out, candidate.held_out))
+    return [
+        b
+        for b in suspects
+        if any(significant(now[b.name]) and now[b.name].ratio - 1.0 > MAIN * (was[b.name].ratio - 1.0) for was, now in stages)
+    ]
 
 
 def _pairs(
@@ -186,7 +199,7 @@ def _pairs(
     """For the best singles that leave something: the effects that would take most of it, fitted together with them."""
     lasting = [c for c in singles if c.fit.events is None]
     ranked = sorted(lasting, key=lambda c: sum(c.held_out[b.name].ratio for b in trial.suspects))[:PAIRED]
-    white = dict.fromkeys((b.name for b in trial.inner.blocks), 1.0)
+    white = trial.white
     tried: set[frozenset[str]] = set()
     found = []
     for single in ranked:

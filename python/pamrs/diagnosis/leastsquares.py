@@ -16,18 +16,22 @@ from numpy.typing import NDArray
 
 from pamrs.errors import SimulationError
 
-__all__ = ["levenberg_marquardt"]
+__all__ = ["SHARE", "levenberg_marquardt"]
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
 
 WORTH, SHARE = 0.2, 2e-3
-"""Gain in chi-square, and share of what there is, below which a step is not worth an evaluation."""
+"""Gain in chi-square, and (if nothing else is said) share of what there is, below which a step is not worth an evaluation."""
 DAMPING, HARDEST = 1e-4, 1e8
 
 
 def levenberg_marquardt(
-    evaluate: Callable[[Array], tuple[Array, Array, T]], start: Array, bounds: tuple[Array, Array], evaluations: int
+    evaluate: Callable[[Array], tuple[Array, Array, T]],
+    start: Array,
+    bounds: tuple[Array, Array],
+    evaluations: int,
+    share: float = SHARE,
 ) -> tuple[Array, tuple[Array, Array, T], int]:
     """Minimise half the sum of squares inside a box.
 
@@ -42,6 +46,8 @@ def levenberg_marquardt(
         The box.
     evaluations : int
         Limit, the first included.
+    share : float, optional
+        Share of the sum of squares that a step has to promise; 0 where the last few units of chi-square count.
 
     Returns
     -------
@@ -69,7 +75,7 @@ def levenberg_marquardt(
         rows, jacobian, _ = best
         gradient = jacobian.T @ rows
         normal = jacobian.T @ jacobian
-        worth = max(WORTH, SHARE * float(rows @ rows))
+        worth = max(WORTH, share * float(rows @ rows))
         step = _step(x, gradient, normal, damping, low, high)
         # a long step that the walls bend may lead uphill: a shorter one meets fewer of them
         while (gain := _promise(step, gradient, normal)) < worth and damping < HARDEST:

@@ -71,7 +71,8 @@ class Sight:
     size : str
         Dotted name of the parameter that scales it; empty where no number does.
     typical, smallest : float
-        Typical value of that parameter and the smallest one that leaves three noise units [SI]; NaN without one.
+        Typical value of that parameter and the smallest one (of a restriction's conductance, the largest) that leaves three noise
+        units [SI]; NaN without one.
     """
 
     effect: str
@@ -565,8 +566,12 @@ def _sight(start: Start, left: float, key: Key) -> Sight:
         return Sight(start.effect, 0.0)
     if not start.scalable:
         return Sight(start.effect, left, *key)
-    typical = abs(start.free[start.sizes[0]])
-    smallest = abs(start.scaled(SEEN / left).free[start.sizes[0]]) if SEEN / left < LARGEST else math.nan
+    leading = start.sizes[0]
+    typical, size = abs(start.free[leading]), SEEN / left
+    found = start.scaled(size).free[leading]
+    # one that its bounds hold shows less than that
+    whole = math.isclose(start.scaled(0.999 * size).free[leading], found, rel_tol=1e-9)
+    smallest = abs(found) if size < LARGEST and not whole else math.nan
     return Sight(start.effect, left, *key, start.sizes[0], typical, smallest)
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from pamrs.effects_table import EFFECTS, EffectParameter
 from pamrs.rig import Rig
 
-__all__ = ["RESTRICTIONS", "Start", "starts_of"]
+__all__ = ["CHOICES", "RESTRICTIONS", "Start", "starts_of"]
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,8 @@ def starts_of(effect: str, *, sealed: bool) -> list[Start]:
 
 RESTRICTIONS = frozenset({"tube_flow_restriction.conductance"})
 """Sizes that take the less effect the larger they are: a pressure loss goes with their inverse square."""
-_CHOICES = frozenset({"laminar_share", "angle_share", "side", "tap"})
+CHOICES = frozenset({"laminar_share", "angle_share", "side", "tap"})
+"""Parameters that are tried at both ends of their range and not fitted."""
 _SHARES = frozenset({"share"})
 _STARTS = frozenset({"initial_temperature_rise"})
 
@@ -103,7 +104,7 @@ def _role(parameter: EffectParameter, *, sealed: bool) -> str:
     """What a parameter is to a fit: a size, a shape, a choice of two, or held."""
     if parameter.name.endswith(("_2", "_3")) or parameter.name == "rise":  # more of the same: what a recording holds, see events.py
         return "held"
-    if parameter.name in _CHOICES:
+    if parameter.name in CHOICES:
         return "choice"
     if parameter.name in _SHARES:  # of a sealed hold nothing but the relaxation is seen
         return "held" if sealed else "size"

@@ -11,7 +11,7 @@ from pamrs.diagnosis.candidates import DETECTION_RATIO, Candidate
 from pamrs.diagnosis.fitting import Problem
 from pamrs.effects_table import EFFECTS
 
-__all__ = ["FORM", "PRICE", "explains", "most_believed", "share_left", "weigh"]
+__all__ = ["FORM", "PRICE", "STANDING", "believed", "doubt", "explains", "most_believed", "share_left", "stands", "weigh"]
 
 EVEN, EVEN_PUSH, SOFTNESS = 0.5, 2.6, 0.4
 """Logarithm of the odds of explained to unexplained variance at which a set is named at even odds with ``unlisted`` (pushes, which
@@ -48,14 +48,15 @@ def most_believed(fitted: Problem, held: Problem, mismatch: Block, left: float) 
 def share_left(candidate: Candidate, baseline: Candidate, suspects: list[Block]) -> float:
     """Share of the baseline's excess variance that a set of effects leaves, the larger of fitted and held-out recordings.
 
-    Recordings that hardly show the mismatch do not count, as long as the effect does not bring one into them.
+    Recordings that hardly show the mismatch cannot say how much of it is left; what an effect brings into them, beyond what noise
+    may, counts beside the mismatch of the others.
     """
-    shares = []
+    found = []
     for was, now in ((baseline.fitted, candidate.fitted), (baseline.held_out, candidate.held_out)):
-        before = sum(max(0.0, was[b.name].ratio - 1.0) for b in suspects)
-        after = sum(max(0.0, now[b.name].ratio - 1.0) for b in suspects)
-        if before > TELLING or after > max(before, TELLING):
-            shares.append(after / before if before > 0.0 else math.inf)
+        found.append(tuple(sum(max(0.0, e[b.name].ratio - 1.0) for b in suspects) for e in (was, now)))
+    most = max(before for before, _ in found)
+    shares = [after / before for before, after in found if before > TELLING]
+    shares += [(after - TELLING) / max(most, TELLING) for before, after in found if before <= TELLING < after]
     return max(shares, default=1.0)
 
 
@@ -80,32 +81,40 @@ def weigh(candidates: list[Candidate], suspects: list[Block], most: float, secon
     if not named:
         return {"unlisted": 1.0}
     start = candidates[0]
-    scores = {c: _score(c, start, suspects) - STANDING * _stands(c, seconds) for c in named}
-    believed = {c: _believed(c, start, suspects, most, seconds) for c in named}
+    scores = {c: _score(c, start, suspects) - STANDING * stands(c, seconds) for c in named}
+    trusted = {c: _trusted(c, start, suspects, most, seconds) for c in named}
     top = max(scores.values())
-    weights = {c: believed[c] * math.exp(max(-60.0, s - top)) for c, s in scores.items()}
+    weights = {c: trusted[c] * math.exp(max(-60.0, s - top)) for c, s in scores.items()}
     total = sum(weights.values())
     out: dict[str, float] = {}
     for c, weight in weights.items():
         key = "+".join(c.effects)
-        out[key] = out.get(key, 0.0) + weight / total * believed[c]
+        out[key] = out.get(key, 0.0) + weight / total * trusted[c]
     out["unlisted"] = max(0.0, 1.0 - sum(out.values()))
     return out
 
 
-def _believed(candidate: Candidate, baseline: Candidate, suspects: list[Block], most: float, seconds: float) -> float:
+def _trusted(candidate: Candidate, baseline: Candidate, suspects: list[Block], most: float, seconds: float) -> float:
     """Probability of a set against ``unlisted``."""
     left = min(max(share_left(candidate, baseline, suspects), 1e-6), 1.0 - 1e-6)
     odds = (math.log((1.0 - left) / left) - (EVEN_PUSH if "external_torque" in candidate.effects else EVEN)) / SOFTNESS
     if explains(candidate, suspects):
         odds = max(odds, 3.0)
-    odds -= max(0.0, candidate.scatter - CONSTANCY) / 0.1
-    if candidate.fit.values.get("muscle_creep.time_constant", 0.0) > UNSEEN * seconds:
-        odds -= 5.0  # what takes that long was not seen to creep
+    return believed(odds - doubt(candidate, seconds), most)
+
+
+def believed(odds: float, most: float) -> float:
+    """Probability of logarithmic odds, at most so much."""
     return most / (1.0 + math.exp(-min(60.0, max(-60.0, odds))))
 
 
-def _stands(candidate: Candidate, seconds: float) -> bool:
+def doubt(candidate: Candidate, seconds: float) -> float:
+    """What a set's values take from the logarithm of its odds: a size that scatters between recordings, creep that was not seen."""
+    unseen = candidate.fit.values.get("muscle_creep.time_constant", 0.0) > UNSEEN * seconds
+    return max(0.0, candidate.scatter - CONSTANCY) / 0.1 + (5.0 if unseen else 0.0)
+
+
+def stands(candidate: Candidate, seconds: float) -> bool:
     """Whether a clock of a set does not drift: two free clocks do, and what is late by the same time always is a lag or a delay."""
     offset, rate = (candidate.fit.values.get(f"clock_skew.{name}", 0.0) for name in ("offset", "rate"))
     return abs(rate) * seconds < abs(offset)

@@ -37,21 +37,27 @@ def where(located: str | None, problem: Problem, groups: list[Group], picture: P
         f"The mismatch lies in the {located} block{parts}: with its neighbours' measured signals as inputs, the refitted "
         f"model still misses {block.channel.replace('_', ' ')} by {found.systematic:.2g} times its noise."
     )
-    if all(g.mismatch is None for g in groups):
+    faint = any(g.faint and g.mismatch is not None and g.mismatch.name == located for g in groups)
+    if faint:
+        text = (
+            f"No block keeps more than its noise, but the residual of the {located} block{parts} has the signature of an effect in it, "
+            "in held-out recordings too."
+        )
+    elif all(g.mismatch is None for g in groups):
         text = (
             f"Every block fits to its noise, but the {located} block only with a parameter far outside its tolerance "
             "(see the warnings)."
         )
-    telling = [c for c in picture.conditions if c["share"] > 1.15 * c["time"]][:2]
+    telling = [] if faint else [c for c in picture.conditions if c["share"] > 1.15 * c["time"]][:2]
     if telling:
         text += " It is largest under: " + "; ".join(c["text"] for c in telling) + "."
-    if picture.intervals:
+    if picture.intervals and not faint:
         text += f" The intervals are those of recording {picture.recording}."
     return {
         "block": located,
         "channel": block.channel,
-        "intervals": picture.intervals,
-        "conditions": picture.conditions[:6],
+        "intervals": [] if faint else picture.intervals,
+        "conditions": [] if faint else picture.conditions[:6],
         "text": text,
         "recording": picture.recording,
     }

@@ -126,7 +126,7 @@ AIR: Final[tuple[EffectInfo, ...]] = (
         "a restricted supply line slows the filling only; a clock that is ahead does so with the valve shut too",
         parameters=(
             Parameter("conductance", _CONDUCTANCE, 1.2e-8, 1e-15, 1.0, (1.2e-8,), "sonic conductance; at 1 no restriction", 1.0),
-            Parameter("tap", "1", 0.0, 0.0, 1.0, (0.0, 1.0), "0: the pressure is read at the muscle, 1 (from 0.5): at the valve"),
+            Parameter("tap", "1", 0.0, 0.0, 1.0, (0.0, 1.0), "0: the pressure is read behind the tube, 1 (from 0.5): at the valve"),
         ),
         reference="ISO 6358-3; Eckersten (1975)",
         rivals=("a smaller valve", "a larger dead volume", "a restricted supply line", "clock_skew"),
