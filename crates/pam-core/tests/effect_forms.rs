@@ -247,7 +247,7 @@ fn force_effects_have_their_size() {
     let started = force(vec![effect("activation_pressure", &[("threshold", 2e4)])]);
     assert!((started - less).abs() < 1e-9 * plain, "{started} {less}");
     let crowded =
-        force(vec![effect("pam_crowding_contact", &[("contact_area", 1e-3), ("onset_contraction", 0.02)])]);
+        force(vec![effect("pam_crowding_contact", &[("contact_area", 1e-3), ("onset_contraction", 0.02), ("exponent", 1.0)])]);
     assert!((crowded - (plain - 6.0 * 1e-3 * 3e5 * (e - 0.02 - 0.0025))).abs() < 1e-6);
     assert_eq!(force(vec![effect("muscle_creep", &[("stiffness", 5e3), ("time_constant", 1.0)])]), plain);
     assert_eq!(
@@ -431,7 +431,7 @@ fn framed(effects: Vec<EffectSpec>, back: bool) -> Vec<f64> {
     let text = r#"{"kind": "frame", "min_length": 0.2, "max_length": 0.28}"#;
     spec.load = Some(serde_json::from_str(text).unwrap());
     let rig = with(spec, effects);
-    let depth = |k: u32| if back { k.min(10) - k.clamp(210, 220) + 210 } else { k.min(10) };
+    let depth = |k: u32| if back { k.min(10) + 210 - k.clamp(210, 220) } else { k.min(10) };
     let length: Vec<f64> = (1..=400).map(|k| 0.27 - 1e-3 * f64::from(depth(k))).collect();
     let start = Initial::rest(&rig).with(&rig, "muscle_pressure", 3e5).unwrap();
     let timing = Timing { sample_time: 0.01, substeps: 5 };

@@ -205,12 +205,12 @@ def _with_std(rig: Rig, candidates: list[Candidate]) -> Rig:
 
 def _probabilities(groups: list[Group]) -> tuple[dict[str, float], dict[str, float]]:
     """Joint probabilities over all hypotheses, and parameters that left their plausible range."""
+    shifted = any(significant(e) for g in groups for e in g.nominal.values())
     quiet = all(g.mismatch is None for g in groups)
     moved = {n: v for g in groups for n, v in g.candidates[0].fit.moved.items()}
     symptoms = {n: v for n, v in moved.items() if abs(v) >= SYMPTOM}
     out: dict[str, float] = {"none": 0.0, "parameters": 0.0, "unlisted": 0.0}
     if quiet:
-        shifted = any(significant(e) for g in groups for e in g.nominal.values())
         if symptoms:
             # everything is explained to its noise, at the price of a parameter that its owner would not have believed
             out["unlisted"] = 0.25
@@ -225,7 +225,7 @@ def _probabilities(groups: list[Group]) -> tuple[dict[str, float], dict[str, flo
         names = [n for n, _ in choice if n]
         apart = [n for k in names for n in k.split("+")]
         weight *= SHARED ** (len(apart) - len(set(apart)))  # one effect seen in two places, not two
-        key = "unlisted" if "unlisted" in names else "+".join(sorted({n for k in names for n in k.split("+")}))
+        key = "unlisted" if "unlisted" in names else "+".join(sorted(set(apart))) or ("parameters" if shifted else "none")
         out[key] = out.get(key, 0.0) + weight
     total = sum(out.values())
     out = {k: p / total for k, p in out.items()}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from pamrs.diagnosis.blocks import Block, Residual
@@ -15,7 +16,7 @@ from pamrs.effects_table import EFFECTS, find_parameter
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 
-__all__ = ["DETECTION_RATIO", "Attempts", "Candidate", "Group", "significant", "start_of"]
+__all__ = ["DETECTION_RATIO", "Attempts", "Candidate", "Group", "significant", "start_of", "without_colour"]
 
 DETECTION_RATIO = 1.45
 """Variance of bin means over the floor's from which a mismatch is taken as real, on recordings that were fitted."""
@@ -70,7 +71,7 @@ class Group:
     candidates : list of Candidate
         The baseline first, then every set of effects tried.
     probabilities : dict of str to float
-        Over the sets (ids joined by ``+``), ``unlisted`` and ``""`` (nothing missing here).
+        Over the sets (ids joined by ``+``), ``unlisted`` and ``""`` (nothing missing here, or parameters that are off).
     mismatch : Block or None
         The block with the largest significant excess after the refit.
     floor : dict
@@ -84,7 +85,8 @@ class Group:
     sought : bool
         Whether one was looked for.
     faint : bool
-        Whether no block keeps an excess, and an effect was found by its signature: ``mismatch`` is then where that signature is.
+        Whether no block keeps an excess, and an effect was found by its signature, or by a parameter that it lets go back:
+        ``mismatch`` (and the only suspect) is then the block in which it acts.
     """
 
     blocks: list[Block]
@@ -128,7 +130,7 @@ class Attempts:
     @property
     def white(self) -> dict[str, float]:
         """Weights of noise without colour."""
-        return dict.fromkeys((b.name for b in self.inner.blocks), 1.0)
+        return without_colour(self.inner.blocks)
 
     @property
     def same(self) -> bool:
@@ -231,6 +233,11 @@ class Attempts:
             return self.judged(effects, best)
         except SimulationError:
             return None  # it leaves the range in which the model holds
+
+
+def without_colour(blocks: Iterable[Block]) -> dict[str, float]:
+    """Weights of blocks whose noise is white."""
+    return dict.fromkeys((b.name for b in blocks), 1.0)
 
 
 def start_of(found: Fit, effect: str) -> Start:

@@ -4,32 +4,58 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from pamrs.diagnosis.blocks import Residual
 from pamrs.diagnosis.candidates import Attempts, Candidate, Group
 from pamrs.diagnosis.evidence import inflation
-from pamrs.diagnosis.fitting import FIT_BIN, Key, Problem, acts_in, fit, residuals, stacked
-from pamrs.diagnosis.screening import by_effect, screen
+from pamrs.diagnosis.fitting import FIT_BIN, Fit, Key, Problem, acts_in, fit, residuals, stacked
+from pamrs.diagnosis.screening import Screen, by_effect, screen
+from pamrs.diagnosis.starts import Start
 from pamrs.diagnosis.weighing import PRICE, STANDING, believed, doubt, stands
 from pamrs.effects_table import EFFECTS
 from pamrs.errors import SimulationError
 
 __all__ = ["faint"]
 
-FAINT, RIVAL, FITTED, AGREES = 45.0, 0.3, 3, 0.05
+FAINT, RIVAL, FITTED, AGREES = 45.0, 0.3, 4, 0.05
 """Gain in chi-square (coloured) from which a signature counts in residuals that are no larger than noise; share of the largest from
 which another effect is its rival, how many are fitted at most, and the share of the gain that held-out recordings have to show."""
 FADED, EVEN, MOST = 0.1, 6.0, 0.93
 """Share of chi-square by which rivals are weighed (their equations are not the true ones), logarithm of the odds of a faint effect that
 nothing speaks against, and how far it is believed."""
+TENSE, ALIKE, RELIEF, RARE = 1.75, 0.8, 3.0, 1.5
+"""Tolerances that a parameter has moved by from which effects that do the same are asked whether they would let it go back, and cosine
+from which they do the same; what of the priors' sum of squares that has to spare; logarithm of the odds of parameters that are off to
+any one effect."""
+
+
+@dataclass(frozen=True)
+class Begun:
+    """Where the fit of a faint effect begins.
+
+    Attributes
+    ----------
+    start : Start
+        The effect.
+    back : dict of str to float
+        Parameters that it stands in for, put back to their nominal values; empty where the residual speaks for the effect.
+    """
+
+    start: Start
+    back: dict[str, float]
 
 
 def faint(trial: Attempts, quiet: Group, acting: list[str], say: Callable[[str], None]) -> Group | None:
-    """An effect whose signature is in residuals that are no larger than noise; None where there is none.
+    """An effect that shows although the refitted baseline leaves no more than noise; None where there is none.
 
     The variance of a residual tells nothing of what is much smaller than the noise, a score test along a known signature does. Noise
     that came in with the drives is coloured and counts by its correlation time. Held-out recordings have to agree.
+
+    Where an effect and a parameter do the same (a lost activation pressure and the zero of the transducer), nothing is left at all;
+    what speaks for the effect is how far the parameter had to leave its nominal value, and the two stay a set.
     """
     if trial.same:
         return None
@@ -40,7 +66,8 @@ def faint(trial: Attempts, quiet: Group, acting: list[str], say: Callable[[str],
     gains = {effect: score.gain for effect, score in best.items()}
     least = max(FAINT, RIVAL * max(gains.values(), default=0.0))
     chosen = [e for e in sorted(gains, key=lambda e: -gains[e]) if gains[e] > least][:FITTED]
-    if not chosen:
+    starts = {e: Begun(best[e].start.scaled(best[e].size), {}) for e in chosen} or _instead(screened, start.fit, trial, colour)
+    if not starts:
         return None
     try:
         # to the last unit of chi-square, or what the baseline still has to gain would count for the effect
@@ -48,31 +75,62 @@ def faint(trial: Attempts, quiet: Group, acting: list[str], say: Callable[[str],
         outside = _chi_square(trial.outer, residuals(trial.outer, finest.rig), colour)
     except SimulationError:
         return None
-    inside = 2.0 * finest.cost
+    inside = _chi_square(trial.inner, finest.residuals, colour)
     names = " and ".join(b.name for b in blocks)
     seconds = max(p.n * p.dt for p in trial.inner.recordings)
-    found: dict[Candidate, float] = {}
-    for effect in chosen:
-        say(f"{names}: no more than noise, with a signature of {effect} in it (chi-square {gains[effect]:.3g})")
-        tried = trial.fitted([best[effect].start.scaled(best[effect].size)], finest, colour, share=0.0)
+    shown: dict[Candidate, float] = {}
+    eased: dict[Candidate, float] = {}
+    for effect, begun in starts.items():
+        why = ", ".join(f"lets {n} go back" for n in begun.back) or f"chi-square {gains[effect]:.3g}"
+        say(f"{names}: no more than noise, with a signature of {effect} in it ({why})")
+        tried = trial.fitted([begun.start], replace(finest, values=finest.values | begun.back), colour, share=0.0)
         if tried is None:
             continue
-        gain = inside - _chi_square(trial.inner, tried.fit.residuals, colour) - sum(m * m for m in tried.fit.moved.values())
+        tried = replace(tried, gain=gains.get(effect, 0.0))
+        within = inside - _chi_square(trial.inner, tried.fit.residuals, colour)
         over = outside - _chi_square(trial.outer, residuals(trial.outer, tried.fit.rig), colour)
+        relief = _strain(finest) - _strain(tried.fit)
+        gain = within + relief
+        price = PRICE * sum(1 for n in tried.fit.values if n.partition(".")[0] in EFFECTS)
+        late = STANDING * stands(tried, seconds)
         if gain > FAINT and over > AGREES * gain:
-            size = sum(1 for n in tried.fit.values if n.partition(".")[0] in EFFECTS)
-            score = 0.5 * FADED * (gain + over - 2.0 * PRICE * size) - STANDING * stands(tried, seconds)
-            found[replace(tried, gain=gains[effect])] = score
-    if not found:
+            shown[tried] = 0.5 * FADED * (gain + over) - FADED * price - late
+        elif begun.back and relief > RELIEF and min(gain, gain + over) > RELIEF:
+            eased[tried] = 0.5 * relief - price - late - RARE
+    if not shown and not eased:
         return None
+    found = shown or eased
     top = max(found, key=lambda c: found[c])
-    weights = {c: math.exp(max(-30.0, score - found[top])) for c, score in found.items()}
-    total = sum(weights.values())
+    # against noise what is faint stands alone, against parameters that may be off what eases them has a rival
+    weights = {c: math.exp(max(-30.0, score - (found[top] if shown else 0.0))) for c, score in found.items()}
+    total = sum(weights.values()) + (0.0 if shown else 1.0)
     probabilities = {c.effects[0]: w / total * believed(EVEN - doubt(c, seconds), MOST) for c, w in weights.items()}
+    if not shown:
+        probabilities[""] = MOST / total
     probabilities["unlisted"] = 1.0 - sum(probabilities.values())
     acts = [b for b in blocks if acts_in(top.effects[0], b)]
     mismatch = max(acts, key=lambda b: quiet.baseline[b.name].ratio - top.fitted[b.name].ratio)
     return replace(quiet, candidates=[start, *found], probabilities=probabilities, mismatch=mismatch, suspects=[mismatch], faint=True)
+
+
+def _instead(screened: Screen, found: Fit, trial: Attempts, colour: dict[str, float]) -> dict[str, Begun]:
+    """Effects that do what a parameter was moved far for."""
+    _, jacobian = stacked(trial.inner, found.residuals, colour)
+    starts: dict[str, Begun] = {}
+    for name, moved in found.moved.items():
+        if abs(moved) < TENSE or jacobian is None:
+            continue
+        done = jacobian[:, list(found.values).index(name)] * found.scales[name] * moved
+        for effect, start, signature in screened.signatures:
+            sizes = float(np.linalg.norm(signature)), float(np.linalg.norm(done))
+            if min(sizes) > 0.0 and start.scalable and float(signature @ done) > ALIKE * math.prod(sizes):
+                starts[effect] = Begun(start.scaled(sizes[1] / sizes[0]), {name: trial.nominal.parameter(name).value})
+    return starts
+
+
+def _strain(found: Fit) -> float:
+    """How far a fit had to leave the nominal values: the sum of squares of its priors."""
+    return sum(m * m for m in found.moved.values())
 
 
 def _chi_square(problem: Problem, found: dict[Key, Residual], colour: dict[str, float]) -> float:

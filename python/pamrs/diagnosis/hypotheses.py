@@ -6,13 +6,13 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from pamrs.diagnosis.blocks import Block, Residual
-from pamrs.diagnosis.candidates import DETECTION_RATIO, Attempts, Candidate, Group, significant, start_of
+from pamrs.diagnosis.candidates import DETECTION_RATIO, Attempts, Candidate, Group, significant, start_of, without_colour
 from pamrs.diagnosis.closure import describe_closure, find_closure
 from pamrs.diagnosis.events import EVENTS
 from pamrs.diagnosis.evidence import Floor, excess, floors, inflation
 from pamrs.diagnosis.faint import faint
-from pamrs.diagnosis.fitting import FIT_BIN, Fit, Key, Problem, acts_in, bin_width, fit, residuals
-from pamrs.diagnosis.screening import Screen, basis_of, by_effect, screen
+from pamrs.diagnosis.fitting import FIT_BIN, Fit, Key, Problem, acts_in, bin_width, fit, residuals, stacked
+from pamrs.diagnosis.screening import Screen, Stand, by_effect, screen, stand_of
 from pamrs.diagnosis.signals import Prepared
 from pamrs.diagnosis.weighing import FORM, explains, most_believed, share_left, weigh
 from pamrs.effects_table import CATALOGUE, EFFECTS
@@ -52,7 +52,7 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
         Receives progress.
     """
     inner, outer = replace(fitted, blocks=blocks), replace(held, blocks=blocks)
-    white = dict.fromkeys((b.name for b in blocks), 1.0)
+    white = without_colour(blocks)
     names = " and ".join(b.name for b in blocks)
     say(f"{names}: refitting the baseline inside its tolerances")
     before = residuals(inner, nominal)
@@ -99,11 +99,10 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
     )
     # what a single effect leaves may be no more than the difference between its equation and the truth: a pair cannot be asked for
     pairs = [] if settled else _pairs(trial, screened, start, singles, lambda text: say(f"{names}: {text}"))
-    steady = [c for c in singles if c.fit.events is None]
-    best = min(steady, key=lambda c: share_left(c, start, suspects), default=start)
-    if happening and not settled and BESIDE < share_left(best, start, suspects) < MAIN:
-        say(f"{names}: looking for what happens beside {best.effects[0]} at times of its own")
-        pairs += [c for e in happening if (c := trial.eventful(e, best)) is not None]
+    for effect, beside in [] if settled else _beside(trial, screened, start, singles, happening):
+        say(f"{names}: looking for {effect} beside {beside.effects[0]}")
+        found = trial.eventful(effect, beside)
+        pairs += [] if found is None else [found]
     candidates = [start, *singles, *pairs]
     most = most_believed(fitted, held, mismatch, now[mismatch.name].rms)
     weighed = weigh(candidates, suspects, most, max(p.n * p.dt for p in inner.recordings))
@@ -128,7 +127,7 @@ def _together(inner: Problem, outer: Problem, nominal: Rig, start: Candidate, fl
     """One baseline inside its tolerances that leaves only noise in fitted and held-out recordings, taken together, if there is one."""
     both = replace(inner, recordings=[*inner.recordings, *outer.recordings])
     try:
-        found = fit(both, nominal, (), {}, dict.fromkeys((b.name for b in inner.blocks), 1.0), warm=start.fit)
+        found = fit(both, nominal, (), {}, without_colour(inner.blocks), warm=start.fit)
     except SimulationError:
         return None
     fitted, held = ({b.name: excess(b, part.recordings, found.residuals, floor) for b in inner.blocks} for part in (inner, outer))
@@ -183,6 +182,29 @@ def _singles(trial: Attempts, screened: Screen, baseline: Fit, say: Callable[[st
     return found
 
 
+def _beside(
+    trial: Attempts, screened: Screen, start: Candidate, singles: list[Candidate], happening: list[str]
+) -> list[tuple[str, Candidate]]:
+    """Effects with times of their own, each with a lasting one that it may have happened beside.
+
+    That is the lasting effect that leaves least, if it leaves much; and the one whose signature is in what the events leave.
+    """
+    steady = [c for c in singles if c.fit.events is None]
+    best = min(steady, key=lambda c: share_left(c, start, trial.suspects), default=start)
+    found = [(e, best) for e in happening] if BESIDE < share_left(best, start, trial.suspects) < MAIN else []
+    own = screened.stand
+    for single in singles:
+        if single.fit.events is None or share_left(single, start, trial.suspects) > MAIN:
+            continue
+        rows, _ = stacked(trial.inner, single.fit.residuals, trial.white)
+        scores = screened.scores(Stand(rows, rows - own.basis @ (own.basis.T @ rows), own.basis))
+        told = [s for s in scores if s.gain > max(LEAST_GAIN, PARTNER * float(own.rows @ own.rows))]
+        partner = next((c for s in told[:1] for c in steady if c.effects == (s.effect,)), None)
+        if partner is not None and (single.effects[0], partner) not in found:
+            found.append((single.effects[0], partner))
+    return found
+
+
 def _untouched(candidate: Candidate, start: Candidate, suspects: list[Block]) -> list[Block]:
     """Blocks in which a set leaves most of what was too much there, in recordings that were fitted or held out."""
     stages = ((start.fitted, candidate.fitted), (start.held_out, candidate.held_out))
@@ -200,12 +222,13 @@ def _pairs(
     lasting = [c for c in singles if c.fit.events is None]
     ranked = sorted(lasting, key=lambda c: sum(c.held_out[b.name].ratio for b in trial.suspects))[:PAIRED]
     white = trial.white
+    mismatch = float(screened.stand.rows @ screened.stand.rows)
     tried: set[frozenset[str]] = set()
     found = []
     for single in ranked:
-        rows, basis = basis_of(single.fit, trial.inner, white)
-        partners = [scores[0] for scores in by_effect(screened.scores(rows, basis, without=single.effects)).values()]
-        least = max(LEAST_GAIN, PARTNER * float(screened.rows @ screened.rows))
+        stand = stand_of(single.fit, trial.inner, white)
+        partners = [scores[0] for scores in by_effect(screened.scores(stand, without=single.effects)).values()]
+        least = max(LEAST_GAIN, PARTNER * mismatch)
         best = [score for score in partners if score.gain > least][:PARTNERS]
         # what one block keeps may be little beside what another one had: an effect of that block alone is asked for by itself
         for block in _untouched(single, start, trial.suspects):

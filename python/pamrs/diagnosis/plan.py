@@ -572,7 +572,7 @@ def _sight(start: Start, left: float, key: Key) -> Sight:
     # one that its bounds hold shows less than that
     whole = math.isclose(start.scaled(0.999 * size).free[leading], found, rel_tol=1e-9)
     smallest = abs(found) if size < LARGEST and not whole else math.nan
-    return Sight(start.effect, left, *key, start.sizes[0], typical, smallest)
+    return Sight(start.effect, left, *key, leading, typical, smallest)
 
 
 def _addition(kind: str, name: str, text: str, now: _Picture, then: _Picture) -> Addition:

@@ -22,7 +22,7 @@ from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 from pamrs.rig_schema import BLOCKS, qualified
 
-__all__ = ["Score", "Screen", "basis_of", "by_effect", "screen"]
+__all__ = ["Score", "Screen", "Stand", "by_effect", "screen", "stand_of"]
 
 Array = NDArray[np.float64]
 MOST = 8.0
@@ -38,7 +38,7 @@ TUBES = (0.6, 3.0)
 LEAST = 0.002
 """Smallest multiple that a fit starts from."""
 FAR, REFINED = 0.3, 3
-"""Multiple of a size below which the signature is taken again at the size that is wanted, and how often at most."""
+"""Multiple of a size below which (and from ``MOST``) the signature is taken again at the size that is wanted, and how often at most."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,44 +67,63 @@ class Score:
 
 
 @dataclass(frozen=True, eq=False)
+class Stand:
+    """Where a fitted model stands, and what its free parameters could still do.
+
+    Attributes
+    ----------
+    rows : (n,) array
+        Stacked residuals.
+    left : (n,) array
+        What of them the free parameters leave, the pull of their priors included: where an effect would let a parameter go back to
+        its nominal value, that counts for the effect.
+    basis : (n, k) array
+        Orthonormal basis of what the free parameters can do, as far as their priors let them.
+    """
+
+    rows: Array
+    left: Array
+    basis: Array
+
+    def power(self, signature: Array) -> float:
+        """Squared length of what the free parameters leave of a signature."""
+        return float(signature @ (signature - self.basis @ (self.basis.T @ signature)))
+
+
+@dataclass(frozen=True, eq=False)
 class Screen:
     """Signatures of effects at a fitted model, to be scored against any residual near to it.
 
     Attributes
     ----------
-    rows : (n,) array
-        Stacked residuals of the model.
-    basis : (n, k) array
-        Orthonormal basis of what its free parameters can do, priors included.
+    stand : Stand
+        The model.
     signatures : list of (effect, start, (n,) array)
         Each effect's, from each of its starts.
     """
 
-    rows: Array
-    basis: Array
+    stand: Stand
     signatures: list[tuple[str, Start, Array]]
 
-    def scores(self, rows: Array | None = None, basis: Array | None = None, *, without: tuple[str, ...] = ()) -> list[Score]:
+    def scores(self, stand: Stand | None = None, *, without: tuple[str, ...] = ()) -> list[Score]:
         """Every start of every effect, the most telling first.
 
         Parameters
         ----------
-        rows, basis : array, optional
-            Residuals and basis of another model than the screen's own (a fitted effect).
+        stand : Stand, optional
+            Another model than the screen's own (a fitted effect).
         without : tuple of str
             Effects to leave out.
         """
-        own = self.rows if rows is None else rows
-        span = self.basis if basis is None else basis
-        left = own - span @ (span.T @ own)
+        own = self.stand if stand is None else stand
         found = []
         for effect, start, signature in self.signatures:
             if effect in without:
                 continue
-            power = float(signature @ (signature - span @ (span.T @ signature)))
+            power = own.power(signature)
             if power < 1e-6:
                 continue
-            along = float(left @ signature)
+            along = float(own.left @ signature)
             size = -along / power
             low = -MOST if start.signed else LEAST
             size = float(np.clip(size, low, MOST)) if start.scalable else 1.0
@@ -121,14 +140,14 @@ def by_effect(scores: list[Score]) -> dict[str, list[Score]]:
     return found
 
 
-def basis_of(fitted: Fit, problem: Problem, inflation: dict[str, float]) -> tuple[Array, Array]:
-    """Stacked residuals of a fit, and an orthonormal basis of what its free parameters can do.
+def stand_of(fitted: Fit, problem: Problem, inflation: dict[str, float]) -> Stand:
+    """Stacked residuals of a fit, and what its free parameters can do.
 
     The priors enter as rows of their own, so that a parameter that its tolerance holds cannot explain anything away.
     """
     rows, jacobian = stacked(problem, fitted.residuals, inflation)
     if jacobian is None or jacobian.shape[1] == 0:
-        return rows, np.zeros((rows.size, 0))
+        return Stand(rows, rows, np.zeros((rows.size, 0)))
     # a parameter at the end of its range cannot go on: what it would explain is left for an effect
     names = [n for n in fitted.values if abs(fitted.moved.get(n, 0.0)) < WIDEST - 1e-3]
     scales = np.array([fitted.scales[name] for name in names])
@@ -139,9 +158,12 @@ def basis_of(fitted: Fit, problem: Problem, inflation: dict[str, float]) -> tupl
     keep = values > 1e-10 * max(float(values[-1]), 1e-300)
     u = scaled @ vectors[:, keep] / np.sqrt(values[keep])
     inner = (vectors[:, keep] * np.sqrt(values[keep])).T
-    shrunk = inner @ np.linalg.solve(inner.T @ inner + np.diag(free) + 1e-12 * np.eye(free.size), inner.T)
+    normal = inner.T @ inner + np.diag(free) + 1e-12 * np.eye(free.size)
+    shrunk = inner @ np.linalg.solve(normal, inner.T)
     weights, turn = np.linalg.eigh(0.5 * (shrunk + shrunk.T))
-    return rows, (u @ turn) * np.sqrt(np.clip(weights, 0.0, 1.0))
+    basis = (u @ turn) * np.sqrt(np.clip(weights, 0.0, 1.0))
+    pull = u @ (inner @ np.linalg.solve(normal, np.array([fitted.moved.get(name, 0.0) for name in names])))
+    return Stand(rows, rows - basis @ (basis.T @ rows) - pull, basis)
 
 
 def screen(problem: Problem, fitted: Fit, effects: list[str], inflation: dict[str, float], *, sealed: bool) -> Screen:
@@ -160,7 +182,7 @@ def screen(problem: Problem, fitted: Fit, effects: list[str], inflation: dict[st
     sealed : bool
         Whether the rig has no valve.
     """
-    rows, basis = basis_of(fitted, problem, inflation)
+    stand = stand_of(fitted, problem, inflation)
     signatures: list[tuple[str, Start, Array]] = []
 
     def try_(start: Start, looks: int = REFINED) -> float:
@@ -172,9 +194,9 @@ def screen(problem: Problem, fitted: Fit, effects: list[str], inflation: dict[st
             except SimulationError:
                 return -math.inf  # this size leaves the range in which the model holds
             moved, _ = stacked(problem, found, inflation)
-            entry = (start.effect, tried, moved - rows)
-            score = max(Screen(rows, basis, [entry]).scores(), key=lambda s: s.gain, default=None)
-            if score is None or score.gain <= 0.0 or not start.scalable or abs(score.size) >= FAR:
+            entry = (start.effect, tried, moved - stand.rows)
+            score = max(Screen(stand, [entry]).scores(), key=lambda s: s.gain, default=None)
+            if score is None or score.gain <= 0.0 or not start.scalable or FAR <= abs(score.size) < MOST:
                 break
             # what a stop or a threshold does is not in proportion to its size: it is looked at where it would be
             tried = tried.scaled(abs(score.size))
@@ -193,7 +215,7 @@ def screen(problem: Problem, fitted: Fit, effects: list[str], inflation: dict[st
         else:
             for start in starts:
                 try_(start)
-    return Screen(rows, basis, signatures)
+    return Screen(stand, signatures)
 
 
 def _placed(starts: list[Start], problem: Problem, rig: Rig) -> list[Start]:

@@ -20,8 +20,9 @@ LOOKS, PRICE, SECOND = 12.0, 0.5, 3.0
 """Independent looks that a block's residual counts for, price of a parameter, price of a further effect."""
 TELLING = 0.5
 """Excess variance, in units of the floor's, from which recordings are asked how much an effect leaves."""
-FORM = 0.04
-"""Share of a mismatch's variance that the difference between a catalogue's equation and the truth may leave."""
+FORM, FINE = 0.04, 0.01
+"""Share of a mismatch's variance that the difference between a catalogue's equation and the truth may leave; share that is granted
+where sets of as many effects are compared, since what a further effect would mend is then no question."""
 DRIFT_SHARE, DRIFT_BELIEVED = 0.02, 0.45
 """Share of the pressure below which a drift that no other recording confirms may as well be the bench's own, and how far a name of it
 is believed at most."""
@@ -70,10 +71,11 @@ def weigh(candidates: list[Candidate], suspects: list[Block], most: float, secon
 
     Between sets: the logarithm of what each leaves of the mismatch, fitted and held out, on a nominal number of independent looks;
     what the form of an equation may leave (``FORM``) is granted to all of them, so that no second effect is asked for to mend the
-    form of the first. Each parameter and each further effect has its price, and a clock that does not drift. Against ``unlisted``:
-    the share of the mismatch that the set explains where it explains least, and whether its size is the same in all recordings; sets
-    that are not believed themselves say nothing against one that is. The constants are those under which the stated probabilities
-    came true in a trial with other seeds than the published one (docs/decisions/0014).
+    form of the first; among sets of as many effects less is granted (``FINE``). Each parameter and each further effect has its price,
+    and a clock that does not drift. Against ``unlisted``: the share of the mismatch that the set explains where it explains least,
+    and whether its size is the same in all recordings; sets that are not believed themselves say nothing against one that is. The
+    constants are those under which the stated probabilities came true in a trial with other seeds than the published one
+    (docs/decisions/0014).
 
     ``seconds`` is the length of the longest recording.
     """
@@ -81,10 +83,19 @@ def weigh(candidates: list[Candidate], suspects: list[Block], most: float, secon
     if not named:
         return {"unlisted": 1.0}
     start = candidates[0]
-    scores = {c: _score(c, start, suspects) - STANDING * stands(c, seconds) for c in named}
     trusted = {c: _trusted(c, start, suspects, most, seconds) for c in named}
-    top = max(scores.values())
-    weights = {c: trusted[c] * math.exp(max(-60.0, s - top)) for c, s in scores.items()}
+
+    def weights_of(granted: float) -> dict[Candidate, float]:
+        scores = {c: _score(c, start, suspects, granted) - STANDING * stands(c, seconds) for c in named}
+        top = max(scores.values())
+        return {c: trusted[c] * math.exp(max(-60.0, s - top)) for c, s in scores.items()}
+
+    coarse, fine = weights_of(FORM), weights_of(FINE)
+    weights: dict[Candidate, float] = {}
+    for count in {len(c.effects) for c in named}:
+        alike = [c for c in named if len(c.effects) == count]
+        share = sum(coarse[c] for c in alike) / sum(fine[c] for c in alike)
+        weights |= {c: share * fine[c] for c in alike}
     total = sum(weights.values())
     out: dict[str, float] = {}
     for c, weight in weights.items():
@@ -120,12 +131,12 @@ def stands(candidate: Candidate, seconds: float) -> bool:
     return abs(rate) * seconds < abs(offset)
 
 
-def _score(candidate: Candidate, baseline: Candidate, suspects: list[Block]) -> float:
-    """Logarithm of the weight of a set of effects, up to a constant."""
+def _score(candidate: Candidate, baseline: Candidate, suspects: list[Block], share: float) -> float:
+    """Logarithm of the weight of a set of effects, up to a constant; ``share`` of the mismatch is granted to the forms of equations."""
     total = 0.0
     for was, now in ((baseline.fitted, candidate.fitted), (baseline.held_out, candidate.held_out)):
         for block in suspects:
-            granted = FORM * max(0.0, was[block.name].ratio - 1.0)
+            granted = share * max(0.0, was[block.name].ratio - 1.0)
             total -= 0.25 * LOOKS * math.log(max(1.0, now[block.name].ratio) + granted)
     size = sum(1 for n in candidate.fit.values if n.partition(".")[0] in EFFECTS and not n.endswith(("_2", "_3")))
     return total - PRICE * size - SECOND * (len(candidate.effects) - 1)

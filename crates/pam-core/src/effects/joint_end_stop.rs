@@ -5,7 +5,7 @@
 //! an upper stop where `side` is positive, a lower one where it is negative. K. H. Hunt & F. R. E. Crossley, "Coefficient of
 //! restitution interpreted as damping in vibroimpact", ASME J. Applied Mechanics 42, 1975.
 
-use super::{beyond, EffectInfo, EffectParameter};
+use super::{beyond, progressive, EffectInfo, EffectParameter};
 use crate::scalar::{constant, Scalar};
 
 /// Table entry.
@@ -28,9 +28,6 @@ const CORNER: f64 = 0.2 * std::f64::consts::PI / 180.0;
 /// Depth at which the stiffness is a secant [rad].
 const SECANT: f64 = 10.0 * std::f64::consts::PI / 180.0;
 
-/// Depth of the softest contact that is told from none [rad]: a logarithm needs one.
-const LEAST: f64 = 1e-12;
-
 /// Torque [N m] at a joint angle and rate.
 #[inline]
 pub fn torque<S: Scalar>(stop: [S; 5], angle: S, rate: S) -> S {
@@ -39,12 +36,7 @@ pub fn torque<S: Scalar>(stop: [S; 5], angle: S, rate: S) -> S {
     let depth = beyond((angle - limit) * sign, CORNER);
     let share = dissipation * rate * sign + 1.0;
     let held = if share.re() > 0.0 { share } else { constant(0.0) };
-    let progress = if depth.re() < LEAST {
-        constant(if exponent.re() > 1.0 { 0.0 } else { 1.0 })
-    } else {
-        ((depth / SECANT).ln() * (exponent - 1.0)).exp()
-    };
-    -(stiffness * depth * progress * held) * sign
+    -(stiffness * progressive(depth, SECANT, exponent) * held) * sign
 }
 
 /// Stiffness at a depth [N m/rad]: the tangent.

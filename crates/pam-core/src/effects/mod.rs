@@ -138,6 +138,19 @@ pub fn beyond<S: Scalar>(x: S, width: f64) -> S {
     }
 }
 
+/// `d (d/d_0)^(n-1)`: what a contact that grows stiffer with its depth `d` is multiplied with, `d` itself at the depth `d_0`.
+#[inline]
+pub fn progressive<S: Scalar>(depth: S, unit: f64, exponent: S) -> S {
+    if depth.re() < SHALLOW {
+        // a logarithm needs a depth: the softest contact is none, but where it is a spring
+        return if exponent.re() > 1.0 { constant(0.0) } else { depth };
+    }
+    depth * ((depth / unit).ln() * (exponent - 1.0)).exp()
+}
+
+/// Depth below which a contact that grows stiffer is none.
+const SHALLOW: f64 = 1e-12;
+
 #[cfg(test)]
 mod tests {
     use super::*;

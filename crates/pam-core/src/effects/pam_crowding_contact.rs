@@ -1,10 +1,12 @@
 //! `pam_crowding_contact`: muscles that swell until they press on their neighbours or on the frame.
 //!
-//! `F = -A p_g max(e - e_c, 0)` for each muscle, `e` the contraction and `e_c` that at which they touch, the corner rounded over 0.005:
-//! what presses sideways is the gas, so that the loss grows with pressure. R. M. Robinson, C. S. Kothera & N. M. Wereley, "Variable
-//! recruitment testing of pneumatic artificial muscles for robotic manipulators", IEEE/ASME Trans. Mechatronics 20, 2015.
+//! `F = -A p_g d (d/d_0)^(n-1)` for each muscle, `d = max(e - e_c, 0)` its contraction beyond that at which they touch, the corner rounded
+//! over 0.005, `d_0` = 0.1: what presses sideways is the gas, so that the loss grows with pressure, and the patch that touches grows with
+//! the depth, so that `n` is 1 where sides meet flat, 1.5 where round ones do (Hertz) and 2 where pointed ones do. R. M. Robinson,
+//! C. S. Kothera & N. M. Wereley, "Variable recruitment testing of pneumatic artificial muscles for robotic manipulators", IEEE/ASME
+//! Trans. Mechatronics 20, 2015.
 
-use super::{beyond, EffectInfo, EffectParameter};
+use super::{beyond, progressive, EffectInfo, EffectParameter};
 use crate::scalar::{constant, Scalar};
 
 /// Table entry.
@@ -15,16 +17,21 @@ pub const INFO: EffectInfo = EffectInfo {
     parameters: &[
         EffectParameter::new("contact_area", "m2"),
         EffectParameter::new("onset_contraction", "1").within(-1.0, 1.0),
+        EffectParameter::new("exponent", "1").within(1.0, 2.0),
     ],
 };
 
 const CORNER: f64 = 0.005;
 
+/// Contraction beyond the onset at which the area is that of a spring.
+const SECANT: f64 = 0.1;
+
 /// Force of one muscle [N] at a gauge pressure [Pa] and a contraction ratio.
 #[inline]
-pub fn force<S: Scalar>(area: S, onset: S, pressure: S, contraction: S) -> S {
+pub fn force<S: Scalar>(contact: [S; 3], pressure: S, contraction: S) -> S {
+    let [area, onset, exponent] = contact;
     let positive = if pressure.re() > 0.0 { pressure } else { constant(0.0) };
-    -(area * positive * beyond(contraction - onset, CORNER))
+    -(area * positive * progressive(beyond(contraction - onset, CORNER), SECANT, exponent))
 }
 
 #[cfg(test)]
@@ -33,9 +40,20 @@ mod tests {
 
     #[test]
     fn it_begins_at_the_onset_and_grows_with_pressure() {
-        assert_eq!(force(1e-3, 0.12, 4e5, 0.1), 0.0);
-        assert!((force(1e-3, 0.12, 4e5, 0.22) + 1e-3 * 4e5 * 0.0975_f64).abs() < 1e-9);
-        assert_eq!(force(1e-3, 0.12, -1e4, 0.2), 0.0);
-        assert_eq!(force(0.0, 0.12, 4e5, 0.2), 0.0);
+        let flat = [1e-3, 0.12, 1.0];
+        assert_eq!(force(flat, 4e5, 0.1), 0.0);
+        assert!((force(flat, 4e5, 0.22) + 1e-3 * 4e5 * 0.0975_f64).abs() < 1e-9);
+        assert_eq!(force(flat, -1e4, 0.2), 0.0);
+        assert_eq!(force([0.0, 0.12, 1.0], 4e5, 0.2), 0.0);
+    }
+
+    #[test]
+    fn round_sides_touch_softly_at_first() {
+        let round = [1e-3, 0.12, 1.5];
+        let depth = |e: f64| e - 0.12 - 0.5 * CORNER;
+        let hertz = |e: f64| -1e-3 * 4e5 * depth(e).powf(1.5) / SECANT.sqrt();
+        assert!((force(round, 4e5, 0.15) - hertz(0.15)).abs() < 1e-9);
+        assert!((force(round, 4e5, 0.25) / hertz(0.25) - 1.0).abs() < 1e-12);
+        assert_eq!(force(round, 4e5, 0.12), 0.0);
     }
 }

@@ -104,8 +104,8 @@ impl<S: Scalar> Plant<'_, S> {
             let rate = -(point.moment_arm * state[self.layout.rate(group.coordinate)]);
             force += muscle_rate_damping::force(damping.map(|id| values[id]), gauge, rate);
         }
-        if let (true, Some([area, onset])) = (here.crowding, units.crowding) {
-            force += pam_crowding_contact::force(values[area], values[onset], gauge, contraction);
+        if let (true, Some(contact)) = (here.crowding, units.crowding) {
+            force += pam_crowding_contact::force(contact.map(|id| values[id]), gauge, contraction);
         }
         force
     }
