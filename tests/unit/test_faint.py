@@ -68,6 +68,23 @@ def test_a_signature_that_held_out_recordings_do_not_share_is_no_effect() -> Non
     assert pamrs.diagnose(case).effects == []
 
 
+def test_a_lost_activation_pressure_and_a_shifted_zero_stay_a_set() -> None:
+    found = pamrs.diagnose(shoulder_case(pamrs.rigs.shoulder().with_effect("activation_pressure", {"threshold": 2400.0})))
+    assert found.verdict == "effects"
+    assert ["activation_pressure"] in found.ambiguity
+    assert ["parameters"] in found.ambiguity
+    assert "sensors.pressure_zero by +2." in found.where["text"]
+    told = found.effects[0]["parameters"]["threshold"]
+    assert abs(told["value"] - 2400.0) < 600.0
+
+
+def test_a_zero_inside_its_tolerance_is_no_effect() -> None:
+    shoulder = pamrs.rigs.shoulder()
+    found = pamrs.diagnose(shoulder_case(shoulder.with_parameters({"sensors.pressure_zero": 900.0})))
+    assert found.verdict in ("none", "parameters")
+    assert found.effects == []
+
+
 def test_a_payload_on_a_cord_is_named_with_its_length() -> None:
     truth = pamrs.rigs.shoulder().with_effect("payload_swing", {"swinging_share": 0.03, "length": 0.23, "damping_ratio": 0.02})
     found = pamrs.diagnose(shoulder_case(truth))

@@ -87,6 +87,8 @@ class Group:
     faint : bool
         Whether no block keeps an excess, and an effect was found by its signature, or by a parameter that it lets go back:
         ``mismatch`` (and the only suspect) is then the block in which it acts.
+    instead : tuple of str
+        Parameters that would have to be far from their nominal values instead of it.
     """
 
     blocks: list[Block]
@@ -101,6 +103,7 @@ class Group:
     form: str = ""
     sought: bool = False
     faint: bool = False
+    instead: tuple[str, ...] = ()
 
     @property
     def best(self) -> Candidate:

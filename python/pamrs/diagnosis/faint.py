@@ -110,7 +110,15 @@ def faint(trial: Attempts, quiet: Group, acting: list[str], say: Callable[[str],
     probabilities["unlisted"] = 1.0 - sum(probabilities.values())
     acts = [b for b in blocks if acts_in(top.effects[0], b)]
     mismatch = max(acts, key=lambda b: quiet.baseline[b.name].ratio - top.fitted[b.name].ratio)
-    return replace(quiet, candidates=[start, *found], probabilities=probabilities, mismatch=mismatch, suspects=[mismatch], faint=True)
+    return replace(
+        quiet,
+        candidates=[start, *found],
+        probabilities=probabilities,
+        mismatch=mismatch,
+        suspects=[mismatch],
+        faint=True,
+        instead=() if shown else tuple(starts[top.effects[0]].back),
+    )
 
 
 def _instead(screened: Screen, found: Fit, trial: Attempts, colour: dict[str, float]) -> dict[str, Begun]:

@@ -37,8 +37,14 @@ def where(located: str | None, problem: Problem, groups: list[Group], picture: P
         f"The mismatch lies in the {located} block{parts}: with its neighbours' measured signals as inputs, the refitted "
         f"model still misses {block.channel.replace('_', ' ')} by {found.systematic:.2g} times its noise."
     )
-    faint = any(g.faint and g.mismatch is not None and g.mismatch.name == located for g in groups)
-    if faint:
+    faint = next((g for g in groups if g.faint and g.mismatch is not None and g.mismatch.name == located), None)
+    if faint is not None and faint.instead:
+        moved = ", ".join(f"{n} by {faint.candidates[0].fit.moved[n]:+.1f} tolerances" for n in faint.instead)
+        text = (
+            f"No block keeps more than its noise, but for that the refit of the {located} block{parts} had to move {moved}, and an "
+            "effect does the same without."
+        )
+    elif faint is not None:
         text = (
             f"No block keeps more than its noise, but the residual of the {located} block{parts} has the signature of an effect in it, "
             "in held-out recordings too."
@@ -48,16 +54,16 @@ def where(located: str | None, problem: Problem, groups: list[Group], picture: P
             f"Every block fits to its noise, but the {located} block only with a parameter far outside its tolerance "
             "(see the warnings)."
         )
-    telling = [] if faint else [c for c in picture.conditions if c["share"] > 1.15 * c["time"]][:2]
+    telling = [] if faint is not None else [c for c in picture.conditions if c["share"] > 1.15 * c["time"]][:2]
     if telling:
         text += " It is largest under: " + "; ".join(c["text"] for c in telling) + "."
-    if picture.intervals and not faint:
+    if picture.intervals and faint is None:
         text += f" The intervals are those of recording {picture.recording}."
     return {
         "block": located,
         "channel": block.channel,
-        "intervals": [] if faint else picture.intervals,
-        "conditions": [] if faint else picture.conditions[:6],
+        "intervals": [] if faint is not None else picture.intervals,
+        "conditions": [] if faint is not None else picture.conditions[:6],
         "text": text,
         "recording": picture.recording,
     }
@@ -73,7 +79,7 @@ def verdict(diagnosis: Diagnosis, named: list[str], case: Case, gap: float | Non
         moved = ", ".join(f"{n} by {p['moved_sigmas']:+.1f} tolerances" for n, p in shifted)
         return (
             "No physics is missing that these recordings could show, but parameters differ from the nominal ones: with values "
-            f"inside their tolerances the model predicts every block to its noise. Moved most: {moved}."
+            f"inside their tolerances the model predicts every block to its noise. Moved most: {moved}." + _unsettled(diagnosis)
         )
     place = diagnosis.where["text"]
     if kind == "unlisted":
@@ -99,10 +105,13 @@ def verdict(diagnosis: Diagnosis, named: list[str], case: Case, gap: float | Non
             " The chamber's volume is not known: what the recording fixes is the time constant (and the conductance per volume); "
             "the conductance itself holds for the placeholder volume of the rig file only."
         )
-    if diagnosis.ambiguity:
-        sets = " or ".join("{" + ", ".join(s) + "}" for s in diagnosis.ambiguity)
-        text += f" It is not settled: these data do not separate {sets}."
-    return text
+    return text + _unsettled(diagnosis)
+
+
+def _unsettled(diagnosis: Diagnosis) -> str:
+    """The sets that are left, as a sentence; empty where the answer is settled."""
+    sets = " or ".join("{" + ", ".join(s) + "}" for s in diagnosis.ambiguity)
+    return f" It is not settled: these data do not separate {sets}." if sets else ""
 
 
 _SEPARATE = {
