@@ -23,6 +23,8 @@ __all__ = ["examine", "fits"]
 
 HELD_RATIO, HINT = 2.0, 1.15
 """As ``DETECTION_RATIO``, on recordings that were held out, where the fitted ones give a hint of it."""
+MARGINAL, NOTHING = 1.6, 0.6
+"""Variance over the floor's up to which a mismatch that no effect explains may be none, and the probability that it is."""
 LIKELY, CARRIES = 0.3, 0.8
 """Probability of ``unlisted`` from which a form of what is missing is looked for, and the share of the mismatch that it may leave."""
 BESIDE, MAIN = 0.08, 0.5
@@ -86,7 +88,9 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
         return faint(Attempts(inner, outer, nominal, floor, out, blocks), nothing, lasting, say) or nothing
     mismatch = max(suspects, key=lambda b: out[b.name].ratio + now[b.name].ratio)
     say(f"{names}: {mismatch.name} keeps {now[mismatch.name].systematic:.2g} noise units after the refit")
-    happening = [e for e in acting if e in EVENTS]
+    # so little may as well be a floor that was taken too low, which events of free times would always mend
+    marginal = all(max(now[b.name].ratio, out[b.name].ratio) < MARGINAL for b in suspects)
+    happening = [] if marginal else [e for e in acting if e in EVENTS]
     acting = [e for e in acting if e not in EVENTS]
     trial = Attempts(inner, outer, nominal, floor, out, suspects)
     screened = screen(inner, baseline, acting, white, sealed=nominal.model["valve"] is None)
@@ -95,7 +99,7 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
         say(f"{names}: looking for what happens at times of its own ({', '.join(happening)})")
         singles += [c for e in happening if (c := trial.eventful(e, start)) is not None]
     settled = any(
-        explains(c, suspects) or (share_left(c, start, suspects) < FORM and not _untouched(c, start, suspects)) for c in singles
+        explains(c, start, suspects) or (share_left(c, start, suspects) < FORM and not _untouched(c, start, suspects)) for c in singles
     )
     # what a single effect leaves may be no more than the difference between its equation and the truth: a pair cannot be asked for
     pairs = [] if settled else _pairs(trial, screened, start, singles, lambda text: say(f"{names}: {text}"))
@@ -106,6 +110,8 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
     candidates = [start, *singles, *pairs]
     most = most_believed(fitted, held, mismatch, now[mismatch.name].rms)
     weighed = weigh(candidates, suspects, most, max(p.n * p.dt for p in inner.recordings))
+    if marginal:
+        weighed |= {"": NOTHING * weighed["unlisted"], "unlisted": (1.0 - NOTHING) * weighed["unlisted"]}
     group = Group(blocks, was, now, candidates, weighed, mismatch, floor, suspects)
     if weighed["unlisted"] < LIKELY or len({b.kind for b in suspects}) < len(suspects):
         return group  # of two chambers one form would have to serve both

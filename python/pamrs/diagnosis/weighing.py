@@ -8,6 +8,7 @@ import numpy as np
 
 from pamrs.diagnosis.blocks import Block
 from pamrs.diagnosis.candidates import DETECTION_RATIO, Candidate
+from pamrs.diagnosis.evidence import Excess
 from pamrs.diagnosis.fitting import Problem
 from pamrs.effects_table import EFFECTS
 
@@ -20,6 +21,8 @@ LOOKS, PRICE, SECOND = 12.0, 0.5, 3.0
 """Independent looks that a block's residual counts for, price of a parameter, price of a further effect."""
 TELLING = 0.5
 """Excess variance, in units of the floor's, from which recordings are asked how much an effect leaves."""
+CLEARLY = 0.7
+"""Share left of a mismatch that is hardly one below which a set still explains it."""
 FORM, FINE = 0.04, 0.01
 """Share of a mismatch's variance that the difference between a catalogue's equation and the truth may leave; share that is granted
 where sets of as many effects are compared, since what a further effect would mend is then no question."""
@@ -52,18 +55,28 @@ def share_left(candidate: Candidate, baseline: Candidate, suspects: list[Block])
     Recordings that hardly show the mismatch cannot say how much of it is left; what an effect brings into them, beyond what noise
     may, counts beside the mismatch of the others.
     """
-    found = []
-    for was, now in ((baseline.fitted, candidate.fitted), (baseline.held_out, candidate.held_out)):
-        found.append(tuple(sum(max(0.0, e[b.name].ratio - 1.0) for b in suspects) for e in (was, now)))
+    found = _excesses(candidate, baseline, suspects)
     most = max(before for before, _ in found)
-    shares = [after / before for before, after in found if before > TELLING]
-    shares += [(after - TELLING) / max(most, TELLING) for before, after in found if before <= TELLING < after]
+    asked = min(TELLING, 0.9 * most)
+    shares = [after / before for before, after in found if before > asked]
+    shares += [(after - TELLING) / max(most, TELLING) for before, after in found if before <= asked and after > TELLING]
     return max(shares, default=1.0)
 
 
-def explains(candidate: Candidate, suspects: list[Block]) -> bool:
-    """Whether only noise is left, fitted and held out."""
-    return all(e[b.name].ratio < DETECTION_RATIO for b in suspects for e in (candidate.fitted, candidate.held_out))
+def _excesses(candidate: Candidate, baseline: Candidate, suspects: list[Block]) -> list[tuple[float, float]]:
+    """Excess variance that the baseline and a set leave, on fitted and on held-out recordings."""
+
+    def over(found: dict[str, Excess]) -> float:
+        return sum(max(0.0, found[b.name].ratio - 1.0) for b in suspects)
+
+    return [(over(baseline.fitted), over(candidate.fitted)), (over(baseline.held_out), over(candidate.held_out))]
+
+
+def explains(candidate: Candidate, baseline: Candidate, suspects: list[Block]) -> bool:
+    """Whether only noise is left, fitted and held out, where there was clearly more."""
+    quiet = all(e[b.name].ratio < DETECTION_RATIO for b in suspects for e in (candidate.fitted, candidate.held_out))
+    before, after = max(_excesses(candidate, baseline, suspects))
+    return quiet and after < CLEARLY * before
 
 
 def weigh(candidates: list[Candidate], suspects: list[Block], most: float, seconds: float) -> dict[str, float]:
@@ -109,7 +122,7 @@ def _trusted(candidate: Candidate, baseline: Candidate, suspects: list[Block], m
     """Probability of a set against ``unlisted``."""
     left = min(max(share_left(candidate, baseline, suspects), 1e-6), 1.0 - 1e-6)
     odds = (math.log((1.0 - left) / left) - (EVEN_PUSH if "external_torque" in candidate.effects else EVEN)) / SOFTNESS
-    if explains(candidate, suspects):
+    if explains(candidate, baseline, suspects):
         odds = max(odds, 3.0)
     return believed(odds - doubt(candidate, seconds), most)
 
