@@ -117,6 +117,22 @@ def test_a_set_that_explains_nothing_says_nothing_against_one_that_does() -> Non
     assert abs(both["leak_muscle"] - alone["leak_muscle"]) < 0.01
 
 
+def test_a_smaller_rest_tells_among_single_effects_and_asks_for_no_second() -> None:
+    rough = candidate(("joint_end_stop",), 0.35, **{"joint_end_stop.stiffness": 100.0})
+    close = candidate(("pam_crowding_contact",), 0.02, **{"pam_crowding_contact.contact_area": 1e-3})
+    assert weighed(rough, close)["pam_crowding_contact"] > 0.75
+    both = candidate(("joint_end_stop", "payload_swing"), 0.02, **{"joint_end_stop.stiffness": 100.0, "payload_swing.length": 0.2})
+    assert weighed(rough, both)["joint_end_stop"] > 0.75
+
+
+def test_what_explains_a_mismatch_has_to_take_most_of_it() -> None:
+    hardly = candidate((), 0.48)
+    little = candidate(("joint_end_stop",), 0.43, **{"joint_end_stop.stiffness": 100.0})
+    most = candidate(("joint_end_stop",), 0.05, **{"joint_end_stop.stiffness": 100.0})
+    assert weighed(little, start=hardly)["joint_end_stop"] < 0.2
+    assert weighed(most, start=hardly)["joint_end_stop"] > 0.9
+
+
 def test_a_clock_that_does_not_drift_gives_way_to_a_lag() -> None:
     lag = candidate(("input_path_lag",), 0.05, **{"input_path_lag.delay": 3e-3, "input_path_lag.time_constant": 1e-4})
     still = candidate(("clock_skew",), 0.0, **{"clock_skew.offset": 3e-3, "clock_skew.rate": 1e-6})

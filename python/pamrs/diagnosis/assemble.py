@@ -178,9 +178,10 @@ def _hypotheses(groups: list[Group], probabilities: dict[str, float], nominal: R
 
 
 def _named(group: Group) -> bool:
-    return group.mismatch is not None and group.probabilities.get("unlisted", 0.0) < max(
-        (p for k, p in group.probabilities.items() if k != "unlisted"), default=0.0
-    )
+    """Whether an effect is the most probable answer of a group."""
+    odds = group.probabilities
+    named = max((p for k, p in odds.items() if k not in ("", "unlisted")), default=0.0)
+    return group.mismatch is not None and named > max(odds.get("", 0.0), odds.get("unlisted", 0.0))
 
 
 def _merged(nominal: Rig, candidates: list[Candidate]) -> Rig:
@@ -205,7 +206,7 @@ def _with_std(rig: Rig, candidates: list[Candidate]) -> Rig:
 
 def _probabilities(groups: list[Group]) -> tuple[dict[str, float], dict[str, float]]:
     """Joint probabilities over all hypotheses, and parameters that left their plausible range."""
-    shifted = any(significant(e) for g in groups for e in g.nominal.values())
+    shifted = any(g.instead or any(significant(e) for e in g.nominal.values()) for g in groups)
     quiet = all(g.mismatch is None for g in groups)
     moved = {n: v for g in groups for n, v in g.candidates[0].fit.moved.items()}
     symptoms = {n: v for n, v in moved.items() if abs(v) >= SYMPTOM}

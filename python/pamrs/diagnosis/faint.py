@@ -1,4 +1,4 @@
-"""Effects whose signature is in residuals that are no larger than noise."""
+"""Effects that show although only noise is left: by a signature that is smaller, or by a parameter that had to move far instead."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ nothing speaks against, and how far it is believed."""
 TENSE, ALIKE, RELIEF, RARE = 1.75, 0.8, 3.0, 1.5
 """Tolerances that a parameter has moved by from which effects that do the same are asked whether they would let it go back, and cosine
 from which they do the same; what of the priors' sum of squares that has to spare; logarithm of the odds of parameters that are off to
-any one effect."""
+all effects that do the same."""
 
 
 @dataclass(frozen=True)
@@ -81,8 +81,8 @@ def faint(trial: Attempts, quiet: Group, acting: list[str], say: Callable[[str],
     shown: dict[Candidate, float] = {}
     eased: dict[Candidate, float] = {}
     for effect, begun in starts.items():
-        why = ", ".join(f"lets {n} go back" for n in begun.back) or f"chi-square {gains[effect]:.3g}"
-        say(f"{names}: no more than noise, with a signature of {effect} in it ({why})")
+        why = ", ".join(f"{n} moved far where {effect} does the same" for n in begun.back)
+        say(f"{names}: no more than noise, " + (why or f"with a signature of {effect} in it (chi-square {gains[effect]:.3g})"))
         tried = trial.fitted([begun.start], replace(finest, values=finest.values | begun.back), colour, share=0.0)
         if tried is None:
             continue
@@ -96,13 +96,15 @@ def faint(trial: Attempts, quiet: Group, acting: list[str], say: Callable[[str],
         if gain > FAINT and over > AGREES * gain:
             shown[tried] = 0.5 * FADED * (gain + over) - FADED * price - late
         elif begun.back and relief > RELIEF and min(gain, gain + over) > RELIEF:
-            eased[tried] = 0.5 * relief - price - late - RARE
+            eased[tried] = 0.5 * min(relief, gain, gain + over) - price - late - RARE
     if not shown and not eased:
         return None
     found = shown or eased
     top = max(found, key=lambda c: found[c])
     # against noise what is faint stands alone, against parameters that may be off what eases them has a rival
-    weights = {c: math.exp(max(-30.0, score - (found[top] if shown else 0.0))) for c, score in found.items()}
+    weights = {
+        c: math.exp(max(-30.0, score - (found[top] if shown else 0.0))) / (1 if shown else len(found)) for c, score in found.items()
+    }
     total = sum(weights.values()) + (0.0 if shown else 1.0)
     probabilities = {c.effects[0]: w / total * believed(EVEN - doubt(c, seconds), MOST) for c, w in weights.items()}
     if not shown:
@@ -124,16 +126,22 @@ def faint(trial: Attempts, quiet: Group, acting: list[str], say: Callable[[str],
 def _instead(screened: Screen, found: Fit, trial: Attempts, colour: dict[str, float]) -> dict[str, Begun]:
     """Effects that do what a parameter was moved far for."""
     _, jacobian = stacked(trial.inner, found.residuals, colour)
-    starts: dict[str, Begun] = {}
+    best: dict[str, tuple[float, Begun]] = {}
     for name, moved in found.moved.items():
         if abs(moved) < TENSE or jacobian is None:
             continue
         done = jacobian[:, list(found.values).index(name)] * found.scales[name] * moved
         for effect, start, signature in screened.signatures:
             sizes = float(np.linalg.norm(signature)), float(np.linalg.norm(done))
-            if min(sizes) > 0.0 and start.scalable and float(signature @ done) > ALIKE * math.prod(sizes):
-                starts[effect] = Begun(start.scaled(sizes[1] / sizes[0]), {name: trial.nominal.parameter(name).value})
-    return starts
+            if min(sizes) == 0.0 or not start.scalable:
+                continue
+            cosine = float(signature @ done) / math.prod(sizes)
+            match = abs(cosine) if start.signed else cosine
+            if match > max(ALIKE, best[effect][0] if effect in best else 0.0):
+                size = math.copysign(sizes[1] / sizes[0], cosine)
+                best[effect] = match, Begun(start.scaled(size), {name: trial.nominal.parameter(name).value})
+    nearest = sorted(best, key=lambda e: -best[e][0])[:FITTED]
+    return {effect: best[effect][1] for effect in nearest}
 
 
 def _strain(found: Fit) -> float:

@@ -11,8 +11,8 @@ from pamrs.diagnosis.closure import describe_closure, find_closure
 from pamrs.diagnosis.events import EVENTS
 from pamrs.diagnosis.evidence import Floor, excess, floors, inflation
 from pamrs.diagnosis.faint import faint
-from pamrs.diagnosis.fitting import FIT_BIN, Fit, Key, Problem, acts_in, bin_width, fit, residuals, stacked
-from pamrs.diagnosis.screening import Screen, Stand, by_effect, screen, stand_of
+from pamrs.diagnosis.fitting import FIT_BIN, Fit, Key, Problem, acts_in, bin_width, fit, residuals
+from pamrs.diagnosis.screening import Screen, by_effect, screen, stand_of
 from pamrs.diagnosis.signals import Prepared
 from pamrs.diagnosis.weighing import FORM, explains, most_believed, share_left, weigh
 from pamrs.effects_table import CATALOGUE, EFFECTS
@@ -193,19 +193,22 @@ def _beside(
 ) -> list[tuple[str, Candidate]]:
     """Effects with times of their own, each with a lasting one that it may have happened beside.
 
-    That is the lasting effect that leaves least, if it leaves much; and the one whose signature is in what the events leave.
+    That is the lasting effect that leaves least, if it leaves much; and, of those that were fitted, the one whose signature
+    is in what the events leave.
     """
     steady = [c for c in singles if c.fit.events is None]
     best = min(steady, key=lambda c: share_left(c, start, trial.suspects), default=start)
     found = [(e, best) for e in happening] if BESIDE < share_left(best, start, trial.suspects) < MAIN else []
-    own = screened.stand
+    mismatch = float(screened.stand.rows @ screened.stand.rows)
     for single in singles:
         if single.fit.events is None or share_left(single, start, trial.suspects) > MAIN:
             continue
-        rows, _ = stacked(trial.inner, single.fit.residuals, trial.white)
-        scores = screened.scores(Stand(rows, rows - own.basis @ (own.basis.T @ rows), own.basis))
-        told = [s for s in scores if s.gain > max(LEAST_GAIN, PARTNER * float(own.rows @ own.rows))]
-        partner = next((c for s in told[:1] for c in steady if c.effects == (s.effect,)), None)
+        # what the baseline can do is taken as without the events
+        kept = start.fit.residuals
+        left = {key: replace(r, jacobian=kept[key].jacobian) for key, r in single.fit.residuals.items()}
+        beside = replace(start.fit, residuals=left, moved=single.fit.moved)
+        told = [s for s in screened.scores(stand_of(beside, trial.inner, trial.white)) if s.gain > max(LEAST_GAIN, PARTNER * mismatch)]
+        partner = next((c for s in told for c in steady if c.effects == (s.effect,)), None)
         if partner is not None and (single.effects[0], partner) not in found:
             found.append((single.effects[0], partner))
     return found

@@ -78,7 +78,7 @@ class Stand:
         What of them the free parameters leave, the pull of their priors included: where an effect would let a parameter go back to
         its nominal value, that counts for the effect.
     basis : (n, k) array
-        Orthonormal basis of what the free parameters can do, as far as their priors let them.
+        Basis of what the free parameters can do, each column as long as the priors let it: its product with its transpose projects.
     """
 
     rows: Array
@@ -187,20 +187,24 @@ def screen(problem: Problem, fitted: Fit, effects: list[str], inflation: dict[st
 
     def try_(start: Start, looks: int = REFINED) -> float:
         """Add the signature of a start; what it would bring."""
-        tried = start
+        tried, entry, score = start, None, None
         for _ in range(looks):
             try:
                 found = changes(problem, tried.applied(fitted.rig), fitted.residuals, start.effect)
             except SimulationError:
-                return -math.inf  # this size leaves the range in which the model holds
+                break  # this size leaves the range in which the model holds
             moved, _ = stacked(problem, found, inflation)
             entry = (start.effect, tried, moved - stand.rows)
             score = max(Screen(stand, [entry]).scores(), key=lambda s: s.gain, default=None)
             if score is None or score.gain <= 0.0 or not start.scalable or FAR <= abs(score.size) < MOST:
                 break
             # what a stop or a threshold does is not in proportion to its size: it is looked at where it would be
-            tried = tried.scaled(abs(score.size))
-        signatures.append(entry)
+            wanted = tried.scaled(abs(score.size))
+            if wanted == tried:
+                break  # its bounds hold it
+            tried = wanted
+        if entry is not None:
+            signatures.append(entry)
         return -math.inf if score is None else score.gain
 
     for effect in effects:

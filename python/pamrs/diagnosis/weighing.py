@@ -20,7 +20,7 @@ take up a good part of anything, need more), and its width."""
 LOOKS, PRICE, SECOND = 12.0, 0.5, 3.0
 """Independent looks that a block's residual counts for, price of a parameter, price of a further effect."""
 TELLING = 0.5
-"""Excess variance, in units of the floor's, from which recordings are asked how much an effect leaves."""
+"""Excess variance, in units of the floor's, from which recordings are asked how much an effect leaves; those with most always are."""
 CLEARLY = 0.7
 """Share left of a mismatch that is hardly one below which a set still explains it."""
 FORM, FINE = 0.04, 0.01

@@ -25,6 +25,10 @@ def unknown_volumes(rig: Rig) -> list[str]:
     return [name for name in names if not rig.parameter(name).known]
 
 
+_DOUBTED = 0.1
+"""Probability of no mismatch from which the words say so."""
+
+
 def where(located: str | None, problem: Problem, groups: list[Group], picture: Picture) -> dict[str, Any]:
     """The ``where`` entry: block, channel, intervals, conditions and a sentence."""
     if located is None:
@@ -43,6 +47,11 @@ def where(located: str | None, problem: Problem, groups: list[Group], picture: P
         text = (
             f"No block keeps more than its noise, but for that the refit of the {located} block{parts} had to move {moved}, and an "
             "effect does the same without."
+        )
+    elif faint is None and any(g.probabilities.get("", 0.0) > _DOUBTED for g in groups if g.mismatch and g.mismatch.name == located):
+        text = (
+            f"The {located} block{parts} keeps hardly more than its noise ({found.systematic:.2g} times it in "
+            f"{block.channel.replace('_', ' ')}): its floor may as well have been taken too low."
         )
     elif faint is not None:
         text = (
@@ -73,7 +82,9 @@ def verdict(diagnosis: Diagnosis, named: list[str], case: Case, gap: float | Non
     """The verdict in a few sentences; ``forms`` say what a mismatch without a name is a function of, if that was ``sought``."""
     kind = diagnosis.verdict
     if kind == "none":
-        return "Nothing is missing that these recordings could show: the nominal model predicts every block to its noise."
+        return "Nothing is missing that these recordings could show: the nominal model predicts every block to its noise." + _unsettled(
+            diagnosis
+        )
     if kind == "parameters":
         shifted = sorted(diagnosis.parameters.items(), key=lambda kv: -abs(kv[1]["moved_sigmas"]))[:3]
         moved = ", ".join(f"{n} by {p['moved_sigmas']:+.1f} tolerances" for n, p in shifted)
@@ -138,6 +149,10 @@ _SEPARATE = {
 }
 
 
+def _sentence(text: str) -> str:
+    return text[:1].upper() + text[1:] + "."
+
+
 def next_experiment(kind: str, probabilities: dict[str, float], ambiguity: list[list[str]], rig: Rig) -> dict[str, Any]:
     """What to record next: the experiment that separates the leading hypotheses.
 
@@ -147,6 +162,9 @@ def next_experiment(kind: str, probabilities: dict[str, float], ambiguity: list[
     if not ambiguity and kind != "unlisted":
         text = "The question is settled by these recordings; nothing further is needed."
         return {"text": text, "excitation": {}, "expected_information_bits": 0.0}
+    doubted = [k for s in ambiguity for k in s if k in EFFECTS and k not in _SEPARATE]
+    if ["parameters"] in ambiguity and doubted:
+        return {"text": _sentence(EFFECTS[doubted[0]].separates), "excitation": {}, "expected_information_bits": None}
     key = next((k for s in [leading.split("+"), *ambiguity] for k in s if k in _SEPARATE), "unlisted")
     text, excitation = _SEPARATE[key]
     if not (rig.tables("valve") or rig.tables("muscle")):

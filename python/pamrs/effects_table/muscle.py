@@ -68,7 +68,7 @@ MUSCLE: Final[tuple[EffectInfo, ...]] = (
         fingerprint="no motion up to a pressure, then as modelled with the pressure shifted",
         separates="a constant torque shifts each angle by another pressure, clearest with another payload or co-contraction; "
         "errors of the zeros show when vented, at a known angle",
-        parameters=(Parameter("threshold", "Pa", 2e4, 0.0, 1e7, (2e3, 2e4), "gauge pressure that is lost", 0.0),),
+        parameters=(Parameter("threshold", "Pa", 2e4, 0.0, 1e7, (1e4, 5e4), "gauge pressure that is lost", 0.0),),
         reference="Tsagarakis & Caldwell (2000); Hocking & Wereley (2013)",
         rivals=("a constant torque", "a pressure zero that is off", "an angle zero that is off"),
     ),
