@@ -296,6 +296,7 @@ def _effects(groups: list[Group], probabilities: dict[str, float], model: Rig | 
                 "id": effect,
                 "name": EFFECTS[effect].name,
                 "probability": min(1.0, p),
+                "inclusion": max((g.inclusion[effect] for g in groups if effect in g.inclusion), default=None),
                 "parameters": _effect_parameters(effect, best),
                 "events": _events(effect, best),
             }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from pamrs.diagnosis.blocks import Block, Residual
 from pamrs.diagnosis.events import fit_events, look_for_events
@@ -89,6 +89,8 @@ class Group:
         ``mismatch`` (and the only suspect) is then the block in which it acts.
     instead : tuple of str
         Parameters that would have to be far from their nominal values instead of it.
+    inclusion : dict of str to float
+        Share of resampled recordings in which the screen would have taken each lasting effect.
     """
 
     blocks: list[Block]
@@ -104,6 +106,7 @@ class Group:
     sought: bool = False
     faint: bool = False
     instead: tuple[str, ...] = ()
+    inclusion: dict[str, float] = field(default_factory=dict)
 
     @property
     def best(self) -> Candidate:

@@ -12,6 +12,7 @@ from pamrs.diagnosis.blocks import Residual
 from pamrs.diagnosis.candidates import Attempts, Candidate, Group
 from pamrs.diagnosis.evidence import inflation
 from pamrs.diagnosis.fitting import FIT_BIN, Fit, Key, Problem, acts_in, fit, residuals, stacked
+from pamrs.diagnosis.resampling import inclusion
 from pamrs.diagnosis.screening import Screen, by_effect, screen
 from pamrs.diagnosis.starts import Start
 from pamrs.diagnosis.weighing import PRICE, STANDING, believed, doubt, stands
@@ -120,6 +121,7 @@ def faint(trial: Attempts, quiet: Group, acting: list[str], say: Callable[[str],
         suspects=[mismatch],
         faint=True,
         instead=() if shown else tuple(starts[top.effects[0]].back),
+        inclusion=inclusion(screened, FAINT, 1.0) if shown else {},
     )
 
 

@@ -12,6 +12,7 @@ from pamrs.diagnosis.events import EVENTS
 from pamrs.diagnosis.evidence import Floor, excess, floors, inflation
 from pamrs.diagnosis.faint import faint
 from pamrs.diagnosis.fitting import FIT_BIN, Fit, Key, Problem, acts_in, bin_width, fit, residuals
+from pamrs.diagnosis.resampling import inclusion
 from pamrs.diagnosis.screening import Screen, by_effect, screen, stand_of
 from pamrs.diagnosis.signals import Prepared
 from pamrs.diagnosis.weighing import FORM, explains, most_believed, share_left, weigh
@@ -112,7 +113,8 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
     weighed = weigh(candidates, suspects, most, max(p.n * p.dt for p in inner.recordings))
     if marginal:
         weighed |= {"": NOTHING * weighed["unlisted"], "unlisted": (1.0 - NOTHING) * weighed["unlisted"]}
-    group = Group(blocks, was, now, candidates, weighed, mismatch, floor, suspects)
+    often = inclusion(screened, LEAST_GAIN, PARTNER)
+    group = Group(blocks, was, now, candidates, weighed, mismatch, floor, suspects, inclusion=often)
     if weighed["unlisted"] < LIKELY or len({b.kind for b in suspects}) < len(suspects):
         return group  # of two chambers one form would have to serve both
     group = replace(group, sought=True)

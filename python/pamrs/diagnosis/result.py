@@ -146,7 +146,8 @@ class Diagnosis:
     effects : list of dict
         ``id``, ``probability``, optional ``name`` (in words), ``parameters``
         {name: {value, std, unit, interval?, identifiable?}}, most probable first; SI, 95 % intervals; optional ``events``, what
-        happened in single recordings (``recording``, ``time`` and the effect's other parameters, SI).
+        happened in single recordings (``recording``, ``time`` and the effect's other parameters, SI), and ``inclusion``, the share of
+        resampled recordings in which the screen would have taken the effect.
     ambiguity : list of list of str
         Sets of effects that the data cannot separate; empty when settled.
     probabilities : dict
@@ -236,6 +237,7 @@ class Diagnosis:
                 {
                     "id": str(effect["id"]),
                     "probability": _plain(effect.get("probability")),
+                    **({"inclusion": _plain(effect["inclusion"])} if effect.get("inclusion") is not None else {}),
                     "parameters": {
                         str(name): _pick(p, ("value", "std", "unit"), ("interval", "identifiable"))
                         for name, p in (effect.get("parameters") or {}).items()

@@ -22,7 +22,7 @@ from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 from pamrs.rig_schema import BLOCKS, qualified
 
-__all__ = ["Score", "Screen", "Stand", "by_effect", "screen", "stand_of"]
+__all__ = ["Score", "Screen", "Stand", "best_size", "by_effect", "screen", "stand_of"]
 
 Array = NDArray[np.float64]
 MOST = 8.0
@@ -35,6 +35,8 @@ CORDS, BROAD = (0.06, 1.5, 14), 0.08
 """Shortest and longest cord [m] of a swinging payload that are tried, how many, and the damping ratio that they are tried with."""
 TUBES = (0.6, 3.0)
 """Parts of the valve's conductance at which a tube is tried."""
+INVISIBLE = 1e-6
+"""Squared length [units of noise] of a signature below which it is none."""
 LEAST = 0.002
 """Smallest multiple that a fit starts from."""
 FAR, REFINED = 0.3, 3
@@ -77,12 +79,19 @@ class Stand:
     left : (n,) array
         What of them the free parameters leave, the pull of their priors included: where an effect would let a parameter go back to
         its nominal value, that counts for the effect.
+    jacobian : (n, k) array
+        Change of the rows with each free parameter that is not at the end of its range, in tolerances or its own scale.
+    moved, free : (k,) array
+        How far each is from its nominal value, and 1 where a prior holds it, 0 where none does.
     basis : (n, k) array
         Basis of what the free parameters can do, each column as long as the priors let it: its product with its transpose projects.
     """
 
     rows: Array
     left: Array
+    jacobian: Array
+    moved: Array
+    free: Array
     basis: Array
 
     def power(self, signature: Array) -> float:
@@ -121,15 +130,23 @@ class Screen:
             if effect in without:
                 continue
             power = own.power(signature)
-            if power < 1e-6:
+            if power < INVISIBLE:
                 continue
-            along = float(own.left @ signature)
-            size = -along / power
-            low = -MOST if start.signed else LEAST
-            size = float(np.clip(size, low, MOST)) if start.scalable else 1.0
-            gain = -2.0 * size * along - size**2 * power
+            size, gain = best_size(float(own.left @ signature), power, start)
             found.append(Score(effect, start, gain, size, signature))
         return sorted(found, key=lambda s: -s.gain)
+
+
+def best_size(along: float, power: float, start: Start) -> tuple[float, float]:
+    """Multiple of a start's size at which its signature gains most, inside what is believed, and that gain in chi-square.
+
+    ``along`` is the product of what is left of the residual with the signature, ``power`` that of the signature with itself.
+    """
+    if power < INVISIBLE:
+        return 0.0, 0.0
+    low = -MOST if start.signed else LEAST
+    size = float(np.clip(-along / power, low, MOST)) if start.scalable else 1.0
+    return size, -2.0 * size * along - size**2 * power
 
 
 def by_effect(scores: list[Score]) -> dict[str, list[Score]]:
@@ -147,7 +164,8 @@ def stand_of(fitted: Fit, problem: Problem, inflation: dict[str, float]) -> Stan
     """
     rows, jacobian = stacked(problem, fitted.residuals, inflation)
     if jacobian is None or jacobian.shape[1] == 0:
-        return Stand(rows, rows, np.zeros((rows.size, 0)))
+        none = np.zeros((rows.size, 0))
+        return Stand(rows, rows, none, np.zeros(0), np.zeros(0), none)
     # a parameter at the end of its range cannot go on: what it would explain is left for an effect
     names = [n for n in fitted.values if abs(fitted.moved.get(n, 0.0)) < WIDEST - 1e-3]
     scales = np.array([fitted.scales[name] for name in names])
@@ -162,8 +180,9 @@ def stand_of(fitted: Fit, problem: Problem, inflation: dict[str, float]) -> Stan
     shrunk = inner @ np.linalg.solve(normal, inner.T)
     weights, turn = np.linalg.eigh(0.5 * (shrunk + shrunk.T))
     basis = (u @ turn) * np.sqrt(np.clip(weights, 0.0, 1.0))
-    pull = u @ (inner @ np.linalg.solve(normal, np.array([fitted.moved.get(name, 0.0) for name in names])))
-    return Stand(rows, rows - basis @ (basis.T @ rows) - pull, basis)
+    moved = np.array([fitted.moved.get(name, 0.0) for name in names])
+    pull = u @ (inner @ np.linalg.solve(normal, moved))
+    return Stand(rows, rows - basis @ (basis.T @ rows) - pull, scaled, moved, free, basis)
 
 
 def screen(problem: Problem, fitted: Fit, effects: list[str], inflation: dict[str, float], *, sealed: bool) -> Screen:

@@ -65,6 +65,7 @@ def _effects(diagnosis: Diagnosis) -> list[dict[str, Any]]:
                 "id": str(effect["id"]),
                 "name": str(effect.get("name") or words.label(str(effect["id"]))),
                 "probability": words.format_probability(effect.get("probability")),
+                "inclusion": "" if effect.get("inclusion") is None else f"{100 * effect['inclusion']:.0f} %",
                 "parameters": parameters,
             }
         )

@@ -1,0 +1,83 @@
+"""How often resampled recordings would have led to the same effects: bootstrap inclusion frequencies.
+
+A single screen says which effect tells most, not whether another few minutes of the same recordings would say so too. Segments of all
+recordings, longer than the residual remembers, are drawn anew with replacement (H. R. Kuensch, "The jackknife and the bootstrap for
+general stationary observations", Annals of Statistics 17, 1989), and forward selection by the score test is done again: the effect that
+tells most, then the one that tells most beside it. Signatures and sensitivities stay those of the whole, so a draw is cheap.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pamrs.diagnosis.fitting import FIT_BIN
+from pamrs.diagnosis.screening import Screen, best_size
+
+__all__ = ["inclusion"]
+
+Array = NDArray[np.float64]
+
+DRAWS, SEGMENT, SEED = 200, 2.5, 20140501
+"""Draws, length of a segment [s], and the seed, so that a diagnosis can be repeated."""
+
+
+def inclusion(screened: Screen, least: float, partner: float) -> dict[str, float]:
+    """Share of resamples in which forward selection takes an effect.
+
+    Parameters
+    ----------
+    screened : Screen
+        Signatures at the refitted baseline.
+    least : float
+        Gain in chi-square from which an effect is taken.
+    partner : float
+        Share of the resample's sum of squares from which a second one is taken beside the first (1 or more: none).
+
+    Returns
+    -------
+    dict of str to float
+        By effect, those that were ever taken.
+    """
+    stand = screened.stand
+    if not screened.signatures or stand.rows.size == 0:
+        return {}
+    columns = np.column_stack([stand.rows, stand.jacobian, *(signature for _, _, signature in screened.signatures)])
+    length = round(SEGMENT / FIT_BIN)
+    count = -(-columns.shape[0] // length)
+    parts = [columns[k * length : (k + 1) * length] for k in range(count)]
+    products = np.array([part.T @ part for part in parts])
+    rng = np.random.default_rng(SEED)
+    taken: Counter[str] = Counter()
+    for weights in rng.multinomial(count, np.full(count, 1.0 / count), DRAWS):
+        taken.update(_selected(screened, np.tensordot(weights.astype(np.float64), products, 1), least, partner))
+    return {effect: number / DRAWS for effect, number in taken.most_common()}
+
+
+def _selected(screened: Screen, products: Array, least: float, partner: float) -> list[str]:
+    """Effects that forward selection takes, from the products of residual, sensitivities and signatures with each other."""
+    stand = screened.stand
+    first = 1 + stand.moved.size
+    base = list(range(1, first))
+    priors, moved = list(stand.free), list(stand.moved * stand.free)
+    chosen: list[str] = []
+    for threshold in (least, max(least, partner * float(products[0, 0]))):
+        normal = products[np.ix_(base, base)] + np.diag([*priors, *np.zeros(len(base) - len(priors))])
+        normal += 1e-9 * np.diag(np.diag(normal)) + 1e-12 * np.eye(len(base))
+        gradient = products[base, 0] + np.array([*moved, *np.zeros(len(base) - len(moved))])
+        gains = []
+        for column, (effect, start, _) in enumerate(screened.signatures, first):
+            if effect in chosen:
+                continue
+            solved = np.linalg.solve(normal, products[base, column])
+            power = float(products[column, column] - products[base, column] @ solved)
+            along = float(products[0, column] - gradient @ solved)
+            gains.append((best_size(along, power, start)[1], effect, column))
+        gain, effect, column = max(gains, default=(0.0, "", 0))
+        if gain <= threshold:
+            break
+        chosen.append(effect)
+        base.append(column)
+    return chosen
