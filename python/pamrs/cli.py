@@ -158,7 +158,9 @@ def _rig_check(file: Annotated[Path, typer.Argument(help="Rig file (TOML), or th
 def _rig_new(
     file: Annotated[Path, typer.Argument(help="The file to write; it must not be there yet.")],
     like: Annotated[str, typer.Option(help=f"Rig of the package to begin with: {', '.join(packaged())}.")] = "shoulder",
-    name: Annotated[str | None, typer.Option(help="What to call the rig; by default as the file.")] = None,
+    name: Annotated[
+        str | None, typer.Option(help="What to call the rig; by default as the file, or its folder if that is rig.toml.")
+    ] = None,
 ) -> None:
     """Write a rig file to begin with, every key explained in comments."""
     from pamrs import rigs
@@ -167,7 +169,8 @@ def _rig_new(
     file.parent.mkdir(parents=True, exist_ok=True)
     if file.exists():
         raise FileExistsError(f"{file}: is there already; it is not overwritten")
-    write_atomically(file, rigs.template(like, file.stem if name is None else name))
+    called = file.resolve().parent.name if file.stem == "rig" else file.stem
+    write_atomically(file, rigs.template(like, (called or file.stem) if name is None else name))
     typer.echo(f"written: {file}; change it, then: pamrs rig check {file}")
 
 

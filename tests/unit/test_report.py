@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import struct
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +30,20 @@ def test_page_is_self_contained(make, tmp_path: Path) -> None:
     assert "@import" not in html
     assert "<script" not in html
     assert len(html) < 4_000_000
+
+
+@pytest.mark.parametrize(
+    ("verdict", "ambiguity", "words"),
+    [
+        ("effects", [["activation_pressure"], ["parameters"]], "cannot tell activation pressure from parameter values"),
+        ("parameters", [["parameters"], ["activation_pressure"]], "cannot rule out activation pressure"),
+        ("none", [["none"], ["unlisted"]], "cannot rule out unlisted effect"),
+        ("parameters", [], "No physics is missing"),
+        ("none", [], "Nothing is missing"),
+    ],
+)
+def test_a_set_with_parameters_in_it_is_no_missing_physics_yet(verdict: str, ambiguity: list[list[str]], words: str) -> None:
+    assert words in replace(synthetic.diagnosis(), verdict=verdict, ambiguity=ambiguity).headline
 
 
 def test_ids_are_unique_and_resolve() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from pamrs.case import Case
 from pamrs.channels import channel_of
-from pamrs.diagnosis.candidates import Group
+from pamrs.diagnosis.candidates import Candidate, Group
 from pamrs.diagnosis.conditions import Picture
 from pamrs.diagnosis.fitting import Problem
 from pamrs.diagnosis.result import Diagnosis
@@ -16,7 +16,7 @@ from pamrs.effects_table import EFFECTS
 from pamrs.rig import Rig
 from pamrs.rig_schema import qualified
 
-__all__ = ["next_experiment", "unknown_volumes", "verdict", "warnings", "where"]
+__all__ = ["next_experiment", "reservations", "unknown_volumes", "verdict", "warnings", "where"]
 
 
 def unknown_volumes(rig: Rig) -> list[str]:
@@ -25,6 +25,8 @@ def unknown_volumes(rig: Rig) -> list[str]:
     return [name for name in names if not rig.parameter(name).known]
 
 
+_FAR_OFF, _MOVED = 3.0, 2.0
+"""Error in units of the noise, and tolerances of a parameter, from which a model with a named effect is reported with a reservation."""
 _DOUBTED = 0.1
 """Probability of no mismatch from which the words say so."""
 
@@ -160,7 +162,7 @@ def next_experiment(kind: str, probabilities: dict[str, float], ambiguity: list[
     """
     leading = max(probabilities, key=lambda k: probabilities[k])
     if not ambiguity and kind != "unlisted":
-        text = "The question is settled by these recordings; nothing further is needed."
+        text = "The name is settled by these recordings; no further one is needed for it."
         return {"text": text, "excitation": {}, "expected_information_bits": 0.0}
     doubted = [k for s in ambiguity for k in s if k in EFFECTS and k not in _SEPARATE]
     if ["parameters"] in ambiguity and doubted:
@@ -205,4 +207,19 @@ def warnings(case: Case, groups: list[Group], symptoms: dict[str, float], no_hel
             out.append(f"the size of {'+'.join(best.effects)} scatters by {100 * best.scatter:.0f} % between recordings")
     for name in unknown_volumes(case.rig):
         out.append(f"{name} is marked unknown: values that scale with it hold for the placeholder only")
+    return out
+
+
+def reservations(chosen: list[Candidate], table: dict[str, dict[str, float]]) -> list[str]:
+    """What a reader should know of a model with a named effect: what it still misses, and values that it had to move far."""
+    out = []
+    for channel, error in table.items():
+        if error["after"] > _FAR_OFF * error["noise"]:
+            times = error["after"] / error["noise"]
+            out.append(
+                f"with the effect the model still misses {channel.replace('_', ' ')} by {times:.2g} times its noise: the name stands, "
+                "its equation is not the whole truth, and standard deviations hold only as far as it is"
+            )
+    moved = {n: v for c in chosen if c.effects for n, v in c.fit.moved.items() if abs(v) > _MOVED}
+    out += [f"with the effect the fit moves {n} by {v:+.1f} tolerances: it may make up for the effect's form" for n, v in moved.items()]
     return out

@@ -181,7 +181,10 @@ def _draw_residuals(axes: Axes, trace: Trace, noise: float | None, *, width: flo
     if noise is not None:
         axes.axhspan(-2 * noise * factor, 2 * noise * factor, color="#dfe3e8", lw=0, label="noise (± 2 std)")
     axes.axhline(0.0, color="#6b7280", lw=0.7)
-    for values, name, text in ((before, "before", "baseline"), (after, "after", "with the effect")):
+    # in the colours of the curves above: what is left before the effect is what the refit leaves, where there was one
+    refitted = trace.refit is not None and _has(trace.refit, trace.before)
+    first = ("refit", "parameters refitted") if refitted else ("before", "before")
+    for values, name, text in ((before, *first), (after, "after", "with the effect")):
         if values is not None and _has(values, before if name == "after" else None):
             x, y = decimate(trace.time, values)
             axes.plot(x, y * factor, color=COLOURS[name], lw=width, label=text)

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 __all__ = ["render"]
 
 HELD_OUT_SHOWN = 2
+THROUGHOUT = 0.9
+"""Share of a recording from which an excess is throughout it."""
 BADGES = {
     "none": "nothing missing",
     "parameters": "parameters only",
@@ -70,6 +72,15 @@ def _effects(diagnosis: Diagnosis) -> list[dict[str, Any]]:
             }
         )
     return rows
+
+
+def _intervals(diagnosis: Diagnosis) -> list[str]:
+    """Where in time the excess is, in words."""
+    spans = [(float(a), float(b)) for a, b in diagnosis.where.get("intervals") or []]
+    told = next((t for t in diagnosis.traces if t.recording == diagnosis.where.get("recording")), None)
+    if told is not None and sum(b - a for a, b in spans) > THROUGHOUT * float(told.time[-1] - told.time[0]):
+        return ["throughout the recording"]
+    return [f"{a:.2f} to {b:.2f} s" for a, b in spans]
 
 
 def _parameters(diagnosis: Diagnosis) -> list[dict[str, Any]]:
@@ -254,7 +265,7 @@ def render(diagnosis: Diagnosis) -> str:
         paragraphs=[p.strip() for p in diagnosis.text.split("\n\n") if p.strip()],
         facts=_facts(diagnosis),
         where_text=str(diagnosis.where.get("text") or ""),
-        intervals=[f"{float(a):.2f} to {float(b):.2f} s" for a, b in diagnosis.where.get("intervals") or []],
+        intervals=_intervals(diagnosis),
         conditions=_conditions(diagnosis),
         blocks=_markup(figures.blocks_svg(diagnosis)),
         map=_markup(figures.map_svg(diagnosis)),

@@ -170,16 +170,23 @@ def headline(diagnosis: Diagnosis) -> str:
     """One sentence that states the verdict."""
     block = diagnosis.where.get("block")
     place = f" in the {label(str(block))}" if block else ""
+    doubtful = [s for s in diagnosis.ambiguity if s not in (["none"], ["parameters"])]
+    rivals = " or ".join(set_label(s) for s in doubtful)
+    if diagnosis.verdict == "none" and doubtful:
+        return f"The model explains these recordings down to their noise, but they cannot rule out {rivals}{place}"
     if diagnosis.verdict == "none":
         return "Nothing is missing: the model explains these recordings down to their noise"
+    if diagnosis.verdict == "parameters" and doubtful:
+        return f"Parameter values may explain the difference; these recordings cannot rule out {rivals}{place}"
     if diagnosis.verdict == "parameters":
         moved = [label(n.replace(".", " ")) for n in moved_parameters(diagnosis)[:3]]
         which = f": {', '.join(moved)}" if moved else ""
         return f"No physics is missing; parameter values explain the difference{which}"
     if diagnosis.verdict == "unlisted":
         return f"Physics outside the catalogue acts{place or ' on this rig'}"
-    if len(diagnosis.ambiguity) > 1:
-        rivals = " or ".join(set_label(s) for s in diagnosis.ambiguity)
+    if len(doubtful) < len(diagnosis.ambiguity):
+        return f"Physics may be missing{place}: these recordings cannot tell {rivals} from parameter values that are off"
+    if len(doubtful) > 1:
         return f"Physics is missing{place}; these recordings cannot tell whether it is {rivals}"
     names = " and ".join(str(e.get("name") or label(str(e["id"]))) for e in diagnosis.effects)
     return f"The model leaves out: {names or 'an effect'}{place}"
