@@ -91,8 +91,8 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
         fit={"channels": fit_table, "held_out": held_table, "gap_closed": gap if model.effects else None},
         next_experiment=_next(verdict, probabilities, ambiguity, nominal, groups, fitted, held),
         warnings=[
-            *words.warnings(case, groups, symptoms, held is fitted),
             *(words.reservations(chosen, held_table or fit_table) if verdict == "effects" else []),
+            *words.warnings(case, groups, symptoms, held is fitted),
         ],
         rig=_with_std(model, chosen) if model.effects else model,
         traces=_traces(fitted, held, fit_found, out_found),
