@@ -71,8 +71,9 @@ def faint(trial: Attempts, quiet: Group, acting: list[str], say: Callable[[str],
     if not starts:
         return None
     try:
-        # to the last unit of chi-square, or what the baseline still has to gain would count for the effect
-        finest = fit(trial.inner, trial.nominal, (), {}, colour, warm=start.fit, share=0.0)
+        # to the last unit of chi-square and from wherever an effect begins, or what the baseline still has to gain would count for it
+        begins = [start.fit, *(replace(start.fit, values=start.fit.values | b.back) for b in starts.values() if b.back)]
+        finest = min((fit(trial.inner, trial.nominal, (), {}, colour, warm=w, share=0.0) for w in begins), key=lambda f: f.cost)
         outside = _chi_square(trial.outer, residuals(trial.outer, finest.rig), colour)
     except SimulationError:
         return None
@@ -96,7 +97,7 @@ def faint(trial: Attempts, quiet: Group, acting: list[str], say: Callable[[str],
         late = STANDING * stands(tried, seconds)
         if gain > FAINT and over > AGREES * gain:
             shown[tried] = 0.5 * FADED * (gain + over) - FADED * price - late
-        elif begun.back and relief > RELIEF and min(gain, gain + over) > RELIEF:
+        elif _gone_back(begun, finest, tried.fit) and relief > RELIEF and min(gain, gain + over) > RELIEF:
             eased[tried] = 0.5 * min(relief, gain, gain + over) - price - late - RARE
     if not shown and not eased:
         return None
@@ -144,6 +145,11 @@ def _instead(screened: Screen, found: Fit, trial: Attempts, colour: dict[str, fl
                 best[effect] = match, Begun(start.scaled(size), {name: trial.nominal.parameter(name).value})
     nearest = sorted(best, key=lambda e: -best[e][0])[:FITTED]
     return {effect: best[effect][1] for effect in nearest}
+
+
+def _gone_back(begun: Begun, before: Fit, after: Fit) -> bool:
+    """Whether the parameters that an effect stands in for are where they were expected, once it is there."""
+    return bool(begun.back) and all(abs(after.moved[n]) < 0.5 * abs(before.moved[n]) for n in begun.back)
 
 
 def _strain(found: Fit) -> float:
