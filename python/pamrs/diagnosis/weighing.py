@@ -33,6 +33,8 @@ BELIEVED = 0.985
 """How far a name is believed at most."""
 STANDING, UNSEEN = 2.0, 3.0
 """Price of a clock that is late but does not drift; recordings' lengths beyond which a time constant was not seen."""
+HERTZ, ROUND = 1.5, 0.25
+"""Exponent of the contact of round bodies, and how far that of muscles is believed to be from it."""
 CONSTANCY = 0.35
 """Relative scatter of an effect's size between recordings beyond which it is not that effect."""
 
@@ -99,7 +101,7 @@ def weigh(candidates: list[Candidate], suspects: list[Block], most: float, secon
     trusted = {c: _trusted(c, start, suspects, most, seconds) for c in named}
 
     def weights_of(granted: float) -> dict[Candidate, float]:
-        scores = {c: _score(c, start, suspects, granted) - STANDING * stands(c, seconds) for c in named}
+        scores = {c: _score(c, start, suspects, granted) - STANDING * stands(c, seconds) - _unlikely(c) for c in named}
         top = max(scores.values())
         return {c: trusted[c] * math.exp(max(-60.0, s - top)) for c, s in scores.items()}
 
@@ -142,6 +144,12 @@ def stands(candidate: Candidate, seconds: float) -> bool:
     """Whether a clock of a set does not drift: two free clocks do, and what is late by the same time always is a lag or a delay."""
     offset, rate = (candidate.fit.values.get(f"clock_skew.{name}", 0.0) for name in ("offset", "rate"))
     return abs(rate) * seconds < abs(offset)
+
+
+def _unlikely(candidate: Candidate) -> float:
+    """What a set loses by a shape that its physics hardly has: swollen muscles are round, and press like round bodies (Hertz)."""
+    exponent = candidate.fit.values.get("pam_crowding_contact.exponent", HERTZ)
+    return 0.5 * ((exponent - HERTZ) / ROUND) ** 2
 
 
 def _score(candidate: Candidate, baseline: Candidate, suspects: list[Block], share: float) -> float:
