@@ -15,8 +15,7 @@ from pamrs.diagnosis.fitting import FIT_BIN, Fit, Key, Problem, acts_in, fit, re
 from pamrs.diagnosis.resampling import inclusion
 from pamrs.diagnosis.screening import Screen, by_effect, screen
 from pamrs.diagnosis.starts import Start
-from pamrs.diagnosis.weighing import PRICE, STANDING, believed, doubt, stands
-from pamrs.effects_table import EFFECTS
+from pamrs.diagnosis.weighing import STANDING, believed, doubt, price, stands
 from pamrs.errors import SimulationError
 
 __all__ = ["faint"]
@@ -93,12 +92,11 @@ def faint(trial: Attempts, quiet: Group, acting: list[str], say: Callable[[str],
         over = outside - _chi_square(trial.outer, residuals(trial.outer, tried.fit.rig), colour)
         relief = _strain(finest) - _strain(tried.fit)
         gain = within + relief
-        price = PRICE * sum(1 for n in tried.fit.values if n.partition(".")[0] in EFFECTS)
         late = STANDING * stands(tried, seconds)
         if gain > FAINT and over > AGREES * gain:
-            shown[tried] = 0.5 * FADED * (gain + over) - FADED * price - late
+            shown[tried] = 0.5 * FADED * (gain + over) - FADED * price(tried) - late
         elif _gone_back(begun, finest, tried.fit) and relief > RELIEF and min(gain, gain + over) > RELIEF:
-            eased[tried] = 0.5 * min(relief, gain, gain + over) - price - late - RARE
+            eased[tried] = 0.5 * min(relief, gain, gain + over) - price(tried) - late - RARE
     if not shown and not eased:
         return None
     found = shown or eased

@@ -60,24 +60,26 @@ def _selected(screened: Screen, products: Array, least: float, partner: float) -
     """Effects that forward selection takes, from the products of residual, sensitivities and signatures with each other."""
     stand = screened.stand
     first = 1 + stand.moved.size
-    base = list(range(1, first))
-    priors, moved = list(stand.free), list(stand.moved * stand.free)
+    base, prior, pull = list(range(1, first)), stand.free, stand.moved * stand.free
+    columns = list(range(first, products.shape[0]))
     chosen: list[str] = []
     for threshold in (least, max(least, partner * float(products[0, 0]))):
-        normal = products[np.ix_(base, base)] + np.diag([*priors, *np.zeros(len(base) - len(priors))])
+        normal = products[np.ix_(base, base)] + np.diag(prior)
         normal += 1e-9 * np.diag(np.diag(normal)) + 1e-12 * np.eye(len(base))
-        gradient = products[base, 0] + np.array([*moved, *np.zeros(len(base) - len(moved))])
-        gains = []
-        for column, (effect, start, _) in enumerate(screened.signatures, first):
-            if effect in chosen:
-                continue
-            solved = np.linalg.solve(normal, products[base, column])
-            power = float(products[column, column] - products[base, column] @ solved)
-            along = float(products[0, column] - gradient @ solved)
-            gains.append((best_size(along, power, start)[1], effect, column))
+        shared = products[np.ix_(base, columns)]
+        solved = np.linalg.solve(normal, shared)
+        powers = products[columns, columns] - np.sum(shared * solved, axis=0)
+        alongs = products[0, columns] - (products[base, 0] + pull) @ solved
+        gains = [
+            (best_size(float(along), float(power), start)[1], effect, column)
+            for column, (effect, start, _), along, power in zip(columns, screened.signatures, alongs, powers, strict=True)
+            if effect not in chosen
+        ]
         gain, effect, column = max(gains, default=(0.0, "", 0))
         if gain <= threshold:
             break
         chosen.append(effect)
+        # what was taken is as free as a parameter without a prior
         base.append(column)
+        prior, pull = np.append(prior, 0.0), np.append(pull, 0.0)
     return chosen

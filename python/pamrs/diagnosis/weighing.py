@@ -12,7 +12,7 @@ from pamrs.diagnosis.evidence import Excess
 from pamrs.diagnosis.fitting import Problem
 from pamrs.effects_table import EFFECTS
 
-__all__ = ["FORM", "PRICE", "STANDING", "believed", "doubt", "explains", "most_believed", "share_left", "stands", "weigh"]
+__all__ = ["FORM", "STANDING", "believed", "doubt", "explains", "most_believed", "price", "share_left", "stands", "weigh"]
 
 EVEN, EVEN_PUSH, SOFTNESS = 0.5, 2.6, 0.4
 """Logarithm of the odds of explained to unexplained variance at which a set is named at even odds with ``unlisted`` (pushes, which
@@ -159,5 +159,9 @@ def _score(candidate: Candidate, baseline: Candidate, suspects: list[Block], sha
         for block in suspects:
             granted = share * max(0.0, was[block.name].ratio - 1.0)
             total -= 0.25 * LOOKS * math.log(max(1.0, now[block.name].ratio) + granted)
-    size = sum(1 for n in candidate.fit.values if n.partition(".")[0] in EFFECTS and not n.endswith(("_2", "_3")))
-    return total - PRICE * size - SECOND * (len(candidate.effects) - 1)
+    return total - price(candidate) - SECOND * (len(candidate.effects) - 1)
+
+
+def price(candidate: Candidate) -> float:
+    """What a set pays for the parameters of its effects; of events of one kind only the first counts."""
+    return PRICE * sum(1 for n in candidate.fit.values if n.partition(".")[0] in EFFECTS and not n.endswith(("_2", "_3")))

@@ -43,38 +43,39 @@ def where(located: str | None, problem: Problem, groups: list[Group], picture: P
         f"The mismatch lies in the {located} block{parts}: with its neighbours' measured signals as inputs, the refitted "
         f"model still misses {block.channel.replace('_', ' ')} by {found.systematic:.2g} times its noise."
     )
-    faint = next((g for g in groups if g.faint and g.mismatch is not None and g.mismatch.name == located), None)
-    if faint is not None and faint.instead:
-        moved = ", ".join(f"{n} by {faint.candidates[0].fit.moved[n]:+.1f} tolerances" for n in faint.instead)
+    group = next((g for g in groups if g.mismatch is not None and g.mismatch.name == located), None)
+    faint = group is not None and group.faint
+    if group is not None and group.instead:
+        moved = ", ".join(f"{n} by {group.candidates[0].fit.moved[n]:+.1f} tolerances" for n in group.instead)
         text = (
             f"No block keeps more than its noise, but for that the refit of the {located} block{parts} had to move {moved}, and an "
             "effect does the same without."
         )
-    elif faint is None and any(g.probabilities.get("", 0.0) > _DOUBTED for g in groups if g.mismatch and g.mismatch.name == located):
-        text = (
-            f"The {located} block{parts} keeps hardly more than its noise ({found.systematic:.2g} times it in "
-            f"{block.channel.replace('_', ' ')}): its floor may as well have been taken too low."
-        )
-    elif faint is not None:
+    elif faint:
         text = (
             f"No block keeps more than its noise, but the residual of the {located} block{parts} has the signature of an effect in it, "
             "in held-out recordings too."
+        )
+    elif group is not None and group.probabilities.get("", 0.0) > _DOUBTED:
+        text = (
+            f"The {located} block{parts} keeps hardly more than its noise ({found.systematic:.2g} times it in "
+            f"{block.channel.replace('_', ' ')}): its floor may as well have been taken too low."
         )
     elif all(g.mismatch is None for g in groups):
         text = (
             f"Every block fits to its noise, but the {located} block only with a parameter far outside its tolerance "
             "(see the warnings)."
         )
-    telling = [] if faint is not None else [c for c in picture.conditions if c["share"] > 1.15 * c["time"]][:2]
+    telling = [] if faint else [c for c in picture.conditions if c["share"] > 1.15 * c["time"]][:2]
     if telling:
         text += " It is largest under: " + "; ".join(c["text"] for c in telling) + "."
-    if picture.intervals and faint is None:
+    if picture.intervals and not faint:
         text += f" The intervals are those of recording {picture.recording}."
     return {
         "block": located,
         "channel": block.channel,
-        "intervals": [] if faint is not None else picture.intervals,
-        "conditions": [] if faint is not None else picture.conditions[:6],
+        "intervals": [] if faint else picture.intervals,
+        "conditions": [] if faint else picture.conditions[:6],
         "text": text,
         "recording": picture.recording,
     }
@@ -84,9 +85,8 @@ def verdict(diagnosis: Diagnosis, named: list[str], case: Case, gap: float | Non
     """The verdict in a few sentences; ``forms`` say what a mismatch without a name is a function of, if that was ``sought``."""
     kind = diagnosis.verdict
     if kind == "none":
-        return "Nothing is missing that these recordings could show: the nominal model predicts every block to its noise." + _unsettled(
-            diagnosis
-        )
+        text = "Nothing is missing that these recordings could show: the nominal model predicts every block to its noise."
+        return text + _unsettled(diagnosis)
     if kind == "parameters":
         shifted = sorted(diagnosis.parameters.items(), key=lambda kv: -abs(kv[1]["moved_sigmas"]))[:3]
         moved = ", ".join(f"{n} by {p['moved_sigmas']:+.1f} tolerances" for n, p in shifted)
