@@ -248,7 +248,7 @@ fn force_effects_have_their_size() {
     assert!((started - less).abs() < 1e-9 * plain, "{started} {less}");
     let crowded = force(vec![effect(
         "pam_crowding_contact",
-        &[("contact_area", 1e-3), ("onset_contraction", 0.02), ("exponent", 1.0)],
+        &[("contact_area", 1e-3), ("onset_contraction", 0.02), ("exponent", 1.0), ("rubbing", 0.0)],
     )]);
     assert!((crowded - (plain - 6.0 * 1e-3 * 3e5 * (e - 0.02 - 0.0025))).abs() < 1e-6);
     assert_eq!(force(vec![effect("muscle_creep", &[("stiffness", 5e3), ("time_constant", 1.0)])]), plain);

@@ -290,14 +290,15 @@ def predicted(block: Block, core: _core.Rig, prepared: Prepared) -> Array:
     (n,) array
         In the channel's unit.
     """
+    starts = prepared.starts(block.window, block.drives)
     prediction, _ = core.predict(
         block.name,
         prepared.commands,
         prepared.dt,
         default_step(prepared.dt, longest=block.step),
-        prepared.starts(block.window, block.drives),
+        starts,
         [],
-        prepared.signals,
+        prepared.signals | {block.channel: prepared.begun(block.channel, starts)},
         prepared.n,
     )
     return prediction
@@ -327,7 +328,7 @@ def residual(block: Block, core: _core.Rig, prepared: Prepared, parameters: list
         default_step(prepared.dt, longest=block.step),
         starts,
         names,
-        prepared.signals,
+        prepared.signals | {block.channel: prepared.begun(block.channel, starts)},
         prepared.n,
     )
     if jacobian is None:

@@ -16,10 +16,12 @@ from pamrs.effects_table import EFFECTS, find_parameter
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 
-__all__ = ["DETECTION_RATIO", "Attempts", "Candidate", "Group", "significant", "start_of", "without_colour"]
+__all__ = ["DETECTION_RATIO", "EXACT", "Attempts", "Candidate", "Group", "significant", "start_of", "without_colour"]
 
 DETECTION_RATIO = 1.45
-"""Variance of bin means over the floor's from which a mismatch is taken as real, on recordings that were fitted."""
+"""Variance of bin means over the floor's up to which a set of effects leaves only noise; an arm's block is suspect from about there."""
+POLISH, EXACT = 10, 1e-5
+"""Evaluations for the last stretch of a fit, and share of the sum of squares to which it goes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,9 +119,9 @@ class Group:
         return max(named, key=lambda c: self.probabilities.get("+".join(c.effects), 0.0))
 
 
-def significant(found: Excess, ratio: float = DETECTION_RATIO) -> bool:
-    """Whether a block keeps more than its noise."""
-    return found.ratio > ratio and found.p_value < 0.01
+def significant(found: Excess, ratio: float = 1.0) -> bool:
+    """Whether a block keeps more than its noise, and so many times its floor at least."""
+    return found.ratio > max(ratio, found.limit)
 
 
 @dataclass(frozen=True, eq=False)
@@ -239,6 +241,28 @@ class Attempts:
             return self.judged(effects, best)
         except SimulationError:
             return None  # it leaves the range in which the model holds
+
+
+    def polished(self, candidate: Candidate) -> Candidate:
+        """A fitted set of lasting effects, fitted on with the sensitivities of every parameter where it is.
+
+        The first fit keeps the baseline's sensitivities as they were without the effects and ends where little is to be gained; of sets
+        that nearly say the same the one that was left further from its end would lose.
+        """
+        found = candidate.fit
+        if found.events is not None or not candidate.effects:
+            return candidate
+        starts = [start_of(found, effect) for effect in candidate.effects]
+        free = {name: value for start in starts for name, value in start.free.items()}
+        held = {name: value for start in starts for name, value in start.held.items()}
+        colour = {b.name: inflation(b, self.inner.recordings, found.residuals, FIT_BIN) for b in self.inner.blocks}
+        try:
+            best = fit(
+                self.inner, self.nominal, candidate.effects, free, colour, fixed=held, warm=found, evaluations=POLISH, share=EXACT
+            )
+            return replace(self.judged(candidate.effects, best), gain=candidate.gain)
+        except SimulationError:
+            return candidate
 
 
 def without_colour(blocks: Iterable[Block]) -> dict[str, float]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.stats import norm
 
 from pamrs import _core
 from pamrs.diagnosis.blocks import Block, Residual, change, residual
@@ -21,10 +21,11 @@ Array = NDArray[np.float64]
 
 BIN = 0.1
 """Width of the bins in which an excess is looked for [s]; at least five samples."""
-MARGIN = 1.1
-"""Factor by which the variance must exceed its floor before it counts: floors are estimates."""
-REPLICATES = 3
-"""Synthetic noise realisations for the part of a floor that the drives bring."""
+MARGIN, CHANCE = 1.1, 0.005
+"""Factor by which the variance must exceed its floor before it counts (floors are estimates), and the chance of noise doing so that is
+taken."""
+REPLICATES = 10
+"""Synthetic noise realisations for a floor and its scatter."""
 
 
 @dataclass(frozen=True)
@@ -37,10 +38,13 @@ class Floor:
         Standard deviation of single samples: the output's own noise and that of the drives.
     binned : float
         Standard deviation of bin means.
+    scatter : float
+        Relative standard deviation, from one realisation of the noise to another, of the mean square of the bin means.
     """
 
     sample: float
     binned: float
+    scatter: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -54,7 +58,11 @@ class Excess:
     systematic : float
         Standard deviation of what is not noise, in units of the noise.
     p_value : float
-        Chance of such a ratio (above the margin) from noise, on the effective number of bins.
+        Chance of such a ratio (above the margin) from noise, by the scatter of the floors.
+    limit : float
+        Ratio that noise exceeds with the chance ``CHANCE``.
+    scatter : float
+        Relative standard deviation of the ratio from noise.
     rms, noise : float
         Residual and floor of single samples, in the channel's unit.
     """
@@ -64,6 +72,8 @@ class Excess:
     p_value: float
     rms: float
     noise: float
+    limit: float = MARGIN
+    scatter: float = 0.0
 
 
 def bins_of(prepared: Prepared) -> int:
@@ -87,20 +97,21 @@ def floors(problem: Problem, core: _core.Rig) -> dict[Key, Floor]:
         for block in problem.blocks:
             base = residual(block, core, prepared, [])
             width = bins_of(prepared)
-            sample = mean = 0.0
+            sample, powers = 0.0, []
             noisy = [name for name in block.drives if name in prepared.signals]
-            replicates = REPLICATES if noisy else 0
-            for _ in range(replicates):
-                shaken = change(block, core, _shaken(prepared, noisy, rng), base) - base.value
-                rows = base.rows
-                sample += float(np.mean(shaken[rows] ** 2)) / replicates if rows.any() else 0.0
+            rows = base.rows
+            for _ in range(REPLICATES):
+                shaken = change(block, core, _shaken(prepared, noisy, rng), base) - base.value if noisy else np.zeros(prepared.n)
+                sample += float(np.mean(shaken[rows] ** 2)) / REPLICATES if rows.any() else 0.0
                 means, counts = binned(shaken, rows, width)
-                mean += float(np.mean(means[counts > 0] ** 2)) / replicates if (counts > 0).any() else 0.0
+                seen = counts > 0
+                own = rng.normal(0.0, base.noise, int(seen.sum())) / np.sqrt(counts[seen])
+                powers.append((float(np.mean(means[seen] ** 2)), float(np.mean((means[seen] + own) ** 2))) if seen.any() else (0.0, 0.0))
             _, counts = binned(base.value, base.rows, width)
             white = float(np.mean(1.0 / counts[counts > 0])) if (counts > 0).any() else 1.0
-            found[block.name, prepared.recording.name] = Floor(
-                math.sqrt(base.noise**2 + sample), math.sqrt(base.noise**2 * white + mean)
-            )
+            variance = base.noise**2 * white + float(np.mean([drives for drives, _ in powers]))
+            scatter = float(np.std([both for _, both in powers], ddof=1)) / variance
+            found[block.name, prepared.recording.name] = Floor(math.sqrt(base.noise**2 + sample), math.sqrt(variance), scatter)
     return found
 
 
@@ -130,7 +141,8 @@ def correlation_time(values: Array) -> float:
 
 def excess(block: Block, recordings: list[Prepared], found: dict[Key, Residual], floor: dict[Key, Floor]) -> Excess:
     """Pool a block's residual over recordings and compare it with its floor."""
-    ratios, weights, squares, noises, effective = [], [], [], [], 0.0
+    keys: list[Key] = []
+    ratios, weights, squares, noises = [], [], [], []
     for prepared in recordings:
         key = (block.name, prepared.recording.name)
         r = found[key]
@@ -138,23 +150,26 @@ def excess(block: Block, recordings: list[Prepared], found: dict[Key, Residual],
         means = means[counts > 0]
         if means.size == 0:
             continue
+        keys.append(key)
         ratios.append(float(np.mean(means**2)) / floor[key].binned ** 2)
         weights.append(means.size)
         squares.append(float(np.mean(r.value[r.rows] ** 2)))
         noises.append(floor[key].sample ** 2)
-        effective += means.size / correlation_time(means)
     if not ratios:
         return Excess(1.0, 0.0, 1.0, float("nan"), float("nan"))
     ratio = float(np.average(ratios, weights=weights))
-    keys = [(block.name, p.recording.name) for p in recordings]
     share = float(np.mean([floor[key].binned ** 2 / floor[key].sample ** 2 for key in keys]))
-    p_value = float(chi2.sf(ratio / MARGIN * effective, max(1.0, effective)))
+    shares = np.array(weights) / sum(weights)
+    scatter = max(1e-6, math.sqrt(float(np.sum((shares * [floor[key].scatter for key in keys]) ** 2))))
     return Excess(
         ratio,
         math.sqrt(max(0.0, (ratio - 1.0) * share)),
-        p_value,
+        # mean squares of few modes are skew, their logarithms hardly
+        float(norm.sf(math.log(max(ratio, 1e-300) / MARGIN) / scatter)),
         math.sqrt(float(np.average(squares, weights=weights))),
         math.sqrt(float(np.average(noises, weights=weights))),
+        MARGIN * math.exp(float(norm.isf(CHANCE)) * scatter),
+        scatter,
     )
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from pamrs.diagnosis.blocks import Block, Residual
-from pamrs.diagnosis.candidates import DETECTION_RATIO, Attempts, Candidate, Group, significant, start_of, without_colour
+from pamrs.diagnosis.candidates import DETECTION_RATIO, EXACT, Attempts, Candidate, Group, significant, start_of, without_colour
 from pamrs.diagnosis.closure import describe_closure, find_closure
 from pamrs.diagnosis.events import EVENTS
 from pamrs.diagnosis.evidence import Floor, excess, floors, inflation
@@ -23,9 +23,9 @@ from pamrs.rig import Rig
 __all__ = ["examine", "fits"]
 
 HELD_RATIO, HINT = 2.0, 1.15
-"""As ``DETECTION_RATIO``, on recordings that were held out, where the fitted ones give a hint of it."""
-MARGINAL, NOTHING = 1.6, 0.6
-"""Variance over the floor's up to which a mismatch that no effect explains may be none, and the probability that it is."""
+"""Variance over the floor's from which recordings that were held out show a mismatch, where the fitted ones give a hint of it."""
+MARGINAL, NOTHING = 1.35, 0.6
+"""Multiple of the excess that noise may leave up to which a mismatch that no effect explains may be none, and the probability of that."""
 LIKELY, CARRIES = 0.3, 0.8
 """Probability of ``unlisted`` from which a form of what is missing is looked for, and the share of the mismatch that it may leave."""
 BESIDE, MAIN = 0.08, 0.5
@@ -36,6 +36,10 @@ LEAST_GAIN, LEAST_SHARE = 12.0, 0.08
 """Gain in chi-square, and share of the largest, from which an effect is fitted."""
 MOST_SINGLES, PAIRED, PARTNERS, PARTNER = 5, 2, 2, 0.01
 """Singles that are fitted; of them those that get a partner, how many each, and the share of the mismatch that one has to promise."""
+THOROUGH = 30
+"""Evaluations of the baseline's fit: what it leaves undone looks like missing physics."""
+RIVAL, MOST_RIVALS = 0.03, 4
+"""Probability from which sets of effects are fitted to the end, and how many."""
 NEAR, STARTS, RICH = 0.6, 2, 3
 """Share of an effect's best gain from which another of its starts is fitted, how many, and of how many effects."""
 
@@ -64,7 +68,7 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
     if held is not fitted:
         floor |= floors(outer, outer.core.respecified(first.rig.to_json()))
     colour = {b.name: inflation(b, inner.recordings, first.residuals, FIT_BIN) for b in blocks}
-    baseline = fit(inner, nominal, (), {}, colour, warm=first) if max(colour.values()) > 2 else first
+    baseline = fit(inner, nominal, (), {}, colour, warm=first, share=EXACT) if max(colour.values()) > 2 else first
     was = {b.name: excess(b, inner.recordings, before, floor) for b in blocks}
     now = {b.name: excess(b, inner.recordings, baseline.residuals, floor) for b in blocks}
     outside = residuals(outer, baseline.rig) if held is not fitted else baseline.residuals
@@ -90,7 +94,7 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
     mismatch = max(suspects, key=lambda b: out[b.name].ratio + now[b.name].ratio)
     say(f"{names}: {mismatch.name} keeps {now[mismatch.name].systematic:.2g} noise units after the refit")
     # so little may as well be a floor that was taken too low, which events of free times would always mend
-    marginal = all(max(now[b.name].ratio, out[b.name].ratio) < MARGINAL for b in suspects)
+    marginal = all(e.ratio - 1.0 < MARGINAL * (e.limit - 1.0) for b in suspects for e in (now[b.name], out[b.name]))
     happening = [] if marginal else [e for e in acting if e in EVENTS]
     acting = [e for e in acting if e not in EVENTS]
     trial = Attempts(inner, outer, nominal, floor, out, suspects)
@@ -110,7 +114,13 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
         pairs += [] if found is None else [found]
     candidates = [start, *singles, *pairs]
     most = most_believed(fitted, held, mismatch, now[mismatch.name].rms)
-    weighed = weigh(candidates, suspects, most, max(p.n * p.dt for p in inner.recordings))
+    seconds = max(p.n * p.dt for p in inner.recordings)
+    weighed = weigh(candidates, suspects, most, seconds)
+    close = [c for c in candidates if weighed.get("+".join(c.effects), 0.0) > RIVAL][:MOST_RIVALS]
+    if len(close) > 1 or (close and not explains(close[0], start, suspects)):
+        say(f"{names}: fitting to the end " + ", ".join("+".join(c.effects) for c in close))
+        candidates = [trial.polished(c) if c in close else c for c in candidates]
+        weighed = weigh(candidates, suspects, most, seconds)
     if marginal:
         weighed |= {"": NOTHING * weighed["unlisted"], "unlisted": (1.0 - NOTHING) * weighed["unlisted"]}
     often = inclusion(screened, LEAST_GAIN, PARTNER)
@@ -135,7 +145,7 @@ def _together(inner: Problem, outer: Problem, nominal: Rig, start: Candidate, fl
     """One baseline inside its tolerances that leaves only noise in fitted and held-out recordings, taken together, if there is one."""
     both = replace(inner, recordings=[*inner.recordings, *outer.recordings])
     try:
-        found = fit(both, nominal, (), {}, without_colour(inner.blocks), warm=start.fit)
+        found = fit(both, nominal, (), {}, without_colour(inner.blocks), warm=start.fit, evaluations=THOROUGH, share=EXACT)
     except SimulationError:
         return None
     fitted, held = ({b.name: excess(b, part.recordings, found.residuals, floor) for b in inner.blocks} for part in (inner, outer))
@@ -146,14 +156,14 @@ def _together(inner: Problem, outer: Problem, nominal: Rig, start: Candidate, fl
 
 def _refitted(problem: Problem, nominal: Rig, inflation: dict[str, float]) -> Fit:
     """The baseline refitted from the nominal values and, where that leaves more than noise could, from the other side of them."""
-    first = fit(problem, nominal, (), {}, inflation)
+    first = fit(problem, nominal, (), {}, inflation, evaluations=THOROUGH, share=EXACT)
     rows = sum(int(r.rows.sum()) / bin_width(p, FIT_BIN) for p in problem.recordings for r in _of(p, first.residuals))
     if 2.0 * first.cost < DETECTION_RATIO * rows:
         return first
     known = nominal.parameters
     mirrored = {n: 2.0 * known[n].value - first.values[n] for n in first.moved}
     try:
-        second = fit(problem, nominal, (), {}, inflation, warm=replace(first, values=mirrored))
+        second = fit(problem, nominal, (), {}, inflation, warm=replace(first, values=mirrored), evaluations=THOROUGH, share=EXACT)
     except SimulationError:
         return first
     return min(first, second, key=lambda f: f.cost)

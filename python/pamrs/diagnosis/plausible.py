@@ -331,7 +331,8 @@ def _sense(block: Block, core: _core.Rig, prepared: Prepared) -> str | None:
         others.append((1.0, 0.0, {one: signals[two], two: signals[one]}, text))
     found = []
     for factor, offset, swapped, text in others:
-        other = replace(prepared, signals={**signals, **swapped, name: (offset + factor * value, factor * slope)})
+        raw = prepared.raw | {name: offset + factor * prepared.raw[name]}
+        other = replace(prepared, signals={**signals, **swapped, name: (offset + factor * value, factor * slope)}, raw=raw)
         try:
             model = predicted(block, core, other)[rows]
         except SimulationError:

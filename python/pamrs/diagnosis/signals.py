@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,10 @@ Mask = NDArray[np.bool_]
 
 SMOOTHING_TIME = 0.06
 """Length of the smoothing filter for drive signals [s]; at least seven samples."""
+STATE_TIMES = (0.16, 0.08, 0.04)
+"""Reaches on either side of a window's start that are tried for what it starts from [s]."""
+CUBIC, LEAST_STRETCH = 1.25, 8
+"""Variance over that of the noise up to which a cubic fits a stretch, beside twice the scatter of such a ratio; fewest samples of one."""
 BRIDGED = 3
 """Longest hole in a drive signal that is bridged [samples]."""
 DRIVES = ("supply_pressure", "line_pressure", "muscle_pressure", "joint_angle")
@@ -41,6 +45,8 @@ class Prepared:
         not recorded stays at rest, and no block that it drives is judged.
     signals : dict of str to (value, slope)
         Smoothed channels and their time derivatives, holes bridged, by the names of the core (``muscle_pressure.flexor``).
+    raw : dict of str to (n,) array
+        The same channels as measured, holes bridged.
     noise : dict of str to float
         Standard deviation of each channel's sample noise, quantisation included.
     """
@@ -48,7 +54,9 @@ class Prepared:
     recording: Recording
     commands: dict[str, Array]
     signals: dict[str, tuple[Array, Array]]
+    raw: dict[str, Array]
     noise: dict[str, float]
+    _begun: dict[tuple[str, tuple[int, ...]], tuple[Array, Array]] = field(init=False, repr=False, default_factory=dict)
 
     @property
     def n(self) -> int:
@@ -81,6 +89,22 @@ class Prepared:
         good = self.clear(drives)
         starts |= set((np.flatnonzero(good[1:] & ~good[:-1]) + 1).tolist())
         return sorted(starts)
+
+    def begun(self, channel: str, starts: list[int]) -> tuple[Array, Array]:
+        """A smoothed channel and its derivative, with the best that can be told of both where windows start.
+
+        At the edge of a recording the filter's derivative is ten times as noisy as inside, and a joint that is given a speed that it did
+        not have slides from where it stood. At a start the longest stretch counts to which a cubic still fits but for the noise.
+        """
+        key = (channel, tuple(starts))
+        if key not in self._begun:
+            value, slope = (array.copy() for array in self.signals[channel])
+            for at in starts:
+                state = _state(self.raw[channel], self.recording.mask[channel], self.noise[channel], self.dt, at)
+                if state is not None:
+                    value[at], slope[at] = state
+            self._begun[key] = value, slope
+        return self._begun[key]
 
     def usable(self, output: str, drives: tuple[str, ...], starts: list[int]) -> Mask:
         """Rows whose prediction rests on measured drives since their window began, and whose output was measured."""
@@ -133,6 +157,26 @@ def smoothed(values: Array, dt: float) -> tuple[Array, Array]:
     return np.ascontiguousarray(value), np.ascontiguousarray(slope)
 
 
+def _state(values: Array, mask: Mask, noise: float, dt: float, at: int) -> tuple[float, float] | None:
+    """Value and slope at a sample by the longest measured stretch around it to which a cubic fits but for the noise, if any does."""
+    holes = np.flatnonzero(~mask)
+    first = int(holes[holes < at][-1]) + 1 if (holes < at).any() else 0
+    last = int(holes[holes >= at][0]) if (holes >= at).any() else values.size
+    for reach in (round(seconds / dt) for seconds in STATE_TIMES):
+        # a side that is cut off makes the other longer
+        low, high = max(first, at - reach), min(last, at + reach + 1)
+        low, high = max(first, min(low, high - 2 * reach - 1)), min(last, max(high, low + 2 * reach + 1))
+        count = high - low
+        if count < LEAST_STRETCH:
+            break
+        powers = np.vander((np.arange(low, high) - at) / count, 4, increasing=True)
+        found = np.linalg.lstsq(powers, values[low:high], rcond=None)[0]
+        left = values[low:high] - powers @ found
+        if float(left @ left) < (CUBIC + 2.0 * np.sqrt(2.0 / (count - 4))) * (count - 4) * noise**2:
+            return float(found[0]), float(found[1]) / (count * dt)
+    return None
+
+
 def _bridged(values: Array, mask: Mask) -> Array:
     index = np.arange(values.size)
     return np.asarray(np.interp(index, index[mask], values[mask]), dtype=np.float64)
@@ -159,20 +203,20 @@ def prepare(recording: Recording, rig: Rig) -> Prepared:
         )
     core = core_rig(rig)
     _check_commands(recording, rig, core.inputs)
-    signals, noise = {}, {}
+    signals, raw, noise = {}, {}, {}
     for name in core.channels:
         if channel_of(name) not in DRIVES or name not in recording.channels:
             continue  # what is measured of a block that the rig does not have is left alone
         mask = recording.mask[name]
         if mask.sum() < max(16, 0.2 * mask.size):
             raise DiagnosisError(f"recording {recording.name!r}: only {int(mask.sum())} of {mask.size} samples of {name} are usable")
-        filled = _bridged(recording.channels[name], mask)
+        raw[name] = filled = _bridged(recording.channels[name], mask)
         signals[name] = smoothed(filled, recording.sample_time)
         noise[name] = noise_level(recording.channels[name], mask)
         if noise[name] <= 0:
             noise[name] = max(1e-9, 1e-6 * float(np.ptp(filled)))
     commands = {name: _command(recording, rig, name) for name in core.inputs}
-    return Prepared(recording, commands, signals, noise)
+    return Prepared(recording, commands, signals, raw, noise)
 
 
 def _check_commands(recording: Recording, rig: Rig, inputs: list[str]) -> None:

@@ -35,6 +35,8 @@ STANDING, UNSEEN = 2.0, 3.0
 """Price of a clock that is late but does not drift; recordings' lengths beyond which a time constant was not seen."""
 HERTZ, ROUND = 1.5, 0.25
 """Exponent of the contact of round bodies, and how far that of muscles is believed to be from it."""
+WRONG, LEAST_SPREAD = 0.15, 0.03
+"""Share of a mismatch's variance that a right effect of another form leaves, as a standard deviation, and the least that noise does."""
 CONSTANCY = 0.35
 """Relative scatter of an effect's size between recordings beyond which it is not that effect."""
 
@@ -157,8 +159,11 @@ def _score(candidate: Candidate, baseline: Candidate, suspects: list[Block], sha
     total = 0.0
     for was, now in ((baseline.fitted, candidate.fitted), (baseline.held_out, candidate.held_out)):
         for block in suspects:
-            granted = share * max(0.0, was[block.name].ratio - 1.0)
-            total -= 0.25 * LOOKS * math.log(max(1.0, now[block.name].ratio) + granted)
+            excess, left = (max(0.0, e[block.name].ratio - 1.0) for e in (was, now))
+            total -= 0.25 * LOOKS * math.log(1.0 + left + share * excess)
+            # of a faint mismatch the noise says how much may be left, of a strong one the forms
+            spread = math.hypot(now[block.name].scatter, WRONG * excess)
+            total -= 0.5 * (left / max(spread, LEAST_SPREAD)) ** 2
     return total - price(candidate) - SECOND * (len(candidate.effects) - 1)
 
 

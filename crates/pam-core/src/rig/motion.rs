@@ -8,7 +8,7 @@ use super::units::Group;
 use crate::effects::payload_swing::Cord;
 use crate::effects::{
     base_flexibility, external_torque, joint_coulomb_stribeck, joint_end_stop, muscle_rate_damping,
-    payload_change, payload_swing,
+    pam_crowding_contact, payload_change, payload_swing,
 };
 use crate::scalar::{constant, Scalar};
 use std::borrow::Cow;
@@ -244,21 +244,33 @@ impl Plant<'_, f64> {
             let blow = (high - low).min(0.1);
             damping += joint_end_stop::tangent(k, n, blow) / n * blow * value(dissipation);
         }
-        if let Some(ids) = units.damping {
-            let spec = self.rig.spec();
-            let supplied = spec.supplies.iter().map(|s| s.initial_pressure);
-            let pressure =
-                supplied.chain(spec.chambers.iter().map(|c| c.initial_pressure)).fold(0.0, f64::max);
-            for group in wiring.groups.iter().filter(|g| g.coordinate == coordinate && g.effects.damping) {
-                let stops = wiring.coordinates[coordinate].stops;
-                let (low, high) = stops.map_or((0.0, 0.0), |s| (s.min_angle, s.max_angle));
-                let arm =
-                    |i: i32| group.joint.eval(low + (high - low) * f64::from(i) / 16.0).moment_arm.abs();
-                let arm = (0..=16).map(arm).fold(0.0, f64::max);
-                let each = muscle_rate_damping::largest(ids.map(value), pressure);
-                damping += each * group.count * arm * arm;
-            }
-        }
+        damping += self.muscles_damping(coordinate);
         (damping, stiffness)
+    }
+
+    /// Damping that effects on its muscles add to a coordinate at most.
+    fn muscles_damping(&self, coordinate: usize) -> f64 {
+        let (wiring, units) = (&self.rig.wiring, &self.rig.wiring.effects);
+        let value = |id| self.values[id];
+        let spec = self.rig.spec();
+        let supplied = spec.supplies.iter().map(|s| s.initial_pressure);
+        let pressure = supplied.chain(spec.chambers.iter().map(|c| c.initial_pressure)).fold(0.0, f64::max);
+        let (low, high) =
+            wiring.coordinates[coordinate].stops.map_or((0.0, 0.0), |s| (s.min_angle, s.max_angle));
+        let mut total = 0.0;
+        for group in wiring.groups.iter().filter(|g| g.coordinate == coordinate) {
+            let points = (0..=16).map(|i| group.joint.eval(low + (high - low) * f64::from(i) / 16.0));
+            let (arm, shortest) =
+                points.fold((0.0_f64, 0.0_f64), |(a, s), p| (a.max(p.moment_arm.abs()), s.max(p.shortening)));
+            let mut each = 0.0;
+            if let (true, Some(ids)) = (group.effects.damping, units.damping) {
+                each += muscle_rate_damping::largest(ids.map(value), pressure);
+            }
+            if let (true, Some(ids)) = (group.effects.crowding, units.crowding) {
+                each += pam_crowding_contact::largest(ids.map(value), pressure, shortest / group.rest_length);
+            }
+            total += each * group.count * arm * arm;
+        }
+        total
     }
 }

@@ -100,12 +100,12 @@ impl<S: Scalar> Plant<'_, S> {
             let damper = state[self.layout.extra(damper)];
             force += muscle_creep::force(values[stiffness], length(group, point.shortening), damper);
         }
+        let rate = -(point.moment_arm * state[self.layout.rate(group.coordinate)]);
         if let (true, Some(damping)) = (here.damping, units.damping) {
-            let rate = -(point.moment_arm * state[self.layout.rate(group.coordinate)]);
             force += muscle_rate_damping::force(damping.map(|id| values[id]), gauge, rate);
         }
         if let (true, Some(contact)) = (here.crowding, units.crowding) {
-            force += pam_crowding_contact::force(contact.map(|id| values[id]), gauge, contraction);
+            force += pam_crowding_contact::force(contact.map(|id| values[id]), gauge, contraction, rate);
         }
         force
     }

@@ -21,7 +21,7 @@ pub(crate) struct EffectUnits {
     pub damping: Option<[Id; 3]>,
     pub activation: Option<[Id; 1]>,
     pub softening: Option<[Id; 2]>,
-    pub crowding: Option<[Id; 3]>,
+    pub crowding: Option<[Id; 4]>,
     pub stribeck: Option<[Id; 2]>,
     pub stop: Option<[Id; 5]>,
     pub swing: Option<[Id; 3]>,

@@ -151,7 +151,7 @@ pub const TYPICAL: &[Typical] = &[
     typical("mullins_softening", &[("softening", 0.3), ("contraction_width", 0.03)], &[("softening", 0.0)]),
     typical(
         "pam_crowding_contact",
-        &[("contact_area", 2e-3), ("onset_contraction", 0.05), ("exponent", 1.3)],
+        &[("contact_area", 2e-3), ("onset_contraction", 0.05), ("exponent", 1.3), ("rubbing", 0.1)],
         &[("contact_area", 0.0)],
     ),
     typical("joint_coulomb_stribeck", &[("stiction", 3.0), ("stribeck_speed", 0.08)], &[("stiction", 0.0)]),
