@@ -242,7 +242,6 @@ class Attempts:
         except SimulationError:
             return None  # it leaves the range in which the model holds
 
-
     def polished(self, candidate: Candidate) -> Candidate:
         """A fitted set of lasting effects, fitted on with the sensitivities of every parameter where it is.
 

@@ -106,7 +106,9 @@ def floors(problem: Problem, core: _core.Rig) -> dict[Key, Floor]:
                 means, counts = binned(shaken, rows, width)
                 seen = counts > 0
                 own = rng.normal(0.0, base.noise, int(seen.sum())) / np.sqrt(counts[seen])
-                powers.append((float(np.mean(means[seen] ** 2)), float(np.mean((means[seen] + own) ** 2))) if seen.any() else (0.0, 0.0))
+                powers.append(
+                    (float(np.mean(means[seen] ** 2)), float(np.mean((means[seen] + own) ** 2))) if seen.any() else (0.0, 0.0)
+                )
             _, counts = binned(base.value, base.rows, width)
             white = float(np.mean(1.0 / counts[counts > 0])) if (counts > 0).any() else 1.0
             variance = base.noise**2 * white + float(np.mean([drives for drives, _ in powers]))

@@ -25,7 +25,7 @@ __all__ = ["examine", "fits"]
 HELD_RATIO, HINT = 2.0, 1.15
 """Variance over the floor's from which recordings that were held out show a mismatch, where the fitted ones give a hint of it."""
 MARGINAL, NOTHING = 1.35, 0.6
-"""Multiple of the excess that noise may leave up to which a mismatch that no effect explains may be none, and the probability of that."""
+"""Multiple of noise's largest excess up to which a mismatch that no effect explains may be none, and the probability that it is."""
 LIKELY, CARRIES = 0.3, 0.8
 """Probability of ``unlisted`` from which a form of what is missing is looked for, and the share of the mismatch that it may leave."""
 BESIDE, MAIN = 0.08, 0.5
@@ -115,12 +115,13 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
     candidates = [start, *singles, *pairs]
     most = most_believed(fitted, held, mismatch, now[mismatch.name].rms)
     seconds = max(p.n * p.dt for p in inner.recordings)
-    weighed = weigh(candidates, suspects, most, seconds)
+    visited = _visited(inner, mismatch)
+    weighed = weigh(candidates, suspects, most, seconds, visited)
     close = [c for c in candidates if weighed.get("+".join(c.effects), 0.0) > RIVAL][:MOST_RIVALS]
     if len(close) > 1 or (close and not explains(close[0], start, suspects)):
         say(f"{names}: fitting to the end " + ", ".join("+".join(c.effects) for c in close))
         candidates = [trial.polished(c) if c in close else c for c in candidates]
-        weighed = weigh(candidates, suspects, most, seconds)
+        weighed = weigh(candidates, suspects, most, seconds, visited)
     if marginal:
         weighed |= {"": NOTHING * weighed["unlisted"], "unlisted": (1.0 - NOTHING) * weighed["unlisted"]}
     often = inclusion(screened, LEAST_GAIN, PARTNER)
@@ -139,6 +140,14 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
     if share_left(judged, start, suspects) > CARRIES:
         return group
     return replace(group, closure=judged, form=describe_closure(closed, inner, baseline))
+
+
+def _visited(inner: Problem, mismatch: Block) -> tuple[float, float] | None:
+    """Range of the angle of a joint's block [rad]; None for any other block."""
+    if mismatch.kind != "arm":
+        return None
+    angles = [p.signals[mismatch.channel][0] for p in inner.recordings]
+    return min(float(a.min()) for a in angles), max(float(a.max()) for a in angles)
 
 
 def _together(inner: Problem, outer: Problem, nominal: Rig, start: Candidate, floor: dict[Key, Floor]) -> Candidate | None:

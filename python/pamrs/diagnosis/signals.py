@@ -24,7 +24,7 @@ SMOOTHING_TIME = 0.06
 STATE_TIMES = (0.16, 0.08, 0.04)
 """Reaches on either side of a window's start that are tried for what it starts from [s]."""
 CUBIC, LEAST_STRETCH = 1.25, 8
-"""Variance over that of the noise up to which a cubic fits a stretch, beside twice the scatter of such a ratio; fewest samples of one."""
+"""Variance over that of the noise up to which a cubic fits a stretch, beside twice its scatter; fewest samples of a stretch."""
 BRIDGED = 3
 """Longest hole in a drive signal that is bridged [samples]."""
 DRIVES = ("supply_pressure", "line_pressure", "muscle_pressure", "joint_angle")
@@ -93,8 +93,8 @@ class Prepared:
     def begun(self, channel: str, starts: list[int]) -> tuple[Array, Array]:
         """A smoothed channel and its derivative, with the best that can be told of both where windows start.
 
-        At the edge of a recording the filter's derivative is ten times as noisy as inside, and a joint that is given a speed that it did
-        not have slides from where it stood. At a start the longest stretch counts to which a cubic still fits but for the noise.
+        At the edge of a recording the filter's derivative is ten times as noisy as inside, and a joint that is given a speed that it
+        did not have slides from where it stood. At a start the longest stretch counts to which a cubic still fits but for the noise.
         """
         key = (channel, tuple(starts))
         if key not in self._begun:

@@ -37,6 +37,10 @@ HERTZ, ROUND = 1.5, 0.25
 """Exponent of the contact of round bodies, and how far that of muscles is believed to be from it."""
 WRONG, LEAST_SPREAD = 0.15, 0.03
 """Share of a mismatch's variance that a right effect of another form leaves, as a standard deviation, and the least that noise does."""
+OUTSIDE, IMPLAUSIBLE = 3.0, 4.0
+"""Factor by which a value is one standard deviation outside the published range, and the most that it costs."""
+NEAR_END, WIDE = 0.5, 0.15
+"""Share of the angles visited over which a stop may act, and how far beyond it costs a standard deviation."""
 CONSTANCY = 0.35
 """Relative scatter of an effect's size between recordings beyond which it is not that effect."""
 
@@ -83,7 +87,9 @@ def explains(candidate: Candidate, baseline: Candidate, suspects: list[Block]) -
     return quiet and after < CLEARLY * before
 
 
-def weigh(candidates: list[Candidate], suspects: list[Block], most: float, seconds: float) -> dict[str, float]:
+def weigh(
+    candidates: list[Candidate], suspects: list[Block], most: float, seconds: float, visited: tuple[float, float] | None = None
+) -> dict[str, float]:
     """Probabilities over sets of effects and ``unlisted``.
 
     Between sets: the logarithm of what each leaves of the mismatch, fitted and held out, on a nominal number of independent looks;
@@ -94,7 +100,7 @@ def weigh(candidates: list[Candidate], suspects: list[Block], most: float, secon
     constants are those under which the stated probabilities came true in a trial with other seeds than the published one
     (docs/decisions/0014).
 
-    ``seconds`` is the length of the longest recording.
+    ``seconds`` is the length of the longest recording, ``visited`` the range of the joint's angle in all of them [rad].
     """
     named = [c for c in candidates if c.effects]
     if not named:
@@ -103,7 +109,7 @@ def weigh(candidates: list[Candidate], suspects: list[Block], most: float, secon
     trusted = {c: _trusted(c, start, suspects, most, seconds) for c in named}
 
     def weights_of(granted: float) -> dict[Candidate, float]:
-        scores = {c: _score(c, start, suspects, granted) - STANDING * stands(c, seconds) - _unlikely(c) for c in named}
+        scores = {c: _score(c, start, suspects, granted) - STANDING * stands(c, seconds) - _unlikely(c, visited) for c in named}
         top = max(scores.values())
         return {c: trusted[c] * math.exp(max(-60.0, s - top)) for c, s in scores.items()}
 
@@ -148,10 +154,26 @@ def stands(candidate: Candidate, seconds: float) -> bool:
     return abs(rate) * seconds < abs(offset)
 
 
-def _unlikely(candidate: Candidate) -> float:
-    """What a set loses by a shape that its physics hardly has: swollen muscles are round, and press like round bodies (Hertz)."""
-    exponent = candidate.fit.values.get("pam_crowding_contact.exponent", HERTZ)
-    return 0.5 * ((exponent - HERTZ) / ROUND) ** 2
+def _unlikely(candidate: Candidate, visited: tuple[float, float] | None) -> float:
+    """What a set loses by values that its physics hardly has.
+
+    Swollen muscles are round, and press like round bodies (Hertz); an end stop is met near an end of the motion, and what acts over
+    most of the range is none; other parameters lose by how many times they are outside the range of published values.
+    """
+    lost = 0.5 * ((candidate.fit.values.get("pam_crowding_contact.exponent", HERTZ) - HERTZ) / ROUND) ** 2
+    stop = next((e["parameters"] for e in candidate.fit.rig.effects if e["id"] == "joint_end_stop"), None)
+    if stop is not None and visited is not None and visited[1] > visited[0]:
+        inside = (stop["angle"] - visited[0]) / (visited[1] - visited[0])
+        touched = 1.0 - inside if stop["side"] >= 0.0 else inside
+        lost += min(0.5 * (max(0.0, touched - NEAR_END) / WIDE) ** 2, IMPLAUSIBLE)
+    for name, value in candidate.fit.values.items():
+        effect, _, own = name.partition(".")
+        known = next((p for p in EFFECTS[effect].parameters if p.name == own), None) if effect in EFFECTS else None
+        if known is not None and known.expected is not None:
+            low, high = known.expected
+            outside = math.log(max(low / max(value, 1e-300), value / high, 1.0)) / math.log(OUTSIDE)
+            lost += min(0.5 * outside**2, IMPLAUSIBLE)
+    return lost
 
 
 def _score(candidate: Candidate, baseline: Candidate, suspects: list[Block], share: float) -> float:

@@ -26,6 +26,8 @@ class EffectParameter:
     neutral : float or None
         Value that switches the effect off (with the other parameters that have one at theirs); None for a parameter that gives
         the effect its shape.
+    expected : (low, high) or None
+        Where published values lie; a diagnosis believes an effect less the further outside it needs the parameter.
     """
 
     name: str
@@ -36,6 +38,7 @@ class EffectParameter:
     starts: tuple[float, ...]
     meaning: str
     neutral: float | None = None
+    expected: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, slots=True)

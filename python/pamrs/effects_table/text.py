@@ -61,8 +61,9 @@ def where(info: EffectInfo) -> str:
 
 
 def range_of(parameter: EffectParameter) -> str:
-    """Bounds of a parameter, and the value at which it does nothing."""
+    """Bounds of a parameter, where it is expected, and the value at which it does nothing."""
     text = f"{parameter.lower:g} to {parameter.upper:g}"
+    text += "" if parameter.expected is None else ", expected {:g} to {:g}".format(*parameter.expected)
     return text if parameter.neutral is None else f"{text}, off at {parameter.neutral:g}"
 
 
