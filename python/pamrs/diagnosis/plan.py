@@ -256,9 +256,9 @@ class Plan:
 
     def _effects(self) -> list[str]:
         """The table of the effects, and what is not told apart."""
-        lines = ["", "Effects at their typical size, after the baseline has moved inside its tolerances (noise units of 0.1 s)"]
+        lines = ["", "Effects of a small but usual size, after the baseline has moved inside its tolerances (noise units of 0.1 s)"]
         lines += [
-            f"  {'effect':<25}{'':<8}{'left':>7}  {'in':<9}{'recording':<17}{'typical':>10}{'seen from':>11}  {'unit':<13}taken for"
+            f"  {'effect':<25}{'':<8}{'left':>7}  {'in':<9}{'recording':<17}{'at size':>10}{'seen from':>11}  {'unit':<13}taken for"
         ]
         for sight in self.sights:
             rivals = [b if a == sight.effect else a for a, b, _ in self.pairs if sight.effect in (a, b)]
@@ -266,12 +266,16 @@ class Plan:
             typical = f"{sight.typical:.3g}" if math.isfinite(sight.typical) else ""
             smallest = f"{sight.smallest:.2g}" if math.isfinite(sight.smallest) else ""
             where = f"{sight.block or '-':<9}{sight.recording or '-':<17}"
+            if sight.verdict == "hidden":
+                rivals += ["the parameters inside their tolerances, or noise" if sight.block else "(no channel shows it)"]
             lines.append(
                 f"  {sight.effect:<25}{sight.verdict:<8}{sight.left:>7.2g}  {where}{typical:>10}"
                 f"{smallest:>11}  {'' if unit == '1' else unit:<13}{', '.join(rivals)}".rstrip()
             )
+        absent = [e for e in CATALOGUE if e not in {sight.effect for sight in self.sights}]
         return [
             *lines,
+            *(["", f"Not in this rig: {', '.join(absent)}"] if absent else []),
             "",
             "Not told apart: " + ("; ".join(", ".join(g) for g in self.groups) if self.groups else "none of those seen"),
         ]
