@@ -131,6 +131,10 @@ def diagnosis(**changes: Any) -> Diagnosis:
         "warnings": ["frozen joint_angle in step_up, 3.1 to 3.4 s: masked"],
         "seconds": 31.4,
         "text": "After each fill the gas cools and the pressure sags.\n\nA leak goes on; this stops.",
+        "asked": [
+            {"id": "heat_transfer", "blocks": ["chamber"], "promised": 0.96, "left": 0.003},
+            {"id": "valve_hysteresis", "blocks": ["chamber"], "promised": 0.011, "left": None},
+        ],
         "rig": ModelText(),
         "traces": [
             trace(name, role, channel, unit, scale, seed=i)

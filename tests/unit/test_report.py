@@ -72,6 +72,9 @@ def test_page_tells_the_story() -> None:
         "310 to 490 kPa",
         "9.00 to 11.20 s",
         "How to read this page",
+        "The 2 effects that were asked",
+        "under 1 %",
+        "not fitted",
     ):
         assert part in html, part
     assert html.count("<svg") == 5

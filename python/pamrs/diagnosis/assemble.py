@@ -20,6 +20,7 @@ from pamrs.diagnosis.experiment import propose
 from pamrs.diagnosis.fitting import Events, Key, Problem, residuals
 from pamrs.diagnosis.result import Diagnosis, Trace
 from pamrs.diagnosis.starts import CHOICES
+from pamrs.diagnosis.weighing import share_left
 from pamrs.effects_table import CATALOGUE, EFFECTS
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError
 from pamrs.rig import Rig
@@ -99,6 +100,7 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
         blocks=_block_table(groups),
         condition_map=picture.map,
         tried=_tried(groups),
+        asked=_asked(groups),
     )
     forms = [g.form for g in groups if g.closure is not None] if verdict == "unlisted" else []
     diagnosis.text = words.verdict(diagnosis, named, case, gap, forms, sought=any(g.sought for g in groups))
@@ -129,6 +131,17 @@ def _tried(groups: list[Group]) -> list[dict[str, Any]]:
         for group in groups
         for candidate in group.candidates
     ]
+
+
+def _asked(groups: list[Group]) -> list[dict[str, Any]]:
+    """Every lasting effect that acts where a mismatch is, what it promised and what it leaves alone, the best first."""
+    found = []
+    for group in groups:
+        for effect, promised in group.promised.items():
+            alone = [share_left(c, group.candidates[0], group.suspects) for c in group.candidates if c.effects == (effect,)]
+            blocks = [b.name for b in group.suspects]
+            found.append({"id": effect, "blocks": blocks, "promised": min(1.0, max(0.0, promised)), "left": min(alone, default=None)})
+    return sorted(found, key=lambda a: (a["left"] is None, a["left"] if a["left"] is not None else -a["promised"]))
 
 
 def _next(

@@ -93,6 +93,8 @@ class Group:
         Parameters that would have to be far from their nominal values instead of it.
     inclusion : dict of str to float
         Share of resampled recordings in which the screen would have taken each lasting effect.
+    promised : dict of str to float
+        Share of the mismatch that each effect that was asked could take by its signature alone.
     """
 
     blocks: list[Block]
@@ -109,6 +111,7 @@ class Group:
     faint: bool = False
     instead: tuple[str, ...] = ()
     inclusion: dict[str, float] = field(default_factory=dict)
+    promised: dict[str, float] = field(default_factory=dict)
 
     @property
     def best(self) -> Candidate:

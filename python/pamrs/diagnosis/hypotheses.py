@@ -125,7 +125,8 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
     if marginal:
         weighed |= {"": NOTHING * weighed["unlisted"], "unlisted": (1.0 - NOTHING) * weighed["unlisted"]}
     often = inclusion(screened, LEAST_GAIN, PARTNER)
-    group = Group(blocks, was, now, candidates, weighed, mismatch, floor, suspects, inclusion=often)
+    promised = {e: scores[0].gain / screened.stand.power_left for e, scores in by_effect(screened.scores()).items()}
+    group = Group(blocks, was, now, candidates, weighed, mismatch, floor, suspects, inclusion=often, promised=promised)
     if weighed["unlisted"] < LIKELY or len({b.kind for b in suspects}) < len(suspects):
         return group  # of two chambers one form would have to serve both
     group = replace(group, sought=True)

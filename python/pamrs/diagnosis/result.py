@@ -178,6 +178,9 @@ class Diagnosis:
     tried : list of dict
         Every set of effects that was fitted: ``blocks``, ``effects``, what it leaves of each block's variance in units of the noise's
         (``fitted``, ``held_out``), ``gap_closed``, its ``values``.
+    asked : list of dict
+        Every lasting effect that acts where the mismatch is: ``id``, ``blocks``, ``promised``, the share of the mismatch that its
+        signature could take before any fit, and ``left``, the share that it leaves fitted alone (None where it promised too little).
 
     Raises
     ------
@@ -203,6 +206,7 @@ class Diagnosis:
     condition_map: dict[str, Any] | None = None
     timings: dict[str, float] = field(default_factory=dict)
     tried: list[dict[str, Any]] = field(default_factory=list)
+    asked: list[dict[str, Any]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         if self.verdict not in VERDICTS:

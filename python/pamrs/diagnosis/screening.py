@@ -94,6 +94,11 @@ class Stand:
     free: Array
     basis: Array
 
+    @property
+    def power_left(self) -> float:
+        """Squared length of what the free parameters leave of the residuals."""
+        return max(float(self.left @ self.left), 1e-300)
+
     def power(self, signature: Array) -> float:
         """Squared length of what the free parameters leave of a signature."""
         return float(signature @ (signature - self.basis @ (self.basis.T @ signature)))

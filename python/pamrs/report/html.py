@@ -74,6 +74,18 @@ def _effects(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     return rows
 
 
+def _asked(diagnosis: Diagnosis) -> list[dict[str, str]]:
+    """Effects that were asked, in percent of the mismatch."""
+
+    def percent(share: float | None) -> str:
+        return "not fitted" if share is None else "all" if share >= 1.0 else f"{100 * share:.0f} %" if share > 0.005 else "under 1 %"
+
+    return [
+        {"name": words.label(a["id"]), "blocks": ", ".join(a["blocks"]), "promised": percent(a["promised"]), "left": percent(a["left"])}
+        for a in diagnosis.asked
+    ]
+
+
 def _intervals(diagnosis: Diagnosis) -> list[str]:
     """Where in time the excess is, in words."""
     spans = [(float(a), float(b)) for a, b in diagnosis.where.get("intervals") or []]
@@ -273,6 +285,7 @@ def render(diagnosis: Diagnosis) -> str:
         probabilities=_probabilities(diagnosis),
         effects=_effects(diagnosis),
         ambiguity=[words.set_label(list(s)) for s in diagnosis.ambiguity],
+        asked=_asked(diagnosis),
         experiment=str(diagnosis.next_experiment.get("text") or ""),
         excitation=_excitation(diagnosis),
         bits=words.format_number(bits, 2) if words.is_number(bits) else "",
