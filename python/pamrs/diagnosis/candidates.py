@@ -11,6 +11,7 @@ from pamrs.diagnosis.events import fit_events, look_for_events
 from pamrs.diagnosis.evidence import Excess, Floor, excess, inflation
 from pamrs.diagnosis.fitting import FIT_BIN, Fit, Key, Problem, acts_in, fit, residuals
 from pamrs.diagnosis.leastsquares import SHARE
+from pamrs.diagnosis.leaving import left_out
 from pamrs.diagnosis.starts import Start
 from pamrs.effects_table import EFFECTS, find_parameter
 from pamrs.errors import SimulationError
@@ -148,6 +149,10 @@ class Attempts:
         """Whether there is no held-out recording."""
         return self.outer.recordings is self.inner.recordings
 
+    def colour(self, found: Fit) -> dict[str, float]:
+        """Weights of the colour that a fit leaves."""
+        return {b.name: inflation(b, self.inner.recordings, found.residuals, FIT_BIN) for b in self.inner.blocks}
+
     def eventful(self, effect: str, beside: Candidate) -> Candidate | None:
         """An effect with times of its own in every recording, held-out ones included, beside the effects of a candidate."""
         try:
@@ -210,13 +215,11 @@ class Attempts:
         )
 
     def judged(self, effects: tuple[str, ...], found: Fit, outside: dict[Key, Residual] | None = None) -> Candidate:
-        """A fitted set on the held-out recordings."""
+        """A fitted set on the held-out recordings, or on each recording as the others predict it."""
         if outside is None:
-            outside = found.residuals if self.same else residuals(self.outer, found.rig)
+            outside = left_out(self.inner, found, self.colour(found)) if self.same else residuals(self.outer, found.rig)
         after = {b.name: excess(b, self.outer.recordings, outside, self.floor) for b in self.inner.blocks}
-        inside = (
-            after if self.same else {b.name: excess(b, self.inner.recordings, found.residuals, self.floor) for b in self.inner.blocks}
-        )
+        inside = {b.name: excess(b, self.inner.recordings, found.residuals, self.floor) for b in self.inner.blocks}
         gaps = [(self.out[b.name].ratio - 1.0, max(0.0, after[b.name].ratio - 1.0)) for b in self.suspects]
         total = sum(math.sqrt(max(0.0, g)) for g, _ in gaps)
         gap = 1.0 - sum(math.sqrt(a) for _, a in gaps) / total if total > 0 else 0.0
@@ -235,7 +238,7 @@ class Attempts:
             best = fit(
                 self.inner, self.nominal, effects, free, colour, fixed=held, warm=warm, frozen=True, evaluations=limit, share=share
             )
-            colour = {b.name: inflation(b, self.inner.recordings, best.residuals, FIT_BIN) for b in self.inner.blocks}
+            colour = self.colour(best)
             if max(colour.values()) > 2:
                 again = {n: _off_zero(n, v) for n, v in best.values.items() if n.partition(".")[0] in EFFECTS}
                 best = fit(
@@ -257,7 +260,7 @@ class Attempts:
         starts = [start_of(found, effect) for effect in candidate.effects]
         free = {name: value for start in starts for name, value in start.free.items()}
         held = {name: value for start in starts for name, value in start.held.items()}
-        colour = {b.name: inflation(b, self.inner.recordings, found.residuals, FIT_BIN) for b in self.inner.blocks}
+        colour = self.colour(found)
         try:
             best = fit(
                 self.inner, self.nominal, candidate.effects, free, colour, fixed=held, warm=found, evaluations=POLISH, share=EXACT

@@ -12,6 +12,7 @@ from pamrs.diagnosis.events import EVENTS
 from pamrs.diagnosis.evidence import Floor, excess, floors, inflation
 from pamrs.diagnosis.faint import faint
 from pamrs.diagnosis.fitting import FIT_BIN, Fit, Key, Problem, acts_in, bin_width, fit, residuals
+from pamrs.diagnosis.leaving import left_out
 from pamrs.diagnosis.resampling import inclusion
 from pamrs.diagnosis.screening import Screen, by_effect, screen, stand_of
 from pamrs.diagnosis.signals import Prepared
@@ -71,11 +72,11 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
     baseline = fit(inner, nominal, (), {}, colour, warm=first, share=EXACT) if max(colour.values()) > 2 else first
     was = {b.name: excess(b, inner.recordings, before, floor) for b in blocks}
     now = {b.name: excess(b, inner.recordings, baseline.residuals, floor) for b in blocks}
-    outside = residuals(outer, baseline.rig) if held is not fitted else baseline.residuals
+    outside = residuals(outer, baseline.rig) if held is not fitted else left_out(inner, baseline, colour)
     out = {b.name: excess(b, outer.recordings, outside, floor) for b in blocks}
     start = Candidate((), baseline, out, now, 0.0)
     # what parameters could not be told from the fitted recordings shows in the others alone, and is no mismatch
-    apart = [b for b in blocks if significant(out[b.name], HELD_RATIO) and now[b.name].ratio > HINT]
+    apart = [b for b in blocks if significant(out[b.name], HELD_RATIO) and now[b.name].ratio > HINT and held is not fitted]
     suspects = [b for b in blocks if significant(now[b.name]) or b in apart]
     if apart and not any(significant(now[b.name]) for b in suspects):
         common = _together(inner, outer, nominal, start, floor)

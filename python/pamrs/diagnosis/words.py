@@ -200,7 +200,8 @@ def warnings(case: Case, groups: list[Group], symptoms: dict[str, float], no_hel
     for name, value in sorted(symptoms.items(), key=lambda kv: -abs(kv[1])):
         out.append(f"the refit without effects moves {name} by {value:+.1f} tolerances: a symptom of missing physics, not a result")
     if no_held_out:
-        out.append("there is no held-out recording: the proof is on the fitted data and counts less")
+        judged = "; names are judged by how the other recordings predict each" if len(case.recordings) > 1 else ""
+        out.append(f"there is no held-out recording: the proof is on the fitted data and counts less{judged}")
     for group in groups:
         best = group.best
         if best.effects and best.scatter > 0.35:
