@@ -12,8 +12,10 @@ from scipy.stats import chi2
 
 from pamrs.case import load_case
 from pamrs.diagnosis.blocks import Block, Residual, available_blocks
+from pamrs.diagnosis.candidates import EXACT
 from pamrs.diagnosis.evidence import Floor, bins_of, floors, inflation
 from pamrs.diagnosis.fitting import FIT_BIN, Key, Problem, fit, residuals
+from pamrs.diagnosis.hypotheses import THOROUGH, refitted
 from pamrs.diagnosis.signals import Prepared, binned, prepare
 from pamrs.rig import Rig
 from pamrs.simulation import core_rig
@@ -114,9 +116,11 @@ class Sheet:
 
 def _refitted(inner: Problem, nominal: Rig) -> tuple[Rig, dict[str, float]]:
     """Baseline inside its tolerances, as the diagnosis refits it."""
-    first = fit(inner, nominal, (), {}, dict.fromkeys((b.name for b in inner.blocks), 1.0))
+    first = refitted(inner, nominal, dict.fromkeys((b.name for b in inner.blocks), 1.0))
     colour = {b.name: inflation(b, inner.recordings, first.residuals, FIT_BIN) for b in inner.blocks}
-    best = fit(inner, nominal, (), {}, colour, warm=first) if max(colour.values()) > 2 else first
+    best = first
+    if max(colour.values()) > 2:
+        best = fit(inner, nominal, (), {}, colour, warm=first, evaluations=THOROUGH, share=EXACT)
     return best.rig, best.moved
 
 

@@ -131,6 +131,7 @@ def test_a_null_keeps_no_excess_and_next_to_no_terms(names: tuple[str, ...], mon
     assert all(excess(b, case.problem.recordings, case.baseline.residuals, floor).ratio < 1.2 for b in case.blocks)
     # a form that is asked for all the same mends what the smoothing of the drives does at reversals: hundredths of the arm's torque
     found = case.found(monkeypatch, case.blocks)
+    assert found is None or set(found.effects) == {"closure_torque"}
     assert found is None or sum(abs(v) for n, v in found.values.items() if n.startswith("closure_torque.")) < 0.25
     assert case.evaluations <= 18
 

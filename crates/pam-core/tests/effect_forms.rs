@@ -508,6 +508,15 @@ fn fast_effects_shorten_the_step() {
     assert!((step(vec![effect("joint_end_stop", &stiff)]) / expected - 1.0).abs() < 1e-3);
     let base = [("compliance", 1e-5), ("natural_frequency", 500.0), ("damping_ratio", 0.1)];
     assert!(step(vec![effect("base_flexibility", &base)]) < 1e-3);
+    // rubbing is a damper of its force over 3 mm/s near rest, at the pressure that may come and not that of the start
+    let contact = |rubbing: f64| {
+        [("contact_area", 3e-2), ("onset_contraction", 0.0), ("exponent", 1.0), ("rubbing", rubbing)]
+    };
+    let (smooth, rough) = (contact(0.0), contact(0.5));
+    assert!(
+        step(vec![effect("pam_crowding_contact", &rough)])
+            < 0.1 * step(vec![effect("pam_crowding_contact", &smooth)])
+    );
     assert_eq!(step(vec![effect("pressure_lag", &[("time_constant", 1e-6)])]), free);
 }
 

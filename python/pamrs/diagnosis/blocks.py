@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs import _core
-from pamrs.channels import dotted
+from pamrs.channels import channel_of, dotted
 from pamrs.diagnosis.signals import Prepared
 from pamrs.rig import Rig
 from pamrs.rig_schema import qualified
@@ -273,6 +273,12 @@ def change(block: Block, core: _core.Rig, prepared: Prepared, base: Residual) ->
     return np.where(base.rows, value, 0.0)
 
 
+def begun(block: Block, prepared: Prepared, starts: list[int]) -> dict[str, tuple[Array, Array]]:
+    """The smoothed channels, with the best that can be told where windows start of what a block integrates (an arm: all joints)."""
+    state = [n for n in prepared.signals if n == block.channel or (block.kind == "arm" and channel_of(n) == "joint_angle")]
+    return prepared.signals | {name: prepared.begun(name, starts) for name in state}
+
+
 def predicted(block: Block, core: _core.Rig, prepared: Prepared) -> Array:
     """A block's output over a recording, every window from its measured start.
 
@@ -298,7 +304,7 @@ def predicted(block: Block, core: _core.Rig, prepared: Prepared) -> Array:
         default_step(prepared.dt, longest=block.step),
         starts,
         [],
-        prepared.signals | {block.channel: prepared.begun(block.channel, starts)},
+        begun(block, prepared, starts),
         prepared.n,
     )
     return prediction
@@ -328,7 +334,7 @@ def residual(block: Block, core: _core.Rig, prepared: Prepared, parameters: list
         default_step(prepared.dt, longest=block.step),
         starts,
         names,
-        prepared.signals | {block.channel: prepared.begun(block.channel, starts)},
+        begun(block, prepared, starts),
         prepared.n,
     )
     if jacobian is None:

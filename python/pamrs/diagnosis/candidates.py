@@ -17,10 +17,8 @@ from pamrs.effects_table import EFFECTS, find_parameter
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 
-__all__ = ["DETECTION_RATIO", "EXACT", "Attempts", "Candidate", "Group", "significant", "start_of", "without_colour"]
+__all__ = ["EXACT", "Attempts", "Candidate", "Group", "significant", "start_of", "without_colour"]
 
-DETECTION_RATIO = 1.45
-"""Variance of bin means over the floor's up to which a set of effects leaves only noise; an arm's block is suspect from about there."""
 POLISH, EXACT = 10, 1e-5
 """Evaluations for the last stretch of a fit, and share of the sum of squares to which it goes."""
 
@@ -292,7 +290,7 @@ def _off_zero(name: str, value: float) -> float:
 def _typical(name: str) -> float:
     """A typical size of an effect's parameter, at least its lower bound."""
     parameter = find_parameter(name)
-    return max(parameter.default, parameter.lower, 1e-3 * parameter.starts[0])
+    return max(parameter.default or parameter.starts[-1], parameter.lower, 1e-3 * parameter.starts[0])
 
 
 def _scatter(effects: tuple[str, ...], problem: Problem, best: Fit) -> float:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.diagnosis.blocks import Block
+from pamrs.diagnosis.blocks import Block, begun
 from pamrs.diagnosis.fitting import Fit, Problem
 from pamrs.effects_table import EFFECTS
 from pamrs.effects_table.closure import CLOSURE_OF, MEMORY_OF, TERMS, Term
@@ -109,7 +109,7 @@ def _parts(found: Fit, problem: Problem, block: Block, closure: str) -> dict[str
             prepared.dt,
             default_step(prepared.dt, longest=block.step),
             starts,
-            prepared.signals,
+            begun(block, prepared, starts),
             prepared.n,
         )
         rows.append(terms[found.residuals[block.name, prepared.recording.name].rows])

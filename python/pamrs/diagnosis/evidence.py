@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from zlib import crc32
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
+from scipy.stats import t
 
 from pamrs import _core
 from pamrs.diagnosis.blocks import Block, Residual, change, residual
 from pamrs.diagnosis.fitting import Key, Problem, bin_width
 from pamrs.diagnosis.signals import Prepared, binned, smoothed
+from pamrs.errors import SimulationError
 
 __all__ = ["Excess", "Floor", "excess", "floors", "inflation"]
 
@@ -24,8 +27,8 @@ BIN = 0.1
 MARGIN, CHANCE = 1.1, 0.005
 """Factor by which the variance must exceed its floor before it counts (floors are estimates), and the chance of noise doing so that is
 taken."""
-REPLICATES = 10
-"""Synthetic noise realisations for a floor and its scatter."""
+REPLICATES, MOST_LIMIT = 10, 2.5
+"""Synthetic noise realisations for a floor and its scatter; variance over the floor's that is a mismatch however noise scatters."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +42,7 @@ class Floor:
     binned : float
         Standard deviation of bin means.
     scatter : float
-        Relative standard deviation, from one realisation of the noise to another, of the mean square of the bin means.
+        Standard deviation, from one realisation of the noise to another, of the logarithm of the mean square of the bin means.
     """
 
     sample: float
@@ -60,9 +63,9 @@ class Excess:
     p_value : float
         Chance of such a ratio (above the margin) from noise, by the scatter of the floors.
     limit : float
-        Ratio that noise exceeds with the chance ``CHANCE``.
+        Ratio that noise exceeds with the chance ``CHANCE``, at most ``MOST_LIMIT``.
     scatter : float
-        Relative standard deviation of the ratio from noise.
+        Standard deviation of the ratio's logarithm from noise and from what floors are known to.
     rms, noise : float
         Residual and floor of single samples, in the channel's unit.
     """
@@ -93,39 +96,42 @@ def floors(problem: Problem, core: _core.Rig) -> dict[Key, Floor]:
     """
     found = {}
     for prepared in problem.recordings:
-        rng = np.random.default_rng(20140501 + prepared.n)
+        rng = np.random.default_rng([20140501, crc32(prepared.recording.name.encode())])
         for block in problem.blocks:
             base = residual(block, core, prepared, [])
             width = bins_of(prepared)
-            sample, powers = 0.0, []
+            powers: list[list[float]] = []
             noisy = [name for name in block.drives if name in prepared.signals]
             rows = base.rows
-            for _ in range(REPLICATES):
-                shaken = change(block, core, _shaken(prepared, noisy, rng), base) - base.value if noisy else np.zeros(prepared.n)
-                sample += float(np.mean(shaken[rows] ** 2)) / REPLICATES if rows.any() else 0.0
-                means, counts = binned(shaken, rows, width)
-                seen = counts > 0
+            _, counts = binned(base.value, rows, width)
+            seen = counts > 0
+            for _ in range(REPLICATES if seen.any() else 0):
+                shaken = np.zeros(prepared.n)
+                with contextlib.suppress(SimulationError):  # a realisation that leaves the model's range tells nothing of the others
+                    shaken = change(block, core, _shaken(prepared, noisy, rng), base) - base.value if noisy else shaken
+                means, _ = binned(shaken, rows, width)
                 own = rng.normal(0.0, base.noise, int(seen.sum())) / np.sqrt(counts[seen])
-                powers.append(
-                    (float(np.mean(means[seen] ** 2)), float(np.mean((means[seen] + own) ** 2))) if seen.any() else (0.0, 0.0)
-                )
-            _, counts = binned(base.value, base.rows, width)
-            white = float(np.mean(1.0 / counts[counts > 0])) if (counts > 0).any() else 1.0
-            variance = base.noise**2 * white + float(np.mean([drives for drives, _ in powers]))
-            scatter = float(np.std([both for _, both in powers], ddof=1)) / variance
-            found[block.name, prepared.recording.name] = Floor(math.sqrt(base.noise**2 + sample), math.sqrt(variance), scatter)
+                squares = [float(np.mean(v**2)) for v in (shaken[rows], means[seen], means[seen] + own)]
+                powers.append(squares)
+            sample, drives, _ = np.mean(powers, axis=0) if powers else (0.0, 0.0, 0.0)
+            white = float(np.mean(1.0 / counts[seen])) if seen.any() else 1.0
+            # mean squares of few modes are skew, their logarithms hardly
+            scatter = float(np.std(np.log([both for *_, both in powers]), ddof=1)) if powers else 0.0
+            found[block.name, prepared.recording.name] = Floor(
+                math.sqrt(base.noise**2 + sample), math.sqrt(base.noise**2 * white + drives), scatter
+            )
     return found
 
 
 def _shaken(prepared: Prepared, names: Iterable[str], rng: np.random.Generator) -> Prepared:
     """The recording with one more realisation of noise, as smoothed, on some drives."""
-    signals = dict(prepared.signals)
+    signals = {}
     for name in names:
         raw = rng.normal(0.0, prepared.noise[name], prepared.n)
-        value, slope = signals[name]
+        value, slope = prepared.signals[name]
         more, steeper = smoothed(raw, prepared.dt)
         signals[name] = (value + more, slope + steeper)
-    return replace(prepared, signals=signals)
+    return prepared.shaken(signals)
 
 
 def correlation_time(values: Array) -> float:
@@ -162,15 +168,17 @@ def excess(block: Block, recordings: list[Prepared], found: dict[Key, Residual],
     ratio = float(np.average(ratios, weights=weights))
     share = float(np.mean([floor[key].binned ** 2 / floor[key].sample ** 2 for key in keys]))
     shares = np.array(weights) / sum(weights)
-    scatter = max(1e-6, math.sqrt(float(np.sum((shares * [floor[key].scatter for key in keys]) ** 2))))
+    # floors are means of as many realisations, and their scatter is known from no more
+    pooled = math.sqrt(float(np.sum((shares * [floor[key].scatter for key in keys]) ** 2)))
+    scatter = max(1e-6, pooled * math.sqrt(1.0 + 1.0 / REPLICATES))
+    chance = t(len(keys) * (REPLICATES - 1))
     return Excess(
         ratio,
         math.sqrt(max(0.0, (ratio - 1.0) * share)),
-        # mean squares of few modes are skew, their logarithms hardly
-        float(norm.sf(math.log(max(ratio, 1e-300) / MARGIN) / scatter)),
+        float(chance.sf(math.log(max(ratio, 1e-300) / MARGIN) / scatter)),
         math.sqrt(float(np.average(squares, weights=weights))),
         math.sqrt(float(np.average(noises, weights=weights))),
-        MARGIN * math.exp(float(norm.isf(CHANCE)) * scatter),
+        min(MOST_LIMIT, MARGIN * math.exp(min(1.0, float(chance.isf(CHANCE)) * scatter))),
         scatter,
     )
 

@@ -15,7 +15,7 @@ from pamrs.diagnosis.fitting import FIT_BIN, Fit, Key, Problem, acts_in, fit, re
 from pamrs.diagnosis.resampling import inclusion
 from pamrs.diagnosis.screening import Screen, by_effect, screen
 from pamrs.diagnosis.starts import Start
-from pamrs.diagnosis.weighing import STANDING, believed, doubt, price, stands
+from pamrs.diagnosis.weighing import STANDING, believed, doubt, price, stands, unlikely, visited
 from pamrs.errors import SimulationError
 
 __all__ = ["faint"]
@@ -79,6 +79,7 @@ def faint(trial: Attempts, quiet: Group, acting: list[str], say: Callable[[str],
     inside = _chi_square(trial.inner, finest.residuals, colour)
     names = " and ".join(b.name for b in blocks)
     seconds = max(p.n * p.dt for p in trial.inner.recordings)
+    ranging = visited(trial.inner)
     shown: dict[Candidate, float] = {}
     eased: dict[Candidate, float] = {}
     for effect, begun in starts.items():
@@ -92,11 +93,11 @@ def faint(trial: Attempts, quiet: Group, acting: list[str], say: Callable[[str],
         over = outside - _chi_square(trial.outer, residuals(trial.outer, tried.fit.rig), colour)
         relief = _strain(finest) - _strain(tried.fit)
         gain = within + relief
-        late = STANDING * stands(tried, seconds)
+        odd = STANDING * stands(tried, seconds) + unlikely(tried, ranging)
         if gain > FAINT and over > AGREES * gain:
-            shown[tried] = 0.5 * FADED * (gain + over) - FADED * price(tried) - late
+            shown[tried] = 0.5 * FADED * (gain + over) - FADED * price(tried) - odd
         elif _gone_back(begun, finest, tried.fit) and relief > RELIEF and min(gain, gain + over) > RELIEF:
-            eased[tried] = 0.5 * min(relief, gain, gain + over) - price(tried) - late - RARE
+            eased[tried] = 0.5 * min(relief, gain, gain + over) - price(tried) - odd - RARE
     if not shown and not eased:
         return None
     found = shown or eased

@@ -51,6 +51,8 @@ Of several tanks, chambers or joints an effect acts on every one, with the same 
 ``at``, and one parameter that all recordings and blocks share is what they can decide. An effect of one muscle alone shows as a block
 that keeps its mismatch while its neighbours lose theirs; ``Rig.with_effect(..., at="flexor")`` then has it.
 """
+LEAST_SCALE = 0.01
+"""Share of an effect parameter's usual start that its scale in a fit has at the least."""
 WIDEST = 3.0
 """Tolerances that a baseline parameter may move: farther out it would stand for physics that is missing."""
 LEAST_STEP, STIFFEST = 4e-4, 0.2
@@ -235,7 +237,8 @@ class Scaling:
                 lower.append(math.log(max(info.lower, start * 1e-3) / start))
                 upper.append(math.log(min(info.upper, start * 1e3) / start))
             else:
-                self.scale[name] = abs(start) if start != 0.0 else 10.0
+                # a parameter that starts from next to nothing has the scale of what it may become
+                self.scale[name] = max(abs(start), LEAST_SCALE * max(abs(s) for s in info.starts)) or 10.0
                 lower.append(info.lower / self.scale[name])
                 upper.append(info.upper / self.scale[name])
         self.bounds = (np.array(lower), np.array(upper))

@@ -6,27 +6,28 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from pamrs.diagnosis.blocks import Block, Residual
-from pamrs.diagnosis.candidates import DETECTION_RATIO, EXACT, Attempts, Candidate, Group, significant, start_of, without_colour
+from pamrs.diagnosis.candidates import EXACT, Attempts, Candidate, Group, significant, start_of, without_colour
 from pamrs.diagnosis.closure import describe_closure, find_closure
 from pamrs.diagnosis.events import EVENTS
-from pamrs.diagnosis.evidence import Floor, excess, floors, inflation
+from pamrs.diagnosis.evidence import MARGIN, Floor, excess, floors, inflation
 from pamrs.diagnosis.faint import faint
 from pamrs.diagnosis.fitting import FIT_BIN, Fit, Key, Problem, acts_in, bin_width, fit, residuals
 from pamrs.diagnosis.leaving import left_out
 from pamrs.diagnosis.resampling import inclusion
 from pamrs.diagnosis.screening import Screen, by_effect, screen, stand_of
 from pamrs.diagnosis.signals import Prepared
-from pamrs.diagnosis.weighing import FORM, explains, most_believed, share_left, weigh
+from pamrs.diagnosis.weighing import FORM, explains, most_believed, share_left, visited, weigh
 from pamrs.effects_table import CATALOGUE, EFFECTS
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 
-__all__ = ["examine", "fits"]
+__all__ = ["THOROUGH", "examine", "fits", "refitted"]
 
 HELD_RATIO, HINT = 2.0, 1.15
 """Variance over the floor's from which recordings that were held out show a mismatch, where the fitted ones give a hint of it."""
-MARGINAL, NOTHING = 1.35, 0.6
-"""Multiple of noise's largest excess up to which a mismatch that no effect explains may be none, and the probability that it is."""
+MARGINAL, HARDLY, NOTHING = 1.35, 0.3, 0.6
+"""Multiple of noise's largest excess, or excess variance, up to which a mismatch that no effect explains may be none, and the
+probability that it is."""
 LIKELY, CARRIES = 0.3, 0.8
 """Probability of ``unlisted`` from which a form of what is missing is looked for, and the share of the mismatch that it may leave."""
 BESIDE, MAIN = 0.08, 0.5
@@ -64,12 +65,14 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
     names = " and ".join(b.name for b in blocks)
     say(f"{names}: refitting the baseline inside its tolerances")
     before = residuals(inner, nominal)
-    first = _refitted(inner, nominal, white)
+    first = refitted(inner, nominal, white)
     floor = floors(inner, inner.core.respecified(first.rig.to_json()))
     if held is not fitted:
         floor |= floors(outer, outer.core.respecified(first.rig.to_json()))
     colour = {b.name: inflation(b, inner.recordings, first.residuals, FIT_BIN) for b in blocks}
-    baseline = fit(inner, nominal, (), {}, colour, warm=first, share=EXACT) if max(colour.values()) > 2 else first
+    baseline = first
+    if max(colour.values()) > 2:
+        baseline = fit(inner, nominal, (), {}, colour, warm=first, evaluations=THOROUGH, share=EXACT)
     was = {b.name: excess(b, inner.recordings, before, floor) for b in blocks}
     now = {b.name: excess(b, inner.recordings, baseline.residuals, floor) for b in blocks}
     outside = residuals(outer, baseline.rig) if held is not fitted else left_out(inner, baseline, colour)
@@ -95,7 +98,7 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
     mismatch = max(suspects, key=lambda b: out[b.name].ratio + now[b.name].ratio)
     say(f"{names}: {mismatch.name} keeps {now[mismatch.name].systematic:.2g} noise units after the refit")
     # so little may as well be a floor that was taken too low, which events of free times would always mend
-    marginal = all(e.ratio - 1.0 < MARGINAL * (e.limit - 1.0) for b in suspects for e in (now[b.name], out[b.name]))
+    marginal = all(e.ratio - 1.0 < max(MARGINAL * (e.limit - 1.0), HARDLY) for b in suspects for e in (now[b.name], out[b.name]))
     happening = [] if marginal else [e for e in acting if e in EVENTS]
     acting = [e for e in acting if e not in EVENTS]
     trial = Attempts(inner, outer, nominal, floor, out, suspects)
@@ -116,17 +119,19 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
     candidates = [start, *singles, *pairs]
     most = most_believed(fitted, held, mismatch, now[mismatch.name].rms)
     seconds = max(p.n * p.dt for p in inner.recordings)
-    visited = _visited(inner, mismatch)
-    weighed = weigh(candidates, suspects, most, seconds, visited)
-    close = [c for c in candidates if weighed.get("+".join(c.effects), 0.0) > RIVAL][:MOST_RIVALS]
+    ranging = visited(inner)
+    weighed = weigh(candidates, suspects, most, seconds, ranging)
+    close = sorted((c for c in candidates[1:] if _odds(weighed, c) > RIVAL), key=lambda c: -_odds(weighed, c))[:MOST_RIVALS]
     if len(close) > 1 or (close and not explains(close[0], start, suspects)):
         say(f"{names}: fitting to the end " + ", ".join("+".join(c.effects) for c in close))
         candidates = [trial.polished(c) if c in close else c for c in candidates]
-        weighed = weigh(candidates, suspects, most, seconds, visited)
+        weighed = weigh(candidates, suspects, most, seconds, ranging)
     if marginal:
         weighed |= {"": NOTHING * weighed["unlisted"], "unlisted": (1.0 - NOTHING) * weighed["unlisted"]}
     often = inclusion(screened, LEAST_GAIN, PARTNER)
-    promised = {e: scores[0].gain / screened.stand.power_left for e, scores in by_effect(screened.scores()).items()}
+    # of the chi-square that is left noise has its part
+    missing = screened.stand.power_left * (1.0 - 1.0 / max(now[mismatch.name].ratio, 1.0 + HARDLY))
+    promised = {e: scores[0].gain / missing for e, scores in by_effect(screened.scores()).items()}
     group = Group(blocks, was, now, candidates, weighed, mismatch, floor, suspects, inclusion=often, promised=promised)
     if weighed["unlisted"] < LIKELY or len({b.kind for b in suspects}) < len(suspects):
         return group  # of two chambers one form would have to serve both
@@ -144,12 +149,9 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
     return replace(group, closure=judged, form=describe_closure(closed, inner, baseline))
 
 
-def _visited(inner: Problem, mismatch: Block) -> tuple[float, float] | None:
-    """Range of the angle of a joint's block [rad]; None for any other block."""
-    if mismatch.kind != "arm":
-        return None
-    angles = [p.signals[mismatch.channel][0] for p in inner.recordings]
-    return min(float(a.min()) for a in angles), max(float(a.max()) for a in angles)
+def _odds(weighed: dict[str, float], candidate: Candidate) -> float:
+    """Probability of a set of effects."""
+    return weighed.get("+".join(candidate.effects), 0.0)
 
 
 def _together(inner: Problem, outer: Problem, nominal: Rig, start: Candidate, floor: dict[Key, Floor]) -> Candidate | None:
@@ -165,11 +167,11 @@ def _together(inner: Problem, outer: Problem, nominal: Rig, start: Candidate, fl
     return Candidate((), found, held, fitted, 0.0)
 
 
-def _refitted(problem: Problem, nominal: Rig, inflation: dict[str, float]) -> Fit:
+def refitted(problem: Problem, nominal: Rig, inflation: dict[str, float]) -> Fit:
     """The baseline refitted from the nominal values and, where that leaves more than noise could, from the other side of them."""
     first = fit(problem, nominal, (), {}, inflation, evaluations=THOROUGH, share=EXACT)
     rows = sum(int(r.rows.sum()) / bin_width(p, FIT_BIN) for p in problem.recordings for r in _of(p, first.residuals))
-    if 2.0 * first.cost < DETECTION_RATIO * rows:
+    if 2.0 * first.cost < MARGIN * rows:
         return first
     known = nominal.parameters
     mirrored = {n: 2.0 * known[n].value - first.values[n] for n in first.moved}

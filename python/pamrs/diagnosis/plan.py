@@ -19,7 +19,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs.diagnosis.blocks import Block, available_blocks
-from pamrs.diagnosis.candidates import DETECTION_RATIO
 from pamrs.diagnosis.differences import EFFECTIVE, MEASURABLE, NOISE, checked_channels, taken, weights_of
 from pamrs.diagnosis.evidence import bins_of
 from pamrs.diagnosis.fitting import FIT_BIN, Key, Problem, acts_in, bin_width, changes, free_baseline, residuals
@@ -39,8 +38,8 @@ Array = NDArray[np.float64]
 
 SEEN = 3.0
 """Signature left, in noise units of a bin of 0.1 s, from which an effect counts as seen."""
-FAINT = math.sqrt(DETECTION_RATIO - 1.0)
-"""Same from which the excess of a block would be called significant (hypotheses.DETECTION_RATIO)."""
+FAINT = math.sqrt(0.45)
+"""Same from which the excess of an arm would be called significant, which scatters most (evidence.Excess.limit)."""
 ALIKE = 0.95
 """Cosine between signatures from which two effects are one."""
 APART = 1.0
@@ -267,7 +266,7 @@ class Plan:
             smallest = f"{sight.smallest:.2g}" if math.isfinite(sight.smallest) else ""
             where = f"{sight.block or '-':<9}{sight.recording or '-':<17}"
             if sight.verdict == "hidden":
-                rivals += ["the parameters inside their tolerances, or noise" if sight.block else "(no channel shows it)"]
+                rivals += ["the parameters inside their tolerances, or noise" if sight.block else "(nothing here shows it)"]
             lines.append(
                 f"  {sight.effect:<25}{sight.verdict:<8}{sight.left:>7.2g}  {where}{typical:>10}"
                 f"{smallest:>11}  {'' if unit == '1' else unit:<13}{', '.join(rivals)}".rstrip()

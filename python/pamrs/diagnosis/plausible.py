@@ -10,7 +10,6 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -332,7 +331,9 @@ def _sense(block: Block, core: _core.Rig, prepared: Prepared) -> str | None:
     found = []
     for factor, offset, swapped, text in others:
         raw = prepared.raw | {name: offset + factor * prepared.raw[name]}
-        other = replace(prepared, signals={**signals, **swapped, name: (offset + factor * value, factor * slope)}, raw=raw)
+        noise = prepared.noise | {name: abs(factor) * prepared.noise[name]}
+        shown_as = {**signals, **swapped, name: (offset + factor * value, factor * slope)}
+        other = Prepared(prepared.recording, prepared.commands, shown_as, raw, noise)
         try:
             model = predicted(block, core, other)[rows]
         except SimulationError:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import math
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,10 +22,12 @@ Mask = NDArray[np.bool_]
 
 SMOOTHING_TIME = 0.06
 """Length of the smoothing filter for drive signals [s]; at least seven samples."""
-STATE_TIMES = (0.16, 0.08, 0.04)
+STATE_TIMES = (0.04, 0.08, 0.16)
 """Reaches on either side of a window's start that are tried for what it starts from [s]."""
-CUBIC, LEAST_STRETCH = 1.25, 8
-"""Variance over that of the noise up to which a cubic fits a stretch, beside twice its scatter; fewest samples of a stretch."""
+MISSED, FIRST, LONGER, APART, LEAST_STRETCH = 1.1, 2.0, 1.5, 2.0, 8
+"""Variance over that of the noise up to which a cubic fits a stretch, standard deviations of that beside it for the first one and for
+longer ones; standard deviations by which slopes of a shorter and a longer stretch may differ; fewest samples of a stretch."""
+DITHER = 20140501
 BRIDGED = 3
 """Longest hole in a drive signal that is bridged [samples]."""
 DRIVES = ("supply_pressure", "line_pressure", "muscle_pressure", "joint_angle")
@@ -56,7 +59,7 @@ class Prepared:
     signals: dict[str, tuple[Array, Array]]
     raw: dict[str, Array]
     noise: dict[str, float]
-    _begun: dict[tuple[str, tuple[int, ...]], tuple[Array, Array]] = field(init=False, repr=False, default_factory=dict)
+    _begun: dict[tuple[str, tuple[int, ...]], tuple[Array, Array]] = field(repr=False, default_factory=dict)
 
     @property
     def n(self) -> int:
@@ -72,13 +75,10 @@ class Prepared:
         """Rows at which every drive was measured: holes of up to three samples are bridged, longer ones are cut out
         together with what the smoothing carries over their edges.
         """
-        bad = ~self.recording.valid(*drives) if drives else np.zeros(self.n, dtype=bool)
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], bad.astype(np.int8), [0]])))
         reach = round(0.5 * SMOOTHING_TIME / self.dt)
         out = np.ones(self.n, dtype=bool)
-        for a, b in zip(edges[::2], edges[1::2], strict=True):
-            if b - a > BRIDGED:
-                out[max(0, a - reach) : b + reach] = False
+        for a, b in _long_holes(self.recording.valid(*drives)) if drives else []:
+            out[max(0, a - reach) : b + reach] = False
         return out
 
     def starts(self, window: float | None, drives: tuple[str, ...]) -> list[int]:
@@ -106,6 +106,11 @@ class Prepared:
             self._begun[key] = value, slope
         return self._begun[key]
 
+    def shaken(self, shaken: dict[str, tuple[Array, Array]]) -> Prepared:
+        """The same recording with other smoothed channels; what the others begin from is not looked for again."""
+        kept = {key: state for key, state in self._begun.items() if key[0] not in shaken}
+        return replace(self, signals=self.signals | shaken, _begun=kept)
+
     def usable(self, output: str, drives: tuple[str, ...], starts: list[int]) -> Mask:
         """Rows whose prediction rests on measured drives since their window began, and whose output was measured."""
         bad = ~self.clear(drives)
@@ -131,17 +136,16 @@ def noise_level(values: Array, mask: Mask) -> float:
     float
         In the unit of ``values``; 0 if there are fewer than eight usable samples.
     """
-    third = np.diff(values, 3)
     ok = mask[:-3] & mask[1:-2] & mask[2:-1] & mask[3:]
-    third = third[ok]
-    if third.size < 8:
+    if ok.sum() < 8:
         return 0.0
-    # a quantised or often resting channel has many zero differences: the lattice bounds the estimate from below
-    sigma = 1.4826 * float(np.median(np.abs(third))) / np.sqrt(20.0)
     steps = np.abs(np.diff(values[mask]))
     steps = steps[steps > 1e-12 * max(1e-12, float(np.abs(values[mask]).max()))]
     lattice = float(steps.min()) if steps.size else 0.0
-    return float(max(sigma, lattice / np.sqrt(12.0)))
+    # the median of differences of whole steps moves by whole steps: as much noise as the lattice brings smears them, and is taken off
+    dithered = values + np.random.default_rng(DITHER).uniform(-0.5, 0.5, values.size) * lattice
+    sigma = 1.4826 * float(np.median(np.abs(np.diff(dithered, 3)[ok]))) / np.sqrt(20.0)
+    return float(np.sqrt(max(sigma**2 - lattice**2 / 12.0, lattice**2 / 12.0)))
 
 
 def filter_length(dt: float) -> int:
@@ -157,24 +161,42 @@ def smoothed(values: Array, dt: float) -> tuple[Array, Array]:
     return np.ascontiguousarray(value), np.ascontiguousarray(slope)
 
 
+def _long_holes(mask: Mask) -> list[tuple[int, int]]:
+    """First sample of each hole that is not bridged, and the first after it."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], (~mask).astype(np.int8), [0]])))
+    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a > BRIDGED]
+
+
 def _state(values: Array, mask: Mask, noise: float, dt: float, at: int) -> tuple[float, float] | None:
-    """Value and slope at a sample by the longest measured stretch around it to which a cubic fits but for the noise, if any does."""
-    holes = np.flatnonzero(~mask)
-    first = int(holes[holes < at][-1]) + 1 if (holes < at).any() else 0
-    last = int(holes[holes >= at][0]) if (holes >= at).any() else values.size
-    for reach in (round(seconds / dt) for seconds in STATE_TIMES):
+    """Value and slope at a sample by the longest stretch around it, free of long holes, that a cubic fits but for the noise.
+
+    From the shortest on, as long as the slope stays within what the shorter one leaves open (Lepski 1991): at the edge of a recording
+    a cubic that hardly misses the samples may miss the slope by far. None where no cubic fits.
+    """
+    holes = _long_holes(mask)
+    first = max((b for _, b in holes if b <= at), default=0)
+    last = min((a for a, _ in holes if a >= at), default=values.size)
+    state, spread = None, math.inf
+    for reach in sorted({max(round(seconds / dt), LEAST_STRETCH // 2) for seconds in STATE_TIMES}):
         # a side that is cut off makes the other longer
         low, high = max(first, at - reach), min(last, at + reach + 1)
         low, high = max(first, min(low, high - 2 * reach - 1)), min(last, max(high, low + 2 * reach + 1))
-        count = high - low
+        rows = low + np.flatnonzero(mask[low:high])
+        count = rows.size
         if count < LEAST_STRETCH:
+            continue
+        powers = np.vander((rows - at) / count, 4, increasing=True)
+        inverse = np.linalg.inv(powers.T @ powers)
+        found = inverse @ (powers.T @ values[rows])
+        left = values[rows] - powers @ found
+        slope = float(found[1]) / (count * dt)
+        scatters = LONGER if state is not None else FIRST
+        rough = float(left @ left) > (MISSED + scatters * math.sqrt(2.0 / (count - 4))) * (count - 4) * noise**2
+        if state is not None and (rough or abs(slope - state[1]) > APART * spread):
             break
-        powers = np.vander((np.arange(low, high) - at) / count, 4, increasing=True)
-        found = np.linalg.lstsq(powers, values[low:high], rcond=None)[0]
-        left = values[low:high] - powers @ found
-        if float(left @ left) < (CUBIC + 2.0 * np.sqrt(2.0 / (count - 4))) * (count - 4) * noise**2:
-            return float(found[0]), float(found[1]) / (count * dt)
-    return None
+        if not rough:
+            state, spread = (float(found[0]), slope), noise * math.sqrt(inverse[1, 1]) / (count * dt)
+    return state
 
 
 def _bridged(values: Array, mask: Mask) -> Array:

@@ -7,12 +7,25 @@ import math
 import numpy as np
 
 from pamrs.diagnosis.blocks import Block
-from pamrs.diagnosis.candidates import DETECTION_RATIO, Candidate
+from pamrs.diagnosis.candidates import Candidate, significant
 from pamrs.diagnosis.evidence import Excess
 from pamrs.diagnosis.fitting import Problem
 from pamrs.effects_table import EFFECTS
 
-__all__ = ["FORM", "STANDING", "believed", "doubt", "explains", "most_believed", "price", "share_left", "stands", "weigh"]
+__all__ = [
+    "FORM",
+    "STANDING",
+    "believed",
+    "doubt",
+    "explains",
+    "most_believed",
+    "price",
+    "share_left",
+    "stands",
+    "unlikely",
+    "visited",
+    "weigh",
+]
 
 EVEN, EVEN_PUSH, SOFTNESS = 0.5, 2.6, 0.4
 """Logarithm of the odds of explained to unexplained variance at which a set is named at even odds with ``unlisted`` (pushes, which
@@ -35,14 +48,24 @@ STANDING, UNSEEN = 2.0, 3.0
 """Price of a clock that is late but does not drift; recordings' lengths beyond which a time constant was not seen."""
 HERTZ, ROUND = 1.5, 0.25
 """Exponent of the contact of round bodies, and how far that of muscles is believed to be from it."""
-WRONG, LEAST_SPREAD = 0.15, 0.03
-"""Share of a mismatch's variance that a right effect of another form leaves, as a standard deviation, and the least that noise does."""
+WRONG, FLOORS, DECIDED = 0.15, 0.06, 8.0
+"""Standard deviations of what a right effect of another form leaves of a mismatch's variance, and of a floor; the most that what is
+left in one block and stage counts."""
 OUTSIDE, IMPLAUSIBLE = 3.0, 4.0
-"""Factor by which a value is one standard deviation outside the published range, and the most that it costs."""
+"""Factor by which a value is one standard deviation outside the usual range, and the most that it costs."""
 NEAR_END, WIDE = 0.5, 0.15
 """Share of the angles visited over which a stop may act, and how far beyond it costs a standard deviation."""
 CONSTANCY = 0.35
 """Relative scatter of an effect's size between recordings beyond which it is not that effect."""
+
+
+def visited(problem: Problem) -> tuple[float, float] | None:
+    """Range of the angle of a rig's only joint [rad]; None where no block is a joint's, or several are."""
+    arms = [b for b in problem.blocks if b.kind == "arm"]
+    if len(arms) != 1:
+        return None
+    angles = [p.signals[arms[0].channel][0] for p in problem.recordings]
+    return min(float(a.min()) for a in angles), max(float(a.max()) for a in angles)
 
 
 def most_believed(fitted: Problem, held: Problem, mismatch: Block, left: float) -> float:
@@ -82,25 +105,26 @@ def _excesses(candidate: Candidate, baseline: Candidate, suspects: list[Block]) 
 
 def explains(candidate: Candidate, baseline: Candidate, suspects: list[Block]) -> bool:
     """Whether only noise is left, fitted and held out, where there was clearly more."""
-    quiet = all(e[b.name].ratio < DETECTION_RATIO for b in suspects for e in (candidate.fitted, candidate.held_out))
+    quiet = not any(significant(e[b.name]) for b in suspects for e in (candidate.fitted, candidate.held_out))
     before, after = max(_excesses(candidate, baseline, suspects))
     return quiet and after < CLEARLY * before
 
 
 def weigh(
-    candidates: list[Candidate], suspects: list[Block], most: float, seconds: float, visited: tuple[float, float] | None = None
+    candidates: list[Candidate], suspects: list[Block], most: float, seconds: float, ranging: tuple[float, float] | None = None
 ) -> dict[str, float]:
     """Probabilities over sets of effects and ``unlisted``.
 
     Between sets: the logarithm of what each leaves of the mismatch, fitted and held out, on a nominal number of independent looks;
     what the form of an equation may leave (``FORM``) is granted to all of them, so that no second effect is asked for to mend the
-    form of the first; among sets of as many effects less is granted (``FINE``). Each parameter and each further effect has its price,
-    and a clock that does not drift. Against ``unlisted``: the share of the mismatch that the set explains where it explains least,
+    form of the first; among sets of as many effects less is granted (``FINE``). What is left of a faint mismatch counts by what noise
+    could leave of it. Each parameter and each further effect has its price, and so have a clock that does not drift and values that an
+    effect hardly has (:func:`unlikely`). Against ``unlisted``: the share of the mismatch that the set explains where it explains least,
     and whether its size is the same in all recordings; sets that are not believed themselves say nothing against one that is. The
     constants are those under which the stated probabilities came true in a trial with other seeds than the published one
     (docs/decisions/0014).
 
-    ``seconds`` is the length of the longest recording, ``visited`` the range of the joint's angle in all of them [rad].
+    ``seconds`` is the length of the longest recording that was fitted, ``ranging`` the range of a joint's angle in them [rad].
     """
     named = [c for c in candidates if c.effects]
     if not named:
@@ -109,7 +133,7 @@ def weigh(
     trusted = {c: _trusted(c, start, suspects, most, seconds) for c in named}
 
     def weights_of(granted: float) -> dict[Candidate, float]:
-        scores = {c: _score(c, start, suspects, granted) - STANDING * stands(c, seconds) - _unlikely(c, visited) for c in named}
+        scores = {c: _score(c, start, suspects, granted) - STANDING * stands(c, seconds) - unlikely(c, ranging) for c in named}
         top = max(scores.values())
         return {c: trusted[c] * math.exp(max(-60.0, s - top)) for c, s in scores.items()}
 
@@ -154,24 +178,24 @@ def stands(candidate: Candidate, seconds: float) -> bool:
     return abs(rate) * seconds < abs(offset)
 
 
-def _unlikely(candidate: Candidate, visited: tuple[float, float] | None) -> float:
+def unlikely(candidate: Candidate, ranging: tuple[float, float] | None) -> float:
     """What a set loses by values that its physics hardly has.
 
     Swollen muscles are round, and press like round bodies (Hertz); an end stop is met near an end of the motion, and what acts over
-    most of the range is none; other parameters lose by how many times they are outside the range of published values.
+    most of the range is none; other parameters lose by how many times they are outside the range of usual values, for certain.
     """
     lost = 0.5 * ((candidate.fit.values.get("pam_crowding_contact.exponent", HERTZ) - HERTZ) / ROUND) ** 2
     stop = next((e["parameters"] for e in candidate.fit.rig.effects if e["id"] == "joint_end_stop"), None)
-    if stop is not None and visited is not None and visited[1] > visited[0]:
-        inside = (stop["angle"] - visited[0]) / (visited[1] - visited[0])
+    if stop is not None and ranging is not None and ranging[1] > ranging[0]:
+        inside = (stop["angle"] - ranging[0]) / (ranging[1] - ranging[0])
         touched = 1.0 - inside if stop["side"] >= 0.0 else inside
         lost += min(0.5 * (max(0.0, touched - NEAR_END) / WIDE) ** 2, IMPLAUSIBLE)
     for name, value in candidate.fit.values.items():
         effect, _, own = name.partition(".")
         known = next((p for p in EFFECTS[effect].parameters if p.name == own), None) if effect in EFFECTS else None
         if known is not None and known.expected is not None:
-            low, high = known.expected
-            outside = math.log(max(low / max(value, 1e-300), value / high, 1.0)) / math.log(OUTSIDE)
+            (low, high), wide = known.expected, 2.0 * candidate.fit.std.get(name, 0.0)
+            outside = math.log(max(low / max(value + wide, 1e-300), (value - wide) / high, 1.0)) / math.log(OUTSIDE)
             lost += min(0.5 * outside**2, IMPLAUSIBLE)
     return lost
 
@@ -179,13 +203,14 @@ def _unlikely(candidate: Candidate, visited: tuple[float, float] | None) -> floa
 def _score(candidate: Candidate, baseline: Candidate, suspects: list[Block], share: float) -> float:
     """Logarithm of the weight of a set of effects, up to a constant; ``share`` of the mismatch is granted to the forms of equations."""
     total = 0.0
+    once = candidate.fitted == candidate.held_out  # the same recordings twice
     for was, now in ((baseline.fitted, candidate.fitted), (baseline.held_out, candidate.held_out)):
         for block in suspects:
             excess, left = (max(0.0, e[block.name].ratio - 1.0) for e in (was, now))
             total -= 0.25 * LOOKS * math.log(1.0 + left + share * excess)
             # of a faint mismatch the noise says how much may be left, of a strong one the forms
-            spread = math.hypot(now[block.name].scatter, WRONG * excess)
-            total -= 0.5 * (left / max(spread, LEAST_SPREAD)) ** 2
+            spread = math.hypot(now[block.name].scatter, WRONG * excess, FLOORS)
+            total -= min(0.5 * (left / spread) ** 2, DECIDED) * (0.5 if once else 1.0)
     return total - price(candidate) - SECOND * (len(candidate.effects) - 1)
 
 

@@ -27,7 +27,7 @@ class EffectParameter:
         Value that switches the effect off (with the other parameters that have one at theirs); None for a parameter that gives
         the effect its shape.
     expected : (low, high) or None
-        Where published values lie; a diagnosis believes an effect less the further outside it needs the parameter.
+        Where it usually lies; a diagnosis believes an effect less the further outside it needs the parameter.
     """
 
     name: str

@@ -46,6 +46,13 @@ pub fn largest(contact: [f64; 4], pressure: f64, contraction: f64) -> f64 {
     rubbing * force([area, onset, exponent, 0.0], pressure, contraction, 0.0).abs() / SLOW
 }
 
+/// Largest slope of the force with the contraction ratio [N], rubbing included.
+pub fn stiffest(contact: [f64; 4], pressure: f64, contraction: f64) -> f64 {
+    let [area, onset, exponent, rubbing] = contact;
+    let depth = (contraction - onset).max(0.0);
+    area * pressure.max(0.0) * exponent * (depth / SECANT).powf(exponent - 1.0) * (1.0 + rubbing)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -68,6 +75,9 @@ mod tests {
         assert_eq!(force(rough, 4e5, 0.1, -1.0), 0.0);
         let slope = (force(rough, 4e5, 0.2, 1e-6) - force(rough, 4e5, 0.2, -1e-6)) / 2e-6;
         assert!((slope / largest(rough, 4e5, 0.2) - 1.0).abs() < 1e-6);
+        let pointed = [1e-3, 0.12, 1.6, 0.2];
+        let slope = (force(pointed, 4e5, 0.200_001, -1.0) - force(pointed, 4e5, 0.199_999, -1.0)) / 2e-6;
+        assert!((-slope / stiffest(pointed, 4e5, 0.2) - 1.0).abs() < 0.03);
     }
 
     #[test]

@@ -244,33 +244,35 @@ impl Plant<'_, f64> {
             let blow = (high - low).min(0.1);
             damping += joint_end_stop::tangent(k, n, blow) / n * blow * value(dissipation);
         }
-        damping += self.muscles_damping(coordinate);
+        let (rubbing, contact) = self.muscles_resistance(coordinate);
+        damping += rubbing;
+        stiffness += contact;
         (damping, stiffness)
     }
 
-    /// Damping that effects on its muscles add to a coordinate at most.
-    fn muscles_damping(&self, coordinate: usize) -> f64 {
+    /// Damping and stiffness that effects on its muscles add to a coordinate at most.
+    fn muscles_resistance(&self, coordinate: usize) -> (f64, f64) {
         let (wiring, units) = (&self.rig.wiring, &self.rig.wiring.effects);
         let value = |id| self.values[id];
-        let spec = self.rig.spec();
-        let supplied = spec.supplies.iter().map(|s| s.initial_pressure);
-        let pressure = supplied.chain(spec.chambers.iter().map(|c| c.initial_pressure)).fold(0.0, f64::max);
-        let (low, high) =
-            wiring.coordinates[coordinate].stops.map_or((0.0, 0.0), |s| (s.min_angle, s.max_angle));
-        let mut total = 0.0;
+        let gauge = self.rig.highest_pressure() - self.rig.gas.ambient_pressure;
+        let (mut damping, mut stiffness) = (0.0, 0.0);
         for group in wiring.groups.iter().filter(|g| g.coordinate == coordinate) {
+            let (low, high) = self.rig.angles(group);
             let points = (0..=16).map(|i| group.joint.eval(low + (high - low) * f64::from(i) / 16.0));
-            let (arm, shortest) =
-                points.fold((0.0_f64, 0.0_f64), |(a, s), p| (a.max(p.moment_arm.abs()), s.max(p.shortening)));
-            let mut each = 0.0;
+            let (arm, contracted) = points.fold((0.0_f64, 0.0_f64), |(arm, contracted), point| {
+                (arm.max(point.moment_arm.abs()), contracted.max(point.shortening / group.rest_length))
+            });
+            let side = group.count * arm * arm;
             if let (true, Some(ids)) = (group.effects.damping, units.damping) {
-                each += muscle_rate_damping::largest(ids.map(value), pressure);
+                damping += muscle_rate_damping::largest(ids.map(value), gauge) * side;
             }
             if let (true, Some(ids)) = (group.effects.crowding, units.crowding) {
-                each += pam_crowding_contact::largest(ids.map(value), pressure, shortest / group.rest_length);
+                let contact = ids.map(value);
+                damping += pam_crowding_contact::largest(contact, gauge, contracted) * side;
+                stiffness +=
+                    pam_crowding_contact::stiffest(contact, gauge, contracted) / group.rest_length * side;
             }
-            total += each * group.count * arm * arm;
         }
-        total
+        (damping, stiffness)
     }
 }
