@@ -82,7 +82,7 @@ def page(info: EffectInfo) -> str:
             f"{p.default:g}",
             f"{p.lower:g} to {p.upper:g}",
             "" if p.neutral is None else f"{p.neutral:g}",
-            p.meaning,
+            p.meaning if p.expected is None else "{}; expected {:g} to {:g}".format(p.meaning, *p.expected),
         ]
         for p in info.parameters
     ]

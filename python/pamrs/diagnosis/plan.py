@@ -274,7 +274,7 @@ class Plan:
         absent = [e for e in CATALOGUE if e not in {sight.effect for sight in self.sights}]
         return [
             *lines,
-            *(["", f"Not in this rig: {', '.join(absent)}"] if absent else []),
+            *(["", f"Not asked of this rig and these channels: {', '.join(absent)}"] if absent else []),
             "",
             "Not told apart: " + ("; ".join(", ".join(g) for g in self.groups) if self.groups else "none of those seen"),
         ]
