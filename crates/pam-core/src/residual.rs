@@ -23,12 +23,12 @@ pub enum Block {
     Supply(usize),
     /// Commands, neighbouring pressures and the angles of its muscles to a chamber's pressure.
     Chamber(usize),
-    /// Chamber pressures to the angle of a joint (muscles, joints and arm).
+    /// Chamber pressures to the angle of a joint (muscles, joints and arm), or to the length of the muscle on a linear load.
     Arm(usize),
 }
 
 impl Block {
-    /// The block of a name: `supply`, `chamber` or `arm`, with the name of the supply, chamber or joint behind it where it has
+    /// The block of a name: `supply`, `chamber` or `arm` (`load` of a linear load), with the name of the supply, chamber or joint behind it where it has
     /// one (`chamber.flexor`).
     ///
     /// # Errors
@@ -213,10 +213,8 @@ fn check(rig: &Rig, block: Block, measured: &Measured<'_>, starts: &[usize]) -> 
         let worst = starts.last().copied().unwrap_or(0) as f64;
         return Err(Error::parameter("starts", worst, format!("sample indices rising from 0, below {n}")));
     }
-    if rig.spec().load.is_some() {
-        return Err(Error::Model(format!(
-            "block '{block:?}' cannot be predicted: a linear load cannot be cut from its muscle yet"
-        )));
+    if matches!(block, Block::Arm(_)) && rig.spec().load.as_ref().is_some_and(|load| load.is_frame()) {
+        return Err(Error::Model("the block load cannot be predicted: a frame holds the length".into()));
     }
     let hidden = hidden(rig.layout(), measured);
     for place in neighbours(rig, block) {
@@ -263,6 +261,8 @@ struct Driven<'a, S> {
     lag: S,
     /// Whether another clock than the block's records it.
     shifted: bool,
+    /// Length of the muscles at rest [m], where a length stands for the shortening of a linear load.
+    rest: Option<f64>,
 }
 
 impl<S: Scalar> Driven<'_, S> {
@@ -273,6 +273,7 @@ impl<S: Scalar> Driven<'_, S> {
         let (cell, t, inside) =
             if self.shifted { self.signal.later(k, fraction, dt, shift.re()) } else { (k, fraction, false) };
         let (value, slope) = self.signal.at(cell, t, dt);
+        let (value, slope, sign) = self.rest.map_or((value, slope, 1.0), |rest| (rest - value, -slope, -1.0));
         let pressure = self.place < layout.angle(0);
         if pressure {
             state[self.place] = -self.zero + (value + rig.gas.ambient_pressure) + self.lag * slope;
@@ -282,7 +283,7 @@ impl<S: Scalar> Driven<'_, S> {
         }
         if inside {
             // what the shift's own derivatives add
-            let (more, bend) = (shift - shift.re(), self.signal.curvature(cell, t, dt));
+            let (more, bend) = (shift - shift.re(), self.signal.curvature(cell, t, dt) * sign);
             if pressure {
                 state[self.place] += more * slope + self.lag * more * bend;
             } else {
@@ -354,6 +355,9 @@ fn run<S: Scalar>(
         _ => (output, None),
     };
     let n = measured.samples;
+    let rest =
+        rig.spec().load.as_ref().and_then(|_| rig.wiring.groups.first()).map(|group| group.rest_length);
+    let mirrored = rest.filter(|_| matches!(block, Block::Arm(_)));
     let drivers: Vec<Driven<'_, S>> = (measured.signals.iter())
         .map(|(place, signal)| Driven {
             place: *place,
@@ -361,6 +365,7 @@ fn run<S: Scalar>(
             zero: zero(&plant, *place),
             lag: lag(&plant, *place),
             // a block's own clock is that of what it predicts
+            rest: rest.filter(|_| *place == layout.angle(0)),
             shifted: plant.skewed() && (*place < layout.angle(0)) == matches!(block, Block::Arm(_)),
         })
         .collect();
@@ -450,7 +455,8 @@ fn run<S: Scalar>(
         if skewed {
             controls = stepper.plant.skewed_controls(late, k as f64 * dt, timing.step(), dt, command);
         }
-        sink(k, state[reading] + offset, &stepper, &state, &controls);
+        let read = mirrored.map_or(state[reading] + offset, |rest| -state[reading] + rest);
+        sink(k, read, &stepper, &state, &controls);
         if k + 1 == n {
             break;
         }

@@ -510,7 +510,7 @@ fn fast_effects_shorten_the_step() {
     assert!(step(vec![effect("base_flexibility", &base)]) < 1e-3);
     // rubbing is a damper of its force over 3 mm/s near rest, at the pressure that may come and not that of the start
     let contact = |rubbing: f64| {
-        [("contact_area", 3e-2), ("onset_contraction", 0.0), ("exponent", 1.0), ("rubbing", rubbing)]
+        [("contact_area", 0.3), ("onset_contraction", 0.0), ("exponent", 1.0), ("rubbing", rubbing)]
     };
     let (smooth, rough) = (contact(0.0), contact(0.5));
     assert!(

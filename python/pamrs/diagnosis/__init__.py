@@ -49,7 +49,7 @@ def _usable_share(block: Block, recordings: list[Prepared]) -> float:
 
 def _unsettled(rig: Rig) -> list[str]:
     """Parameters of what moves that the rig file marks unknown and that no fit moves."""
-    moving = ("muscle", "transmission", "joint", "arm", "link")
+    moving = ("muscle", "transmission", "joint", "arm", "link", "load")
     unknown = [name for name, parameter in rig.parameters.items() if not parameter.known]
     return [name for name in unknown if name.partition(".")[0] in moving]
 
@@ -102,6 +102,7 @@ def _wanted(rig: Rig) -> str:
     names = [dotted("muscle_pressure", name) for name in rig.tables("chamber")]
     names += [dotted("supply_pressure", name) for name in rig.tables("supply")]
     names += [dotted("joint_angle", name) for name in rig.tables("joint")]
+    names += ["length"] if rig.model["load"] else []
     return ", ".join([*names, *core_rig(rig).inputs])
 
 
@@ -147,9 +148,10 @@ def diagnose(case: Case | str | os.PathLike[str], *, progress: Callable[[str], N
         raise DiagnosisError(
             f"the nominal rig of case {case.name!r} already has the effect {rig.effects[0]['id']!r}; diagnose a rig without effects"
         )
-    if "load" in rig.blocks:
+    if (rig.model["load"] or {}).get("kind") == "frame":
         raise DiagnosisError(
-            f"the rig of case {case.name!r} has a [load]; rigs with [joint] and [arm], or without a muscle, can be diagnosed"
+            f"load.kind = 'frame' of case {case.name!r} is not allowed: a frame holds the length, and its force is for pamrs fit; "
+            "'mass', or a rig with [joint] and [arm], or without a muscle, can be diagnosed"
         )
     check_plausible(case.recordings, rig, case.name)
     say(f"{case.name}: preparing {len(case.recordings)} recordings")

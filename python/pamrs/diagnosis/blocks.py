@@ -57,8 +57,9 @@ class Block:
 
     @property
     def kind(self) -> str:
-        """``supply``, ``chamber`` or ``arm``: its name without that of the tank, chamber or joint."""
-        return self.name.partition(".")[0]
+        """``supply``, ``chamber`` or ``arm`` (of a hanging load too): its name without that of the tank, chamber or joint."""
+        kind = self.name.partition(".")[0]
+        return "arm" if kind == "load" else kind
 
 
 _SUPPLY = ("volume", "time_constant", "droop")
@@ -67,6 +68,7 @@ _LINE = ("length", "diameter", "discharge_area")
 _CHAMBER = ("dead_volume", "alpha_in", "alpha_out", "alpha")
 _MUSCLE = ("modulus_scale",)
 _ARM = ("inertia", "first_moment", "payload", "viscous", "coulomb")
+_LOAD = ("mass", "viscous", "coulomb")
 _LINK = ("length", "mass", "centre", "inertia", "payload", "viscous", "coulomb")
 
 
@@ -98,7 +100,7 @@ class _Map:
 
     def __init__(self, rig: Rig, channels: tuple[str, ...]) -> None:
         self.rig, self.has, self.ways = rig, frozenset(channels), _ways(rig)
-        self.angles = tuple(dotted("joint_angle", name) for name in rig.tables("joint"))
+        self.angles = ("length",) if rig.model["load"] else tuple(dotted("joint_angle", name) for name in rig.tables("joint"))
         self.pulling = {name: ends["chamber"].partition(".")[2] for name, ends in rig.ports("muscle").items()}
         self.joint_of = {name: ends["joint"].partition(".")[2] for name, ends in rig.ports("muscle").items()}
 
@@ -188,17 +190,26 @@ class _Map:
         covers = "muscle, joint and arm" + _called(joint)
         return Block(name, dotted("joint_angle", joint), drives, ARM_WINDOW, frozenset(names), STEP, covers)
 
+    def load(self) -> Block | None:
+        """The block of a hanging load: muscles' pressures to their length."""
+        drives = tuple(dict.fromkeys(dotted("muscle_pressure", chamber) for chamber in self.pulling.values()))
+        if not {*drives, *self.angles} <= self.has:
+            return None
+        names = {f"load.{key}" for key in _LOAD} | {f"{qualified('muscle', m)}.{key}" for m in self.pulling for key in _MUSCLE}
+        names |= {self.zero("pressure_zero", chamber) for chamber in self.pulling.values()}
+        return Block("load", "length", drives, ARM_WINDOW, frozenset(names), STEP, "muscle and load")
+
 
 def _called(name: str) -> str:
     return f" of {name}" if name else ""
 
 
 def available_blocks(rig: Rig, channels: tuple[str, ...]) -> list[Block]:
-    """The blocks that these channels can tell apart: supplies, chambers, then joints, each in the order of the rig file.
+    """The blocks that these channels can tell apart: supplies, chambers, then joints or the load, each in the order of the rig file.
 
-    Every tank (or regulator), chamber and joint is a block of its own, driven by the measured channels next to it, with the baseline
-    parameters of what it stands for. A rig with joints and without valves and supplies is driven by the pressures of its muscles: these
-    are given, and only its joints are judged.
+    Every tank (or regulator), chamber, joint and hanging load is a block of its own, driven by the measured channels next to it, with
+    the baseline parameters of what it stands for. A rig with joints and without valves and supplies is driven by the pressures of its
+    muscles: these are given, and only its joints are judged.
 
     Parameters
     ----------
@@ -215,6 +226,7 @@ def available_blocks(rig: Rig, channels: tuple[str, ...]) -> list[Block]:
     found = [have.supply(name) for name in rig.tables("supply")]
     found += [have.chamber(name) for name in rig.tables("chamber")]
     found += [have.arm(name) for name in rig.tables("joint")] if rig.tables("arm") else []
+    found += [have.load()] if (rig.model["load"] or {}).get("kind") == "mass" else []
     return [block for block in found if block is not None]
 
 

@@ -70,6 +70,9 @@ def _conditions(block: Block, prepared: Prepared, rig: Rig, width: int) -> dict[
         if channel_of(name) == "joint_angle":
             out[_named("joint angle", name, "deg")] = np.degrees(_binned(angle, all_rows, width))
             out[_named("joint rate", name, "deg/s")] = np.degrees(_binned(rate, all_rows, width))
+        elif name == "length":
+            out["length of the muscle [mm]"] = 1e3 * _binned(angle, all_rows, width)
+            out["muscle rate [mm/s]"] = 1e3 * _binned(rate, all_rows, width)
     out["time [s]"] = _binned(prepared.recording.time, all_rows, width)
     return out
 
@@ -87,6 +90,8 @@ def _regimes(c: dict[str, Array]) -> dict[str, NDArray[np.bool_]]:
             still = np.abs(values) < 0.5
             words = ("muscle contracting", "muscle extending") if not of else (f"joint{of} rising", f"joint{of} falling")
             out |= {f"joint{of} at rest": still, words[0]: ~still & (values > 0), words[1]: ~still & (values < 0)}
+        elif quantity == "muscle rate":
+            out |= {"load at rest": np.abs(values) < 1.0, "muscle contracting": values <= -1.0, "muscle extending": values >= 1.0}
         elif quantity.startswith("muscle pressure"):
             low, high = np.quantile(values, [1 / 3, 2 / 3])
             if high - low > 0.05:

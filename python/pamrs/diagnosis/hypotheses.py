@@ -133,8 +133,8 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
     missing = screened.stand.power_left * (1.0 - 1.0 / max(now[mismatch.name].ratio, 1.0 + HARDLY))
     promised = {e: scores[0].gain / missing for e, scores in by_effect(screened.scores()).items()}
     group = Group(blocks, was, now, candidates, weighed, mismatch, floor, suspects, inclusion=often, promised=promised)
-    if weighed["unlisted"] < LIKELY or len({b.kind for b in suspects}) < len(suspects):
-        return group  # of two chambers one form would have to serve both
+    if weighed["unlisted"] < LIKELY or len({b.kind for b in suspects}) < len(suspects) or any(b.name == "load" for b in suspects):
+        return group  # of two chambers one form would have to serve both, and a load has none yet
     group = replace(group, sought=True)
     closed = find_closure(inner, nominal, baseline, colour, suspects, say)
     if closed is None:
@@ -191,6 +191,8 @@ def fits(rig: Rig, effect: str) -> bool:
     kinds = {supply["kind"] for supply in rig.tables("supply").values()}
     if effect in ("compressor_cut_in", "supply_regulator_deadband"):
         return ("tank" if effect == "compressor_cut_in" else "regulator") in kinds
+    if effect == "payload_change" and rig.model["load"]:
+        return bool(rig.model["load"]["kind"] == "mass")
     needs = EFFECTS[effect].at or ("joint" if EFFECTS[effect].block == "arm" else "chamber")
     return bool(rig.tables(needs))
 

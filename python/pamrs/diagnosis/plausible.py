@@ -297,7 +297,7 @@ def check_sense(blocks: Sequence[Block], recordings: Sequence[Prepared], core: _
         With every finding.
     """
     found = []
-    for block in (b for b in blocks if b.kind == "arm"):
+    for block in (b for b in blocks if channel_of(b.channel) == "joint_angle"):
         for prepared in recordings:
             try:
                 text = _sense(block, core, prepared)

@@ -30,7 +30,7 @@ longer ones; standard deviations by which slopes of a shorter and a longer stret
 DITHER = 20140501
 BRIDGED = 3
 """Longest hole in a drive signal that is bridged [samples]."""
-DRIVES = ("supply_pressure", "line_pressure", "muscle_pressure", "joint_angle")
+DRIVES = ("supply_pressure", "line_pressure", "muscle_pressure", "joint_angle", "length")
 """Channels at which a rig is cut; of a block with a name its name stands behind it."""
 COMMANDS = ("valve_command", "supply_command")
 

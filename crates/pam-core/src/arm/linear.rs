@@ -3,7 +3,7 @@
 //! `m x'' = F - m g - c x' - f tanh(x'/w) + F_stop`, `x` the shortening of the muscle, `F` the pull of all muscles; stops as of
 //! the one-link arm, in metres. A frame prescribes `x` (dissertation ch. 2: length cycled slowly at held pressure).
 
-use crate::scalar::{constant, tanh, Scalar};
+use crate::scalar::{tanh, Scalar};
 
 /// A mass that hangs from a muscle.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -11,21 +11,13 @@ pub struct HangingMass<S> {
     /// Mass [kg].
     pub mass: S,
     /// Viscous friction [N s/m].
-    pub viscous: f64,
+    pub viscous: S,
     /// Coulomb friction [N].
-    pub coulomb: f64,
+    pub coulomb: S,
     /// Speed over which Coulomb friction changes sign [m/s].
     pub coulomb_speed: f64,
     /// Gravity [m/s2].
     pub gravity: f64,
-}
-
-impl HangingMass<f64> {
-    /// The same in another scalar type.
-    pub fn lift<S: Scalar>(&self) -> HangingMass<S> {
-        let Self { mass, viscous, coulomb, coulomb_speed, gravity } = *self;
-        HangingMass { mass: constant(mass), viscous, coulomb, coulomb_speed, gravity }
-    }
 }
 
 impl<S: Scalar> HangingMass<S> {

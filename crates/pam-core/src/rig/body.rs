@@ -29,7 +29,16 @@ impl<S: Scalar> Body<S> {
         let stops = coordinates.first().and_then(|c| c.stops);
         Ok(match unit {
             BodyUnit::Fixed => Self::Fixed,
-            BodyUnit::Mass(mass) => Self::Mass(mass.lift(), stops),
+            BodyUnit::Mass { mass, viscous, coulomb, coulomb_speed, gravity } => Self::Mass(
+                HangingMass {
+                    mass: values[*mass],
+                    viscous: values[*viscous],
+                    coulomb: values[*coulomb],
+                    coulomb_speed: *coulomb_speed,
+                    gravity: *gravity,
+                },
+                stops,
+            ),
             BodyUnit::OneLink {
                 inertia,
                 first_moment,

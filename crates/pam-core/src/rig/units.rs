@@ -4,7 +4,6 @@ use super::parameters::{ParameterId, Parameters};
 use super::units_effects::{
     ArmEffects, EffectUnits, JointEffects, MuscleEffects, SupplyEffects, ValveEffects,
 };
-use crate::arm::linear::HangingMass;
 use crate::arm::planar::Stops;
 use crate::gas::valve::AreaTable;
 use crate::joint::Joint;
@@ -139,7 +138,13 @@ pub(crate) enum BodyUnit {
         gravity: f64,
         links: Vec<LinkUnit>,
     },
-    Mass(HangingMass<f64>),
+    Mass {
+        mass: ParameterId,
+        viscous: ParameterId,
+        coulomb: ParameterId,
+        coulomb_speed: f64,
+        gravity: f64,
+    },
 }
 
 /// A whole rig, resolved.

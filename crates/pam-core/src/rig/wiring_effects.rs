@@ -42,7 +42,7 @@ pub(super) fn switch_on(spec: &RigSpec, wiring: &mut Wiring) -> Result<()> {
         }
         place.mark(info.id, wiring)?;
     }
-    check_payload(spec, wiring)
+    check_payload(wiring)
 }
 
 impl EffectInfo {
@@ -273,17 +273,17 @@ impl Place<'_> {
 }
 
 /// A payload must not become negative.
-fn check_payload(spec: &RigSpec, wiring: &Wiring) -> Result<()> {
+fn check_payload(wiring: &Wiring) -> Result<()> {
     let (Some([change, _]), Some(link)) = (wiring.effects.payload, wiring.arm_effects.payload) else {
         return Ok(());
     };
-    let (now, least) = match (&wiring.body, &spec.load) {
-        (BodyUnit::OneLink { payload, .. }, _) => (wiring.parameters.value(*payload), 0.0),
-        (BodyUnit::Planar { links, .. }, _) => {
+    let (now, least) = match &wiring.body {
+        BodyUnit::OneLink { payload, .. } => (wiring.parameters.value(*payload), 0.0),
+        BodyUnit::Planar { links, .. } => {
             (links.get(link).map_or(0.0, |l| wiring.parameters.value(l.payload)), 0.0)
         }
-        (_, Some(load)) => (load.mass, 1e-6),
-        _ => return Ok(()),
+        BodyUnit::Mass { mass, .. } => (wiring.parameters.value(*mass), 1e-6),
+        BodyUnit::Fixed => return Ok(()),
     };
     let value = wiring.parameters.value(change);
     if now + value < least {

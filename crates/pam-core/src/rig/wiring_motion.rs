@@ -5,7 +5,6 @@ use super::spec::{dotted, ArmSpec, LinkSpec, LoadSpec, RigSpec};
 use super::units::{BodyUnit, Coordinate, Group, LinkUnit, MOST_LINKS};
 use super::units_effects::{JointEffects, MuscleEffects};
 use super::wiring::model;
-use crate::arm::linear::HangingMass;
 use crate::arm::planar::Stops;
 use crate::joint::Joint;
 use crate::muscle::{CompiledMuscle, Muscle};
@@ -166,13 +165,13 @@ pub(super) fn groups(spec: &RigSpec, known: &[Group], table: &mut Parameters) ->
 
 pub(super) fn body(spec: &RigSpec, table: &mut Parameters) -> BodyUnit {
     if let Some(load) = spec.load.as_ref().filter(|load| !load.is_frame()) {
-        return BodyUnit::Mass(HangingMass {
-            mass: load.mass,
-            viscous: load.viscous,
-            coulomb: load.coulomb,
+        return BodyUnit::Mass {
+            mass: table.add("load.mass".into(), load.mass),
+            viscous: table.add("load.viscous".into(), load.viscous),
+            coulomb: table.add("load.coulomb".into(), load.coulomb),
             coulomb_speed: load.coulomb_speed,
             gravity: load.gravity,
-        });
+        };
     }
     let Some(arm) = &spec.arm else { return BodyUnit::Fixed };
     if arm.kind == "planar" {
