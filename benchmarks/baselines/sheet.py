@@ -12,10 +12,9 @@ from scipy.stats import chi2
 
 from pamrs.case import load_case
 from pamrs.diagnosis.blocks import Block, Residual, available_blocks
-from pamrs.diagnosis.candidates import EXACT
-from pamrs.diagnosis.evidence import Floor, bins_of, floors, inflation
-from pamrs.diagnosis.fitting import FIT_BIN, Key, Problem, fit, residuals
-from pamrs.diagnosis.hypotheses import THOROUGH, refitted
+from pamrs.diagnosis.evidence import Floor, bins_of, floors
+from pamrs.diagnosis.fitting import Key, Problem, residuals
+from pamrs.diagnosis.hypotheses import coloured, refitted
 from pamrs.diagnosis.signals import Prepared, binned, prepare
 from pamrs.rig import Rig
 from pamrs.simulation import core_rig
@@ -117,10 +116,7 @@ class Sheet:
 def _refitted(inner: Problem, nominal: Rig) -> tuple[Rig, dict[str, float]]:
     """Baseline inside its tolerances, as the diagnosis refits it."""
     first = refitted(inner, nominal, dict.fromkeys((b.name for b in inner.blocks), 1.0))
-    colour = {b.name: inflation(b, inner.recordings, first.residuals, FIT_BIN) for b in inner.blocks}
-    best = first
-    if max(colour.values()) > 2:
-        best = fit(inner, nominal, (), {}, colour, warm=first, evaluations=THOROUGH, share=EXACT)
+    best, _ = coloured(inner, nominal, first)
     return best.rig, best.moved
 
 

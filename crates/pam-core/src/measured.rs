@@ -75,7 +75,8 @@ pub struct Measured<'a> {
 
 impl<'a> Measured<'a> {
     /// Commands (one for each input of the rig, held over each sample) and measured channels by name: `supply_pressure`,
-    /// `muscle_pressure`, `line_pressure`, `joint_angle`, `length` of the muscle on a linear load, each with the name of its block behind it where it has one.
+    /// `muscle_pressure`, `line_pressure`, `joint_angle`, `length` of the muscle on a linear load, each with the name of its block
+    /// behind it where it has one.
     ///
     /// # Errors
     /// [`Error::Length`] or [`Error::Parameter`] for bad arrays; [`Error::Model`] for a name that the rig does not have, or a

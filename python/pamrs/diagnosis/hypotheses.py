@@ -21,7 +21,7 @@ from pamrs.effects_table import CATALOGUE, EFFECTS
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 
-__all__ = ["THOROUGH", "examine", "fits", "refitted"]
+__all__ = ["coloured", "examine", "fits", "refitted"]
 
 HELD_RATIO, HINT = 2.0, 1.15
 """Variance over the floor's from which recordings that were held out show a mismatch, where the fitted ones give a hint of it."""
@@ -69,10 +69,7 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
     floor = floors(inner, inner.core.respecified(first.rig.to_json()))
     if held is not fitted:
         floor |= floors(outer, outer.core.respecified(first.rig.to_json()))
-    colour = {b.name: inflation(b, inner.recordings, first.residuals, FIT_BIN) for b in blocks}
-    baseline = first
-    if max(colour.values()) > 2:
-        baseline = fit(inner, nominal, (), {}, colour, warm=first, evaluations=THOROUGH, share=EXACT)
+    baseline, colour = coloured(inner, nominal, first)
     was = {b.name: excess(b, inner.recordings, before, floor) for b in blocks}
     now = {b.name: excess(b, inner.recordings, baseline.residuals, floor) for b in blocks}
     outside = residuals(outer, baseline.rig) if held is not fitted else left_out(inner, baseline, colour)
@@ -165,6 +162,14 @@ def _together(inner: Problem, outer: Problem, nominal: Rig, start: Candidate, fl
     if any(significant(e[b.name]) for b in inner.blocks for e in (fitted, held)):
         return None
     return Candidate((), found, held, fitted, 0.0)
+
+
+def coloured(problem: Problem, nominal: Rig, first: Fit) -> tuple[Fit, dict[str, float]]:
+    """The refitted baseline fitted on with the colour that it leaves as weights, where it leaves much, and that colour."""
+    colour = {b.name: inflation(b, problem.recordings, first.residuals, FIT_BIN) for b in problem.blocks}
+    if max(colour.values()) <= 2:
+        return first, colour
+    return fit(problem, nominal, (), {}, colour, warm=first, evaluations=THOROUGH, share=EXACT), colour
 
 
 def refitted(problem: Problem, nominal: Rig, inflation: dict[str, float]) -> Fit:
