@@ -27,6 +27,8 @@ PROVE_COMMAND := make prove SEED=$(PROVE_SEED)$(if $(CASES), CASES=$(CASES)) JOB
 
 # The binding crate must see the same interpreter from cargo and from maturin, or it is rebuilt each time.
 export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
+# What is built here runs here: sums over eight sensitivities at once take what vectors the processor has. Same results bit for bit.
+export RUSTFLAGS ?= -C target-cpu=native
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export MPLBACKEND := Agg
 export OPENBLAS_NUM_THREADS ?= 1

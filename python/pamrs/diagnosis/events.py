@@ -9,6 +9,7 @@ only if little is left.
 from __future__ import annotations
 
 import math
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -99,17 +100,17 @@ def look_for_events(
     Events or None
         None where no recording has one.
     """
-    values = {}
-    for prepared in problem.recordings:
+
+    def one(prepared: Prepared) -> dict[str, float] | None:
         alone = replace(problem, recordings=[prepared])
         own = {key: r for key, r in base.items() if key[1] == prepared.recording.name}
         started = _scan(effect, alone, prepared, rig, own, inflation, size)
-        if started:
-            values[prepared.recording.name] = started
-    if not values:
-        return None
-    found = _refined(Events(effect, values), problem, rig, inflation, keep_size=size is not None)
-    return found if found.values else None
+        return _fitted(effect, started, alone, prepared, rig, inflation, size is not None) if started else None
+
+    with ThreadPoolExecutor(max_workers=2) as pool:
+        found = list(pool.map(one, problem.recordings))
+    values = {p.recording.name: own for p, own in zip(problem.recordings, found, strict=True) if own is not None}
+    return Events(effect, values) if values else None
 
 
 def _scan(
@@ -192,23 +193,10 @@ def _numbered(events: list[tuple[float, float]], leading: str, effect: str) -> d
     return values
 
 
-def _refined(events: Events, problem: Problem, rig: Rig, inflation: dict[str, float], *, keep_size: bool = False) -> Events:
-    """Events of each recording fitted alone, at a model that stays."""
-    values = {}
-    for prepared in problem.recordings:
-        start = events.values.get(prepared.recording.name)
-        if start is not None:
-            alone = replace(problem, recordings=[prepared])
-            found = _fitted(events.effect, start, alone, prepared, rig, inflation, keep_size)
-            if found is not None:
-                values[prepared.recording.name] = found
-    return Events(events.effect, values)
-
-
 def _fitted(
     effect: str, start: dict[str, float], alone: Problem, prepared: Prepared, rig: Rig, inflation: dict[str, float], keep_size: bool
 ) -> dict[str, float] | None:
-    """Events of one recording; None where the model leaves its range."""
+    """Events of one recording fitted alone, at a model that stays; None where the model leaves its range."""
     leading, typical, _ = EVENTS[effect]
     free = [p for p in start if not (keep_size and p.startswith(leading))]
     scale = np.array([SCALES.get(p.rstrip("_23"), typical) for p in free])
