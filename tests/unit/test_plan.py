@@ -11,7 +11,7 @@ import pamrs
 from pamrs.cli import main
 from pamrs.diagnosis import plan
 from pamrs.diagnosis.protocols import library, pressure_range
-from pamrs.effects_table import EFFECTS
+from pamrs.effects_table import CATALOGUE, EFFECTS
 
 ALL = ("valve_command", "supply_pressure", "muscle_pressure", "joint_angle")
 
@@ -30,8 +30,14 @@ def test_a_sealed_chamber_is_planned_quickly(capsys: pytest.CaptureFixture[str],
     written = json.loads(out.read_text())
     assert written["schema"] == "pamrs.plan/1"
     assert written["noise"] == {"muscle_pressure": 100.0}
-    assert {e["id"]: e["verdict"] for e in written["effects"]}["leak_muscle"] == "seen"
-    assert "leak_muscle" in capsys.readouterr().out
+    verdicts = {e["id"]: e["verdict"] for e in written["effects"]}
+    assert verdicts["leak_muscle"] == "seen"
+    assert "payload_swing" in written["not_asked"]  # there is no arm
+    assert not verdicts.keys() & set(written["not_asked"])
+    assert verdicts.keys() | set(written["not_asked"]) == set(CATALOGUE)
+    page = capsys.readouterr().out
+    assert "leak_muscle" in page
+    assert "Not asked of this rig" in page
 
 
 def test_unknown_names_are_errors_that_name_them() -> None:

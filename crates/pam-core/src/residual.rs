@@ -28,8 +28,8 @@ pub enum Block {
 }
 
 impl Block {
-    /// The block of a name: `supply`, `chamber` or `arm` (`load` of a linear load), with the name of the supply, chamber or joint behind it where it has
-    /// one (`chamber.flexor`).
+    /// The block of a name: `supply`, `chamber` or `arm` (`load` of a linear load), with the name of the supply, chamber or
+    /// joint behind it where it has one (`chamber.flexor`).
     ///
     /// # Errors
     /// [`Error::Model`] for another name.

@@ -194,6 +194,11 @@ class Plan:
         both = {self.sight(first).effect, self.sight(second).effect}
         return both <= set(self.seen) and not any({a, b} == both for a, b, _ in self.pairs)
 
+    @property
+    def not_asked(self) -> tuple[str, ...]:
+        """Effects of the catalogue that have no place in this rig, or none that these channels surround."""
+        return tuple(e for e in CATALOGUE if e not in {sight.effect for sight in self.sights})
+
     def to_dict(self) -> dict[str, Any]:
         """The plan as plain values, null for no number."""
 
@@ -221,6 +226,7 @@ class Plan:
                 }
                 for s in self.sights
             ],
+            "not_asked": list(self.not_asked),
             "pairs": [{"effects": [a, b], "cosine": round(c, 4)} for a, b, c in self.pairs],
             "groups": [list(group) for group in self.groups],
             "additions": [
@@ -271,10 +277,9 @@ class Plan:
                 f"  {sight.effect:<25}{sight.verdict:<8}{sight.left:>7.2g}  {where}{typical:>10}"
                 f"{smallest:>11}  {'' if unit == '1' else unit:<13}{', '.join(rivals)}".rstrip()
             )
-        absent = [e for e in CATALOGUE if e not in {sight.effect for sight in self.sights}]
         return [
             *lines,
-            *(["", f"Not asked of this rig and these channels: {', '.join(absent)}"] if absent else []),
+            *(["", f"Not asked of this rig and these channels: {', '.join(self.not_asked)}"] if self.not_asked else []),
             "",
             "Not told apart: " + ("; ".join(", ".join(g) for g in self.groups) if self.groups else "none of those seen"),
         ]
