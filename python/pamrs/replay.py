@@ -26,7 +26,7 @@ _STATES = {
     "supply_pressure": ("supply", ""),
     "line_pressure": ("line", ""),
     "joint_angle": ("joint", "angle_zero"),
-    "length": ("load", ""),
+    "length": ("load", "length_zero"),
 }
 #: A recorded channel beside a simulated one of another name.
 _RECORDED_AS = {"muscle_force": "force"}

@@ -184,6 +184,7 @@ class Reader:
         if raw is None:
             model["sensors"] = self.block("sensors", {})
         owners = {"pressure_zero": tables_of(model, "chamber"), "angle_zero": tables_of(model, "joint")}
+        self._length_zero(model, raw)
         for name, table in tables_of(model, "sensors").items():
             if not name or not self.whole:
                 continue
@@ -197,6 +198,19 @@ class Reader:
                     if key in raw[name]:
                         what = "chamber" if key == "pressure_zero" else "joint"
                         self.problem(f"sensors.{name}.{key} is not allowed: the rig has no {what}.{name}")
+
+    def _length_zero(self, model: dict[str, Any], raw: Any) -> None:
+        """The zero of the length is that of a mass that moves, and a rig has one: sensors without a name have it."""
+        moves = (model["load"] or {}).get("kind") == "mass"
+        for name, table in tables_of(model, "sensors").items():
+            if moves and not name:
+                continue
+            given = isinstance(raw, Mapping) and "length_zero" in (raw.get(name) or {} if name else raw)
+            if given and self.whole:
+                label = qualified("sensors", name)
+                needs = 'a [load] with kind = "mass" is needed' if not moves else "it stands in [sensors], without a name"
+                self.problem(f"{label}.length_zero is not allowed: {needs}")
+            table.pop("length_zero", None)
 
     # -------------------------------------------------------------------- values
 

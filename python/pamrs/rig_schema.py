@@ -231,6 +231,7 @@ BLOCKS: Final[dict[str, tuple[Key, ...]]] = {
     "sensors": (
         Key("pressure_zero", "Pa", -1e6, 1e6, 0.0),
         Key("angle_zero", "rad", -_TURN, _TURN, 0.0),
+        Key("length_zero", "m", -10.0, 10.0, 0.0),
     ),
 }
 

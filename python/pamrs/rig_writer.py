@@ -135,6 +135,7 @@ def core_json(model: Mapping[str, Any], ports: Ports) -> str:
         "load": model["load"],
         "sensors": [
             {"name": name, "pressure_zero": table.get("pressure_zero", 0.0), "angle_zero": table.get("angle_zero", 0.0)}
+            | {key: table[key] for key in ("length_zero",) if key in table}
             for name, table in tables_of(model, "sensors").items()
         ],
         "effects": [

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,10 +11,16 @@ import pytest
 
 import pamrs
 from pamrs.diagnosis.blocks import available_blocks
+from pamrs.diagnosis.events import look_for_events
+from pamrs.diagnosis.experiment import propose
 from pamrs.diagnosis.fitting import Problem, residuals
+from pamrs.diagnosis.hypotheses import fits
+from pamrs.diagnosis.plausible import implausible
+from pamrs.diagnosis.protocols import library
 from pamrs.diagnosis.signals import prepare
 from pamrs.errors import DiagnosisError, SimulationError
 from pamrs.recording import Recording
+from pamrs.rig import parse_rig
 from pamrs.simulation import core_rig
 
 RIG = pamrs.rigs.hanging_mass()
@@ -47,7 +55,7 @@ def test_the_load_is_a_block_and_its_sensitivities_are_those_of_differences() ->
     assert blocks["load"].kind == "arm"
     assert "length" in blocks["chamber"].drives
     problem = Problem([blocks["load"]], [prepare(recording(RIG, "slow", "fit", 0, 6.0), RIG)], core_rig(RIG))
-    names = ["load.mass", "load.viscous", "load.coulomb", "muscle.modulus_scale", "sensors.pressure_zero"]
+    names = ["load.mass", "load.viscous", "load.coulomb", "muscle.modulus_scale", "sensors.pressure_zero", "sensors.length_zero"]
     found = residuals(problem, RIG, names)["load", "slow"]
     assert float(np.sqrt(np.mean(found.value**2))) < 2.0 * found.noise
     prepared, known = problem.recordings[0], RIG.parameters
@@ -63,9 +71,66 @@ def test_the_load_is_a_block_and_its_sensitivities_are_those_of_differences() ->
         assert np.abs(slope - jacobian[:, k]).max() < 1e-3 * np.abs(slope).max(), name
 
 
-def test_a_true_model_of_a_load_misses_nothing() -> None:
-    found = pamrs.diagnose(case(RIG.with_parameters({"load.mass": 40.08, "muscle.modulus_scale": 1.04})))
+@pytest.mark.parametrize("true", [{"load.mass": 40.08, "muscle.modulus_scale": 1.04}, {"muscle.rest_length": 0.277}])
+def test_a_true_model_of_a_load_misses_nothing(true: dict[str, float]) -> None:
+    found = pamrs.diagnose(case(RIG.with_parameters(true)))
     assert found.verdict in ("none", "parameters")
+    if "muscle.rest_length" in true:  # what is read as a longer muscle is the zero of its length, near enough
+        assert found.parameters["sensors.length_zero"]["value"] == pytest.approx(1e-3, abs=2e-4)
+
+
+def test_the_zero_of_the_length_is_what_is_read_beside_the_true_one() -> None:
+    off = RIG.with_parameters({"sensors.length_zero": 0.002})
+    one, other = (pamrs.simulate(rig, np.full(60, 5.05), sample_time=DT) for rig in (RIG, off))
+    assert other["length"] - one["length"] == pytest.approx(0.002)
+    assert other["muscle_pressure"] == pytest.approx(one["muscle_pressure"])
+    text = pamrs.rigs.sealed_chamber().to_toml_text() + 'length_zero = { value = 1, unit = "mm" }\n'
+    with pytest.raises(pamrs.RigError, match=r'length_zero is not allowed: a \[load\] with kind = "mass"'):
+        parse_rig(text)
+
+
+def test_a_length_that_cannot_be_is_refused() -> None:
+    def told(change: Callable[[np.ndarray], np.ndarray]) -> str:
+        sound = recording(RIG, "slow", "fit", 0, 4.0)
+        channels = sound.channels | {"length": change(sound.channels["length"])}
+        return "; ".join(implausible(replace(sound, channels=channels), RIG))
+
+    assert told(lambda x: x) == ""
+    assert "length has the one value" in told(lambda x: np.full_like(x, 0.25))
+    assert "length is outside its load's range" in told(lambda x: 1e-3 * x)
+    assert "length moves with" in told(lambda x: 0.24 + 100.0 * (x - x.mean()) * np.sign(np.sin(1e4 * np.arange(x.size))))
+    slow = replace(recording(RIG, "slow", "fit", 0, 4.0), sample_time=0.4)
+    assert "too slow for a load" in "; ".join(implausible(slow, RIG))
+
+
+def test_a_load_behind_a_valve_that_was_not_recorded_is_driven_by_its_pressure() -> None:
+    whole = recording(RIG, "slow", "fit", 0, 4.0)
+    bare = replace(whole, channels={n: v for n, v in whole.channels.items() if n in ("muscle_pressure", "length")})
+    assert [b.name for b in available_blocks(RIG, tuple(bare.channels))] == ["load"]
+    assert prepare(bare, RIG).n == whole.time.size
+
+
+def test_a_mass_that_changes_is_looked_for_and_found() -> None:
+    assert RIG.muscle is not None
+    assert fits(RIG, "payload_change")
+    assert not fits(pamrs.rigs.bench(RIG.muscle), "payload_change")
+    changed = RIG.with_effect("payload_change", {"mass_change": -2.0, "time": 7.0})  # of which 4 s are not recorded
+    load = [b for b in available_blocks(RIG, tuple(NOISE)) if b.name == "load"]
+    problem = Problem(load, [prepare(recording(changed, "slow", "fit", 0, 6.0), RIG)], core_rig(RIG))
+    found = look_for_events("payload_change", problem, RIG, residuals(problem, RIG), {"load": 1.0})
+    assert found is not None
+    (values,) = found.values.values()
+    assert values["mass_change"] == pytest.approx(-2.0, rel=0.2)
+
+
+def test_the_next_experiment_with_a_load_is_simulated() -> None:
+    experiments = library(RIG, only={"staircase", "other_payload"})
+    assert [e.name for e in experiments] == ["staircase", "other_payload"]
+    assert experiments[1].changes == {"load.mass": pytest.approx(20.0)}
+    creeping = RIG.with_effect("muscle_creep")
+    told = propose(RIG, [("none", RIG, 0.5), ("muscle_creep", creeping, 0.5)], experiments=experiments[:1])
+    assert told["expected_information_bits"] > 0.3
+    assert told["curves"] is not None
 
 
 def test_an_effect_on_a_load_is_named() -> None:
@@ -76,7 +141,7 @@ def test_an_effect_on_a_load_is_named() -> None:
     assert found.effects[0]["probability"] > 0.8
     assert found.fit["gap_closed"] > 0.8
     assert "length" in found.fit["held_out"]
-    assert "length" in found.summary()
+    assert "load block" in found.summary()
 
 
 def test_a_frame_holds_the_length_and_has_no_block_of_its_own() -> None:

@@ -143,7 +143,7 @@ def test_a_load_and_a_joint_exclude_each_other() -> None:
         parse_rig(pamrs.rigs.shoulder().to_toml_text() + load)
 
 
-def test_a_rig_with_a_load_is_not_diagnosed_by_guessing(tmp_path: Path) -> None:
+def test_a_load_without_its_length_is_refused_with_what_to_measure(tmp_path: Path) -> None:
     (tmp_path / "rig.toml").write_text(MASS, encoding="utf-8")
     run = pamrs.simulate(parse_rig(MASS), sample_time=0.01, duration=2.0, initial={"muscle_pressure": 4e5, "length": 0.25})
     rows = "\n".join(f"{t:.3f},{p:.3f}" for t, p in zip(run.time, run["muscle_pressure"], strict=True))

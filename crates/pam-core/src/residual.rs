@@ -261,7 +261,8 @@ struct Driven<'a, S> {
     lag: S,
     /// Whether another clock than the block's records it.
     shifted: bool,
-    /// Length of the muscles at rest [m], where a length stands for the shortening of a linear load.
+    /// Length of the muscles at rest [m], where a length stands for the shortening of a linear load; `zero` is then that of the
+    /// shortening, the length's with the other sign.
     rest: Option<f64>,
 }
 
@@ -359,14 +360,17 @@ fn run<S: Scalar>(
         rig.spec().load.as_ref().and_then(|_| rig.wiring.groups.first()).map(|group| group.rest_length);
     let mirrored = rest.filter(|_| matches!(block, Block::Arm(_)));
     let drivers: Vec<Driven<'_, S>> = (measured.signals.iter())
-        .map(|(place, signal)| Driven {
-            place: *place,
-            signal: *signal,
-            zero: zero(&plant, *place),
-            lag: lag(&plant, *place),
-            // a block's own clock is that of what it predicts
-            rest: rest.filter(|_| *place == layout.angle(0)),
-            shifted: plant.skewed() && (*place < layout.angle(0)) == matches!(block, Block::Arm(_)),
+        .map(|(place, signal)| {
+            let (zero, rest) = (zero(&plant, *place), rest.filter(|_| *place == layout.angle(0)));
+            Driven {
+                place: *place,
+                signal: *signal,
+                zero: if rest.is_some() { -zero } else { zero },
+                lag: lag(&plant, *place),
+                rest,
+                // a block's own clock is that of what it predicts
+                shifted: plant.skewed() && (*place < layout.angle(0)) == matches!(block, Block::Arm(_)),
+            }
         })
         .collect();
     let skewed = plant.skewed();
@@ -455,7 +459,7 @@ fn run<S: Scalar>(
         if skewed {
             controls = stepper.plant.skewed_controls(late, k as f64 * dt, timing.step(), dt, command);
         }
-        let read = mirrored.map_or(state[reading] + offset, |rest| -state[reading] + rest);
+        let read = mirrored.map_or(state[reading], |rest| -state[reading] + rest) + offset;
         sink(k, read, &stepper, &state, &controls);
         if k + 1 == n {
             break;

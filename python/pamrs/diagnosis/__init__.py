@@ -1,7 +1,7 @@
 """Diagnosis: locate a mismatch between model and recordings, name the omitted physics or say that it is not listed.
 
-A rig is cut at every measured channel, so that each tank, chamber and joint has a residual of its own. The baseline is refitted
-inside its tolerances first; what then exceeds the noise floor is located by block and condition, and the effects of the
+A rig is cut at every measured channel, so that each tank, chamber, joint and hanging load has a residual of its own. The baseline is
+refitted inside its tolerances first; what then exceeds the noise floor is located by block and condition, and the effects of the
 catalogue compete with each other and with "unlisted" on held-out recordings.
 """
 
@@ -194,9 +194,10 @@ def diagnose(case: Case | str | os.PathLike[str], *, progress: Callable[[str], N
         diagnosis.warnings.append(f"block {name} was left out: only {100 * share:.0f} % of its samples are usable")
     diagnosis.warnings += drowned.values()
     if unsettled:
+        what = "length" if rig.model["load"] else "angle"
         diagnosis.warnings.append(
-            f"{', '.join(unsettled)}: marked unknown, and no fit moves them; a wrong one bends the angle as an effect would, so that "
-            f"no effect of muscles, joints and arm is believed by more than {100 * MOST_BELIEVED:.0f} %"
+            f"{', '.join(unsettled)}: marked unknown, and no fit moves them; a wrong one bends the {what} as an effect would, so that "
+            f"no effect of muscles and what they move is believed by more than {100 * MOST_BELIEVED:.0f} %"
         )
     diagnosis.seconds = round(time.perf_counter() - began, 3)
     if not math.isfinite(sum(diagnosis.probabilities.values())):

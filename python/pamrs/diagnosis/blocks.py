@@ -136,7 +136,8 @@ class _Map:
 
     def zeros(self, chambers: Iterable[str], joints: Iterable[str]) -> set[str]:
         """Those of the sensors of some chambers and joints."""
-        return {self.zero("pressure_zero", c) for c in chambers} | {self.zero("angle_zero", j) for j in joints}
+        moving = {"sensors.length_zero"} if self.rig.model["load"] else {self.zero("angle_zero", j) for j in joints}
+        return {self.zero("pressure_zero", c) for c in chambers} | moving
 
     def of_ways(self, block: str) -> set[str]:
         """Parameters of the valves and lines at a block."""
@@ -196,7 +197,7 @@ class _Map:
         if not {*drives, *self.angles} <= self.has:
             return None
         names = {f"load.{key}" for key in _LOAD} | {f"{qualified('muscle', m)}.{key}" for m in self.pulling for key in _MUSCLE}
-        names |= {self.zero("pressure_zero", chamber) for chamber in self.pulling.values()}
+        names |= self.zeros(self.pulling.values(), ())
         return Block("load", "length", drives, ARM_WINDOW, frozenset(names), STEP, "muscle and load")
 
 
@@ -208,8 +209,8 @@ def available_blocks(rig: Rig, channels: tuple[str, ...]) -> list[Block]:
     """The blocks that these channels can tell apart: supplies, chambers, then joints or the load, each in the order of the rig file.
 
     Every tank (or regulator), chamber, joint and hanging load is a block of its own, driven by the measured channels next to it, with
-    the baseline parameters of what it stands for. A rig with joints and without valves and supplies is driven by the pressures of its
-    muscles: these are given, and only its joints are judged.
+    the baseline parameters of what it stands for. A rig with joints or a load and without valves and supplies is driven by the
+    pressures of its muscles: these are given, and only what they move is judged.
 
     Parameters
     ----------

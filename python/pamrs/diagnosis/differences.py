@@ -44,9 +44,10 @@ Array = NDArray[np.float64]
 
 EFFECTIVE = 10.0
 """Independent samples that a block's residual over one recording counts as."""
-NOISE: dict[str, float] = {"supply_pressure": 200.0, "muscle_pressure": 200.0, "joint_angle": math.radians(0.03)}
-"""Sample noise of typical transducers [SI]: a 0 to 14 bar pressure transducer and a Hall angle sensor on a 16-bit converter."""
-MEASURABLE = ("valve_command", "supply_pressure", "muscle_pressure", "joint_angle")
+NOISE: dict[str, float] = {"supply_pressure": 200.0, "muscle_pressure": 200.0, "joint_angle": math.radians(0.03), "length": 3e-5}
+"""Sample noise of typical transducers [SI]: a 0 to 14 bar pressure transducer, a Hall angle sensor and a linear transducer on a 16-bit
+converter."""
+MEASURABLE = ("valve_command", "supply_pressure", "muscle_pressure", "joint_angle", "length")
 """Channels that the cut chain uses."""
 KNOWN_SHARE = 0.5
 """Relative standard deviation of an effect's parameter of which the rig file says none."""

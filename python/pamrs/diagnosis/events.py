@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from threading import Event
 
 import numpy as np
 from numpy.typing import NDArray
@@ -104,11 +105,16 @@ def look_for_events(
     def one(prepared: Prepared) -> dict[str, float] | None:
         alone = replace(problem, recordings=[prepared])
         own = {key: r for key, r in base.items() if key[1] == prepared.recording.name}
-        started = _scan(effect, alone, prepared, rig, own, inflation, size)
-        return _fitted(effect, started, alone, prepared, rig, inflation, size is not None) if started else None
+        started = _scan(effect, alone, prepared, rig, own, inflation, size, stopped)
+        return _fitted(effect, started, alone, prepared, rig, inflation, size is not None, stopped) if started else None
 
+    stopped = Event()
     with ThreadPoolExecutor(max_workers=2) as pool:
-        found = list(pool.map(one, problem.recordings))
+        try:
+            found = list(pool.map(one, problem.recordings))
+        except BaseException:  # an interrupt is not to wait for two whole searches
+            stopped.set()
+            raise
     values = {p.recording.name: own for p, own in zip(problem.recordings, found, strict=True) if own is not None}
     return Events(effect, values) if values else None
 
@@ -121,6 +127,7 @@ def _scan(
     base: dict[Key, Residual],
     inflation: dict[str, float],
     size: float | None,
+    stopped: Event,
 ) -> dict[str, float]:
     """Where the events of one recording begin, the most telling first; empty where none is worth it."""
     leading, typical, slots = EVENTS[effect]
@@ -129,6 +136,8 @@ def _scan(
     rows, _ = stacked(problem, base, inflation)
     signatures: dict[float, Array] = {}
     for group in _apart(times, slots):
+        if stopped.is_set():
+            return {}
         values = _numbered([(typical if size is None else size, float(t)) for t in group], leading, effect)
         try:
             moved, _ = stacked(problem, changes(problem, rig.with_effect(effect, values), base, effect), inflation)
@@ -194,7 +203,14 @@ def _numbered(events: list[tuple[float, float]], leading: str, effect: str) -> d
 
 
 def _fitted(
-    effect: str, start: dict[str, float], alone: Problem, prepared: Prepared, rig: Rig, inflation: dict[str, float], keep_size: bool
+    effect: str,
+    start: dict[str, float],
+    alone: Problem,
+    prepared: Prepared,
+    rig: Rig,
+    inflation: dict[str, float],
+    keep_size: bool,
+    stopped: Event,
 ) -> dict[str, float] | None:
     """Events of one recording fitted alone, at a model that stays; None where the model leaves its range."""
     leading, typical, _ = EVENTS[effect]
@@ -207,6 +223,8 @@ def _fitted(
         return start | {p: float(v) for p, v in zip(free, x * scale, strict=True)}
 
     def evaluate(x: Array) -> tuple[Array, Array, None]:
+        if stopped.is_set():
+            raise SimulationError("the search for events was stopped")
         events = Events(effect, {prepared.recording.name: told(x)})
         found = residuals(alone, rig, [f"{effect}.{p}" for p in free], events)
         rows, slope = stacked(alone, found, inflation)

@@ -130,8 +130,11 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
     missing = screened.stand.power_left * (1.0 - 1.0 / max(now[mismatch.name].ratio, 1.0 + HARDLY))
     promised = {e: scores[0].gain / missing for e, scores in by_effect(screened.scores()).items()}
     group = Group(blocks, was, now, candidates, weighed, mismatch, floor, suspects, inclusion=often, promised=promised)
-    if weighed["unlisted"] < LIKELY or len({b.kind for b in suspects}) < len(suspects) or any(b.name == "load" for b in suspects):
-        return group  # of two chambers one form would have to serve both, and a load has none yet
+    if weighed["unlisted"] < LIKELY or len({b.kind for b in suspects}) < len(suspects):
+        return group  # of two chambers one form would have to serve both
+    if any(b.name == "load" for b in suspects):
+        say(f"{names}: no form of what is missing is looked for, since that of a load is not in the simulator")
+        return group
     group = replace(group, sought=True)
     closed = find_closure(inner, nominal, baseline, colour, suspects, say)
     if closed is None:

@@ -26,7 +26,7 @@ from pamrs.diagnosis.hypotheses import fits
 from pamrs.diagnosis.protocols import Experiment, library
 from pamrs.diagnosis.signals import binned
 from pamrs.diagnosis.starts import Start, starts_of
-from pamrs.driving import regulators_of
+from pamrs.driving import has_frame, regulators_of
 from pamrs.effects_table import CATALOGUE, find_parameter
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError
 from pamrs.rig import Rig
@@ -456,7 +456,7 @@ def _check_rig(rig: Rig) -> None:
         f"it already has the effect {rig.effects[0]['id']!r}; plan with a rig without effects" if rig.effects else "",
         f"it has named blocks ({', '.join(several)}); rigs of one chain can be planned, without names" if several else "",
         "it is fed by a regulator; rigs fed by a tank or a constant supply can be planned" if regulators_of(rig) else "",
-        "it has a [load]; rigs with [joint] and [arm], or without a muscle, can be planned" if "load" in rig.blocks else "",
+        "its load is a frame; a mass, [joint] and [arm], or no muscle can be planned" if has_frame(rig) else "",
     } - {""}
     if reasons:
         raise DiagnosisError(f"rig {rig.name!r}: {'; '.join(sorted(reasons))}")

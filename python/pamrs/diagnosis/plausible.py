@@ -10,6 +10,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,14 +39,16 @@ ANGLE_MARGIN, ANGLE_SHARE = 0.05, 0.2
 """Share of a joint's range (and at least 0.1 rad) by which an angle may leave it, and share of the time."""
 MOST_RATE = 200.0
 """Joint rate that one sample in a hundred may exceed [rad/s]."""
+MOST_SPEED = 20.0
+"""Speed of a load that one sample in a hundred may exceed [m/s]."""
 LONGEST_SAMPLE = 0.25
-"""Sample time at which a joint's motion can still be followed [s]."""
+"""Sample time at which the motion of a joint or load can still be followed [s]."""
 FROZEN_WHILE = 2e4
 """Change of a muscle's pressure while which a tank that feeds it cannot read one and the same value [Pa]."""
 OPPOSED, OPPOSITE = 0.6, -0.2
 """Share of a chamber's change of pressure that may go against its valve's command, if the two are also correlated below this."""
-STILL = 0.02
-"""Change of a joint's angle up to which its muscles' volume hardly moves their pressure [rad]."""
+STILL = {"joint_angle": 0.02, "length": 1e-3}
+"""Change of a joint's angle [rad] or a load's length [m] up to which the muscles' volume hardly moves their pressure."""
 DEGREES = 180.0 / math.pi
 WRONG, RIGHT = 1.0, 0.4
 """Misfit in standard deviations of the angle as recorded, and as it would be in another unit, from which the unit is wrong."""
@@ -99,7 +102,7 @@ def implausible(recording: Recording, rig: Rig) -> list[str]:
         *_clock(recording, rig),
         *_pressures(recording, rig),
         *_order(recording, rig),
-        *_angles(recording, rig),
+        *_motion(recording, rig),
         *_valves(recording, rig),
     ]
 
@@ -112,9 +115,10 @@ def _values(recording: Recording, name: str) -> Array:
 
 
 def _clock(recording: Recording, rig: Rig) -> Iterator[str]:
-    if rig.tables("joint") and recording.sample_time > LONGEST_SAMPLE:
+    if _moving(rig) and recording.sample_time > LONGEST_SAMPLE:
+        what = "a joint" if rig.tables("joint") else "a load"
         yield (
-            f"a sample every {recording.sample_time:g} s is too slow for a joint: at most {LONGEST_SAMPLE:g} s; is the unit of "
+            f"a sample every {recording.sample_time:g} s is too slow for {what}: at most {LONGEST_SAMPLE:g} s; is the unit of "
             "'time' (ms, us) the one its values are in?"
         )
 
@@ -201,39 +205,70 @@ def _order(recording: Recording, rig: Rig) -> Iterator[str]:
                 )
 
 
-def _angles(recording: Recording, rig: Rig) -> Iterator[str]:
-    """Range, rate and life of joint angles."""
+@dataclass(frozen=True)
+class _Moving:
+    """What muscles move: its channel, unit and range, how far and fast it may be, and the chambers of its muscles."""
+
+    channel: str
+    unit: str
+    low: float
+    high: float
+    margin: float
+    fastest: float
+    pulled: tuple[str, ...]
+
+
+def _moving(rig: Rig) -> list[_Moving]:
+    """The joints of a rig, or its hanging load."""
+    ends = rig.ports("muscle").values()
+    found = []
     for joint, table in rig.tables("joint").items():
-        name = dotted("joint_angle", joint)
+        low, high = float(table["min_angle"]), float(table["max_angle"])
+        pulled = tuple(e["chamber"].partition(".")[2] for e in ends if e["joint"] == dotted("joint", joint))
+        margin = max(0.1, ANGLE_MARGIN * (high - low))
+        found.append(_Moving(dotted("joint_angle", joint), "rad", low, high, margin, MOST_RATE, pulled))
+    load = rig.model["load"]
+    if load and load["kind"] == "mass":
+        low, high = float(load["min_length"]), float(load["max_length"])
+        pulled = tuple(e["chamber"].partition(".")[2] for e in ends)
+        found.append(_Moving("length", "m", low, high, max(0.01, ANGLE_MARGIN * (high - low)), MOST_SPEED, pulled))
+    return found
+
+
+def _motion(recording: Recording, rig: Rig) -> Iterator[str]:
+    """Range, rate and life of joint angles and of a load's length."""
+    for moving in _moving(rig):
+        name, unit = moving.channel, moving.unit
         values = _values(recording, name)
         if values.size < 3:
             continue
-        low, high = float(table["min_angle"]), float(table["max_angle"])
-        margin = max(0.1, ANGLE_MARGIN * (high - low))
-        share = float(np.mean((values < low - margin) | (values > high + margin)))
+        share = float(np.mean((values < moving.low - moving.margin) | (values > moving.high + moving.margin)))
         if share > ANGLE_SHARE:
+            whose, units = ("its joint's range", "deg or rad") if unit == "rad" else ("its load's range", "mm or m")
             yield (
-                f"{name} is outside its joint's range for {100 * share:.0f} % of the time: from {values.min():.3g} to "
-                f"{values.max():.3g} rad, where {low:.3g} to {high:.3g} rad are possible: right column, unit (deg or rad) and sign?"
+                f"{name} is outside {whose} for {100 * share:.0f} % of the time: from {values.min():.3g} to "
+                f"{values.max():.3g} {unit}, where {moving.low:.3g} to {moving.high:.3g} {unit} are possible: right column, unit "
+                f"({units}) and sign?"
             )
         rows = recording.mask[name]
         steps = np.abs(np.diff(recording.channels[name]))[rows[1:] & rows[:-1]] / recording.sample_time
         fast = float(np.quantile(steps, 0.99)) if steps.size >= 16 else 0.0
-        if fast > MOST_RATE:
+        if fast > moving.fastest:
             yield (
-                f"{name} turns with {fast:.3g} rad/s, one sample in a hundred faster; at most {MOST_RATE:g} rad/s is allowed: are the "
-                "units of 'time' (s, ms, us) and of the angle those that their values are in?"
+                f"{name} {'turns' if unit == 'rad' else 'moves'} with {fast:.3g} {unit}/s, one sample in a hundred faster; at most "
+                f"{moving.fastest:g} {unit}/s is allowed: are the units of 'time' (s, ms, us) and of the "
+                f"{'angle' if unit == 'rad' else 'length'} those that their values are in?"
             )
-        pulled = [e["chamber"].partition(".")[2] for e in rig.ports("muscle").values() if e["joint"] == dotted("joint", joint)]
-        pressures = [v for c in pulled if (v := _values(recording, dotted("muscle_pressure", c))).size]
+        pressures = [v for c in moving.pulled if (v := _values(recording, dotted("muscle_pressure", c))).size]
         if (
             values.size >= 16
             and np.ptp(values) == 0.0
             and any(float(np.ptp(v)) > 0.1 * float(np.abs(v).max()) > 1e3 for v in pressures)
         ):
+            what = "a frozen encoder and a joint that is held" if unit == "rad" else "a frozen transducer and a load that is held"
             yield (
-                f"{name} has the one value {values[0]:.4g} rad throughout while its muscles' pressures change: a frozen encoder and a "
-                "joint that is held cannot be told apart, and neither is in the model; leave the recording out"
+                f"{name} has the one value {values[0]:.4g} {unit} throughout while its muscles' pressures change: {what} cannot be "
+                "told apart, and neither is in the model; leave the recording out"
             )
 
 
@@ -262,9 +297,9 @@ def _valves(recording: Recording, rig: Rig) -> Iterator[str]:
             continue  # another valve may fill while this one vents
         width = max(2, round(0.1 / recording.sample_time))
         rows = np.flatnonzero(both[:-width] & both[width // 2 : -width + width // 2] & both[width:])
-        # a joint that swings moves the pressure by its volume, whatever the valve does
-        for angle in (v for c, v in recording.channels.items() if channel_of(c) == "joint_angle"):
-            rows = rows[~(np.abs(angle[rows + width] - angle[rows]) > STILL)]
+        # what swings moves the pressure by its volume, whatever the valve does
+        for place, still in ((v, STILL[channel_of(c)]) for c, v in recording.channels.items() if channel_of(c) in STILL):
+            rows = rows[~(np.abs(place[rows + width] - place[rows]) > still)]
         change = recording.channels[pressure][rows + width] - recording.channels[pressure][rows]
         towards, moved = opening[rows + width // 2], float(np.ptp(recording.channels[pressure][both]))
         if rows.size < 32 or moved < 2e4 or not np.ptp(towards) > 0.0 or not np.ptp(change) > 0.0:

@@ -175,20 +175,23 @@ def pressure_range(rig: Rig, *, highest: float | None = None) -> Range:
     Returns
     -------
     Range
-        With an arm, from where it leaves a twentieth of its range to nine tenths of it; without one, from a tenth to six tenths
-        of the supply's pressure.
+        With an arm or a load, from where it has moved by a twentieth of its range to nine tenths of it; without one, from a tenth to
+        six tenths of the supply's pressure.
     """
     model = rig.model
     if model["valve"] is None:
         top = 7.0e5 if highest is None else highest
         return Range(0.35 * top, top)
     top = min(0.8 * model["supply"]["initial_pressure"], math.inf if highest is None else highest)
-    if model["arm"] is None:
+    joint, load = model["joint"], model["load"]
+    if model["arm"] is None and load is None:
         return Range(0.1 * top, min(0.75 * top, 7.0e5))
-    joint = model["joint"]
     ramp = np.linspace(0.0, top, 1501)
     found = simulate(rig, trial_of(rig, ramp, sample_time=0.01), sample_time=0.01)
-    share = (found["joint_angle"] - joint["rest_angle"]) / (joint["max_angle"] - joint["rest_angle"])
+    if load is None:
+        share = (found["joint_angle"] - joint["rest_angle"]) / (joint["max_angle"] - joint["rest_angle"])
+    else:
+        share = (found["length"][0] - found["length"]) / (found["length"][0] - load["min_length"])
     pressure = np.maximum.accumulate(found["muscle_pressure"])
     low = float(pressure[np.argmax(share > 0.05)]) if (share > 0.05).any() else 0.2 * top
     high = float(pressure[np.argmax(share > 0.85)]) if (share > 0.85).any() else top
@@ -391,11 +394,11 @@ class _Maker:
             return None
 
     def other_payload(self) -> Experiment:
-        payload = self.rig.model["arm"]["payload"]
-        other = 0.5 * payload
+        name = "load.mass" if self.rig.model["load"] else "arm.payload"
+        other = 0.5 * self.rig.parameters[name].value
         text = f"change the payload to {other:.3g} kg and "
         also = {"payload_kg": round(other, 3)}
-        return self.triangle("other_payload", 12.0, 2, text=text, also=also, changes={"arm.payload": other}, extra=90.0)
+        return self.triangle("other_payload", 12.0, 2, text=text, also=also, changes={name: other}, extra=90.0)
 
 
 def _sealed_library(rig: Rig, sample_time: float, span: Range) -> list[Experiment]:
@@ -421,7 +424,7 @@ def library(
     Parameters
     ----------
     rig : Rig
-        A rig of one chain: with a valve and an arm, with a valve alone, or a sealed chamber.
+        A rig of one chain: with a valve and an arm or a hanging load, with a valve alone, or a sealed chamber.
     sample_time : float, optional
         Time between samples [s].
     highest : float, optional
@@ -456,8 +459,10 @@ def library(
         "null_ramp": make.null_ramp,
         "holds_both_sides": make.both_sides,
     }
+    if rig.model["arm"] is not None or rig.model["load"] is not None:
+        makers |= {"other_payload": make.other_payload}
     if rig.model["arm"] is not None:
-        makers |= {"other_payload": make.other_payload, "free_decay": make.free_decay}
+        makers |= {"free_decay": make.free_decay}
     out = []
     for name, maker in makers.items():
         if only is not None and name not in only:

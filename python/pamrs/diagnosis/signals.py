@@ -242,9 +242,9 @@ def prepare(recording: Recording, rig: Rig) -> Prepared:
 
 
 def _check_commands(recording: Recording, rig: Rig, inputs: list[str]) -> None:
-    """Refuse a recording without a command, unless what moves a joint was measured past the valves."""
+    """Refuse a recording without a command, unless what moves a joint or load was measured past the valves."""
     missing = [name for name in inputs if name not in recording.channels]
-    joints = [dotted("joint_angle", name) for name in rig.tables("joint")]
+    joints = ["length"] if rig.model["load"] else [dotted("joint_angle", name) for name in rig.tables("joint")]
     pulling = [dotted("muscle_pressure", ends["chamber"].partition(".")[2]) for ends in rig.ports("muscle").values()]
     if missing and not (joints and {*joints, *pulling} <= set(recording.channels)):
         what = "valve" if channel_of(missing[0]) == "valve_command" else "regulator"

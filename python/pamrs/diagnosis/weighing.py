@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from pamrs.channels import channel_of
 from pamrs.diagnosis.blocks import Block
 from pamrs.diagnosis.candidates import Candidate, significant
 from pamrs.diagnosis.evidence import Excess
@@ -61,7 +62,7 @@ CONSTANCY = 0.35
 
 def visited(problem: Problem) -> tuple[float, float] | None:
     """Range of the angle of a rig's only joint [rad]; None where no block is a joint's, or several are."""
-    arms = [b for b in problem.blocks if b.kind == "arm"]
+    arms = [b for b in problem.blocks if channel_of(b.channel) == "joint_angle"]
     if len(arms) != 1:
         return None
     angles = [p.signals[arms[0].channel][0] for p in problem.recordings]

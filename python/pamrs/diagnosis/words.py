@@ -102,7 +102,7 @@ def verdict(diagnosis: Diagnosis, named: list[str], case: Case, gap: float | Non
             f"named. {place}" + (f" Closest: {tried}." if tried else "")
         )
         if not forms and not sought:
-            return text
+            return text + (" No form of it was looked for: a load has none in the simulator yet." if case.rig.model["load"] else "")
         if not forms:
             return text + " No form of it was found that carries over to other recordings: the model stays the refitted one."
         closes = "" if gap is None else f" With it in the model, {100 * gap:.0f} % of the gap between refitted model and noise closes."

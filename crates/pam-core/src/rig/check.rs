@@ -68,6 +68,7 @@ impl RigSpec {
             let block = Block { kind: "sensors", name: &sensors.name };
             block.range("pressure_zero", sensors.pressure_zero, -1e7, 1e7, "Pa")?;
             block.range("angle_zero", sensors.angle_zero, -7.0, 7.0, "rad")?;
+            block.range("length_zero", sensors.length_zero, -10.0, 10.0, "m")?;
         }
         Ok(())
     }

@@ -397,7 +397,9 @@ impl Plant<'_, f64> {
                 }
                 Channel::Angle(k) => state[layout.angle(k)] + zero(wiring.coordinates[k].zero),
                 Channel::Rate(k) => state[layout.rate(k)],
-                Channel::Length => wiring.groups[0].rest_length - state[layout.angle(0)],
+                Channel::Length => {
+                    wiring.groups[0].rest_length - state[layout.angle(0)] + zero(wiring.coordinates[0].zero)
+                }
                 Channel::LengthRate => -state[layout.rate(0)],
                 Channel::Contraction(k) => here.contraction[k],
                 Channel::Force(k) => here.force[k],

@@ -231,7 +231,7 @@ impl LoadSpec {
     }
 }
 
-/// Constant sensor errors: measured = true + zero; of the chamber or joint of its name, of all without a name.
+/// Constant sensor errors: measured = true + zero; of the chamber or joint of its name, of all (and of a load) without a name.
 #[allow(missing_docs)]
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -240,6 +240,8 @@ pub struct SensorSpec {
     pub name: String,
     pub pressure_zero: f64,
     pub angle_zero: f64,
+    #[serde(default)]
+    pub length_zero: f64,
 }
 
 /// An effect that is switched on, with its parameters.

@@ -252,6 +252,9 @@ fn sensors(spec: &RigSpec, table: &mut Parameters, gases: &mut [GasUnit]) -> Res
         let name = |key: &str| format!("{}.{key}", dotted("sensors", &sensor.name));
         let pressure = table.add(name("pressure_zero"), sensor.pressure_zero);
         table.add(name("angle_zero"), sensor.angle_zero);
+        if spec.load.is_some() && sensor.name.is_empty() {
+            table.add(name("length_zero"), sensor.length_zero);
+        }
         let chambers = spec.chambers.iter().map(|c| &c.name);
         let known = chambers.clone().chain(spec.joints.iter().map(|j| &j.name)).any(|n| *n == sensor.name);
         if !sensor.name.is_empty() && !known {
@@ -271,6 +274,10 @@ fn sensors(spec: &RigSpec, table: &mut Parameters, gases: &mut [GasUnit]) -> Res
 }
 
 fn zeros(spec: &RigSpec, table: &Parameters, mut coordinates: Vec<Coordinate>) -> Vec<Coordinate> {
+    if spec.load.as_ref().is_some_and(|load| !load.is_frame()) {
+        coordinates[0].zero = table.find("sensors.length_zero").ok();
+        return coordinates;
+    }
     for (coordinate, name) in coordinates.iter_mut().zip(coordinate_names(spec)) {
         let own = |name: &str| table.find(&format!("{}.angle_zero", dotted("sensors", name))).ok();
         coordinate.zero = own(&name).or_else(|| own(""));
