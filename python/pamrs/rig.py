@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pamrs.errors import ParameterError, RigError, joined
-from pamrs.rig_ports import Ports, bare, connect, effect_problem, wiring
+from pamrs.rig_ports import Ports, bare, connect, effect_problem, near_name, wiring
 from pamrs.rig_reader import Content, read_model
 from pamrs.rig_schema import BLOCKS, Key, keys_of, qualified, split_name, tables_of
 from pamrs.rig_writer import core_json, toml_text
@@ -316,11 +316,11 @@ class Rig:
         ParameterError
             For an unknown effect, parameter or block, or a value outside its bounds.
         """
-        from pamrs.effects_table import EFFECTS
+        from pamrs.effects_table import CATALOGUE, EFFECTS
 
         info = EFFECTS.get(effect)
         if info is None:
-            raise ParameterError(f"unknown effect {effect!r}; the catalogue has: {', '.join(sorted(EFFECTS))}")
+            raise ParameterError(f"effect = {effect!r} is not in the catalogue{near_name(str(effect), CATALOGUE)}")
         at = bare(info.at, at)
         given = dict(parameters or {})
         names = [parameter.name for parameter in info.parameters]

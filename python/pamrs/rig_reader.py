@@ -322,7 +322,7 @@ class Reader:
             return []
         if not raw:
             return []
-        from pamrs.effects_table import EFFECTS
+        from pamrs.effects_table import CATALOGUE, EFFECTS
 
         found: list[dict[str, Any]] = []
         for index, entry in enumerate(raw):
@@ -330,8 +330,7 @@ class Reader:
             self.unknown_keys(f"{label}.", entry, ("id", "at", "parameters"))
             identity = entry.get("id")
             if not isinstance(identity, str) or identity not in EFFECTS:
-                allowed = ", ".join(sorted(EFFECTS))
-                self.problem(f"{label}.id = {_shown(identity)} is not in the catalogue: {allowed}")
+                self.problem(f"{label}.id = {_shown(identity)} is not in the catalogue{near_name(str(identity), CATALOGUE)}")
                 continue
             if any(identity == other["id"] for other in found):
                 self.problem(f"{label}.id = {identity!r} is there twice")

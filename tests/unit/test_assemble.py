@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis.assemble import _ambiguity, _chosen
+from pamrs.diagnosis import words
+from pamrs.diagnosis.assemble import _ambiguity, _chosen, _merged, _settled
+from pamrs.diagnosis.blocks import available_blocks
+from pamrs.diagnosis.candidates import Candidate, Group
+from pamrs.diagnosis.fitting import Problem, fit, residuals
 from pamrs.diagnosis.protocols import library
+from pamrs.diagnosis.signals import prepare
 from pamrs.errors import DiagnosisError
 from pamrs.recording import Recording
+from pamrs.simulation import core_rig
 
 NAMES = ("valve_command", "supply_pressure", "muscle_pressure", "joint_angle")
 
@@ -76,3 +83,57 @@ def test_one_set_is_no_ambiguity() -> None:
     assert _ambiguity({"leak_muscle": 0.89, "unlisted": 0.04, "none": 0.04, "parameters": 0.03}) == []
     assert _ambiguity({"leak_muscle": 0.6, "heat_transfer": 0.4}) == [["leak_muscle"], ["heat_transfer"]]
     assert _chosen([], frozenset({"leak_muscle"})) == []
+
+
+def test_one_zero_serves_both_groups_and_the_others_are_fitted_beside_it() -> None:
+    rig = pamrs.rigs.shoulder()
+    prepared = prepare(
+        recorded(rig.with_parameters({"sensors.pressure_zero": 800.0, "chamber.dead_volume": 2.3e-5}), "all", "fit"), rig
+    )
+    blocks = {b.name: b for b in available_blocks(rig, NAMES)}
+    chamber = Problem([blocks["chamber"]], [prepared], core_rig(rig))
+    # as if its own data had said another zero
+    moved = fit(chamber, rig, (), {}, {"chamber": 1.0}, settled={"sensors.pressure_zero": -2500.0})
+    first = replace(
+        moved, values=moved.values | {"sensors.pressure_zero": -2500.0}, moved=moved.moved | {"sensors.pressure_zero": -2.5}
+    )
+    last = fit(Problem([blocks["arm"]], [prepared], core_rig(rig)), rig, (), {}, {"arm": 1.0})
+    candidates = [Candidate((), found, {}, {}, 0.0) for found in (first, last)]
+    groups = [Group([blocks[n]], {}, {}, [c], {"": 1.0}, None, {}, []) for n, c in zip(("chamber", "arm"), candidates, strict=True)]
+    settled = _settled(rig, chamber, groups, candidates)
+    assert settled[1] is candidates[1]
+    model = _merged(rig, settled)
+    assert model.parameter("sensors.pressure_zero").value == last.values["sensors.pressure_zero"]
+
+    def missed(model: pamrs.Rig) -> float:
+        found = residuals(chamber, model)["chamber", "all"]
+        return float(np.sqrt(np.mean(found.value[found.rows] ** 2)))
+
+    assert missed(model) < missed(_merged(rig, candidates))
+    assert missed(model) < 1.05 * prepared.noise["muscle_pressure"]
+    assert _settled(rig, chamber, groups, settled)[0].fit.values["chamber.dead_volume"] == pytest.approx(
+        settled[0].fit.values["chamber.dead_volume"], rel=1e-3
+    )
+
+
+def test_pressures_that_begin_at_one_atmosphere_are_asked_about() -> None:
+    rig = pamrs.rigs.shoulder()
+    gauge = recorded(rig, "all", "fit")
+    pressure = gauge.channels["muscle_pressure"] - gauge.channels["muscle_pressure"][0]
+    cases = [
+        pamrs.Case("c", rig, [replace(gauge, channels=gauge.channels | {"muscle_pressure": pressure + zero})], Path())
+        for zero in (0.0, 101325.0)
+    ]
+    assert words.absolute(cases[0]) == []
+    (told,) = words.absolute(cases[1])
+    assert "absolute pressures" in told
+
+
+def test_a_channel_that_a_new_model_spoils_is_told() -> None:
+    table = {
+        "muscle_pressure": {"noise": 400.0, "before": 7500.0, "refit": 26900.0, "after": 8910.0},
+        "joint_angle": {"noise": 1e-3, "before": 1e-2, "refit": 5e-3, "after": 1e-3},
+    }
+    (told,) = words.worse(table | {"muscle_pressure": table["muscle_pressure"] | {"after": 9100.0}})
+    assert "muscle pressure by 9.1e+03 Pa" in told
+    assert words.worse({"joint_angle": table["joint_angle"]}) == []

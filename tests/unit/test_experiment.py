@@ -112,7 +112,7 @@ def test_a_missing_sensor_is_proposed(pool) -> None:
         ("muscle_hysteresis", rig.with_effect("muscle_hysteresis"), 0.5),
         ("leak_muscle", rig.with_effect("leak_muscle", {"conductance": 1e-10}), 0.5),
     ]
-    some = [c for c in MEASURABLE if c != "joint_angle"]
+    some = [c for c in MEASURABLE if c not in ("joint_angle", "length")]
     found = propose(rig, hypotheses, channels=tuple(some), experiments=[pool["null_ramp"]])
     assert found["excitation"]["sensor"] == "joint_angle"
     assert "one more channel: joint angle" in found["text"]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import itertools
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,11 +14,11 @@ from pamrs.case import Case
 from pamrs.channels import unit_of
 from pamrs.diagnosis import words
 from pamrs.diagnosis.blocks import Residual
-from pamrs.diagnosis.candidates import Candidate, Group, significant
+from pamrs.diagnosis.candidates import EXACT, Candidate, Group, significant, start_of
 from pamrs.diagnosis.conditions import Picture, describe
-from pamrs.diagnosis.evidence import Floor
+from pamrs.diagnosis.evidence import Floor, inflation
 from pamrs.diagnosis.experiment import propose
-from pamrs.diagnosis.fitting import Events, Key, Problem, residuals
+from pamrs.diagnosis.fitting import FIT_BIN, Events, Key, Problem, fit, residuals
 from pamrs.diagnosis.result import Diagnosis, Trace
 from pamrs.diagnosis.starts import CHOICES
 from pamrs.diagnosis.weighing import share_left
@@ -33,6 +34,8 @@ SHARED = 6.0
 """Odds of one effect that acts in two blocks to two effects."""
 SIMULATED = 0.03
 """Probability from which a hypothesis is simulated in the search for the next experiment."""
+APART = 0.1
+"""Tolerances by which two groups differ about a sensor's zero, from which the earlier one is fitted again."""
 SETTLED = 0.9
 """Probability from which an answer counts as settled."""
 
@@ -50,11 +53,19 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
         Gas blocks and arm, examined.
     """
     nominal = case.rig
-    baseline = _merged(nominal, [g.candidates[0] for g in groups])
+    starts = _settled(nominal, fitted, groups, [g.candidates[0] for g in groups])
+    baseline = _merged(nominal, starts)
     probabilities, symptoms = _probabilities(groups)
     top = max(probabilities, key=lambda k: probabilities[k])
     verdict = top if top in ("none", "parameters", "unlisted") else "effects"
-    chosen = _chosen(groups, frozenset(top.split("+"))) if verdict == "effects" else [g.candidates[0] for g in groups]
+    chosen = starts
+    if verdict == "effects":
+        picked = _chosen(groups, frozenset(top.split("+")))
+        chosen = _settled(nominal, fitted, groups, picked)
+        groups = [
+            replace(g, candidates=[new if c is old else c for c in g.candidates])
+            for g, old, new in zip(groups, picked, chosen, strict=True)
+        ]
     model = _merged(nominal, chosen)
     named = list(dict.fromkeys(e for c in chosen for e in c.effects))
     if verdict in ("none", "parameters"):
@@ -62,7 +73,7 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
         named = []
     elif verdict == "unlisted":
         # the most probable catalogue effects stay in the list with their (small) probability; the model gets the form that was found
-        chosen = [g.closure or (g.best if _named(g) else g.candidates[0]) for g in groups]
+        chosen = [g.closure or (g.best if _named(g) else start) for g, start in zip(groups, starts, strict=True)]
         model = _merged(nominal, chosen)
     floor = {k: v for g in groups for k, v in g.floor.items()}
     stages = {"before": nominal, "refit": baseline, "after": model}
@@ -79,7 +90,7 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
     gap = _gap(held_table or fit_table)
     effects = _effects(groups, probabilities, model if verdict == "effects" else None)
     ambiguity = _ambiguity(probabilities)
-    parameters = _parameters(nominal, chosen if verdict == "effects" else [g.candidates[0] for g in groups])
+    parameters = _parameters(nominal, chosen if verdict == "effects" else starts)
     where = words.where(located, fitted, groups, picture)
     diagnosis = Diagnosis(
         case=case.name,
@@ -92,7 +103,9 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
         fit={"channels": fit_table, "held_out": held_table, "gap_closed": gap if model.effects else None},
         next_experiment=_next(verdict, probabilities, ambiguity, nominal, groups, fitted, held),
         warnings=[
-            *(words.reservations(chosen, held_table or fit_table) if verdict == "effects" else []),
+            *words.absolute(case),
+            *(words.reservations(chosen, held_table or fit_table, doubtful=bool(ambiguity)) if verdict == "effects" else []),
+            *(words.worse(held_table or fit_table) if model.effects else []),
             *words.warnings(case, groups, symptoms, held is fitted),
         ],
         rig=_with_std(model, chosen) if model.effects else model,
@@ -198,6 +211,29 @@ def _named(group: Group) -> bool:
     odds = group.probabilities
     named = max((p for k, p in odds.items() if k not in ("", "unlisted")), default=0.0)
     return group.mismatch is not None and named > max(odds.get("", 0.0), odds.get("unlisted", 0.0))
+
+
+def _settled(nominal: Rig, problem: Problem, groups: list[Group], chosen: list[Candidate]) -> list[Candidate]:
+    """The fits of earlier groups again, with what the last one settles (the sensors' zeros) held, where theirs are others.
+
+    A rig has one zero of a sensor; the other values of a fit are right beside its own only.
+    """
+    *earlier, last = chosen
+    found = []
+    for group, candidate in zip(groups, earlier, strict=False):
+        common = {n: last.fit.values[n] for n in candidate.fit.moved if n in last.fit.moved}
+        apart = any(abs(candidate.fit.moved[n] - last.fit.moved[n]) > APART for n in common)
+        if apart and candidate.fit.events is None:
+            own = replace(problem, blocks=group.blocks)
+            origins = [start_of(candidate.fit, effect) for effect in candidate.effects]
+            free = {name: value for origin in origins for name, value in origin.free.items()}
+            fixed = {name: value for origin in origins for name, value in origin.held.items()}
+            colour = {b.name: inflation(b, own.recordings, candidate.fit.residuals, FIT_BIN) for b in own.blocks}
+            with contextlib.suppress(SimulationError):  # it then stays as it was fitted
+                again = fit(own, nominal, candidate.effects, free, colour, fixed=fixed, warm=candidate.fit, share=EXACT, settled=common)
+                candidate = replace(candidate, fit=again)
+        found.append(candidate)
+    return [*found, last]
 
 
 def _merged(nominal: Rig, candidates: list[Candidate]) -> Rig:

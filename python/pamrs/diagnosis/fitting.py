@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -341,6 +341,7 @@ def fit(
     events: Events | None = None,
     evaluations: int = 12,
     share: float = SHARE,
+    settled: Mapping[str, float] | None = None,
 ) -> Fit:
     """Fit baseline parameters (with their tolerances as priors) and effects to the recordings.
 
@@ -368,13 +369,16 @@ def fit(
         Limit on evaluations.
     share : float, optional
         As in :func:`pamrs.diagnosis.leastsquares.levenberg_marquardt`.
+    settled : mapping of str to float, optional
+        Baseline parameters that are held at other values than the nominal ones.
 
     Raises
     ------
     SimulationError
         If the model leaves the range in which it holds where the fit starts.
     """
-    baseline = free_baseline(problem, nominal)
+    nominal = nominal.with_parameters(settled or {})
+    baseline = [name for name in free_baseline(problem, nominal) if name not in (settled or {})]
     scaling = Scaling(nominal, baseline, starts)
     count = len(baseline)
     kept = _jacobian_of(warm, baseline) if frozen and warm is not None else None

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from pamrs.case import Case
-from pamrs.channels import channel_of
+from pamrs.channels import channel_of, unit_of
 from pamrs.diagnosis.candidates import Candidate, Group
 from pamrs.diagnosis.conditions import Picture
 from pamrs.diagnosis.fitting import Problem
@@ -16,7 +16,7 @@ from pamrs.effects_table import EFFECTS
 from pamrs.rig import Rig
 from pamrs.rig_schema import qualified
 
-__all__ = ["next_experiment", "reservations", "unknown_volumes", "verdict", "warnings", "where"]
+__all__ = ["absolute", "next_experiment", "reservations", "unknown_volumes", "verdict", "warnings", "where", "worse"]
 
 
 def unknown_volumes(rig: Rig) -> list[str]:
@@ -27,6 +27,10 @@ def unknown_volumes(rig: Rig) -> list[str]:
 
 _FAR_OFF, _MOVED = 3.0, 2.0
 """Error in units of the noise, and tolerances of a parameter, from which a model with a named effect is reported with a reservation."""
+_SPOILED = 1.2
+"""Times what the nominal model misses that a new one has to miss to be reported."""
+_ATMOSPHERE = 0.01
+"""Share of the ambient pressure within which a recording begins at it."""
 _DOUBTED = 0.1
 """Probability of no mismatch from which the words say so."""
 
@@ -211,14 +215,45 @@ def warnings(case: Case, groups: list[Group], symptoms: dict[str, float], no_hel
     return out
 
 
-def reservations(chosen: list[Candidate], table: dict[str, dict[str, float]]) -> list[str]:
-    """What a reader should know of a model with a named effect: what it still misses, and values that it had to move far."""
+def absolute(case: Case) -> list[str]:
+    """Muscle pressures that begin at one atmosphere in every recording: they may not be gauge."""
+    ambient = float(case.rig.model["gas"]["ambient_pressure"])
+    firsts: dict[str, list[float]] = {}
+    for recording in case.recordings:
+        for channel, values in recording.channels.items():
+            rows = recording.mask[channel]
+            if channel_of(channel) == "muscle_pressure" and rows.any():
+                firsts.setdefault(channel, []).append(float(values[rows][0]))
+    return [
+        f"{channel} begins at {np.mean(begun):.4g} Pa in every recording, one atmosphere (gas.ambient_pressure = {ambient:g} Pa): are "
+        "these absolute pressures? Gauge pressures are needed; what is found below may be no more than the difference"
+        for channel, begun in firsts.items()
+        if all(abs(first - ambient) < _ATMOSPHERE * ambient for first in begun)
+    ]
+
+
+def worse(table: dict[str, dict[str, float]]) -> list[str]:
+    """Channels that the model with what was added predicts worse than the nominal one did."""
+    return [
+        f"the new model misses {channel.replace('_', ' ')} by {error['after']:.3g} {unit_of(channel)}, the nominal one by "
+        f"{error['before']:.3g}: what was added does not mend what the refit spoiled there"
+        for channel, error in table.items()
+        if error["after"] > _SPOILED * max(error["before"], error["noise"])
+    ]
+
+
+def reservations(chosen: list[Candidate], table: dict[str, dict[str, float]], *, doubtful: bool) -> list[str]:
+    """What a reader should know of a model with a named effect: what it still misses, and values that it had to move far.
+
+    ``doubtful`` where the name is one of several that are left.
+    """
     out = []
     for channel, error in table.items():
         if error["after"] > _FAR_OFF * error["noise"]:
             times = error["after"] / error["noise"]
+            name = "" if doubtful else "the name stands, "
             out.append(
-                f"with the effect the model still misses {channel.replace('_', ' ')} by {times:.2g} times its noise: the name stands, "
+                f"with the effect the model still misses {channel.replace('_', ' ')} by {times:.2g} times its noise: {name}"
                 "its equation is not the whole truth, and standard deviations hold only as far as it is"
             )
     moved = {n: v for c in chosen if c.effects for n, v in c.fit.moved.items() if abs(v) > _MOVED}

@@ -407,8 +407,8 @@ def map_svg(diagnosis: Diagnosis, prefix: str = "map") -> str | None:
         for panel, (title, z) in zip(axes, grids, strict=True):
             mesh = _draw_map(panel, x, y, z, limit)
             panel.set_title(title)
-            panel.set_xlabel(str(diagnosis.condition_map.get("x_label", "")))
         axes[0].set_ylabel(str(diagnosis.condition_map.get("y_label", "")))
+        figure.supxlabel(str(diagnosis.condition_map.get("x_label", "")), fontsize=mpl.rcParams["axes.labelsize"])
         figure.colorbar(mesh, ax=list(axes), label="mean residual / noise", extend="both", pad=0.015)
         return svg_text(figure, prefix)
 
@@ -495,8 +495,8 @@ def _draw_right(right: Any, diagnosis: Diagnosis) -> None:
         for panel, (title, z) in zip(axes, grids, strict=True):
             mesh = _draw_map(panel, x, y, z, limit)
             panel.set_title(title, fontweight="normal", pad=4)
-            panel.set_xlabel(str(diagnosis.condition_map.get("x_label", "")))
         axes[0].set_ylabel(str(diagnosis.condition_map.get("y_label", "")))
+        parts[-1].supxlabel(str(diagnosis.condition_map.get("x_label", "")), fontsize=mpl.rcParams["axes.labelsize"])
         parts[-1].colorbar(mesh, ax=list(axes), label="mean residual / noise", extend="both", pad=0.02, aspect=28)
     elif rows:
         _draw_blocks(parts[-1].subplots(), rows, least_rows=4)
