@@ -87,16 +87,14 @@ def test_one_set_is_no_ambiguity() -> None:
 
 def test_one_zero_serves_both_groups_and_the_others_are_fitted_beside_it() -> None:
     rig = pamrs.rigs.shoulder()
-    prepared = prepare(
-        recorded(rig.with_parameters({"sensors.pressure_zero": 800.0, "chamber.dead_volume": 2.3e-5}), "all", "fit"), rig
-    )
+    true = rig.with_parameters({"sensors.pressure_zero": 800.0, "chamber.alpha": 1.25})
+    prepared = prepare(recorded(true, "all", "fit"), rig)
     blocks = {b.name: b for b in available_blocks(rig, NAMES)}
     chamber = Problem([blocks["chamber"]], [prepared], core_rig(rig))
     # as if its own data had said another zero
     moved = fit(chamber, rig, (), {}, {"chamber": 1.0}, settled={"sensors.pressure_zero": -2500.0})
-    first = replace(
-        moved, values=moved.values | {"sensors.pressure_zero": -2500.0}, moved=moved.moved | {"sensors.pressure_zero": -2.5}
-    )
+    values, tolerances = ({**found, "sensors.pressure_zero": zero} for found, zero in ((moved.values, -2500.0), (moved.moved, -2.5)))
+    first = replace(moved, values=values, moved=tolerances)
     last = fit(Problem([blocks["arm"]], [prepared], core_rig(rig)), rig, (), {}, {"arm": 1.0})
     candidates = [Candidate((), found, {}, {}, 0.0) for found in (first, last)]
     groups = [Group([blocks[n]], {}, {}, [c], {"": 1.0}, None, {}, []) for n, c in zip(("chamber", "arm"), candidates, strict=True)]
@@ -110,10 +108,7 @@ def test_one_zero_serves_both_groups_and_the_others_are_fitted_beside_it() -> No
         return float(np.sqrt(np.mean(found.value[found.rows] ** 2)))
 
     assert missed(model) < missed(_merged(rig, candidates))
-    assert missed(model) < 1.05 * prepared.noise["muscle_pressure"]
-    assert _settled(rig, chamber, groups, settled)[0].fit.values["chamber.dead_volume"] == pytest.approx(
-        settled[0].fit.values["chamber.dead_volume"], rel=1e-3
-    )
+    assert missed(model) < 1.02 * missed(true)
 
 
 def test_pressures_that_begin_at_one_atmosphere_are_asked_about() -> None:
