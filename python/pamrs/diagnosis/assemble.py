@@ -14,11 +14,11 @@ from pamrs.case import Case
 from pamrs.channels import unit_of
 from pamrs.diagnosis import words
 from pamrs.diagnosis.blocks import Residual
-from pamrs.diagnosis.candidates import EXACT, Candidate, Group, significant, start_of
+from pamrs.diagnosis.candidates import EXACT, Candidate, Group, colour_of, parts_of, significant, start_of
 from pamrs.diagnosis.conditions import Picture, describe
-from pamrs.diagnosis.evidence import Floor, inflation
+from pamrs.diagnosis.evidence import Floor
 from pamrs.diagnosis.experiment import propose
-from pamrs.diagnosis.fitting import FIT_BIN, Events, Key, Problem, fit, residuals
+from pamrs.diagnosis.fitting import Events, Key, Problem, fit, residuals
 from pamrs.diagnosis.result import Diagnosis, Trace
 from pamrs.diagnosis.starts import CHOICES
 from pamrs.diagnosis.weighing import share_left
@@ -225,10 +225,8 @@ def _settled(nominal: Rig, problem: Problem, groups: list[Group], chosen: list[C
         apart = any(abs(candidate.fit.moved[n] - last.fit.moved[n]) > APART for n in common)
         if apart and candidate.fit.events is None:
             own = replace(problem, blocks=group.blocks)
-            origins = [start_of(candidate.fit, effect) for effect in candidate.effects]
-            free = {name: value for origin in origins for name, value in origin.free.items()}
-            fixed = {name: value for origin in origins for name, value in origin.held.items()}
-            colour = {b.name: inflation(b, own.recordings, candidate.fit.residuals, FIT_BIN) for b in own.blocks}
+            free, fixed = parts_of(start_of(candidate.fit, effect) for effect in candidate.effects)
+            colour = colour_of(own, candidate.fit)
             with contextlib.suppress(SimulationError):  # it then stays as it was fitted
                 again = fit(own, nominal, candidate.effects, free, colour, fixed=fixed, warm=candidate.fit, share=EXACT, settled=common)
                 candidate = replace(candidate, fit=again)

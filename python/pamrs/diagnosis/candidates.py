@@ -149,7 +149,7 @@ class Attempts:
 
     def colour(self, found: Fit) -> dict[str, float]:
         """Weights of the colour that a fit leaves."""
-        return {b.name: inflation(b, self.inner.recordings, found.residuals, FIT_BIN) for b in self.inner.blocks}
+        return colour_of(self.inner, found)
 
     def eventful(self, effect: str, beside: Candidate) -> Candidate | None:
         """An effect with times of its own in every recording, held-out ones included, beside the effects of a candidate."""
@@ -186,9 +186,7 @@ class Attempts:
         """The lasting effects of a candidate fitted again, with the events that were found beside them held."""
         assert found.events is not None
         effect = found.events.effect
-        starts = [start_of(beside.fit, e) for e in beside.effects]
-        own = {n: v for start in starts for n, v in start.free.items()}
-        kept = {n: v for start in starts for n, v in start.held.items()}
+        own, kept = parts_of([start_of(beside.fit, e) for e in beside.effects])
         warm = replace(beside.fit, values=beside.fit.values | {n: found.values[n] for n in beside.fit.moved})
         again = fit(
             self.inner,
@@ -229,8 +227,7 @@ class Attempts:
         ``share`` is the share of the sum of squares below which a step is not worth it.
         """
         effects = tuple(start.effect for start in starts)
-        free = {name: value for start in starts for name, value in start.free.items()}
-        held = {name: value for start in starts for name, value in start.held.items()}
+        free, held = parts_of(starts)
         limit = 30 if self.nominal.model["valve"] is None else 8
         try:
             best = fit(
@@ -255,9 +252,7 @@ class Attempts:
         found = candidate.fit
         if found.events is not None or not candidate.effects:
             return candidate
-        starts = [start_of(found, effect) for effect in candidate.effects]
-        free = {name: value for start in starts for name, value in start.free.items()}
-        held = {name: value for start in starts for name, value in start.held.items()}
+        free, held = parts_of([start_of(found, effect) for effect in candidate.effects])
         colour = self.colour(found)
         try:
             best = fit(
@@ -271,6 +266,21 @@ class Attempts:
 def without_colour(blocks: Iterable[Block]) -> dict[str, float]:
     """Weights of blocks whose noise is white."""
     return dict.fromkeys((b.name for b in blocks), 1.0)
+
+
+def colour_of(problem: Problem, found: Fit) -> dict[str, float]:
+    """Weights of the colour that a fit leaves in each block."""
+    return {b.name: inflation(b, problem.recordings, found.residuals, FIT_BIN) for b in problem.blocks}
+
+
+def parts_of(starts: Iterable[Start]) -> tuple[dict[str, float], dict[str, float]]:
+    """Parameters of several effects that are free, and those that are held."""
+    free: dict[str, float] = {}
+    held: dict[str, float] = {}
+    for start in starts:
+        free |= start.free
+        held |= start.held
+    return free, held
 
 
 def start_of(found: Fit, effect: str) -> Start:

@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs.diagnosis.blocks import Block
+from pamrs.diagnosis.candidates import colour_of
 from pamrs.diagnosis.closure_words import describe_closure
 from pamrs.diagnosis.evidence import correlation_time
-from pamrs.diagnosis.evidence import inflation as _inflation
-from pamrs.diagnosis.fitting import FIT_BIN, Fit, Problem, fit, residuals, stacked
+from pamrs.diagnosis.fitting import Fit, Problem, fit, residuals, stacked
 from pamrs.effects_table import EFFECTS
 from pamrs.effects_table.closure import CLOSURE_OF, MEMORY_OF, TERMS, Term
 from pamrs.errors import DiagnosisError, SimulationError
@@ -127,7 +127,7 @@ def find_closure(
     found = None if chosen is None else _fitted(problem, nominal, baseline, inflation, chosen, say)
     if found is None:
         return None
-    colour = {b.name: _inflation(b, problem.recordings, found.residuals, FIT_BIN) for b in problem.blocks}
+    colour = colour_of(problem, found)
     candidates, columns, warm = _again(problem, baseline, found, colour, blocks, closures)
     second = _select(_Frame.of(problem, warm, found, colour), candidates, columns, found.values)
     other = None if second is None else _fitted(problem, nominal, warm, colour, second, say)

@@ -10,8 +10,7 @@ import numpy as np
 
 from pamrs.diagnosis.blocks import Residual
 from pamrs.diagnosis.candidates import Attempts, Candidate, Group
-from pamrs.diagnosis.evidence import inflation
-from pamrs.diagnosis.fitting import FIT_BIN, Fit, Key, Problem, acts_in, fit, residuals, stacked
+from pamrs.diagnosis.fitting import Fit, Key, Problem, acts_in, fit, residuals, stacked
 from pamrs.diagnosis.resampling import inclusion
 from pamrs.diagnosis.screening import Screen, by_effect, screen
 from pamrs.diagnosis.starts import Start
@@ -60,7 +59,7 @@ def faint(trial: Attempts, quiet: Group, acting: list[str], say: Callable[[str],
     if trial.same:
         return None
     blocks, start = quiet.blocks, quiet.candidates[0]
-    colour = {b.name: inflation(b, trial.inner.recordings, start.fit.residuals, FIT_BIN) for b in blocks}
+    colour = trial.colour(start.fit)
     screened = screen(trial.inner, start.fit, acting, colour, sealed=trial.nominal.model["valve"] is None)
     best = {effect: scores[0] for effect, scores in by_effect(screened.scores()).items()}
     gains = {effect: score.gain for effect, score in best.items()}

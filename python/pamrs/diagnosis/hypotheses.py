@@ -6,10 +6,10 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from pamrs.diagnosis.blocks import Block, Residual
-from pamrs.diagnosis.candidates import EXACT, Attempts, Candidate, Group, significant, start_of, without_colour
+from pamrs.diagnosis.candidates import EXACT, Attempts, Candidate, Group, colour_of, significant, start_of, without_colour
 from pamrs.diagnosis.closure import describe_closure, find_closure
 from pamrs.diagnosis.events import EVENTS
-from pamrs.diagnosis.evidence import MARGIN, Floor, excess, floors, inflation
+from pamrs.diagnosis.evidence import MARGIN, Floor, excess, floors
 from pamrs.diagnosis.faint import faint
 from pamrs.diagnosis.fitting import FIT_BIN, Fit, Key, Problem, acts_in, bin_width, fit, residuals
 from pamrs.diagnosis.leaving import left_out
@@ -169,7 +169,7 @@ def _together(inner: Problem, outer: Problem, nominal: Rig, start: Candidate, fl
 
 def coloured(problem: Problem, nominal: Rig, first: Fit) -> tuple[Fit, dict[str, float]]:
     """The refitted baseline fitted on with the colour that it leaves as weights, where it leaves much, and that colour."""
-    colour = {b.name: inflation(b, problem.recordings, first.residuals, FIT_BIN) for b in problem.blocks}
+    colour = colour_of(problem, first)
     if max(colour.values()) <= 2:
         return first, colour
     return fit(problem, nominal, (), {}, colour, warm=first, evaluations=THOROUGH, share=EXACT), colour

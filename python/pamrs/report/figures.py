@@ -400,17 +400,22 @@ def map_svg(diagnosis: Diagnosis, prefix: str = "map") -> str | None:
     content = diagnosis.condition_map and _grids(diagnosis.condition_map)
     if not content or diagnosis.condition_map is None:
         return None
-    x, y, grids, limit = content
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(5.0 * len(grids) + 0.6, 3.9), layout="constrained")
-        axes = figure.subplots(1, len(grids), sharey=True, squeeze=False)[0]
-        for panel, (title, z) in zip(axes, grids, strict=True):
-            mesh = _draw_map(panel, x, y, z, limit)
-            panel.set_title(title)
-        axes[0].set_ylabel(str(diagnosis.condition_map.get("y_label", "")))
-        figure.supxlabel(str(diagnosis.condition_map.get("x_label", "")), fontsize=mpl.rcParams["axes.labelsize"])
-        figure.colorbar(mesh, ax=list(axes), label="mean residual / noise", extend="both", pad=0.015)
+        figure = Figure(figsize=(5.0 * len(content[2]) + 0.6, 3.9), layout="constrained")
+        _draw_maps(figure, diagnosis.condition_map, content, {}, {"pad": 0.015})
         return svg_text(figure, prefix)
+
+
+def _draw_maps(part: Any, condition_map: dict[str, Any], content: Any, title_style: dict[str, Any], bar_style: dict[str, Any]) -> None:
+    """Heat maps side by side in a figure or a part of one, with one label for both and one colour bar."""
+    x, y, grids, limit = content
+    axes = part.subplots(1, len(grids), sharey=True, squeeze=False)[0]
+    for panel, (title, z) in zip(axes, grids, strict=True):
+        mesh = _draw_map(panel, x, y, z, limit)
+        panel.set_title(title, **title_style)
+    axes[0].set_ylabel(str(condition_map.get("y_label", "")))
+    part.supxlabel(str(condition_map.get("x_label", "")), fontsize=mpl.rcParams["axes.labelsize"])
+    part.colorbar(mesh, ax=list(axes), label="mean residual / noise", extend="both", **bar_style)
 
 
 def _draw_probabilities(axes: Axes, diagnosis: Diagnosis) -> None:
@@ -490,14 +495,7 @@ def _draw_right(right: Any, diagnosis: Diagnosis) -> None:
         _head(parts[0], "Probability of each hypothesis")
     if content and diagnosis.condition_map is not None:
         _head(parts[-1], "When: residual over two conditions")
-        x, y, grids, limit = content
-        axes = parts[-1].subplots(1, len(grids), sharey=True, squeeze=False)[0]
-        for panel, (title, z) in zip(axes, grids, strict=True):
-            mesh = _draw_map(panel, x, y, z, limit)
-            panel.set_title(title, fontweight="normal", pad=4)
-        axes[0].set_ylabel(str(diagnosis.condition_map.get("y_label", "")))
-        parts[-1].supxlabel(str(diagnosis.condition_map.get("x_label", "")), fontsize=mpl.rcParams["axes.labelsize"])
-        parts[-1].colorbar(mesh, ax=list(axes), label="mean residual / noise", extend="both", pad=0.02, aspect=28)
+        _draw_maps(parts[-1], diagnosis.condition_map, content, {"fontweight": "normal", "pad": 4}, {"pad": 0.02, "aspect": 28})
     elif rows:
         _draw_blocks(parts[-1].subplots(), rows, least_rows=4)
         _head(parts[-1], "Where the residual is")
