@@ -141,7 +141,7 @@ def diagnosis(**changes: Any) -> Diagnosis:
             for i, (name, role) in enumerate([("step_up", "fit"), ("sine_sweep", "held_out"), ("random", "held_out")])
             for channel, unit, scale in (("joint_angle", "rad", 0.6), ("muscle_pressure", "Pa", 3e5))
         ],
-        "blocks": {
+        "residuals": {
             name: {
                 "rms": rms,
                 "noise": 1.0,
@@ -173,7 +173,7 @@ def sealed_chamber() -> Diagnosis:
         traces=[trace("hold", "fit", "muscle_pressure", "Pa", 3e5, n=900)],
         fit={"channels": {"muscle_pressure": fit_entry(3e5)}, "held_out": {}, "gap_closed": None},
         condition_map=None,
-        blocks={
+        residuals={
             "chamber": {
                 "rms": 900.0,
                 "noise": 100.0,
@@ -208,7 +208,7 @@ def nothing() -> Diagnosis:
         parameters={},
         next_experiment={},
         warnings=[],
-        blocks={},
+        residuals={},
         condition_map=None,
         traces=[same],
         text="",

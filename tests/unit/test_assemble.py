@@ -10,12 +10,13 @@ import pytest
 
 import pamrs
 from pamrs.diagnosis import words
-from pamrs.diagnosis.assemble import _ambiguity, _chosen, _merged, _settled
+from pamrs.diagnosis.assemble import _merged, _settled
 from pamrs.diagnosis.blocks import available_blocks
 from pamrs.diagnosis.candidates import Candidate, Group
 from pamrs.diagnosis.fitting import Problem, fit, residuals
 from pamrs.diagnosis.protocols import library
 from pamrs.diagnosis.signals import prepare
+from pamrs.diagnosis.verdicts import judge
 from pamrs.errors import DiagnosisError
 from pamrs.recording import Recording
 from pamrs.simulation import core_rig
@@ -79,12 +80,6 @@ def test_experiments_are_refused_for_rigs_that_nobody_could_command(name: str) -
         library(pamrs.rigs.named(name))
 
 
-def test_one_set_is_no_ambiguity() -> None:
-    assert _ambiguity({"leak_muscle": 0.89, "unlisted": 0.04, "none": 0.04, "parameters": 0.03}) == []
-    assert _ambiguity({"leak_muscle": 0.6, "heat_transfer": 0.4}) == [["leak_muscle"], ["heat_transfer"]]
-    assert _chosen([], frozenset({"leak_muscle"})) == []
-
-
 def test_one_zero_serves_both_groups_and_the_others_are_fitted_beside_it() -> None:
     rig = pamrs.rigs.shoulder()
     true = rig.with_parameters({"sensors.pressure_zero": 800.0, "chamber.alpha": 1.25})
@@ -98,16 +93,17 @@ def test_one_zero_serves_both_groups_and_the_others_are_fitted_beside_it() -> No
     last = fit(Problem([blocks["arm"]], [prepared], core_rig(rig)), rig, (), {}, {"arm": 1.0})
     candidates = [Candidate((), found, {}, {}, 0.0) for found in (first, last)]
     groups = [Group([blocks[n]], {}, {}, [c], {"": 1.0}, None, {}, []) for n, c in zip(("chamber", "arm"), candidates, strict=True)]
-    settled = _settled(rig, chamber, groups, candidates)
+    judged = judge(groups)
+    settled = _settled(rig, chamber, judged, candidates)
     assert settled[1] is candidates[1]
-    model = _merged(rig, settled)
+    model = _merged(rig, judged, settled)
     assert model.parameter("sensors.pressure_zero").value == last.values["sensors.pressure_zero"]
 
     def missed(model: pamrs.Rig) -> float:
         found = residuals(chamber, model)["chamber", "all"]
         return float(np.sqrt(np.mean(found.value[found.rows] ** 2)))
 
-    assert missed(model) < missed(_merged(rig, candidates))
+    assert missed(model) < missed(_merged(rig, judged, candidates))
     assert missed(model) < 1.02 * missed(true)
 
 

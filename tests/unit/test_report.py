@@ -37,7 +37,7 @@ def test_page_is_self_contained(make, tmp_path: Path) -> None:
     [
         ("effects", [["activation_pressure"], ["parameters"]], "cannot tell activation pressure from parameter values"),
         ("parameters", [["parameters"], ["activation_pressure"]], "cannot rule out activation pressure"),
-        ("none", [["none"], ["unlisted"]], "cannot rule out unlisted effect"),
+        ("none", [["none"], ["unlisted"]], "cannot rule out an effect outside the catalogue"),
         ("parameters", [], "No physics is missing"),
         ("none", [], "Nothing is missing"),
     ],
@@ -102,7 +102,7 @@ def test_figure_is_a_png(make, tmp_path: Path) -> None:
 
 
 def test_figure_without_traces(tmp_path: Path) -> None:
-    assert synthetic.diagnosis(traces=[], probabilities={}, blocks={}, condition_map=None).figure(tmp_path / "f.png").exists()
+    assert synthetic.diagnosis(traces=[], probabilities={}, residuals={}, condition_map=None).figure(tmp_path / "f.png").exists()
 
 
 def test_decimation_keeps_extremes_and_gaps() -> None:

@@ -77,7 +77,7 @@ def test_headlines() -> None:
     assert "discharge area" in synthetic.diagnosis(verdict="parameters", effects=[], where={}).headline
     assert "outside the catalogue" in synthetic.diagnosis(verdict="unlisted", effects=[]).headline
     rivals = synthetic.diagnosis(ambiguity=[["leak_muscle"], ["leak_muscle", "heat_transfer"]])
-    assert "muscle leak or muscle leak + heat transfer" in rivals.headline
+    assert "cannot tell muscle leak from muscle leak + heat transfer" in rivals.headline
 
 
 def test_notebook_html_escapes() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import itertools
 import math
 from dataclasses import replace
 from typing import Any
@@ -13,14 +12,16 @@ import numpy as np
 from pamrs.case import Case
 from pamrs.channels import unit_of
 from pamrs.diagnosis import words
+from pamrs.diagnosis.block_entries import block_entries, unexplained
 from pamrs.diagnosis.blocks import Residual
-from pamrs.diagnosis.candidates import EXACT, Candidate, Group, colour_of, parts_of, significant, start_of
+from pamrs.diagnosis.candidates import EXACT, Candidate, Group, colour_of, parts_of, start_of
 from pamrs.diagnosis.conditions import Picture, describe
 from pamrs.diagnosis.evidence import Floor
 from pamrs.diagnosis.experiment import propose
 from pamrs.diagnosis.fitting import Events, Key, Problem, fit, residuals
 from pamrs.diagnosis.result import Diagnosis, Trace
 from pamrs.diagnosis.starts import CHOICES
+from pamrs.diagnosis.verdicts import IN_SET, Judged, case_ambiguity, case_probabilities, case_verdict, is_parameter, judge, symptoms_of
 from pamrs.diagnosis.weighing import share_left
 from pamrs.effects_table import CATALOGUE, EFFECTS
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError
@@ -28,16 +29,10 @@ from pamrs.rig import Rig
 
 __all__ = ["assemble"]
 
-SYMPTOM = 2.9
-"""Tolerances beyond which a refitted parameter is a symptom of missing physics, not a result."""
-SHARED = 6.0
-"""Odds of one effect that acts in two blocks to two effects."""
 SIMULATED = 0.03
 """Probability from which a hypothesis is simulated in the search for the next experiment."""
 APART = 0.1
 """Tolerances by which two groups differ about a sensor's zero, from which the earlier one is fitted again."""
-SETTLED = 0.9
-"""Probability from which an answer counts as settled."""
 
 
 def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) -> Diagnosis:
@@ -53,71 +48,67 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
         Gas blocks and arm, examined.
     """
     nominal = case.rig
-    starts = _settled(nominal, fitted, groups, [g.candidates[0] for g in groups])
-    baseline = _merged(nominal, starts)
-    probabilities, symptoms = _probabilities(groups)
-    top = max(probabilities, key=lambda k: probabilities[k])
-    verdict = top if top in ("none", "parameters", "unlisted") else "effects"
+    judged = judge(groups)
+    verdict, probabilities, ambiguity = case_verdict(judged), case_probabilities(judged), case_ambiguity(judged)
+    starts = _settled(nominal, fitted, judged, [g.candidates[0] for g in groups])
+    baseline = _merged(nominal, judged, starts)
+    changed = verdict in ("effects", "unlisted") or any(j.wrong for j in judged)
     chosen = starts
-    if verdict == "effects":
-        picked = _chosen(groups, frozenset(top.split("+")))
-        chosen = _settled(nominal, fitted, groups, picked)
-        groups = [
-            replace(g, candidates=[new if c is old else c for c in g.candidates])
-            for g, old, new in zip(groups, picked, chosen, strict=True)
-        ]
-    model = _merged(nominal, chosen)
-    named = list(dict.fromkeys(e for c in chosen for e in c.effects))
-    if verdict in ("none", "parameters"):
-        model = nominal if verdict == "none" else baseline
-        named = []
-    elif verdict == "unlisted":
-        # the most probable catalogue effects stay in the list with their (small) probability; the model gets the form that was found
-        chosen = [g.closure or (g.best if _named(g) else start) for g, start in zip(groups, starts, strict=True)]
-        model = _merged(nominal, chosen)
+    if changed:
+        chosen = _settled(nominal, fitted, judged, [_model_of(j, start) for j, start in zip(judged, starts, strict=True)])
+        judged = [replace(j, chosen=c) if j.named or j.wrong else j for j, c in zip(judged, chosen, strict=True)]
+    model = _merged(nominal, judged, chosen) if changed else nominal if verdict == "none" else baseline
     floor = {k: v for g in groups for k, v in g.floor.items()}
     stages = {"before": nominal, "refit": baseline, "after": model}
     events = next((c.fit.events for c in chosen if c.fit.events is not None), None) if model.effects else None
     fit_found = {s: _run(fitted, rig, events if s == "after" else None) for s, rig in stages.items()}
     out_found = fit_found if held is fitted else {s: _run(held, rig, events if s == "after" else None) for s, rig in stages.items()}
-    located = _located(groups, symptoms)
+    located = _located(judged)
     picture = Picture()
     if located is not None:
         block = next(b for b in fitted.blocks if b.name == located)
         picture = describe(block, fitted.recordings, nominal, fit_found["refit"], fit_found["after"], floor)
     fit_table = _table(fitted, fit_found, floor)
     held_table = _table(held, out_found, floor) if held is not fitted else {}
-    gap = _gap(held_table or fit_table)
-    effects = _effects(groups, probabilities, model if verdict == "effects" else None)
-    ambiguity = _ambiguity(probabilities)
-    parameters = _parameters(nominal, chosen if verdict == "effects" else starts)
-    where = words.where(located, fitted, groups, picture)
+    gap = _gap(held_table or fit_table) if model.effects or any(j.wrong for j in judged) else None
+    blocks = block_entries(judged, fitted, fit_found, held, out_found, floor)
+    named = any(j.named or j.wrong for j in judged)
     diagnosis = Diagnosis(
         case=case.name,
         verdict=verdict,
-        where=where,
-        effects=effects,
+        where=words.where(located, fitted, judged, picture),
+        effects=_effects(judged, verdict),
         ambiguity=ambiguity,
         probabilities=probabilities,
-        parameters=parameters,
-        fit={"channels": fit_table, "held_out": held_table, "gap_closed": gap if model.effects else None},
-        next_experiment=_next(verdict, probabilities, ambiguity, nominal, groups, fitted, held),
+        parameters=_parameters(nominal, chosen if named else starts),
+        fit={"channels": fit_table, "held_out": held_table, "gap_closed": gap},
+        next_experiment=_next(verdict, probabilities, ambiguity, nominal, judged, fitted, held),
         warnings=[
             *words.absolute(case),
-            *(words.reservations(chosen, held_table or fit_table, doubtful=bool(ambiguity)) if verdict == "effects" else []),
+            *(words.reservations(judged, chosen, held_table or fit_table) if named else []),
             *(words.worse(held_table or fit_table) if model.effects else []),
-            *words.warnings(case, groups, symptoms, held is fitted),
+            *words.warnings(case, judged, held is fitted),
         ],
         rig=_with_std(model, chosen) if model.effects else model,
         traces=_traces(fitted, held, fit_found, out_found),
-        blocks=_block_table(groups),
+        blocks=blocks,
+        unexplained=unexplained(blocks),
+        wrong_parameters=_wrong(nominal, judged, fitted, held_table or fit_table),
+        residuals=_block_table(groups),
         condition_map=picture.map,
         tried=_tried(groups),
         asked=_asked(groups),
     )
-    forms = [g.form for g in groups if g.closure is not None] if verdict == "unlisted" else []
-    diagnosis.text = words.verdict(diagnosis, named, case, gap, forms, sought=any(g.sought for g in groups))
+    forms = [g.form for g in groups if g.closure is not None] if changed else []
+    diagnosis.text = words.verdict(diagnosis, case, gap, forms, sought=any(g.sought for g in groups))
     return diagnosis
+
+
+def _model_of(judged: Judged, start: Candidate) -> Candidate:
+    """What of a group goes into the model: what is named, or a form of what has no name, or parameters alone."""
+    if judged.named or judged.wrong:
+        return judged.chosen
+    return (judged.group.closure if judged.verdict == "unlisted" else None) or start
 
 
 def _run(problem: Problem, rig: Rig, events: Events | None) -> dict[Key, Residual]:
@@ -131,6 +122,7 @@ def _tried(groups: list[Group]) -> list[dict[str, Any]]:
         {
             "blocks": [b.name for b in group.blocks],
             "effects": list(candidate.effects),
+            "wrong_parameters": list(candidate.wrong),
             "fitted": {b: e.ratio for b, e in candidate.fitted.items()},
             "held_out": {b: e.ratio for b, e in candidate.held_out.items()},
             "gap_closed": candidate.gap_closed,
@@ -162,12 +154,12 @@ def _next(
     probabilities: dict[str, float],
     ambiguity: list[list[str]],
     nominal: Rig,
-    groups: list[Group],
+    judged: list[Judged],
     fitted: Problem,
     held: Problem,
 ) -> dict[str, Any]:
     """What to record next: simulated with every hypothesis that has a model, where two or more are left; else in words."""
-    left = _hypotheses(groups, probabilities, nominal)
+    left = _hypotheses(judged, probabilities, nominal)
     recordings = [*fitted.recordings, *(held.recordings if held is not fitted else [])]
     if ambiguity and len(left) > 1:
         common = set.intersection(*(set(p.noise) for p in recordings))
@@ -177,68 +169,71 @@ def _next(
     return words.next_experiment(verdict, probabilities, ambiguity, nominal)
 
 
-def _chosen(groups: list[Group], wanted: frozenset[str]) -> list[Candidate]:
-    """The candidate of each group that belongs to a set of effects: of those inside it, the most probable of the group.
-
-    A group that keeps nothing has the baseline alone.
-    """
-    found = []
-    for group in groups:
-        own = [c for c in group.candidates if set(c.effects) <= wanted]
-        named = [c for c in own if c.effects] if group.mismatch is not None else []
-        weights = [group.probabilities.get("+".join(c.effects), 0.0) for c in named]
-        found.append(named[weights.index(max(weights))] if named else group.candidates[0])
-    return found
-
-
-def _hypotheses(groups: list[Group], probabilities: dict[str, float], nominal: Rig) -> list[tuple[str, Rig, float]]:
+def _hypotheses(judged: list[Judged], probabilities: dict[str, float], nominal: Rig) -> list[tuple[str, Rig, float]]:
     """The likely hypotheses that have a model, as fitted; those of an effect with times of its own can predict no other recording."""
     found = []
     for key, p in probabilities.items():
         wanted = frozenset(key.split("+"))
-        if p < SIMULATED or not wanted <= set(CATALOGUE):
+        if p < SIMULATED or not all(name in CATALOGUE or is_parameter(name) for name in wanted):
             continue
-        chosen = _chosen(groups, wanted)
+        chosen = [_inside(j.group, wanted) for j in judged]
         if any(c.fit.events is not None for c in chosen):
             continue
-        if {e for c in chosen for e in c.effects} == wanted:
-            found.append((key, _with_std(_merged(nominal, chosen), chosen), p))
+        if {name for c in chosen for name in c.names} == wanted:
+            found.append((key, _with_std(_merged(nominal, judged, chosen), chosen), p))
     return found
 
 
-def _named(group: Group) -> bool:
-    """Whether an effect is the most probable answer of a group."""
-    odds = group.probabilities
-    named = max((p for k, p in odds.items() if k not in ("", "unlisted")), default=0.0)
-    return group.mismatch is not None and named > max(odds.get("", 0.0), odds.get("unlisted", 0.0))
+def _inside(group: Group, wanted: frozenset[str]) -> Candidate:
+    """The most probable hypothesis of a group that names nothing else than what is wanted; the baseline where there is none."""
+    named = [c for c in group.candidates if c.names and set(c.names) <= wanted]
+    weights = [group.probabilities.get(c.key, 0.0) for c in named]
+    return named[weights.index(max(weights))] if named else group.candidates[0]
 
 
-def _settled(nominal: Rig, problem: Problem, groups: list[Group], chosen: list[Candidate]) -> list[Candidate]:
-    """The fits of earlier groups again, with what the last one settles (the sensors' zeros) held, where theirs are others.
+def _order(judged: list[Judged]) -> list[int]:
+    """Groups from the one whose sensors' zeros count least to the one that settles them.
+
+    A zero that is wrong itself is known best; what a group without a name leaves may be in its zeros; of the others the last (the arm)
+    tells most.
+    """
+
+    def rank(k: int) -> tuple[bool, bool, int]:
+        return any(name.startswith("sensors.") for name in judged[k].wrong), judged[k].verdict != "unlisted", k
+
+    return sorted(range(len(judged)), key=rank)
+
+
+def _settled(nominal: Rig, problem: Problem, judged: list[Judged], chosen: list[Candidate]) -> list[Candidate]:
+    """The fits of all groups but one again, with what that one settles (the sensors' zeros) held, where theirs are others.
 
     A rig has one zero of a sensor; the other values of a fit are right beside its own only.
     """
-    *earlier, last = chosen
-    found = []
-    for group, candidate in zip(groups, earlier, strict=False):
-        common = {n: last.fit.values[n] for n in candidate.fit.moved if n in last.fit.moved}
-        apart = any(abs(candidate.fit.moved[n] - last.fit.moved[n]) > APART for n in common)
+    *others, last = _order(judged)
+    settling = chosen[last].fit
+    found = list(chosen)
+    for k in others:
+        candidate = chosen[k]
+        common = {n: settling.values[n] for n in candidate.fit.moved if n in settling.moved}
+        apart = any(abs(candidate.fit.moved[n] - settling.moved[n]) > APART for n in common)
         if apart and candidate.fit.events is None:
-            own = replace(problem, blocks=group.blocks)
+            own = replace(problem, blocks=judged[k].group.blocks)
             free, fixed = parts_of(start_of(candidate.fit, effect) for effect in candidate.effects)
             colour = colour_of(own, candidate.fit)
             with contextlib.suppress(SimulationError):  # it then stays as it was fitted
-                again = fit(own, nominal, candidate.effects, free, colour, fixed=fixed, warm=candidate.fit, share=EXACT, settled=common)
-                candidate = replace(candidate, fit=again)
-        found.append(candidate)
-    return [*found, last]
+                again = fit(
+                    own, nominal, candidate.effects, free, colour,
+                    fixed=fixed, warm=candidate.fit, share=EXACT, settled=common, freed=candidate.wrong,
+                )  # fmt: skip
+                found[k] = replace(candidate, fit=again)
+    return found
 
 
-def _merged(nominal: Rig, candidates: list[Candidate]) -> Rig:
-    """One rig from the groups' fits: the arm, judged last, settles the sensors' zeros."""
+def _merged(nominal: Rig, judged: list[Judged], candidates: list[Candidate]) -> Rig:
+    """One rig from the groups' fits; where two have a value of their own, that of the group that settles it."""
     values: dict[str, float] = {}
     rig = nominal
-    for candidate in candidates:
+    for candidate in (candidates[k] for k in _order(judged)):
         values |= {n: v for n, v in candidate.fit.values.items() if n in nominal.parameters}
         for effect in candidate.fit.rig.effects:
             rig = rig.with_effect(effect["id"], effect["parameters"])
@@ -254,49 +249,20 @@ def _with_std(rig: Rig, candidates: list[Candidate]) -> Rig:
     return rig
 
 
-def _probabilities(groups: list[Group]) -> tuple[dict[str, float], dict[str, float]]:
-    """Joint probabilities over all hypotheses, and parameters that left their plausible range."""
-    shifted = any(g.instead or any(significant(e) for e in g.nominal.values()) for g in groups)
-    quiet = all(g.mismatch is None for g in groups)
-    moved = {n: v for g in groups for n, v in g.candidates[0].fit.moved.items()}
-    symptoms = {n: v for n, v in moved.items() if abs(v) >= SYMPTOM}
-    out: dict[str, float] = {"none": 0.0, "parameters": 0.0, "unlisted": 0.0}
-    if quiet:
-        if symptoms:
-            # everything is explained to its noise, at the price of a parameter that its owner would not have believed
-            out["unlisted"] = 0.25
-            out["parameters"] = 0.75
-        else:
-            out["parameters" if shifted else "none"] = 0.96
-            out["none" if shifted else "parameters"] = 0.03
-            out["unlisted"] = 0.01
-        return out, symptoms
-    for choice in itertools.product(*(g.probabilities.items() for g in groups)):
-        weight = math.prod(p for _, p in choice)
-        names = [n for n, _ in choice if n]
-        apart = [n for k in names for n in k.split("+")]
-        weight *= SHARED ** (len(apart) - len(set(apart)))  # one effect seen in two places, not two
-        key = "unlisted" if "unlisted" in names else "+".join(sorted(set(apart))) or ("parameters" if shifted else "none")
-        out[key] = out.get(key, 0.0) + weight
-    total = sum(out.values())
-    out = {k: p / total for k, p in out.items()}
-    # a mismatch this significant leaves next to nothing for wrong parameters
-    rest = 0.005
-    out = {k: p * (1.0 - rest) for k, p in out.items()}
-    out["parameters"] += rest
-    return out, symptoms
-
-
-def _located(groups: list[Group], symptoms: dict[str, float]) -> str | None:
-    found = [(g.candidates[0].held_out[g.mismatch.name].ratio, g.mismatch.name) for g in groups if g.mismatch]
-    if found:
-        return max(found)[1]
-    if symptoms:
-        worst = max(symptoms, key=lambda n: abs(symptoms[n]))
-        for group in groups:
-            for block in reversed(group.blocks):
-                if worst in block.parameters:
-                    return block.name
+def _located(judged: list[Judged]) -> str | None:
+    """The block that the answer is about: of those with a name first, else of those that keep something, else one at a wall."""
+    named = [j.group for j in judged if j.named or j.wrong]
+    missing = [j.group for j in judged if j.verdict == "unlisted"]
+    for groups in (named, missing, [j.group for j in judged]):
+        found = [(g.candidates[0].held_out[g.mismatch.name].ratio, g.mismatch.name) for g in groups if g.mismatch]
+        if found:
+            return max(found)[1]
+    for j in judged:
+        moved = symptoms_of(j.group)
+        worst = j.wrong or tuple(sorted(moved, key=lambda n: -abs(moved[n])))
+        for block in reversed(j.group.blocks):
+            if worst and worst[0] in block.parameters:
+                return block.name
     return None
 
 
@@ -327,31 +293,55 @@ def _gap(table: dict[str, dict[str, float]]) -> float | None:
     return None if room < 0.05 else max(0.0, min(1.0, (refit - after) / room))
 
 
-def _effects(groups: list[Group], probabilities: dict[str, float], model: Rig | None) -> list[dict[str, Any]]:
-    """Effects by their marginal probability, with parameters of the best set that has them."""
-    marginal: dict[str, float] = {}
-    for key, p in probabilities.items():
-        for effect in key.split("+"):
-            if effect in CATALOGUE:
-                marginal[effect] = marginal.get(effect, 0.0) + p
-    chosen = {e["id"] for e in model.effects} if model is not None else set()
-    out = []
-    for effect, p in sorted(marginal.items(), key=lambda kv: -kv[1]):
-        if effect not in chosen and p < 0.05:
-            continue
-        candidates = [c for g in groups for c in g.candidates if effect in c.effects]
-        best = max(candidates, key=lambda c: (effect in chosen and c is _best_of(groups, c), c.gap_closed))
-        out.append(
-            {
-                "id": effect,
-                "name": EFFECTS[effect].name,
-                "probability": min(1.0, p),
-                "inclusion": max((g.inclusion[effect] for g in groups if effect in g.inclusion), default=None),
-                "parameters": _effect_parameters(effect, best),
-                "events": _events(effect, best),
-            }
-        )
-    return out
+def _effects(judged: list[Judged], verdict: str) -> list[dict[str, Any]]:
+    """The effects that are named, the most probable first; without a name those that come closest."""
+    found: dict[str, tuple[float, Candidate]] = {}
+    for k in _order(judged):
+        j = judged[k]
+        names = {effect for c in j.group.candidates for effect in c.effects}
+        for effect in j.named if verdict == "effects" else names & set(CATALOGUE):
+            p = j.probability(effect)
+            if verdict == "effects":
+                # of one effect in two groups the model has the parameters of the group that comes last
+                found[effect] = max(p, found[effect][0] if effect in found else 0.0), j.chosen
+            elif p >= IN_SET:
+                own = [c for c in j.group.candidates if effect in c.effects]
+                found[effect] = p, max(own, key=lambda c: (j.group.probabilities.get(c.key, 0.0), c.gap_closed))
+    return [
+        {
+            "id": effect,
+            "name": EFFECTS[effect].name,
+            "probability": p,
+            "inclusion": max((j.group.inclusion[effect] for j in judged if effect in j.group.inclusion), default=None),
+            "parameters": _effect_parameters(effect, candidate),
+            "events": _events(effect, candidate),
+        }
+        for effect, (p, candidate) in sorted(found.items(), key=lambda kv: -kv[1][0])
+    ]
+
+
+def _wrong(nominal: Rig, judged: list[Judged], problem: Problem, table: dict[str, dict[str, float]]) -> list[dict[str, Any]]:
+    """Parameters that the rig file is wrong about: its value, the one that the recordings ask for, and what the error becomes."""
+    found = []
+    for j in judged:
+        for name in j.wrong:
+            known, value, std = nominal.parameter(name), j.chosen.fit.values[name], j.chosen.fit.std[name]
+            told = [b for b in problem.blocks if name in b.parameters and b in j.group.blocks]
+            errors = {b.channel: {"before": table[b.channel]["refit"], "after": table[b.channel]["after"]} for b in told}
+            entry = _entry(value, std, known.unit, True, known.lower)
+            found.append(
+                {
+                    "name": name,
+                    "block": told[-1].name if told else None,
+                    "nominal": known.value,
+                    "tolerance": known.tol,
+                    **{key: entry[key] for key in ("value", "std", "interval", "unit")},
+                    "moved_sigmas": j.chosen.fit.moved[name],
+                    "probability": j.probability(name),
+                    "held_out": errors,
+                }
+            )
+    return found
 
 
 def _events(effect: str, candidate: Candidate) -> list[dict[str, Any]]:
@@ -366,10 +356,6 @@ def _events(effect: str, candidate: Candidate) -> list[dict[str, Any]]:
                 own = {name: values[name + suffix] for name in ("torque", "mass_change", "time", "duration") if name + suffix in values}
                 found.append({"recording": recording, **own, **({"rise": values["rise"]} if "rise" in values else {})})
     return found
-
-
-def _best_of(groups: list[Group], candidate: Candidate) -> Candidate | None:
-    return next((g.best for g in groups if candidate in g.candidates), None)
 
 
 _CHOSEN = CHOICES | {"cut_in_pressure", "cut_out_pressure"}
@@ -410,14 +396,6 @@ def _entry(value: float, std: float, unit: str, identifiable: bool, lower: float
         "interval": [max(lower, value - 1.96 * std), value + 1.96 * std],
         "identifiable": identifiable,
     }
-
-
-def _ambiguity(probabilities: dict[str, float]) -> list[list[str]]:
-    top = max(probabilities.values())
-    if top >= SETTLED:
-        return []
-    found = [sorted(k.split("+")) for k, p in sorted(probabilities.items(), key=lambda kv: -kv[1]) if p >= 0.05]
-    return found if len(found) > 1 else []
 
 
 def _parameters(nominal: Rig, candidates: list[Candidate]) -> dict[str, dict[str, Any]]:

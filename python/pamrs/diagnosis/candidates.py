@@ -17,15 +17,17 @@ from pamrs.effects_table import EFFECTS, find_parameter
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 
-__all__ = ["EXACT", "Attempts", "Candidate", "Group", "significant", "start_of", "without_colour"]
+__all__ = ["EXACT", "THOROUGH", "Attempts", "Candidate", "Group", "significant", "start_of", "without_colour"]
 
 POLISH, EXACT = 10, 1e-5
 """Evaluations for the last stretch of a fit, and share of the sum of squares to which it goes."""
+THOROUGH = 30
+"""Evaluations of a fit of baseline parameters alone: what it leaves undone looks like missing physics."""
 
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """A set of effects, fitted.
+    """A hypothesis, fitted: a set of effects, or values of the rig file that are wrong.
 
     Attributes
     ----------
@@ -43,6 +45,8 @@ class Candidate:
         Relative scatter of its size between recordings, beyond its uncertainty.
     gain : float
         Gain in chi-square that the screen promised of a single effect.
+    wrong : tuple of str
+        Dotted names of the parameters that were freed from their tolerance.
     """
 
     effects: tuple[str, ...]
@@ -52,6 +56,17 @@ class Candidate:
     gap_closed: float
     scatter: float = 0.0
     gain: float = 0.0
+    wrong: tuple[str, ...] = ()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What it names: effects, and parameters that are wrong; nothing for the baseline."""
+        return (*self.effects, *self.wrong)
+
+    @property
+    def key(self) -> str:
+        """Its names joined by ``+``, as probabilities are listed."""
+        return "+".join(self.names)
 
     @property
     def misfit(self) -> float:
@@ -72,7 +87,8 @@ class Group:
     candidates : list of Candidate
         The baseline first, then every set of effects tried.
     probabilities : dict of str to float
-        Over the sets (ids joined by ``+``), ``unlisted`` and ``""`` (nothing missing here, or parameters that are off).
+        Over the hypotheses (names joined by ``+``: ids of effects, dotted names of wrong parameters), ``unlisted`` and ``""``
+        (nothing missing here, or parameters that are off inside their tolerances).
     mismatch : Block or None
         The block with the largest significant excess after the refit.
     floor : dict
@@ -114,11 +130,11 @@ class Group:
 
     @property
     def best(self) -> Candidate:
-        """The most probable set of effects (the baseline when none is)."""
-        named = [c for c in self.candidates if c.effects]
+        """The most probable hypothesis (the baseline when none is)."""
+        named = [c for c in self.candidates if c.names]
         if self.mismatch is None or not named:
             return self.candidates[0]
-        return max(named, key=lambda c: self.probabilities.get("+".join(c.effects), 0.0))
+        return max(named, key=lambda c: self.probabilities.get(c.key, 0.0))
 
 
 def significant(found: Excess, ratio: float = 1.0) -> bool:
@@ -240,6 +256,21 @@ class Attempts:
                     self.inner, self.nominal, effects, again, colour, fixed=held, warm=best, frozen=True, evaluations=limit, share=share
                 )
             return self.judged(effects, best)
+        except SimulationError:
+            return None  # it leaves the range in which the model holds
+
+    def freed(self, names: tuple[str, ...], warm: Fit) -> Candidate | None:
+        """The baseline with some parameters freed from their tolerance, fitted to its end; None where it cannot be run."""
+
+        def found(colour: dict[str, float], begun: Fit) -> Fit:
+            return fit(self.inner, self.nominal, (), {}, colour, warm=begun, freed=names, evaluations=THOROUGH, share=EXACT)
+
+        try:
+            best = found(self.white, warm)
+            colour = self.colour(best)
+            if max(colour.values()) > 2:
+                best = found(colour, best)
+            return replace(self.judged((), best), wrong=names)
         except SimulationError:
             return None  # it leaves the range in which the model holds
 

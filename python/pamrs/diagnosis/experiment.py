@@ -315,7 +315,7 @@ def _library(rig: Rig, records: Sequence[Recording]) -> list[Experiment]:
 
 def _spoken(label: str) -> str:
     """A hypothesis in words."""
-    names = [EFFECTS[part].name if part in EFFECTS else part for part in label.split("+")]
+    names = [EFFECTS[part].name if part in EFFECTS else f"another value of {part}" for part in label.split("+")]
     return " with ".join(names)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -17,7 +17,7 @@ from pamrs.diagnosis.leastsquares import SHARE, levenberg_marquardt
 from pamrs.diagnosis.signals import Prepared, binned
 from pamrs.effects_table import EFFECTS, find_parameter
 from pamrs.errors import ParameterError, RigError, SimulationError
-from pamrs.rig import Rig
+from pamrs.rig import Parameter, Rig
 from pamrs.simulation import core_rig
 
 __all__ = ["Events", "Fit", "Problem", "Scaling", "changes", "fit", "residuals", "stacked"]
@@ -54,7 +54,9 @@ that keeps its mismatch while its neighbours lose theirs; ``Rig.with_effect(...,
 LEAST_SCALE = 0.01
 """Share of an effect parameter's usual start that its scale in a fit has at the least."""
 WIDEST = 3.0
-"""Tolerances that a baseline parameter may move: farther out it would stand for physics that is missing."""
+"""Tolerances that a baseline parameter may move: farther out it would stand for physics that is missing, or for a wrong rig file."""
+FARTHEST = 10.0
+"""Multiple of its nominal value, or of the walls of the others, by which a parameter that is freed from its prior may move."""
 LEAST_STEP, STIFFEST = 4e-4, 0.2
 """Stable step [s], or for a stiff rig the share of its own, below which a model is not tried."""
 FIT_BIN = 0.02
@@ -122,6 +124,8 @@ class Fit:
         Change of each free parameter per unit of its scaled one, SI.
     events : Events or None
         What happens in single recordings.
+    freed : tuple of str
+        Baseline parameters that no prior holds.
     """
 
     effects: tuple[str, ...]
@@ -135,6 +139,12 @@ class Fit:
     evaluations: int = 0
     scales: dict[str, float] = field(default_factory=dict)
     events: Events | None = None
+    freed: tuple[str, ...] = ()
+
+    @property
+    def held_by_prior(self) -> dict[str, float]:
+        """Baseline parameters that a prior holds, and how far each moved [tolerances]."""
+        return {name: moved for name, moved in self.moved.items() if name not in self.freed}
 
 
 def residuals(problem: Problem, rig: Rig, names: Sequence[str] = (), events: Events | None = None) -> dict[Key, Residual]:
@@ -223,14 +233,15 @@ def free_baseline(problem: Problem, nominal: Rig) -> list[str]:
 class Scaling:
     """Free parameters as numbers of order one: tolerances for the baseline, starts or logarithms for effects."""
 
-    def __init__(self, nominal: Rig, baseline: Sequence[str], starts: dict[str, float]) -> None:
+    def __init__(self, nominal: Rig, baseline: Sequence[str], starts: dict[str, float], freed: Collection[str] = ()) -> None:
         self.names = [*baseline, *starts]
         self.nominal, self.baseline, self.starts = nominal, list(baseline), dict(starts)
         known = nominal.parameters
         self.scale = {n: known[n].tol for n in baseline}
         self.centre = {n: known[n].value for n in baseline}
-        lower = [max(-WIDEST, (known[n].lower - self.centre[n]) / self.scale[n]) for n in baseline]
-        upper = [min(WIDEST, (known[n].upper - self.centre[n]) / self.scale[n]) for n in baseline]
+        reach = {n: _reach(known[n]) if n in freed else WIDEST * known[n].tol for n in baseline}
+        lower = [(max(known[n].lower, self.centre[n] - reach[n]) - self.centre[n]) / self.scale[n] for n in baseline]
+        upper = [(min(known[n].upper, self.centre[n] + reach[n]) - self.centre[n]) / self.scale[n] for n in baseline]
         for name, start in starts.items():
             info = find_parameter(name)
             if name in LOGARITHMIC:
@@ -266,6 +277,11 @@ class Scaling:
             own = {n.partition(".")[2]: v for n, v in chosen.items() if n.startswith(effect + ".")}
             rig = rig.with_effect(effect, own)
         return rig
+
+
+def _reach(parameter: Parameter) -> float:
+    """How far a parameter that is freed may move [SI], if its bounds allow it."""
+    return max(FARTHEST * abs(parameter.value), FARTHEST * WIDEST * parameter.tol)
 
 
 def bin_width(prepared: Prepared, seconds: float) -> int:
@@ -342,6 +358,7 @@ def fit(
     evaluations: int = 12,
     share: float = SHARE,
     settled: Mapping[str, float] | None = None,
+    freed: Collection[str] = (),
 ) -> Fit:
     """Fit baseline parameters (with their tolerances as priors) and effects to the recordings.
 
@@ -371,6 +388,8 @@ def fit(
         As in :func:`pamrs.diagnosis.leastsquares.levenberg_marquardt`.
     settled : mapping of str to float, optional
         Baseline parameters that are held at other values than the nominal ones.
+    freed : collection of str, optional
+        Baseline parameters that no prior holds, and that may leave their tolerance.
 
     Raises
     ------
@@ -379,12 +398,13 @@ def fit(
     """
     nominal = nominal.with_parameters(settled or {})
     baseline = [name for name in free_baseline(problem, nominal) if name not in (settled or {})]
-    scaling = Scaling(nominal, baseline, starts)
+    scaling = Scaling(nominal, baseline, starts, freed)
     count = len(baseline)
+    bound = np.array([0.0 if name in freed else 1.0 for name in baseline])
     kept = _jacobian_of(warm, baseline) if frozen and warm is not None else None
     asked = scaling.names if kept is None else list(starts)
     prior = np.zeros((count, len(scaling.names)))
-    prior[:, :count] = np.eye(count)
+    prior[:, :count] = np.diag(bound)
 
     def evaluate(x: Array) -> tuple[Array, Array, dict[Key, Residual]]:
         found = residuals(problem, scaling.rig(x, fixed or {}), asked, events)
@@ -393,7 +413,7 @@ def fit(
         rows, slope = stacked(problem, found, inflation)
         slopes = np.array([scaling.slope(n, float(v)) for n, v in zip(scaling.names, x, strict=True)])
         jacobian = np.zeros((rows.size, 0)) if slope is None else slope * slopes
-        return np.concatenate([rows, x[:count]]), np.concatenate([jacobian, prior]), found
+        return np.concatenate([rows, bound * x[:count]]), np.concatenate([jacobian, prior]), found
 
     start = scaling.start.copy()
     for index, name in enumerate(baseline):
@@ -409,7 +429,8 @@ def fit(
     std = {n: float(s) * scales[n] for n, s in zip(scaling.names, spread, strict=True)}
     moved = {n: float(v) for n, v in zip(baseline, x[:count], strict=True)}
     rig = scaling.rig(x, fixed or {})
-    return Fit(effects, rig, named, std, covariance, 0.5 * float(values @ values), found, moved, spent, scales, events)
+    loose = tuple(name for name in baseline if name in freed)
+    return Fit(effects, rig, named, std, covariance, 0.5 * float(values @ values), found, moved, spent, scales, events, loose)
 
 
 def _jacobian_of(fitted: Fit, names: Sequence[str]) -> dict[Key, Array]:

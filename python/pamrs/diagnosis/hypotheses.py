@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from pamrs.diagnosis.blocks import Block, Residual
-from pamrs.diagnosis.candidates import EXACT, Attempts, Candidate, Group, colour_of, significant, start_of, without_colour
+from pamrs.diagnosis.candidates import EXACT, THOROUGH, Attempts, Candidate, Group, colour_of, significant, start_of, without_colour
 from pamrs.diagnosis.closure import describe_closure, find_closure
 from pamrs.diagnosis.events import EVENTS
 from pamrs.diagnosis.evidence import MARGIN, Floor, excess, floors
@@ -16,7 +16,9 @@ from pamrs.diagnosis.leaving import left_out
 from pamrs.diagnosis.resampling import inclusion
 from pamrs.diagnosis.screening import Screen, by_effect, screen, stand_of
 from pamrs.diagnosis.signals import Prepared
-from pamrs.diagnosis.weighing import FORM, explains, most_believed, share_left, visited, weigh
+from pamrs.diagnosis.starts import Start
+from pamrs.diagnosis.weighing import FINE, FORM, explains, most_believed, same_recordings, share_left, visited, weigh
+from pamrs.diagnosis.wrong_parameters import beside_quiet, freed
 from pamrs.effects_table import CATALOGUE, EFFECTS
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
@@ -38,8 +40,6 @@ LEAST_GAIN, LEAST_SHARE = 12.0, 0.08
 """Gain in chi-square, and share of the largest, from which an effect is fitted."""
 MOST_SINGLES, PAIRED, PARTNERS, PARTNER = 5, 2, 2, 0.01
 """Singles that are fitted; of them those that get a partner, how many each, and the share of the mismatch that one has to promise."""
-THOROUGH = 30
-"""Evaluations of the baseline's fit: what it leaves undone looks like missing physics."""
 RIVAL, MOST_RIVALS = 0.03, 4
 """Probability from which sets of effects are fitted to the end, and how many."""
 NEAR, STARTS, RICH = 0.6, 2, 3
@@ -91,7 +91,8 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
         # a parameter at the end of its plausible range is a symptom even where the fit is good
         nothing = Group(blocks, was, now, [start], {"": 1.0}, None, floor, [])
         lasting = [e for e in acting if e not in EVENTS]
-        return faint(Attempts(inner, outer, nominal, floor, out, blocks), nothing, lasting, say) or nothing
+        attempts = Attempts(inner, outer, nominal, floor, out, blocks)
+        return beside_quiet(attempts, faint(attempts, nothing, lasting, say) or nothing, lambda text: say(f"{names}: {text}"))
     mismatch = max(suspects, key=lambda b: out[b.name].ratio + now[b.name].ratio)
     say(f"{names}: {mismatch.name} keeps {now[mismatch.name].systematic:.2g} noise units after the refit")
     # so little may as well be a floor that was taken too low, which events of free times would always mend
@@ -99,13 +100,17 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
     happening = [] if marginal else [e for e in acting if e in EVENTS]
     acting = [e for e in acting if e not in EVENTS]
     trial = Attempts(inner, outer, nominal, floor, out, suspects)
+    mistaken = freed(trial, baseline, lambda text: say(f"{names}: {text}"))
     screened = screen(inner, baseline, acting, white, sealed=nominal.model["valve"] is None)
     singles = _singles(trial, screened, baseline, lambda text: say(f"{names}: {text}"))
-    if happening and all(share_left(c, start, suspects) > DOUBTFUL for c in singles):
+    seconds = max(p.n * p.dt for p in inner.recordings)
+    singles = _with_same_data(trial, start, singles, seconds)
+    if happening and all(share_left(c, start, suspects) > DOUBTFUL for c in (*singles, *mistaken)):
         say(f"{names}: looking for what happens at times of its own ({', '.join(happening)})")
         singles += [c for e in happening if (c := trial.eventful(e, start)) is not None]
     settled = any(
-        explains(c, start, suspects) or (share_left(c, start, suspects) < FORM and not _untouched(c, start, suspects)) for c in singles
+        explains(c, start, suspects) or (share_left(c, start, suspects) < FORM and not _untouched(c, start, suspects))
+        for c in (*singles, *mistaken)
     )
     # what a single effect leaves may be no more than the difference between its equation and the truth: a pair cannot be asked for
     pairs = [] if settled else _pairs(trial, screened, start, singles, lambda text: say(f"{names}: {text}"))
@@ -113,14 +118,13 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
         say(f"{names}: looking for {effect} beside {beside.effects[0]}")
         found = trial.eventful(effect, beside)
         pairs += [] if found is None else [found]
-    candidates = [start, *singles, *pairs]
+    candidates = [start, *singles, *pairs, *mistaken]
     most = most_believed(fitted, held, mismatch, now[mismatch.name].rms)
-    seconds = max(p.n * p.dt for p in inner.recordings)
     ranging = visited(inner)
     weighed = weigh(candidates, suspects, most, seconds, ranging)
     close = sorted((c for c in candidates[1:] if _odds(weighed, c) > RIVAL), key=lambda c: -_odds(weighed, c))[:MOST_RIVALS]
     if len(close) > 1 or (close and not explains(close[0], start, suspects)):
-        say(f"{names}: fitting to the end " + ", ".join("+".join(c.effects) for c in close))
+        say(f"{names}: fitting to the end " + ", ".join(c.key for c in close))
         candidates = [trial.polished(c) if c in close else c for c in candidates]
         weighed = weigh(candidates, suspects, most, seconds, ranging)
     if marginal:
@@ -150,8 +154,8 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
 
 
 def _odds(weighed: dict[str, float], candidate: Candidate) -> float:
-    """Probability of a set of effects."""
-    return weighed.get("+".join(candidate.effects), 0.0)
+    """Probability of a hypothesis."""
+    return weighed.get(candidate.key, 0.0)
 
 
 def _together(inner: Problem, outer: Problem, nominal: Rig, start: Candidate, floor: dict[Key, Floor]) -> Candidate | None:
@@ -220,6 +224,30 @@ def _singles(trial: Attempts, screened: Screen, baseline: Fit, say: Callable[[st
         fitted = [candidate for candidate in tried if candidate is not None]
         if fitted:
             found.append(replace(min(fitted, key=lambda c: c.misfit), gain=gains[effect]))
+    return found
+
+
+def _with_same_data(trial: Attempts, start: Candidate, singles: list[Candidate], seconds: float) -> list[Candidate]:
+    """The singles, and beside each that may be the same data as another effect (a late clock and a dead time) that other one."""
+    found = list(singles)
+    for place, single in enumerate(singles):
+        same = EFFECTS[single.effects[0]].same_data
+        if same is None:
+            continue
+        own = start_of(single.fit, single.effects[0])
+        held = {f"{own.effect}.{name}": value for name, value in same.held}
+        if any(own.held[name] != value for name, value in held.items()):
+            # the shape that is the same data is taken where it explains as much
+            alike = trial.fitted([replace(own, held=own.held | held)], start.fit, trial.white)
+            if alike is None or share_left(alike, start, trial.suspects) > share_left(single, start, trial.suspects) + FINE:
+                continue
+            single = found[place] = replace(alike, gain=single.gain)
+        if not same_recordings(single, own.effect, seconds) or any(c.effects == (same.effect,) for c in singles):
+            continue
+        usual = {f"{same.effect}.{p.name}": p.default for p in EFFECTS[same.effect].parameters}
+        usual[f"{same.effect}.{same.parameter}"] = single.fit.values[f"{own.effect}.{same.size}"]
+        other = trial.fitted([Start(same.effect, usual, {}, (), False)], start.fit, trial.white)
+        found += [] if other is None else [other]
     return found
 
 

@@ -52,7 +52,7 @@ def left_out(problem: Problem, found: Fit, inflation: dict[str, float]) -> dict[
         scaled = slope * scales
         normals.append(scaled.T @ scaled)
         gradients.append(scaled.T @ rows)
-    total = np.sum(normals, axis=0) + np.diag([1.0 if name in found.moved else 0.0 for name in names])
+    total = np.sum(normals, axis=0) + np.diag([1.0 if name in found.held_by_prior else 0.0 for name in names])
     total += RIDGE * np.diag(np.maximum(np.diag(total), RIDGE))
     root = np.linalg.inv(np.linalg.cholesky(total))
     out = dict(found.residuals)

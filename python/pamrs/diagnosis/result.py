@@ -168,8 +168,17 @@ class Diagnosis:
         Final model, with the effect.
     traces : list of Trace
         Measured and simulated channels.
-    blocks : dict
-        {block: {rms, noise, excess, p_value, channel}}, residual of each block against its noise floor.
+    blocks : list of dict
+        The verdict of each group of blocks: ``blocks`` (their names), ``verdict``, ``probabilities``, ``effects``,
+        ``wrong_parameters``, ``ambiguity``, and ``mismatch``: for each block its ``channel``, ``unit``, and ``fitted`` and ``held_out``
+        {before, refit, after: {noises, size, more_than_noise}}, what is more than noise in units of the noise and in SI.
+    unexplained : list of dict
+        Blocks that keep a mismatch: ``block``, ``channel``, ``unit``, ``noises``, ``size`` (SI), and the ``verdict`` of their group.
+    wrong_parameters : list of dict
+        Values of the rig file that are wrong: ``name``, ``block``, ``nominal``, ``tolerance``, ``value``, ``std``, ``interval`` (95 %),
+        ``unit``, ``moved_sigmas``, ``probability``, and ``held_out`` {channel: {before, after}}, the error without and with it, SI.
+    residuals : dict
+        {block: {rms, noise, excess, p_value, channel}}, residual of each block's refitted baseline against its noise.
     condition_map : dict or None
         ``x_label``, ``y_label``, ``x_edges`` (m+1,), ``y_edges`` (n+1,), ``z`` and ``z_after`` (n, m): mean
         residual in units of the noise, NaN where there are no data; ``block``.
@@ -202,7 +211,10 @@ class Diagnosis:
     text: str = ""
     rig: ModelFile | None = None
     traces: list[Trace] = field(default_factory=list)
-    blocks: dict[str, dict[str, Any]] = field(default_factory=dict)
+    blocks: list[dict[str, Any]] = field(default_factory=list)
+    unexplained: list[dict[str, Any]] = field(default_factory=list)
+    wrong_parameters: list[dict[str, Any]] = field(default_factory=list)
+    residuals: dict[str, dict[str, Any]] = field(default_factory=dict)
     condition_map: dict[str, Any] | None = None
     timings: dict[str, float] = field(default_factory=dict)
     tried: list[dict[str, Any]] = field(default_factory=list)
@@ -252,6 +264,9 @@ class Diagnosis:
             ],
             "ambiguity": _plain([list(s) for s in self.ambiguity]),
             "probabilities": _plain(self.probabilities),
+            "blocks": _plain(self.blocks),
+            "unexplained": _plain(self.unexplained),
+            "wrong_parameters": _plain(self.wrong_parameters),
             "parameters": {
                 str(name): _pick(p, ("nominal", "value", "std", "unit", "moved_sigmas"), ("identifiable",))
                 for name, p in self.parameters.items()
@@ -293,7 +308,7 @@ class Diagnosis:
         if self.probabilities:
             lines.append("")
             for name, p in words.ranked_probabilities(self, 5):
-                lines.append(f"{words.label(name):<38.38} {words.format_probability(p):>7}  {'#' * round(30 * p)}")
+                lines.append(f"{words.hypothesis_label(name):<38.38} {words.format_probability(p):>7}  {'#' * round(30 * p)}")
         for effect in self.effects:
             lines.append("")
             lines.append(f"{effect.get('name') or words.label(str(effect['id']))}")
@@ -303,7 +318,11 @@ class Diagnosis:
                     lines.append(f"  {name} = {value} {p.get('unit') or ''}".rstrip())
                 else:
                     lines.append(f"  {name}: these recordings do not determine it")
+        for wrong in self.wrong_parameters:
+            lines += ["", *textwrap.wrap(words.sentence_of(wrong), 96)]
         lines += self._summary_fit()
+        for kept in self.unexplained:
+            lines += textwrap.wrap(f"Open: {words.kept_sentence(kept)}", 96, subsequent_indent="  ")
         if len(self.ambiguity) > 1:
             sets = "; ".join(words.set_label(s) for s in self.ambiguity)
             lines += ["", *textwrap.wrap(f"Not separable: {sets}.", 96, subsequent_indent="  ")]
@@ -387,7 +406,7 @@ class Diagnosis:
     def _repr_html_(self) -> str:
         """Short HTML for notebooks."""
         rows = "".join(
-            f"<tr><td style='text-align:left'>{html.escape(words.label(name))}</td>"
+            f"<tr><td style='text-align:left'>{html.escape(words.hypothesis_label(name))}</td>"
             f"<td>{html.escape(words.format_probability(p))}</td>"
             f"<td style='text-align:left'><span style='display:inline-block;height:.7em;"
             f"width:{max(0.0, min(1.0, p)) * 12:.2f}em;background:#0072b2'></span></td></tr>"

@@ -172,10 +172,10 @@ def stand_of(fitted: Fit, problem: Problem, inflation: dict[str, float]) -> Stan
         none = np.zeros((rows.size, 0))
         return Stand(rows, rows, none, np.zeros(0), np.zeros(0), none)
     # a parameter at the end of its range cannot go on: what it would explain is left for an effect
-    names = [n for n in fitted.values if abs(fitted.moved.get(n, 0.0)) < WIDEST - 1e-3]
+    names = [n for n in fitted.values if abs(fitted.held_by_prior.get(n, 0.0)) < WIDEST - 1e-3]
     scales = np.array([fitted.scales[name] for name in names])
     scaled = jacobian[:, [list(fitted.values).index(name) for name in names]] * scales
-    free = np.array([name in fitted.moved for name in names], dtype=np.float64)
+    free = np.array([name in fitted.held_by_prior for name in names], dtype=np.float64)
     # J (J'J + prior)^-1 J' is the projector that a prior leaves; its square root's columns are the basis
     values, vectors = np.linalg.eigh(scaled.T @ scaled)
     keep = values > 1e-10 * max(float(values[-1]), 1e-300)
@@ -185,7 +185,7 @@ def stand_of(fitted: Fit, problem: Problem, inflation: dict[str, float]) -> Stan
     shrunk = inner @ np.linalg.solve(normal, inner.T)
     weights, turn = np.linalg.eigh(0.5 * (shrunk + shrunk.T))
     basis = (u @ turn) * np.sqrt(np.clip(weights, 0.0, 1.0))
-    moved = np.array([fitted.moved.get(name, 0.0) for name in names])
+    moved = np.array([fitted.held_by_prior.get(name, 0.0) for name in names])
     pull = u @ (inner @ np.linalg.solve(normal, moved))
     return Stand(rows, rows - basis @ (basis.T @ rows) - pull, scaled, moved, free, basis)
 

@@ -10,7 +10,7 @@ from pamrs.channels import channel_of
 from pamrs.diagnosis.blocks import Block
 from pamrs.diagnosis.candidates import Candidate, significant
 from pamrs.diagnosis.evidence import Excess
-from pamrs.diagnosis.fitting import Problem
+from pamrs.diagnosis.fitting import WIDEST, Problem
 from pamrs.effects_table import EFFECTS
 
 __all__ = [
@@ -21,6 +21,7 @@ __all__ = [
     "explains",
     "most_believed",
     "price",
+    "same_recordings",
     "share_left",
     "stands",
     "unlikely",
@@ -28,11 +29,12 @@ __all__ = [
     "weigh",
 ]
 
-EVEN, EVEN_PUSH, SOFTNESS = 0.5, 2.6, 0.4
-"""Logarithm of the odds of explained to unexplained variance at which a set is named at even odds with ``unlisted`` (pushes, which
-take up a good part of anything, need more), and its width."""
-LOOKS, PRICE, SECOND = 12.0, 0.5, 3.0
-"""Independent looks that a block's residual counts for, price of a parameter, price of a further effect."""
+EVEN, EVEN_PLIABLE, SOFTNESS = 0.5, 2.6, 0.4
+"""Logarithm of the odds of explained to unexplained variance at which a set is named at even odds with ``unlisted`` (pushes, and
+parameters of the baseline, which take up a good part of anything, need more), and its width."""
+LOOKS, PRICE, SECOND, FILE = 12.0, 0.5, 3.0, 1.5
+"""Independent looks that a block's residual counts for, price of a parameter, of a further effect or wrong parameter, and of a rig file
+that is wrong about a parameter (more, but less and less so, the further outside its tolerances it is)."""
 TELLING = 0.5
 """Excess variance, in units of the floor's, from which recordings are asked how much an effect leaves; those with most always are."""
 CLEARLY = 0.7
@@ -47,6 +49,8 @@ BELIEVED = 0.985
 """How far a name is believed at most."""
 STANDING, UNSEEN = 2.0, 3.0
 """Price of a clock that is late but does not drift; recordings' lengths beyond which a time constant was not seen."""
+ALIKE, UNTOLD = 0.1, 2.0
+"""Part of an effect's size over a recording, and standard deviations, below which what would tell it from another effect is zero."""
 HERTZ, ROUND = 1.5, 0.25
 """Exponent of the contact of round bodies, and how far that of muscles is believed to be from it."""
 WRONG, FLOORS, DECIDED = 0.15, 0.06, 8.0
@@ -127,7 +131,7 @@ def weigh(
 
     ``seconds`` is the length of the longest recording that was fitted, ``ranging`` the range of a joint's angle in them [rad].
     """
-    named = [c for c in candidates if c.effects]
+    named = [c for c in candidates if c.names]
     if not named:
         return {"unlisted": 1.0}
     start = candidates[0]
@@ -140,23 +144,51 @@ def weigh(
 
     coarse, fine = weights_of(FORM), weights_of(FINE)
     weights: dict[Candidate, float] = {}
-    for count in {len(c.effects) for c in named}:
-        alike = [c for c in named if len(c.effects) == count]
+    for count in {len(c.names) for c in named}:
+        alike = [c for c in named if len(c.names) == count]
         share = sum(coarse[c] for c in alike) / sum(fine[c] for c in alike)
         weights |= {c: share * fine[c] for c in alike}
     total = sum(weights.values())
     out: dict[str, float] = {}
     for c, weight in weights.items():
-        key = "+".join(c.effects)
-        out[key] = out.get(key, 0.0) + weight / total * trusted[c]
+        out[c.key] = out.get(c.key, 0.0) + weight / total * trusted[c]
+    _shared_out(out, named, start, suspects, seconds)
     out["unlisted"] = max(0.0, 1.0 - sum(out.values()))
     return out
+
+
+def _shared_out(out: dict[str, float], named: list[Candidate], start: Candidate, suspects: list[Block], seconds: float) -> None:
+    """Share probabilities out between sets that are the same data, by the odds before any data."""
+    for one in named:
+        for effect in one.effects:
+            same = EFFECTS[effect].same_data
+            if same is None or not same_recordings(one, effect, seconds):
+                continue
+            names = {same.effect if e == effect else e for e in one.effects}
+            other = next((c for c in named if set(c.effects) == names and not c.wrong), None)
+            # what explains more than the other could is something else as well
+            if other is None or share_left(one, start, suspects) > share_left(other, start, suspects) + FINE:
+                continue
+            both, odds = out.get(one.key, 0.0) + out.get(other.key, 0.0), math.exp(STANDING)
+            out[one.key], out[other.key] = both / (1.0 + odds), both * odds / (1.0 + odds)
+
+
+def same_recordings(candidate: Candidate, effect: str, seconds: float) -> bool:
+    """Whether an effect of a set leaves the very recordings that another effect of the catalogue would leave."""
+    same = EFFECTS[effect].same_data
+    if same is None:
+        return False
+    own = next(e["parameters"] for e in candidate.fit.rig.effects if e["id"] == effect)
+    telling, spread = own[same.without] * seconds, candidate.fit.std.get(f"{effect}.{same.without}", 0.0) * seconds
+    at_rest = abs(telling) < max(ALIKE * abs(own[same.size]), UNTOLD * spread)
+    return bool(own[same.size] > 0.0 and at_rest and all(own[name] == value for name, value in same.held))
 
 
 def _trusted(candidate: Candidate, baseline: Candidate, suspects: list[Block], most: float, seconds: float) -> float:
     """Probability of a set against ``unlisted``."""
     left = min(max(share_left(candidate, baseline, suspects), 1e-6), 1.0 - 1e-6)
-    odds = (math.log((1.0 - left) / left) - (EVEN_PUSH if "external_torque" in candidate.effects else EVEN)) / SOFTNESS
+    pliable = candidate.wrong or "external_torque" in candidate.effects
+    odds = (math.log((1.0 - left) / left) - (EVEN_PLIABLE if pliable else EVEN)) / SOFTNESS
     if explains(candidate, baseline, suspects):
         odds = max(odds, 3.0)
     return believed(odds - doubt(candidate, seconds), most)
@@ -212,9 +244,10 @@ def _score(candidate: Candidate, baseline: Candidate, suspects: list[Block], sha
             # of a faint mismatch the noise says how much may be left, of a strong one the forms
             spread = math.hypot(now[block.name].scatter, WRONG * excess, FLOORS)
             total -= min(0.5 * (left / spread) ** 2, DECIDED) * (0.5 if once else 1.0)
-    return total - price(candidate) - SECOND * (len(candidate.effects) - 1)
+    return total - price(candidate) - SECOND * (len(candidate.names) - 1)
 
 
 def price(candidate: Candidate) -> float:
-    """What a set pays for the parameters of its effects; of events of one kind only the first counts."""
-    return PRICE * sum(1 for n in candidate.fit.values if n.partition(".")[0] in EFFECTS and not n.endswith(("_2", "_3")))
+    """What a set pays for the parameters of its effects (of events of one kind only the first counts) and for a file that is wrong."""
+    own = sum(FILE + math.log(max(1.0, abs(candidate.fit.moved[n]) / WIDEST)) for n in candidate.wrong)
+    return own + PRICE * sum(1 for n in candidate.fit.values if n.partition(".")[0] in EFFECTS and not n.endswith(("_2", "_3")))

@@ -8,11 +8,13 @@ import numpy as np
 
 from pamrs.case import Case
 from pamrs.channels import channel_of, unit_of
-from pamrs.diagnosis.candidates import Candidate, Group
+from pamrs.diagnosis.candidates import Candidate
 from pamrs.diagnosis.conditions import Picture
 from pamrs.diagnosis.fitting import Problem
 from pamrs.diagnosis.result import Diagnosis
+from pamrs.diagnosis.verdicts import Judged, is_parameter, symptoms_of
 from pamrs.effects_table import EFFECTS
+from pamrs.report.text import display_unit, format_number, kept_sentence, sentence_of
 from pamrs.rig import Rig
 from pamrs.rig_schema import qualified
 
@@ -35,8 +37,9 @@ _DOUBTED = 0.1
 """Probability of no mismatch from which the words say so."""
 
 
-def where(located: str | None, problem: Problem, groups: list[Group], picture: Picture) -> dict[str, Any]:
+def where(located: str | None, problem: Problem, judged: list[Judged], picture: Picture) -> dict[str, Any]:
     """The ``where`` entry: block, channel, intervals, conditions and a sentence."""
+    groups = [j.group for j in judged]
     if located is None:
         text = "No block keeps more than its noise after the refit."
         return {"block": None, "channel": None, "intervals": [], "conditions": [], "text": text}
@@ -48,6 +51,7 @@ def where(located: str | None, problem: Problem, groups: list[Group], picture: P
         f"model still misses {block.channel.replace('_', ' ')} by {found.systematic:.2g} times its noise."
     )
     group = next((g for g in groups if g.mismatch is not None and g.mismatch.name == located), None)
+    wrong = next((j.wrong for j in judged if block in j.group.blocks), ())
     faint = group is not None and group.faint
     if group is not None and group.instead:
         moved = ", ".join(f"{n} by {group.candidates[0].fit.moved[n]:+.1f} tolerances" for n in group.instead)
@@ -64,6 +68,11 @@ def where(located: str | None, problem: Problem, groups: list[Group], picture: P
         text = (
             f"The {located} block{parts} keeps hardly more than its noise ({found.systematic:.2g} times it in "
             f"{block.channel.replace('_', ' ')}): its floor may as well have been taken too low."
+        )
+    elif wrong and group is None:
+        text = (
+            f"Inside its tolerances the {located} block{parts} fits to its noise, but only with parameters at their ends; with another "
+            f"value of {' and '.join(wrong)} they come back."
         )
     elif all(g.mismatch is None for g in groups):
         text = (
@@ -85,12 +94,15 @@ def where(located: str | None, problem: Problem, groups: list[Group], picture: P
     }
 
 
-def verdict(diagnosis: Diagnosis, named: list[str], case: Case, gap: float | None, forms: list[str], *, sought: bool) -> str:
+def verdict(diagnosis: Diagnosis, case: Case, gap: float | None, forms: list[str], *, sought: bool) -> str:
     """The verdict in a few sentences; ``forms`` say what a mismatch without a name is a function of, if that was ``sought``."""
     kind = diagnosis.verdict
+    missing = [b for b in diagnosis.blocks if b["verdict"] == "unlisted"]
     if kind == "none":
         text = "Nothing is missing that these recordings could show: the nominal model predicts every block to its noise."
         return text + _unsettled(diagnosis)
+    if kind == "parameters" and diagnosis.wrong_parameters:
+        return _mistaken(diagnosis, case, gap) + _beside(diagnosis, missing, forms, sought=sought)
     if kind == "parameters":
         shifted = sorted(diagnosis.parameters.items(), key=lambda kv: -abs(kv[1]["moved_sigmas"]))[:3]
         moved = ", ".join(f"{n} by {p['moved_sigmas']:+.1f} tolerances" for n, p in shifted)
@@ -111,18 +123,62 @@ def verdict(diagnosis: Diagnosis, named: list[str], case: Case, gap: float | Non
             return text + " No form of it was found that carries over to other recordings: the model stays the refitted one."
         closes = "" if gap is None else f" With it in the model, {100 * gap:.0f} % of the gap between refitted model and noise closes."
         return text + "\n\nWhat is missing, as a form without a name. " + " ".join(forms) + closes
-    names = " and ".join(f"{EFFECTS[n].name} ({n})" for n in named)
-    p = diagnosis.probabilities.get("+".join(sorted(named)), 0.0)
-    where_proved = "held-out recordings" if case.held_out and case.fit else "the fitted recording (no other was given)"
-    text = f"The model leaves out: {names}; probability {p:.2f}. {place}"
+    names = " and ".join(f"{e['name']} ({e['id']}, probability {e['probability']:.2f})" for e in diagnosis.effects)
+    text = f"The model leaves out: {names}. {place}"
     if gap is not None:
-        text += f" With it, {100 * gap:.0f} % of the gap between refitted model and noise closes on {where_proved}."
+        it = "it" if len(diagnosis.effects) == 1 else "them"
+        text += f" With {it}, {100 * gap:.0f} % of the gap between refitted model and noise closes on {_proof(case)}."
+    if diagnosis.wrong_parameters:
+        text += " " + _mistaken(diagnosis, case, None)
     if unknown_volumes(case.rig):
         text += (
             " The chamber's volume is not known: what the recording fixes is the time constant (and the conductance per volume); "
             "the conductance itself holds for the placeholder volume of the rig file only."
         )
-    return text + _unsettled(diagnosis)
+    return text + _beside(diagnosis, missing, forms, sought=sought)
+
+
+def _proof(case: Case) -> str:
+    return "held-out recordings" if case.held_out and case.fit else "the fitted recording (no other was given)"
+
+
+def _mistaken(diagnosis: Diagnosis, case: Case, gap: float | None) -> str:
+    """Which values of the rig file are wrong, and what that does to the error."""
+    told = []
+    for wrong in diagnosis.wrong_parameters:
+        errors = "; ".join(
+            f"the {channel.replace('_', ' ')} is then missed by {_instead(e['after'], e['before'], unit_of(channel))}"
+            for channel, e in wrong["held_out"].items()
+        )
+        told.append(
+            f"{sentence_of(wrong)} (probability {wrong['probability']:.2f}, {abs(wrong['moved_sigmas']):.0f} tolerances away); "
+            f"on {_proof(case)} {errors}."
+        )
+    text = "The rig file is wrong: " + " ".join(told) if len(told) == 1 else "The rig file is wrong twice: " + " ".join(told)
+    if gap is not None:
+        text += f" {100 * gap:.0f} % of the gap between the model refitted inside its tolerances and the noise closes."
+    return text
+
+
+def _instead(value: float, before: float, unit: str) -> str:
+    """One size instead of another, in one unit."""
+    shown, factor = display_unit(unit, max(value, before))
+    now, was = (format_number(v * factor, 3, unicode=False) for v in (value, before))
+    return f"{now} {shown} instead of {was} {shown}".replace("°", "deg")
+
+
+def _beside(diagnosis: Diagnosis, missing: list[dict[str, Any]], forms: list[str], *, sought: bool) -> str:
+    """What stays open beside a name: sets that are left, and blocks that keep a mismatch without one."""
+    text = _unsettled(diagnosis)
+    if not missing:
+        return text
+    kept = [u for u in diagnosis.unexplained if u["verdict"] == "unlisted"]
+    text += "\n\nWhat stays open. " + " ".join(_capital(kept_sentence(u)) + "." for u in kept)
+    if forms:
+        text += " As a form without a name, which is in the model: " + " ".join(forms)
+    elif sought:
+        text += " No form of it was found that carries over to other recordings."
+    return text
 
 
 def _unsettled(diagnosis: Diagnosis) -> str:
@@ -155,8 +211,12 @@ _SEPARATE = {
 }
 
 
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
 def _sentence(text: str) -> str:
-    return text[:1].upper() + text[1:] + "."
+    return _capital(text) + "."
 
 
 def next_experiment(kind: str, probabilities: dict[str, float], ambiguity: list[list[str]], rig: Rig) -> dict[str, Any]:
@@ -169,8 +229,13 @@ def next_experiment(kind: str, probabilities: dict[str, float], ambiguity: list[
         text = "The name is settled by these recordings; no further one is needed for it."
         return {"text": text, "excitation": {}, "expected_information_bits": 0.0}
     doubted = [k for s in ambiguity for k in s if k in EFFECTS and k not in _SEPARATE]
-    if ["parameters"] in ambiguity and doubted:
+    parameters = [k for s in ambiguity for k in s if k == "parameters" or is_parameter(k)]
+    if parameters and doubted:
         return {"text": _sentence(EFFECTS[doubted[0]].separates), "excitation": {}, "expected_information_bits": None}
+    measurable = [k for k in parameters if is_parameter(k)]
+    if measurable:
+        text = f"Measure {' or '.join(measurable)} by itself (scale, ruler, known volume): these recordings cannot tell which is wrong."
+        return {"text": text, "excitation": {}, "expected_information_bits": None}
     key = next((k for s in [leading.split("+"), *ambiguity] for k in s if k in _SEPARATE), "unlisted")
     text, excitation = _SEPARATE[key]
     if not (rig.tables("valve") or rig.tables("muscle")):
@@ -182,9 +247,12 @@ def next_experiment(kind: str, probabilities: dict[str, float], ambiguity: list[
     return {"text": text, "excitation": excitation, "expected_information_bits": None}
 
 
-def warnings(case: Case, groups: list[Group], symptoms: dict[str, float], no_held_out: bool) -> list[str]:
+def warnings(case: Case, judged: list[Judged], no_held_out: bool) -> list[str]:
     """What a reader should know about the data and the fit."""
     out = []
+    groups = [j.group for j in judged]
+    mistaken = any(j.wrong for j in judged)
+    symptoms = {n: v for j in judged if not j.wrong for n, v in symptoms_of(j.group).items()}
     for recording in case.recordings:
         for issue in recording.issues[:8]:
             when = f"{issue.start:g} to {issue.stop:g} s"
@@ -202,14 +270,15 @@ def warnings(case: Case, groups: list[Group], symptoms: dict[str, float], no_hel
                     "the unit in its header the one its values are in?"
                 )
     for name, value in sorted(symptoms.items(), key=lambda kv: -abs(kv[1])):
-        out.append(f"the refit without effects moves {name} by {value:+.1f} tolerances: a symptom of missing physics, not a result")
+        what = "a symptom of a wrong value beside it or of missing physics" if mistaken else "a symptom of missing physics"
+        out.append(f"the refit without effects moves {name} by {value:+.1f} tolerances: {what}, not a result")
     if no_held_out:
-        judged = "; names are judged by how the other recordings predict each" if len(case.recordings) > 1 else ""
-        out.append(f"there is no held-out recording: the proof is on the fitted data and counts less{judged}")
+        how = "; names are judged by how the other recordings predict each" if len(case.recordings) > 1 else ""
+        out.append(f"there is no held-out recording: the proof is on the fitted data and counts less{how}")
     for group in groups:
         best = group.best
         if best.effects and best.scatter > 0.35:
-            out.append(f"the size of {'+'.join(best.effects)} scatters by {100 * best.scatter:.0f} % between recordings")
+            out.append(f"the size of {best.key} scatters by {100 * best.scatter:.0f} % between recordings")
     for name in unknown_volumes(case.rig):
         out.append(f"{name} is marked unknown: values that scale with it hold for the placeholder only")
     return out
@@ -242,20 +311,24 @@ def worse(table: dict[str, dict[str, float]]) -> list[str]:
     ]
 
 
-def reservations(chosen: list[Candidate], table: dict[str, dict[str, float]], *, doubtful: bool) -> list[str]:
-    """What a reader should know of a model with a named effect: what it still misses, and values that it had to move far.
-
-    ``doubtful`` where the name is one of several that are left.
-    """
+def reservations(judged: list[Judged], chosen: list[Candidate], table: dict[str, dict[str, float]]) -> list[str]:
+    """What a reader should know of a model with a name: what it still misses where it acts, and values that it had to move far."""
     out = []
-    for channel, error in table.items():
-        if error["after"] > _FAR_OFF * error["noise"]:
+    for j in judged:
+        if not (j.named or j.wrong):
+            continue
+        for channel in dict.fromkeys(b.channel for b in j.group.blocks):
+            error = table[channel]
+            if error["after"] <= _FAR_OFF * error["noise"]:
+                continue
+            what = "the effect" if j.named else "the other value"
             times = error["after"] / error["noise"]
-            name = "" if doubtful else "the name stands, "
+            why = "its equation is not the whole truth" if j.named else "something acts beside it"
+            name = "" if j.ambiguity else "the name stands, "
             out.append(
-                f"with the effect the model still misses {channel.replace('_', ' ')} by {times:.2g} times its noise: {name}"
-                "its equation is not the whole truth, and standard deviations hold only as far as it is"
+                f"with {what} the model still misses {channel.replace('_', ' ')} by {times:.2g} times its noise: {name}{why}, and "
+                "standard deviations hold only as far as that matters little"
             )
-    moved = {n: v for c in chosen if c.effects for n, v in c.fit.moved.items() if abs(v) > _MOVED}
+    moved = {n: v for c in chosen if c.effects for n, v in c.fit.held_by_prior.items() if abs(v) > _MOVED}
     out += [f"with the effect the fit moves {n} by {v:+.1f} tolerances: it may make up for the effect's form" for n, v in moved.items()]
     return out

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-__all__ = ["EffectInfo", "EffectParameter"]
+__all__ = ["EffectInfo", "EffectParameter", "SameData"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +42,29 @@ class EffectParameter:
 
 
 @dataclass(frozen=True, slots=True)
+class SameData:
+    """When an effect leaves the very recordings that another one leaves, so that nothing in them can tell the two apart.
+
+    Attributes
+    ----------
+    effect, parameter : str
+        The other effect, and its parameter that is then as large as ``size``.
+    size : str
+        The own parameter that is the effect's size; the two are the same where it is positive.
+    without : str
+        The own parameter that would tell the two apart, if it were not zero.
+    held : tuple of (str, float)
+        Own parameters with the values at which the two are the same.
+    """
+
+    effect: str
+    parameter: str
+    size: str
+    without: str
+    held: tuple[tuple[str, float], ...]
+
+
+@dataclass(frozen=True, slots=True)
 class EffectInfo:
     """One effect of the catalogue.
 
@@ -61,6 +84,8 @@ class EffectInfo:
         What looks like it in recordings: ids of the catalogue first, then other causes in words. Of two effects each names the other.
     catalogue : bool
         Whether it is a name for physics, which a diagnosis may give; a closure is none.
+    same_data : SameData or None
+        Another effect whose recordings it leaves where a parameter is zero.
     """
 
     id: str
@@ -74,6 +99,7 @@ class EffectInfo:
     reference: str
     rivals: tuple[str, ...] = ()
     catalogue: bool = True
+    same_data: SameData | None = None
 
     @property
     def everywhere(self) -> str:

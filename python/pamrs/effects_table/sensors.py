@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from pamrs.effects_table.entry import EffectInfo
+from pamrs.effects_table.entry import EffectInfo, SameData
 from pamrs.effects_table.entry import EffectParameter as Parameter
 
 __all__ = ["SENSORS"]
@@ -38,6 +38,7 @@ SENSORS: Final[tuple[EffectInfo, ...]] = (
         ),
         reference="Mills (1991), offset and skew of clocks",
         rivals=("input_path_lag", "pressure_lag", "tube_flow_restriction"),
+        same_data=SameData("input_path_lag", "delay", "offset", "rate", (("angle_share", 1.0),)),
     ),
 )
 """In the order of the catalogue."""

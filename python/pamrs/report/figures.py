@@ -21,6 +21,7 @@ from pamrs.report.text import (
     format_number,
     format_probability,
     headline,
+    hypothesis_label,
     is_named,
     is_number,
     label,
@@ -320,15 +321,10 @@ def _separating(curves: dict[str, Any]) -> Figure:
     return figure
 
 
-def hypothesis_label(name: str) -> str:
-    """A set of effects joined by ``+`` in words."""
-    return " + ".join(label(part) for part in name.split("+"))
-
-
 def _block_rows(diagnosis: Diagnosis) -> list[tuple[str, float, bool]]:
     """Name, residual in units of the noise floor, whether located; in the order of the chain."""
     rows = []
-    for name, entry in diagnosis.blocks.items():
+    for name, entry in diagnosis.residuals.items():
         rms, noise = entry.get("rms"), entry.get("noise")
         if is_number(rms) and is_number(noise) and float(noise) > 0:
             rows.append((name, float(rms) / float(noise), name == diagnosis.where.get("block")))
@@ -425,7 +421,7 @@ def _draw_probabilities(axes: Axes, diagnosis: Diagnosis) -> None:
     axes.barh(position, [p for _, p in rows], color=colours, height=0.62)
     for y, (_, p) in zip(position.tolist(), rows, strict=True):
         axes.text(p + 0.015, y, format_probability(p), va="center", fontsize="small")
-    axes.set_yticks(position, [textwrap.shorten(label(name), 34, placeholder=" …") for name, _ in rows])
+    axes.set_yticks(position, [textwrap.shorten(hypothesis_label(name), 34, placeholder=" …") for name, _ in rows])
     axes.set_xlim(0.0, 1.16)
     axes.set_xticks([0.0, 0.5, 1.0])
     axes.set_ylim(max(len(rows), 5) - 0.4, -0.6)

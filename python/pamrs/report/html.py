@@ -74,6 +74,62 @@ def _effects(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     return rows
 
 
+def _blocks(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+    """The verdict of each group of blocks, and what each block misses before and after."""
+    rows = []
+    for entry in diagnosis.blocks:
+        found = [*entry["effects"], *entry["wrong_parameters"]]
+        sizes = []
+        for block in entry["mismatch"]:
+            part = block["held_out"] or block["fitted"]
+            unit, factor = words.display_unit(block["unit"], abs(float(part["refit"]["size"])))
+            stages = [part[stage] for stage in ("refit", "after")]
+            shown = [
+                f"{words.format_number(s['noises'], 2)} ({words.format_number(s['size'] * factor, 2)} {unit})"
+                if s["more_than_noise"]
+                else "noise only"
+                for s in stages
+            ]
+            sizes.append({"block": words.label(block["block"].replace(".", " ")), "refit": shown[0], "after": shown[1]})
+        rows.append(
+            {
+                "verdict": BADGES[entry["verdict"]],
+                "kind": entry["verdict"],
+                "names": words.set_label(found) if found else "–",
+                "probability": words.format_probability(max(entry["probabilities"].values(), default=math.nan)),
+                "leading": words.hypothesis_label(max(entry["probabilities"], key=lambda k: entry["probabilities"][k], default="none")),
+                "sizes": sizes,
+            }
+        )
+    return rows
+
+
+def _wrong(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+    """Values of the rig file that are wrong."""
+    rows = []
+    for entry in diagnosis.wrong_parameters:
+        unit, factor = words.display_unit(str(entry["unit"]), abs(float(entry["nominal"])))
+        errors = []
+        for channel, error in entry["held_out"].items():
+            shown, scale = words.display_unit(UNITS.get(channel.partition(".")[0], ""), max(error.values()))
+            before, after = (words.format_number(error[key] * scale) for key in ("before", "after"))
+            errors.append(f"{words.label(channel)}: {before} to {after} {shown}")
+        interval = [float(v) * factor for v in entry["interval"]]
+        rows.append(
+            {
+                "name": entry["name"],
+                "unit": _unit(unit),
+                "stated": words.format_uncertain(entry["nominal"] * factor, entry["tolerance"] * factor),
+                "value": words.format_uncertain(entry["value"] * factor, entry["std"] * factor),
+                "interval": _span((interval[0], interval[1]), 4),
+                "moved": f"{entry['moved_sigmas']:+.1f}".replace("-", "−"),
+                "probability": words.format_probability(entry["probability"]),
+                "errors": "; ".join(errors),
+            }
+        )
+    return rows
+
+
 def _asked(diagnosis: Diagnosis) -> list[dict[str, str]]:
     """Effects that were asked, in percent of the mismatch."""
 
@@ -102,7 +158,9 @@ def _parameters(diagnosis: Diagnosis) -> list[dict[str, Any]]:
         raw = p.get("moved_sigmas")
         moved = float(raw) if words.is_number(raw) else math.nan
         flag = ""
-        if not known:
+        if name in {w["name"] for w in diagnosis.wrong_parameters}:
+            flag = "the rig file is wrong"
+        elif not known:
             flag = "not determined by these recordings"
         elif abs(moved) >= 3:
             flag = "outside its tolerance"
@@ -185,7 +243,7 @@ def _conditions(diagnosis: Diagnosis) -> list[str]:
 def _probabilities(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     return [
         {
-            "name": words.label(name),
+            "name": words.hypothesis_label(name),
             "text": words.format_probability(p),
             "width": f"{100 * max(0.0, min(1.0, p)):.1f}",
             "named": words.is_named(diagnosis, name),
@@ -203,7 +261,7 @@ def _facts(diagnosis: Diagnosis) -> list[tuple[str, str]]:
     facts = []
     if diagnosis.probabilities:
         name, p = words.ranked_probabilities(diagnosis, len(diagnosis.probabilities))[0]
-        facts.append((words.format_probability(p), f"probability of: {words.label(name)}"))
+        facts.append((words.format_probability(p), f"probability of: {words.hypothesis_label(name)}"))
     gap = diagnosis.fit.get("gap_closed")
     if words.is_number(gap):
         facts.append(
@@ -284,6 +342,9 @@ def render(diagnosis: Diagnosis) -> str:
         map_block=words.label(str((diagnosis.condition_map or {}).get("block") or diagnosis.where.get("block") or "")),
         probabilities=_probabilities(diagnosis),
         effects=_effects(diagnosis),
+        verdicts=_blocks(diagnosis),
+        wrong=_wrong(diagnosis),
+        kept=[words.kept_sentence(u) for u in diagnosis.unexplained],
         ambiguity=[words.set_label(list(s)) for s in diagnosis.ambiguity],
         asked=_asked(diagnosis),
         experiment=str(diagnosis.next_experiment.get("text") or ""),

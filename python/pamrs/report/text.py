@@ -14,11 +14,14 @@ __all__ = [
     "format_probability",
     "format_uncertain",
     "headline",
+    "hypothesis_label",
     "is_named",
     "is_number",
+    "kept_sentence",
     "label",
     "moved_parameters",
     "ranked_probabilities",
+    "sentence_of",
     "set_label",
     "span95",
 ]
@@ -40,6 +43,8 @@ _DISPLAY = {
     "Pa": (("kPa", 1e-3, 1e3), ("Pa", 1.0, 0.0)),
     "rad": (("°", 180.0 / math.pi, 0.0),),
     "m": (("m", 1.0, 1.0), ("mm", 1e3, 0.0)),
+    "m2": (("m2", 1.0, 1e-2), ("mm2", 1e6, 0.0)),
+    "m3": (("m3", 1.0, 1.0), ("l", 1e3, 1e-3), ("cm3", 1e6, 0.0)),
     "s": (("s", 1.0, 0.1), ("ms", 1e3, 0.0)),
 }
 
@@ -51,8 +56,15 @@ def label(identifier: str) -> str:
 
 
 def set_label(identifiers: list[str]) -> str:
-    """Readable name of a set of effects that act together."""
-    return " + ".join(label(i) for i in identifiers) if identifiers else label("none")
+    """Readable name of a hypothesis: effects that act together, parameters that are wrong."""
+    if not identifiers:
+        return label("none")
+    return " + ".join(f"wrong {label(i.replace('.', ' '))}" if "." in i else label(i) for i in identifiers)
+
+
+def hypothesis_label(key: str) -> str:
+    """Readable name of a hypothesis by its key, names joined by ``+``."""
+    return set_label(key.split("+"))
 
 
 def is_number(value: Any) -> TypeGuard[float]:
@@ -152,7 +164,9 @@ def ranked_probabilities(diagnosis: Diagnosis, count: int = 8) -> list[tuple[str
 
 def is_named(diagnosis: Diagnosis, hypothesis: str) -> bool:
     """Whether `hypothesis` (an id, or ids joined by ``+``) is the one that the verdict names."""
-    named = {str(e["id"]) for e in diagnosis.effects} if diagnosis.verdict == "effects" else {diagnosis.verdict}
+    wrong = {str(w["name"]) for w in diagnosis.wrong_parameters}
+    effects = {str(e["id"]) for e in diagnosis.effects} if diagnosis.verdict == "effects" else set()
+    named = effects | wrong or {diagnosis.verdict}
     return set(hypothesis.replace(" ", "").split("+")) == named
 
 
@@ -166,12 +180,117 @@ def moved_parameters(diagnosis: Diagnosis, least: float = 1.0) -> list[str]:
     return [name for size, name in sorted(moved, reverse=True) if size >= least]
 
 
+def sentence_of(wrong: dict[str, Any]) -> str:
+    """What the rig file says of a parameter and what the recordings say: ``chamber dead volume is 360 +- 5 cm3, not 150 +- 23``."""
+    unit, factor = display_unit(str(wrong.get("unit") or ""), abs(float(wrong["nominal"])))
+    keys = ("value", "std", "nominal", "tolerance")
+    values = {key: float(v) * factor if is_number(v := wrong.get(key)) else math.nan for key in keys}
+    found = format_uncertain(values["value"], values["std"], unicode=False)
+    stated = format_uncertain(values["nominal"], values["tolerance"], unicode=False)
+    shown = "" if unit in ("", "1") else f" {unit}".replace("°", "deg")
+    return f"{_parameter_label(str(wrong['name']))} is {found}{shown}, not {stated}"
+
+
+def kept_sentence(kept: dict[str, Any]) -> str:
+    """What a block keeps: ``the arm keeps 15 times its noise (0.4 deg) that no listed effect explains``."""
+    unit, factor = display_unit(str(kept.get("unit") or ""), abs(float(kept["size"])))
+    size = format_number(float(kept["size"]) * factor, 2, unicode=False)
+    why = "no listed effect explains" if kept.get("verdict") == "unlisted" else "what is named does not explain"
+    times = format_number(kept["noises"], 2, unicode=False)
+    return f"the {_block_label(str(kept['block']))} keeps {times} times its noise ({size} {unit}) that {why}".replace("°", "deg")
+
+
+def _block_label(name: str) -> str:
+    """A block in words: ``arm``, ``chamber flexor``."""
+    return label(name.replace(".", " "))
+
+
+def _parameter_label(name: str) -> str:
+    """A parameter of the rig file in words: ``chamber dead volume``."""
+    return label(name.replace(".", " "))
+
+
 def headline(diagnosis: Diagnosis) -> str:
-    """One sentence that states the verdict."""
+    """One sentence that states the verdict: what was found in each block, then what stays open."""
+    named = [b for b in _blocks(diagnosis) if b["effects"] or b["wrong_parameters"]]
+    if not named:
+        return _unnamed(diagnosis)
+    found = [_found(diagnosis, block) for block in sorted(named, key=lambda b: not b["effects"])]
+    text = "; ".join(dict.fromkeys(found))
+    kept = [kept_sentence(u) for u in diagnosis.unexplained if u.get("verdict") == "unlisted"]
+    return "; ".join([text[:1].upper() + text[1:], *kept[:2]])
+
+
+def _blocks(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+    """The groups of blocks with their names; one of the whole case where a result does not tell them apart."""
+    if diagnosis.blocks:
+        return diagnosis.blocks
     block = diagnosis.where.get("block")
-    place = f" in the {label(str(block))}" if block else ""
+    return [
+        {
+            "blocks": [str(block)] if block else [],
+            "effects": [str(e["id"]) for e in diagnosis.effects] if diagnosis.verdict == "effects" else [],
+            "wrong_parameters": [str(w["name"]) for w in diagnosis.wrong_parameters],
+            "ambiguity": diagnosis.ambiguity,
+        }
+    ]
+
+
+def _place(diagnosis: Diagnosis, block: dict[str, Any]) -> str:
+    """Where a group has its mismatch, as the end of a sentence."""
+    located = diagnosis.where.get("block")
+    if located not in block["blocks"]:
+        # not the block that the answer is about first: the one of the group that misses most
+        worst = max(block.get("mismatch") or [], key=lambda m: float(m["fitted"]["refit"]["noises"] or 0.0), default=None)
+        located = worst["block"] if worst else next(iter(block["blocks"]), None)
+    return f" in the {_block_label(str(located))}" if located else ""
+
+
+def _found(diagnosis: Diagnosis, block: dict[str, Any]) -> str:
+    """What was found in one group of blocks."""
+    place = _place(diagnosis, block)
+    if len(block["ambiguity"]) > 1:
+        told = f"these recordings cannot tell {_from_each_other(block['ambiguity'])}"
+        if any(s in (["none"], ["parameters"]) for s in block["ambiguity"]):
+            return f"physics may be missing{place}: {told}"
+        if all("." in name for s in block["ambiguity"] for name in s):
+            return f"the rig file is wrong about the {_place(diagnosis, block).rpartition(' ')[2] or 'rig'}: {told}"
+        if any("." in name for s in block["ambiguity"] for name in s):
+            return f"physics is missing{place}, or the rig file is wrong: {told}"
+        return f"physics is missing{place}: {told}"
+    told = {str(e["id"]): e for e in diagnosis.effects}
+    if block["effects"]:
+        names = " and ".join(str(told.get(e, {}).get("name") or label(e)) for e in block["effects"])
+        chance = min((float(p) for e in block["effects"] if is_number(p := told.get(e, {}).get("probability"))), default=math.nan)
+        how_sure = f", probability {format_probability(chance)}" if math.isfinite(chance) else ""
+        return f"the model leaves out: {names}{place}{how_sure}"
+    wrong = {str(w["name"]): w for w in diagnosis.wrong_parameters}
+    values = " and ".join(sentence_of(wrong[name]) for name in block["wrong_parameters"])
+    chance = min(float(wrong[name]["probability"]) for name in block["wrong_parameters"])
+    return f"the rig file is wrong: {values}, probability {format_probability(chance)}"
+
+
+def _from_each_other(sets: list[list[str]]) -> str:
+    """Hypotheses that are left: ``a from b``, ``a, b and c apart``."""
+    told = [_answer(s) for s in sets]
+    return f"{told[0]} from {told[1]}" if len(told) == 2 else f"{', '.join(told[:-1])} and {told[-1]} apart"
+
+
+def _answer(names: list[str]) -> str:
+    """One of several hypotheses, in words."""
+    if names == ["parameters"]:
+        return "parameter values that are off"
+    if names == ["unlisted"]:
+        return "an effect outside the catalogue"
+    return " + ".join(f"a {set_label([name])}" if "." in name else label(name) for name in names)
+
+
+def _unnamed(diagnosis: Diagnosis) -> str:
+    """The headline of a diagnosis without a name."""
+    block = diagnosis.where.get("block")
+    place = f" in the {_block_label(str(block))}" if block else ""
     doubtful = [s for s in diagnosis.ambiguity if s not in (["none"], ["parameters"])]
-    rivals = " or ".join(set_label(s) for s in doubtful)
+    rivals = " or ".join(_answer(s) for s in doubtful)
     if diagnosis.verdict == "none" and doubtful:
         return f"The model explains these recordings down to their noise, but they cannot rule out {rivals}{place}"
     if diagnosis.verdict == "none":
@@ -182,11 +301,7 @@ def headline(diagnosis: Diagnosis) -> str:
         moved = [label(n.replace(".", " ")) for n in moved_parameters(diagnosis)[:3]]
         which = f": {', '.join(moved)}" if moved else ""
         return f"No physics is missing; parameter values explain the difference{which}"
-    if diagnosis.verdict == "unlisted":
-        return f"Physics outside the catalogue acts{place or ' on this rig'}"
-    if len(doubtful) < len(diagnosis.ambiguity):
-        return f"Physics may be missing{place}: these recordings cannot tell {rivals} from parameter values that are off"
     if len(doubtful) > 1:
-        return f"Physics is missing{place}; these recordings cannot tell whether it is {rivals}"
-    names = " and ".join(str(e.get("name") or label(str(e["id"]))) for e in diagnosis.effects)
-    return f"The model leaves out: {names or 'an effect'}{place}"
+        return f"Physics is missing{place}: these recordings cannot tell {_from_each_other(doubtful)}"
+    kept = [kept_sentence(u) for u in diagnosis.unexplained if u.get("verdict") == "unlisted"]
+    return "; ".join([f"Physics outside the catalogue acts{place or ' on this rig'}", *kept[:2]])

@@ -1,0 +1,92 @@
+"""What is said of each group of blocks: verdict, names, and how large its mismatch is before and after."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pamrs.channels import unit_of
+from pamrs.diagnosis.blocks import Block, Residual
+from pamrs.diagnosis.candidates import significant
+from pamrs.diagnosis.evidence import Floor, excess
+from pamrs.diagnosis.fitting import Key, Problem
+from pamrs.diagnosis.verdicts import Judged
+
+__all__ = ["block_entries", "unexplained"]
+
+Stages = dict[str, dict[Key, Residual]]
+
+
+def block_entries(
+    judged: list[Judged], fitted: Problem, fit_found: Stages, held: Problem, out_found: Stages, floor: dict[Key, Floor]
+) -> list[dict[str, Any]]:
+    """One entry for each group of blocks.
+
+    Parameters
+    ----------
+    judged : list of Judged
+        The groups with their verdicts.
+    fitted, held : Problem
+        Recordings that were fitted and held out (the same object when there are no others).
+    fit_found, out_found : dict of str to dict
+        Their residuals by stage (``before``, ``refit``, ``after``), block and recording.
+    floor : dict
+        Noise by block and recording.
+    """
+
+    def mismatch(block: Block) -> dict[str, Any]:
+        outside = None if held is fitted else _sizes(block, held, out_found, floor)
+        inside = _sizes(block, fitted, fit_found, floor)
+        return {
+            "block": block.name,
+            "channel": block.channel,
+            "unit": unit_of(block.channel),
+            "fitted": inside,
+            "held_out": outside,
+        }
+
+    return [
+        {
+            "blocks": [b.name for b in j.group.blocks],
+            "verdict": j.verdict,
+            "probabilities": j.probabilities,
+            "effects": list(j.named),
+            "wrong_parameters": list(j.wrong),
+            "ambiguity": j.ambiguity,
+            "mismatch": [mismatch(b) for b in j.group.blocks],
+        }
+        for j in judged
+    ]
+
+
+def _sizes(block: Block, problem: Problem, found: Stages, floor: dict[Key, Floor]) -> dict[str, dict[str, Any]]:
+    """What is more than noise at every stage: in noises, in the channel's unit, and whether noise could be so large."""
+    sizes = {}
+    for stage, residuals in found.items():
+        told = excess(block, problem.recordings, residuals, floor)
+        sizes[stage] = {
+            "noises": told.systematic,
+            "size": told.systematic * told.noise,
+            "more_than_noise": significant(told),
+        }
+    return sizes
+
+
+def unexplained(entries: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Blocks that keep a mismatch beside what is named, or without a name, the largest first.
+
+    Parameters
+    ----------
+    entries : list of dict
+        From :func:`block_entries`. The size is that of the held-out recordings, where they show it, else of the fitted ones.
+    """
+    found = []
+    for entry in entries:
+        if entry["verdict"] == "none" or (entry["verdict"] == "parameters" and not entry["wrong_parameters"]):
+            continue
+        for block in entry["mismatch"]:
+            stages = [part["after"] for part in (block["held_out"], block["fitted"]) if part is not None]
+            left = next((after for after in stages if after["more_than_noise"]), None)
+            if left is not None:
+                size = {key: left[key] for key in ("noises", "size")}
+                found.append({**{key: block[key] for key in ("block", "channel", "unit")}, **size, "verdict": entry["verdict"]})
+    return sorted(found, key=lambda u: -u["noises"])

@@ -1,0 +1,192 @@
+"""What each group of blocks says, beside what the others say, and what the case comes to.
+
+Groups of blocks are judged by themselves: what one keeps without a name says nothing of what another one has. Only an effect that acts
+in two groups ties them: it is one effect, so that its evidence in both counts together.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from pamrs.diagnosis.candidates import Candidate, Group, significant
+from pamrs.diagnosis.wrong_parameters import AT_WALL
+
+__all__ = ["Judged", "case_ambiguity", "case_probabilities", "case_verdict", "is_parameter", "judge", "symptoms_of"]
+
+SHARED = 6.0
+"""Odds of one effect that acts in two groups to two effects."""
+SETTLED, IN_SET = 0.9, 0.05
+"""Probability from which an answer counts as settled, and from which a hypothesis belongs to the set that is left."""
+MOST_SETS = 8
+"""Sets that a case lists."""
+QUIET = {"parameters": 0.96, "none": 0.03, "unlisted": 0.01}
+"""Probabilities of a group that keeps nothing, its parameters having moved; where they have not, ``none`` and ``parameters`` change
+places."""
+STRAINED = {"parameters": 0.75, "unlisted": 0.25}
+"""The same where a parameter stands at its wall: everything is explained, at a price that the rig's owner would not have believed."""
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """A group of blocks with its verdict.
+
+    Attributes
+    ----------
+    group : Group
+        The blocks, and everything found out about them.
+    verdict : str
+        ``none``, ``parameters``, ``effects`` or ``unlisted``.
+    probabilities : dict of str to float
+        Over ``none``, ``parameters``, ``unlisted``, sets of effects and wrong parameters (names joined by ``+``), the most probable
+        first.
+    ambiguity : list of list of str
+        Hypotheses that are left, each as its names; empty when settled.
+    chosen : Candidate
+        The hypothesis that is named; the baseline where none is.
+    """
+
+    group: Group
+    verdict: str
+    probabilities: dict[str, float]
+    ambiguity: list[list[str]]
+    chosen: Candidate
+
+    @property
+    def named(self) -> tuple[str, ...]:
+        """Effects that are named."""
+        return self.chosen.effects if self.verdict == "effects" else ()
+
+    @property
+    def wrong(self) -> tuple[str, ...]:
+        """Parameters that are named as wrong."""
+        return self.chosen.wrong if self.verdict == "parameters" else ()
+
+    def probability(self, name: str) -> float:
+        """Probability of an effect or of a wrong parameter, whatever else acts in these blocks."""
+        return min(1.0, sum(p for key, p in self.probabilities.items() if name in key.split("+")))
+
+
+def is_parameter(name: str) -> bool:
+    """Whether a name in a hypothesis is that of a parameter of the rig file: ``chamber.dead_volume``."""
+    return "." in name
+
+
+def symptoms_of(group: Group) -> dict[str, float]:
+    """Parameters that the refit without effects moved to their wall, and how far [tolerances]."""
+    return {name: moved for name, moved in group.candidates[0].fit.moved.items() if abs(moved) >= AT_WALL}
+
+
+def _own(group: Group) -> dict[str, float]:
+    """Probabilities of one group by itself; what stands under ``""`` is shared out between nothing and parameters that moved."""
+    found = {key: p for key, p in group.probabilities.items() if key}
+    unchanged = group.probabilities.get("", 0.0)
+    shifted = bool(group.instead) or any(significant(e) for e in group.nominal.values())
+    explained = any(c.wrong for c in group.candidates)
+    quiet = dict(QUIET)
+    if symptoms_of(group) and group.mismatch is None and not explained:
+        quiet = dict(STRAINED)
+    elif not shifted:
+        quiet |= {"none": QUIET["parameters"], "parameters": QUIET["none"]}
+    for name, share in quiet.items():
+        found[name] = found.get(name, 0.0) + unchanged * share
+    return found
+
+
+def judge(groups: Sequence[Group]) -> list[Judged]:
+    """The verdict of every group, an effect that acts in several being judged once.
+
+    Parameters
+    ----------
+    groups : sequence of Group
+        Examined, each by itself.
+    """
+    own = [_own(group) for group in groups]
+    beside: list[dict[str, float]] = [{} for _ in groups]
+    for choice in itertools.product(*(p.items() for p in own)):
+        effects = [n for key, _ in choice for n in key.split("+") if n not in ("none", "parameters", "unlisted")]
+        weight = math.prod(p for _, p in choice) * SHARED ** (len(effects) - len(set(effects)))
+        for found, (key, _) in zip(beside, choice, strict=True):
+            found[key] = found.get(key, 0.0) + weight
+    return [_judged(group, _normalised(found)) for group, found in zip(groups, beside, strict=True)]
+
+
+def _normalised(weights: dict[str, float]) -> dict[str, float]:
+    total = sum(weights.values())
+    return dict(sorted(((key, w / total) for key, w in weights.items()), key=lambda kv: -kv[1]))
+
+
+def _judged(group: Group, probabilities: dict[str, float]) -> Judged:
+    """The verdict: healthy unless something else is more probable, a name where names are more probable than their absence."""
+    start = group.candidates[0]
+    names = {key: p for key, p in probabilities.items() if key not in ("none", "parameters", "unlisted")}
+    healthy = max((key for key in ("none", "parameters")), key=lambda key: probabilities.get(key, 0.0))
+    without = probabilities.get("unlisted", 0.0)
+    best = max(names, key=lambda key: names[key], default="")
+    ambiguity = _sets(probabilities)
+    if probabilities.get(healthy, 0.0) >= max(without, names.get(best, 0.0)):
+        return Judged(group, healthy, probabilities, ambiguity, start)
+    if sum(names.values()) <= without:
+        return Judged(group, "unlisted", probabilities, ambiguity, start)
+    chosen = next(c for c in group.candidates if c.key == best)
+    return Judged(group, "effects" if chosen.effects else "parameters", probabilities, ambiguity, chosen)
+
+
+def _sets(probabilities: dict[str, float]) -> list[list[str]]:
+    """Hypotheses that are left, the most probable first; none where one is settled, ``none`` and ``parameters`` being one answer."""
+    healthy = probabilities.get("none", 0.0) + probabilities.get("parameters", 0.0)
+    others = [p for key, p in probabilities.items() if key not in ("none", "parameters")]
+    if max(healthy, *others, 0.0) >= SETTLED:
+        return []
+    found = [sorted(key.split("+")) for key, p in probabilities.items() if p >= IN_SET]
+    return found if len(found) > 1 else []
+
+
+def case_verdict(judged: Sequence[Judged]) -> str:
+    """The verdict of a case: a name wherever a block has one, what is missing without a name only where there is none."""
+    found = [j.verdict for j in judged]
+    if "effects" in found or any(j.wrong for j in judged):
+        return "effects" if "effects" in found else "parameters"
+    return next((verdict for verdict in ("unlisted", "parameters") if verdict in found), "none")
+
+
+def case_probabilities(judged: Sequence[Judged]) -> dict[str, float]:
+    """Probabilities of what a case may be told to have: the names of all its blocks together.
+
+    ``unlisted`` is that something is missing and nothing has a name. What one block keeps without a name takes nothing from a name in
+    another.
+    """
+    found = {"none": 0.0, "parameters": 0.0, "unlisted": 0.0}
+    for choice in itertools.product(*(j.probabilities.items() for j in judged)):
+        keys = [key for key, _ in choice]
+        names = _names(keys)
+        rest = next((key for key in ("unlisted", "parameters") if key in keys), "none")
+        key = "+".join(names) or rest
+        found[key] = found.get(key, 0.0) + math.prod(p for _, p in choice)
+    return _normalised(found)
+
+
+def case_ambiguity(judged: Sequence[Judged]) -> list[list[str]]:
+    """Sets of names that a case leaves open: the open sets of its blocks, each beside what is settled in the others."""
+    if not any(j.ambiguity for j in judged):
+        return []
+    options = []
+    for j in judged:
+        settled = [*j.named, *j.wrong] or ([j.verdict] if j.verdict == "unlisted" else [])
+        options.append(j.ambiguity or [settled])
+    found: list[list[str]] = []
+    for choice in itertools.product(*options):
+        flat = [name for names in choice for name in names]
+        named = _names(flat)
+        # beside a name, what another block is settled to have or not to have is no part of the question
+        entry = named if named else sorted(dict.fromkeys(flat))
+        if entry not in found:
+            found.append(entry)
+    return found[:MOST_SETS] if len(found) > 1 else []
+
+
+def _names(keys: Iterable[str]) -> list[str]:
+    """Names of effects and of parameters in hypotheses, each once, in alphabetical order."""
+    return sorted({name for key in keys for name in key.split("+") if name not in ("none", "parameters", "unlisted")})

@@ -1,0 +1,168 @@
+"""Values of the rig file that are wrong: parameters freed from their tolerance, as rivals of the effects.
+
+The baseline moves inside three tolerances. A parameter that ends at that wall may stand for physics that is missing, or the file may be
+wrong about it. Which of the two is decided as between effects: the parameter is freed, everything is fitted again, and held-out
+recordings judge.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pamrs.diagnosis.blocks import Block
+from pamrs.diagnosis.candidates import Attempts, Candidate, Group, significant
+from pamrs.diagnosis.fitting import WIDEST, Fit, Problem, stacked
+from pamrs.diagnosis.leastsquares import levenberg_marquardt
+from pamrs.rig import Rig
+
+__all__ = ["AT_WALL", "beside_quiet", "freed", "rarity", "suspected"]
+
+Array = NDArray[np.float64]
+
+AT_WALL = 2.9
+"""Tolerances from which a refitted parameter stands at its wall."""
+RARE = 4.6
+"""Logarithm of the odds against a parameter that is outside its tolerances: one file in a hundred."""
+MOST, LEAST_GAIN, LEAST_SHARE = 5, 12.0, 0.08
+"""Hypotheses that are fitted; gain in chi-square by the linear model, and share of the largest, from which one is."""
+ONE_MISTAKE: tuple[tuple[tuple[str, str], tuple[str, str]], ...] = (
+    (("chamber", "dead_volume"), ("valve", "discharge_area_max")),
+    (("arm", "payload"), ("arm", "first_moment")),
+    (("arm", "inertia"), ("arm", "first_moment")),
+    (("link", "mass"), ("link", "centre")),
+    (("link", "inertia"), ("link", "mass")),
+)
+"""Parameters that one mistake makes wrong together: another valve and fittings, another load, another arm."""
+
+
+def suspected(fitted: Fit, blocks: list[Block]) -> list[tuple[str, ...]]:
+    """Parameters at their wall, alone and in pairs that one mistake makes wrong together.
+
+    Parameters
+    ----------
+    fitted : Fit
+        The refitted baseline.
+    blocks : list of Block
+        Blocks that were fitted.
+
+    Returns
+    -------
+    list of tuple of str
+        Dotted names.
+    """
+    at_wall = [name for name, moved in fitted.moved.items() if abs(moved) >= AT_WALL]
+    found: list[tuple[str, ...]] = [(name,) for name in at_wall]
+    for one, other in itertools.permutations(fitted.moved, 2):
+        together = any({one, other} <= block.parameters for block in blocks)
+        if (_kind(one), _kind(other)) in ONE_MISTAKE and together and not {one, other}.isdisjoint(at_wall):
+            found.append((one, other))
+    return found
+
+
+def _kind(name: str) -> tuple[str, str]:
+    """Kind of block and key of a dotted name."""
+    return name.partition(".")[0], name.rpartition(".")[2]
+
+
+def freed(trial: Attempts, baseline: Fit, say: Callable[[str], None]) -> list[Candidate]:
+    """The suspected parameters, each freed and fitted; those first that promise most by the linear model.
+
+    Parameters
+    ----------
+    trial : Attempts
+        Recordings, model, floors.
+    baseline : Fit
+        The refitted baseline, with sensitivities.
+    say : callable
+        Receives progress.
+    """
+    gains = _promised(trial.inner, trial.nominal, baseline, suspected(baseline, trial.inner.blocks), trial.white)
+    least = max(LEAST_GAIN, LEAST_SHARE * max(gains.values(), default=0.0))
+    found = []
+    for names in sorted((n for n, gain in gains.items() if gain > least), key=lambda n: -gains[n])[:MOST]:
+        say(f"trying another value of {' and '.join(names)}")
+        candidate = trial.freed(names, baseline)
+        if candidate is not None and outside(candidate):
+            found.append(replace(candidate, gain=gains[names]))
+    return found
+
+
+def outside(candidate: Candidate) -> bool:
+    """Whether every freed parameter ends outside its tolerances: one that comes back inside is not wrong."""
+    return all(abs(candidate.fit.moved[name]) > WIDEST for name in candidate.wrong)
+
+
+def _promised(
+    problem: Problem, nominal: Rig, baseline: Fit, suspects: list[tuple[str, ...]], inflation: dict[str, float]
+) -> dict[tuple[str, ...], float]:
+    """Gain in chi-square, priors included, that freeing parameters brings by the sensitivities at the baseline."""
+    names = list(baseline.moved)
+    rows, jacobian = stacked(problem, baseline.residuals, inflation)
+    if jacobian is None or not suspects:
+        return {}
+    scaled = jacobian[:, [list(baseline.values).index(n) for n in names]] * [baseline.scales[n] for n in names]
+    # the triangle of a QR decomposition has the same sums of squares in a few rows
+    triangle: Array = np.asarray(np.linalg.qr(np.column_stack([scaled, rows]), mode="r"))
+    slopes, left = triangle[:, :-1], triangle[:, -1]
+    begin = np.array([baseline.moved[n] for n in names])
+    known = nominal.parameters
+    low, high = (np.array([(end - known[n].value) / known[n].tol for n, end in ends]) for ends in _ends(nominal, names))
+
+    def cost(loose: tuple[str, ...]) -> float:
+        bound = np.array([n not in loose for n in names], dtype=np.float64)
+        wall = np.where(bound > 0.0, WIDEST, np.inf)
+        prior = np.diag(bound)
+
+        def evaluate(x: Array) -> tuple[Array, Array, None]:
+            return np.concatenate([left + slopes @ (x - begin), bound * x]), np.concatenate([slopes, prior]), None
+
+        _, (values, _, _), _ = levenberg_marquardt(evaluate, begin, (np.maximum(low, -wall), np.minimum(high, wall)), 50, 0.0)
+        return float(values @ values)
+
+    was = cost(())
+    return {loose: was - cost(loose) for loose in suspects}
+
+
+def _ends(nominal: Rig, names: list[str]) -> tuple[list[tuple[str, float]], list[tuple[str, float]]]:
+    """The least and the largest possible value of each parameter."""
+    known = nominal.parameters
+    return [(n, known[n].lower) for n in names], [(n, known[n].upper) for n in names]
+
+
+def rarity(candidate: Candidate) -> float:
+    """Logarithm of the odds against a file that is so wrong: the further outside, the rarer, but less and less so."""
+    return sum(RARE + math.log(max(1.0, abs(candidate.fit.moved[name]) / WIDEST)) for name in candidate.wrong)
+
+
+def beside_quiet(trial: Attempts, quiet: Group, say: Callable[[str], None]) -> Group:
+    """A group whose baseline leaves only noise, but needs a parameter at its wall for it: which one the file is wrong about.
+
+    Each parameter at its wall is freed. What speaks for it is what misfit and priors lose together, weighed against the odds of a file
+    that is so wrong; what else the group found keeps its share beside it.
+    """
+    start = quiet.candidates[0]
+    found = freed(trial, start.fit, say)
+    shown = [c for c in found if not any(significant(e) for e in c.fitted.values())]
+    if not shown:
+        return quiet
+    before = _cost(trial, start.fit)
+    scores = {c: 0.5 * (before - _cost(trial, c.fit)) - rarity(c) for c in shown}
+    top = max(0.0, *scores.values())
+    weights = {c: math.exp(max(-60.0, score - top)) for c, score in scores.items()}
+    total = math.exp(-top) + sum(weights.values())
+    unchanged = quiet.probabilities.get("", 0.0)
+    probabilities = dict(quiet.probabilities) | {"": unchanged * math.exp(-top) / total}
+    probabilities |= {c.key: unchanged * weight / total for c, weight in weights.items()}
+    return replace(quiet, candidates=[*quiet.candidates, *shown], probabilities=probabilities)
+
+
+def _cost(trial: Attempts, found: Fit) -> float:
+    """Sum of squares of a fit, white, and of the priors that hold it."""
+    rows, _ = stacked(trial.inner, found.residuals, trial.colour(found))
+    return float(rows @ rows) + sum(moved * moved for moved in found.held_by_prior.values())

@@ -1,0 +1,140 @@
+"""Verdicts of groups of blocks, and what a case comes to: by laws, without a recording."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import pamrs
+from pamrs.diagnosis.blocks import Block, available_blocks
+from pamrs.diagnosis.candidates import Candidate, Group
+from pamrs.diagnosis.evidence import Excess
+from pamrs.diagnosis.fitting import Fit
+from pamrs.diagnosis.verdicts import Judged, case_ambiguity, case_probabilities, case_verdict, judge
+from pamrs.report.text import kept_sentence, sentence_of
+
+RIG = pamrs.rigs.shoulder()
+BLOCKS = {b.name: b for b in available_blocks(RIG, ("valve_command", "supply_pressure", "muscle_pressure", "joint_angle"))}
+HEALTHY = ("none", "parameters", "unlisted")
+
+
+def candidate(key: str, moved: dict[str, float] | None = None) -> Candidate:
+    """A hypothesis by its key, without a fit behind it."""
+    names = [name for name in key.split("+") if name]
+    effects, wrong = tuple(n for n in names if "." not in n), tuple(n for n in names if "." in n)
+    none = Fit(effects, RIG, {}, {}, None, 0.0, {}, moved or {})  # type: ignore[arg-type]
+    return Candidate(effects, none, {}, {}, 0.0, wrong=wrong)
+
+
+def group(name: str, probabilities: dict[str, float], *, moved: dict[str, float] | None = None, shifted: bool = False) -> Group:
+    """A group of one block with given probabilities."""
+    block: Block = BLOCKS[name]
+    keys = [key for key in probabilities if key not in ("", "unlisted")]
+    size = Excess(4.0 if shifted else 1.0, 1.0, 0.0, 1.0, 1.0)
+    mismatch = None if set(probabilities) == {""} else block
+    return Group(
+        [block], {name: size}, {name: size}, [candidate("", moved), *(candidate(k) for k in keys)], probabilities, mismatch, {}, []
+    )
+
+
+def said(*groups: Group) -> tuple[list[Judged], str]:
+    judged = judge(groups)
+    return judged, case_verdict(judged)
+
+
+def test_one_block_without_a_name_takes_nothing_from_a_name_in_another() -> None:
+    alone = judge([group("chamber", {"valve_dead_zone": 0.98, "unlisted": 0.02})])
+    judged, verdict = said(
+        group("chamber", {"valve_dead_zone": 0.98, "unlisted": 0.02}), group("arm", {"muscle_creep": 0.01, "unlisted": 0.99})
+    )
+    assert verdict == "effects"
+    assert [j.verdict for j in judged] == ["effects", "unlisted"]
+    assert judged[0].named == ("valve_dead_zone",)
+    assert judged[0].probability("valve_dead_zone") == pytest.approx(alone[0].probability("valve_dead_zone"))
+    found = case_probabilities(judged)
+    assert max(found, key=lambda key: found[key]) == "valve_dead_zone"
+    assert found["unlisted"] < 0.03
+    assert case_ambiguity(judged) == []
+
+
+def test_a_second_effect_in_another_block_lowers_nothing() -> None:
+    gas = {"leak_muscle": 0.92, "heat_transfer": 0.05, "unlisted": 0.03}
+    judged, _ = said(group("chamber", gas), group("arm", {"muscle_hysteresis": 0.92, "unlisted": 0.08}))
+    assert judged[0].probabilities["leak_muscle"] == pytest.approx(0.92)
+    # each is settled, although the two together are less so
+    assert case_ambiguity(judged) == []
+    assert {n for j in judged for n in j.named} == {"leak_muscle", "muscle_hysteresis"}
+
+
+def test_an_effect_of_two_groups_is_judged_once() -> None:
+    gas = {"pressure_lag": 0.5, "input_path_lag": 0.45, "unlisted": 0.05}
+    judged, _ = said(group("chamber", gas), group("arm", {"pressure_lag": 0.9, "unlisted": 0.1}))
+    # what the arm tells of it counts in the chamber too
+    assert judged[0].probability("pressure_lag") > 0.8
+    assert case_probabilities(judged)["pressure_lag"] > 0.7
+    assert judged[1].probability("pressure_lag") > 0.9
+
+
+def test_open_sets_stand_beside_what_is_settled() -> None:
+    gas = {"leak_muscle": 0.6, "chamber.dead_volume": 0.4}
+    judged, verdict = said(group("chamber", gas), group("arm", {"muscle_creep": 0.98, "unlisted": 0.02}))
+    assert verdict == "effects"
+    assert case_ambiguity(judged) == [["leak_muscle", "muscle_creep"], ["chamber.dead_volume", "muscle_creep"]]
+    judged, _ = said(group("chamber", gas), group("arm", {"unlisted": 0.98, "muscle_creep": 0.02}))
+    assert case_ambiguity(judged) == [["leak_muscle"], ["chamber.dead_volume"]]
+
+
+def test_a_wrong_parameter_is_the_verdict_parameters() -> None:
+    judged, verdict = said(group("chamber", {"chamber.dead_volume": 0.97, "unlisted": 0.03}), group("arm", {"": 1.0}))
+    assert verdict == "parameters"
+    assert judged[0].wrong == ("chamber.dead_volume",)
+    assert case_probabilities(judged)["chamber.dead_volume"] > 0.9
+    # and stays it where another block keeps something without a name; an effect comes first
+    assert said(group("chamber", {"chamber.dead_volume": 1.0}), group("arm", {"unlisted": 1.0}))[1] == "parameters"
+    assert said(group("chamber", {"chamber.dead_volume": 1.0}), group("arm", {"muscle_creep": 1.0}))[1] == "effects"
+
+
+def test_names_that_are_more_probable_together_than_none_are_given() -> None:
+    (one,) = judge([group("arm", {"muscle_creep": 0.35, "muscle_hysteresis": 0.25, "unlisted": 0.4})])
+    assert (one.verdict, one.named) == ("effects", ("muscle_creep",))
+    assert one.ambiguity == [["unlisted"], ["muscle_creep"], ["muscle_hysteresis"]]
+    (other,) = judge([group("arm", {"muscle_creep": 0.25, "muscle_hysteresis": 0.2, "unlisted": 0.55})])
+    assert other.verdict == "unlisted"
+
+
+def test_healthy_groups() -> None:
+    assert said(group("chamber", {"": 1.0}), group("arm", {"": 1.0}))[1] == "none"
+    assert said(group("chamber", {"": 1.0}, shifted=True), group("arm", {"": 1.0}))[1] == "parameters"
+    judged, verdict = said(group("chamber", {"": 1.0}, moved={"chamber.alpha": 3.0}), group("arm", {"": 1.0}))
+    assert verdict == "parameters"
+    # a parameter at its wall, and nobody knows why
+    assert judged[0].ambiguity == [["parameters"], ["unlisted"]]
+
+
+@given(
+    gas=st.dictionaries(
+        st.sampled_from(["leak_muscle", "pressure_lag", "chamber.dead_volume", "unlisted"]), st.floats(0.01, 1.0), min_size=1
+    ),
+    arm=st.dictionaries(st.sampled_from(["muscle_creep", "pressure_lag", "arm.payload", "unlisted"]), st.floats(0.01, 1.0), min_size=1),
+)
+def test_probabilities_add_to_one_and_verdicts_follow_them(gas: dict[str, float], arm: dict[str, float]) -> None:
+    found = [{k: v / sum(p.values()) for k, v in p.items()} for p in (gas, arm)]
+    judged = judge([group("chamber", found[0]), group("arm", found[1])])
+    for j in judged:
+        assert sum(j.probabilities.values()) == pytest.approx(1.0)
+        assert bool(j.named or j.wrong) == (j.verdict in ("effects", "parameters"))
+        best = max(j.probabilities.values())
+        assert j.ambiguity == [] if best >= 0.9 else all(j.probabilities[k] >= 0.05 for k in ("+".join(s) for s in j.ambiguity))
+    case = case_probabilities(judged)
+    assert sum(case.values()) == pytest.approx(1.0)
+    assert set(HEALTHY) <= set(case)
+    named = [j.verdict for j in judged]
+    assert (case_verdict(judged) == "unlisted") == (set(named) == {"unlisted"})
+
+
+def test_sentences_have_units_of_the_field() -> None:
+    wrong = {"name": "chamber.dead_volume", "unit": "m3", "nominal": 1.5e-4, "tolerance": 2.25e-5, "value": 3.6e-4, "std": 5e-6}
+    assert sentence_of(wrong) == "chamber dead volume is 360.0 +- 5.0 cm3, not 150 +- 22"
+    kept = {"block": "arm", "unit": "rad", "noises": 15.2, "size": 0.007, "verdict": "unlisted"}
+    assert kept_sentence(kept) == "the arm keeps 15 times its noise (0.40 deg) that no listed effect explains"
