@@ -1,4 +1,4 @@
-"""Command line of the trial: ``python -m trial write``, ``make``, ``score`` and ``selfcheck``."""
+"""Command line of the trial: ``python -m trial write``, ``make``, ``score``, ``report``, ``blocks`` and ``selfcheck``."""
 
 from __future__ import annotations
 
@@ -8,14 +8,15 @@ import sys
 import time
 from pathlib import Path
 
-from .concealed import make_case, write
+from .blocks import blocks_page
+from .concealed import WRONG, make_case, write
 from .effects import KINDS, LISTED
 from .pictures import figure
-from .plan import specs, write_plan
+from .plan import PLANS, specs, write_plan
 from .report import report
 from .score import score
 from .selfcheck import selfcheck
-from .strength import MEASURES, STRENGTHS
+from .strength import LABELS, MEASURES
 from .summary import markdown, target_table
 from .targets import targets
 
@@ -27,10 +28,10 @@ def _parser() -> argparse.ArgumentParser:
     sub = parser.add_subparsers(dest="command", required=True)
     whole = sub.add_parser("write", help="write the cases, keys and manifest of a plan; goes on where it was stopped")
     whole.add_argument("folder", type=Path, help="gets cases/, keys/ and manifest.json")
-    whole.add_argument("--plan", choices=("full", "small"), default="full")
+    whole.add_argument("--plan", choices=PLANS, default="full")
     whole.add_argument("--cases", type=int, help="how many (default: the whole plan)")
     whole.add_argument("--seed", type=int, required=True)
-    whole.add_argument("--duration", type=float, help="seconds per recording (default: 30 to 40, small 12)")
+    whole.add_argument("--duration", type=float, help="seconds per recording (default: 30 to 40; plan small 12)")
     whole.add_argument("--jobs", type=int, default=1, help="processes (default 1)")
     whole.add_argument("--measure", choices=MEASURES, default="reach", help=_MEASURE)
     whole.add_argument("--rig", type=Path, help="nominal rig file (default: the shoulder)")
@@ -41,13 +42,19 @@ def _parser() -> argparse.ArgumentParser:
         "--kind",
         action="append",
         required=True,
-        help=f"{', '.join(KINDS)}, random, or a pair a+b; may be repeated",
+        help=f"{', '.join((*KINDS, WRONG))}, random, or a pair a+b; may be repeated",
     )
     make.add_argument("--seed", type=int, required=True, help="seed of the first case; the following cases count up")
     make.add_argument("--repeat", type=int, default=1, help="cases per kind (default 1)")
     make.add_argument("--first", type=int, default=1, help="number of the first case (default 1)")
     make.add_argument("--strength", type=float, default=1.0, help="size of the effects; 1 is moderate")
-    make.add_argument("--wanted", choices=tuple(STRENGTHS), help="scale each effect to this multiple of the noise instead")
+    make.add_argument("--wanted", choices=tuple(LABELS), help="scale each effect to this multiple of the noise instead")
+    make.add_argument(
+        "--parameter", action="append", default=[], help=f"of the kind {WRONG}: a parameter as SECTION.NAME; may be repeated"
+    )
+    make.add_argument(
+        "--tolerances", action="append", type=float, default=[], help="by how many tolerances it is off; once per parameter"
+    )
     make.add_argument("--measure", choices=MEASURES, default="reach", help=_MEASURE)
     make.add_argument("--recordings", type=int, default=5, help="1 to 5 (default 5)")
     make.add_argument("--duration", type=float, default=40.0, help="seconds per recording (default 40)")
@@ -67,6 +74,11 @@ def _parser() -> argparse.ArgumentParser:
     page.add_argument("--results", type=Path, help="results of `pamrs prove` and of the baselines (default: FOLDER/results)")
     page.add_argument("--out", type=Path, required=True, help="folder for the page and the pictures")
     page.add_argument("--command", dest="words", default="python -m trial report", help="what makes the page, as it says")
+    apart = sub.add_parser("blocks", help="score a trial of plan blocks and write its page, blocks.md")
+    apart.add_argument("folder", type=Path, help="the trial: cases/, keys/ and manifest.json")
+    apart.add_argument("--results", type=Path, help="results of `pamrs prove` (default: FOLDER/results)")
+    apart.add_argument("--out", type=Path, required=True, help="folder for the page")
+    apart.add_argument("--command", dest="words", default="python -m trial blocks", help="what makes the page, as it says")
     check = sub.add_parser("selfcheck", help="compare the plant with finer steps and with another integrator")
     check.add_argument("--golden", type=Path, help="folder with golden vectors of the plant without effects")
     return parser
@@ -83,11 +95,16 @@ def main(argv: list[str] | None = None) -> int:
             def told(name: str, done: int, total: int) -> None:
                 print(f"{name} written, {done} of {total}", file=sys.stderr, flush=True)
 
-            wanted = specs(args.plan, args.seed, args.cases, args.duration, args.measure)
+            wanted = specs(args.plan, args.seed, args.cases, args.duration, args.measure, args.rig)
             manifest = write_plan(args.folder, wanted, jobs=args.jobs, rig=args.rig, progress=told)
             print(f"sha256 of the manifest: {hashlib.sha256(manifest.read_bytes()).hexdigest()}")
         elif args.command == "make":
             keys = args.keys_dir or args.out.with_name(args.out.name + "_keys")
+            if len(args.parameter) != len(args.tolerances):
+                raise ValueError("give --tolerances once for every --parameter")
+            wrong = tuple(zip(args.parameter, args.tolerances, strict=True))
+            if wrong and WRONG not in args.kind:
+                raise ValueError(f"--parameter is for --kind {WRONG}")
             kinds = [k for k in args.kind for _ in range(args.repeat)]
             for i, kind in enumerate(kinds):
                 start = time.perf_counter()
@@ -100,6 +117,7 @@ def main(argv: list[str] | None = None) -> int:
                     args.out, keys, kind, seed=args.seed + i, name=name, strength=args.strength, wanted=args.wanted,
                     measure=args.measure,
                     recordings=args.recordings, duration=args.duration, rig=args.rig, publish=publish,
+                    wrong=wrong if kind == WRONG else (),
                 )  # fmt: skip
                 print(f"{name} written in {time.perf_counter() - start:.1f} s", file=sys.stderr, flush=True)
         elif args.command == "score":
@@ -113,6 +131,8 @@ def main(argv: list[str] | None = None) -> int:
                 figure(scores, args.figure)
         elif args.command == "report":
             print(f"written: {report(args.folder, args.results or args.folder / 'results', args.out, args.words)}")
+        elif args.command == "blocks":
+            print(f"written: {blocks_page(args.folder, args.results or args.folder / 'results', args.out, args.words)}")
         else:
             print(selfcheck(args.golden))
     except (ValueError, OSError) as error:

@@ -7,7 +7,7 @@ import json
 import math
 import os
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -21,16 +21,21 @@ from .plant import Plant
 from .recording import ANGLE_STEP, Array, Noise, Record, follow, prepare, reach, run
 from .remainder import Remainder
 from .rigfile import default_rig, draw_parameters, read_rig, to_parameters
-from .strength import FIRST, MEASURES, STRENGTHS, aim
+from .strength import FIRST, LABELS, MEASURES, STRENGTHS, aim
+
+#: kind of a case whose rig file holds a parameter that is far from the true one
+WRONG = "wrong_parameter"
+_NO_EFFECT = ("none", "parameters", WRONG)
 
 
 @dataclass(frozen=True)
 class Spec:
     """What a case is made from.
 
-    `kind` is "none", "parameters", an effect id, or ids joined by "+". With `wanted` (one label of
-    :data:`trial.strength.STRENGTHS` per effect) the effects are scaled to that reach, else by `strength`. `measure`
-    is what the multiple of the noise is of: "reach", or "left", what a refit of the baseline leaves of it.
+    `kind` is "none", "parameters", "wrong_parameter", an effect id, or ids joined by "+". With `wanted` (one label of
+    :data:`trial.strength.LABELS` per effect) the effects are scaled to that reach, else by `strength`. `measure`
+    is what the multiple of the noise is of: "reach", or "left", what a refit of the baseline leaves of it. `wrong`
+    lists the parameters that are far off, dotted name and tolerances with their sign, of the kind "wrong_parameter".
     """
 
     name: str
@@ -41,6 +46,7 @@ class Spec:
     wanted: tuple[str, ...] = ()
     strength: float = 1.0
     measure: str = "reach"
+    wrong: tuple[tuple[str, float], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -97,11 +103,21 @@ Measured = tuple[Record, Array]
 class _Bench:
     """The recordings of one case, to be run with any effects."""
 
-    def __init__(self, spec: Spec, true: dict[str, Any], tolerance: dict[str, float], nominal: Plant, noise: Noise) -> None:
+    def __init__(
+        self,
+        spec: Spec,
+        true: dict[str, Any],
+        tolerance: dict[str, float],
+        nominal: Plant,
+        noise: Noise,
+        believed: dict[str, Any] | None = None,
+    ) -> None:
         self.spec, self.true, self.tolerance, self.noise = spec, true, tolerance, noise
         self.par = par = to_parameters(true)
         supply_tol = tolerance.get("supply.initial_pressure", 0.0)
-        self.bare = Plant(par)
+        # the plant without what is concealed: no effects, and no parameter far off
+        self.bare = Plant(to_parameters(believed or true))
+        self.moves = believed is not None
         self._remainder: Remainder | None = None
         roles = [role for _, role in spec.recordings]
         self.fit = [i for i, role in enumerate(roles) if role == "fit"] or list(range(len(roles)))
@@ -120,7 +136,7 @@ class _Bench:
             if i in found or (fit_only and i not in self.fit):
                 continue
             record = run(plant, *made, supply, self.noise, np.random.default_rng([self.spec.seed, i, 78]), i)
-            found[i] = (record, record.clean - follow(self.bare, record, i) if effects.items else np.zeros((1, 3)))
+            found[i] = (record, record.clean - follow(self.bare, record, i) if effects.items or self.moves else np.zeros((1, 3)))
         return found
 
     def most_moved(self, measured: dict[int, Measured]) -> tuple[str, float]:
@@ -150,19 +166,41 @@ class _Bench:
         return aim(simulate, target, effect.most(), 2.0 * start if left else start)
 
 
+def _values(model: dict[str, Any], names: Iterable[str]) -> dict[str, float]:
+    """Values of a nested model by dotted name."""
+    return {name: model[name.split(".")[0]][name.split(".")[1]] for name in names}
+
+
+def _put(model: dict[str, Any], values: dict[str, float]) -> dict[str, Any]:
+    """Copy of a nested model with other values."""
+    changed = {k: dict(v) for k, v in model.items()}
+    for name, value in values.items():
+        section, key = name.split(".")
+        changed[section][key] = value
+    return changed
+
+
+def _verdict(kind: str, ids: Sequence[str]) -> str:
+    """The right verdict; an effect that can be named counts, whatever stands beside it."""
+    if not ids:
+        return "none" if kind == "none" else "parameters"
+    return "effects" if any(i in LISTED for i in ids) else "unlisted"
+
+
 def generate(spec: Spec, rig: Path) -> Case:
     """Make one case in memory; the same arguments give the same bytes."""
     model, tolerance = read_rig(rig)
     rng = np.random.default_rng([spec.seed, 20140517])
-    true, moved = draw_parameters(spec.kind, model, tolerance, rng)
-    ids = [p for p in spec.kind.split("+") if p not in ("none", "parameters")]
+    wrong = dict(spec.wrong)
+    true, moved = draw_parameters(spec.kind, model, tolerance, rng, wrong)
+    ids = [p for p in spec.kind.split("+") if p not in _NO_EFFECT]
     noise = Noise(
         pressure=float(rng.uniform(300.0, 600.0)),
         pressure_step=float(rng.choice([42.0, 84.0])),
         angle=math.radians(float(rng.uniform(0.01, 0.02))),
         angle_step=ANGLE_STEP,
     )
-    bench = _Bench(spec, true, tolerance, _nominal(rig), noise)
+    bench = _Bench(spec, true, tolerance, _nominal(rig), noise, _put(true, _values(model, wrong)) if wrong else None)
     start = float(np.median(bench.supply))
     setting = Setting(len(spec.recordings), spec.duration, start, bench.par.payload, bench.par.coulomb)
     alone: dict[str, float] = {}
@@ -175,25 +213,25 @@ def generate(spec: Spec, rig: Path) -> Case:
             for attempt in range(4):
                 if attempt:
                     effect = draw(name, spec.strength, rng, setting)
-                factor, alone[name], known = bench.scale(effect, STRENGTHS[label])
-                if alone[name] > 0.5 * STRENGTHS[label]:
+                factor, alone[name], known = bench.scale(effect, LABELS[label])
+                if alone[name] > 0.5 * LABELS[label]:
                     break
             effect = effect.scaled(factor)
         chosen.append(effect)
     effects = Effects(*chosen)
     measured = bench.measure(effects, known if len(ids) == 1 else None)
     channel, size, left = None, 0.0, 0.0
-    if ids:
+    if ids or wrong:
         channel, size = bench.most_moved(measured)
         left = bench.left(measured)
     runs: dict[str, Any] = {}
     for i, (name, role) in enumerate(spec.recordings):
         runs[name] = {"role": role, "initial_supply_pressure": bench.supply[i], "reach": reach(measured[i][1], noise)}
-    key = {
+    key: dict[str, Any] = {
         "schema": "pamrs.trial-key/1",
         "case": spec.name,
         "kind": spec.kind,
-        "verdict": spec.kind if not ids else ("effects" if all(i in LISTED for i in ids) else "unlisted"),
+        "verdict": _verdict(spec.kind, ids),
         "effects": ids,
         "blocks": {e.id: e.block for e in effects},
         "effect_parameters": effects.to_dict(),
@@ -205,15 +243,29 @@ def generate(spec: Spec, rig: Path) -> Case:
         "reach_channel": channel,
         "reach_alone": alone,
         "reach_left": left,
-        "parameters": {k: true[k.split(".")[0]][k.split(".")[1]] for k in moved},
+        "parameters": _values(true, moved),
         "moved_tolerances": moved,
         "noise": asdict(noise),
         "recordings": runs,
         "seed": spec.seed,
     }
+    if wrong:
+        nominal, value = _values(model, wrong), _values(true, wrong)
+        key["wrong_parameters"] = {k: {"nominal": nominal[k], "value": value[k], "tolerances": z} for k, z in wrong.items()}
     files = {f"{name}.csv": _csv(measured[i][0]) for i, (name, _) in enumerate(spec.recordings)}
     files = {"rig.toml": rig.read_text(encoding="utf-8"), **files, "case.toml": _case_toml(spec.recordings)}
     return Case(spec.name, json.dumps(key, indent=1) + "\n", files)
+
+
+def _check_wrong(wrong: Sequence[tuple[str, float]], rig: Path) -> None:
+    """Refuse parameters without a tolerance, and values that are not positive."""
+    model, tolerance = read_rig(rig)
+    allowed = [n for n in tolerance if not n.startswith("sensors.") and n != "supply.initial_pressure"]
+    for name, z in wrong:
+        if name not in allowed:
+            raise ValueError(f"unknown parameter {name!r}; known: {', '.join(allowed)}")
+        if not (math.isfinite(z) and _values(model, [name])[name] + z * tolerance[name] > 0.0):
+            raise ValueError(f"{name} cannot be {z:g} tolerances off")
 
 
 def make_case(
@@ -230,6 +282,7 @@ def make_case(
     duration: float = 40.0,
     rig: Path | None = None,
     publish: Callable[[str], None] | None = None,
+    wrong: Sequence[tuple[str, float]] = (),
 ) -> str:
     """Write one concealed case and its answer key.
 
@@ -238,7 +291,7 @@ def make_case(
     out, keys : Path
         Folder of the cases and folder of the keys (must differ, and the keys must not lie inside the cases).
     kind : str
-        One of :data:`trial.effects.KINDS`, "random", or effects joined by "+" for a pair.
+        One of :data:`trial.effects.KINDS`, "wrong_parameter", "random", or effects joined by "+" for a pair.
     seed : int
         Everything is determined by the seed, the kind and the other arguments.
     name : str
@@ -246,7 +299,7 @@ def make_case(
     strength : float
         Size of the effect; 1 is moderate.
     wanted : str, optional
-        "weak", "medium" or "strong": scale every effect until it reaches that multiple of the noise.
+        "weak", "medium", "strong" or "heavy": scale every effect until it reaches that multiple of the noise.
     measure : str
         "reach", or "left": the multiple is of what a refit of the baseline leaves.
     recordings : int
@@ -257,6 +310,8 @@ def make_case(
         Nominal rig file.
     publish : callable, optional
         Called with the SHA-256 of the key before any file of the case is written.
+    wrong : sequence of tuple
+        Of the kind "wrong_parameter": dotted names and by how many tolerances they are off.
 
     Returns
     -------
@@ -266,7 +321,8 @@ def make_case(
     Raises
     ------
     ValueError
-        Unknown kind, bad duration or number of recordings, or keys inside the folder of the cases.
+        Unknown kind, bad duration or number of recordings, a wrong parameter that cannot be, or keys inside the folder of
+        the cases.
     """
     out, keys = Path(out), Path(keys)
     if keys.resolve().is_relative_to((out / name).resolve()):
@@ -275,19 +331,23 @@ def make_case(
         raise ValueError(f"duration must be at least 2 s, got {duration!r}")
     if not strength > 0.0:
         raise ValueError(f"strength must be positive, got {strength!r}")
-    if wanted is not None and wanted not in STRENGTHS:
-        raise ValueError(f"strength must be one of {', '.join(STRENGTHS)}, got {wanted!r}")
+    if wanted is not None and wanted not in LABELS:
+        raise ValueError(f"strength must be one of {', '.join(LABELS)}, got {wanted!r}")
     if measure not in MEASURES:
         raise ValueError(f"measure must be one of {', '.join(MEASURES)}, got {measure!r}")
     chosen = tuple(select(recordings))
     if kind == "random":
         kind = str(np.random.default_rng([seed, 5]).choice(KINDS))
     parts = kind.split("+")
-    if any(p not in KINDS for p in parts) or (len(parts) > 1 and {"none", "parameters"} & set(parts)):
-        raise ValueError(f"unknown kind {kind!r}; known: {', '.join(KINDS)}, random, and effects joined by '+'")
-    labels = (wanted,) * len(parts) if wanted and kind not in ("none", "parameters") else ()
-    spec = Spec(name, kind, seed, chosen, duration, labels, strength, measure)
-    case = generate(spec, (rig or default_rig()).resolve())
+    if any(p not in (*KINDS, WRONG) for p in parts) or (len(parts) > 1 and set(_NO_EFFECT) & set(parts)):
+        raise ValueError(f"unknown kind {kind!r}; known: {', '.join((*KINDS, WRONG))}, random, and effects joined by '+'")
+    if (kind == WRONG) != bool(wrong):
+        raise ValueError(f"wrong parameters and the kind {WRONG!r} go together")
+    rig = (rig or default_rig()).resolve()
+    _check_wrong(wrong, rig)
+    labels = (wanted,) * len(parts) if wanted and kind not in _NO_EFFECT else ()
+    spec = Spec(name, kind, seed, chosen, duration, labels, strength, measure, tuple(wrong))
+    case = generate(spec, rig)
     write(keys / f"{name}.json", case.key)
     if publish is not None:
         publish(case.digest())
@@ -301,4 +361,4 @@ def store(case: Case, out: Path) -> None:
         write(out / case.name / file, content)
 
 
-__all__ = ["RECORDINGS", "Case", "Spec", "generate", "make_case", "store", "write"]
+__all__ = ["RECORDINGS", "WRONG", "Case", "Spec", "generate", "make_case", "store", "write"]

@@ -50,7 +50,7 @@ def draw_strength(axes: Any, rows: Sequence[Row]) -> None:
         axes.errorbar(
             [a * nudge for a in at], share, yerr=(below, above), marker=marker, color=colour, capsize=3, label=word, linewidth=1.4
         )  # fmt: skip
-    false = [r.detected for r in rows if not r.ids]
+    false = [r.detected for r in rows if r.healthy]
     if false:
         word = f"false alarms ({sum(false)} of {len(false)})"
         axes.axhline(sum(false) / len(false), color=_GREY, linestyle=":", linewidth=1.2, label=word)

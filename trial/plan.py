@@ -6,18 +6,21 @@ import hashlib
 import json
 import multiprocessing
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from .concealed import Case, Spec, generate, store, write
+from .concealed import WRONG, Case, Spec, generate, store, write
 from .effects import LISTED, TYPES, UNLISTED
-from .rigfile import default_rig
+from .effects.base import log_uniform
+from .rigfile import default_rig, read_rig
 from .strength import STRENGTHS
 
 MANIFEST = "manifest.json"
 SCHEMA = "pamrs.trial-manifest/1"
+PLANS = ("full", "small", "blocks")
 #: nobody can tell these apart at 200 Hz, so no pair is made of them
 _FAST_LAGS = {"input_path_lag", "pressure_lag", "clock_skew"}
 _SMALL: tuple[tuple[str, tuple[str, ...]], ...] = (
@@ -34,6 +37,58 @@ _SMALL: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("leak_muscle+muscle_hysteresis", ("strong", "strong")),
     ("pressure_zero_drift", ("strong",)),
 )
+#: plan `blocks`: effects of the gas blocks, and effects of no catalogue that act in the arm
+GAS = (
+    "supply_leak", "compressor_cut_in", "valve_dead_zone", "valve_hysteresis", "valve_centre_leakage", "input_path_lag",
+    "tube_flow_restriction", "leak_muscle", "heat_transfer",
+)  # fmt: skip
+ARM = ("tendon_compliance", "muscle_buckling", "encoder_gear_lash", "hose_torque", "moment_arm_error", "encoder_eccentricity")
+#: plan `blocks`: parameters that are put far off, by how many tolerances, and the least share of the nominal value
+PARAMETERS = (
+    "supply.volume", "valve.discharge_area_max", "chamber.dead_volume", "muscle.modulus_scale", "arm.inertia",
+    "arm.first_moment", "arm.payload", "arm.viscous",
+)  # fmt: skip
+SIZES = ((4.0, 6.0), (7.0, 10.0), (11.0, 15.0))
+LEAST_SHARE = 0.3
+
+
+@dataclass(frozen=True)
+class Planned:
+    """One case of a plan; cases of the same `group` (not 0) share their seed and recordings."""
+
+    kind: str
+    labels: tuple[str, ...] = ()
+    wrong: tuple[tuple[str, float], ...] = ()
+    group: int = 0
+
+
+def _far(name: str, way: float, size: tuple[float, float], rig: Path, rng: np.random.Generator) -> float:
+    """Tolerances, with their sign, by which a parameter is off; upwards where no four of them fit downwards."""
+    model, tolerance = read_rig(rig)
+    section, key = name.split(".")
+    most = (1.0 - LEAST_SHARE) * model[section][key] / tolerance[name] if way < 0.0 else SIZES[-1][1]
+    if most < SIZES[0][0]:
+        way, most = 1.0, SIZES[-1][1]
+    low, high = size if size[0] < most else SIZES[0]
+    return way * log_uniform(rng, low, min(high, most))
+
+
+def blocks(rng: np.random.Generator, rig: Path | None = None) -> list[Planned]:
+    """Cases of plan `blocks`, in no particular order.
+
+    Every effect of the gas blocks at medium and strong, alone and beside an effect of no catalogue in the arm at strong
+    and at heavy: 54 cases in groups of three, which share the seed and so the baseline, the noise and the first effect.
+    Eight parameters far off, upwards and downwards, of three sizes: 48. Six nulls and six with parameters only.
+    """
+    rig = rig or default_rig()
+    found: list[Planned] = []
+    turn = [str(v) for v in rng.permutation(ARM)]
+    for i, (name, label) in enumerate((n, s) for n in GAS for s in ("medium", "strong")):
+        found.append(Planned(name, (label,), group=i + 1))
+        found.extend(Planned(f"{name}+{turn[i % len(turn)]}", (label, much), group=i + 1) for much in ("strong", "heavy"))
+    for name in PARAMETERS:
+        found.extend(Planned(WRONG, wrong=((name, _far(name, way, size, rig, rng)),)) for way in (1.0, -1.0) for size in SIZES)
+    return [*found, *(Planned(kind) for kind in ("none", "parameters") for _ in range(6))]
 
 
 def _pair(rng: np.random.Generator) -> tuple[str, str]:
@@ -45,7 +100,7 @@ def _pair(rng: np.random.Generator) -> tuple[str, str]:
 
 
 def kinds(plan: str, rng: np.random.Generator) -> list[tuple[str, tuple[str, ...]]]:
-    """Kinds and wanted strengths of a plan, in no particular order.
+    """Kinds and wanted strengths of plan `full` or `small`, in no particular order.
 
     `full`: 30 nulls, 30 with parameters only, every listed effect three times at each strength, 30 pairs, every
     unlisted effect at medium and twice at strong. `small`: twelve cases.
@@ -58,7 +113,7 @@ def kinds(plan: str, rng: np.random.Generator) -> list[tuple[str, tuple[str, ...
     if plan == "small":
         return list(_SMALL)
     if plan != "full":
-        raise ValueError(f"unknown plan {plan!r}; known: full, small")
+        raise ValueError(f"unknown plan {plan!r}; known: {', '.join(PLANS)}")
     found: list[tuple[str, tuple[str, ...]]] = []
     for kind in ("none", "parameters"):
         found.extend([(kind, ())] * 30)
@@ -82,37 +137,46 @@ def _recordings(rng: np.random.Generator) -> tuple[tuple[str, str], ...]:
 
 
 def specs(
-    plan: str, seed: int, cases: int | None = None, duration: float | None = None, measure: str = "reach"
-) -> list[Spec]:  # fmt: skip
+    plan: str,
+    seed: int,
+    cases: int | None = None,
+    duration: float | None = None,
+    measure: str = "reach",
+    rig: Path | None = None,
+) -> list[Spec]:
     """Cases of a plan, shuffled so that their numbers say nothing; the first `cases` of them.
 
     Parameters
     ----------
     plan : str
-        "full" or "small".
+        One of :data:`PLANS`.
     seed : int
-        Settles everything. Each case has its own seed, so that it comes out the same whatever is made with it.
+        Settles everything. Each case (or group of cases) has its own seed, so that it comes out the same whatever is made
+        with it.
     cases : int, optional
         How many; above the size of the plan it is repeated with other seeds.
     duration : float, optional
-        Length of the recordings [s]; default 30 to 40 (full) or 12 (small).
+        Length of the recordings [s]; default 30 to 40, or 12 (small).
     measure : str
         What the strengths are multiples of, see :class:`trial.concealed.Spec`.
+    rig : Path, optional
+        Nominal rig file.
     """
     found: list[Spec] = []
     turn = 0
     while not found or (cases is not None and len(found) < cases):
         rng = np.random.default_rng([seed, turn, 4711])
-        wanted = kinds(plan, rng)
+        wanted = blocks(rng, rig) if plan == "blocks" else [Planned(*k) for k in kinds(plan, rng)]
         for i in rng.permutation(len(wanted)).tolist():
-            kind, labels = wanted[i]
+            one = wanted[i]
             number = len(found) + 1
-            own = np.random.default_rng([seed, number, 815])
+            own = np.random.default_rng([seed, turn, one.group, 816] if one.group else [seed, number, 815])
             chosen = _recordings(own)
-            length = float(own.integers(30, 41)) if plan == "full" else 12.0
+            length = 12.0 if plan == "small" else float(own.integers(30, 41))
             length = length if duration is None else duration
             seed_of_case = int(own.integers(2**31))
-            found.append(Spec(f"case_{number:04d}", kind, seed_of_case, chosen, length, labels, measure=measure))
+            name = f"case_{number:04d}"
+            found.append(Spec(name, one.kind, seed_of_case, chosen, length, one.labels, measure=measure, wrong=one.wrong))
         turn += 1
     return found[:cases]
 
@@ -127,7 +191,11 @@ def _complete(folder: Path, spec: Spec, digests: dict[str, str]) -> bool:
     if hashlib.sha256(content).hexdigest() != digests[spec.name]:
         return False
     told: dict[str, Any] = json.loads(content)
-    return all(told.get(name) == getattr(spec, name) for name in ("kind", "seed", "duration", "measure"))
+    same = all(told.get(name) == getattr(spec, name) for name in ("kind", "seed", "duration", "measure", "strength"))
+    wrong = {name: entry["tolerances"] for name, entry in told.get("wrong_parameters", {}).items()}
+    roles = {name: entry["role"] for name, entry in told.get("recordings", {}).items()}
+    wanted = tuple(told.get("wanted", {}).values())
+    return same and wanted == spec.wanted and wrong == dict(spec.wrong) and roles == dict(spec.recordings)
 
 
 def _work(task: tuple[Spec, Path]) -> Case:

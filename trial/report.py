@@ -59,7 +59,7 @@ def checked(folder: Path) -> tuple[str, int]:
     return hashlib.sha256(content).hexdigest(), len(found)
 
 
-def _run(results: Path, digest: str) -> dict[str, Any]:
+def run_of(results: Path, digest: str) -> dict[str, Any]:
     """What ``pamrs prove`` says of its run; it must be of this manifest."""
     file = results / "run.json"
     if not file.is_file():
@@ -70,7 +70,8 @@ def _run(results: Path, digest: str) -> dict[str, Any]:
     return told
 
 
-def _about(folder: Path, digest: str, count: int, run: dict[str, Any], command: str) -> list[str]:
+def about(folder: Path, digest: str, count: int, run: dict[str, Any], command: str) -> list[str]:
+    """How a trial was made: its cases, the digest of its manifest, the code and the machine, and the command."""
     entries = run.get("cases", {}).values()
     codes = sorted({str(e["code"])[:12] for e in entries if "code" in e})
     errors = sum("error" in e for e in entries)
@@ -121,12 +122,12 @@ def report(folder: Path, results: Path, out: Path, command: str, catalogue: Sequ
         The keys are not those that were published, or the results are of another trial.
     """
     digest, count = checked(folder)
-    run = _run(results, digest)
+    run = run_of(results, digest)
     scores = score(folder / "keys", results, catalogue)
     others = compared(folder / "keys", results, catalogue)
     drawn = pictures(scores, others, out)
     images = {p.stem: f"![{_CAPTIONS[p.stem]}]({p.name})\n\n*{_CAPTIONS[p.stem]}.*" for p in drawn}
-    text = "\n".join(["# Blinded trial\n", *_about(folder, digest, count, run, command), markdown(scores, catalogue)])
+    text = "\n".join(["# Blinded trial\n", *about(folder, digest, count, run, command), markdown(scores, catalogue)])
     closes = {"## Measures": "strength", "## What was named first": "gap", "## Calibration of the leading": "confusion"}
     for heading, name in closes.items():
         text = text.replace(heading, f"{images[name]}\n\n{heading}", 1)  # a picture closes the part before it

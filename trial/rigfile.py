@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import tomllib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -99,12 +100,16 @@ def to_parameters(model: dict[str, Any]) -> Parameters:
 
 
 def draw_parameters(
-    kind: str, model: dict[str, Any], tolerance: dict[str, float], rng: np.random.Generator
+    kind: str,
+    model: dict[str, Any],
+    tolerance: dict[str, float],
+    rng: np.random.Generator,
+    wrong: Mapping[str, float] | None = None,
 ) -> tuple[dict[str, Any], dict[str, float]]:
     """Draw the true baseline.
 
     Every parameter lies within one tolerance (normal, truncated); `parameters` moves one or two of them by 1.5 to
-    2.5 tolerances instead.
+    2.5 tolerances instead. Those in `wrong` lie as many tolerances off as it says.
 
     Returns
     -------
@@ -125,6 +130,7 @@ def draw_parameters(
         loud = [k for k in names if not k.startswith("sensors.") and k not in ("supply.volume", "arm.coulomb")]
         for name in rng.choice(loud, int(rng.integers(1, 3)), replace=False):
             moved[str(name)] = float(rng.choice([-1.0, 1.0]) * rng.uniform(1.5, 2.5))
+    moved.update(wrong or {})
     for name, z in moved.items():
         section, key = name.split(".")
         true[section][key] = model[section][key] + z * tolerance[name]

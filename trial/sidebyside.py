@@ -102,7 +102,7 @@ def side_by_side(rows: Sequence[Compared]) -> str:
         middle, count = medians(c for c in rows if c.row.ids and name in ("all", c.kind))
         if count:
             lines.append(f"| {name} | {count} | " + " | ".join(f"{middle[m]:.2f}" for m in METHODS) + " |")
-    healthy = [c for c in rows if not c.row.ids]
+    healthy = [c for c in rows if c.row.healthy]
     seen = [c for c in rows if c.row.ids and c.row.visible >= SEEN]
     listed = [c for c in seen if not c.kind.startswith("unlisted")]
     none = "0 % by construction"

@@ -9,6 +9,8 @@ from typing import TypeVar
 T = TypeVar("T")
 #: multiples of the noise; medium lies a little above 3, so that every medium case counts as detectable
 STRENGTHS = {"weak": 1.5, "medium": 3.3, "strong": 10.0}
+#: every label that can be wanted; "heavy" is what stands beside an effect in plan `blocks`
+LABELS = {**STRENGTHS, "heavy": 20.0}
 #: factor on the drawn size with which the search for medium starts; it only saves time
 FIRST = {
     "supply_leak": 0.5, "compressor_cut_in": 0.2, "valve_dead_zone": 0.01, "valve_hysteresis": 0.15,

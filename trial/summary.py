@@ -14,7 +14,8 @@ from .targets import Target, targets, wilson
 BINS = (0.0, 0.5, 0.7, 0.8, 0.9, 0.95, 0.99, 1.0)
 
 
-def _percent(hits: int, cases: int) -> str:
+def percent(hits: int, cases: int) -> str:
+    """A share in percent with its Wilson interval of 95 %."""
     if cases == 0:
         return "-"
     low, high = wilson(hits, cases)
@@ -33,7 +34,7 @@ def confusion(rows: Sequence[Row]) -> dict[str, Counter[str]]:
     found: dict[str, Counter[str]] = {}
     for row in rows:
         if len(row.ids) < 2:
-            truth = row.ids[0] if row.ids else row.truth
+            truth = row.ids[0] if row.ids else "+".join(name for name, _ in row.wrong) or row.truth
             found.setdefault(truth, Counter())["no result" if row.verdict == "missing" else row.first] += 1
     return found
 
@@ -110,7 +111,7 @@ def markdown(scores: Scores, catalogue: Sequence[str] = LISTED) -> str:
     """All tables of a trial."""
     rows = scores.rows
     parts = ["## Targets\n", target_table(targets(scores, catalogue)), "\n## Measures\n"]
-    body = [(name, _percent(*share), f"{share[0]} of {share[1]}") for name, share in scores.shares.items()]
+    body = [(name, percent(*share), f"{share[0]} of {share[1]}") for name, share in scores.shares.items()]
     for name, value in scores.totals.items():
         if name not in scores.shares:
             body.append((name, "-" if value is None else f"{value}" if isinstance(value, int) else f"{value:.3f}", ""))
@@ -130,7 +131,7 @@ def markdown(scores: Scores, catalogue: Sequence[str] = LISTED) -> str:
     for label in labels:
         hit = [c[label] for c in split.values() if label in c]
         a, b, n = (sum(c[i] for c in hit) for i in range(3))
-        every.append(f"{_percent(a, n)}, {_percent(b, n)}" if n else "-")
+        every.append(f"{percent(a, n)}, {percent(b, n)}" if n else "-")
     parts.append(table(("effect", *labels), [*lines, ("all", *every)]))
     parts.append("\n## What was named first\n")
     matrix = confusion(rows)
@@ -145,7 +146,7 @@ def markdown(scores: Scores, catalogue: Sequence[str] = LISTED) -> str:
     parts.append(
         table(
             ("stated", "mean stated", "true (95 % interval)", "cases"),
-            [(f"{lo:.2f} to {hi:.2f}", f"{p:.3f}", _percent(k, n), str(n)) for lo, hi, p, k, n in bins],
+            [(f"{lo:.2f} to {hi:.2f}", f"{p:.3f}", percent(k, n), str(n)) for lo, hi, p, k, n in bins],
         )
     )
     parts.append(f"\nBrier score: {'-' if brier is None else f'{brier:.4f}'}")

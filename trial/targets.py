@@ -98,10 +98,10 @@ def targets(scores: Scores, catalogue: Sequence[str] = LISTED) -> list[Target]:
     because nothing was named counts with a gap closed of 0.
     """
     rows = scores.rows
-    healthy = [r for r in rows if not r.ids]
+    healthy = [r for r in rows if r.healthy]
     listed = [r for r in rows if r.ids and all(i in catalogue for i in r.ids)]
-    unlisted = [r for r in rows if r.ids and not all(i in catalogue for i in r.ids)]
-    sick = [*listed, *unlisted]
+    unlisted = [r for r in rows if r.ids and not any(i in catalogue for i in r.ids)]
+    sick = [r for r in rows if r.ids]
     seen, lost = [r for r in listed if r.visible >= SEEN], f"{SEEN:g} x noise left after a refit"
     found: list[Target] = []
 
