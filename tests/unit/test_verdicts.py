@@ -95,12 +95,14 @@ def test_a_wrong_parameter_is_the_verdict_parameters() -> None:
     assert said(group("chamber", {"chamber.dead_volume": 1.0}), group("arm", {"muscle_creep": 1.0}))[1] == "effects"
 
 
-def test_names_that_are_more_probable_together_than_none_are_given() -> None:
-    (one,) = judge([group("arm", {"muscle_creep": 0.35, "muscle_hysteresis": 0.25, "unlisted": 0.4})])
+def test_a_name_that_is_more_probable_than_not_is_given() -> None:
+    (one,) = judge([group("arm", {"muscle_creep": 0.35, "muscle_creep+payload_swing": 0.25, "unlisted": 0.4})])
     assert (one.verdict, one.named) == ("effects", ("muscle_creep",))
-    assert one.ambiguity == [["unlisted"], ["muscle_creep"], ["muscle_hysteresis"]]
-    (other,) = judge([group("arm", {"muscle_creep": 0.25, "muscle_hysteresis": 0.2, "unlisted": 0.55})])
-    assert other.verdict == "unlisted"
+    assert one.ambiguity == [["unlisted"], ["muscle_creep"], ["muscle_creep", "payload_swing"]]
+    (two,) = judge([group("arm", {"muscle_creep": 0.45, "muscle_hysteresis": 0.4, "unlisted": 0.15})])
+    assert (two.verdict, two.named) == ("effects", ("muscle_creep",))
+    (none,) = judge([group("arm", {"muscle_creep": 0.35, "muscle_hysteresis": 0.25, "unlisted": 0.4})])
+    assert none.verdict == "unlisted"
 
 
 def test_healthy_groups() -> None:

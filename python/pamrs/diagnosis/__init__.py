@@ -184,7 +184,7 @@ def diagnose(case: Case | str | os.PathLike[str], *, progress: Callable[[str], N
     gas = [b for b in blocks if b.kind != "arm"]
     motion = [b for b in blocks if b.kind == "arm"]
     with _in_range(case.name):
-        groups = [examine(inner, outer, rig, members, say) for members in (gas, motion) if members]
+        groups = [group for members in (gas, motion) if members for group in examine(inner, outer, rig, members, say)]
         unsettled = _unsettled(rig) if motion else []
         if unsettled:
             groups = [_doubted(group) for group in groups]

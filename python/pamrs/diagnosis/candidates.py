@@ -259,20 +259,29 @@ class Attempts:
         except SimulationError:
             return None  # it leaves the range in which the model holds
 
-    def freed(self, names: tuple[str, ...], warm: Fit) -> Candidate | None:
-        """The baseline with some parameters freed from their tolerance, fitted to its end; None where it cannot be run."""
+    def freed(self, names: tuple[str, ...], baseline: Fit) -> Candidate | None:
+        """The baseline with some parameters freed from their tolerance, fitted to its end; None where it cannot be run.
 
-        def found(colour: dict[str, float], begun: Fit) -> Fit:
+        It begins at the nominal values, where the other parameters belong if these are the wrong ones; and, where that leaves more than
+        noise, at those that the baseline was moved to.
+        """
+
+        def found(colour: dict[str, float], begun: Fit | None) -> Fit:
             return fit(self.inner, self.nominal, (), {}, colour, warm=begun, freed=names, evaluations=THOROUGH, share=EXACT)
 
-        try:
-            best = found(self.white, warm)
-            colour = self.colour(best)
-            if max(colour.values()) > 2:
-                best = found(colour, best)
-            return replace(self.judged((), best), wrong=names)
-        except SimulationError:
-            return None  # it leaves the range in which the model holds
+        best: Candidate | None = None
+        for begin in (None, baseline):
+            try:
+                first = found(self.white, begin)
+                colour = self.colour(first)
+                judged = self.judged((), found(colour, first) if max(colour.values()) > 2 else first)
+            except SimulationError:
+                continue  # it leaves the range in which the model holds
+            if best is None or judged.misfit < best.misfit:
+                best = replace(judged, wrong=names)
+            if not any(significant(e) for e in best.fitted.values()):
+                break
+        return best
 
     def polished(self, candidate: Candidate) -> Candidate:
         """A fitted set of lasting effects, fitted on with the sensitivities of every parameter where it is.

@@ -32,6 +32,8 @@ MARGINAL, HARDLY, NOTHING = 1.35, 0.3, 0.6
 probability that it is."""
 LIKELY, CARRIES = 0.3, 0.8
 """Probability of ``unlisted`` from which a form of what is missing is looked for, and the share of the mismatch that it may leave."""
+NAMED = 0.5
+"""Probability of ``unlisted`` above which no name is more probable than its absence."""
 BESIDE, MAIN = 0.08, 0.5
 """Shares left by the best effect of lasting kind between which events are looked for beside it."""
 DOUBTFUL = 0.15
@@ -46,8 +48,11 @@ NEAR, STARTS, RICH = 0.6, 2, 3
 """Share of an effect's best gain from which another of its starts is fitted, how many, and of how many effects."""
 
 
-def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], say: Callable[[str], None]) -> Group:
+def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], say: Callable[[str], None]) -> list[Group]:
     """Refit the baseline of some blocks, locate what is left, and try every effect that acts there.
+
+    The blocks are one group, unless no name explains all of them and one does explain a block in which alone it acts: then that block
+    is a group of its own.
 
     Parameters
     ----------
@@ -85,14 +90,14 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
             # what the nominal model leaves in the held-out ones is what the parameters are moved for
             quiet = residuals(outer, nominal)
             ever = {b.name: max(was[b.name], excess(b, outer.recordings, quiet, floor), key=lambda e: e.ratio) for b in blocks}
-            return Group(blocks, ever, common.fitted, [common], {"": 1.0}, None, floor, [])
+            return [Group(blocks, ever, common.fitted, [common], {"": 1.0}, None, floor, [])]
     acting = [e for e in CATALOGUE if fits(nominal, e) and any(acts_in(e, b) for b in suspects or blocks)]
     if not suspects:
         # a parameter at the end of its plausible range is a symptom even where the fit is good
         nothing = Group(blocks, was, now, [start], {"": 1.0}, None, floor, [])
         lasting = [e for e in acting if e not in EVENTS]
         attempts = Attempts(inner, outer, nominal, floor, out, blocks)
-        return beside_quiet(attempts, faint(attempts, nothing, lasting, say) or nothing, lambda text: say(f"{names}: {text}"))
+        return [beside_quiet(attempts, faint(attempts, nothing, lasting, say) or nothing, lambda text: say(f"{names}: {text}"))]
     mismatch = max(suspects, key=lambda b: out[b.name].ratio + now[b.name].ratio)
     say(f"{names}: {mismatch.name} keeps {now[mismatch.name].systematic:.2g} noise units after the refit")
     # so little may as well be a floor that was taken too low, which events of free times would always mend
@@ -134,23 +139,64 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
     missing = screened.stand.power_left * (1.0 - 1.0 / max(now[mismatch.name].ratio, 1.0 + HARDLY))
     promised = {e: scores[0].gain / missing for e, scores in by_effect(screened.scores()).items()}
     group = Group(blocks, was, now, candidates, weighed, mismatch, floor, suspects, inclusion=often, promised=promised)
+    parts = _apart(group, most, seconds, ranging) if weighed["unlisted"] > NAMED else []
+    if parts:
+        return parts
     if weighed["unlisted"] < LIKELY or len({b.kind for b in suspects}) < len(suspects):
-        return group  # of two chambers one form would have to serve both
+        return [group]  # of two chambers one form would have to serve both
     if any(b.name == "load" for b in suspects):
         say(f"{names}: no form of what is missing is looked for, since that of a load is not in the simulator")
-        return group
+        return [group]
     group = replace(group, sought=True)
     closed = find_closure(inner, nominal, baseline, colour, suspects, say)
     if closed is None:
-        return group
+        return [group]
     try:
         judged = trial.judged(closed.effects, closed)
     except SimulationError:
-        return group
+        return [group]
     # what does not carry over to recordings that were held out is no form of anything
     if share_left(judged, start, suspects) > CARRIES:
-        return group
-    return replace(group, closure=judged, form=describe_closure(closed, inner, baseline))
+        return [group]
+    return [replace(group, closure=judged, form=describe_closure(closed, inner, baseline))]
+
+
+def _apart(group: Group, most: float, seconds: float, ranging: tuple[float, float] | None) -> list[Group]:
+    """A group in parts, where a name explains a block in which alone it acts and the others keep what they have; else nothing.
+
+    A leak of the tank is seen in the tank's pressure, whatever the chamber behind the valve keeps without a name.
+    """
+    start = group.candidates[0]
+    acting = {c: [b for b in group.suspects if _acts(c, b)] for c in group.candidates if c.names}
+
+    def weighed(blocks: list[Block]) -> dict[str, float]:
+        there = [c for c in acting if any(b in blocks for b in acting[c])]
+        return weigh([start, *there], blocks, most, seconds, ranging, acting)
+
+    own = {b.name: weighed([b]) for b in group.suspects if any(found == [b] for found in acting.values())}
+    named = [b for b in group.suspects if own.get(b.name, {"unlisted": 1.0})["unlisted"] < NAMED]
+    rest = [b for b in group.suspects if b not in named]
+    if not named or not rest:
+        return []
+
+    def part(blocks: list[Block], suspects: list[Block], probabilities: dict[str, float]) -> Group:
+        return replace(
+            group,
+            blocks=blocks,
+            candidates=[start, *(c for c in acting if c.key in probabilities)],
+            probabilities=probabilities,
+            mismatch=max(suspects, key=lambda b: start.held_out[b.name].ratio + start.fitted[b.name].ratio),
+            suspects=suspects,
+            promised={e: p for e, p in group.promised.items() if any(acts_in(e, b) for b in suspects)},
+        )
+
+    others = [b for b in group.blocks if b not in named]
+    return [*(part([b], [b], own[b.name]) for b in named), part(others, rest, weighed(rest))]
+
+
+def _acts(candidate: Candidate, block: Block) -> bool:
+    """Whether what a hypothesis names acts in a block."""
+    return any(acts_in(e, block) for e in candidate.effects) or any(name in block.parameters for name in candidate.wrong)
 
 
 def _odds(weighed: dict[str, float], candidate: Candidate) -> float:

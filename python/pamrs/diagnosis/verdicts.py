@@ -20,6 +20,10 @@ SHARED = 6.0
 """Odds of one effect that acts in two groups to two effects."""
 SETTLED, IN_SET = 0.9, 0.05
 """Probability from which an answer counts as settled, and from which a hypothesis belongs to the set that is left."""
+NAMED = 0.5
+"""Probability above which a name is given even where ``unlisted`` is more probable than each set of names that has it."""
+LISTED = 1e-4
+"""Probability from which a case lists a set of names: most products of what several blocks leave open are next to nothing."""
 MOST_SETS = 8
 """Sets that a case lists."""
 QUIET = {"parameters": 0.96, "none": 0.03, "unlisted": 0.01}
@@ -119,7 +123,7 @@ def _normalised(weights: dict[str, float]) -> dict[str, float]:
 
 
 def _judged(group: Group, probabilities: dict[str, float]) -> Judged:
-    """The verdict: healthy unless something else is more probable, a name where names are more probable than their absence."""
+    """The verdict: that of the most probable hypothesis; without a name only if no single name is more probable than not."""
     start = group.candidates[0]
     names = {key: p for key, p in probabilities.items() if key not in ("none", "parameters", "unlisted")}
     healthy = max((key for key in ("none", "parameters")), key=lambda key: probabilities.get(key, 0.0))
@@ -128,7 +132,8 @@ def _judged(group: Group, probabilities: dict[str, float]) -> Judged:
     ambiguity = _sets(probabilities)
     if probabilities.get(healthy, 0.0) >= max(without, names.get(best, 0.0)):
         return Judged(group, healthy, probabilities, ambiguity, start)
-    if sum(names.values()) <= without:
+    marginal = {name: sum(p for key, p in names.items() if name in key.split("+")) for name in _names(names)}
+    if names.get(best, 0.0) <= without and max(marginal.values(), default=0.0) <= NAMED:
         return Judged(group, "unlisted", probabilities, ambiguity, start)
     chosen = next(c for c in group.candidates if c.key == best)
     return Judged(group, "effects" if chosen.effects else "parameters", probabilities, ambiguity, chosen)
@@ -165,7 +170,7 @@ def case_probabilities(judged: Sequence[Judged]) -> dict[str, float]:
         rest = next((key for key in ("unlisted", "parameters") if key in keys), "none")
         key = "+".join(names) or rest
         found[key] = found.get(key, 0.0) + math.prod(p for _, p in choice)
-    return _normalised(found)
+    return _normalised({key: p for key, p in found.items() if p >= LISTED or key in QUIET})
 
 
 def case_ambiguity(judged: Sequence[Judged]) -> list[list[str]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -116,7 +117,12 @@ def explains(candidate: Candidate, baseline: Candidate, suspects: list[Block]) -
 
 
 def weigh(
-    candidates: list[Candidate], suspects: list[Block], most: float, seconds: float, ranging: tuple[float, float] | None = None
+    candidates: list[Candidate],
+    suspects: list[Block],
+    most: float,
+    seconds: float,
+    ranging: tuple[float, float] | None = None,
+    own: Mapping[Candidate, list[Block]] | None = None,
 ) -> dict[str, float]:
     """Probabilities over sets of effects and ``unlisted``.
 
@@ -129,16 +135,18 @@ def weigh(
     constants are those under which the stated probabilities came true in a trial with other seeds than the published one
     (docs/decisions/0014).
 
-    ``seconds`` is the length of the longest recording that was fitted, ``ranging`` the range of a joint's angle in them [rad].
+    ``seconds`` is the length of the longest recording that was fitted, ``ranging`` the range of a joint's angle in them [rad], ``own``
+    the blocks in which each set is judged against ``unlisted``, where these are not all the suspects.
     """
     named = [c for c in candidates if c.names]
     if not named:
         return {"unlisted": 1.0}
     start = candidates[0]
-    trusted = {c: _trusted(c, start, suspects, most, seconds) for c in named}
+    trusted = {c: _trusted(c, start, suspects if own is None else own[c], most, seconds) for c in named}
 
     def weights_of(granted: float) -> dict[Candidate, float]:
         scores = {c: _score(c, start, suspects, granted) - STANDING * stands(c, seconds) - unlikely(c, ranging) for c in named}
+        scores = _beside_values(scores)
         top = max(scores.values())
         return {c: trusted[c] * math.exp(max(-60.0, s - top)) for c, s in scores.items()}
 
@@ -182,6 +190,24 @@ def same_recordings(candidate: Candidate, effect: str, seconds: float) -> bool:
     telling, spread = own[same.without] * seconds, candidate.fit.std.get(f"{effect}.{same.without}", 0.0) * seconds
     at_rest = abs(telling) < max(ALIKE * abs(own[same.size]), UNTOLD * spread)
     return bool(own[same.size] > 0.0 and at_rest and all(own[name] == value for name, value in same.held))
+
+
+def _beside_values(scores: dict[Candidate, float]) -> dict[Candidate, float]:
+    """Scores of effects and of wrong values made comparable: what the priors of the other parameters lose counts between the two.
+
+    A value that is wrong lets the others go back to where they were expected; sets of effects keep their order among each other,
+    since what moves beside them is the form of their equations as well.
+    """
+    if not any(c.wrong for c in scores):
+        return scores
+    effects = [c for c in scores if not c.wrong]
+    shared = strained(max(effects, key=lambda c: scores[c])) if effects else 0.0
+    return {c: score - (strained(c) if c.wrong else shared) for c, score in scores.items()}
+
+
+def strained(candidate: Candidate) -> float:
+    """Half of the sum of squares of the priors of a hypothesis, as far as it counts."""
+    return min(0.5 * sum(moved * moved for moved in candidate.fit.held_by_prior.values()), DECIDED)
 
 
 def _trusted(candidate: Candidate, baseline: Candidate, suspects: list[Block], most: float, seconds: float) -> float:

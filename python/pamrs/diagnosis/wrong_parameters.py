@@ -29,7 +29,7 @@ AT_WALL = 2.9
 """Tolerances from which a refitted parameter stands at its wall."""
 RARE = 4.6
 """Logarithm of the odds against a parameter that is outside its tolerances: one file in a hundred."""
-MOST, LEAST_GAIN, LEAST_SHARE = 5, 12.0, 0.08
+MOST, LEAST_GAIN, LEAST_SHARE = 5, 2.0 * RARE, 0.08
 """Hypotheses that are fitted; gain in chi-square by the linear model, and share of the largest, from which one is."""
 ONE_MISTAKE: tuple[tuple[tuple[str, str], tuple[str, str]], ...] = (
     (("chamber", "dead_volume"), ("valve", "discharge_area_max")),
@@ -151,8 +151,9 @@ def beside_quiet(trial: Attempts, quiet: Group, say: Callable[[str], None]) -> G
     shown = [c for c in found if not any(significant(e) for e in c.fitted.values())]
     if not shown:
         return quiet
-    before = _cost(trial, start.fit)
-    scores = {c: 0.5 * (before - _cost(trial, c.fit)) - rarity(c) for c in shown}
+    colour = trial.colour(start.fit)
+    before = _cost(trial, start.fit, colour)
+    scores = {c: 0.5 * (before - _cost(trial, c.fit, colour)) - rarity(c) for c in shown}
     top = max(0.0, *scores.values())
     weights = {c: math.exp(max(-60.0, score - top)) for c, score in scores.items()}
     total = math.exp(-top) + sum(weights.values())
@@ -162,7 +163,7 @@ def beside_quiet(trial: Attempts, quiet: Group, say: Callable[[str], None]) -> G
     return replace(quiet, candidates=[*quiet.candidates, *shown], probabilities=probabilities)
 
 
-def _cost(trial: Attempts, found: Fit) -> float:
-    """Sum of squares of a fit, white, and of the priors that hold it."""
-    rows, _ = stacked(trial.inner, found.residuals, trial.colour(found))
+def _cost(trial: Attempts, found: Fit, colour: dict[str, float]) -> float:
+    """Sum of squares of a fit and of the priors that hold it."""
+    rows, _ = stacked(trial.inner, found.residuals, colour)
     return float(rows @ rows) + sum(moved * moved for moved in found.held_by_prior.values())

@@ -250,14 +250,14 @@ def _found(diagnosis: Diagnosis, block: dict[str, Any]) -> str:
     """What was found in one group of blocks."""
     place = _place(diagnosis, block)
     if len(block["ambiguity"]) > 1:
-        told = f"these recordings cannot tell {_from_each_other(block['ambiguity'])}"
+        rivals = f"these recordings cannot tell {_from_each_other(block['ambiguity'])}"
         if any(s in (["none"], ["parameters"]) for s in block["ambiguity"]):
-            return f"physics may be missing{place}: {told}"
+            return f"physics may be missing{place}: {rivals}"
         if all("." in name for s in block["ambiguity"] for name in s):
-            return f"the rig file is wrong about the {_place(diagnosis, block).rpartition(' ')[2] or 'rig'}: {told}"
+            return f"the rig file is wrong: {rivals}"
         if any("." in name for s in block["ambiguity"] for name in s):
-            return f"physics is missing{place}, or the rig file is wrong: {told}"
-        return f"physics is missing{place}: {told}"
+            return f"physics is missing{place}, or the rig file is wrong: {rivals}"
+        return f"physics is missing{place}: {rivals}"
     told = {str(e["id"]): e for e in diagnosis.effects}
     if block["effects"]:
         names = " and ".join(str(told.get(e, {}).get("name") or label(e)) for e in block["effects"])
