@@ -45,7 +45,8 @@ class Proof:
     results : Path
         Folder with ``NAME/out.json`` and ``run.json``.
     cases : dict of str to dict
-        By name: ``verdict`` and ``seconds``, or ``error``; as in ``run.json``.
+        By name: ``verdict``, ``effects``, ``wrong_parameters``, ``unexplained`` (blocks without a name) and ``seconds``, or ``error``;
+        as in ``run.json``.
     kept : int
         Results that were there before.
     """
@@ -238,7 +239,22 @@ def _ended(running: _Running, out: Path) -> dict[str, Any]:
 def _entry(result: dict[str, Any]) -> dict[str, Any]:
     seconds = result.get("seconds")
     known = isinstance(seconds, int | float) and math.isfinite(seconds)
-    return {"verdict": result["verdict"], **({"seconds": seconds} if known else {})}
+    named = {
+        "effects": [e.get("id") for e in result.get("effects") or []] if result["verdict"] == "effects" else [],
+        "wrong_parameters": [w.get("name") for w in result.get("wrong_parameters") or []],
+        "unexplained": [u.get("block") for u in result.get("unexplained") or [] if u.get("verdict") == "unlisted"],
+    }
+    return {"verdict": result["verdict"], **{key: v for key, v in named.items() if v}, **({"seconds": seconds} if known else {})}
+
+
+def _said(entry: dict[str, Any]) -> str:
+    """What a case came to, in one line: verdict, names, and blocks that keep a mismatch without one."""
+    if "error" in entry:
+        return f"error: {entry['error']}"
+    names = ", ".join([*entry.get("effects", []), *(f"wrong {name}" for name in entry.get("wrong_parameters", []))])
+    kept = ", ".join(entry.get("unexplained", []))
+    beside = f"; without a name in {kept}" if kept and entry["verdict"] != "unlisted" else ""
+    return f"{entry['verdict']}{' ' * bool(names)}{names}{beside}"
 
 
 def _before(results: Path) -> dict[str, Any]:
@@ -364,9 +380,8 @@ def prove(
                 proof.cases[one.case.name] = {**entry, "version": __version__, "code": code, "case_sha256": digests[one.case.name]}
                 record()
                 left = (time.perf_counter() - began) / done * (todo - done)
-                told = f"error: {entry['error']}" if "error" in entry else entry["verdict"]
                 rest = f"; about {_span(left)} left" if done < todo else ""
-                tell(f"[{proof.kept + done}/{len(found)}] {one.case.name}: {told}, {entry['wall_seconds']:.1f} s{rest}")
+                tell(f"[{proof.kept + done}/{len(found)}] {one.case.name}: {_said(entry)}, {entry['wall_seconds']:.1f} s{rest}")
             if not ended:
                 time.sleep(_POLL)
     finally:

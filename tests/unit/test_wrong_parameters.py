@@ -106,3 +106,24 @@ def test_pairs_of_one_mistake_are_suspected_with_either_at_its_wall() -> None:
     assert loose.values["arm.payload"] == pytest.approx(0.7 * 9.07, rel=0.03)
     assert "arm.payload" not in loose.held_by_prior
     assert loose.cost < 0.2 * baseline.cost
+
+
+def test_a_dead_time_of_the_command_and_a_late_clock_stay_a_set() -> None:
+    rig = pamrs.rigs.shoulder()
+
+    def late(name: str, role: str, seed: int) -> Recording:
+        rng = np.random.default_rng(seed)
+        time = np.arange(0.0, 12.0, 0.005)
+        command = 5.0 + 0.5 * np.sin(2 * np.pi * 0.2 * time + seed) + 0.4 * np.sign(np.sin(2 * np.pi * 0.35 * time + 2 * seed))
+        run = pamrs.simulate(rig, valve_command=np.concatenate([np.full(5, 5.0), command[:-5]]), sample_time=0.005)
+        channels = {"valve_command": command, **{n: run[n] + NOISE[n] * rng.standard_normal(time.size) for n in NAMES[1:]}}
+        mask = {n: np.ones(time.size, dtype=bool) for n in channels}
+        return Recording(name, role, time, 0.005, channels, mask, [], dict.fromkeys(channels, ""))
+
+    roles = ("fit", "fit", "held_out")
+    found = pamrs.diagnose(pamrs.Case("late", rig, [late(f"r{k}", role, k) for k, role in enumerate(roles)], Path()))
+    assert found.verdict == "effects"
+    assert sorted(found.ambiguity) == [["clock_skew"], ["input_path_lag"]]
+    told = found.effects[0]["parameters"]
+    assert told["delay"]["value"] + told["time_constant"]["value"] == pytest.approx(0.025, rel=0.2)
+    assert "with the logger of the pressures" in found.next_experiment["text"]

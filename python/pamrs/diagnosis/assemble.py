@@ -161,7 +161,7 @@ def _next(
     """What to record next: simulated with every hypothesis that has a model, where two or more are left; else in words."""
     left = _hypotheses(judged, probabilities, nominal)
     recordings = [*fitted.recordings, *(held.recordings if held is not fitted else [])]
-    if ambiguity and len(left) > 1:
+    if ambiguity and len(left) > 1 and not words.same_data(ambiguity):
         common = set.intersection(*(set(p.noise) for p in recordings))
         noise = {channel: float(np.median([p.noise[channel] for p in recordings])) for channel in sorted(common)}
         with contextlib.suppress(DiagnosisError, ParameterError, SimulationError):  # a rig that no experiment of the library suits

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from pamrs.report.text import display_unit, format_number, kept_sentence, senten
 from pamrs.rig import Rig
 from pamrs.rig_schema import qualified
 
-__all__ = ["absolute", "next_experiment", "reservations", "unknown_volumes", "verdict", "warnings", "where", "worse"]
+__all__ = ["absolute", "next_experiment", "reservations", "same_data", "unknown_volumes", "verdict", "warnings", "where", "worse"]
 
 
 def unknown_volumes(rig: Rig) -> list[str]:
@@ -219,6 +220,16 @@ def _sentence(text: str) -> str:
     return _capital(text) + "."
 
 
+def same_data(ambiguity: list[list[str]]) -> str:
+    """What tells the two most probable sets apart where they are the same data; empty where they are not."""
+    for one, other in itertools.permutations([set(s) for s in ambiguity[:2]], 2):
+        for effect in one:
+            same = EFFECTS[effect].same_data if effect in EFFECTS else None
+            if same is not None and other == one - {effect} | {same.effect}:
+                return same.told_by
+    return ""
+
+
 def next_experiment(kind: str, probabilities: dict[str, float], ambiguity: list[list[str]], rig: Rig) -> dict[str, Any]:
     """What to record next: the experiment that separates the leading hypotheses.
 
@@ -228,6 +239,9 @@ def next_experiment(kind: str, probabilities: dict[str, float], ambiguity: list[
     if not ambiguity and kind != "unlisted":
         text = "The name is settled by these recordings; no further one is needed for it."
         return {"text": text, "excitation": {}, "expected_information_bits": 0.0}
+    same = same_data(ambiguity)
+    if same:
+        return {"text": same, "excitation": {}, "expected_information_bits": None}
     doubted = [k for s in ambiguity for k in s if k in EFFECTS and k not in _SEPARATE]
     parameters = [k for s in ambiguity for k in s if k == "parameters" or is_parameter(k)]
     if parameters and doubted:

@@ -55,6 +55,8 @@ class SameData:
         The own parameter that would tell the two apart, if it were not zero.
     held : tuple of (str, float)
         Own parameters with the values at which the two are the same.
+    told_by : str
+        What tells the two apart, since no recording of the same channels does.
     """
 
     effect: str
@@ -62,6 +64,7 @@ class SameData:
     size: str
     without: str
     held: tuple[tuple[str, float], ...]
+    told_by: str
 
 
 @dataclass(frozen=True, slots=True)

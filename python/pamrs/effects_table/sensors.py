@@ -38,7 +38,16 @@ SENSORS: Final[tuple[EffectInfo, ...]] = (
         ),
         reference="Mills (1991), offset and skew of clocks",
         rivals=("input_path_lag", "pressure_lag", "tube_flow_restriction"),
-        same_data=SameData("input_path_lag", "delay", "offset", "rate", (("angle_share", 1.0),)),
+        same_data=SameData(
+            "input_path_lag",
+            "delay",
+            "offset",
+            "rate",
+            (("angle_share", 1.0),),
+            "No excitation tells a dead time from a clock that is late by the same time: record the command as it arrives at the valve "
+            "with the logger of the pressures (a dead time stays, a late clock is gone), or record for an hour and see whether the delay "
+            "grows.",
+        ),
     ),
 )
 """In the order of the catalogue."""
