@@ -99,8 +99,9 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
         tried=_tried(groups),
         asked=_asked(groups),
     )
-    forms = [g.form for g in groups if g.closure is not None] if changed else []
-    diagnosis.text = words.verdict(diagnosis, case, gap, forms, sought=any(g.sought for g in groups))
+    missing = [j.group for j in judged if j.verdict == "unlisted"]
+    forms = [g.form for g in missing if g.closure is not None]
+    diagnosis.text = words.verdict(diagnosis, case, gap, forms, sought=any(g.sought for g in missing))
     return diagnosis
 
 

@@ -78,14 +78,21 @@ def unexplained(entries: list[dict[str, Any]]) -> list[dict[str, Any]]:
     ----------
     entries : list of dict
         From :func:`block_entries`. The size is that of the held-out recordings, where they show it, else of the fitted ones.
+
+    Returns
+    -------
+    list of dict
+        ``block``, ``channel``, ``unit``, ``noises`` and ``size`` [unit] of what names leave, and the ``verdict`` of the group.
     """
     found = []
     for entry in entries:
         if entry["verdict"] == "none" or (entry["verdict"] == "parameters" and not entry["wrong_parameters"]):
             continue
         for block in entry["mismatch"]:
-            stages = [part["after"] for part in (block["held_out"], block["fitted"]) if part is not None]
-            left = next((after for after in stages if after["more_than_noise"]), None)
+            # a form without a name takes up what no name explains, and is no explanation
+            stage = "refit" if entry["verdict"] == "unlisted" else "after"
+            sizes = [part[stage] for part in (block["held_out"], block["fitted"]) if part is not None]
+            left = next((size for size in sizes if size["more_than_noise"]), None)
             if left is not None:
                 size = {key: left[key] for key in ("noises", "size")}
                 found.append({**{key: block[key] for key in ("block", "channel", "unit")}, **size, "verdict": entry["verdict"]})

@@ -32,7 +32,7 @@ MARGINAL, HARDLY, NOTHING = 1.35, 0.3, 0.6
 probability that it is."""
 LIKELY, CARRIES = 0.3, 0.8
 """Probability of ``unlisted`` from which a form of what is missing is looked for, and the share of the mismatch that it may leave."""
-NAMED = 0.5
+UNNAMED = 0.5
 """Probability of ``unlisted`` above which no name is more probable than its absence."""
 BESIDE, MAIN = 0.08, 0.5
 """Shares left by the best effect of lasting kind between which events are looked for beside it."""
@@ -139,7 +139,7 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
     missing = screened.stand.power_left * (1.0 - 1.0 / max(now[mismatch.name].ratio, 1.0 + HARDLY))
     promised = {e: scores[0].gain / missing for e, scores in by_effect(screened.scores()).items()}
     group = Group(blocks, was, now, candidates, weighed, mismatch, floor, suspects, inclusion=often, promised=promised)
-    parts = _apart(group, most, seconds, ranging) if weighed["unlisted"] > NAMED else []
+    parts = _apart(group, most, seconds, ranging) if weighed["unlisted"] > UNNAMED else []
     if parts:
         return parts
     if weighed["unlisted"] < LIKELY or len({b.kind for b in suspects}) < len(suspects):
@@ -174,7 +174,7 @@ def _apart(group: Group, most: float, seconds: float, ranging: tuple[float, floa
         return weigh([start, *there], blocks, most, seconds, ranging, acting)
 
     own = {b.name: weighed([b]) for b in group.suspects if any(found == [b] for found in acting.values())}
-    named = [b for b in group.suspects if own.get(b.name, {"unlisted": 1.0})["unlisted"] < NAMED]
+    named = [b for b in group.suspects if own.get(b.name, {"unlisted": 1.0})["unlisted"] < UNNAMED]
     rest = [b for b in group.suspects if b not in named]
     if not named or not rest:
         return []

@@ -54,7 +54,13 @@ def where(located: str | None, problem: Problem, judged: list[Judged], picture: 
     group = next((g for g in groups if g.mismatch is not None and g.mismatch.name == located), None)
     wrong = next((j.wrong for j in judged if block in j.group.blocks), ())
     faint = group is not None and group.faint
-    if group is not None and group.instead:
+    mistaken = bool(wrong) and (group is None or faint)
+    if mistaken:
+        text = (
+            f"Inside its tolerances the {located} block{parts} fits to its noise, but only with parameters at their ends; with another "
+            f"value of {' and '.join(wrong)} they come back."
+        )
+    elif group is not None and group.instead:
         moved = ", ".join(f"{n} by {group.candidates[0].fit.moved[n]:+.1f} tolerances" for n in group.instead)
         text = (
             f"No block keeps more than its noise, but for that the refit of the {located} block{parts} had to move {moved}, and an "
@@ -69,11 +75,6 @@ def where(located: str | None, problem: Problem, judged: list[Judged], picture: 
         text = (
             f"The {located} block{parts} keeps hardly more than its noise ({found.systematic:.2g} times it in "
             f"{block.channel.replace('_', ' ')}): its floor may as well have been taken too low."
-        )
-    elif wrong and group is None:
-        text = (
-            f"Inside its tolerances the {located} block{parts} fits to its noise, but only with parameters at their ends; with another "
-            f"value of {' and '.join(wrong)} they come back."
         )
     elif all(g.mismatch is None for g in groups):
         text = (
@@ -174,7 +175,9 @@ def _beside(diagnosis: Diagnosis, missing: list[dict[str, Any]], forms: list[str
     if not missing:
         return text
     kept = [u for u in diagnosis.unexplained if u["verdict"] == "unlisted"]
-    text += "\n\nWhat stays open. " + " ".join(_capital(kept_sentence(u)) + "." for u in kept)
+    blocks = " and ".join(name for b in missing for name in b["blocks"])
+    said = [_capital(kept_sentence(u)) + "." for u in kept] or [f"Something acts in {blocks} that no listed effect explains."]
+    text += "\n\nWhat stays open. " + " ".join(said)
     if forms:
         text += " As a form without a name, which is in the model: " + " ".join(forms)
     elif sought:

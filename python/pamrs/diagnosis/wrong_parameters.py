@@ -27,9 +27,9 @@ Array = NDArray[np.float64]
 
 AT_WALL = 2.9
 """Tolerances from which a refitted parameter stands at its wall."""
-RARE = 4.6
-"""Logarithm of the odds against a parameter that is outside its tolerances: one file in a hundred."""
-MOST, LEAST_GAIN, LEAST_SHARE = 5, 2.0 * RARE, 0.08
+ONE_FILE_IN_A_HUNDRED = 4.6
+"""Logarithm of the odds against a parameter that is outside its tolerances."""
+MOST_FREED, PROMISING, BESIDE_LARGEST = 5, 2.0 * ONE_FILE_IN_A_HUNDRED, 0.08
 """Hypotheses that are fitted; gain in chi-square by the linear model, and share of the largest, from which one is."""
 ONE_MISTAKE: tuple[tuple[tuple[str, str], tuple[str, str]], ...] = (
     (("chamber", "dead_volume"), ("valve", "discharge_area_max")),
@@ -83,9 +83,9 @@ def freed(trial: Attempts, baseline: Fit, say: Callable[[str], None]) -> list[Ca
         Receives progress.
     """
     gains = _promised(trial.inner, trial.nominal, baseline, suspected(baseline, trial.inner.blocks), trial.white)
-    least = max(LEAST_GAIN, LEAST_SHARE * max(gains.values(), default=0.0))
+    least = max(PROMISING, BESIDE_LARGEST * max(gains.values(), default=0.0))
     found = []
-    for names in sorted((n for n, gain in gains.items() if gain > least), key=lambda n: -gains[n])[:MOST]:
+    for names in sorted((n for n, gain in gains.items() if gain > least), key=lambda n: -gains[n])[:MOST_FREED]:
         say(f"trying another value of {' and '.join(names)}")
         candidate = trial.freed(names, baseline)
         if candidate is not None and outside(candidate):
@@ -137,7 +137,7 @@ def _ends(nominal: Rig, names: list[str]) -> tuple[list[tuple[str, float]], list
 
 def rarity(candidate: Candidate) -> float:
     """Logarithm of the odds against a file that is so wrong: the further outside, the rarer, but less and less so."""
-    return sum(RARE + math.log(max(1.0, abs(candidate.fit.moved[name]) / WIDEST)) for name in candidate.wrong)
+    return sum(ONE_FILE_IN_A_HUNDRED + math.log(max(1.0, abs(candidate.fit.moved[name]) / WIDEST)) for name in candidate.wrong)
 
 
 def beside_quiet(trial: Attempts, quiet: Group, say: Callable[[str], None]) -> Group:
@@ -148,7 +148,7 @@ def beside_quiet(trial: Attempts, quiet: Group, say: Callable[[str], None]) -> G
     """
     start = quiet.candidates[0]
     found = freed(trial, start.fit, say)
-    shown = [c for c in found if not any(significant(e) for e in c.fitted.values())]
+    shown = [c for c in found if not any(significant(e) for e in c.fitted.values()) and _carries_over(c, start)]
     if not shown:
         return quiet
     colour = trial.colour(start.fit)
@@ -161,6 +161,12 @@ def beside_quiet(trial: Attempts, quiet: Group, say: Callable[[str], None]) -> G
     probabilities = dict(quiet.probabilities) | {"": unchanged * math.exp(-top) / total}
     probabilities |= {c.key: unchanged * weight / total for c, weight in weights.items()}
     return replace(quiet, candidates=[*quiet.candidates, *shown], probabilities=probabilities)
+
+
+def _carries_over(candidate: Candidate, start: Candidate) -> bool:
+    """Whether held-out recordings are predicted as well as by the baseline, or to their noise."""
+    pairs = [(candidate.held_out[name], was) for name, was in start.held_out.items()]
+    return all(now.ratio <= max(now.limit, was.ratio) for now, was in pairs)
 
 
 def _cost(trial: Attempts, found: Fit, colour: dict[str, float]) -> float:

@@ -45,8 +45,8 @@ SENSORS: Final[tuple[EffectInfo, ...]] = (
             "rate",
             (("angle_share", 1.0),),
             "No excitation tells a dead time from a clock that is late by the same time: record the command as it arrives at the valve "
-            "with the logger of the pressures (a dead time stays, a late clock is gone), or record for an hour and see whether the delay "
-            "grows.",
+            "with the logger of the pressures (a dead time stays, a late clock is gone), or record for an hour and see whether the "
+            "delay grows.",
         ),
     ),
 )
