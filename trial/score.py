@@ -195,13 +195,14 @@ def _numbers(table: dict[str, Any]) -> dict[str, float]:
 
 
 def _among(result: dict[str, Any], names: Sequence[str]) -> float:
-    """Probability that all these names are among what is missing, by the block that knows most of them."""
+    """Probability that all these names are among what is missing, each by the block that knows most of it."""
 
-    def within(told: dict[str, Any]) -> float:
+    def within(told: dict[str, Any], name: str) -> float:
         chances = _numbers(told.get("probabilities", {})).items()
-        return min(1.0, sum(p for k, p in chances if set(names) <= _parts(k, True)))
+        return min(1.0, sum(p for k, p in chances if name in _parts(k, True)))
 
-    return max((within(b) for b in result.get("blocks") or [result]), default=0.0)
+    blocks = result.get("blocks") or [result]
+    return math.prod(max((within(b, name) for b in blocks), default=0.0) for name in names)
 
 
 def _block_of(effect: str) -> str:
@@ -310,7 +311,8 @@ def score_case(key: dict[str, Any], result: dict[str, Any] | None, catalogue: Se
     top = named[: max(1, len(listed) if mixed else len(truth))] if verdict == "effects" else []
     told_wrong = list(result.get("wrong_parameters") or [])
     wrong_named = tuple(str(e["name"]) for e in told_wrong)
-    unexplained = tuple(str(e["block"]) for e in result.get("unexplained") or [])
+    # what a name leaves is no claim of its own
+    unexplained = tuple(str(e["block"]) for e in result.get("unexplained") or [] if e.get("verdict", "unlisted") == "unlisted")
     rest = {"unlisted"} if unexplained else set[str]()
     answer = _answer(verdict, named)
     sets = [{part for i in group for part in str(i).split("+")} for group in result.get("ambiguity", [])]

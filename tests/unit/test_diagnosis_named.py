@@ -94,7 +94,7 @@ def test_the_channels_decide_what_can_be_told_apart(name: str, channels: tuple[s
 def test_a_nominal_antagonist_has_nothing_missing(rig: pamrs.Rig) -> None:
     found = pamrs.diagnose(case(rig, rig))
     assert found.verdict in ("none", "parameters")
-    assert set(found.blocks) == {"supply", "chamber.flexor", "chamber.extensor", "arm.elbow"}
+    assert set(found.residuals) == {"supply", "chamber.flexor", "chamber.extensor", "arm.elbow"}
     assert "chamber.flexor.dead_volume" in found.parameters
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import pamrs
@@ -114,6 +114,7 @@ def test_healthy_groups() -> None:
     assert judged[0].ambiguity == [["parameters"], ["unlisted"]]
 
 
+@settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(
     gas=st.dictionaries(
         st.sampled_from(["leak_muscle", "pressure_lag", "chamber.dead_volume", "unlisted"]), st.floats(0.01, 1.0), min_size=1

@@ -51,13 +51,13 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
     judged = judge(groups)
     verdict, probabilities, ambiguity = case_verdict(judged), case_probabilities(judged), case_ambiguity(judged)
     starts = _settled(nominal, fitted, judged, [g.candidates[0] for g in groups])
-    baseline = _merged(nominal, judged, starts)
+    baseline = _merged(nominal, starts)
     changed = verdict in ("effects", "unlisted") or any(j.wrong for j in judged)
     chosen = starts
     if changed:
         chosen = _settled(nominal, fitted, judged, [_model_of(j, start) for j, start in zip(judged, starts, strict=True)])
         judged = [replace(j, chosen=c) if j.named or j.wrong else j for j, c in zip(judged, chosen, strict=True)]
-    model = _merged(nominal, judged, chosen) if changed else nominal if verdict == "none" else baseline
+    model = _merged(nominal, chosen) if changed else nominal if verdict == "none" else baseline
     floor = {k: v for g in groups for k, v in g.floor.items()}
     stages = {"before": nominal, "refit": baseline, "after": model}
     events = next((c.fit.events for c in chosen if c.fit.events is not None), None) if model.effects else None
@@ -92,7 +92,7 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
         rig=_with_std(model, chosen) if model.effects else model,
         traces=_traces(fitted, held, fit_found, out_found),
         blocks=blocks,
-        unexplained=unexplained(blocks),
+        unexplained=unexplained(judged, blocks),
         wrong_parameters=_wrong(nominal, judged, fitted, held_table or fit_table),
         residuals=_block_table(groups),
         condition_map=picture.map,
@@ -167,7 +167,8 @@ def _next(
         noise = {channel: float(np.median([p.noise[channel] for p in recordings])) for channel in sorted(common)}
         with contextlib.suppress(DiagnosisError, ParameterError, SimulationError):  # a rig that no experiment of the library suits
             return propose(nominal, left, noise, recordings)
-    return words.next_experiment(verdict, probabilities, ambiguity, nominal)
+    missing = [j.group.mismatch.name for j in judged if j.verdict == "unlisted" and j.group.mismatch is not None]
+    return words.next_experiment(verdict, probabilities, ambiguity, nominal, missing)
 
 
 def _hypotheses(judged: list[Judged], probabilities: dict[str, float], nominal: Rig) -> list[tuple[str, Rig, float]]:
@@ -181,7 +182,7 @@ def _hypotheses(judged: list[Judged], probabilities: dict[str, float], nominal: 
         if any(c.fit.events is not None for c in chosen):
             continue
         if {name for c in chosen for name in c.names} == wanted:
-            found.append((key, _with_std(_merged(nominal, judged, chosen), chosen), p))
+            found.append((key, _with_std(_merged(nominal, chosen), chosen), p))
     return found
 
 
@@ -192,53 +193,52 @@ def _inside(group: Group, wanted: frozenset[str]) -> Candidate:
     return named[weights.index(max(weights))] if named else group.candidates[0]
 
 
-def _order(judged: list[Judged]) -> list[int]:
-    """Groups from the one whose sensors' zeros count least to the one that settles them.
+def _owners(candidates: list[Candidate]) -> dict[str, int]:
+    """The group that tells most of each parameter that several have (sensors' zeros): the one with the least standard deviation.
 
-    A zero that is wrong itself is known best; what a group without a name leaves may be in its zeros; of the others the last (the arm)
-    tells most.
+    What a group leaves without a name is in its colour, and so in its standard deviations.
     """
-
-    def rank(k: int) -> tuple[bool, bool, int]:
-        return any(name.startswith("sensors.") for name in judged[k].wrong), judged[k].verdict != "unlisted", k
-
-    return sorted(range(len(judged)), key=rank)
+    found: dict[str, int] = {}
+    for k, candidate in enumerate(candidates):
+        for name in candidate.fit.moved:
+            spread = [c.fit.std.get(name, math.inf) for c in (candidate, candidates[found.get(name, k)])]
+            if name not in found or spread[0] <= spread[1]:
+                found[name] = k
+    return found
 
 
 def _settled(nominal: Rig, problem: Problem, judged: list[Judged], chosen: list[Candidate]) -> list[Candidate]:
-    """The fits of all groups but one again, with what that one settles (the sensors' zeros) held, where theirs are others.
+    """The fits of the groups again, with what another group knows better (the sensors' zeros) held, where theirs are others.
 
     A rig has one zero of a sensor; the other values of a fit are right beside its own only.
     """
-    *others, last = _order(judged)
-    settling = chosen[last].fit
+    owners = _owners(chosen)
     found = list(chosen)
-    for k in others:
-        candidate = chosen[k]
-        common = {n: settling.values[n] for n in candidate.fit.moved if n in settling.moved}
-        apart = any(abs(candidate.fit.moved[n] - settling.moved[n]) > APART for n in common)
+    for k, candidate in enumerate(chosen):
+        common = {n: chosen[owners[n]].fit for n in candidate.fit.moved if owners[n] != k and n.startswith("sensors.")}
+        apart = any(abs(candidate.fit.moved[n] - other.moved[n]) > APART for n, other in common.items())
         if apart and candidate.fit.events is None:
             own = replace(problem, blocks=judged[k].group.blocks)
-            free, fixed = parts_of(start_of(candidate.fit, effect) for effect in candidate.effects)
+            effects = candidate.fit.effects
+            free, fixed = parts_of(start_of(candidate.fit, effect) for effect in effects)
+            settled = {n: other.values[n] for n, other in common.items()}
             colour = colour_of(own, candidate.fit)
             with contextlib.suppress(SimulationError):  # it then stays as it was fitted
                 again = fit(
-                    own, nominal, candidate.effects, free, colour,
-                    fixed=fixed, warm=candidate.fit, share=EXACT, settled=common, freed=candidate.wrong,
+                    own, nominal, effects, free, colour,
+                    fixed=fixed, warm=candidate.fit, share=EXACT, settled=settled, freed=candidate.fit.freed,
                 )  # fmt: skip
                 found[k] = replace(candidate, fit=again)
     return found
 
 
-def _merged(nominal: Rig, judged: list[Judged], candidates: list[Candidate]) -> Rig:
-    """One rig from the groups' fits; where two have a value of their own, that of the group that settles it."""
-    values: dict[str, float] = {}
+def _merged(nominal: Rig, candidates: list[Candidate]) -> Rig:
+    """One rig from the groups' fits; where two have a value of their own, that of the group that knows it best."""
     rig = nominal
-    for candidate in (candidates[k] for k in _order(judged)):
-        values |= {n: v for n, v in candidate.fit.values.items() if n in nominal.parameters}
+    for candidate in candidates:
         for effect in candidate.fit.rig.effects:
             rig = rig.with_effect(effect["id"], effect["parameters"])
-    return rig.with_parameters(values)
+    return rig.with_parameters({name: candidates[k].fit.values[name] for name, k in _owners(candidates).items()})
 
 
 def _with_std(rig: Rig, candidates: list[Candidate]) -> Rig:
@@ -258,7 +258,7 @@ def _located(judged: list[Judged]) -> str | None:
         found = [(g.candidates[0].held_out[g.mismatch.name].ratio, g.mismatch.name) for g in groups if g.mismatch]
         if found:
             return max(found)[1]
-    for j in judged:
+    for j in sorted(judged, key=lambda j: not j.wrong):
         moved = symptoms_of(j.group)
         worst = j.wrong or tuple(sorted(moved, key=lambda n: -abs(moved[n])))
         for block in reversed(j.group.blocks):
@@ -297,8 +297,7 @@ def _gap(table: dict[str, dict[str, float]]) -> float | None:
 def _effects(judged: list[Judged], verdict: str) -> list[dict[str, Any]]:
     """The effects that are named, the most probable first; without a name those that come closest."""
     found: dict[str, tuple[float, Candidate]] = {}
-    for k in _order(judged):
-        j = judged[k]
+    for j in judged:
         names = {effect for c in j.group.candidates for effect in c.effects}
         for effect in j.named if verdict == "effects" else names & set(CATALOGUE):
             p = j.probability(effect)
@@ -324,24 +323,26 @@ def _effects(judged: list[Judged], verdict: str) -> list[dict[str, Any]]:
 def _wrong(nominal: Rig, judged: list[Judged], problem: Problem, table: dict[str, dict[str, float]]) -> list[dict[str, Any]]:
     """Parameters that the rig file is wrong about: its value, the one that the recordings ask for, and what the error becomes."""
     found = []
-    for j in judged:
-        for name in j.wrong:
-            known, value, std = nominal.parameter(name), j.chosen.fit.values[name], j.chosen.fit.std[name]
-            told = [b for b in problem.blocks if name in b.parameters and b in j.group.blocks]
-            errors = {b.channel: {"before": table[b.channel]["refit"], "after": table[b.channel]["after"]} for b in told}
-            entry = _entry(value, std, known.unit, True, known.lower)
-            found.append(
-                {
-                    "name": name,
-                    "block": told[-1].name if told else None,
-                    "nominal": known.value,
-                    "tolerance": known.tol,
-                    **{key: entry[key] for key in ("value", "std", "interval", "unit")},
-                    "moved_sigmas": j.chosen.fit.moved[name],
-                    "probability": j.probability(name),
-                    "held_out": errors,
-                }
-            )
+    owners = _owners([j.chosen for j in judged])
+    for name in dict.fromkeys(name for j in judged for name in j.wrong):
+        # of a zero that two groups name, the value is that of the group that knows it best
+        j, naming = judged[owners[name]], [j for j in judged if name in j.wrong]
+        known, value, std = nominal.parameter(name), j.chosen.fit.values[name], j.chosen.fit.std[name]
+        told = [b for b in problem.blocks if name in b.parameters and any(b in j.group.blocks for j in naming)]
+        errors = {b.channel: {stage: table[b.channel][stage] for stage in ("before", "refit", "after")} for b in told}
+        entry = _entry(value, std, known.unit, True, known.lower)
+        found.append(
+            {
+                "name": name,
+                "block": told[-1].name if told else None,
+                "nominal": known.value,
+                "tolerance": known.tol,
+                **{key: entry[key] for key in ("value", "std", "interval", "unit")},
+                "moved_sigmas": j.chosen.fit.moved[name],
+                "probability": max(j.probability(name) for j in naming),
+                "held_out": errors,
+            }
+        )
     return found
 
 
@@ -401,18 +402,16 @@ def _entry(value: float, std: float, unit: str, identifiable: bool, lower: float
 
 def _parameters(nominal: Rig, candidates: list[Candidate]) -> dict[str, dict[str, Any]]:
     out: dict[str, dict[str, Any]] = {}
-    for candidate in candidates:
-        for name, moved in candidate.fit.moved.items():
-            p = nominal.parameter(name)
-            std = candidate.fit.std[name]
-            out[name] = {
-                "nominal": p.value,
-                "value": candidate.fit.values[name],
-                "std": std,
-                "unit": p.unit,
-                "moved_sigmas": moved,
-                "identifiable": std < 0.7 * p.tol,
-            }
+    for name, k in _owners(candidates).items():
+        p, own = nominal.parameter(name), candidates[k].fit
+        out[name] = {
+            "nominal": p.value,
+            "value": own.values[name],
+            "std": own.std[name],
+            "unit": p.unit,
+            "moved_sigmas": own.moved[name],
+            "identifiable": own.std[name] < 0.7 * p.tol,
+        }
     return out
 
 

@@ -71,11 +71,13 @@ def _sizes(block: Block, problem: Problem, found: Stages, floor: dict[Key, Floor
     return sizes
 
 
-def unexplained(entries: list[dict[str, Any]]) -> list[dict[str, Any]]:
+def unexplained(judged: list[Judged], entries: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Blocks that keep a mismatch beside what is named, or without a name, the largest first.
 
     Parameters
     ----------
+    judged : list of Judged
+        The groups with their verdicts; blocks that were no suspects keep nothing.
     entries : list of dict
         From :func:`block_entries`. The size is that of the held-out recordings, where they show it, else of the fitted ones.
 
@@ -85,10 +87,11 @@ def unexplained(entries: list[dict[str, Any]]) -> list[dict[str, Any]]:
         ``block``, ``channel``, ``unit``, ``noises`` and ``size`` [unit] of what names leave, and the ``verdict`` of the group.
     """
     found = []
-    for entry in entries:
+    for j, entry in zip(judged, entries, strict=True):
         if entry["verdict"] == "none" or (entry["verdict"] == "parameters" and not entry["wrong_parameters"]):
             continue
-        for block in entry["mismatch"]:
+        suspects = {b.name for b in j.group.suspects}
+        for block in (m for m in entry["mismatch"] if m["block"] in suspects):
             # a form without a name takes up what no name explains, and is no explanation
             stage = "refit" if entry["verdict"] == "unlisted" else "after"
             sizes = [part[stage] for part in (block["held_out"], block["fitted"]) if part is not None]

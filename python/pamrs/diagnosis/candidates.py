@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from pamrs.diagnosis.blocks import Block, Residual
 from pamrs.diagnosis.events import fit_events, look_for_events
 from pamrs.diagnosis.evidence import Excess, Floor, excess, inflation
-from pamrs.diagnosis.fitting import FIT_BIN, Fit, Key, Problem, acts_in, fit, residuals
+from pamrs.diagnosis.fitting import FIT_BIN, WIDEST, Fit, Key, Problem, acts_in, fit, residuals
 from pamrs.diagnosis.leastsquares import SHARE
 from pamrs.diagnosis.leaving import left_out
 from pamrs.diagnosis.starts import Start
@@ -67,6 +67,11 @@ class Candidate:
     def key(self) -> str:
         """Its names joined by ``+``, as probabilities are listed."""
         return "+".join(self.names)
+
+    @property
+    def outside(self) -> float:
+        """How far outside its tolerances what is wrong is: the logarithm of how many times the walls, of each parameter."""
+        return sum(math.log(max(1.0, abs(self.fit.moved[name]) / WIDEST)) for name in self.wrong)
 
     @property
     def misfit(self) -> float:
@@ -282,6 +287,19 @@ class Attempts:
             if not any(significant(e) for e in best.fitted.values()):
                 break
         return best
+
+    def united(self, candidates: list[Candidate]) -> Fit | None:
+        """One fit with everything that some hypotheses name, each for a block of its own; None where it cannot be run."""
+        if any(c.fit.events is not None for c in candidates):
+            return None
+        effects = tuple(effect for c in candidates for effect in c.effects)
+        free, held = parts_of(start_of(c.fit, effect) for c in candidates for effect in c.effects)
+        wrong = [name for c in candidates for name in c.wrong]
+        warm = replace(candidates[0].fit, values=candidates[0].fit.values | {n: c.fit.values[n] for c in candidates for n in c.wrong})
+        try:
+            return fit(self.inner, self.nominal, effects, free, self.white, fixed=held, warm=warm, freed=wrong, share=EXACT)
+        except SimulationError:
+            return None
 
     def polished(self, candidate: Candidate) -> Candidate:
         """A fitted set of lasting effects, fitted on with the sensitivities of every parameter where it is.

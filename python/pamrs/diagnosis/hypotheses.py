@@ -105,7 +105,7 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
     happening = [] if marginal else [e for e in acting if e in EVENTS]
     acting = [e for e in acting if e not in EVENTS]
     trial = Attempts(inner, outer, nominal, floor, out, suspects)
-    mistaken = freed(trial, baseline, lambda text: say(f"{names}: {text}"))
+    mistaken = freed(trial, baseline, first, lambda text: say(f"{names}: {text}"))
     screened = screen(inner, baseline, acting, white, sealed=nominal.model["valve"] is None)
     singles = _singles(trial, screened, baseline, lambda text: say(f"{names}: {text}"))
     seconds = max(p.n * p.dt for p in inner.recordings)
@@ -139,7 +139,7 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
     missing = screened.stand.power_left * (1.0 - 1.0 / max(now[mismatch.name].ratio, 1.0 + HARDLY))
     promised = {e: scores[0].gain / missing for e, scores in by_effect(screened.scores()).items()}
     group = Group(blocks, was, now, candidates, weighed, mismatch, floor, suspects, inclusion=often, promised=promised)
-    parts = _apart(group, most, seconds, ranging) if weighed["unlisted"] > UNNAMED else []
+    parts = _apart(group, trial, most, seconds, ranging) if weighed["unlisted"] > UNNAMED else []
     if parts:
         return parts
     if weighed["unlisted"] < LIKELY or len({b.kind for b in suspects}) < len(suspects):
@@ -161,10 +161,11 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
     return [replace(group, closure=judged, form=describe_closure(closed, inner, baseline))]
 
 
-def _apart(group: Group, most: float, seconds: float, ranging: tuple[float, float] | None) -> list[Group]:
-    """A group in parts, where a name explains a block in which alone it acts and the others keep what they have; else nothing.
+def _apart(group: Group, trial: Attempts, most: float, seconds: float, ranging: tuple[float, float] | None) -> list[Group]:
+    """A group in parts, where a name explains a block in which alone it acts; else nothing.
 
-    A leak of the tank is seen in the tank's pressure, whatever the chamber behind the valve keeps without a name.
+    A leak of the tank is seen in the tank's pressure, whatever the chamber behind the valve keeps without a name, or with one of its
+    own. All parts have one fit, with everything that they name.
     """
     start = group.candidates[0]
     acting = {c: [b for b in group.suspects if _acts(c, b)] for c in group.candidates if c.names}
@@ -176,22 +177,31 @@ def _apart(group: Group, most: float, seconds: float, ranging: tuple[float, floa
     own = {b.name: weighed([b]) for b in group.suspects if any(found == [b] for found in acting.values())}
     named = [b for b in group.suspects if own.get(b.name, {"unlisted": 1.0})["unlisted"] < UNNAMED]
     rest = [b for b in group.suspects if b not in named]
-    if not named or not rest:
+    if not named:
         return []
+    best = [max((c for c in acting if c.key in own[b.name]), key=lambda c: own[b.name][c.key]) for b in named]
+    common = best[0].fit if len(best) == 1 else trial.united(best)
+    if common is None:
+        return []
+    start = replace(start, fit=common)
 
     def part(blocks: list[Block], suspects: list[Block], probabilities: dict[str, float]) -> Group:
         return replace(
             group,
             blocks=blocks,
-            candidates=[start, *(c for c in acting if c.key in probabilities)],
+            candidates=[start, *(replace(c, fit=common) if c in best else c for c in acting if c.key in probabilities)],
             probabilities=probabilities,
             mismatch=max(suspects, key=lambda b: start.held_out[b.name].ratio + start.fitted[b.name].ratio),
             suspects=suspects,
             promised={e: p for e, p in group.promised.items() if any(acts_in(e, b) for b in suspects)},
         )
 
+    parts = [part([b], [b], own[b.name]) for b in named]
     others = [b for b in group.blocks if b not in named]
-    return [*(part([b], [b], own[b.name]) for b in named), part(others, rest, weighed(rest))]
+    if rest:
+        return [*parts, part(others, rest, weighed(rest))]
+    # blocks that kept nothing stay with the first part
+    return [replace(parts[0], blocks=[*named[:1], *others]), *parts[1:]]
 
 
 def _acts(candidate: Candidate, block: Block) -> bool:
@@ -293,6 +303,16 @@ def _with_same_data(trial: Attempts, start: Candidate, singles: list[Candidate],
         usual = {f"{same.effect}.{p.name}": p.default for p in EFFECTS[same.effect].parameters}
         usual[f"{same.effect}.{same.parameter}"] = single.fit.values[f"{own.effect}.{same.size}"]
         other = trial.fitted([Start(same.effect, usual, {}, (), False)], start.fit, trial.white)
+        found += [] if other is None else [other]
+    named = {c.effects for c in found}
+    for effect, same in ((e, i.same_data) for e, i in EFFECTS.items() if i.same_data is not None and (e,) not in named):
+        twin = next((c for c in singles if c.effects == (same.effect,)), None)
+        size = 0.0 if twin is None else twin.fit.values.get(f"{same.effect}.{same.parameter}", 0.0)
+        if size <= 0.0:
+            continue
+        free = {f"{effect}.{same.size}": size, f"{effect}.{same.without}": 0.0}
+        held = {f"{effect}.{name}": value for name, value in same.held}
+        other = trial.fitted([Start(effect, free, held, (), False)], start.fit, trial.white)
         found += [] if other is None else [other]
     return found
 

@@ -144,14 +144,16 @@ class Diagnosis:
         ``block``, ``channel``, ``intervals`` (pairs in s), ``conditions`` (sentences or dictionaries with a
         ``text``), ``text``; optionally ``recording``, to which the intervals belong.
     effects : list of dict
-        ``id``, ``probability``, optional ``name`` (in words), ``parameters``
+        What is named (with the verdict ``unlisted`` what comes closest): ``id``, ``probability``, ``name`` (in words), ``parameters``
         {name: {value, std, unit, interval?, identifiable?}}, most probable first; SI, 95 % intervals; optional ``events``, what
         happened in single recordings (``recording``, ``time`` and the effect's other parameters, SI), and ``inclusion``, the share of
         resampled recordings in which the screen would have taken the effect.
     ambiguity : list of list of str
-        Sets of effects that the data cannot separate; empty when settled.
+        Sets of names (effects, wrong parameters by dotted name, ``unlisted``, ``parameters``) that the data cannot separate; empty when
+        settled.
     probabilities : dict
-        Probability of each hypothesis.
+        Probability of what the case may be told to have: names of all its blocks joined by ``+``, ``none``, ``parameters`` (that moved
+        inside their tolerances), or ``unlisted`` (something is missing and nothing has a name). Those of each block are in ``blocks``.
     parameters : dict
         {name: {nominal, value, std, unit, moved_sigmas, identifiable}}, SI.
     fit : dict
@@ -165,7 +167,7 @@ class Diagnosis:
     text : str
         The verdict in words, several sentences; paragraphs are separated by a blank line.
     rig : Rig or None
-        Final model, with the effect.
+        Final model, with what was found.
     traces : list of Trace
         Measured and simulated channels.
     blocks : list of dict
@@ -176,7 +178,7 @@ class Diagnosis:
         Blocks that keep a mismatch: ``block``, ``channel``, ``unit``, ``noises``, ``size`` (SI), and the ``verdict`` of their group.
     wrong_parameters : list of dict
         Values of the rig file that are wrong: ``name``, ``block``, ``nominal``, ``tolerance``, ``value``, ``std``, ``interval`` (95 %),
-        ``unit``, ``moved_sigmas``, ``probability``, and ``held_out`` {channel: {before, after}}, the error without and with it, SI.
+        ``unit``, ``moved_sigmas``, ``probability``, and ``held_out`` {channel: {before, refit, after}}, the error as in ``fit``, SI.
     residuals : dict
         {block: {rms, noise, excess, p_value, channel}}, residual of each block's refitted baseline against its noise.
     condition_map : dict or None

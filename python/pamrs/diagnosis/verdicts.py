@@ -16,14 +16,18 @@ from pamrs.diagnosis.wrong_parameters import AT_WALL
 
 __all__ = ["Judged", "case_ambiguity", "case_probabilities", "case_verdict", "is_parameter", "judge", "symptoms_of"]
 
+HEALTHY = ("none", "parameters")
+WITHOUT_NAME = (*HEALTHY, "unlisted")
+"""Hypotheses that name nothing."""
 SHARED = 6.0
 """Odds of one effect that acts in two groups to two effects."""
 SETTLED, IN_SET = 0.9, 0.05
 """Probability from which an answer counts as settled, and from which a hypothesis belongs to the set that is left."""
 NAMED = 0.5
 """Probability above which a name is given even where ``unlisted`` is more probable than each set of names that has it."""
-LISTED = 1e-4
-"""Probability from which a case lists a set of names: most products of what several blocks leave open are next to nothing."""
+LISTED, COUNTED = 1e-4, 1e-6
+"""Probability from which a case lists a set of names (most products of what several blocks leave open are next to nothing), and from
+which a hypothesis of one group is put beside those of the others."""
 MOST_SETS = 8
 """Sets that a case lists."""
 QUIET = {"parameters": 0.96, "none": 0.03, "unlisted": 0.01}
@@ -96,7 +100,7 @@ def _own(group: Group) -> dict[str, float]:
         quiet |= {"none": QUIET["parameters"], "parameters": QUIET["none"]}
     for name, share in quiet.items():
         found[name] = found.get(name, 0.0) + unchanged * share
-    return found
+    return {key: p for key, p in found.items() if p >= COUNTED or key in WITHOUT_NAME}
 
 
 def judge(groups: Sequence[Group]) -> list[Judged]:
@@ -110,7 +114,7 @@ def judge(groups: Sequence[Group]) -> list[Judged]:
     own = [_own(group) for group in groups]
     beside: list[dict[str, float]] = [{} for _ in groups]
     for choice in itertools.product(*(p.items() for p in own)):
-        effects = [n for key, _ in choice for n in key.split("+") if n not in ("none", "parameters", "unlisted")]
+        effects = [n for key, _ in choice for n in key.split("+") if n not in WITHOUT_NAME]
         weight = math.prod(p for _, p in choice) * SHARED ** (len(effects) - len(set(effects)))
         for found, (key, _) in zip(beside, choice, strict=True):
             found[key] = found.get(key, 0.0) + weight
@@ -125,8 +129,8 @@ def _normalised(weights: dict[str, float]) -> dict[str, float]:
 def _judged(group: Group, probabilities: dict[str, float]) -> Judged:
     """The verdict: that of the most probable hypothesis; without a name only if no single name is more probable than not."""
     start = group.candidates[0]
-    names = {key: p for key, p in probabilities.items() if key not in ("none", "parameters", "unlisted")}
-    healthy = max((key for key in ("none", "parameters")), key=lambda key: probabilities.get(key, 0.0))
+    names = {key: p for key, p in probabilities.items() if key not in WITHOUT_NAME}
+    healthy = max(HEALTHY, key=lambda key: probabilities.get(key, 0.0))
     without = probabilities.get("unlisted", 0.0)
     best = max(names, key=lambda key: names[key], default="")
     ambiguity = _sets(probabilities)
@@ -141,8 +145,8 @@ def _judged(group: Group, probabilities: dict[str, float]) -> Judged:
 
 def _sets(probabilities: dict[str, float]) -> list[list[str]]:
     """Hypotheses that are left, the most probable first; none where one is settled, ``none`` and ``parameters`` being one answer."""
-    healthy = probabilities.get("none", 0.0) + probabilities.get("parameters", 0.0)
-    others = [p for key, p in probabilities.items() if key not in ("none", "parameters")]
+    healthy = sum(probabilities.get(key, 0.0) for key in HEALTHY)
+    others = [p for key, p in probabilities.items() if key not in HEALTHY]
     if max(healthy, *others, 0.0) >= SETTLED:
         return []
     found = [sorted(key.split("+")) for key, p in probabilities.items() if p >= IN_SET]
@@ -163,35 +167,33 @@ def case_probabilities(judged: Sequence[Judged]) -> dict[str, float]:
     ``unlisted`` is that something is missing and nothing has a name. What one block keeps without a name takes nothing from a name in
     another.
     """
-    found = {"none": 0.0, "parameters": 0.0, "unlisted": 0.0}
+    found = dict.fromkeys(WITHOUT_NAME, 0.0)
     for choice in itertools.product(*(j.probabilities.items() for j in judged)):
         keys = [key for key, _ in choice]
         names = _names(keys)
         rest = next((key for key in ("unlisted", "parameters") if key in keys), "none")
         key = "+".join(names) or rest
         found[key] = found.get(key, 0.0) + math.prod(p for _, p in choice)
-    return _normalised({key: p for key, p in found.items() if p >= LISTED or key in QUIET})
+    return _normalised({key: p for key, p in found.items() if p >= LISTED or key in WITHOUT_NAME})
 
 
 def case_ambiguity(judged: Sequence[Judged]) -> list[list[str]]:
     """Sets of names that a case leaves open: the open sets of its blocks, each beside what is settled in the others."""
     if not any(j.ambiguity for j in judged):
         return []
-    options = []
-    for j in judged:
-        settled = [*j.named, *j.wrong] or ([j.verdict] if j.verdict == "unlisted" else [])
-        options.append(j.ambiguity or [settled])
+    # what a block is settled to keep without a name is no part of the question
+    options = [j.ambiguity or [[*j.named, *j.wrong]] for j in judged]
     found: list[list[str]] = []
     for choice in itertools.product(*options):
         flat = [name for names in choice for name in names]
-        named = _names(flat)
-        # beside a name, what another block is settled to have or not to have is no part of the question
-        entry = named if named else sorted(dict.fromkeys(flat))
-        if entry not in found:
+        rest = next((word for word in reversed(WITHOUT_NAME) if word in flat), None)
+        # nothing else counts beside a name but that something else is missing
+        entry = [*_names(flat), *([rest] if rest == "unlisted" or (rest and not _names(flat)) else [])]
+        if entry and entry not in found:
             found.append(entry)
     return found[:MOST_SETS] if len(found) > 1 else []
 
 
 def _names(keys: Iterable[str]) -> list[str]:
     """Names of effects and of parameters in hypotheses, each once, in alphabetical order."""
-    return sorted({name for key in keys for name in key.split("+") if name not in ("none", "parameters", "unlisted")})
+    return sorted({name for key in keys for name in key.split("+") if name not in WITHOUT_NAME})

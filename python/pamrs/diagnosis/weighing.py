@@ -11,7 +11,7 @@ from pamrs.channels import channel_of
 from pamrs.diagnosis.blocks import Block
 from pamrs.diagnosis.candidates import Candidate, significant
 from pamrs.diagnosis.evidence import Excess
-from pamrs.diagnosis.fitting import WIDEST, Problem
+from pamrs.diagnosis.fitting import Problem
 from pamrs.effects_table import EFFECTS
 
 __all__ = [
@@ -186,7 +186,9 @@ def same_recordings(candidate: Candidate, effect: str, seconds: float) -> bool:
     same = EFFECTS[effect].same_data
     if same is None:
         return False
-    own = next(e["parameters"] for e in candidate.fit.rig.effects if e["id"] == effect)
+    own: dict[str, float] = next((e["parameters"] for e in candidate.fit.rig.effects if e["id"] == effect), {})
+    if not own:
+        return False
     telling, spread = own[same.without] * seconds, candidate.fit.std.get(f"{effect}.{same.without}", 0.0) * seconds
     at_rest = abs(telling) < max(ALIKE * abs(own[same.size]), UNTOLD * spread)
     return bool(own[same.size] > 0.0 and at_rest and all(own[name] == value for name, value in same.held))
@@ -275,5 +277,5 @@ def _score(candidate: Candidate, baseline: Candidate, suspects: list[Block], sha
 
 def price(candidate: Candidate) -> float:
     """What a set pays for the parameters of its effects (of events of one kind only the first counts) and for a file that is wrong."""
-    own = sum(FILE + math.log(max(1.0, abs(candidate.fit.moved[n]) / WIDEST)) for n in candidate.wrong)
+    own = FILE * len(candidate.wrong) + candidate.outside
     return own + PRICE * sum(1 for n in candidate.fit.values if n.partition(".")[0] in EFFECTS and not n.endswith(("_2", "_3")))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from pamrs.diagnosis.conditions import Picture
 from pamrs.diagnosis.fitting import Problem
 from pamrs.diagnosis.result import Diagnosis
 from pamrs.diagnosis.verdicts import Judged, is_parameter, symptoms_of
-from pamrs.effects_table import EFFECTS
+from pamrs.effects_table import CATALOGUE, EFFECTS
 from pamrs.report.text import display_unit, format_number, kept_sentence, sentence_of
 from pamrs.rig import Rig
 from pamrs.rig_schema import qualified
@@ -32,6 +33,8 @@ _FAR_OFF, _MOVED = 3.0, 2.0
 """Error in units of the noise, and tolerances of a parameter, from which a model with a named effect is reported with a reservation."""
 _SPOILED = 1.2
 """Times what the nominal model misses that a new one has to miss to be reported."""
+_MENDED = 0.98
+"""Share of a channel's error from which a wrong value is not said to mend it."""
 _ATMOSPHERE = 0.01
 """Share of the ambient pressure within which a recording begins at it."""
 _DOUBTED = 0.1
@@ -129,7 +132,9 @@ def verdict(diagnosis: Diagnosis, case: Case, gap: float | None, forms: list[str
     text = f"The model leaves out: {names}. {place}"
     if gap is not None:
         it = "it" if len(diagnosis.effects) == 1 else "them"
-        text += f" With {it}, {100 * gap:.0f} % of the gap between refitted model and noise closes on {_proof(case)}."
+        text += (
+            f" With {it}, {100 * gap:.0f} % of the gap between refitted model and noise closes, over all channels, on {_proof(case)}."
+        )
     if diagnosis.wrong_parameters:
         text += " " + _mistaken(diagnosis, case, None)
     if unknown_volumes(case.rig):
@@ -148,17 +153,21 @@ def _mistaken(diagnosis: Diagnosis, case: Case, gap: float | None) -> str:
     """Which values of the rig file are wrong, and what that does to the error."""
     told = []
     for wrong in diagnosis.wrong_parameters:
+        told_by = {channel: e for channel, e in wrong["held_out"].items() if e["after"] < _MENDED * e["refit"]} or wrong["held_out"]
         errors = "; ".join(
-            f"the {channel.replace('_', ' ')} is then missed by {_instead(e['after'], e['before'], unit_of(channel))}"
-            for channel, e in wrong["held_out"].items()
+            f"the {channel.replace('_', ' ')} is then missed by {_instead(e['after'], e['refit'], unit_of(channel))}, which values "
+            "inside the tolerances leave"
+            for channel, e in told_by.items()
         )
         told.append(
             f"{sentence_of(wrong)} (probability {wrong['probability']:.2f}, {abs(wrong['moved_sigmas']):.0f} tolerances away); "
             f"on {_proof(case)} {errors}."
         )
-    text = "The rig file is wrong: " + " ".join(told) if len(told) == 1 else "The rig file is wrong twice: " + " ".join(told)
+    text = "The rig file is wrong: " + " ".join(told)
     if gap is not None:
-        text += f" {100 * gap:.0f} % of the gap between the model refitted inside its tolerances and the noise closes."
+        text += (
+            f" Over all channels, {100 * gap:.0f} % of the gap between the model refitted inside its tolerances and the noise closes."
+        )
     return text
 
 
@@ -180,8 +189,8 @@ def _beside(diagnosis: Diagnosis, missing: list[dict[str, Any]], forms: list[str
     text += "\n\nWhat stays open. " + " ".join(said)
     if forms:
         text += " As a form without a name, which is in the model: " + " ".join(forms)
-    elif sought:
-        text += " No form of it was found that carries over to other recordings."
+    else:
+        text += " No form of it " + ("was found that carries over to other recordings." if sought else "was looked for.")
     return text
 
 
@@ -233,12 +242,18 @@ def same_data(ambiguity: list[list[str]]) -> str:
     return ""
 
 
-def next_experiment(kind: str, probabilities: dict[str, float], ambiguity: list[list[str]], rig: Rig) -> dict[str, Any]:
-    """What to record next: the experiment that separates the leading hypotheses.
+def next_experiment(
+    kind: str, probabilities: dict[str, float], ambiguity: list[list[str]], rig: Rig, missing: Sequence[str] = ()
+) -> dict[str, Any]:
+    """What to record next: the experiment that separates the leading hypotheses, or tells of blocks that keep something without a name.
 
     It is not simulated, so that nothing is said of how much it would tell.
     """
     leading = max(probabilities, key=lambda k: probabilities[k])
+    if not ambiguity and kind != "unlisted" and missing:
+        text, excitation = _SEPARATE["unlisted"]
+        text = f"The name is settled. For what the {' and '.join(missing)} keeps: {text[:1].lower()}{text[1:]}"
+        return {"text": text, "excitation": excitation, "expected_information_bits": None}
     if not ambiguity and kind != "unlisted":
         text = "The name is settled by these recordings; no further one is needed for it."
         return {"text": text, "excitation": {}, "expected_information_bits": 0.0}
@@ -319,13 +334,18 @@ def absolute(case: Case) -> list[str]:
 
 
 def worse(table: dict[str, dict[str, float]]) -> list[str]:
-    """Channels that the model with what was added predicts worse than the nominal one did."""
-    return [
-        f"the new model misses {channel.replace('_', ' ')} by {error['after']:.3g} {unit_of(channel)}, the nominal one by "
-        f"{error['before']:.3g}: what was added does not mend what the refit spoiled there"
-        for channel, error in table.items()
-        if error["after"] > _SPOILED * max(error["before"], error["noise"])
-    ]
+    """Channels that the model with what was added predicts worse than the nominal one did, or the refitted one."""
+    out = []
+    for channel, error in table.items():
+        better, which = min((error["before"], "nominal"), (error["refit"], "refitted"))
+        if error["after"] > _SPOILED * max(better, error["noise"]):
+            unit, factor = display_unit(unit_of(channel), error["after"])
+            now, was = (format_number(v * factor, 3, unicode=False) for v in (error["after"], better))
+            out.append(
+                f"the new model misses {channel.replace('_', ' ')} by {now} {unit}, the {which} one by {was} {unit}: what was added "
+                "spoils this channel".replace("°", "deg")
+            )
+    return out
 
 
 def reservations(judged: list[Judged], chosen: list[Candidate], table: dict[str, dict[str, float]]) -> list[str]:
@@ -346,6 +366,7 @@ def reservations(judged: list[Judged], chosen: list[Candidate], table: dict[str,
                 f"with {what} the model still misses {channel.replace('_', ' ')} by {times:.2g} times its noise: {name}{why}, and "
                 "standard deviations hold only as far as that matters little"
             )
-    moved = {n: v for c in chosen if c.effects for n, v in c.fit.held_by_prior.items() if abs(v) > _MOVED}
+    named = [c for c in chosen if any(effect in CATALOGUE for effect in c.effects)]
+    moved = {n: v for c in named for n, v in c.fit.held_by_prior.items() if abs(v) > _MOVED}
     out += [f"with the effect the fit moves {n} by {v:+.1f} tolerances: it may make up for the effect's form" for n, v in moved.items()]
     return out

@@ -59,10 +59,15 @@ def suspected(fitted: Fit, blocks: list[Block]) -> list[tuple[str, ...]]:
     at_wall = [name for name, moved in fitted.moved.items() if abs(moved) >= AT_WALL]
     found: list[tuple[str, ...]] = [(name,) for name in at_wall]
     for one, other in itertools.permutations(fitted.moved, 2):
-        together = any({one, other} <= block.parameters for block in blocks)
+        together = any({one, other} <= block.parameters for block in blocks) and _same_owner(one, other)
         if (_kind(one), _kind(other)) in ONE_MISTAKE and together and not {one, other}.isdisjoint(at_wall):
             found.append((one, other))
     return found
+
+
+def _same_owner(one: str, other: str) -> bool:
+    """Whether two parameters may belong to one mistake: of blocks of one kind they have to belong to the same block."""
+    return _kind(one)[0] != _kind(other)[0] or one.rpartition(".")[0] == other.rpartition(".")[0]
 
 
 def _kind(name: str) -> tuple[str, str]:
@@ -70,8 +75,11 @@ def _kind(name: str) -> tuple[str, str]:
     return name.partition(".")[0], name.rpartition(".")[2]
 
 
-def freed(trial: Attempts, baseline: Fit, say: Callable[[str], None]) -> list[Candidate]:
+def freed(trial: Attempts, baseline: Fit, first: Fit, say: Callable[[str], None]) -> list[Candidate]:
     """The suspected parameters, each freed and fitted; those first that promise most by the linear model.
+
+    Where the mismatch is large its colour leaves little weight to the recordings, so that the priors hold what a fit with
+    white noise moved to its wall: parameters at their wall in either fit are suspects.
 
     Parameters
     ----------
@@ -79,23 +87,21 @@ def freed(trial: Attempts, baseline: Fit, say: Callable[[str], None]) -> list[Ca
         Recordings, model, floors.
     baseline : Fit
         The refitted baseline, with sensitivities.
+    first : Fit
+        The same with white noise.
     say : callable
         Receives progress.
     """
-    gains = _promised(trial.inner, trial.nominal, baseline, suspected(baseline, trial.inner.blocks), trial.white)
+    suspects = [names for found in (baseline, first) for names in suspected(found, trial.inner.blocks)]
+    gains = _promised(trial.inner, trial.nominal, baseline, list(dict.fromkeys(suspects)), trial.white)
     least = max(PROMISING, BESIDE_LARGEST * max(gains.values(), default=0.0))
     found = []
     for names in sorted((n for n, gain in gains.items() if gain > least), key=lambda n: -gains[n])[:MOST_FREED]:
         say(f"trying another value of {' and '.join(names)}")
         candidate = trial.freed(names, baseline)
-        if candidate is not None and outside(candidate):
+        if candidate is not None and all(abs(candidate.fit.moved[name]) > WIDEST for name in names):  # else it is not wrong
             found.append(replace(candidate, gain=gains[names]))
     return found
-
-
-def outside(candidate: Candidate) -> bool:
-    """Whether every freed parameter ends outside its tolerances: one that comes back inside is not wrong."""
-    return all(abs(candidate.fit.moved[name]) > WIDEST for name in candidate.wrong)
 
 
 def _promised(
@@ -137,7 +143,7 @@ def _ends(nominal: Rig, names: list[str]) -> tuple[list[tuple[str, float]], list
 
 def rarity(candidate: Candidate) -> float:
     """Logarithm of the odds against a file that is so wrong: the further outside, the rarer, but less and less so."""
-    return sum(ONE_FILE_IN_A_HUNDRED + math.log(max(1.0, abs(candidate.fit.moved[name]) / WIDEST)) for name in candidate.wrong)
+    return ONE_FILE_IN_A_HUNDRED * len(candidate.wrong) + candidate.outside
 
 
 def beside_quiet(trial: Attempts, quiet: Group, say: Callable[[str], None]) -> Group:
@@ -147,7 +153,7 @@ def beside_quiet(trial: Attempts, quiet: Group, say: Callable[[str], None]) -> G
     that is so wrong; what else the group found keeps its share beside it.
     """
     start = quiet.candidates[0]
-    found = freed(trial, start.fit, say)
+    found = freed(trial, start.fit, start.fit, say)
     shown = [c for c in found if not any(significant(e) for e in c.fitted.values()) and _carries_over(c, start)]
     if not shown:
         return quiet

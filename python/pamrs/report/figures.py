@@ -171,7 +171,7 @@ def _draw_curves(axes: Axes, trace: Trace, *, width: float = 1.2) -> None:
     if trace.refit is not None and _has(trace.refit, trace.before):
         plot(trace.refit, "refit", "parameters refitted", lw=width, ls=(0, (5, 2)))
     if trace.after is not None and _has(trace.after, trace.refit):
-        plot(trace.after, "after", "after: with the effect", lw=width)
+        plot(trace.after, "after", "after: with what was found", lw=width)
     axes.set_ylabel(f"{label(trace.channel)} [{unit}]" if unit else label(trace.channel))
 
 
@@ -185,7 +185,7 @@ def _draw_residuals(axes: Axes, trace: Trace, noise: float | None, *, width: flo
     # in the colours of the curves above: what is left before the effect is what the refit leaves, where there was one
     refitted = trace.refit is not None and _has(trace.refit, trace.before)
     first = ("refit", "parameters refitted") if refitted else ("before", "before")
-    for values, name, text in ((before, *first), (after, "after", "with the effect")):
+    for values, name, text in ((before, *first), (after, "after", "with what was found")):
         if values is not None and _has(values, before if name == "after" else None):
             x, y = decimate(trace.time, values)
             axes.plot(x, y * factor, color=COLOURS[name], lw=width, label=text)

@@ -23,10 +23,14 @@ THROUGHOUT = 0.9
 """Share of a recording from which an excess is throughout it."""
 BADGES = {
     "none": "nothing missing",
-    "parameters": "parameters only",
+    "parameters": "parameters inside their tolerances",
     "effects": "missing physics named",
     "unlisted": "missing physics, not in the catalogue",
 }
+
+
+WRONG = "a value of the rig file is wrong"
+"""Badge of the verdict ``parameters`` where a value is named."""
 
 
 def _span(bounds: tuple[float, float] | None, digits: int = 3) -> str:
@@ -93,8 +97,7 @@ def _blocks(diagnosis: Diagnosis) -> list[dict[str, Any]]:
             sizes.append({"block": words.label(block["block"].replace(".", " ")), "refit": shown[0], "after": shown[1]})
         rows.append(
             {
-                "verdict": BADGES[entry["verdict"]],
-                "kind": entry["verdict"],
+                "verdict": WRONG if entry["wrong_parameters"] else BADGES[entry["verdict"]],
                 "names": words.set_label(found) if found else "–",
                 "probability": words.format_probability(max(entry["probabilities"].values(), default=math.nan)),
                 "leading": words.hypothesis_label(max(entry["probabilities"], key=lambda k: entry["probabilities"][k], default="none")),
@@ -112,7 +115,7 @@ def _wrong(diagnosis: Diagnosis) -> list[dict[str, Any]]:
         errors = []
         for channel, error in entry["held_out"].items():
             shown, scale = words.display_unit(UNITS.get(channel.partition(".")[0], ""), max(error.values()))
-            before, after = (words.format_number(error[key] * scale) for key in ("before", "after"))
+            before, after = (words.format_number(error[key] * scale) for key in ("refit", "after"))
             errors.append(f"{words.label(channel)}: {before} to {after} {shown}")
         interval = [float(v) * factor for v in entry["interval"]]
         rows.append(
@@ -330,7 +333,7 @@ def render(diagnosis: Diagnosis) -> str:
     return render_page(
         Path(__file__).with_name("template.html.j2"),
         d=diagnosis,
-        badge=BADGES[diagnosis.verdict],
+        badge=WRONG if diagnosis.verdict == "parameters" and diagnosis.wrong_parameters else BADGES[diagnosis.verdict],
         headline=words.headline(diagnosis),
         paragraphs=[p.strip() for p in diagnosis.text.split("\n\n") if p.strip()],
         facts=_facts(diagnosis),

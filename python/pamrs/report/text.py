@@ -28,7 +28,7 @@ __all__ = [
 
 _LABELS = {
     "none": "nothing missing",
-    "parameters": "parameters only",
+    "parameters": "parameters in tolerance",
     "unlisted": "unlisted effect",
     "leak_muscle": "muscle leak",
     "pam_crowding_contact": "fibre crowding contact",
@@ -188,7 +188,7 @@ def sentence_of(wrong: dict[str, Any]) -> str:
     found = format_uncertain(values["value"], values["std"], unicode=False)
     stated = format_uncertain(values["nominal"], values["tolerance"], unicode=False)
     shown = "" if unit in ("", "1") else f" {unit}".replace("°", "deg")
-    return f"{_parameter_label(str(wrong['name']))} is {found}{shown}, not {stated}"
+    return f"{_spoken(str(wrong['name']))} is {found}{shown}, not {stated}"
 
 
 def kept_sentence(kept: dict[str, Any]) -> str:
@@ -197,27 +197,25 @@ def kept_sentence(kept: dict[str, Any]) -> str:
     size = format_number(float(kept["size"]) * factor, 2, unicode=False)
     why = "no listed effect explains" if kept.get("verdict") == "unlisted" else "what is named does not explain"
     times = format_number(kept["noises"], 2, unicode=False)
-    return f"the {_block_label(str(kept['block']))} keeps {times} times its noise ({size} {unit}) that {why}".replace("°", "deg")
+    return f"the {_spoken(str(kept['block']))} keeps {times} times its noise ({size} {unit}) that {why}".replace("°", "deg")
 
 
-def _block_label(name: str) -> str:
-    """A block in words: ``arm``, ``chamber flexor``."""
-    return label(name.replace(".", " "))
-
-
-def _parameter_label(name: str) -> str:
-    """A parameter of the rig file in words: ``chamber dead volume``."""
+def _spoken(name: str) -> str:
+    """A block or a parameter of the rig file by its dotted name, in words: ``chamber flexor``, ``chamber dead volume``."""
     return label(name.replace(".", " "))
 
 
 def headline(diagnosis: Diagnosis) -> str:
     """One sentence that states the verdict: what was found in each block, then what stays open."""
-    named = [b for b in _blocks(diagnosis) if b["effects"] or b["wrong_parameters"]]
-    if not named:
+    blocks = _blocks(diagnosis)
+    named = [b for b in blocks if b["effects"] or b["wrong_parameters"]]
+    doubtful = [b for b in blocks if b.get("verdict") == "unlisted" and len(b["ambiguity"]) > 1]
+    if not named and not doubtful:
         return _unnamed(diagnosis)
     found = [_found(diagnosis, block) for block in sorted(named, key=lambda b: not b["effects"])]
-    text = "; ".join(dict.fromkeys(found))
-    kept = [kept_sentence(u) for u in diagnosis.unexplained if u.get("verdict") == "unlisted"]
+    text = "; ".join(dict.fromkeys([*found, *(_found(diagnosis, block) for block in doubtful)]))
+    open_ = {name for b in doubtful for name in b["blocks"]}
+    kept = [kept_sentence(u) for u in diagnosis.unexplained if u.get("verdict") == "unlisted" and u["block"] not in open_]
     return "; ".join([text[:1].upper() + text[1:], *kept[:2]])
 
 
@@ -243,7 +241,7 @@ def _place(diagnosis: Diagnosis, block: dict[str, Any]) -> str:
         # not the block that the answer is about first: the one of the group that misses most
         worst = max(block.get("mismatch") or [], key=lambda m: float(m["fitted"]["refit"]["noises"] or 0.0), default=None)
         located = worst["block"] if worst else next(iter(block["blocks"]), None)
-    return f" in the {_block_label(str(located))}" if located else ""
+    return f" in the {_spoken(str(located))}" if located else ""
 
 
 def _found(diagnosis: Diagnosis, block: dict[str, Any]) -> str:
@@ -251,10 +249,11 @@ def _found(diagnosis: Diagnosis, block: dict[str, Any]) -> str:
     place = _place(diagnosis, block)
     if len(block["ambiguity"]) > 1:
         rivals = f"these recordings cannot tell {_from_each_other(block['ambiguity'])}"
-        if any(s in (["none"], ["parameters"]) for s in block["ambiguity"]):
+        healthy = any(s in (["none"], ["parameters"]) for s in block["ambiguity"])
+        if all("." in name or name in ("none", "parameters") for s in block["ambiguity"] for name in s):
+            return f"the rig file {'may be' if healthy else 'is'} wrong: {rivals}"
+        if healthy:
             return f"physics may be missing{place}: {rivals}"
-        if all("." in name for s in block["ambiguity"] for name in s):
-            return f"the rig file is wrong: {rivals}"
         if any("." in name for s in block["ambiguity"] for name in s):
             return f"physics is missing{place}, or the rig file is wrong: {rivals}"
         return f"physics is missing{place}: {rivals}"
@@ -282,13 +281,15 @@ def _answer(names: list[str]) -> str:
         return "parameter values that are off"
     if names == ["unlisted"]:
         return "an effect outside the catalogue"
+    if names == ["none"]:
+        return "nothing missing"
     return " + ".join(f"a {set_label([name])}" if "." in name else label(name) for name in names)
 
 
 def _unnamed(diagnosis: Diagnosis) -> str:
     """The headline of a diagnosis without a name."""
     block = diagnosis.where.get("block")
-    place = f" in the {_block_label(str(block))}" if block else ""
+    place = f" in the {_spoken(str(block))}" if block else ""
     doubtful = [s for s in diagnosis.ambiguity if s not in (["none"], ["parameters"])]
     rivals = " or ".join(_answer(s) for s in doubtful)
     if diagnosis.verdict == "none" and doubtful:
