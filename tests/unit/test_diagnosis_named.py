@@ -95,6 +95,7 @@ def test_a_nominal_antagonist_has_nothing_missing(rig: pamrs.Rig) -> None:
     found = pamrs.diagnose(case(rig, rig))
     assert found.verdict in ("none", "parameters")
     assert set(found.residuals) == {"supply", "chamber.flexor", "chamber.extensor", "arm.elbow"}
+    assert [b["blocks"] for b in found.blocks] == [["supply", "chamber.flexor", "chamber.extensor"], ["arm.elbow"]]
     assert "chamber.flexor.dead_volume" in found.parameters
 
 

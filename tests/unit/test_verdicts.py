@@ -112,6 +112,11 @@ def test_healthy_groups() -> None:
     assert verdict == "parameters"
     # a parameter at its wall, and nobody knows why
     assert judged[0].ambiguity == [["parameters"], ["unlisted"]]
+    judged, _ = said(group("chamber", {"": 1.0}, moved={"chamber.alpha": 3.0}), group("arm", {"": 1.0}, moved={"arm.payload": 3.0}))
+    assert case_ambiguity(judged) == [["parameters"], ["unlisted"]]
+    # what is open in a block keeps that it may have no name
+    judged, _ = said(group("chamber", {"valve_dead_zone": 1.0}), group("arm", {"muscle_creep": 0.5, "unlisted": 0.5}))
+    assert sorted(case_ambiguity(judged)) == [["muscle_creep", "valve_dead_zone"], ["valve_dead_zone", "unlisted"]]
 
 
 @settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -129,6 +134,11 @@ def test_probabilities_add_to_one_and_verdicts_follow_them(gas: dict[str, float]
         assert bool(j.named or j.wrong) == (j.verdict in ("effects", "parameters"))
         best = max(j.probabilities.values())
         assert j.ambiguity == [] if best >= 0.9 else all(j.probabilities[k] >= 0.05 for k in ("+".join(s) for s in j.ambiguity))
+    sets = case_ambiguity(judged)
+    assert len({tuple(s) for s in sets}) == len(sets)
+    assert not sets or any(j.ambiguity for j in judged)
+    # a set is names, maybe with what has none; or one word
+    assert all(s and (len(s) == 1 or set(s).isdisjoint({"none", "parameters"})) for s in sets)
     case = case_probabilities(judged)
     assert sum(case.values()) == pytest.approx(1.0)
     assert set(HEALTHY) <= set(case)

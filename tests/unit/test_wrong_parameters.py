@@ -127,3 +127,14 @@ def test_a_dead_time_of_the_command_and_a_late_clock_stay_a_set() -> None:
     told = found.effects[0]["parameters"]
     assert told["delay"]["value"] + told["time_constant"]["value"] == pytest.approx(0.025, rel=0.2)
     assert "with the logger of the pressures" in found.next_experiment["text"]
+
+
+def test_a_zero_that_two_groups_share_is_named_once() -> None:
+    rig = pamrs.rigs.shoulder()
+    found = pamrs.diagnose(case(rig.with_parameters({"sensors.pressure_zero": 4500.0}), rig))
+    assert found.verdict == "parameters"
+    (wrong,) = found.wrong_parameters
+    assert wrong["name"] == "sensors.pressure_zero"
+    assert wrong["interval"][0] < 4500.0 < wrong["interval"][1]
+    # table of parameters, model and name agree
+    assert found.parameters["sensors.pressure_zero"]["value"] == wrong["value"] == found.rig.parameter("sensors.pressure_zero").value

@@ -1,0 +1,82 @@
+"""Blocks that are judged by themselves where no name explains all of a group."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import pamrs
+from pamrs.diagnosis.blocks import available_blocks
+from pamrs.diagnosis.candidates import Attempts, Candidate, Group
+from pamrs.diagnosis.evidence import Excess
+from pamrs.diagnosis.fitting import Fit, Problem
+from pamrs.diagnosis.hypotheses import _apart
+from pamrs.diagnosis.verdicts import case_verdict, judge
+from pamrs.diagnosis.weighing import weigh
+from pamrs.simulation import core_rig
+
+RIG = pamrs.rigs.shoulder()
+BLOCKS = [b for b in available_blocks(RIG, ("supply_pressure", "muscle_pressure", "valve_command", "joint_angle")) if b.kind != "arm"]
+TRIAL = Attempts(Problem(BLOCKS, [], core_rig(RIG)), Problem(BLOCKS, [], core_rig(RIG)), RIG, {}, {}, BLOCKS)
+
+
+def candidate(key: str, supply: float, chamber: float, **values: float) -> Candidate:
+    """A made-up hypothesis that leaves these excess variances."""
+    names = [name for name in key.split("+") if name]
+    effects, wrong = tuple(n for n in names if "." not in n), tuple(n for n in names if "." in n)
+    model = RIG
+    for effect in effects:
+        model = model.with_effect(effect)
+    fit = Fit(effects, model, values, dict.fromkeys(values, 1e-12), np.zeros((0, 0)), 0.0, {}, dict.fromkeys(wrong, 8.0), freed=wrong)
+    left = {
+        name: Excess(1.0 + ratio, ratio**0.5, 0.0, 1.0, 1.0, 1.1, 0.02) for name, ratio in (("supply", supply), ("chamber", chamber))
+    }
+    return Candidate(effects, fit, left, left, 0.0, wrong=wrong)
+
+
+def group(*found: Candidate) -> Group:
+    start = candidate("", 2.5, 64.0)
+    probabilities = weigh([start, *found], BLOCKS, 0.985, 30.0)
+    chamber = next(b for b in BLOCKS if b.name == "chamber")
+    return Group(BLOCKS, start.fitted, start.fitted, [start, *found], probabilities, chamber, {}, BLOCKS)
+
+
+def leak(supply: float, chamber: float) -> Candidate:
+    return candidate("supply_leak", supply, chamber, **{"supply_leak.conductance": 1e-11})
+
+
+def test_a_leak_of_the_tank_is_named_beside_a_chamber_without_a_name() -> None:
+    whole = group(leak(0.02, 64.0), candidate("valve_hysteresis", 2.4, 58.0, **{"valve_hysteresis.half_width": 0.01}))
+    assert whole.probabilities["unlisted"] > 0.95
+    tank, chamber = _apart(whole, TRIAL, 0.985, 30.0, None)
+    assert ([b.name for b in tank.blocks], [b.name for b in chamber.blocks]) == (["supply"], ["chamber"])
+    judged = judge([tank, chamber])
+    assert [(j.verdict, j.named) for j in judged] == [("effects", ("supply_leak",)), ("unlisted", ())]
+    assert case_verdict(judged) == "effects"
+    # one fit for both, so that the model has the tank's parameters beside the leak
+    assert chamber.candidates[0].fit is tank.candidates[1].fit
+
+
+def test_a_valve_that_explains_the_tank_alone_is_no_name() -> None:
+    # it acts in both blocks, and leaves one of them as it was
+    whole = group(candidate("valve_hysteresis", 0.02, 60.0, **{"valve_hysteresis.half_width": 0.01}))
+    assert _apart(whole, TRIAL, 0.985, 30.0, None) == []
+
+
+def test_each_block_may_have_a_name_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    volume = candidate("supply.volume", 0.0, 64.0, **{"supply.volume": 0.02})
+    heat = candidate("heat_transfer", 2.5, 0.6, **{"heat_transfer.coefficient": 20.0})
+    asked: list[list[str]] = []
+
+    def united(self: Attempts, candidates: list[Candidate]) -> Fit:
+        asked.append(sorted(c.key for c in candidates))
+        return replace(candidates[0].fit, effects=("heat_transfer",))
+
+    monkeypatch.setattr(Attempts, "united", united)
+    parts = _apart(group(volume, heat), TRIAL, 0.985, 30.0, None)
+    assert asked == [["heat_transfer", "supply.volume"]]
+    judged = judge(parts)
+    assert {name for j in judged for name in (*j.named, *j.wrong)} == {"supply.volume", "heat_transfer"}
+    assert sorted(b.name for p in parts for b in p.blocks) == ["chamber", "supply"]
