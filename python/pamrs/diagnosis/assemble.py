@@ -196,13 +196,18 @@ def _inside(group: Group, wanted: frozenset[str]) -> Candidate:
 def _owners(candidates: list[Candidate]) -> dict[str, int]:
     """The group that tells most of each parameter that several have (sensors' zeros): the one with the least standard deviation.
 
-    What a group leaves without a name is in its colour, and so in its standard deviations.
+    What a group leaves without a name is in its colour, and so in its standard deviations. Events are fitted with the values beside
+    them, which stay.
     """
+
+    def spread(k: int, name: str) -> float:
+        own = candidates[k].fit
+        return own.std.get(name, math.inf) if own.events is None else 0.0
+
     found: dict[str, int] = {}
     for k, candidate in enumerate(candidates):
         for name in candidate.fit.moved:
-            spread = [c.fit.std.get(name, math.inf) for c in (candidate, candidates[found.get(name, k)])]
-            if name not in found or spread[0] <= spread[1]:
+            if spread(k, name) <= spread(found.get(name, k), name):
                 found[name] = k
     return found
 
