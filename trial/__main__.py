@@ -79,6 +79,7 @@ def _parser() -> argparse.ArgumentParser:
     apart.add_argument("--results", type=Path, help="results of `pamrs prove` (default: FOLDER/results)")
     apart.add_argument("--out", type=Path, required=True, help="folder for the page")
     apart.add_argument("--command", dest="words", default="python -m trial blocks", help="what makes the page, as it says")
+    apart.add_argument("--first", type=int, help="only the first so many cases, where a run was ended before the last")
     check = sub.add_parser("selfcheck", help="compare the plant with finer steps and with another integrator")
     check.add_argument("--golden", type=Path, help="folder with golden vectors of the plant without effects")
     return parser
@@ -132,7 +133,10 @@ def main(argv: list[str] | None = None) -> int:
         elif args.command == "report":
             print(f"written: {report(args.folder, args.results or args.folder / 'results', args.out, args.words)}")
         elif args.command == "blocks":
-            print(f"written: {blocks_page(args.folder, args.results or args.folder / 'results', args.out, args.words)}")
+            if args.first is not None and args.first < 1:
+                raise ValueError(f"--first {args.first} is not allowed: at least 1")
+            page_of = blocks_page(args.folder, args.results or args.folder / "results", args.out, args.words, first=args.first)
+            print(f"written: {page_of}")
         else:
             print(selfcheck(args.golden))
     except (ValueError, OSError) as error:

@@ -196,7 +196,9 @@ def tables(scores: Scores) -> str:
     return "\n".join(parts) + "\n"
 
 
-def blocks_page(folder: Path, results: Path, out: Path, command: str, catalogue: Sequence[str] = LISTED) -> Path:
+def blocks_page(
+    folder: Path, results: Path, out: Path, command: str, catalogue: Sequence[str] = LISTED, first: int | None = None
+) -> Path:
     """Score a trial of plan `blocks` and write its page ``blocks.md``.
 
     Parameters
@@ -211,6 +213,8 @@ def blocks_page(folder: Path, results: Path, out: Path, command: str, catalogue:
         What makes the page, as the page says.
     catalogue : sequence of str
         As in :func:`trial.score.score`.
+    first : int, optional
+        Only the first so many cases, where a run was ended before the last: they stand in random order, so that these are a fair share.
 
     Returns
     -------
@@ -224,7 +228,9 @@ def blocks_page(folder: Path, results: Path, out: Path, command: str, catalogue:
     """
     digest, count = checked(folder)
     run = run_of(results, digest)
-    scores = score(folder / "keys", results, catalogue)
+    scores = score(folder / "keys", results, catalogue, first)
     head = ["# Blocks judged apart, and parameters far outside their tolerance\n", *about(folder, digest, count, run, command)]
+    if first is not None and first < count:
+        head.append(f"**Scored are the first {first} of the {count} cases**, which stand in random order: the run was ended there.\n")
     write(out / "blocks.md", "\n".join([*head, tables(scores)]))
     return out / "blocks.md"

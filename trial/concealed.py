@@ -264,8 +264,9 @@ def _check_wrong(wrong: Sequence[tuple[str, float]], rig: Path) -> None:
     for name, z in wrong:
         if name not in allowed:
             raise ValueError(f"unknown parameter {name!r}; known: {', '.join(allowed)}")
-        if not (math.isfinite(z) and _values(model, [name])[name] + z * tolerance[name] > 0.0):
-            raise ValueError(f"{name} cannot be {z:g} tolerances off")
+        least = -_values(model, [name])[name] / tolerance[name]
+        if not (math.isfinite(z) and z > least):
+            raise ValueError(f"{name}: {z:g} tolerances off is not allowed, more than {least:.3g} are (the value stays positive)")
 
 
 def make_case(

@@ -81,6 +81,9 @@ def blocks(rng: np.random.Generator, rig: Path | None = None) -> list[Planned]:
     Eight parameters far off, upwards and downwards, of three sizes: 48. Six nulls and six with parameters only.
     """
     rig = rig or default_rig()
+    missing = [name for name in PARAMETERS if name not in read_rig(rig)[1]]
+    if missing:
+        raise ValueError(f"{rig}: plan 'blocks' needs a tolerance of {', '.join(PARAMETERS)}; missing: {', '.join(missing)}")
     found: list[Planned] = []
     turn = [str(v) for v in rng.permutation(ARM)]
     for i, (name, label) in enumerate((n, s) for n in GAS for s in ("medium", "strong")):

@@ -392,8 +392,8 @@ def _median(values: Sequence[float | None]) -> float | None:
     return median(kept) if kept else None
 
 
-def score(keys: Path, results: Path, catalogue: Sequence[str] = LISTED) -> Scores:
-    """Score every key in a folder.
+def score(keys: Path, results: Path, catalogue: Sequence[str] = LISTED, first: int | None = None) -> Scores:
+    """Score every key in a folder, or the first so many by name.
 
     Parameters
     ----------
@@ -403,13 +403,15 @@ def score(keys: Path, results: Path, catalogue: Sequence[str] = LISTED) -> Score
         Folder with ``case_xxx/out.json`` or ``case_xxx.json``.
     catalogue : sequence of str
         Effect ids that the diagnosis may name; others are unlisted.
+    first : int, optional
+        How many; all by default.
 
     Raises
     ------
     ValueError
         No key, or a result of another schema.
     """
-    files = sorted(Path(keys).glob("*.json"))
+    files = sorted(Path(keys).glob("*.json"))[:first]
     if not files:
         raise ValueError(f"no key in {keys}")
     rows: list[Row] = []
