@@ -167,7 +167,7 @@ def test_make_a_wrong_parameter(tmp_path, capsys):
         ([], "go together"),
         (["--parameter", DEAD], "once for every"),
         (["--parameter", "arm.length", "--tolerances", "6"], "unknown parameter"),
-        (["--parameter", DEAD, "--tolerances", "-7"], "cannot be -7 tolerances off"),
+        (["--parameter", DEAD, "--tolerances", "-7"], "-7 tolerances off is not allowed"),
     ):
         assert main([*told, *more]) == 2
         assert words in capsys.readouterr().err
