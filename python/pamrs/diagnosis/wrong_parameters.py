@@ -29,8 +29,10 @@ AT_WALL = 2.9
 """Tolerances from which a refitted parameter stands at its wall."""
 ONE_FILE_IN_A_HUNDRED = 4.6
 """Logarithm of the odds against a parameter that is outside its tolerances."""
-MOST_FREED, PROMISING, BESIDE_LARGEST = 5, 2.0 * ONE_FILE_IN_A_HUNDRED, 0.08
-"""Hypotheses that are fitted; gain in chi-square by the linear model, and share of the largest, from which one is."""
+FAINT_EFFECT = 6.0
+"""The same against an effect where only noise is left."""
+MOST_PAIRS, PROMISING, BESIDE_LARGEST = 2, 2.0 * ONE_FILE_IN_A_HUNDRED, 0.08
+"""Pairs that are fitted; gain in chi-square by the linear model from which a hypothesis is, and share of the largest for a pair."""
 ONE_MISTAKE: tuple[tuple[tuple[str, str], tuple[str, str]], ...] = (
     (("chamber", "dead_volume"), ("valve", "discharge_area_max")),
     (("arm", "payload"), ("arm", "first_moment")),
@@ -76,7 +78,7 @@ def _kind(name: str) -> tuple[str, str]:
 
 
 def freed(trial: Attempts, baseline: Fit, first: Fit, say: Callable[[str], None]) -> list[Candidate]:
-    """The suspected parameters, each freed and fitted; those first that promise most by the linear model.
+    """The suspected parameters, each freed and fitted, and the pairs that promise most by the linear model.
 
     Where the mismatch is large its colour leaves little weight to the recordings, so that the priors hold what a fit with
     white noise moved to its wall: parameters at their wall in either fit are suspects.
@@ -94,9 +96,12 @@ def freed(trial: Attempts, baseline: Fit, first: Fit, say: Callable[[str], None]
     """
     suspects = [names for found in (baseline, first) for names in suspected(found, trial.inner.blocks)]
     gains = _promised(trial.inner, trial.nominal, baseline, list(dict.fromkeys(suspects)), trial.white)
-    least = max(PROMISING, BESIDE_LARGEST * max(gains.values(), default=0.0))
+    ranked = sorted((n for n, gain in gains.items() if gain > PROMISING), key=lambda n: -gains[n])
+    # the linear model says little of what is far away: each parameter at its wall is fitted, whatever it promises beside others
+    least = BESIDE_LARGEST * max(gains.values(), default=0.0)
+    pairs = [names for names in ranked if len(names) > 1 and gains[names] > least][:MOST_PAIRS]
     found = []
-    for names in sorted((n for n, gain in gains.items() if gain > least), key=lambda n: -gains[n])[:MOST_FREED]:
+    for names in [n for n in ranked if len(n) == 1 or n in pairs]:
         say(f"trying another value of {' and '.join(names)}")
         candidate = trial.freed(names, baseline)
         if candidate is not None and all(abs(candidate.fit.moved[name]) > WIDEST for name in names):  # else it is not wrong
@@ -150,7 +155,7 @@ def beside_quiet(trial: Attempts, quiet: Group, say: Callable[[str], None]) -> G
     """A group whose baseline leaves only noise, but needs a parameter at its wall for it: which one the file is wrong about.
 
     Each parameter at its wall is freed. What speaks for it is what misfit and priors lose together, weighed against the odds of a file
-    that is so wrong; what else the group found keeps its share beside it.
+    that is so wrong, beside faint effects that the group found, by what they lose.
     """
     start = quiet.candidates[0]
     found = freed(trial, start.fit, start.fit, say)
@@ -159,13 +164,13 @@ def beside_quiet(trial: Attempts, quiet: Group, say: Callable[[str], None]) -> G
         return quiet
     colour = trial.colour(start.fit)
     before = _cost(trial, start.fit, colour)
-    scores = {c: 0.5 * (before - _cost(trial, c.fit, colour)) - rarity(c) for c in shown}
+    effects = [c for c in quiet.candidates if c.effects and quiet.probabilities.get(c.key, 0.0) > 0.0]
+    scores = {c: 0.5 * (before - _cost(trial, c.fit, colour)) - (rarity(c) if c.wrong else FAINT_EFFECT) for c in (*shown, *effects)}
     top = max(0.0, *scores.values())
     weights = {c: math.exp(max(-60.0, score - top)) for c, score in scores.items()}
     total = math.exp(-top) + sum(weights.values())
-    unchanged = quiet.probabilities.get("", 0.0)
-    probabilities = dict(quiet.probabilities) | {"": unchanged * math.exp(-top) / total}
-    probabilities |= {c.key: unchanged * weight / total for c, weight in weights.items()}
+    share = {c.key: weights[c] / total for c in shown}
+    probabilities = {key: p * (1.0 - sum(share.values())) for key, p in quiet.probabilities.items()} | share
     return replace(quiet, candidates=[*quiet.candidates, *shown], probabilities=probabilities)
 
 
