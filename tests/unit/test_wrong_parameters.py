@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import pamrs
+from pamrs.diagnosis import wrong_parameters
 from pamrs.diagnosis.blocks import available_blocks
 from pamrs.diagnosis.fitting import Problem, fit
 from pamrs.diagnosis.result import schema
@@ -138,3 +139,25 @@ def test_a_zero_that_two_groups_share_is_named_once() -> None:
     assert wrong["interval"][0] < 4500.0 < wrong["interval"][1]
     # table of parameters, model and name agree
     assert found.parameters["sensors.pressure_zero"]["value"] == wrong["value"] == found.rig.parameter("sensors.pressure_zero").value
+
+
+def test_every_parameter_at_its_wall_is_freed_whatever_pairs_promise(monkeypatch: pytest.MonkeyPatch) -> None:
+    pairs = [
+        ("arm.payload", "arm.first_moment"),
+        ("arm.inertia", "arm.first_moment"),
+        ("chamber.dead_volume", "valve.discharge_area_max"),
+    ]
+    gains = dict.fromkeys(pairs, 1e6) | {("muscle.modulus_scale",): 50.0, ("arm.viscous",): 3.0}
+    monkeypatch.setattr(wrong_parameters, "suspected", lambda *_: list(gains))
+    monkeypatch.setattr(wrong_parameters, "_promised", lambda *_: gains)
+    asked: list[tuple[str, ...]] = []
+
+    class Trial:
+        inner, nominal, white = Problem([], [], core_rig(pamrs.rigs.shoulder())), pamrs.rigs.shoulder(), {}
+
+        def freed(self, names: tuple[str, ...], baseline: object) -> None:
+            asked.append(names)
+
+    assert wrong_parameters.freed(Trial(), None, None, lambda text: None) == []  # type: ignore[arg-type]
+    # two pairs at the most, the one parameter that promises something beyond a file that is wrong by chance, and not the other
+    assert asked == [*pairs[:2], ("muscle.modulus_scale",)]
