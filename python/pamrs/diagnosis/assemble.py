@@ -189,8 +189,7 @@ def _hypotheses(judged: list[Judged], probabilities: dict[str, float], nominal: 
 def _inside(group: Group, wanted: frozenset[str]) -> Candidate:
     """The most probable hypothesis of a group that names nothing else than what is wanted; the baseline where there is none."""
     named = [c for c in group.candidates if c.names and set(c.names) <= wanted]
-    weights = [group.probabilities.get(c.key, 0.0) for c in named]
-    return named[weights.index(max(weights))] if named else group.candidates[0]
+    return max(named, key=lambda c: group.probabilities.get(c.key, 0.0), default=group.candidates[0])
 
 
 def _owners(candidates: list[Candidate]) -> dict[str, int]:

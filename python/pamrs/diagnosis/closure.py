@@ -19,7 +19,7 @@ from pamrs.diagnosis.blocks import Block
 from pamrs.diagnosis.candidates import colour_of
 from pamrs.diagnosis.closure_words import describe_closure
 from pamrs.diagnosis.evidence import correlation_time
-from pamrs.diagnosis.fitting import Fit, Problem, fit, residuals, stacked
+from pamrs.diagnosis.fitting import Fit, Problem, fit, residuals, stacked, with_priors
 from pamrs.effects_table import EFFECTS
 from pamrs.effects_table.closure import CLOSURE_OF, MEMORY_OF, TERMS, Term
 from pamrs.errors import DiagnosisError, SimulationError
@@ -255,12 +255,6 @@ def _price(samples: float, among: int) -> float:
     return math.log(samples) + 2.0 * math.log(among)
 
 
-def _misfit(problem: Problem, found: Fit, inflation: dict[str, float]) -> float:
-    """Sum of squares of stacked residuals and priors under a weighting of its own."""
-    rows, _ = stacked(problem, found.residuals, inflation)
-    return float(rows @ rows) + sum(x * x for x in found.moved.values())
-
-
 def _better(models: list[Fit], problem: Problem, inflation: dict[str, float], among: int) -> Fit | None:
     """The model that is worth most by misfit and price, all on the independent samples of that with the least misfit; None for the
     first.
@@ -276,7 +270,7 @@ def _better(models: list[Fit], problem: Problem, inflation: dict[str, float], am
     among : int
         Number of terms that there were to choose from.
     """
-    misfits = [_misfit(problem, model, inflation) for model in models]
+    misfits = [with_priors(problem, model, inflation) for model in models]
     least = models[int(np.argmin(misfits))]
     frame = _Frame.of(problem, models[0], least, inflation)
     samples = frame.independent(frame.rows)
@@ -449,6 +443,6 @@ def _fitted(
             continue
         if best is None or tried.cost < best.cost:
             best = tried
-        if 2.0 * best.cost < _misfit(problem, warm, inflation):
+        if 2.0 * best.cost < with_priors(problem, warm, inflation):
             break
     return best

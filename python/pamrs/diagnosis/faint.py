@@ -90,7 +90,7 @@ def faint(trial: Attempts, quiet: Group, acting: list[str], say: Callable[[str],
         tried = replace(tried, gain=gains.get(effect, 0.0))
         within = inside - _chi_square(trial.inner, tried.fit.residuals, colour)
         over = outside - _chi_square(trial.outer, residuals(trial.outer, tried.fit.rig), colour)
-        relief = _strain(finest) - _strain(tried.fit)
+        relief = finest.strain - tried.fit.strain
         gain = within + relief
         odd = STANDING * stands(tried, seconds) + unlikely(tried, ranging)
         if gain > FAINT and over > AGREES * gain:
@@ -148,11 +148,6 @@ def _instead(screened: Screen, found: Fit, trial: Attempts, colour: dict[str, fl
 def _gone_back(begun: Begun, before: Fit, after: Fit) -> bool:
     """Whether the parameters that an effect stands in for are where they were expected, once it is there."""
     return bool(begun.back) and all(abs(after.moved[n]) < 0.5 * abs(before.moved[n]) for n in begun.back)
-
-
-def _strain(found: Fit) -> float:
-    """How far a fit had to leave the nominal values: the sum of squares of its priors."""
-    return sum(m * m for m in found.moved.values())
 
 
 def _chi_square(problem: Problem, found: dict[Key, Residual], colour: dict[str, float]) -> float:

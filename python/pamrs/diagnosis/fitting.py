@@ -20,7 +20,7 @@ from pamrs.errors import ParameterError, RigError, SimulationError
 from pamrs.rig import Parameter, Rig
 from pamrs.simulation import core_rig
 
-__all__ = ["Events", "Fit", "Problem", "Scaling", "changes", "fit", "residuals", "stacked"]
+__all__ = ["Events", "Fit", "Problem", "Scaling", "changes", "fit", "residuals", "stacked", "with_priors"]
 
 Array = NDArray[np.float64]
 Key = tuple[str, str]
@@ -145,6 +145,11 @@ class Fit:
     def held_by_prior(self) -> dict[str, float]:
         """Baseline parameters that a prior holds, and how far each moved [tolerances]."""
         return {name: moved for name, moved in self.moved.items() if name not in self.freed}
+
+    @property
+    def strain(self) -> float:
+        """How far it had to leave the nominal values: the sum of squares of its priors."""
+        return sum(moved * moved for moved in self.held_by_prior.values())
 
 
 def residuals(problem: Problem, rig: Rig, names: Sequence[str] = (), events: Events | None = None) -> dict[Key, Residual]:
@@ -318,6 +323,12 @@ def stacked(problem: Problem, found: dict[Key, Residual], inflation: dict[str, f
                 slope, _ = binned(r.jacobian, r.rows, bin_width(prepared, FIT_BIN))
                 slopes.append(-slope * weight[:, None])
     return np.concatenate(rows), np.concatenate(slopes) if slopes else None
+
+
+def with_priors(problem: Problem, found: Fit, inflation: dict[str, float]) -> float:
+    """Sum of squares of a fit's stacked residuals and priors under a weighting of its own."""
+    rows, _ = stacked(problem, found.residuals, inflation)
+    return float(rows @ rows) + found.strain
 
 
 def changes(problem: Problem, rig: Rig, base: dict[Key, Residual], effect: str) -> dict[Key, Residual]:

@@ -13,6 +13,7 @@ from pamrs.diagnosis.candidates import Candidate, significant
 from pamrs.diagnosis.evidence import Excess
 from pamrs.diagnosis.fitting import Problem
 from pamrs.effects_table import EFFECTS
+from pamrs.effects_table.entry import SameData
 
 __all__ = [
     "FORM",
@@ -209,7 +210,7 @@ def _beside_values(scores: dict[Candidate, float]) -> dict[Candidate, float]:
 
 def strained(candidate: Candidate) -> float:
     """Half of the sum of squares of the priors of a hypothesis, as far as it counts."""
-    return min(0.5 * sum(moved * moved for moved in candidate.fit.held_by_prior.values()), DECIDED)
+    return min(0.5 * candidate.fit.strain, DECIDED)
 
 
 def _trusted(candidate: Candidate, baseline: Candidate, suspects: list[Block], most: float, seconds: float) -> float:
@@ -235,8 +236,13 @@ def doubt(candidate: Candidate, seconds: float) -> float:
 
 def stands(candidate: Candidate, seconds: float) -> bool:
     """Whether a clock of a set does not drift: two free clocks do, and what is late by the same time always is a lag or a delay."""
-    offset, rate = (candidate.fit.values.get(f"clock_skew.{name}", 0.0) for name in ("offset", "rate"))
-    return abs(rate) * seconds < abs(offset)
+
+    def at_rest(effect: str, same: SameData) -> bool:
+        size, telling = (candidate.fit.values.get(f"{effect}.{name}", 0.0) for name in (same.size, same.without))
+        return abs(telling) * seconds < abs(size)
+
+    known = ((effect, EFFECTS[effect].same_data) for effect in candidate.effects)
+    return any(at_rest(effect, same) for effect, same in known if same is not None)
 
 
 def unlikely(candidate: Candidate, ranging: tuple[float, float] | None) -> float:

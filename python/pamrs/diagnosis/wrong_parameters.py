@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 
 from pamrs.diagnosis.blocks import Block
 from pamrs.diagnosis.candidates import Attempts, Candidate, Group, significant
-from pamrs.diagnosis.fitting import WIDEST, Fit, Problem, stacked
+from pamrs.diagnosis.fitting import WIDEST, Fit, Problem, stacked, with_priors
 from pamrs.diagnosis.leastsquares import levenberg_marquardt
 from pamrs.rig import Rig
 
-__all__ = ["AT_WALL", "beside_quiet", "freed", "rarity", "suspected"]
+__all__ = ["AT_WALL", "beside_quiet", "freed", "suspected"]
 
 Array = NDArray[np.float64]
 
@@ -113,9 +113,11 @@ def _promised(
     problem: Problem, nominal: Rig, baseline: Fit, suspects: list[tuple[str, ...]], inflation: dict[str, float]
 ) -> dict[tuple[str, ...], float]:
     """Gain in chi-square, priors included, that freeing parameters brings by the sensitivities at the baseline."""
+    if not suspects:
+        return {}
     names = list(baseline.moved)
     rows, jacobian = stacked(problem, baseline.residuals, inflation)
-    if jacobian is None or not suspects:
+    if jacobian is None:
         return {}
     scaled = jacobian[:, [list(baseline.values).index(n) for n in names]] * [baseline.scales[n] for n in names]
     # the triangle of a QR decomposition has the same sums of squares in a few rows
@@ -123,7 +125,7 @@ def _promised(
     slopes, left = triangle[:, :-1], triangle[:, -1]
     begin = np.array([baseline.moved[n] for n in names])
     known = nominal.parameters
-    low, high = (np.array([(end - known[n].value) / known[n].tol for n, end in ends]) for ends in _ends(nominal, names))
+    low, high = (np.array([(getattr(known[n], end) - known[n].value) / known[n].tol for n in names]) for end in ("lower", "upper"))
 
     def cost(loose: tuple[str, ...]) -> float:
         bound = np.array([n not in loose for n in names], dtype=np.float64)
@@ -140,17 +142,6 @@ def _promised(
     return {loose: was - cost(loose) for loose in suspects}
 
 
-def _ends(nominal: Rig, names: list[str]) -> tuple[list[tuple[str, float]], list[tuple[str, float]]]:
-    """The least and the largest possible value of each parameter."""
-    known = nominal.parameters
-    return [(n, known[n].lower) for n in names], [(n, known[n].upper) for n in names]
-
-
-def rarity(candidate: Candidate) -> float:
-    """Logarithm of the odds against a file that is so wrong: the further outside, the rarer, but less and less so."""
-    return ONE_FILE_IN_A_HUNDRED * len(candidate.wrong) + candidate.outside
-
-
 def beside_quiet(trial: Attempts, quiet: Group, say: Callable[[str], None]) -> Group:
     """A group whose baseline leaves only noise, but needs a parameter at its wall for it: which one the file is wrong about.
 
@@ -163,9 +154,11 @@ def beside_quiet(trial: Attempts, quiet: Group, say: Callable[[str], None]) -> G
     if not shown:
         return quiet
     colour = trial.colour(start.fit)
-    before = _cost(trial, start.fit, colour)
+    before = with_priors(trial.inner, start.fit, colour)
     effects = [c for c in quiet.candidates if c.effects and quiet.probabilities.get(c.key, 0.0) > 0.0]
-    scores = {c: 0.5 * (before - _cost(trial, c.fit, colour)) - (rarity(c) if c.wrong else FAINT_EFFECT) for c in (*shown, *effects)}
+    # a file that is further outside its tolerances is rarer, but less and less so
+    against = {c: ONE_FILE_IN_A_HUNDRED * len(c.wrong) + c.outside for c in shown} | dict.fromkeys(effects, FAINT_EFFECT)
+    scores = {c: 0.5 * (before - with_priors(trial.inner, c.fit, colour)) - odds for c, odds in against.items()}
     top = max(0.0, *scores.values())
     weights = {c: math.exp(max(-60.0, score - top)) for c, score in scores.items()}
     total = math.exp(-top) + sum(weights.values())
@@ -178,9 +171,3 @@ def _carries_over(candidate: Candidate, start: Candidate) -> bool:
     """Whether held-out recordings are predicted as well as by the baseline, or to their noise."""
     pairs = [(candidate.held_out[name], was) for name, was in start.held_out.items()]
     return all(now.ratio <= max(now.limit, was.ratio) for now, was in pairs)
-
-
-def _cost(trial: Attempts, found: Fit, colour: dict[str, float]) -> float:
-    """Sum of squares of a fit and of the priors that hold it."""
-    rows, _ = stacked(trial.inner, found.residuals, colour)
-    return float(rows @ rows) + sum(moved * moved for moved in found.held_by_prior.values())

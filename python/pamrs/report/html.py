@@ -83,6 +83,7 @@ def _blocks(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     rows = []
     for entry in diagnosis.blocks:
         found = [*entry["effects"], *entry["wrong_parameters"]]
+        leading, chance = max(entry["probabilities"].items(), key=lambda kv: kv[1], default=("none", math.nan))
         sizes = []
         for block in entry["mismatch"]:
             part = block["held_out"] or block["fitted"]
@@ -99,8 +100,8 @@ def _blocks(diagnosis: Diagnosis) -> list[dict[str, Any]]:
             {
                 "verdict": WRONG if entry["wrong_parameters"] else BADGES[entry["verdict"]],
                 "names": words.set_label(found) if found else "–",
-                "probability": words.format_probability(max(entry["probabilities"].values(), default=math.nan)),
-                "leading": words.hypothesis_label(max(entry["probabilities"], key=lambda k: entry["probabilities"][k], default="none")),
+                "probability": words.format_probability(chance),
+                "leading": words.hypothesis_label(leading),
                 "sizes": sizes,
             }
         )
