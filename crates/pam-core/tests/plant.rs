@@ -1,8 +1,8 @@
 //! Laws of the composed plant: order, sensitivities against differences, typed errors, determinism.
 
-use pam_core::measured::{Measured, Signal};
-use pam_core::residual::{predict, Block};
-use pam_core::rig::spec::EffectSpec;
+use pam_core::cut_chain::{predict, Block};
+use pam_core::cut_chain::{Measured, Signal};
+use pam_core::description::EffectSpec;
 use pam_core::simulate::{simulate, Initial, Timing, Trajectory};
 use pam_core::{Error, Rig, RigSpec};
 use std::collections::BTreeMap;

@@ -158,7 +158,7 @@ pub fn fastest(time: f64, angle: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::integrate::Rk4;
+    use crate::simulate::integrate::Rk4;
 
     fn here(pressure: f64, angle: f64, rate: f64, memory: [f64; STATES]) -> Here<f64> {
         Here { pressure, angle, rate, memory }

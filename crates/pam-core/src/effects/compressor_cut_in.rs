@@ -6,7 +6,7 @@
 //! moment moves with the pressures and not by whole steps. Acts on tanks.
 
 use super::{EffectInfo, EffectParameter};
-use crate::gas::tube::REFERENCE_DENSITY;
+use crate::blocks::tube::REFERENCE_DENSITY;
 use crate::scalar::Scalar;
 
 /// Table entry.

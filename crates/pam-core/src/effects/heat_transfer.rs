@@ -10,8 +10,8 @@
 //! Carneiro & de Almeida (2006); Al-Ibrahim & Otis (1992).
 
 use super::{EffectInfo, EffectParameter};
-use crate::gas::chamber::ChamberState;
-use crate::gas::orifice::Gas;
+use crate::blocks::chamber::ChamberState;
+use crate::blocks::gas::Gas;
 use crate::scalar::Scalar;
 
 /// Table entry.

@@ -6,7 +6,7 @@
 //! `V/(alpha_out C rho0 R T)`. Beater, *Pneumatic Drives* (2007).
 
 use super::{EffectInfo, EffectParameter};
-use crate::gas::orifice::Gas;
+use crate::blocks::gas::Gas;
 use crate::scalar::{constant, Scalar};
 
 /// Table entry.

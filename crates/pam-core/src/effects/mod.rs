@@ -1,7 +1,7 @@
 //! Physics that a nominal model leaves out: one file each, plugged into a block.
 //!
 //! An effect that is absent costs the step loop at most one branch on a flag. What it remembers (a spool's position, a creeping
-//! strain, a relay) stands behind the states of the rig, see [`crate::rig::Layout`].
+//! strain, a relay) stands behind the states of the rig, see [`crate::plant::Layout`].
 
 pub mod activation_pressure;
 pub mod base_flexibility;

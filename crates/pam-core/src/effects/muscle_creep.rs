@@ -34,7 +34,7 @@ pub fn rate<S: Scalar>(time_constant: S, length: S, damper: S) -> S {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::integrate::Rk4;
+    use crate::simulate::integrate::Rk4;
 
     #[test]
     fn a_step_of_length_relaxes_exponentially() {

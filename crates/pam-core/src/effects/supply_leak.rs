@@ -5,7 +5,7 @@
 //! droop. P. Beater, *Pneumatic Drives* (2007).
 
 use super::{EffectInfo, EffectParameter};
-use crate::gas::orifice::Gas;
+use crate::blocks::gas::Gas;
 use crate::scalar::{constant, Scalar};
 
 /// Table entry.

@@ -8,12 +8,12 @@
 //!
 //! With a `tap` of [`AT_VALVE`] or more the transducer of what the valve feeds sits at the valve's end of the tube and reads the node,
 //! which leads the muscle's pressure while air flows. Where such a reading drives a block, it gives the valve's flow, and the muscle's
-//! pressure is that to which the tube passes it ([`Tube::other_end`]); see [`crate::rig`]'s `tap.rs`. In front of a `[line]` that is the
+//! pressure is that to which the tube passes it ([`Tube::other_end`]); see [`crate::plant`]'s `tap.rs`. In front of a `[line]` that is the
 //! line's inlet; of two valves at one chamber the first one has the transducer.
 
 use super::{EffectInfo, EffectParameter};
-use crate::gas::orifice::Gas;
-use crate::gas::tube::Tube;
+use crate::blocks::gas::Gas;
+use crate::blocks::tube::Tube;
 use crate::scalar::{constant, Scalar};
 use num_dual::Dual64;
 

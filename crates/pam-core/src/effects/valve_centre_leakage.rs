@@ -5,7 +5,7 @@
 //! of the flow stage of a pneumatic servo-distributor", 1999; *Energies* 12, 1096 (2019).
 
 use super::{EffectInfo, EffectParameter};
-use crate::gas::orifice::Gas;
+use crate::blocks::gas::Gas;
 use crate::scalar::Scalar;
 
 /// Table entry.

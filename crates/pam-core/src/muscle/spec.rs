@@ -5,8 +5,8 @@ use serde::Deserialize;
 use super::elbow_linear::Factors;
 use super::friction::Friction;
 use super::model::ForceModel;
+use crate::braid::{Dimensions, EndRatio, MuscleGeometry, Profile};
 use crate::error::{check_range, Error, Result};
-use crate::geometry::Profile;
 
 /// Largest order of the stress polynomial.
 pub const HIGHEST_ORDER: usize = 12;
@@ -148,6 +148,27 @@ impl MuscleSpec {
             Some(name) => Profile::from_name(name),
             None => Ok(self.force_model()?.profile()),
         }
+    }
+
+    /// The geometry of one muscle of this kind.
+    ///
+    /// # Errors
+    /// As [`Self::validate`].
+    pub fn shape(&self) -> Result<MuscleGeometry> {
+        self.validate()?;
+        Ok(MuscleGeometry::new(&Dimensions {
+            rest_length: self.rest_length,
+            rest_diameter: self.rest_diameter,
+            braid_angle: self.braid_angle,
+            wall_thickness: self.wall_thickness,
+            ends: EndRatio {
+                k0: self.k0,
+                contraction_slope: self.contraction_slope,
+                extension_slope: self.extension_slope,
+            },
+            neck_floor: self.neck_floor,
+            profile: self.profile()?,
+        }))
     }
 
     /// The friction of the muscle, none if it has none.

@@ -1,7 +1,7 @@
 //! Rigs that several tests use.
 #![allow(dead_code)]
 
-use pam_core::rig::spec::{
+use pam_core::description::{
     ArmSpec, ChamberSpec, EffectSpec, JointSpec, LinkSpec, TransmissionSpec, ValveSpec,
 };
 use pam_core::RigSpec;

@@ -1,0 +1,208 @@
+//! Where each state and channel of a rig is, and what it is called.
+
+use super::units::Wiring;
+use super::wiring_motion::coordinate_names;
+use crate::description::{dotted, RigSpec};
+
+/// Number of sums that are kept beside the states: see [`BOOKS`].
+pub const BOOK_COUNT: usize = 6;
+
+/// Channels of the sums over a simulation, in their order: mass out of the supplies and into the ambient, what
+/// regulators relieve included [kg]; energy `R T m` and exergy `R T ln(p/p_a) m` of what the supplies gave, work of
+/// the muscles, positive work at the joints [J].
+pub const BOOKS: [&str; BOOK_COUNT] =
+    ["mass_supplied", "mass_vented", "energy_supplied", "exergy_supplied", "muscle_work", "joint_work"];
+
+/// Places of the states: supplies' pressures, gases' pressures, gases' masses, coordinates, their rates, what effects need.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Layout {
+    /// Supplies.
+    pub supplies: usize,
+    /// Chambers and, behind them, inlets of lines.
+    pub gases: usize,
+    /// Joints, or one for a linear load.
+    pub coordinates: usize,
+    /// Chambers among the gases.
+    pub chambers: usize,
+    /// Numbers that effects move or remember, behind the motion.
+    pub extras: usize,
+}
+
+impl Layout {
+    /// States without the books.
+    #[inline]
+    #[must_use]
+    pub fn states(&self) -> usize {
+        self.extra(0) + self.extras
+    }
+
+    /// A number of an effect; the first one is where the motion ends.
+    #[inline]
+    #[must_use]
+    pub fn extra(&self, k: usize) -> usize {
+        self.supplies + 2 * (self.gases + self.coordinates) + k
+    }
+
+    /// Absolute pressure of a supply [Pa].
+    #[inline]
+    #[must_use]
+    pub fn supply(&self, k: usize) -> usize {
+        k
+    }
+
+    /// Absolute pressure of a gas [Pa].
+    #[inline]
+    #[must_use]
+    pub fn pressure(&self, k: usize) -> usize {
+        self.supplies + k
+    }
+
+    /// Mass of a gas [kg].
+    #[inline]
+    #[must_use]
+    pub fn mass(&self, k: usize) -> usize {
+        self.supplies + self.gases + k
+    }
+
+    /// Joint angle [rad], or shortening of a linear load [m].
+    #[inline]
+    #[must_use]
+    pub fn angle(&self, k: usize) -> usize {
+        self.supplies + 2 * self.gases + k
+    }
+
+    /// Its rate.
+    #[inline]
+    #[must_use]
+    pub fn rate(&self, k: usize) -> usize {
+        self.supplies + 2 * self.gases + self.coordinates + k
+    }
+
+    /// A sum of [`BOOKS`].
+    #[inline]
+    #[must_use]
+    pub fn book(&self, k: usize) -> usize {
+        self.states() + k
+    }
+}
+
+/// What a simulated channel shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Channel {
+    /// Gauge pressure of a supply [Pa].
+    Supply(usize),
+    /// Gauge pressure of a gas as its sensor reads it [Pa].
+    Pressure(usize),
+    /// Joint angle as its sensor reads it [rad].
+    Angle(usize),
+    /// Joint rate [rad/s].
+    Rate(usize),
+    /// Length of the muscle on a linear load [m].
+    Length,
+    /// Its rate [m/s].
+    LengthRate,
+    /// Contraction ratio of a group [1].
+    Contraction(usize),
+    /// Force of all muscles of a group [N].
+    Force(usize),
+    /// Torque of all muscles on a joint [N m].
+    Torque(usize),
+    /// Volume of a chamber [m3].
+    Volume(usize),
+    /// Temperature of a chamber's gas [K].
+    Temperature(usize),
+    /// Mass of a gas [kg].
+    Mass(usize),
+    /// One of [`BOOKS`].
+    Book(usize),
+}
+
+/// Names of everything that can be set, read or driven.
+#[derive(Debug, Clone)]
+pub struct Names {
+    /// Simulated channels.
+    pub channels: Vec<(String, Channel)>,
+    /// States that an initial value can be given for, pressures gauge; with the place of each.
+    pub initial: Vec<(String, usize)>,
+    /// Commands that a simulation takes: of the valves, then of the regulators.
+    pub inputs: Vec<String>,
+    /// Names of the gases: `chamber.flexor`, `line.flexor`.
+    pub gases: Vec<String>,
+    /// Names of the coordinates: `joint.elbow`, or `load`.
+    pub coordinates: Vec<String>,
+}
+
+impl Names {
+    /// The names of a rig.
+    pub(crate) fn new(spec: &RigSpec, wiring: &Wiring, layout: &Layout) -> Self {
+        let joints = coordinate_names(spec);
+        let load = spec.load.is_some();
+        let (mut channels, mut initial) = (Vec::new(), Vec::new());
+        let of = |kind: &str, name: &str| dotted(kind, name);
+        for (k, supply) in spec.supplies.iter().enumerate() {
+            channels.push((of("supply_pressure", &supply.name), Channel::Supply(k)));
+            initial.push((of("supply_pressure", &supply.name), layout.supply(k)));
+        }
+        let chambers = spec.chambers.iter().map(|c| c.name.as_str());
+        let inlets = wiring.inlets.iter().map(|(line, _)| spec.lines[*line].name.as_str());
+        for (k, name) in chambers.clone().enumerate() {
+            channels.push((of("muscle_pressure", name), Channel::Pressure(k)));
+            initial.push((of("muscle_pressure", name), layout.pressure(k)));
+        }
+        for (k, name) in inlets.clone().enumerate() {
+            let gas = wiring.chambers + k;
+            channels.push((of("line_pressure", name), Channel::Pressure(gas)));
+            initial.push((of("line_pressure", name), layout.pressure(gas)));
+        }
+        for (k, name) in joints.iter().enumerate() {
+            channels.push((of("joint_angle", name), Channel::Angle(k)));
+            initial.push((of("joint_angle", name), layout.angle(k)));
+            initial.push((of("joint_rate", name), layout.rate(k)));
+        }
+        for (k, name) in joints.iter().enumerate() {
+            channels.push((of("joint_rate", name), Channel::Rate(k)));
+        }
+        if load {
+            channels.push(("length".into(), Channel::Length));
+            channels.push(("length_rate".into(), Channel::LengthRate));
+            initial.push(("length".into(), layout.angle(0)));
+            initial.push(("length_rate".into(), layout.rate(0)));
+        }
+        for (k, group) in spec.muscles.iter().enumerate() {
+            channels.push((of("contraction_ratio", &group.name), Channel::Contraction(k)));
+        }
+        for (k, group) in spec.muscles.iter().enumerate() {
+            channels.push((of("muscle_force", &group.name), Channel::Force(k)));
+        }
+        for (k, name) in joints.iter().enumerate() {
+            channels.push((of("joint_torque", name), Channel::Torque(k)));
+        }
+        for (k, name) in chambers.clone().enumerate() {
+            channels.push((of("air_volume", name), Channel::Volume(k)));
+        }
+        for (k, name) in chambers.clone().enumerate() {
+            channels.push((of("temperature", name), Channel::Temperature(k)));
+        }
+        for (k, name) in chambers.clone().enumerate() {
+            channels.push((of("air_mass", name), Channel::Mass(k)));
+        }
+        for (k, name) in inlets.clone().enumerate() {
+            channels.push((of("line_mass", name), Channel::Mass(wiring.chambers + k)));
+        }
+        channels.extend(BOOKS.iter().enumerate().map(|(k, name)| ((*name).to_string(), Channel::Book(k))));
+        let regulators = spec.supplies.iter().filter(|s| s.kind == "regulator");
+        Self {
+            channels,
+            initial,
+            inputs: (spec.valves.iter().map(|v| of("valve_command", &v.name)))
+                .chain(regulators.map(|s| of("supply_command", &s.name)))
+                .collect(),
+            gases: chambers.map(|n| of("chamber", n)).chain(inlets.map(|n| of("line", n))).collect(),
+            coordinates: if load {
+                vec!["load".into()]
+            } else {
+                joints.iter().map(|n| of("joint", n)).collect()
+            },
+        }
+    }
+}
