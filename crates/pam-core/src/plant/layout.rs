@@ -3,6 +3,7 @@
 use super::units::Wiring;
 use super::wiring_motion::coordinate_names;
 use crate::description::{dotted, RigSpec};
+use crate::effects::Role;
 
 /// Number of sums that are kept beside the states: see [`BOOKS`].
 pub const BOOK_COUNT: usize = 6;
@@ -24,8 +25,8 @@ pub struct Layout {
     pub coordinates: usize,
     /// Chambers among the gases.
     pub chambers: usize,
-    /// Numbers that effects move or remember, behind the motion.
-    pub extras: usize,
+    /// States of effects, behind the motion.
+    pub effects: usize,
 }
 
 impl Layout {
@@ -33,13 +34,13 @@ impl Layout {
     #[inline]
     #[must_use]
     pub fn states(&self) -> usize {
-        self.extra(0) + self.extras
+        self.effect(0) + self.effects
     }
 
-    /// A number of an effect; the first one is where the motion ends.
+    /// A state of an effect; the first one is where the motion ends.
     #[inline]
     #[must_use]
-    pub fn extra(&self, k: usize) -> usize {
+    pub fn effect(&self, k: usize) -> usize {
         self.supplies + 2 * (self.gases + self.coordinates) + k
     }
 
@@ -84,6 +85,63 @@ impl Layout {
     pub fn book(&self, k: usize) -> usize {
         self.states() + k
     }
+}
+
+/// What a number of a simulation's state is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StateRole {
+    /// Absolute pressure of a supply or a gas [Pa].
+    Pressure,
+    /// Mass of a gas [kg].
+    Mass,
+    /// The same, of a gas whose temperature is free: a state of its own.
+    FreeMass,
+    /// Joint angle [rad], or shortening of a linear load [m].
+    Position,
+    /// Its rate.
+    Rate,
+    /// State of an effect.
+    Effect(Role),
+    /// Sum of the mass and energy balance.
+    Balance,
+    /// What a muscle's own friction remembers of its motion.
+    Memory,
+    /// A condition that an event ends.
+    Flag,
+    /// Samples since the start.
+    Samples,
+}
+
+impl StateRole {
+    /// Name, public API.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Pressure => "pressure",
+            Self::Mass => "mass",
+            Self::FreeMass => "free_mass",
+            Self::Position => "position",
+            Self::Rate => "rate",
+            Self::Effect(Role::Moves) => "effect_moves",
+            Self::Effect(Role::Opens) => "effect_opens",
+            Self::Effect(Role::Follows) => "effect_follows",
+            Self::Effect(Role::Begun) => "effect_begun",
+            Self::Effect(Role::Keeps) => "effect_keeps",
+            Self::Balance => "balance",
+            Self::Memory => "memory",
+            Self::Flag => "flag",
+            Self::Samples => "samples",
+        }
+    }
+}
+
+/// One number of a simulation's state.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StatePlace {
+    /// A channel, an effect's state (`input_path_lag.lag.flexor`), or what it belongs to.
+    pub name: String,
+    /// What it is.
+    pub role: StateRole,
 }
 
 /// What a simulated channel shows.

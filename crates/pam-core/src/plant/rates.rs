@@ -7,12 +7,14 @@
 use super::body::Body;
 use super::layout::{Channel, Layout, BOOK_COUNT};
 use super::memory::Memory;
+use super::ports::Acting;
 use super::units::{LineUnit, Path, SupplyUnit};
 use super::{Rig, Values};
 use crate::blocks::chamber::Polytropic;
+use crate::blocks::chamber::{cube_area, cylinder_area, gas_temperature};
 use crate::blocks::supply::Supply;
 use crate::blocks::tube::Tube;
-use crate::effects::{heat_transfer, tube_flow_restriction};
+use crate::effects::{Effect, Number};
 use crate::scalar::{constant, Scalar};
 use crate::Result;
 
@@ -25,8 +27,8 @@ pub struct Simulated {
     gas: bool,
     /// Some motion is integrated.
     motion: bool,
-    /// Some number of an effect is integrated.
-    extras: bool,
+    /// Some state of an effect is integrated.
+    effects: bool,
 }
 
 impl Simulated {
@@ -34,11 +36,11 @@ impl Simulated {
     pub fn all_but(layout: &Layout, places: &[usize]) -> Self {
         let driven: Vec<bool> = (0..layout.states()).map(|k| places.contains(&k)).collect();
         let some = |from: usize, to: usize| driven[from..to].iter().any(|d| !d);
-        let end = layout.extra(0);
+        let end = layout.effect(0);
         Self {
             gas: some(0, layout.angle(0)),
             motion: some(layout.angle(0), end),
-            extras: some(end, layout.states()),
+            effects: some(end, layout.states()),
             driven,
         }
     }
@@ -74,7 +76,7 @@ pub(super) enum Line<S> {
 }
 
 /// A rig with the values of its parameters in a scalar type.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub struct Plant<'a, S> {
     pub(super) rig: &'a Rig,
     pub(super) layout: Layout,
@@ -88,10 +90,8 @@ pub struct Plant<'a, S> {
     pub(super) lines: Vec<Line<S>>,
     pub(super) scales: Vec<S>,
     pub(super) body: Body<S>,
-    /// Tube behind each valve, by the effect.
-    pub(super) restriction: Option<Tube<S>>,
-    /// Transducers sit at the valve's end of those tubes.
-    tapped: bool,
+    /// Effects that are switched on.
+    effects: Vec<Box<dyn Effect<S>>>,
     /// Effects act on supplies, on joints or arm.
     pub(super) supplies_altered: bool,
     motion_altered: bool,
@@ -118,7 +118,7 @@ pub struct Scratch<S> {
     now: Vec<S>,
 }
 
-impl<'a, S: Scalar> Plant<'a, S> {
+impl<'a, S: Number> Plant<'a, S> {
     /// Compose a rig with parameter values; `books` keeps the sums of [`super::layout::BOOKS`] behind the states.
     ///
     /// # Errors
@@ -170,32 +170,44 @@ impl<'a, S: Scalar> Plant<'a, S> {
             lines,
             scales: wiring.groups.iter().map(|group| values[group.scale]).collect(),
             body: Body::new(&wiring.body, &wiring.coordinates, &values)?,
-            supplies_altered: wiring.effects.on_supplies(),
-            motion_altered: wiring.effects.on_motion(),
-            restriction: (wiring.effects.restriction)
-                .filter(|[id, _]| values[*id].re() < tube_flow_restriction::NONE)
-                .map(|[id, _]| tube_flow_restriction::tube(values[id], rig.gas.temperature)),
-            tapped: (wiring.effects.restriction)
-                .is_some_and(|[_, tap]| values[tap].re() >= tube_flow_restriction::AT_VALVE),
+            supplies_altered: wiring.ports.on_supplies(),
+            motion_altered: wiring.ports.on_motion(),
+            effects: (wiring.ports.effects.iter())
+                .map(|effect| {
+                    let own: Vec<S> = effect.parameters.iter().map(|id| values[*id]).collect();
+                    S::effect(&effect.form.make, &own, &rig.gas)
+                })
+                .collect(),
             rig,
             values,
         })
     }
+}
 
+impl<'a, S: Scalar> Plant<'a, S> {
     /// Parameter values.
     pub fn values(&self) -> &Values<S> {
         &self.values
     }
 
-    /// Gases whose transducers sit in front of tubes, with the valves there.
-    pub fn taps(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
-        let gases = self.rig.wiring.gases.iter().enumerate().filter(|_| self.tapped().is_some());
-        gases.filter_map(|(gas, unit)| unit.tap.map(|(valve, _)| (gas, valve)))
+    /// What acts.
+    #[inline]
+    pub(super) fn effect(&self, acting: &Acting) -> &dyn Effect<S> {
+        &*self.effects[acting.effect]
     }
 
-    /// The tube in front of which transducers sit.
-    pub(super) fn tapped(&self) -> Option<&Tube<S>> {
-        self.restriction.as_ref().filter(|_| self.tapped)
+    /// The states of what acts.
+    #[inline]
+    pub(super) fn own<'s>(&self, acting: &Acting, state: &'s [S]) -> &'s [S] {
+        let first = self.layout.effect(acting.first);
+        &state[first..first + acting.count]
+    }
+
+    /// The same, to be written.
+    #[inline]
+    pub(super) fn own_mut<'s>(&self, acting: &Acting, state: &'s mut [S]) -> &'s mut [S] {
+        let first = self.layout.effect(acting.first);
+        &mut state[first..first + acting.count]
     }
 
     /// The rig.
@@ -237,12 +249,12 @@ impl<'a, S: Scalar> Plant<'a, S> {
         here.volume_rate.fill(zero);
         here.torque.fill(zero);
         here.muscle_work = zero;
-        let heat = self.rig.wiring.effects.heat.is_some();
+        let heat = self.rig.wiring.ports.on_balance();
         if heat {
             here.wall.fill(zero);
         }
         for (k, group) in self.rig.wiring.groups.iter().enumerate() {
-            let pull = self.pull(k, group, state, &memory[k], start[k]);
+            let pull = self.muscle_force(k, group, state, &memory[k], start[k]);
             let rate = state[self.layout.rate(group.coordinate)];
             (here.contraction[k], here.force[k]) = (pull.contraction, pull.force);
             here.volume[group.chamber] += pull.table.volume * group.count;
@@ -254,8 +266,7 @@ impl<'a, S: Scalar> Plant<'a, S> {
             }
             if heat {
                 let length = (-pull.contraction + 1.0) * group.rest_length;
-                here.wall[group.chamber] +=
-                    heat_transfer::cylinder_area(group.count, pull.table.volume, length);
+                here.wall[group.chamber] += cylinder_area(group.count, pull.table.volume, length);
             }
         }
         if heat {
@@ -265,9 +276,9 @@ impl<'a, S: Scalar> Plant<'a, S> {
 
     /// Wall area of the gases without muscles [m2]: the cube of their volume.
     fn cubes(&self, here: &mut Scratch<S>) {
-        for (k, gas) in self.rig.wiring.gases.iter().enumerate() {
-            if gas.heat && self.rig.wiring.groups.iter().all(|g| g.chamber != k) {
-                here.wall[k] = heat_transfer::cube_area(here.volume[k]);
+        for (k, balance) in self.rig.wiring.ports.balance.iter().enumerate() {
+            if balance.is_some() && self.rig.wiring.groups.iter().all(|g| g.chamber != k) {
+                here.wall[k] = cube_area(here.volume[k]);
             }
         }
     }
@@ -285,12 +296,9 @@ impl<'a, S: Scalar> Plant<'a, S> {
     /// Mass of a gas [kg] at the start of a recording: at rest temperature plus the initial rise.
     pub fn initial_mass(&self, gas: usize, state: &[S]) -> S {
         let rest = self.rest_mass(gas, state);
-        match self.rig.wiring.effects.heat {
-            Some([_, rise, _]) if self.rig.wiring.gases[gas].heat => {
-                let temperature = self.rig.gas.temperature;
-                rest * temperature / (self.values[rise] + temperature)
-            }
-            _ => rest,
+        match &self.rig.wiring.ports.balance[gas] {
+            Some(acting) => self.effect(acting).initial_mass(&self.rig.gas, rest),
+            None => rest,
         }
     }
 
@@ -316,9 +324,9 @@ impl<'a, S: Scalar> Plant<'a, S> {
             out[..layout.angle(0)].fill(constant(0.0));
         }
         let (angle, rate) = (layout.angle(0), layout.rate(0));
-        let end = layout.extra(0);
-        if simulated.extras {
-            self.extra_rates(state, controls, here, out);
+        let end = layout.effect(0);
+        if simulated.effects {
+            self.effect_rates(state, controls, here, out);
         }
         if simulated.motion && self.body.moves() {
             let (angles, rates) = state[angle..end].split_at(layout.coordinates);
@@ -406,7 +414,7 @@ impl Plant<'_, f64> {
                 Channel::Torque(k) => here.torque[k],
                 Channel::Volume(k) => here.volume[k],
                 Channel::Mass(k) => state[layout.mass(k)],
-                Channel::Temperature(k) if wiring.gases[k].heat => heat_transfer::temperature(
+                Channel::Temperature(k) if wiring.ports.balance[k].is_some() => gas_temperature(
                     &self.rig.gas,
                     state[layout.pressure(k)],
                     here.volume[k],
