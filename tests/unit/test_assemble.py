@@ -18,7 +18,7 @@ from pamrs.diagnosis.protocols import library
 from pamrs.diagnosis.signals import prepare
 from pamrs.diagnosis.verdicts import judge
 from pamrs.errors import DiagnosisError
-from pamrs.recording import Recording
+from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
 
 NAMES = ("valve_command", "supply_pressure", "muscle_pressure", "joint_angle")

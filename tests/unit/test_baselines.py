@@ -14,7 +14,7 @@ from benchmarks.baselines import sindy  # noqa: E402
 from benchmarks.baselines.__main__ import main  # noqa: E402
 from benchmarks.baselines.sheet import _signals, gap_closed  # noqa: E402
 from pamrs.diagnosis.signals import prepare  # noqa: E402
-from pamrs.recording import Recording  # noqa: E402
+from pamrs.recordings import Recording  # noqa: E402
 
 
 def hold(folder, conductance, *starts):

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.case import load_case
 from pamrs.errors import CaseError
+from pamrs.recordings import load_case
 
 ROOT = Path(__file__).parents[2]
 SHARED = ROOT / ".." / "shared"

@@ -11,7 +11,7 @@ import pytest
 import pamrs
 from pamrs import cli
 
-RIG = Path(cli.__file__).parent / "rigs" / "shoulder.toml"
+RIG = Path(pamrs.__file__).parent / "rigs" / "shoulder.toml"
 
 
 def run(capsys, *words):
@@ -138,13 +138,13 @@ class FakeDiagnosis:
 
 
 def test_diagnose_writes_what_it_is_asked_for(capsys, tmp_path, monkeypatch):
-    import pamrs.case
     import pamrs.diagnosis
+    import pamrs.recordings
 
     class Loaded:
         name = "a case"
 
-    monkeypatch.setattr(pamrs.case, "load_case", lambda folder: Loaded())
+    monkeypatch.setattr(pamrs.recordings, "load_case", lambda folder: Loaded())
     monkeypatch.setattr(pamrs.diagnosis, "diagnose", lambda case, **options: FakeDiagnosis())
     paths = {word: tmp_path / f"out.{word}" for word in ("report", "json", "png", "model")}
     options = [part for word, path in paths.items() for part in (f"--{word}", path)]

@@ -8,7 +8,8 @@ import sys
 import numpy as np
 import pytest
 
-from pamrs import Joint, cli, cli_design, library, rigs
+from pamrs import Joint, cli, library, rigs
+from pamrs.cli import design as cli_design
 from pamrs.rig import parse_rig
 
 ARGUMENTS = {
@@ -150,7 +151,7 @@ def test_wrong_input_is_named(capsys, changes, more, part):
 )
 def test_a_missing_package_is_named(capsys, tmp_path, monkeypatch, package, more, extra):
     monkeypatch.chdir(tmp_path)
-    for name in [name for name in sys.modules if name.startswith((package, "pamrs.design.genetic", "pamrs.design.figures"))]:
+    for name in [name for name in sys.modules if name.startswith((package, "pamrs.design", "pamrs.design"))]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, package, None)
     code, out, err = run(capsys, words(*more, evaluations="20"))

@@ -8,7 +8,7 @@ import pytest
 
 from pamrs import cli
 from pamrs.fit import fit_friction, load_force_map
-from pamrs.muscle import Muscle
+from pamrs.rig import Muscle
 
 C0, C1 = 0.16, -0.145e-6  # (2.36)
 REST = 0.276

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from pamrs import cli, library, load_rig
+from pamrs.design.sizing import Filling, Requirement, size
 from pamrs.library.published import compare
-from pamrs.sizing import Filling, Requirement, size
 
 POINTS = ["--point", "0 mm:18 kN", "--point", "30 mm:7 kN"]
 PAIR = ["elbow_0625in", "large_2in_effective"]

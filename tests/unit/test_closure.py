@@ -16,7 +16,7 @@ from pamrs.diagnosis.signals import prepare
 from pamrs.effects_table import CATALOGUE, EFFECTS
 from pamrs.effects_table.closure import CLOSURES, MEMORY_OF, TERMS
 from pamrs.errors import DiagnosisError, RigError
-from pamrs.recording import Recording
+from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
 
 DT, ROWS = 0.005, 1600

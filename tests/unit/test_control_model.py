@@ -19,7 +19,7 @@ from pamrs.control import (
     torque_line,
 )
 from pamrs.errors import ParameterError
-from pamrs.joint import Joint
+from pamrs.rig import Joint
 
 SHOULDER = pamrs.rigs.shoulder()
 

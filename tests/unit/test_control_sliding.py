@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pamrs.control import AdaptiveSliding, Cascade, Neural, Reference, Sliding, fuzzy_rules
-from pamrs.control.adaptive import dead
+from pamrs.control._adaptive import dead
 from pamrs.errors import ParameterError
 
 from .control_cases import FULL, GAYLORD, PERIOD, SIMPLIFIED

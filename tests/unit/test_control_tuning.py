@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.control import PID, Sensors, closed_loop
-from pamrs.control.sweeping import sweep
+from pamrs.control import PID, Sensors, closed_loop, sweep
 from pamrs.control.trajectories import degrees, lift_hold_return
 from pamrs.control.tuning import gain_map, perturbed, search_gains
 from pamrs.errors import ParameterError

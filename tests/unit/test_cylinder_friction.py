@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from pamrs.errors import ParameterError, RecordingError
+from pamrs.fit._level_line import fit_levels, mean_of_series
+from pamrs.fit.cylinder._strokes import find_strokes, onset_at_rest, pair_strokes
 from pamrs.fit.cylinder.compare import compare_friction_laws
 from pamrs.fit.cylinder.figure import plot_cylinders
 from pamrs.fit.cylinder.friction import fit_cylinder_friction
 from pamrs.fit.cylinder.record import FrictionRecord, load_friction_folder, load_friction_record
-from pamrs.fit.cylinder.strokes import find_strokes, onset_at_rest, pair_strokes
-from pamrs.fit.level_line import fit_levels, mean_of_series
 
 DATA = (
     Path(__file__).parents[2]

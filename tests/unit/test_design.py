@@ -24,9 +24,9 @@ from pamrs.design import (
     pareto_front,
     search,
 )
-from pamrs.design.genetic import child, decode, redraw_one
-from pamrs.design.problem import _areas
-from pamrs.design.published import CASES, facts_of_geometry
+from pamrs.design._genetic import child, decode, redraw_one
+from pamrs.design._problem import _areas
+from pamrs.reproduce.joints import CASES, facts_of_geometry
 
 INCH = 0.0254
 GOOD = [0.0145, 0.0204, 0.0282, -0.0085]
@@ -526,6 +526,6 @@ def test_friction_plays_no_part():
 
 def test_the_package_is_light():
     heavy = ("deap", "cma", "scipy", "matplotlib")
-    code = f"import sys, pamrs.design, pamrs.cli_design; print([name for name in {heavy} if name in sys.modules])"
+    code = f"import sys, pamrs.design, pamrs.cli.design; print([name for name in {heavy} if name in sys.modules])"
     shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert shown.strip() == "[]"

@@ -15,7 +15,7 @@ from pamrs.diagnosis.blocks import available_blocks
 from pamrs.diagnosis.result import schema
 from pamrs.diagnosis.signals import noise_level, prepare
 from pamrs.effects_table import EFFECTS
-from pamrs.recording import Recording
+from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
 
 ROOT = Path(__file__).parents[2]

@@ -19,7 +19,7 @@ from pamrs.diagnosis.plausible import implausible
 from pamrs.diagnosis.protocols import library
 from pamrs.diagnosis.signals import prepare
 from pamrs.errors import DiagnosisError, SimulationError
-from pamrs.recording import Recording
+from pamrs.recordings import Recording
 from pamrs.rig import parse_rig
 from pamrs.simulation import core_rig
 

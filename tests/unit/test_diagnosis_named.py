@@ -11,7 +11,7 @@ import pamrs
 from pamrs.diagnosis import _doubted, _unsettled
 from pamrs.diagnosis.blocks import available_blocks
 from pamrs.diagnosis.candidates import Group
-from pamrs.recording import Recording
+from pamrs.recordings import Recording
 
 ROOT = Path(__file__).parents[2]
 RIGS = ROOT / "python" / "pamrs" / "rigs"

@@ -11,7 +11,7 @@ import pamrs
 from pamrs.diagnosis.blocks import available_blocks
 from pamrs.diagnosis.fitting import Events, Problem, residuals
 from pamrs.diagnosis.signals import prepare
-from pamrs.recording import Recording
+from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
 
 TIMES = {"lift": 4.3, "lower": 7.1, "again": 5.6}

@@ -15,7 +15,7 @@ from pamrs.diagnosis.candidates import Candidate
 from pamrs.diagnosis.evidence import Excess
 from pamrs.diagnosis.fitting import Fit
 from pamrs.diagnosis.weighing import weigh
-from pamrs.recording import Recording
+from pamrs.recordings import Recording
 
 NOISE = {"supply_pressure": 400.0, "muscle_pressure": 400.0, "joint_angle": 3e-4}
 SECONDS = 15.0

@@ -8,7 +8,7 @@ import pytest
 from pamrs import Muscle
 from pamrs.errors import FitError, RecordingError
 from pamrs.fit import ForceMap, compare_models, fit_muscle
-from pamrs.fit.compare import effective_size
+from pamrs.fit._compare import effective_size
 
 
 def test_lengths_at_which_the_geometry_has_no_solution_are_flagged():

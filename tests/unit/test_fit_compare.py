@@ -8,7 +8,7 @@ import pytest
 from pamrs import Muscle
 from pamrs.errors import ParameterError
 from pamrs.fit import FitError, ForceMap, compare_models, fit_friction, fit_muscle
-from pamrs.fit.compare import effective_size
+from pamrs.fit._compare import effective_size
 
 from .fit_cases import REST, TOLERANCE, measure, muscle
 

@@ -8,9 +8,7 @@ import numpy as np
 import pytest
 
 from pamrs.errors import ParameterError, RecordingError
-from pamrs.fit.data import ForceMap
-from pamrs.fit.description import load_measured_muscle
-from pamrs.fit.files import load_force_map
+from pamrs.fit import ForceMap, load_force_map, load_measured_muscle
 
 CASE = Path(__file__).parents[2] / "cases" / "festo_dmsp"
 TABLE = CASE.parents[2] / "shared/recordings/festo_dmsp_martens_boblan/martens_boblan_2017_force_maps.csv"

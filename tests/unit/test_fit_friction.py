@@ -5,8 +5,7 @@ import pytest
 
 import pamrs
 from pamrs.errors import ParameterError, RecordingError
-from pamrs.fit.data import ForceMap
-from pamrs.fit.friction import fit_friction
+from pamrs.fit import ForceMap, fit_friction
 
 C0, C1, FLOOR = 0.16, -0.145e-6, 0.01  # (2.36)
 REST = 0.276

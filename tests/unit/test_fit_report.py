@@ -12,7 +12,7 @@ from pamrs import cli, load_rig, rigs
 from pamrs.fit import ForceMap, compare_models, fit_muscle
 from pamrs.fit import report as pages
 from pamrs.fit.remarks import headline, limits, meaning, percent, residual_pattern
-from pamrs.muscle import Muscle
+from pamrs.rig import Muscle
 
 REST = 0.3
 LEVELS = [1e5, 2e5, 3e5, 4e5, 5e5, 6e5]

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 import pamrs
 from pamrs.control import trajectories
 from pamrs.diagnosis.plausible import implausible
-from pamrs.reproduce import lift
-from pamrs.reproduce.lift_diagnosis import recorded
+from pamrs.reproduce import _lift as lift
+from pamrs.reproduce._lift_diagnosis import recorded
 
 Array = NDArray[np.float64]
 Table = dict[str, Array]

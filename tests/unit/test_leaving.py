@@ -12,7 +12,7 @@ from pamrs.diagnosis.blocks import available_blocks
 from pamrs.diagnosis.fitting import Fit, Problem, fit, residuals
 from pamrs.diagnosis.leaving import left_out
 from pamrs.diagnosis.signals import prepare
-from pamrs.recording import Recording
+from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
 
 RIG = pamrs.rigs.sealed_chamber()

@@ -10,10 +10,9 @@ import pytest
 
 import pamrs
 from pamrs import cli, rigs
+from pamrs.design import lift
 from pamrs.errors import ParameterError
-from pamrs.joint import Joint
-from pamrs.lifting import lift
-from pamrs.rig import Rig
+from pamrs.rig import Joint, Rig
 
 PSI, LB = 6894.757293168361, 0.45359237
 FULL = 150.0 * PSI
@@ -246,7 +245,7 @@ def test_command_refuses_what_it_cannot_use(capsys, words, message):
 
 
 def test_missing_plot_package_is_named(capsys, tmp_path, monkeypatch):
-    for name in [name for name in sys.modules if name.startswith(("matplotlib", "pamrs.report.lifting", "pamrs.report.fig"))]:
+    for name in [name for name in sys.modules if name.startswith(("matplotlib", "pamrs.design", "pamrs.report.fig"))]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     code, _, err = run(capsys, "elbow", "--png", tmp_path / "a.png")

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.muscle_models import ELASTIC_PARAMETERS, GEOMETRIES, MODELS
 from pamrs.rig import parse_rig
+from pamrs.rig.muscle_models import ELASTIC_PARAMETERS, GEOMETRIES, MODELS
 
 SHOULDER = pamrs.rigs.shoulder().to_toml_text()
 ELASTIC: dict[str, dict[str, Any]] = {

@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from pamrs.errors import PamrsError, RecordingError
-from pamrs.recording import CHANNELS, Recording, load_recording
-from pamrs.recording_faults import find_faults
+from pamrs.recordings import CHANNELS, Recording, load_recording
+from pamrs.recordings._faults import find_faults
 
 Array = NDArray[np.float64]
 SHARED = Path(__file__).parents[2] / ".." / "shared"

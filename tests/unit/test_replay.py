@@ -11,7 +11,7 @@ import pytest
 import pamrs
 from pamrs import cli
 from pamrs.channels import unit_of
-from pamrs.replay import differences, replay
+from pamrs.simulation import differences, replay
 
 
 def write(path: Path, run: pamrs.Simulation, *names: str) -> Path:

@@ -12,12 +12,14 @@ import numpy as np
 import pytest
 
 from pamrs import cli, library, reproduce, rigs
+from pamrs.comparison import judge, markdown, table, to_csv, verdicts
 from pamrs.errors import ParameterError
-from pamrs.joint import Joint
-from pamrs.reproduce import chapter3, elbow, names
-from pamrs.reproduce.facts import judge, markdown, table, to_csv, verdicts
+from pamrs.reproduce import _chapter3 as chapter3
+from pamrs.reproduce import _elbow as elbow
+from pamrs.reproduce import _symbols as symbols
+from pamrs.reproduce import names
 from pamrs.reproduce.page import Picture, Section, page
-from pamrs.reproduce.symbols import symbols
+from pamrs.rig import Joint
 
 DOCS = Path(__file__).parents[2] / "docs" / "reproduction"
 AXIAL, OFFSET, TENDON = 1.56 * 0.0254, 0.42 * 0.0254, 3.04 * 0.0254

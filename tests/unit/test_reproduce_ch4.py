@@ -12,9 +12,11 @@ import pytest
 from pamrs.control import PID, closed_loop
 from pamrs.control.metrics import evaluate
 from pamrs.errors import ParameterError
-from pamrs.reproduce import chapter4, lift, lift_diagnosis
-from pamrs.reproduce.chapter4_statements import SERIES, statements
-from pamrs.reproduce.lift import GAINS, PAYLOADS, VARIANTS, Lifts
+from pamrs.reproduce import _chapter4 as chapter4
+from pamrs.reproduce import _lift as lift
+from pamrs.reproduce import _lift_diagnosis as lift_diagnosis
+from pamrs.reproduce._chapter4_statements import SERIES, statements
+from pamrs.reproduce._lift import GAINS, PAYLOADS, VARIANTS, Lifts
 
 DOCS = Path(__file__).parents[2] / "docs" / "reproduction"
 TIME = np.arange(2501) * 0.01

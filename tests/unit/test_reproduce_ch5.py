@@ -9,14 +9,15 @@ import numpy as np
 import pytest
 
 from pamrs import reproduce
+from pamrs.comparison import table, to_csv
 from pamrs.control import AdaptiveSliding, Neural
 from pamrs.errors import ParameterError
-from pamrs.reproduce import chapter5, tracking
-from pamrs.reproduce.chapter5_comparison import orders
-from pamrs.reproduce.chapter5_statements import GROUPS
-from pamrs.reproduce.facts import table, to_csv
-from pamrs.reproduce.tracking import KINDS, PERIOD, Track, arm_model, controller, follow, plant, waves
-from pamrs.reproduce.tracking_runs import EFFECTS, MIDDLE, SHORT, STARTS, WRONG, Plan
+from pamrs.reproduce import _chapter5 as chapter5
+from pamrs.reproduce import _tracking as tracking
+from pamrs.reproduce._chapter5_comparison import orders
+from pamrs.reproduce._chapter5_statements import GROUPS
+from pamrs.reproduce._tracking import KINDS, PERIOD, Track, arm_model, controller, follow, plant, waves
+from pamrs.reproduce._tracking_runs import EFFECTS, MIDDLE, SHORT, STARTS, WRONG, Plan
 
 DOCS = Path(__file__).parents[2] / "docs" / "reproduction"
 #: Shorter still than the short plan: a few samples of everything.

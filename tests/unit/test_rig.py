@@ -17,7 +17,7 @@ import pamrs
 from pamrs.effects_table import EFFECTS
 from pamrs.errors import ParameterError, RigError
 from pamrs.rig import Rig, load_rig, parse_rig
-from pamrs.rig_schema import BLOCKS
+from pamrs.rig.schema import BLOCKS
 
 CONCEALED = Path(__file__).parents[2] / ".." / "shared" / "concealed"
 SHOULDER = (Path(pamrs.__file__).parent / "rigs" / "shoulder.toml").read_text(encoding="utf-8")
@@ -207,7 +207,7 @@ JSON_LIKE = st.recursive(
 @settings(max_examples=150)
 @given(st.sampled_from(list(BLOCKS)), st.text("abcdef_", min_size=1, max_size=9), JSON_LIKE, st.booleans())
 def test_nothing_but_a_rig_error(block: str, key: str, value: Any, known: bool) -> None:
-    from pamrs.rig_reader import Reader
+    from pamrs.rig import Reader
 
     name = BLOCKS[block][0].where[0] if known else key
     reader = Reader()

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from pamrs import rigs
 from pamrs.errors import RigError
 from pamrs.rig import Rig, parse_rig
-from pamrs.rig_schema import BLOCKS
+from pamrs.rig.schema import BLOCKS
 
 from .rig_cases import HEAD, LEAST, refused, same, stand
 

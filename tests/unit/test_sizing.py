@@ -9,9 +9,9 @@ import pytest
 
 import pamrs.library as library
 from pamrs import Muscle
+from pamrs.design import Filling
+from pamrs.design.sizing import Candidate, Requirement, SizingResult, packed_diameter, size
 from pamrs.errors import ParameterError
-from pamrs.filling import Filling
-from pamrs.sizing import Candidate, Requirement, SizingResult, packed_diameter, size
 from tests.reference.gas import orifice_flow
 
 PAIR = ("elbow_0625in", "large_2in_effective")

@@ -14,7 +14,7 @@ from pamrs.diagnosis.evidence import Excess, excess, floors
 from pamrs.diagnosis.fitting import Fit, Problem, residuals
 from pamrs.diagnosis.signals import Prepared, noise_level, prepare
 from pamrs.diagnosis.weighing import weigh
-from pamrs.recording import Recording
+from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
 
 DT, ROWS = 0.005, 1600

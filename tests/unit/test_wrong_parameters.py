@@ -16,7 +16,7 @@ from pamrs.diagnosis.fitting import Problem, fit
 from pamrs.diagnosis.result import schema
 from pamrs.diagnosis.signals import prepare
 from pamrs.diagnosis.wrong_parameters import suspected
-from pamrs.recording import Recording
+from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
 
 NAMES = ("valve_command", "supply_pressure", "muscle_pressure", "joint_angle")

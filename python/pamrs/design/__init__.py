@@ -12,10 +12,13 @@ Searches need ``pip install pamrs[search]``, figures ``pamrs[plot]``; both are i
 
 from __future__ import annotations
 
-from pamrs.design.joint_design import AREA_TOLERANCE, JointDesign, MethodComparison, compare_methods, optimise
-from pamrs.design.pressure import ParetoFront, PressureSearch, Trial, least_pressure, minimum_pressure, pareto_front
-from pamrs.design.problem import DEFAULT_BOUNDS, LENGTHS, SYMBOLS, JointProblem, Scores
-from pamrs.design.search import METHODS, Genetic, History, MissingPackageError, Search, search
+from pamrs.design._filling import Filling
+from pamrs.design._joint_design import AREA_TOLERANCE, JointDesign, MethodComparison, compare_methods, optimise
+from pamrs.design._lifting import Lift, lift
+from pamrs.design._pressure import ParetoFront, PressureSearch, Trial, least_pressure, minimum_pressure, pareto_front
+from pamrs.design._problem import DEFAULT_BOUNDS, LENGTHS, SYMBOLS, JointProblem, Scores
+from pamrs.design._search import METHODS, Genetic, History, Search, search
+from pamrs.errors import MissingPackageError
 
 __all__ = [
     "AREA_TOLERANCE",
@@ -23,10 +26,12 @@ __all__ = [
     "LENGTHS",
     "METHODS",
     "SYMBOLS",
+    "Filling",
     "Genetic",
     "History",
     "JointDesign",
     "JointProblem",
+    "Lift",
     "MethodComparison",
     "MissingPackageError",
     "ParetoFront",
@@ -36,6 +41,7 @@ __all__ = [
     "Trial",
     "compare_methods",
     "least_pressure",
+    "lift",
     "minimum_pressure",
     "optimise",
     "pareto_front",

@@ -11,18 +11,20 @@ from typing import TYPE_CHECKING, Any, Final
 from pamrs.errors import FitError
 
 if TYPE_CHECKING:
-    from pamrs.fit.bench import from_recording
-    from pamrs.fit.compare import ModelComparison, compare_models
+    from pamrs.fit._bench import from_recording
+    from pamrs.fit._compare import ModelComparison, compare_models
+    from pamrs.fit._data import ForceMap
+    from pamrs.fit._description import MeasuredMuscle, load_measured_muscle
+    from pamrs.fit._engine import COEFFICIENTS, fit_muscle
+    from pamrs.fit._export import friction_words
+    from pamrs.fit._files import load_force_map
+    from pamrs.fit._friction import FrictionFit, fit_friction
+    from pamrs.fit._result import FitParameter, MuscleFit
+    from pamrs.fit._validation import CrossValidation, PressureErrors
     from pamrs.fit.cylinder.friction import CylinderFriction, fit_cylinder_friction
-    from pamrs.fit.data import ForceMap
-    from pamrs.fit.description import MeasuredMuscle, load_measured_muscle
-    from pamrs.fit.engine import fit_muscle
-    from pamrs.fit.files import load_force_map
-    from pamrs.fit.friction import FrictionFit, fit_friction
-    from pamrs.fit.result import FitParameter, MuscleFit
-    from pamrs.fit.validation import CrossValidation, PressureErrors
 
 __all__ = [
+    "COEFFICIENTS",
     "CrossValidation",
     "CylinderFriction",
     "FitError",
@@ -37,28 +39,31 @@ __all__ = [
     "fit_cylinder_friction",
     "fit_friction",
     "fit_muscle",
+    "friction_words",
     "from_recording",
     "load_force_map",
     "load_measured_muscle",
 ]
 
 _HOMES: Final[dict[str, str]] = {
-    "CrossValidation": "validation",
+    "COEFFICIENTS": "_engine",
+    "CrossValidation": "_validation",
     "CylinderFriction": "cylinder.friction",
-    "FitParameter": "result",
-    "ForceMap": "data",
-    "FrictionFit": "friction",
-    "MeasuredMuscle": "description",
-    "ModelComparison": "compare",
-    "MuscleFit": "result",
-    "PressureErrors": "validation",
-    "compare_models": "compare",
+    "FitParameter": "_result",
+    "ForceMap": "_data",
+    "FrictionFit": "_friction",
+    "MeasuredMuscle": "_description",
+    "ModelComparison": "_compare",
+    "MuscleFit": "_result",
+    "PressureErrors": "_validation",
+    "compare_models": "_compare",
     "fit_cylinder_friction": "cylinder.friction",
-    "fit_friction": "friction",
-    "fit_muscle": "engine",
-    "from_recording": "bench",
-    "load_force_map": "files",
-    "load_measured_muscle": "description",
+    "fit_friction": "_friction",
+    "fit_muscle": "_engine",
+    "friction_words": "_export",
+    "from_recording": "_bench",
+    "load_force_map": "_files",
+    "load_measured_muscle": "_description",
 }
 
 

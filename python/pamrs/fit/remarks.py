@@ -13,9 +13,9 @@ from pamrs.errors import FitError
 from pamrs.report.text import format_number
 
 if TYPE_CHECKING:
-    from pamrs.fit.compare import ModelComparison
-    from pamrs.fit.result import MuscleFit
-    from pamrs.fit.validation import CrossValidation
+    from pamrs.fit._compare import ModelComparison
+    from pamrs.fit._result import MuscleFit
+    from pamrs.fit._validation import CrossValidation
 
 __all__ = ["MODEL_WORDS", "Pattern", "cross_validation", "headline", "limits", "meaning", "opening", "residual_pattern", "title"]
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs.errors import ParameterError
-from pamrs.library.entry import Entry, quantity
+from pamrs.library._entry import Entry, quantity
 from pamrs.library.evaluate import KINDS
 
 __all__ = ["Identification", "derive", "gent_modulus", "least_norm"]
