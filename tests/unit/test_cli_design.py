@@ -151,7 +151,7 @@ def test_wrong_input_is_named(capsys, changes, more, part):
 )
 def test_a_missing_package_is_named(capsys, tmp_path, monkeypatch, package, more, extra):
     monkeypatch.chdir(tmp_path)
-    for name in [name for name in sys.modules if name.startswith((package, "pamrs.design", "pamrs.design"))]:
+    for name in [name for name in sys.modules if name.startswith((package, "pamrs.design._genetic", "pamrs.design.figures"))]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, package, None)
     code, out, err = run(capsys, words(*more, evaluations="20"))

@@ -245,7 +245,7 @@ def test_command_refuses_what_it_cannot_use(capsys, words, message):
 
 
 def test_missing_plot_package_is_named(capsys, tmp_path, monkeypatch):
-    for name in [name for name in sys.modules if name.startswith(("matplotlib", "pamrs.design", "pamrs.report.fig"))]:
+    for name in [name for name in sys.modules if name.startswith(("matplotlib", "pamrs.design._lifting_figure", "pamrs.report.fig"))]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     code, _, err = run(capsys, "elbow", "--png", tmp_path / "a.png")

@@ -381,7 +381,7 @@ def test_command_refuses_chapters_that_there_are_not(capsys, tmp_path):
 
 
 def test_missing_plot_package_is_named(capsys, tmp_path, monkeypatch):
-    for name in [name for name in sys.modules if name.startswith(("matplotlib", "pamrs.reproduce.chapter3_fig", "pamrs.report.fig"))]:
+    for name in [name for name in sys.modules if name.startswith(("matplotlib", "pamrs.reproduce._chapter3_fig", "pamrs.report.fig"))]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     code, out, err = run(capsys, "ch3", "--output", tmp_path, "--no-search")

@@ -167,7 +167,8 @@ def _rubbing(
     import numpy as np
 
     from pamrs.errors import RecordingError
-    from pamrs.fit import fit_friction, friction_words
+    from pamrs.fit import fit_friction
+    from pamrs.fit.remarks import friction_words
 
     given = muscle.parameters
     bare = dict.fromkeys(("friction_coefficient", "friction_pressure_slope", "friction_floor"), 0.0)

@@ -10,7 +10,7 @@ import numpy as np
 from deap import base, tools  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
-from pamrs.design._search import Evaluator, Genetic
+from pamrs.design._evaluator import Evaluator, Genetic
 
 __all__ = ["child", "decode", "evolve", "evolve_two", "redraw_one"]
 

@@ -10,8 +10,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pamrs.design._evaluator import Genetic, Progress, Search
 from pamrs.design._problem import LENGTHS, JointProblem, Scores
-from pamrs.design._search import METHODS, PUBLISHED_EVALUATIONS, Genetic, Progress, Search, search
+from pamrs.design._search import METHODS, PUBLISHED_EVALUATIONS, search
 from pamrs.errors import ParameterError
 from pamrs.rig import Joint
 from pamrs.units import bar_and_psi
@@ -207,7 +208,7 @@ def optimise(
     problem : JointProblem
         What is asked.
     method, evaluations, seed, genetic, progress
-        As for :func:`pamrs.design._search.search`; by default the algorithm of 3.5 for 100 generations.
+        As for :func:`pamrs.design.search`; by default the algorithm of 3.5 for 100 generations.
     area_tolerance : float
         Kept in the result, for :meth:`JointDesign.met`; plays no part in the search.
 
@@ -281,7 +282,7 @@ def compare_methods(
     problem : JointProblem
         What is asked.
     methods : sequence of str
-        Of :data:`pamrs.design._search.METHODS`.
+        Of :data:`pamrs.design.METHODS`.
     seeds : sequence of int
         One run each.
     evaluations : int

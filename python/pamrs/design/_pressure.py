@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs.design._evaluator import Genetic, Progress
 from pamrs.design._joint_design import AREA_TOLERANCE, JointDesign, optimise
 from pamrs.design._problem import JointProblem
-from pamrs.design._search import PUBLISHED_EVALUATIONS, Genetic, Progress, search, seeded
+from pamrs.design._search import PUBLISHED_EVALUATIONS, search, seeded
 from pamrs.errors import ParameterError, missing_package
 from pamrs.units import bar_and_psi
 

@@ -14,17 +14,18 @@ if TYPE_CHECKING:
     from pamrs.fit._bench import from_recording
     from pamrs.fit._compare import ModelComparison, compare_models
     from pamrs.fit._data import ForceMap
-    from pamrs.fit._description import MeasuredMuscle, load_measured_muscle
-    from pamrs.fit._engine import COEFFICIENTS, fit_muscle
-    from pamrs.fit._export import friction_words
-    from pamrs.fit._files import load_force_map
+    from pamrs.fit._engine import fit_muscle
     from pamrs.fit._friction import FrictionFit, fit_friction
-    from pamrs.fit._result import FitParameter, MuscleFit
+    from pamrs.fit._load import MeasuredMuscle, load_force_map, load_measured_muscle
+    from pamrs.fit._result import MuscleFit
+    from pamrs.fit._solution import COEFFICIENTS, GEOMETRY
+    from pamrs.fit._statistics import FitParameter
     from pamrs.fit._validation import CrossValidation, PressureErrors
     from pamrs.fit.cylinder.friction import CylinderFriction, fit_cylinder_friction
 
 __all__ = [
     "COEFFICIENTS",
+    "GEOMETRY",
     "CrossValidation",
     "CylinderFriction",
     "FitError",
@@ -39,20 +40,20 @@ __all__ = [
     "fit_cylinder_friction",
     "fit_friction",
     "fit_muscle",
-    "friction_words",
     "from_recording",
     "load_force_map",
     "load_measured_muscle",
 ]
 
 _HOMES: Final[dict[str, str]] = {
-    "COEFFICIENTS": "_engine",
+    "COEFFICIENTS": "_solution",
     "CrossValidation": "_validation",
     "CylinderFriction": "cylinder.friction",
-    "FitParameter": "_result",
+    "FitParameter": "_statistics",
     "ForceMap": "_data",
     "FrictionFit": "_friction",
-    "MeasuredMuscle": "_description",
+    "GEOMETRY": "_solution",
+    "MeasuredMuscle": "_load",
     "ModelComparison": "_compare",
     "MuscleFit": "_result",
     "PressureErrors": "_validation",
@@ -60,10 +61,9 @@ _HOMES: Final[dict[str, str]] = {
     "fit_cylinder_friction": "cylinder.friction",
     "fit_friction": "_friction",
     "fit_muscle": "_engine",
-    "friction_words": "_export",
     "from_recording": "_bench",
-    "load_force_map": "_files",
-    "load_measured_muscle": "_description",
+    "load_force_map": "_load",
+    "load_measured_muscle": "_load",
 }
 
 

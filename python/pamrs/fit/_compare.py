@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from pamrs.errors import FitError, ParameterError
 from pamrs.fit._design import CONSTANTS, template
-from pamrs.fit._engine import COEFFICIENTS, fit_muscle, has_effect, level_indices
+from pamrs.fit._engine import fit_muscle
 from pamrs.fit._result import MuscleFit
+from pamrs.fit._solution import COEFFICIENTS, has_effect, level_indices
 from pamrs.rig.muscle_models import ELASTIC_PARAMETERS, MODELS, POLYNOMIAL_MODELS
 
 if TYPE_CHECKING:

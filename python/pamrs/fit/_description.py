@@ -5,19 +5,14 @@ from __future__ import annotations
 import os
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final, NamedTuple
 
 from pamrs.errors import RecordingError, joined
-from pamrs.fit._data import ForceMap
-from pamrs.rig import Reader, muscle_problems
+from pamrs.rig import Muscle, Reader, muscle_problems
 from pamrs.rig.muscle_models import models_with
 
-if TYPE_CHECKING:
-    from pamrs.rig import Muscle
-
-__all__ = ["NO_MODULI", "SCHEMA", "MeasuredMuscle", "load_measured_muscle"]
+__all__ = ["NO_MODULI", "SCHEMA", "Description", "read_description", "with_moduli"]
 
 SCHEMA: Final = "pamrs.force_map/1"
 _TOP: Final = (
@@ -47,51 +42,50 @@ _ZEROS: Final[dict[str, Any]] = {
 }
 
 
-@dataclass(frozen=True, eq=False)
-class MeasuredMuscle:
-    """A force map with the muscle it was measured on, as a ``pamrs.force_map/1`` file describes them.
+class Description(NamedTuple):
+    """What a description says.
 
     Attributes
     ----------
-    data : ForceMap
-        The map, checked against the muscle.
+    table : Path
+        Where the table is.
+    options : dict
+        How to read it: arguments of :func:`pamrs.fit.load_force_map`.
     muscle : Muscle
         Geometry, and the force model to start from.
     tolerance : dict of str to float
-        Standard deviation of what the file knows of a number, SI; infinite where it is unknown.
+        Standard deviation of what is known of a number, SI; infinite where it is unknown.
     noise : float or None
-        Standard deviation of the forces [N], where the file gives one; priors of moduli need it.
-    description : str
-        What the file says about it.
+        Standard deviation of the forces [N].
+    text : str
+        What it says about the measurements.
     """
 
-    data: ForceMap
+    table: Path
+    options: dict[str, Any]
     muscle: Muscle
     tolerance: dict[str, float]
-    noise: float | None = None
-    description: str = ""
+    noise: float | None
+    text: str
 
 
-def load_measured_muscle(path: str | os.PathLike[str]) -> MeasuredMuscle:
-    """Read a ``pamrs.force_map/1`` description: where the table is, what its columns are, which muscle it is of.
+def read_description(file: Path) -> Description:
+    """Read a ``pamrs.force_map/1`` file, but not yet its table.
 
     Parameters
     ----------
-    path : path-like
-        The TOML file. ``file`` in it is relative to its folder; ``columns`` maps the table's headings to headings with
-        units; ``where`` picks rows; ``clipped_force``, ``level_tolerance`` and ``noise`` are quantities; ``[muscle]`` is as in a rig
-        file, with ``tol`` as the standard deviation of what is known.
+    file : Path
+        The TOML file.
 
     Returns
     -------
-    MeasuredMuscle
+    Description
 
     Raises
     ------
     RecordingError
-        With every problem found in the description, or if the table cannot be read.
+        With every problem found in it.
     """
-    file = Path(path)
     document = _document(file)
     reader = Reader()
     reader.unknown_keys("", document, _TOP)
@@ -118,24 +112,18 @@ def load_measured_muscle(path: str | os.PathLike[str]) -> MeasuredMuscle:
     if not table.exists():
         advice = texts["source"] or "correct file in the description"
         raise RecordingError(f"{file}: file = {texts['file']!r}: there is no file {table}; {advice}")
-    from pamrs.rig import Muscle
-
-    muscle = Muscle.from_model(model)
-    from pamrs.fit._files import load_force_map
-
-    data = load_force_map(
-        table,
-        rest_length=model["rest_length"],
-        columns=maps["columns"],
-        where=maps["where"] or None,
-        clipped=clipped,
-        level_tolerance=tolerance,
-        delimiter=texts["delimiter"] or None,
-        decimal=texts["decimal"] or None,
-        name=texts["name"] or file.stem,
-    )
+    options = {
+        "rest_length": model["rest_length"],
+        "columns": maps["columns"],
+        "where": maps["where"] or None,
+        "clipped": clipped,
+        "level_tolerance": tolerance,
+        "delimiter": texts["delimiter"] or None,
+        "decimal": texts["decimal"] or None,
+        "name": texts["name"] or file.stem,
+    }
     known = {name.partition(".")[2]: spread for name, spread in reader.tolerances.items()}
-    return MeasuredMuscle(data.checked_against(muscle), muscle, known, noise, texts["description"])
+    return Description(table, options, Muscle.from_model(model), known, noise, texts["description"])
 
 
 def with_moduli(block: Mapping[str, Any]) -> dict[str, Any]:

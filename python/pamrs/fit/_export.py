@@ -9,9 +9,9 @@ import numpy as np
 
 if TYPE_CHECKING:
     from pamrs.fit._result import MuscleFit
-    from pamrs.rig import Muscle, Rig
+    from pamrs.rig import Rig
 
-__all__ = ["fit_report", "friction_words", "to_dict", "to_rig"]
+__all__ = ["fit_report", "to_dict", "to_rig"]
 
 
 def fit_report(fit: MuscleFit) -> str:
@@ -60,15 +60,6 @@ def _scatter(fit: MuscleFit) -> str:
         return text
     shown = f"{fit.stated_noise:.4g} N" if fit.weights == "force" else f"{100 * fit.stated_noise:.3g} % of the level's largest force"
     return f"{text}, reduced chi2 {fit.redchi / fit.stated_noise**2:.4g} with the stated noise of {shown}"
-
-
-def friction_words(muscle: Muscle) -> str:
-    """The friction law (2.36) of a muscle with its numbers; empty without friction."""
-    given = muscle.parameters
-    c0, c1, floor = given["friction_coefficient"], given["friction_pressure_slope"], given["friction_floor"]
-    if not (c0 or c1 or floor):
-        return ""
-    return f"c_F = max(c0 + c1 P, {floor:.4g}), c0 = {c0:.4g}, c1 = {1e6 * c1:.4g} 1/MPa"
 
 
 def to_rig(fit: MuscleFit, rig: Rig | None) -> Rig:

@@ -20,6 +20,7 @@ from pamrs.report.figures import COLOURS, STYLE, svg_text
 
 if TYPE_CHECKING:
     from pamrs.fit._result import MuscleFit
+    from pamrs.fit._statistics import FitStatistics
 
 __all__ = ["ErrorCurve", "errors_svg", "family_svg", "moduli_svg", "pressure_colours", "residuals_svg", "summary_png", "thinned"]
 
@@ -163,7 +164,7 @@ def family_svg(fit: MuscleFit, prefix: str = "family") -> str:
 _Curve = tuple[Array, Array, Array]  # pressure, value and standard error, each (m,) [Pa]
 
 
-def _coefficients(fit: MuscleFit | None) -> dict[str, _Curve]:
+def _coefficients(fit: FitStatistics | None) -> dict[str, _Curve]:
     """The moduli of a fit at its levels, by name."""
     if fit is None:
         return {}
@@ -185,14 +186,14 @@ def _span(line: _Curve | None, points: _Curve | None) -> tuple[float, float]:
     return low - room, high + room
 
 
-def moduli_svg(fit: MuscleFit, per_level: MuscleFit | None = None, prefix: str = "moduli") -> str | None:
+def moduli_svg(fit: MuscleFit, per_level: FitStatistics | None = None, prefix: str = "moduli") -> str | None:
     """Moduli over pressure, with bands of two standard errors.
 
     Parameters
     ----------
     fit : MuscleFit
         Fitted muscle.
-    per_level : MuscleFit, optional
+    per_level : FitStatistics, optional
         A fit with moduli free at each level, drawn as points with bars of two standard errors.
     prefix : str
         Prefix of the element ids.

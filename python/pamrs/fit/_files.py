@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import os
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -13,12 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs.errors import ParameterError, RecordingError, joined
+from pamrs.fit._bench import from_recording
 from pamrs.fit._data import ForceMap
 from pamrs.fit._dialect import decimal_of, delimiter_of
+from pamrs.recordings import load_recording
 from pamrs.recordings.table import Table, read_table, read_text
 from pamrs.units import parse_unit, same_dimension, to_si
 
-__all__ = ["load_force_map"]
+__all__ = ["read_map"]
 
 Array = NDArray[np.float64]
 
@@ -54,62 +55,19 @@ class _Column(NamedTuple):
     unit: str
 
 
-def load_force_map(
-    path: str | os.PathLike[str],
+def read_map(
+    file: Path,
     *,
-    rest_length: float | None = None,
-    columns: Mapping[str, str] | None = None,
-    where: Mapping[str, str | float] | None = None,
-    clipped: float | None = None,
-    level_tolerance: float | None = None,
-    delimiter: str | None = None,
-    decimal: str | None = None,
-    name: str | None = None,
+    rest_length: float | None,
+    columns: Mapping[str, str] | None,
+    where: Mapping[str, str | float] | None,
+    clipped: float | None,
+    level_tolerance: float | None,
+    delimiter: str | None,
+    decimal: str | None,
+    name: str | None,
 ) -> ForceMap:
-    """Read a force map.
-
-    Parameters
-    ----------
-    path : path-like
-        A table (``.csv``, ``.tsv``, ``.txt``, ``.dat``, each also ``.gz``, or ``.parquet``) with the columns length or
-        contraction, pressure, force and, if known, direction (-1 or "contracting", 1 or "lengthening"). Units are in the
-        headings: ``length [mm]``, ``pressure_kPa``, ``force (N)``. With a column ``time`` it is read as a recording of a
-        bench. Or a ``.toml`` description (schema ``pamrs.force_map/1``), to which no other argument applies.
-    rest_length : float, optional
-        Length at zero contraction [m]; needed for a table.
-    columns : mapping of str to str, optional
-        From the file's headings to headings as above; an empty one leaves the column out.
-    where : mapping of str to str or float, optional
-        Column of the file -> value: only rows with these values belong to the map. Numbers count as numbers: 1 is 1.000.
-    clipped, level_tolerance : float, optional
-        As in :meth:`ForceMap.from_arrays`.
-    delimiter : str, optional
-        What separates cells, ``" "`` for any run of blanks; by default the tabulator, semicolon, comma, bar or blank with
-        which the rows have as many cells as the header.
-    decimal : str, optional
-        Decimal mark; by default the comma if the measured columns have numbers like ``12,5``, else the point.
-    name : str, optional
-        What to call the map; by default the file's stem, or what the description says.
-
-    Returns
-    -------
-    ForceMap
-
-    Raises
-    ------
-    RecordingError
-        If the file cannot be read, its cells cannot be told apart, a column is missing, has no unit or the wrong one, or
-        fewer than two rows are usable.
-    """
-    file = Path(path)
-    if file.suffix.lower() == ".toml":
-        given = {"rest_length": rest_length, "columns": columns, "where": where, "clipped": clipped, "level_tolerance": level_tolerance}
-        for key, value in {**given, "delimiter": delimiter, "decimal": decimal, "name": name}.items():
-            if value is not None:
-                raise ParameterError(f"{key} cannot be given: {file} describes its table itself")
-        from pamrs.fit._description import load_measured_muscle
-
-        return load_measured_muscle(file).data
+    """Read a force map from a table; arguments and errors as those of :func:`pamrs.fit.load_force_map`."""
     source = str(file)
     if rest_length is None:
         raise RecordingError(f"{source}: rest_length is missing: give the length at zero contraction, in m")
@@ -126,9 +84,6 @@ def load_force_map(
     if "time" in found:
         if wanted:
             raise RecordingError(f"{source}: where does not apply to a table with a time column, which is one recording")
-        from pamrs.fit._bench import from_recording
-        from pamrs.recordings import load_recording
-
         recording = load_recording(file, columns=_channels(table, found), delimiter=delimiter, decimal=decimal, name=title)
         return from_recording(recording, rest_length=rest_length, clipped=clipped, level_tolerance=level_tolerance)
     keep, notes = _kept(table, wanted, decimal, source)

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any, Final
 
 from pamrs.errors import FitError, ParameterError
 from pamrs.fit import remarks
-from pamrs.fit._export import friction_words
 from pamrs.report import require
 from pamrs.report.text import format_number, format_uncertain
 
@@ -18,6 +17,7 @@ if TYPE_CHECKING:
     from pamrs.fit._figures import ErrorCurve
     from pamrs.fit._friction import FrictionFit
     from pamrs.fit._result import MuscleFit
+    from pamrs.fit._statistics import FitStatistics
 
 __all__ = ["error_curves", "render_friction_png", "render_html", "render_png", "write_figure", "write_report"]
 
@@ -66,11 +66,11 @@ def error_curves(fit: MuscleFit, comparison: ModelComparison | None = None) -> l
     return [_curve(remarks.title(other), other) for other in best.values()]
 
 
-def _level_by_level(fit: MuscleFit) -> MuscleFit | None:
+def _level_by_level(fit: MuscleFit) -> FitStatistics | None:
     """The same fit with moduli free at each level that has points enough; None where that says nothing."""
     import numpy as np
 
-    from pamrs.fit._engine import fit_muscle
+    from pamrs.fit._solution import solution
 
     if fit.moduli_kind == "per_level" or not fit.params:
         return None
@@ -83,7 +83,7 @@ def _level_by_level(fit: MuscleFit) -> MuscleFit | None:
     if any(p.name == "rest_length" for p in fit.params.values()):
         return None
     try:
-        return fit_muscle(
+        return solution(
             fit.data,
             fit.muscle.replace(**fixed),
             model=fit.model,
@@ -173,7 +173,7 @@ def _facts(fit: MuscleFit) -> list[tuple[str, str]]:
 
 def _muscle(fit: MuscleFit) -> list[tuple[str, str]]:
     muscle = fit.muscle_at(float(fit.data.levels[-1]))
-    parameters, friction = muscle.parameters, friction_words(muscle)
+    parameters, friction = muscle.parameters, remarks.friction_words(muscle)
     return [
         ("model", remarks.title(fit)),
         ("geometry", str(parameters["geometry"])),

@@ -1,6 +1,6 @@
 """The muscles of the 2014 dissertation: geometry, moduli, published facts, and where each number comes from.
 
-``pamrs.library.elbow_0625in()`` is a :class:`pamrs.Muscle`; ``pamrs.library._entry("elbow_0625in")`` also has the origin of
+``pamrs.library.elbow_0625in()`` is a :class:`pamrs.Muscle`; ``pamrs.library.entry("elbow_0625in")`` also has the origin of
 each number, the mass, the highest pressure and the published facts. ``python -m pamrs.library`` derives the identified numbers
 again and prints every fact beside what the muscle gives.
 """

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["check", "names", "section"]
 
 #: Chapter -> its module; the one of its pictures has the same name and ``_figures``.
-_CHAPTERS: Final = {"ch3": "chapter3", "ch4": "chapter4", "ch5": "chapter5"}
+_CHAPTERS: Final = {"ch3": "_chapter3", "ch4": "_chapter4", "ch5": "_chapter5"}
 
 
 def names() -> list[str]:
