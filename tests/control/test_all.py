@@ -11,8 +11,7 @@ import pytest
 import pamrs
 from pamrs.control import PID, Cascade, Feedforward, Parallel, Reference, cascaded_pid
 from pamrs.errors import ParameterError
-
-from .control_cases import AIR, CONTROLLERS, DIAGNOSED, FULL, PERIOD, SHOULDER, samples, singles, smooth
+from tests.control.cases import AIR, CONTROLLERS, DIAGNOSED, FULL, PERIOD, SHOULDER, samples, singles, smooth
 
 ALL = pytest.mark.parametrize("name", CONTROLLERS)
 

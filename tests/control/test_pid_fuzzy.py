@@ -22,8 +22,7 @@ from pamrs.control import (
     fuzzy_surface,
 )
 from pamrs.errors import ParameterError
-
-from .control_cases import AIR, FULL
+from tests.control.cases import AIR, FULL
 
 
 def surface(x, y, table="anti_diagonal"):

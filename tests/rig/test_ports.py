@@ -13,8 +13,7 @@ from pamrs import rigs
 from pamrs.errors import RigError
 from pamrs.rig import Rig, parse_rig
 from pamrs.rig.schema import BLOCKS
-
-from .rig_cases import HEAD, LEAST, refused, same, stand
+from tests.rig.cases import HEAD, LEAST, refused, same, stand
 
 # --------------------------------------------------------------------------------- ports
 

@@ -5,8 +5,7 @@ import pytest
 
 from pamrs.errors import ParameterError
 from pamrs.fit import FitError, ForceMap, fit_friction, fit_muscle, load_force_map
-
-from .fit_cases import CONTRACTIONS, PRESSURES, REST, SHAPE, TOLERANCE, measure, muscle
+from tests.fit.cases import CONTRACTIONS, PRESSURES, REST, SHAPE, TOLERANCE, measure, muscle
 
 
 @pytest.mark.parametrize(

@@ -9,8 +9,7 @@ from pamrs import Muscle
 from pamrs.errors import ParameterError
 from pamrs.fit import FitError, ForceMap, compare_models, fit_friction, fit_muscle
 from pamrs.fit._compare import effective_size
-
-from .fit_cases import REST, TOLERANCE, measure, muscle
+from tests.fit.cases import REST, TOLERANCE, measure, muscle
 
 
 def row(comparison, model, order=None):

@@ -12,7 +12,7 @@ from pamrs.control.stability import margins, spectral_radius, stable_region
 from pamrs.control.trajectories import step
 from pamrs.effects_table import EFFECTS
 from pamrs.errors import ParameterError
-from tests.unit.control_helpers import SmallPid
+from tests.control.helpers import SmallPid
 
 ANGLE = math.radians(45)
 #: What each moving effect adds, where the model has to show it.

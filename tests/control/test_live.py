@@ -16,8 +16,8 @@ from pamrs.control.live import LiveError, SystemClock, run_live
 from pamrs.control.simulated_device import FAULTS, SimulatedDevice, VirtualClock
 from pamrs.control.trajectories import degrees, lift_hold_return
 from pamrs.errors import ParameterError
-from tests.unit.control_cases import CONTROLLERS, DIAGNOSED
-from tests.unit.control_helpers import SmallPid
+from tests.control.cases import CONTROLLERS, DIAGNOSED
+from tests.control.helpers import SmallPid
 
 LIFT = lift_hold_return(*degrees(15, 50), ramp=2.0, hold=1.0, duration=5.0)
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from pamrs.fit import FitError, fit_muscle
-
-from .fit_cases import TOLERANCE, measure, muscle
+from tests.fit.cases import TOLERANCE, measure, muscle
 
 
 @pytest.mark.parametrize("model", ["kothera", "robinson"])

@@ -5,7 +5,7 @@ import json
 
 import pytest
 
-from tests.unit.test_trial_score import CASES
+from tests.trial.test_score import CASES
 from trial.__main__ import main
 from trial.report import checked
 from trial.score import gap_of, score

@@ -16,8 +16,8 @@ from pamrs.comparison import judge, markdown, table, to_csv, verdicts
 from pamrs.errors import ParameterError
 from pamrs.reproduce import _chapter3 as chapter3
 from pamrs.reproduce import _elbow as elbow
-from pamrs.reproduce import _symbols as symbols
 from pamrs.reproduce import names
+from pamrs.reproduce._symbols import symbols
 from pamrs.reproduce.page import Picture, Section, page
 from pamrs.rig import Joint
 

@@ -10,7 +10,7 @@ from pamrs.control import PID, Sensors, closed_loop, sweep
 from pamrs.control.trajectories import degrees, lift_hold_return
 from pamrs.control.tuning import gain_map, perturbed, search_gains
 from pamrs.errors import ParameterError
-from tests.unit.control_helpers import SmallPid
+from tests.control.helpers import SmallPid
 
 LIFT = lift_hold_return(*degrees(15, 50), ramp=2.0, hold=1.0, duration=6.0)
 FAST = {"duration": 3.0, "sample_time": 0.01}

@@ -11,7 +11,7 @@ import pytest
 
 from pamrs.diagnosis.result import Diagnosis, Trace, schema
 from pamrs.report import text as words
-from tests.unit import synthetic_diagnosis as synthetic
+from tests.diagnosis import synthetic
 
 
 @pytest.mark.parametrize("make", [synthetic.diagnosis, synthetic.sealed_chamber, synthetic.nothing])

@@ -14,7 +14,7 @@ from pamrs.diagnosis.differences import MEASURABLE, NOISE, taken
 from pamrs.diagnosis.experiment import entropy, information, propose
 from pamrs.diagnosis.protocols import library
 from pamrs.diagnosis.result import schema
-from tests.unit import synthetic_diagnosis as synthetic
+from tests.diagnosis import synthetic
 
 
 @pytest.fixture(scope="module")

@@ -5,8 +5,7 @@ import pytest
 
 from pamrs.errors import ParameterError
 from pamrs.fit import FitError, compare_models, fit_muscle
-
-from .fit_cases import TOLERANCE, measure, muscle, truth
+from tests.fit.cases import TOLERANCE, measure, muscle, truth
 
 WIDE = {"modulus_slope": 10.0, "modulus_offset": 1e7}
 

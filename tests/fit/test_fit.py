@@ -10,8 +10,7 @@ from pamrs import rigs
 from pamrs.errors import ParameterError
 from pamrs.fit import FitError, ForceMap, fit_muscle
 from pamrs.rig import Rig
-
-from .fit_cases import CONTRACTIONS, OFFSETS, PRESSURES, REST, SLOPES, TOLERANCE, measure, muscle, truth
+from tests.fit.cases import CONTRACTIONS, OFFSETS, PRESSURES, REST, SLOPES, TOLERANCE, measure, muscle, truth
 
 # ------------------------------------------------------------------------ recovery
 

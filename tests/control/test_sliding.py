@@ -8,8 +8,7 @@ import pytest
 from pamrs.control import AdaptiveSliding, Cascade, Neural, Reference, Sliding, fuzzy_rules
 from pamrs.control._adaptive import dead
 from pamrs.errors import ParameterError
-
-from .control_cases import FULL, GAYLORD, PERIOD, SIMPLIFIED
+from tests.control.cases import FULL, GAYLORD, PERIOD, SIMPLIFIED
 
 LAMBDA, KD = 5.0, 2e4
 STEP = 1e-3
@@ -213,7 +212,7 @@ def test_networks_learn_from_zero_on_their_plant():
 
 @pytest.mark.parametrize("shape", [(), (2,)])
 def test_saved_and_loaded_bit_for_bit(tmp_path, shape):
-    from .control_cases import samples, singles
+    from tests.control.cases import samples, singles
 
     def made():
         return Cascade(Neural(SIMPLIFIED, period=PERIOD))

@@ -8,7 +8,7 @@ from pamrs import cli
 from pamrs.effects_table import EFFECTS, text
 from pamrs.errors import ParameterError
 from pamrs.rig import parse_rig
-from tests.unit.test_effects import rig_for
+from tests.effects.test_effects import rig_for
 
 IDS = [info.id for infos in text.catalogue().values() for info in infos]
 

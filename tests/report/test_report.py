@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.unit import synthetic_diagnosis as synthetic
+from tests.diagnosis import synthetic
 
 pytest.importorskip("matplotlib")
 pytest.importorskip("jinja2")

@@ -16,8 +16,7 @@ from pamrs.errors import ParameterError
 from pamrs.rig import Rig, load_rig, parse_rig
 from pamrs.rig.schema import BLOCKS, PORTS
 from pamrs.rigs._keys import every_key
-
-from .rig_cases import refused, same, stand
+from tests.rig.cases import refused, same, stand
 
 
 def core(rig: Rig) -> dict[str, Any]:

@@ -10,7 +10,7 @@ import pamrs
 from pamrs.control import Controller, Sensors, closed_loop, sweep
 from pamrs.control.trajectories import degrees, lift_hold_return, step
 from pamrs.errors import ParameterError
-from tests.unit.control_helpers import SmallPid
+from tests.control.helpers import SmallPid
 
 LIFT = lift_hold_return(*degrees(15, 60), ramp=2.0, hold=1.0, duration=8.0)
 

@@ -18,8 +18,7 @@ from pamrs.control import (
     SlipMemory,
 )
 from pamrs.errors import ParameterError
-
-from .control_cases import DIAGNOSED, FULL, PERIOD, SHOULDER, smooth
+from tests.control.cases import DIAGNOSED, FULL, PERIOD, SHOULDER, smooth
 
 FRICTION = {"friction_constant": 15.0, "friction_pressure": 8e-5, "presliding": 1e-3}
 HYSTERETIC = SHOULDER.with_effect("muscle_hysteresis", FRICTION)

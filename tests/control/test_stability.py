@@ -11,7 +11,7 @@ from pamrs.control.linear import LinearController, LinearModel, equilibrium, lin
 from pamrs.control.stability import loop_matrix, margins, spectral_radius, stable_region
 from pamrs.control.trajectories import step
 from pamrs.errors import ParameterError
-from tests.unit.control_helpers import SmallPid
+from tests.control.helpers import SmallPid
 
 ANGLE = math.radians(45)
 
