@@ -78,7 +78,7 @@ class Entry:
     facts : tuple of Fact
         What is published about it.
     identification : dict
-        Prior and conditions from which :func:`pamrs.library.identify.derive` derives the identified numbers.
+        Prior and conditions from which :func:`pamrs.library._identify.derive` derives the identified numbers.
     """
 
     name: str

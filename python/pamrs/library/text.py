@@ -9,7 +9,7 @@ import numpy as np
 
 from pamrs.comparison import Comparison, verdicts
 from pamrs.library import entry, names
-from pamrs.library.identify import derive
+from pamrs.library._identify import derive
 from pamrs.library.published import compare, compare_all, table
 from pamrs.units import parse_unit
 
