@@ -21,7 +21,7 @@ from pamrs.diagnosis.fitting import FIT_BIN, Key, Problem, bin_width, free_basel
 from pamrs.diagnosis.signals import Prepared, binned, prepare
 from pamrs.effects_table import EFFECTS
 from pamrs.errors import DiagnosisError, ParameterError
-from pamrs.recording import Recording
+from pamrs.recordings import Recording
 from pamrs.rig import Rig
 from pamrs.simulation import Simulation, core_rig
 
