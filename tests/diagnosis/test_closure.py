@@ -13,8 +13,8 @@ from pamrs.diagnosis.evidence import Floor, excess, floors, inflation
 from pamrs.diagnosis.fitting import FIT_BIN, Fit, Key, Problem, fit, residuals
 from pamrs.diagnosis.hypotheses import fits
 from pamrs.diagnosis.signals import prepare
-from pamrs.effects_table import CATALOGUE, EFFECTS
-from pamrs.effects_table.closure import CLOSURES, MEMORY_OF, TERMS
+from pamrs.effects import CATALOGUE, EFFECTS
+from pamrs.effects import CLOSURES, MEMORY_OF, TERMS
 from pamrs.errors import DiagnosisError, RigError
 from pamrs.recordings import Recording
 from pamrs.simulation import core_rig

@@ -9,7 +9,7 @@ import pamrs
 from pamrs import _core
 from pamrs.diagnosis.fitting import ACTS
 from pamrs.diagnosis.starts import RESTRICTIONS, starts_of
-from pamrs.effects_table import EFFECTS
+from pamrs.effects import EFFECTS
 from pamrs.errors import ParameterError, RigError
 from pamrs.rig import parse_rig
 from pamrs.units import parse_unit

@@ -367,8 +367,11 @@ def test_an_effect_on_one_block() -> None:
     assert same(rig, parse_rig(rig.to_toml_text()))
     assert same(rig, pickle.loads(pickle.dumps(rig)))
     other = rig.with_effect("leak_muscle", at="flexor")
-    assert [entry.get("at") for entry in other.effects] == [None, "flexor"]
-    assert other.effect_std == {}
+    assert [entry.get("at") for entry in other.effects] == ["extensor", None, "flexor"]
+    assert other.effect_std == {"leak_muscle.extensor": {"conductance": 1e-12}}
+    assert same(other, parse_rig(other.to_toml_text()))
+    assert other.without_effect("leak_muscle", at="flexor").effects == rig.effects
+    assert [entry.get("at") for entry in other.with_effect("leak_muscle").effects] == [None, None]
     assert rig.without_effect("leak_muscle").effects == pair.with_effect("muscle_hysteresis").effects
     with pytest.raises(ParameterError, match="leak_muscle: at = 'flexr' names no chamber; did you mean 'flexor'"):
         pair.with_effect("leak_muscle", at="flexr")

@@ -22,7 +22,7 @@ from pamrs.diagnosis.result import Diagnosis, Trace
 from pamrs.diagnosis.starts import CHOICES
 from pamrs.diagnosis.verdicts import IN_SET, Judged, case_ambiguity, case_probabilities, case_verdict, is_parameter, judge, symptoms_of
 from pamrs.diagnosis.weighing import share_left
-from pamrs.effects_table import CATALOGUE, EFFECTS
+from pamrs.effects import CATALOGUE, EFFECTS
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError
 from pamrs.recordings import Case
 from pamrs.rig import Rig

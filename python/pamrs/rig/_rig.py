@@ -158,14 +158,26 @@ class Rig:
 
     @property
     def effects(self) -> list[dict[str, Any]]:
-        """The omitted physics already in the model: ``{"id", "parameters": {name: SI value}}`` each, ``"at"`` if on one block only."""
+        """The omitted physics already in the model: ``{"id", "parameters": {name: SI value}}`` each.
+
+        With ``"at"`` if it acts on one block only, and ``"form"`` if it has another form than the first.
+        """
         effects: list[dict[str, Any]] = copy.deepcopy(self._model["effects"])
         return effects
 
     @property
     def effect_std(self) -> dict[str, dict[str, float]]:
-        """Standard deviations of the effects' parameters, where the file gives them: id -> name -> SI."""
-        return copy.deepcopy(self._effect_std)
+        """Standard deviations of the effects' parameters, where the file gives them: id -> name -> SI.
+
+        Of several effects of one id each has the name of its block behind a dot, ``"leak_muscle.flexor"``.
+        """
+        found: dict[str, dict[str, float]] = {}
+        ids = [entry["id"] for entry in self._model["effects"]]
+        for entry in self._model["effects"]:
+            full = qualified(entry["id"], entry.get("at", ""))
+            if full in self._effect_std:
+                found[entry["id"] if ids.count(entry["id"]) == 1 else full] = dict(self._effect_std[full])
+        return found
 
     @property
     def blocks(self) -> tuple[str, ...]:
@@ -292,8 +304,12 @@ class Rig:
         *,
         std: Mapping[str, float] | None = None,
         at: str = "",
+        form: str = "",
     ) -> Rig:
-        """A rig with one effect more; an effect of the same id is replaced.
+        """A rig with one effect more.
+
+        Several of one id can be there, each at a block of its own and with its own parameters. One at the same block is
+        replaced; one that acts everywhere replaces all of its id, and is replaced by one at a block.
 
         Parameters
         ----------
@@ -305,6 +321,8 @@ class Rig:
             Standard deviations, SI; written to the file as a note of how well each is known.
         at : str, optional
             Name of the one block on which it acts, for example of a chamber; by default it acts on every block of its kind.
+        form : str, optional
+            Name of one of its forms; by default the first.
 
         Returns
         -------
@@ -314,20 +332,23 @@ class Rig:
         Raises
         ------
         ParameterError
-            For an unknown effect, parameter or block, or a value outside its bounds.
+            For an unknown effect, form, parameter or block, or a value outside its bounds.
         """
-        from pamrs.effects_table import CATALOGUE, EFFECTS
+        from pamrs.effects import CATALOGUE, EFFECTS
 
         info = EFFECTS.get(effect)
         if info is None:
             raise ParameterError(f"effect = {effect!r} is not in the catalogue{near_name(str(effect), CATALOGUE)}")
         at = bare(info.at, at)
         given = dict(parameters or {})
-        names = [parameter.name for parameter in info.parameters]
+        if form and form not in (allowed := [known.name for known in info.forms]):
+            raise ParameterError(f"form = {form!r} is not allowed: {effect} has {', '.join(map(repr, allowed))}")
+        chosen_form = info.form(form)
+        names = [parameter.name for parameter in chosen_form.parameters]
         problems = [f"unknown parameter {name!r}; it has: {', '.join(names)}" for name in {*given, *(std or {})} if name not in names]
         problems += [text] if (text := effect_problem(self._model, effect, at)) else []
         chosen: dict[str, float] = {}
-        for parameter in info.parameters:
+        for parameter in chosen_form.parameters:
             value = float(given.get(parameter.name, parameter.default))
             if not (math.isfinite(value) and parameter.lower <= value <= parameter.upper):
                 problems.append(
@@ -337,27 +358,39 @@ class Rig:
             chosen[parameter.name] = value
         if problems:
             raise ParameterError(joined(f"effect {effect!r}", problems))
-        base = self.without_effect(effect)
+        base = self.without_effect(effect, at=at or None)
+        base = base.without_effect(effect, at="") if at else base
         model = base.model
-        model["effects"].append({"id": effect, **({"at": at} if at else {}), "parameters": chosen})
-        kept = {**base._effect_std, **({effect: {k: float(v) for k, v in std.items()}} if std else {})}
-        return Rig(self.name, model, self._tolerances, kept, self.source)
+        place = {"at": at} if at else {}
+        own = {"form": form} if form and form != info.forms[0].name else {}
+        model["effects"].append({"id": effect, **place, **own, "parameters": chosen})
+        known = {qualified(effect, at): {k: float(v) for k, v in std.items()}} if std else {}
+        return Rig(self.name, model, self._tolerances, {**base._effect_std, **known}, self.source)
 
-    def without_effect(self, effect: str | None = None) -> Rig:
+    def without_effect(self, effect: str | None = None, *, at: str | None = None) -> Rig:
         """A rig without one effect; an effect that is not there is no error.
 
         Parameters
         ----------
         effect : str, optional
             Its id; None removes all.
+        at : str, optional
+            Only the one at the block of this name, ``""`` for the one that acts everywhere; by default wherever it acts.
 
         Returns
         -------
         Rig
         """
         model = self.model
-        model["effects"] = [entry for entry in model["effects"] if effect is not None and entry["id"] != effect]
-        kept = {k: v for k, v in self._effect_std.items() if effect is not None and k != effect}
+
+        def stays(entry: Mapping[str, Any]) -> bool:
+            if effect is None:
+                return False
+            return entry["id"] != effect or (at is not None and entry.get("at", "") != at)
+
+        model["effects"] = [entry for entry in model["effects"] if stays(entry)]
+        left = {qualified(entry["id"], entry.get("at", "")) for entry in model["effects"]}
+        kept = {name: std for name, std in self._effect_std.items() if name in left}
         return Rig(self.name, model, self._tolerances, kept, self.source)
 
     # ------------------------------------------------------------------ writing

@@ -5,13 +5,13 @@ use super::wiring_motion::coordinate_names;
 use crate::description::{dotted, RigSpec};
 use crate::effects::Role;
 
-/// Number of sums that are kept beside the states: see [`BOOKS`].
-pub const BOOK_COUNT: usize = 6;
+/// Number of sums that are kept beside the states: see [`BALANCE`].
+pub const BALANCE_COUNT: usize = 6;
 
 /// Channels of the sums over a simulation, in their order: mass out of the supplies and into the ambient, what
 /// regulators relieve included [kg]; energy `R T m` and exergy `R T ln(p/p_a) m` of what the supplies gave, work of
 /// the muscles, positive work at the joints [J].
-pub const BOOKS: [&str; BOOK_COUNT] =
+pub const BALANCE: [&str; BALANCE_COUNT] =
     ["mass_supplied", "mass_vented", "energy_supplied", "exergy_supplied", "muscle_work", "joint_work"];
 
 /// Places of the states: supplies' pressures, gases' pressures, gases' masses, coordinates, their rates, what effects need.
@@ -30,7 +30,7 @@ pub struct Layout {
 }
 
 impl Layout {
-    /// States without the books.
+    /// States without the sums of the balance.
     #[inline]
     #[must_use]
     pub fn states(&self) -> usize {
@@ -79,10 +79,10 @@ impl Layout {
         self.supplies + 2 * self.gases + self.coordinates + k
     }
 
-    /// A sum of [`BOOKS`].
+    /// A sum of [`BALANCE`].
     #[inline]
     #[must_use]
-    pub fn book(&self, k: usize) -> usize {
+    pub fn balance(&self, k: usize) -> usize {
         self.states() + k
     }
 }
@@ -171,8 +171,8 @@ pub enum Channel {
     Temperature(usize),
     /// Mass of a gas [kg].
     Mass(usize),
-    /// One of [`BOOKS`].
-    Book(usize),
+    /// One of [`BALANCE`].
+    Balance(usize),
 }
 
 /// Names of everything that can be set, read or driven.
@@ -247,7 +247,8 @@ impl Names {
         for (k, name) in inlets.clone().enumerate() {
             channels.push((of("line_mass", name), Channel::Mass(wiring.chambers + k)));
         }
-        channels.extend(BOOKS.iter().enumerate().map(|(k, name)| ((*name).to_string(), Channel::Book(k))));
+        channels
+            .extend(BALANCE.iter().enumerate().map(|(k, name)| ((*name).to_string(), Channel::Balance(k))));
         let regulators = spec.supplies.iter().filter(|s| s.kind == "regulator");
         Self {
             channels,

@@ -16,7 +16,7 @@ mod views;
 mod wiring;
 mod wiring_motion;
 
-pub use layout::{Channel, Layout, Names, StatePlace, StateRole, BOOKS};
+pub use layout::{Channel, Layout, Names, StatePlace, StateRole, BALANCE};
 pub use memory::Memory;
 pub use parameters::{ParameterId, Parameters, Values};
 pub(crate) use ports::{moves, Place};
@@ -300,7 +300,7 @@ impl Rig {
         for (name, role) in wiring.ports.state_names(&self.spec, wiring) {
             add(&name, StateRole::Effect(role));
         }
-        for name in BOOKS {
+        for name in BALANCE {
             add(name, StateRole::Balance);
         }
         for muscle in &self.spec.muscles {

@@ -1,11 +1,11 @@
 //! The state equation of a rig, composed of its blocks.
 //!
 //! States as in [`Layout`]: absolute pressures of supplies and gases [Pa], gas masses [kg], joint angles [rad] and rates
-//! [rad/s], then what effects need and, where they are kept, the sums of [`super::layout::BOOKS`]. Any of them can be *driven* by a signal
+//! [rad/s], then what effects need and, where they are kept, the sums of [`super::layout::BALANCE`]. Any of them can be *driven* by a signal
 //! instead of being integrated: that is where the rig is cut.
 
 use super::body::Body;
-use super::layout::{Channel, Layout, BOOK_COUNT};
+use super::layout::{Channel, Layout, BALANCE_COUNT};
 use super::memory::Memory;
 use super::ports::Acting;
 use super::units::{LineUnit, Path, SupplyUnit};
@@ -81,7 +81,7 @@ pub struct Plant<'a, S> {
     pub(super) rig: &'a Rig,
     pub(super) layout: Layout,
     pub(super) values: Values<S>,
-    books: bool,
+    balanced: bool,
     pub(super) supplies: Vec<Supply<S>>,
     /// Fixed volume of each gas, halves of tubes included [m3].
     pub(super) fixed_volume: Vec<S>,
@@ -119,11 +119,11 @@ pub struct Scratch<S> {
 }
 
 impl<'a, S: Number> Plant<'a, S> {
-    /// Compose a rig with parameter values; `books` keeps the sums of [`super::layout::BOOKS`] behind the states.
+    /// Compose a rig with parameter values; `balanced` keeps the sums of [`super::layout::BALANCE`] behind the states.
     ///
     /// # Errors
     /// [`crate::Error::Parameter`] for links that cannot be.
-    pub fn new(rig: &'a Rig, values: Values<S>, books: bool) -> Result<Self> {
+    pub fn new(rig: &'a Rig, values: Values<S>, balanced: bool) -> Result<Self> {
         let wiring = &rig.wiring;
         let line = |line: &LineUnit| match line.path {
             Path::Orifice(area) => Line::Orifice(values[area]),
@@ -141,7 +141,7 @@ impl<'a, S: Number> Plant<'a, S> {
         let isothermal = Polytropic { inflow: constant(1.0), outflow: constant(1.0), volume: constant(1.0) };
         Ok(Self {
             layout: rig.layout,
-            books,
+            balanced,
             supplies: (wiring.supplies.iter())
                 .map(|supply| match supply {
                     SupplyUnit::Tank(volume) => Supply::Tank(values[*volume]),
@@ -215,9 +215,9 @@ impl<'a, S: Scalar> Plant<'a, S> {
         self.rig
     }
 
-    /// Length of the state, books included.
+    /// Length of the state, the sums of the balance included.
     pub fn states(&self) -> usize {
-        self.layout.states() + if self.books { BOOK_COUNT } else { 0 }
+        self.layout.states() + if self.balanced { BALANCE_COUNT } else { 0 }
     }
 
     /// Room for the equations.
@@ -254,19 +254,19 @@ impl<'a, S: Scalar> Plant<'a, S> {
             here.wall.fill(zero);
         }
         for (k, group) in self.rig.wiring.groups.iter().enumerate() {
-            let pull = self.muscle_force(k, group, state, &memory[k], start[k]);
+            let muscle = self.muscle_force(k, group, state, &memory[k], start[k]);
             let rate = state[self.layout.rate(group.coordinate)];
-            (here.contraction[k], here.force[k]) = (pull.contraction, pull.force);
-            here.volume[group.chamber] += pull.table.volume * group.count;
+            (here.contraction[k], here.force[k]) = (muscle.contraction, muscle.force);
+            here.volume[group.chamber] += muscle.table.volume * group.count;
             here.volume_rate[group.chamber] +=
-                pull.table.volume_slope * pull.moment_arm * rate * (group.count / group.rest_length);
-            here.torque[group.coordinate] += pull.force * pull.torque_arm;
-            if self.books {
-                here.muscle_work += pull.force * pull.moment_arm * rate;
+                muscle.table.volume_slope * muscle.moment_arm * rate * (group.count / group.rest_length);
+            here.torque[group.coordinate] += muscle.force * muscle.torque_arm;
+            if self.balanced {
+                here.muscle_work += muscle.force * muscle.moment_arm * rate;
             }
             if heat {
-                let length = (-pull.contraction + 1.0) * group.rest_length;
-                here.wall[group.chamber] += cylinder_area(group.count, pull.table.volume, length);
+                let length = (-muscle.contraction + 1.0) * group.rest_length;
+                here.wall[group.chamber] += cylinder_area(group.count, muscle.table.volume, length);
             }
         }
         if heat {
@@ -339,8 +339,8 @@ impl<'a, S: Scalar> Plant<'a, S> {
         } else {
             out[angle..end].fill(constant(0.0));
         }
-        if self.books {
-            self.book(state, here, out);
+        if self.balanced {
+            self.balances(state, here, out);
         }
         for (out, driven) in out.iter_mut().zip(&simulated.driven) {
             if *driven {
@@ -350,7 +350,7 @@ impl<'a, S: Scalar> Plant<'a, S> {
     }
 
     #[inline(always)]
-    fn book(&self, state: &[S], here: &Scratch<S>, out: &mut [S]) {
+    fn balances(&self, state: &[S], here: &Scratch<S>, out: &mut [S]) {
         let (gas, layout) = (&self.rig.gas, &self.layout);
         let rt = gas.gas_constant * gas.temperature;
         let (mut drawn, mut exergy, mut vented) = (constant::<S>(0.0), constant::<S>(0.0), here.vented);
@@ -421,7 +421,7 @@ impl Plant<'_, f64> {
                     state[layout.mass(k)],
                 ),
                 Channel::Temperature(_) => self.rig.gas.temperature,
-                Channel::Book(k) => state.get(layout.book(k)).copied().unwrap_or(f64::NAN),
+                Channel::Balance(k) => state.get(layout.balance(k)).copied().unwrap_or(f64::NAN),
             });
         }
         here.now = now;

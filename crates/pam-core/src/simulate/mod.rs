@@ -536,11 +536,11 @@ fn held_mass(plant: &Plant<'_, f64>, place: usize, state: &mut [f64]) {
     let rt = air.gas_constant * air.temperature;
     state[layout.mass(gas)] = mass;
     if more > 0.0 {
-        state[layout.book(0)] += more;
-        state[layout.book(2)] += more * rt;
-        state[layout.book(3)] += more * rt * (pressure / air.ambient_pressure).ln();
+        state[layout.balance(0)] += more;
+        state[layout.balance(2)] += more * rt;
+        state[layout.balance(3)] += more * rt * (pressure / air.ambient_pressure).ln();
     } else {
-        state[layout.book(1)] -= more;
+        state[layout.balance(1)] -= more;
     }
 }
 

@@ -7,8 +7,8 @@ import textwrap
 from collections.abc import Mapping
 from typing import Final
 
-from pamrs.effects_table import CATALOGUE
-from pamrs.effects_table.entry import EffectInfo, EffectParameter
+from pamrs.effects import CATALOGUE
+from pamrs.effects import EffectInfo, EffectParameter
 from pamrs.errors import ParameterError
 
 __all__ = ["catalogue", "description", "entry", "overview", "range_of", "snippet", "where"]
