@@ -96,6 +96,21 @@ impl Rig {
         Ok(Self { inner: Arc::new(made.map_err(|e| error(py, &e))?) })
     }
 
+    /// The same rig with other values of some parameters by name; None where one of them is not a parameter that can vary, so
+    /// that the rig has to be made again.
+    fn revalued(&self, py: Python<'_>, values: BTreeMap<String, f64>) -> PyResult<Option<Self>> {
+        let table = self.inner.parameters();
+        let mut all = table.values().to_vec();
+        for (name, value) in &values {
+            match table.find(name) {
+                Ok(id) => all[id.index()] = *value,
+                Err(_) => return Ok(None),
+            }
+        }
+        let made = py.detach(|| self.inner.with_values(&all));
+        Ok(Some(Self { inner: Arc::new(made.map_err(|e| error(py, &e))?) }))
+    }
+
     /// Values of the parameters, in the order of their names.
     #[getter]
     fn values<'py>(&self, py: Python<'py>) -> Bound<'py, numpy::PyArray1<f64>> {

@@ -27,7 +27,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Parameter", "Rig", "load_rig", "parse_rig"]
 
-_MADE_AGAIN = ("_compiled", "_connected")  # by the core and from the ports when they are needed
+#: By the core and from the ports when they are needed; what a rig differs from by numbers only, and what was made of it.
+_MADE_AGAIN = ("_compiled", "_connected", "_origin", "_grown")
 
 
 @dataclass(frozen=True, slots=True)
@@ -281,7 +282,7 @@ class Rig:
         ParameterError
             For an unknown name, or a value outside the bounds of the possible.
         """
-        model = self.model
+        model = _opened(self._model, {split_name(name)[:2] for name in values})
         problems = []
         for name, value in values.items():
             table, key = self._scalar(model, name)
@@ -295,7 +296,32 @@ class Rig:
             table[key.name] = int(number) if whole else number
         if problems:
             raise ParameterError(joined(f"rig {self.name!r}", problems))
-        return Rig(self.name, model, self._tolerances, self._effect_std, self.source)
+        found = Rig(self.name, model, self._tolerances, self._effect_std, self.source)
+        return found._with_origin(self, {name: float(value) for name, value in values.items()})
+
+    # A rig that differs from another one by numbers only is not wired again: the core takes the numbers.
+
+    def _with_origin(self, base: Rig, values: Mapping[str, float]) -> Rig:
+        """Note that this rig is another one with other numbers."""
+        origin, before = base.__dict__.get("_origin", (base, {}))
+        object.__setattr__(self, "_origin", (origin, {**before, **values}))
+        return self
+
+    def _with_entry(self, entry: dict[str, Any], std: dict[str, dict[str, float]]) -> Rig:
+        """This rig with one effect more, as an entry of its model."""
+        model = {**self._model, "effects": [*self._model["effects"], entry]}
+        found = Rig(self.name, model, self._tolerances, {**self._effect_std, **std}, self.source)
+        origin, before = self.__dict__.get("_origin", (self, {}))
+        grown: dict[tuple[str, str, str], Rig] = origin.__dict__.get("_grown", {})
+        kind = (entry["id"], entry.get("at", ""), entry.get("form", ""))
+        if kind not in grown:
+            same = {**origin._model, "effects": [*origin._model["effects"], entry]}
+            grown[kind] = Rig(self.name, same, self._tolerances, origin._effect_std, self.source)
+            object.__setattr__(origin, "_grown", grown)
+        full = qualified(entry["id"], entry.get("at", ""))
+        own = {f"{full}.{name}": value for name, value in entry["parameters"].items()}
+        object.__setattr__(found, "_origin", (grown[kind], {**before, **own}))
+        return found
 
     def with_effect(
         self,
@@ -360,12 +386,10 @@ class Rig:
             raise ParameterError(joined(f"effect {effect!r}", problems))
         base = self.without_effect(effect, at=at or None)
         base = base.without_effect(effect, at="") if at else base
-        model = base.model
         place = {"at": at} if at else {}
         own = {"form": form} if form and form != info.forms[0].name else {}
-        model["effects"].append({"id": effect, **place, **own, "parameters": chosen})
         known = {qualified(effect, at): {k: float(v) for k, v in std.items()}} if std else {}
-        return Rig(self.name, model, self._tolerances, {**base._effect_std, **known}, self.source)
+        return base._with_entry({"id": effect, **place, **own, "parameters": chosen}, known)
 
     def without_effect(self, effect: str | None = None, *, at: str | None = None) -> Rig:
         """A rig without one effect; an effect that is not there is no error.
@@ -381,14 +405,15 @@ class Rig:
         -------
         Rig
         """
-        model = self.model
-
         def stays(entry: Mapping[str, Any]) -> bool:
             if effect is None:
                 return False
             return entry["id"] != effect or (at is not None and entry.get("at", "") != at)
 
-        model["effects"] = [entry for entry in model["effects"] if stays(entry)]
+        entries = [entry for entry in self._model["effects"] if stays(entry)]
+        if len(entries) == len(self._model["effects"]):
+            return self
+        model = {**self._model, "effects": entries}
         left = {qualified(entry["id"], entry.get("at", "")) for entry in model["effects"]}
         kept = {name: std for name, std in self._effect_std.items() if name in left}
         return Rig(self.name, model, self._tolerances, kept, self.source)
@@ -437,6 +462,20 @@ class Rig:
             return write_atomically(path, self.to_toml_text())
         except OSError as error:
             raise RigError(f"{path}: cannot be written ({error.strerror or error})") from error
+
+
+def _opened(model: dict[str, Any], tables: set[tuple[str, str]]) -> dict[str, Any]:
+    """A model with copies of some of its tables, by block and name; what is not changed is shared."""
+    opened = dict(model)
+    for block, name in tables:
+        content = opened.get(block)
+        if not isinstance(content, dict):
+            continue
+        if content is model.get(block):
+            opened[block] = content = {**content}
+        if name in content:
+            content[name] = dict(content[name])
+    return opened
 
 
 def _range(key: Key) -> str:

@@ -16,6 +16,14 @@ fn check(name: &str, value: f64, (low, high, unit): Bounds) -> Result<()> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct ParameterId(usize);
 
+impl ParameterId {
+    /// Its number in the table.
+    #[must_use]
+    pub fn index(self) -> usize {
+        self.0
+    }
+}
+
 /// Names, bounds and values of the scalar parameters of a rig.
 #[derive(Debug, Clone, Default)]
 pub struct Parameters {
