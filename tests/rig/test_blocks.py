@@ -387,7 +387,11 @@ def test_effects_in_a_file_name_their_block() -> None:
     assert parse_rig(text + leak + 'at = "chamber.b"\n').effects[0]["at"] == "b"
     assert "leak_muscle: at = 'c' names no chamber; there are: a, b" in refused(text + leak + 'at = "c"\n')
     assert "effects[0].at = 3 is not allowed: the name of a chamber" in refused(text + leak + "at = 3\n")
-    assert "effects[1].id = 'leak_muscle' is there twice" in refused(text + leak + 'at = "a"\n' + leak + 'at = "b"\n')
+    both = parse_rig(text + leak + 'at = "a"\n' + leak + 'at = "b"\n')
+    assert [entry["at"] for entry in both.effects] == ["a", "b"]
+    for other in ('at = "a"\n', ""):
+        assert "effects[1].id = 'leak_muscle' is there twice" in refused(text + leak + 'at = "a"\n' + leak + other)
+    assert "effects[0].form = 'wide' is not allowed" in refused(text + leak + 'form = "wide"\n')
     assert "there is none with a name" in refused(stand("chamber") + leak + 'at = "a"\n')
 
 

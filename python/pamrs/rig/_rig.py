@@ -468,11 +468,11 @@ def _opened(model: dict[str, Any], tables: set[tuple[str, str]]) -> dict[str, An
     """A model with copies of some of its tables, by block and name; what is not changed is shared."""
     opened = dict(model)
     for block, name in tables:
-        content = opened.get(block)
+        content: Any = opened.get(block)
         if not isinstance(content, dict):
             continue
         if content is model.get(block):
-            opened[block] = content = {**content}
+            opened[block] = content = copy.copy(content)
         if name in content:
             content[name] = dict(content[name])
     return opened

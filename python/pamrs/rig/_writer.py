@@ -140,7 +140,8 @@ def core_json(model: Mapping[str, Any], ports: Ports) -> str:
             for name, table in tables_of(model, "sensors").items()
         ],
         "effects": [
-            {"id": effect["id"], "at": effect.get("at", ""), "form": effect.get("form", ""), "parameters": effect["parameters"]}
+            {key: effect.get(key, "") for key in ("id", "at", "form") if key != "form" or key in effect}
+            | {"parameters": effect["parameters"]}
             for effect in model["effects"]
         ],
     }
