@@ -21,11 +21,24 @@ MUSCLE: Final[tuple[EffectInfo, ...]] = (
         separates="joint Coulomb friction has neither presliding nor growth with pressure; creep and damping depend on time and speed",
         parameters=(
             Parameter("friction_constant", "N", 5.0, 0.0, 1e4, (2.0,), "half width of one muscle's loop at zero pressure", 0.0),
-            Parameter("friction_pressure", "m2", 5e-5, 0.0, 1.0, (2e-5,), "growth of the half width with gauge pressure", 0.0),
+            Parameter(
+                "friction_pressure",
+                "m2",
+                5e-5,
+                0.0,
+                1.0,
+                (2e-5,),
+                "growth of the half width with gauge pressure",
+                0.0,
+                same_everywhere=True,
+            ),
             Parameter("presliding", "m", 1e-3, 1e-6, 0.1, (5e-4, 3e-3), "distance over which the loop closes after a reversal"),
         ),
         reference="Vo-Minh et al. (2011); Al-Bender, Lampaert & Swevers (2005); Robinson (2014) (2.36) as a special case",
         rivals=("joint_coulomb_stribeck", "muscle_creep", "muscle_rate_damping"),
+        experiment="Drive a slow triangle with nested smaller loops at two speeds a decade apart: hysteresis does not change with speed, "
+        "creep and damping do; repeat with the muscle vented to see joint friction alone.",
+        excitation=(("kind", "nested_triangle"), ("periods_s", (50.0, 5.0)), ("levels", 4)),
     ),
     EffectInfo(
         id="muscle_creep",
@@ -37,7 +50,7 @@ MUSCLE: Final[tuple[EffectInfo, ...]] = (
         separates="a leak moves the pressure; hysteresis does not depend on time; softening is only there below the largest stretch",
         parameters=(
             Parameter("stiffness", "N/m", 500.0, 0.0, 1e7, (200.0, 2000.0), "spring in series with the damper, one muscle", 0.0),
-            Parameter("time_constant", "s", 3.0, 1e-3, 1e6, (1.0, 10.0), "time in which it relaxes"),
+            Parameter("time_constant", "s", 3.0, 1e-3, 1e6, (1.0, 10.0), "time in which it relaxes", time_constant=True),
         ),
         reference="Findley, Lai & Onaran (1976); Schulte (1961)",
         rivals=("leak_muscle", "muscle_hysteresis", "mullins_softening"),
@@ -89,6 +102,7 @@ MUSCLE: Final[tuple[EffectInfo, ...]] = (
     ),
     EffectInfo(
         id="pam_crowding_contact",
+        label="fibre crowding contact",
         name="contact of a swelling muscle with its neighbours or the frame",
         block="muscle",
         at="muscle",
@@ -98,7 +112,16 @@ MUSCLE: Final[tuple[EffectInfo, ...]] = (
         parameters=(
             Parameter("contact_area", "m2", 1e-3, 0.0, 1.0, (5e-4, 3e-3), "loss per pressure and contraction, secant at 0.1", 0.0),
             Parameter("onset_contraction", "1", 0.12, -1.0, 1.0, (0.04, 0.08, 0.15), "contraction at which they touch"),
-            Parameter("exponent", "1", 1.0, 1.0, 2.0, (1.5,), "of the depth: 1 where flat sides touch, 1.5 round ones, 2 pointed ones"),
+            Parameter(
+                "exponent",
+                "1",
+                1.0,
+                1.0,
+                2.0,
+                (1.5,),
+                "of the depth: 1 where flat sides touch, 1.5 round ones, 2 pointed ones",
+                prior=(1.5, 0.25),  # swollen muscles are round, and press like round bodies (Hertz)
+            ),
             Parameter("rubbing", "1", 0.0, 0.0, 1.0, (0.1,), "friction where they touch, as a share of the loss"),
         ),
         reference="Robinson, Kothera & Wereley (2015)",

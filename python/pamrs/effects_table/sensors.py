@@ -15,6 +15,7 @@ SENSORS: Final[tuple[EffectInfo, ...]] = (
         name="lag of the recorded muscle pressure",
         block="sensors",
         at="chamber",
+        acts_in=("chamber", "arm"),
         equation="T y' = p - y",
         fingerprint="every change of the recorded pressure comes late, also one by motion with the valve shut; the arm moves before it",
         separates="a lag on the way in does not touch pressure that motion makes; a clock's shift moves the angle too",
@@ -27,6 +28,7 @@ SENSORS: Final[tuple[EffectInfo, ...]] = (
         name="recorded by another clock than the commands",
         block="sensors",
         at="",
+        acts_in=("supply", "chamber", "arm"),
         equation="p recorded at t was there at t - d, the angle at t - a d, d = d0 + r t: commands act later by d on the recording",
         fingerprint="pressures, or all channels, answer late to the command, or early, by a time that grows through the recording",
         separates="a lag on the way in is the same at the start and at the end and rounds the edges; "
@@ -34,7 +36,16 @@ SENSORS: Final[tuple[EffectInfo, ...]] = (
         parameters=(
             Parameter("offset", "s", 0.01, -10.0, 10.0, (0.005, 0.03), "how late at the start; early if negative", 0.0),
             Parameter("rate", "1", 1e-4, -0.01, 0.01, (0.0, 3e-4), "growth per time", 0.0),
-            Parameter("angle_share", "1", 1.0, 0.0, 1.0, (0.0, 1.0), "1: the angle is on the pressures' clock, 0: on the command's"),
+            Parameter(
+                "angle_share",
+                "1",
+                1.0,
+                0.0,
+                1.0,
+                (0.0, 1.0),
+                "1: the angle is on the pressures' clock, 0: on the command's",
+                role="choice",
+            ),
         ),
         reference="Mills (1991), offset and skew of clocks",
         rivals=("input_path_lag", "pressure_lag", "tube_flow_restriction"),
