@@ -33,8 +33,6 @@ _TURNS = {
     "closure_flow": "the way in which the valve opens",
     "closure_supply": "the valve",
 }
-SPOKEN = 0.05
-"""Share of a closure from which a kind of dependence is spoken of."""
 
 
 def describe_closure(found: Fit, problem: Problem, baseline: Fit) -> str:
@@ -82,8 +80,9 @@ def _sentence(found: Fit, problem: Problem, baseline: Fit, block: Block) -> str:
     shares = {k: sum(float(parts[n] @ whole) for n, t in used.items() if t.kind == k) / power if power else 0.0 for k in _KINDS}
     variables = list(dict.fromkeys(v for term in used.values() for v in term.variables)) or ["nothing: it is constant"]
     shape = {kind: found.rig.effects[_index(found.rig, closure)]["parameters"].get(name) for kind, name in MEMORY_OF.items()}
+    least = problem.settings.closures.spoken_share
     words = [
-        _kind_in_words(kind, closure, share, shape) for kind, share in shares.items() if _present(kind, used) and abs(share) > SPOKEN
+        _kind_in_words(kind, closure, share, shape) for kind, share in shares.items() if _present(kind, used) and abs(share) > least
     ]
     taken = _percent(_taken(found, baseline, problem, block))
     return (
