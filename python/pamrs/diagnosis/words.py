@@ -199,28 +199,21 @@ def _unsettled(diagnosis: Diagnosis) -> str:
     return f" It is not settled: these data do not separate {sets}." if sets else ""
 
 
-_SEPARATE = {
-    "leak_muscle": (
-        "Fill to three pressures, shut the valve and hold each for at least 60 s: a leak keeps falling in proportion to the "
-        "absolute pressure, heat exchange stops within seconds, and a valve null error follows the spool.",
-        {"kind": "sealed_hold", "levels_bar": [2.0, 4.0, 6.0], "hold_s": 60.0},
-    ),
-    "heat_transfer": (
-        "Fill fast by steps of 1:3 in size, shut the valve after each and watch the pressure for 5 s; add a fast thermocouple "
-        "in the chamber if there is one.",
-        {"kind": "step_and_shut", "steps_bar": [1.0, 3.0], "watch_s": 5.0},
-    ),
-    "muscle_hysteresis": (
-        "Drive a slow triangle with nested smaller loops at two speeds a decade apart: hysteresis does not change with speed, creep "
-        "and damping do; repeat with the muscle vented to see joint friction alone.",
-        {"kind": "nested_triangle", "periods_s": [50.0, 5.0], "levels": 4},
-    ),
-    "unlisted": (
-        "Repeat the excitation under which the excess is largest at two speeds and at two payloads: what scales with speed, with "
-        "load or with neither tells the class of the missing effect.",
-        {"kind": "repeat_scaled", "speed_ratio": 10.0, "payloads": 2},
-    ),
-}
+_SCALED = (
+    "Repeat the excitation under which the excess is largest at two speeds and at two payloads: what scales with speed, with "
+    "load or with neither tells the class of the missing effect."
+)
+_SCALED_EXCITATION: dict[str, Any] = {"kind": "repeat_scaled", "speed_ratio": 10.0, "payloads": 2}
+"""What to record of a mismatch without a name."""
+
+
+def _separating(names: Sequence[str]) -> tuple[str, dict[str, Any]]:
+    """What to record for the first of some hypotheses that says it; for what has no name where none does."""
+    told = (EFFECTS[name] for name in names if name in EFFECTS and EFFECTS[name].experiment)
+    info = next(told, None)
+    if info is None or ("unlisted" in names and names.index("unlisted") < names.index(info.id)):
+        return _SCALED, _SCALED_EXCITATION
+    return info.experiment, {key: list(value) if isinstance(value, tuple) else value for key, value in info.excitation}
 
 
 def _capital(text: str) -> str:
@@ -250,7 +243,7 @@ def next_experiment(
     """
     leading = max(probabilities, key=lambda k: probabilities[k])
     if not ambiguity and kind != "unlisted" and missing:
-        text, excitation = _SEPARATE["unlisted"]
+        text, excitation = _SCALED, _SCALED_EXCITATION
         text = f"The name is settled. For what the {' and '.join(missing)} keeps: {text[:1].lower()}{text[1:]}"
         return {"text": text, "excitation": excitation, "expected_information_bits": None}
     if not ambiguity and kind != "unlisted":
@@ -259,7 +252,7 @@ def next_experiment(
     same = same_data(ambiguity)
     if same:
         return {"text": same, "excitation": {}, "expected_information_bits": None}
-    doubted = [k for s in ambiguity for k in s if k in EFFECTS and k not in _SEPARATE]
+    doubted = [k for s in ambiguity for k in s if k in EFFECTS and not EFFECTS[k].experiment]
     parameters = [k for s in ambiguity for k in s if k == "parameters" or is_parameter(k)]
     if parameters and doubted:
         return {"text": _sentence(EFFECTS[doubted[0]].separates), "excitation": {}, "expected_information_bits": None}
@@ -267,8 +260,7 @@ def next_experiment(
     if measurable:
         text = f"Measure {' or '.join(measurable)} by itself (scale, ruler, known volume): these recordings cannot tell which is wrong."
         return {"text": text, "excitation": {}, "expected_information_bits": None}
-    key = next((k for s in [leading.split("+"), *ambiguity] for k in s if k in _SEPARATE), "unlisted")
-    text, excitation = _SEPARATE[key]
+    text, excitation = _separating([k for s in [leading.split("+"), *ambiguity] for k in s])
     if not (rig.tables("valve") or rig.tables("muscle")):
         text = (
             "Repeat the hold at a third of the pressure and with the chamber removed (transducer and fittings alone): a leak of the "

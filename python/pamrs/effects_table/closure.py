@@ -13,7 +13,7 @@ from typing import Final
 from pamrs.effects_table.entry import EffectInfo
 from pamrs.effects_table.entry import EffectParameter as Parameter
 
-__all__ = ["CLOSURES", "CLOSURE_OF", "MEMORY_OF", "TERMS", "Term"]
+__all__ = ["CLOSURES", "CLOSURE_OF", "MEMORY_OF", "TERMS", "WORDS", "Term", "Words"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,6 +94,41 @@ TERMS: Final[dict[str, tuple[Term, ...]]] = {"closure_torque": _TORQUE, "closure
 """Terms of each closure, in the order of its parameters; behind them stand the shapes of its memories."""
 CLOSURE_OF: Final[dict[str, str]] = {"supply": "closure_supply", "chamber": "closure_flow", "arm": "closure_torque"}
 """Closure of each block of the cut chain."""
+@dataclass(frozen=True, slots=True)
+class Words:
+    """How a closure is put into words.
+
+    Attributes
+    ----------
+    what, letter : str
+        What it is the sum of, and the letter for it.
+    symbols : str
+        What the symbols of its terms stand for.
+    odd_in : str
+        What its odd terms turn their sign with.
+    """
+
+    what: str
+    letter: str
+    symbols: str
+    odd_in: str
+
+
+WORDS: Final[dict[str, Words]] = {
+    "closure_torque": Words(
+        "torque", "tau", "s: gauge pressure in bar, a: angle in rad, w: rate in rad/s", "the direction of motion"
+    ),
+    "closure_flow": Words(
+        "flow into the chamber",
+        "m",
+        "p, ps: absolute pressures of chamber and supply in bar, x: valve opening, -1 to 1, V': rate of the volume in l/s",
+        "the way in which the valve opens",
+    ),
+    "closure_supply": Words(
+        "flow into the supply", "m", "p: absolute supply pressure in bar, x+: opening of the filling valve", "the valve"
+    ),
+}
+"""Words of each closure."""
 MEMORY_OF: Final[dict[str, str]] = {"time": "memory_time", "distance": "memory_angle"}
 """Shape that a term of a kind with memory depends on."""
 
