@@ -13,7 +13,7 @@ from pamrs.channels import channel_of, dotted
 from pamrs.diagnosis.settings import PrepareSettings
 from pamrs.diagnosis.signals import Prepared
 from pamrs.rig import Rig
-from pamrs.rig_schema import qualified
+from pamrs.rig.schema import qualified
 from pamrs.simulation import default_step
 
 __all__ = ["Block", "Residual", "available_blocks", "change", "predicted", "residual"]

@@ -24,7 +24,7 @@ from pamrs.diagnosis.settings import DiagnosisSettings, NextExperimentSettings
 from pamrs.diagnosis.signals import Prepared
 from pamrs.effects_table import EFFECTS
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError
-from pamrs.recording import Recording
+from pamrs.recordings import Recording
 from pamrs.rig import Rig
 from pamrs.simulation import Simulation, core_rig
 

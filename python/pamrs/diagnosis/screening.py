@@ -24,7 +24,7 @@ from pamrs.diagnosis.starts import Start, starts_of
 from pamrs.effects_table import EFFECTS, EffectParameter
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
-from pamrs.rig_schema import BLOCKS, qualified
+from pamrs.rig.schema import BLOCKS, qualified
 
 __all__ = ["Score", "Screen", "Stand", "best_size", "by_effect", "screen", "stand_of"]
 
