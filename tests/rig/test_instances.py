@@ -1,4 +1,4 @@
-"""Several instances of one effect in a rig: each at a block of its own, with parameters of its own."""
+"""Several instances of one effect in a rig: each at its own block, with its own parameters."""
 
 from __future__ import annotations
 
@@ -41,7 +41,9 @@ def test_only_one_of_two_chambers_loses_its_pressure() -> None:
 
 
 def test_two_alike_are_one_everywhere() -> None:
-    everywhere = pamrs.rigs.named("antagonistic_joint").with_effect("leak_muscle", {"conductance": 1e-10})
+    everywhere = pamrs.rigs.named("antagonistic_joint").with_effect(
+        "leak_muscle", {"conductance": 1e-10}
+    )
     one, two = held(leaking(1e-10, 1e-10)), held(everywhere)
     for channel in one:
         np.testing.assert_array_equal(one[channel], two[channel])
@@ -73,7 +75,9 @@ def test_each_leak_has_a_sensitivity_of_its_own(side: str, other: str) -> None:
     assert np.all(jacobian[:, 1] == 0.0)
     step = 1e-3 * sizes[side]
     up, down = (
-        predict(core_rig(leaking(**{**sizes, side: sizes[side] + h})), run, f"chamber.{side}", [])[0]
+        predict(core_rig(leaking(**{**sizes, side: sizes[side] + h})), run, f"chamber.{side}", [])[
+            0
+        ]
         for h in (step, -step)
     )
     slope = (up - down) / (2.0 * step)
@@ -129,7 +133,9 @@ def test_one_at_a_block_is_replaced_or_taken_away_alone() -> None:
     changed = rig.with_effect("leak_muscle", {"conductance": 5e-11}, at="chamber.flexor")
     sizes = {effect["at"]: effect["parameters"]["conductance"] for effect in changed.effects}
     assert sizes == {"flexor": 5e-11, "extensor": 3e-11}
-    assert [effect["at"] for effect in rig.without_effect("leak_muscle", at="flexor").effects] == ["extensor"]
+    assert [effect["at"] for effect in rig.without_effect("leak_muscle", at="flexor").effects] == [
+        "extensor"
+    ]
     assert rig.without_effect("leak_muscle").effects == []
     everywhere = rig.with_effect("leak_muscle", {"conductance": 5e-11})
     assert ["at" in effect for effect in everywhere.effects] == [False]

@@ -1,4 +1,4 @@
-//! Several instances of one effect, each at a block of its own with parameters of its own, and what cannot be together.
+//! Several instances of one effect, each at its own block with its own parameters, and what cannot be together.
 
 mod rigs;
 

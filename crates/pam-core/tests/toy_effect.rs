@@ -1,5 +1,5 @@
-//! A new effect is one file: `toy/toy_spring.rs`, which the core does not know, acts in a rig as those of the catalogue do. The same
-//! file is an entry of the catalogue where the feature `toy` is on (tests/effects/test_toy.py).
+//! A new effect is one file: `toy/toy_spring.rs`, which the core does not know, acts in a rig as those of the catalogue
+//! do. The same file is an entry of the catalogue where the feature `toy` is on (tests/effects/test_toy.py).
 
 mod rigs;
 #[path = "toy/toy_spring.rs"]
