@@ -23,7 +23,7 @@ from pamrs.control import PID, ClosedLoop, Value
 from pamrs.control import closed_loop as run_closed_loop
 from pamrs.control.trajectories import step
 from pamrs.control.tuning import gain_map
-from pamrs.muscle_models import GEOMETRIES, MODELS
+from pamrs.rig.muscle_models import GEOMETRIES, MODELS
 from tests.reference import GeometryReference, MuscleReference
 from tests.reference import plant as reference
 

@@ -26,8 +26,8 @@ def rigs() -> Iterator[tuple[str, pamrs.Rig]]:
     """Every packaged rig, bare, with each effect by itself at two sets of values, and with all of them."""
     try:
         from pamrs.effects import EFFECTS
-    except ImportError:  # builds before the package of that name
-        from pamrs.effects_table import EFFECTS  # type: ignore[no-redef, import-not-found]
+    except ImportError:  # builds before that package
+        from pamrs.effects_table import EFFECTS
     for name in pamrs.rigs.names():
         rig = pamrs.rigs.named(name)
         yield name, rig
@@ -105,9 +105,7 @@ def numbers(label: str, rig: pamrs.Rig, measured: dict[str, np.ndarray]) -> Iter
             if channel not in known:
                 continue
             try:
-                value, slopes = core.predict(
-                    block, commands, SAMPLE, step, starts, list(core.parameter_names), known, SAMPLES
-                )
+                value, slopes = core.predict(block, commands, SAMPLE, step, starts, list(core.parameter_names), known, SAMPLES)
             except pamrs.PamrsError as error:
                 yield f"{label}|{block} refused: {error}", np.zeros(0)
                 continue

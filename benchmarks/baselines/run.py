@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.baselines.sheet import errors, gap_closed, sheet
+from pamrs._writing import write_atomically
 from pamrs.prove import case_digest
-from pamrs.writing import write_atomically
 
 SCHEMA = "pamrs.baselines/1"
 METHODS = ("refit", "sindy", "gp")

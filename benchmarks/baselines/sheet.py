@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from pamrs.case import load_case
 from pamrs.diagnosis.blocks import Block, Residual, available_blocks
 from pamrs.diagnosis.evidence import Floor, bins_of, floors
 from pamrs.diagnosis.fitting import Key, Problem, residuals
 from pamrs.diagnosis.hypotheses import coloured, refitted
 from pamrs.diagnosis.signals import Prepared, binned, prepare
+from pamrs.recordings import load_case
 from pamrs.rig import Rig
 from pamrs.simulation import core_rig
 

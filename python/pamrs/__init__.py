@@ -8,10 +8,11 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any, Final
 
+from pamrs import _moved
+
 if TYPE_CHECKING:
-    from pamrs import fit, library, rigs, sizing
-    from pamrs.batch import Batch, BatchRun
-    from pamrs.case import Case, load_case
+    from pamrs import fit, library, rigs
+    from pamrs.design import Lift, lift, sizing
     from pamrs.diagnosis import diagnose
     from pamrs.diagnosis.plan import Plan, plan_diagnosis
     from pamrs.diagnosis.result import Diagnosis
@@ -25,13 +26,9 @@ if TYPE_CHECKING:
         RigError,
         SimulationError,
     )
-    from pamrs.joint import Joint
-    from pamrs.lifting import Lift, lift
-    from pamrs.muscle import Muscle
-    from pamrs.recording import Issue, Recording, load_recording
-    from pamrs.rig import Parameter, Rig, load_rig
-    from pamrs.simulation import Simulation, simulate
-    from pamrs.simulator import Simulator
+    from pamrs.recordings import Case, Issue, Recording, load_case, load_recording
+    from pamrs.rig import Joint, Muscle, Parameter, Rig, load_rig
+    from pamrs.simulation import Batch, BatchRun, Simulation, Simulator, simulate
 
     __version__: str
 
@@ -72,34 +69,34 @@ __all__ = [
     "sizing",
 ]
 
-_MODULES: Final = ("fit", "library", "rigs", "sizing")
+_MODULES: Final = {name: f"pamrs.{name}" for name in ("fit", "library", "rigs")} | {"sizing": "pamrs.design.sizing"}
 _HOMES: Final[dict[str, str]] = {
-    "Batch": "pamrs.batch",
-    "BatchRun": "pamrs.batch",
-    "Case": "pamrs.case",
+    "Batch": "pamrs.simulation",
+    "BatchRun": "pamrs.simulation",
+    "Case": "pamrs.recordings",
     "CaseError": "pamrs.errors",
     "Diagnosis": "pamrs.diagnosis.result",
     "DiagnosisError": "pamrs.errors",
     "FitError": "pamrs.errors",
-    "Issue": "pamrs.recording",
-    "Joint": "pamrs.joint",
-    "Lift": "pamrs.lifting",
-    "Muscle": "pamrs.muscle",
+    "Issue": "pamrs.recordings",
+    "Joint": "pamrs.rig",
+    "Lift": "pamrs.design",
+    "Muscle": "pamrs.rig",
     "PamrsError": "pamrs.errors",
     "Parameter": "pamrs.rig",
     "ParameterError": "pamrs.errors",
     "Plan": "pamrs.diagnosis.plan",
-    "Recording": "pamrs.recording",
+    "Recording": "pamrs.recordings",
     "RecordingError": "pamrs.errors",
     "Rig": "pamrs.rig",
     "RigError": "pamrs.errors",
     "Simulation": "pamrs.simulation",
     "SimulationError": "pamrs.errors",
-    "Simulator": "pamrs.simulator",
+    "Simulator": "pamrs.simulation",
     "diagnose": "pamrs.diagnosis",
-    "lift": "pamrs.lifting",
-    "load_case": "pamrs.case",
-    "load_recording": "pamrs.recording",
+    "lift": "pamrs.design",
+    "load_case": "pamrs.recordings",
+    "load_recording": "pamrs.recordings",
     "load_rig": "pamrs.rig",
     "plan_diagnosis": "pamrs.diagnosis.plan",
     "simulate": "pamrs.simulation",
@@ -119,13 +116,18 @@ def __getattr__(name: str) -> Any:
     if name == "__version__":
         value: Any = _version()
     elif name in _MODULES:
-        value = importlib.import_module(f"pamrs.{name}")
+        value = importlib.import_module(_MODULES[name])
     elif name in _HOMES:
         value = getattr(importlib.import_module(_HOMES[name]), name)
+    elif name in _moved.PACKAGES:
+        return _moved.module(name)
     else:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     globals()[name] = value
     return value
+
+
+_moved.register()
 
 
 def __dir__() -> list[str]:

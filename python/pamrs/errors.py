@@ -37,6 +37,30 @@ class FitError(PamrsError, ValueError):
     """The measurements do not determine what a fit asks for; the message says what is missing."""
 
 
+class MissingPackageError(PamrsError, ImportError):
+    """A package that only some commands need is not installed."""
+
+
+def missing_package(error: ImportError, extra: str) -> MissingPackageError:
+    """The error that says what to install for a package that could not be imported.
+
+    Parameters
+    ----------
+    error : ImportError
+        What the import raised.
+    extra : str
+        The extra of pamrs that installs the package.
+
+    Returns
+    -------
+    MissingPackageError
+    """
+    return MissingPackageError(
+        f"this needs {error.name}, which is not installed: pip install pamrs[{extra}]",
+        name=error.name,
+    )
+
+
 def joined(head: str, problems: Iterable[str]) -> str:
     """One message out of a headline and the problems found under it.
 

@@ -21,8 +21,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
+from pamrs._writing import write_atomically
 from pamrs.errors import CaseError, ParameterError
-from pamrs.writing import write_atomically
 
 __all__ = ["MANIFEST", "SCHEMA", "Proof", "case_digest", "cases_of", "code_digest", "prove", "valid_result", "worker"]
 

@@ -16,7 +16,7 @@ from typing import Final, NamedTuple
 
 from pamrs.errors import ParameterError
 
-__all__ = ["DIMENSIONS", "Unit", "from_si", "parse_unit", "same_dimension", "to_si"]
+__all__ = ["DIMENSIONS", "Unit", "bar_and_psi", "from_si", "parse_unit", "same_dimension", "to_si"]
 
 #: Names of dimensions accepted by :func:`to_si`, with the SI unit of each.
 DIMENSIONS: Final[dict[str, str]] = {
@@ -226,3 +226,23 @@ def from_si(value: float, unit: str, dimension: str, *, difference: bool = False
     """Convert an SI value into ``unit``; the inverse of :func:`to_si`, with the same parameters."""
     parsed = _checked(unit, dimension)
     return (value - (0.0 if difference else parsed.offset)) / parsed.scale
+
+
+def bar_and_psi(pressure: float) -> str:
+    """A pressure in words, in bar and in psi.
+
+    Parameters
+    ----------
+    pressure : float
+        [Pa].
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> bar_and_psi(1e5)
+    '1 bar (14.5 psi)'
+    """
+    return f"{pressure / 1e5:.4g} bar ({from_si(pressure, 'psi', 'pressure'):.4g} psi)"

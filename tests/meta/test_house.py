@@ -20,10 +20,10 @@ NOT_SOURCES = {".git", ".venv", "target", "out"}
 
 
 def modules():
-    """Every module of the package that is written in Python, private ones left out."""
+    """Every module of the package that is written in Python, entry points left out."""
     names = ["pamrs"]
     for found in pkgutil.walk_packages(pamrs.__path__, "pamrs."):
-        if not any(part.startswith("_") for part in found.name.split(".")):
+        if found.name.rpartition(".")[2] not in ("__main__", "_core"):
             names.append(found.name)
     return names
 
@@ -110,13 +110,6 @@ def test_files_can_be_read_in_one_sitting():
     lengths = {path: len(path.read_text(encoding="utf-8").splitlines()) for path in sources(".py", ".rs", ".pyi")}
     assert lengths
     assert not {str(path.relative_to(ROOT)): n for path, n in lengths.items() if n > 600}
-
-
-def test_trial_does_not_know_the_package():
-    pattern = re.compile(r"^\s*(from|import)\s+pamrs\b", re.MULTILINE)
-    files = [path for path in sources(".py") if path.is_relative_to(ROOT / "trial")]
-    assert files
-    assert not [path.name for path in files if pattern.search(path.read_text(encoding="utf-8"))]
 
 
 def test_lock_pins_every_dependency():

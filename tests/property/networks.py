@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import pamrs
 from pamrs.rig import parse_rig
-from pamrs.rig_schema import BLOCKS
+from pamrs.rig.schema import BLOCKS
 from tests.runs import Run
 
 #: Tables by the full name of their block: keys, SI values, ports.

@@ -70,7 +70,7 @@ fn every_effect_is_tested() {
     let others = ["heat_transfer"]; // it replaces an equation and has no neutral value
     for info in EFFECTS.iter().filter(|e| !others.contains(&e.id)) {
         let typical = TYPICAL.iter().find(|t| t.id == info.id).unwrap_or_else(|| panic!("{}", info.id));
-        assert!(info.parameters.iter().map(|p| p.name).eq(typical.parameters.iter().map(|(n, _)| *n)));
+        assert!(info.parameters().iter().map(|p| p.name).eq(typical.parameters.iter().map(|(n, _)| *n)));
     }
 }
 

@@ -375,6 +375,7 @@ fn light_bodies_on_stiff_muscles_are_stable_at_a_millisecond() {
 fn fast_leaks_and_walls_are_stable() {
     let effect = |id: &str, values: &[(&str, f64)]| pam_core::description::EffectSpec {
         id: id.into(),
+        form: String::new(),
         at: String::new(),
         parameters: values.iter().map(|(n, v)| ((*n).to_string(), *v)).collect(),
     };

@@ -13,7 +13,7 @@ fn spec() -> RigSpec {
 
 fn effect(id: &str, parameters: &[(&str, f64)]) -> EffectSpec {
     let parameters: BTreeMap<_, _> = parameters.iter().map(|(n, v)| ((*n).to_string(), *v)).collect();
-    EffectSpec { id: id.into(), at: String::new(), parameters }
+    EffectSpec { id: id.into(), form: String::new(), at: String::new(), parameters }
 }
 
 fn command(n: usize) -> Vec<f64> {

@@ -8,33 +8,34 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any, Final
 
-from pamrs.control.adaptive import AdaptiveSliding
-from pamrs.control.air import AirModel, OrificeInverse
-from pamrs.control.cascade import Cascade, PressureLoop, cascaded_pid
-from pamrs.control.feedforward import Feedforward, Parallel
-from pamrs.control.fuzzy import FUZZY_SETS, Fuzzy, fuzzy_rules, fuzzy_surface
-from pamrs.control.hysteresis import DeadZoneCompensation, HysteresisCompensation, HystereticTorque, SlipMemory
-from pamrs.control.joint_sensor import JointSensor
-from pamrs.control.model import ArmModel, FullTorque, GaylordTorque, SimplifiedTorque, TorqueModel, torque_line
-from pamrs.control.neural import NETWORKS, Neural
-from pamrs.control.parts import ANTI_WINDUP, FilteredDerivative, Integrator, LowPass
-from pamrs.control.pid import PID, PIDLaw
-from pamrs.control.protocol import Controller, Measurement, Reference, Value
-from pamrs.control.sampled import SampledController
-from pamrs.control.sliding import Sliding, SlidingController
+from pamrs.control._adaptive import AdaptiveSliding
+from pamrs.control._air import AirModel, OrificeInverse
+from pamrs.control._cascade import Cascade, PressureLoop, cascaded_pid
+from pamrs.control._feedforward import Feedforward, Parallel
+from pamrs.control._fuzzy import FUZZY_SETS, Fuzzy, fuzzy_rules, fuzzy_surface
+from pamrs.control._hysteresis import DeadZoneCompensation, HysteresisCompensation, HystereticTorque, SlipMemory
+from pamrs.control._joint_sensor import JointSensor
+from pamrs.control._model import ArmModel, FullTorque, GaylordTorque, SimplifiedTorque, TorqueModel, torque_line
+from pamrs.control._neural import NETWORKS, Neural
+from pamrs.control._parts import ANTI_WINDUP, FilteredDerivative, Integrator, LowPass
+from pamrs.control._pid import PID, PIDLaw
+from pamrs.control._protocol import Controller, Measurement, Reference, Value
+from pamrs.control._sampled import SampledController
+from pamrs.control._sliding import Sliding, SlidingController
 
 if TYPE_CHECKING:
     from pamrs.control import gym, iosystem, linear, live, metrics, simulated_device, stability, trajectories, tuning
+    from pamrs.control._loop import Actuation, ClosedLoop, closed_loop
+    from pamrs.control._sensors import Sensors
+    from pamrs.control._sweeping import Sweep, sweep
     from pamrs.control.live import Device, LiveError, LiveRun, SystemClock, run_live
-    from pamrs.control.loop import ClosedLoop, closed_loop
     from pamrs.control.metrics import Metrics
-    from pamrs.control.sensors import Sensors
-    from pamrs.control.sweeping import Sweep, sweep
     from pamrs.control.trajectories import Trajectory
     from pamrs.control.tuning import GainMap
 
 __all__ = [
     "ANTI_WINDUP",
+    "Actuation",
     "FUZZY_SETS",
     "NETWORKS",
     "PID",
@@ -98,19 +99,20 @@ __all__ = [
 
 _MODULES: Final = ("gym", "iosystem", "linear", "live", "metrics", "simulated_device", "stability", "trajectories", "tuning")
 _HOMES: Final[dict[str, str]] = {
-    "ClosedLoop": "pamrs.control.loop",
+    "Actuation": "pamrs.control._loop",
+    "ClosedLoop": "pamrs.control._loop",
     "Device": "pamrs.control.live",
     "GainMap": "pamrs.control.tuning",
     "LiveError": "pamrs.control.live",
     "LiveRun": "pamrs.control.live",
     "Metrics": "pamrs.control.metrics",
-    "Sensors": "pamrs.control.sensors",
-    "Sweep": "pamrs.control.sweeping",
+    "Sensors": "pamrs.control._sensors",
+    "Sweep": "pamrs.control._sweeping",
     "SystemClock": "pamrs.control.live",
     "Trajectory": "pamrs.control.trajectories",
-    "closed_loop": "pamrs.control.loop",
+    "closed_loop": "pamrs.control._loop",
     "run_live": "pamrs.control.live",
-    "sweep": "pamrs.control.sweeping",
+    "sweep": "pamrs.control._sweeping",
 }
 
 

@@ -24,19 +24,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs.control._values import positive_number
 from pamrs.control.trajectories import Trajectory, lift_hold_return
-from pamrs.control.values import positive_number
-from pamrs.design.search import missing
-from pamrs.errors import ParameterError, SimulationError
+from pamrs.errors import ParameterError, SimulationError, missing_package
 from pamrs.rig import Rig
-from pamrs.simulator import Simulator
+from pamrs.simulation import Simulator
 
 try:
     import gymnasium
     from gymnasium.vector import AutoresetMode
     from gymnasium.vector.utils import batch_space
 except ImportError as error:
-    raise missing(error, "control") from None
+    raise missing_package(error, "control") from None
 
 __all__ = ["ID", "ShoulderEnv", "ShoulderVectorEnv"]
 
@@ -248,7 +247,7 @@ class ShoulderVectorEnv(gymnasium.vector.VectorEnv[Array32, Array32, Any]):
         penalty: float = 100.0,
         render_mode: str | None = None,
     ) -> None:
-        from pamrs.batch import Batch
+        from pamrs.simulation import Batch
 
         _check_render_mode(render_mode)
         self.render_mode = None

@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from pamrs.control.linear import python_control
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
-from pamrs.simulation import core_rig
-from pamrs.simulator import Simulator
+from pamrs.simulation import Simulator, core_rig
 
 if TYPE_CHECKING:
     import control  # type: ignore[import-untyped]

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs.channels import channel_of, dotted
-from pamrs.control.controller_model import LinearController, heard, linear_controller
+from pamrs.control._controller_model import LinearController, heard, linear_controller
 from pamrs.control.rig_state import COMMAND, Place, RigState, check_smooth, resting, without_dry_friction
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
-from pamrs.simulator import Simulator
+from pamrs.simulation import Simulator
 
 if TYPE_CHECKING:
     import control  # type: ignore[import-untyped]
@@ -347,9 +347,9 @@ def python_control() -> Any:
     try:
         import control as library
     except ImportError as error:
-        from pamrs.design.search import missing
+        from pamrs.errors import missing_package
 
-        raise missing(error, "control") from None
+        raise missing_package(error, "control") from None
     return library
 
 

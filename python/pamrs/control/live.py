@@ -18,8 +18,8 @@ from typing import Any, Final, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.control.protocol import Controller, Reference, check_controller, check_drives_valve
-from pamrs.control.termination import Termination
+from pamrs.control._protocol import Controller, Reference, check_controller, check_drives_valve
+from pamrs.control._termination import Termination
 from pamrs.control.trajectories import Trajectory, check_angles
 from pamrs.errors import PamrsError, ParameterError
 from pamrs.simulation import whole_samples

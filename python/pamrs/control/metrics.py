@@ -16,9 +16,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pamrs.control.signals import checked, integral, plain
-from pamrs.control.step_metrics import overshoot, rise_time, settling_time
-from pamrs.control.values import angle_factor
+from pamrs.control._signals import checked, integral, plain
+from pamrs.control._step_metrics import overshoot, rise_time, settling_time
+from pamrs.control._values import angle_factor
 from pamrs.errors import ParameterError
 
 __all__ = [

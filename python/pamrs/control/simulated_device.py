@@ -11,7 +11,7 @@ import numpy as np
 from pamrs.control.live import Clock
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
-from pamrs.simulator import Simulator
+from pamrs.simulation import Simulator
 
 __all__ = ["FAULTS", "SimulatedDevice", "VirtualClock"]
 

@@ -14,8 +14,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs.control._protocol import Controller
 from pamrs.control.linear import SIDES, LinearController, LinearModel, linear_controller, linearise, python_control
-from pamrs.control.protocol import Controller
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
 

@@ -19,7 +19,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pamrs.control.protocol import Reference, Value
+from pamrs.control._protocol import Reference, Value
 from pamrs.errors import ParameterError
 
 __all__ = [

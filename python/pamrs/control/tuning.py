@@ -16,12 +16,11 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs.control._protocol import Controller
+from pamrs.control._sweeping import sweep
 from pamrs.control.metrics import WEIGHTS, combined
-from pamrs.control.protocol import Controller
-from pamrs.control.sweeping import sweep
 from pamrs.control.trajectories import Trajectory
-from pamrs.design.search import missing
-from pamrs.errors import ParameterError
+from pamrs.errors import ParameterError, missing_package
 from pamrs.rig import Rig
 
 __all__ = ["METHODS", "GainMap", "GainSearch", "gain_map", "perturbed", "search_gains"]
@@ -395,7 +394,7 @@ def _cma(
     try:
         import cma  # type: ignore[import-untyped]
     except ImportError as error:
-        raise missing(error) from None
+        raise missing_package(error, "search") from None
     if size == 1:
         raise ParameterError("bounds has one gain; CMA-ES needs two at least: take optuna, or a gain_map")
     # its own random numbers: numpy's global ones stay as they are
@@ -419,7 +418,7 @@ def _optuna(
     try:
         import optuna
     except ImportError as error:
-        raise missing(error) from None
+        raise missing_package(error, "search") from None
     before = optuna.logging.get_verbosity()
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     try:

@@ -1,4 +1,9 @@
-"""Joint design (dissertation 3.5): four lengths of a tendon joint that give a wanted torque at the least pressure.
+"""Design: what a requirement asks of a joint, of its muscles, and what an arm then lifts.
+
+A joint (dissertation 3.5): four lengths of a tendon joint that give a wanted torque at the least
+pressure. :mod:`pamrs.design.sizing` counts the muscles that a force over a stroke needs;
+:func:`lift` says what an arm lifts and holds; :mod:`pamrs.design.elbow_muscles` is the
+dissertation's own choice of muscles (3.2.3); :mod:`pamrs.design.figures` draws.
 
 >>> import math, pamrs
 >>> from pamrs.design import JointProblem, optimise
@@ -12,10 +17,14 @@ Searches need ``pip install pamrs[search]``, figures ``pamrs[plot]``; both are i
 
 from __future__ import annotations
 
-from pamrs.design.joint_design import AREA_TOLERANCE, JointDesign, MethodComparison, compare_methods, optimise
-from pamrs.design.pressure import ParetoFront, PressureSearch, Trial, least_pressure, minimum_pressure, pareto_front
-from pamrs.design.problem import DEFAULT_BOUNDS, LENGTHS, SYMBOLS, JointProblem, Scores
-from pamrs.design.search import METHODS, Genetic, History, MissingPackageError, Search, search
+from pamrs.design._evaluator import Genetic, History, Search
+from pamrs.design._filling import Filling
+from pamrs.design._joint_design import AREA_TOLERANCE, JointDesign, MethodComparison, compare_methods, optimise
+from pamrs.design._lifting import Lift, lift
+from pamrs.design._pressure import ParetoFront, PressureSearch, Trial, least_pressure, minimum_pressure, pareto_front
+from pamrs.design._problem import DEFAULT_BOUNDS, LENGTHS, SYMBOLS, JointProblem, Scores
+from pamrs.design._search import METHODS, search
+from pamrs.errors import MissingPackageError
 
 __all__ = [
     "AREA_TOLERANCE",
@@ -23,10 +32,12 @@ __all__ = [
     "LENGTHS",
     "METHODS",
     "SYMBOLS",
+    "Filling",
     "Genetic",
     "History",
     "JointDesign",
     "JointProblem",
+    "Lift",
     "MethodComparison",
     "MissingPackageError",
     "ParetoFront",
@@ -36,6 +47,7 @@ __all__ = [
     "Trial",
     "compare_methods",
     "least_pressure",
+    "lift",
     "minimum_pressure",
     "optimise",
     "pareto_front",

@@ -15,9 +15,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from pamrs.design.joint_design import JointDesign, MethodComparison
-from pamrs.design.pressure import ParetoFront
-from pamrs.design.problem import SYMBOLS
+from pamrs.design._joint_design import JointDesign, MethodComparison
+from pamrs.design._pressure import ParetoFront
+from pamrs.design._problem import SYMBOLS
 from pamrs.report.figures import COLOURS, STYLE
 
 __all__ = ["summary_png"]

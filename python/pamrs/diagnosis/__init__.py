@@ -15,7 +15,6 @@ from contextlib import contextmanager
 from dataclasses import replace
 
 from pamrs import _core
-from pamrs.case import Case, load_case
 from pamrs.channels import dotted
 from pamrs.diagnosis import assemble
 from pamrs.diagnosis.blocks import Block, available_blocks
@@ -26,10 +25,10 @@ from pamrs.diagnosis.hypotheses import examine
 from pamrs.diagnosis.plausible import check_plausible, check_sense
 from pamrs.diagnosis.result import Diagnosis
 from pamrs.diagnosis.signals import Prepared, prepare
-from pamrs.driving import regulators_of
 from pamrs.errors import DiagnosisError, SimulationError
+from pamrs.recordings import Case, load_case
 from pamrs.rig import Rig
-from pamrs.simulation import core_rig
+from pamrs.simulation import core_rig, regulators_of
 
 __all__ = ["Diagnosis", "diagnose"]
 

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from pamrs.case import Case
 from pamrs.channels import unit_of
 from pamrs.diagnosis import words
 from pamrs.diagnosis.block_entries import block_entries, unexplained
@@ -23,8 +22,9 @@ from pamrs.diagnosis.result import Diagnosis, Trace
 from pamrs.diagnosis.starts import CHOICES
 from pamrs.diagnosis.verdicts import IN_SET, Judged, case_ambiguity, case_probabilities, case_verdict, is_parameter, judge, symptoms_of
 from pamrs.diagnosis.weighing import share_left
-from pamrs.effects_table import CATALOGUE, EFFECTS
+from pamrs.effects import CATALOGUE, EFFECTS
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError
+from pamrs.recordings import Case
 from pamrs.rig import Rig
 
 __all__ = ["assemble"]

@@ -12,7 +12,7 @@ from pamrs import _core
 from pamrs.channels import channel_of, dotted
 from pamrs.diagnosis.signals import Prepared
 from pamrs.rig import Rig
-from pamrs.rig_schema import qualified
+from pamrs.rig.schema import qualified
 from pamrs.simulation import default_step
 
 __all__ = ["Block", "Residual", "available_blocks", "change", "predicted", "residual"]

@@ -13,7 +13,7 @@ from pamrs.diagnosis.fitting import FIT_BIN, WIDEST, Fit, Key, Problem, acts_in,
 from pamrs.diagnosis.leastsquares import SHARE
 from pamrs.diagnosis.leaving import left_out
 from pamrs.diagnosis.starts import Start
-from pamrs.effects_table import EFFECTS, find_parameter
+from pamrs.effects import EFFECTS, find_parameter
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 

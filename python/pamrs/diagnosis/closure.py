@@ -20,8 +20,8 @@ from pamrs.diagnosis.candidates import colour_of
 from pamrs.diagnosis.closure_words import describe_closure
 from pamrs.diagnosis.evidence import correlation_time
 from pamrs.diagnosis.fitting import Fit, Problem, fit, residuals, stacked, with_priors
-from pamrs.effects_table import EFFECTS
-from pamrs.effects_table.closure import CLOSURE_OF, MEMORY_OF, TERMS, Term
+from pamrs.effects import EFFECTS
+from pamrs.effects import CLOSURE_OF, MEMORY_OF, TERMS, Term
 from pamrs.errors import DiagnosisError, SimulationError
 from pamrs.rig import Rig
 

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from pamrs.diagnosis.blocks import Block, begun
 from pamrs.diagnosis.fitting import Fit, Problem
-from pamrs.effects_table import EFFECTS
-from pamrs.effects_table.closure import CLOSURE_OF, MEMORY_OF, TERMS, Term
+from pamrs.effects import EFFECTS
+from pamrs.effects import CLOSURE_OF, MEMORY_OF, TERMS, Term
 from pamrs.errors import DiagnosisError
 from pamrs.rig import Rig
 from pamrs.simulation import default_step

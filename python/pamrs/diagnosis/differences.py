@@ -19,9 +19,9 @@ from pamrs.diagnosis.blocks import Residual, available_blocks
 from pamrs.diagnosis.evidence import bins_of, floors
 from pamrs.diagnosis.fitting import FIT_BIN, Key, Problem, bin_width, free_baseline, residuals
 from pamrs.diagnosis.signals import Prepared, binned, prepare
-from pamrs.effects_table import EFFECTS
+from pamrs.effects import EFFECTS
 from pamrs.errors import DiagnosisError, ParameterError
-from pamrs.recording import Recording
+from pamrs.recordings import Recording
 from pamrs.rig import Rig
 from pamrs.simulation import Simulation, core_rig
 

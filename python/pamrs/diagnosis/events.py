@@ -20,7 +20,7 @@ from pamrs.diagnosis.blocks import Residual
 from pamrs.diagnosis.fitting import Events, Fit, Key, Problem, Scaling, changes, residuals, stacked
 from pamrs.diagnosis.leastsquares import levenberg_marquardt
 from pamrs.diagnosis.signals import Prepared
-from pamrs.effects_table import find_parameter
+from pamrs.effects import find_parameter
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 

@@ -21,9 +21,9 @@ from pamrs.diagnosis.differences import EFFECTIVE, MEASURABLE, NOISE, Left, chec
 from pamrs.diagnosis.fitting import FIT_BIN, Key, Problem, acts_in, bin_width, residuals
 from pamrs.diagnosis.protocols import SAMPLE_TIME, SEALED_SAMPLE_TIME, Experiment, library
 from pamrs.diagnosis.signals import Prepared
-from pamrs.effects_table import EFFECTS
+from pamrs.effects import EFFECTS
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError
-from pamrs.recording import Recording
+from pamrs.recordings import Recording
 from pamrs.rig import Rig
 from pamrs.simulation import Simulation, core_rig
 

@@ -15,7 +15,7 @@ from pamrs import _core
 from pamrs.diagnosis.blocks import Block, Residual, change, residual
 from pamrs.diagnosis.leastsquares import SHARE, levenberg_marquardt
 from pamrs.diagnosis.signals import Prepared, binned
-from pamrs.effects_table import EFFECTS, find_parameter
+from pamrs.effects import EFFECTS, find_parameter
 from pamrs.errors import ParameterError, RigError, SimulationError
 from pamrs.rig import Parameter, Rig
 from pamrs.simulation import core_rig

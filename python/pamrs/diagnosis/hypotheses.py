@@ -19,7 +19,7 @@ from pamrs.diagnosis.signals import Prepared
 from pamrs.diagnosis.starts import Start
 from pamrs.diagnosis.weighing import FINE, FORM, explains, most_believed, same_recordings, share_left, visited, weigh
 from pamrs.diagnosis.wrong_parameters import beside_quiet, freed
-from pamrs.effects_table import CATALOGUE, EFFECTS
+from pamrs.effects import CATALOGUE, EFFECTS
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 

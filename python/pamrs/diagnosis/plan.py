@@ -26,11 +26,10 @@ from pamrs.diagnosis.hypotheses import fits
 from pamrs.diagnosis.protocols import Experiment, library
 from pamrs.diagnosis.signals import binned
 from pamrs.diagnosis.starts import Start, starts_of
-from pamrs.driving import has_frame, regulators_of
-from pamrs.effects_table import CATALOGUE, find_parameter
+from pamrs.effects import CATALOGUE, find_parameter
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError
 from pamrs.rig import Rig
-from pamrs.simulation import core_rig
+from pamrs.simulation import core_rig, has_frame, regulators_of
 
 __all__ = ["Addition", "Plan", "Sight", "plan_diagnosis"]
 

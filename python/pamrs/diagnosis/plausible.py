@@ -20,7 +20,7 @@ from pamrs.channels import channel_of, dotted
 from pamrs.diagnosis.blocks import Block, predicted
 from pamrs.diagnosis.signals import Prepared
 from pamrs.errors import DiagnosisError, SimulationError, joined
-from pamrs.recording import Recording
+from pamrs.recordings import Recording
 from pamrs.rig import Rig
 
 __all__ = ["check_plausible", "check_sense", "implausible"]

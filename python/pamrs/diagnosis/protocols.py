@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 
 from pamrs.errors import DiagnosisError, SimulationError
 from pamrs.rig import Rig
-from pamrs.simulation import Simulation, simulate
-from pamrs.simulator import Simulator
+from pamrs.simulation import Simulation, Simulator, simulate
 
 __all__ = ["Experiment", "Range", "library", "pressure_range", "trial_of"]
 

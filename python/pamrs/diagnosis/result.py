@@ -15,9 +15,9 @@ from typing import Any, Protocol, cast
 import numpy as np
 import numpy.typing as npt
 
+from pamrs._writing import write_atomically
 from pamrs.channels import UNITS
 from pamrs.report import text as words
-from pamrs.writing import write_atomically
 
 __all__ = ["SCHEMA", "VERDICTS", "Diagnosis", "Trace", "schema"]
 

@@ -20,7 +20,7 @@ from pamrs.diagnosis.fitting import WIDEST, Fit, Problem, changes, stacked
 from pamrs.diagnosis.starts import Start, starts_of
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
-from pamrs.rig_schema import BLOCKS, qualified
+from pamrs.rig.schema import BLOCKS, qualified
 
 __all__ = ["Score", "Screen", "Stand", "best_size", "by_effect", "screen", "stand_of"]
 

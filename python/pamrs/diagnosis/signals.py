@@ -11,7 +11,7 @@ from scipy.signal import savgol_filter
 
 from pamrs.channels import channel_of, dotted
 from pamrs.errors import DiagnosisError
-from pamrs.recording import Recording
+from pamrs.recordings import Recording
 from pamrs.rig import Rig
 from pamrs.simulation import core_rig
 

@@ -6,7 +6,7 @@ import itertools
 import math
 from dataclasses import dataclass, replace
 
-from pamrs.effects_table import EFFECTS, EffectParameter
+from pamrs.effects import EFFECTS, EffectParameter
 from pamrs.rig import Rig
 
 __all__ = ["CHOICES", "RESTRICTIONS", "Start", "starts_of"]

@@ -12,8 +12,8 @@ from pamrs.diagnosis.blocks import Block
 from pamrs.diagnosis.candidates import Candidate, significant
 from pamrs.diagnosis.evidence import Excess
 from pamrs.diagnosis.fitting import Problem
-from pamrs.effects_table import EFFECTS
-from pamrs.effects_table.entry import SameData
+from pamrs.effects import EFFECTS
+from pamrs.effects import SameData
 
 __all__ = [
     "FORM",

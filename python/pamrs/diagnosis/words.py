@@ -8,17 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from pamrs.case import Case
 from pamrs.channels import channel_of, unit_of
 from pamrs.diagnosis.candidates import Candidate
 from pamrs.diagnosis.conditions import Picture
 from pamrs.diagnosis.fitting import Problem
 from pamrs.diagnosis.result import Diagnosis
 from pamrs.diagnosis.verdicts import Judged, is_parameter, symptoms_of
-from pamrs.effects_table import CATALOGUE, EFFECTS
+from pamrs.effects import CATALOGUE, EFFECTS
+from pamrs.recordings import Case
 from pamrs.report.text import display_unit, format_number, kept_sentence, sentence_of
 from pamrs.rig import Rig
-from pamrs.rig_schema import qualified
+from pamrs.rig.schema import qualified
 
 __all__ = ["absolute", "next_experiment", "reservations", "same_data", "unknown_volumes", "verdict", "warnings", "where", "worse"]
 

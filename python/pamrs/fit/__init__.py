@@ -11,18 +11,21 @@ from typing import TYPE_CHECKING, Any, Final
 from pamrs.errors import FitError
 
 if TYPE_CHECKING:
-    from pamrs.fit.bench import from_recording
-    from pamrs.fit.compare import ModelComparison, compare_models
+    from pamrs.fit._bench import from_recording
+    from pamrs.fit._compare import ModelComparison, compare_models
+    from pamrs.fit._data import ForceMap
+    from pamrs.fit._engine import fit_muscle
+    from pamrs.fit._friction import FrictionFit, fit_friction
+    from pamrs.fit._load import MeasuredMuscle, load_force_map, load_measured_muscle
+    from pamrs.fit._result import MuscleFit
+    from pamrs.fit._solution import COEFFICIENTS, GEOMETRY
+    from pamrs.fit._statistics import FitParameter
+    from pamrs.fit._validation import CrossValidation, PressureErrors
     from pamrs.fit.cylinder.friction import CylinderFriction, fit_cylinder_friction
-    from pamrs.fit.data import ForceMap
-    from pamrs.fit.description import MeasuredMuscle, load_measured_muscle
-    from pamrs.fit.engine import fit_muscle
-    from pamrs.fit.files import load_force_map
-    from pamrs.fit.friction import FrictionFit, fit_friction
-    from pamrs.fit.result import FitParameter, MuscleFit
-    from pamrs.fit.validation import CrossValidation, PressureErrors
 
 __all__ = [
+    "COEFFICIENTS",
+    "GEOMETRY",
     "CrossValidation",
     "CylinderFriction",
     "FitError",
@@ -43,22 +46,24 @@ __all__ = [
 ]
 
 _HOMES: Final[dict[str, str]] = {
-    "CrossValidation": "validation",
+    "COEFFICIENTS": "_solution",
+    "CrossValidation": "_validation",
     "CylinderFriction": "cylinder.friction",
-    "FitParameter": "result",
-    "ForceMap": "data",
-    "FrictionFit": "friction",
-    "MeasuredMuscle": "description",
-    "ModelComparison": "compare",
-    "MuscleFit": "result",
-    "PressureErrors": "validation",
-    "compare_models": "compare",
+    "FitParameter": "_statistics",
+    "ForceMap": "_data",
+    "FrictionFit": "_friction",
+    "GEOMETRY": "_solution",
+    "MeasuredMuscle": "_load",
+    "ModelComparison": "_compare",
+    "MuscleFit": "_result",
+    "PressureErrors": "_validation",
+    "compare_models": "_compare",
     "fit_cylinder_friction": "cylinder.friction",
-    "fit_friction": "friction",
-    "fit_muscle": "engine",
-    "from_recording": "bench",
-    "load_force_map": "files",
-    "load_measured_muscle": "description",
+    "fit_friction": "_friction",
+    "fit_muscle": "_engine",
+    "from_recording": "_bench",
+    "load_force_map": "_load",
+    "load_measured_muscle": "_load",
 }
 
 

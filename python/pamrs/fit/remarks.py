@@ -13,11 +13,23 @@ from pamrs.errors import FitError
 from pamrs.report.text import format_number
 
 if TYPE_CHECKING:
-    from pamrs.fit.compare import ModelComparison
-    from pamrs.fit.result import MuscleFit
-    from pamrs.fit.validation import CrossValidation
+    from pamrs.fit._compare import ModelComparison
+    from pamrs.fit._result import MuscleFit
+    from pamrs.fit._validation import CrossValidation
+    from pamrs.rig import Muscle
 
-__all__ = ["MODEL_WORDS", "Pattern", "cross_validation", "headline", "limits", "meaning", "opening", "residual_pattern", "title"]
+__all__ = [
+    "MODEL_WORDS",
+    "Pattern",
+    "cross_validation",
+    "friction_words",
+    "headline",
+    "limits",
+    "meaning",
+    "opening",
+    "residual_pattern",
+    "title",
+]
 
 Array = NDArray[np.float64]
 
@@ -65,6 +77,15 @@ def cross_validation(fit: MuscleFit) -> tuple[CrossValidation | None, str]:
         return fit.leave_one_pressure_out(), ""
     except FitError as error:
         return None, str(error)
+
+
+def friction_words(muscle: Muscle) -> str:
+    """The friction law (2.36) of a muscle with its numbers; empty without friction."""
+    given = muscle.parameters
+    c0, c1, floor = given["friction_coefficient"], given["friction_pressure_slope"], given["friction_floor"]
+    if not (c0 or c1 or floor):
+        return ""
+    return f"c_F = max(c0 + c1 P, {floor:.4g}), c0 = {c0:.4g}, c1 = {1e6 * c1:.4g} 1/MPa"
 
 
 def headline(fit: MuscleFit) -> str:

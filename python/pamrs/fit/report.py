@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING, Any, Final
 
 from pamrs.errors import FitError, ParameterError
 from pamrs.fit import remarks
-from pamrs.fit.export import friction_words
 from pamrs.report import require
 from pamrs.report.text import format_number, format_uncertain
 
 if TYPE_CHECKING:
-    from pamrs.fit.compare import ModelComparison
-    from pamrs.fit.data import ForceMap
-    from pamrs.fit.figures import ErrorCurve
-    from pamrs.fit.friction import FrictionFit
-    from pamrs.fit.result import MuscleFit
+    from pamrs.fit._compare import ModelComparison
+    from pamrs.fit._data import ForceMap
+    from pamrs.fit._figures import ErrorCurve
+    from pamrs.fit._friction import FrictionFit
+    from pamrs.fit._result import MuscleFit
+    from pamrs.fit._statistics import FitStatistics
 
 __all__ = ["error_curves", "render_friction_png", "render_html", "render_png", "write_figure", "write_report"]
 
@@ -34,7 +34,7 @@ _MOST_LEVELS: Final = 40
 def _curve(name: str, fit: MuscleFit) -> ErrorCurve:
     import numpy as np
 
-    from pamrs.fit.figures import ErrorCurve
+    from pamrs.fit._figures import ErrorCurve
 
     errors = fit.error_by_pressure()
     cross, _ = remarks.cross_validation(fit)
@@ -66,11 +66,11 @@ def error_curves(fit: MuscleFit, comparison: ModelComparison | None = None) -> l
     return [_curve(remarks.title(other), other) for other in best.values()]
 
 
-def _level_by_level(fit: MuscleFit) -> MuscleFit | None:
+def _level_by_level(fit: MuscleFit) -> FitStatistics | None:
     """The same fit with moduli free at each level that has points enough; None where that says nothing."""
     import numpy as np
 
-    from pamrs.fit.engine import fit_muscle
+    from pamrs.fit._solution import solution
 
     if fit.moduli_kind == "per_level" or not fit.params:
         return None
@@ -83,7 +83,7 @@ def _level_by_level(fit: MuscleFit) -> MuscleFit | None:
     if any(p.name == "rest_length" for p in fit.params.values()):
         return None
     try:
-        return fit_muscle(
+        return solution(
             fit.data,
             fit.muscle.replace(**fixed),
             model=fit.model,
@@ -173,7 +173,7 @@ def _facts(fit: MuscleFit) -> list[tuple[str, str]]:
 
 def _muscle(fit: MuscleFit) -> list[tuple[str, str]]:
     muscle = fit.muscle_at(float(fit.data.levels[-1]))
-    parameters, friction = muscle.parameters, friction_words(muscle)
+    parameters, friction = muscle.parameters, remarks.friction_words(muscle)
     return [
         ("model", remarks.title(fit)),
         ("geometry", str(parameters["geometry"])),
@@ -223,7 +223,7 @@ def render_html(fit: MuscleFit, comparison: ModelComparison | None = None, *, co
     require("jinja2", "matplotlib", "markupsafe")
     from markupsafe import Markup
 
-    from pamrs.fit import figures
+    from pamrs.fit import _figures as figures
     from pamrs.report.page import render_page
 
     def markup(svg: str | None) -> Markup | None:
@@ -265,7 +265,7 @@ def render_html(fit: MuscleFit, comparison: ModelComparison | None = None, *, co
 
 def write_report(fit: MuscleFit, path: str | os.PathLike[str], comparison: ModelComparison | None = None, *, command: str = "") -> Path:
     """Write :func:`render_html` to `path` and return the path; the file appears whole or not at all."""
-    from pamrs.writing import write_atomically
+    from pamrs._writing import write_atomically
 
     return write_atomically(path, render_html(fit, comparison, command=command))
 
@@ -279,7 +279,7 @@ def render_png(fit: MuscleFit, comparison: ModelComparison | None = None) -> byt
         If matplotlib is missing; names the extra to install.
     """
     require("matplotlib")
-    from pamrs.fit.figures import summary_png
+    from pamrs.fit._figures import summary_png
 
     return summary_png(fit, error_curves(fit, comparison), remarks.headline(fit))
 
@@ -304,13 +304,13 @@ def render_friction_png(fit: FrictionFit, data: ForceMap) -> bytes:
         If matplotlib is missing; names the extra to install.
     """
     require("matplotlib")
-    from pamrs.fit.friction_figure import friction_png
+    from pamrs.fit._friction_figure import friction_png
 
     return friction_png(fit, data)
 
 
 def write_figure(fit: MuscleFit, path: str | os.PathLike[str], comparison: ModelComparison | None = None) -> Path:
     """Write :func:`render_png` to `path` and return the path; the file appears whole or not at all."""
-    from pamrs.writing import write_atomically
+    from pamrs._writing import write_atomically
 
     return write_atomically(path, render_png(fit, comparison))

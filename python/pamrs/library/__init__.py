@@ -13,10 +13,10 @@ from importlib import resources
 from typing import TYPE_CHECKING, Final
 
 from pamrs.errors import ParameterError
-from pamrs.library.entry import Entry, Fact, read_entry
+from pamrs.library._entry import Entry, Fact, read_entry
 
 if TYPE_CHECKING:
-    from pamrs.muscle import Muscle
+    from pamrs.rig import Muscle
 
 __all__ = [
     "Entry",

@@ -1,8 +1,12 @@
-"""``python -m pamrs.library``: derive the identified numbers again and print every published fact beside ours."""
+"""``python -m pamrs.library``: as ``pamrs library --facts``."""
 
 from __future__ import annotations
 
-from pamrs.library.text import facts
+import sys
+
+from pamrs.cli import main
 
 if __name__ == "__main__":
-    print(facts())
+    code = main(["library", "--facts"])
+    if code:
+        sys.exit(code)

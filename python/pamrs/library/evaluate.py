@@ -11,8 +11,8 @@ import numpy as np
 from pamrs.errors import ParameterError
 
 if TYPE_CHECKING:
-    from pamrs.library.entry import Entry
-    from pamrs.muscle import Muscle
+    from pamrs.library._entry import Entry
+    from pamrs.rig import Muscle
 
 __all__ = ["KINDS", "activation_pressure", "root_between", "free_contraction", "polynomial"]
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from pamrs import comparison
+from pamrs.comparison import Comparison, judge, verdicts
 from pamrs.errors import ParameterError
 from pamrs.library import Entry, Fact, entry, names
 from pamrs.library.evaluate import KINDS
-from pamrs.reproduce import facts
-from pamrs.reproduce.facts import Comparison, judge, verdicts
 from pamrs.units import parse_unit
 
 __all__ = ["Comparison", "compare", "compare_all", "headings", "table", "verdicts"]
@@ -46,8 +46,8 @@ def headings() -> dict[str, str]:
 
 
 def table(rows: Iterable[Comparison], *, notes: bool = True, titles: bool = True) -> str:
-    """The comparison as text, as :func:`pamrs.reproduce.facts.table`, under the titles of the muscles."""
-    return facts.table(rows, notes=notes, titles=titles, headings=headings())
+    """The comparison as text, as :func:`pamrs.comparison.table`, under the titles of the muscles."""
+    return comparison.table(rows, notes=notes, titles=titles, headings=headings())
 
 
 def _compare(item: Entry, fact: Fact) -> Comparison:

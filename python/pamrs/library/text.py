@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
 
+from pamrs.comparison import Comparison, verdicts
 from pamrs.library import entry, names
-from pamrs.library.design import compare_design, six_against_two
-from pamrs.library.identify import derive
-from pamrs.library.published import compare, compare_all, table, verdicts
+from pamrs.library._identify import derive
+from pamrs.library.published import compare, compare_all, table
 from pamrs.units import parse_unit
 
 __all__ = ["description", "facts", "overview"]
@@ -64,8 +65,20 @@ def description(name: str) -> str:
     return "\n".join([*lines, "", table(rows, titles=False), "", verdicts(rows)])
 
 
-def facts() -> str:
-    """The identified numbers derived again, every published fact beside ours, and the comparison of 3.2.3."""
+def facts(others: Sequence[Comparison] = (), below: str = "") -> str:
+    """The identified numbers derived again, and every published fact beside ours.
+
+    Parameters
+    ----------
+    others : sequence of Comparison
+        More statements, in the same table and count.
+    below : str
+        What stands between the table and the count.
+
+    Returns
+    -------
+    str
+    """
     lines = ["Identified numbers, derived again from prior and facts", ""]
     for name in names():
         item, again = entry(name), derive(entry(name))
@@ -78,8 +91,8 @@ def facts() -> str:
             f"    prior: {item.identification['prior']['origin']}",
             f"    moved by {np.round(again.change, 3)} prior standard deviations",
         ]
-    rows = [*compare_all(), *compare_design("large_2in_effective"), *compare_design("large_2in")]
-    lines += ["", "Published facts", "", table(rows), "", "Six against two", "", six_against_two().table(), ""]
+    rows = [*compare_all(), *others]
+    lines += ["", "Published facts", "", table(rows), "", *([below, ""] if below else [])]
     return "\n".join([*lines, verdicts(rows)])
 
 

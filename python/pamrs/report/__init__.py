@@ -56,7 +56,7 @@ def write_report(diagnosis: Diagnosis, path: str | os.PathLike[str]) -> Path:
     ImportError
         If matplotlib or jinja2 is missing; names the extra to install.
     """
-    from pamrs.writing import write_atomically
+    from pamrs._writing import write_atomically
 
     return write_atomically(path, render_html(diagnosis))
 
@@ -69,7 +69,7 @@ def write_figure(diagnosis: Diagnosis, path: str | os.PathLike[str]) -> Path:
     ImportError
         If matplotlib is missing; names the extra to install.
     """
-    from pamrs.writing import write_atomically
+    from pamrs._writing import write_atomically
 
     require("matplotlib")
     from pamrs.report.figures import summary_png

@@ -138,7 +138,7 @@ def write_animation(result: Simulation, path: Path, *, speed: float = 1.0) -> Pa
     import tempfile
     from pathlib import Path as File
 
-    from pamrs.writing import write_atomically
+    from pamrs._writing import write_atomically
 
     if not result.under("joint_angle") and "length" not in result:
         raise ParameterError(f"the rig {result.rig.name!r} has no arm and no load to draw")

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["check", "names", "section"]
 
 #: Chapter -> its module; the one of its pictures has the same name and ``_figures``.
-_CHAPTERS: Final = {"ch3": "chapter3", "ch4": "chapter4", "ch5": "chapter5"}
+_CHAPTERS: Final = {"ch3": "_chapter3", "ch4": "_chapter4", "ch5": "_chapter5"}
 
 
 def names() -> list[str]:
@@ -72,17 +72,17 @@ def section(name: str, *, search: bool = True, pictures: bool = True, progress: 
     MissingPackageError
         If an extra is missing; the message names it.
     """
+    from pamrs.reproduce._symbols import symbols
     from pamrs.reproduce.page import Section
-    from pamrs.reproduce.symbols import symbols
 
     check(name)
     if pictures:
         try:
             drawn = importlib.import_module(f"pamrs.reproduce.{_CHAPTERS[name]}_figures")
         except ImportError as error:
-            from pamrs.design.search import missing
+            from pamrs.errors import missing_package
 
-            raise missing(error, "plot") from None
+            raise missing_package(error, "plot") from None
     chapter = importlib.import_module(f"pamrs.reproduce.{_CHAPTERS[name]}")
     rows = chapter.facts(search=search, progress=progress)
     if pictures and progress is not None:

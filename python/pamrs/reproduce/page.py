@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from pamrs.reproduce.facts import Comparison, markdown, verdicts
+from pamrs.comparison import Comparison, markdown, verdicts
 
 __all__ = ["Picture", "Section", "page"]
 

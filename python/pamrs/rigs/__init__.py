@@ -1,19 +1,17 @@
-"""Rigs that come with the package."""
+"""Rigs that come with the package, by name; light, so that the command line can list them in its help."""
 
 from __future__ import annotations
 
 import functools
 import json
 from collections.abc import Callable
+from importlib import resources
 from typing import TYPE_CHECKING, Final
 
 from pamrs.errors import ParameterError
-from pamrs.rig import Rig, parse_rig
-from pamrs.rig_files import packaged, text_of
-from pamrs.rig_schema import keys_of
 
 if TYPE_CHECKING:
-    from pamrs.muscle import Muscle
+    from pamrs.rig import Muscle, Rig
 
 __all__ = ["bench", "names", "named", "sealed_chamber", "shoulder", "template"]
 
@@ -25,18 +23,21 @@ dead_volume = {{ value = {volume!r}, unit = "m3" }}
 """
 
 
+_FIRST: Final = "shoulder"  # the one that a new rig begins with
 _INSIDE: Final = 0.999  # of the range of the muscle that the frame uses
 
 
 def names() -> list[str]:
-    """Names of the rigs that come with the package, the shoulder first."""
-    return packaged()
+    """Names of the rigs that come with the package, the shoulder first, the others by the alphabet."""
+    files = (file.name for file in resources.files(__name__).iterdir())
+    found = sorted(name.removesuffix(".toml") for name in files if name.endswith(".toml"))
+    return sorted(found, key=lambda name: name != _FIRST)
 
 
 def _text(name: str) -> str:
     if name not in names():
         raise ParameterError(f"rig = {name!r} does not come with the package; there are: {', '.join(names())}")
-    return text_of(name)
+    return resources.files(__name__).joinpath(f"{name}.toml").read_text(encoding="utf-8")
 
 
 def named(name: str) -> Rig:
@@ -56,6 +57,8 @@ def named(name: str) -> Rig:
     ParameterError
         If there is no such rig.
     """
+    from pamrs.rig import parse_rig
+
     return parse_rig(_text(name), source=f"{name}.toml")
 
 
@@ -79,7 +82,7 @@ def template(like: str = "shoulder", name: str | None = None) -> str:
     ParameterError
         If there is no such rig, or the name is empty.
     """
-    from pamrs.rigs.keys import every_key
+    from pamrs.rigs._keys import every_key
 
     text = _text(like)
     if name is not None:
@@ -110,6 +113,9 @@ def bench(muscle: Muscle, name: str = "bench") -> Rig:
     -------
     Rig
     """
+    from pamrs.rig import Rig, parse_rig
+    from pamrs.rig.schema import keys_of
+
     rig = parse_rig(_BENCH.format(volume=0.1 * float(muscle.air_volume(0.0))), source="bench")
     low, high = muscle.contraction_range
     rest = float(muscle.parameters["rest_length"])

@@ -3,6 +3,7 @@
 //! `dP/dt = R T/V (alpha_in mdot_in - alpha_out mdot_out) - alpha P (dV/dt)/V`, dissertation (3.17), (4.3),
 //! and (6.4) with its sign corrected; polytropic coefficients after Richer & Hurmuzlu (2000).
 
+use super::gas::Gas;
 use crate::scalar::Scalar;
 
 /// Polytropic coefficients of filling, emptying and volume change [1].
@@ -36,6 +37,24 @@ pub struct ChamberState<S> {
 pub fn pressure_rate<S: Scalar>(c: &ChamberState<S>, alpha: &Polytropic<S>, rt: f64) -> S {
     ((alpha.inflow * c.inflow - alpha.outflow * c.outflow) * rt - alpha.volume * c.pressure * c.volume_rate)
         / c.volume
+}
+
+/// Wall area [m2] of `count` cylinders of one muscle's air volume [m3] and length [m].
+#[inline]
+pub fn cylinder_area<S: Scalar>(count: f64, volume: S, length: S) -> S {
+    (volume * length * std::f64::consts::PI).sqrt() * (2.0 * count)
+}
+
+/// Wall area [m2] of a cube of a volume [m3].
+#[inline]
+pub fn cube_area<S: Scalar>(volume: S) -> S {
+    volume.powf(2.0 / 3.0) * 6.0
+}
+
+/// Gas temperature [K] of a mass [kg] at a pressure [Pa] in a volume [m3].
+#[inline]
+pub fn gas_temperature<S: Scalar>(gas: &Gas, pressure: S, volume: S, mass: S) -> S {
+    pressure * volume / (mass * gas.gas_constant)
 }
 
 #[cfg(test)]

@@ -1,4 +1,5 @@
-//! Whether the values of a description are possible. How its blocks fit together is [`super::wiring`]'s.
+//! Whether the words and fixed numbers of a description are possible. The bounds of a parameter stand where it enters the
+//! table of parameters, and how blocks fit together is the wiring's: both in [`crate::plant`].
 
 use super::{dotted, ArmSpec, LinkSpec, LoadSpec, RigSpec};
 use crate::blocks::joint::Joint;
@@ -64,12 +65,6 @@ impl RigSpec {
         if let Some(arm) = &self.arm {
             arm.validate()?;
         }
-        for sensors in &self.sensors {
-            let block = Block { kind: "sensors", name: &sensors.name };
-            block.range("pressure_zero", sensors.pressure_zero, -1e7, 1e7, "Pa")?;
-            block.range("angle_zero", sensors.angle_zero, -7.0, 7.0, "rad")?;
-            block.range("length_zero", sensors.length_zero, -10.0, 10.0, "m")?;
-        }
         Ok(())
     }
 
@@ -78,42 +73,18 @@ impl RigSpec {
             let block = Block { kind: "supply", name: &supply.name };
             block.choice("kind", &supply.kind, &["tank", "constant", "regulator"])?;
             block.range("initial_pressure", supply.initial_pressure, vacuum, 1e8, "Pa")?;
-            match supply.kind.as_str() {
-                "tank" => block.range("volume", supply.volume, 1e-7, 1e4, "m3")?,
-                "regulator" => {
-                    block.range("time_constant", supply.time_constant, 1e-5, 1e3, "s")?;
-                    block.range("droop", supply.droop, 0.0, 1e13, "Pa s/kg")?;
-                }
-                _ => {}
-            }
         }
         for valve in &self.valves {
             let block = Block { kind: "valve", name: &valve.name };
-            block.range("discharge_area_max", valve.discharge_area_max, 0.0, 1.0, "m2")?;
-            block.range("null_voltage", valve.null_voltage, -1e3, 1e3, "V")?;
             block.range("half_range", valve.half_range, 1e-9, 1e3, "V")?;
         }
         for line in &self.lines {
             let block = Block { kind: "line", name: &line.name };
             block.choice("kind", &line.kind, &["tube", "orifice"])?;
-            if line.kind == "tube" {
-                block.range("length", line.length, 1e-4, 1e4, "m")?;
-                block.range("diameter", line.diameter, 1e-5, 1.0, "m")?;
-            } else {
-                block.range("discharge_area", line.discharge_area, 0.0, 1.0, "m2")?;
-            }
-            block.range("inlet_volume", line.inlet_volume, 0.0, 1e3, "m3")?;
         }
         for chamber in &self.chambers {
             let block = Block { kind: "chamber", name: &chamber.name };
-            let filled = self.muscles.iter().any(|m| m.chamber == dotted("chamber", &chamber.name));
-            block.range("dead_volume", chamber.dead_volume, if filled { 0.0 } else { 1e-9 }, 1e4, "m3")?;
             block.range("initial_pressure", chamber.initial_pressure, vacuum, 1e8, "Pa")?;
-            for (key, value) in
-                [("alpha_in", chamber.alpha_in), ("alpha_out", chamber.alpha_out), ("alpha", chamber.alpha)]
-            {
-                block.range(key, value, 0.2, 3.0, "")?;
-            }
         }
         Ok(())
     }
@@ -127,28 +98,14 @@ impl ArmSpec {
         if self.kind == "planar" {
             return self.links.iter().try_for_each(LinkSpec::validate);
         }
-        block.range("inertia", self.inertia, 0.0, 1e6, "kg m2")?;
-        block.range("first_moment", self.first_moment, -1e6, 1e6, "kg m")?;
         block.range("length", self.length, 0.0, 1e3, "m")?;
-        block.range("payload", self.payload, 0.0, 1e6, "kg")?;
-        block.range("viscous", self.viscous, 0.0, 1e6, "N m s/rad")?;
-        block.range("coulomb", self.coulomb, 0.0, 1e6, "N m")?;
-        block.range("coulomb_speed", self.coulomb_speed, 1e-9, 1e3, "rad/s")?;
-        let total = self.inertia + self.payload * self.length.powi(2);
-        block.range("inertia + payload length^2", total, 1e-9, 1e9, "kg m2")
+        block.range("coulomb_speed", self.coulomb_speed, 1e-9, 1e3, "rad/s")
     }
 }
 
 impl LinkSpec {
     fn validate(&self) -> Result<()> {
         let block = Block { kind: "link", name: &self.name };
-        block.range("length", self.length, 0.0, 1e3, "m")?;
-        block.range("mass", self.mass, 0.0, 1e6, "kg")?;
-        block.range("centre", self.centre, -1e3, 1e3, "m")?;
-        block.range("inertia", self.inertia, 0.0, 1e6, "kg m2")?;
-        block.range("payload", self.payload, 0.0, 1e6, "kg")?;
-        block.range("viscous", self.viscous, 0.0, 1e6, "N m s/rad")?;
-        block.range("coulomb", self.coulomb, 0.0, 1e6, "N m")?;
         block.range("coulomb_speed", self.coulomb_speed, 1e-9, 1e3, "rad/s")
     }
 }
@@ -162,9 +119,6 @@ impl LoadSpec {
         if self.is_frame() {
             return Ok(());
         }
-        block.range("mass", self.mass, 1e-6, 1e6, "kg")?;
-        block.range("viscous", self.viscous, 0.0, 1e9, "N s/m")?;
-        block.range("coulomb", self.coulomb, 0.0, 1e9, "N")?;
         block.range("coulomb_speed", self.coulomb_speed, 1e-9, 1e3, "m/s")?;
         block.range("gravity", self.gravity, -1e3, 1e3, "m/s2")?;
         block.range("stop_stiffness", self.stop_stiffness, 0.0, 1e12, "N/m")?;

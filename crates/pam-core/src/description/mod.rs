@@ -255,6 +255,9 @@ pub struct EffectSpec {
     /// Name of the one block that it acts on; empty for every block of its kind.
     #[serde(default)]
     pub at: String,
+    /// Its form; empty for the first one.
+    #[serde(default)]
+    pub form: String,
     /// Values by parameter name, SI.
     pub parameters: BTreeMap<String, f64>,
 }

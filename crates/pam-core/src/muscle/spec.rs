@@ -8,6 +8,8 @@ use super::model::ForceModel;
 use crate::braid::{Dimensions, EndRatio, MuscleGeometry, Profile};
 use crate::error::{check_range, Error, Result};
 
+/// Bounds of the factor on every modulus, with its unit.
+pub const MODULUS_SCALE: (f64, f64, &str) = (0.0, 1e3, "(1)");
 /// Largest order of the stress polynomial.
 pub const HIGHEST_ORDER: usize = 12;
 
@@ -220,7 +222,8 @@ impl MuscleSpec {
         let thickest = 0.45 * self.rest_diameter;
         check_range("muscle.wall_thickness", self.wall_thickness, 0.0, thickest, "m (0.45 rest diameters)")?;
         self.check_elastic(model)?;
-        check_range("muscle.modulus_scale", self.modulus_scale, 0.0, 1e3, "(1)")?;
+        let (low, high, unit) = MODULUS_SCALE;
+        check_range("muscle.modulus_scale", self.modulus_scale, low, high, unit)?;
         for (factor, name) in self.extension_factors.iter().zip(["0", "1", "2"]) {
             check_range(&format!("muscle.extension_factors[{name}]"), *factor, -10.0, 10.0, "(1)")?;
         }

@@ -1,12 +1,10 @@
 //! Flows between the nodes of a rig, what they do to the pressures, and how fast.
 
+use super::ports::{Flow, Place};
 use super::rates::{Controls, Line, Plant, Scratch};
 use super::units::Node;
-use crate::blocks::chamber::{pressure_rate, ChamberState};
-use crate::effects::{
-    compressor_cut_in, heat_transfer, leak_muscle, supply_leak, supply_regulator_deadband,
-    tube_flow_restriction, valve_centre_leakage,
-};
+use crate::blocks::chamber::{cube_area, cylinder_area, pressure_rate, ChamberState};
+use crate::effects::Extremes;
 use crate::scalar::{constant, Scalar};
 
 impl<S: Scalar> Plant<'_, S> {
@@ -29,26 +27,17 @@ impl<S: Scalar> Plant<'_, S> {
         here.outflow.fill(zero);
         here.drawn.fill(zero);
         here.vented = zero;
-        for ((unit, valve), spool) in self.rig.wiring.valves.iter().zip(&self.valves).zip(&controls.spool) {
+        for (k, (unit, valve)) in self.rig.wiring.valves.iter().zip(&self.valves).enumerate() {
+            let spool = controls.spool[k];
             let pressure = state[self.layout.pressure(unit.to)];
             if spool.re() > 0.0 {
-                let area = valve.area * unit.table.eval(*spool);
+                let area = valve.area * unit.table.eval(spool);
                 let upstream = self.pressure_at(unit.from, state);
-                let flow = match &self.restriction {
-                    Some(tube) if unit.effects.restriction => {
-                        tube_flow_restriction::mass_flow(gas, area, tube, upstream, pressure, false)
-                    }
-                    _ => gas.mass_flow(area, upstream, pressure),
-                };
+                let flow = self.valve_flow(k, area, upstream, pressure, false);
                 here.pass(unit.from, Node::Gas(unit.to), flow);
             } else if spool.re() < 0.0 {
-                let area = valve.area * unit.table.eval(-*spool);
-                let flow = match &self.restriction {
-                    Some(tube) if unit.effects.restriction => {
-                        tube_flow_restriction::mass_flow(gas, area, tube, pressure, ambient, true)
-                    }
-                    _ => gas.mass_flow(area, pressure, ambient),
-                };
+                let area = valve.area * unit.table.eval(-spool);
+                let flow = self.valve_flow(k, area, pressure, ambient, true);
                 here.pass(Node::Gas(unit.to), Node::Ambient, flow);
             }
         }
@@ -60,55 +49,45 @@ impl<S: Scalar> Plant<'_, S> {
             };
             here.pass(unit.from, unit.to, flow);
         }
-        if let Some([conductance, share]) = self.rig.wiring.effects.leak {
-            for (k, _) in self.rig.wiring.gases.iter().enumerate().filter(|(_, unit)| unit.leak) {
-                let pressure = state[self.layout.pressure(k)];
-                let flow =
-                    leak_muscle::mass_flow(gas, self.values[conductance], self.values[share], pressure);
-                here.outflow[k] += flow;
-                here.vented += flow;
-            }
-        }
-        if let Some([conductance, opening]) = self.rig.wiring.effects.centre_leak {
-            self.centre_leaks(self.values[conductance], self.values[opening], state, controls, here);
-        }
-        if let Some([conductance]) = self.rig.wiring.effects.supply_leak {
-            for (k, _) in self.rig.wiring.supply_effects.iter().enumerate().filter(|(_, unit)| unit.leak) {
-                let pressure = state[self.layout.supply(k)];
-                let flow = supply_leak::mass_flow(gas, self.values[conductance], pressure);
-                here.drawn[k] += flow;
-                here.vented += flow;
-            }
-        }
-        if self.rig.wiring.effects.closes_air() {
-            self.closing_flows(state, controls, here);
+        if !self.rig.wiring.ports.flows.is_empty() {
+            self.effect_flows(state, controls, here);
         }
     }
 
-    /// Flows around the null of the valves, from the supply and to the ambient.
+    /// Mass flow through an opening of a valve [kg/s], and what lies behind it.
+    #[inline]
+    fn valve_flow(&self, valve: usize, area: S, upstream: S, downstream: S, venting: bool) -> S {
+        match &self.rig.wiring.ports.passage[valve] {
+            None => self.rig.gas.mass_flow(area, upstream, downstream),
+            Some(acting) => self.effect(acting).through(&self.rig.gas, area, upstream, downstream, venting),
+        }
+    }
+
+    /// Flows of effects, written to the scratch.
     #[inline(never)]
-    fn centre_leaks(
-        &self,
-        conductance: S,
-        opening: S,
-        state: &[S],
-        controls: &Controls<S>,
-        here: &mut Scratch<S>,
-    ) {
+    fn effect_flows(&self, state: &[S], controls: &Controls<S>, here: &mut Scratch<S>) {
         let gas = &self.rig.gas;
-        for (unit, spool) in self.rig.wiring.valves.iter().zip(&controls.spool) {
-            if !unit.effects.centre_leak {
-                continue;
-            }
-            let area = valve_centre_leakage::area(gas, conductance, opening, *spool);
-            for (from, to) in [(unit.from, Node::Gas(unit.to)), (Node::Gas(unit.to), Node::Ambient)] {
-                let flow = gas.mass_flow(area, self.pressure_at(from, state), self.pressure_at(to, state));
-                if flow.re() >= 0.0 {
-                    here.take(from, flow);
-                    here.give(to, flow);
-                } else {
-                    here.take(to, -flow);
-                    here.give(from, -flow);
+        for (flow, acting) in &self.rig.wiring.ports.flows {
+            let effect = self.effect(acting);
+            match *flow {
+                Flow::Leak(node) => {
+                    let lost = effect.leak(gas, self.pressure_at(node, state));
+                    here.take(node, lost);
+                    here.vented += lost;
+                }
+                Flow::Clearance(valve) => {
+                    let unit = &self.rig.wiring.valves[valve];
+                    let area = effect.clearance(gas, controls.spool[valve]);
+                    let chamber = Node::Gas(unit.to);
+                    for (from, to) in [(unit.from, chamber), (chamber, Node::Ambient)] {
+                        let (upstream, downstream) =
+                            (self.pressure_at(from, state), self.pressure_at(to, state));
+                        here.pass(from, to, gas.mass_flow(area, upstream, downstream));
+                    }
+                }
+                Flow::Inflow(node) => {
+                    let at = self.at_node(node, state, controls, here);
+                    here.pass(Node::Ambient, node, effect.inflow(&at, self.own(acting, state)));
                 }
             }
         }
@@ -117,20 +96,12 @@ impl<S: Scalar> Plant<'_, S> {
     /// Rate of a supply's pressure with the effects on it [Pa/s].
     #[inline(never)]
     fn altered_supply(&self, k: usize, state: &[S], drawn: S, rt: f64, set: S) -> S {
-        let (units, here) = (&self.rig.wiring.effects, &self.rig.wiring.supply_effects[k]);
         let pressure = state[self.layout.supply(k)];
-        match (units.dead_band, units.compressor, here.compressor) {
-            (Some([dead_band]), ..) if here.dead_band => {
-                let error = set - pressure;
-                let ignored = error - supply_regulator_deadband::answered(error, self.values[dead_band]);
-                self.supplies[k].pressure_rate(pressure, drawn, rt, set - ignored)
-            }
-            (_, Some([delivery, ..]), Some(relay)) if state[self.layout.extra(relay)].re() > 0.5 => {
-                let given = compressor_cut_in::mass_flow(self.values[delivery]);
-                self.supplies[k].pressure_rate(pressure, drawn - given, rt, set)
-            }
-            _ => self.supplies[k].pressure_rate(pressure, drawn, rt, set),
+        let (mut drawn, mut set) = (drawn, set);
+        for acting in &self.rig.wiring.ports.feed[k] {
+            self.effect(acting).feed(self.own(acting, state), pressure, &mut drawn, &mut set);
         }
+        self.supplies[k].pressure_rate(pressure, drawn, rt, set)
     }
 
     #[inline(always)]
@@ -151,7 +122,7 @@ impl<S: Scalar> Plant<'_, S> {
                 supply.pressure_rate(state[layout.supply(k)], here.drawn[k], rt, set)
             };
         }
-        for (k, unit) in self.rig.wiring.gases.iter().enumerate() {
+        for k in 0..layout.gases {
             let chamber = ChamberState {
                 pressure: state[layout.pressure(k)],
                 volume: here.volume[k],
@@ -160,20 +131,15 @@ impl<S: Scalar> Plant<'_, S> {
                 outflow: here.outflow[k],
             };
             out[layout.mass(k)] = chamber.inflow - chamber.outflow;
-            out[layout.pressure(k)] = match self.rig.wiring.effects.heat {
-                Some([coefficient, _, share]) if unit.heat => {
+            let fixed = pressure_rate(&chamber, &self.alphas[k], rt);
+            out[layout.pressure(k)] = match &self.rig.wiring.ports.balance[k] {
+                None => fixed,
+                Some(acting) => {
                     let mass = state[layout.mass(k)];
-                    let temperature = heat_transfer::temperature(gas, chamber.pressure, chamber.volume, mass);
-                    let coefficient = self.values[coefficient];
-                    let balance =
-                        heat_transfer::pressure_rate(gas, &chamber, temperature, here.wall[k], coefficient);
-                    let rest = (-self.values[share] + 1.0)
-                        * (pressure_rate(&chamber, &self.alphas[k], rt) - balance);
-                    // The temperature follows the balance, whatever the pressure does.
-                    out[layout.mass(k)] += mass * rest / chamber.pressure;
-                    balance + rest
+                    let (rate, more) = self.effect(acting).balance(gas, &chamber, here.wall[k], mass, fixed);
+                    out[layout.mass(k)] += more;
+                    rate
                 }
-                _ => pressure_rate(&chamber, &self.alphas[k], rt),
             };
         }
     }
@@ -189,7 +155,7 @@ impl<S: Scalar> Scratch<S> {
     }
 
     #[inline]
-    fn take(&mut self, node: Node, flow: S) {
+    pub(super) fn take(&mut self, node: Node, flow: S) {
         match node {
             Node::Ambient => self.vented -= flow,
             Node::Supply(k) => self.drawn[k] += flow,
@@ -262,26 +228,28 @@ impl Plant<'_, f64> {
             add(unit.from, unit.to, slope);
             add(unit.to, unit.from, slope);
         }
-        if let Some([conductance, _]) = wiring.effects.centre_leak {
-            let slope = gas.steepest(gas.area_of_conductance(self.values[conductance]));
-            for unit in wiring.valves.iter().filter(|unit| unit.effects.centre_leak) {
+        for (flow, acting) in &wiring.ports.flows {
+            if let Flow::Clearance(valve) = *flow {
+                let slope = self.effect(acting).steepest(gas, &self.extremes(0));
+                let unit = &wiring.valves[valve];
                 add(Node::Gas(unit.to), unit.from, slope);
                 add(unit.from, Node::Gas(unit.to), slope);
                 add(Node::Gas(unit.to), Node::Ambient, slope);
             }
         }
-        let mut worst = (self.closure_air_memory(), None);
+        let mut worst =
+            (self.fastest_effect(|place| matches!(place, Place::Supply(_) | Place::Gas(_))), None);
         for (k, slope) in steepest.iter().enumerate() {
             let alpha = self.alphas[k].inflow.max(self.alphas[k].outflow).max(gas.gamma);
             let (volume, wall) = self.least_volume(k);
-            let leak = self.steepest_leak(k) + self.steepest_closure(k);
+            let leak = self.steepest_flows(Node::Gas(k));
             let rate = alpha * rt * (slope + leak) / volume + self.wall_rate(k, volume, wall);
             if rate > worst.0 {
                 worst = (rate, Some(k));
             }
         }
         for (k, (supply, slope)) in self.supplies.iter().zip(&drawn).enumerate() {
-            let rate = supply.fastest(*slope + self.steepest_supply(k), rt);
+            let rate = supply.fastest(*slope + self.steepest_flows(Node::Supply(k)), rt);
             if rate > worst.0 {
                 worst = (rate, None);
             }
@@ -289,31 +257,38 @@ impl Plant<'_, f64> {
         worst
     }
 
-    /// Largest change of a gas's leak per pressure [kg/(s Pa)].
-    fn steepest_leak(&self, gas: usize) -> f64 {
-        let (wiring, air) = (&self.rig.wiring, &self.rig.gas);
-        match wiring.effects.leak {
-            Some([conductance, share]) if wiring.gases[gas].leak => {
-                let (conductance, share) = (self.values[conductance], self.values[share]);
-                let area = air.area_of_conductance(conductance);
-                let high = self.rig.highest_pressure();
-                let laminar = 2.0 * air.choked_flow(area, high) / leak_muscle::REFERENCE_PRESSURE;
-                (1.0 - share) * air.steepest(area) + share * laminar
-            }
-            _ => 0.0,
-        }
+    /// Largest change of what effects let in or out per pressure of a block [kg/(s Pa)].
+    fn steepest_flows(&self, node: Node) -> f64 {
+        let wiring = &self.rig.wiring;
+        let valves = wiring.valves.iter().filter(|v| v.from == node || Node::Gas(v.to) == node).count();
+        let most = self.extremes(valves);
+        let at = |flow: &Flow| matches!(flow, Flow::Leak(n) | Flow::Inflow(n) if *n == node);
+        let flows = wiring.ports.flows.iter().filter(|(flow, _)| at(flow));
+        flows.map(|(_, acting)| self.effect(acting).steepest(&self.rig.gas, &most)).sum()
+    }
+
+    /// Extremes of a block of the air.
+    fn extremes(&self, valves: usize) -> Extremes {
+        let (pressure, ambient) = (self.rig.highest_pressure(), self.rig.gas.ambient_pressure);
+        Extremes { pressure, ambient, angles: (0.0, 0.0), contraction: 0.0, valves }
     }
 
     /// Rate at which a gas takes the temperature of its wall [1/s], with the least of it: at ambient pressure.
     fn wall_rate(&self, gas: usize, volume: f64, wall: f64) -> f64 {
-        let (wiring, air) = (&self.rig.wiring, &self.rig.gas);
-        match wiring.effects.heat {
-            Some([coefficient, ..]) if wiring.gases[gas].heat => {
-                (air.gamma - 1.0) * self.values[coefficient] * wall * air.temperature
-                    / (air.ambient_pressure * volume)
-            }
-            _ => 0.0,
-        }
+        let balance = self.rig.wiring.ports.balance[gas].as_ref();
+        balance.map_or(0.0, |acting| self.effect(acting).wall_rate(&self.rig.gas, volume, wall))
+    }
+
+    /// Fastest rate of what effects move by themselves at some blocks [1/s].
+    pub(super) fn fastest_effect(&self, here: impl Fn(Place) -> bool) -> f64 {
+        let all = self.rig.wiring.ports.integrated().filter(|(place, _)| here(*place));
+        all.map(|(_, acting)| self.effect(&acting).fastest()).fold(0.0, f64::max)
+    }
+
+    /// Fastest rate on the way from commands to openings [1/s].
+    pub(crate) fn fastest_command(&self) -> f64 {
+        let all = self.rig.wiring.ports.command.iter().flatten();
+        all.map(|acting| self.effect(acting).fastest()).fold(0.0, f64::max)
     }
 
     /// Least volume of a gas over the range of its muscles [m3], with the largest wall [m2].
@@ -327,12 +302,12 @@ impl Plant<'_, f64> {
                 let here = group.muscle.table.eval(contraction).volume.max(0.0);
                 least = least.min(here);
                 let length = (1.0 - contraction) * group.rest_length;
-                most = most.max(heat_transfer::cylinder_area(group.count, here, length));
+                most = most.max(cylinder_area(group.count, here, length));
             }
             volume += least * group.count;
             wall += most;
         }
         let volume = volume.max(f64::MIN_POSITIVE);
-        (volume, if wall > 0.0 { wall } else { heat_transfer::cube_area(volume) })
+        (volume, if wall > 0.0 { wall } else { cube_area(volume) })
     }
 }

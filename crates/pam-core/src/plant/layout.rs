@@ -3,14 +3,15 @@
 use super::units::Wiring;
 use super::wiring_motion::coordinate_names;
 use crate::description::{dotted, RigSpec};
+use crate::effects::Role;
 
-/// Number of sums that are kept beside the states: see [`BOOKS`].
-pub const BOOK_COUNT: usize = 6;
+/// Number of sums that are kept beside the states: see [`BALANCE`].
+pub const BALANCE_COUNT: usize = 6;
 
 /// Channels of the sums over a simulation, in their order: mass out of the supplies and into the ambient, what
 /// regulators relieve included [kg]; energy `R T m` and exergy `R T ln(p/p_a) m` of what the supplies gave, work of
 /// the muscles, positive work at the joints [J].
-pub const BOOKS: [&str; BOOK_COUNT] =
+pub const BALANCE: [&str; BALANCE_COUNT] =
     ["mass_supplied", "mass_vented", "energy_supplied", "exergy_supplied", "muscle_work", "joint_work"];
 
 /// Places of the states: supplies' pressures, gases' pressures, gases' masses, coordinates, their rates, what effects need.
@@ -24,22 +25,22 @@ pub struct Layout {
     pub coordinates: usize,
     /// Chambers among the gases.
     pub chambers: usize,
-    /// Numbers that effects move or remember, behind the motion.
-    pub extras: usize,
+    /// States of effects, behind the motion.
+    pub effects: usize,
 }
 
 impl Layout {
-    /// States without the books.
+    /// States without the sums of the balance.
     #[inline]
     #[must_use]
     pub fn states(&self) -> usize {
-        self.extra(0) + self.extras
+        self.effect(0) + self.effects
     }
 
-    /// A number of an effect; the first one is where the motion ends.
+    /// A state of an effect; the first one is where the motion ends.
     #[inline]
     #[must_use]
-    pub fn extra(&self, k: usize) -> usize {
+    pub fn effect(&self, k: usize) -> usize {
         self.supplies + 2 * (self.gases + self.coordinates) + k
     }
 
@@ -78,12 +79,69 @@ impl Layout {
         self.supplies + 2 * self.gases + self.coordinates + k
     }
 
-    /// A sum of [`BOOKS`].
+    /// A sum of [`BALANCE`].
     #[inline]
     #[must_use]
-    pub fn book(&self, k: usize) -> usize {
+    pub fn balance(&self, k: usize) -> usize {
         self.states() + k
     }
+}
+
+/// What a number of a simulation's state is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StateRole {
+    /// Absolute pressure of a supply or a gas [Pa].
+    Pressure,
+    /// Mass of a gas [kg].
+    Mass,
+    /// The same, of a gas whose temperature is free: a state of its own.
+    FreeMass,
+    /// Joint angle [rad], or shortening of a linear load [m].
+    Position,
+    /// Its rate.
+    Rate,
+    /// State of an effect.
+    Effect(Role),
+    /// Sum of the mass and energy balance.
+    Balance,
+    /// What a muscle's own friction remembers of its motion.
+    Memory,
+    /// A condition that an event ends.
+    Flag,
+    /// Samples since the start.
+    Samples,
+}
+
+impl StateRole {
+    /// Name, public API.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Pressure => "pressure",
+            Self::Mass => "mass",
+            Self::FreeMass => "free_mass",
+            Self::Position => "position",
+            Self::Rate => "rate",
+            Self::Effect(Role::Moves) => "effect_moves",
+            Self::Effect(Role::Opens) => "effect_opens",
+            Self::Effect(Role::Follows) => "effect_follows",
+            Self::Effect(Role::Begun) => "effect_begun",
+            Self::Effect(Role::Keeps) => "effect_keeps",
+            Self::Balance => "balance",
+            Self::Memory => "memory",
+            Self::Flag => "flag",
+            Self::Samples => "samples",
+        }
+    }
+}
+
+/// One number of a simulation's state.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StatePlace {
+    /// A channel, an effect's state (`input_path_lag.lag.flexor`), or what it belongs to.
+    pub name: String,
+    /// What it is.
+    pub role: StateRole,
 }
 
 /// What a simulated channel shows.
@@ -113,8 +171,8 @@ pub enum Channel {
     Temperature(usize),
     /// Mass of a gas [kg].
     Mass(usize),
-    /// One of [`BOOKS`].
-    Book(usize),
+    /// One of [`BALANCE`].
+    Balance(usize),
 }
 
 /// Names of everything that can be set, read or driven.
@@ -189,7 +247,8 @@ impl Names {
         for (k, name) in inlets.clone().enumerate() {
             channels.push((of("line_mass", name), Channel::Mass(wiring.chambers + k)));
         }
-        channels.extend(BOOKS.iter().enumerate().map(|(k, name)| ((*name).to_string(), Channel::Book(k))));
+        channels
+            .extend(BALANCE.iter().enumerate().map(|(k, name)| ((*name).to_string(), Channel::Balance(k))));
         let regulators = spec.supplies.iter().filter(|s| s.kind == "regulator");
         Self {
             channels,

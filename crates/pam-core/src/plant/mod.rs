@@ -2,34 +2,34 @@
 
 mod air;
 mod body;
-mod closures;
 mod discrete;
 pub mod layout;
 pub mod memory;
 mod motion;
 mod muscle_force;
 pub mod parameters;
+mod ports;
 pub mod rates;
 mod tap;
 mod units;
-mod units_effects;
+mod views;
 mod wiring;
-mod wiring_effects;
 mod wiring_motion;
 
-pub(crate) use closures::ClosureAt;
-pub use layout::{Channel, Layout, Names};
+pub use layout::{Channel, Layout, Names, StatePlace, StateRole, BALANCE};
 pub use memory::Memory;
 pub use parameters::{ParameterId, Parameters, Values};
+pub(crate) use ports::{moves, Place};
 pub(crate) use rates::{Controls, Plant, Scratch, Simulated};
 
 use self::units::{Group, Wiring};
 use crate::blocks::gas::Gas;
 use crate::blocks::joint::Joint;
 use crate::description::{dotted, RigSpec};
-use crate::effects::input_path_lag;
+use crate::effects::{EffectInfo, EFFECTS};
 use crate::muscle::CompiledMuscle;
 use crate::{Error, Result};
+use std::sync::Arc;
 
 /// Of the 2.78 that the Runge-Kutta method bears on the negative real axis.
 const STABLE: f64 = 2.0;
@@ -43,11 +43,14 @@ const LEAST_STEP: f64 = 1e-7;
 /// A rig ready to be simulated: muscles compiled to a table, ports resolved. Immutable.
 #[derive(Debug, Clone)]
 pub struct Rig {
-    spec: RigSpec,
+    spec: Arc<RigSpec>,
     pub(crate) gas: Gas,
-    pub(crate) wiring: Wiring,
+    pub(crate) wiring: Arc<Wiring>,
     pub(crate) layout: Layout,
-    pub(crate) names: Names,
+    pub(crate) names: Arc<Names>,
+    parameters: Parameters,
+    /// Effects to choose from.
+    effects: &'static [&'static EffectInfo],
     gas_step: f64,
     body_step: f64,
 }
@@ -57,28 +60,59 @@ impl Rig {
     ///
     /// # Errors
     /// As [`RigSpec::validate`]; [`Error::Model`] for blocks that do not fit together, an unknown effect or effect parameter,
-    /// or a volume too small for its openings.
+    /// or a volume too small for its openings; [`Error::Parameter`] for a parameter outside its bounds.
     pub fn new(spec: RigSpec) -> Result<Self> {
-        Self::with_groups(spec, &[])
+        Self::wired(spec, &[], EFFECTS)
     }
 
-    fn with_groups(spec: RigSpec, known: &[Group]) -> Result<Self> {
+    /// As [`Self::new`], with other effects than those of the catalogue to choose from.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn with_effects(spec: RigSpec, effects: &'static [&'static EffectInfo]) -> Result<Self> {
+        Self::wired(spec, &[], effects)
+    }
+
+    fn wired(spec: RigSpec, known: &[Group], effects: &'static [&'static EffectInfo]) -> Result<Self> {
         spec.validate()?;
         let g = &spec.gas;
         let gas = Gas::new(g.ambient_pressure, g.temperature, g.gas_constant, g.heat_capacity_ratio);
-        let wiring = Wiring::new(&spec, known)?;
+        let (wiring, parameters) = Wiring::new(&spec, known, effects)?;
         let layout = Layout {
             supplies: wiring.supplies.len(),
             gases: wiring.gases.len(),
             coordinates: wiring.coordinates.len(),
             chambers: wiring.chambers,
-            extras: wiring.extras,
+            effects: wiring.ports.states,
         };
-        let names = Names::new(&spec, &wiring, &layout);
+        let names = Arc::new(Names::new(&spec, &wiring, &layout));
         let endless = f64::INFINITY;
-        let mut rig = Self { gas, wiring, layout, names, gas_step: endless, body_step: endless, spec };
+        let (spec, wiring) = (Arc::new(spec), Arc::new(wiring));
+        let mut rig = Self {
+            gas,
+            wiring,
+            layout,
+            names,
+            parameters,
+            effects,
+            gas_step: endless,
+            body_step: endless,
+            spec,
+        };
         rig.check_reach()?;
-        (rig.gas_step, rig.body_step) = rig.find_steps()?;
+        rig.find_steps()?;
+        Ok(rig)
+    }
+
+    /// The same rig with other values of its parameters, in the order of [`Parameters::names`]: nothing is wired again.
+    /// [`Self::spec`] stays what it was.
+    ///
+    /// # Errors
+    /// As [`Parameters::with_values`], and [`Error::Model`] for values that would need too short a step.
+    pub fn with_values(&self, values: &[f64]) -> Result<Self> {
+        let mut rig = self.clone();
+        rig.parameters = self.parameters.with_values(values)?;
+        rig.find_steps()?;
         Ok(rig)
     }
 
@@ -163,8 +197,16 @@ impl Rig {
         supplies.chain(chambers).fold(USUAL_PRESSURE, f64::max) + self.gas.ambient_pressure
     }
 
-    fn find_steps(&self) -> Result<(f64, f64)> {
-        let plant = Plant::new(self, self.wiring.parameters.lift::<f64>(), false)?;
+    /// Find the longest stable steps; refuses values that together are not possible.
+    fn find_steps(&mut self) -> Result<()> {
+        let plant = Plant::new(self, self.parameters.lift::<f64>(), false)?;
+        plant.check_masses()?;
+        let steps = self.stable_steps(&plant)?;
+        (self.gas_step, self.body_step) = steps;
+        Ok(())
+    }
+
+    fn stable_steps(&self, plant: &Plant<'_, f64>) -> Result<(f64, f64)> {
         let body = plant.fastest_body();
         if !body.is_finite() {
             return Err(Error::Model(
@@ -193,11 +235,7 @@ impl Rig {
                 None => format!("a supply answers too fast to what flows out of it: {}", needed(step)),
             }));
         }
-        let path = |[lag, delay]: [ParameterId; 2]| {
-            input_path_lag::fastest(plant.values()[lag], plant.values()[delay])
-        };
-        let step = step.min(STABLE / self.wiring.effects.path.map_or(0.0, path));
-        Ok((step, STABLE / body))
+        Ok((step.min(STABLE / plant.fastest_command()), STABLE / body))
     }
 
     /// The same rig with other parameter values and effects; a muscle's table is kept when its geometry and moduli are the
@@ -206,7 +244,7 @@ impl Rig {
     /// # Errors
     /// As [`Self::new`].
     pub fn respecified(&self, spec: RigSpec) -> Result<Self> {
-        Self::with_groups(spec, &self.wiring.groups)
+        Self::wired(spec, &self.wiring.groups, self.effects)
     }
 
     /// The description it was made from.
@@ -240,9 +278,51 @@ impl Rig {
         &self.names
     }
 
+    /// What each number of a simulation's state is, in the order of [`crate::simulate::Progress::to_vec`] at the start.
+    pub fn state_map(&self) -> Vec<StatePlace> {
+        let (layout, wiring) = (&self.layout, &self.wiring);
+        let mut places: Vec<StatePlace> = Vec::new();
+        let mut add = |name: &str, role| places.push(StatePlace { name: name.into(), role });
+        let named = |place: usize| {
+            self.names.initial.iter().find(|(_, p)| *p == place).map_or("", |(name, _)| name.as_str())
+        };
+        for place in layout.supply(0)..layout.mass(0) {
+            add(named(place), StateRole::Pressure);
+        }
+        for (k, gas) in self.names.gases.iter().enumerate() {
+            let free = wiring.ports.frees_mass(k);
+            add(gas, if free { StateRole::FreeMass } else { StateRole::Mass });
+        }
+        for place in layout.angle(0)..layout.effect(0) {
+            let role = if place < layout.rate(0) { StateRole::Position } else { StateRole::Rate };
+            add(named(place), role);
+        }
+        for (name, role) in wiring.ports.state_names(&self.spec, wiring) {
+            add(&name, StateRole::Effect(role));
+        }
+        for name in BALANCE {
+            add(name, StateRole::Balance);
+        }
+        for muscle in &self.spec.muscles {
+            for _ in 0..Memory::<f64>::NUMBERS {
+                add(&dotted("muscle", &muscle.name), StateRole::Memory);
+            }
+        }
+        for name in &self.names.coordinates {
+            add(name, StateRole::Flag);
+            add(name, StateRole::Flag);
+        }
+        let valves = self.spec.valves.iter().map(|v| dotted("valve", &v.name));
+        for name in valves.chain(self.spec.lines.iter().map(|l| dotted("line", &l.name))) {
+            add(&name, StateRole::Flag);
+        }
+        add("samples", StateRole::Samples);
+        places
+    }
+
     /// Names and values of all scalar parameters.
     pub fn parameters(&self) -> &Parameters {
-        &self.wiring.parameters
+        &self.parameters
     }
 
     /// The muscles of a group with their compiled table.

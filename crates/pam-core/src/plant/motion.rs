@@ -3,111 +3,98 @@
 use num_dual::Dual64;
 
 use super::body::Body;
+use super::ports::{Acting, Place};
 use super::rates::{Plant, Scratch};
-use super::units::Group;
+use super::units::{BodyUnit, Group};
 use crate::effects::payload_swing::Cord;
-use crate::effects::{
-    base_flexibility, external_torque, joint_coulomb_stribeck, joint_end_stop, muscle_rate_damping,
-    pam_crowding_contact, payload_change, payload_swing,
-};
+use crate::effects::Extremes;
+use crate::error::check_range;
+use crate::muscle::slip::STUCK;
 use crate::scalar::{constant, Scalar};
+use crate::{Error, Result};
 use std::borrow::Cow;
 
-/// Slope of the mean of a bank of slip elements where all of them stick, times the presliding distance.
-const BANK: f64 = 3.75;
+/// Points of a range at which its largest moment arm is looked for, less one.
+const ARM_POINTS: u32 = 16;
 
 impl<S: Scalar> Plant<'_, S> {
     /// Accelerations of the coordinates and of what effects move beside them.
     #[inline(never)]
     pub(super) fn altered_motion(&self, state: &[S], time: f64, here: &mut Scratch<S>, out: &mut [S]) {
-        let (layout, wiring, values) = (&self.layout, &self.rig.wiring, &self.values);
-        let units = &wiring.effects;
-        let (angles, rates) = state[layout.angle(0)..layout.extra(0)].split_at(layout.coordinates);
+        let (layout, ports) = (&self.layout, &self.rig.wiring.ports);
+        let (angles, rates) = state[layout.angle(0)..layout.effect(0)].split_at(layout.coordinates);
         let [pose, turn, load, column] = &mut here.arm;
         pose.copy_from_slice(angles);
         turn.copy_from_slice(rates);
         load.copy_from_slice(&here.torque);
-        for (k, coordinate) in wiring.coordinates.iter().enumerate() {
-            if let (true, Some([stiction, speed])) = (coordinate.effects.stribeck, units.stribeck) {
-                load[k] -= joint_coulomb_stribeck::torque(values[stiction], values[speed], rates[k]);
-            }
-            if let (true, Some(stop)) = (coordinate.effects.stop, units.stop) {
-                load[k] += joint_end_stop::torque(stop.map(|id| values[id]), angles[k], rates[k]);
-            }
-            if coordinate.effects.closure.is_some() {
-                load[k] += self.closing_torque(k, state);
-            }
+        for (k, load) in load.iter_mut().enumerate() {
+            *load = self.joint_torque(k, *load, state);
         }
-        let base = wiring.arm_effects.base.zip(units.base);
-        let reaction = base.map(|(place, ids)| {
-            let (q, rate) = (state[layout.extra(place)], state[layout.extra(place) + 1]);
-            pose[0] += q;
-            turn[0] += rate;
+        let reaction = ports.mounting.as_ref().map(|acting| {
+            let own = self.own(acting, state);
+            pose[0] += own[0];
+            turn[0] += own[1];
             // Friction and stops belong to the joint, whatever the base does.
             let joint = self.body.passive(0, angles[0], rates[0]);
             let exchanged = load[0] + joint;
             load[0] += joint - self.body.passive(0, pose[0], turn[0]);
-            base_flexibility::acceleration(ids.map(|id| values[id]), q, rate, exchanged)
+            self.effect(acting).mounting(own, exchanged)
         });
-        if let Some(pulse) = units.torque {
-            for (k, coordinate) in wiring.coordinates.iter().enumerate() {
-                if coordinate.effects.torque {
-                    load[k] += external_torque::torque(pulse.map(|id| values[id]), time);
-                }
+        for (load, push) in load.iter_mut().zip(&ports.push) {
+            for acting in push {
+                *load += self.effect(acting).push(time);
             }
         }
         let body = self.carrying(time);
-        let accelerations = layout.rate(0)..layout.extra(0);
+        let accelerations = layout.rate(0)..layout.effect(0);
         body.accelerations(pose, turn, load, &mut out[accelerations.clone()]);
-        if let (Some((link, place)), Some([share, length, damping])) = (wiring.arm_effects.swing, units.swing)
-        {
-            let place = layout.extra(place);
-            let (phi, rate) = (state[place], state[place + 1]);
+        if let Some((link, acting)) = &ports.hanging {
             let gravity = body.gravity();
-            let cord = Cord::new(values[length], values[damping], gravity, phi, rate);
-            let mass = values[share] * self.payload(link, time);
-            let felt = hang(&body, link, &cord, mass, gravity, [pose, turn, column], &mut out[accelerations]);
-            (out[place], out[place + 1]) = (rate, cord.acceleration(felt));
+            if let Some(cord) = self.effect(acting).cord(gravity, self.own(acting, state)) {
+                let mass = self.effect(acting).hanging() * self.payload(*link, time);
+                let moving = [pose, turn, column];
+                let felt = hang(&body, *link, &cord, mass, gravity, moving, &mut out[accelerations]);
+                let rates = [self.own(acting, state)[1], cord.acceleration(felt)];
+                self.own_mut(acting, out).copy_from_slice(&rates);
+            }
         }
-        if let (Some((place, _)), Some(acceleration)) = (base, reaction) {
-            let place = layout.extra(place);
+        if let (Some(acting), Some(acceleration)) = (&ports.mounting, reaction) {
             out[layout.rate(0)] -= acceleration;
-            (out[place], out[place + 1]) = (state[place + 1], acceleration);
+            let rates = [self.own(acting, state)[1], acceleration];
+            self.own_mut(acting, out).copy_from_slice(&rates);
         }
+    }
+
+    /// Torque of a joint with those of the effects on it [N m].
+    #[inline]
+    fn joint_torque(&self, coordinate: usize, load: S, state: &[S]) -> S {
+        let here = &self.rig.wiring.ports.torque[coordinate];
+        if here.is_empty() {
+            return load;
+        }
+        let at = self.at_joint(coordinate, state);
+        here.iter().fold(load, |load, acting| load + self.effect(acting).torque(&at, self.own(acting, state)))
     }
 
     /// Payload at the end of a link [kg] (the mass of a linear load) at a time [s].
     fn payload(&self, link: usize, time: f64) -> S {
-        let payload = self.body.payload(link);
-        match (self.rig.wiring.arm_effects.payload, self.rig.wiring.effects.payload) {
-            (Some(changed), Some([mass, moment])) if changed == link => {
-                payload + payload_change::change(self.values[mass], self.values[moment], time)
-            }
-            _ => payload,
-        }
+        let changes = self.rig.wiring.ports.payload.iter().filter(|(changed, _)| *changed == link);
+        changes
+            .fold(self.body.payload(link), |payload, (_, acting)| payload + self.effect(acting).payload(time))
     }
 
     /// The body with the payloads that its links carry rigidly at a time [s].
     fn carrying(&self, time: f64) -> Cow<'_, Body<S>> {
-        let effects = &self.rig.wiring.arm_effects;
+        let ports = &self.rig.wiring.ports;
         let mut body = Cow::Borrowed(&self.body);
-        if let Some(link) = effects.payload {
-            body = Cow::Owned(body.with_payload(link, self.payload(link, time)));
+        for (link, _) in &ports.payload {
+            body = Cow::Owned(body.with_payload(*link, self.payload(*link, time)));
         }
-        if let (Some((link, _)), Some([share, ..])) = (effects.swing, self.rig.wiring.effects.swing) {
-            let rigid = self.payload(link, time) * (-self.values[share] + 1.0);
-            body = Cow::Owned(body.with_payload(link, rigid));
+        if let Some((link, acting)) = &ports.hanging {
+            let rigid = self.payload(*link, time) * (-self.effect(acting).hanging() + 1.0);
+            body = Cow::Owned(body.with_payload(*link, rigid));
         }
         body
-    }
-
-    /// Cord and base at rest: the one hangs, the other carries the weight of the arm.
-    pub(super) fn settle_arm(&self, state: &mut [S]) {
-        let (layout, wiring) = (&self.layout, &self.rig.wiring);
-        if let (Some(place), Some([compliance, ..])) = (wiring.arm_effects.base, wiring.effects.base) {
-            let weight = self.body.weight(&state[layout.angle(0)..layout.rate(0)]);
-            state[layout.extra(place)] = -(self.values[compliance] * weight);
-        }
     }
 }
 
@@ -149,33 +136,56 @@ fn hang<S: Scalar>(
 }
 
 impl Plant<'_, f64> {
+    /// Refuse masses that are not possible: an arm without inertia, more taken away from a payload than is there.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] that names what is too small.
+    pub(crate) fn check_masses(&self) -> Result<()> {
+        let wiring = &self.rig.wiring;
+        if let BodyUnit::OneLink { inertia, payload, length, .. } = &wiring.body {
+            let total = self.values[*inertia] + self.values[*payload] * length.powi(2);
+            check_range("arm.inertia + payload length^2", total, 1e-9, 1e9, "kg m2")?;
+        }
+        let least = if matches!(wiring.body, BodyUnit::Mass { .. }) { 1e-6 } else { 0.0 };
+        for (link, acting) in &wiring.ports.payload {
+            let now = self.body.payload(*link);
+            let changes = wiring.ports.payload.iter().filter(|(changed, _)| changed == link);
+            let taken: f64 = changes.map(|(_, a)| self.effect(a).payload(f64::INFINITY).min(0.0)).sum();
+            if now + taken < least {
+                let effect = &wiring.ports.effects[acting.effect];
+                let name = format!("{}.{}", effect.name, effect.form.parameters[0].name);
+                let allowed = format!("at least {} kg: no more can be taken away than is there", least - now);
+                return Err(Error::parameter(name, self.effect(acting).payload(f64::INFINITY), allowed));
+            }
+        }
+        Ok(())
+    }
+
     /// Fastest rate of the body [1/s], and of what effects move beside it.
     pub(crate) fn fastest_body(&self) -> f64 {
-        let (wiring, units) = (&self.rig.wiring, &self.rig.wiring.effects);
-        let value = |id| self.values[id];
+        let (wiring, ports) = (&self.rig.wiring, &self.rig.wiring.ports);
         let spring = |k| {
             let (damping, stiffness) = self.resistance(k);
             (damping, stiffness + self.stiffness(k))
         };
         let mut loads: Vec<(f64, f64)> = (0..wiring.coordinates.len()).map(spring).collect();
         loads.resize(wiring.coordinates.len().max(1), (0.0, 0.0));
-        let base = units.base.map_or((0.0, 0.0), |ids| base_flexibility::mobility(ids.map(value)));
+        let mounting = ports.mounting.as_ref().map(|acting| self.effect(acting));
+        let (mobility, own) = mounting.map_or((0.0, 0.0), |base| (base.mobility(), base.fastest()));
         let mut bodies = vec![self.carrying(f64::NEG_INFINITY)];
-        if units.payload.is_some() {
+        if !ports.payload.is_empty() {
             bodies.push(self.carrying(f64::INFINITY));
         }
-        let body = |b: &Cow<'_, Body<f64>>| b.fastest(&loads, base.0);
-        let mut fastest = bodies.iter().map(body).fold(base.1, f64::max);
-        if let (Some((link, _)), Some([share, length, _])) = (wiring.arm_effects.swing, units.swing) {
-            let heaviest = self.payload(link, f64::NEG_INFINITY).max(self.payload(link, f64::INFINITY));
-            let ratio =
-                bodies.iter().map(|b| value(share) * heaviest * b.end_mobility(link)).fold(0.0, f64::max);
-            fastest = fastest.max(payload_swing::fastest(value(length), self.body.gravity(), ratio));
+        let body = |b: &Cow<'_, Body<f64>>| b.fastest(&loads, mobility);
+        let mut fastest = bodies.iter().map(body).fold(own, f64::max);
+        if let Some((link, acting)) = &ports.hanging {
+            let effect = self.effect(acting);
+            let heaviest = self.payload(*link, f64::NEG_INFINITY).max(self.payload(*link, f64::INFINITY));
+            let ratio = |b: &Cow<'_, Body<f64>>| effect.hanging() * heaviest * b.end_mobility(*link);
+            let ratio = bodies.iter().map(ratio).fold(0.0, f64::max);
+            fastest = fastest.max(effect.swing_rate(self.body.gravity(), ratio));
         }
-        if let Some([_, time_constant]) = units.creep {
-            fastest = fastest.max(1.0 / value(time_constant));
-        }
-        fastest.max(self.closure_memory())
+        fastest.max(self.fastest_effect(|place| matches!(place, Place::Group(_) | Place::Joint(_))))
     }
 
     /// Largest stiffness [N m/rad] of what pulls on a coordinate, over its range, at the highest pressure.
@@ -199,6 +209,7 @@ impl Plant<'_, f64> {
                 let swept = table.volume_slope.re * arm * group.count / group.rest_length;
                 let air = self.alphas[group.chamber].volume * pressure * swept * swept / volume;
                 let friction = self.presliding_stiffness(
+                    k,
                     group,
                     table.force(Dual64::from(gauge), Dual64::from(1.0)).re.abs(),
                     gauge,
@@ -211,68 +222,52 @@ impl Plant<'_, f64> {
     }
 
     /// Stiffness of one muscle's friction before it slips [N/m]: every element of the bank still sticks.
-    fn presliding_stiffness(&self, group: &Group, force: f64, gauge: f64) -> f64 {
+    fn presliding_stiffness(&self, k: usize, group: &Group, force: f64, gauge: f64) -> f64 {
         let mut total = 0.0;
         if group.direction {
             let spec = &group.muscle.exact.spec;
             let width = spec.friction_coefficient.abs() + (spec.friction_pressure_slope * gauge).abs();
-            total += width.max(spec.friction_floor) * force * BANK / group.muscle.presliding();
+            total += width.max(spec.friction_floor) * force * STUCK / group.muscle.presliding();
         }
-        if let (true, Some([constant, slope, presliding])) =
-            (group.effects.hysteresis, self.rig.wiring.effects.hysteresis)
-        {
-            total += (self.values[constant] + self.values[slope] * gauge) * BANK / self.values[presliding];
+        for acting in &self.rig.wiring.ports.muscles[k].force {
+            total += self.effect(acting).presliding(gauge);
         }
         total
     }
 
-    /// Damping and stiffness that effects add to a coordinate at most.
+    /// Damping and stiffness that effects add to a coordinate at most, those on its muscles included.
     fn resistance(&self, coordinate: usize) -> (f64, f64) {
-        let (wiring, units) = (&self.rig.wiring, &self.rig.wiring.effects);
-        let value = |id| self.values[id];
-        let own = &wiring.coordinates[coordinate].effects;
-        let (mut damping, mut stiffness) = self.closure_resistance(coordinate);
-        if let (true, Some([stiction, speed])) = (own.stribeck, units.stribeck) {
-            damping += joint_coulomb_stribeck::steepest(value(stiction), value(speed));
-        }
-        if let (true, Some([k, angle, dissipation, exponent, side])) = (own.stop, units.stop) {
-            let (low, high) =
-                wiring.coordinates[coordinate].stops.map_or((0.0, 0.0), |s| (s.min_angle, s.max_angle));
-            let depth = if value(side) >= 0.0 { high - value(angle) } else { value(angle) - low }.max(0.0);
-            let (k, n) = (value(k), value(exponent));
-            stiffness += joint_end_stop::tangent(k, n, depth);
-            let blow = (high - low).min(0.1);
-            damping += joint_end_stop::tangent(k, n, blow) / n * blow * value(dissipation);
-        }
-        let (rubbing, contact) = self.muscles_resistance(coordinate);
-        damping += rubbing;
-        stiffness += contact;
-        (damping, stiffness)
-    }
-
-    /// Damping and stiffness that effects on its muscles add to a coordinate at most.
-    fn muscles_resistance(&self, coordinate: usize) -> (f64, f64) {
-        let (wiring, units) = (&self.rig.wiring, &self.rig.wiring.effects);
-        let value = |id| self.values[id];
-        let gauge = self.rig.highest_pressure() - self.rig.gas.ambient_pressure;
-        let (mut damping, mut stiffness) = (0.0, 0.0);
-        for group in wiring.groups.iter().filter(|g| g.coordinate == coordinate) {
+        let wiring = &self.rig.wiring;
+        let stops = wiring.coordinates[coordinate].stops;
+        let angles = stops.map_or((0.0, 0.0), |s| (s.min_angle, s.max_angle));
+        let most = self.reach(angles, 0.0);
+        let (mut damping, mut stiffness) = self.summed(&wiring.ports.torque[coordinate], &most);
+        for (k, group) in wiring.groups.iter().enumerate().filter(|(_, g)| g.coordinate == coordinate) {
             let (low, high) = self.rig.angles(group);
-            let points = (0..=16).map(|i| group.joint.eval(low + (high - low) * f64::from(i) / 16.0));
+            let share = |i: u32| low + (high - low) * f64::from(i) / f64::from(ARM_POINTS);
+            let points = (0..=ARM_POINTS).map(|i| group.joint.eval(share(i)));
             let (arm, contracted) = points.fold((0.0_f64, 0.0_f64), |(arm, contracted), point| {
                 (arm.max(point.moment_arm.abs()), contracted.max(point.shortening / group.rest_length))
             });
             let side = group.count * arm * arm;
-            if let (true, Some(ids)) = (group.effects.damping, units.damping) {
-                damping += muscle_rate_damping::largest(ids.map(value), gauge) * side;
-            }
-            if let (true, Some(ids)) = (group.effects.crowding, units.crowding) {
-                let contact = ids.map(value);
-                damping += pam_crowding_contact::largest(contact, gauge, contracted) * side;
-                stiffness +=
-                    pam_crowding_contact::stiffest(contact, gauge, contracted) / group.rest_length * side;
-            }
+            let most = self.reach(angles, contracted);
+            let (rubbing, contact) = self.summed(&wiring.ports.muscles[k].force, &most);
+            damping += rubbing * side;
+            stiffness += contact / group.rest_length * side;
         }
         (damping, stiffness)
+    }
+
+    fn summed(&self, acting: &[Acting], most: &Extremes) -> (f64, f64) {
+        acting
+            .iter()
+            .map(|acting| self.effect(acting).resistance(most))
+            .fold((0.0, 0.0), |sum, here| (sum.0 + here.0, sum.1 + here.1))
+    }
+
+    /// Extremes of a joint or of a muscle on it.
+    fn reach(&self, angles: (f64, f64), contraction: f64) -> Extremes {
+        let (pressure, ambient) = (self.rig.highest_pressure(), self.rig.gas.ambient_pressure);
+        Extremes { pressure, ambient, angles, contraction, valves: 0 }
     }
 }

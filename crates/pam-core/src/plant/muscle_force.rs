@@ -1,18 +1,15 @@
 //! What the muscles pull, with what they remember and what effects make of it.
 
 use super::memory::Memory;
-use super::rates::{Controls, Plant, Scratch};
+use super::rates::Plant;
 use super::units::Group;
 use crate::blocks::joint::JointPoint;
-use crate::effects::{
-    activation_pressure, mullins_softening, muscle_creep, muscle_hysteresis, muscle_rate_damping,
-    pam_crowding_contact,
-};
+use crate::effects::AtMuscle;
 use crate::muscle::TablePoint;
 use crate::scalar::{constant, Scalar};
 
 /// One group at one instant.
-pub(super) struct Pull<S> {
+pub(super) struct MuscleForce<S> {
     pub contraction: S,
     /// Of all its muscles [N].
     pub force: S,
@@ -23,19 +20,26 @@ pub(super) struct Pull<S> {
 
 impl<S: Scalar> Plant<'_, S> {
     #[inline(always)]
-    pub(super) fn pull(&self, k: usize, group: &Group, state: &[S], memory: &Memory<S>, start: S) -> Pull<S> {
+    pub(super) fn muscle_force(
+        &self,
+        k: usize,
+        group: &Group,
+        state: &[S],
+        memory: &Memory<S>,
+        start: S,
+    ) -> MuscleForce<S> {
         let point = group.joint.eval(state[self.layout.angle(group.coordinate)]);
         let contraction = point.shortening / group.rest_length;
         let table = group.muscle.table.eval(contraction);
         let gauge = state[self.layout.pressure(group.chamber)] - self.rig.gas.ambient_pressure;
         let scale = self.scales[k];
-        let force = if group.effects.some {
+        let force = if self.rig.wiring.ports.muscles[k].some {
             self.altered_force(k, group, state, memory, start, &point, &table)
         } else {
             let force = table.force(gauge, scale);
             self.directed(group, memory, start, contraction, gauge, scale, force)
         };
-        Pull {
+        MuscleForce {
             contraction,
             force: force * group.count,
             moment_arm: point.moment_arm,
@@ -78,61 +82,41 @@ impl<S: Scalar> Plant<'_, S> {
         point: &JointPoint<S>,
         table: &TablePoint<S>,
     ) -> S {
-        let (here, units, values) = (&group.effects, &self.rig.wiring.effects, &self.values);
-        let (contraction, scale) = (point.shortening / group.rest_length, self.scales[k]);
-        let mut gauge = state[self.layout.pressure(group.chamber)] - self.rig.gas.ambient_pressure;
-        if let (true, Some([threshold])) = (here.activation, units.activation) {
-            gauge = activation_pressure::effective(gauge, values[threshold]);
+        let here = &self.rig.wiring.ports.muscles[k];
+        let scale = self.scales[k];
+        let mut at = self.at_muscle(group, state, point);
+        at.stretched = (start - at.contraction) * group.rest_length;
+        for acting in &here.gauge {
+            at.gauge = self.effect(acting).gauge(at.gauge);
         }
-        let mut force = table.force(gauge, scale);
-        if let (true, Some([softening, width])) = (here.softening, units.softening) {
-            let bladder = scale * (gauge * table.a_elastic + table.b_elastic);
-            let (softening, width) = (values[softening], values[width]);
-            force += mullins_softening::change(softening, width, bladder, contraction, memory.largest);
+        let mut force = table.force(at.gauge, scale);
+        for acting in &here.bladder {
+            let bladder = scale * (at.gauge * table.a_elastic + table.b_elastic);
+            force += self.effect(acting).bladder(self.own(acting, state), bladder, at.contraction);
         }
-        force = self.directed(group, memory, start, contraction, gauge, scale, force);
-        if let (true, Some([friction, pressure, presliding])) = (here.hysteresis, units.hysteresis) {
-            let stretched = (start - contraction) * group.rest_length;
-            let slip = memory.hysteresis.moved(stretched, values[presliding]);
-            force += muscle_hysteresis::force(&slip, values[friction], values[pressure], gauge);
-        }
-        if let (Some(damper), Some([stiffness, _])) = (here.creep, units.creep) {
-            let damper = state[self.layout.extra(damper)];
-            force += muscle_creep::force(values[stiffness], length(group, point.shortening), damper);
-        }
-        let rate = -(point.moment_arm * state[self.layout.rate(group.coordinate)]);
-        if let (true, Some(damping)) = (here.damping, units.damping) {
-            force += muscle_rate_damping::force(damping.map(|id| values[id]), gauge, rate);
-        }
-        if let (true, Some(contact)) = (here.crowding, units.crowding) {
-            force += pam_crowding_contact::force(contact.map(|id| values[id]), gauge, contraction, rate);
+        force = self.directed(group, memory, start, at.contraction, at.gauge, scale, force);
+        for acting in &here.force {
+            force += self.effect(acting).force(&at, self.own(acting, state));
         }
         force
     }
 
-    /// Rates of what the effects on the muscles and the closures need; of the rest zero.
-    #[inline(never)]
-    pub(super) fn extra_rates(&self, state: &[S], controls: &Controls<S>, here: &Scratch<S>, out: &mut [S]) {
-        let layout = &self.layout;
-        out[layout.extra(0)..layout.states()].fill(constant(0.0));
-        self.closure_rates(state, controls, here, out);
-        let Some([_, time_constant]) = self.rig.wiring.effects.creep else { return };
-        for group in &self.rig.wiring.groups {
-            let Some(damper) = group.effects.creep.map(|k| layout.extra(k)) else { continue };
-            let shortening = group.joint.eval(state[layout.angle(group.coordinate)]).shortening;
-            let time_constant = self.values[time_constant];
-            out[damper] = muscle_creep::rate(time_constant, length(group, shortening), state[damper]);
+    /// What effects see of a group of muscles that have not moved since the step began.
+    fn at_muscle(&self, group: &Group, state: &[S], point: &JointPoint<S>) -> AtMuscle<S> {
+        AtMuscle {
+            gauge: state[self.layout.pressure(group.chamber)] - self.rig.gas.ambient_pressure,
+            contraction: point.shortening / group.rest_length,
+            length: -point.shortening + group.rest_length,
+            rate: -(point.moment_arm * state[self.layout.rate(group.coordinate)]),
+            stretched: constant(0.0),
         }
     }
 
-    /// Dampers of creeping muscles at rest.
-    pub(super) fn settle_dampers(&self, state: &mut [S]) {
-        for group in &self.rig.wiring.groups {
-            if let Some(damper) = group.effects.creep {
-                let shortening = group.joint.eval(state[self.layout.angle(group.coordinate)]).shortening;
-                state[self.layout.extra(damper)] = length(group, shortening);
-            }
-        }
+    /// The same for a group by its number.
+    pub(super) fn at_group(&self, k: usize, state: &[S]) -> AtMuscle<S> {
+        let group = &self.rig.wiring.groups[k];
+        let point = group.joint.eval(state[self.layout.angle(group.coordinate)]);
+        self.at_muscle(group, state, &point)
     }
 
     /// Contraction ratio of each group at a state.
@@ -143,45 +127,29 @@ impl<S: Scalar> Plant<'_, S> {
         }
     }
 
-    /// Memories of muscles that have never been further than in a state.
-    pub fn fresh_memory(&self, state: &[S]) -> Vec<Memory<S>> {
-        let mut now = vec![constant(0.0); self.rig.wiring.groups.len()];
-        self.contractions(state, &mut now);
-        let softens = |k: usize| self.rig.wiring.groups[k].effects.softening;
-        let memory = |(k, e): (usize, &S)| {
-            let largest = if softens(k) { *e } else { constant(0.0) };
-            Memory { largest, ..Memory::default() }
-        };
-        now.iter().enumerate().map(memory).collect()
+    /// Memories of muscles that have not moved.
+    pub fn fresh_memory(&self) -> Vec<Memory<S>> {
+        vec![Memory::default(); self.rig.wiring.groups.len()]
     }
 
-    /// Memories after a step that moved the muscles between contraction ratios.
-    pub fn advance_memory(&self, memory: &mut [Memory<S>], from: &[S], to: &[S]) {
+    /// Memories, and the states of effects that follow the muscles, after a step that moved these between contraction ratios.
+    pub fn follow_muscles(&self, state: &mut [S], memory: &mut [Memory<S>], from: &[S], to: &[S]) {
         for (k, group) in self.rig.wiring.groups.iter().enumerate() {
-            let stretched = (from[k] - to[k]) * group.rest_length;
             if group.direction {
+                let stretched = (from[k] - to[k]) * group.rest_length;
                 memory[k].direction =
                     memory[k].direction.moved(stretched, constant(group.muscle.presliding()));
             }
-            if let (true, Some([.., presliding])) =
-                (group.effects.hysteresis, self.rig.wiring.effects.hysteresis)
-            {
-                memory[k].hysteresis = memory[k].hysteresis.moved(stretched, self.values[presliding]);
-            }
-            if group.effects.softening && to[k].re() > memory[k].largest.re() {
-                memory[k].largest = to[k];
-            }
+        }
+        for (k, acting) in self.rig.wiring.ports.follow_muscles() {
+            let rest = self.rig.wiring.groups[k].rest_length;
+            self.effect(&acting).moved(self.own_mut(&acting, state), from[k], to[k], rest);
         }
     }
 
     /// Whether any muscle remembers its motion.
     pub fn remembers(&self) -> bool {
-        let remembers = |g: &Group| g.direction || g.effects.hysteresis || g.effects.softening;
-        self.rig.wiring.groups.iter().any(remembers)
+        let wiring = &self.rig.wiring;
+        wiring.groups.iter().any(|g| g.direction) || wiring.ports.follow_muscles().next().is_some()
     }
-}
-
-/// Length of a group's muscles [m].
-fn length<S: Scalar>(group: &Group, shortening: S) -> S {
-    -shortening + group.rest_length
 }

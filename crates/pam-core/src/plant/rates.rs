@@ -1,18 +1,20 @@
 //! The state equation of a rig, composed of its blocks.
 //!
 //! States as in [`Layout`]: absolute pressures of supplies and gases [Pa], gas masses [kg], joint angles [rad] and rates
-//! [rad/s], then what effects need and, where they are kept, the sums of [`super::layout::BOOKS`]. Any of them can be *driven* by a signal
+//! [rad/s], then what effects need and, where they are kept, the sums of [`super::layout::BALANCE`]. Any of them can be *driven* by a signal
 //! instead of being integrated: that is where the rig is cut.
 
 use super::body::Body;
-use super::layout::{Channel, Layout, BOOK_COUNT};
+use super::layout::{Channel, Layout, BALANCE_COUNT};
 use super::memory::Memory;
+use super::ports::Acting;
 use super::units::{LineUnit, Path, SupplyUnit};
 use super::{Rig, Values};
 use crate::blocks::chamber::Polytropic;
+use crate::blocks::chamber::{cube_area, cylinder_area, gas_temperature};
 use crate::blocks::supply::Supply;
 use crate::blocks::tube::Tube;
-use crate::effects::{heat_transfer, tube_flow_restriction};
+use crate::effects::{Effect, Number};
 use crate::scalar::{constant, Scalar};
 use crate::Result;
 
@@ -25,8 +27,8 @@ pub struct Simulated {
     gas: bool,
     /// Some motion is integrated.
     motion: bool,
-    /// Some number of an effect is integrated.
-    extras: bool,
+    /// Some state of an effect is integrated.
+    effects: bool,
 }
 
 impl Simulated {
@@ -34,11 +36,11 @@ impl Simulated {
     pub fn all_but(layout: &Layout, places: &[usize]) -> Self {
         let driven: Vec<bool> = (0..layout.states()).map(|k| places.contains(&k)).collect();
         let some = |from: usize, to: usize| driven[from..to].iter().any(|d| !d);
-        let end = layout.extra(0);
+        let end = layout.effect(0);
         Self {
             gas: some(0, layout.angle(0)),
             motion: some(layout.angle(0), end),
-            extras: some(end, layout.states()),
+            effects: some(end, layout.states()),
             driven,
         }
     }
@@ -74,12 +76,12 @@ pub(super) enum Line<S> {
 }
 
 /// A rig with the values of its parameters in a scalar type.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub struct Plant<'a, S> {
     pub(super) rig: &'a Rig,
     pub(super) layout: Layout,
     pub(super) values: Values<S>,
-    books: bool,
+    balanced: bool,
     pub(super) supplies: Vec<Supply<S>>,
     /// Fixed volume of each gas, halves of tubes included [m3].
     pub(super) fixed_volume: Vec<S>,
@@ -88,10 +90,8 @@ pub struct Plant<'a, S> {
     pub(super) lines: Vec<Line<S>>,
     pub(super) scales: Vec<S>,
     pub(super) body: Body<S>,
-    /// Tube behind each valve, by the effect.
-    pub(super) restriction: Option<Tube<S>>,
-    /// Transducers sit at the valve's end of those tubes.
-    tapped: bool,
+    /// Effects that are switched on.
+    effects: Vec<Box<dyn Effect<S>>>,
     /// Effects act on supplies, on joints or arm.
     pub(super) supplies_altered: bool,
     motion_altered: bool,
@@ -118,12 +118,12 @@ pub struct Scratch<S> {
     now: Vec<S>,
 }
 
-impl<'a, S: Scalar> Plant<'a, S> {
-    /// Compose a rig with parameter values; `books` keeps the sums of [`super::layout::BOOKS`] behind the states.
+impl<'a, S: Number> Plant<'a, S> {
+    /// Compose a rig with parameter values; `balanced` keeps the sums of [`super::layout::BALANCE`] behind the states.
     ///
     /// # Errors
     /// [`crate::Error::Parameter`] for links that cannot be.
-    pub fn new(rig: &'a Rig, values: Values<S>, books: bool) -> Result<Self> {
+    pub fn new(rig: &'a Rig, values: Values<S>, balanced: bool) -> Result<Self> {
         let wiring = &rig.wiring;
         let line = |line: &LineUnit| match line.path {
             Path::Orifice(area) => Line::Orifice(values[area]),
@@ -141,7 +141,7 @@ impl<'a, S: Scalar> Plant<'a, S> {
         let isothermal = Polytropic { inflow: constant(1.0), outflow: constant(1.0), volume: constant(1.0) };
         Ok(Self {
             layout: rig.layout,
-            books,
+            balanced,
             supplies: (wiring.supplies.iter())
                 .map(|supply| match supply {
                     SupplyUnit::Tank(volume) => Supply::Tank(values[*volume]),
@@ -170,32 +170,44 @@ impl<'a, S: Scalar> Plant<'a, S> {
             lines,
             scales: wiring.groups.iter().map(|group| values[group.scale]).collect(),
             body: Body::new(&wiring.body, &wiring.coordinates, &values)?,
-            supplies_altered: wiring.effects.on_supplies(),
-            motion_altered: wiring.effects.on_motion(),
-            restriction: (wiring.effects.restriction)
-                .filter(|[id, _]| values[*id].re() < tube_flow_restriction::NONE)
-                .map(|[id, _]| tube_flow_restriction::tube(values[id], rig.gas.temperature)),
-            tapped: (wiring.effects.restriction)
-                .is_some_and(|[_, tap]| values[tap].re() >= tube_flow_restriction::AT_VALVE),
+            supplies_altered: wiring.ports.on_supplies(),
+            motion_altered: wiring.ports.on_motion(),
+            effects: (wiring.ports.effects.iter())
+                .map(|effect| {
+                    let own: Vec<S> = effect.parameters.iter().map(|id| values[*id]).collect();
+                    S::effect(&effect.form.make, &own, &rig.gas)
+                })
+                .collect(),
             rig,
             values,
         })
     }
+}
 
+impl<'a, S: Scalar> Plant<'a, S> {
     /// Parameter values.
     pub fn values(&self) -> &Values<S> {
         &self.values
     }
 
-    /// Gases whose transducers sit in front of tubes, with the valves there.
-    pub fn taps(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
-        let gases = self.rig.wiring.gases.iter().enumerate().filter(|_| self.tapped().is_some());
-        gases.filter_map(|(gas, unit)| unit.tap.map(|(valve, _)| (gas, valve)))
+    /// What acts.
+    #[inline]
+    pub(super) fn effect(&self, acting: &Acting) -> &dyn Effect<S> {
+        &*self.effects[acting.effect]
     }
 
-    /// The tube in front of which transducers sit.
-    pub(super) fn tapped(&self) -> Option<&Tube<S>> {
-        self.restriction.as_ref().filter(|_| self.tapped)
+    /// The states of what acts.
+    #[inline]
+    pub(super) fn own<'s>(&self, acting: &Acting, state: &'s [S]) -> &'s [S] {
+        let first = self.layout.effect(acting.first);
+        &state[first..first + acting.count]
+    }
+
+    /// The same, to be written.
+    #[inline]
+    pub(super) fn own_mut<'s>(&self, acting: &Acting, state: &'s mut [S]) -> &'s mut [S] {
+        let first = self.layout.effect(acting.first);
+        &mut state[first..first + acting.count]
     }
 
     /// The rig.
@@ -203,9 +215,9 @@ impl<'a, S: Scalar> Plant<'a, S> {
         self.rig
     }
 
-    /// Length of the state, books included.
+    /// Length of the state, the sums of the balance included.
     pub fn states(&self) -> usize {
-        self.layout.states() + if self.books { BOOK_COUNT } else { 0 }
+        self.layout.states() + if self.balanced { BALANCE_COUNT } else { 0 }
     }
 
     /// Room for the equations.
@@ -237,25 +249,24 @@ impl<'a, S: Scalar> Plant<'a, S> {
         here.volume_rate.fill(zero);
         here.torque.fill(zero);
         here.muscle_work = zero;
-        let heat = self.rig.wiring.effects.heat.is_some();
+        let heat = self.rig.wiring.ports.on_balance();
         if heat {
             here.wall.fill(zero);
         }
         for (k, group) in self.rig.wiring.groups.iter().enumerate() {
-            let pull = self.pull(k, group, state, &memory[k], start[k]);
+            let muscle = self.muscle_force(k, group, state, &memory[k], start[k]);
             let rate = state[self.layout.rate(group.coordinate)];
-            (here.contraction[k], here.force[k]) = (pull.contraction, pull.force);
-            here.volume[group.chamber] += pull.table.volume * group.count;
+            (here.contraction[k], here.force[k]) = (muscle.contraction, muscle.force);
+            here.volume[group.chamber] += muscle.table.volume * group.count;
             here.volume_rate[group.chamber] +=
-                pull.table.volume_slope * pull.moment_arm * rate * (group.count / group.rest_length);
-            here.torque[group.coordinate] += pull.force * pull.torque_arm;
-            if self.books {
-                here.muscle_work += pull.force * pull.moment_arm * rate;
+                muscle.table.volume_slope * muscle.moment_arm * rate * (group.count / group.rest_length);
+            here.torque[group.coordinate] += muscle.force * muscle.torque_arm;
+            if self.balanced {
+                here.muscle_work += muscle.force * muscle.moment_arm * rate;
             }
             if heat {
-                let length = (-pull.contraction + 1.0) * group.rest_length;
-                here.wall[group.chamber] +=
-                    heat_transfer::cylinder_area(group.count, pull.table.volume, length);
+                let length = (-muscle.contraction + 1.0) * group.rest_length;
+                here.wall[group.chamber] += cylinder_area(group.count, muscle.table.volume, length);
             }
         }
         if heat {
@@ -265,9 +276,9 @@ impl<'a, S: Scalar> Plant<'a, S> {
 
     /// Wall area of the gases without muscles [m2]: the cube of their volume.
     fn cubes(&self, here: &mut Scratch<S>) {
-        for (k, gas) in self.rig.wiring.gases.iter().enumerate() {
-            if gas.heat && self.rig.wiring.groups.iter().all(|g| g.chamber != k) {
-                here.wall[k] = heat_transfer::cube_area(here.volume[k]);
+        for (k, balance) in self.rig.wiring.ports.balance.iter().enumerate() {
+            if balance.is_some() && self.rig.wiring.groups.iter().all(|g| g.chamber != k) {
+                here.wall[k] = cube_area(here.volume[k]);
             }
         }
     }
@@ -285,12 +296,9 @@ impl<'a, S: Scalar> Plant<'a, S> {
     /// Mass of a gas [kg] at the start of a recording: at rest temperature plus the initial rise.
     pub fn initial_mass(&self, gas: usize, state: &[S]) -> S {
         let rest = self.rest_mass(gas, state);
-        match self.rig.wiring.effects.heat {
-            Some([_, rise, _]) if self.rig.wiring.gases[gas].heat => {
-                let temperature = self.rig.gas.temperature;
-                rest * temperature / (self.values[rise] + temperature)
-            }
-            _ => rest,
+        match &self.rig.wiring.ports.balance[gas] {
+            Some(acting) => self.effect(acting).initial_mass(&self.rig.gas, rest),
+            None => rest,
         }
     }
 
@@ -316,9 +324,9 @@ impl<'a, S: Scalar> Plant<'a, S> {
             out[..layout.angle(0)].fill(constant(0.0));
         }
         let (angle, rate) = (layout.angle(0), layout.rate(0));
-        let end = layout.extra(0);
-        if simulated.extras {
-            self.extra_rates(state, controls, here, out);
+        let end = layout.effect(0);
+        if simulated.effects {
+            self.effect_rates(state, controls, here, out);
         }
         if simulated.motion && self.body.moves() {
             let (angles, rates) = state[angle..end].split_at(layout.coordinates);
@@ -331,8 +339,8 @@ impl<'a, S: Scalar> Plant<'a, S> {
         } else {
             out[angle..end].fill(constant(0.0));
         }
-        if self.books {
-            self.book(state, here, out);
+        if self.balanced {
+            self.balances(state, here, out);
         }
         for (out, driven) in out.iter_mut().zip(&simulated.driven) {
             if *driven {
@@ -342,7 +350,7 @@ impl<'a, S: Scalar> Plant<'a, S> {
     }
 
     #[inline(always)]
-    fn book(&self, state: &[S], here: &Scratch<S>, out: &mut [S]) {
+    fn balances(&self, state: &[S], here: &Scratch<S>, out: &mut [S]) {
         let (gas, layout) = (&self.rig.gas, &self.layout);
         let rt = gas.gas_constant * gas.temperature;
         let (mut drawn, mut exergy, mut vented) = (constant::<S>(0.0), constant::<S>(0.0), here.vented);
@@ -406,14 +414,14 @@ impl Plant<'_, f64> {
                 Channel::Torque(k) => here.torque[k],
                 Channel::Volume(k) => here.volume[k],
                 Channel::Mass(k) => state[layout.mass(k)],
-                Channel::Temperature(k) if wiring.gases[k].heat => heat_transfer::temperature(
+                Channel::Temperature(k) if wiring.ports.balance[k].is_some() => gas_temperature(
                     &self.rig.gas,
                     state[layout.pressure(k)],
                     here.volume[k],
                     state[layout.mass(k)],
                 ),
                 Channel::Temperature(_) => self.rig.gas.temperature,
-                Channel::Book(k) => state.get(layout.book(k)).copied().unwrap_or(f64::NAN),
+                Channel::Balance(k) => state.get(layout.balance(k)).copied().unwrap_or(f64::NAN),
             });
         }
         here.now = now;

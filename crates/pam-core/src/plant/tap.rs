@@ -1,25 +1,39 @@
 //! Where the transducer of a gas sits: at the gas, or in front of the tube through which a valve feeds it.
 
+use super::ports::Acting;
 use super::rates::{Controls, Plant};
-use crate::effects::tube_flow_restriction;
 use crate::scalar::{constant, Scalar};
 
 impl<S: Scalar> Plant<'_, S> {
+    /// Gases whose transducers sit at the valve's end of what it feeds them through, with the valves there.
+    pub fn taps(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        (0..self.layout.gases).filter_map(|gas| self.tap(gas).map(|(valve, _)| (gas, valve)))
+    }
+
+    /// The valve in front of a gas at which its transducer sits, and what is between them.
+    fn tap(&self, gas: usize) -> Option<(usize, &Acting)> {
+        let (valve, acting) = self.rig.wiring.ports.tap[gas].as_ref()?;
+        self.effect(acting).taps().then_some((*valve, acting))
+    }
+
     /// Place of what the sensor of a gas reads.
     pub fn reading(&self, gas: usize) -> usize {
-        let unit = &self.rig.wiring.gases[gas];
-        let tap = unit.tap.filter(|_| self.tapped().is_some()).map(|(_, place)| place);
-        unit.lag.or(tap).map_or(self.layout.pressure(gas), |place| self.layout.extra(place))
+        let lag = self.rig.wiring.ports.reading[gas].as_ref();
+        let acting = lag.or(self.tap(gas).map(|(_, acting)| acting));
+        acting.map_or(self.layout.pressure(gas), |acting| self.layout.effect(acting.first))
+    }
+
+    /// Place of the reading of a sensor that lags, and how far it does [s]; None for one that does not.
+    pub fn lagging(&self, gas: usize) -> Option<(usize, S)> {
+        let acting = self.rig.wiring.ports.reading[gas].as_ref()?;
+        Some((self.layout.effect(acting.first), self.effect(acting).lag()))
     }
 
     /// Write the pressures between valves and tubes, where sensors sit there: those of a state, its commands held.
     pub fn read_taps(&self, state: &mut [S], controls: &Controls<S>) {
-        if self.tapped().is_none() {
-            return;
-        }
-        for (k, gas) in self.rig.wiring.gases.iter().enumerate() {
-            if let Some((_, place)) = gas.tap {
-                state[self.layout.extra(place)] = self.at_sensor(k, state, controls);
+        for gas in 0..self.layout.gases {
+            if let Some((_, acting)) = self.tap(gas) {
+                state[self.layout.effect(acting.first)] = self.at_sensor(gas, state, controls);
             }
         }
     }
@@ -27,27 +41,23 @@ impl<S: Scalar> Plant<'_, S> {
     /// Absolute pressure where the sensor of a gas sits [Pa]: that of the gas while its valve is shut.
     pub fn at_sensor(&self, gas: usize, state: &[S], controls: &Controls<S>) -> S {
         let inside = state[self.layout.pressure(gas)];
-        let (Some(tube), Some((valve, _))) = (self.tapped(), self.rig.wiring.gases[gas].tap) else {
-            return inside;
-        };
+        let Some((valve, acting)) = self.tap(gas) else { return inside };
         let (area, filling) = self.opening(valve, controls.spool[valve]);
-        let air = &self.rig.gas;
+        let (air, effect) = (&self.rig.gas, self.effect(acting));
         if area.re() <= 0.0 {
             inside
         } else if filling {
             let outside = self.pressure_at(self.rig.wiring.valves[valve].from, state);
-            tube_flow_restriction::node(air, area, tube, outside, inside, false)
+            effect.between(air, area, outside, inside, false)
         } else {
-            tube_flow_restriction::node(air, area, tube, inside, constant(air.ambient_pressure), true)
+            effect.between(air, area, inside, constant(air.ambient_pressure), true)
         }
     }
 
     /// Absolute pressure of a gas [Pa] whose sensor sits where the pressure is `there`: the valve's flow is known from the
     /// pressures at its two sides, and the tube passes it to one pressure. At most the highest that the rig can have.
     pub fn behind_tube(&self, gas: usize, there: S, state: &[S], spool: S) -> S {
-        let (Some(tube), Some((valve, _))) = (self.tapped(), self.rig.wiring.gases[gas].tap) else {
-            return there;
-        };
+        let Some((valve, acting)) = self.tap(gas) else { return there };
         let (area, filling) = self.opening(valve, spool);
         let air = &self.rig.gas;
         if area.re() <= 0.0 || there.re() <= 0.0 {
@@ -58,7 +68,7 @@ impl<S: Scalar> Plant<'_, S> {
         } else {
             -air.mass_flow(area, there, constant(air.ambient_pressure))
         };
-        let inside = tube.other_end(there, flow);
+        let inside = self.effect(acting).behind(there, flow);
         let highest = self.rig.highest_pressure().max(there.re());
         if inside.re() <= highest {
             inside

@@ -1,9 +1,7 @@
 //! The blocks of a rig with their ports resolved to indices and their numbers to parameters.
 
-use super::parameters::{ParameterId, Parameters};
-use super::units_effects::{
-    ArmEffects, EffectUnits, JointEffects, MuscleEffects, SupplyEffects, ValveEffects,
-};
+use super::parameters::ParameterId;
+use super::ports::Ports;
 use crate::blocks::arm::planar::Stops;
 use crate::blocks::joint::Joint;
 use crate::blocks::valve::AreaTable;
@@ -47,7 +45,6 @@ pub(crate) struct ValveUnit {
     pub area: ParameterId,
     pub null: ParameterId,
     pub half_range: f64,
-    pub effects: ValveEffects,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -75,14 +72,6 @@ pub(crate) struct GasUnit {
     pub pressure_zero: Option<ParameterId>,
     /// Gauge [Pa]; an inlet begins at the pressure of the line's end.
     pub initial_pressure: f64,
-    pub leak: bool,
-    pub heat: bool,
-    /// Valve whose tube its sensor sits in front of, where one has the effect, and the pressure there among the extras.
-    pub tap: Option<(usize, usize)>,
-    /// Reading of its lagging sensor among the extras.
-    pub lag: Option<usize>,
-    /// First of what its closure remembers, among the extras.
-    pub closure: Option<usize>,
 }
 
 /// Muscles of one kind that share a chamber and a joint.
@@ -96,7 +85,6 @@ pub(crate) struct Group {
     pub count: f64,
     pub rest_length: f64,
     pub direction: bool,
-    pub effects: MuscleEffects,
 }
 
 /// What moves: a joint angle, or the shortening of a linear load.
@@ -105,7 +93,6 @@ pub(crate) struct Coordinate {
     pub rest: f64,
     pub stops: Option<Stops>,
     pub zero: Option<ParameterId>,
-    pub effects: JointEffects,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -150,7 +137,6 @@ pub(crate) enum BodyUnit {
 /// A whole rig, resolved.
 #[derive(Debug, Clone)]
 pub(crate) struct Wiring {
-    pub parameters: Parameters,
     pub supplies: Vec<SupplyUnit>,
     pub gases: Vec<GasUnit>,
     /// The first `chambers` of `gases` are chambers, the rest inlets of lines.
@@ -162,10 +148,6 @@ pub(crate) struct Wiring {
     pub groups: Vec<Group>,
     pub coordinates: Vec<Coordinate>,
     pub body: BodyUnit,
-    pub effects: EffectUnits,
-    /// Effects on each supply.
-    pub supply_effects: Vec<SupplyEffects>,
-    pub arm_effects: ArmEffects,
-    /// Numbers behind the states: what effects move or remember.
-    pub extras: usize,
+    /// Effects at the ports of the blocks.
+    pub ports: Ports,
 }

@@ -1,12 +1,12 @@
 //! How the air and the effects of a description fit together: ports become indices, numbers become parameters.
 
 use super::parameters::Parameters;
+use super::ports::{switch_on, Ports as EffectPorts};
 use super::units::{Coordinate, GasUnit, Group, LineUnit, Node, Path, SupplyUnit, ValveUnit, Wiring};
-use super::units_effects::{ArmEffects, EffectUnits, SupplyEffects, ValveEffects};
-use super::wiring_effects::switch_on;
 use super::wiring_motion::{body, coordinate_names, coordinates, groups};
 use crate::blocks::valve::AreaTable;
-use crate::description::{dotted, RigSpec};
+use crate::description::{dotted, RigSpec, SupplySpec};
+use crate::effects::EffectInfo;
 use crate::{Error, Result};
 
 pub(super) fn model<T>(text: impl Into<String>) -> Result<T> {
@@ -62,15 +62,20 @@ impl<'a> Ports<'a> {
 }
 
 impl Wiring {
-    /// Resolve a description whose values are checked; `known` are compiled muscles to use again.
-    pub fn new(spec: &RigSpec, known: &[Group]) -> Result<Self> {
+    /// Resolve a description whose words are checked, with the numbers of its blocks; `known` are compiled muscles to use
+    /// again, `effects` all that there are.
+    pub fn new(
+        spec: &RigSpec,
+        known: &[Group],
+        effects: &[&'static EffectInfo],
+    ) -> Result<(Self, Parameters)> {
         no_twins(spec)?;
         let ports = Ports::new(spec);
         let mut table = Parameters::default();
-        let supplies = supplies(spec, &mut table);
+        let supplies = supplies(spec, &mut table)?;
         let valves = valves(spec, &ports, &mut table)?;
         let (lines, inlets) = lines(spec, &ports, &valves, &mut table)?;
-        let mut gases = gases(spec, &inlets, &mut table);
+        let mut gases = gases(spec, &inlets, &mut table)?;
         for (k, line) in lines.iter().enumerate().filter(|(_, l)| matches!(l.path, Path::Tube { .. })) {
             for end in [line.from, line.to] {
                 if let Node::Gas(gas) = end {
@@ -80,13 +85,11 @@ impl Wiring {
         }
         let coordinates = coordinates(spec)?;
         let groups = groups(spec, known, &mut table)?;
-        let body = body(spec, &mut table);
+        let body = body(spec, &mut table)?;
         sensors(spec, &mut table, &mut gases)?;
         let coordinates = zeros(spec, &table, coordinates);
         let mut wiring = Self {
-            parameters: table,
             chambers: spec.chambers.len(),
-            supply_effects: vec![SupplyEffects::default(); supplies.len()],
             supplies,
             gases,
             inlets,
@@ -95,12 +98,10 @@ impl Wiring {
             groups,
             coordinates,
             body,
-            effects: EffectUnits::default(),
-            arm_effects: ArmEffects::default(),
-            extras: 0,
+            ports: EffectPorts::default(),
         };
-        switch_on(spec, &mut wiring)?;
-        Ok(wiring)
+        switch_on(spec, effects, &mut table, &mut wiring)?;
+        Ok((wiring, table))
     }
 }
 
@@ -128,19 +129,19 @@ fn no_twins(spec: &RigSpec) -> Result<()> {
     twins("sensors", spec.sensors.iter().map(|b| &b.name))
 }
 
-fn supplies(spec: &RigSpec, table: &mut Parameters) -> Vec<SupplyUnit> {
-    let unit = |supply: &crate::description::SupplySpec| {
+fn supplies(spec: &RigSpec, table: &mut Parameters) -> Result<Vec<SupplyUnit>> {
+    let mut unit = |supply: &SupplySpec| {
         let name = |key: &str| format!("{}.{key}", dotted("supply", &supply.name));
-        match supply.kind.as_str() {
-            "tank" => SupplyUnit::Tank(table.add(name("volume"), supply.volume)),
+        Ok(match supply.kind.as_str() {
+            "tank" => SupplyUnit::Tank(table.add(name("volume"), supply.volume, (1e-7, 1e4, "m3"))?),
             "regulator" => SupplyUnit::Regulator {
-                time_constant: table.add(name("time_constant"), supply.time_constant),
-                droop: table.add(name("droop"), supply.droop),
+                time_constant: table.add(name("time_constant"), supply.time_constant, (1e-5, 1e3, "s"))?,
+                droop: table.add(name("droop"), supply.droop, (0.0, 1e13, "Pa s/kg"))?,
             },
             _ => SupplyUnit::Constant,
-        }
+        })
     };
-    spec.supplies.iter().map(unit).collect()
+    spec.supplies.iter().map(&mut unit).collect()
 }
 
 fn valves(spec: &RigSpec, ports: &Ports<'_>, table: &mut Parameters) -> Result<Vec<ValveUnit>> {
@@ -165,10 +166,13 @@ fn valves(spec: &RigSpec, ports: &Ports<'_>, table: &mut Parameters) -> Result<V
             from,
             to,
             table: AreaTable::new(&valve.opening, &valve.fraction)?,
-            area: table.add(format!("{block}.discharge_area_max"), valve.discharge_area_max),
-            null: table.add(format!("{block}.null_voltage"), valve.null_voltage),
+            area: table.add(
+                format!("{block}.discharge_area_max"),
+                valve.discharge_area_max,
+                (0.0, 1.0, "m2"),
+            )?,
+            null: table.add(format!("{block}.null_voltage"), valve.null_voltage, (-1e3, 1e3, "V"))?,
             half_range: valve.half_range,
-            effects: ValveEffects::default(),
         });
     }
     Ok(units)
@@ -199,18 +203,18 @@ fn lines(spec: &RigSpec, ports: &Ports<'_>, valves: &[ValveUnit], table: &mut Pa
         let name = |key: &str| format!("{block}.{key}");
         let path = if line.kind == "tube" {
             Path::Tube {
-                length: table.add(name("length"), line.length),
-                diameter: table.add(name("diameter"), line.diameter),
+                length: table.add(name("length"), line.length, (1e-4, 1e4, "m"))?,
+                diameter: table.add(name("diameter"), line.diameter, (1e-5, 1.0, "m"))?,
             }
         } else {
-            Path::Orifice(table.add(name("discharge_area"), line.discharge_area))
+            Path::Orifice(table.add(name("discharge_area"), line.discharge_area, (0.0, 1.0, "m2"))?)
         };
         units.push(LineUnit { from, to, path });
     }
     Ok((units, inlets))
 }
 
-fn gases(spec: &RigSpec, inlets: &[(usize, Node)], table: &mut Parameters) -> Vec<GasUnit> {
+fn gases(spec: &RigSpec, inlets: &[(usize, Node)], table: &mut Parameters) -> Result<Vec<GasUnit>> {
     let mut units = Vec::new();
     let plain = |volume, alphas, initial_pressure| GasUnit {
         volume,
@@ -218,25 +222,24 @@ fn gases(spec: &RigSpec, inlets: &[(usize, Node)], table: &mut Parameters) -> Ve
         initial_pressure,
         tubes: Vec::new(),
         pressure_zero: None,
-        leak: false,
-        heat: false,
-        tap: None,
-        lag: None,
-        closure: None,
     };
     for chamber in &spec.chambers {
         let name = |key: &str| format!("{}.{key}", dotted("chamber", &chamber.name));
-        let volume = table.add(name("dead_volume"), chamber.dead_volume);
+        let filled = spec.muscles.iter().any(|m| m.chamber == dotted("chamber", &chamber.name));
+        let least = if filled { 0.0 } else { 1e-9 };
+        let volume = table.add(name("dead_volume"), chamber.dead_volume, (least, 1e4, "m3"))?;
+        let polytropic = (0.2, 3.0, "");
         let alphas = [
-            table.add(name("alpha_in"), chamber.alpha_in),
-            table.add(name("alpha_out"), chamber.alpha_out),
-            table.add(name("alpha"), chamber.alpha),
+            table.add(name("alpha_in"), chamber.alpha_in, polytropic)?,
+            table.add(name("alpha_out"), chamber.alpha_out, polytropic)?,
+            table.add(name("alpha"), chamber.alpha, polytropic)?,
         ];
         units.push(plain(volume, Some(alphas), chamber.initial_pressure));
     }
     for (k, end) in inlets {
         let line = &spec.lines[*k];
-        let volume = table.add(format!("{}.inlet_volume", dotted("line", &line.name)), line.inlet_volume);
+        let name = format!("{}.inlet_volume", dotted("line", &line.name));
+        let volume = table.add(name, line.inlet_volume, (0.0, 1e3, "m3"))?;
         let pressure = match end {
             Node::Gas(gas) => spec.chambers.get(*gas).map_or(0.0, |c| c.initial_pressure),
             Node::Supply(supply) => spec.supplies[*supply].initial_pressure,
@@ -244,16 +247,16 @@ fn gases(spec: &RigSpec, inlets: &[(usize, Node)], table: &mut Parameters) -> Ve
         };
         units.push(plain(volume, None, pressure));
     }
-    units
+    Ok(units)
 }
 
 fn sensors(spec: &RigSpec, table: &mut Parameters, gases: &mut [GasUnit]) -> Result<()> {
     for sensor in &spec.sensors {
         let name = |key: &str| format!("{}.{key}", dotted("sensors", &sensor.name));
-        let pressure = table.add(name("pressure_zero"), sensor.pressure_zero);
-        table.add(name("angle_zero"), sensor.angle_zero);
+        let pressure = table.add(name("pressure_zero"), sensor.pressure_zero, (-1e7, 1e7, "Pa"))?;
+        table.add(name("angle_zero"), sensor.angle_zero, (-7.0, 7.0, "rad"))?;
         if spec.load.is_some() && sensor.name.is_empty() {
-            table.add(name("length_zero"), sensor.length_zero);
+            table.add(name("length_zero"), sensor.length_zero, (-10.0, 10.0, "m"))?;
         }
         let chambers = spec.chambers.iter().map(|c| &c.name);
         let known = chambers.clone().chain(spec.joints.iter().map(|j| &j.name)).any(|n| *n == sensor.name);

@@ -2,11 +2,11 @@
 
 use super::parameters::Parameters;
 use super::units::{BodyUnit, Coordinate, Group, LinkUnit, MOST_LINKS};
-use super::units_effects::{JointEffects, MuscleEffects};
 use super::wiring::model;
 use crate::blocks::arm::planar::Stops;
 use crate::blocks::joint::Joint;
 use crate::description::{dotted, ArmSpec, LinkSpec, LoadSpec, RigSpec};
+use crate::muscle::spec::MODULUS_SCALE;
 use crate::muscle::{CompiledMuscle, Muscle};
 use crate::Result;
 
@@ -22,12 +22,7 @@ pub(super) fn coordinates(spec: &RigSpec) -> Result<Vec<Coordinate>> {
         if spec.muscles.iter().any(|m| m.muscle.rest_length != rest) {
             return model("muscles on one load must have the same rest_length");
         }
-        return Ok(vec![Coordinate {
-            rest: 0.0,
-            stops: load_stops(load, rest),
-            zero: None,
-            effects: JointEffects::default(),
-        }]);
+        return Ok(vec![Coordinate { rest: 0.0, stops: load_stops(load, rest), zero: None }]);
     }
     let coordinate = |joint: &crate::description::JointSpec| Coordinate {
         rest: joint.rest_angle,
@@ -38,7 +33,6 @@ pub(super) fn coordinates(spec: &RigSpec) -> Result<Vec<Coordinate>> {
             damping: joint.stop_damping,
         }),
         zero: None,
-        effects: JointEffects::default(),
     };
     let named = |port: &str| spec.joints.iter().position(|j| dotted("joint", &j.name) == port);
     match &spec.arm {
@@ -149,11 +143,10 @@ pub(super) fn groups(spec: &RigSpec, known: &[Group], table: &mut Parameters) ->
             chamber,
             coordinate,
             joint,
-            scale: table.add(format!("{block}.modulus_scale"), group.muscle.modulus_scale),
+            scale: table.add(format!("{block}.modulus_scale"), group.muscle.modulus_scale, MODULUS_SCALE)?,
             count: f64::from(group.muscle.count),
             rest_length: group.muscle.rest_length,
             direction: muscle.has_direction(),
-            effects: MuscleEffects::default(),
             muscle,
         });
     }
@@ -163,45 +156,48 @@ pub(super) fn groups(spec: &RigSpec, known: &[Group], table: &mut Parameters) ->
     Ok(units)
 }
 
-pub(super) fn body(spec: &RigSpec, table: &mut Parameters) -> BodyUnit {
+pub(super) fn body(spec: &RigSpec, table: &mut Parameters) -> Result<BodyUnit> {
     if let Some(load) = spec.load.as_ref().filter(|load| !load.is_frame()) {
-        return BodyUnit::Mass {
-            mass: table.add("load.mass".into(), load.mass),
-            viscous: table.add("load.viscous".into(), load.viscous),
-            coulomb: table.add("load.coulomb".into(), load.coulomb),
+        return Ok(BodyUnit::Mass {
+            mass: table.add("load.mass".into(), load.mass, (1e-6, 1e6, "kg"))?,
+            viscous: table.add("load.viscous".into(), load.viscous, (0.0, 1e9, "N s/m"))?,
+            coulomb: table.add("load.coulomb".into(), load.coulomb, (0.0, 1e9, "N"))?,
             coulomb_speed: load.coulomb_speed,
             gravity: load.gravity,
-        };
+        });
     }
-    let Some(arm) = &spec.arm else { return BodyUnit::Fixed };
+    let Some(arm) = &spec.arm else { return Ok(BodyUnit::Fixed) };
     if arm.kind == "planar" {
         return planar(arm, table);
     }
-    BodyUnit::OneLink {
-        inertia: table.add("arm.inertia".into(), arm.inertia),
-        first_moment: table.add("arm.first_moment".into(), arm.first_moment),
-        payload: table.add("arm.payload".into(), arm.payload),
-        viscous: table.add("arm.viscous".into(), arm.viscous),
-        coulomb: table.add("arm.coulomb".into(), arm.coulomb),
+    Ok(BodyUnit::OneLink {
+        inertia: table.add("arm.inertia".into(), arm.inertia, (0.0, 1e6, "kg m2"))?,
+        first_moment: table.add("arm.first_moment".into(), arm.first_moment, (-1e6, 1e6, "kg m"))?,
+        payload: table.add("arm.payload".into(), arm.payload, (0.0, 1e6, "kg"))?,
+        viscous: table.add("arm.viscous".into(), arm.viscous, (0.0, 1e6, "N m s/rad"))?,
+        coulomb: table.add("arm.coulomb".into(), arm.coulomb, (0.0, 1e6, "N m"))?,
         length: arm.length,
         coulomb_speed: arm.coulomb_speed,
         gravity: arm.gravity,
-    }
+    })
 }
 
-fn planar(arm: &ArmSpec, table: &mut Parameters) -> BodyUnit {
-    let mut unit = |link: &LinkSpec| {
-        let mut add = |key: &str, value| table.add(format!("{}.{key}", dotted("link", &link.name)), value);
-        LinkUnit {
-            length: add("length", link.length),
-            mass: add("mass", link.mass),
-            centre: add("centre", link.centre),
-            inertia: add("inertia", link.inertia),
-            payload: add("payload", link.payload),
-            viscous: add("viscous", link.viscous),
-            coulomb: add("coulomb", link.coulomb),
+fn planar(arm: &ArmSpec, table: &mut Parameters) -> Result<BodyUnit> {
+    let mut unit = |link: &LinkSpec| -> Result<LinkUnit> {
+        let mut add = |key: &str, value, (low, high, unit)| {
+            table.add(format!("{}.{key}", dotted("link", &link.name)), value, (low, high, unit))
+        };
+        Ok(LinkUnit {
+            length: add("length", link.length, (0.0, 1e3, "m"))?,
+            mass: add("mass", link.mass, (0.0, 1e6, "kg"))?,
+            centre: add("centre", link.centre, (-1e3, 1e3, "m"))?,
+            inertia: add("inertia", link.inertia, (0.0, 1e6, "kg m2"))?,
+            payload: add("payload", link.payload, (0.0, 1e6, "kg"))?,
+            viscous: add("viscous", link.viscous, (0.0, 1e6, "N m s/rad"))?,
+            coulomb: add("coulomb", link.coulomb, (0.0, 1e6, "N m"))?,
             coulomb_speed: link.coulomb_speed,
-        }
+        })
     };
-    BodyUnit::Planar { gravity: arm.gravity, links: arm.links.iter().map(&mut unit).collect() }
+    let links = arm.links.iter().map(&mut unit).collect::<Result<_>>()?;
+    Ok(BodyUnit::Planar { gravity: arm.gravity, links })
 }

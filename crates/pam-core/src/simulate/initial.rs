@@ -64,7 +64,7 @@ impl Initial {
         Ok(self)
     }
 
-    /// The state, its masses and books still zero.
+    /// The state, its masses and balance still zero.
     pub(crate) fn state(&self, rig: &Rig, states: usize) -> Vec<f64> {
         let (layout, wiring) = (&rig.layout, &rig.wiring);
         let mut state = vec![0.0; states];

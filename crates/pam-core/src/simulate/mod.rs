@@ -13,7 +13,7 @@ pub use self::initial::Initial;
 use self::integrate::Rk4;
 use self::run::Run;
 use crate::description::dotted;
-use crate::effects::clock_skew;
+use crate::effects::clock_skew::late;
 use crate::error::check_range;
 use crate::plant::{Channel, Memory, Rig};
 use crate::plant::{Controls, Plant, Scratch, Simulated};
@@ -94,9 +94,9 @@ impl<'a, S: Scalar> Stepper<'a, S> {
     pub fn new(plant: Plant<'a, S>) -> Self {
         let groups = plant.rig().wiring.groups.len();
         let zeros = || vec![constant(0.0); groups];
-        let effects = &plant.rig().wiring.effects;
-        let stages = effects.staged().then(|| std::array::from_fn(|_| plant.controls(|_| 0.0)));
-        let before = effects.between_steps().then(|| vec![constant(0.0); plant.states()]);
+        let ports = &plant.rig().wiring.ports;
+        let stages = ports.staged().then(|| std::array::from_fn(|_| plant.controls(|_| 0.0)));
+        let before = ports.updates().then(|| vec![constant(0.0); plant.states()]);
         Self {
             stages,
             before,
@@ -159,14 +159,14 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         });
         drive(plant, at(2), 1.0, state);
         if let Some(before) = before {
-            plant.between_steps(before, state, held, dt);
+            plant.discrete_update(before, state, held, dt);
             if *reads {
                 plant.read(before, state, [at(0), at(2)], dt);
             }
         }
         if *remembers {
             plant.contractions(state, end);
-            plant.advance_memory(memory, start, end);
+            plant.follow_muscles(state, memory, start, end);
         }
     }
 }
@@ -282,7 +282,7 @@ impl Progress {
             state[rig.layout.mass(gas)] = plant.initial_mass(gas, &state);
         }
         plant.start_effects(&mut state);
-        let memory = plant.fresh_memory(&state);
+        let memory = plant.fresh_memory();
         let mut flags = Vec::new();
         for (k, coordinate) in rig.wiring.coordinates.iter().enumerate() {
             let x = state[rig.layout.angle(k)];
@@ -373,8 +373,7 @@ impl Progress {
             for (column, channel) in gauges(plant.rig()).enumerate() {
                 let rows = || self.past.chunks(self.kept).rev();
                 if let Some(reading) = out.channels[channel].last_mut() {
-                    *reading =
-                        clock_skew::late(|ago| rows().nth(ago).map(|r| r[first + column]), *reading, later);
+                    *reading = late(|ago| rows().nth(ago).map(|r| r[first + column]), *reading, later);
                 }
             }
         }
@@ -537,11 +536,11 @@ fn held_mass(plant: &Plant<'_, f64>, place: usize, state: &mut [f64]) {
     let rt = air.gas_constant * air.temperature;
     state[layout.mass(gas)] = mass;
     if more > 0.0 {
-        state[layout.book(0)] += more;
-        state[layout.book(2)] += more * rt;
-        state[layout.book(3)] += more * rt * (pressure / air.ambient_pressure).ln();
+        state[layout.balance(0)] += more;
+        state[layout.balance(2)] += more * rt;
+        state[layout.balance(3)] += more * rt * (pressure / air.ambient_pressure).ln();
     } else {
-        state[layout.book(1)] -= more;
+        state[layout.balance(1)] -= more;
     }
 }
 

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pamrs.errors import ParameterError
-from pamrs.fit.cylinder.friction import CylinderFriction
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from pamrs.fit.cylinder.friction import CylinderFriction
 
 __all__ = ["plot_cylinders"]
 

@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pamrs.errors import ParameterError, RecordingError
+from pamrs.fit._level_line import LawParameter, fit_levels, mean_of_series
+from pamrs.fit.cylinder._strokes import Onset, StrokePairs, onset_at_rest, pair_strokes, reversal_onsets
 from pamrs.fit.cylinder.record import FrictionRecord
-from pamrs.fit.cylinder.strokes import Onset, StrokePairs, onset_at_rest, pair_strokes, reversal_onsets
-from pamrs.fit.level_line import LawParameter, fit_levels, mean_of_series
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

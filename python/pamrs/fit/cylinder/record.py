@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pamrs.errors import RecordingError
-from pamrs.recording_table import read_table
+from pamrs.recordings.table import read_table
 from pamrs.units import to_si
 
 __all__ = ["CylinderFolder", "FrictionRecord", "load_friction_folder", "load_friction_record"]

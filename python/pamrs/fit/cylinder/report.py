@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from pamrs.fit.level_line import LawParameter
+from pamrs.fit._level_line import LawParameter
 
 if TYPE_CHECKING:
     from pamrs.fit.cylinder.friction import CylinderFriction, HeldOut, LevelFriction

@@ -1,0 +1,114 @@
+"""The command line: ``pamrs diagnose``, ``effects``, ``prove``, ``fit``, ``library``, ``lift``, ``simulate``, ``size``, ``rig``, ...
+
+Results go to standard output, progress and errors to standard error. The exit code is 0 when the
+command did its work (a diagnosis that finds nothing missing included), 2 when the input is wrong,
+3 when ``prove`` has a case without a result.
+Everything heavy is imported inside the command that needs it, so that ``pamrs --help`` answers at once.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from typing import Annotated
+
+import typer
+
+from pamrs.cli.design import design_app
+from pamrs.cli.diagnose import diagnose_command
+from pamrs.cli.effects import effects_command
+from pamrs.cli.fit import fit_app
+from pamrs.cli.library import library_command
+from pamrs.cli.lift import lift_command
+from pamrs.cli.prove import prove_command
+from pamrs.cli.reproduce import reproduce_command
+from pamrs.cli.rig import rig_app
+from pamrs.cli.simulate import simulate_command
+from pamrs.cli.size import size_command
+
+__all__ = ["app", "main"]
+
+app = typer.Typer(
+    name="pamrs",
+    help="Simulate pneumatic artificial muscles, and find the physics that a simulation leaves out.",
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+app.add_typer(rig_app, name="rig")
+app.add_typer(fit_app, name="fit")
+app.add_typer(design_app, name="design")
+app.command("simulate")(simulate_command)
+app.command("effects")(effects_command)
+app.command("library")(library_command)
+app.command("lift")(lift_command)
+app.command("prove")(prove_command)
+app.command("reproduce")(reproduce_command)
+app.command("size")(size_command)
+app.command("diagnose")(diagnose_command)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        from pamrs import __version__
+
+        typer.echo(f"pamrs {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _root(
+    version: Annotated[bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")] = False,
+) -> None:
+    """Simulate pneumatic artificial muscles, and find the physics that a simulation leaves out."""
+
+
+def _one_line(error: BaseException) -> str:
+    """The message of an error on one line, its kind where there is no message."""
+    parts = [line.strip().removeprefix("- ") for line in str(error).splitlines() if line.strip()]
+    if len(parts) > 1:
+        parts = [f"{parts[0].rstrip(':')}: {parts[1]}", *parts[2:]]
+    return "; ".join(parts) or type(error).__name__
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        The words after ``pamrs``; those of this process by default.
+
+    Returns
+    -------
+    int
+        Exit code: 0 done, 1 interrupted, 2 wrong input (one line on standard error says what), 3 a case without a result.
+
+    Examples
+    --------
+    >>> main(["rig", "check", "no_such_file.toml"])
+    2
+    """
+    command = typer.main.get_command(app)
+    words = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
+    try:
+        code = command.main(args=words, prog_name="pamrs", standalone_mode=False)
+    except (KeyboardInterrupt, EOFError, typer.Abort):
+        typer.echo("pamrs: interrupted", err=True)
+        return 1
+    except OSError as error:
+        where = f"{error.filename}: " if error.filename is not None else ""
+        typer.echo(f"pamrs: error: {where}{error.strerror or _one_line(error)}", err=True)
+        return 2
+    except ValueError as error:
+        typer.echo(f"pamrs: error: {_one_line(error)}", err=True)
+        return 2
+    except Exception as error:
+        from pamrs.errors import PamrsError
+
+        usage = getattr(error, "format_message", None)
+        if usage is None and not isinstance(error, PamrsError):
+            raise
+        typer.echo(f"pamrs: error: {usage() if usage is not None else _one_line(error)}", err=True)
+        return 2
+    return int(code or 0)

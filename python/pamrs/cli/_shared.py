@@ -1,0 +1,110 @@
+"""What the commands of ``pamrs`` share: numbers with units, muscles by name, files to write, progress."""
+
+from __future__ import annotations
+
+import re
+import sys
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import typer
+
+if TYPE_CHECKING:
+    from pamrs.rig import Muscle, Rig
+
+__all__ = ["GEOMETRY", "QUANTITY", "as_given", "check_writable", "exact", "named_muscle", "progress", "quantity", "rig_named", "write"]
+
+_NUMBER = r"[-+]?\d*\.?\d+(?:[eE][-+]?\d+)?"
+QUANTITY = re.compile(rf"^\s*(?P<value>{_NUMBER})\s*(?:(?:\+-|±)\s*(?P<tol>{_NUMBER})\s*)?(?P<unit>\S.*?)?\s*$")
+#: Sizes of a muscle that commands take, and their dimension.
+GEOMETRY: Final = {"rest_length": "length", "rest_diameter": "length", "braid_angle": "angle", "wall_thickness": "length"}
+
+
+def as_given(name: str, text: str) -> str:
+    """An option and what it was given, as messages name it."""
+    return f"--{name.replace('_', '-')} = {text.strip()!r}"
+
+
+def quantity(name: str, text: str, dimension: str) -> tuple[float, float | None]:
+    """Value and, after ``+-``, standard deviation of a number with a unit, in SI."""
+    from pamrs.errors import ParameterError
+    from pamrs.units import DIMENSIONS, to_si
+
+    match = QUANTITY.match(text)
+    if match is None or match["unit"] is None:
+        raise ParameterError(f"{as_given(name, text)} is not allowed: a number with a unit like {DIMENSIONS[dimension]!r} is needed")
+    try:
+        value = to_si(float(match["value"]), match["unit"], dimension)
+        spread = None if match["tol"] is None else to_si(float(match["tol"]), match["unit"], dimension, difference=True)
+    except ParameterError as error:
+        raise ParameterError(f"{as_given(name, text)}: {error}") from None
+    return value, spread
+
+
+def exact(name: str, text: str, dimension: str) -> float:
+    """A number with a unit in SI, without a standard deviation."""
+    from pamrs.errors import ParameterError
+
+    value, spread = quantity(name, text, dimension)
+    if spread is not None:
+        raise ParameterError(f"{as_given(name, text)} is not allowed: a standard deviation has no use here")
+    return value
+
+
+def named_muscle(name: str, option: str = "--muscle") -> tuple[Muscle, dict[str, float], Rig | None]:
+    """The muscle of a rig file, or of the library, what is known of its geometry, and the rig."""
+    from pamrs import library
+    from pamrs.errors import ParameterError
+    from pamrs.rig import load_rig
+
+    if not name.endswith(".toml") and not Path(name).exists():
+        if name not in library.names():
+            raise ParameterError(f"{option} = {name!r} is neither a file nor in the library: {', '.join(library.names())}")
+        return library.entry(name).muscle, {}, None
+    rig = load_rig(name)
+    if rig.muscle is None:
+        raise ParameterError(f"{option} = {name!r}: this rig has no block [muscle]")
+    known = {key.partition(".")[2]: p.tol for key, p in rig.parameters.items() if key.startswith("muscle.") and p.tol > 0.0}
+    return rig.muscle, {key: value for key, value in known.items() if key in GEOMETRY}, rig
+
+
+def rig_named(file: Path) -> Rig:
+    """A rig file, or a rig of the package by its name."""
+    from pamrs import rigs
+    from pamrs.rig import load_rig
+
+    return rigs.named(str(file)) if not file.exists() and str(file) in rigs.names() else load_rig(file)
+
+
+def write(contents: Mapping[Path, str | bytes]) -> None:
+    """Write every file, and say so."""
+    from pamrs._writing import write_atomically
+
+    for path, content in contents.items():
+        write_atomically(path, content)
+        typer.echo(f"written: {path}", err=True)
+
+
+@contextmanager
+def progress(text: str) -> Iterator[None]:
+    """Say on standard error what is going on, with a clock where a person is looking."""
+    started = time.perf_counter()
+    if sys.stderr.isatty():
+        from rich.console import Console
+
+        with Console(stderr=True).status(text):
+            yield
+    else:
+        typer.echo(f"{text} ...", err=True)
+        yield
+    typer.echo(f"{text}: done in {time.perf_counter() - started:.1f} s", err=True)
+
+
+def check_writable(*paths: Path | None) -> None:
+    """Refuse an output whose folder does not exist before any long work starts."""
+    for path in paths:
+        if path is not None and not path.absolute().parent.is_dir():
+            raise FileNotFoundError(f"{path}: the folder {path.parent} does not exist")

@@ -1,0 +1,50 @@
+"""The command line of lifting: ``pamrs lift``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Final
+
+import typer
+
+from pamrs.cli._shared import as_given, check_writable, exact, rig_named, write
+
+__all__ = ["lift_command"]
+
+SCHEMA: Final = "pamrs.lift/1"
+
+
+def lift_command(
+    rig: Annotated[Path, typer.Argument(help="Rig file (TOML), or the name of a rig of the package.")],
+    pressure: Annotated[str | None, typer.Option(help='Gauge pressure, like "8 bar"; that of the supply by default.')] = None,
+    payload: Annotated[str | None, typer.Option(help='Mass at the tip, like "120 kg"; that of the rig by default.')] = None,
+    to: Annotated[str | None, typer.Option(help='How far it is to be lifted, like "90 deg"; to the upper stop by default.')] = None,
+    png: Annotated[Path | None, typer.Option(help="Write a picture.")] = None,
+    json: Annotated[Path | None, typer.Option(help=f"Write the result (schema {SCHEMA}).")] = None,
+) -> None:
+    """Say what an arm lifts and holds at a pressure, up to which angle, and how much it could lift at most."""
+    check_writable(png, json)
+    from pamrs.design import lift
+    from pamrs.errors import ParameterError
+
+    loaded = rig_named(rig)
+    if payload is not None:
+        mass = exact("payload", payload, "mass")
+        if "arm.payload" in loaded.parameters:
+            try:
+                loaded = loaded.with_parameters({"arm.payload": mass})
+            except ParameterError as error:
+                raise ParameterError(f"{as_given('payload', payload)}: {error}") from None
+    result = lift(
+        loaded,
+        pressure=None if pressure is None else exact("pressure", pressure, "pressure"),
+        to=None if to is None else exact("to", to, "angle"),
+    )
+    typer.echo(result.summary())
+    if json is not None:
+        import json as encoder
+
+        write({json: encoder.dumps({"schema": SCHEMA, **result.to_dict()}, indent=1, allow_nan=False) + "\n"})
+    if png is not None:
+        result.plot(png)
+        typer.echo(f"written: {png}", err=True)

@@ -1,0 +1,51 @@
+"""``pamrs rig``: check a rig file, or write one to begin with."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from pamrs import rigs
+from pamrs.cli._shared import rig_named
+
+__all__ = ["rig_app"]
+
+rig_app = typer.Typer(help="Work with rig files.")
+
+
+@rig_app.command("check")
+def _rig_check(file: Annotated[Path, typer.Argument(help="Rig file (TOML), or the name of a rig of the package.")]) -> None:
+    """Check a rig file, say what is connected to what, and list its parameters in SI units."""
+    from pamrs.simulation import core_rig
+
+    rig = rig_named(file)
+    core_rig(rig)  # what only the whole model shows: lengths that the muscle cannot have, angles that the tendon does not reach
+    for line in rig.wiring:
+        typer.echo(line)
+    width = max((len(name) for name in rig.parameters), default=0)
+    for name, parameter in rig.parameters.items():
+        known = f"{parameter.value:.6g}" if parameter.known else "unknown"
+        spread = f" ± {parameter.tol:.3g}" if parameter.known and parameter.tol else ""
+        typer.echo(f"{name:<{width}}  {known}{spread} {parameter.unit}")
+    typer.echo(f"{file}: rig {rig.name!r} is valid, {len(rig.parameters)} parameters, {len(rig.effects)} effects")
+
+
+@rig_app.command("new")
+def _rig_new(
+    file: Annotated[Path, typer.Argument(help="The file to write; it must not be there yet.")],
+    like: Annotated[str, typer.Option(help=f"Rig of the package to begin with: {', '.join(rigs.names())}.")] = "shoulder",
+    name: Annotated[
+        str | None, typer.Option(help="What to call the rig; by default as the file, or its folder if that is rig.toml.")
+    ] = None,
+) -> None:
+    """Write a rig file to begin with, every key explained in comments."""
+    from pamrs._writing import write_atomically
+
+    file.parent.mkdir(parents=True, exist_ok=True)
+    if file.exists():
+        raise FileExistsError(f"{file}: is there already; it is not overwritten")
+    called = file.resolve().parent.name if file.stem == "rig" else file.stem
+    write_atomically(file, rigs.template(like, (called or file.stem) if name is None else name))
+    typer.echo(f"written: {file}; change it, then: pamrs rig check {file}")

@@ -1,0 +1,166 @@
+"""``pamrs simulate``: a rig driven by a recording, or by steps that are written on the command line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from pamrs.channels import UNITS, channel_of, unit_of
+from pamrs.cli._shared import check_writable, exact, progress, rig_named
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from pamrs.recordings import Recording
+    from pamrs.rig import Rig
+    from pamrs.simulation import Simulation
+
+__all__ = ["simulate_command"]
+
+_DIMENSIONS = {"valve_command": "voltage", "supply_command": "pressure", "pressure": "pressure", "length": "length"}
+_INITIAL = {"Pa": "pressure", "rad": "angle", "rad/s": "angular speed", "m": "length", "m/s": "m/s"}
+
+
+def simulate_command(
+    rig: Annotated[Path, typer.Argument(help="Rig file (TOML), or the name of a rig of the package.")],
+    input: Annotated[Path | None, typer.Option("--input", help="Recording whose inputs drive the rig (CSV).")] = None,
+    hold: Annotated[
+        list[str] | None,
+        typer.Option(help="Without a recording: a signal of steps, 'valve_command = 5 V, 8 V @ 1 s'; one --hold for each signal."),
+    ] = None,
+    initial: Annotated[list[str] | None, typer.Option(help="Without a recording: where it begins, 'muscle_pressure = 2 bar'.")] = None,
+    duration: Annotated[str, typer.Option(help="Without a recording: how long.")] = "5 s",
+    sample_time: Annotated[str, typer.Option(help="Without a recording: time between two rows.")] = "5 ms",
+    output: Annotated[Path | None, typer.Option("--output", help="Where to write the simulated channels (CSV).")] = None,
+    plot: Annotated[Path | None, typer.Option(help="Write a picture of the channels, beside the recorded ones (PNG).")] = None,
+    animation: Annotated[Path | None, typer.Option(help="Write the arm as it moves (GIF).")] = None,
+    speed: Annotated[float, typer.Option(help="Of the animation: times faster than it happens.")] = 1.0,
+) -> None:
+    """Drive a rig with a recording's inputs, or with steps, and write what its channels would be."""
+    if output is None and plot is None and animation is None:
+        raise typer.BadParameter("nothing would be written: give --output, --plot or --animation")
+    if input is not None and (hold or initial):
+        raise typer.BadParameter("--hold and --initial do not go with --input, which says both")
+    check_writable(output, plot, animation)
+    loaded = rig_named(rig)
+    recorded: dict[str, tuple[Any, Any]] = {}
+    recording = None
+    if input is not None:
+        from pamrs.recordings import load_recording
+        from pamrs.simulation import replay
+
+        recording = load_recording(input)
+        _say_what_is_held(loaded, recording, input)
+        with progress(f"simulating {loaded.name}"):
+            result = replay(loaded, recording)
+        recorded = {name: (recording.time[rows], recording.channels[name][rows]) for name, rows in recording.mask.items()}
+    else:
+        result = _steps(
+            loaded, hold or [], initial or [], exact("duration", duration, "time"), exact("sample_time", sample_time, "time")
+        )
+    if output is not None:
+        _write_csv(output, result)
+        typer.echo(f"{loaded.name}: {len(result.time)} samples written to {output}")
+    if plot is not None:
+        result.plot(plot, recorded=recorded)
+        typer.echo(f"written: {plot}", err=True)
+    if animation is not None:
+        with progress("drawing the motion"):
+            result.animate(animation, speed=speed)
+        typer.echo(f"written: {animation}", err=True)
+    typer.echo(result.summary())
+    if recording is not None:
+        from pamrs.simulation import differences
+
+        for name, rms in differences(result, recording).items():
+            typer.echo(f"{name}: rms difference from the recording {rms:.4g} {unit_of(name)}")
+
+
+def _say_what_is_held(rig: Rig, recording: Recording, path: Path) -> None:
+    """Name the inputs of which some samples cannot be used."""
+    from pamrs.simulation import has_frame
+
+    driving = {"valve_command", "supply_command", *(["length"] if has_frame(rig) else [])}
+    for name, rows in recording.mask.items():
+        if channel_of(name) in driving and rows.any() and not rows.all():
+            typer.echo(f"{path}: {int((~rows).sum())} unusable samples of {name} hold the last usable one", err=True)
+
+
+def _steps(rig: Rig, hold: list[str], initial: list[str], duration: float, sample_time: float) -> Simulation:
+    """Simulate under signals of steps."""
+    import numpy as np
+
+    from pamrs.errors import ParameterError
+    from pamrs.simulation import simulate
+
+    if not (0.0 < sample_time <= duration and duration / sample_time < 1e8):
+        given = f"--duration = {duration:g} s with --sample-time = {sample_time:g} s"
+        raise ParameterError(f"{given} is not allowed: two times > 0 s are needed that give from 2 to 1e8 rows")
+    time = np.asarray(np.arange(round(duration / sample_time) + 1) * sample_time, dtype=np.float64)
+    drive: dict[str, Any] = {}
+    for text in hold:
+        name, values = _held(text, time)
+        head, _, block = name.partition(".")
+        if (head == "length" and "length" in drive) or block in drive.get(head, {}):
+            raise ParameterError(f"--hold = {text!r} is not allowed: {name} is given twice")
+        if head == "length":
+            drive["length"] = values
+        else:
+            drive.setdefault(head, {})[block] = values
+    start = dict(_began(text) for text in initial)
+    if not drive:
+        drive["duration"] = duration
+    with progress(f"simulating {rig.name}"):
+        return simulate(rig, sample_time=sample_time, initial=start, **drive)
+
+
+def _held(text: str, time: NDArray[np.float64]) -> tuple[str, NDArray[np.float64]]:
+    """A signal of steps from ``"valve_command.elbow = 5 V, 8 V @ 1 s"``."""
+    import numpy as np
+
+    from pamrs.errors import ParameterError
+
+    name, equals, steps = text.partition("=")
+    name = name.strip()
+    dimension = _DIMENSIONS.get(channel_of(name))
+    if not equals or dimension is None:
+        raise ParameterError(
+            f"--hold = {text!r} is not allowed: a signal like 'valve_command = 5 V, 8 V @ 1 s' is needed, "
+            f"one of {', '.join(_DIMENSIONS)}, with the name of the block behind a dot where it has one"
+        )
+    values, last = np.zeros(time.size), 0.0
+    for k, step in enumerate(steps.split(",")):
+        value, at, when = step.partition("@")
+        if (k > 0) != bool(at):
+            raise ParameterError(f"--hold = {text!r} is not allowed: every value but the first needs its time, like '8 V @ 1 s'")
+        begin = exact("hold", when, "time") if at else last
+        if k > 0 and not last < begin <= time[-1]:
+            raise ParameterError(f"--hold = {text!r} is not allowed: times that rise from 0 to {time[-1]:g} s are needed")
+        last = begin
+        values[time >= begin - 1e-9] = exact("hold", value, dimension)
+    return name, values
+
+
+def _began(text: str) -> tuple[str, float]:
+    """An initial value from ``"muscle_pressure.elbow = 2 bar"``."""
+    from pamrs.errors import ParameterError
+
+    name, equals, value = text.partition("=")
+    unit = UNITS.get(channel_of(name.strip()), "")
+    if not equals or unit not in _INITIAL:
+        raise ParameterError(f"--initial = {text!r} is not allowed: a state like 'muscle_pressure = 2 bar' is needed")
+    return name.strip(), exact("initial", value, _INITIAL[unit])
+
+
+def _write_csv(path: Path, columns: Simulation) -> None:
+    """Write channels in SI units under headers that carry the unit."""
+    from pamrs._writing import write_atomically
+
+    names = list(columns)
+    lines = [",".join(f"{name} [{unit_of(name)}]" for name in names)]
+    for row in zip(*(columns[name].tolist() for name in names), strict=True):
+        lines.append(",".join(f"{value:.10g}" for value in row))
+    write_atomically(path, "\n".join(lines) + "\n")

@@ -1,0 +1,178 @@
+"""The way of the air, backwards: from a wanted change of pressure to the valve command that makes it (4.13), (4.14)."""
+
+from __future__ import annotations
+
+import bisect
+import math
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pamrs import _core
+from pamrs.control._protocol import Value
+from pamrs.control._spline import Spline
+from pamrs.errors import ParameterError
+
+if TYPE_CHECKING:
+    from pamrs.rig import Rig
+
+__all__ = ["AirModel", "OrificeInverse"]
+
+Array = NDArray[np.float64]
+
+_LAMINAR: Final = 0.999  # pressure ratio above which the orifice law is a line (physics reference, section 3)
+_LEAST_FLOW: Final = 1e-12  # of the choked one: nothing flows, and any area is as good
+
+
+class OrificeInverse:
+    """Area that lets a mass flow through, ``A_d = mdot_d/(pu f(pd/pu))``, with ``f`` tabulated from the core's orifice law.
+
+    Parameters
+    ----------
+    ambient_pressure, temperature, gas_constant, heat_capacity_ratio : float
+        Of the gas: [Pa, absolute], [K], [J/(kg K)], [1].
+    """
+
+    def __init__(self, ambient_pressure: float, temperature: float, gas_constant: float, heat_capacity_ratio: float) -> None:
+        core = _core.Gas(ambient_pressure, temperature, gas_constant, heat_capacity_ratio)
+        upstream = 1e5  # the law is in proportion to it
+
+        def per_pressure(ratio: Array) -> Array:
+            return core.mass_flow(1.0, upstream, upstream * ratio) / upstream
+
+        gamma = heat_capacity_ratio
+        self.critical = (2.0 / (gamma + 1.0)) ** (gamma / (gamma - 1.0))
+        self._choked = float(per_pressure(np.array([0.5 * self.critical]))[0])
+        # in sqrt(1 - r) the law is smooth up to r = 1
+        root = np.linspace(math.sqrt(1.0 - _LAMINAR), math.sqrt(1.0 - self.critical), 2049)
+        ratio = 1.0 - root**2
+        ratio[0], ratio[-1] = _LAMINAR, self.critical
+        self._between = Spline(root[0], root[-1], per_pressure(ratio))
+        self._slope = float(per_pressure(np.array([_LAMINAR]))[0]) / (1.0 - _LAMINAR)
+
+    def flow(self, upstream: Value, downstream: Value) -> Value:
+        """Mass flow per area [kg/(s m2)] between absolute pressures [Pa], zero for none or a reversed difference."""
+        ratio = downstream / upstream
+        if ratio.__class__ is float:
+            if ratio <= self.critical:
+                return upstream * self._choked
+            if ratio <= _LAMINAR:
+                return upstream * self._between(math.sqrt(1.0 - ratio))
+            return upstream * (self._slope * (1.0 - ratio)) if ratio < 1.0 else 0.0
+        ratio = np.asarray(ratio)
+        gap = np.maximum(1.0 - ratio, 0.0)
+        return upstream * np.where(
+            ratio <= self.critical, self._choked, np.where(ratio <= _LAMINAR, self._between(np.sqrt(gap)), self._slope * gap)
+        )
+
+    def area(self, mass_flow: Value, upstream: Value, downstream: Value) -> Value:
+        """Effective area [m2] for a mass flow [kg/s] >= 0; zero for no flow, very large where nothing can flow."""
+        unit, least = self.flow(upstream, downstream), _LEAST_FLOW * self._choked * upstream
+        if unit.__class__ is float and least.__class__ is float:
+            return mass_flow / (unit if unit > least else least)
+        return mass_flow / np.maximum(unit, least)
+
+
+class AirModel:
+    """Chamber and valve of a rig as a controller knows them.
+
+    Parameters
+    ----------
+    rig : Rig
+        With one muscle, joint, valve and chamber, and a supply.
+
+    Raises
+    ------
+    ParameterError
+        If it has not, or its area table is level somewhere but at its ends, so that it has no inverse.
+    """
+
+    def __init__(self, rig: Rig) -> None:
+        from pamrs.control._model import _parts, _supply_pressure
+
+        muscle, joint, table = _parts(rig)
+        for block in ("valve", "chamber"):
+            if len(rig.tables(block)) != 1:
+                raise ParameterError(f"rig {rig.name!r} has {len(rig.tables(block))} [{block}]: a controller's model needs exactly one")
+        valve, chamber = next(iter(rig.tables("valve").values())), next(iter(rig.tables("chamber").values()))
+        gas: dict[str, float] = rig.model["gas"]
+        self.ambient = float(gas["ambient_pressure"])
+        self.supply_pressure = _supply_pressure(rig)
+        self.alpha_in, self.alpha_out, self.alpha = (float(chamber[name]) for name in ("alpha_in", "alpha_out", "alpha"))
+        self._rt = float(gas["gas_constant"]) * float(gas["temperature"])
+        low, high = float(table["min_angle"]), float(table["max_angle"])
+        contraction = joint.shortening(np.linspace(low, high, 1025)) / float(muscle.parameters["rest_length"])
+        volume = int(muscle.parameters["count"]) * muscle.air_volume(contraction) + float(chamber["dead_volume"])
+        self.volume = Spline(low, high, volume)
+        self.orifice = OrificeInverse(self.ambient, gas["temperature"], gas["gas_constant"], gas["heat_capacity_ratio"])
+        self.null, self.half_range = float(valve["null_voltage"]), float(valve["half_range"])
+        self.largest_area = float(valve["discharge_area_max"])
+        self._fraction, self._opening = _inverse(valve)
+
+    def opening(self, area: Value) -> Value:
+        """Opening ``|x|`` [1] of an effective area [m2] >= 0: the area table backwards, 1 where it cannot be so large."""
+        fraction = area / self.largest_area
+        places, values = self._fraction, self._opening
+        if fraction.__class__ is float:
+            if fraction <= places[0]:
+                return values[0] if fraction > 0.0 else 0.0
+            if fraction >= places[-1]:
+                return values[-1]
+            cell = bisect.bisect_right(places, fraction) - 1
+            slope = (values[cell + 1] - values[cell]) / (places[cell + 1] - places[cell])
+            return slope * (fraction - places[cell]) + values[cell]
+        p, v = np.array(places), np.array(values)
+        k = np.clip(np.searchsorted(p, fraction, side="right") - 1, 0, p.size - 2)
+        inside = (v[k + 1] - v[k]) / (p[k + 1] - p[k]) * (np.asarray(fraction) - p[k]) + v[k]
+        return np.where(
+            np.asarray(fraction) <= p[0], np.where(np.asarray(fraction) > 0.0, v[0], 0.0), np.where(fraction >= p[-1], v[-1], inside)
+        )
+
+    def command(self, pressure_rate: Value, pressure: Value, supply: Value, angle: Value, rate: Value) -> Value:
+        """Valve command less its null [V] that changes the pressure at a rate.
+
+        ``mdot_d = (P_d' V + alpha P V')/(R T alpha_in)`` or ``alpha_out`` by its sign (4.13), the area (4.14), and the valve's table.
+
+        Parameters
+        ----------
+        pressure_rate : float or ndarray
+            ``P_d'`` [Pa/s].
+        pressure, supply : float or ndarray
+            Gauge pressures of muscle and supply [Pa].
+        angle, rate : float or ndarray
+            Of the joint [rad, rad/s].
+
+        Returns
+        -------
+        float or ndarray
+            From minus to plus the half range; 0 where the supply is below the muscle and air would be needed.
+        """
+        inside, feed = pressure + self.ambient, supply + self.ambient
+        demand = pressure_rate * self.volume(angle) + self.alpha * inside * (self.volume.slope(angle) * rate)
+        if demand.__class__ is float and feed.__class__ is float:
+            if demand > 0.0:
+                if feed <= inside:
+                    return 0.0
+                return self.half_range * self.opening(self.orifice.area(demand / (self._rt * self.alpha_in), feed, inside))
+            if demand == 0.0:
+                return 0.0
+            return -self.half_range * self.opening(self.orifice.area(-demand / (self._rt * self.alpha_out), inside, self.ambient))
+        demand, feed, inside = np.broadcast_arrays(demand, feed, inside)
+        filling = self.opening(self.orifice.area(np.maximum(demand, 0.0) / (self._rt * self.alpha_in), feed, inside))
+        venting = self.opening(self.orifice.area(np.maximum(-demand, 0.0) / (self._rt * self.alpha_out), inside, self.ambient))
+        return self.half_range * np.where(demand > 0.0, np.where(feed <= inside, 0.0, filling), -venting)
+
+
+def _inverse(valve: dict[str, Any]) -> tuple[list[float], list[float]]:
+    """Area fractions that rise strictly, and the opening of each: level stretches at the ends are left out."""
+    opening, fraction = [float(x) for x in valve["opening"]], [float(x) for x in valve["fraction"]]
+    first, last = 0, len(fraction) - 1
+    while first < last and fraction[first + 1] == fraction[0]:
+        first += 1
+    while last > first and fraction[last - 1] == fraction[-1]:
+        last -= 1
+    opening, fraction = opening[first : last + 1], fraction[first : last + 1]
+    if len(fraction) < 2 or any(b <= a for a, b in zip(fraction[:-1], fraction[1:], strict=True)):
+        raise ParameterError(f"valve.area_fraction.fraction = {valve['fraction']} has no inverse: it must rise between its ends")
+    return fraction, opening

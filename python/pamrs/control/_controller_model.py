@@ -1,0 +1,196 @@
+"""Linear models of sampled controllers about an operating point, by differences of one update over its state and its measurements."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pamrs.control._protocol import Controller, Reference
+from pamrs.errors import ParameterError
+
+__all__ = ["LinearController", "heard", "linear_controller"]
+
+Array = NDArray[np.float64]
+
+#: Half width of the differences in what is measured [SI].
+_WIDTHS: Final[dict[str, float]] = {"joint_angle": 1e-5, "joint_rate": 1e-5, "muscle_pressure": 10.0}
+#: By how much of the slope the slopes of both sides may differ.
+_KINK: Final = 0.01
+SIDES: Final = ("", "up", "down", "mean")
+
+
+@dataclass(frozen=True)
+class LinearController:
+    """``x+ = A x + B y, u = C x + D y`` from one sample to the next, about an operating point; y are :attr:`inputs`.
+
+    Attributes
+    ----------
+    a, b, c, d : ndarray
+        Shapes (n, n), (n, p), (1, n), (1, p).
+    inputs : tuple of str
+        Channels that the controller reads.
+    period : float
+        [s]
+    command : float
+        What it answers at the operating point.
+    """
+
+    a: Array = field(repr=False)
+    b: Array = field(repr=False)
+    c: Array = field(repr=False)
+    d: Array = field(repr=False)
+    inputs: tuple[str, ...]
+    period: float
+    command: float = 0.0
+
+
+def linear_controller(
+    controller: Controller,
+    point: Mapping[str, float],
+    angle: float | None = None,
+    *,
+    state: Mapping[str, Any] | None = None,
+    side: str = "",
+) -> LinearController:
+    """Any controller with a state of floats about an operating point, by differences of one update.
+
+    Exact for a controller that is linear inside its limits (PID, cascade). What does not reach the command (a clock), or is never
+    moved by a measurement (an integral without a gain), is left out. A law with a corner at the point (a dead band's edge, a limit, a
+    switching line) has two slopes there and no linear model: it is refused unless a side is chosen.
+
+    Parameters
+    ----------
+    controller : Controller
+        For one plant; it is reset before and after.
+    point : mapping of str to float
+        Channels at the operating point; the reference rests at its ``joint_angle``.
+    angle : float, optional
+        Another reference [rad].
+    state : mapping, optional
+        The controller's state at the operating point, for one whose integrals have to hold the arm up (a cascade, whose outer integral
+        is the pressure): ``controller.state`` after a closed loop that has come to rest there. By default that of a controller which
+        has seen the point three times.
+    side : {"", "up", "down", "mean"}
+        Of what is measured or remembered, where the slopes towards larger and smaller values differ by more than one percent: which
+        of them, or the mean of both. By default such a controller is refused.
+
+    Returns
+    -------
+    LinearController
+        From ``joint_angle``, ``joint_rate`` and ``muscle_pressure``, those of them that are in ``point``.
+
+    Raises
+    ------
+    ParameterError
+        If the side is unknown, the controller answers what is not a finite number, has a corner at the point, or no measurement reaches
+        its command: it is at a limit.
+    """
+    if side not in SIDES:
+        raise ParameterError(f"side = {side!r} is not allowed: one of {', '.join(map(repr, SIDES))}")
+    inputs = tuple(name for name in ("joint_angle", "joint_rate", "muscle_pressure") if name in point)
+    reference = Reference(point["joint_angle"] if angle is None else angle)
+    controller.reset()
+    if state is None:
+        for k in range(3):  # filters and differences have seen something
+            controller.update(k * controller.period, point, reference)
+    else:
+        controller.restore(state)
+    start = controller.state
+    clocks = [value for path, value in _floats(start) if path[-1] == "time"]  # of the parts too
+    now = max(clocks, default=2.0 * controller.period) + controller.period
+    paths = [path for path, value in _floats(start) if path[-1] != "time"]
+
+    def answered(state: Mapping[str, Any], sample: Mapping[str, float]) -> Array:
+        controller.restore(state)
+        command = float(controller.update(now, sample, reference))
+        after = controller.state
+        return np.array([*(_at(after, path) for path in paths), command])
+
+    middle = answered(start, point)
+    command = float(middle[-1])
+    slopes = []
+    for path in paths:
+        width = 1e-4 * max(1.0, abs(_at(start, path)))
+        up, down = (answered(_changed(start, path, s * width), point) for s in (1.0, -1.0))
+        slopes.append(_slope(up, middle, down, width, side))
+    for name in inputs:
+        up, down = (answered(start, {**point, name: point[name] + s * _WIDTHS[name]}) for s in (1.0, -1.0))
+        slopes.append(_slope(up, middle, down, _WIDTHS[name], side))
+    controller.reset()
+    n = len(paths)
+    whole = np.array([slope for slope, _ in slopes]).T
+    if not (np.isfinite(whole).all() and math.isfinite(command)):
+        raise ParameterError("the controller's command is not finite at the operating point: no linear model is there")
+    if not whole[n].any() or not whole[:, n:].any():
+        raise ParameterError(
+            f"the controller answers {command:g} whatever it measures: it is at a limit; give the state in which it holds the arm here"
+        )
+    # an integral with a gain of zero is heard, but nothing moves it; it would count as a motion that never dies out
+    moved = heard(whole[:n, :n].T, np.abs(whole[:n, n:]).sum(axis=1))
+    kept = sorted(set(heard(whole[:n, :n], whole[n, :n])) & set(moved))
+    for name, (_, step) in zip([*(".".join(map(str, path)) for path in paths), *inputs], slopes, strict=True):
+        if side == "" and step[[*kept, n]].any():
+            k = [*kept, n][int(np.argmax(step[[*kept, n]]))]
+            what = "its command" if k == n else ".".join(map(str, paths[k]))
+            raise ParameterError(
+                f"the controller has a corner at the operating point: the slopes of {what} over {name} differ by {step[k]:.3g} between "
+                "its sides; choose a side (up, down, mean), or another point"
+            )
+    a, b = whole[np.ix_(kept, kept)], whole[np.ix_(kept, range(n, n + len(inputs)))]
+    return LinearController(a, b, whole[[n]][:, kept], whole[[n]][:, n:], inputs, controller.period, command)
+
+
+def _slope(up: Array, middle: Array, down: Array, width: float, side: str) -> tuple[Array, Array]:
+    """Slope of what is answered, and by how much it differs between both sides; zero where that is next to nothing."""
+    above, below = (up - middle) / width, (middle - down) / width
+    # the last digits of what is differenced are no corner
+    slack = _KINK * np.maximum(np.abs(above), np.abs(below)) + 1e-11 * np.maximum(1.0, np.abs(middle)) / width
+    apart = np.abs(above - below)
+    return {"up": above, "down": below}.get(side, 0.5 * (above + below)), np.where(apart > slack, apart, 0.0)
+
+
+def heard(a: Array, c: Array) -> list[int]:
+    """Indices of the states that reach the output, at once or by way of another."""
+    heard = set(np.flatnonzero(c).tolist())
+    while True:
+        more = {int(j) for i in heard for j in np.flatnonzero(a[i])} - heard
+        if not more:
+            return sorted(heard)
+        heard |= more
+
+
+Path = tuple[Any, ...]
+
+
+def _floats(state: Any, path: Path = ()) -> Iterator[tuple[Path, float]]:
+    """Every float in nested mappings and arrays, with the way to it."""
+    if isinstance(state, Mapping):
+        for key, value in state.items():
+            yield from _floats(value, (*path, key))
+    elif isinstance(state, np.ndarray):
+        for index in np.ndindex(state.shape):
+            yield (*path, index), float(state[index])
+    elif isinstance(state, float):
+        yield path, float(state)
+
+
+def _at(state: Any, path: Path) -> float:
+    for key in path:
+        state = state[key]
+    return float(state)
+
+
+def _changed(state: Any, path: Path, change: float) -> Any:
+    """A copy with one float changed."""
+    if not path:
+        return state + change
+    if isinstance(state, np.ndarray):
+        copied = state.copy()
+        copied[path[0]] += change
+        return copied
+    return {key: _changed(value, path[1:], change) if key == path[0] else value for key, value in state.items()}

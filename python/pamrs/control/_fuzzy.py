@@ -1,0 +1,214 @@
+"""Fuzzy control of the joint angle (dissertation 4.3.1.2, (4.10); Passino & Yurkovich, Fuzzy Control, 1998)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import ClassVar, Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pamrs.control._output_feedback import OutputFeedback
+from pamrs.control._parts import LowPass
+from pamrs.control._protocol import Measurement, Reference, Value
+from pamrs.control._sampled import Fixed
+from pamrs.control._values import as_value, clip, positive_gain
+from pamrs.errors import ParameterError
+
+__all__ = ["FUZZY_SETS", "Fuzzy", "fuzzy_rules", "fuzzy_surface"]
+
+FUZZY_SETS: Final = ("NB", "NM", "NS", "ZE", "PS", "PM", "PB")
+"""Names of the sets, centres -1, -2/3, ... 1."""
+_HALF: Final = 3  # sets on each side of zero
+
+#: Gains as printed: 4.4.1.2 (optimum at 23 kg), 4.4.2 and Fig. 4.13 (beside a feedforward), Fig. 4.14 (series of kM).
+_PRINTED: Final[Mapping[str, Mapping[str, float]]] = {
+    "optimal_23kg": {"g1": 0.45, "g2": 0.6, "h": 0.65},
+    "feedforward": {"g1": 0.4, "g2": 0.3, "h": 0.7},
+    "feedforward_gain_series": {"g1": 0.45, "g2": 0.3, "h": 0.7},
+}
+
+
+def fuzzy_rules(table: str | ArrayLike = "anti_diagonal") -> NDArray[np.float64]:
+    """Centre of the output set for each pair of sets.
+
+    Table 4.1 is printed as a picture. ``anti_diagonal`` is the standard table, output index ``clip(i + j, -3, 3)``: error NS and rate
+    PS give ZE. The text quotes "positive small" for that pair; ``quoted`` is the standard table with the smallest change that gives it:
+    where error and rate cancel, the output leans to the rate by one set, ``i + j + sgn(j) [i + j = 0]``.
+
+    Parameters
+    ----------
+    table : {"anti_diagonal", "quoted"} or array_like, shape (7, 7)
+        Or output indices from -3 to 3, rows by error from NB to PB, columns by rate.
+
+    Returns
+    -------
+    ndarray, shape (7, 7)
+        Centres, -1 to 1.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such table, or it is not one.
+    """
+    i, j = np.meshgrid(np.arange(-_HALF, _HALF + 1), np.arange(-_HALF, _HALF + 1), indexing="ij")
+    if isinstance(table, str):
+        if table not in ("anti_diagonal", "quoted"):
+            raise ParameterError(f"table = {table!r} is not allowed: 'anti_diagonal', 'quoted' or 7 x 7 numbers are needed")
+        index = (i + j + (np.sign(j) * (i + j == 0) if table == "quoted" else 0)).astype(np.float64)
+        return np.clip(index, -_HALF, _HALF) / _HALF
+    given = np.asarray(table, dtype=np.float64)
+    if given.shape != (7, 7) or not np.all(np.isfinite(given)) or np.any(np.abs(given) > _HALF):
+        raise ParameterError(f"table of shape {given.shape} is not allowed: 7 x 7 output indices from -3 to 3 are needed")
+    return given / _HALF
+
+
+def fuzzy_surface(error: Value, rate: Value, rules: Sequence[Sequence[float]], rules_array: NDArray[np.float64]) -> Value:
+    """Output of the rules for scaled inputs, before h.
+
+    Triangular sets that overlap by half, so that two of each input are active and their memberships sum to one; premise by the minimum
+    (4.10); centre of gravity of the output sets, each a triangle cut off at its premise ``m`` with the area ``w (m - m^2/2)``.
+    With the minimum as premise the surface is not quite monotone: it falls by at most 0.007 (``anti_diagonal``) or 0.02 (``quoted``)
+    of its range where it should rise.
+
+    Parameters
+    ----------
+    error, rate : float or ndarray, shape (n,)
+        Scaled by g1 and g2; beyond -1 to 1 the shoulders saturate.
+    rules : sequence of sequence of float
+        Centres as lists, for floats.
+    rules_array : ndarray, shape (7, 7)
+        The same, for arrays.
+
+    Returns
+    -------
+    float or ndarray
+        From -1 to 1.
+    """
+    if error.__class__ is float and rate.__class__ is float:
+        x: float = (0.0 if error < 0.0 else 6.0) if not -1.0 < error < 1.0 else (error + 1.0) * 3.0
+        y: float = (0.0 if rate < 0.0 else 6.0) if not -1.0 < rate < 1.0 else (rate + 1.0) * 3.0
+        i, j = int(x), int(y)
+        if i > 5:
+            i = 5
+        if j > 5:
+            j = 5
+        a, b = x - i, y - j
+        na, nb = 1.0 - a, 1.0 - b
+        m = na if na < nb else nb
+        w00 = m * (2.0 - m)
+        m = na if na < b else b
+        w01 = m * (2.0 - m)
+        m = a if a < nb else nb
+        w10 = m * (2.0 - m)
+        m = a if a < b else b
+        w11 = m * (2.0 - m)
+        low, high = rules[i], rules[i + 1]
+        return (w00 * low[j] + w01 * low[j + 1] + w10 * high[j] + w11 * high[j + 1]) / (w00 + w01 + w10 + w11)
+    places = np.broadcast_arrays((np.clip(error, -1.0, 1.0) + 1.0) * 3.0, (np.clip(rate, -1.0, 1.0) + 1.0) * 3.0)
+    return _surface(places[0], places[1], rules_array)
+
+
+def _surface(x: NDArray[np.float64], y: NDArray[np.float64], rules_array: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The same for arrays of places among the sets, 0 to 6."""
+    i, j = np.minimum(x.astype(np.intp), 5), np.minimum(y.astype(np.intp), 5)
+    a, b = x - i, y - j
+    na, nb = 1.0 - a, 1.0 - b
+    p00, p01, p10, p11 = np.minimum(na, nb), np.minimum(na, b), np.minimum(a, nb), np.minimum(a, b)
+    w00, w01, w10, w11 = p00 * (2.0 - p00), p01 * (2.0 - p01), p10 * (2.0 - p10), p11 * (2.0 - p11)
+    total = w00 * rules_array[i, j] + w01 * rules_array[i, j + 1] + w10 * rules_array[i + 1, j] + w11 * rules_array[i + 1, j + 1]
+    return np.asarray(total / (w00 + w01 + w10 + w11))
+
+
+class Fuzzy(OutputFeedback):
+    """Fuzzy control of the joint angle by the valve, volts around the closed valve.
+
+    ``u = null + h f(e/g1, e'/g2)``, low-passed, with ``f`` the surface of :func:`fuzzy_surface`; ``e = theta_d - theta``.
+
+    The printed gains are in **radians** and volts: the experiments lag by some 0.75 s on a ramp of about 15 deg/s, an error of 0.2 rad,
+    which g1 = 0.45 rad scales into the middle of the sets and 0.45 deg would saturate throughout; so scaled, the slope at the origin
+    h/g1 = 1.44 V/rad is that of the PID tuned on the same rig (kP = 1.4).
+
+    Parameters
+    ----------
+    g1 : float or ndarray, shape (n,)
+        Error at which the sets end [unit].
+    g2 : float or ndarray, shape (n,)
+        Rate of the error at which the sets end [unit/s].
+    h : float or ndarray, shape (n,)
+        Largest output [V].
+    period : float
+        Time between two updates [s].
+    unit : {"rad", "deg"}
+        Unit of the angle in the gains.
+    table : {"anti_diagonal", "quoted"} or array_like, shape (7, 7)
+        As for :func:`fuzzy_rules`.
+    limits : tuple of (float, float)
+        Smallest and largest output [V].
+    null : float
+        Output for no error [V].
+    output_filter, rate_filter, angle_filter, measured_rate
+        As for :class:`pamrs.control.PID`.
+
+    Raises
+    ------
+    ParameterError
+        If a number is not finite or not allowed; the message names it.
+
+    Examples
+    --------
+    >>> from pamrs.control import Fuzzy, Reference
+    >>> controller = Fuzzy.published("optimal_23kg", output_filter=0.0)
+    >>> round(controller.update(0.0, {"joint_angle": 0.3}, Reference(0.9)), 3)
+    5.65
+    """
+
+    _PARTS: ClassVar[tuple[str, ...]] = ("sensor", "low_pass")
+    _PUBLISHED = _PRINTED
+
+    g1, g2, h, output_filter = Fixed(), Fixed(), Fixed(), Fixed("low_pass.time_constant")
+
+    def __init__(
+        self,
+        g1: Value,
+        g2: Value,
+        h: Value,
+        *,
+        period: float = 1e-3,
+        unit: str = "rad",
+        table: str | ArrayLike = "anti_diagonal",
+        limits: tuple[float, float] = (0.0, 10.0),
+        null: float = 5.0,
+        output_filter: Value = 0.05,
+        rate_filter: Value = 0.02,
+        angle_filter: Value = 0.0,
+        measured_rate: bool = False,
+    ) -> None:
+        self._g1, self._g2, self._h = positive_gain("g1", g1), positive_gain("g2", g2), as_value("h", h, lower=0.0)
+        self.rules = fuzzy_rules(table)
+        self._rows: list[list[float]] = self.rules.tolist()
+        self.low_pass = LowPass(output_filter, period, initial=0.0)
+        super().__init__(
+            period,
+            (self._g1, self._g2, self._h, self.low_pass.time_constant),
+            unit=unit,
+            limits=limits,
+            null=null,
+            rate_filter=rate_filter,
+            angle_filter=angle_filter,
+            measured_rate=measured_rate,
+        )
+        self._error_scale, self._rate_scale = self._scale / self._g1, self._scale / self._g2
+        self.reset()
+
+    def answer(self, time: float, measurement: Measurement, reference: Reference, bias: Value) -> Value:
+        """As :meth:`update`, with ``bias`` [V] added before the limits."""
+        aim = self._aim(reference)
+        if bias.__class__ is not float:
+            bias = self._sized("bias", bias)
+        angle, rate = self.sensor.read(self, measurement)
+        self._tick(time)
+        angle, rate = self.sensor.update(angle, rate)
+        error, error_rate = (aim.angle - angle) * self._error_scale, (aim.rate - rate) * self._rate_scale
+        output = self.low_pass.update(self._h * fuzzy_surface(error, error_rate, self._rows, self.rules))
+        return clip(self._null + output + bias, self._limits[0], self._limits[1])

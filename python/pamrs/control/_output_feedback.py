@@ -1,0 +1,92 @@
+"""What PID and fuzzy control share: the joint as measured, a unit of the angle, volts around the closed valve, printed gains."""
+
+from __future__ import annotations
+
+import abc
+from collections.abc import Iterable, Mapping
+from typing import Any, ClassVar, Self
+
+from pamrs.control._joint_sensor import JointSensor
+from pamrs.control._protocol import Measurement, Reference, Value
+from pamrs.control._sampled import Fixed, SampledController
+from pamrs.control._values import angle_factor, limits_around
+from pamrs.errors import ParameterError
+
+__all__ = ["OutputFeedback"]
+
+
+class OutputFeedback(SampledController):
+    """A controller of the joint angle by the valve, which a feedforward can be added to.
+
+    Parameters
+    ----------
+    period : float
+        Time between two updates [s].
+    gains : iterable of float or ndarray
+        Everything that may be an array, but for the sensor's.
+    unit, limits, null, rate_filter, angle_filter, measured_rate
+        As for :class:`pamrs.control.PID`.
+
+    Raises
+    ------
+    ParameterError
+        If a number is not finite or not allowed; the message names it.
+    """
+
+    #: Gains as printed, by name.
+    _PUBLISHED: ClassVar[Mapping[str, Mapping[str, float]]] = {}
+
+    unit, limits, null = Fixed(), Fixed(), Fixed()
+
+    def __init__(
+        self,
+        period: float,
+        gains: Iterable[Any],
+        *,
+        unit: str,
+        limits: tuple[float, float],
+        null: float,
+        rate_filter: Value,
+        angle_filter: Value,
+        measured_rate: bool,
+    ) -> None:
+        self._unit, self._scale = unit, angle_factor(unit)
+        low, high, self._null = limits_around(limits, null)
+        self._limits = low, high
+        self.sensor = JointSensor(period, angle_filter=angle_filter, rate_filter=rate_filter, measured_rate=measured_rate)
+        super().__init__(period, (*gains, self.sensor.low_pass.time_constant, self.sensor.slope.time_constant))
+
+    @classmethod
+    def published(cls, name: str, **others: Any) -> Self:
+        """With gains as printed, radians and volts (see the class).
+
+        Parameters
+        ----------
+        name : str
+            Of :class:`pamrs.control.PID`: ``feedforward`` (4.4.2, to be used beside a feedforward of kM = 1.0), ``experiment_23kg``
+            (4.5.1.2, best combined), ``optimal_11kg`` (Fig. 4.9, kP just above 1 and kI near 4). Of :class:`pamrs.control.Fuzzy`:
+            ``optimal_23kg`` (4.4.1.2), ``feedforward`` (4.4.2 and Fig. 4.13, beside a feedforward), ``feedforward_gain_series``
+            (Fig. 4.14).
+        **others
+            The other arguments; for a PID ``anti_windup="none"`` as in the dissertation.
+
+        Returns
+        -------
+        PID or Fuzzy
+
+        Raises
+        ------
+        ParameterError
+            If there is no such set of gains.
+        """
+        if name not in cls._PUBLISHED:
+            raise ParameterError(f"name = {name!r} is not allowed: one of {', '.join(cls._PUBLISHED)}")
+        return cls(**{**cls._PUBLISHED[name], "unit": "rad", **others})
+
+    def update(self, time: float, measurement: Measurement, reference: Reference) -> Value:
+        """Valve command [V] for a sample; see :meth:`pamrs.control.Controller.update`."""
+        return self.answer(time, measurement, reference, 0.0)
+
+    @abc.abstractmethod
+    def answer(self, time: float, measurement: Measurement, reference: Reference, bias: Value) -> Value:
+        """As :meth:`update`, with ``bias`` [V] added before the limits: a feedforward beside it."""

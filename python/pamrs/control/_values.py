@@ -1,0 +1,115 @@
+"""Numbers of one plant or of a batch: the few operations that need a word for both, lean for plain floats."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final
+
+import numpy as np
+
+from pamrs.control._protocol import Value
+from pamrs.errors import ParameterError
+
+__all__ = ["angle_factor", "as_value", "clip", "limits_around", "positive_gain", "positive_number", "sign", "sin"]
+
+#: How many of a unit are in a radian.
+_PER_RADIAN: Final[dict[str, float]] = {"rad": 1.0, "deg": 180.0 / math.pi}
+
+
+def as_value(name: str, value: Any, *, lower: float = -math.inf, upper: float = math.inf, above: bool = False) -> Value:
+    """A finite float, or a finite array of shape (n,), within bounds.
+
+    Parameters
+    ----------
+    name : str
+        What it is, for messages.
+    value : float or array_like, shape (n,)
+        What was given.
+    lower, upper : float
+        What is allowed.
+    above : bool
+        Whether ``lower`` itself is refused.
+
+    Returns
+    -------
+    float or ndarray, shape (n,)
+        Never a numpy scalar, whose arithmetic is slow.
+
+    Raises
+    ------
+    ParameterError
+        If it is not of that form; the message names it.
+    """
+    try:
+        array = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ParameterError(f"{name} = {value!r} is not allowed: a number or an array of shape (n,) is needed") from None
+    if array.ndim > 1 or array.size == 0:
+        raise ParameterError(f"{name} has shape {array.shape}: a number or an array of shape (n,) is needed")
+    wrong = ~(np.isfinite(array) & (array >= lower) & (array <= upper))
+    if above:
+        wrong |= array == lower
+    if np.any(wrong):
+        first = np.atleast_1d(array)[np.atleast_1d(wrong)][0]
+        bound = f"above {lower:g}" if above else f"from {lower:g}"
+        allowed = "finite" if lower == -math.inf and upper == math.inf else f"finite, {bound} to {upper:g}"
+        raise ParameterError(f"{name} = {first:g} is not allowed: {allowed} is needed")
+    if array.ndim == 0:
+        return float(array)
+    # whoever could write into it would change some of what follows from it
+    kept = array.copy()
+    kept.flags.writeable = False
+    return kept
+
+
+def positive_gain(name: str, value: Any) -> Value:
+    """A gain above zero, see :func:`as_value`."""
+    return as_value(name, value, lower=0.0, above=True)
+
+
+def positive_number(name: str, value: Any) -> float:
+    """One number above zero for the whole batch, see :func:`as_value`."""
+    checked = positive_gain(name, value)
+    if isinstance(checked, np.ndarray):
+        raise ParameterError(f"{name} is an array: one number for the whole batch is needed")
+    return checked
+
+
+def limits_around(limits: Any, null: Any) -> tuple[float, float, float]:
+    """Limits of an output and what is put out for no error, checked: two finite numbers, the first below the second, null within."""
+    try:
+        low, high = (float(limit) for limit in limits)
+        middle = float(null)
+    except (TypeError, ValueError):
+        low = high = middle = math.nan
+    if not (math.isfinite(low) and math.isfinite(high) and low <= middle <= high and low < high):
+        raise ParameterError(f"limits = {limits!r} are not allowed: two finite numbers are needed, rising, with {null!r} between them")
+    return low, high, middle
+
+
+def angle_factor(unit: str) -> float:
+    """How many of a unit, ``"rad"`` or ``"deg"``, are in a radian; a ParameterError for another one."""
+    if unit not in _PER_RADIAN:
+        raise ParameterError(f"unit = {unit!r} is not allowed: one of {', '.join(_PER_RADIAN)} is needed")
+    return _PER_RADIAN[unit]
+
+
+def clip(value: Value, low: Value, high: Value) -> Value:
+    """``value`` within ``low`` and ``high``, which are not checked against each other."""
+    if value.__class__ is float and low.__class__ is float and high.__class__ is float:
+        return low if value < low else high if value > high else value
+    return np.minimum(np.maximum(value, low), high)
+
+
+def sign(value: Value) -> Value:
+    """-1, 0 or 1."""
+    if value.__class__ is float:
+        return 1.0 if value > 0.0 else -1.0 if value < 0.0 else 0.0
+    return np.sign(value)
+
+
+def sin(value: Value) -> Value:
+    """Sine; that of an array may differ from that of a float in the last bit."""
+    if value.__class__ is float:
+        return math.sin(value)
+    return np.sin(value)

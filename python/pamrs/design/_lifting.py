@@ -1,0 +1,389 @@
+"""What an arm can lift and hold: the torque of its muscles at a pressure against that of gravity, over the joint's range.
+
+Statics only: pressure is taken as reached slowly, so that nothing is carried on by its swing. Coulomb friction of the arm and
+hysteresis of the muscles are losses while lifting and help while holding.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pamrs.errors import ParameterError
+from pamrs.rig import Joint
+
+if TYPE_CHECKING:
+    from pamrs.rig import Rig
+
+__all__ = ["Lift", "lift"]
+
+Array = NDArray[np.float64]
+
+#: Effects of the catalogue that change no static torque at a given pressure.
+_WITHOUT_TORQUE: Final = ("leak_muscle", "heat_transfer")
+_LIFTING, _HOLDING = -1.0, 1.0  # direction of the muscles: shortening, about to be drawn out
+
+
+@dataclass(frozen=True, eq=False)
+class Lift:
+    """What :func:`lift` found; SI units, angles from the vertical.
+
+    Attributes
+    ----------
+    rig : str
+        Name of the rig.
+    pressure : float
+        Gauge pressure of the muscles [Pa].
+    payload : float
+        Mass at the tip [kg].
+    angle : ndarray (n,)
+        Angles from the lower stop to the end that was asked for [rad].
+    torque, torque_holding : ndarray (n,)
+        Torque of the muscles at each angle while they shorten, and the most with which they resist being drawn out [N m].
+    gravity : ndarray (n,)
+        Torque of the arm's and the payload's weight at each angle [N m].
+    coulomb : float
+        Coulomb friction of the arm [N m].
+    capacity : ndarray (n,)
+        Payload that would just be lifted past each angle [kg]: negative where not even the empty arm is, infinite where a payload
+        does not weigh on the joint.
+    reached : float
+        Angle up to which the arm is lifted from its lower stop [rad]; that stop itself where it is not lifted at all.
+    held : float
+        Angle up to which it is held when brought there [rad].
+    regained : tuple of (float, float)
+        Ranges beyond ``reached`` in which it is lifted again if it is brought there [rad].
+    can_lift : bool
+        Whether it is lifted over the whole range of ``angle``.
+    margin, margin_angle : float
+        Least of muscles less friction less gravity over the range [N m], and where [rad].
+    payload_limit : float or None
+        The most that is lifted over the whole range [kg]: infinite where no payload weighs on the joint, None where not even the empty
+        arm is lifted.
+    limit_angle : float
+        Where that is decided [rad].
+    left_out : tuple of str
+        Effects of the rig that change a torque and are not counted.
+    """
+
+    rig: str
+    pressure: float
+    payload: float
+    angle: Array = field(repr=False)
+    torque: Array = field(repr=False)
+    torque_holding: Array = field(repr=False)
+    gravity: Array = field(repr=False)
+    coulomb: float
+    capacity: Array = field(repr=False)
+    reached: float
+    held: float
+    regained: tuple[tuple[float, float], ...]
+    can_lift: bool
+    margin: float
+    margin_angle: float
+    payload_limit: float | None
+    limit_angle: float
+    left_out: tuple[str, ...] = ()
+
+    @property
+    def lifts(self) -> NDArray[np.bool_]:
+        """Whether the muscles overcome gravity and friction, at each angle."""
+        return np.asarray(self.torque - self.coulomb > self.gravity)
+
+    @property
+    def holds(self) -> NDArray[np.bool_]:
+        """Whether the muscles and friction keep the arm from sinking, at each angle."""
+        return np.asarray(self.torque_holding + self.coulomb >= self.gravity)
+
+    @property
+    def text(self) -> str:
+        """The result in one or two sentences."""
+        load, bar = _kg(self.payload), f"{self.pressure / 1e5:.3g} bar"
+        first, last = _degrees(self.angle[0]), _degrees(self.angle[-1])
+        if self.can_lift:
+            least = f"least margin {self.margin:.3g} N m at {_degrees(self.margin_angle)} deg"
+            return f"lifts {load} from {first} to {last} deg at {bar}: {least}; {self._limit()}"
+        at = float(np.interp(self.reached, self.angle, self.gravity))
+        muscles = float(np.interp(self.reached, self.angle, self.torque))
+        lost = f" less {self.coulomb:.3g} N m of friction" if self.coulomb else ""
+        where = f"beyond {_degrees(self.reached)} deg" if self.reached > self.angle[0] else f"off its stop at {first} deg"
+        balance = f"there the muscles give {muscles:.4g} N m{lost}, gravity takes {at:.4g} N m"
+        again = "".join(f"; brought there, it goes on from {_degrees(a)} to {_degrees(b)} deg" for a, b in self.regained)
+        return f"cannot lift {load} {where} at {bar}: {balance}{again}; {self._limit()}"
+
+    def _limit(self) -> str:
+        last = _degrees(self.angle[-1])
+        if self.payload_limit is None:
+            return f"up to {last} deg it does not even lift the empty arm"
+        if math.isinf(self.payload_limit):
+            return f"up to {last} deg no payload weighs on the joint"
+        return f"up to {last} deg at most {_kg(self.payload_limit)}, decided at {_degrees(self.limit_angle)} deg"
+
+    def summary(self) -> str:
+        """The result as text: the sentence, and torques and capacity at a dozen angles."""
+        rows = np.unique(np.linspace(0, self.angle.size - 1, 13).round().astype(int))
+        lines = [
+            f"{self.rig}: {self.text}",
+            "",
+            "angle [deg]  muscles [N m]  gravity [N m]  margin [N m]  lifts up to [kg]  payload is",
+        ]
+        for row in rows.tolist():
+            margin = self.torque[row] - self.coulomb - self.gravity[row]
+            state = "lifted" if self.lifts[row] else "held" if self.holds[row] else "not held"
+            numbers = f"{math.degrees(self.angle[row]):>11.1f}{self.torque[row]:>15.1f}{self.gravity[row]:>15.1f}{margin:>14.1f}"
+            lines.append(f"{numbers}{max(float(self.capacity[row]), 0.0):>18.1f}  {state}")
+        if self.left_out:
+            lines += ["", f"without the effects of the rig: {', '.join(self.left_out)}"]
+        return "\n".join(lines)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything as numbers and lists, SI units; what is infinite becomes None."""
+        document = {name: getattr(self, name) for name in self.__dataclass_fields__}
+        shown: dict[str, Any] = {}
+        for name, value in document.items():
+            if isinstance(value, np.ndarray):
+                shown[name] = [item if math.isfinite(item) else None for item in value.tolist()]
+            else:
+                shown[name] = None if isinstance(value, float) and not math.isfinite(value) else value
+        return {**shown, "lifts": self.lifts.tolist(), "holds": self.holds.tolist(), "text": self.text}
+
+    def plot(self, path: str | os.PathLike[str]) -> Path:
+        """Write a picture of torques and capacity over the angle, a PNG.
+
+        Parameters
+        ----------
+        path : path-like
+            The file.
+
+        Returns
+        -------
+        Path
+            The file written.
+
+        Raises
+        ------
+        MissingPackageError
+            If matplotlib is missing; names the extra to install.
+        """
+        from pamrs._writing import write_atomically
+
+        try:
+            from pamrs.design._lifting_figure import lift_png
+        except ImportError as error:
+            from pamrs.errors import missing_package
+
+            raise missing_package(error, "plot") from None
+        return write_atomically(path, lift_png(self))
+
+
+def lift(rig: Rig, *, pressure: float | None = None, to: float | None = None, points: int = 721) -> Lift:
+    """What a one-link rig lifts and holds at a pressure.
+
+    At each angle the torque of the muscles ``n F(P, d(theta)/L0) dd/dtheta`` stands against gravity's
+    ``(m lc + mp l) g sin(theta)`` (sections 4 and 5 of the physics reference; dissertation (3.24)). A payload that is too much
+    is a result, not an error.
+
+    Parameters
+    ----------
+    rig : Rig
+        With muscle, joint and arm; its payload is what is to be lifted.
+    pressure : float, optional
+        Gauge pressure of the muscles [Pa]; that of the full supply by default.
+    to : float, optional
+        Angle up to which the payload is to be lifted [rad]; the upper stop by default.
+    points : int
+        Angles at which the torques are given; where signs change is found to round-off between them.
+
+    Returns
+    -------
+    Lift
+
+    Raises
+    ------
+    ParameterError
+        If the rig has no muscle, joint or arm, there is no pressure, a value is not finite or outside its range; the message
+        names it.
+
+    Examples
+    --------
+    >>> import pamrs
+    >>> result = pamrs.lift(pamrs.rigs.named("elbow"), pressure=8.3e5)
+    >>> result.can_lift, round(result.payload_limit, 1)
+    (False, 9.8)
+    """
+    from pamrs.simulation import core_rig
+
+    missing = [block for block in ("muscle", "joint", "arm") if block not in rig.blocks]
+    if missing:
+        raise ParameterError(f"rig {rig.name!r} has no [{missing[0]}]: lifting needs muscle, joint and arm")
+    if rig.tables("arm")[""]["kind"] != "one_link":
+        raise ParameterError(f"rig {rig.name!r} has an arm of several links: what it lifts is found for a one-link arm only")
+    core_rig(rig)  # refuses lengths that the muscle cannot have, and angles that the tendon does not reach
+    pressure = _pressure(rig, pressure)
+    joint = next(iter(rig.tables("joint").values()))
+    low, high = float(joint["min_angle"]), float(joint["max_angle"])
+    end = high if to is None else float(to)
+    if not low < end <= high:
+        allowed = f"above joint.min_angle = {_degrees(low)} deg, at most joint.max_angle = {_degrees(high)} deg"
+        raise ParameterError(f"to = {end:g} rad ({math.degrees(end):.4g} deg) is not allowed: {allowed}")
+    if points < 3:
+        raise ParameterError(f"points = {points} is not allowed: at least 3")
+    balance = _Balance(rig, pressure)
+    angle = np.linspace(low, end, points)
+    torque = balance.torque(angle, _LIFTING)
+    capacity = balance.capacity(angle)
+    crossings = _crossings(balance.excess, angle)
+    lifted = bool(balance.excess(angle[:1])[0] > 0.0)
+    reached = (crossings[0] if crossings else end) if lifted else low
+    later = [*crossings[1:], end] if lifted else [*crossings, end]
+    regained = tuple(zip(later[::2], later[1::2], strict=False))
+    margin_angle = _least(balance.excess, angle)
+    limit, limit_angle = balance.limit(angle)
+    left_out = tuple(e["id"] for e in rig.effects if e["id"] not in (*_WITHOUT_TORQUE, "muscle_hysteresis"))
+    return Lift(
+        rig=rig.name,
+        pressure=pressure,
+        payload=float(balance.arm["payload"]),
+        angle=angle,
+        torque=torque,
+        torque_holding=balance.torque(angle, _HOLDING),
+        gravity=balance.gravity(angle),
+        coulomb=balance.coulomb,
+        capacity=capacity,
+        reached=float(reached),
+        held=_held(balance, angle),
+        regained=regained,
+        can_lift=bool(lifted and not crossings),
+        margin=float(balance.excess(np.array([margin_angle]))[0]),
+        margin_angle=margin_angle,
+        payload_limit=limit,
+        limit_angle=limit_angle,
+        left_out=left_out,
+    )
+
+
+class _Balance:
+    """Torques of one rig at one pressure, as functions of the angle [rad] over arrays."""
+
+    def __init__(self, rig: Rig, pressure: float) -> None:
+        self.arm = rig.tables("arm")[""]
+        own, transmissions = next(iter(rig.tables("joint").values())), rig.tables("transmission")
+        self.groups = [(rig.muscle_of(name), Joint.from_model(transmissions.get(name, own))) for name in rig.tables("muscle")]
+        self.pressure = pressure
+        self.coulomb = float(self.arm["coulomb"])
+        self.hysteresis = (0.0, 0.0)  # of one muscle: constant [N], by pressure [N/Pa]; the effect of the catalogue
+        for effect in rig.effects:
+            if effect["id"] == "muscle_hysteresis":
+                self.hysteresis = effect["parameters"]["friction_constant"], effect["parameters"]["friction_pressure"]
+
+    def torque(self, angle: Array, direction: float) -> Array:
+        """Of the muscles, while they shorten or are about to be drawn out [N m]; those that would lower the arm are vented."""
+        total = np.zeros(angle.shape)
+        for muscle, joint in self.groups:
+            rest, count = float(muscle.parameters["rest_length"]), int(muscle.parameters["count"])
+            arm = joint.torque_arm(angle)
+            # a muscle on the other side of the joint lengthens where the arm rises
+            way = direction * np.sign(np.where(arm == 0.0, 1.0, arm))
+            pressure = np.where(arm < 0.0, 0.0, self.pressure) if len(self.groups) > 1 else np.full(angle.shape, self.pressure)
+            friction = self.hysteresis[0] + self.hysteresis[1] * np.maximum(pressure, 0.0)
+            total += count * (muscle.force(pressure, joint.shortening(angle) / rest, way) + way * friction) * arm
+        return total
+
+    def weight(self, angle: Array) -> Array:
+        """Torque of a kilogram at the tip [N m/kg]."""
+        return np.asarray(self.arm["length"] * self.arm["gravity"] * np.sin(angle))
+
+    def own(self, angle: Array) -> Array:
+        """Gravity's torque on the empty arm [N m]."""
+        return np.asarray(self.arm["first_moment"] * self.arm["gravity"] * np.sin(angle))
+
+    def gravity(self, angle: Array) -> Array:
+        """Gravity's torque [N m]."""
+        return np.asarray(self.own(angle) + self.arm["payload"] * self.weight(angle))
+
+    def excess(self, angle: Array) -> Array:
+        """Muscles less friction less gravity, lifting [N m]."""
+        return self.torque(angle, _LIFTING) - self.coulomb - self.gravity(angle)
+
+    def keeps(self, angle: Array) -> Array:
+        """Muscles and friction less gravity, holding [N m]."""
+        return self.torque(angle, _HOLDING) + self.coulomb - self.gravity(angle)
+
+    def capacity(self, angle: Array) -> Array:
+        """Payload just lifted past an angle [kg]."""
+        free = self.torque(angle, _LIFTING) - self.coulomb - self.own(angle)
+        weight = self.weight(angle)
+        return np.where(weight > 0.0, free / np.where(weight > 0.0, weight, 1.0), math.inf)
+
+    def limit(self, angle: Array) -> tuple[float | None, float]:
+        """The most that is lifted at every angle, and where that is decided."""
+        where = _least(self.capacity, angle)
+        limit = float(self.capacity(np.array([where]))[0])
+        if limit < 0.0:
+            return None, where
+        # where a payload helps or does not weigh, the muscles must still do their part
+        helped = self.weight(angle) <= 0.0
+        load = 0.0 if math.isinf(limit) else limit
+        rest = (self.torque(angle, _LIFTING) - self.coulomb - self.own(angle) - load * self.weight(angle))[helped]
+        if rest.size and rest.min() < 0.0:
+            return None, float(angle[helped][rest.argmin()])
+        return limit, where
+
+
+def _pressure(rig: Rig, pressure: float | None) -> float:
+    """The pressure asked for, or the supply's."""
+    if pressure is None:
+        if "supply" not in rig.blocks:
+            raise ParameterError(f"pressure is missing: the rig {rig.name!r} has no [supply] whose pressure could be taken")
+        return max(float(supply["initial_pressure"]) for supply in rig.tables("supply").values())
+    if not (math.isfinite(pressure) and 0.0 <= pressure <= 1e8):
+        raise ParameterError(f"pressure = {pressure} Pa is not allowed: a gauge pressure from 0 to 1e8 Pa")
+    return float(pressure)
+
+
+def _crossings(function: Callable[[Array], Array], angle: Array) -> list[float]:
+    """Where a function changes sign between the first and the last angle."""
+    from scipy.optimize import brentq
+
+    positive = function(angle) > 0.0
+    found = []
+    for index in np.flatnonzero(positive[1:] != positive[:-1]).tolist():
+        low, high = float(angle[index]), float(angle[index + 1])
+        found.append(float(brentq(lambda x: float(function(np.array([x]))[0]), low, high, xtol=1e-14, rtol=1e-14)))
+    return found
+
+
+def _least(function: Callable[[Array], Array], angle: Array) -> float:
+    """Where a function is least over the angles, refined between its neighbours."""
+    from scipy.optimize import minimize_scalar
+
+    values = function(angle)
+    best = int(np.argmin(values))
+    if not math.isfinite(values[best]) or best in (0, angle.size - 1):
+        return float(angle[best])
+    around = (float(angle[best - 1]), float(angle[best + 1]))
+    found = minimize_scalar(lambda x: float(function(np.array([x]))[0]), bounds=around, method="bounded", options={"xatol": 1e-10})
+    return float(found.x if found.fun < values[best] else angle[best])
+
+
+def _held(balance: _Balance, angle: Array) -> float:
+    """Angle up to which the arm is held, from the lower stop on, which holds it."""
+    gaps = _crossings(balance.keeps, angle)
+    if balance.keeps(angle[:1])[0] < 0.0:
+        return float(angle[0])
+    return gaps[0] if gaps else float(angle[-1])
+
+
+def _degrees(angle: float) -> str:
+    return f"{math.degrees(angle):.1f}"
+
+
+def _kg(mass: float) -> str:
+    return f"{mass:.4g} kg"

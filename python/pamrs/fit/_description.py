@@ -1,0 +1,169 @@
+"""Descriptions of force maps: where the table is, what its columns are, which muscle it is of."""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+from pamrs.errors import RecordingError, joined
+from pamrs.rig import Muscle, Reader, muscle_problems
+from pamrs.rig.muscle_models import models_with
+
+__all__ = ["NO_MODULI", "SCHEMA", "Description", "read_description", "with_moduli"]
+
+SCHEMA: Final = "pamrs.force_map/1"
+_TOP: Final = (
+    "schema",
+    "name",
+    "description",
+    "source",
+    "file",
+    "delimiter",
+    "decimal",
+    "columns",
+    "where",
+    "clipped_force",
+    "level_tolerance",
+    "noise",
+    "muscle",
+)
+
+
+#: Moduli of a muscle whose moduli a fit is to find, in the order that it takes unless told otherwise.
+NO_MODULI: Final = (0.0, 0.0, 0.0, 0.0)
+_ZEROS: Final[dict[str, Any]] = {
+    "modulus_slope": {"value": list(NO_MODULI), "unit": "1"},
+    "modulus_offset": {"value": list(NO_MODULI), "unit": "Pa"},
+    "c10": {"value": 0.0, "unit": "Pa"},
+    "bladder_modulus": {"value": 0.0, "unit": "Pa"},
+}
+
+
+class Description(NamedTuple):
+    """What a description says.
+
+    Attributes
+    ----------
+    table : Path
+        Where the table is.
+    options : dict
+        How to read it: arguments of :func:`pamrs.fit.load_force_map`.
+    muscle : Muscle
+        Geometry, and the force model to start from.
+    tolerance : dict of str to float
+        Standard deviation of what is known of a number, SI; infinite where it is unknown.
+    noise : float or None
+        Standard deviation of the forces [N].
+    text : str
+        What it says about the measurements.
+    """
+
+    table: Path
+    options: dict[str, Any]
+    muscle: Muscle
+    tolerance: dict[str, float]
+    noise: float | None
+    text: str
+
+
+def read_description(file: Path) -> Description:
+    """Read a ``pamrs.force_map/1`` file, but not yet its table.
+
+    Parameters
+    ----------
+    file : Path
+        The TOML file.
+
+    Returns
+    -------
+    Description
+
+    Raises
+    ------
+    RecordingError
+        With every problem found in it.
+    """
+    document = _document(file)
+    reader = Reader()
+    reader.unknown_keys("", document, _TOP)
+    if document.get("schema") != SCHEMA:
+        reader.problem(f"schema = {document.get('schema')!r} is not allowed: {SCHEMA!r} is needed")
+    texts = {key: _text(reader, document, key) for key in ("name", "description", "source", "file", "delimiter", "decimal")}
+    if "file" not in document:
+        reader.problem("file is missing: the table with the measurements")
+    maps = {key: _text_table(reader, document, key) for key in ("columns", "where")}
+    clipped = _quantity(reader, document, "clipped_force", "N")
+    tolerance = _quantity(reader, document, "level_tolerance", "Pa")
+    noise = _quantity(reader, document, "noise", "N")
+    block = document.get("muscle")
+    model: dict[str, Any] = {}
+    if isinstance(block, Mapping):
+        model = reader.block("muscle", with_moduli(block))
+        if not reader.problems:
+            reader.problems += muscle_problems("muscle", model)
+    else:
+        reader.problem("the block [muscle] is missing: the geometry of the muscle, as in a rig file")
+    if reader.problems:
+        raise RecordingError(joined(str(file), reader.problems))
+    table = Path(os.path.normpath(file.parent / texts["file"]))
+    if not table.exists():
+        advice = texts["source"] or "correct file in the description"
+        raise RecordingError(f"{file}: file = {texts['file']!r}: there is no file {table}; {advice}")
+    options = {
+        "rest_length": model["rest_length"],
+        "columns": maps["columns"],
+        "where": maps["where"] or None,
+        "clipped": clipped,
+        "level_tolerance": tolerance,
+        "delimiter": texts["delimiter"] or None,
+        "decimal": texts["decimal"] or None,
+        "name": texts["name"] or file.stem,
+    }
+    known = {name.partition(".")[2]: spread for name, spread in reader.tolerances.items()}
+    return Description(table, options, Muscle.from_model(model), known, noise, texts["description"])
+
+
+def with_moduli(block: Mapping[str, Any]) -> dict[str, Any]:
+    """A ``[muscle]`` block with zeros where it leaves out the moduli of its model, which a fit is to find."""
+    return {**{key: value for key, value in _ZEROS.items() if str(block.get("model", "robinson")) in models_with(key)}, **block}
+
+
+def _document(file: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise RecordingError(f"{file}: cannot be read ({error.strerror or error})") from error
+    except UnicodeDecodeError as error:
+        raise RecordingError(f"{file}: not a text file in UTF-8") from error
+    except tomllib.TOMLDecodeError as error:
+        raise RecordingError(f"{file}: not valid TOML: {error}") from error
+
+
+def _text(reader: Reader, document: Mapping[str, Any], key: str) -> str:
+    value = document.get(key, "")
+    if isinstance(value, str):
+        return value
+    reader.problem(f"{key} = {value!r} is not allowed: a text is needed")
+    return ""
+
+
+def _text_table(reader: Reader, document: Mapping[str, Any], key: str) -> dict[str, str]:
+    table = document.get(key, {})
+    if isinstance(table, Mapping) and all(isinstance(value, (str, int, float)) for value in table.values()):
+        return {str(name): str(value) for name, value in table.items()}
+    reader.problem(f"{key} = {table!r} is not allowed: a table of texts is needed")
+    return {}
+
+
+def _quantity(reader: Reader, document: Mapping[str, Any], key: str, unit: str) -> float | None:
+    """``{ value, unit }`` in SI, None where there is none or after noting what is wrong with it."""
+    raw = document.get(key)
+    if raw is None:
+        return None
+    if not isinstance(raw, Mapping) or set(raw) != {"value", "unit"} or not isinstance(raw["unit"], str):
+        reader.problem(f"{key} = {raw!r} is not allowed: write {{ value = ..., unit = {unit!r} }}")
+        return None
+    return reader.scalar(key, unit, raw["value"], raw["unit"], -1e9, 1e9)

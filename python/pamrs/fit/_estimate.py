@@ -1,0 +1,408 @@
+"""The estimate behind every fit: linear coefficients exactly, free geometry around them by variable projection."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pamrs.errors import FitError, ParameterError
+from pamrs.fit._design import Design, friction_factor
+from pamrs.fit._problem import decompose, project_out, solve
+
+if TYPE_CHECKING:
+    from pamrs.rig import Muscle
+
+__all__ = ["Estimate", "Free", "Known", "Problem", "estimate"]
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+Mask = NDArray[np.bool_]
+
+_SIGMA_ROUNDS = 30
+_STEP = 1e-4  # of a scale, for differences
+_NO_TOLERANCE_SCALE = 0.02  # of the nominal value
+
+
+@dataclass(frozen=True)
+class Free:
+    """A geometry parameter that is fitted: its nominal value, and one standard deviation of what is known of it (infinite: nothing)."""
+
+    name: str
+    nominal: float
+    tolerance: float
+
+    @property
+    def scale(self) -> float:
+        """Step size of the search."""
+        return self.tolerance if math.isfinite(self.tolerance) else _NO_TOLERANCE_SCALE * max(abs(self.nominal), 1e-3)
+
+
+@dataclass(frozen=True)
+class Known:
+    """What is known of one kind of coefficient before the fit: its values (zero beyond the last) and one standard deviation."""
+
+    values: tuple[float, ...]
+    tolerance: float
+
+
+_UNKNOWN = Known((), math.inf)
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Rows of a force map and what is to be fitted to them; all arrays ``(n,)``.
+
+    ``knot`` is the pressure that the moduli see: that of the row, or of its level when moduli are free at each level.
+    ``weight`` multiplies force residuals. ``known`` has the priors of coefficients, by kind; they need a known ``noise``.
+    """
+
+    blank: Muscle
+    moduli: str
+    free: tuple[Free, ...]
+    noise: float | None
+    known: Mapping[str, Known]
+    pressure: Array
+    length: Array
+    force: Array
+    level: Index
+    direction: Array
+    weight: Array
+    levels: Array
+
+    def design(self, rows: Mask) -> Design:
+        """The coefficients that the levels of some rows allow."""
+        present = np.unique(self.level[rows])
+        return Design.of(self.blank, self.moduli, self.levels[present])
+
+    def knot(self, rows: Mask) -> Array:
+        """Pressure at which the moduli of some rows are taken [Pa]."""
+        return self.levels[self.level[rows]] if self.moduli == "per_level" else self.pressure[rows]
+
+    def muscle(self, values: Array) -> Muscle:
+        """The template with other geometry values."""
+        return (
+            self.blank.replace(**{free.name: float(v) for free, v in zip(self.free, values, strict=True)}) if self.free else self.blank
+        )
+
+    def system(self, design: Design, muscle: Muscle, rows: Mask) -> tuple[Array, Array]:
+        """Weighted design matrix (n, k) and target (n,) of some rows for one geometry."""
+        contraction = 1.0 - self.length[rows] / muscle.parameters["rest_length"]
+        pressure, direction, force = self.pressure[rows], self.direction[rows], self.force[rows]
+        gas, columns = design.columns(muscle, pressure, contraction, direction, design.weights(self.knot(rows)))
+        factor = friction_factor(muscle, pressure, direction, force)
+        weight = self.weight[rows]
+        return columns * (factor * weight)[:, None], (force - factor * gas) * weight
+
+    def expected(self, design: Design) -> tuple[Array, Array]:
+        """Prior values of the coefficients (k,) and their information ``1/tolerance`` (k,), 0 without a prior."""
+        values, variance = np.zeros(len(design.names)), np.zeros(len(design.names))
+        for i, parts in enumerate(design.kinds):
+            for kind, place, factor in parts:  # one, or slope and offset of a modulus at one pressure
+                if factor == 0.0:  # a slope at no pressure
+                    continue
+                known = self.known.get(kind, _UNKNOWN)
+                values[i] += factor * (known.values[place] if place < len(known.values) else 0.0)
+                variance[i] += (factor * known.tolerance) ** 2
+        return np.where(np.isfinite(variance), values, 0.0), 1.0 / np.sqrt(variance)
+
+    def equations(self, design: Design, muscle: Muscle, rows: Mask) -> tuple[Array, Array]:
+        """:meth:`system`, and below it one equation for each coefficient with a prior, weighted by the noise."""
+        matrix, target = self.system(design, muscle, rows)
+        values, information = self.expected(design)
+        prior = np.flatnonzero(information)
+        if not len(prior) or self.noise is None:
+            return matrix, target
+        extra = np.diag(self.noise * information)[prior]
+        return np.vstack([matrix, extra]), np.concatenate([target, extra @ values])
+
+    def check_reach(self, muscle: Muscle) -> None:
+        """Raise FitError if the geometry cannot have one of the lengths."""
+        low, high = muscle.contraction_limits
+        rest = muscle.parameters["rest_length"]
+        longest, shortest = rest * (1.0 - low), rest * (1.0 - high)
+        outside = int(np.sum((self.length > longest) | (self.length < shortest)))
+        if outside:
+            raise FitError(
+                f"{outside} of {len(self.length)} points have lengths that this geometry cannot reach: the braid allows "
+                f"{shortest:.4g} to {longest:.4g} m, the points span {self.length.min():.4g} to {self.length.max():.4g} m; check "
+                f"rest_length = {rest:g} m and braid_angle = {math.degrees(muscle.parameters['braid_angle']):.4g} deg, or flag the "
+                "rows with data.checked_against(muscle)"
+            )
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What a fit found.
+
+    Attributes
+    ----------
+    design : Design
+    blank : Muscle
+        Template with the fitted geometry.
+    x : (k,) array
+        Coefficients.
+    geometry : (q,) array
+        Values of the free geometry.
+    residual : (n,) array
+        Weighted residuals of the fitted rows.
+    jacobian : (n, k + q) array
+        Derivative of the weighted model.
+    sigma : float
+        Standard deviation of the weighted residuals.
+    condition_number : float
+        Of the scaled design matrix.
+    message : str
+        How the search ended.
+    success : bool
+        Whether it converged.
+    """
+
+    design: Design
+    blank: Muscle
+    x: Array
+    geometry: Array
+    residual: Array
+    jacobian: Array
+    sigma: float
+    condition_number: float
+    message: str
+    success: bool
+
+
+def estimate(problem: Problem, rows: Mask, start: Estimate | None = None) -> Estimate:
+    """Fit some rows of a problem.
+
+    Parameters
+    ----------
+    problem : Problem
+        Data and unknowns.
+    rows : (n,) bool array
+        The rows to fit.
+    start : Estimate, optional
+        Where the search of the geometry begins; the nominal geometry by default.
+
+    Returns
+    -------
+    Estimate
+
+    Raises
+    ------
+    FitError
+        If the rows do not determine the unknowns, or no geometry of the search reaches their lengths.
+    """
+    design = problem.design(rows)
+    _check_counts(problem, design, rows)
+    nominal = np.array([free.nominal for free in problem.free])
+    blank = problem.muscle(nominal)
+    problem.check_reach(blank)
+    try:
+        problem.system(design, blank, rows)
+    except ParameterError as error:
+        raise FitError(
+            f"the nominal geometry does not do at every fitted length: {error}; data.checked_against(muscle) flags such rows"
+        ) from error
+    if not problem.free:
+        return _at(problem, design, rows, blank, nominal, None, "linear least squares", True)
+    return _search(problem, design, rows, start)
+
+
+def _check_counts(problem: Problem, design: Design, rows: Mask) -> None:
+    """Name what is missing before the algebra does."""
+    n, k = int(rows.sum()), len(design.names)
+    told = int(np.count_nonzero(problem.expected(design)[1]))  # a coefficient with a prior needs no point
+    # A tolerance is an equation of its own, but what it weighs against the data must come from points to spare.
+    extra = sum(math.isinf(free.tolerance) for free in problem.free) if problem.noise is not None else len(problem.free)
+    terms = len(design.base)
+    what = f"order {terms}" if design.polynomial else f"the model {problem.blank.model}"
+    unknowns = [*(design.names if k <= 8 else (*design.names[:3], "...", design.names[-1])), *(free.name for free in problem.free)]
+    if design.per_level and told < k:
+        counts = {int(level): int(np.sum(rows & (problem.level == level))) for level in np.unique(problem.level[rows])}
+        short = [f"{problem.levels[level] / 1e3:g} kPa ({count})" for level, count in counts.items() if count < terms]
+        if short:
+            enough = [level for level, count in counts.items() if count >= terms]
+            raise FitError(
+                f"moduli free at each level need {terms} points at every level for {what}; fewer at {', '.join(short)}. "
+                f"Levels with enough: {enough or 'none'}"
+            )
+    elif design.polynomial and told < k and len(np.unique(problem.level[rows])) < 2:
+        only = problem.levels[problem.level[rows][0]] / 1e3
+        raise FitError(
+            f"one pressure level only ({only:g} kPa): slopes m_k and offsets b_k are collinear; give two levels at least, "
+            "or moduli='per_level'"
+        )
+    needed = k - told + extra + 1
+    if n < needed:
+        hint = ", or a known noise" if extra and problem.noise is None else ""
+        raise FitError(
+            f"{n} usable points, but {what} has {k + len(problem.free)} unknowns ({', '.join(unknowns)}); {needed} points are "
+            f"needed at least{hint}"
+        )
+    lengths = len(np.unique(np.round(problem.length[rows], 9)))
+    if lengths < terms and told < k:
+        raise FitError(f"{lengths} different lengths, but {what} has {terms} functions of length; {terms} different lengths are needed")
+
+
+def _hint(problem: Problem, rows: Mask) -> str:
+    lengths = np.unique(np.round(problem.length[rows], 9))
+    span = (lengths[-1] - lengths[0]) / problem.blank.parameters["rest_length"]
+    return (
+        f" ({int(rows.sum())} points, {len(np.unique(problem.level[rows]))} pressure levels, {len(lengths)} lengths over "
+        f"{100 * span:.3g} % of the rest length); take a lower order, or more lengths and pressures"
+    )
+
+
+def _at(
+    problem: Problem, design: Design, rows: Mask, blank: Muscle, values: Array, sigma: float | None, message: str, success: bool
+) -> Estimate:
+    """The estimate for one geometry: coefficients, Jacobian, noise."""
+    matrix, target = problem.system(design, blank, rows)
+    found = solve(*problem.equations(design, blank, rows), design.names, _hint(problem, rows))
+    residual = found.residual[: len(target)]
+
+    def model(muscle: Muscle) -> Array:
+        a, y = problem.system(design, muscle, rows)
+        return np.asarray(a @ found.x - y)
+
+    slopes = geometry_slopes(problem, values, model, len(target))
+    freedom = max(len(target) - len(found.x) - len(values), 1)
+    plain = math.sqrt(float(residual @ residual) / freedom)
+    noise = problem.noise if problem.noise is not None else (sigma or plain)
+    return Estimate(
+        design, blank, found.x, values, residual, np.hstack([matrix, slopes]), noise, found.condition_number, message, success
+    )
+
+
+def geometry_slopes(problem: Problem, values: Array, function: Callable[[Muscle], Array], n: int) -> Array:
+    """Differences of a function of the muscle by the free geometry.
+
+    Parameters
+    ----------
+    problem : Problem
+        Names and scales of the free geometry.
+    values : (q,) array
+        Where to take them.
+    function : callable
+        Muscle -> (n,) array.
+    n : int
+        Length of its result.
+
+    Returns
+    -------
+    (n, q) array
+        Central differences, one-sided where the other side is impossible.
+    """
+    slopes = np.zeros((n, len(values)))
+    for j, free in enumerate(problem.free):
+        ends: list[tuple[float, Array]] = []
+        for step in (_STEP * free.scale, 0.0, -_STEP * free.scale):
+            moved = values.copy()
+            moved[j] += step
+            try:
+                ends.append((step, function(problem.muscle(moved))))
+            except ParameterError:
+                continue
+        (first, up), (last, down) = ends[0], ends[-1]
+        if first > last:
+            slopes[:, j] = (up - down) / (first - last)
+    return slopes
+
+
+def _search(problem: Problem, design: Design, rows: Mask, start: Estimate | None) -> Estimate:
+    """Variable projection: least squares over the geometry, with the coefficients solved exactly inside.
+
+    Residuals of the priors, ``(value - nominal)/tolerance``, stand beside data residuals divided by their
+    standard deviation; that is estimated from the residuals, and the search repeated until it stays.
+    """
+    from scipy.optimize import least_squares
+
+    nominal = np.array([free.nominal for free in problem.free])
+    scale = np.array([free.scale for free in problem.free])
+    prior = np.array([1.0 / free.tolerance for free in problem.free])  # 0 without a tolerance
+    weighted = problem.force[rows] * problem.weight[rows]
+    least = 1e-9 * float(np.abs(weighted).max())
+    n, k = len(weighted), len(design.names)
+    priors = int(np.count_nonzero(problem.expected(design)[1]))
+    impossible = np.full(n + priors + len(nominal), np.inf)
+
+    def residuals(z: Array, sigma: float) -> Array:
+        values = nominal + z * scale
+        try:
+            blank = problem.muscle(values)
+            problem.check_reach(blank)
+            matrix, target = problem.equations(design, blank, rows)
+        except (ParameterError, FitError):  # least_squares shortens a step that ends in infinity
+            return impossible
+        return np.concatenate([project_out(matrix, target) / sigma, (values - nominal) * prior])
+
+    def jacobian(z: Array, sigma: float) -> Array:
+        here = residuals(z, sigma)
+        columns = []
+        for j in range(len(z)):
+            step = np.zeros_like(z)
+            step[j] = _STEP
+            up, down = residuals(z + step, sigma), residuals(z - step, sigma)
+            ends = np.isfinite(up[0]), np.isfinite(down[0])
+            if all(ends):
+                columns.append((up - down) / (2.0 * _STEP))
+            elif ends[0]:
+                columns.append((up - here) / _STEP)
+            else:
+                columns.append((here - down) / _STEP if ends[1] else np.zeros_like(here))
+        return np.stack(columns, axis=1)
+
+    z = np.zeros(len(nominal)) if start is None else (start.geometry - nominal) / scale
+    first = residuals(z, 1.0)[:n]
+    sigma = problem.noise or (start.sigma if start else max(math.sqrt(float(first @ first) / max(n - k, 1)), least))
+    found = None
+    settled = problem.noise is not None
+    for _ in range(_SIGMA_ROUNDS):
+        found = least_squares(residuals, z, jac=jacobian, args=(sigma,), x_scale=1.0, xtol=1e-12)
+        z = np.asarray(found.x)
+        if problem.noise is not None:
+            break
+        slopes = jacobian(z, sigma)[:n]
+        share = np.linalg.lstsq(slopes.T @ slopes + np.diag((prior * scale) ** 2), slopes.T @ slopes, rcond=None)[0]
+        rest = found.fun[:n] * sigma
+        freedom = max(n - k - float(np.trace(share)), 1.0)
+        new = max(math.sqrt(float(rest @ rest) / freedom), least)
+        settled = abs(new / sigma - 1.0) < 1e-3 or new == least
+        sigma = new
+        if settled:
+            break
+    assert found is not None
+    success = bool(found.success) and settled
+    message = f"variable projection: {found.message}" + ("" if settled else " The noise estimate did not settle.")
+    values = nominal + z * scale
+    result = _at(problem, design, rows, problem.muscle(values), values, sigma, message, success)
+    _check_identified(problem, result)
+    return result
+
+
+def _check_identified(problem: Problem, result: Estimate) -> None:
+    """Refuse a geometry that neither the data nor a tolerance determines."""
+    names = (*result.design.names, *(free.name for free in problem.free))
+    information = np.concatenate([problem.expected(result.design)[1], [1.0 / free.tolerance for free in problem.free]])
+    priors = np.diag(result.sigma * information)
+    loose = [free.name for free in problem.free if math.isinf(free.tolerance)]
+    stacked = np.vstack([result.jacobian, priors])
+    hint = f"; give a tolerance for {', '.join(loose)}" if loose else "; take a lower order, or free less geometry"
+    _, _, s, _ = decompose(stacked, names, hint)
+    if loose and s[-1] < 1e-7 * s[0]:  # differences carry no more digits
+        raise FitError(f"the fitted points do not determine {', '.join(loose)} beside the other unknowns{hint}")
+
+
+def refitted(problem: Problem, result: Estimate, rows: Mask, gone: int) -> Estimate:
+    """The fit without one level; the search of the geometry starts from ``result``.
+
+    Raises
+    ------
+    FitError
+        If the other levels do not determine the unknowns.
+    """
+    kept = rows & (problem.level != gone)
+    return estimate(problem, kept, result)

@@ -1,0 +1,325 @@
+"""Reads force maps from tables with units in their headings."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pamrs.errors import ParameterError, RecordingError, joined
+from pamrs.fit._bench import from_recording
+from pamrs.fit._data import ForceMap
+from pamrs.fit._dialect import decimal_of, delimiter_of
+from pamrs.recordings import load_recording
+from pamrs.recordings.table import Table, read_table, read_text
+from pamrs.units import parse_unit, same_dimension, to_si
+
+__all__ = ["read_map"]
+
+Array = NDArray[np.float64]
+
+# channel -> SI unit
+_UNITS: Final = {"length": "m", "contraction": "1", "pressure": "Pa", "force": "N", "direction": "1", "time": "s"}
+_ALIASES: Final = {
+    "muscle_length": "length",
+    "contraction_ratio": "contraction",
+    "muscle_pressure": "pressure",
+    "gauge_pressure": "pressure",
+    "muscle_force": "force",
+    "tension": "force",
+}
+_SPECIMEN: Final = ("muscle", "specimen", "sample", "actuator", "id")
+_DIRECTIONS: Final = {
+    "contracting": -1.0,
+    "contraction": -1.0,
+    "shortening": -1.0,
+    "lengthening": 1.0,
+    "extending": 1.0,
+    "extension": 1.0,
+    "": 0.0,
+    "unknown": 0.0,
+}
+_HEADING = re.compile(r"^(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]*(?:\([^()]*\))?)[\])]\s*$")
+_NARROW: Final = 0.006  # a map of contractions from 0 to less than 0.6 % is one of fractions
+_SET_POINTS: Final = 50  # a pressure with fewer distinct values in a time series is a set point, not a sensor
+
+
+class _Column(NamedTuple):
+    position: int
+    heading: str
+    unit: str
+
+
+def read_map(
+    file: Path,
+    *,
+    rest_length: float | None,
+    columns: Mapping[str, str] | None,
+    where: Mapping[str, str | float] | None,
+    clipped: float | None,
+    level_tolerance: float | None,
+    delimiter: str | None,
+    decimal: str | None,
+    name: str | None,
+) -> ForceMap:
+    """Read a force map from a table; arguments and errors as those of :func:`pamrs.fit.load_force_map`."""
+    source = str(file)
+    if rest_length is None:
+        raise RecordingError(f"{source}: rest_length is missing: give the length at zero contraction, in m")
+    if file.is_dir():
+        raise RecordingError(f"{source}: cannot be read (a folder, not a file)")
+    _one_character(delimiter, decimal, source)
+    delimiter = delimiter or _delimiter(file)
+    table = read_table(file, delimiter=delimiter, header=True)
+    headings = _renamed(table, columns, source)
+    found, strange = _understood(headings, source)
+    decimal = decimal or decimal_of(_texts(table, found), source)
+    wanted = {heading: str(value) for heading, value in (where or {}).items()}
+    title = name or "_".join([file.name.removesuffix(".gz").rsplit(".", 1)[0], *wanted.values()])
+    if "time" in found:
+        if wanted:
+            raise RecordingError(f"{source}: where does not apply to a table with a time column, which is one recording")
+        recording = load_recording(file, columns=_channels(table, found), delimiter=delimiter, decimal=decimal, name=title)
+        return from_recording(recording, rest_length=rest_length, clipped=clipped, level_tolerance=level_tolerance)
+    keep, notes = _kept(table, wanted, decimal, source)
+    if where is None:
+        _one_specimen(table, strange, source)
+    strange = [heading for heading in strange if heading not in wanted]
+    if strange:
+        notes.append(f"columns not used: {', '.join(strange)}")
+    if table.ragged:
+        rows = "1 row has" if len(table.ragged) == 1 else f"{len(table.ragged)} rows have"
+        notes.append(f"{rows} too few or too many cells (first: row {table.ragged[0]})")
+    values = {channel: _numbers(table, column, channel, source, decimal)[keep] for channel, column in found.items()}
+    if "length" not in values:
+        contraction = _fraction(values["contraction"], source)
+        notes += _narrow(contraction, found["contraction"])
+        values["length"] = rest_length * (1.0 - contraction)
+    return ForceMap.from_arrays(
+        values["length"],
+        values["pressure"],
+        values["force"],
+        rest_length=rest_length,
+        direction=values.get("direction"),
+        clipped=clipped,
+        level_tolerance=level_tolerance,
+        name=title,
+        source=source,
+        notes=notes,
+        row_numbers=np.asarray(table.row_numbers)[keep].tolist(),
+        units={channel: column.unit for channel, column in found.items() if channel in ("length", "pressure", "force")},
+    )
+
+
+def _one_character(delimiter: str | None, decimal: str | None, source: str) -> None:
+    if delimiter and len(delimiter) != 1:
+        raise RecordingError(
+            f"{source}: delimiter = {delimiter!r} is not allowed: one character is needed, like ',' or ';' or '\\t' (tabulator)"
+        )
+    if decimal and decimal not in (".", ","):
+        raise RecordingError(f"{source}: decimal = {decimal!r} is not allowed: '.' or ',' is needed")
+
+
+def _delimiter(file: Path) -> str:
+    return "," if file.suffix.lower() == ".parquet" else delimiter_of(read_text(file), str(file))
+
+
+def _texts(table: Table, found: Mapping[str, _Column]) -> list[Sequence[str]]:
+    """Cells of the columns with numbers, where they are text."""
+    columns = [table.cells[column.position] for channel, column in found.items() if channel != "direction"]
+    return [cells for cells in columns if not isinstance(cells, np.ndarray)]
+
+
+def _renamed(table: Table, columns: Mapping[str, str] | None, source: str) -> list[str]:
+    given = table.header or []
+    strange = [key for key in columns or {} if key not in given]
+    if strange:
+        raise RecordingError(f"{source}: columns names {strange[0]!r}, but {_has(strange[0], given)}")
+    return [(columns or {}).get(heading, heading) for heading in given]
+
+
+def _split(heading: str) -> tuple[str, str | None]:
+    """Channel and unit of a heading; the channel as written if it is none that is known."""
+    text = heading.strip()
+    match = _HEADING.match(text)
+    if match:
+        name, unit = match["name"], match["unit"].strip()
+        plain = name.strip().lower().replace(" ", "_")
+        return _ALIASES.get(plain, plain), unit or None
+    plain = text.lower().replace(" ", "_")
+    if _ALIASES.get(plain, plain) in _UNITS:
+        return _ALIASES.get(plain, plain), None
+    name, _, unit = text.rpartition("_")
+    plain = _ALIASES.get(name.lower(), name.lower())
+    return (plain, unit) if plain in _UNITS else (text, None)
+
+
+def _understood(headings: Sequence[str], source: str) -> tuple[dict[str, _Column], list[str]]:
+    """Columns by channel, and the headings that are none."""
+    problems: list[str] = []
+    found: dict[str, _Column] = {}
+    strange: list[str] = []
+    for index, heading in enumerate(headings):
+        if not heading.strip():
+            continue
+        channel, unit = _split(heading)
+        if channel not in _UNITS:
+            strange.append(heading)
+            continue
+        if channel in found:
+            problems.append(f"column {heading!r}: {channel} is there twice (an empty name in columns leaves one out)")
+            continue
+        if unit is None and channel == "direction":
+            unit = "1"
+        if unit is None:
+            problems.append(f"column {heading!r} has no unit: write '{channel} [{_UNITS[channel]}]', with the unit its values are in")
+            continue
+        try:
+            to_si(1.0, unit, _UNITS[channel])
+        except ParameterError as error:
+            problems.append(f"column {heading!r}: {error}")
+        found[channel] = _Column(index, heading, unit)
+    if not problems:
+        lacking = [] if {"length", "contraction"} & set(found) else ["length"]
+        lacking += [channel for channel in ("pressure", "force") if channel not in found]
+        if lacking:
+            problems.append(_lacking(lacking, headings, strange))
+        if {"length", "contraction"} <= set(found):
+            problems.append("both length and contraction are there: leave one out with an empty name in columns")
+    if problems:
+        raise RecordingError(joined(source, problems))
+    return found, strange
+
+
+def _lacking(channels: Sequence[str], headings: Sequence[str], strange: Sequence[str]) -> str:
+    """What is missing, what there is, and how to map it; a heading whose unit fits alone is proposed."""
+    maps = []
+    for channel in channels:
+        fitting = [heading for heading in strange if _measures(heading, _UNITS[channel])]
+        unit = _HEADING.match(fitting[0])["unit"].strip() if len(fitting) == 1 else _UNITS[channel]  # type: ignore[index]
+        maps.append(f'"{fitting[0] if len(fitting) == 1 else "..."}" = "{channel} [{unit}]"')
+    names = ", ".join(channel + (" (or contraction)" if channel == "length" else "") for channel in channels)
+    return (
+        f"no column for {names}; there are: {', '.join(headings)}. Rename the headings, or map them with "
+        f"columns = {{ {', '.join(maps)} }} in a .toml description (in Python: the argument columns)"
+    )
+
+
+def _measures(heading: str, si_unit: str) -> bool:
+    """Whether a heading has a unit of this dimension."""
+    match = _HEADING.match(heading)
+    try:
+        return match is not None and same_dimension(match["unit"].strip(), si_unit)
+    except ParameterError:
+        return False
+
+
+def _has(name: str, header: Sequence[str]) -> str:
+    """What the file has in place of a heading, and the one that is nearly it."""
+    plain = name.strip().lower()
+    near = [heading for heading in header if plain and (heading.lower().startswith(plain) or _split(heading)[0] == _split(name)[0])]
+    near = near or difflib.get_close_matches(name, header, n=1, cutoff=0.6)
+    return f"the file has: {', '.join(header)}" + (f"; did you mean {near[0]!r}?" if near else "")
+
+
+def _numbers(table: Table, column: _Column, channel: str, source: str, decimal: str) -> Array:
+    if channel == "direction" and not isinstance(table.cells[column.position], np.ndarray):
+        return _direction_cells([str(cell) for cell in table.cells[column.position]], column.heading, table.row_numbers, source)
+    values = table.numbers(column.position, column.heading, source, None, decimal)
+    unit = parse_unit(column.unit)
+    return np.asarray(values * unit.scale + unit.offset)
+
+
+def _direction_cells(cells: Sequence[str], heading: str, numbers: Sequence[int], source: str) -> Array:
+    values = np.zeros(len(cells))
+    for row, cell in enumerate(cells):
+        text = cell.strip().lower()
+        try:
+            values[row] = _DIRECTIONS[text] if text in _DIRECTIONS else float(text)
+        except ValueError:
+            words = ", ".join(filter(None, _DIRECTIONS))
+            raise RecordingError(
+                f"{source}: column {heading!r}, row {numbers[row]}: {cell[:40]!r} is not allowed: -1, 0, 1, {words}"
+            ) from None
+    return values
+
+
+def _fraction(contraction: Array, source: str) -> Array:
+    usual = float(np.nanmedian(np.abs(contraction))) if np.isfinite(contraction).any() else 0.0
+    if usual > 1.0:
+        raise RecordingError(f"{source}: contraction around {usual:.4g}: wrong unit? The column is probably in %")
+    return contraction
+
+
+def _narrow(contraction: Array, column: _Column) -> list[str]:
+    """A note if contractions in percent are as small as fractions would be."""
+    finite = contraction[np.isfinite(contraction)]
+    span = float(np.ptp(finite)) if len(finite) else 0.0
+    if parse_unit(column.unit).scale == 1.0 or not 0.0 < span < _NARROW or float(np.max(np.abs(finite))) > _NARROW:
+        return []
+    return [f"contractions span only {100.0 * span:.2g} %: are they fractions? write contraction [1]"]
+
+
+def _cells(table: Table, heading: str, source: str) -> list[str]:
+    header = table.header or []
+    if heading not in header:
+        raise RecordingError(f"{source}: where names the column {heading!r}, but {_has(heading, header)}")
+    return [str(cell).strip() for cell in table.cells[header.index(heading)]]
+
+
+def _kept(table: Table, where: Mapping[str, str], decimal: str, source: str) -> tuple[NDArray[np.bool_], list[str]]:
+    """Rows that ``where`` asks for, and a note about the others."""
+    keep = np.ones(len(table.cells[0]), dtype=bool)
+    for heading, value in where.items():
+        cells = _cells(table, heading, source)
+        same = np.array([_alike(cell, value, decimal) for cell in cells])
+        if not same.any():
+            have = list(dict.fromkeys(cells))
+            raise RecordingError(f"{source}: where: no row has {heading} = {value!r}; there are: {', '.join(have[:12])}")
+        keep &= same
+    others = int((~keep).sum())
+    chosen = ", ".join(f"{heading} = {value}" for heading, value in where.items())
+    if not others:
+        return keep, []
+    rows = f"1 row of the file is not {chosen} and belongs" if others == 1 else f"{others} rows of the file are not {chosen} and belong"
+    return keep, [f"{rows} to another map"]
+
+
+def _alike(cell: str, value: str, decimal: str) -> bool:
+    if cell == value:
+        return True
+    try:
+        return float(cell.replace(decimal, ".")) == float(value.replace(decimal, "."))
+    except ValueError:
+        return False
+
+
+def _one_specimen(table: Table, strange: Sequence[str], source: str) -> None:
+    """Refuse a table of several muscles when nobody says which one is meant."""
+    for heading in strange:
+        if heading.lower() in _SPECIMEN and heading in (table.header or []):
+            values = list(dict.fromkeys(_cells(table, heading, source)))
+            if len(values) > 1:
+                raise RecordingError(
+                    f"{source}: column {heading!r} has {len(values)} values ({', '.join(values[:6])}): "
+                    f"choose one, where {heading} = {values[0]}"
+                )
+
+
+def _channels(table: Table, found: Mapping[str, _Column]) -> list[str]:
+    """Headings for :func:`load_recording`: canonical channels, nothing for the other columns."""
+    if "contraction" in found:
+        raise RecordingError("a recording with a time column needs the column length, not contraction")
+    headings = [""] * len(table.cells)
+    for channel, (index, _, unit) in found.items():
+        if channel == "pressure":
+            held = len(set(np.asarray(table.cells[index]).tolist())) < _SET_POINTS
+            headings[index] = f"{'reference' if held else 'muscle_pressure'} [{unit}]"
+        elif channel != "direction":
+            headings[index] = f"{channel} [{unit}]"
+    return headings

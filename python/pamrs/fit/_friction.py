@@ -1,0 +1,479 @@
+"""Friction of a muscle from its hysteresis loops: the coefficients of (2.36).
+
+``F_total = F + d c_F |F|`` with ``c_F = max(c0 + c1 P, floor)`` and ``d`` = -1 while contracting, +1 while lengthening
+(Robinson 2014, (2.36)). At one contraction half the difference of the two branches is ``c_F |F|`` and half their sum
+is ``F``, whatever the force model: friction comes from the loops alone, and the mean curve goes to the fit of the moduli.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pamrs.errors import ParameterError, RecordingError
+from pamrs.fit._data import ForceMap
+from pamrs.fit._level_line import LawParameter, LevelLine, fit_levels
+from pamrs.fit._validation import WEAK
+
+if TYPE_CHECKING:
+    from pamrs.rig import Muscle
+
+__all__ = ["FrictionFit", "FrictionLevel", "fit_friction"]
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+_FEWEST: Final = 4  # rows of a branch
+_BINS: Final = 200  # of a branch's contraction: rows nearer than that are averaged
+_BLOCKS: Final = 8  # stretches of contraction whose coefficients are compared for the standard error
+_SLACK: Final = 0.05  # of a level's largest mean force: below it a loop tells nothing about the ratio
+_HALFWAY: Final = 2.0 / 7.0  # of the presliding distance, where slip elements of 1/8, 1/4, 1/2 and 1 of it average to zero
+_PART_WAY: Final = 0.95  # of the way to either branch: rows within are in transition
+_RESOLVED: Final = 3  # rows in transition that a reversal needs
+_SIGNIFICANT: Final = 0.05
+_SURE: Final = 4.0  # standard errors, for a friction that nobody asked about
+
+
+@dataclass(frozen=True, slots=True)
+class FrictionLevel:
+    """The loop of one pressure.
+
+    Attributes
+    ----------
+    pressure : float
+        Gauge pressure [Pa].
+    coefficient, stderr : float
+        ``c_F`` and its standard error from the scatter over the contraction [1].
+    contraction, force, half_width : (k,) array
+        Contractions of the branch with fewer of them, within both [1], mean force of the branches there [N], half their difference [N].
+    rows : int
+        Rows of both branches.
+    at_floor : bool
+        Whether the fitted law is on its floor here.
+    """
+
+    pressure: float
+    coefficient: float
+    stderr: float
+    contraction: Array
+    force: Array
+    half_width: Array
+    rows: int
+    at_floor: bool = False
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FrictionFit:
+    """Friction coefficients of a muscle; the names are those of lmfit's results where there is one.
+
+    Attributes
+    ----------
+    params : dict of str to LawParameter
+        ``friction_coefficient`` [1] and ``friction_pressure_slope`` [1/Pa].
+    floor : float
+        The least that ``c_F`` becomes, as given [1].
+    presliding : float or None
+        Distance of motion over which the force goes from one branch to the other [m]; None if not determinable.
+    presliding_reason : str
+        How it was found, or why it is not determinable.
+    levels : list of FrictionLevel
+        By rising pressure.
+    best_fit, residual : (m,) array
+        ``c_F`` of the law at the levels, and measured minus law [1].
+    ndata, nvarys, nfree : int
+        Levels above the floor, coefficients, and their difference.
+    redchi : float
+        Reduced chi-square with the levels' own errors; NaN without a spare level.
+    between : float
+        Scatter of the levels about the law beyond their own errors [1]; NaN without a spare level.
+    covar : (2, 2) array
+        Covariance of the coefficients.
+    slope_pvalue : float
+        Chance of a slope this far from zero if there were none; NaN without a spare level.
+    issues : list of str
+        What was found.
+    """
+
+    params: dict[str, LawParameter]
+    floor: float
+    presliding: float | None
+    presliding_reason: str
+    levels: list[FrictionLevel]
+    best_fit: Array
+    residual: Array
+    ndata: int
+    nvarys: int
+    nfree: int
+    redchi: float
+    between: float
+    covar: Array
+    slope_pvalue: float
+    issues: list[str]
+
+    def __repr__(self) -> str:
+        c0, c1 = self.params["friction_coefficient"].value, self.params["friction_pressure_slope"].value
+        law = f"max({c0:.4g} {'-' if c1 < 0.0 else '+'} {1e6 * abs(c1):.4g}/MPa P, {self.floor:g})"
+        return f"FrictionFit(c_F = {law}, {len(self.levels)} levels)"
+
+    @property
+    def told(self) -> bool:
+        """Whether the loops tell a friction from none: all levels together, by four standard errors, at two levels above the floor."""
+        mean, spread = _pooled(self.levels)
+        return self.ndata >= 2 and mean > _SURE * spread
+
+    @property
+    def slope_significant(self) -> bool:
+        """Whether the slope over pressure differs from zero at 5 %; False where that cannot be tested."""
+        return self.slope_pvalue < _SIGNIFICANT
+
+    def predict(self, pressure: ArrayLike) -> Array:
+        """``c_F`` at gauge pressures [Pa].
+
+        Parameters
+        ----------
+        pressure : array_like
+            Gauge pressure [Pa].
+
+        Returns
+        -------
+        ndarray
+
+        Raises
+        ------
+        ParameterError
+            If a pressure is not finite.
+        """
+        p = np.asarray(pressure, dtype=np.float64)
+        if not np.all(np.isfinite(p)):
+            raise ParameterError("pressure: a value is not finite")
+        line = self.params["friction_coefficient"].value + self.params["friction_pressure_slope"].value * p
+        return np.maximum(line, self.floor)
+
+    def mean_curve(self) -> tuple[Array, Array, Array]:
+        """Pressure [Pa], contraction [1] and mean force of both branches [N] of all levels: data free of friction."""
+        pressure = np.concatenate([np.full(len(level.force), level.pressure) for level in self.levels])
+        return (
+            pressure,
+            np.concatenate([level.contraction for level in self.levels]),
+            np.concatenate([level.force for level in self.levels]),
+        )
+
+    def to_muscle(self, muscle: Muscle) -> Muscle:
+        """The muscle with this friction.
+
+        Parameters
+        ----------
+        muscle : Muscle
+            Any muscle.
+
+        Returns
+        -------
+        Muscle
+            A copy with the friction arguments replaced; its presliding distance stays where none was determinable.
+        """
+        changes = {name: parameter.value for name, parameter in self.params.items()} | {"friction_floor": self.floor}
+        if self.presliding is not None:
+            changes["friction_presliding"] = self.presliding
+        return muscle.replace(**changes)
+
+    def fit_report(self) -> str:
+        """The result in words and a table."""
+        c0, c1 = self.params["friction_coefficient"], self.params["friction_pressure_slope"]
+        lines = [
+            "friction of the muscle: F_total = F + d c_F |F|, c_F = max(c0 + c1 P, floor)",
+            f"  c0 = {c0.value:.4g} +- {c0.stderr:.2g}",
+            f"  c1 = {c1.value * 1e6:.4g} +- {c1.stderr * 1e6:.2g} 1/MPa ({self._slope_words()})",
+            f"  floor = {self.floor:g} (given)",
+            f"  presliding: {self.presliding_reason}",
+            "  pressure [kPa]    c_F +- s.e.         law   rows",
+        ]
+        for level, law in zip(self.levels, self.best_fit.tolist(), strict=True):
+            floor = "  on the floor" if level.at_floor else ""
+            lines.append(
+                f"  {level.pressure / 1e3:11.1f}{level.coefficient:10.4f} +- {level.stderr:.4f}{law:10.4f}{level.rows:7d}{floor}"
+            )
+        return "\n".join([*lines, *(f"  note: {issue}" for issue in self.issues)])
+
+    def to_dict(self) -> dict[str, Any]:
+        """The result as plain data, SI units; None where a number is not determinable."""
+        return {
+            "parameters": [{**asdict(item), "stderr": _or_none(item.stderr)} for item in self.params.values()],
+            "floor": self.floor,
+            "presliding": self.presliding,
+            "presliding_reason": self.presliding_reason,
+            "levels": [
+                {
+                    "pressure": level.pressure,
+                    "coefficient": level.coefficient,
+                    "stderr": level.stderr,
+                    "law": law,
+                    "at_floor": level.at_floor,
+                    "rows": level.rows,
+                    "contraction": level.contraction.tolist(),
+                    "force": level.force.tolist(),
+                    "half_width": level.half_width.tolist(),
+                }
+                for level, law in zip(self.levels, self.best_fit.tolist(), strict=True)
+            ],
+            "residual": self.residual.tolist(),
+            "ndata": self.ndata,
+            "nvarys": self.nvarys,
+            "nfree": self.nfree,
+            "redchi": _or_none(self.redchi),
+            "between": _or_none(self.between),
+            "covar": [[_or_none(value) for value in row] for row in self.covar.tolist()],
+            "slope_pvalue": _or_none(self.slope_pvalue),
+            "slope_significant": self.slope_significant,
+            "issues": self.issues,
+        }
+
+    def _slope_words(self) -> str:
+        if math.isnan(self.slope_pvalue):
+            return "its significance cannot be tested without a spare pressure"
+        return f"{'significant' if self.slope_significant else 'not significant'}, p = {self.slope_pvalue:.2g}"
+
+
+def fit_friction(
+    data: ForceMap | None = None,
+    *,
+    pressure: ArrayLike | None = None,
+    contraction: ArrayLike | None = None,
+    force: ArrayLike | None = None,
+    direction: ArrayLike | None = None,
+    rest_length: float | None = None,
+    floor: float = 0.01,
+) -> FrictionFit:
+    """Friction coefficients from the hysteresis loops of a muscle.
+
+    Parameters
+    ----------
+    data : ForceMap, optional
+        A map with directions; else give arrays.
+    pressure, contraction, force, direction : (n,) array_like, optional
+        Gauge pressure [Pa], contraction [1], force [N], and -1 while contracting, +1 while lengthening, in the order measured.
+    rest_length : float, optional
+        With arrays [m]; without it the presliding distance, a length, is not determined.
+    floor : float
+        The least that ``c_F`` becomes; 0.01 in (2.36).
+
+    Returns
+    -------
+    FrictionFit
+
+    Raises
+    ------
+    ParameterError
+        If neither a map nor all four arrays are given, or ``floor`` is negative or not below 1.
+    RecordingError
+        If no direction is known, or fewer than two pressures have both branches.
+    """
+    if not (math.isfinite(floor) and 0.0 <= floor < 1.0):
+        raise ParameterError(f"floor = {floor!r} is not allowed: at least 0 and below 1")
+    rested = data is not None or rest_length is not None
+    if data is None:
+        missing = [
+            word
+            for word, values in (("pressure", pressure), ("contraction", contraction), ("force", force), ("direction", direction))
+            if values is None
+        ]
+        if missing or pressure is None or contraction is None or force is None:
+            raise ParameterError(f"{', '.join(missing)}: needed when no ForceMap is given")
+        rest = 1.0 if rest_length is None else rest_length
+        length = rest * (1.0 - np.asarray(contraction, dtype=np.float64))
+        data = ForceMap.from_arrays(length, pressure, force, rest_length=rest, direction=direction, check_duplicates=False)
+    gas, e, pull, level, way = data.used_rows()
+    if not np.any(way != 0):
+        raise RecordingError(f"{data.label}: no row has a direction of motion; friction needs both branches of the loop")
+    issues = list(data.issues)
+    unknown = int(np.sum(way == 0))
+    if unknown:
+        issues.append(f"{unknown} rows have no direction of motion: not used here")
+    levels: list[FrictionLevel] = []
+    least = WEAK * float(np.abs(pull).max())
+    for index, nominal in enumerate(data.levels.tolist()):
+        rows = level == index
+        if float(np.abs(pull[rows]).max()) < least:
+            issues.append(f"{nominal / 1e3:.0f} kPa: forces below {100 * WEAK:g} % of the map's largest: no coefficient")
+            continue
+        found = _loop(float(np.median(gas[rows])), e[rows], pull[rows], way[rows])
+        if isinstance(found, str):
+            issues.append(f"{nominal / 1e3:.0f} kPa: {found}: no coefficient")
+        else:
+            levels.append(found)
+    if not levels:
+        raise RecordingError(f"{data.label}: no pressure gives a coefficient ({'; '.join(issues)})")
+    if len(levels) < 2:
+        raise RecordingError(f"{data.label}: one pressure only ({levels[0].pressure / 1e3:.0f} kPa): the slope c1 is not determinable")
+    line, above = _law(levels, floor)
+    above &= np.array([x.coefficient > floor for x in levels])
+    if above.sum() == 1:
+        issues.append(
+            f"one pressure only stands above the floor of {floor:g}: the slope c1 is hardly determined by it and its neighbour"
+        )
+    pooled, spread = _pooled(levels)
+    if pooled < -_SURE * spread:
+        issues.append(
+            f"forces while lengthening lie below those while contracting (c_F = {pooled:.2g} +- {spread:.1g}): "
+            "are the directions exchanged?"
+        )
+    if not above.any():
+        issues.append(f"no coefficient stands above the floor of {floor:g}: the law is its floor at every pressure")
+    levels = [
+        FrictionLevel(x.pressure, x.coefficient, x.stderr, x.contraction, x.force, x.half_width, x.rows, not bool(on))
+        for x, on in zip(levels, above, strict=True)
+    ]
+    free = max(int(above.sum()) - 2, 0)
+    distance, reason = _presliding(data, levels) if rested else (None, "not determinable: a length, and rest_length is not given")
+    pressures = np.array([x.pressure for x in levels])
+    best = np.maximum(line.values[0] + line.values[1] * pressures, floor)
+    return FrictionFit(
+        params={
+            "friction_coefficient": LawParameter("friction_coefficient", float(line.values[0]), float(line.stderr[0]), "1"),
+            "friction_pressure_slope": LawParameter("friction_pressure_slope", float(line.values[1]), float(line.stderr[1]), "1/Pa"),
+        },
+        floor=floor,
+        presliding=distance,
+        presliding_reason=reason,
+        levels=levels,
+        best_fit=best,
+        residual=np.array([x.coefficient for x in levels]) - best,
+        ndata=int(above.sum()),
+        nvarys=2,
+        nfree=free,
+        redchi=line.redchi,
+        between=line.between,
+        covar=line.covar,
+        slope_pvalue=_pvalue(line, free),
+        issues=issues,
+    )
+
+
+def _or_none(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _loop(pressure: float, contraction: Array, force: Array, way: NDArray[np.int8]) -> FrictionLevel | str:
+    """The loop of one level, or why it has none."""
+    branches = [(contraction[way == d], force[way == d]) for d in (-1, 1)]
+    for (e, _), word in zip(branches, ("contracting", "lengthening"), strict=True):
+        if len(e) < _FEWEST:
+            return f"{len(e)} rows while {word}, {_FEWEST} at least are needed"
+    merged = [_merged(e, f) for e, f in branches]
+    low, high = max(float(e[0]) for e, _ in merged), min(float(e[-1]) for e, _ in merged)
+    grid = min((e[(e >= low) & (e <= high)] for e, _ in merged), key=len)
+    if len(grid) < _FEWEST:
+        return f"the two branches share {len(grid)} contractions, {_FEWEST} at least are needed"
+    shortening, lengthening = (np.interp(grid, e, f) for e, f in merged)
+    mean, half = 0.5 * (lengthening + shortening), 0.5 * (lengthening - shortening)
+    size = np.abs(mean)
+    strong = size > _SLACK * float(size.max())
+    coefficient = _ratio(half[strong], size[strong])
+    blocks = [part for part in np.array_split(np.flatnonzero(strong), _BLOCKS) if len(part)]
+    parts = np.array([_ratio(half[part], size[part]) for part in blocks])
+    stderr = float(np.std(parts, ddof=1) / math.sqrt(len(parts))) if len(parts) > 1 else 0.0
+    return FrictionLevel(pressure, coefficient, stderr, grid, mean, half, sum(len(e) for e, _ in branches))
+
+
+def _merged(contraction: Array, force: Array) -> tuple[Array, Array]:
+    """One branch by rising contraction; repeated passes are averaged."""
+    spacing = float(np.ptp(contraction)) / _BINS
+    bins = (
+        np.rint((contraction - contraction.min()) / spacing).astype(np.int64) if spacing > 0.0 else np.zeros(len(force), dtype=np.int64)
+    )
+    _, inverse, counts = np.unique(bins, return_inverse=True, return_counts=True)
+    return np.bincount(inverse, contraction) / counts, np.bincount(inverse, force) / counts
+
+
+def _ratio(half: Array, size: Array) -> float:
+    """Slope of ``half = c size`` by least absolute deviations: the weighted median of the ratios."""
+    ratio = half / size
+    order = np.argsort(ratio)
+    share = np.cumsum(size[order])
+    return float(ratio[order][np.searchsorted(share, 0.5 * share[-1])])
+
+
+def _pooled(levels: list[FrictionLevel]) -> tuple[float, float]:
+    """One coefficient for all levels and its standard error, from the levels' own errors or their scatter, whichever is larger."""
+    value, error = (np.array([getattr(x, key) for x in levels]) for key in ("coefficient", "stderr"))
+    weight = 1.0 / np.maximum(error, 1e-9) ** 2
+    mean = float(weight @ value / weight.sum())
+    return mean, float(1.0 / math.sqrt(weight.sum()))
+
+
+def _law(levels: list[FrictionLevel], floor: float) -> tuple[LevelLine, Mask]:
+    """The line through the levels above the floor, and which they are: the split with the least squares of ``max(line, floor)``."""
+    pressure, value, error = (np.array([getattr(x, key) for x in levels]) for key in ("pressure", "coefficient", "stderr"))
+    design = np.column_stack([np.ones_like(pressure), pressure])
+    count = len(levels)
+    best: tuple[float, LevelLine, Mask] | None = None
+    for first, last in [(0, n) for n in range(count, 1, -1)] + [(n, count) for n in range(1, count - 1)]:
+        above = (np.arange(count) >= first) & (np.arange(count) < last)
+        line = fit_levels(design[above], value[above], error[above])
+        law = design @ line.values
+        if np.any(law[~above] > floor) or np.all(law[above] <= floor):
+            continue
+        score = float(np.sum((value - np.maximum(law, floor)) ** 2))
+        if best is None or score < 0.999 * best[0] - 1e-18:
+            best = (score, line, above)
+    if best is None:
+        return fit_levels(design, value, error), np.zeros(count, dtype=bool)
+    return best[1], best[2]
+
+
+def _pvalue(line: LevelLine, free: int) -> float:
+    if free < 1:
+        return math.nan
+    if line.stderr[1] == 0.0:
+        return 0.0 if line.values[1] != 0.0 else 1.0
+    from scipy.stats import t
+
+    return float(2.0 * t.sf(abs(line.values[1]) / line.stderr[1], free))
+
+
+def _presliding(data: ForceMap, levels: list[FrictionLevel]) -> tuple[float | None, str]:
+    """From each reversal, how far the force needs to get halfway to the other branch."""
+    _, contraction, force, level, way = data.used_rows()
+    coefficients = {int(np.argmin(np.abs(data.levels - x.pressure))): x.coefficient for x in levels}
+    turns = np.flatnonzero((level[1:] == level[:-1]) & (way[1:] == -way[:-1]) & (way[1:] != 0)) + 1
+    found: list[float] = []
+    sparse = 0
+    for turn in turns:
+        c = coefficients.get(int(level[turn]), 0.0)
+        before, after = _runs(level, way, int(turn))
+        if c <= 0.0 or before.stop - before.start < _FEWEST:
+            sparse += 1
+            continue
+        order = np.argsort(contraction[before], kind="stable")
+        old = np.interp(contraction[after], contraction[before][order], force[before][order])
+        d = float(way[turn])
+        mean = old / (1.0 - d * c * np.sign(old))
+        share = d * (force[after] - mean) / (c * np.maximum(np.abs(mean), 1e-12))
+        moved = np.abs(contraction[after] - contraction[turn - 1]) * data.rest_length
+        crossed = np.flatnonzero(share > 0.0)
+        partly = share[: int(np.argmax(share > _PART_WAY))]
+        if not len(crossed) or crossed[0] < 1 or np.sum(partly > -_PART_WAY) < _RESOLVED:
+            sparse += 1
+            continue
+        k = int(crossed[0])
+        part = -share[k - 1] / (share[k] - share[k - 1])
+        found.append(float(moved[k - 1] + part * (moved[k] - moved[k - 1])) / _HALFWAY)
+    if len(found) >= 2 and len(found) > sparse:
+        value = float(np.median(found))
+        return value, f"{value * 1e3:.3g} mm, median of {len(found)} reversals"
+    if not len(turns):
+        return None, "not determinable: no reversal within a pressure"
+    return None, f"not determinable: the rows are too sparse after {sparse} of {len(turns)} reversals"
+
+
+def _runs(level: NDArray[np.intp], way: NDArray[np.int8], turn: int) -> tuple[slice, slice]:
+    """The rows of one direction before and after a turn, within its level."""
+    same = (level == level[turn]) & (way == way[turn])
+    stop = turn + int(np.argmin(same[turn:])) if not same[turn:].all() else len(way)
+    same = (level == level[turn]) & (way == way[turn - 1])
+    back = same[:turn][::-1]
+    start = turn - (int(np.argmin(back)) if not back.all() else turn)
+    return slice(start, turn), slice(turn, stop)

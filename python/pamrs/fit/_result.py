@@ -1,0 +1,330 @@
+"""What a fit of a muscle returns."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pamrs.errors import ParameterError
+from pamrs.fit._design import friction_factor
+from pamrs.fit._estimate import geometry_slopes
+from pamrs.fit._statistics import FitParameter, FitStatistics, determination
+from pamrs.fit._validation import CrossValidation, PressureErrors, leave_one_out, summary
+
+if TYPE_CHECKING:
+    from pamrs.fit._compare import ModelComparison
+    from pamrs.fit._data import ForceMap
+    from pamrs.rig import Muscle, Rig
+
+__all__ = ["OUTSIDE_CONTRACTION", "OUTSIDE_PRESSURE", "FitParameter", "MuscleFit"]
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.uint8]
+
+#: Bits of the flags of :meth:`MuscleFit.outside`.
+OUTSIDE_PRESSURE, OUTSIDE_CONTRACTION = 1, 2
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class MuscleFit(FitStatistics):
+    """A fitted muscle: made by :func:`pamrs.fit.fit_muscle`.
+
+    It has the numbers of the fit (:class:`pamrs.fit._statistics.FitStatistics`), errors by pressure and on pressures left out,
+    and it predicts.
+    """
+
+    @cached_property
+    def all_residuals(self) -> Array:
+        """Measured minus model force [N] of all used rows of the map, fitted or not."""
+        everything = np.ones_like(self._rows)
+        matrix, target = self._problem.system(self._estimate.design, self._estimate.blank, everything)
+        return (target - matrix @ self._estimate.x) / self._problem.weight
+
+    def error_by_pressure(self) -> PressureErrors:
+        """The measure (2.37) of every level of the map, fitted or not: rms of ``(F - F_model)/F_max`` of the level.
+
+        Levels whose own largest force is below 1 % of the map's are not in it but named: no force there to measure errors by.
+        """
+        everything = np.ones_like(self._rows)
+        return PressureErrors.of(self._problem, self.all_residuals, everything, self._rows)
+
+    def errors_of(self, rows: Literal["fitted", "held_out", "all"]) -> tuple[float, float] | None:
+        """Rms and largest force error as fractions of the map's largest force.
+
+        Parameters
+        ----------
+        rows : {"fitted", "held_out", "all"}
+            Rows of the fit, the other used rows of the map, or both.
+
+        Returns
+        -------
+        rms, max : float
+            None when there is no such row.
+        """
+        masks = {"fitted": self._rows, "held_out": ~self._rows, "all": np.ones_like(self._rows)}
+        if rows not in masks:
+            raise ParameterError(f"rows = {rows!r} is not allowed: one of {', '.join(masks)}")
+        return summary(self.all_residuals[masks[rows]], float(self._problem.force.max()))
+
+    @property
+    def rms_error(self) -> float:
+        """Rms force error of all used rows, fitted or not, as a fraction of the map's largest force [1]."""
+        return (self.errors_of("all") or (0.0, 0.0))[0]
+
+    @property
+    def max_error(self) -> float:
+        """Largest force error of all used rows, fitted or not, as a fraction of the map's largest force [1]."""
+        return (self.errors_of("all") or (0.0, 0.0))[1]
+
+    def leave_one_pressure_out(self) -> CrossValidation:
+        """Predict every fitted level by a fit of the other levels; geometry, where free, is fitted anew each time.
+
+        Returns
+        -------
+        CrossValidation
+
+        Raises
+        ------
+        FitError
+            If the other levels do not determine the fit.
+        """
+        return self._cross_validation
+
+    @cached_property
+    def _cross_validation(self) -> CrossValidation:
+        return leave_one_out(self._problem, self._estimate, self._rows)
+
+    # -------------------------------------------------------------- prediction
+
+    def _points(
+        self, pressure: ArrayLike, contraction: ArrayLike | None, length: ArrayLike | None, direction: ArrayLike | None
+    ) -> tuple[Array, Array, Array]:
+        """Pressure, contraction, direction in one shape; direction NaN-free, 0 where none."""
+        if (contraction is None) == (length is None):
+            raise ParameterError("give contraction or length, one of the two")
+        if length is not None:
+            contraction = 1.0 - np.asarray(length, dtype=np.float64) / self._estimate.blank.parameters["rest_length"]
+        way = 0.0 if direction is None else direction
+        p, e, d = np.broadcast_arrays(*(np.asarray(v, dtype=np.float64) for v in (pressure, contraction, way)))
+        for name, values in (("pressure", p), ("contraction", e), ("direction", d)):
+            if not np.isfinite(values).all():
+                raise ParameterError(f"{name} has a value that is not finite")
+        return p, e, d
+
+    def outside(self, pressure: ArrayLike, contraction: ArrayLike | None = None, *, length: ArrayLike | None = None) -> Flags:
+        """Where a prediction extrapolates.
+
+        Parameters
+        ----------
+        pressure, contraction, length : array_like
+            As in :meth:`predict`.
+
+        Returns
+        -------
+        ndarray of uint8
+            0 inside the fitted range, 1 pressure outside, 2 contraction outside, 3 both, in the broadcast shape.
+        """
+        p, e, _ = self._points(pressure, contraction, length, None)
+        seen_e = 1.0 - self._problem.length[self._rows] / self._estimate.blank.parameters["rest_length"]
+        seen_p = self._problem.knot(self._rows)
+        slack_p, slack_e = 1e-9 * float(seen_p.max()), 1e-9
+        beyond_p = (p < seen_p.min() - slack_p) | (p > seen_p.max() + slack_p)
+        beyond_e = (e < seen_e.min() - slack_e) | (e > seen_e.max() + slack_e)
+        return np.asarray(beyond_p * OUTSIDE_PRESSURE + beyond_e * OUTSIDE_CONTRACTION, dtype=np.uint8)
+
+    def predict(
+        self,
+        pressure: ArrayLike,
+        contraction: ArrayLike | None = None,
+        *,
+        length: ArrayLike | None = None,
+        direction: ArrayLike | None = None,
+    ) -> Array:
+        """Force of the fitted model [N]; :meth:`outside` tells where that extrapolates.
+
+        Parameters
+        ----------
+        pressure : array_like
+            Gauge pressure [Pa].
+        contraction : array_like, optional
+            Contraction ratio [1] of the *fitted* rest length; this or ``length``. All arguments broadcast.
+        length : array_like, optional
+            Length [m].
+        direction : array_like, optional
+            -1 while contracting, +1 while lengthening, 0 midway between the branches; None without friction.
+
+        Returns
+        -------
+        ndarray
+            In the broadcast shape.
+
+        Raises
+        ------
+        ParameterError
+            If a value is not finite, a pressure below vacuum, a contraction beyond the braid's limits, or a pressure beyond the
+            fitted levels where moduli free at each level have no law.
+        """
+        p, e, d = self._points(pressure, contraction, length, direction)
+        design, blank = self._estimate.design, self._estimate.blank
+        if not design.per_level:
+            muscle = design.muscle(blank, self._estimate.x)
+            return muscle.force(p, e) if direction is None else muscle.force(p, e, direction=d)
+        low, high = float(design.knots[0]), float(design.knots[-1])
+        slack = 1e-9 * high
+        if p.size and (p.min() < low - slack or p.max() > high + slack):
+            raise ParameterError(
+                f"pressure from {p.min() / 1e3:g} to {p.max() / 1e3:g} kPa: moduli free at each level are known from {low / 1e3:g} to "
+                f"{high / 1e3:g} kPa; moduli='linear' has a law beyond"
+            )
+        blank.force(p, e)  # refuses what the braid cannot do
+        flat_p, flat_d = p.ravel(), d.ravel()
+        gas, columns = design.columns(blank, flat_p, e.ravel(), flat_d, design.weights(flat_p))
+        force = gas + columns @ self._estimate.x
+        return np.asarray(force * friction_factor(blank, flat_p, flat_d, force)).reshape(p.shape)
+
+    def predict_std(
+        self, pressure: ArrayLike, contraction: ArrayLike | None = None, *, length: ArrayLike | None = None, new_point: bool = False
+    ) -> Array:
+        """Standard error of the predicted force [N], from ``covar``.
+
+        Parameters
+        ----------
+        pressure, contraction, length : array_like
+            As in :meth:`predict`.
+        new_point : bool
+            Add the scatter of a single measurement (:attr:`noise`; only with ``weights="force"``).
+
+        Returns
+        -------
+        ndarray
+            In the broadcast shape. It knows the scatter and the priors, not the model's own error beyond the fitted range.
+        """
+        p, e, d = self._points(pressure, contraction, length, None)
+        shape, p, d = p.shape, p.ravel(), d.ravel()
+        lengths = (1.0 - e.ravel()) * self._estimate.blank.parameters["rest_length"]
+        design, x = self._estimate.design, self._estimate.x
+        weights = design.weights(p)
+
+        def force(muscle: Muscle) -> Array:
+            gas, columns = design.columns(muscle, p, 1.0 - lengths / muscle.parameters["rest_length"], d, weights)
+            return np.asarray(gas + columns @ x)
+
+        _, columns = design.columns(self._estimate.blank, p, e.ravel(), d, weights)
+        slopes = np.hstack([columns, geometry_slopes(self._problem, self._estimate.geometry, force, len(p))])
+        variance = np.einsum("ni,ij,nj->n", slopes, self.covar, slopes)
+        if new_point:
+            if self.weights != "force":
+                raise ParameterError("new_point = True needs a fit with weights='force': the scatter is one number in N only there")
+            variance = variance + self.noise**2
+        return np.asarray(np.sqrt(np.maximum(variance, 0.0))).reshape(shape)
+
+    def score(self, data: ForceMap | None = None) -> float:
+        """Coefficient of determination R² of the predictions on a map.
+
+        Parameters
+        ----------
+        data : ForceMap, optional
+            Another map of the same muscle; by default the fitted one, all used rows.
+
+        Returns
+        -------
+        float
+            1 is perfect; 0 is no better than the mean.
+        """
+        chosen = self.data if data is None else data
+        used = chosen.used
+        way = chosen.direction[used] if np.any(self._problem.direction) else None
+        if way is not None and self.model == "elbow_linear":
+            way = np.where(way == 0, -1, way)  # as in the fit: rows of unknown direction are on the contracting branch
+        force = self.predict(chosen.pressure[used], length=chosen.length[used], direction=way)
+        return determination(chosen.force[used], force)
+
+    # ----------------------------------------------------------------- handing on
+
+    def to_rig(self, rig: Rig | None = None) -> Rig:
+        """A rig with the fitted muscle.
+
+        Parameters
+        ----------
+        rig : Rig, optional
+            Gets its muscle replaced, the number of muscles kept. None makes a bench: gas, muscle, and a dead volume of a tenth
+            of the muscle's air; without joint and arm it cannot be simulated.
+
+        Returns
+        -------
+        Rig
+            Fitted geometry carries its standard error as tolerance; the rig's other tolerances stay where the number does.
+
+        Raises
+        ------
+        FitError
+            When the moduli are free at each level.
+        """
+        from pamrs.fit._export import to_rig
+
+        return to_rig(self, rig)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The fit as plain numbers and text, ready for JSON."""
+        from pamrs.fit._export import to_dict
+
+        return to_dict(self)
+
+    def report(self, path: str | os.PathLike[str], comparison: ModelComparison | None = None) -> Path:
+        """Write the report, one HTML file that needs no network.
+
+        Parameters
+        ----------
+        path : path-like
+            The file.
+        comparison : ModelComparison, optional
+            Models to show beside the fit, from :func:`pamrs.fit.compare_models`.
+
+        Returns
+        -------
+        Path
+            The file written.
+
+        Raises
+        ------
+        ImportError
+            If matplotlib or jinja2 is missing; names the extra to install.
+        """
+        from pamrs.fit.report import write_report
+
+        return write_report(self, path, comparison)
+
+    def figure(self, path: str | os.PathLike[str], comparison: ModelComparison | None = None) -> Path:
+        """Write one picture of the fit, a PNG of 1600 x 1000 pixels; arguments as :meth:`report`.
+
+        Parameters
+        ----------
+        path : path-like
+            The file.
+        comparison : ModelComparison, optional
+            Models to show beside the fit.
+
+        Returns
+        -------
+        Path
+            The file written.
+        """
+        from pamrs.fit.report import write_figure
+
+        return write_figure(self, path, comparison)
+
+    def fit_report(self) -> str:
+        """The fit in words and numbers, for a terminal."""
+        from pamrs.fit._export import fit_report
+
+        return fit_report(self)
+
+    def __repr__(self) -> str:
+        order = "" if self.order is None else f" of order {self.order}"
+        return f"MuscleFit({self.model}{order}, {self.ndata} points, max error {100 * self.max_error:.2f} % of the largest force)"

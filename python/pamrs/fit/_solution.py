@@ -1,0 +1,246 @@
+"""Solves a fit: checks what is asked, chooses rows and unknowns, and puts the numbers together."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pamrs.errors import FitError, ParameterError
+from pamrs.fit._cautions import cautions
+from pamrs.fit._covariance import covariances, levels_needed
+from pamrs.fit._design import template
+from pamrs.fit._estimate import Estimate, Free, Known, Problem, estimate
+from pamrs.fit._statistics import FitParameter, FitStatistics
+from pamrs.fit._validation import WEAK, level_forces
+from pamrs.rig.muscle_models import ELASTIC_PARAMETERS, POLYNOMIAL_MODELS
+
+if TYPE_CHECKING:
+    from pamrs.fit._data import ForceMap
+    from pamrs.rig import Muscle
+
+__all__ = ["COEFFICIENTS", "GEOMETRY", "has_effect", "level_indices", "solution"]
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+#: Geometry that can be fitted, and its unit.
+GEOMETRY: Final[dict[str, str]] = {
+    "rest_length": "m",
+    "rest_diameter": "m",
+    "braid_angle": "rad",
+    "wall_thickness": "m",
+    "k0": "1",
+    "contraction_slope": "1",
+    "extension_slope": "1",
+    "neck_floor": "1",
+}
+
+#: Coefficients of the models that can have a prior.
+COEFFICIENTS: Final[tuple[str, ...]] = ("modulus_slope", "modulus_offset", "c10", "c01", "bladder_modulus")
+
+_ELLIPTIC_ONLY = ("k0", "contraction_slope", "extension_slope", "neck_floor")
+_WALLLESS = ("gaylord",)
+
+
+def has_effect(name: str, model: str, geometry: str) -> bool:
+    """Whether a geometry parameter enters the force of a model."""
+    return not (name in _ELLIPTIC_ONLY and geometry == "cylinder") and not (name == "wall_thickness" and model in _WALLLESS)
+
+
+def solution(
+    data: ForceMap,
+    muscle: Muscle,
+    *,
+    model: str | None = None,
+    geometry: str | None = None,
+    order: int | None = None,
+    moduli: str = "linear",
+    free: Iterable[str] = (),
+    tolerance: Mapping[str, float] | None = None,
+    levels: Sequence[float] | None = None,
+    direction: str | None = "data",
+    weights: str = "force",
+    noise: float | None = None,
+    errors: str = "level",
+) -> FitStatistics:
+    """The numbers of :func:`pamrs.fit.fit_muscle`, whose arguments and errors these are."""
+    _choices(weights=weights, errors=errors, direction=direction)
+    rows = _chosen(data, levels)
+    blank = template(muscle, model, geometry, order)
+    spread = _tolerances(tolerance)
+    unknowns = _free(blank, tuple(free), spread)
+    known = _known(muscle, blank, spread)
+    if noise is not None and not (_is_number(noise) and 0.0 < noise < math.inf):
+        raise ParameterError(f"noise = {noise!r} is not allowed: a positive number is needed")
+    if known and noise is None:
+        raise ParameterError(
+            f"tolerance of {', '.join(known)} needs noise: the standard deviation of the forces that it is weighed against"
+        )
+    rest = float(blank.parameters["rest_length"])
+    if not math.isclose(rest, data.rest_length, rel_tol=1e-6):
+        raise ParameterError(f"rest_length: the muscle has {rest:g} m, the force map {data.rest_length:g} m; the same is needed")
+    problem = _problem(data, blank, moduli, unknowns, known, noise, direction)
+    if not float(problem.force[rows].max()) > 0.0:
+        raise FitError(f"the largest force of the fitted rows is {problem.force[rows].max():g} N: a pulling force is needed")
+    if weights == "level":
+        problem = _weighted(problem, rows)
+    return _result(data, problem, rows, estimate(problem, rows), errors)
+
+
+def _choices(*, weights: str, errors: str, direction: str | None) -> None:
+    for name, value, allowed in (
+        ("weights", weights, ("force", "level")),
+        ("errors", errors, ("level", "plain")),
+        ("direction", direction, ("data", None)),
+    ):
+        if value not in allowed:
+            raise ParameterError(f"{name} = {value!r} is not allowed: {' or '.join(repr(choice) for choice in allowed)}")
+
+
+def level_indices(data: ForceMap, levels: Sequence[float]) -> list[int]:
+    """Indices of levels given as whole numbers (indices) or floats (pressures in Pa)."""
+    chosen = np.asarray(levels)
+    if chosen.ndim != 1 or not len(chosen) or chosen.dtype.kind not in "iuf":
+        raise ParameterError(f"levels = {levels!r} is not allowed: a list of indices, or of pressures in Pa as floats")
+    if chosen.dtype.kind == "f":
+        return data.level_indices(chosen.tolist())
+    count = len(data.levels)
+    if np.any((chosen < -count) | (chosen >= count)):
+        raise ParameterError(
+            f"levels = {chosen.tolist()} is not allowed: indices from 0 to {count - 1}; pressures are given as floats, in Pa"
+        )
+    return sorted({int(index) % count for index in chosen})
+
+
+def _chosen(data: ForceMap, levels: Sequence[float] | None) -> Mask:
+    level = data.level[data.used]
+    return np.ones(len(level), dtype=bool) if levels is None else np.isin(level, level_indices(data, levels))
+
+
+def _free(blank: Muscle, names: tuple[str, ...], tolerance: dict[str, float]) -> tuple[Free, ...]:
+    known = blank.parameters
+    for name in names:
+        if name not in GEOMETRY:
+            raise ParameterError(f"free: {name!r} is not allowed: of {', '.join(GEOMETRY)}")
+        if not has_effect(name, blank.model, blank.geometry):
+            raise ParameterError(f"free: {name!r} has no effect on the model {blank.model} with {blank.geometry} geometry")
+    if len(set(names)) < len(names):
+        raise ParameterError(f"free = {list(names)} names a parameter twice")
+    return tuple(Free(name, float(known[name]), float(tolerance.get(name, math.inf))) for name in names)
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
+
+
+def _tolerances(tolerance: Mapping[str, float] | None) -> dict[str, float]:
+    allowed = (*GEOMETRY, *COEFFICIENTS)
+    for name, value in (tolerance or {}).items():
+        if name not in allowed:
+            raise ParameterError(f"tolerance: {name!r} is not allowed: of {', '.join(allowed)}")
+        if not (_is_number(value) and value > 0.0):
+            raise ParameterError(f"tolerance: {name} = {value!r} is not allowed: a positive number is needed (infinite for no prior)")
+    return dict(tolerance or {})
+
+
+def _known(muscle: Muscle, blank: Muscle, tolerance: Mapping[str, float]) -> dict[str, Known]:
+    """Priors of the coefficients: around the muscle's own values where it has the same kind."""
+    own = muscle.parameters if muscle.model in (blank.model, *_alike(blank.model)) else {}
+    known: dict[str, Known] = {}
+    for name in (name for name in COEFFICIENTS if math.isfinite(tolerance.get(name, math.inf))):
+        if name not in ELASTIC_PARAMETERS[blank.model]:
+            raise ParameterError(f"tolerance: {name!r} is not allowed: the model {blank.model} has no such coefficient")
+        known[name] = Known(tuple(np.atleast_1d(own.get(name, 0.0)).tolist()), float(tolerance[name]))
+    return known
+
+
+def _alike(model: str) -> tuple[str, ...]:
+    """The models whose coefficients mean the same: those with a stress polynomial."""
+    return POLYNOMIAL_MODELS if model in POLYNOMIAL_MODELS else ()
+
+
+def _problem(
+    data: ForceMap,
+    blank: Muscle,
+    moduli: str,
+    free: tuple[Free, ...],
+    known: Mapping[str, Known],
+    noise: float | None,
+    direction: str | None,
+) -> Problem:
+    used = data.used
+    pressure, _, force, level, way = data.used_rows()
+    steps = way.astype(np.float64) if direction == "data" else np.zeros(len(force))
+    arrays: dict[str, Any] = {
+        "pressure": pressure,
+        "length": data.length[used],
+        "force": force,
+        "level": level,
+        "direction": steps,
+        "levels": data.levels,
+    }
+    return Problem(blank=blank, moduli=moduli, free=free, known=known, noise=noise, weight=np.ones(len(force)), **arrays)
+
+
+def _weighted(problem: Problem, rows: Mask) -> Problem:
+    """The problem with every fitted residual over the largest force of its level."""
+    tops = level_forces(problem)
+    weak = tops < WEAK * float(problem.force.max())
+    named = [f"{problem.levels[i] / 1e3:g} kPa ({tops[i]:.3g} N)" for i in np.unique(problem.level[rows]) if weak[i]]
+    if named:
+        raise FitError(
+            f"weights = 'level' divides by the largest force of a level, which is below {100 * WEAK:g} % of the map's largest at "
+            f"{', '.join(named)}: leave these levels out, or take weights = 'force'"
+        )
+    return replace(problem, weight=1.0 / np.where(weak, 1.0, tops)[problem.level])
+
+
+def _result(data: ForceMap, problem: Problem, rows: Mask, found: Estimate, errors: str) -> FitStatistics:
+    plain, robust = covariances(problem, found, problem.level[rows])
+    warnings = []
+    kind = errors
+    if errors == "level" and robust is None:
+        kind = "plain"
+        if found.sigma > 0.0:
+            count, needed = len(np.unique(problem.level[rows])), levels_needed(len(plain))
+            why = (
+                f"errors by level need {needed} fitted levels for {len(plain)} unknowns, there are {count}"
+                if count < needed
+                else f"errors by level leave out one level at a time, and one of the {count} cannot be missed"
+            )
+            warnings.append(f"standard errors take the residuals as independent: {why}")
+    covar = plain if kind == "plain" or robust is None else robust
+    parameters = _parameters(problem, found, covar, plain)
+    warnings += cautions(problem, found, rows, data.labels(), parameters)
+    return FitStatistics(
+        data=data,
+        params=parameters,
+        covar=covar,
+        covar_plain=plain,
+        errors=kind,
+        success=found.success,
+        message=found.message,
+        warnings=tuple(warnings),
+        _problem=problem,
+        _estimate=found,
+        _rows=rows,
+    )
+
+
+def _parameters(problem: Problem, found: Estimate, covar: Array, plain: Array) -> dict[str, FitParameter]:
+    spread, spread_plain = np.sqrt(np.diag(covar)).tolist(), np.sqrt(np.diag(plain)).tolist()
+    parameters = {}
+    expected, information = problem.expected(found.design)
+    for i, (name, unit) in enumerate(zip(found.design.names, found.design.units, strict=True)):
+        told = (float(expected[i]), 1.0 / float(information[i])) if information[i] else (None, None)
+        parameters[name] = FitParameter(name, float(found.x[i]), spread[i], unit, spread_plain[i], *told)
+    for i, free in enumerate(problem.free, start=len(found.x)):
+        known = free.tolerance if math.isfinite(free.tolerance) else None
+        value = float(found.geometry[i - len(found.x)])
+        parameters[free.name] = FitParameter(free.name, value, spread[i], GEOMETRY[free.name], spread_plain[i], free.nominal, known)
+    return parameters

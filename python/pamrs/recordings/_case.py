@@ -1,0 +1,225 @@
+"""Cases: a folder with a rig and the recordings made on it."""
+
+from __future__ import annotations
+
+import difflib
+import os
+import tomllib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Final
+
+from pamrs.errors import CaseError, RecordingError, RigError, joined
+from pamrs.recordings._recording import Recording, load_recording
+from pamrs.rig import Rig, load_rig
+
+__all__ = ["SCHEMA", "Case", "load_case"]
+
+SCHEMA: Final = "pamrs.case/1"
+_ROLES: Final = ("fit", "held_out")
+_TOP: Final = ("schema", "name", "description", "rig", "source", "recording")
+_FORMAT: Final = ("columns", "delimiter", "header", "thousands", "sample_time", "decimal")
+_ENTRY: Final = ("file", "name", "role", "start", "stop", *_FORMAT)
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A rig and its recordings.
+
+    Attributes
+    ----------
+    name : str
+        The folder's name, or what ``case.toml`` says.
+    rig : Rig
+        The nominal model.
+    recordings : list of Recording
+        In the order of ``case.toml``.
+    path : Path
+        The folder.
+    description : str
+        What ``case.toml`` says about it.
+    """
+
+    name: str
+    rig: Rig
+    recordings: list[Recording]
+    path: Path
+    description: str = ""
+
+    @property
+    def fit(self) -> list[Recording]:
+        """The recordings to fit."""
+        return [recording for recording in self.recordings if recording.role == "fit"]
+
+    @property
+    def held_out(self) -> list[Recording]:
+        """The recordings kept for the proof."""
+        return [recording for recording in self.recordings if recording.role == "held_out"]
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """The channels that every recording has."""
+        first = self.recordings[0].channels
+        return tuple(name for name in first if all(name in other.channels for other in self.recordings))
+
+    def with_rig(self, rig: Rig) -> Case:
+        """The same recordings with another rig.
+
+        Parameters
+        ----------
+        rig : Rig
+            The model to put in place.
+
+        Returns
+        -------
+        Case
+        """
+        return replace(self, rig=rig)
+
+
+def load_case(folder: str | os.PathLike[str]) -> Case:
+    """Read a case.
+
+    Parameters
+    ----------
+    folder : path-like
+        A folder with a ``case.toml`` of the schema ``pamrs.case/1``, or that file itself. File names in
+        it are relative to the folder and may point out of it.
+
+    Returns
+    -------
+    Case
+        Rig and recordings.
+
+    Raises
+    ------
+    CaseError
+        If a file is missing or ``case.toml``, the rig or a recording is wrong; all problems are listed.
+    """
+    given = Path(folder)
+    file = given if given.name == "case.toml" else given / "case.toml"
+    home = file.parent
+    document = _document(file, given)
+    problems: list[str] = []
+    _unknown(problems, "", document, _TOP)
+    if document.get("schema") != SCHEMA:
+        problems.append(f"schema = {document.get('schema')!r} is not allowed: {SCHEMA!r} is needed")
+    name = _text(problems, document, "name", home.resolve().name)
+    description = _text(problems, document, "description", "")
+    source = _text(problems, document, "source", "")
+    rig = _rig(problems, home, _text(problems, document, "rig", "rig.toml"))
+    recordings = _recordings(problems, home, document.get("recording"), source)
+    if problems or rig is None:
+        raise CaseError(joined(str(file), problems))
+    return Case(name, rig, recordings, home, description)
+
+
+def _document(file: Path, given: Path) -> dict[str, Any]:
+    if not given.exists():
+        raise CaseError(f"{given}: no such case folder")
+    try:
+        return tomllib.loads(file.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise CaseError(f"{given}: not a case folder, it has no case.toml") from None
+    except OSError as error:
+        raise CaseError(f"{file}: cannot be read ({error.strerror or error})") from error
+    except UnicodeDecodeError as error:
+        raise CaseError(f"{file}: not a text file in UTF-8") from error
+    except tomllib.TOMLDecodeError as error:
+        raise CaseError(f"{file}: not valid TOML: {error}") from error
+
+
+def _unknown(problems: list[str], prefix: str, given: Iterable[str], allowed: tuple[str, ...]) -> None:
+    for key in given:
+        if key not in allowed:
+            near = difflib.get_close_matches(key, allowed, n=1)
+            hint = f"did you mean {near[0]!r}?" if near else f"allowed: {', '.join(allowed)}"
+            problems.append(f"unknown key {prefix + key!r}; {hint}")
+
+
+def _text(problems: list[str], document: Mapping[str, Any], key: str, default: str) -> str:
+    value = document.get(key, default)
+    if isinstance(value, str):
+        return value
+    problems.append(f"{key} = {value!r} is not allowed: a text is needed")
+    return default
+
+
+def _rig(problems: list[str], home: Path, name: str) -> Rig | None:
+    try:
+        return load_rig(home / name)
+    except RigError as error:
+        problems.append(f"rig = {name!r}: {error}")
+        return None
+
+
+def _recordings(problems: list[str], home: Path, entries: Any, source: str) -> list[Recording]:
+    if not isinstance(entries, list) or not entries or not all(isinstance(entry, Mapping) for entry in entries):
+        problems.append("recording is missing: one table [[recording]] with file and role for each is needed")
+        return []
+    recordings: list[Recording] = []
+    for index, entry in enumerate(entries):
+        label = f"recording[{index}]."
+        before = len(problems)
+        _unknown(problems, label, entry, _ENTRY)
+        name = entry.get("file")
+        if not isinstance(name, str) or not name:
+            problems.append(f"{label}file = {name!r} is not allowed: a file name is needed")
+        role = entry.get("role", "fit")
+        if role not in _ROLES:
+            problems.append(f"{label}role = {role!r} is not allowed: 'fit' or 'held_out'")
+        _formats(problems, label, entry)
+        if len(problems) > before:
+            continue
+        file = home / str(name)
+        if not file.exists():
+            advice = f"; {source}" if source else "; copy it there, or correct file in case.toml"
+            problems.append(f"{label}file = {name!r}: there is no file {os.path.normpath(file)}{advice}")
+            continue
+        options = {key: entry[key] for key in _FORMAT if key in entry}
+        try:
+            recording = load_recording(file, role=role, name=entry.get("name"), **options)
+            recordings.append(recording.between(entry.get("start"), entry.get("stop")))
+        except RecordingError as error:
+            problems.append(str(error))
+    names = [recording.name for recording in recordings]
+    problems += [f"two recordings are called {name!r}" for name in dict.fromkeys(names) if names.count(name) > 1]
+    if recordings and not problems and all(recording.role == "held_out" for recording in recordings):
+        problems.append("no recording has the role 'fit': nothing is left to fit")
+    return recordings
+
+
+def _formats(problems: list[str], label: str, entry: Mapping[str, Any]) -> None:
+    def texts(value: object) -> bool:
+        return isinstance(value, list) and all(isinstance(item, str) for item in value)
+
+    def mapping(value: object) -> bool:
+        return isinstance(value, Mapping) and all(isinstance(item, str) for item in value.values())
+
+    def number(value: object) -> bool:
+        return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+    rules: dict[str, tuple[Any, str]] = {
+        "name": (lambda v: isinstance(v, str) and v != "", "a text"),
+        "columns": (
+            lambda v: texts(v) or mapping(v),
+            "a list of headings, or a table from headings to headings",
+        ),
+        "delimiter": (lambda v: isinstance(v, str) and len(v) == 1, "one character"),
+        "header": (lambda v: isinstance(v, bool), "true or false"),
+        "thousands": (
+            lambda v: isinstance(v, str) or mapping(v),
+            "a mark, or a table from channels to marks",
+        ),
+        "sample_time": (
+            number,
+            "a number of seconds",
+        ),
+        "decimal": (lambda v: isinstance(v, str) and len(v) == 1, "one character"),
+        "start": (number, "a number of seconds"),
+        "stop": (number, "a number of seconds"),
+    }
+    for key, (accepts, needed) in rules.items():
+        if key in entry and not accepts(entry[key]):
+            problems.append(f"{label}{key} = {entry[key]!r} is not allowed: {needed} is needed")

@@ -1,0 +1,468 @@
+"""Recordings: tables of named channels with units, checked and laid on a uniform grid.
+
+Headings carry the unit, ``muscle_pressure [bar]``; everything inside is SI, with gauge pressures and
+radians. Whatever cannot be trusted is reported as an :class:`Issue` and masked, never used silently.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+import os
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pamrs.channels import UNITS, channel_of
+from pamrs.errors import ParameterError, RecordingError, joined
+from pamrs.recordings._clock import Grid, lay_grid
+from pamrs.recordings._faults import find_faults
+from pamrs.recordings.table import Table, read_table, thousands_of
+from pamrs.units import parse_unit, to_si
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["CHANNELS", "Issue", "Recording", "load_recording"]
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+class _Channel(NamedTuple):
+    unit: str
+    lower: float
+    upper: float
+
+
+#: Canonical channels: SI unit and the range of the possible (SI; pressures gauge). Where a rig has several blocks of a kind, the
+#: name of the block stands behind a dot: ``muscle_pressure.flexor``.
+CHANNELS: Final[dict[str, _Channel]] = {
+    name: _Channel(UNITS[name], lower, upper)
+    for name, lower, upper in (
+        ("time", -math.inf, math.inf),
+        ("valve_command", -1000.0, 1000.0),
+        ("supply_command", -1.3e5, 1e8),
+        ("supply_pressure", -1.3e5, 1e8),
+        ("line_pressure", -1.3e5, 1e8),
+        ("muscle_pressure", -1.3e5, 1e8),
+        ("joint_angle", -100.0, 100.0),
+        ("length", -100.0, 100.0),
+        ("force", -1e7, 1e7),
+        ("joint_torque", -1e7, 1e7),
+        ("temperature", 50.0, 2000.0),
+        ("reference", -1e9, 1e9),
+    )
+}
+# a reference may be one of an angle or of a pressure
+_REFERENCE_UNITS: Final = ("rad", "Pa")
+_HEADING = re.compile(r"^\s*(?P<name>[^\[\]]*?)\s*(?:\[(?P<unit>[^\[\]]*)\])?\s*$")
+_FEW: Final = 20
+
+
+@dataclass(frozen=True, slots=True)
+class Issue:
+    """Something found in a recording.
+
+    Attributes
+    ----------
+    kind : str
+        ``nan``, ``gap``, ``clock_jump``, ``frozen``, ``saturated``, ``outlier``, ``constant`` or ``short``.
+    channel : str
+        Canonical name; ``time`` for the clock.
+    start, stop : float
+        From when to when [s].
+    text : str
+        What it is and what was done.
+    """
+
+    kind: str
+    channel: str
+    start: float
+    stop: float
+    text: str
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """One recording on a uniform grid.
+
+    Attributes
+    ----------
+    name : str
+        The file's stem, or what the case calls it.
+    role : str
+        ``fit`` or ``held_out``.
+    time : (n,) array
+        Seconds from 0.
+    sample_time : float
+        Seconds.
+    channels : dict of str to (n,) array
+        SI values, NaN where the mask is False.
+    mask : dict of str to (n,) bool array
+        True where the channel may be used.
+    issues : list of Issue
+        What was found.
+    units : dict of str to str
+        SI unit of each channel.
+    """
+
+    name: str
+    role: str
+    time: Array
+    sample_time: float
+    channels: dict[str, Array]
+    mask: dict[str, Mask]
+    issues: list[Issue] = field(default_factory=list)
+    units: dict[str, str] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def __repr__(self) -> str:
+        return (
+            f"Recording({self.name!r}, {self.role}, {len(self)} samples every {self.sample_time:g} s: "
+            f"{', '.join(self.channels)}; {len(self.issues)} issues)"
+        )
+
+    @property
+    def duration(self) -> float:
+        """Time of the last sample [s]."""
+        return float(self.time[-1])
+
+    def valid(self, *channels: str) -> Mask:
+        """Where all these channels may be used; without names, where all that there are may be.
+
+        Parameters
+        ----------
+        *channels : str
+            Canonical names.
+
+        Returns
+        -------
+        (n,) bool array
+
+        Raises
+        ------
+        RecordingError
+            If the recording lacks one of them.
+        """
+        combined = np.ones(len(self), dtype=bool)
+        for channel in channels or self.channels:
+            if channel not in self.mask:
+                raise RecordingError(f"recording {self.name!r} has no channel {channel!r}; it has: {', '.join(self.channels)}")
+            combined &= self.mask[channel]
+        return combined
+
+    def segments(self, *channels: str, minimum: int = 1) -> list[tuple[int, int]]:
+        """Stretches without a hole in these channels.
+
+        Parameters
+        ----------
+        *channels : str
+            Canonical names; without names all that there are.
+        minimum : int, optional
+            Shortest stretch [samples].
+
+        Returns
+        -------
+        list of (start, stop)
+            Sample indices, ``stop`` excluded.
+        """
+        padded = np.concatenate([[False], self.valid(*channels), [False]])
+        edges = np.flatnonzero(padded[1:] != padded[:-1])
+        pairs = zip(edges[::2], edges[1::2], strict=True)
+        return [(int(a), int(b)) for a, b in pairs if b - a >= minimum]
+
+    def between(self, start: float | None = None, stop: float | None = None) -> Recording:
+        """The part of a recording between two times; its time begins at 0 again.
+
+        Parameters
+        ----------
+        start, stop : float, optional
+            Limits [s], both included; by default the beginning and the end.
+
+        Returns
+        -------
+        Recording
+
+        Raises
+        ------
+        RecordingError
+            If fewer than two samples are left.
+        """
+        if start is None and stop is None:
+            return self
+        low = 0.0 if start is None else float(start)
+        high = self.duration if stop is None else float(stop)
+        slack = 1e-6 * self.sample_time
+        keep = (self.time >= low - slack) & (self.time <= high + slack)
+        if keep.sum() < 2:
+            raise RecordingError(
+                f"recording {self.name!r}: start = {low:g} and stop = {high:g} s leave {int(keep.sum())} samples of "
+                f"0 to {self.duration:g} s; at least 2 are needed"
+            )
+        offset = float(self.time[keep][0])
+        issues = [
+            Issue(i.kind, i.channel, max(0.0, i.start - offset), i.stop - offset, i.text)
+            for i in self.issues
+            if i.stop >= low and i.start <= high
+        ]
+        return replace(
+            self,
+            time=self.time[keep] - offset,
+            channels={name: values[keep] for name, values in self.channels.items()},
+            mask={name: flags[keep] for name, flags in self.mask.items()},
+            issues=issues,
+        )
+
+    def to_pandas(self) -> pd.DataFrame:
+        """A data frame indexed by time, SI values, NaN where masked; needs pandas."""
+        import pandas as pd
+
+        index = pd.Index(self.time, name="time [s]")
+        data = {f"{name} [{self.units[name]}]": values for name, values in self.channels.items()}
+        return pd.DataFrame(data, index=index)
+
+
+def load_recording(
+    path: str | os.PathLike[str],
+    *,
+    columns: Sequence[str] | Mapping[str, str] | None = None,
+    delimiter: str = ",",
+    header: bool = True,
+    thousands: str | Mapping[str, str] | None = None,
+    sample_time: float | None = None,
+    decimal: str = ".",
+    name: str | None = None,
+    role: str = "fit",
+) -> Recording:
+    """Read a recording, check it and lay it on a uniform grid.
+
+    Parameters
+    ----------
+    path : path-like
+        ``.csv``, ``.tsv``, ``.txt``, ``.dat`` (each also ``.gz``) or ``.parquet``.
+    columns : sequence or mapping of str, optional
+        Headings ``"name [unit]"`` to use instead of the file's: one for each column in order, or a
+        mapping from the file's headings. An empty heading leaves the column out.
+    delimiter : str
+        What separates cells; ``" "`` means any run of blanks.
+    header : bool
+        Whether the first row holds headings.
+    thousands : str or mapping, optional
+        Mark between groups of digits, of all columns or by channel: ``{"time": "."}``.
+    sample_time : float, optional
+        Grid spacing [s]; without a time column, the spacing of the rows. Else the usual interval.
+    decimal : str
+        Decimal mark.
+    name, role : str
+        Name (default: the file's stem) and role, ``fit`` or ``held_out``.
+
+    Returns
+    -------
+    Recording
+        SI values with masks and issues.
+
+    Raises
+    ------
+    RecordingError
+        If the file cannot be read or a column cannot be understood; the message names file and column.
+    """
+    file = Path(path)
+    source = str(file)
+    if role not in ("fit", "held_out"):
+        raise RecordingError(f"{source}: role = {role!r} is not allowed: 'fit' or 'held_out'")
+    if sample_time is not None and not (math.isfinite(sample_time) and sample_time > 0.0):
+        raise RecordingError(f"{source}: sample_time = {sample_time!r} s is not allowed: a positive number is needed")
+    if len(delimiter) != 1:
+        raise RecordingError(f"{source}: delimiter = {delimiter!r} is not allowed: one character is needed")
+    if file.is_dir():
+        raise RecordingError(f"{source}: cannot be read (a folder, not a file)")
+    if not header and not isinstance(columns, Sequence):
+        raise RecordingError(f"{source}: without a header, columns must list what each column is: 'name [unit]'")
+    table = read_table(file, delimiter=delimiter, header=header)
+    wanted = _understood(_headings(table, columns, source), source)
+    raw, units = _si_columns(table, wanted, source, thousands, decimal)
+    stem = file.name.removesuffix(".gz").rsplit(".", 1)[0]
+    return _assemble(name or stem, role, raw, units, table.ragged, source, sample_time)
+
+
+# ------------------------------------------------------------------------- columns
+
+
+def _headings(table: Table, columns: Sequence[str] | Mapping[str, str] | None, source: str) -> list[str]:
+    found = table.header
+    if columns is None:
+        return found or []
+    if isinstance(columns, str):
+        raise RecordingError(f"{source}: columns = {columns!r} is not allowed: a list of headings is needed")
+    if isinstance(columns, Mapping):
+        given = found or []
+        strange = [key for key in columns if key not in given]
+        if strange:
+            raise RecordingError(f"{source}: columns names {strange[0]!r}, but the file has: {', '.join(given)}")
+        return [columns.get(heading, heading) for heading in given]
+    if len(columns) != len(table.cells):
+        raise RecordingError(f"{source}: columns lists {len(columns)} headings, but there are {len(table.cells)} columns")
+    return list(columns)
+
+
+def _understood(headings: list[str], source: str) -> dict[str, tuple[int, str]]:
+    """Canonical name -> (column, unit) of every heading that is to be used."""
+    problems: list[str] = []
+    wanted: dict[str, tuple[int, str]] = {}
+    for index, heading in enumerate(headings):
+        if not heading.strip():
+            continue
+        match = _HEADING.match(heading)
+        name = match["name"] if match else heading
+        channel = channel_of(name)
+        if match is None or channel not in CHANNELS or name.endswith("."):
+            near = difflib.get_close_matches(channel.lower(), CHANNELS, n=1, cutoff=0.6)
+            hint = f"did you mean {near[0]!r}?" if near else f"known are {', '.join(CHANNELS)}"
+            problems.append(f"unknown column {heading!r}; {hint} (columns = {{{heading!r} = ''}} leaves it out)")
+            continue
+        expected = _REFERENCE_UNITS if channel == "reference" else (CHANNELS[channel].unit,)
+        unit = match["unit"]
+        if unit is None or not unit.strip():
+            problems.append(f"column {heading!r} has no unit: write '{name} [{expected[0]}]', with the unit its values are in")
+        elif name in wanted:
+            problems.append(f"column {heading!r}: the channel {name!r} is there twice")
+        else:
+            trouble = _unit_trouble(unit, expected)
+            if trouble:
+                problems.append(f"column {heading!r}: {trouble}")
+            wanted[name] = (index, unit.strip())
+    if not problems and not set(wanted) - {"time"}:
+        problems.append("there is no channel to use")
+    if problems:
+        raise RecordingError(joined(source, problems))
+    return wanted
+
+
+def _unit_trouble(unit: str, expected: Sequence[str]) -> str | None:
+    trouble = None
+    for si_unit in expected:
+        try:
+            to_si(1.0, unit.strip(), si_unit)
+        except ParameterError as error:
+            trouble = trouble or str(error)
+        else:
+            return None
+    return trouble
+
+
+def _si_columns(
+    table: Table,
+    wanted: Mapping[str, tuple[int, str]],
+    source: str,
+    thousands: str | Mapping[str, str] | None,
+    decimal: str,
+) -> tuple[dict[str, Array], dict[str, str]]:
+    if isinstance(thousands, Mapping):
+        strange = [key for key in thousands if key not in wanted]
+        if strange:
+            raise RecordingError(f"{source}: thousands names {strange[0]!r}, but the channels are: {', '.join(wanted)}")
+    raw: dict[str, Array] = {}
+    units: dict[str, str] = {}
+    for name, (index, unit) in wanted.items():
+        mark = thousands_of(thousands, name)
+        numbers = table.numbers(index, f"{name} [{unit}]", source, mark, decimal)
+        parsed = parse_unit(unit)
+        values: Array = np.asarray(numbers * parsed.scale + parsed.offset, dtype=np.float64)
+        values[~np.isfinite(values)] = np.nan
+        raw[name] = values
+        units[name] = CHANNELS[channel_of(name)].unit
+        if channel_of(name) == "reference" and parsed.dimension != parse_unit("rad").dimension:
+            units[name] = "Pa"
+    return raw, units
+
+
+# ------------------------------------------------------------------------ assembly
+
+
+def _assemble(
+    name: str,
+    role: str,
+    raw: dict[str, Array],
+    units: dict[str, str],
+    ragged: list[int],
+    source: str,
+    sample_time: float | None,
+) -> Recording:
+    issues: list[Issue] = []
+    count = len(next(iter(raw.values())))
+    if "time" not in raw:
+        if sample_time is None:
+            raise RecordingError(f"{source}: column 'time' is missing (give sample_time if the rows are evenly spaced)")
+        raw["time"] = np.asarray(np.arange(count) * sample_time, dtype=np.float64)
+    if count < 2:
+        raise RecordingError(f"{source}: one row only; two at least are needed")
+    stamped = np.isfinite(raw["time"])
+    if not stamped.any():
+        raise RecordingError(f"{source}: column 'time' has no value at all")
+    grid = lay_grid(raw["time"][stamped], source, sample_time)
+    if not stamped.all():
+        text = f"{int((~stamped).sum())} rows without a time are left out"
+        issues.append(Issue("nan", "time", 0.0, float(grid.time[-1]), text))
+    if ragged:
+        text = f"{len(ragged)} rows with too few or too many cells (first: row {ragged[0]}) are masked there"
+        issues.append(Issue("nan", "time", 0.0, float(grid.time[-1]), text))
+    issues += [Issue(event.kind, "time", event.start, event.stop, event.text) for event in grid.events]
+    if len(grid.time) < _FEW:
+        text = f"{len(grid.time)} samples only: too few to judge noise or faults"
+        issues.append(Issue("short", "time", 0.0, float(grid.time[-1]), text))
+    channels: dict[str, Array] = {}
+    masks: dict[str, Mask] = {}
+    for channel, values in raw.items():
+        if channel != "time":
+            laid = _judged(channel, values[stamped][grid.rows], grid, source, issues)
+            channels[channel], masks[channel] = laid
+    issues.sort(key=lambda issue: (issue.start, issue.channel))
+    units.pop("time", None)
+    return Recording(name, role, grid.time, grid.sample_time, channels, masks, issues, units)
+
+
+def _judged(channel: str, values: Array, grid: Grid, source: str, issues: list[Issue]) -> tuple[Array, Mask]:
+    """One channel on the grid with its mask; what is wrong with it goes to ``issues``."""
+    values = values.copy()
+    limits = CHANNELS[channel_of(channel)]
+    usable = np.isfinite(values)
+    impossible = usable & ((values < limits.lower) | (values > limits.upper))
+    bad = int(impossible.sum())
+    if bad > max(3, len(values) // 50):
+        worst = float(values[impossible][0])
+        raise RecordingError(
+            f"{source}: column {channel!r}: {worst:.6g} {limits.unit} and {bad - 1} more values are not "
+            f"possible ({limits.lower:g} to {limits.upper:g} {limits.unit}); right column and unit?"
+        )
+    found: list[tuple[str, int, int, str]] = _runs(~usable, "nan", "no value")
+    found += _runs(impossible, "outlier", "an impossible value")
+    usable &= ~impossible
+    values[~usable] = np.nan
+    for fault in find_faults(channel_of(channel), values):
+        found.append((fault.kind, fault.start, fault.stop, fault.text))
+        if fault.masked:
+            usable[fault.start : fault.stop] = False
+    for kind in dict.fromkeys(item[0] for item in found):
+        same = [item for item in found if item[0] == kind]
+        if len(same) > _FEW:
+            total = sum(stop - start for _, start, stop, _ in same)
+            start, _ = grid.when(same[0][1], same[0][2])
+            _, stop = grid.when(same[-1][1], same[-1][2])
+            issues.append(Issue(kind, channel, start, stop, f"{len(same)} stretches, {total} samples in all"))
+        else:
+            issues += [Issue(kind, channel, *grid.when(first, last), text) for _, first, last, text in same]
+    return grid.lay(values, usable)
+
+
+def _runs(flags: Mask, kind: str, text: str) -> list[tuple[str, int, int, str]]:
+    padded: NDArray[Any] = np.concatenate([[False], flags, [False]])
+    edges = np.flatnonzero(padded[1:] != padded[:-1])
+    return [(kind, int(a), int(b), f"{text} ({int(b - a)} samples)") for a, b in zip(edges[::2], edges[1::2], strict=True)]

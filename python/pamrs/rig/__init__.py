@@ -1,0 +1,17 @@
+"""The description of a rig: blocks with parameters, the file that holds it, muscle and joint.
+
+:class:`Rig` is what everything else works with; :func:`load_rig` reads one from a TOML file.
+:class:`Muscle` and :class:`Joint` also stand alone. :mod:`pamrs.rig.schema` lists the blocks and
+keys that a rig file may have, :mod:`pamrs.rig.muscle_models` the force models. :class:`Reader` and
+:func:`muscle_problems` read and check the blocks of other files as those of a rig.
+"""
+
+from __future__ import annotations
+
+from pamrs.rig._checks import muscle_problems
+from pamrs.rig._joint import Joint
+from pamrs.rig._muscle import Muscle
+from pamrs.rig._reader import Reader
+from pamrs.rig._rig import Parameter, Rig, load_rig, parse_rig
+
+__all__ = ["Joint", "Muscle", "Parameter", "Reader", "Rig", "load_rig", "muscle_problems", "parse_rig"]

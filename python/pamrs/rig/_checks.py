@@ -1,0 +1,104 @@
+"""What no key of a rig alone shows: numbers of one block that do not go together."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from pamrs.rig.schema import BLOCKS, qualified, tables_of
+
+__all__ = ["block_problems", "muscle_problems"]
+
+
+def block_problems(model: Mapping[str, Any]) -> list[str]:
+    """Problems within the blocks of a model.
+
+    Parameters
+    ----------
+    model : mapping
+        As :attr:`pamrs.Rig.model`; a table with a value that could not be read (None) is passed over.
+
+    Returns
+    -------
+    list of str
+        One sentence each, with the block, the value and what is allowed.
+    """
+    problems: list[str] = []
+    for block in BLOCKS:
+        check = _CHECKS.get(block)
+        for name, table in tables_of(model, block).items():
+            if check is not None and None not in table.values():
+                problems += check(qualified(block, name), table)
+    gas = model["gas"]
+    if gas is not None and gas["ambient_pressure"] is not None:
+        problems += _vacuum(model, gas["ambient_pressure"])
+    return problems
+
+
+def muscle_problems(label: str, muscle: Mapping[str, Any]) -> list[str]:
+    """What does not go together in a muscle; ``label`` is what the block is called, ``"muscle.flexor"``."""
+    problems = []
+    slope, offset = muscle.get("modulus_slope", []), muscle.get("modulus_offset", [])
+    if len(slope) != len(offset):
+        problems.append(
+            f"{label}.modulus_slope has {len(slope)} values and {label}.modulus_offset {len(offset)}; the same number is needed"
+        )
+    factors = muscle.get("extension_factors", [])
+    if factors and len(factors) != 3:
+        problems.append(f"{label}.extension_factors has {len(factors)} values; three are needed")
+    thickness, diameter = muscle["wall_thickness"], muscle["rest_diameter"]
+    if not thickness < diameter / 2:
+        problems.append(
+            f"{label}.wall_thickness = {thickness:g} m is not allowed: "
+            f"less than half of {label}.rest_diameter = {diameter:g} m is needed"
+        )
+    return problems
+
+
+def _valve(label: str, valve: Mapping[str, Any]) -> list[str]:
+    """What is wrong with a valve's area table."""
+    opening, fraction, label = valve["opening"], valve["fraction"], f"{label}.area_fraction"
+    if len(opening) != len(fraction) or len(opening) < 2:
+        return [f"{label}: opening has {len(opening)} values and fraction {len(fraction)}; the same number, two at least, is needed"]
+    problems = []
+    if opening[0] != 0.0 or opening[-1] != 1.0 or any(b <= a for a, b in zip(opening, opening[1:], strict=False)):
+        problems.append(f"{label}.opening = {opening} is not allowed: it must rise from 0 to 1")
+    if any(b < a for a, b in zip(fraction, fraction[1:], strict=False)):
+        problems.append(f"{label}.fraction = {fraction} is not allowed: it must not fall")
+    return problems
+
+
+def _joint(label: str, joint: Mapping[str, Any]) -> list[str]:
+    return _rising(label, "min_angle", "max_angle", "rad", joint)
+
+
+def _load(label: str, load: Mapping[str, Any]) -> list[str]:
+    return _rising(label, "min_length", "max_length", "m", load)
+
+
+def _rising(label: str, low: str, high: str, unit: str, table: Mapping[str, Any]) -> list[str]:
+    """Limits of a range that are the wrong way round."""
+    if table[low] < table[high]:
+        return []
+    return [f"{label}.{high} = {table[high]:g} {unit} is not allowed: more than {label}.{low} = {table[low]:g} {unit} is needed"]
+
+
+def _link(label: str, link: Mapping[str, Any]) -> list[str]:
+    """A link that nothing holds against its joint: the arm's mass matrix could not be solved."""
+    if link["inertia"] + link["mass"] * link["centre"] ** 2 + link["payload"] * link["length"] ** 2 > 0.0:
+        return []
+    return [f"{label} has no inertia about its joint (inertia + mass centre^2 + payload length^2 = 0 kg m2): more is needed"]
+
+
+def _vacuum(model: Mapping[str, Any], ambient: float) -> list[str]:
+    """Chambers that begin below vacuum."""
+    start = {name: table["initial_pressure"] for name, table in tables_of(model, "chamber").items()}
+    return [
+        f"{qualified('chamber', name)}.initial_pressure = {pressure:g} Pa (gauge) is not allowed: "
+        f"more than -gas.ambient_pressure = {-ambient:g} Pa is needed"
+        for name, pressure in start.items()
+        if pressure is not None and not pressure > -ambient
+    ]
+
+
+_CHECKS = {"valve": _valve, "muscle": muscle_problems, "joint": _joint, "link": _link, "load": _load}

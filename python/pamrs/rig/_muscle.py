@@ -1,0 +1,407 @@
+"""One pneumatic artificial muscle: geometry and force, exact, over arrays."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pamrs import _core
+from pamrs.errors import ParameterError
+from pamrs.rig.muscle_models import ELASTIC_PARAMETERS, own_geometry
+
+__all__ = ["Muscle"]
+
+Array = NDArray[np.float64]
+
+
+class Muscle:
+    """A braided muscle with one of the quasi-static force models of the dissertation (ch. 2 to 4).
+
+    Every model is ``F = P gas_area(e) + modulus_scale sum_j (slope_j P + offset_j) elastic_basis(e)[j]``.
+
+    Parameters
+    ----------
+    rest_length, rest_diameter : float
+        Length and outer diameter at rest [m].
+    braid_angle : float
+        Angle of the braid from the circumferential plane at rest [rad].
+    wall_thickness : float
+        Bladder thickness at rest [m].
+    model : str
+        ``gaylord``, ``chou_hannaford``, ``mooney_rivlin``, ``ferraresi`` (2.8), ``kothera`` (2.16), ``robinson``
+        (2.16 on elliptic ends) or ``elbow_linear`` (4.4)-(4.7).
+    geometry : {"cylinder", "elliptic", "elliptic_published"}, optional
+        Shape of the ends; by default that of the model's source: elliptic for ``robinson``, else cylinder.
+    modulus_slope, modulus_offset : sequence of float
+        ``m_k`` [1] and ``b_k`` [Pa] of the moduli ``E_k = m_k P + b_k``, from order 1 on (``ferraresi``, ``kothera``,
+        ``robinson``).
+    c10, c01 : float
+        Mooney-Rivlin constants [Pa] (``mooney_rivlin``).
+    bladder_modulus : float
+        ``E_R`` [Pa] (``elbow_linear``).
+    extension_factors : sequence of float
+        Factors on the wall's pressure, on FL and on FT while the muscle lengthens [1] (``elbow_linear``).
+    friction_coefficient, friction_pressure_slope, friction_floor : float
+        ``c_F = max(coefficient + slope P, floor)`` of the friction hysteresis (2.36) [1, 1/Pa, 1]; all zero: none.
+    friction_presliding : float
+        Motion over which the force goes from one branch of the hysteresis to the other in a simulation [m].
+    count : int
+        Muscles in parallel in a rig; the methods here are those of one muscle.
+    modulus_scale : float
+        Factor on every elastic parameter [1].
+    k0, contraction_slope, extension_slope, neck_floor : float
+        Axis ratio of the elliptic ends at rest, its slopes per unit contraction, and the smallest radius in
+        extension relative to rest [1].
+
+    Raises
+    ------
+    ParameterError
+        If a value is not finite or not possible, or the model has no such parameter; the message names it.
+
+    Examples
+    --------
+    >>> import numpy as np, pamrs
+    >>> muscle = pamrs.rigs.shoulder().muscle
+    >>> muscle.force(4e5, [0.0, 0.1]).round(1)
+    array([3351. , 1289.6])
+    >>> muscle.replace(model="gaylord").force(4e5, [0.1]).round(1)
+    array([3100.6])
+    """
+
+    def __init__(
+        self,
+        *,
+        rest_length: float,
+        rest_diameter: float,
+        braid_angle: float,
+        wall_thickness: float,
+        model: str = "robinson",
+        geometry: str | None = None,
+        modulus_slope: Sequence[float] = (),
+        modulus_offset: Sequence[float] = (),
+        c10: float = 0.0,
+        c01: float = 0.0,
+        bladder_modulus: float = 0.0,
+        extension_factors: Sequence[float] = (0.3, 0.8, 0.8),
+        friction_coefficient: float = 0.0,
+        friction_pressure_slope: float = 0.0,
+        friction_floor: float = 0.0,
+        friction_presliding: float = 1e-3,
+        count: int = 1,
+        modulus_scale: float = 1.0,
+        k0: float = 1.64,
+        contraction_slope: float = 2.405,
+        extension_slope: float = 6.105,
+        neck_floor: float = 0.80,
+    ) -> None:
+        self._model: dict[str, Any] = {
+            "model": model,
+            "geometry": own_geometry(model) if geometry is None else geometry,
+            "count": count,
+            "rest_length": rest_length,
+            "rest_diameter": rest_diameter,
+            "braid_angle": braid_angle,
+            "wall_thickness": wall_thickness,
+            "modulus_slope": [float(v) for v in modulus_slope],
+            "modulus_offset": [float(v) for v in modulus_offset],
+            "c10": c10,
+            "c01": c01,
+            "bladder_modulus": bladder_modulus,
+            "extension_factors": [float(v) for v in extension_factors],
+            "modulus_scale": modulus_scale,
+            "friction_coefficient": friction_coefficient,
+            "friction_pressure_slope": friction_pressure_slope,
+            "friction_floor": friction_floor,
+            "friction_presliding": friction_presliding,
+            "k0": k0,
+            "contraction_slope": contraction_slope,
+            "extension_slope": extension_slope,
+            "neck_floor": neck_floor,
+        }
+        for name, value in self._model.items():
+            entries = value if isinstance(value, list) else [value]
+            for entry in entries:
+                if isinstance(entry, (float, np.floating)) and not np.isfinite(entry):
+                    raise ParameterError(f"muscle.{name} = {entry} is not allowed: a finite number is needed")
+        if len(self._model["extension_factors"]) != 3:
+            raise ParameterError(f"muscle.extension_factors = {list(extension_factors)} is not allowed: three numbers are needed")
+        self._core = _core.Muscle(json.dumps(self._model, default=float))
+
+    @classmethod
+    def from_model(cls, model: Mapping[str, Any]) -> Muscle:
+        """The muscle of a rig's model.
+
+        Parameters
+        ----------
+        model : mapping
+            ``rig.model["muscle"]``.
+
+        Returns
+        -------
+        Muscle
+        """
+        return cls(**model)
+
+    def replace(self, **changes: Any) -> Muscle:
+        """The same muscle with other parameters.
+
+        Parameters
+        ----------
+        **changes
+            Parameters of :class:`Muscle`. With another ``model`` the elastic parameters that it does not have are left
+            out, and the geometry becomes the model's own unless one is given.
+
+        Returns
+        -------
+        Muscle
+
+        Raises
+        ------
+        ParameterError
+            As for :class:`Muscle`, and for a parameter that there is not.
+        """
+        unknown = [name for name in changes if name not in self._model]
+        if unknown:
+            raise ParameterError(f"muscle.{unknown[0]} is not a parameter: {', '.join(self._model)}")
+        parameters = self.parameters
+        model = str(changes.get("model", self.model))
+        if model != self.model:
+            parameters["geometry"] = None
+            kept = ELASTIC_PARAMETERS.get(model, ())
+            for name in {name for names in ELASTIC_PARAMETERS.values() for name in names}.difference(kept):
+                parameters.pop(name)
+            if "modulus_slope" in kept and not parameters["modulus_slope"]:
+                parameters["modulus_slope"] = parameters["modulus_offset"] = [0.0]
+        return Muscle(**{**parameters, **changes})
+
+    @property
+    def model(self) -> str:
+        """Name of the force model."""
+        return str(self._model["model"])
+
+    @property
+    def geometry(self) -> str:
+        """Name of the outer profile."""
+        return str(self._model["geometry"])
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """Every argument that the muscle was made with, SI units (a copy)."""
+        return {name: list(value) if isinstance(value, list) else value for name, value in self._model.items()}
+
+    @property
+    def fibre_length(self) -> float:
+        """Length ``B`` of one braid fibre [m]."""
+        return self._core.braid[0]
+
+    @property
+    def turns(self) -> float:
+        """Turns ``N`` of one braid fibre [1]."""
+        return self._core.braid[1]
+
+    @property
+    def bladder_volume(self) -> float:
+        """Volume ``VB`` of the rubber [m3]."""
+        return self._core.braid[2]
+
+    @property
+    def contraction_limits(self) -> tuple[float, float]:
+        """Contraction ratios at which the muscle is as long as its fibre, and 0.58 of that [1]."""
+        return self._core.contraction_limits
+
+    @property
+    def contraction_range(self) -> tuple[float, float]:
+        """Smallest and largest contraction ratio that the compiled table covers [1]."""
+        return self._core.contraction_range
+
+    @property
+    def table_error(self) -> float:
+        """Largest relative error of the compiled table against the exact solve [1]."""
+        return self._core.table_error
+
+    def radius(self, contraction: ArrayLike) -> Array:
+        """Outer radius of the middle part [m].
+
+        Parameters
+        ----------
+        contraction : array_like
+            Contraction ratio ``e = 1 - L/L0`` [1], any shape.
+
+        Returns
+        -------
+        ndarray
+            In the shape of ``contraction``.
+
+        Raises
+        ------
+        ParameterError
+            If a contraction ratio is not finite or beyond the braid's limits.
+        """
+        return self._over(self._core.radius, contraction)
+
+    def thickness(self, contraction: ArrayLike) -> Array:
+        """Wall thickness [m]; arguments and errors as :meth:`radius`.
+
+        Parameters
+        ----------
+        contraction : array_like
+            Contraction ratio [1].
+
+        Returns
+        -------
+        ndarray
+        """
+        return self._over(self._core.thickness, contraction)
+
+    def air_volume(self, contraction: ArrayLike) -> Array:
+        """Air volume of one muscle [m3]; arguments and errors as :meth:`radius`.
+
+        Parameters
+        ----------
+        contraction : array_like
+            Contraction ratio [1].
+
+        Returns
+        -------
+        ndarray
+        """
+        return self._over(self._core.air_volume, contraction)
+
+    def circumferential_strain(self, contraction: ArrayLike) -> Array:
+        """Hoop strain of the wall's mid-line, ``(R - t/2)/(R0 - t0/2) - 1`` (2.15) [1]; otherwise as :meth:`radius`.
+
+        Parameters
+        ----------
+        contraction : array_like
+            Contraction ratio [1].
+
+        Returns
+        -------
+        ndarray
+        """
+        return self._over(self._core.circumferential_strain, contraction)
+
+    def braid_taut(self, contraction: ArrayLike) -> NDArray[np.bool_]:
+        """Whether the radius has reached its floor in extension; arguments and errors as :meth:`radius`.
+
+        Parameters
+        ----------
+        contraction : array_like
+            Contraction ratio [1].
+
+        Returns
+        -------
+        ndarray of bool
+        """
+        return self._over(self._core.braid_taut, contraction) > 0.5
+
+    def gas_area(self, contraction: ArrayLike) -> Array:
+        """Force per gauge pressure without elasticity, while contracting [m2]; otherwise as :meth:`radius`.
+
+        Parameters
+        ----------
+        contraction : array_like
+            Contraction ratio [1].
+
+        Returns
+        -------
+        ndarray
+        """
+        return self._over(self._core.gas_area, contraction)
+
+    def elastic_basis(self, contraction: ArrayLike) -> Array:
+        """Force per unit of each elastic parameter of the model, while contracting [m2].
+
+        Parameters
+        ----------
+        contraction : array_like
+            Contraction ratio [1], shape S.
+
+        Returns
+        -------
+        ndarray
+            Shape S + (J,): one column for each order of the stress polynomial, for ``c10`` and ``c01``, or for the
+            bladder modulus; none for ``gaylord`` and ``chou_hannaford``.
+
+        Raises
+        ------
+        ParameterError
+            If a contraction ratio is not finite or beyond the braid's limits.
+        """
+        e = np.asarray(contraction, dtype=np.float64)
+        columns = self._core.elastic_basis(np.ascontiguousarray(e.ravel()))
+        return columns.reshape(*e.shape, columns.shape[1])
+
+    def force(self, pressure: ArrayLike, contraction: ArrayLike, direction: ArrayLike | None = None) -> Array:
+        """Pulling force of one muscle [N], exact solve.
+
+        Parameters
+        ----------
+        pressure : array_like
+            Gauge pressure [Pa].
+        contraction : array_like
+            Contraction ratio [1]; broadcast against ``pressure``.
+        direction : array_like, optional
+            Direction of motion, from -1 (contracting) to +1 (lengthening): adds the friction hysteresis and, for
+            ``elbow_linear``, the lengthening branch. None: the contracting branch without friction.
+
+        Returns
+        -------
+        ndarray
+            Force in the broadcast shape.
+
+        Raises
+        ------
+        ParameterError
+            If a value is not finite, a pressure below vacuum, a contraction beyond the braid's limits or a direction
+            outside -1 to 1.
+        """
+        return self._forces(self._core.force, pressure, contraction, direction)
+
+    def force_table(self, pressure: ArrayLike, contraction: ArrayLike, direction: ArrayLike | None = None) -> Array:
+        """Pulling force of one muscle [N] from the compiled table; otherwise as :meth:`force`.
+
+        Parameters
+        ----------
+        pressure : array_like
+            Gauge pressure [Pa].
+        contraction : array_like
+            Contraction ratio [1], inside :attr:`contraction_range`; broadcast against ``pressure``.
+        direction : array_like, optional
+            Direction of motion, as for :meth:`force`.
+
+        Returns
+        -------
+        ndarray
+            Force in the broadcast shape.
+        """
+        return self._forces(self._core.force_table, pressure, contraction, direction)
+
+    @staticmethod
+    def _over(function: Callable[[Array], Array], contraction: ArrayLike) -> Array:
+        e = np.asarray(contraction, dtype=np.float64)
+        return function(np.ascontiguousarray(e.ravel())).reshape(e.shape)
+
+    @staticmethod
+    def _forces(
+        function: Callable[[Array, Array, Array | None], Array],
+        pressure: ArrayLike,
+        contraction: ArrayLike,
+        direction: ArrayLike | None,
+    ) -> Array:
+        given = [pressure, contraction] if direction is None else [pressure, contraction, direction]
+        arrays = np.broadcast_arrays(*(np.asarray(value, dtype=np.float64) for value in given))
+        flat = [np.ascontiguousarray(array.ravel()) for array in arrays]
+        return function(flat[0], flat[1], flat[2] if len(flat) > 2 else None).reshape(arrays[0].shape)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Muscle.from_model, (self.parameters,)
+
+    def __repr__(self) -> str:
+        m = self._model
+        shape = f"rest_length={m['rest_length']:g} m, rest_diameter={m['rest_diameter']:g} m"
+        return f"Muscle({self.model}, {self.geometry}, {shape})"

@@ -1,0 +1,404 @@
+"""Reads rig TOML into a model, collecting every problem on the way."""
+
+from __future__ import annotations
+
+import difflib
+import math
+import re
+import tomllib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from pamrs.errors import ParameterError, RigError, joined
+from pamrs.rig._checks import block_problems
+from pamrs.rig._ports import bare, connect, near_name
+from pamrs.rig.muscle_models import own_geometry
+from pamrs.rig.schema import BLOCKS, PORTS, REQUIRED_BLOCKS, SCHEMA, SINGLE_BLOCKS, Key, Port, keys_of, kind_of, qualified, tables_of
+from pamrs.units import to_si
+
+__all__ = ["Content", "Reader", "read_model"]
+
+_TOP = ("schema", "name", "description", "effects")
+_QUANTITY = ("value", "unit", "tol", "unknown")
+_NAME = re.compile(r"[A-Za-z0-9_-]+")
+
+
+@dataclass
+class Content:
+    """What a rig file holds: the model, and what is known about its numbers."""
+
+    name: str
+    model: dict[str, Any]
+    tolerances: dict[str, float] = field(default_factory=dict)
+    effect_std: dict[str, dict[str, float]] = field(default_factory=dict)
+
+
+def read_model(text: str, source: str) -> Content:
+    """Read rig TOML.
+
+    Parameters
+    ----------
+    text : str
+        The file's text.
+    source : str
+        What to call it in messages.
+
+    Returns
+    -------
+    Content
+        Model, tolerances and standard deviations in SI units.
+
+    Raises
+    ------
+    RigError
+        With every problem found.
+    """
+    try:
+        document = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise RigError(f"{source}: not valid TOML: {error}") from error
+    reader = Reader()
+    content = reader.document(document)
+    if reader.problems:
+        raise RigError(joined(source, reader.problems))
+    return content
+
+
+def _shown(value: object) -> str:
+    text = f"{value:g}" if isinstance(value, float) else repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+class Reader:
+    """Turns tables into SI numbers, and notes every problem instead of stopping at the first."""
+
+    def __init__(self) -> None:
+        self.problems: list[str] = []
+        self.tolerances: dict[str, float] = {}
+        self.effect_std: dict[str, dict[str, float]] = {}
+        self.ports: dict[str, dict[str, str]] = {}
+        self.whole = True  # every block could be told: what is connected to what can be checked
+
+    def problem(self, text: str) -> None:
+        """Note a problem."""
+        self.problems.append(text)
+
+    def unknown_keys(self, prefix: str, given: Iterable[str], allowed: Iterable[str]) -> None:
+        """Note every key that is not allowed, with what is near to it."""
+        names = list(allowed)
+        for name in given:
+            if name not in names:
+                near = difflib.get_close_matches(name, names, n=1)
+                hint = f"did you mean {near[0]!r}?" if near else f"allowed: {', '.join(names)}"
+                self.problem(f"unknown key {prefix + name!r}; {hint}")
+
+    # ------------------------------------------------------------------ document
+
+    def document(self, document: Mapping[str, Any]) -> Content:
+        """A whole rig file."""
+        self.unknown_keys("", document, [*_TOP, *BLOCKS])
+        if document.get("schema") != SCHEMA:
+            self.problem(f"schema = {_shown(document.get('schema'))} is not allowed: {SCHEMA!r} is needed")
+        name = document.get("name", "rig")
+        if not isinstance(name, str) or not name.strip():
+            self.problem(f"name = {_shown(name)} is not allowed: a text is needed")
+            name = "rig"
+        self.whole = set(document) <= {*_TOP, *BLOCKS}
+        model: dict[str, Any] = {"name": name}
+        for block in BLOCKS:
+            model[block] = self.blocks(block, document.get(block))
+        self.sensors(model, document.get("sensors"))
+        model["ports"] = self.ports
+        model["effects"] = self.effects(document.get("effects", []))
+        if self.whole:
+            self.problems += connect(model)[1]
+        self.problems += block_problems(model)
+        return Content(name, model, self.tolerances, self.effect_std)
+
+    def blocks(self, block: str, raw: Any) -> dict[str, Any] | None:
+        """A block without a name, or all blocks of a kind by their names; None where there is none."""
+        if raw is None:
+            if block in REQUIRED_BLOCKS:
+                self.problem(f"the block [{block}] is missing")
+                self.whole = False
+            return None
+        if not isinstance(raw, Mapping):
+            self.problem(f"{block} = {_shown(raw)} is not allowed: a table [{block}] is needed")
+            self.whole = False
+            return None
+        names = _block_names(block, raw)
+        if not names:
+            return self.block(block, raw, ports=PORTS.get(block, ()))
+        others = [name for name in raw if name not in names]
+        if block in SINGLE_BLOCKS or others:
+            self.whole = False
+            named = ", ".join(f"[{block}.{name}]" for name in names)
+            if block in SINGLE_BLOCKS:
+                self.problem(f"{named} is not allowed: a rig has one [{block}], without a name")
+            else:
+                self.problem(f"[{block}] has {', '.join(others)} beside {named}: either one [{block}] or only named ones are needed")
+            return None
+        wrong = [name for name in names if not _NAME.fullmatch(name)]
+        for name in wrong:
+            self.problem(f"[{block}.{name!r}]: the name {name!r} is not allowed: letters, digits, _ and - are needed")
+            self.whole = False
+        return {name: self.block(block, raw[name], name, ports=PORTS.get(block, ())) for name in names if name not in wrong}
+
+    def block(self, block: str, table: Mapping[str, Any], name: str = "", *, ports: Iterable[Port] = ()) -> dict[str, Any]:
+        """One block by the keys of its table; the ports that it may have go to :attr:`ports`."""
+        label = qualified(block, name)
+        groups: dict[str, list[str]] = {}
+        for key in BLOCKS[block]:
+            if key.path:
+                groups.setdefault(key.path[0], []).append(key.path[1])
+        allowed = [port.name for port in ports]
+        self.unknown_keys(f"{label}.", table, [*allowed, *(k.name for k in BLOCKS[block] if not k.path), *groups])
+        for group, members in groups.items():
+            inner = table.get(group)
+            if isinstance(inner, Mapping):
+                self.unknown_keys(f"{label}.{group}.", inner, members)
+            elif inner is not None:
+                self.problem(f"{label}.{group} = {_shown(inner)} is not allowed: give {', '.join(members)} as a table")
+        for port in allowed:
+            other = table.get(port)
+            if isinstance(other, str):
+                self.ports.setdefault(label, {})[port] = other
+            elif other is not None:
+                self.problem(f"{label}.{port} = {_shown(other)} is not allowed: the name of a block is needed")
+        keys = keys_of(block, table)
+        for key in BLOCKS[block]:
+            if key not in keys and _dig(table, key.where) is not None:
+                kind, only = _shown(kind_of(block, table)), ", ".join(key.only)
+                self.problem(f"{label}.{key.name} is not allowed with {kind}: only with {only}")
+        content = {key.name: self.value(label, key, _dig(table, key.where)) for key in keys}
+        if content.get("geometry") == "":
+            content["geometry"] = own_geometry(content["model"])
+        return content
+
+    def sensors(self, model: dict[str, Any], raw: Any) -> None:
+        """Put in the sensors that a file leaves out, and hold their names against the chambers and joints.
+
+        Sensors without a name are those of every chamber and joint, so that they are always there where none has a name.
+        """
+        if raw is None:
+            model["sensors"] = self.block("sensors", {})
+        owners = {"pressure_zero": tables_of(model, "chamber"), "angle_zero": tables_of(model, "joint")}
+        self._length_zero(model, raw)
+        for name, table in tables_of(model, "sensors").items():
+            if not name or not self.whole:
+                continue
+            if not any(name in names for names in owners.values()):
+                named = dict.fromkeys(other for names in owners.values() for other in names if other)
+                self.problem(f"the block [sensors.{name}] is named after no chamber and no joint{near_name(name, named)}")
+                continue
+            for key, names in owners.items():
+                if name not in names:
+                    del table[key]
+                    if key in raw[name]:
+                        what = "chamber" if key == "pressure_zero" else "joint"
+                        self.problem(f"sensors.{name}.{key} is not allowed: the rig has no {what}.{name}")
+
+    def _length_zero(self, model: dict[str, Any], raw: Any) -> None:
+        """The zero of the length is that of a mass that moves, and a rig has one: sensors without a name have it."""
+        moves = (model["load"] or {}).get("kind") == "mass"
+        for name, table in tables_of(model, "sensors").items():
+            if moves and not name:
+                continue
+            given = isinstance(raw, Mapping) and "length_zero" in (raw.get(name) or {} if name else raw)
+            if given and self.whole:
+                label = qualified("sensors", name)
+                needs = 'a [load] with kind = "mass" is needed' if not moves else "it stands in [sensors], without a name"
+                self.problem(f"{label}.length_zero is not allowed: {needs}")
+            table.pop("length_zero", None)
+
+    # -------------------------------------------------------------------- values
+
+    def value(self, block: str, key: Key, raw: Any) -> Any:
+        """The value of one key in SI, None after noting what is wrong with it; ``block`` is what its block is called."""
+        label = ".".join((block, *key.where))
+        if raw is None:
+            if key.default is None:
+                self.problem(f"{label} is missing")
+            return list(key.default) if isinstance(key.default, tuple) else key.default
+        if key.kind == "choice":
+            if raw not in key.choices:
+                self.problem(f"{label} = {_shown(raw)} is not allowed: one of {', '.join(map(repr, key.choices))}")
+                return None
+            return raw
+        bare_allowed = key.kind == "count" or bool(key.path)
+        number, unit, extra = self.quantity(label, key, raw, bare_allowed)
+        if number is None:
+            return None
+        if key.kind == "vector":
+            self.spread(f"{block}.{key.name}", label, key, unit, extra)
+            return self.vector(label, key, number, unit)
+        value = self.scalar(label, key.unit, number, unit, key.lower, key.upper)
+        if value is None:
+            return None
+        self.spread(f"{block}.{key.name}", label, key, unit, extra)
+        if key.kind == "count":
+            if not value.is_integer():
+                self.problem(f"{label} = {value:g} is not allowed: a whole number is needed")
+            return int(value)
+        return value
+
+    def quantity(self, label: str, key: Key, raw: Any, bare_allowed: bool) -> tuple[Any, str, Mapping[str, Any]]:
+        """Number, unit and the whole table of ``{ value, unit, tol, unknown }``, or of a bare number."""
+        if not isinstance(raw, Mapping):
+            if bare_allowed:
+                return raw, key.unit, {}
+            self.problem(f"{label} = {_shown(raw)} has no unit: write {{ value = ..., unit = {key.unit!r} }}")
+            return None, key.unit, {}
+        self.unknown_keys(f"{label}.", raw, _QUANTITY)
+        if "value" not in raw:
+            self.problem(f"{label}.value is missing")
+            return None, key.unit, {}
+        unit = raw.get("unit")
+        if not isinstance(unit, str):
+            self.problem(f"{label}.unit is missing: a unit like {key.unit!r} is needed")
+            return None, key.unit, {}
+        return raw["value"], unit, raw
+
+    def scalar(
+        self,
+        label: str,
+        si_unit: str,
+        number: Any,
+        unit: str,
+        lower: float,
+        upper: float,
+        *,
+        difference: bool = False,
+    ) -> float | None:
+        """``number`` in SI, or None after noting what is wrong with it."""
+        if isinstance(number, bool) or not isinstance(number, (int, float)):
+            self.problem(f"{label} = {_shown(number)} is not allowed: a number is needed")
+            return None
+        try:
+            value = to_si(float(number), unit, si_unit, difference=difference)
+        except ParameterError as error:
+            self.problem(f"{label}: {error}")
+            return None
+        except OverflowError:
+            value = math.inf
+        if not (math.isfinite(value) and lower <= value <= upper):
+            given = "" if unit == si_unit else f" ({number:g} {unit})"
+            allowed = f"a finite number from {lower:g} to {upper:g} {si_unit}"
+            self.problem(f"{label} = {value:g} {si_unit}{given} is not allowed: {allowed}")
+            return None
+        return value
+
+    def vector(self, label: str, key: Key, numbers: Any, unit: str) -> list[float] | None:
+        """A list of numbers in SI."""
+        if not isinstance(numbers, list) or not numbers:
+            self.problem(f"{label} = {_shown(numbers)} is not allowed: a list of numbers is needed")
+            return None
+        values = [self.scalar(f"{label}[{i}]", key.unit, number, unit, key.lower, key.upper) for i, number in enumerate(numbers)]
+        known = [value for value in values if value is not None]
+        return known if len(known) == len(values) else None
+
+    def spread(self, name: str, label: str, key: Key, unit: str, extra: Mapping[str, Any]) -> None:
+        """Keep what is known of a value: ``tol``, or ``unknown = true``."""
+        unknown = extra.get("unknown", False)
+        if not isinstance(unknown, bool):
+            self.problem(f"{label}.unknown = {_shown(unknown)} is not allowed: true or false")
+            return
+        if unknown:
+            if "tol" in extra:
+                self.problem(f"{label}: tol and unknown = true exclude each other")
+            self.tolerances[name] = math.inf
+        elif "tol" in extra:
+            tol = self.scalar(f"{label}.tol", key.unit, extra["tol"], unit, 0.0, 1e300, difference=True)
+            if tol:
+                self.tolerances[name] = tol
+
+    # ------------------------------------------------------------------- effects
+
+    def effects(self, raw: Any) -> list[dict[str, Any]]:
+        """The tables ``[[effects]]``."""
+        if not isinstance(raw, list) or not all(isinstance(entry, Mapping) for entry in raw):
+            self.problem("effects is not allowed as it stands: one table [[effects]] for each is needed")
+            return []
+        if not raw:
+            return []
+        from pamrs.effects import CATALOGUE, EFFECTS
+
+        found: list[dict[str, Any]] = []
+        for index, entry in enumerate(raw):
+            label = f"effects[{index}]"
+            self.unknown_keys(f"{label}.", entry, ("id", "at", "form", "parameters"))
+            identity = entry.get("id")
+            if not isinstance(identity, str) or identity not in EFFECTS:
+                self.problem(f"{label}.id = {_shown(identity)} is not in the catalogue{near_name(str(identity), CATALOGUE)}")
+                continue
+            info = EFFECTS[identity]
+            place = self.place(label, info.at or "rig", entry.get("at", ""))
+            if any(identity == other["id"] and (not place or other.get("at", "") in ("", place)) for other in found):
+                self.problem(f"{label}.id = {identity!r} is there twice: of several each needs another block (at)")
+                continue
+            given = entry.get("parameters", {})
+            if not isinstance(given, Mapping):
+                self.problem(f"{label}.parameters = {_shown(given)} is not allowed: a table is needed")
+                continue
+            name = entry.get("form", "")
+            form = next((form for form in info.forms if name in ("", form.name)), None)
+            if form is None:
+                names = ", ".join(repr(form.name) for form in info.forms)
+                self.problem(f"{label}.form = {_shown(name)} is not allowed: {identity} has {names}")
+                continue
+            self.unknown_keys(f"{identity}.", given, [parameter.name for parameter in form.parameters])
+            values = {
+                parameter.name: self.effect_value(identity, place, parameter, given.get(parameter.name))
+                for parameter in form.parameters
+            }
+            own = {"form": name} if name and name != info.forms[0].name else {}
+            found.append({"id": identity, **({"at": place} if place else {}), **own, "parameters": values})
+        return found
+
+    def place(self, label: str, block: str, raw: Any) -> str:
+        """Name of the block that an effect acts on, ``""`` for every one of its kind."""
+        if not isinstance(raw, str):
+            self.problem(f"{label}.at = {_shown(raw)} is not allowed: the name of a {block} is needed")
+            return ""
+        return bare(block, raw)
+
+    def effect_value(self, identity: str, place: str, parameter: Any, raw: Any) -> float | None:
+        """One parameter of an effect, its default where it is left out."""
+        label = f"{identity}.{parameter.name}"
+        if raw is None:
+            return float(parameter.default)
+        if not isinstance(raw, Mapping):
+            self.problem(f"{label} = {_shown(raw)} has no unit: write {{ value = ..., unit = {parameter.unit!r} }}")
+            return None
+        self.unknown_keys(f"{label}.", raw, ("value", "unit", "std"))
+        unit = raw.get("unit")
+        if "value" not in raw or not isinstance(unit, str):
+            self.problem(f"{label}: value and unit (like {parameter.unit!r}) are needed")
+            return None
+        value = self.scalar(label, parameter.unit, raw["value"], unit, parameter.lower, parameter.upper)
+        if "std" in raw:
+            std = self.scalar(f"{label}.std", parameter.unit, raw["std"], unit, 0.0, 1e300, difference=True)
+            if std is not None:
+                self.effect_std.setdefault(qualified(identity, place), {})[parameter.name] = std
+        return value
+
+
+def _block_names(block: str, table: Mapping[str, Any]) -> list[str]:
+    """Entries of a block that are blocks with a name, and neither a key of its own nor a mistyped one."""
+    own = {*(key.where[0] for key in BLOCKS[block]), *(port.name for port in PORTS.get(block, ()))}
+    names = [
+        name for name, inner in table.items() if name not in own and isinstance(inner, Mapping) and not {"value", "unit"} & {*inner}
+    ]
+    if own & {*table}:
+        names = [name for name in names if not difflib.get_close_matches(name, own, n=1)]
+    return names
+
+
+def _dig(table: Mapping[str, Any], path: tuple[str, ...]) -> Any:
+    inner: Any = table
+    for name in path:
+        if not isinstance(inner, Mapping):
+            return None
+        inner = inner.get(name)
+    return inner

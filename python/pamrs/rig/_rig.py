@@ -1,0 +1,519 @@
+"""Rigs: the nominal model of a test stand, read from TOML with units and tolerances.
+
+A rig is blocks around a gas: supplies, valves, lines and chambers that the air goes through, muscles, joints and an arm or a
+load that the force goes through, sensors. Only ``gas`` and ``chamber`` are always there. A block that stands once needs no name;
+several of a kind have one each, and ports say which is connected to which. Everything inside is SI; angles are radians, pressures
+gauge.
+"""
+
+from __future__ import annotations
+
+import copy
+import math
+import os
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pamrs.errors import ParameterError, RigError, joined
+from pamrs.rig._ports import Ports, bare, connect, effect_problem, near_name, wiring
+from pamrs.rig._reader import Content, read_model
+from pamrs.rig._writer import core_json, toml_text
+from pamrs.rig.schema import BLOCKS, Key, keys_of, qualified, split_name, tables_of
+
+if TYPE_CHECKING:
+    from pamrs.rig._muscle import Muscle
+
+__all__ = ["Parameter", "Rig", "load_rig", "parse_rig"]
+
+#: By the core and from the ports when they are needed; what a rig differs from by numbers only, and what was made of it.
+_MADE_AGAIN = ("_compiled", "_connected", "_origin", "_grown")
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """One scalar of a rig.
+
+    Attributes
+    ----------
+    name : str
+        Dotted name, ``"valve.discharge_area_max"`` or, of a block with a name, ``"valve.flexor.discharge_area_max"``.
+    value : float
+        SI value; only a placeholder where ``known`` is False.
+    unit : str
+        The SI unit.
+    tol : float
+        One standard deviation of what the user knows, SI; 0 when the value is taken as exact, infinite
+        when it is unknown.
+    lower, upper : float
+        Bounds of the possible, SI.
+    known : bool
+        False when the file says ``unknown = true``.
+    """
+
+    name: str
+    value: float
+    unit: str
+    tol: float
+    lower: float
+    upper: float
+    known: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class Rig:
+    """The model of a test stand; made by :func:`load_rig`, changed only by making another.
+
+    Attributes
+    ----------
+    name : str
+        The rig's name.
+    source : str
+        Where it was read from, for messages.
+    """
+
+    name: str
+    _model: dict[str, Any] = field(repr=False)
+    _tolerances: dict[str, float] = field(default_factory=dict, repr=False)
+    _effect_std: dict[str, dict[str, float]] = field(default_factory=dict, repr=False)
+    source: str = field(default="", repr=False)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in self.__dict__.items() if name not in _MADE_AGAIN}
+
+    # ------------------------------------------------------------------ reading
+
+    @property
+    def model(self) -> dict[str, Any]:
+        """The nested model in SI values (a copy).
+
+        A block is its table, named ones are ``{name: table}``, an absent one is None. ``"ports"`` has the ports that the file
+        gives, by the full name of the block; :meth:`ports` has all of them.
+        """
+        return copy.deepcopy(self._model)
+
+    def tables(self, block: str) -> dict[str, dict[str, Any]]:
+        """The tables of one kind of block, with or without names (a copy).
+
+        Parameters
+        ----------
+        block : str
+            For example ``"valve"``.
+
+        Returns
+        -------
+        dict
+            Name -> SI table, in the order of the file; ``""`` is the name of a block without one. Empty when the rig has none.
+
+        Raises
+        ------
+        ParameterError
+            If there is no such kind of block.
+        """
+        if block not in BLOCKS:
+            raise ParameterError(f"block = {block!r} is not allowed: one of {', '.join(BLOCKS)}")
+        return copy.deepcopy(tables_of(self._model, block))
+
+    def ports(self, block: str) -> dict[str, dict[str, str]]:
+        """What the blocks of one kind are connected to, given in the file or by default.
+
+        Parameters
+        ----------
+        block : str
+            For example ``"valve"``, whose ports are ``from`` and ``to``.
+
+        Returns
+        -------
+        dict
+            Name -> port -> block in full, ``"chamber.flexor"``; links base first. The ``from`` of a line that valves feed is ``""``.
+
+        Raises
+        ------
+        ParameterError
+            If there is no such kind of block.
+        RigError
+            If the blocks do not fit together, which only a rig made by hand can show.
+        """
+        names = self.tables(block)
+        return copy.deepcopy(self._ports().get(block, {name: {} for name in names}))
+
+    @property
+    def wiring(self) -> list[str]:
+        """The ways of the air and of the force in words, one line each: ``"air: supply -> valve -> chamber -> ambient"``."""
+        return wiring(self._model, self._ports())
+
+    def _ports(self) -> Ports:
+        cached: Ports | None = self.__dict__.get("_connected")
+        if cached is None:
+            cached, problems = connect(self._model)
+            if problems:
+                raise RigError(joined(f"rig {self.name!r}", problems))
+            object.__setattr__(self, "_connected", cached)
+        return cached
+
+    @property
+    def parameters(self) -> dict[str, Parameter]:
+        """All scalar parameters by dotted name, in the order of the blocks."""
+        return {name: self.parameter(name) for name, _ in self._scalars()}
+
+    @property
+    def effects(self) -> list[dict[str, Any]]:
+        """The omitted physics already in the model: ``{"id", "parameters": {name: SI value}}`` each.
+
+        With ``"at"`` if it acts on one block only, and ``"form"`` if it has another form than the first.
+        """
+        effects: list[dict[str, Any]] = copy.deepcopy(self._model["effects"])
+        return effects
+
+    @property
+    def effect_std(self) -> dict[str, dict[str, float]]:
+        """Standard deviations of the effects' parameters, where the file gives them: id -> name -> SI.
+
+        Of several effects of one id each has the name of its block behind a dot, ``"leak_muscle.flexor"``.
+        """
+        found: dict[str, dict[str, float]] = {}
+        ids = [entry["id"] for entry in self._model["effects"]]
+        for entry in self._model["effects"]:
+            full = qualified(entry["id"], entry.get("at", ""))
+            if full in self._effect_std:
+                found[entry["id"] if ids.count(entry["id"]) == 1 else full] = dict(self._effect_std[full])
+        return found
+
+    @property
+    def blocks(self) -> tuple[str, ...]:
+        """The kinds of block that this rig has."""
+        return tuple(block for block in BLOCKS if tables_of(self._model, block))
+
+    @property
+    def muscle(self) -> Muscle | None:
+        """The rig's muscle as a model of its own, or None when the rig has none.
+
+        Raises
+        ------
+        ParameterError
+            If the rig has several: :meth:`muscle_of` takes the name of one.
+        """
+        names = list(tables_of(self._model, "muscle"))
+        if len(names) > 1:
+            raise ParameterError(f"rig {self.name!r} has the muscles {', '.join(names)}: take one by Rig.muscle_of(name)")
+        return self.muscle_of(names[0]) if names else None
+
+    def muscle_of(self, name: str = "") -> Muscle:
+        """One of the rig's muscles as a model of its own.
+
+        Parameters
+        ----------
+        name : str
+            Its name; ``""`` for the muscle without a name.
+
+        Returns
+        -------
+        Muscle
+
+        Raises
+        ------
+        ParameterError
+            If the rig has no such muscle.
+        """
+        tables = tables_of(self._model, "muscle")
+        if name not in tables:
+            there = ", ".join(map(repr, tables)) or "none"
+            raise ParameterError(f"name = {name!r}: rig {self.name!r} has no such muscle; it has: {there}")
+        from pamrs.rig._muscle import Muscle
+
+        return Muscle.from_model(tables[name])
+
+    def parameter(self, name: str) -> Parameter:
+        """One parameter by its dotted name.
+
+        Parameters
+        ----------
+        name : str
+            For example ``"arm.payload"``, or ``"chamber.flexor.dead_volume"`` of a block with a name.
+
+        Returns
+        -------
+        Parameter
+
+        Raises
+        ------
+        ParameterError
+            If the rig has no such scalar.
+        """
+        table, key = self._scalar(self._model, name)
+        tol = self._tolerances.get(name, 0.0)
+        return Parameter(name, float(table[key.name]), key.unit, tol, key.lower, key.upper, not math.isinf(tol))
+
+    def _scalars(self) -> Iterator[tuple[str, Key]]:
+        for block in BLOCKS:
+            for name, table in tables_of(self._model, block).items():
+                for key in keys_of(block, table):
+                    if key.kind in ("scalar", "count") and key.name in table:
+                        yield f"{qualified(block, name)}.{key.name}", key
+
+    def _scalar(self, model: dict[str, Any], dotted: str) -> tuple[dict[str, Any], Key]:
+        """The table in which ``model`` has a scalar, and what is known of it; the model is of the form of this rig's own."""
+        block, name, own = split_name(dotted)
+        table = tables_of(model, block).get(name, {}) if block in BLOCKS else {}
+        key = next((key for key in BLOCKS.get(block, ()) if key.name == own and own in table), None)
+        if key is None or key.kind not in ("scalar", "count"):
+            known = ", ".join(scalar for scalar, _ in self._scalars())
+            raise ParameterError(f"rig {self.name!r} has no parameter {dotted!r}; it has: {known}")
+        return table, key
+
+    # ----------------------------------------------------------------- changing
+
+    def with_parameters(self, values: Mapping[str, float]) -> Rig:
+        """A rig with other parameter values.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Dotted name -> SI value. Tolerances stay; an unknown parameter that gets a value stays unknown.
+
+        Returns
+        -------
+        Rig
+            A new rig.
+
+        Raises
+        ------
+        ParameterError
+            For an unknown name, or a value outside the bounds of the possible.
+        """
+        model = _opened(self._model, {split_name(name)[:2] for name in values})
+        problems = []
+        for name, value in values.items():
+            table, key = self._scalar(model, name)
+            number = float(value)
+            if not (math.isfinite(number) and key.lower <= number <= key.upper):
+                problems.append(f"{name} = {number:g} {key.unit} is not allowed: {_range(key)}")
+            whole = key.kind == "count"
+            if whole and not number.is_integer():
+                problems.append(f"{name} = {number:g} is not allowed: a whole number is needed")
+                continue
+            table[key.name] = int(number) if whole else number
+        if problems:
+            raise ParameterError(joined(f"rig {self.name!r}", problems))
+        found = Rig(self.name, model, self._tolerances, self._effect_std, self.source)
+        return found._with_origin(self, {name: float(value) for name, value in values.items()})
+
+    # A rig that differs from another one by numbers only is not wired again: the core takes the numbers.
+
+    def _with_origin(self, base: Rig, values: Mapping[str, float]) -> Rig:
+        """Note that this rig is another one with other numbers."""
+        origin, before = base.__dict__.get("_origin", (base, {}))
+        object.__setattr__(self, "_origin", (origin, {**before, **values}))
+        return self
+
+    def _with_entry(self, entry: dict[str, Any], std: dict[str, dict[str, float]]) -> Rig:
+        """This rig with one effect more, as an entry of its model."""
+        model = {**self._model, "effects": [*self._model["effects"], entry]}
+        found = Rig(self.name, model, self._tolerances, {**self._effect_std, **std}, self.source)
+        origin, before = self.__dict__.get("_origin", (self, {}))
+        grown: dict[tuple[str, str, str], Rig] = origin.__dict__.get("_grown", {})
+        kind = (entry["id"], entry.get("at", ""), entry.get("form", ""))
+        if kind not in grown:
+            same = {**origin._model, "effects": [*origin._model["effects"], entry]}
+            grown[kind] = Rig(self.name, same, self._tolerances, origin._effect_std, self.source)
+            object.__setattr__(origin, "_grown", grown)
+        full = qualified(entry["id"], entry.get("at", ""))
+        own = {f"{full}.{name}": value for name, value in entry["parameters"].items()}
+        object.__setattr__(found, "_origin", (grown[kind], {**before, **own}))
+        return found
+
+    def with_effect(
+        self,
+        effect: str,
+        parameters: Mapping[str, float] | None = None,
+        *,
+        std: Mapping[str, float] | None = None,
+        at: str = "",
+        form: str = "",
+    ) -> Rig:
+        """A rig with one effect more.
+
+        Several of one id can be there, each at a block of its own and with its own parameters. One at the same block is
+        replaced; one that acts everywhere replaces all of its id, and is replaced by one at a block.
+
+        Parameters
+        ----------
+        effect : str
+            Id of the catalogue, for example ``"leak_muscle"``.
+        parameters : mapping of str to float, optional
+            SI values; what is left out gets the catalogue's default.
+        std : mapping of str to float, optional
+            Standard deviations, SI; written to the file as a note of how well each is known.
+        at : str, optional
+            Name of the one block on which it acts, for example of a chamber; by default it acts on every block of its kind.
+        form : str, optional
+            Name of one of its forms; by default the first.
+
+        Returns
+        -------
+        Rig
+            A new rig.
+
+        Raises
+        ------
+        ParameterError
+            For an unknown effect, form, parameter or block, or a value outside its bounds.
+        """
+        from pamrs.effects import CATALOGUE, EFFECTS
+
+        info = EFFECTS.get(effect)
+        if info is None:
+            raise ParameterError(f"effect = {effect!r} is not in the catalogue{near_name(str(effect), CATALOGUE)}")
+        at = bare(info.at, at)
+        given = dict(parameters or {})
+        if form and form not in (allowed := [known.name for known in info.forms]):
+            raise ParameterError(f"form = {form!r} is not allowed: {effect} has {', '.join(map(repr, allowed))}")
+        chosen_form = info.form(form)
+        names = [parameter.name for parameter in chosen_form.parameters]
+        problems = [f"unknown parameter {name!r}; it has: {', '.join(names)}" for name in {*given, *(std or {})} if name not in names]
+        problems += [text] if (text := effect_problem(self._model, effect, at)) else []
+        chosen: dict[str, float] = {}
+        for parameter in chosen_form.parameters:
+            value = float(given.get(parameter.name, parameter.default))
+            if not (math.isfinite(value) and parameter.lower <= value <= parameter.upper):
+                problems.append(
+                    f"{parameter.name} = {value:g} {parameter.unit} is not allowed: "
+                    f"from {parameter.lower:g} to {parameter.upper:g} {parameter.unit}"
+                )
+            chosen[parameter.name] = value
+        if problems:
+            raise ParameterError(joined(f"effect {effect!r}", problems))
+        base = self.without_effect(effect, at=at or None)
+        base = base.without_effect(effect, at="") if at else base
+        place = {"at": at} if at else {}
+        own = {"form": form} if form and form != info.forms[0].name else {}
+        known = {qualified(effect, at): {k: float(v) for k, v in std.items()}} if std else {}
+        return base._with_entry({"id": effect, **place, **own, "parameters": chosen}, known)
+
+    def without_effect(self, effect: str | None = None, *, at: str | None = None) -> Rig:
+        """A rig without one effect; an effect that is not there is no error.
+
+        Parameters
+        ----------
+        effect : str, optional
+            Its id; None removes all.
+        at : str, optional
+            Only the one at the block of this name, ``""`` for the one that acts everywhere; by default wherever it acts.
+
+        Returns
+        -------
+        Rig
+        """
+        def stays(entry: Mapping[str, Any]) -> bool:
+            if effect is None:
+                return False
+            return entry["id"] != effect or (at is not None and entry.get("at", "") != at)
+
+        entries = [entry for entry in self._model["effects"] if stays(entry)]
+        if len(entries) == len(self._model["effects"]):
+            return self
+        model = {**self._model, "effects": entries}
+        left = {qualified(entry["id"], entry.get("at", "")) for entry in model["effects"]}
+        kept = {name: std for name, std in self._effect_std.items() if name in left}
+        return Rig(self.name, model, self._tolerances, kept, self.source)
+
+    # ------------------------------------------------------------------ writing
+
+    def to_json(self) -> str:
+        """The model as JSON text, as the core takes it: every block in a list, every port in full (SI, radians, gauge pressures).
+
+        Returns
+        -------
+        str
+
+        Raises
+        ------
+        RigError
+            As :meth:`ports`.
+        """
+        return core_json(self._model, self._ports())
+
+    def to_toml_text(self) -> str:
+        """The rig as TOML in SI units; reading it gives the same numbers to the last bit, the same names and the same ports."""
+        return toml_text(Content(self.name, self._model, self._tolerances, self._effect_std))
+
+    def to_toml(self, path: str | os.PathLike[str]) -> Path:
+        """Write :meth:`to_toml_text` to a file.
+
+        Parameters
+        ----------
+        path : path-like
+            The file.
+
+        Returns
+        -------
+        Path
+            The file written.
+
+        Raises
+        ------
+        RigError
+            If the file cannot be written.
+        """
+        from pamrs._writing import write_atomically
+
+        try:
+            return write_atomically(path, self.to_toml_text())
+        except OSError as error:
+            raise RigError(f"{path}: cannot be written ({error.strerror or error})") from error
+
+
+def _opened(model: dict[str, Any], tables: set[tuple[str, str]]) -> dict[str, Any]:
+    """A model with copies of some of its tables, by block and name; what is not changed is shared."""
+    opened = dict(model)
+    for block, name in tables:
+        content: Any = opened.get(block)
+        if not isinstance(content, dict):
+            continue
+        if content is model.get(block):
+            opened[block] = content = copy.copy(content)
+        if name in content:
+            content[name] = dict(content[name])
+    return opened
+
+
+def _range(key: Key) -> str:
+    return f"from {key.lower:g} to {key.upper:g} {key.unit}"
+
+
+def load_rig(path: str | os.PathLike[str]) -> Rig:
+    """Read a rig file.
+
+    Parameters
+    ----------
+    path : path-like
+        A TOML file of the schema ``pamrs.rig/1``, or a folder that has a ``rig.toml``.
+
+    Returns
+    -------
+    Rig
+        The rig, in SI units.
+
+    Raises
+    ------
+    RigError
+        If the file cannot be read, or with every problem found in it: unknown keys, missing or wrong
+        units, values that are not finite or not possible, blocks that do not fit together.
+    """
+    file = Path(path)
+    if file.is_dir():
+        file = file / "rig.toml"
+    try:
+        text = file.read_text(encoding="utf-8")
+    except OSError as error:
+        raise RigError(f"{file}: cannot be read ({error.strerror or error})") from error
+    except UnicodeDecodeError as error:
+        raise RigError(f"{file}: not a text file in UTF-8") from error
+    return parse_rig(text, source=str(file))
+
+
+def parse_rig(text: str, *, source: str = "rig") -> Rig:
+    """Read a rig from TOML text; ``source`` names it in messages. See :func:`load_rig`."""
+    content = read_model(text, source)
+    return Rig(content.name, content.model, content.tolerances, content.effect_std, source)

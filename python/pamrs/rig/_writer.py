@@ -1,0 +1,171 @@
+"""Writes the model of a rig: as TOML that reads back the same to the last bit, and as the JSON that the core takes."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator, Mapping
+from typing import Any, Final
+
+from pamrs.rig._ports import Ports
+from pamrs.rig._reader import Content
+from pamrs.rig.schema import BLOCKS, PORTS, SCHEMA, Key, keys_of, kind_of, qualified, tables_of
+
+__all__ = ["core_json", "toml_text"]
+
+_STOPS: Final = ("min_angle", "max_angle", "stop_stiffness", "stop_damping")
+
+# ---------------------------------------------------------------------------------- TOML
+
+
+def toml_text(content: Content) -> str:
+    """A rig as TOML in SI units.
+
+    Parameters
+    ----------
+    content : Content
+        Name, model, tolerances and standard deviations.
+
+    Returns
+    -------
+    str
+        A rig file; reading it gives the same numbers, names and ports.
+    """
+    lines = [f"schema = {_text(SCHEMA)}", f"name = {_text(content.name)}"]
+    for block in BLOCKS:
+        for name, table in tables_of(content.model, block).items():
+            lines += ["", f"[{qualified(block, name)}]", *_block(content, block, name, table)]
+    for effect in content.model["effects"]:
+        place = effect.get("at", "")
+        lines += [
+            "",
+            "[[effects]]",
+            f"id = {_text(effect['id'])}",
+            *([f"at = {_text(place)}"] if place else []),
+            *([f"form = {_text(effect['form'])}"] if "form" in effect else []),
+            "[effects.parameters]",
+        ]
+        units = _effect_units(effect["id"], effect.get("form", ""))
+        spread = content.effect_std.get(qualified(effect["id"], place), {})
+        for name, value in effect["parameters"].items():
+            std = f", std = {_number(spread[name])}" if name in spread else ""
+            lines.append(f"{name} = {{ value = {_number(value)}, unit = {_text(units[name])}{std} }}")
+    return "\n".join(lines) + "\n"
+
+
+def _block(content: Content, block: str, name: str, table: Mapping[str, Any]) -> Iterator[str]:
+    """The lines of one block: its ports as the file gave them, its keys, its groups of keys."""
+    label = qualified(block, name)
+    given = content.model.get("ports", {}).get(label, {})
+    yield from (f"{port.name} = {_text(given[port.name])}" for port in PORTS.get(block, ()) if port.name in given)
+    groups: dict[str, list[str]] = {}
+    for key in keys_of(block, table):
+        if key.name not in table:
+            continue
+        entry = _entry(key, table[key.name], content.tolerances.get(f"{label}.{key.name}", 0.0))
+        if len(key.where) == 1:
+            yield f"{key.name} = {entry}"
+        else:
+            groups.setdefault(key.where[0], []).append(f"{key.where[1]} = {entry}")
+    yield from (f"{group} = {{ {', '.join(members)} }}" for group, members in groups.items())
+
+
+def _entry(key: Key, value: Any, tol: float) -> str:
+    if key.kind == "choice":
+        return _text(value)
+    if key.kind == "count":
+        return str(value)
+    if key.kind == "vector":
+        numbers = "[" + ", ".join(_number(item) for item in value) + "]"
+        if key.path:
+            return numbers
+    note = "" if tol == 0.0 else (", unknown = true" if math.isinf(tol) else f", tol = {_number(tol)}")
+    if key.kind == "vector":
+        return f"{{ value = {numbers}, unit = {_text(key.unit)}{note} }}"
+    if key.path and not note:
+        return _number(value)
+    return f"{{ value = {_number(value)}, unit = {_text(key.unit)}{note} }}"
+
+
+def _effect_units(effect: str, form: str) -> dict[str, str]:
+    from pamrs.effects import EFFECTS
+
+    return {parameter.name: parameter.unit for parameter in EFFECTS[effect].form(form).parameters}
+
+
+def _text(value: str) -> str:
+    return json.dumps(value, ensure_ascii=False)
+
+
+def _number(value: float) -> str:
+    return repr(float(value))
+
+
+# ---------------------------------------------------------------------------------- JSON
+
+
+def core_json(model: Mapping[str, Any], ports: Ports) -> str:
+    """A model as the core takes it: lists of named blocks, every port given in full.
+
+    Parameters
+    ----------
+    model : mapping
+        As :attr:`pamrs.Rig.model`.
+    ports : dict
+        As :func:`pamrs.rig._ports.connect` returns them.
+
+    Returns
+    -------
+    str
+        JSON text; SI, radians, gauge pressures. Keys that the kind of a block does not have are left out.
+    """
+    transmissions, joints = tables_of(model, "transmission"), tables_of(model, "joint")
+    document = {
+        "name": model["name"],
+        "gas": model["gas"],
+        "supplies": [{"name": name, **table} for name, table in tables_of(model, "supply").items()],
+        "valves": [{"name": name, **ports["valve"][name], **table} for name, table in tables_of(model, "valve").items()],
+        "lines": [_line(name, table, ports) for name, table in tables_of(model, "line").items()],
+        "chambers": [{"name": name, **table} for name, table in tables_of(model, "chamber").items()],
+        "muscles": [
+            {"name": name, **ports["muscle"][name], "transmission": _transmission(transmissions.get(name)), "muscle": table}
+            for name, table in tables_of(model, "muscle").items()
+        ],
+        "joints": [_joint(name, table) for name, table in joints.items()],
+        "arm": _arm(model, ports),
+        "load": model["load"],
+        "sensors": [
+            {"name": name, "pressure_zero": table.get("pressure_zero", 0.0), "angle_zero": table.get("angle_zero", 0.0)}
+            | {key: table[key] for key in ("length_zero",) if key in table}
+            for name, table in tables_of(model, "sensors").items()
+        ],
+        "effects": [
+            {key: effect.get(key, "") for key in ("id", "at", "form") if key != "form" or key in effect}
+            | {"parameters": effect["parameters"]}
+            for effect in model["effects"]
+        ],
+    }
+    return json.dumps(document)
+
+
+def _line(name: str, table: Mapping[str, Any], ports: Ports) -> dict[str, Any]:
+    values = {key: value for key, value in table.items() if key != "kind"}
+    ends = ports["line"][name]
+    return {"name": name, "kind": table["kind"], "from": ends["from"], "to": ends["to"], **values}
+
+
+def _joint(name: str, table: Mapping[str, Any]) -> dict[str, Any]:
+    own = None if kind_of("joint", table) == "free" else _transmission(table)
+    return {"name": name, "transmission": own, "rest_angle": table["rest_angle"], **{key: table[key] for key in _STOPS}}
+
+
+def _transmission(table: Mapping[str, Any] | None) -> dict[str, Any] | None:
+    """How a muscle pulls on its joint; None where it is the joint's own way."""
+    return None if table is None else {key: value for key, value in table.items() if key not in _STOPS}
+
+
+def _arm(model: Mapping[str, Any], ports: Ports) -> dict[str, Any] | None:
+    if model["arm"] is None:
+        return None
+    tables = tables_of(model, "link")
+    return {**model["arm"], "links": [{"name": name, "joint": ends["joint"], **tables[name]} for name, ends in ports["link"].items()]}

@@ -1,0 +1,300 @@
+"""Every key of a rig file in one table: unit, bounds and default of each; and the ports by which blocks name each other.
+
+The bounds are those of the possible, not of the likely: outside them a value is a mistake in the file.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, Final, Literal, NamedTuple
+
+from pamrs.rig.muscle_models import GEOMETRIES, MODELS, models_with
+
+__all__ = [
+    "BLOCKS",
+    "PORTS",
+    "REQUIRED_BLOCKS",
+    "SCHEMA",
+    "SINGLE_BLOCKS",
+    "Key",
+    "Port",
+    "keys_of",
+    "kind_of",
+    "qualified",
+    "split_name",
+    "tables_of",
+]
+
+SCHEMA: Final = "pamrs.rig/1"
+REQUIRED_BLOCKS: Final = ("gas", "chamber")
+#: Blocks that stand once and have no name; every other one may stand several times, then each with a name.
+SINGLE_BLOCKS: Final = ("gas", "arm", "load")
+
+Kind = Literal["scalar", "count", "vector", "choice"]
+
+
+class Key(NamedTuple):
+    """One entry of a block.
+
+    Attributes
+    ----------
+    name : str
+        Name in the model, and in the file unless ``path`` says otherwise.
+    unit : str
+        SI unit ("1" for a pure number).
+    lower, upper : float
+        Bounds in SI units, both allowed.
+    default : float, str, tuple of float or None
+        Value when the file leaves it out; None makes the key required.
+    kind : str
+        ``scalar``, ``count`` (whole number), ``vector`` or ``choice`` (text).
+    choices : tuple of str
+        What a ``choice`` may be.
+    path : tuple of str
+        Where the file has it inside the block: ``("end_ratio", "k0")``.
+    only : tuple of str
+        The kinds of the block (force model of a muscle, kind of a joint) that have this key; empty for all.
+    note : str
+        What it is, where the name does not say it.
+    """
+
+    name: str
+    unit: str = "1"
+    lower: float = -math.inf
+    upper: float = math.inf
+    default: float | str | tuple[float, ...] | None = None
+    kind: Kind = "scalar"
+    choices: tuple[str, ...] = ()
+    path: tuple[str, ...] = ()
+    only: tuple[str, ...] = ()
+    note: str = ""
+
+    @property
+    def where(self) -> tuple[str, ...]:
+        """Path in the file, inside the block."""
+        return self.path or (self.name,)
+
+
+class Port(NamedTuple):
+    """A key of a block that names another block.
+
+    Attributes
+    ----------
+    name : str
+        Name in the file.
+    kinds : tuple of str
+        Kinds of block that it may name.
+    words : tuple of str
+        What else it may be: ``ambient``, ``load``, ``base``.
+    default : str
+        In words, what it is where the file leaves it out.
+    """
+
+    name: str
+    kinds: tuple[str, ...]
+    words: tuple[str, ...] = ()
+    default: str = ""
+
+
+_POLYTROPIC_LOW, _POLYTROPIC_HIGH = 0.3, 3.0
+_RIGHT_ANGLE = math.pi / 2
+_TURN = 2 * math.pi
+_TENDON = ("tendon", "published")
+_TRANSMISSIONS = (*_TENDON, "pulley", "polynomial")
+_ONE_LINK = ("one_link",)
+
+#: The key of a block that says of which kind it is, and the kind where it is left out.
+_KINDS: Final = {
+    "supply": ("kind", "tank"),
+    "line": ("kind", "tube"),
+    "muscle": ("model", "robinson"),
+    "transmission": ("kind", "tendon"),
+    "joint": ("kind", "tendon"),
+    "arm": ("kind", "one_link"),
+    "load": ("kind", "mass"),
+}
+
+#: How far a muscle shortens at an angle: of a joint, or of a muscle's own transmission in the joint's place.
+_GEOMETRY: Final = (
+    Key("upper_axial", "m", 1e-6, 10.0, only=_TENDON),
+    Key("upper_offset", "m", -10.0, 10.0, only=_TENDON),
+    Key("lower_axial", "m", 1e-6, 10.0, only=_TENDON),
+    Key("lower_offset", "m", -10.0, 10.0, only=_TENDON),
+    Key("radius", "m", -10.0, 10.0, only=("pulley",)),
+    Key("coefficients", "m", -100.0, 100.0, kind="vector", only=("polynomial",)),
+    Key("rest_angle", "rad", -_TURN, _TURN, note="where the muscle is at rest length"),
+)
+
+#: block -> its keys, in the order in which they are written.
+BLOCKS: Final[dict[str, tuple[Key, ...]]] = {
+    "gas": (
+        Key("ambient_pressure", "Pa", 1e3, 2e5, 101325.0),
+        Key("temperature", "K", 150.0, 500.0, 293.15),
+        Key("gas_constant", "J/(kg K)", 20.0, 5000.0, 287.05),
+        Key("heat_capacity_ratio", "1", 1.01, 1.7, 1.4),
+    ),
+    "supply": (
+        Key("kind", default="tank", kind="choice", choices=("tank", "constant", "regulator")),
+        Key("volume", "m3", 1e-7, 1e3, only=("tank",)),
+        Key("initial_pressure", "Pa", 0.0, 1e8, note="of a regulator what it is set to until it gets a command"),
+        Key("time_constant", "s", 1e-4, 100.0, 0.05, only=("regulator",)),
+        Key("droop", "Pa s/kg", 0.0, 1e12, 0.0, only=("regulator",), note="fall of the outlet pressure per mass flow"),
+    ),
+    "valve": (
+        Key("discharge_area_max", "m2", 1e-11, 1e-2),
+        Key("null_voltage", "V", -50.0, 50.0),
+        Key("half_range", "V", 1e-3, 100.0),
+        Key("opening", "1", 0.0, 1.0, kind="vector", path=("area_fraction", "opening")),
+        Key("fraction", "1", 0.0, 1.0, kind="vector", path=("area_fraction", "fraction")),
+    ),
+    "line": (
+        Key("kind", default="tube", kind="choice", choices=("tube", "orifice")),
+        Key("length", "m", 1e-3, 1e3, only=("tube",)),
+        Key("diameter", "m", 1e-4, 0.2, only=("tube",)),
+        Key("discharge_area", "m2", 1e-12, 1e-1, only=("orifice",)),
+        Key("inlet_volume", "m3", 0.0, 1.0, 0.0, note="at its inlet where valves feed it, besides half of the tube's own"),
+    ),
+    "chamber": (
+        Key("dead_volume", "m3", 1e-10, 1e2),
+        Key("initial_pressure", "Pa", -1e5, 1e8, 0.0),
+        Key("alpha_in", "1", _POLYTROPIC_LOW, _POLYTROPIC_HIGH, 1.4),
+        Key("alpha_out", "1", _POLYTROPIC_LOW, _POLYTROPIC_HIGH, 1.0),
+        Key("alpha", "1", _POLYTROPIC_LOW, _POLYTROPIC_HIGH, 1.2),
+    ),
+    "muscle": (
+        Key("model", default="robinson", kind="choice", choices=MODELS),
+        Key("geometry", default="", kind="choice", choices=GEOMETRIES),  # the model's own
+        Key("count", "1", 1, 1000, 1, kind="count"),
+        Key("rest_length", "m", 1e-3, 10.0),
+        Key("rest_diameter", "m", 1e-4, 1.0),
+        Key("braid_angle", "rad", 1e-2, _RIGHT_ANGLE - 1e-3),
+        Key("wall_thickness", "m", 1e-6, 0.1),
+        Key("modulus_slope", "1", -1e6, 1e6, kind="vector", only=models_with("modulus_slope")),
+        Key("modulus_offset", "Pa", -1e11, 1e11, kind="vector", only=models_with("modulus_offset")),
+        Key("c10", "Pa", -1e11, 1e11, only=models_with("c10")),
+        Key("c01", "Pa", -1e11, 1e11, 0.0, only=models_with("c01")),
+        Key("bladder_modulus", "Pa", -1e11, 1e11, only=models_with("bladder_modulus")),
+        Key("extension_factors", "1", -10.0, 10.0, (0.3, 0.8, 0.8), kind="vector", only=models_with("extension_factors")),
+        Key("modulus_scale", "1", 0.0, 100.0, 1.0),
+        Key("k0", "1", 0.0, 100.0, 1.64, path=("end_ratio", "k0")),
+        Key("contraction_slope", "1", -1e3, 1e3, 2.405, path=("end_ratio", "contraction_slope")),
+        Key("extension_slope", "1", -1e3, 1e3, 6.105, path=("end_ratio", "extension_slope")),
+        Key("neck_floor", "1", 0.0, 1.0, 0.80, path=("end_ratio", "neck_floor")),
+        Key("friction_coefficient", "1", -1.0, 1.0, 0.0, path=("friction", "coefficient")),
+        Key("friction_pressure_slope", "1/Pa", -1e-4, 1e-4, 0.0, path=("friction", "pressure_slope")),
+        Key("friction_floor", "1", 0.0, 1.0, 0.0, path=("friction", "floor")),
+        Key("friction_presliding", "m", 1e-7, 1.0, 1e-3, path=("friction", "presliding")),
+    ),
+    "transmission": (Key("kind", default="tendon", kind="choice", choices=_TRANSMISSIONS), *_GEOMETRY),
+    "joint": (
+        Key("kind", default="tendon", kind="choice", choices=(*_TRANSMISSIONS, "free")),
+        *_GEOMETRY,
+        Key("min_angle", "rad", -_TURN, _TURN),
+        Key("max_angle", "rad", -_TURN, _TURN),
+        Key("stop_stiffness", "N m/rad", 0.0, 1e9, 2e4),
+        Key("stop_damping", "N m s/rad", 0.0, 1e7, 60.0),
+    ),
+    "arm": (
+        Key("kind", default="one_link", kind="choice", choices=("one_link", "planar")),
+        Key("inertia", "kg m2", 1e-9, 1e6, only=_ONE_LINK),
+        Key("first_moment", "kg m", -1e5, 1e5, 0.0, only=_ONE_LINK),
+        Key("length", "m", 1e-4, 100.0, only=_ONE_LINK),
+        Key("payload", "kg", 0.0, 1e5, 0.0, only=_ONE_LINK),
+        Key("viscous", "N m s/rad", 0.0, 1e6, 0.0, only=_ONE_LINK),
+        Key("coulomb", "N m", 0.0, 1e6, 0.0, only=_ONE_LINK),
+        Key("coulomb_speed", "rad/s", 1e-9, 100.0, 0.02, only=_ONE_LINK),
+        Key("gravity", "m/s2", -50.0, 50.0, 9.80665),
+    ),
+    "link": (
+        Key("length", "m", 0.0, 100.0),
+        Key("mass", "kg", 0.0, 1e5),
+        Key("centre", "m", -100.0, 100.0, note="of mass, from its joint"),
+        Key("inertia", "kg m2", 0.0, 1e6, note="about its centre of mass"),
+        Key("payload", "kg", 0.0, 1e5, 0.0, note="at its end"),
+        Key("viscous", "N m s/rad", 0.0, 1e6, 0.0),
+        Key("coulomb", "N m", 0.0, 1e6, 0.0),
+        Key("coulomb_speed", "rad/s", 1e-9, 100.0, 0.02),
+    ),
+    "load": (
+        Key("kind", default="mass", kind="choice", choices=("mass", "frame")),
+        Key("min_length", "m", 1e-3, 10.0),
+        Key("max_length", "m", 1e-3, 10.0),
+        Key("mass", "kg", 1e-6, 1e5, only=("mass",)),
+        Key("viscous", "N s/m", 0.0, 1e7, 0.0, only=("mass",)),
+        Key("coulomb", "N", 0.0, 1e7, 0.0, only=("mass",)),
+        Key("coulomb_speed", "m/s", 1e-9, 100.0, 0.01, only=("mass",)),
+        Key("gravity", "m/s2", -50.0, 50.0, 9.80665, only=("mass",)),
+        Key("stop_stiffness", "N/m", 0.0, 1e11, 1e6, only=("mass",)),
+        Key("stop_damping", "N s/m", 0.0, 1e9, 1e3, only=("mass",)),
+    ),
+    "sensors": (
+        Key("pressure_zero", "Pa", -1e6, 1e6, 0.0),
+        Key("angle_zero", "rad", -_TURN, _TURN, 0.0),
+        Key("length_zero", "m", -10.0, 10.0, 0.0),
+    ),
+}
+
+#: block -> its ports. What they default to stands here in words; :mod:`pamrs.rig._ports` does it.
+PORTS: Final[dict[str, tuple[Port, ...]]] = {
+    "valve": (
+        Port("from", ("supply", "chamber"), default="the supply of the same name, else the only supply"),
+        Port(
+            "to",
+            ("line", "chamber"),
+            default="the line without from or the chamber of the same name, else the only line without from, else the only chamber",
+        ),
+    ),
+    "line": (
+        Port(
+            "from",
+            ("supply", "chamber"),
+            default="the valves that lead to it, else the supply of the same name, else, without valves, the only supply",
+        ),
+        Port("to", ("chamber",), ("ambient",), default="the chamber of the same name, else the only chamber"),
+    ),
+    "muscle": (
+        Port("chamber", ("chamber",), default="the chamber of the same name, else the only chamber"),
+        Port("joint", ("joint",), ("load",), default="the joint of the same name, else the only joint, else the load"),
+    ),
+    "link": (
+        Port("on", ("link",), ("base",), default="the link before it in the file, for the first the base"),
+        Port("joint", ("joint",), default="the joint of the same name"),
+    ),
+}
+
+
+def keys_of(block: str, content: Mapping[str, Any]) -> tuple[Key, ...]:
+    """The keys that a block of its kind has: force model of a muscle, kind of a joint."""
+    kind = kind_of(block, content)
+    return tuple(key for key in BLOCKS[block] if not key.only or kind in key.only)
+
+
+def kind_of(block: str, content: Mapping[str, Any]) -> Any:
+    """Force model of a muscle, kind of a supply, line, joint, transmission, arm or load, None for the other blocks."""
+    name, default = _KINDS.get(block, ("", None))
+    return content.get(name, default)
+
+
+def qualified(block: str, name: str) -> str:
+    """What a block is called in full: ``"valve"`` without a name, else ``"valve.flexor"``."""
+    return f"{block}.{name}" if name else block
+
+
+def split_name(dotted: str) -> tuple[str, str, str]:
+    """Block, name of the block (``""`` without one) and key of a dotted name such as ``"valve.flexor.half_range"``."""
+    block, _, rest = dotted.partition(".")
+    name, _, key = rest.rpartition(".")
+    return block, name, key
+
+
+def tables_of(model: Mapping[str, Any], block: str) -> dict[str, dict[str, Any]]:
+    """Tables of a model by the name of the block, ``""`` for one without a name; empty where there is none.
+
+    No value of a block is a table, so that the content itself shows whether its entries are values or named blocks.
+    """
+    content = model.get(block)
+    if content is None:
+        return {}
+    named = all(isinstance(inner, dict) for inner in content.values())
+    return dict(content) if named else {"": content}

@@ -1,0 +1,432 @@
+"""Many plants advanced together, sample by sample: gain sweeps, payload sweeps, vector environments."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pamrs import _core
+from pamrs.errors import ParameterError
+from pamrs.rig import Rig
+from pamrs.simulation._driving import Inputs, initial_values, keywords
+from pamrs.simulation._simulation import MOST_NUMBERS, check_run, chosen_step, core_rig, whole_samples
+
+__all__ = ["Batch", "BatchRun", "Failure"]
+
+Array = NDArray[np.float64]
+_MOST_THREADS = 256
+#: What is made from the rest, and not pickled.
+_MADE = ("_core", "_first", "_inputs", "_channels", "_commands")
+
+
+class Failure(NamedTuple):
+    """Why a plant of a batch has ended.
+
+    Attributes
+    ----------
+    time : float
+        When [s].
+    message : str
+        What happened: the quantity, its value and what is allowed.
+    """
+
+    time: float
+    message: str
+
+
+@dataclass(frozen=True, eq=False)
+class BatchRun(Mapping[str, Array]):
+    """What :meth:`Batch.control` recorded; ``run["joint_angle"]`` has the shape (n, rows).
+
+    Attributes
+    ----------
+    time : ndarray, shape (rows,)
+        Time of each row [s].
+    channels : dict of str to ndarray, shape (n, rows)
+        Channels and commands by name in SI units, pressures gauge; a command is the one held from that row. The samples of all
+        plants at one time lie next to each other in memory.
+    status : tuple of Failure or None
+        Why and when each plant ended, None for those that did not. A plant that ended stays at its last good sample.
+    """
+
+    time: Array
+    channels: dict[str, Array]
+    status: tuple[Failure | None, ...]
+
+    @property
+    def failed(self) -> NDArray[np.bool_]:
+        """Which plants ended, shape (n,)."""
+        return np.array([failure is not None for failure in self.status], dtype=np.bool_)
+
+    def __getitem__(self, channel: str) -> Array:
+        try:
+            return self.channels[channel]
+        except KeyError:
+            raise KeyError(f"{channel!r} was not recorded; there are: {', '.join(self.channels)}") from None
+
+    def __iter__(self) -> Any:
+        return iter(self.channels)
+
+    def __len__(self) -> int:
+        return len(self.channels)
+
+    def __repr__(self) -> str:
+        ended = f"{len(self.status)} plants, {self.failed.sum()} of them ended"
+        return f"BatchRun({ended}; {self.time.size} rows of {', '.join(self.channels)})"
+
+
+class Batch:
+    """Plants that take their commands together, each as if it were alone.
+
+    Every plant gives bit for bit what :class:`pamrs.Simulator` gives, whatever stands beside it and however many threads there
+    are. A plant whose state leaves the range in which the model holds is kept: its channels stay at its last good sample,
+    :attr:`status` says why, and the others go on. A batch can be pickled and copied; it belongs to one thread at a time.
+
+    Parameters
+    ----------
+    rig : Rig or sequence of Rig
+        The model of all plants, or one for each: rigs with the same inputs and channels, other parameters.
+    n : int, optional
+        Number of plants; needed where neither a sequence of rigs nor an array of initial values says it.
+    sample_time : float
+        Time between two samples [s].
+    step : float, optional
+        RK4 step [s] as of :class:`pamrs.Simulator`.
+    initial : mapping of str to float or array_like, shape (n,), optional
+        Initial values as for :func:`pamrs.simulate`, common ones or one for each plant.
+    threads : int, optional
+        Most threads that work; by default one for each processor that this process may use.
+
+    Raises
+    ------
+    ParameterError
+        If an argument is not finite, outside its range or of another length; the message names it, and the row.
+    RigError
+        If the rigs do not have the same inputs and channels.
+
+    Examples
+    --------
+    >>> import numpy as np, pamrs
+    >>> batch = pamrs.Batch(pamrs.rigs.shoulder(), n=3, sample_time=0.005)
+    >>> for _ in range(100):
+    ...     sample = batch.step(np.array([5.0, 5.5, 6.0]))
+    >>> sample["joint_angle"].shape, bool(sample["joint_angle"][2] > sample["joint_angle"][1])
+    ((3,), True)
+    """
+
+    def __init__(
+        self,
+        rig: Rig | Sequence[Rig],
+        *,
+        n: int | None = None,
+        sample_time: float,
+        step: float | None = None,
+        initial: Mapping[str, ArrayLike] | None = None,
+        threads: int | None = None,
+    ) -> None:
+        many = not isinstance(rig, Rig) and isinstance(rig, Iterable)
+        given: list[Any] = list(rig) if many else [rig]  # type: ignore[arg-type]
+        if not given:
+            raise ParameterError("rig is an empty sequence; one Rig at least is needed")
+        for each in {id(each): each for each in given}.values():
+            check_run(each, sample_time)
+        count = _plants(n, len(given) if many else None, initial)
+        channels = len(core_rig(given[0]).channels)
+        if count * channels > MOST_NUMBERS:
+            raise ParameterError(f"n = {count} is not allowed: at most {MOST_NUMBERS // channels} plants of {channels} channels (2 GB)")
+        self.rigs: tuple[Rig, ...] = tuple(given) if many else (given[0],) * count
+        """The rig of each plant."""
+        self.sample_time = float(sample_time)
+        self._step = chosen_step(self.sample_time, step)
+        self._threads = _threads(threads)
+        self._prepare()
+        self._begin(self._starting(initial))
+
+    def _begin(self, initial: dict[str, Array]) -> None:
+        """A core for initial values, and its first state, to begin again from without new threads."""
+        self._initial = initial
+        self._core = self._started(initial)
+        self._first = self._core.states
+
+    def _prepare(self) -> None:
+        self._inputs = Inputs(self.rigs[0])
+        core = core_rig(self.rigs[0])
+        self._channels = tuple(core.channels)
+        self._commands = tuple(core.inputs)
+
+    def _starting(self, initial: Mapping[str, ArrayLike] | None) -> dict[str, Array]:
+        names = initial_values(dict.fromkeys(initial or {}, 0.0), self.rigs[0])
+        return {name: _rowwise(f"initial {name}", (initial or {})[name], len(self)) for name in names}
+
+    def _started(self, initial: Mapping[str, Array]) -> _core.Batch:
+        like = core_rig(self.rigs[0])
+        return _core.Batch([core_rig(rig, like) for rig in self.rigs], self.sample_time, self._step, dict(initial), self._threads)
+
+    def __len__(self) -> int:
+        return len(self.rigs)
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s] of the plants that have not ended."""
+        return self._core.samples * self.sample_time
+
+    @property
+    def status(self) -> tuple[Failure | None, ...]:
+        """Why and when each plant ended, None for those that did not."""
+        return tuple(None if ended is None else Failure(*ended) for ended in self._core.status)
+
+    @property
+    def state(self) -> dict[str, Any]:
+        """What everything to come depends on (copies): ``samples``, ``rows`` and ``status``; give it back to :meth:`restore`."""
+        return {"samples": self._core.samples, "rows": self._core.states, "status": self.status}
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Go on from a state, bit for bit.
+
+        Parameters
+        ----------
+        state : mapping
+            :attr:`state` of a batch of the same rigs.
+
+        Raises
+        ------
+        ParameterError
+            If it is not one; the message says what is wrong, and the row. The batch then stays as it is.
+        """
+        needed = {"samples", "rows", "status"}
+        if not isinstance(state, Mapping) or set(state) != needed:
+            what = f"has {', '.join(map(str, state)) or 'nothing'}" if isinstance(state, Mapping) else f"is a {type(state).__name__}"
+            raise ParameterError(f"state {what}; samples, rows and status are needed, as of Batch.state")
+        try:
+            samples = int(state["samples"])
+            rows = [np.ascontiguousarray(np.asarray(row, dtype=np.float64).reshape(-1)) for row in state["rows"]]
+            status = [None if ended is None else (float(ended[0]), str(ended[1])) for ended in state["status"]]
+        except (TypeError, ValueError, IndexError, OverflowError):
+            raise ParameterError(
+                "state is not one of a batch: its rows are arrays of numbers, its status None or (time, message)"
+            ) from None
+        if not 0 <= samples < 2**53:
+            raise ParameterError(f"state.samples = {samples} is not allowed: a number from 0 on is needed")
+        self._core.restore(samples, rows, status)
+
+    def reset(self, initial: Mapping[str, ArrayLike] | None = None) -> dict[str, Array]:
+        """Begin again, all plants.
+
+        Parameters
+        ----------
+        initial : mapping of str to float or array_like, shape (n,), optional
+            Other initial values; those of the last start by default.
+
+        Returns
+        -------
+        dict of str to ndarray, shape (n,)
+            The first sample.
+        """
+        if initial is None:
+            self._core.restore(0, self._first, [None] * len(self))
+        else:
+            self._begin(self._starting(initial))
+        return self.observe()
+
+    def observe(self) -> dict[str, Array]:
+        """The present sample: channel -> values of all plants in SI units, pressures gauge.
+
+        Returns
+        -------
+        dict of str to ndarray, shape (n,)
+        """
+        return self._named(self._core.observe())
+
+    def step(
+        self,
+        valve_command: ArrayLike | Mapping[str, ArrayLike] | None = None,
+        *,
+        supply_command: ArrayLike | Mapping[str, ArrayLike] | None = None,
+        length: ArrayLike | None = None,
+        pressure: ArrayLike | Mapping[str, ArrayLike] | None = None,
+    ) -> dict[str, Array]:
+        """Hold a command of each plant for one sample.
+
+        Parameters
+        ----------
+        valve_command : float or array_like, shape (n,), or mapping of str to either, optional
+            Commands [V]; needed by rigs with a valve, of several one for each name.
+        supply_command : float or array_like, shape (n,), or mapping of str to either, optional
+            Set pressures of a regulator [Pa, gauge].
+        length, pressure : float or array_like, shape (n,), optional
+            As in :meth:`pamrs.Simulator.step`.
+
+        Returns
+        -------
+        dict of str to ndarray, shape (n,)
+            The sample after it.
+
+        Raises
+        ------
+        ParameterError
+            If a command is missing, not finite (the index is the plant's) or of another length; the batch stays as it is.
+        """
+        signals = self._inputs.rows(
+            len(self), valve_command=valve_command, supply_command=supply_command, length=length, pressure=pressure
+        )
+        return self._named(self._core.advance(1, signals, True))
+
+    def control(
+        self,
+        update: Callable[[dict[str, Any]], ArrayLike | Mapping[str, ArrayLike] | Mapping[str, Mapping[str, ArrayLike]]],
+        duration: float,
+        *,
+        period: float | None = None,
+        channels: Sequence[str] | None = None,
+        record_every: int = 1,
+    ) -> BatchRun:
+        """Close the loop of every plant with one sampled controller.
+
+        The controller sees the present sample every ``period``; what it answers is held exactly until the next.
+
+        Parameters
+        ----------
+        update : callable
+            Takes the sample (channel -> values of all plants, shape (n,), in SI units, read-only, and ``time`` [s]); returns the valve
+            commands [V], shape (n,) or one for all, of several valves a mapping of names, or a mapping of the keywords of
+            :meth:`step`.
+        duration : float
+            How long [s].
+        period : float, optional
+            Time between two updates [s], a multiple of the sample time; the sample time by default.
+        channels : sequence of str, optional
+            Channels and commands that are recorded; all by default.
+        record_every : int
+            Samples from one recorded row to the next; the first row is the present sample.
+
+        Returns
+        -------
+        BatchRun
+            Arrays of shape (n, rows). A plant whose state leaves the model's range, or that is answered a command that is not
+            finite or not possible, ends there, and the others go on.
+
+        Raises
+        ------
+        ParameterError
+            If the period or the duration is not a multiple of the sample time, a channel is not known, more than 2 GB would be
+            recorded, or the controller answers what no plant can take.
+        """
+        if not callable(update):
+            raise ParameterError(f"update is a {type(update).__name__}; something that can be called with a sample is needed")
+        every = whole_samples("period", self.sample_time if period is None else period, self.sample_time, least=1)
+        total = whole_samples("duration", duration, self.sample_time, least=0)
+        book = self._book(total, channels, record_every)
+        # what is recorded is what was, whatever the controller does with its sample
+        began, sample, k = self.time, self._named(self._core.observe(), writeable=False), 0
+        signals: dict[str, Array] = {}
+        while True:
+            if k % every == 0 and k < total:
+                signals = self._inputs.rows(len(self), **keywords(update({"time": self.time, **sample})))
+            if k % book.every == 0:
+                book.write(k // book.every, sample, signals)
+            if k == total:
+                break
+            # up to where there is something to do
+            stop = min(k + every - k % every, k + book.every - k % book.every, total)
+            sample = self._named(self._core.advance(stop - k, signals, False), writeable=False)
+            k = stop
+        time = np.asarray(began + np.arange(0, total + 1, book.every) * self.sample_time, dtype=np.float64)
+        return BatchRun(time, {name: rows.T for name, rows in book.rows.items()}, self.status)
+
+    def _book(self, total: int, channels: Sequence[str] | None, every: int) -> _Book:
+        if isinstance(every, bool) or not isinstance(every, (int, np.integer)) or every < 1:
+            raise ParameterError(f"record_every = {every!r} is not allowed: a whole number of samples, 1 at least, is needed")
+        known = (*self._channels, *self._commands)
+        names = list(dict.fromkeys(known if channels is None else [channels] if isinstance(channels, str) else channels))
+        for name in names:
+            if name not in known:
+                raise ParameterError(f"channels has {name!r}, which these plants do not have; there are: {', '.join(known)}")
+        rows = total // int(every) + 1
+        if rows * len(self) * len(names) > MOST_NUMBERS:
+            most = MOST_NUMBERS // (len(self) * len(names))
+            raise ParameterError(
+                f"{rows} rows of {len(names)} channels of {len(self)} plants are not allowed: at most {most} rows (2 GB); "
+                "choose fewer channels or a larger record_every"
+            )
+        return _Book({name: np.full((rows, len(self)), np.nan) for name in names}, int(every))
+
+    def _named(self, sample: Array, *, writeable: bool = True) -> dict[str, Array]:
+        sample.flags.writeable = writeable
+        return dict(zip(self._channels, sample, strict=True))
+
+    def __getstate__(self) -> dict[str, Any]:
+        kept = {name: value for name, value in self.__dict__.items() if name not in _MADE}
+        return {**kept, "state": self.state}
+
+    def __setstate__(self, kept: dict[str, Any]) -> None:
+        state = kept.pop("state")
+        self.__dict__.update(kept)
+        self._prepare()
+        self._begin(self._initial)
+        self.restore(state)
+
+    def __repr__(self) -> str:
+        names = ", ".join(dict.fromkeys(rig.name for rig in self.rigs))
+        return f"Batch({len(self)} x {names}, time={self.time:.6g} s, sample_time={self.sample_time:g} s)"
+
+
+class _Book(NamedTuple):
+    """What is recorded: arrays of shape (rows, n), so that what comes together is written together."""
+
+    rows: dict[str, Array]
+    every: int
+
+    def write(self, row: int, sample: Mapping[str, Array], signals: Mapping[str, Array]) -> None:
+        """Note a sample and the commands that are held from it."""
+        for name, rows in self.rows.items():
+            values = sample.get(name, signals.get(name))
+            if values is not None:
+                rows[row] = values
+
+
+def _plants(n: int | None, rigs: int | None, initial: Mapping[str, ArrayLike] | None) -> int:
+    """Number of plants from what says it."""
+    sizes = {f"initial {name}": int(np.size(values)) for name, values in (initial or {}).items() if np.ndim(values) > 0}
+    if n is not None:
+        if isinstance(n, bool) or not isinstance(n, (int, np.integer)) or n < 1:
+            raise ParameterError(f"n = {n!r} is not allowed: a whole number of plants, 1 at least, is needed")
+        sizes = {"n": int(n), **sizes}
+    if rigs is not None:
+        sizes = {"rig": rigs, **sizes}
+    if not sizes:
+        raise ParameterError("n is missing: the number of plants (or a sequence of rigs, or an array of initial values)")
+    first, count = next(iter(sizes.items()))
+    for name, size in sizes.items():
+        if size != count or size < 1:
+            raise ParameterError(f"{name} is for {size} plants, {first} for {count}; one number of plants, 1 at least, is needed")
+    return count
+
+
+def _rowwise(name: str, values: ArrayLike, n: int) -> Array:
+    """A number for each plant."""
+    try:
+        array = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ParameterError(f"{name} = {values!r} is not allowed: numbers are needed") from None
+    if array.ndim == 0:
+        array = np.full(n, float(array))
+    if array.shape != (n,):
+        raise ParameterError(f"{name} has the shape {array.shape}; ({n},) is needed, one value for each plant")
+    for row in np.flatnonzero(~np.isfinite(array))[:1]:
+        raise ParameterError(f"{name}[{row}] = {array[row]} is not allowed: a finite number is needed")
+    return np.ascontiguousarray(array)
+
+
+def _threads(threads: int | None) -> int:
+    """How many threads may work."""
+    if threads is None:
+        has = os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else range(os.cpu_count() or 1)
+        return min(len(has), _MOST_THREADS)
+    if isinstance(threads, bool) or not isinstance(threads, (int, np.integer)) or not 1 <= threads <= _MOST_THREADS:
+        raise ParameterError(f"threads = {threads!r} is not allowed: a whole number from 1 to {_MOST_THREADS} is needed")
+    return int(threads)

@@ -1,0 +1,147 @@
+"""A rig driven by what a recording says went in: the simulation beside the measurement."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pamrs.channels import dotted
+from pamrs.errors import RecordingError
+from pamrs.simulation._driving import has_frame, regulators_of, sensor_zero
+from pamrs.simulation._simulation import Simulation, simulate
+
+if TYPE_CHECKING:
+    from pamrs.recordings import Recording
+    from pamrs.rig import Rig
+
+__all__ = ["differences", "replay"]
+
+Array = NDArray[np.float64]
+
+#: State of a recording's first row that a simulation begins with, the block that has it and the zero of its sensor.
+_STATES = {
+    "muscle_pressure": ("chamber", "pressure_zero"),
+    "supply_pressure": ("supply", ""),
+    "line_pressure": ("line", ""),
+    "joint_angle": ("joint", "angle_zero"),
+    "length": ("load", "length_zero"),
+}
+#: A recorded channel beside a simulated one of another name.
+_RECORDED_AS = {"muscle_force": "force"}
+
+
+def replay(rig: Rig, recording: Recording) -> Simulation:
+    """Simulate a rig from a recording's first values under its inputs.
+
+    Commands of valves and regulators come from the recording, the length of a load frame and the pressures of chambers that nothing
+    feeds as well; what a recording leaves unusable holds its last usable value.
+
+    Parameters
+    ----------
+    rig : Rig
+        The model.
+    recording : Recording
+        As :func:`pamrs.load_recording` gives it; channels of a block with a name carry it (``valve_command.flexor``).
+
+    Returns
+    -------
+    Simulation
+        One row for each of the recording's.
+
+    Raises
+    ------
+    RecordingError
+        If an input that the rig needs is not in the recording.
+    ParameterError
+        As :func:`pamrs.simulate`.
+    """
+    drive = _drive(rig, recording)
+    prescribed = {"muscle_pressure": drive.get("pressure", {}), "length": drive.get("length")}
+    initial = {}
+    for channel, (block, _) in _STATES.items():
+        own = prescribed.get(channel)
+        for name in rig.tables(block):
+            if _usable(recording, channel, name) and (own is None or (isinstance(own, dict) and name not in own)):
+                full = dotted(channel, name)
+                initial[full] = float(recording.channels[full][recording.mask[full]][0]) - _zero(rig, channel, name)
+    if not drive:
+        drive["duration"] = float(recording.time[-1])
+    return simulate(rig, sample_time=recording.sample_time, initial=initial, **drive)
+
+
+def _drive(rig: Rig, recording: Recording) -> dict[str, Any]:
+    """The keywords of :func:`pamrs.simulate` that a recording gives."""
+    drive: dict[str, Any] = {}
+    valves = {name: _held(recording, dotted("valve_command", name)) for name in rig.tables("valve")}
+    if valves:
+        drive["valve_command"] = valves
+    commands = {
+        name: _held(recording, dotted("supply_command", name))
+        for name in regulators_of(rig)
+        if _usable(recording, "supply_command", name)
+    }
+    if commands:
+        drive["supply_command"] = commands
+    frame = has_frame(rig)
+    if frame:
+        drive["length"] = _held(recording, "length")
+    # Where muscles pull and nothing feeds them, their measured pressure is what moves them.
+    if (frame or rig.tables("joint")) and not (valves or rig.tables("supply")):
+        given = [name for name in rig.tables("chamber") if _usable(recording, "muscle_pressure", name)]
+        full = {name: dotted("muscle_pressure", name) for name in given}
+        if given:
+            drive["pressure"] = {name: _held(recording, full[name]) - _zero(rig, "muscle_pressure", name) for name in given}
+    return drive
+
+
+def differences(result: Simulation, recording: Recording) -> dict[str, float]:
+    """Root mean square of simulated less recorded, for each channel that both have and that was not prescribed.
+
+    Parameters
+    ----------
+    result : Simulation
+        What :func:`replay` returns.
+    recording : Recording
+        The recording that it was driven by.
+
+    Returns
+    -------
+    dict of str to float
+        Channel -> difference in its SI unit.
+    """
+    drive = _drive(result.rig, recording)
+    skipped = {"time", "valve_command", "supply_command", *(["length"] if "length" in drive else [])}
+    skipped |= {dotted("muscle_pressure", name) for name in drive.get("pressure", ())}
+    found = {}
+    for name in result:
+        head, _, block = name.partition(".")
+        other = dotted(_RECORDED_AS.get(head, head), block)
+        if {head, name} & skipped or other not in recording.mask or not recording.mask[other].any():
+            continue
+        rows = recording.mask[other]
+        found[name] = float(np.sqrt(np.mean((result[name][rows] - recording.channels[other][rows]) ** 2)))
+    return found
+
+
+def _usable(recording: Recording, channel: str, name: str = "") -> bool:
+    """Whether a recording has a usable sample of a block's channel."""
+    full = dotted(channel, name)
+    return full in recording.channels and bool(recording.mask[full].any())
+
+
+def _held(recording: Recording, name: str) -> Array:
+    """A channel whose unusable samples repeat the last usable one, as a valve does that hears nothing new."""
+    if not _usable(recording, name):
+        raise RecordingError(f"{recording.name}: no usable {name}, which the rig needs")
+    rows = recording.mask[name]
+    last = np.maximum.accumulate(np.where(rows, np.arange(rows.size), int(np.argmax(rows))))
+    values: Array = recording.channels[name][last]
+    return values
+
+
+def _zero(rig: Rig, channel: str, name: str) -> float:
+    """Zero of the sensor of a block's channel; none where its sensor has none."""
+    key = _STATES[channel][1]
+    return sensor_zero(rig, key, name) if key else 0.0

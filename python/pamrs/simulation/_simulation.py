@@ -1,0 +1,446 @@
+"""Simulation of a rig under held commands."""
+
+from __future__ import annotations
+
+import importlib
+import math
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pamrs import _core
+from pamrs.channels import channel_of, dotted
+from pamrs.errors import PamrsError, ParameterError
+from pamrs.rig import Rig
+from pamrs.simulation._driving import Signals, initial_values, sensor_zero, signals_of
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["Balance", "Event", "Simulation", "core_rig", "simulate"]
+
+Array = NDArray[np.float64]
+
+
+class Event(NamedTuple):
+    """Something that happened between two samples.
+
+    Attributes
+    ----------
+    time : float
+        When [s], by a straight line through the step in which it happened.
+    kind : str
+        ``min_stop_reached``, ``min_stop_left``, ``max_stop_reached``, ``max_stop_left``, ``choked`` or ``unchoked``.
+    block : str
+        Where: ``joint.elbow``, ``load``, ``valve.flexor``, ``line``.
+    """
+
+    time: float
+    kind: str
+    block: str
+
+
+@dataclass(frozen=True)
+class Balance:
+    """Mass, energy and work over a simulation.
+
+    Attributes
+    ----------
+    supplied, vented, stored : float
+        Mass out of the supplies, mass to the ambient (what regulators relieve included), gain of all chambers and lines by what
+        flowed [kg].
+    implied : float
+        Gain by the gas law at the rest temperature, ``P V/(R T)`` [kg]. The constant coefficients of filling, emptying and volume
+        change are no energy balance, so that it differs from ``stored`` where they are not 1; with the effect ``heat_transfer``
+        the two differ by the gas's temperature alone.
+    energy : float
+        ``R T`` times the mass supplied, what section 6 of the dissertation calls ``E_in``: ``(P_initial - P_final) V`` of a
+        tank [J].
+    exergy : float
+        ``R T ln(P/P_a)`` times the mass supplied at the supply's pressure ``P``: the most work that it could do [J].
+    muscle_work : float
+        Work of the muscles, ``F dd`` [J].
+    joint_work : float
+        Work at the joints where torque and motion go the same way, ``tau dtheta > 0`` [J].
+    """
+
+    supplied: float
+    vented: float
+    stored: float
+    implied: float
+    energy: float
+    exergy: float
+    muscle_work: float
+    joint_work: float
+
+    @property
+    def residual(self) -> float:
+        """Mass that is unaccounted for by what flowed [kg]: rounding."""
+        return self.supplied - self.vented - self.stored
+
+    @property
+    def created(self) -> float:
+        """Mass that the gas coefficients make or lose [kg]: what pressure and volume say is stored, less what flowed in."""
+        return self.implied - self.stored
+
+    @property
+    def efficiency(self) -> float:
+        """Lifting work by energy supplied [1] (dissertation 6.4); NaN where nothing was supplied.
+
+        An arm that swings is lifted again and again, and the spring of its muscles gives the work back: then it is above 1.
+        """
+        return self.joint_work / self.energy if self.energy > 0.0 else math.nan
+
+    def __str__(self) -> str:
+        air = f"air {1e3 * self.supplied:.4g} g supplied, {1e3 * self.vented:.4g} g vented, {1e3 * self.implied:.4g} g more stored"
+        if abs(self.created) > 1e-3 * max(self.supplied, self.vented, 1e-12):
+            reason = "the constant gas coefficients, which are no energy balance; the effect heat_transfer is"
+            air += f" ({1e3 * self.created:+.4g} g by {reason})"
+        share = f" ({100.0 * self.muscle_work / self.exergy:.1f} % of it)" if self.exergy > 0.0 else ""
+        return (
+            f"{air}\nair's energy R T m {self.energy:.4g} J, exergy {self.exergy:.4g} J; "
+            f"net work of the muscles {self.muscle_work:.4g} J"
+            f"{share}, lifting work {self.joint_work:.4g} J"
+        )
+
+
+class Simulation(Mapping[str, Array]):
+    """Simulated channels by name, SI, gauge pressures; ``time`` [s] is a channel too.
+
+    ``result["muscle_pressure"]`` is an array with one row per sample; ``result.time`` is ``result["time"]``.
+    """
+
+    def __init__(self, channels: Mapping[str, Array], rig: Rig, events: Sequence[tuple[float, str, str]] = ()) -> None:
+        self._channels = dict(channels)
+        self.rig = rig
+        self.events = [Event(*event) for event in events]
+        """Stops that were reached or left, flows that became choked or no longer are, in the order of time."""
+
+    @property
+    def time(self) -> Array:
+        """Time of each row [s]."""
+        return self._channels["time"]
+
+    def __getitem__(self, channel: str) -> Array:
+        try:
+            return self._channels[channel]
+        except KeyError:
+            raise KeyError(f"no channel {channel!r}; there are: {', '.join(self._channels)}") from None
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._channels)
+
+    def __len__(self) -> int:
+        return len(self._channels)
+
+    def under(self, channel: str) -> dict[str, Array]:
+        """A channel of every block that has it.
+
+        Parameters
+        ----------
+        channel : str
+            For example ``"muscle_pressure"``.
+
+        Returns
+        -------
+        dict of str to ndarray
+            Name of the block ("" where it has none) -> channel.
+        """
+        split = {name: name.partition(".") for name in self._channels}
+        return {block: self._channels[name] for name, (head, _, block) in split.items() if head == channel}
+
+    @property
+    def balance(self) -> Balance:
+        """Mass, energy and work from the first to the last row."""
+        channels = self._channels
+        gain = {name: float(channels[name][-1] - channels[name][0]) for name in _BOOKS}
+        masses = [m for channel in ("air_mass", "line_mass") for m in self.under(channel).values()]
+        return Balance(
+            supplied=gain["mass_supplied"],
+            vented=gain["mass_vented"],
+            stored=sum(float(mass[-1] - mass[0]) for mass in masses),
+            implied=self._implied(),
+            energy=gain["energy_supplied"],
+            exergy=gain["exergy_supplied"],
+            muscle_work=gain["muscle_work"],
+            joint_work=gain["joint_work"],
+        )
+
+    def _implied(self) -> float:
+        """Gain of mass by the gas law at the rest temperature [kg]."""
+        gas = self.rig.tables("gas")[""]
+        total = sum(float(mass[-1] - mass[0]) for mass in self.under("line_mass").values())
+        for name, volume in self.under("air_volume").items():
+            zero = sensor_zero(self.rig, "pressure_zero", name)
+            absolute = self._channels[dotted("muscle_pressure", name)] - zero + gas["ambient_pressure"]
+            total += float(absolute[-1] * volume[-1] - absolute[0] * volume[0]) / (gas["gas_constant"] * gas["temperature"])
+        return total
+
+    def summary(self) -> str:
+        """Where every motion and pressure ends, what happened on the way, and what went where, in a few lines."""
+        said = [f"{self.rig.name}: {self.time[-1]:g} s, {self.time.size} rows"]
+        for channel, unit, factor in (("muscle_pressure", "bar", 1e-5), ("joint_angle", "deg", 180.0 / math.pi), ("length", "mm", 1e3)):
+            for block, values in self.under(channel).items():
+                low, high, last = (factor * float(v) for v in (values.min(), values.max(), values[-1]))
+                said.append(f"{dotted(channel, block)}: from {low:.4g} to {high:.4g} {unit}, at the end {last:.4g} {unit}")
+        kinds = dict.fromkeys((event.block, event.kind) for event in self.events)
+        for block, kind in kinds:
+            times = [event.time for event in self.events if (event.block, event.kind) == (block, kind)]
+            often = "" if len(times) == 1 else f" and {len(times) - 1} times more"
+            said.append(f"{block}: {kind.replace('_', ' ')} at {times[0]:.4g} s{often}")
+        return "\n".join([*said, *self._fallen(), str(self.balance)])
+
+    def _fallen(self) -> list[str]:
+        """Joints that end on their lower stop although their muscles are under pressure."""
+        said = []
+        for name, joint in self.rig.tables("joint").items():
+            angle, torque = (self._channels[dotted(channel, name)] for channel in ("joint_angle", "joint_torque"))
+            if angle[-1] <= joint["min_angle"] + 1e-3 and torque[-1] > _TELLING_TORQUE:
+                said.append(f"{dotted('joint', name)}: ends on its lower stop; {torque[-1]:.3g} N m of its muscles do not lift the arm")
+        return said
+
+    def to_pandas(self) -> pd.DataFrame:
+        """All channels as a table indexed by time [s]."""
+        import pandas as pd
+
+        columns = {name: values for name, values in self._channels.items() if name != "time"}
+        return pd.DataFrame(columns, index=pd.Index(self.time, name="time"))
+
+    def plot(self, path: str | os.PathLike[str], *, recorded: Mapping[str, tuple[Array, Array]] | None = None) -> Path:
+        """Write a picture of the channels over time, a PNG.
+
+        Parameters
+        ----------
+        path : path-like
+            The file.
+        recorded : mapping of str to (time, value), optional
+            Recorded channels to draw beside them [s, SI].
+
+        Returns
+        -------
+        Path
+            The file written.
+
+        Raises
+        ------
+        ImportError
+            If matplotlib is missing; names the extra to install.
+        """
+        from pamrs._writing import write_atomically
+
+        return write_atomically(path, _motion().channels_png(self, recorded))
+
+    def animate(self, path: str | os.PathLike[str], *, speed: float = 1.0) -> Path:
+        """Write the arm as it moves, an animated GIF.
+
+        Parameters
+        ----------
+        path : path-like
+            The file.
+        speed : float
+            Times faster than it happens.
+
+        Returns
+        -------
+        Path
+            The file written.
+
+        Raises
+        ------
+        ImportError
+            If matplotlib is missing; names the extra to install.
+        ParameterError
+            If the rig has no arm, there are fewer than two samples, or the speed is not a finite number above zero.
+        """
+        written: Path = _motion().write_animation(self, Path(path), speed=speed)
+        return written
+
+    def __repr__(self) -> str:
+        return f"Simulation({self.rig.name}: {self.time.size} rows of {', '.join(self._channels)})"
+
+
+def _motion() -> ModuleType:
+    """The module that draws; an ImportError names the extra where matplotlib is missing."""
+    try:
+        return importlib.import_module("pamrs.report.motion")
+    except ImportError as error:
+        raise ImportError("pictures need matplotlib: pip install 'pamrs[plot]'") from error
+
+
+def core_rig(rig: Rig, like: _core.Rig | None = None) -> _core.Rig:
+    """The compiled rig of a description, kept with it so that a second simulation costs no compilation.
+
+    A rig that differs from another one by the values of its parameters only is that one with other values: nothing is read or
+    wired again. Of any other, muscles that are those of ``like`` are not compiled again.
+    """
+    cached: Any = rig.__dict__.get("_compiled")
+    if cached is None:
+        cached = _revalued(rig, like)
+        if cached is None:
+            cached = _core.Rig(rig.to_json()) if like is None else like.respecified(rig.to_json())
+        object.__setattr__(rig, "_compiled", cached)
+    compiled: _core.Rig = cached
+    return compiled
+
+
+def _revalued(rig: Rig, like: _core.Rig | None) -> _core.Rig | None:
+    """The compiled rig from which this one differs by numbers, with these; None where there is none or it cannot be."""
+    origin, values = rig.__dict__.get("_origin", (None, {}))
+    if origin is None:
+        return None
+    try:
+        compiled = core_rig(origin, like)
+    except PamrsError:  # what it began from is not possible, this one may be
+        return None
+    return compiled.revalued(values)
+
+
+def simulate(
+    rig: Rig,
+    valve_command: Signals | None = None,
+    *,
+    sample_time: float,
+    step: float | None = None,
+    initial: Mapping[str, float] | None = None,
+    duration: float | None = None,
+    supply_command: Signals | None = None,
+    length: ArrayLike | None = None,
+    pressure: Signals | None = None,
+) -> Simulation:
+    """Simulate a rig from an initial state by fixed-step RK4.
+
+    Parameters
+    ----------
+    rig : Rig
+        The model.
+    valve_command : array_like, shape (n,), or mapping of str to array_like, optional
+        Command [V]; entry ``k`` is held over ``[k, k + 1)`` samples. Needed by a rig with a valve; of several valves, one for each
+        name. A number is held throughout where another signal or ``duration`` says how long.
+    sample_time : float
+        Time between rows [s].
+    step : float, optional
+        RK4 step [s]; divides ``sample_time``. By default the longest that does and is at most 1 ms. Where the rig is stiffer (small
+        volumes behind large openings, hard stops, a small mass), each step is divided until it is stable.
+    initial : mapping of str to float, optional
+        Initial ``muscle_pressure``, ``supply_pressure``, ``line_pressure`` [Pa, gauge], ``joint_angle`` [rad], ``joint_rate``
+        [rad/s], or with a linear load ``length`` [m], ``length_rate`` [m/s]; of a block with a name, ``muscle_pressure.flexor``.
+        What is left out is at rest: pressures as the rig file has them, joint at its rest angle, muscle at its rest length.
+    duration : float, optional
+        Simulated time [s], where no signal has a length.
+    supply_command : array_like, shape (n,), or mapping of str to array_like, optional
+        Set pressure [Pa, gauge] of a regulator, held like ``valve_command``; its initial pressure where it is left out.
+    length : array_like, shape (n,), optional
+        Length of the muscle at each row [m], straight lines between: what a load frame (``[load] kind = "frame"``) prescribes.
+    pressure : array_like, shape (n,), or mapping of str to array_like, optional
+        Gauge pressure at each row [Pa], straight lines between, of a chamber without a valve.
+
+    Returns
+    -------
+    Simulation
+        n rows at ``k * sample_time``; the first one is the initial state.
+
+    Raises
+    ------
+    ParameterError
+        If an argument is not finite or outside its range; the message names it.
+    SimulationError
+        If the state leaves the range in which the model holds.
+
+    Examples
+    --------
+    >>> import numpy as np, pamrs
+    >>> rig = pamrs.rigs.shoulder()
+    >>> result = pamrs.simulate(rig, valve_command=np.full(201, 6.0), sample_time=0.005)
+    >>> bool(result["joint_angle"][-1] > result["joint_angle"][0])
+    True
+    """
+    check_run(rig, sample_time)
+    rows = _rows(sample_time, duration, valve_command, supply_command, length, pressure)
+    check_rows(rig, rows or 0)
+    signals, count = signals_of(
+        rig, valve_command=valve_command, supply_command=supply_command, length=length, pressure=pressure, rows=rows
+    )
+    if count is None:
+        raise ParameterError("duration is missing: a finite time >= 0 s is needed (or give valve_command)")
+    check_rows(rig, count)
+    start = initial_values(initial, rig)
+    held = {name: signal for name, signal in signals.items() if channel_of(name) in ("valve_command", "supply_command")}
+    driven = {}
+    for name, signal in signals.items():
+        if name in held:
+            driven[name] = signal
+            continue
+        first = name.replace("pressure", "muscle_pressure", 1)
+        if start.setdefault(first, float(signal[0])) != float(signal[0]):
+            raise ParameterError(f"initial {first} = {start[first]:g} does not go with {name}[0] = {signal[0]:g}: leave one out")
+        driven[name] = np.ascontiguousarray(np.append(signal[1:], signal[-1]))  # for the end of each sample; the last is not run
+    channels, events = core_rig(rig).simulate(count, driven, sample_time, chosen_step(sample_time, step), start)
+    time = np.asarray(np.arange(count) * sample_time, dtype=np.float64)
+    return Simulation({"time": time, **held, **channels}, rig, events)
+
+
+def check_run(rig: Rig, sample_time: float) -> None:
+    """Refuse what is not a rig and a sample time [s] that is not a finite number above zero."""
+    if not isinstance(rig, Rig):
+        raise ParameterError(f"rig is a {type(rig).__name__}; a Rig is needed: pamrs.rigs.shoulder(), pamrs.load_rig(path)")
+    if not (isinstance(sample_time, (int, float, np.number)) and np.isfinite(sample_time) and sample_time > 0):
+        raise ParameterError(f"sample_time = {sample_time} is not allowed: a finite time > 0 s is needed")
+
+
+def check_rows(rig: Rig, rows: int) -> None:
+    """Refuse a simulation whose channels would not fit in memory, before it starts."""
+    channels = len(core_rig(rig).channels)
+    if rows * channels > MOST_NUMBERS:
+        raise ParameterError(
+            f"{rows} rows of {channels} channels are not allowed: at most {MOST_NUMBERS // channels} rows (2 GB); "
+            "give a longer sample_time, or run pamrs.Simulator piece by piece"
+        )
+
+
+def whole_samples(name: str, value: float, sample_time: float, least: int) -> int:
+    """A time [s] as a whole number of samples, ``least`` at least; an error names it."""
+    count = round(value / sample_time) if isinstance(value, (int, float, np.number)) and np.isfinite(value) else -1
+    if count < least or abs(count * sample_time - value) > 1e-6 * sample_time:
+        raise ParameterError(
+            f"{name} = {value} s is not allowed: a multiple of sample_time = {sample_time} s, {least} at least, is needed"
+        )
+    return count
+
+
+def _rows(sample_time: float, duration: float | None, *given: Signals | None) -> int | None:
+    """Number of rows from the duration; None where a signal says it."""
+    if duration is None:
+        return None
+    signals = [v for g in given if g is not None for v in (g.values() if isinstance(g, Mapping) else [g])]
+    if any(np.ndim(signal) > 0 for signal in signals):
+        raise ParameterError(
+            f"duration = {duration} is not allowed together with a signal that sets it (valve_command, length, pressure)"
+        )
+    if not (isinstance(duration, (int, float, np.number)) and np.isfinite(duration) and duration >= 0):
+        raise ParameterError(f"duration = {duration} is not allowed: a finite time >= 0 s (or give valve_command)")
+    return round(duration / sample_time) + 1
+
+
+def chosen_step(sample_time: float, step: float | None) -> float:
+    """The RK4 step [s] to begin with: the one given, or the longest that divides the sample time and is at most 1 ms."""
+    if step is not None and not isinstance(step, (int, float, np.number)):
+        raise ParameterError(f"step = {step!r} is not allowed: a time > 0 s is needed")
+    return default_step(sample_time) if step is None else float(step)
+
+
+def default_step(sample_time: float, longest: float = 1e-3) -> float:
+    """The longest step [s] that divides a sample time [s] and is at most ``longest``."""
+    return sample_time / max(1, int(np.ceil(sample_time / longest - 1e-9)))
+
+
+#: Numbers that one run may keep: 2 GB.
+MOST_NUMBERS = 250_000_000
+_TELLING_TORQUE = 1.0  # N m
+#: Channels of the core that are sums since the start.
+_BOOKS = ("mass_supplied", "mass_vented", "energy_supplied", "exergy_supplied", "muscle_work", "joint_work")

@@ -1,0 +1,177 @@
+"""The command line of friction: ``pamrs fit friction``."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+
+from pamrs import cli
+from pamrs.fit import fit_friction, load_force_map
+from pamrs.rig import Muscle
+
+C0, C1 = 0.16, -0.145e-6  # (2.36)
+REST = 0.276
+LEVELS = np.array([2.0, 4.0, 6.0, 8.0, 12.0]) * 1e5
+OPTIONS = ["--rest-length", "276 mm"]
+
+
+def cycle(count):
+    """Contraction and direction of one slow loop."""
+    e = np.linspace(0.01, 0.28, count)
+    return np.concatenate([e, e[::-1]]), np.repeat([-1, 1], count)
+
+
+def rows(count, noise):
+    """Length [mm], pressure [kPa], force [N] and direction of one loop at every level."""
+    muscle = Muscle(
+        rest_length=REST,
+        rest_diameter=0.0254,
+        braid_angle=np.radians(73.5),
+        wall_thickness=0.003175,
+        modulus_slope=[3.0, -0.35],
+        modulus_offset=[1.15e6, -0.15e6],
+        friction_coefficient=C0,
+        friction_pressure_slope=C1,
+        friction_floor=0.01,
+    )
+    rng = np.random.default_rng(3)
+    e, way = cycle(count)
+    loops = [
+        [REST * (1 - e) * 1e3, 0 * e + p / 1e3, muscle.force(p, e, direction=way) + noise * rng.normal(size=e.size), way]
+        for p in LEVELS
+    ]
+    return np.concatenate([np.column_stack(loop) for loop in loops])
+
+
+@pytest.fixture(scope="module")
+def table(tmp_path_factory):
+    path = tmp_path_factory.mktemp("loops") / "loops.csv"
+    np.savetxt(path, rows(40, 2.0), delimiter=",", header="length [mm],pressure [kPa],force [N],direction", comments="", fmt="%.10g")
+    return path
+
+
+def run(capsys, *words):
+    code = cli.main(["fit", "friction", *(str(word) for word in words)])
+    captured = capsys.readouterr()
+    return code, captured.out, captured.err
+
+
+def printed(out, name):
+    """Value and standard error of a coefficient as printed."""
+    return [float(text) for text in re.search(rf"{name} = (\S+) \+- (\S+)", out).groups()]
+
+
+def test_the_coefficients_come_back_with_the_loops(capsys, table):
+    code, out, err = run(capsys, table, *OPTIONS)
+    assert code == 0
+    assert "fitting loops" in err
+    assert out.startswith("loops: friction of the muscle")
+    for name, truth in (("c0", C0), ("c1", C1 * 1e6)):
+        value, stderr = printed(out, name)
+        assert value == pytest.approx(truth, abs=3 * stderr)
+        assert stderr < 0.02 * abs(truth)
+    assert "(significant, p = " in out
+    assert "floor = 0.01 (given)" in out
+    assert re.search(r"1200\.0 .*on the floor", out)
+
+
+def test_it_prints_and_writes_what_the_function_gives(capsys, table, tmp_path):
+    result, picture = tmp_path / "out.json", tmp_path / "out.png"
+    code, out, err = run(capsys, table, *OPTIONS, "--floor", 0.0, "--json", result, "--png", picture)
+    assert code == 0
+    fit = fit_friction(load_force_map(table, rest_length=REST), floor=0.0)
+    assert out == f"loops: {fit.fit_report()}\n"
+    document = json.loads(result.read_text(encoding="utf-8"))
+    assert document["schema"] == "pamrs.friction_fit/1"
+    assert document["rows"] == 400
+    assert document["fit"] == fit.to_dict()
+    assert [item["value"] for item in document["fit"]["parameters"]] == [p.value for p in fit.params.values()]
+    assert document["fit"]["levels"][0]["rows"] == 80
+    assert f"pamrs fit friction {table} --rest-length '276 mm' --floor 0.0" in document["command"]
+    head = picture.read_bytes()[:24]
+    assert head[:8] == b"\x89PNG\r\n\x1a\n"
+    assert (int.from_bytes(head[16:20], "big"), int.from_bytes(head[20:24], "big")) == (1600, 800)
+    assert err.count("written: ") == 2
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["out.json", "out.png"]
+
+
+def test_what_is_not_determinable_is_null(capsys, table, tmp_path):
+    text = table.read_text(encoding="utf-8").splitlines()
+    two = tmp_path / "two.csv"
+    two.write_text("\n".join([text[0], *(line for line in text[1:] if line.split(",")[1] in ("200", "400"))]) + "\n", encoding="utf-8")
+    code, out, _ = run(capsys, two, *OPTIONS, "--json", tmp_path / "two.json")
+    assert code == 0
+    assert "its significance cannot be tested" in out
+    found = json.loads((tmp_path / "two.json").read_text(encoding="utf-8"))["fit"]
+    assert found["slope_pvalue"] is None
+    assert found["redchi"] is None
+    assert found["presliding"] is None
+
+
+def test_a_recording_of_a_bench_is_read(capsys, tmp_path):
+    measured = rows(300, 1.0)
+    path = tmp_path / "bench.csv"
+    columns = np.column_stack([0.1 * np.arange(len(measured)), measured[:, :3]])
+    np.savetxt(path, columns, delimiter=",", header="time [s],length [mm],pressure [kPa],force [N]", comments="", fmt="%.10g")
+    code, out, _ = run(capsys, path, *OPTIONS)
+    assert code == 0
+    assert printed(out, "c0")[0] == pytest.approx(C0, rel=0.03)
+    assert printed(out, "c1")[0] == pytest.approx(C1 * 1e6, rel=0.03)
+    assert "have no direction of motion: not used here" in out
+
+
+def test_the_muscle_may_be_named_or_given_in_full(capsys, table):
+    alone = run(capsys, table, *OPTIONS)[1]
+    assert run(capsys, table, "--muscle", "pam_a_1in")[1] == alone
+    sizes = ["--rest-diameter", "25.4 mm", "--braid-angle", "73.5 deg", "--wall-thickness", "3.175 mm"]
+    assert run(capsys, table, *OPTIONS, *sizes)[1] == alone
+
+
+def test_a_description_brings_its_muscle(capsys, table):
+    sizes = {"rest_length": (276, "mm"), "rest_diameter": (25.4, "mm"), "braid_angle": (73.5, "deg"), "wall_thickness": (3.175, "mm")}
+    text = 'schema = "pamrs.force_map/1"\nname = "loops"\nfile = "loops.csv"\n[muscle]\n'
+    text += "".join(f'{name} = {{ value = {value}, unit = "{unit}" }}\n' for name, (value, unit) in sizes.items())
+    path = table.with_name("loops.toml")
+    path.write_text(text, encoding="utf-8")
+    assert run(capsys, path)[1] == run(capsys, table, *OPTIONS)[1]
+    code, _, err = run(capsys, path, *OPTIONS)
+    assert code == 2
+    assert "--rest-length cannot be given" in err
+
+
+@pytest.mark.parametrize(
+    ("words", "parts"),
+    [
+        ([], ["the rest length is missing", "--rest-length", "--muscle"]),
+        (["--rest-length", "276"], ["--rest-length = '276' is not allowed"]),
+        (["--rest-length", "3 bar"], ["--rest-length = '3 bar'", "wrong dimension"]),
+        (["--rest-length", "3 mm"], ["wrong unit"]),
+        ([*OPTIONS, "--rest-diameter", "20 mm"], ["give --braid-angle, --wall-thickness"]),
+        (["--muscle", "no_such"], ["--muscle = 'no_such' is neither a file nor in the library"]),
+        ([*OPTIONS, "--floor", "1.5"], ["floor = 1.5 is not allowed"]),
+        ([*OPTIONS, "--floor", "nan"], ["floor = nan is not allowed"]),
+        ([*OPTIONS, "--where", "direction"], ["--where = 'direction' is not allowed"]),
+        ([*OPTIONS, "--where", "direction=1"], ["no pressure gives a coefficient", "0 rows while contracting"]),
+        ([*OPTIONS, "--clipped", "0"], ["--clipped = '0' is not allowed"]),
+        ([*OPTIONS, "--colour", "red"], ["--colour"]),
+    ],
+)
+def test_wrong_input_is_one_line_and_writes_nothing(capsys, table, tmp_path, words, parts):
+    code, out, err = run(capsys, table, *words, "--json", tmp_path / "x.json", "--png", tmp_path / "x.png")
+    line = err.splitlines()[-1]
+    assert (code, out) == (2, "")
+    assert line.startswith("pamrs: error: ")
+    assert "Traceback" not in err
+    for part in parts:
+        assert part in line
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_missing_files_and_folders_are_named(capsys, table):
+    code, _, err = run(capsys, "no_such.csv", *OPTIONS)
+    assert code == 2
+    assert "no_such.csv: cannot be read" in err
+    code, _, err = run(capsys, table, *OPTIONS, "--png", "no_folder/x.png")
+    assert code == 2
+    assert "folder no_folder does not exist" in err

@@ -1,0 +1,223 @@
+"""The command line of muscles: the library, and sizing."""
+
+import json
+import re
+import runpy
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pamrs import cli, library, load_rig
+from pamrs.design.sizing import Filling, Requirement, size
+from pamrs.library.published import compare
+
+POINTS = ["--point", "0 mm:18 kN", "--point", "30 mm:7 kN"]
+PAIR = ["elbow_0625in", "large_2in_effective"]
+
+
+def run(capsys, *words):
+    code = cli.main([str(word) for word in words])
+    captured = capsys.readouterr()
+    return code, captured.out, captured.err
+
+
+def assert_refused(capsys, words, parts):
+    """Exit code 2, nothing on standard output, one line that names what is wrong."""
+    code, out, err = run(capsys, *words)
+    assert (code, out) == (2, "")
+    assert err.count("\n") == 1
+    assert err.startswith("pamrs: error: ")
+    for part in parts:
+        assert part in err
+
+
+def line_of(text, start):
+    """The words of the line that starts with ``start``."""
+    return next(line for line in text.splitlines() if line.strip().startswith(start)).split()
+
+
+# ----------------------------------------------------------------------- library
+
+
+def test_library_lists_every_muscle_with_its_pressure_and_mass(capsys):
+    code, out, err = run(capsys, "library")
+    assert (code, err) == (0, "")
+    for name in library.names():
+        item = library.entry(name)
+        words = line_of(out, name)
+        assert words[0] == name
+        assert float(words[1]) == pytest.approx(item.max_pressure / 1e5, rel=1e-4)
+        assert words[2] == "bar"
+        assert words[3] == "unknown" if item.mass is None else float(words[3]) == pytest.approx(item.mass, rel=1e-4)
+        assert item.title in out
+
+
+@pytest.mark.parametrize("name", library.names())
+def test_a_muscle_is_shown_with_the_origin_of_each_number(capsys, name):
+    code, out, _ = run(capsys, "library", name)
+    item = library.entry(name)
+    assert code == 0
+    for key, origin in item.origins.items():
+        assert origin in " ".join(line_of(out, f"{key} "))
+    assert float(line_of(out, "rest_length")[1]) == pytest.approx(1e3 * item.parameters["rest_length"], rel=1e-4)
+    assert float(line_of(out, "braid_angle")[1]) == pytest.approx(np.degrees(item.parameters["braid_angle"]), rel=1e-4)
+    assert float(line_of(out, "modulus_offset")[1].rstrip(",")) == pytest.approx(item.parameters["modulus_offset"][0] / 1e6, rel=1e-4)
+    rows = compare(name)
+    for row in rows:
+        assert f"{row.fact} " in out
+    agree = sum(row.verdict == "agree" for row in rows)
+    assert out.splitlines()[-1].startswith(f"{agree} agree")
+
+
+def test_friction_is_shown_per_megapascal(capsys):
+    assert line_of(run(capsys, "library", "ch2_075in")[1], "friction_pressure_slope")[1:3] == ["-0.145", "1/MPa"]
+
+
+@pytest.mark.parametrize("name", library.names())
+def test_the_rig_of_a_muscle_has_that_muscle(capsys, tmp_path, name):
+    path = tmp_path / "out.toml"
+    code, out, err = run(capsys, "library", name, "--rig", path)
+    assert code == 0
+    assert out.startswith(f"{name}: ")
+    assert f"written: {path}" in err
+    rig = load_rig(path)
+    assert rig.name == name
+    assert rig.muscle.parameters == library.entry(name).muscle.parameters
+    assert rig.parameter("chamber.dead_volume").value == pytest.approx(0.1 * float(rig.muscle.air_volume(0.0)))
+
+
+def test_facts_are_what_the_module_prints(capsys):
+    code, out, _ = run(capsys, "library", "--facts")
+    assert code == 0
+    runpy.run_module("pamrs.library", run_name="__main__")
+    assert capsys.readouterr().out == out
+    assert "they determine 3 of 4 combinations" in out
+    assert "Six against two" in out
+    assert re.search(r"\d+ agree( .*)?, \d+ differ, \d+ cannot tell\n$", out)
+
+
+@pytest.mark.parametrize(
+    ("words", "parts"),
+    [
+        (["elbow"], ["'elbow' is not in the library", "elbow_0625in"]),
+        (["--rig", "out.toml"], ["--rig needs the NAME"]),
+        (["pam_a_1in", "--facts"], ["leave out NAME"]),
+        (["pam_a_1in", "--rig", "no_folder/out.toml"], ["folder no_folder does not exist"]),
+        (["no_such", "--rig", "out.toml"], ["'no_such' is not in the library"]),
+    ],
+)
+def test_wrong_words_to_library_write_nothing(capsys, tmp_path, monkeypatch, words, parts):
+    monkeypatch.chdir(tmp_path)
+    assert_refused(capsys, ["library", *words], parts)
+    assert list(tmp_path.iterdir()) == []
+
+
+# ------------------------------------------------------------------------- sizing
+
+
+def test_size_prints_and_writes_what_the_function_gives(capsys, tmp_path):
+    path = tmp_path / "size.json"
+    code, out, err = run(capsys, "size", *POINTS, *PAIR, "--core", "40 mm", "--dead-volume", "20 ml", "--json", path)
+    assert code == 0
+    assert err == f"written: {path}\n"
+    expected = size(PAIR, Requirement([(0.0, 18e3), (0.03, 7e3)]), filling=Filling(dead_volume=20e-6), core=0.04)
+    assert expected.table() in out
+    assert line_of(out, "count")[1:] == ["6", "1", "*"]
+    assert "required: 0 mm:18 kN, 30 mm:7 kN" in out
+    document = json.loads(path.read_text(encoding="utf-8"))
+    assert document["schema"] == "pamrs.sizing/1"
+    assert document["requirement"] == {"position": "stroke", "points": [[0.0, 18e3], [0.03, 7e3]]}
+    assert document["filling"]["dead_volume"] == pytest.approx(20e-6)
+    assert document["rows"][0] == pytest.approx(expected.rows[0])
+    assert document["best"] == expected.best
+
+
+def test_size_compares_the_whole_library_by_default(capsys):
+    code, out, _ = run(capsys, "size", *POINTS)
+    assert code == 0
+    assert out.splitlines()[3].split() == library.names()
+
+
+def test_the_valve_is_an_area_or_a_conductance(capsys):
+    def fill_time(*options):
+        code, out, _ = run(capsys, "size", *POINTS, "elbow_0625in", *options)
+        assert code == 0
+        return float(line_of(out, "fill time, inflated")[4])
+
+    usual = fill_time()
+    assert fill_time("--valve", "8.4 mm2", "--supply", "13.8 bar") == usual
+    assert fill_time("--valve", "16.8 mm2") == pytest.approx(0.5 * usual, rel=1e-3)
+    area = Filling.from_sonic_conductance(2e-8).area
+    assert fill_time("--valve", "2 l/(s bar)") == pytest.approx(usual * 8.4e-6 / area, rel=1e-3)
+    assert fill_time("--supply", "20 bar") < usual
+
+
+def test_positions_may_be_contractions(capsys):
+    length = library.elbow_0625in().parameters["rest_length"]
+    by_contraction = run(capsys, "size", "--point", "10 %:5 kN", "elbow_0625in")[1]
+    by_stroke = run(capsys, "size", "--point", f"{100 * length:.15g} mm:5 kN", "elbow_0625in")[1]
+    assert by_contraction.splitlines()[1:] == by_stroke.splitlines()[1:]
+
+
+def test_a_rig_file_is_a_candidate_at_a_pressure(capsys, tmp_path):
+    path = tmp_path / "a.toml"
+    assert run(capsys, "library", "pam_a_1in", "--rig", path)[0] == 0
+    code, out, _ = run(capsys, "size", *POINTS, path, "pam_a_1in", "--pressure", "11 bar")
+    assert code == 0
+    assert line_of(out, "blocked force")[3] == line_of(out, "blocked force")[4]
+    assert_refused(capsys, ["size", *POINTS, path], [f"MUSCLE = '{path}' is a rig file", "give --pressure"])
+
+
+def test_a_pressure_beyond_the_tests_is_said(capsys):
+    out = run(capsys, "size", *POINTS, "elbow_0625in", "--pressure", "12 bar")[1]
+    assert "elbow_0625in: 12 bar is above the highest pressure of its tests, 10.34 bar" in out
+    assert "above the highest" not in run(capsys, "size", *POINTS, "elbow_0625in")[1]
+
+
+def test_what_is_not_feasible_is_printed_with_its_reason(capsys, tmp_path):
+    path = tmp_path / "size.json"
+    code, out, _ = run(capsys, "size", "--point", "30 cm:9 N", "elbow_0625in", "--json", path)
+    assert code == 0
+    assert "elbow_0625in: not feasible: it would contract by 1.517, beyond the braid's limit 0.392" in out
+    assert "count" not in out
+    assert json.loads(path.read_text(encoding="utf-8"))["rows"] == []
+    code, out, _ = run(capsys, "size", *POINTS, *PAIR, "--max-count", 3)
+    assert code == 0
+    assert "elbow_0625in: not feasible: 6 are needed, at most 3 are considered" in out
+    assert line_of(out, "count")[1] == "1"
+
+
+@pytest.mark.parametrize(
+    ("words", "parts"),
+    [
+        ([], ["--point"]),
+        (["--point", "18"], ["--point = '18' is not allowed", "POSITION:FORCE"]),
+        (["--point", "0:4 kN"], ["--point = '0' is not allowed", "unit like 'm'"]),
+        (["--point", "0 mm:4 bar"], ["--point = '4 bar'", "wrong dimension"]),
+        (["--point", "3 mm:4 kN", "--point", "3 %:2 kN"], ["3 mm:4 kN, 3 %:2 kN", "all contractions"]),
+        (["--point", "3 mm:4 kN", "--point", "2 mm:5 kN"], ["3 mm:4 kN, 2 mm:5 kN", "positions must increase"]),
+        (["--point", "3 mm:4 +- 1 kN"], ["--point = '4 +- 1 kN'", "standard deviation"]),
+        (["--point", "-3 mm:4 kN"], ["-3 mm:4 kN", "none below zero"]),
+        ([*POINTS, "no_such"], ["MUSCLE = 'no_such' is neither a file nor in the library", "elbow_0625in"]),
+        ([*POINTS, "no_such.toml", "--pressure", "5 bar"], ["no_such.toml: cannot be read"]),
+        ([*POINTS, "pam_a_1in", "pam_a_1in"], ["'pam_a_1in' is used twice"]),
+        ([*POINTS, "--valve", "3"], ["--valve = '3' is not allowed"]),
+        ([*POINTS, "--valve", "3 kg"], ["--valve = '3 kg'", "wrong dimension"]),
+        ([*POINTS, "--valve", "0 mm2"], ["--valve = '0 mm2'", "above zero"]),
+        ([*POINTS, "--valve", "0 l/(s bar)"], ["--valve = '0 l/(s bar)'", "above zero"]),
+        ([*POINTS, "--supply", "-1 bar"], ["--supply = '-1 bar'", "above zero"]),
+        ([*POINTS, "--pressure", "0 bar"], ["--pressure = '0 bar'", "above zero"]),
+        ([*POINTS, "--dead-volume", "-1 l"], ["--dead-volume = '-1 l'", "from zero"]),
+        ([*POINTS, "--core", "-1 mm"], ["--core = '-1 mm'", "from zero"]),
+        ([*POINTS, "--max-count", "0"], ["max_count = 0 is not allowed"]),
+    ],
+)
+def test_wrong_words_to_size_write_nothing(capsys, tmp_path, monkeypatch, words, parts):
+    monkeypatch.chdir(tmp_path)
+    assert_refused(capsys, ["size", *words, "--json", "size.json"], parts)
+    assert list(Path().iterdir()) == []
+
+
+def test_size_needs_the_folder_of_its_output(capsys):
+    assert_refused(capsys, ["size", *POINTS, "--json", "no_folder/x.json"], ["folder no_folder does not exist"])

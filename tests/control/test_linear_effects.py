@@ -1,0 +1,270 @@
+"""Linear models of rigs with effects, sensors that are off, several joints, dry friction; and of controllers with corners."""
+
+import math
+
+import numpy as np
+import pytest
+
+import pamrs
+from pamrs.control import PID, closed_loop
+from pamrs.control.linear import equilibrium, linear_controller, linearise
+from pamrs.control.stability import margins, spectral_radius, stable_region
+from pamrs.control.trajectories import step
+from pamrs.effects import EFFECTS
+from pamrs.errors import ParameterError
+from tests.control.helpers import SmallPid
+
+ANGLE = math.radians(45)
+#: What each moving effect adds, where the model has to show it.
+MOVING = {
+    "pressure_lag": ({"time_constant": 0.02}, ["pressure_lag"]),
+    "input_path_lag": (
+        {"time_constant": 0.01, "delay": 0.03},
+        [f"input_path_lag.{k}" for k in ("lag", "delay_1", "delay_2", "delay_3")],
+    ),
+    "muscle_creep": ({"stiffness": 2e4, "time_constant": 0.05}, ["muscle_creep"]),
+    "heat_transfer": ({"initial_temperature_rise": 5.0}, ["heat_transfer.air_mass"]),
+    "base_flexibility": ({}, ["base_flexibility.angle", "base_flexibility.rate"]),
+    "payload_swing": ({}, ["payload_swing.angle", "payload_swing.rate"]),
+    "muscle_hysteresis": ({}, []),
+    "closure_torque": (
+        {"creep": 5.0, "pressure_memory": 0.5, "slip": 3.0, "memory_time": 0.1},
+        ["closure_torque.angle", "closure_torque.pressure"],
+    ),
+    "closure_flow": ({"pressure_memory": -2e-4, "memory_time": 0.1}, ["closure_flow.pressure"]),
+}
+
+
+@pytest.fixture(scope="module")
+def rig():
+    return pamrs.rigs.shoulder()
+
+
+def moves_alike(rig, model, start, moved, *, low=2e-3):
+    """The core and its linear model, both from the operating point under commands; channels as the sensors read them."""
+    time = np.arange(301) * 1e-3
+    null = dict.fromkeys(model.inputs, 5.0)
+    commands = {name: null[name] + moved(time, k) for k, name in enumerate(model.inputs)}
+    named = {name.partition(".")[2]: values for name, values in commands.items()}
+    runs = [
+        pamrs.simulate(rig, values, sample_time=1e-3, initial=start)
+        for values in (named, {name: np.full(time.size, 5.0) for name in named})
+    ]
+    phi, gamma = model.sampled(1e-3)
+    x = np.zeros((time.size, len(model.states)))
+    u = np.array([commands[name] - null[name] for name in model.inputs])
+    for k in range(time.size - 1):
+        x[k + 1] = phi @ x[k] + gamma @ u[:, k]
+    y = x @ model.c.T
+    for k, name in enumerate(model.outputs):
+        went = runs[0][name] - runs[1][name]
+        assert np.abs(y[:, k]).max() > 0.0
+        assert went == pytest.approx(y[:, k], abs=low * np.abs(y[:, k]).max()), name
+
+
+@pytest.mark.parametrize("effect", MOVING)
+def test_states_of_effects_are_in_the_model_and_it_moves_as_the_core_does(rig, effect):
+    given, states = MOVING[effect]
+    altered = rig.with_effect(effect, given)
+    model = linearise(altered, ANGLE, side="fill")
+    assert list(model.states[3:]) == states
+    bare = linearise(rig, ANGLE, side="fill")
+    assert model.outputs == bare.outputs
+    still = altered if effect != "heat_transfer" else rig.with_effect(effect)
+    moves_alike(still, model, equilibrium(still, ANGLE), lambda t, _: 2e-3 * np.sin(30.0 * t) ** 2)
+    # and the effect is in it: without, the answer is another one
+    period = 0.3
+    out, other = (m.c @ m.sampled(period)[1][:, 0] for m in (model, bare))
+    assert np.abs(out / other - 1.0).max() > 1e-3
+
+
+def test_a_lag_is_one_and_leaves_the_rest_as_it_is(rig):
+    bare = linearise(rig, ANGLE)
+    lagged = linearise(rig.with_effect("pressure_lag", {"time_constant": 0.005}), ANGLE)
+    # T y' = p - y; what a sample takes as straight is curved by 7 Pa/s per radian
+    assert lagged.a[3] == pytest.approx([200.0, 0.0, 0.0, -200.0], abs=10.0)
+    assert lagged.a[3, [0, 3]] == pytest.approx([200.0, -200.0], rel=1e-6)
+    assert lagged.b[0] == pytest.approx(bare.b[0], rel=1e-6)
+    assert lagged.c[lagged.outputs.index("muscle_pressure")] == pytest.approx([0.0, 0.0, 0.0, 1.0], abs=1e-9)
+    late = linearise(rig.with_effect("input_path_lag", {"time_constant": 0.02}), ANGLE)
+    assert late.states[3:] == ("input_path_lag.lag",)
+    assert late.a[3] == pytest.approx([0.0, 0.0, 0.0, -50.0], abs=1e-3)
+    assert late.b[3, 0] == pytest.approx(50.0 / 5.0, rel=1e-6)  # of the half range
+    assert late.a[0, 3] == pytest.approx(bare.b[0, 0] * 5.0, rel=1e-3)
+    # a lag in the loop costs what the same delay costs, to first order
+    pytest.importorskip("control")
+    controller = PID(0.5, 0.0, 0.0, period=0.005)
+    spare = [margins(model, controller).delay for model in (bare, late)]
+    assert spare[0] - spare[1] == pytest.approx(0.02, rel=0.2)
+
+
+@pytest.mark.parametrize("side", ["fill", "vent"])
+def test_behind_a_lag_a_valve_still_has_sides(rig, side):
+    late = linearise(rig.with_effect("input_path_lag", {"time_constant": 0.02, "delay": 0.01}), ANGLE, side=side)
+    # at low frequency the way to the flow is that of the valve alone
+    steady = np.linalg.solve(late.a[3:, 3:], -late.b[3:, 0])
+    assert (late.a[0, 3:] @ steady) == pytest.approx(linearise(rig, ANGLE, side=side).b[0, 0], rel=1e-3)
+
+
+@pytest.mark.parametrize("effect", ["valve_dead_zone", "valve_hysteresis", "mullins_softening", "clock_skew"])
+def test_what_has_no_linear_model_is_refused_by_name(rig, effect):
+    with pytest.raises(ParameterError, match=f"{effect}.*no linear model"):
+        linearise(rig.with_effect(effect), ANGLE)
+    with pytest.raises(ParameterError, match=effect):
+        stable_region(rig.with_effect(effect), SmallPid, {"kp": [1.0]}, payloads=[9.0], angle=ANGLE)
+
+
+def test_a_relay_of_the_supply_matters_only_where_the_supply_moves(rig):
+    fed = rig.with_effect("compressor_cut_in")
+    assert linearise(fed, ANGLE).a == pytest.approx(linearise(rig, ANGLE).a, rel=1e-6, abs=1e-6)
+    with pytest.raises(ParameterError, match="compressor_cut_in"):
+        linearise(fed, ANGLE, held=())
+
+
+def test_play_and_dead_zone_of_no_width_and_lags_of_no_time_are_none(rig):
+    same = rig
+    for effect, values in {
+        "valve_dead_zone": {"half_width": 0.0},
+        "valve_hysteresis": {"half_width": 0.0},
+        "input_path_lag": {"time_constant": 0.0, "delay": 0.0},
+        "pressure_lag": {"time_constant": 0.0},
+    }.items():
+        same = same.with_effect(effect, values)
+    bare, model = linearise(rig, ANGLE), linearise(same, ANGLE)
+    assert model.states == bare.states
+    assert model.a == pytest.approx(bare.a, rel=1e-6, abs=1e-5)
+    assert model.b == pytest.approx(bare.b, rel=1e-5, abs=1e-5)
+    assert model.c == pytest.approx(bare.c, abs=1e-9)
+
+
+def test_every_effect_is_known_and_all_together_too(rig):
+    kinks = {"valve_dead_zone", "valve_hysteresis", "mullins_softening", "clock_skew"}
+    every = rig
+    for effect in reversed(EFFECTS):
+        if effect not in kinks and effect != "supply_regulator_deadband":
+            every = every.with_effect(effect)
+    model = linearise(every, ANGLE)
+    assert np.linalg.eigvals(model.a).real.max() < 1.0
+    assert {"payload_swing.rate", "base_flexibility.angle", "muscle_creep", "pressure_lag"} < set(model.states)
+
+
+def test_a_command_that_moves_nothing_is_refused(rig):
+    start = equilibrium(rig, ANGLE)
+    with pytest.raises(ParameterError, match="valve_command moves nothing"):
+        linearise(rig, ANGLE, side="fill", initial={"supply_pressure": start["muscle_pressure"]})
+
+
+def test_zeros_of_sensors_move_no_operating_point(rig):
+    off = rig.with_parameters({"sensors.angle_zero": 0.05, "sensors.pressure_zero": 700.0})
+    true, read = linearise(rig, ANGLE), linearise(off, ANGLE)
+    assert read.a == pytest.approx(true.a, rel=1e-9, abs=1e-9)
+    assert read.b == pytest.approx(true.b, rel=1e-9, abs=1e-9)
+    assert read.point["joint_angle"] == pytest.approx(ANGLE + 0.05)  # what a controller sees there
+    assert read.point["muscle_pressure"] == pytest.approx(true.point["muscle_pressure"] + 700.0)
+
+
+@pytest.fixture(scope="module")
+def two_joints():
+    rig, start = pamrs.rigs.named("two_joint_arm"), {}
+    for _ in range(60):
+        for joint, angle in (("elbow", 0.8), ("wrist", 0.6)):
+            start = equilibrium(rig, angle, joint=joint, chamber=joint, initial=start)
+    return rig, start
+
+
+def test_of_several_joints_each_has_to_rest(two_joints):
+    rig, start = two_joints
+    with pytest.raises(ParameterError, match=r"joint_rate\.wrist.*does not rest"):
+        linearise(rig, 0.8, joint="elbow", chamber="elbow")
+    model = linearise(rig, 0.8, joint="elbow", chamber="elbow", initial=start, side="fill")
+    assert np.linalg.eigvals(model.a).real.max() < 1e-3
+    assert model.inputs == ("valve_command.elbow", "valve_command.wrist")
+    start = equilibrium(rig, 0.8, joint="elbow", chamber="elbow", initial=start)
+    moves_alike(rig, model, start, lambda t, k: (1e-3 + 1e-3 * k) * np.sin(30.0 * t) ** 2, low=5e-3)
+
+
+def test_dry_friction_at_rest_and_in_motion_have_regions_of_their_own(rig):
+    def made(kp):
+        return PID(kp, period=0.005)
+
+    axes = {"kp": [0.3, 0.44, 0.5, 7.5, 8.5]}
+    regions = {
+        friction: stable_region(rig, made, axes, payloads=[9.07], angle=ANGLE, friction=friction) for friction in ("rest", "moving")
+    }
+    assert regions["rest"].stable[0].tolist() == [True, True, True, True, False]
+    assert regions["moving"].stable[0].tolist() == [True, True, False, False, False]
+    assert regions["moving"].friction == "moving"
+    moving = linearise(rig, ANGLE, friction="moving")
+    bare = linearise(rig.with_parameters({"arm.coulomb": 0.0}), ANGLE)
+    assert moving.a == pytest.approx(bare.a, rel=1e-12, abs=1e-12)
+    # between both bounds the arm forgets a small push, and swings for good after a large one; below both it forgets any
+    start = equilibrium(rig, ANGLE)
+    for kp, push, swings in ((7.0, 0.1, False), (7.0, 0.3, True), (0.4, 0.3, False)):
+        run = closed_loop(rig, made(kp), step(ANGLE, ANGLE, duration=12.0), initial={**start, "joint_angle": ANGLE + push})
+        late = np.ptp(run.angle[run.time > 9.0])
+        assert (late > 1.0) == swings, (kp, push, late)
+        assert (late < 0.1) != swings, (kp, push, late)
+
+
+class DeadBand(SmallPid):
+    """Proportional outside an error of 0.01 rad, silent inside."""
+
+    def update(self, time, measurement, reference):
+        error = reference.angle - measurement["joint_angle"]
+        return self.null + self.kp * math.copysign(max(abs(error) - 0.01, 0.0), error)
+
+
+def test_a_corner_of_a_controller_is_refused_or_a_side_is_chosen(rig):
+    point = linearise(rig, ANGLE).point
+    with pytest.raises(ParameterError, match=r"corner.*command over joint_angle"):
+        linear_controller(DeadBand(kp=2.0), point, ANGLE + 0.01)
+    slopes = {side: linear_controller(DeadBand(kp=2.0), point, ANGLE + 0.01 + 1e-12, side=side).d[0, 0] for side in ("down", "mean")}
+    assert slopes["down"] == pytest.approx(-2.0, rel=1e-4)
+    assert slopes["mean"] == pytest.approx(-1.0, rel=1e-4)
+    assert linear_controller(DeadBand(kp=2.0), point, ANGLE + 0.02).d[0, 0] == pytest.approx(-2.0)
+    with pytest.raises(ParameterError, match="at a limit"):
+        linear_controller(DeadBand(kp=2.0), point)
+    # a loop whose valve is at its end has a slope to one side only
+    with pytest.raises(ParameterError, match="corner"):
+        linear_controller(SmallPid(kp=2.0, ki=0.0), point, ANGLE + 2.5)
+
+
+@pytest.mark.parametrize(
+    ("call", "word"),
+    [
+        (lambda rig: linearise(rig, ANGLE, friction="none"), "friction"),
+        (lambda rig: stable_region(rig, SmallPid, {"kp": [1.0]}, payloads=[1.0], angle=ANGLE, friction=""), "friction"),
+        (lambda rig: linear_controller(PID(1.0), {"joint_angle": 0.5}, side="left"), "side"),
+    ],
+)
+def test_bad_input_is_named(rig, call, word):
+    with pytest.raises(ParameterError, match=word):
+        call(rig)
+
+
+def test_a_loop_is_judged_with_its_lag(rig):
+    law = linear_controller(PID(7.5, period=0.005), linearise(rig, ANGLE).point)
+    late = rig.with_effect("input_path_lag", {"time_constant": 0.02})
+    radii = [max(spectral_radius(linearise(plant, ANGLE, side=side), law) for side in ("fill", "vent")) for plant in (rig, late)]
+    assert radii[0] < 1.0 < radii[1]
+
+
+def test_effects_at_one_of_several_blocks_are_named_after_it():
+    rig = pamrs.rigs.named("antagonistic_joint")
+    for effect, values, at in (
+        ("closure_flow", {"pressure_memory": -1e-5, "memory_time": 0.1}, "flexor"),
+        ("input_path_lag", {"time_constant": 0.02}, "extensor"),
+        ("muscle_creep", {"stiffness": 2e4, "time_constant": 0.05}, "extensor"),
+        ("pressure_lag", {"time_constant": 0.02}, "flexor"),
+    ):
+        rig = rig.with_effect(effect, values, at=at)
+    start = equilibrium(rig, 0.7, joint="elbow", chamber="flexor", initial={"muscle_pressure.extensor": 2e5})
+    model = linearise(rig, 0.7, joint="elbow", chamber="flexor", initial=start, side="fill")
+    assert model.states[-4:] == (
+        "closure_flow.pressure.flexor",
+        "input_path_lag.lag.extensor",
+        "muscle_creep.extensor",
+        "pressure_lag.flexor",
+    )
+    start = equilibrium(rig, 0.7, joint="elbow", chamber="flexor", initial=start)
+    moves_alike(rig, model, start, lambda t, k: (1e-3 + 1e-3 * k) * np.sin(30.0 * t) ** 2, low=5e-3)

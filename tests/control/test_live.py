@@ -1,0 +1,419 @@
+"""A live loop: what it does at jitter, dropouts, overruns, lost sensors, Ctrl-C and failures; the safe command comes last, always."""
+
+import math
+import os
+import signal
+import subprocess
+import sys
+import threading
+
+import numpy as np
+import pytest
+
+import pamrs
+from pamrs.control import PID, Cascade, DeadZoneCompensation, HysteresisCompensation, Parallel, closed_loop, sweep
+from pamrs.control.live import LiveError, SystemClock, run_live
+from pamrs.control.simulated_device import FAULTS, SimulatedDevice, VirtualClock
+from pamrs.control.trajectories import degrees, lift_hold_return
+from pamrs.errors import ParameterError
+from tests.control.cases import CONTROLLERS, DIAGNOSED
+from tests.control.helpers import SmallPid
+
+LIFT = lift_hold_return(*degrees(15, 50), ramp=2.0, hold=1.0, duration=5.0)
+
+
+@pytest.fixture(scope="module")
+def rig():
+    return pamrs.rigs.shoulder()
+
+
+def live(rig, controller=None, clock=None, device=None, **options):
+    clock = clock or VirtualClock()
+    device = SimulatedDevice(rig, clock, **(device or {}))
+    return run_live(device, controller or SmallPid(period=0.01), LIFT, clock=clock, **options), device
+
+
+def test_on_time_it_is_the_simulated_loop(rig):
+    run, device = live(rig)
+    alone = closed_loop(rig, SmallPid(period=0.01), LIFT, sample_time=0.001)
+    assert run.reason == "finished"
+    assert run.command == pytest.approx(alone.command[:-1:10], abs=1e-9)
+    assert run.channels["joint_angle"] == pytest.approx(alone.angle[:-1:10], abs=1e-9)
+    assert (run.missed, run.overruns) == (0, 0)
+    assert run.latest < 1e-9
+    assert device.written[-1] == (pytest.approx(5.0), 5.0)
+
+
+def test_jitter_is_measured_and_borne(rig):
+    run, _ = live(rig, PID(2.0, 1.0, period=0.01), VirtualClock(1e-3, seed=2))
+    assert run.reason == "finished"
+    assert run.jitter == pytest.approx(1e-3, rel=0.2)  # of an exponential distribution, its mean
+    assert run.overruns == 0
+    even, _ = live(rig, PID(2.0, 1.0, period=0.01))
+    error = [np.sqrt(np.mean((r.channels["joint_angle"] - r.reference) ** 2)) for r in (run, even)]
+    assert error[0] == pytest.approx(error[1], rel=0.1)
+    assert error[0] != error[1]
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_missed_reading_holds_the_command_and_the_controller_keeps_its_time(rig, fault):
+    run, device = live(
+        rig, PID(2.0, 1.0, period=0.01), device={"dropouts": 0.15, "faults": (fault,), "seed": 4}, stamp="time", most_missed=9
+    )
+    gone = np.isnan(run.channels["joint_angle"])
+    assert run.reason == "finished"
+    assert run.missed == gone.sum()
+    assert 0.1 < gone.mean() < 0.2
+    for k in np.flatnonzero(gone):
+        assert run.command[k] == (run.command[k - 1] if k else 5.0)
+    assert len(device.written) == (~gone).sum() + 2  # the safe command before and after
+
+
+class Altered(SimulatedDevice):
+    """A device whose readings pass through a function."""
+
+    def __init__(self, rig, clock, change, **options):
+        super().__init__(rig, clock, **options)
+        self.change = change
+
+    def read(self):
+        return self.change(super().read())
+
+
+def test_a_stale_reading_is_seen_by_its_time_or_a_counter(rig):
+    stale = {"dropouts": 0.2, "faults": ("stale",), "seed": 1}
+    for stamp, change, seen in (
+        (None, dict, True),
+        (None, lambda m: {n: v for n, v in m.items() if n != "time"}, False),
+        ("frame", lambda m: {**{n: v for n, v in m.items() if n != "time"}, "frame": round(1e3 * m["time"])}, True),
+    ):
+        clock = VirtualClock()
+        run = run_live(Altered(rig, clock, change, **stale), SmallPid(period=0.01), LIFT, clock=clock, stamp=stamp)
+        assert (50 < run.missed < 150) == seen
+        assert seen or run.missed == 0
+
+
+def test_what_cannot_be_is_no_reading(rig):
+    def change(m):
+        return {**m, "joint_angle": m["joint_angle"] + (7.0 if 1.0 < m["time"] < 1.03 else 0.0)}
+
+    clock = VirtualClock()
+    device = Altered(rig, clock, change)
+    run = run_live(device, SmallPid(period=0.01), LIFT, clock=clock, plausible={"joint_angle": (0.0, 2.2)})
+    assert run.missed == 2
+    assert (np.flatnonzero(np.isnan(run.channels["joint_angle"])) == [101, 102]).all()
+    clock = VirtualClock()
+    run = run_live(SimulatedDevice(rig, clock), SmallPid(period=0.01), LIFT, clock=clock, plausible={"elbow": (0.0, 1.0)})
+    assert (run.reason, run.missed) == ("lost_sensor", 6)
+
+
+@pytest.mark.parametrize("safe", [5.0, 0.0])
+def test_a_lost_sensor_is_a_safe_stop(rig, safe):
+    run, device = live(rig, device={"lost_from": 2.0, "seed": 1}, stamp="time", most_missed=3, safe=safe)
+    assert run.reason == "lost_sensor"
+    assert run.missed == 4
+    when, command = device.written[-1]
+    assert command == safe
+    assert when == pytest.approx(2.03)
+    assert run.time[-1] == pytest.approx(2.03)
+    angle = device.simulator.observe()["joint_angle"]
+    after = pamrs.Simulator(rig, sample_time=0.001)
+    after.restore(device.simulator.state)
+    moved = after.run(np.full(3000, safe))["joint_angle"][-1]
+    if safe == 0.0:
+        assert moved < math.radians(20)  # vented, the arm comes down
+    else:
+        assert abs(moved - angle) < math.radians(25)  # closed, it stays about where it was
+        assert moved > math.radians(25)
+
+
+def test_no_reading_at_all_commands_nothing_but_the_safe_value(rig):
+    run, device = live(rig, device={"lost_from": 0.0, "faults": ("none",)}, most_missed=5, safe=5.0)
+    assert run.reason == "lost_sensor"
+    assert run.time.size == 6
+    assert [command for _, command in device.written] == [5.0, 5.0]
+
+
+def test_the_safe_command_is_written_before_the_first_reading(rig):
+    _, device = live(rig, device={"lost_from": 0.0, "faults": ("none",)}, safe=0.0)
+    assert device.written[0] == (0.0, 0.0)
+    assert device.command == 0.0
+
+
+class Slow(SimulatedDevice):
+    """One call takes its time."""
+
+    def __init__(self, rig, clock, at, takes):
+        super().__init__(rig, clock)
+        self.at, self.takes = at, takes
+
+    def read(self):
+        reading = super().read()
+        if self.clock.now() >= self.at:
+            self.at = math.inf
+            self.clock.sleep(self.takes)
+        return reading
+
+
+def test_a_reading_that_hung_is_not_acted_on(rig):
+    for takes, reason, missed in ((0.025, "finished", 1), (1.0, "overrun", 1)):
+        clock = VirtualClock()
+        device = Slow(rig, clock, 0.995, takes)
+        run = run_live(device, SmallPid(period=0.01), LIFT, clock=clock, safe=0.0)
+        assert (run.reason, run.missed) == (reason, missed)
+        assert run.stall == pytest.approx(takes - 0.01, abs=0.006)
+        assert np.isnan(run.channels["joint_angle"][100])
+        after = [pair for pair in device.written if pair[0] > 0.9951]
+        # the first command after it is of a new reading, or the safe one
+        assert after[0] == ((pytest.approx(1.025), after[0][1]) if reason == "finished" else (pytest.approx(2.0), 0.0))
+
+
+def test_an_answer_that_took_too_long_is_not_written(rig):
+    clock = VirtualClock()
+
+    class Thinking(SmallPid):
+        def update(self, time, measurement, reference):
+            if time == 1.0:
+                clock.sleep(0.015)
+            return super().update(time, measurement, reference)
+
+    device = SimulatedDevice(rig, clock)
+    run = run_live(device, Thinking(period=0.01), LIFT, clock=clock)
+    assert (run.reason, run.missed, run.overruns) == ("finished", 1, 0)
+    assert run.command[100] == run.command[99]
+    # at 1.015 s only the answer to the sample of that moment
+    assert [when for when, _ in device.written if 0.995 < when < 1.018] == [pytest.approx(1.015)]
+
+
+def test_a_clock_that_goes_back_is_an_error_and_no_long_sleep(rig):
+    class Jumping(VirtualClock):
+        def now(self):
+            return super().now() - (3600.0 if super().now() >= 1.0 else 0.0)
+
+    clock = Jumping()
+    device = SimulatedDevice(rig, clock)
+    with pytest.raises(LiveError, match="went back") as caught:
+        run_live(device, SmallPid(period=0.01), LIFT, clock=clock, safe=0.0)
+    assert device.written[-1][1] == 0.0
+    assert caught.value.run.reason == "failed"
+    assert caught.value.run.time.size == 100
+
+
+def test_overruns_are_counted_and_left_out(rig):
+    run, _ = live(rig, PID(2.0, 1.0, period=0.01), VirtualClock(stalls={1.0: 0.045}), most_missed=4)
+    assert run.reason == "finished"
+    assert run.overruns == 4
+    assert run.time == pytest.approx(0.01 * np.arange(500))
+    assert np.isnan(run.late).sum() == 4
+    lost, _ = live(rig, None, VirtualClock(stalls={1.0: 0.5}), most_missed=4)
+    assert lost.reason == "overrun"
+
+
+class Failing(SmallPid):
+    def __init__(self, error, at=1.0):
+        super().__init__(period=0.01)
+        self.error, self.at = error, at
+
+    def update(self, time, measurement, reference):
+        if time >= self.at:
+            if isinstance(self.error, float):
+                return self.error
+            raise self.error
+        return super().update(time, measurement, reference)
+
+
+def test_ctrl_c_gives_the_record_and_the_safe_command(rig):
+    run, device = live(rig, Failing(KeyboardInterrupt()), safe=0.0)
+    assert run.reason == "interrupted"
+    assert run.time.size == 100
+    assert device.written[-1][1] == 0.0
+
+
+@pytest.mark.parametrize("error", [ZeroDivisionError("oh"), math.nan])
+def test_a_controller_that_fails_is_an_error_after_the_safe_command(rig, error):
+    clock = VirtualClock()
+    device = SimulatedDevice(rig, clock)
+    with pytest.raises(LiveError, match="at 1 s") as caught:
+        run_live(device, Failing(error), LIFT, clock=clock, safe=0.0)
+    assert device.written[-1] == (pytest.approx(1.0), 0.0)
+    assert caught.value.run.time.size == 100
+    assert np.isfinite(caught.value.run.channels["joint_angle"]).all()
+
+
+def test_what_is_no_exception_goes_on_after_the_safe_command(rig):
+    clock = VirtualClock()
+    device = SimulatedDevice(rig, clock)
+    with pytest.raises(SystemExit):
+        run_live(device, Failing(SystemExit()), LIFT, clock=clock, safe=0.0)
+    assert device.written[-1][1] == 0.0
+
+
+def test_a_way_out_whose_safe_command_fails_says_so(rig):
+    class Dead(SimulatedDevice):
+        def write(self, command):
+            if self.clock.now() >= 1.0:
+                raise OSError("bus")
+            super().write(command)
+
+    clock = VirtualClock()
+    with pytest.raises(SystemExit) as caught:
+        run_live(Dead(rig, clock), Failing(SystemExit(3)), LIFT, clock=clock, safe=0.0)
+    assert "could not be written: OSError bus" in caught.value.__notes__[0]
+
+
+TERMINATED = """
+import sys, pamrs
+from pamrs.control import PID, run_live
+from pamrs.control.trajectories import step
+
+class Device:
+    def read(self):
+        return {"joint_angle": 0.3}
+    def write(self, command):
+        print(command, flush=True)
+
+run_live(Device(), PID(2.0, period=0.01), step(0.3, 1.0, duration=30.0), safe=0.0)
+"""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP"])
+def test_a_signal_that_ends_the_program_leaves_the_safe_command(name):
+    number = getattr(signal, name)
+    with subprocess.Popen([sys.executable, "-c", TERMINATED], stdout=subprocess.PIPE, text=True) as child:
+        first = [child.stdout.readline() for _ in range(5)]
+        child.send_signal(number)
+        rest = child.stdout.read().split()
+        assert child.wait(30) == 128 + number
+    assert float(first[0]) == 0.0
+    assert float(first[4]) > 5.0
+    assert float(rest[-1]) == 0.0
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+def test_signals_are_the_programs_own_again_and_never_interrupt_the_safe_command(rig):
+    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    before = [signal.getsignal(number) for number in numbers]
+
+    class Signalled(SimulatedDevice):
+        """It gets a signal while its last command is written."""
+
+        def write(self, command):
+            if self.clock.now() >= 4.9999:
+                os.kill(os.getpid(), signal.SIGTERM)
+            super().write(command)
+
+    clock = VirtualClock()
+    device = Signalled(rig, clock)
+    with pytest.raises(SystemExit) as caught:
+        run_live(device, SmallPid(period=0.01), LIFT, clock=clock, safe=0.0)
+    assert caught.value.code == 128 + signal.SIGTERM
+    assert device.written[-1][1] == 0.0
+    assert [signal.getsignal(number) for number in numbers] == before
+    # what the program ignores stays ignored
+    old = signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    try:
+        clock = VirtualClock()
+        assert run_live(Signalled(rig, clock), SmallPid(period=0.01), LIFT, clock=clock).reason == "finished"
+    finally:
+        signal.signal(signal.SIGTERM, old)
+
+
+def test_a_loop_runs_in_any_thread(rig):
+    found = []
+    thread = threading.Thread(target=lambda: found.append(live(rig)[0].reason))
+    thread.start()
+    thread.join()
+    assert found == ["finished"]
+
+
+def test_a_pressure_is_no_valve_command(rig):
+    sliding = CONTROLLERS["sliding"](1.0).outer
+    assert sliding.answers == "pressure"
+    clock = VirtualClock()
+    for call in (
+        lambda: run_live(SimulatedDevice(rig, clock), sliding, LIFT, clock=clock),
+        lambda: closed_loop(rig, sliding, LIFT, 0.1),
+        lambda: sweep(rig, sliding, LIFT, 0.1, n=2),
+        lambda: DeadZoneCompensation(sliding, DIAGNOSED),
+        lambda: Parallel(CONTROLLERS["feedforward"](1.0), sliding),
+        lambda: closed_loop(rig, CONTROLLERS["cascaded pid"](1.0).outer, LIFT, 0.1),
+        lambda: closed_loop(rig, HysteresisCompensation(sliding, DIAGNOSED), LIFT, 0.1),
+    ):
+        with pytest.raises(ParameterError, match="Cascade"):
+            call()
+    assert closed_loop(rig, Cascade(sliding), LIFT, 0.1).command.max() <= 10.0
+    # nor is a valve command a pressure, which 5 of 10 V would hardly be
+    for name in ("pid", "sliding"):
+        with pytest.raises(ParameterError, match="outer is a .* with answers = 'valve', which is not allowed: 'pressure' is needed"):
+            Cascade(CONTROLLERS[name](1.0))
+    # with an actuation that knows what to do with it it is allowed
+    run = closed_loop(rig, sliding, LIFT, 0.1, actuation=lambda pressure: {"valve_command": 5.0 + 1e-7 * pressure})
+    assert run.command.max() > 10.0
+
+
+def test_a_write_that_fails_is_tried_again_for_the_safe_command(rig):
+    class Stubborn(SimulatedDevice):
+        def __init__(self, failures, *arguments):
+            super().__init__(*arguments)
+            self.failures = failures
+
+        def write(self, command):
+            if self.clock.now() >= 1.0 and self.failures:
+                self.failures -= 1
+                raise OSError("bus")
+            super().write(command)
+
+    for failures, words in ((3, "bus$"), (9, "could not be written")):
+        clock = VirtualClock()
+        device = Stubborn(failures, rig, clock)
+        with pytest.raises(LiveError, match=words):
+            run_live(device, SmallPid(period=0.01), LIFT, clock=clock, safe=0.0)
+        assert (device.written[-1][1] == 0.0) == (failures == 3)
+
+
+def test_the_machines_clock_runs_in_real_time(rig):
+    clock = SystemClock()
+    begin = clock.now()
+    run = run_live(SimulatedDevice(rig, clock), SmallPid(period=0.02), LIFT, 0.2, most_missed=100)
+    assert run.reason == "finished"
+    assert clock.now() - begin >= 0.2
+
+
+@pytest.mark.parametrize(
+    ("change", "word"),
+    [
+        ({"safe": 11.0}, "safe"),
+        ({"limits": (5.0, 1.0)}, "limits"),
+        ({"limits": (0.0, 1.0, 2.0)}, "limits"),
+        ({"limits": 5.0}, "limits"),
+        ({"plausible": {"joint_angle": (1.0, 0.0)}}, "plausible"),
+        ({"controller": 3}, "controller"),
+        ({"controller": SmallPid(period=0.0)}, "period"),
+        ({"most_missed": -1}, "most_missed"),
+        ({"duration": 0.005}, "duration"),
+    ],
+)
+def test_bad_input_is_named(rig, change, word):
+    clock = VirtualClock()
+    options = {"controller": SmallPid(period=0.01), **change}
+    with pytest.raises(ParameterError, match=word):
+        run_live(SimulatedDevice(rig, clock), options.pop("controller"), LIFT, clock=clock, **options)
+    with pytest.raises(ParameterError, match="2 valves"):
+        SimulatedDevice(pamrs.rigs.named("antagonistic_joint"), clock)
+    for wrong in ({"dropouts": 2.0}, {"faults": ("smoke",)}):
+        with pytest.raises(ParameterError, match=next(iter(wrong))):
+            SimulatedDevice(rig, clock, **wrong)
+    with pytest.raises(ParameterError, match="jitter"):
+        VirtualClock(-1.0)
+
+
+def test_a_channel_that_goes_is_a_missed_reading(rig):
+    class Loses(SimulatedDevice):
+        def read(self):
+            reading = super().read()
+            return {"muscle_pressure": reading["muscle_pressure"]} if self.clock.now() > 0.5 else reading
+
+    clock = VirtualClock()
+    run = run_live(Loses(rig, clock), SmallPid(period=0.01), LIFT, clock=clock)
+    assert (run.reason, run.missed) == ("lost_sensor", 6)

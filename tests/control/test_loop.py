@@ -1,0 +1,233 @@
+"""A closed loop is the simulator with a controller: period, hold, sensors, restart."""
+
+import copy
+import math
+
+import numpy as np
+import pytest
+
+import pamrs
+from pamrs.control import Controller, Sensors, closed_loop, sweep
+from pamrs.control.trajectories import degrees, lift_hold_return, step
+from pamrs.errors import ParameterError
+from tests.control.helpers import SmallPid
+
+LIFT = lift_hold_return(*degrees(15, 60), ramp=2.0, hold=1.0, duration=8.0)
+
+
+@pytest.fixture(scope="module")
+def rig():
+    return pamrs.rigs.shoulder()
+
+
+class Listening(SmallPid):
+    """Keeps what it was told and answered."""
+
+    def reset(self):
+        super().reset()
+        self.heard = []
+
+    def update(self, time, measurement, reference):
+        command = super().update(time, measurement, reference)
+        self.heard.append((time, dict(measurement), reference, command))
+        return command
+
+
+def test_the_command_is_held_from_one_sample_of_the_controller_to_the_next(rig):
+    controller = Listening(period=0.008)
+    run = closed_loop(rig, controller, LIFT, 1.0, sample_time=0.001)
+    assert run.time.size == 1001
+    assert len(controller.heard) == 125
+    for k, (time, sample, reference, command) in enumerate(controller.heard):
+        assert time == pytest.approx(0.008 * k)
+        assert (run.command[8 * k : 8 * k + 8] == command).all()
+        assert reference == LIFT(time)
+        assert sample.pop("time") == pytest.approx(time)
+        for name, value in sample.items():
+            assert run.channels[name][8 * k] == value
+    # the plant under these commands, without a controller, is the same to the last bit
+    alone = pamrs.simulate(rig, run.command, sample_time=0.001)
+    for name, values in run.channels.items():
+        assert (alone[name] == values).all()
+    assert run.reference.angle == pytest.approx(LIFT(run.time).angle)
+
+
+def test_it_follows_and_its_metrics_are_those_of_its_rows(rig):
+    run = closed_loop(rig, SmallPid(), lift_hold_return(*degrees(15, 60)))
+    found = run.metrics()
+    assert found.rms < math.radians(8)
+    assert abs(found.phases["hold"]["final"]) < math.radians(4)
+    assert set(found.phases) == {"lift", "hold", "return", "rest"}
+    assert found.squared_error == pytest.approx(np.sum(run.error**2) * 1e-3, rel=1e-2)
+    slower = closed_loop(rig, SmallPid(kp=1.0, ki=0.5), run.trajectory).metrics()
+    assert slower.lag > found.lag > 0.1
+
+
+def test_a_restarted_loop_is_the_whole_one(rig):
+    whole = closed_loop(rig, SmallPid(), LIFT, 3.0, sample_time=0.005)
+    simulator, controller = pamrs.Simulator(rig, sample_time=0.005), SmallPid()
+    first = closed_loop(simulator, controller, LIFT, 1.5)
+    other = SmallPid()
+    other.restore(controller.state)
+    second = closed_loop(simulator, other, LIFT, 1.5, start=1.5, reset=False)
+    assert (np.concatenate([first.angle, second.angle[1:]]) == whole.angle).all()
+    assert (np.concatenate([first.command[:-1], second.command]) == whole.command).all()
+
+
+def test_a_restarted_loop_with_noise_and_delay_is_the_whole_one(rig):
+    sensors = Sensors(noise={"joint_angle": 2e-3}, delay=0.02, seed=4)
+    whole = closed_loop(rig, SmallPid(), LIFT, 3.0, sample_time=0.005, sensors=sensors)
+    simulator, controller, reader = pamrs.Simulator(rig, sample_time=0.005), SmallPid(), sensors.started(0.005)
+    first = closed_loop(simulator, controller, LIFT, 1.5, sensors=reader)
+    kept = copy.deepcopy(reader.state)
+    state = simulator.state
+    second = closed_loop(simulator, controller, LIFT, 1.5, start=1.5, reset=False, sensors=reader)
+    assert (np.concatenate([first.command[:-1], second.command]) == whole.command).all()
+    # and from the state alone, in another process so to say
+    simulator.restore(state)
+    controller, other = SmallPid(), Sensors(noise={"joint_angle": 2e-3}, delay=0.02).started(0.005)
+    controller.restore(closed_loop_state(rig, sensors))
+    other.restore(kept)
+    again = closed_loop(simulator, controller, LIFT, 1.5, start=1.5, reset=False, sensors=other)
+    assert (again.command == second.command).all()
+    for wrong in ({}, {"late": 3, "random": kept["random"]}, {**kept, "random": {}}, {**kept, "late": kept["late"] * 3}):
+        with pytest.raises(ParameterError, match="state"):
+            other.restore(wrong)
+    with pytest.raises(ParameterError, match="period"):
+        closed_loop(rig, SmallPid(period=0.01), LIFT, 0.1, sensors=reader)
+
+
+def closed_loop_state(rig, sensors):
+    """State of the controller after 1.5 s."""
+    controller = SmallPid()
+    closed_loop(rig, controller, LIFT, 1.5, sample_time=0.005, sensors=sensors)
+    return controller.state
+
+
+def test_sensors_delay_round_and_are_noisy_as_said(rig):
+    sensors = Sensors(noise={"joint_angle": 2e-3}, resolution={"muscle_pressure": 5e3}, delay=0.02, seed=4)
+    controller = Listening()
+    run = closed_loop(rig, controller, LIFT, 2.0, sample_time=0.005, sensors=sensors)
+    told = np.array([h[1]["joint_angle"] for h in controller.heard])
+    true = run.angle[np.maximum(np.arange(told.size) - 4, 0)]
+    noise = told - true
+    assert noise.std() == pytest.approx(2e-3, rel=0.15)
+    assert abs(noise.mean()) < 5e-4
+    pressure = np.array([h[1]["muscle_pressure"] for h in controller.heard])
+    truth = run.channels["muscle_pressure"][np.maximum(np.arange(told.size) - 4, 0)]
+    assert np.abs(pressure - truth).max() <= 2.5e3 + 1e-6
+    assert pressure / 5e3 == pytest.approx(np.round(pressure / 5e3))
+    again = closed_loop(rig, Listening(), LIFT, 2.0, sample_time=0.005, sensors=sensors)
+    assert (again.command == run.command).all()
+    other = closed_loop(rig, Listening(), LIFT, 2.0, sample_time=0.005, sensors=Sensors(noise={"joint_angle": 2e-3}, seed=5))
+    assert (other.command != run.command).any()
+
+
+def test_a_regulator_and_named_blocks_are_driven_by_name():
+    rig = pamrs.rigs.named("antagonistic_joint")
+    inputs = [f"valve_command.{name}" for name in rig.tables("valve")]
+
+    class Still(Controller):
+        period = 0.005
+        state = {}  # noqa: RUF012
+
+        def reset(self):
+            pass
+
+        def restore(self, state):
+            pass
+
+        def update(self, time, measurement, reference):
+            return 5.5
+
+    with pytest.raises(ParameterError, match="measured"):
+        closed_loop(rig, Still(), step(0.0, 0.1), 0.1, actuation=lambda u: {})
+    with pytest.raises(ParameterError, match="actuation"):
+        closed_loop(rig, Still(), step(0.0, 0.1), 0.1)
+    named = {name: 5.5 if k == 0 else 4.5 for k, name in enumerate(inputs)}
+
+    def split_up(command):
+        return {"valve_command": {name.partition(".")[2]: command if k == 0 else 10.0 - command for k, name in enumerate(inputs)}}
+
+    measured = {"joint_angle": "joint_angle.elbow"}
+    run = closed_loop(rig, Still(), step(0.0, 0.1), 0.5, actuation=split_up, measured=measured)
+    split = {name.partition(".")[2]: np.full(501, value) for name, value in named.items()}
+    alone = pamrs.simulate(rig, split, sample_time=0.001)
+    assert (run.angle == alone["joint_angle.elbow"]).all()
+    assert np.ptp(run.angle) > 0.01
+    # a sweep names them as well
+    many = sweep(
+        rig, Still(), step(0.0, 0.1), 0.5, n=2, actuation=split_up, measured=measured, channels=["joint_angle.elbow"], sample_time=0.001
+    )
+    assert (many.run["joint_angle.elbow"][0] == run.angle).all()
+    assert many.largest[1] == pytest.approx(np.abs(run.error[::5]).max())
+    with pytest.raises(ParameterError, match="measured"):
+        sweep(rig, Still(), step(0.0, 0.1), 0.5, n=2, actuation=split_up)
+
+
+def test_a_table_has_a_column_for_everything(rig):
+    pytest.importorskip("pandas")
+    run = closed_loop(rig, SmallPid(), LIFT, 0.5, channels=["muscle_pressure"])
+    assert list(run.to_pandas().columns) == ["reference", "reference_rate", "command", "joint_angle", "joint_rate", "muscle_pressure"]
+
+
+@pytest.mark.parametrize(
+    ("change", "word"),
+    [
+        ({"sample_time": 0.003}, "controller.period"),
+        ({"duration": 0.0123}, "duration"),
+        ({"duration": math.nan}, "duration"),
+        ({"channels": ["pressure"]}, "channels has 'pressure'"),
+        ({"measured": {"joint_angle": "angle"}}, "measured"),
+        ({"controller": SmallPid(kp=np.ones(3))}, "command"),
+        ({"controller": SmallPid(kp=math.nan)}, "command at 0 s"),
+        ({"controller": 3}, "controller"),
+        ({"sensors": 3}, "sensors"),
+        ({"controller": SmallPid(period=0.0)}, "controller.period"),
+        ({"sensors": Sensors(delay=0.0031)}, "delay"),
+        ({"sensors": Sensors(noise={"angle": 1.0})}, "angle"),
+    ],
+)
+def test_bad_input_is_named(rig, change, word):
+    arguments = {"controller": SmallPid(), "duration": 0.5, **change}
+    with pytest.raises(ParameterError, match=word):
+        closed_loop(rig, arguments.pop("controller"), LIFT, **arguments)
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [
+        {"noise": {"joint_angle": -1.0}},
+        {"resolution": {"joint_angle": 0.0}},
+        {"delay": -1.0},
+        {"seed": -1},
+        {"noise": "a"},
+        {"noise": {"a": "b"}},
+        {"delay": "a"},
+    ],
+)
+def test_bad_sensors_are_named(bad):
+    with pytest.raises(ParameterError, match=next(iter(bad))):
+        Sensors(**bad)
+
+
+def test_degrees_for_radians_and_pressures_for_volts_are_refused():
+    rig = pamrs.rigs.shoulder()
+    with pytest.raises(ParameterError, match="goes to 60 rad.*degrees converts"):
+        closed_loop(rig, SmallPid(period=0.005), lift_hold_return(20.0, 60.0, ramp=2.0))
+
+    class Pascals(Controller):
+        period = 0.005
+        state: dict[str, float] = {}
+
+        def reset(self):
+            """Nothing to forget."""
+
+        def restore(self, state):
+            """Nothing to go on from."""
+
+        def update(self, time, measurement, reference):
+            return 2e5
+
+    with pytest.raises(ParameterError, match="answered 2e.05 V.*put it in a pamrs.control.Cascade"):
+        closed_loop(rig, Pascals(), step(0.3, 0.4, duration=0.1))

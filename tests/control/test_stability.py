@@ -1,0 +1,267 @@
+"""Linear models and stability: closed forms, and the nonlinear simulation on both sides of the boundary."""
+
+import math
+
+import numpy as np
+import pytest
+
+import pamrs
+from pamrs.control import PID, cascaded_pid, closed_loop
+from pamrs.control.linear import LinearController, LinearModel, equilibrium, linear_controller, linearise
+from pamrs.control.stability import loop_matrix, margins, spectral_radius, stable_region
+from pamrs.control.trajectories import step
+from pamrs.errors import ParameterError
+from tests.control.helpers import SmallPid
+
+ANGLE = math.radians(45)
+
+
+@pytest.fixture(scope="module")
+def rig():
+    return pamrs.rigs.shoulder()
+
+
+def arm(rig):
+    table = rig.tables("arm")[""]
+    inertia = table["inertia"] + table["payload"] * table["length"] ** 2
+    return table, inertia
+
+
+def test_equilibrium_stands_still(rig):
+    start = equilibrium(rig, ANGLE)
+    run = pamrs.simulate(rig, np.full(1001, 5.0), sample_time=0.001, initial=start)
+    assert np.ptp(run["joint_angle"]) < 1e-6
+    table, _ = arm(rig)
+    weight = (table["first_moment"] + table["payload"] * table["length"]) * table["gravity"] * math.sin(ANGLE)
+    assert run["joint_torque"][0] == pytest.approx(weight, rel=1e-8)
+
+
+def test_the_linear_rig_has_the_equations_coefficients(rig):
+    model = linearise(rig, ANGLE)
+    assert model.states == ("muscle_pressure", "joint_angle", "joint_rate")
+    table, inertia = arm(rig)
+    p, th, w = range(3)
+    # friction: viscous, and Coulomb's slope at rest
+    assert model.a[w, w] == pytest.approx(-(table["viscous"] + table["coulomb"] / table["coulomb_speed"]) / inertia, rel=1e-6)
+    assert model.a[th] == pytest.approx([0.0, 0.0, 1.0], abs=1e-6)
+    # torque over pressure and angle, from the channels of held states
+    point = equilibrium(rig, ANGLE)
+
+    def torque(**change):
+        moved = {name: value + change.get(name, 0.0) for name, value in point.items()}
+        return pamrs.Simulator(rig, sample_time=0.001, initial=moved).observe()["joint_torque"]
+
+    by_pressure = (torque(muscle_pressure=50.0) - torque(muscle_pressure=-50.0)) / 100.0
+    by_angle = (torque(joint_angle=1e-5) - torque(joint_angle=-1e-5)) / 2e-5
+    weight = (table["first_moment"] + table["payload"] * table["length"]) * table["gravity"] * math.cos(ANGLE)
+    assert model.a[w, p] == pytest.approx(by_pressure / inertia, rel=1e-6)
+    assert model.a[w, th] == pytest.approx((by_angle - weight) / inertia, rel=1e-5)
+    # filling is faster than venting: the mass flow goes with the upstream pressure, both choked or nearly
+    fill, vent = (linearise(rig, ANGLE, side=side).b[p, 0] for side in ("fill", "vent"))
+    assert fill > 2 * vent > 0.0
+    assert model.b[p, 0] == pytest.approx(0.5 * (fill + vent), rel=1e-5)
+    gas, valve, chamber = (rig.tables(b)[""] for b in ("gas", "valve", "chamber"))
+    area = valve["discharge_area_max"] * 0.2 / (0.25 * valve["half_range"])  # the table's first slope
+    r, t = gas["gas_constant"], gas["temperature"]
+    choked = math.sqrt(1.4 / (r * t)) * (2 / 2.4) ** (2.4 / 0.8)
+    flow = area * choked * (13.8e5 + 101325.0)
+    volume = model.point["air_volume"]
+    assert fill == pytest.approx(chamber["alpha_in"] * r * t * flow / volume, rel=1e-4)
+    driven = model.driven_by("muscle_pressure")
+    assert driven.b[:, 0] == pytest.approx([0.0, model.a[w, p]], abs=1e-9)
+    assert np.linalg.eigvals(driven.a).real.max() < 0.0
+
+
+def test_the_linear_rig_moves_as_the_core_does(rig):
+    model = linearise(rig, ANGLE, side="fill")
+    time = np.arange(301) * 1e-3
+    command = 5.0 + 2e-3 * np.sin(30.0 * time) ** 2
+    run = pamrs.simulate(rig, command, sample_time=1e-3, initial=equilibrium(rig, ANGLE))
+    phi, gamma = model.sampled(1e-3)
+    x = np.zeros((301, 3))
+    for k in range(300):
+        x[k + 1] = phi @ x[k] + gamma[:, 0] * (command[k] - 5.0)
+    for k, name in enumerate(model.states):
+        moved = run[name] - run[name][0]
+        assert moved == pytest.approx(x[:, k], abs=2e-3 * np.abs(x[:, k]).max()), name
+
+
+def test_python_control_gets_the_names(rig):
+    control = pytest.importorskip("control")
+    system = linearise(rig, ANGLE).system()
+    assert isinstance(system, control.StateSpace)
+    assert system.state_labels == ["muscle_pressure", "joint_angle", "joint_rate"]
+    assert system.input_labels == ["valve_command"]
+
+
+def integrator(gain):
+    one = np.ones((1, 1))
+    return LinearModel(0.0 * one, gain * one, one, ("joint_angle",), ("valve_command",), ("joint_angle",))
+
+
+def proportional(gain, period):
+    none = np.zeros((0, 0))
+    return LinearController(none, np.zeros((0, 1)), np.zeros((1, 0)), np.array([[-gain]]), ("joint_angle",), period)
+
+
+@pytest.mark.parametrize("gain", [0.5, 3.0, 19.9, 20.1])
+def test_a_sampled_integrator_is_stable_up_to_two_over_its_period(gain):
+    pytest.importorskip("control")
+    # x+ = (1 - K T) x: the radius is |1 - K T|, the gain margin 2/(K T)
+    found = margins(integrator(1.0), proportional(gain, 0.1))
+    assert found.radius == pytest.approx(abs(1 - 0.1 * gain))
+    assert found.stable == (gain < 20.0)
+    assert found.gain == pytest.approx(20.0 / gain, rel=1e-3)
+    if gain < 19.0:  # |L| = K T/(2 sin(w T/2)) = 1, its phase -90 deg - w T/2
+        crossing = 2 / 0.1 * math.asin(gain * 0.1 / 2)
+        assert found.phase_frequency == pytest.approx(crossing, rel=1e-3)
+        assert found.phase == pytest.approx(math.pi / 2 - crossing * 0.05, rel=1e-3)
+
+
+def test_an_unstable_loop_has_no_phase_or_delay_to_spare():
+    pytest.importorskip("control")
+    model, law = integrator(1.0), proportional(3.0, 0.1)
+    spare = margins(model, law).delay
+    stable, unstable = (margins(model, law, delay=delay) for delay in (0.9 * spare, spare + 0.05))
+    assert stable.stable
+    assert stable.phase > 0.0
+    assert 0.0 < stable.delay < 0.2 * spare
+    assert str(stable).startswith("stable (largest eigenvalue 0.")
+    assert "delay to spare" in str(stable)
+    assert not unstable.stable
+    assert unstable.phase is None
+    assert unstable.delay is None
+    assert unstable.gain < 1.0
+    assert str(unstable).startswith("unstable (largest eigenvalue 1.")
+    assert "no margin of phase or delay; nearest boundary: all gains times 0." in str(unstable)
+    # a gain so small that no gain of one is crossed
+    assert "None" not in str(margins(integrator(1.0), proportional(1e-9, 0.1)))
+
+
+def test_margins_of_an_unstable_arm_are_not_positive(rig):
+    pytest.importorskip("control")
+    found = margins(linearise(rig, ANGLE, friction="moving"), PID(1.4, 2.5, period=0.005))
+    assert (found.stable, found.phase, found.delay) == (False, None, None)
+
+
+@pytest.mark.parametrize("delay", [0.03, 0.1, 0.14, 0.25])
+def test_delay_of_part_of_a_period_is_exact(delay):
+    model, law = integrator(1.0), proportional(3.0, 0.1)
+    matrix = loop_matrix(model, law, delay=delay)
+    # the same loop, simulated finely: x' = u(t - delay), u held over each period
+    x, held, fine = 1.0, [], 10_000
+    state = np.zeros(matrix.shape[0])
+    state[0] = 1.0
+    dt = 0.1 / fine
+    late = round(delay / dt)
+    for k in range(12):
+        held.append(-3.0 * x)
+        starts = [late + j * fine for j in range(k + 1)]
+        for j, u in enumerate(held):
+            begin, end = starts[j], starts[j] + fine
+            overlap = max(0, min(end, (k + 1) * fine) - max(begin, k * fine))
+            x += u * overlap * dt
+        state = matrix @ state
+        assert state[0] == pytest.approx(x, abs=1e-9)
+
+
+def test_delay_margin_is_where_delay_makes_it_unstable():
+    pytest.importorskip("control")
+    model, law = integrator(1.0), proportional(3.0, 0.01)
+    spare = margins(model, law).delay
+    assert spectral_radius(model, law, delay=0.98 * spare) < 1.0 < spectral_radius(model, law, delay=1.02 * spare)
+
+
+def test_a_controller_made_linear_answers_as_itself(rig):
+    point = linearise(rig, ANGLE).point
+    controller = PID(1.4, 2.5, 0.3, period=0.01, output_filter=0.05, rate_filter=0.02)
+    linear = linear_controller(controller, point)
+    assert linear.command == pytest.approx(5.0)
+    rng = np.random.default_rng(1)
+    from pamrs.control import Reference
+
+    reference = Reference(point["joint_angle"])
+    for k in range(3):
+        controller.update(0.01 * k, point, reference)
+    x = np.zeros(linear.a.shape[0])
+    for k in range(3, 60):
+        moved = rng.normal(0.0, 1e-2)
+        y = np.array([moved if name == "joint_angle" else 0.0 for name in linear.inputs])
+        answer = controller.update(0.01 * k, {**point, "joint_angle": point["joint_angle"] + moved}, reference)
+        assert answer - 5.0 == pytest.approx((linear.c @ x + linear.d @ y)[0], abs=1e-7)
+        x = linear.a @ x + linear.b @ y
+
+
+def test_a_cascade_is_made_linear_where_it_holds_the_arm(rig):
+    point = linearise(rig, ANGLE).point
+    with pytest.raises(ParameterError, match="at a limit"):
+        linear_controller(cascaded_pid(1.2e6, period=0.005), point)
+    controller = cascaded_pid(1.2e6, period=0.005)
+    closed_loop(rig, controller, step(ANGLE, ANGLE), 25.0, initial=equilibrium(rig, ANGLE))
+    linear = linear_controller(controller, point, state=controller.state)
+    assert linear.command == pytest.approx(5.0, abs=0.05)
+    assert linear.inputs == ("joint_angle", "joint_rate", "muscle_pressure")
+    models = [linearise(rig, ANGLE, side=side) for side in ("fill", "vent")]
+    assert all(spectral_radius(model, linear) < 1.0 for model in models)
+    # the inner loop alone is proportional at high frequency: volts per pascal, low-passed
+    pressure = linear.d[0, 2] + sum((linear.c @ np.linalg.matrix_power(linear.a, k) @ linear.b)[0, 2] for k in range(8))
+    assert pressure == pytest.approx(-2e-4 * (1 + 8 * 0.005), rel=0.05)
+
+
+def test_both_sides_of_the_boundary_are_what_the_arm_does(rig):
+    # proportional control of a sampled arm: the boundary in the gain, then the arm itself a little inside and outside
+    def made(kp):
+        return SmallPid(kp=kp, ki=0.0, kd=0.1, period=0.01)
+
+    loaded = rig.with_parameters({"arm.payload": 15.0})
+    models = [linearise(loaded, ANGLE, side=side) for side in ("fill", "vent")]
+
+    def radius(kp):
+        linear = linear_controller(made(kp), models[0].point)
+        return [spectral_radius(model, linear) for model in models]
+
+    from scipy.optimize import brentq
+
+    edges = [brentq(lambda kp, k=k: radius(kp)[k] - 1.0, 1.0, 300.0) for k in range(2)]
+    inside, outside = 0.8 * min(edges), 1.25 * max(edges)
+    start = equilibrium(loaded, ANGLE)
+    start["joint_angle"] += 1e-5
+    for kp, grows in ((inside, False), (outside, True)):
+        run = closed_loop(loaded, made(kp), step(ANGLE, ANGLE, duration=4.0), initial=start)
+        early, late = (np.abs(run.error[(run.time >= a) & (run.time < a + 0.5)]).max() for a in (0.0, 3.0))
+        assert (late > 3 * early) == grows, (kp, early, late)
+        assert (late < 0.5 * early) != grows, (kp, early, late)
+
+
+def test_region_of_stable_gains_over_payload(rig):
+    axes = {"kp": [0.5, 2.0, 60.0, 400.0], "kd": [0.0, 0.1]}
+    region = stable_region(rig, lambda kp, kd: SmallPid(kp, 0.0, kd, period=0.01), axes, payloads=[2.0, 15.0], angle=ANGLE, delay=0.01)
+    assert region.radius.shape == (2, 4, 2)
+    assert region.stable[:, 0].all()
+    assert not region.stable[:, 3].any()
+    assert (np.diff(region.radius[:, :, 0], axis=1)[:, 1:] > 0).all()  # more gain, less stable
+    assert (region.growth < 0).tolist() == region.stable.tolist()
+    one = linear_controller(SmallPid(2.0, 0.0, 0.1, period=0.01), linearise(rig, ANGLE).point)
+    loaded = rig.with_parameters({"arm.payload": 15.0})
+    both = [spectral_radius(linearise(loaded, ANGLE, side=side), one, delay=0.01) for side in ("fill", "vent")]
+    assert region.radius[1, 1, 1] == pytest.approx(max(both))
+
+
+@pytest.mark.parametrize(
+    ("call", "word"),
+    [
+        (lambda rig: linearise(rig, 0.1), "angle"),
+        (lambda rig: linearise(rig, math.nan), "angle"),
+        (lambda rig: linearise(rig, ANGLE, side="left"), "side"),
+        (lambda rig: linearise(rig.with_parameters({"arm.payload": 500.0}), 1.5), "no pressure"),
+        (lambda rig: linearise(pamrs.rigs.named("antagonistic_joint"), 0.1), "chamber"),
+        (lambda rig: linearise(rig, ANGLE).driven_by("pressure"), "state"),
+        (lambda rig: linearise(rig, ANGLE).sampled(0.0), "period"),
+        (lambda rig: loop_matrix(integrator(1.0), proportional(1.0, 0.1), delay=-1.0), "delay"),
+        (lambda rig: stable_region(rig, SmallPid, {"kp": []}, payloads=[1.0], angle=ANGLE), "kp"),
+        (lambda rig: stable_region(rig, SmallPid, {"kp": [1.0]}, payloads=[1.0], angle=ANGLE, sides=("up",)), "sides"),
+    ],
+)
+def test_bad_input_is_named(rig, call, word):
+    with pytest.raises(ParameterError, match=word):
+        call(rig)

@@ -1,0 +1,531 @@
+"""Joint design: the objective, the searches, the outer loop, the front, the published joints."""
+
+import math
+import random
+import subprocess
+import sys
+import tomllib
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from pamrs import Joint, Muscle, ParameterError, library
+from pamrs.design import (
+    LENGTHS,
+    METHODS,
+    Genetic,
+    JointDesign,
+    JointProblem,
+    compare_methods,
+    least_pressure,
+    minimum_pressure,
+    optimise,
+    pareto_front,
+    search,
+)
+from pamrs.design._genetic import child, decode, redraw_one
+from pamrs.design._problem import _areas
+from pamrs.reproduce.joints import CASES, facts_of_geometry
+
+INCH = 0.0254
+GOOD = [0.0145, 0.0204, 0.0282, -0.0085]
+TABLE = np.array([1.00, 1.08, 1.08, 0.19]) * INCH
+
+
+def problem(**changes):
+    values = {
+        "muscle": library.pam_a_1in(),
+        "count": 6,
+        "torque": 1000.0,
+        "min_angle": math.radians(15.0),
+        "max_angle": math.radians(120.0),
+        "pressure": 1.6e6,
+    }
+    return JointProblem(**{**values, **changes})
+
+
+def ball(points):
+    """Smallest, 1.0, at (0.3, 0.7, 0.3, 0.7)."""
+    return 1.0 + np.sum((points - np.array([0.3, 0.7, 0.3, 0.7])) ** 2, axis=1)
+
+
+def run(method, seed=0, **options):
+    return search(ball, np.zeros(4), np.ones(4), method=method, seed=seed, **options)
+
+
+# --------------------------------------------------------------------- objective
+
+
+@pytest.mark.parametrize("torque", [700.0, 1000.0, 1300.0])
+@pytest.mark.parametrize("lengths", [GOOD, [0.03, 0.03, 0.02, 0.0]])
+def test_objective_is_the_slow_integral(torque, lengths):
+    task = problem(torque=torque, points=421)
+    joint = Joint(rest_angle=task.min_angle, **dict(zip(LENGTHS, lengths, strict=True)))
+
+    def gap(angle, sign):
+        return max(sign * (float(joint.torque(task.muscle, task.pressure, angle, count=6)) - torque), 0.0)
+
+    below, above = (quad(gap, task.min_angle, task.max_angle, (sign,), limit=400)[0] for sign in (-1.0, 1.0))
+    scores = task.evaluate(lengths)
+    assert scores.area_below[0] == pytest.approx(below, abs=2e-5 * task.required_area)
+    assert scores.area_above[0] == pytest.approx(above, abs=2e-5 * task.required_area)
+    stroke = joint.shortening(task.angles).max()
+    penalty = 0.0 if stroke <= 0.15 * 0.276 else 1e4
+    assert scores.fitness[0] == pytest.approx(below + 0.01 * above + penalty, abs=1e-4 * task.required_area)
+
+
+def test_areas_are_cut_where_the_line_crosses():
+    below, above = _areas(np.array([0.0, 1.0, 3.0]), np.array([[-1.0, 3.0, 3.0], [1.0, -1.0, 0.0], [0.0, 0.0, 0.0]]))
+    assert below == pytest.approx([0.125, 0.25 + 1.0, 0.0])
+    assert above == pytest.approx([1.125 + 6.0, 0.25, 0.0])
+
+
+def test_a_dead_centre_ends_the_range():
+    task = problem()
+    dead = [0.02, 0.0, 0.03, -0.02]
+    arm = task.joint(dead).moment_arm(task.angles)
+    assert arm[0] < 0.0 < arm[-1]
+    assert task.evaluate(dead).max_angle[0] == task.min_angle
+    assert not task.evaluate(dead).available[0]
+
+
+def test_the_penalty_begins_at_the_largest_stroke():
+    task = problem()
+    stroke = problem().joint(GOOD).shortening(task.max_angle)
+    contraction = float(stroke) / 0.276
+    inside, outside = (task.replace(max_contraction=contraction * factor).evaluate(GOOD) for factor in (1.0001, 0.9999))
+    assert inside.available[0]
+    assert inside.max_angle[0] == pytest.approx(task.max_angle)
+    assert not outside.available[0]
+    assert outside.max_angle[0] < task.max_angle
+    assert outside.fitness[0] - inside.fitness[0] == pytest.approx(1e4, rel=1e-9)
+
+
+def test_many_designs_at_once_are_the_same_as_one_by_one():
+    task = problem(points=31)
+    designs = task.lower + (task.upper - task.lower) * np.random.default_rng(1).random((40, 4))
+    together = task.evaluate(designs)
+    for row, design in enumerate(designs):
+        alone = task.evaluate(design)
+        assert alone.fitness[0] == pytest.approx(together.fitness[row], rel=1e-12)
+        assert alone.torque[0] == pytest.approx(together.torque[row], rel=1e-12)
+
+
+def test_designs_out_of_reach_are_penalised_and_finite():
+    task = problem(max_angle=math.radians(170.0))
+    short = np.array([0.001, 0.02, 0.02, 0.08])
+    with pytest.raises(ParameterError, match="folded"):
+        task.joint(short)
+    designs = np.array([short, [0.0127, 0.0635, 0.0127, 0.0], [0.5, 0.5, 0.5, 0.5], [0.05, 0.0, 0.05, 0.05]])
+    scores = task.evaluate(designs)
+    for values in (scores.fitness, scores.area_below, scores.area_above, scores.torque, scores.max_angle):
+        assert np.all(np.isfinite(values))
+    assert np.all(scores.fitness >= 1e4)
+    assert not np.any(scores.available)
+    assert np.all(task.needed_pressure(designs) >= 1e10)
+    assert np.all(np.isfinite(task.size(designs)))
+    folding = {"upper_axial": (0.001, 0.003), "lower_offset": (0.04, 0.09)}
+    assert not JointDesign.of(task, short).met()
+    assert np.isfinite(optimise(task.replace(bounds=folding), "random", evaluations=60).scores.fitness[0])
+
+
+def test_a_muscle_that_cannot_pull_is_slack():
+    task = problem(pressure=5e3)
+    scores = task.evaluate(GOOD)
+    assert float(task.muscle.force(5e3, scores.contraction[0, -1])) < 0.0
+    assert scores.torque[0, -1] == 0.0
+    assert scores.area_below[0] <= task.required_area
+
+
+def test_needed_pressure_is_where_the_torque_just_suffices():
+    task = problem()
+    needed = float(task.needed_pressure(GOOD)[0])
+    assert task.replace(pressure=needed).evaluate(GOOD).torque.min() == pytest.approx(task.torque, rel=1e-9)
+    assert JointDesign.of(task.replace(pressure=1.001 * needed), GOOD).met(1e-9)
+    assert JointDesign.of(task, TABLE).needed_pressure is None  # beyond 15 % of stroke
+
+
+def test_met_within_a_tolerance_is_not_called_met():
+    task = problem()
+    needed = float(task.needed_pressure(GOOD)[0])
+    low = JointDesign.of(task.replace(pressure=0.99 * needed), GOOD)
+    torque = low.scores.torque[0]
+    short, angle = low.shortfall
+    assert low.met()
+    assert short == pytest.approx(1.0 - torque.min() / task.torque)
+    assert angle == task.angles[int(np.argmin(torque))]
+    words = (
+        f"met within 0.1 % of the work wanted; least torque {100 * short:.2g} % below the wanted one at {math.degrees(angle):.4g} deg"
+    )
+    assert words in low.summary()
+    assert "the requirement is met" not in low.summary()
+    found = low.to_dict()
+    assert [found[name] for name in ("met", "area_tolerance", "shortfall", "shortfall_angle")] == [True, 1e-3, short, angle]
+    enough = JointDesign.of(task.replace(pressure=needed), GOOD)
+    assert enough.shortfall[0] == 0.0
+    assert "the requirement is met" in enough.summary()
+
+
+def test_a_design_keeps_its_tolerance():
+    task = problem(pressure=0.99 * float(problem().needed_pressure(GOOD)[0]))
+    strict, loose = (JointDesign(task, np.array(GOOD), area_tolerance=value) for value in (0.0, 0.05))
+    assert (strict.met(), loose.met(), strict.met(0.05)) == (False, True, True)
+    assert (strict.to_dict()["met"], loose.to_dict()["met"]) == (False, True)
+    assert "THE REQUIREMENT IS NOT MET" in strict.summary()
+    assert "met within 5 % of the work wanted" in loose.summary()
+    with pytest.raises(ParameterError, match="area_tolerance"):
+        JointDesign(task, np.array(GOOD), area_tolerance=-1.0)
+
+
+def test_no_joint_gets_more_work_out_of_a_stroke_than_the_muscle_gives():
+    task = problem()
+    designs = task.lower + (task.upper - task.lower) * np.random.default_rng(2).random((500, 4))
+    needed = task.needed_pressure(designs)
+    assert np.sum(needed < 1e10) > 20
+    assert np.all(needed >= task.least_possible_pressure())
+    # the area below the threshold is at least the work that is missing
+    low = task.replace(pressure=1.2e6)
+    stroke = np.linspace(0.0, low.max_stroke, 4001)
+    work = 6 * np.trapezoid(low.muscle.force(low.pressure, stroke / 0.276), stroke)
+    scores = low.evaluate(designs)
+    assert work < low.required_area
+    assert scores.area_below[scores.available].min() >= low.required_area - work - 1e-3
+    # a joint whose arm fits the muscle at every angle needs just this: the work of the muscle is the work wanted
+    force = 6 * task.muscle.force(task.least_possible_pressure(), stroke / 0.276)
+    assert np.trapezoid(force, stroke) == pytest.approx(task.required_area, rel=1e-6)
+
+
+def test_the_published_joint_law_gives_less_torque():
+    assert np.all(problem(kind="published").evaluate(GOOD).torque < problem().evaluate(GOOD).torque)
+
+
+@pytest.mark.parametrize(
+    ("changes", "word"),
+    [
+        ({"count": 0}, "count"),
+        ({"count": 2.5}, "count"),
+        ({"points": 2}, "points"),
+        ({"torque": -1.0}, "torque"),
+        ({"torque": math.nan}, "torque"),
+        ({"pressure": 0.0}, "pressure"),
+        ({"max_contraction": math.inf}, "max_contraction"),
+        ({"penalty": -1.0}, "penalty"),
+        ({"min_angle": 2.5}, "min_angle"),
+        ({"max_angle": math.nan}, "max_angle"),
+        ({"kind": "pulley"}, "kind"),
+        ({"bounds": {"lu": (0.01, 0.02)}}, "'lu'"),
+        ({"bounds": {"upper_offset": (0.02, 0.01)}}, "upper_offset"),
+        ({"bounds": {"upper_offset": (0.02, math.nan)}}, "upper_offset"),
+        ({"bounds": {"lower_axial": (0.0, 0.01)}}, "lower_axial"),
+    ],
+)
+def test_impossible_problems_are_named(changes, word):
+    with pytest.raises(ParameterError, match=word):
+        problem(**changes)
+
+
+@pytest.mark.parametrize("designs", [[0.1, 0.2], [[math.nan, 0.1, 0.1, 0.1]], [-0.1, 0.1, 0.1, 0.1]])
+def test_impossible_designs_are_named(designs):
+    with pytest.raises(ParameterError):
+        problem().evaluate(designs)
+
+
+# ---------------------------------------------------------------------- searches
+
+
+def test_a_child_is_the_head_of_one_parent_and_the_tail_of_the_other():
+    first, second = [0] * 24, [1] * 24
+    random.seed(3)
+    cuts, starts = set(), set()
+    for _ in range(400):
+        genes = list(child(first, second))
+        changes = [index for index in range(1, 24) if genes[index] != genes[index - 1]]
+        assert len(changes) == 1
+        cuts.add(changes[0])
+        starts.add(genes[0])
+    assert cuts == set(range(1, 24))
+    assert starts == {0, 1}
+    assert (first, second) == ([0] * 24, [1] * 24)
+
+
+def test_mutation_changes_one_variable_only():
+    random.seed(4)
+    changed = 0
+    for _ in range(400):
+        genes = redraw_one([0] * 48, 12, 0.25)
+        touched = {index // 12 for index, gene in enumerate(genes) if gene}
+        assert len(touched) <= 1
+        changed += bool(touched)
+    assert 70 <= changed <= 130
+    assert redraw_one([0] * 48, 12, 0.0) == [0] * 48
+
+
+def test_genes_are_binary_numbers():
+    assert decode([0, 0, 0, 1, 1, 1, 1, 0, 0], 3) == pytest.approx([0.0, 1.0, 4.0 / 7.0])
+
+
+def test_the_published_numbers_of_designs():
+    batches = []
+
+    def counted(points):
+        batches.append(points.copy())
+        return ball(points)
+
+    found = search(counted, np.zeros(4), np.ones(4), genetic=Genetic(tolerance=None))
+    assert [len(batch) for batch in batches] == [20] + [18] * 100
+    assert found.evaluations == 1820
+    assert found.history.evaluations.tolist() == [20 + 18 * k for k in range(101)]
+    assert not found.converged
+
+
+def single_cut(point, first, second):
+    """Whether a point is the head of one and the tail of the other."""
+    pairs = ((first, second), (second, first))
+    return any(np.array_equal(point, np.concatenate([a[:cut], b[cut:]])) for a, b in pairs for cut in range(1, len(point)))
+
+
+@pytest.mark.parametrize("order", [1.0, -1.0])
+def test_every_child_comes_from_the_two_best_of_elites_and_children(order):
+    batches = []
+
+    def by_order(points):  # later ones are worse, or better
+        batches.append(points.copy())
+        done = sum(map(len, batches))
+        return order * np.arange(done - len(points), done, dtype=float)
+
+    settings = Genetic(mutation=0.0, tolerance=None, bits=1)  # one digit a coordinate: cuts can be seen
+    search(by_order, np.zeros(24), np.ones(24), evaluations=20 + 18 * 8, genetic=settings)
+    for before, batch in zip(batches[:-1], batches[1:], strict=True):
+        elites = batches[0][:2] if order > 0.0 else before[-2:]
+        assert all(single_cut(point, *elites) for point in batch)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_search_repeats_by_its_seed_and_never_loses_the_best(method):
+    random.seed(5)
+    np.random.seed(5)  # noqa: NPY002
+    expected = random.getstate(), np.random.get_state()[1].tolist()  # noqa: NPY002
+    one, same, other = (run(method, seed, evaluations=400) for seed in (7, 7, 8))
+    assert (random.getstate(), np.random.get_state()[1].tolist()) == expected  # noqa: NPY002
+    assert np.array_equal(one.history.points, same.history.points)
+    assert np.array_equal(one.history.best, same.history.best)
+    assert not np.array_equal(one.history.points, other.history.points)
+    assert np.all(np.diff(one.history.best) <= 0.0)
+    assert one.value == one.history.best[-1] == ball(one.point[None])[0]
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("evaluations", [20, 333, 1000])
+def test_every_method_makes_exactly_the_evaluations_it_may(method, evaluations):
+    calls = []
+
+    def counted(points):
+        calls.append(len(points))
+        return ball(points)
+
+    found = search(counted, np.zeros(4), np.ones(4), method=method, evaluations=evaluations, genetic=Genetic(tolerance=None))
+    assert sum(calls) == found.evaluations == found.history.evaluations[-1] == evaluations
+
+
+@pytest.mark.parametrize(("method", "within"), [("ga", 0.05), ("de", 1e-4), ("cma", 1e-6), ("random", 0.1)])
+def test_searches_find_a_known_optimum(method, within):
+    found = run(method, 1, genetic=Genetic(tolerance=None))
+    assert found.value == pytest.approx(1.0, abs=within)
+    assert np.all(np.abs(found.point - [0.3, 0.7, 0.3, 0.7]) < 2.0 * math.sqrt(within))
+
+
+def test_the_genetic_algorithm_stops_when_it_has_converged():
+    found = run("ga", evaluations=18200, genetic=Genetic(stall=10))
+    assert found.converged
+    assert found.evaluations < 18200
+    assert found.history.best[-11] - found.history.best[-1] <= 1e-6 * found.history.best[-11]
+
+
+@pytest.mark.parametrize(
+    ("options", "word"),
+    [({"method": "newton"}, "method"), ({"evaluations": 19}, "evaluations"), ({"seed": -1}, "seed")],
+)
+def test_impossible_searches_are_named(options, word):
+    with pytest.raises(ParameterError, match=word):
+        search(ball, np.zeros(4), np.ones(4), **options)
+
+
+@pytest.mark.parametrize(
+    "options", [{"elites": 1}, {"population": 2}, {"bits": 0}, {"mutation": 1.5}, {"stall": 0}, {"tolerance": -1.0}]
+)
+def test_impossible_settings_are_named(options):
+    with pytest.raises(ParameterError, match=next(iter(options))):
+        Genetic(**options)
+
+
+def test_a_joint_with_one_free_length_is_found_by_every_method():
+    fixed = {name: (value, value) for name, value in zip(LENGTHS, GOOD, strict=True)}
+    task = problem(torque=900.0, points=36, bounds={**fixed, "lower_axial": (0.015, 0.045)})
+    grid = np.array([[GOOD[0], GOOD[1], value, GOOD[3]] for value in np.linspace(0.015, 0.045, 3001)])
+    fitness = task.evaluate(grid).fitness
+    best = grid[int(np.argmin(fitness)), 2]
+    for method, within in (("ga", 5e-4), ("de", 2e-5), ("cma", 2e-5)):
+        found = optimise(task, method, evaluations=600, seed=2)
+        assert found.lengths[[0, 1, 3]] == pytest.approx([GOOD[0], GOOD[1], GOOD[3]])
+        assert found.lengths[2] == pytest.approx(best, abs=within)
+
+
+def test_a_long_tendon_on_a_constant_force_is_a_pulley():
+    # muscle ends far away, force nearly constant over a short range: torque = F (arm), arm is about the lower link's lever
+    task = problem(min_angle=math.radians(80.0), max_angle=math.radians(84.0), torque=400.0, points=11)
+    far = {"upper_axial": (2.0, 2.0), "upper_offset": (0.0, 0.0), "lower_offset": (0.0, 0.0), "lower_axial": (0.001, 0.05)}
+    task = task.replace(bounds=far)
+    found = optimise(task, "de", evaluations=300)
+    lever = task.torque / (6.0 * float(task.muscle.force(task.pressure, 0.0)))
+    assert found.lengths[2] == pytest.approx(lever, rel=0.03)
+    assert found.met(2e-3)
+
+
+def test_methods_are_compared_at_equal_evaluations():
+    table = compare_methods(problem(points=22), seeds=range(3), evaluations=200)
+    assert table.methods == METHODS
+    assert np.all(table.evaluations == 200)
+    for row, values in zip(table.rows(), table.fitness, strict=True):
+        assert row["median"] == np.median(values)
+        assert row["best"] == values.min()
+        assert row["worst"] == values.max()
+        assert row["runs"] == 3
+    assert all(name in table.table() for name in METHODS)
+    with pytest.raises(ParameterError, match="seeds"):
+        compare_methods(problem(), seeds=())
+
+
+# ---------------------------------------------------------------- pressure, size
+
+
+def test_the_outer_loop_brackets_the_smallest_pressure():
+    task = problem(points=22)
+    found = minimum_pressure(task, "de", tries=1, evaluations=600, tolerance=2e4)
+    assert found.met
+    enough = min(trial.pressure for trial in found.trials if trial.met)
+    assert found.pressure == found.design.problem.pressure == enough
+    assert max(trial.pressure for trial in found.trials if not trial.met) > enough - 2e4
+    assert found.evaluations == 600 * len(found.trials)
+    assert found.design.met()
+    strict = least_pressure(task)
+    assert 0.97 * strict.problem.pressure < found.pressure < 1.02 * strict.problem.pressure
+    assert found.pressure > 0.99 * task.least_possible_pressure()
+
+
+def test_the_tolerance_of_the_outer_loop_is_kept_and_its_bound_holds():
+    task = problem(points=22)
+    found = minimum_pressure(task, "de", tries=1, evaluations=400, tolerance=2e4, area_tolerance=0.2)
+    assert found.design.area_tolerance == found.to_dict()["area_tolerance"] == 0.2
+    assert found.design.met()
+    assert found.design.to_dict()["met"]
+    assert not found.design.met(1e-3)
+    assert "met within 20 % of the work wanted" in found.design.summary()
+    bound = found.to_dict()["least_possible_pressure"]
+    assert bound == pytest.approx(task.least_possible_pressure(0.2), rel=1e-12)
+    assert bound <= found.pressure < task.least_possible_pressure()
+    assert f"less than {bound / 1e5:.4g} bar" in found.summary()
+    assert "the smallest at which this search succeeded" in found.summary()
+
+
+def test_more_torque_needs_more_pressure():
+    options = {"tries": 1, "evaluations": 400, "tolerance": 2e4}
+    pressures = [minimum_pressure(problem(points=22, torque=t), "de", **options).pressure for t in (600.0, 900.0, 1200.0)]
+    assert pressures[0] < pressures[1] < pressures[2]
+    bounds = [problem(torque=t).least_possible_pressure() for t in (600.0, 900.0, 1200.0)]
+    assert all(low < high for low, high in zip(bounds, pressures, strict=True))
+
+
+def test_an_impossible_requirement_says_so():
+    task = problem(points=22, torque=1e5)
+    found = minimum_pressure(task, tries=1, evaluations=200, highest=3e6)
+    assert not found.met
+    assert found.pressure is None
+    assert max(trial.pressure for trial in found.trials) == 3e6
+    assert "NO PRESSURE" in found.summary()
+    assert "THE REQUIREMENT IS NOT MET" in found.design.summary()
+    assert found.design.scores.area_below[0] > 0.5 * task.required_area
+    assert found.to_dict()["pressure"] is None
+
+
+def test_bounds_that_cannot_reach_the_range_give_a_result_too():
+    far = {"lower_axial": (0.2, 0.21), "upper_axial": (0.2, 0.21)}
+    task = problem(points=22, bounds=far)
+    design = optimise(task, evaluations=100)
+    assert not design.scores.available[0]
+    assert "up to" in design.summary()
+    assert least_pressure(task, evaluations=200) is None
+    assert len(pareto_front(task, population=8, generations=2).size) == 0
+
+
+@pytest.mark.parametrize(
+    ("options", "word"), [({"tolerance": 0.0}, "tolerance"), ({"tries": 0}, "tries"), ({"highest": -1.0}, "highest")]
+)
+def test_impossible_outer_loops_are_named(options, word):
+    with pytest.raises(ParameterError, match=word):
+        minimum_pressure(problem(), **options)
+
+
+def test_no_design_of_the_front_beats_another_and_none_is_far_from_the_best():
+    task = problem(points=22)
+    front = pareto_front(task, population=60, generations=60)
+    assert len(front.size) > 20
+    assert np.all(np.diff(front.size) > 0.0)
+    assert np.all(np.diff(front.pressure) < 0.0)
+    assert task.size(front.lengths) == pytest.approx(front.size)
+    assert task.needed_pressure(front.lengths) == pytest.approx(front.pressure)
+    again = pareto_front(task, population=60, generations=60)
+    assert np.array_equal(front.lengths, again.lengths)
+    for size in (0.037, 0.045, 0.053):
+        best = least_pressure(task, largest_size=size)
+        assert best.size <= size
+        ours = float(front.pressure[front.size <= size].min())
+        assert best.problem.pressure < 1.01 * ours
+        assert ours < 1.06 * best.problem.pressure
+    with pytest.raises(ParameterError, match="population"):
+        pareto_front(task, population=6)
+
+
+def test_size_holds_both_ends_of_the_tendon():
+    task = problem()
+    stroke = task.joint(GOOD).shortening(task.angles).max()
+    assert task.size(GOOD)[0] == pytest.approx(max(math.hypot(GOOD[0] + stroke, GOOD[1]), math.hypot(GOOD[2], GOOD[3])))
+
+
+# ------------------------------------------------------------- published, package
+
+
+def test_published_joints_beside_ours():
+    shoulder, elbow = ({row.fact: row for row in facts_of_geometry(case)} for case in CASES)
+    assert shoulder["muscle length"].verdict == elbow["muscle length"].verdict == "agree"
+    assert shoulder["stroke of Table 3.5 over the range"].ours == pytest.approx(16.36, abs=0.02)
+    assert elbow["stroke of Table 3.5 over the range"].ours == pytest.approx(17.40, abs=0.02)
+    assert shoulder["torque of Table 3.5 at the least angle"].verdict == "agree"
+    assert shoulder["least torque of Table 3.5"].ours == pytest.approx(350.0, abs=2.0)
+    assert shoulder["the same, braid's force alone, 75.4 deg (ch. 5: N 0.9)"].verdict == "agree"
+    assert "against itself" in shoulder["torque at 13 bar and 90 deg"].note
+    assert {row.verdict for row in (*shoulder.values(), *elbow.values())} == {"agree", "differs", "cannot tell"}
+
+
+def test_a_design_round_trips_as_a_joint():
+    design = JointDesign.of(problem(), GOOD)
+    block = tomllib.loads(design.to_toml())["joint"]
+    assert [block[name]["value"] for name in LENGTHS] == pytest.approx(GOOD)
+    assert block["max_angle"] == {"value": pytest.approx(120.0), "unit": "deg"}
+    assert "history" not in design.to_dict()
+
+
+def test_friction_plays_no_part():
+    muscle = library.ch2_075in()
+    assert muscle.parameters["friction_coefficient"] > 0.0
+    plain = muscle.replace(friction_coefficient=0.0, friction_pressure_slope=0.0, friction_floor=0.0)
+    values = [problem(muscle=item, points=22).evaluate(GOOD).fitness[0] for item in (muscle, plain)]
+    assert values[0] == values[1]
+    assert isinstance(plain, Muscle)
+
+
+def test_the_package_is_light():
+    heavy = ("deap", "cma", "scipy", "matplotlib")
+    code = f"import sys, pamrs.design, pamrs.cli.design; print([name for name in {heavy} if name in sys.modules])"
+    shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert shown.strip() == "[]"

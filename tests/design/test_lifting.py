@@ -1,0 +1,253 @@
+"""What an arm lifts and holds: laws, and the same found by a simulation that comes to rest."""
+
+import json
+import math
+import re
+import sys
+
+import numpy as np
+import pytest
+
+import pamrs
+from pamrs import cli, rigs
+from pamrs.design import lift
+from pamrs.errors import ParameterError
+from pamrs.rig import Joint, Rig
+
+PSI, LB = 6894.757293168361, 0.45359237
+FULL = 150.0 * PSI
+#: (2.36), the friction hysteresis of the 0.75-in muscle
+HYSTERESIS = {"friction_coefficient": 0.16, "friction_pressure_slope": -0.145e-6, "friction_floor": 0.01}
+
+
+def changed(rig, **blocks):
+    """A rig with other entries of its blocks; None leaves a block out."""
+    model = rig.model
+    for block, entries in blocks.items():
+        model[block] = None if entries is None else {**model[block], **entries}
+    return Rig(rig.name, model)
+
+
+@pytest.fixture(scope="module")
+def elbow():
+    return rigs.named("elbow")
+
+
+def rest_angle(rig, pressure, *, start=None, seconds=40.0):
+    """Angle of rest by brute force: pressure raised slowly (or, from a given angle, on at once), arm damped until nothing moves."""
+    fed = changed(rig, supply=None, valve=None, arm={"viscous": 150.0})
+    time = np.arange(0.0, seconds, 0.02)
+    given = np.full(time.size, pressure) if start is not None else pressure * np.minimum(time / (0.5 * seconds), 1.0)
+    initial = {} if start is None else {"joint_angle": start}
+    result = pamrs.simulate(fed, pressure=given, sample_time=0.02, initial=initial)
+    assert abs(float(result["joint_rate"][-1])) < 1e-5, "it has not come to rest"
+    return float(result["joint_angle"][-1])
+
+
+# ----------------------------------------------------------------------------- laws
+
+
+def test_torques_are_those_of_joint_and_gravity(elbow):
+    result = lift(elbow, pressure=FULL, points=50)
+    model = elbow.model
+    joint = Joint.from_model(model["joint"])
+    np.testing.assert_allclose(result.torque, joint.torque(elbow.muscle, FULL, result.angle, count=6), rtol=1e-12)
+    np.testing.assert_array_equal(result.torque, result.torque_holding)  # no hysteresis in the rig
+    moment = model["arm"]["first_moment"] + 100.0 * LB * 0.508
+    np.testing.assert_allclose(result.gravity, moment * 9.80665 * np.sin(result.angle), rtol=1e-12)
+    assert result.angle[0] == model["joint"]["min_angle"]
+    assert result.angle[-1] == model["joint"]["max_angle"]
+
+
+def test_the_angle_reached_is_where_the_torques_meet(elbow):
+    result = lift(elbow, pressure=FULL)
+    assert not result.can_lift
+    at = lift(elbow, pressure=FULL, to=result.reached)
+    assert at.torque[-1] - at.coulomb == pytest.approx(at.gravity[-1], rel=1e-9)
+    assert at.margin == pytest.approx(0.0, abs=1e-6)
+    before = lift(elbow, pressure=FULL, to=result.reached - 1e-4)
+    assert before.can_lift
+    assert before.reached == before.angle[-1]
+
+
+def test_capacity_is_the_payload_that_reaches_an_angle(elbow):
+    light = lift(elbow, pressure=FULL, points=200)
+    for row in (20, 100, 190):
+        again = lift(elbow.with_parameters({"arm.payload": float(light.capacity[row])}), pressure=FULL)
+        assert again.reached == pytest.approx(float(light.angle[row]), abs=1e-9)
+
+
+@pytest.mark.parametrize("degrees", [30.0, 60.0, 90.0, 120.0])
+def test_payload_limit_is_just_lifted(elbow, degrees):
+    to = elbow.model["joint"]["max_angle"] if degrees == 120.0 else math.radians(degrees)
+    limit = lift(elbow, pressure=FULL, to=to).payload_limit
+    verdicts = [lift(elbow.with_parameters({"arm.payload": f * limit}), pressure=FULL, to=to).can_lift for f in (0.9999, 1.0001)]
+    assert verdicts == [True, False]
+
+
+def test_the_limit_inside_the_range_is_found_between_the_points(elbow):
+    # a cam whose lever is shortest in the middle of the range
+    level = {"kind": "polynomial", "coefficients": [0.03, -0.03, 0.0167], "rest_angle": 0.3, "min_angle": 0.3, "max_angle": 1.9}
+    kept = {name: elbow.model["joint"][name] for name in ("stop_stiffness", "stop_damping")}
+    model = elbow.model
+    model["joint"] = {**kept, **level}
+    rig = Rig("cam", model)
+    coarse, fine = lift(rig, pressure=FULL, points=31), lift(rig, pressure=FULL, points=20001)
+    assert 0.3 < fine.limit_angle < 1.9
+    assert coarse.payload_limit == pytest.approx(fine.payload_limit, rel=1e-8)
+    assert coarse.payload_limit <= coarse.capacity.min()
+    # a payload between what the middle and the end take: stopped in the middle, lifted again beyond
+    heavy = rig.with_parameters({"arm.payload": 1.05 * fine.payload_limit})
+    result = lift(heavy, pressure=FULL)
+    assert not result.can_lift
+    (first, last) = result.regained[0]
+    assert result.reached < fine.limit_angle < first < last == result.angle[-1]
+    assert "brought there, it goes on" in result.text
+    assert rest_angle(changed(heavy, arm={"coulomb": 0.0}), FULL) == pytest.approx(
+        lift(changed(heavy, arm={"coulomb": 0.0}), pressure=FULL).reached, abs=2e-4
+    )
+
+
+def test_friction_narrows_what_is_lifted_and_widens_what_is_held(elbow):
+    plain, rough = lift(elbow, pressure=FULL), lift(changed(elbow, arm={"coulomb": 15.0}), pressure=FULL)
+    assert rough.reached < plain.reached < plain.held < rough.held
+    hysteretic = lift(changed(elbow, muscle=HYSTERESIS), pressure=4e5)
+    np.testing.assert_allclose((hysteretic.torque_holding / hysteretic.torque)[:300], 1.102 / 0.898, rtol=1e-9)
+    effect = elbow.with_effect("muscle_hysteresis", {"friction_constant": 10.0, "friction_pressure": 2e-5, "presliding": 1e-3})
+    change = lift(effect, pressure=4e5).torque - lift(elbow, pressure=4e5).torque
+    arm = Joint.from_model(elbow.model["joint"]).moment_arm(plain.angle)
+    np.testing.assert_allclose(change, -6 * (10.0 + 8.0) * arm, rtol=1e-8, atol=1e-9)
+
+
+def test_more_pressure_lifts_more_and_none_lifts_nothing(elbow):
+    reached = [lift(elbow, pressure=p * PSI).reached for p in (0.0, 20.0, 60.0, 100.0, 150.0)]
+    assert reached[0] == reached[1] == elbow.model["joint"]["min_angle"]
+    assert np.all(np.diff(reached[1:]) > 0.0)
+    nothing = lift(elbow, pressure=0.0)
+    assert nothing.payload_limit is None
+    assert nothing.held == elbow.model["joint"]["min_angle"]
+    assert "does not even lift the empty arm" in nothing.text
+    assert "off its stop at 9.5 deg" in nothing.text
+
+
+def test_without_gravity_any_payload_is_lifted(elbow):
+    result = lift(changed(elbow, arm={"gravity": 0.0}), pressure=FULL)
+    assert result.can_lift
+    assert math.isinf(result.payload_limit)
+    assert "no payload weighs on the joint" in result.text
+    assert result.to_dict()["payload_limit"] is None
+
+
+# ------------------------------------------------------------------ by brute force
+
+
+@pytest.mark.parametrize(("pounds", "psi"), [(100.0, 150.0), (100.0, 60.0), (135.0, 150.0), (380.0, 150.0), (500.0, 150.0)])
+def test_simulation_comes_to_rest_at_the_angle_reached(elbow, pounds, psi):
+    rig = changed(elbow, arm={"coulomb": 0.0, "payload": pounds * LB})
+    result = lift(rig, pressure=psi * PSI)
+    assert not result.can_lift
+    assert rest_angle(rig, psi * PSI) == pytest.approx(result.reached, abs=2e-5)
+
+
+def test_simulation_reaches_the_upper_stop_with_what_it_can_lift(elbow):
+    limit = lift(changed(elbow, arm={"coulomb": 0.0}), pressure=FULL).payload_limit
+    rig = changed(elbow, arm={"coulomb": 0.0, "payload": 0.9 * limit})
+    assert lift(rig, pressure=FULL).can_lift
+    assert rest_angle(rig, FULL) > rig.model["joint"]["max_angle"]  # pressed into it
+
+
+def test_simulation_with_hysteresis_rests_between_lifted_and_held(elbow):
+    rig = changed(elbow, arm={"coulomb": 0.0}, muscle=HYSTERESIS)
+    result = lift(rig, pressure=6e5)
+    assert math.degrees(result.held - result.reached) > 4.0
+    assert rest_angle(rig, 6e5) == pytest.approx(result.reached, abs=2e-4)  # lifted slowly: the shortening branch
+    assert rest_angle(rig, 6e5, start=1.9) == pytest.approx(result.held, abs=2e-4)  # sunk from above: the other branch
+
+
+def test_simulation_with_coulomb_friction_rests_between_lifted_and_held(elbow):
+    rig = changed(elbow, arm={"coulomb": 20.0})
+    result = lift(rig, pressure=6e5)
+    # its friction is a smooth function of speed, so it creeps on until nothing is left of it
+    assert result.reached < rest_angle(rig, 6e5, seconds=80.0) < result.held
+
+
+# -------------------------------------------------------------------------- errors
+
+
+def test_bad_arguments(elbow):
+    with pytest.raises(ParameterError, match=r"rig 'sealed_chamber' has no \[muscle\]"):
+        lift(rigs.sealed_chamber())
+    for pressure in (math.nan, math.inf, -1.0):
+        with pytest.raises(ParameterError, match=f"pressure = {pressure}"):
+            lift(elbow, pressure=pressure)
+    with pytest.raises(ParameterError, match=r"pressure is missing: the rig 'elbow' has no \[supply\]"):
+        lift(changed(elbow, supply=None, valve=None))
+    for to in (0.1, 3.0, math.nan):
+        with pytest.raises(ParameterError, match=r"to = .* rad .* at most joint.max_angle = 120.0 deg"):
+            lift(elbow, to=to)
+    with pytest.raises(ParameterError, match="points = 2"):
+        lift(elbow, points=2)
+
+
+def test_the_supply_is_the_default_and_the_text_is_as_the_numbers(elbow):
+    result = lift(elbow.with_parameters({"arm.payload": 120.0}))
+    assert result.pressure == pytest.approx(8.3e5)
+    degrees = re.fullmatch(r"cannot lift 120 kg beyond ([\d.]+) deg at 8.3 bar: .*", result.text)[1]
+    assert float(degrees) == pytest.approx(math.degrees(result.reached), abs=0.05)
+    assert result.summary().count("lifted") >= 1
+    assert "not held" in result.summary()
+    assert json.loads(json.dumps(result.to_dict()))["can_lift"] is False
+
+
+# --------------------------------------------------------------------- command line
+
+
+def run(capsys, *words):
+    code = cli.main(["lift", *map(str, words)])
+    captured = capsys.readouterr()
+    return code, captured.out, captured.err
+
+
+def test_command_prints_and_writes(capsys, tmp_path):
+    data, picture = tmp_path / "a.json", tmp_path / "a.png"
+    words = ("elbow", "--pressure", "150 psi", "--payload", "380 lb", "--json", data, "--png", picture)
+    code, out, err = run(capsys, *words)
+    assert code == 0
+    assert out.startswith("elbow: cannot lift 172.4 kg beyond 22.")
+    assert sorted(err.splitlines()) == sorted(f"written: {path}" for path in (data, picture))
+    document = json.loads(data.read_text())
+    assert document["schema"] == "pamrs.lift/1"
+    assert document["text"] in out
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    file = tmp_path / "elbow.toml"
+    rigs.named("elbow").to_toml(file)
+    assert run(capsys, file, "--pressure", "8 bar", "--to", "60 deg")[1].startswith(
+        "elbow: lifts 45.36 kg from 9.5 to 60.0 deg at 8 bar"
+    )
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("nowhere.toml",), "nowhere.toml"),
+        (("sealed_chamber",), "no [muscle]"),
+        (("elbow", "--pressure", "8"), "--pressure = '8'"),
+        (("elbow", "--pressure", "8 kg"), "--pressure = '8 kg'"),
+        (("elbow", "--payload", "-3 kg"), "--payload = '-3 kg'"),
+        (("elbow", "--to", "200 deg"), "200 deg"),
+        (("elbow", "--png", "no/such/folder/a.png"), "no/such/folder"),
+    ],
+)
+def test_command_refuses_what_it_cannot_use(capsys, words, message):
+    code, out, err = run(capsys, *words)
+    assert (code, out) == (2, "")
+    assert message in err
+
+
+def test_missing_plot_package_is_named(capsys, tmp_path, monkeypatch):
+    for name in [name for name in sys.modules if name.startswith(("matplotlib", "pamrs.design._lifting_figure", "pamrs.report.fig"))]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    code, _, err = run(capsys, "elbow", "--png", tmp_path / "a.png")
+    assert code == 2
+    assert "pip install pamrs[plot]" in err

@@ -1,0 +1,153 @@
+"""Closures: a mismatch without a name is modelled, predicts recordings that were held out, and nothing is made of nothing."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import pamrs
+from pamrs import _core
+from pamrs.diagnosis.blocks import Block, available_blocks
+from pamrs.diagnosis.closure import MOST_TERMS, describe_closure, find_closure
+from pamrs.diagnosis.evidence import Floor, excess, floors, inflation
+from pamrs.diagnosis.fitting import FIT_BIN, Fit, Key, Problem, fit, residuals
+from pamrs.diagnosis.hypotheses import fits
+from pamrs.diagnosis.signals import prepare
+from pamrs.effects import CATALOGUE, EFFECTS
+from pamrs.effects import CLOSURES, MEMORY_OF, TERMS
+from pamrs.errors import DiagnosisError, RigError
+from pamrs.recordings import Recording
+from pamrs.simulation import core_rig
+
+DT, ROWS = 0.005, 1600
+NOISE = {"valve_command": 0.0, "supply_pressure": 400.0, "muscle_pressure": 400.0, "joint_angle": 3e-4}
+NOMINAL = pamrs.rigs.shoulder()
+
+
+def command(kind: str) -> np.ndarray:
+    """Valve commands; the steps are held out."""
+    t = DT * np.arange(ROWS)
+    return {
+        "slow": 5.03 + 0.30 * np.sin(0.9 * t) + 0.08 * np.sin(5.0 * t),
+        "fast": 5.03 + 0.25 * np.sin(1.7 * t + 0.4) + 0.20 * np.sin(4.1 * t),
+        "mixed": 5.02 + 0.22 * np.sin(0.6 * t) + 0.20 * np.sin(2.7 * t + 1.0),
+        "steps": 5.03 + 0.30 * np.sign(np.sin(1.3 * t)) + 0.10 * np.sign(np.sin(3.1 * t)),
+    }[kind]
+
+
+def recorded(truth: pamrs.Rig, kind: str, seed: int) -> Recording:
+    run = pamrs.simulate(truth, command(kind), sample_time=DT, initial={"muscle_pressure": 2e5, "joint_angle": 0.9})
+    rng = np.random.default_rng(seed)
+    channels = {name: run[name] + rng.normal(0.0, 1.0, ROWS) * level for name, level in NOISE.items()}
+    mask = {name: np.ones(ROWS, dtype=bool) for name in channels}
+    return Recording(kind, "fit", run.time, DT, channels, mask, [], dict.fromkeys(channels, "SI"))
+
+
+class Case:
+    """Three recordings of a truth with the nominal model fitted to them, and one of another excitation."""
+
+    def __init__(self, truth: pamrs.Rig, names: tuple[str, ...]) -> None:
+        self.blocks: list[Block] = [b for b in available_blocks(NOMINAL, tuple(NOISE)) if b.name in names]
+        self.problem, self.held = (
+            Problem(self.blocks, [prepare(recorded(truth, kind, seed), NOMINAL) for seed, kind in enumerate(kinds)], core_rig(NOMINAL))
+            for kinds in (("slow", "fast", "mixed"), ("steps",))
+        )
+        white = dict.fromkeys(names, 1.0)
+        first = fit(self.problem, NOMINAL, (), {}, white)
+        self.colour = {b.name: inflation(b, self.problem.recordings, first.residuals, FIT_BIN) for b in self.blocks}
+        self.baseline = fit(self.problem, NOMINAL, (), {}, self.colour, warm=first)
+        self.evaluations = 0
+
+    def found(self, monkeypatch: pytest.MonkeyPatch, blocks: list[Block]) -> Fit | None:
+        def counted(*arguments: object, **more: object) -> object:
+            self.evaluations += 1
+            return residuals(*arguments, **more)  # type: ignore[arg-type]
+
+        monkeypatch.setattr("pamrs.diagnosis.closure.residuals", counted)
+        monkeypatch.setattr("pamrs.diagnosis.fitting.residuals", counted)
+        return find_closure(self.problem, NOMINAL, self.baseline, self.colour, blocks, lambda _: None)
+
+    def gap_closed(self, model: Fit, block: str) -> float:
+        """Share of the excess beyond noise that a model removes on the held-out recording."""
+        floor: dict[Key, Floor] = floors(self.held, self.held.core.respecified(model.rig.to_json()))
+        own = next(b for b in self.blocks if b.name == block)
+        ratios = [excess(own, self.held.recordings, residuals(self.held, m.rig), floor).ratio - 1.0 for m in (self.baseline, model)]
+        return 1.0 - float(np.sqrt(max(0.0, ratios[1]) / ratios[0]))
+
+
+def test_closures_are_no_names_and_their_dictionaries_are_those_of_the_core() -> None:
+    assert not {c.id for c in CLOSURES} & set(CATALOGUE)
+    assert {c.id for c in CLOSURES} | set(CATALOGUE) == set(EFFECTS)
+    for closure in CLOSURES:
+        coefficients = [p.name for p in closure.parameters if p.neutral == 0.0]
+        assert coefficients == [term.name for term in TERMS[closure.id]]
+        kinds = {term.kind for term in TERMS[closure.id]}
+        assert {p.name for p in closure.parameters if p.neutral is None} == {MEMORY_OF[k] for k in kinds & set(MEMORY_OF)}
+        assert kinds <= {"static", "even", "odd", *MEMORY_OF}
+        assert fits(NOMINAL, closure.id)
+
+
+def test_a_hidden_torque_is_modelled_and_predicts_what_was_held_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    case = Case(NOMINAL.with_effect("closure_torque", {"pressure_creep": -4.0, "sine_4": 2.5, "memory_time": 0.7}), ("arm",))
+    found = case.found(monkeypatch, case.blocks)
+    assert found is not None
+    assert case.evaluations <= 18
+    assert found.values["closure_torque.sine_4"] == pytest.approx(2.5, rel=0.1)
+    assert 2 <= sum(name.startswith("closure_torque.") for name in found.values) <= MOST_TERMS + 2
+    assert case.gap_closed(found, "arm") > 0.85
+    text = describe_closure(found, case.problem, case.baseline)
+    assert "a torque is missing" in text
+    assert "sin(4 a)" in text
+    assert "rate dependent" in text
+    assert "(a - a_T)" in text
+    # the model is a rig like every other
+    again = pamrs.rig.parse_rig(found.rig.to_toml_text())
+    one, two = (pamrs.simulate(rig, command("steps"), sample_time=DT) for rig in (found.rig, again))
+    np.testing.assert_array_equal(one["joint_angle"], two["joint_angle"])
+
+
+def test_hysteresis_of_another_form_is_a_memory_of_the_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    hidden = {"friction_constant": 0.0, "friction_pressure": 6e-5, "presliding": 2e-3}
+    case = Case(NOMINAL.with_effect("muscle_hysteresis", hidden), ("arm",))
+    found = case.found(monkeypatch, case.blocks)
+    assert found is not None
+    assert case.gap_closed(found, "arm") > 0.3  # the parameters take their part of a friction
+    assert "rate independent" in describe_closure(found, case.problem, case.baseline)
+
+
+def test_a_hidden_flow_is_modelled(monkeypatch: pytest.MonkeyPatch) -> None:
+    case = Case(NOMINAL.with_effect("leak_muscle", {"conductance": 3e-10}), ("supply", "chamber"))
+    found = case.found(monkeypatch, [b for b in case.blocks if b.name == "chamber"])
+    assert found is not None
+    assert found.values["closure_flow.pressure"] < 0.0
+    assert case.gap_closed(found, "chamber") > 0.85
+    assert "a flow into the chamber is missing" in describe_closure(found, case.problem, case.baseline)
+
+
+@pytest.mark.parametrize("names", [("arm",), ("supply", "chamber")])
+def test_a_null_keeps_no_excess_and_next_to_no_terms(names: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:
+    case = Case(NOMINAL, names)
+    floor = floors(case.problem, case.problem.core.respecified(case.baseline.rig.to_json()))
+    assert all(excess(b, case.problem.recordings, case.baseline.residuals, floor).ratio < 1.2 for b in case.blocks)
+    # a form that is asked for all the same mends what the smoothing of the drives does at reversals: hundredths of the arm's torque
+    found = case.found(monkeypatch, case.blocks)
+    assert found is None or set(found.effects) == {"closure_torque"}
+    assert found is None or sum(abs(v) for n, v in found.values.items() if n.startswith("closure_torque.")) < 0.25
+    assert case.evaluations <= 18
+
+
+def test_what_does_not_fit_together_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    case = Case(NOMINAL, ("arm",))
+    with pytest.raises(DiagnosisError, match="blocks"):
+        find_closure(case.problem, NOMINAL, case.baseline, case.colour, [], lambda _: None)
+    with pytest.raises(DiagnosisError, match="closure_torque"):
+        describe_closure(case.baseline, case.problem, case.baseline)
+    prepared = case.problem.recordings[0]
+    given = ("arm", prepared.commands, DT, DT, [0], prepared.signals, prepared.n)
+    with pytest.raises(RigError, match="closure_torque"):
+        core_rig(NOMINAL).closure_terms(*given)
+    terms = _core.Rig(NOMINAL.with_effect("closure_torque").to_json()).closure_terms(*given)
+    assert terms.shape == (ROWS, len(TERMS["closure_torque"]))
+    np.testing.assert_array_equal(terms[:, 0], 1.0)
+    angle = prepared.signals["joint_angle"][0]
+    assert np.abs(terms[:, 1] - angle).max() < 0.2

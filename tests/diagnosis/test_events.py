@@ -1,0 +1,86 @@
+"""Pushes and payload changes at times of their own are found where they were put."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pamrs
+from pamrs.diagnosis.blocks import available_blocks
+from pamrs.diagnosis.fitting import Events, Problem, residuals
+from pamrs.diagnosis.signals import prepare
+from pamrs.recordings import Recording
+from pamrs.simulation import core_rig
+
+TIMES = {"lift": 4.3, "lower": 7.1, "again": 5.6}
+ROLES = {"lift": "fit", "lower": "fit", "again": "held_out"}
+
+
+def recordings(effect: str, make: dict[str, float], duration: float = 12.0, *, plant: pamrs.Rig | None = None) -> list[Recording]:
+    """Recordings of a shoulder with an event each, with the noise of transducers."""
+    found = []
+    for number, (name, when) in enumerate(TIMES.items()):
+        rng = np.random.default_rng([2014, number])
+        time = np.arange(0.0, duration, 0.005)
+        command = 5.0 + (0.35 + 0.1 * number) * np.sin(2 * np.pi * 0.15 * time) + 0.25 * np.sin(2 * np.pi * 0.4 * time + number)
+        rig = (plant or pamrs.rigs.shoulder()).with_effect(effect, make | {"time": when})
+        run = pamrs.simulate(rig, valve_command=command, sample_time=0.005)
+        channels = {
+            "valve_command": command,
+            "supply_pressure": run["supply_pressure"] + rng.normal(0.0, 400.0, time.size),
+            "muscle_pressure": run["muscle_pressure"] + rng.normal(0.0, 400.0, time.size),
+            "joint_angle": run["joint_angle"] + rng.normal(0.0, 3e-4, time.size),
+        }
+        mask = {channel: np.ones(time.size, dtype=bool) for channel in channels}
+        found.append(Recording(name, ROLES[name], time, 0.005, channels, mask, [], dict.fromkeys(channels, "")))
+    return found
+
+
+@pytest.mark.parametrize(
+    ("effect", "make"),
+    [
+        ("external_torque", {"torque": 3.0, "duration": 0.8}),
+        pytest.param("payload_change", {"mass_change": 0.4}, marks=pytest.mark.slow),
+    ],
+)
+def test_an_event_is_named_with_its_times(effect: str, make: dict[str, float]) -> None:
+    found = pamrs.diagnose(pamrs.Case("events", pamrs.rigs.shoulder(), recordings(effect, make), Path()))
+    assert found.verdict == "effects"
+    assert found.effects[0]["id"] == effect
+    assert found.probabilities[effect] > 0.8
+    size = next(iter(make))
+    events = sorted(found.effects[0]["events"], key=lambda entry: abs(entry[size]))
+    times = {entry["recording"]: entry["time"] for entry in events}  # the largest of each recording
+    assert times.keys() == TIMES.keys()
+    for name, when in TIMES.items():
+        assert abs(times[name] - when) < 0.25, name
+    assert found.fit["gap_closed"] > 0.8
+
+
+def test_a_recording_without_the_event_has_no_slope_in_it() -> None:
+    rig = pamrs.rigs.shoulder()
+    prepared = [prepare(r, rig) for r in recordings("payload_change", {"mass_change": 0.4}, 4.0)[:2]]
+    blocks = [b for b in available_blocks(rig, tuple(prepared[0].recording.channels)) if b.name == "arm"]
+    happened = Events("payload_change", {"lift": {"mass_change": 0.4, "time": 2.0}})
+    names = ["arm.payload", "payload_change.mass_change"]
+    found = residuals(Problem(blocks, prepared, core_rig(rig)), rig, names, happened)
+    with_event, without = found["arm", "lift"].jacobian, found["arm", "lower"].jacobian
+    assert with_event is not None
+    assert without is not None
+    assert np.abs(with_event[:, 1]).max() > 1e-3
+    assert not without[:, 1].any()
+    assert without[:, 0].any()
+
+
+@pytest.mark.slow
+def test_a_push_is_found_beside_a_lasting_effect() -> None:
+    plant = pamrs.rigs.shoulder().with_effect("muscle_hysteresis", {"friction_pressure": 1e-4, "presliding": 0.003})
+    records = recordings("external_torque", {"torque": 5.0, "duration": 0.8}, plant=plant)
+    found = pamrs.diagnose(pamrs.Case("both", pamrs.rigs.shoulder(), records, Path()))
+    assert found.probabilities["external_torque+muscle_hysteresis"] > 0.5
+    (push,) = [e for e in found.effects if e["id"] == "external_torque"]
+    largest = {e["recording"]: e["time"] for e in sorted(push["events"], key=lambda e: abs(e["torque"]))}
+    assert all(abs(largest[name] - when) < 0.3 for name, when in TIMES.items())
+    assert found.rig.effects[0]["id"] == "muscle_hysteresis"

@@ -1,0 +1,83 @@
+"""Where no recording is held out, each is predicted by the others: as a fit to the others would, without one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+import pamrs
+from pamrs.diagnosis.blocks import available_blocks
+from pamrs.diagnosis.fitting import Fit, Problem, fit, residuals
+from pamrs.diagnosis.leaving import left_out
+from pamrs.diagnosis.signals import prepare
+from pamrs.recordings import Recording
+from pamrs.simulation import core_rig
+
+RIG = pamrs.rigs.sealed_chamber()
+CHANNEL = {"muscle_pressure": "Pa"}
+
+
+def hold(name: str, conductance: float, seconds: float = 60.0, seed: int = 0) -> Recording:
+    """A sealed hold at 10 Hz with 150 Pa of noise."""
+    truth = RIG.with_effect("leak_muscle", {"conductance": conductance})
+    run = pamrs.simulate(truth, duration=seconds, sample_time=0.1, step=0.01, initial={"muscle_pressure": 7e5})
+    pressure = run["muscle_pressure"] + np.random.default_rng(seed).normal(0.0, 150.0, run.time.size)
+    mask = {"muscle_pressure": np.ones(run.time.size, dtype=bool)}
+    return Recording(name, "fit", run.time, 0.1, {"muscle_pressure": pressure}, mask, [], dict(CHANNEL))
+
+
+def problem(*recordings: Recording) -> Problem:
+    blocks = available_blocks(RIG, ("muscle_pressure",))
+    return Problem(blocks, [prepare(r, RIG) for r in recordings], core_rig(RIG))
+
+
+def leaking(given: Problem) -> Fit:
+    """The leak fitted to every recording of a problem."""
+    start = {"leak_muscle.conductance": 1e-11}
+    white = {b.name: 1.0 for b in given.blocks}
+    return fit(given, RIG, ("leak_muscle",), start, white, fixed={"leak_muscle.laminar_share": 0.0}, evaluations=30, share=0.0)
+
+
+def rms(found: object, key: tuple[str, str]) -> float:
+    return float(np.sqrt(np.mean(found[key].value ** 2)))  # type: ignore[index]
+
+
+def test_one_step_is_what_a_fit_to_the_others_predicts() -> None:
+    names = ("one", "two", "three")
+    everything = problem(*(hold(n, c, seed=k) for k, (n, c) in enumerate(zip(names, (2e-11, 2.2e-11, 2.6e-11), strict=True))))
+    found = leaking(everything)
+    away = left_out(everything, found, {b.name: 1.0 for b in everything.blocks})
+    for k, name in enumerate(names):
+        others = replace(everything, recordings=[p for i, p in enumerate(everything.recordings) if i != k])
+        alone = replace(everything, recordings=[everything.recordings[k]])
+        refitted = residuals(alone, leaking(others).rig)
+        key = (everything.blocks[0].name, name)
+        assert rms(away, key) > 1.1 * rms(found.residuals, key)
+        assert abs(rms(away, key) / rms(refitted, key) - 1.0) < 0.05
+
+
+def test_of_one_recording_nothing_is_left_out() -> None:
+    single = problem(hold("one", 2e-11))
+    found = leaking(single)
+    assert left_out(single, found, {b.name: 1.0 for b in single.blocks}) is found.residuals
+
+
+def test_what_one_recording_alone_tells_is_taken_from_it() -> None:
+    together = problem(hold("long", 2e-11, 200.0), hold("short", 2e-11, 4.0, seed=1))
+    found = leaking(together)
+    away = left_out(together, found, {b.name: 1.0 for b in together.blocks})
+    key = (together.blocks[0].name, "long")
+    assert rms(away, key) < 1.01 * rms(found.residuals, key)
+
+
+def test_recordings_without_roles_name_a_leak_that_is_in_all_of_them() -> None:
+    case = pamrs.Case("holds", RIG, [hold("one", 3e-11, 120.0), hold("two", 3e-11, 120.0, seed=1)], Path())
+    found = pamrs.diagnose(case)
+    assert found.effects[0]["id"] == "leak_muscle"
+    assert any("how the other recordings predict each" in w for w in found.warnings)
+    one, two = (next(t for t in found.tried if t["effects"] == e)["held_out"]["chamber"] for e in ([], ["leak_muscle"]))
+    assert one > 20.0 * two
+    differ = pamrs.diagnose(pamrs.Case("holds", RIG, [hold("one", 1e-11, 120.0), hold("two", 9e-11, 120.0, seed=1)], Path()))
+    assert differ.probabilities["unlisted"] > max(0.3, 10.0 * found.probabilities["unlisted"])

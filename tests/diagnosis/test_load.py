@@ -1,0 +1,163 @@
+"""A muscle that lifts a hanging mass is diagnosed as an arm is: its length is the channel, its load the block."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pamrs
+from pamrs.diagnosis.blocks import available_blocks
+from pamrs.diagnosis.events import look_for_events
+from pamrs.diagnosis.experiment import propose
+from pamrs.diagnosis.fitting import Problem, residuals
+from pamrs.diagnosis.hypotheses import fits
+from pamrs.diagnosis.plausible import implausible
+from pamrs.diagnosis.protocols import library
+from pamrs.diagnosis.signals import prepare
+from pamrs.errors import DiagnosisError, SimulationError
+from pamrs.recordings import Recording
+from pamrs.rig import parse_rig
+from pamrs.simulation import core_rig
+
+RIG = pamrs.rigs.hanging_mass()
+NOISE = {"valve_command": 0.0, "supply_pressure": 300.0, "muscle_pressure": 300.0, "length": 3e-5}
+DT = 0.005
+
+
+def recording(rig: pamrs.Rig, name: str, role: str, seed: int, seconds: float = 10.0) -> Recording:
+    """Lifts and lowerings at two speeds; steps where it is held out."""
+    rest = round(4.0 / DT)  # it settles before it is recorded
+    time = np.arange(0.0, seconds, DT)
+    wave = {
+        "slow": 0.05 * np.sin(1.1 * time) + 0.03 * np.sin(4.0 * time),
+        "fast": 0.05 * np.sin(2.3 * time + 0.4) + 0.04 * np.sin(5.1 * time),
+        "steps": 0.06 * np.sign(np.sin(1.5 * time)),
+    }[name]
+    command = np.concatenate([np.full(rest, 5.0), 5.02 + wave])
+    run = pamrs.simulate(rig, command, sample_time=DT, initial={"muscle_pressure": 2.5e5})
+    rng = np.random.default_rng(seed)
+    channels = {n: run[n][rest:] + rng.normal(0.0, s, time.size) for n, s in NOISE.items()}
+    mask = {n: np.ones(time.size, dtype=bool) for n in channels}
+    return Recording(name, role, time, DT, channels, mask, [], dict.fromkeys(channels, "SI"))
+
+
+def case(rig: pamrs.Rig) -> pamrs.Case:
+    roles = {"slow": "fit", "fast": "fit", "steps": "held_out"}
+    return pamrs.Case("lift", RIG, [recording(rig, n, r, k) for k, (n, r) in enumerate(roles.items())], Path())
+
+
+def test_the_load_is_a_block_and_its_sensitivities_are_those_of_differences() -> None:
+    blocks = {b.name: b for b in available_blocks(RIG, tuple(NOISE))}
+    assert blocks["load"].kind == "arm"
+    assert "length" in blocks["chamber"].drives
+    problem = Problem([blocks["load"]], [prepare(recording(RIG, "slow", "fit", 0, 6.0), RIG)], core_rig(RIG))
+    names = ["load.mass", "load.viscous", "load.coulomb", "muscle.modulus_scale", "sensors.pressure_zero", "sensors.length_zero"]
+    found = residuals(problem, RIG, names)["load", "slow"]
+    assert float(np.sqrt(np.mean(found.value**2))) < 2.0 * found.noise
+    prepared, known = problem.recordings[0], RIG.parameters
+    given = ("load", prepared.commands, DT, DT / 2, prepared.starts(2.5, ("muscle_pressure",)))
+    _, jacobian = core_rig(RIG).predict(*given, names, prepared.signals, prepared.n)
+    for k, name in enumerate(names):
+        step = 1e-3 * known[name].tol
+        up, down = (
+            core_rig(RIG.with_parameters({name: known[name].value + s * step})).predict(*given, [], prepared.signals, prepared.n)[0]
+            for s in (1.0, -1.0)
+        )
+        slope = (up - down) / (2.0 * step)
+        assert np.abs(slope - jacobian[:, k]).max() < 1e-3 * np.abs(slope).max(), name
+
+
+@pytest.mark.parametrize(
+    "true",
+    [
+        pytest.param({"load.mass": 40.08, "muscle.modulus_scale": 1.04}, marks=pytest.mark.slow),
+        {"muscle.rest_length": 0.277},
+    ],
+)
+def test_a_true_model_of_a_load_misses_nothing(true: dict[str, float]) -> None:
+    found = pamrs.diagnose(case(RIG.with_parameters(true)))
+    assert found.verdict in ("none", "parameters")
+    if "muscle.rest_length" in true:  # what is read as a longer muscle is the zero of its length, near enough
+        assert found.parameters["sensors.length_zero"]["value"] == pytest.approx(1e-3, abs=2e-4)
+
+
+def test_the_zero_of_the_length_is_what_is_read_beside_the_true_one() -> None:
+    off = RIG.with_parameters({"sensors.length_zero": 0.002})
+    one, other = (pamrs.simulate(rig, np.full(60, 5.05), sample_time=DT) for rig in (RIG, off))
+    assert other["length"] - one["length"] == pytest.approx(0.002)
+    assert other["muscle_pressure"] == pytest.approx(one["muscle_pressure"])
+    text = pamrs.rigs.sealed_chamber().to_toml_text() + 'length_zero = { value = 1, unit = "mm" }\n'
+    with pytest.raises(pamrs.RigError, match=r'length_zero is not allowed: a \[load\] with kind = "mass"'):
+        parse_rig(text)
+
+
+def test_a_length_that_cannot_be_is_refused() -> None:
+    def told(change: Callable[[np.ndarray], np.ndarray]) -> str:
+        sound = recording(RIG, "slow", "fit", 0, 4.0)
+        channels = sound.channels | {"length": change(sound.channels["length"])}
+        return "; ".join(implausible(replace(sound, channels=channels), RIG))
+
+    assert told(lambda x: x) == ""
+    assert "length has the one value" in told(lambda x: np.full_like(x, 0.25))
+    assert "length is outside its load's range" in told(lambda x: 1e-3 * x)
+    assert "length moves with" in told(lambda x: 0.24 + 100.0 * (x - x.mean()) * np.sign(np.sin(1e4 * np.arange(x.size))))
+    slow = replace(recording(RIG, "slow", "fit", 0, 4.0), sample_time=0.4)
+    assert "too slow for a load" in "; ".join(implausible(slow, RIG))
+
+
+def test_a_load_behind_a_valve_that_was_not_recorded_is_driven_by_its_pressure() -> None:
+    whole = recording(RIG, "slow", "fit", 0, 4.0)
+    bare = replace(whole, channels={n: v for n, v in whole.channels.items() if n in ("muscle_pressure", "length")})
+    assert [b.name for b in available_blocks(RIG, tuple(bare.channels))] == ["load"]
+    assert prepare(bare, RIG).n == whole.time.size
+
+
+def test_a_mass_that_changes_is_looked_for_and_found() -> None:
+    assert RIG.muscle is not None
+    assert fits(RIG, "payload_change")
+    assert not fits(pamrs.rigs.bench(RIG.muscle), "payload_change")
+    changed = RIG.with_effect("payload_change", {"mass_change": -2.0, "time": 7.0})  # of which 4 s are not recorded
+    load = [b for b in available_blocks(RIG, tuple(NOISE)) if b.name == "load"]
+    problem = Problem(load, [prepare(recording(changed, "slow", "fit", 0, 6.0), RIG)], core_rig(RIG))
+    found = look_for_events("payload_change", problem, RIG, residuals(problem, RIG), {"load": 1.0})
+    assert found is not None
+    (values,) = found.values.values()
+    assert values["mass_change"] == pytest.approx(-2.0, rel=0.2)
+
+
+def test_the_next_experiment_with_a_load_is_simulated() -> None:
+    experiments = library(RIG, only={"staircase", "other_payload"})
+    assert [e.name for e in experiments] == ["staircase", "other_payload"]
+    assert experiments[1].changes == {"load.mass": pytest.approx(20.0)}
+    creeping = RIG.with_effect("muscle_creep")
+    told = propose(RIG, [("none", RIG, 0.5), ("muscle_creep", creeping, 0.5)], experiments=experiments[:1])
+    assert told["expected_information_bits"] > 0.3
+    assert told["curves"] is not None
+
+
+@pytest.mark.slow
+def test_an_effect_on_a_load_is_named() -> None:
+    found = pamrs.diagnose(
+        case(RIG.with_effect("muscle_hysteresis", {"friction_constant": 4.0, "friction_pressure": 4e-5, "presliding": 2e-3}))
+    )
+    assert found.effects[0]["id"] == "muscle_hysteresis"
+    assert found.effects[0]["probability"] > 0.8
+    assert found.fit["gap_closed"] > 0.8
+    assert "length" in found.fit["held_out"]
+    assert "load block" in found.summary()
+
+
+def test_a_frame_holds_the_length_and_has_no_block_of_its_own() -> None:
+    assert RIG.muscle is not None
+    bench = pamrs.rigs.bench(RIG.muscle)
+    assert not [b for b in available_blocks(bench, ("muscle_pressure", "length")) if b.name == "load"]
+    signals = {n: (np.full(64, v), np.zeros(64)) for n, v in (("muscle_pressure", 2e5), ("length", 0.25))}
+    with pytest.raises((SimulationError, ValueError), match="frame"):
+        core_rig(bench).predict("load", {}, DT, DT, [0], [], signals, 64)
+    still = Recording("held", "fit", DT * np.arange(64), DT, {n: v for n, (v, _) in signals.items()}, {}, [], {})
+    with pytest.raises(DiagnosisError, match="a frame holds the length"):
+        pamrs.diagnose(pamrs.Case("held", bench, [still], Path()))

@@ -1,0 +1,134 @@
+"""What channels can tell, before any data."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import pytest
+
+import pamrs
+from pamrs.cli import main
+from pamrs.diagnosis import plan
+from pamrs.diagnosis.protocols import library, pressure_range
+from pamrs.effects import CATALOGUE, EFFECTS
+
+ALL = ("valve_command", "supply_pressure", "muscle_pressure", "joint_angle")
+
+
+def test_levels_follow_from_the_rig() -> None:
+    for name in ("shoulder", "elbow"):
+        rig = pamrs.rigs.named(name)
+        span = pressure_range(rig)
+        assert 0.0 < span.low < span.high < rig.model["supply"]["initial_pressure"]
+    assert pressure_range(pamrs.rigs.shoulder(), highest=2e5).high <= 2e5
+
+
+def test_a_sealed_chamber_is_planned_quickly(capsys: pytest.CaptureFixture[str], tmp_path) -> None:
+    out = tmp_path / "plan.json"
+    assert main(["diagnose", "--plan", "sealed_chamber", "--pressure-noise", "100 Pa", "--json", str(out)]) == 0
+    written = json.loads(out.read_text())
+    assert written["schema"] == "pamrs.plan/1"
+    assert written["noise"] == {"muscle_pressure": 100.0}
+    verdicts = {e["id"]: e["verdict"] for e in written["effects"]}
+    assert verdicts["leak_muscle"] == "seen"
+    assert "payload_swing" in written["not_asked"]  # there is no arm
+    assert not verdicts.keys() & set(written["not_asked"])
+    assert verdicts.keys() | set(written["not_asked"]) == set(CATALOGUE)
+    page = capsys.readouterr().out
+    assert "leak_muscle" in page
+    assert "Not asked of this rig" in page
+
+
+def test_unknown_names_are_errors_that_name_them() -> None:
+    rig = pamrs.rigs.sealed_chamber()
+    with pytest.raises(pamrs.ParameterError, match="'pressure'.*muscle_pressure"):
+        pamrs.plan_diagnosis(rig, ["pressure"])
+    with pytest.raises(pamrs.ParameterError, match="'joint_angle'"):
+        pamrs.plan_diagnosis(rig, ["joint_angle"])
+    with pytest.raises(pamrs.ParameterError, match="'wiggle'.*hold_low"):
+        pamrs.plan_diagnosis(rig, ["muscle_pressure"], experiments=["wiggle"])
+    with pytest.raises(pamrs.ParameterError, match="muscle_pressure = -1"):
+        pamrs.plan_diagnosis(rig, ["muscle_pressure"], noise={"muscle_pressure": -1.0})
+    with pytest.raises(pamrs.DiagnosisError, match="load"):
+        pamrs.plan_diagnosis(pamrs.rigs.named("bench"), ["muscle_pressure"])
+
+
+@pytest.mark.parametrize(
+    "words", [["diagnose"], ["diagnose", "case", "--plan", "shoulder"], ["diagnose", "case", "--channels", "time"]]
+)
+def test_a_case_or_a_plan(words: list[str]) -> None:
+    assert main(words) == 2
+
+
+@pytest.fixture(scope="module")
+def few():
+    """Plans of the shoulder from one experiment in the place of all, computed once, so that the tests are quick."""
+    pool = library(pamrs.rigs.shoulder(), sample_time=0.01, only=["slow_triangle"])
+    made = plan._parts
+    kept: dict[str, Any] = {}
+
+    def once(rig, blocks, experiment, starts, noise):
+        if experiment.name not in kept:
+            kept[experiment.name] = made(rig, blocks, experiment, starts, noise)
+        return kept[experiment.name]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(plan, "library", lambda rig: pool)
+        patch.setattr(plan, "_parts", once)
+        yield lambda *channels: pamrs.plan_diagnosis(pamrs.rigs.shoulder(), channels, experiments=["slow_triangle"])
+
+
+@pytest.fixture(scope="module")
+def whole(few):
+    return few(*ALL)
+
+
+def test_all_channels_cut_three_blocks(whole: pamrs.Plan) -> None:
+    assert [b["name"] for b in whole.blocks] == ["supply", "chamber", "arm"]
+    assert whole.missing == []
+    arm = whole.blocks[-1]
+    assert arm["drives"] == ["muscle_pressure"]
+    assert "force" in arm["why"]
+
+
+def test_effects_show_in_their_own_block(whole: pamrs.Plan) -> None:
+    assert whole.sight("muscle_hysteresis").block == "arm"
+    assert whole.sight("valve_dead_zone").block in ("supply", "chamber")
+    assert whole.sight("valve_dead_zone").verdict == "seen"
+    smallest = whole.sight("muscle_hysteresis")
+    assert smallest.smallest == pytest.approx(smallest.typical * 3.0 / smallest.left)
+
+
+def test_without_the_angle_the_arm_is_not_isolable(few) -> None:
+    found = few(*ALL[:3])
+    assert "arm" not in [b["name"] for b in found.blocks]
+    lost = {b["name"]: b["needs"] for b in found.missing}
+    assert lost["arm"] == ["joint_angle"]
+    assert found.sight("muscle_hysteresis").verdict == "hidden"
+    assert found.additions[0].name == "joint_angle"
+    assert "muscle_hysteresis" in found.additions[0].seen
+    assert "not arm (muscle, joint and arm): without joint_angle" in found.text()
+
+
+def test_without_the_supply_the_arm_alone_is_left(few) -> None:
+    found = few("muscle_pressure", "joint_angle")
+    assert [b["name"] for b in found.blocks] == ["arm"]
+    assert found.sight("leak_muscle").verdict == "hidden"
+    assert found.sight("muscle_hysteresis").verdict == "seen"
+
+
+def test_holds_on_both_sides_separate_a_leak_from_centre_leakage(monkeypatch: pytest.MonkeyPatch) -> None:
+    rig = pamrs.rigs.shoulder()
+    (both,) = pool = library(rig, sample_time=0.01, only=["holds_both_sides"])
+    monkeypatch.setattr(plan, "library", lambda rig: pool)
+    leaks = {name: EFFECTS[name] for name in ("leak_muscle", "valve_centre_leakage")}
+    monkeypatch.setattr(plan, "CATALOGUE", leaks)
+    quiet = {"muscle_pressure": 20.0, "supply_pressure": 20.0, "joint_angle": 1e-4}
+    found = pamrs.plan_diagnosis(rig, ALL, experiments=["holds_both_sides"], noise=quiet)
+    assert found.separable("leak_muscle", "valve_centre_leakage")
+    leaking, still = both.simulate(rig.with_effect("valve_centre_leakage", {"conductance": 3e-10})), both.simulate(rig)
+    change = leaking["muscle_pressure"] - still["muscle_pressure"]
+    start, stop = round(2.5 / both.sample_time), round(17.5 / both.sample_time)
+    assert change[stop] > change[start]  # it fills below the balance
+    assert change[-1] < change[-1 - (stop - start)]  # and empties above it

@@ -1,0 +1,125 @@
+"""Result of a diagnosis: JSON, summary, validation."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import pytest
+
+from pamrs.diagnosis.result import Diagnosis, Trace, schema
+from pamrs.report import text as words
+from tests.diagnosis import synthetic
+
+
+@pytest.mark.parametrize("make", [synthetic.diagnosis, synthetic.sealed_chamber, synthetic.nothing])
+def test_json_follows_schema(make, tmp_path: Path) -> None:
+    jsonschema.Draft202012Validator.check_schema(schema())
+    path = tmp_path / "out.json"
+    text = make().to_json(path)
+    assert path.read_text(encoding="utf-8") == text
+    assert [p.name for p in tmp_path.iterdir()] == ["out.json"]
+    assert "NaN" not in text
+    assert "Infinity" not in text
+    jsonschema.validate(json.loads(text), schema())
+
+
+def test_schema_is_closed() -> None:
+    content = synthetic.diagnosis().to_dict()
+    for change in ({"extra": 1}, {"verdict": "perhaps"}, {"where": {**content["where"], "extra": 1}}):
+        with pytest.raises(jsonschema.ValidationError):
+            jsonschema.validate({**content, **change}, schema())
+
+
+def test_not_finite_becomes_null() -> None:
+    content = json.loads(synthetic.diagnosis(seconds=float("inf")).to_json())
+    assert content["seconds"] is None
+    assert content["parameters"]["arm.payload"]["std"] is None
+    assert content["fit"]["gap_closed"] == 0.97
+
+
+def test_numpy_values_become_json() -> None:
+    where = {
+        "block": "arm",
+        "intervals": np.array([[0.0, 1.0]]).tolist(),
+        "conditions": [{"low": np.float32(0.5)}],
+    }
+    content = json.loads(synthetic.diagnosis(where=where, probabilities={"none": np.float64(0.25)}).to_json())
+    assert content["where"]["conditions"] == [{"low": 0.5}]
+    assert content["probabilities"] == {"none": 0.25}
+
+
+def test_failed_write_leaves_old_file(tmp_path: Path) -> None:
+    path = tmp_path / "out.json"
+    synthetic.diagnosis().to_json(path)
+    old = path.read_text(encoding="utf-8")
+    with pytest.raises(TypeError, match="object"):
+        synthetic.diagnosis(probabilities={"none": object()}).to_json(path)
+    assert path.read_text(encoding="utf-8") == old
+
+
+def test_summary_names_the_effect() -> None:
+    summary = synthetic.diagnosis().summary()
+    assert "heat transfer" in summary
+    assert "41.3 +- 2.2 W/(m2 K)" in summary
+    assert "97 %" in summary
+    assert "do not determine" in summary
+    assert 12 <= len(summary.splitlines()) <= 32
+    assert max(map(len, summary.splitlines())) <= 100
+    assert summary.isascii()
+
+
+def test_headlines() -> None:
+    assert "chamber" in synthetic.diagnosis().headline
+    assert synthetic.nothing().headline.startswith("Nothing is missing")
+    assert "discharge area" in synthetic.diagnosis(verdict="parameters", effects=[], where={}).headline
+    assert "outside the catalogue" in synthetic.diagnosis(verdict="unlisted", effects=[]).headline
+    rivals = synthetic.diagnosis(ambiguity=[["leak_muscle"], ["leak_muscle", "heat_transfer"]])
+    assert "cannot tell muscle leak from muscle leak + heat transfer" in rivals.headline
+
+
+def test_notebook_html_escapes() -> None:
+    html = synthetic.diagnosis(where={"text": "<script>"})._repr_html_()
+    assert "<script>" not in html
+    assert "heat transfer" in html
+
+
+def test_bad_input_is_refused() -> None:
+    with pytest.raises(ValueError, match="verdict"):
+        Diagnosis("case", "maybe")
+    with pytest.raises(ValueError, match="before"):
+        Trace("r", "fit", "force", "N", np.arange(3.0), np.arange(3.0), np.arange(4.0))
+
+
+def test_trace_fills_residuals() -> None:
+    t = Trace("r", "fit", "force", "N", np.arange(3.0), np.ones(3), np.zeros(3))
+    assert t.residual_before is not None
+    assert np.array_equal(t.residual_before, np.ones(3))
+    assert t.after is not None
+    assert np.all(np.isnan(t.after))
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (0.0, "0"),
+        (9.996, "10.0"),
+        (1234567.0, "1.23 × 10⁶"),
+        (-1.5e-9, "−1.50 × 10⁻⁹"),
+        (float("nan"), "–"),
+        (None, "–"),
+        (9.999e-7, "1.00 × 10⁻⁶"),
+        (412345.0, "412000"),
+    ],
+)
+def test_format_number(value: float | None, text: str) -> None:
+    assert words.format_number(value) == text
+
+
+def test_format_uncertain() -> None:
+    assert words.format_uncertain(1.234e-9, 5.6e-11) == "(1.234 ± 0.056) × 10⁻⁹"
+    assert words.format_uncertain(41.27, 2.2) == "41.3 ± 2.2"
+    assert words.format_uncertain(2.0, None) == "2.000"
+    assert words.format_probability(0.9999) == "> 0.99"

@@ -1,0 +1,189 @@
+"""Effects through Python: rig files, simulation, restart, places and what is refused; their laws are tested in the core."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import pamrs
+from pamrs import _core
+from pamrs.diagnosis.fitting import ACTS
+from pamrs.diagnosis.starts import RESTRICTIONS, starts_of
+from pamrs.effects import EFFECTS
+from pamrs.errors import ParameterError, RigError
+from pamrs.rig import parse_rig
+from pamrs.units import parse_unit
+
+START = {"muscle_pressure": 2e5, "joint_angle": 0.9}
+COMMAND = 5.2 + 0.5 * np.sin(0.2 * np.arange(60)) + 0.2 * (np.arange(60) // 15 % 2)
+
+
+def regulated() -> pamrs.Rig:
+    """The shoulder behind a regulator."""
+    text = pamrs.rigs.shoulder().to_toml_text()
+    head, _, rest = text.partition("[supply]")
+    _, _, rest = rest.partition("\n\n")
+    supply = 'kind = "regulator"\ninitial_pressure = { value = 6e5, unit = "Pa" }\ntime_constant = { value = 0.1, unit = "s" }\n'
+    return parse_rig(f"{head}[supply]\n{supply}\n{rest}")
+
+
+def rig_for(effect: str) -> pamrs.Rig:
+    return regulated() if effect == "supply_regulator_deadband" else pamrs.rigs.shoulder()
+
+
+def run(rig: pamrs.Rig) -> pamrs.Simulation:
+    return pamrs.simulate(rig, COMMAND, sample_time=0.01, initial=START)
+
+
+@pytest.mark.parametrize("effect", sorted(EFFECTS))
+def test_an_effect_survives_its_file_and_runs(effect: str) -> None:
+    rig = rig_for(effect).with_effect(effect)
+    again = parse_rig(rig.to_toml_text())
+    assert again.effects == rig.effects
+    one, two = run(rig), run(again)
+    for channel in one:
+        np.testing.assert_array_equal(one[channel], two[channel])
+    assert all(np.isfinite(one[channel]).all() for channel in one)
+
+
+@pytest.mark.parametrize("effect", sorted(e for e in EFFECTS if EFFECTS[e].neutral()))
+def test_its_neutral_values_switch_it_off(effect: str) -> None:
+    plain = rig_for(effect)
+    off = plain.with_effect(effect, EFFECTS[effect].neutral())
+    one, two = run(plain), run(off)
+    for channel in one:
+        np.testing.assert_array_equal(one[channel], two[channel])
+
+
+def test_one_effect_has_no_neutral_value() -> None:
+    assert [e for e in EFFECTS if not EFFECTS[e].neutral()] == ["heat_transfer"]
+
+
+@pytest.mark.parametrize("effect", sorted(EFFECTS))
+def test_a_simulator_goes_on_bit_for_bit(effect: str) -> None:
+    rig = rig_for(effect).with_effect(effect)
+    whole, first = (pamrs.Simulator(rig, sample_time=0.01, initial=START) for _ in range(2))
+    expected = whole.run(COMMAND)
+    first.run(COMMAND[:31])
+    second = pamrs.Simulator(rig, sample_time=0.01, initial=START)
+    second.restore(first.state)
+    found = second.run(COMMAND[31:])
+    for channel, values in found.items():
+        np.testing.assert_array_equal(values, expected[channel][31:])
+
+
+def test_all_at_once_run_and_restart() -> None:
+    rig = pamrs.rigs.shoulder()
+    for effect in EFFECTS:
+        rig = rig.with_effect(effect)
+    whole, first = (pamrs.Simulator(rig, sample_time=0.01, initial=START) for _ in range(2))
+    expected = whole.run(COMMAND)
+    first.run(COMMAND[:17])
+    second = pamrs.Simulator(rig, sample_time=0.01, initial=START)
+    second.restore(first.state)
+    np.testing.assert_array_equal(second.run(COMMAND[17:])["joint_angle"], expected["joint_angle"][17:])
+
+
+def test_the_table_can_be_read_by_a_fit() -> None:
+    for effect in EFFECTS.values():
+        assert 1 <= len({p.name.rstrip("_23") for p in effect.parameters}) <= (5 if effect.catalogue else 24)
+        assert all((effect.name, effect.equation, effect.fingerprint, effect.separates, effect.reference))
+        for parameter in effect.parameters:
+            assert parameter.lower <= parameter.default <= parameter.upper
+            assert parameter.starts
+            assert list(parameter.starts) == sorted(parameter.starts)
+            assert all(parameter.lower <= start <= parameter.upper for start in parameter.starts)
+            assert parameter.neutral is None or parameter.lower <= parameter.neutral <= parameter.upper
+            assert parse_unit(parameter.unit).scale == 1.0
+            assert parameter.meaning
+
+
+@pytest.mark.parametrize("effect", sorted(EFFECTS))
+def test_the_core_takes_every_bound_of_the_table(effect: str) -> None:
+    for parameter in EFFECTS[effect].parameters:
+        for value in (parameter.lower, parameter.upper):
+            rig = rig_for(effect).with_effect(effect, {parameter.name: value})
+            if (parameter.name, value) == ("mass_change", parameter.lower):
+                with pytest.raises(ParameterError, match="no more can be taken away"):
+                    _core.Rig(rig.to_json())
+                continue
+            refused = ""
+            try:
+                _core.Rig(rig.to_json())
+            except RigError as error:
+                refused = str(error)
+            # what would need a step of less than a tenth of a microsecond is refused by that name
+            assert not refused or "s would be needed" in refused
+
+
+@pytest.mark.parametrize("effect", EFFECTS)
+def test_the_diagnosis_knows_where_an_effect_acts_and_where_to_begin(effect: str) -> None:
+    assert ACTS.get(effect) or ACTS[EFFECTS[effect].block]
+    for sealed in (True, False):
+        starts = starts_of(effect, sealed=sealed)
+        assert starts
+        for start in starts:
+            assert {*start.free, *start.held} == set(EFFECTS[effect].dotted())
+            assert all(value != 0.0 for name, value in start.free.items() if name in start.sizes)
+            half = start.scaled(0.5)
+            assert all(
+                half.free[name] == pytest.approx(start.free[name] * (2.0**0.5 if name in RESTRICTIONS else 0.5)) for name in start.sizes
+            )
+
+
+def test_unknown_places_and_parameters_are_named() -> None:
+    rig = pamrs.rigs.shoulder()
+    with pytest.raises(ParameterError, match="'widht'"):
+        rig.with_effect("valve_dead_zone", {"widht": 0.01})
+    with pytest.raises(ParameterError, match="half_width = 2"):
+        rig.with_effect("valve_dead_zone", {"half_width": 2.0})
+    with pytest.raises(ParameterError, match="names no valve"):
+        rig.with_effect("valve_dead_zone", at="left")
+    with pytest.raises(ParameterError, match="whole rig"):
+        rig.with_effect("base_flexibility", at="left")
+    entry = '\n[[effects]]\nid = "muscle_creep"\nparameters = { stiffnes = { value = 1.0, unit = "N/m" } }\n'
+    with pytest.raises(RigError, match="stiffnes"):
+        parse_rig(rig.to_toml_text() + entry)
+    entry = '\n[[effects]]\nid = "clock_skew"\nat = "left"\n'
+    with pytest.raises(RigError, match="whole rig"):
+        parse_rig(rig.to_toml_text() + entry)
+
+
+def test_an_effect_on_what_is_not_there_is_refused() -> None:
+    sealed = pamrs.rigs.sealed_chamber()
+    for effect, word in (("valve_dead_zone", "valve"), ("muscle_creep", "muscle"), ("payload_swing", "arm"), ("supply_leak", "supply")):
+        with pytest.raises(RigError, match=word):
+            pamrs.simulate(sealed.with_effect(effect), duration=1.0, sample_time=0.1)
+
+
+def test_a_lagging_sensor_is_inverted_where_it_drives() -> None:
+    rig = pamrs.rigs.shoulder().with_effect("pressure_lag", {"time_constant": 0.02})
+    truth = pamrs.simulate(pamrs.rigs.shoulder(), COMMAND, sample_time=0.01, initial=START)
+    lagging = pamrs.simulate(rig, COMMAND, sample_time=0.01, initial=START)
+    np.testing.assert_array_equal(lagging["joint_angle"], truth["joint_angle"])
+    behind = lagging["muscle_pressure"] + 0.02 * np.gradient(lagging["muscle_pressure"], 0.01)
+    inner = slice(3, -3)
+    assert np.abs(behind - truth["muscle_pressure"])[inner].max() < 0.2 * np.ptp(truth["muscle_pressure"])
+    assert np.abs(lagging["muscle_pressure"] - truth["muscle_pressure"]).max() > 1e3
+
+
+def test_a_transducer_at_the_valve_reads_what_the_air_leaves_in_the_tube() -> None:
+    tube = {"conductance": 2e-9}
+    bare, muscle, valve = (
+        run(rig)
+        for rig in (
+            pamrs.rigs.shoulder(),
+            pamrs.rigs.shoulder().with_effect("tube_flow_restriction", tube),
+            pamrs.rigs.shoulder().with_effect("tube_flow_restriction", tube | {"tap": 1.0}),
+        )
+    )
+    assert not np.allclose(bare["joint_angle"], muscle["joint_angle"], rtol=1e-6)
+    assert np.array_equal(muscle["joint_angle"], valve["joint_angle"]), "the transducer moves nothing"
+    lead = valve["muscle_pressure"] - muscle["muscle_pressure"]
+    before = np.concatenate([[5.0], COMMAND[:-1]])[: lead.size]  # a sample is read under the command before it
+    assert np.all(lead[before > 5.0] >= 0.0)
+    assert np.all(lead[before < 5.0] <= 0.0)
+    assert np.all(lead[before == 5.0] == 0.0), "shut: the muscle's own"
+    assert np.abs(lead).max() > 1e3
+    with pytest.raises(ParameterError, match=r"tap = 2"):
+        pamrs.rigs.shoulder().with_effect("tube_flow_restriction", {"tap": 2.0})

@@ -1,0 +1,378 @@
+"""Friction of cylinders: strokes, breakaway and law from synthetic runs whose friction is known, and the real set."""
+
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pamrs.errors import ParameterError, RecordingError
+from pamrs.fit._level_line import fit_levels, mean_of_series
+from pamrs.fit.cylinder._strokes import find_strokes, onset_at_rest, pair_strokes
+from pamrs.fit.cylinder.compare import compare_friction_laws
+from pamrs.fit.cylinder.figure import plot_cylinders
+from pamrs.fit.cylinder.friction import fit_cylinder_friction
+from pamrs.fit.cylinder.record import FrictionRecord, load_friction_folder, load_friction_record
+
+DATA = (
+    Path(__file__).parents[2]
+    / ".."
+    / "shared"
+    / "recordings"
+    / "pneumatic_cylinders_zillen"
+    / "results_pneumatic-actuator"
+    / "data"
+    / "friction"
+)
+AREA, ZERO, F0, F1, RATIO = 5.0e-4, 1.5, 3.0, 8e-6, 1.8
+PRESSURES = (1e5, 2e5, 4e5, 5e5, 7e5)
+STEP, STROKE = 0.01, 0.036
+
+
+def run(pressure, *, seed=0, scatter=0.02, between=0.0, cycles=5, breakaway=RATIO, name=None, tilt=0.0, speeds=(0.02, 0.03), sign=1):
+    """A run with friction F0 + F1 p: at rest, then to and fro; the regulator lags by 4 kPa to each side."""
+    rng = np.random.default_rng(seed + int(pressure / 1e4))
+    friction = (F0 + F1 * pressure) * (1.0 + between * rng.standard_normal())
+    position, force, gas = [np.zeros(15)], [np.zeros(15)], [np.zeros(15)]
+    for _ in range(cycles):
+        factor = 1.0 + scatter * rng.standard_normal()
+        for way, speed in ((1, speeds[0]), (-1, speeds[1])):
+            x = np.arange(0.0, STROKE, speed * STEP)
+            x = x if way > 0 else STROKE - x
+            position.append(x)
+            force.append(way * factor * friction * np.clip(np.abs(x - x[0]) / 4e-4, 0.0, 1.0) ** (0.5 if len(force) > 1 else 0.0))
+            gas.append(np.full(len(x), way * 4e3))
+    position, force, gas = (np.concatenate(part) for part in (position, force, gas))
+    force[16:19] = friction * np.array([0.7, 1.0, 0.9]) * breakaway
+    gas = gas + pressure
+    force = ZERO + AREA * gas * (1.0 + tilt * (position / STROKE - 0.5)) + force
+    noise = 0.003 * rng.standard_normal(len(force))
+    time = STEP * np.arange(len(force))
+    label = name or f"run_{pressure / 1e5:.0f}bar"
+    position = position + 2e-6 * rng.standard_normal(len(position))
+    return FrictionRecord.from_arrays(time, sign * position, gas, force + noise, name=label, cylinder="made")
+
+
+def runs(**options):
+    return [run(pressure, **options) for pressure in PRESSURES]
+
+
+# ------------------------------------------------------------------------ statistics
+
+
+def test_level_means_with_extra_scatter():
+    x = np.array([1.0, 2.0, 3.0, 4.0])
+    design = np.column_stack([np.ones(4), x])
+    own = np.full(4, 0.1)
+    close = fit_levels(design, 1.0 + 2.0 * x + 0.02 * np.array([1, -1, -1, 1]), own)
+    assert close.between == 0.0
+    assert np.allclose(close.values, [1.0, 2.0], atol=1e-9)
+    assert close.stderr[1] == pytest.approx(0.1 / np.sqrt(5.0), rel=1e-9)
+    far = fit_levels(design, 1.0 + 2.0 * x + 2.0 * np.array([1, -1, -1, 1]), own)
+    # four residuals of 2 and two spare levels: a variance of 8 in all
+    assert far.between == pytest.approx(np.sqrt(8.0 - 0.01), rel=1e-6)
+    assert far.redchi == pytest.approx(800.0, rel=1e-6)
+    assert np.isnan(fit_levels(design[:2], x[:2], own[:2]).between)
+
+
+def test_drifting_repeats_count_as_fewer():
+    rng = np.random.default_rng(3)
+    independent = np.mean([mean_of_series(rng.standard_normal(10))[1] for _ in range(300)])
+    assert 0.9 / np.sqrt(10) < independent < 1.5 / np.sqrt(10)
+    drift = np.linspace(-1.0, 1.0, 10)
+    assert mean_of_series(drift)[1] == pytest.approx(np.std(drift, ddof=1) / np.sqrt(2.0), rel=0.1)
+    assert mean_of_series(np.full(5, 2.0)) == (2.0, 0.0)
+
+
+# ------------------------------------------------------------------- known friction
+
+
+def test_known_friction_and_breakaway_are_recovered():
+    fit = fit_cylinder_friction(runs(seed=1))
+    for name, truth in (("f0", F0), ("f1", F1)):
+        parameter = fit.params[name]
+        assert abs(parameter.value - truth) < 3.0 * parameter.stderr
+        assert 0.0 < parameter.stderr < 0.1 * truth
+    assert fit.area == pytest.approx(AREA, rel=1e-3)
+    assert fit.params["force_zero"].value == pytest.approx(ZERO, abs=0.1)
+    assert fit.params["breakaway_ratio"].value == pytest.approx(RATIO, rel=0.03)
+    assert fit.breakaway(3e5) == pytest.approx(RATIO * (F0 + F1 * 3e5), rel=0.05)
+    assert (fit.ndata, fit.nvarys, fit.nfree) == (5, 2, 3)
+    assert np.allclose(fit.best_fit + fit.residual, [level.friction for level in fit.levels])
+    assert np.allclose(fit.predict(fit.pressures), fit.best_fit)
+
+
+def test_signed_prediction_over_velocity():
+    fit = fit_cylinder_friction(runs())
+    assert np.allclose(fit.predict(2e5, [-0.1, 0.0, 0.1]), fit.predict(2e5) * np.array([-1.0, 0.0, 1.0]))
+    with pytest.raises(ParameterError, match="pressure: a value is not finite"):
+        fit.predict([1e5, np.nan])
+
+
+def test_standard_errors_tell_the_truth():
+    slopes, held_out = [], []
+    for seed in range(30):
+        records = [run(p, seed=100 * seed, scatter=0.01, between=0.05, cycles=3) for p in PRESSURES]
+        fit = fit_cylinder_friction(records, area=AREA)
+        slope = fit.params["f1"]
+        slopes.append((slope.value - F1) / slope.stderr)
+        held_out += [item.error / item.stderr for item in fit.leave_one_pressure_out() if not item.extrapolated]
+    # a scatter that only the levels show, two or three of them to spare: Student's tails, so medians and wide limits
+    assert 0.7 < float(np.std(slopes)) < 1.6
+    assert 0.5 < float(np.median(np.abs(held_out))) < 1.1
+
+
+def test_held_out_pressures_are_predicted_with_their_error():
+    fit = fit_cylinder_friction(runs(seed=2), fit_on=(1e5, 4e5, 7e5))
+    found = fit.held_out()
+    assert [round(item.level.pressure / 1e5) for item in found] == [2, 5]
+    for item in found:
+        assert abs(item.relative_error) < 0.05
+        assert abs(item.error) < 4.0 * item.stderr
+        assert not item.extrapolated
+        assert item.breakaway == pytest.approx(item.level.breakaway, rel=0.1)
+    crossed = fit.leave_one_pressure_out()
+    assert [item.extrapolated for item in crossed] == [True, False, False, False, True]
+    assert max(abs(item.relative_error) for item in crossed) < 0.1
+
+
+def test_a_held_out_run_does_not_touch_the_fit():
+    records = runs(seed=4)
+    spoilt = [*records[:1], run(2e5, seed=4, between=0.5), *records[2:]]
+    options = {"fit_on": (1e5, 4e5, 7e5)}
+    one, other = (fit_cylinder_friction(found, **options) for found in (records, spoilt))
+    assert {k: v.value for k, v in one.params.items()} == {k: v.value for k, v in other.params.items()}
+    assert one.held_out()[0].level.friction != other.held_out()[0].level.friction
+
+
+def test_area_that_changes_with_the_position_does_not_become_friction():
+    straight, tilted = (fit_cylinder_friction(runs(seed=5, tilt=tilt)) for tilt in (0.0, 0.08))
+    assert np.allclose(straight.best_fit, tilted.best_fit, rtol=0.01)
+
+
+def test_position_that_falls_against_the_gas():
+    fit = fit_cylinder_friction(runs(seed=6, sign=-1))
+    assert fit.params["f1"].value == pytest.approx(F1, rel=0.1)
+    assert fit.params["breakaway_ratio"].value == pytest.approx(RATIO, rel=0.03)
+    level = fit.levels[0]
+    assert level.speed_against == pytest.approx(0.02, rel=0.01)
+    assert level.speed_giving == pytest.approx(0.03, rel=0.01)
+
+
+def test_no_breakaway_is_no_breakaway():
+    fit = fit_cylinder_friction(runs(seed=7, breakaway=1.0))
+    assert fit.params["breakaway_ratio"].value == pytest.approx(1.0, abs=0.05)
+
+
+def test_a_pause_of_the_logger_hides_the_breakaway():
+    whole = run(3e5)
+    rows = np.r_[0:15, 22 : len(whole)]
+    parts = [values[rows] for values in (whole.time, whole.position, whole.pressure, whole.force)]
+    pairs = pair_strokes(FrictionRecord.from_arrays(*parts))
+    onset = onset_at_rest(pairs, AREA)
+    assert onset is not None
+    assert onset.status == "missed"
+    rows = np.r_[0:18, 25 : len(whole)]
+    parts = [values[rows] for values in (whole.time, whole.position, whole.pressure, whole.force)]
+    onset = onset_at_rest(pair_strokes(FrictionRecord.from_arrays(*parts)), AREA)
+    assert onset is not None
+    assert onset.status == "at least"
+    assert onset.ratio == pytest.approx(RATIO, rel=0.05)
+
+
+def test_a_record_that_begins_in_motion_has_no_breakaway_from_rest():
+    whole = run(3e5)
+    parts = [values[16:] for values in (whole.time, whole.position, whole.pressure, whole.force)]
+    onset = onset_at_rest(pair_strokes(FrictionRecord.from_arrays(*parts)), AREA)
+    assert onset is not None
+    assert onset.status == "in motion"
+
+
+def test_speed_and_pressure_are_told_apart_only_if_they_vary_apart():
+    together = [run(p, speeds=(0.02 + 2e-8 * p, 0.03)) for p in PRESSURES]
+    with pytest.raises(RecordingError, match="speed and pressure have a correlation of 1.00"):
+        fit_cylinder_friction(together, law="linear_speed")
+    apart = [run(p, speeds=(v, v)) for p, v in zip(PRESSURES, (0.02, 0.04, 0.03, 0.02, 0.03), strict=True)]
+    fit = fit_cylinder_friction(apart, law="linear_speed")
+    assert abs(fit.params["fv"].value) < 3.0 * fit.params["fv"].stderr
+    with pytest.raises(ParameterError, match="velocity is needed"):
+        fit.predict(1e5)
+
+
+def test_report_says_what_the_runs_do_not_tell():
+    text = fit_cylinder_friction([run(p, speeds=(0.02 + 2e-8 * p, 0.03)) for p in PRESSURES], fit_on=(1e5, 7e5)).fit_report()
+    for words in ("the law cannot be tested", "not separable from the area", "f1 = ", "N/bar", "predicted 4.00 bar", "breakaway"):
+        assert words in text
+
+
+def test_figure(tmp_path):
+    fit = fit_cylinder_friction(runs(), fit_on=(1e5, 4e5, 7e5))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        plot_cylinders([fit]).savefig(tmp_path / "friction.png")
+    assert (tmp_path / "friction.png").stat().st_size > 20_000
+    with pytest.raises(ParameterError, match="loop = 'no' is no run"):
+        plot_cylinders([fit], loop="no")
+
+
+# ------------------------------------------------------------------------- bad input
+
+
+def test_rows_that_cannot_be_used_are_flagged():
+    whole = run(3e5)
+    force, time = whole.force.copy(), whole.time.copy()
+    force[100:103] = np.nan
+    time[200] = time[199]
+    record = FrictionRecord.from_arrays(time, whole.position, whole.pressure, force)
+    assert [record.reason[i] for i in (100, 102, 200)] == ["not a number", "not a number", "time does not advance"]
+    assert "3 rows of" in " ".join(record.issues)
+    assert pair_strokes(record).friction(AREA).mean() == pytest.approx(pair_strokes(whole).friction(AREA).mean(), rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "message"),
+    [
+        (lambda r: (r.time, r.position * 1e3, r.pressure, r.force), r"position = .* m is outside -5 to 5 m; right unit\?"),
+        (lambda r: (r.time, r.position, r.pressure * 1e3, r.force), r"pressure = .* Pa is outside .*; right unit\?"),
+        (lambda r: (r.time[:10], r.position[:10], r.pressure[:10], r.force[:10]), "10 usable rows of 10; 20 at least"),
+        (lambda r: (r.time[1:], r.position, r.pressure, r.force), "the same number is needed"),
+    ],
+)
+def test_impossible_columns_are_named(spoil, message):
+    with pytest.raises(RecordingError, match=message):
+        FrictionRecord.from_arrays(*spoil(run(3e5)))
+
+
+def test_motion_without_reversal_or_with_too_few_strokes():
+    whole = run(3e5)
+    one_way = FrictionRecord.from_arrays(*(values[:150] for values in (whole.time, whole.position, whole.pressure, whole.force)))
+    with pytest.raises(RecordingError, match="the motion never reverses"):
+        find_strokes(one_way)
+    still = FrictionRecord.from_arrays(whole.time, np.zeros(len(whole)), whole.pressure, whole.force)
+    with pytest.raises(RecordingError, match="the position does not change"):
+        find_strokes(still)
+    with pytest.raises(RecordingError, match="2 complete pairs of strokes; 3 at least"):
+        pair_strokes(run(3e5, cycles=2))
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"fit_on": (1e5,)}, r"1 pressure \(100 kPa\): the slope f1 of friction over pressure is not determinable"),
+        ({"fit_on": (1e5, 7e5), "law": "quadratic"}, r"2 pressures .* the 3 coefficients of the law 'quadratic' are not determinable"),
+        ({"fit_on": (1e5,), "law": "constant"}, "the piston area is not determinable from one pressure; give area"),
+        ({"area": 1e-1}, r"friction comes out as .* N with area = 0.1 m2"),
+    ],
+)
+def test_what_the_runs_do_not_determine_is_named(options, message):
+    with pytest.raises(RecordingError, match=message):
+        fit_cylinder_friction(runs(), **options)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"fit_on": (3e5,)}, "fit_on: no run at 300 kPa; there are runs at 100, 200, 400, 500, 700 kPa"),
+        ({"law": "cubic"}, "law = 'cubic' is not allowed: constant"),
+        ({"area": -1.0}, "area = -1.0 m2 is not allowed"),
+        ({"margin": 0.6}, "margin = 0.6 is not allowed: 0 to 0.45"),
+    ],
+)
+def test_impossible_arguments_are_named(options, message):
+    with pytest.raises(ParameterError, match=message):
+        fit_cylinder_friction(runs(), **options)
+
+
+def test_a_single_pressure_with_its_area_gives_a_constant():
+    fit = fit_cylinder_friction(runs(), fit_on=(4e5,), law="constant", area=AREA)
+    assert fit.params["f0"].value == pytest.approx(F0 + F1 * 4e5, rel=0.05)
+
+
+# ----------------------------------------------------------------------------- files
+
+
+def write(path, record):
+    table = np.column_stack(
+        [record.time * 1e3, *[np.zeros(len(record))] * 3, record.position * 1e3, record.pressure / 1e5, record.force]
+    )
+    np.savetxt(path, table, fmt="%.6f", delimiter="\t")
+
+
+def test_folder_with_a_duplicate(tmp_path):
+    for pressure in (1e5, 3e5):
+        write(tmp_path / f"A_{pressure / 1e5:.0f}bar.csv", run(pressure))
+    (tmp_path / "B_1bar.csv").write_bytes((tmp_path / "A_1bar.csv").read_bytes())
+    found = load_friction_folder(tmp_path)
+    assert found.duplicates == [("B_1bar", "A_1bar")]
+    assert list(found.cylinders) == ["A"]
+    assert "B_1bar equals A_1bar byte for byte: left out" in found.issues
+    back = found.cylinders["A"][1]
+    assert np.allclose(back.force, run(3e5).force, atol=1e-5)
+    assert np.allclose(back.pressure, run(3e5).pressure, atol=1.0)
+
+
+def test_files_that_cannot_be_read(tmp_path):
+    with pytest.raises(RecordingError, match="no file NAME_Nbar.csv is there"):
+        load_friction_folder(tmp_path)
+    write(tmp_path / "A_1bar.csv", run(1e5))
+    with pytest.raises(RecordingError, match="columns lists 2 names, but there are 7 columns"):
+        load_friction_record(tmp_path / "A_1bar.csv", columns=("time [ms]", "force [N]"))
+    with pytest.raises(RecordingError, match="columns names no position"):
+        load_friction_record(tmp_path / "A_1bar.csv", columns=("time [ms]", "", "", "", "", "pressure [bar]", "force [N]"))
+
+
+# -------------------------------------------------------------------------- real set
+
+
+@pytest.mark.skipif(not DATA.is_dir(), reason="the recordings are not beside the project")
+def test_real_cylinders():
+    found = load_friction_folder(DATA)
+    assert found.duplicates == [(f"O-ring_{bar}bar", f"Circle_{bar}bar") for bar in (1, 3, 5, 7)]
+    assert {name: len(records) for name, records in found.cylinders.items()} == {
+        "Circle": 7,
+        "Kidney_lc": 7,
+        "O-ring257": 4,
+        "X-ring257": 4,
+    }
+    kidney = fit_cylinder_friction(found.cylinders["Kidney_lc"], fit_on=(1e5, 4e5, 7e5))
+    assert max(abs(item.relative_error) for item in kidney.held_out()) < 0.10
+    ring = fit_cylinder_friction(found.cylinders["O-ring257"])
+    assert max(abs(item.relative_error) for item in ring.leave_one_pressure_out()) < 0.08
+    assert ring.area == pytest.approx(np.pi / 4 * 0.0257**2, rel=0.01)
+    # the X-ring is linear up to 5 bar, and then it is not: the law must say so
+    sealed = found.cylinders["X-ring257"]
+    assert abs(fit_cylinder_friction(sealed, fit_on=(1e5, 3e5), area=ring.area).held_out()[0].relative_error) < 0.05
+    whole = fit_cylinder_friction(sealed)
+    assert whole.between > 1.0
+    assert whole.redchi > 10.0
+    rest = {level.name: level.rest.status for level in whole.levels if level.rest is not None}
+    assert rest["X-ring257_7bar"] == "seen"
+    assert rest["X-ring257_5bar"] == "missed"
+
+
+# --------------------------------------------------------------- what it depends on
+
+
+def test_pressure_is_named_where_speed_does_not_go_with_it():
+    speeds = [(0.02, 0.03), (0.03, 0.045), (0.018, 0.026), (0.028, 0.04), (0.022, 0.03)]
+    records = [run(p, scatter=0.01, between=0.01, speeds=s) for p, s in zip(PRESSURES, speeds, strict=True)]
+    found = compare_friction_laws(records, name="made")
+    assert found.settled
+    assert found.pressure > 0.98
+    assert sum(found.probabilities.values()) == pytest.approx(1.0)
+    assert found.probabilities["coulomb_pressure"] > 0.5
+    assert "made: friction depends on pressure" in found.statement()
+
+
+def test_pressure_is_not_named_where_speed_falls_with_it():
+    records = [run(p, scatter=0.01, speeds=(0.04 - 8e-8 * p, 0.05 - 1e-7 * p)) for p in (2e5, 3e5, 4e5)]
+    found = compare_friction_laws(records)
+    assert not found.settled
+    assert found.probabilities["stribeck"] > 0.03
+    assert "not settled" in found.statement()
+    assert "speed goes with pressure" in found.statement()
+
+
+def test_two_pressures_compare_nothing():
+    with pytest.raises(RecordingError, match="at least 3 are needed"):
+        compare_friction_laws([run(p) for p in (1e5, 4e5)])

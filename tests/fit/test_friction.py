@@ -1,0 +1,182 @@
+"""Friction coefficients of a muscle from loops whose coefficients are known."""
+
+import numpy as np
+import pytest
+
+import pamrs
+from pamrs.errors import ParameterError, RecordingError
+from pamrs.fit import ForceMap, fit_friction
+
+C0, C1, FLOOR = 0.16, -0.145e-6, 0.01  # (2.36)
+REST = 0.276
+LEVELS = np.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.0]) * 1e5
+
+
+def muscle(**friction):
+    return pamrs.Muscle(
+        rest_length=REST,
+        rest_diameter=0.0254,
+        braid_angle=np.radians(73.5),
+        wall_thickness=0.003175,
+        modulus_slope=[3.0, -0.35],
+        modulus_offset=[1.15e6, -0.15e6],
+        **friction,
+    )
+
+
+RUBBED = {"friction_coefficient": C0, "friction_pressure_slope": C1, "friction_floor": FLOOR}
+
+
+def loops(levels=LEVELS, *, friction=RUBBED, noise=0.0, count=60, cycles=2, presliding=None, seed=0):
+    """Pressure, contraction, force and direction of slow loops; with a presliding distance, of four slip elements."""
+    rng = np.random.default_rng(seed)
+    e = np.tile(np.concatenate([np.linspace(0.01, 0.30, count), np.linspace(0.30, 0.01, count)]), cycles)
+    way = np.tile(np.repeat([-1, 1], count), cycles)
+    acting = way.astype(float)
+    if presliding is not None:
+        reach = presliding * np.array([0.125, 0.25, 0.5, 1.0])
+        elements, acting, last = np.zeros(4), [], e[0]
+        for here in e:
+            elements = np.clip(elements - (here - last) * REST / reach, -1.0, 1.0)
+            acting.append(elements.mean())
+            last = here
+    body = muscle(**friction)
+    force = [body.force(p, e, direction=acting) + noise * rng.standard_normal(len(e)) for p in levels]
+    tiled = [np.tile(values, len(levels)) for values in (e, way)]
+    return {
+        "pressure": np.repeat(levels, len(e)),
+        "contraction": tiled[0],
+        "force": np.concatenate(force),
+        "direction": tiled[1],
+    }
+
+
+def test_exact_loops_give_the_coefficients_back():
+    fit = fit_friction(**loops())
+    assert fit.params["friction_coefficient"].value == pytest.approx(C0, rel=1e-3)
+    assert fit.params["friction_pressure_slope"].value == pytest.approx(C1, rel=1e-3)
+    assert fit.slope_significant
+    assert np.allclose(fit.predict(LEVELS), C0 + C1 * LEVELS, rtol=1e-3)
+    assert np.allclose(fit.residual, 0.0, atol=1e-4)
+    pressure, contraction, force = fit.mean_curve()
+    assert np.allclose(force, muscle().force(pressure, contraction), rtol=1e-3, atol=0.5)
+
+
+def test_it_shows_itself_in_one_line():
+    assert repr(fit_friction(**loops())) == "FrictionFit(c_F = max(0.16 - 0.145/MPa P, 0.01), 6 levels)"
+
+
+def test_a_pressure_at_which_nothing_pulls_gives_no_coefficient():
+    given = loops(levels=np.append(1e3, LEVELS), noise=3.0)
+    slack = given["pressure"] < 2e3
+    given["force"][slack] = np.random.default_rng(1).normal(size=slack.sum())
+    fit = fit_friction(**given)
+    assert len(fit.levels) == 6
+    assert "1 kPa: forces below 1 % of the map's largest: no coefficient" in fit.issues
+    assert fit.params["friction_coefficient"].value == pytest.approx(C0, rel=0.02)
+
+
+def test_standard_errors_tell_the_truth():
+    scores = []
+    for seed in range(24):
+        fit = fit_friction(**loops(noise=10.0, seed=seed))
+        scores.append([(fit.params[k].value - t) / fit.params[k].stderr for k, t in zip(fit.params, (C0, C1), strict=True)])
+    spread = np.std(scores, axis=0)
+    assert np.all((spread > 0.5) & (spread < 1.6))
+    assert np.all(np.abs(np.mean(scores, axis=0)) < 0.7)
+
+
+def test_levels_on_the_floor_do_not_bend_the_line():
+    fit = fit_friction(**loops(np.array([2.0, 4.0, 6.0, 8.0, 10.0, 12.0, 14.0]) * 1e5, noise=1.0))
+    assert [level.at_floor for level in fit.levels] == [False] * 5 + [True] * 2
+    assert fit.ndata == 5
+    assert fit.params["friction_pressure_slope"].value == pytest.approx(C1, rel=0.01)
+    assert fit.predict(2e6) == FLOOR
+
+
+def test_friction_that_does_not_depend_on_pressure():
+    fit = fit_friction(**loops(friction={"friction_coefficient": 0.08}, noise=5.0))
+    assert not fit.slope_significant
+    assert fit.params["friction_coefficient"].value == pytest.approx(0.08, abs=3 * fit.params["friction_coefficient"].stderr)
+    assert "not significant" in fit.fit_report()
+
+
+def test_a_muscle_without_friction_is_on_the_floor():
+    fit = fit_friction(**loops(friction={}, noise=1.0))
+    assert np.all(fit.predict(LEVELS) == FLOOR)
+    assert "the law is its floor at every pressure" in " ".join(fit.issues)
+
+
+def test_presliding_from_dense_reversals():
+    fit = fit_friction(**loops(LEVELS[:3], count=400, presliding=4e-3), rest_length=REST)
+    assert fit.presliding == pytest.approx(4e-3, rel=0.05)
+    sparse = fit_friction(**loops(LEVELS[:3], count=20, presliding=4e-3), rest_length=REST)
+    assert sparse.presliding is None
+    assert "too sparse after 9 of 9 reversals" in sparse.presliding_reason
+    assert "rest_length is not given" in fit_friction(**loops()).presliding_reason
+
+
+def test_to_muscle_carries_the_friction():
+    fit = fit_friction(**loops(LEVELS[:3], count=400, presliding=4e-3), rest_length=REST)
+    rubbed = fit.to_muscle(muscle())
+    given = rubbed.parameters
+    assert given["friction_coefficient"] == fit.params["friction_coefficient"].value
+    assert given["friction_floor"] == FLOOR
+    assert given["friction_presliding"] == fit.presliding
+    expected = muscle(**RUBBED).force(3e5, 0.1, direction=1.0)
+    assert rubbed.force(3e5, 0.1, direction=1.0) == pytest.approx(expected, rel=0.01)
+    stays = fit_friction(**loops()).to_muscle(muscle(friction_presliding=2e-3))
+    assert stays.parameters["friction_presliding"] == 2e-3
+
+
+def test_force_map_with_rows_of_unknown_direction():
+    made = loops()
+    way = made["direction"].copy()
+    way[:7] = 0
+    force = made["force"].copy()
+    force[20] = np.nan
+    data = ForceMap.from_arrays(
+        REST * (1.0 - made["contraction"]), made["pressure"], force, rest_length=REST, direction=way, check_duplicates=False
+    )
+    fit = fit_friction(data)
+    assert fit.params["friction_coefficient"].value == pytest.approx(C0, rel=2e-3)
+    text = " ".join(fit.issues)
+    assert "7 rows have no direction of motion" in text
+    assert "1 row of 1440 has no number" in text
+
+
+def test_a_pressure_with_one_branch_is_named_and_the_others_count():
+    made = loops()
+    keep = ~((made["pressure"] == 3e5) & (made["direction"] > 0))
+    fit = fit_friction(**{name: values[keep] for name, values in made.items()})
+    assert len(fit.levels) == 5
+    assert "300 kPa: 0 rows while lengthening, 4 at least are needed: no coefficient" in fit.issues
+
+
+def test_what_the_loops_do_not_determine_is_named():
+    made = loops()
+    with pytest.raises(RecordingError, match=r"one pressure only \(100 kPa\): the slope c1 is not determinable"):
+        fit_friction(**loops(LEVELS[:1]))
+    with pytest.raises(RecordingError, match="no row has a direction of motion"):
+        fit_friction(**{**made, "direction": np.zeros(len(made["force"]))})
+    one_way = made["direction"] < 0
+    with pytest.raises(RecordingError, match="no pressure gives a coefficient"):
+        fit_friction(**{name: values[one_way] for name, values in made.items()})
+    two = fit_friction(**loops(LEVELS[:2], noise=2.0))
+    assert np.isnan(two.slope_pvalue)
+    assert not two.slope_significant
+    assert "cannot be tested" in two.fit_report()
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"floor": 1.5}, "floor = 1.5 is not allowed"),
+        ({"force": None}, "force: needed when no ForceMap is given"),
+    ],
+)
+def test_impossible_arguments_are_named(options, message):
+    with pytest.raises(ParameterError, match=message):
+        fit_friction(**{**loops(), **options})
+    with pytest.raises(ParameterError, match="pressure: a value is not finite"):
+        fit_friction(**loops()).predict(np.nan)

@@ -1,0 +1,152 @@
+"""What may import what: the order of the packages, no cycles, nothing private from outside."""
+
+import ast
+import graphlib
+from functools import cache
+from pathlib import Path
+
+import grimp
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+#: From the bottom to the top; a package imports only what stands in lines above its own.
+#: Those in one line do not know each other.
+LAYERS = (
+    ("errors",),
+    ("channels", "comparison", "units", "_checks", "_writing", "_moved"),
+    ("effects",),
+    ("rig",),
+    ("recordings", "rigs"),
+    ("simulation",),
+    ("report",),
+    ("fit", "library"),
+    ("control", "design"),
+    ("diagnosis",),
+    ("prove",),
+    ("reproduce",),
+    ("cli",),
+)
+#: Imports against that order, which are to go: the page of a diagnosis names the result that it
+#: shows, and the result writes it.
+REPORT_OF_A_DIAGNOSIS = {
+    ("pamrs.report", "pamrs.diagnosis.result"),
+    ("pamrs.report.figures", "pamrs.diagnosis.result"),
+    ("pamrs.report.html", "pamrs.diagnosis.result"),
+    ("pamrs.report.text", "pamrs.diagnosis.result"),
+}
+#: Names that a module may take from the root package, which loads all others on first use.
+FROM_ROOT = {"_core", "__version__"}
+
+
+@cache
+def graph(*, annotations: bool = True) -> grimp.ImportGraph:
+    """Imports between the modules of pamrs, those inside functions too."""
+    return grimp.build_graph("pamrs", cache_dir=None, exclude_type_checking_imports=not annotations)
+
+
+def edges(*, annotations: bool = True) -> set[tuple[str, str]]:
+    """Who imports whom; the root package and entry points, which nothing imports, are left out."""
+    found = graph(annotations=annotations)
+    return {
+        (importer, imported)
+        for importer in found.modules
+        if importer != "pamrs" and not importer.endswith(".__main__")
+        for imported in found.find_modules_directly_imported_by(importer)
+        if imported != "pamrs"
+    }
+
+
+def part(module: str) -> str:
+    """The package, or module, directly in pamrs that a module belongs to."""
+    return module.split(".")[1]
+
+
+def test_every_part_has_its_place():
+    parts = {part(module) for module in graph().modules if module != "pamrs"}
+    named = [name for layer in LAYERS for name in layer]
+    assert len(named) == len(set(named))
+    assert parts - {"__main__"} == set(named)
+
+
+def test_no_package_imports_one_beside_or_above_it():
+    height = {name: index for index, layer in enumerate(LAYERS) for name in layer}
+    against = {(a, b) for a, b in edges() if part(a) != part(b) and height[part(b)] >= height[part(a)]}
+    assert not against - REPORT_OF_A_DIAGNOSIS, "imports that go upward"
+    assert against == REPORT_OF_A_DIAGNOSIS, "exceptions that are not needed any more"
+
+
+def test_no_modules_import_each_other():
+    """Imports for annotations alone are left out.
+
+    A result has a method that draws it, and what draws it names the result in its signature; that
+    import never runs. Between packages these imports count, see above.
+    """
+    needs: dict[str, set[str]] = {}
+    for importer, imported in edges(annotations=False) - REPORT_OF_A_DIAGNOSIS:
+        needs.setdefault(importer, set()).add(imported)
+    try:
+        graphlib.TopologicalSorter(needs).prepare()
+    except graphlib.CycleError as error:
+        pytest.fail(f"a cycle of imports: {' <- '.join(error.args[1])}")
+
+
+def test_only_the_core_and_the_version_come_from_the_root():
+    modules = graph().modules
+    for importer in sorted(graph().find_modules_that_directly_import("pamrs")):
+        for details in graph().get_import_details(importer=importer, imported="pamrs"):
+            line = details["line_contents"]
+            names = {name.split(" as ")[0].strip() for name in line.partition(" import ")[2].strip("()").split(",")}
+            others = {name for name in names - FROM_ROOT if f"pamrs.{name}" not in modules}
+            assert not others, f"{importer}: {line}"
+
+
+def test_nothing_imports_an_entry_point():
+    for module in graph().modules:
+        if module.endswith("__main__"):
+            assert not graph().find_modules_that_directly_import(module)
+
+
+def test_only_its_command_imports_the_reproduction_and_only_when_it_runs():
+    outside = {a for a, b in edges() if part(b) == "reproduce" and part(a) != "reproduce"}
+    assert outside == {"pamrs.cli.reproduce"}
+    tree = ast.parse((ROOT / "python/pamrs/cli/reproduce.py").read_text(encoding="utf-8"))
+    assert not [name for statement in tree.body for name in imported(statement) if name.startswith("pamrs.reproduce")]
+
+
+def imported(node: ast.AST) -> list[str]:
+    """Modules, and names as if they were, that a statement at its own level imports."""
+    if isinstance(node, ast.Import):
+        return [alias.name for alias in node.names]
+    if isinstance(node, ast.ImportFrom) and node.module and not node.level:
+        return [f"{node.module}.{alias.name}" for alias in node.names]
+    return []
+
+
+def owner(module: str) -> str | None:
+    """The package in which a private module or package may be imported; None for a public one."""
+    words = module.split(".")
+    private = [index for index, word in enumerate(words) if word.startswith("_") and not word.startswith("__")]
+    return ".".join(words[: private[0]]) if private else None
+
+
+def test_private_modules_are_imported_in_their_package_alone():
+    strange = [(a, b) for a, b in edges() if (home := owner(b)) and not f"{a}.".startswith(f"{home}.")]
+    assert not strange
+
+
+@pytest.mark.parametrize("folder", ["benchmarks", "cases", "demo", "docs", "fingerprints"])
+def test_scripts_import_no_private_part_of_a_package(folder):
+    """The private modules directly in pamrs are for all parts of this project."""
+    for path in sorted((ROOT / folder).rglob("*.py")):
+        names = [name for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) for name in imported(node)]
+        mine = [name for name in names if name.startswith("pamrs.")]
+        assert not [name for name in mine if owner(name) not in (None, "pamrs")], path
+
+
+def test_trial_does_not_know_the_package():
+    files = sorted((ROOT / "trial").rglob("*.py"))
+    assert files
+    for path in files:
+        names = [name for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) for name in imported(node)]
+        assert not [name for name in names if name.split(".")[0] == "pamrs"], path

@@ -1,0 +1,149 @@
+"""Cases: folders with a rig and recordings."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pamrs
+from pamrs.errors import CaseError
+from pamrs.recordings import load_case
+
+ROOT = Path(__file__).parents[2]
+SHARED = ROOT / ".." / "shared"
+CONCEALED = SHARED / "concealed"
+CHAMBERS = ROOT / "cases" / "zillen_chambers"
+TOML = 'schema = "pamrs.case/1"\nrig = "rig.toml"\n\n[[recording]]\nfile = "run.csv"\nrole = "fit"\n'
+
+
+def folder(path: Path, toml: str = TOML) -> Path:
+    home = path / "stand"
+    home.mkdir(exist_ok=True)
+    pamrs.rigs.sealed_chamber().to_toml(home / "rig.toml")
+    rows = "".join(f"{0.1 * i:.1f},{7 + 0.01 * ((i * 5) % 7):.2f}\n" for i in range(60))
+    for name in ("run.csv", "proof.csv"):
+        (home / name).write_text("time [s],muscle_pressure [bar]\n" + rows)
+    (home / "case.toml").write_text(toml)
+    return home
+
+
+def refused(home: Path) -> str:
+    with pytest.raises(CaseError) as caught:
+        load_case(home)
+    return str(caught.value)
+
+
+def test_case_with_defaults(tmp_path: Path) -> None:
+    case = load_case(folder(tmp_path))
+    assert case.name == "stand"
+    assert case.path == tmp_path / "stand"
+    assert case.rig.name == "sealed_chamber"
+    assert [recording.name for recording in case.recordings] == ["run"]
+    assert case.channels == ("muscle_pressure",)
+    assert (len(case.fit), len(case.held_out)) == (1, 0)
+    assert load_case(case.path / "case.toml").name == "stand"
+    other = case.with_rig(case.rig.with_parameters({"chamber.dead_volume": 2e-4}))
+    assert other.recordings is case.recordings
+    assert case.rig.parameters["chamber.dead_volume"].value == 1e-4
+
+
+def test_roles_names_and_files_outside(tmp_path: Path) -> None:
+    extra = '[[recording]]\nfile = "../elsewhere.csv"\nname = "proof"\nrole = "held_out"\nsample_time = 0.2\n'
+    home = folder(tmp_path, TOML + extra)
+    (tmp_path / "elsewhere.csv").write_bytes((home / "run.csv").read_bytes())
+    case = load_case(home)
+    assert [recording.name for recording in case.held_out] == ["proof"]
+    assert case.held_out[0].sample_time == 0.2
+
+
+BAD = [
+    ('schema = "pamrs.case/1"', 'schema = "pamrs.case/9"', ["'pamrs.case/9'", "'pamrs.case/1'"]),
+    ('rig = "rig.toml"', 'rig = "other.toml"', ["rig = 'other.toml'", "cannot be read"]),
+    ('rig = "rig.toml"', "rig = 4", ["rig = 4"]),
+    ('rig = "rig.toml"', 'rigg = "rig.toml"', ["'rigg'", "'rig'"]),
+    ('role = "fit"', 'role = "train"', ["recording[0].role = 'train'", "'held_out'"]),
+    ('role = "fit"', 'role = "held_out"', ["'fit'", "nothing is left"]),
+    ('role = "fit"', "role = ['fit']", ["recording[0].role"]),
+    ('role = "fit"', 'rolle = "fit"', ["'recording[0].rolle'", "'role'"]),
+    ('role = "fit"', "header = 1", ["recording[0].header = 1", "true or false"]),
+    ('role = "fit"', 'delimiter = "::"', ["recording[0].delimiter", "one character"]),
+    ('role = "fit"', "columns = [1, 2]", ["recording[0].columns"]),
+    ('role = "fit"', "thousands = { time = 1 }", ["recording[0].thousands"]),
+    ('role = "fit"', "sample_time = true", ["recording[0].sample_time"]),
+    ('role = "fit"', "sample_time = -1.0", ["sample_time = -1.0", "positive"]),
+    ('role = "fit"', "name = 3", ["recording[0].name"]),
+    ('role = "fit"', 'columns = ["time [s]", "force [V]"]', ["run.csv", "force [V]"]),
+    ('file = "run.csv"', 'file = "absent.csv"', ["recording[0].file = 'absent.csv'", "no file", "copy it"]),
+    ('file = "run.csv"', "file = 7", ["recording[0].file = 7"]),
+    ('file = "run.csv"', 'file = "."', ["folder"]),
+    ("[[recording]]", "[recording]", ["[[recording]]"]),
+    ("[[recording]]", "[[recordings]]", ["'recordings'", "[[recording]]"]),
+    ("[[recording]]", "[[recording", ["not valid TOML"]),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "wanted"), BAD)
+def test_mistakes_are_named(tmp_path: Path, old: str, new: str, wanted: list[str]) -> None:
+    assert old in TOML
+    message = refused(folder(tmp_path, TOML.replace(old, new)))
+    assert "case.toml" in message
+    for words in wanted:
+        assert words in message, message
+
+
+def test_all_problems_at_once(tmp_path: Path) -> None:
+    extra = '[[recording]]\nfile = "absent.csv"\n'
+    home = folder(tmp_path, TOML + extra)
+    (home / "rig.toml").write_text('schema = "pamrs.rig/1"\n')
+    (home / "run.csv").write_text("time [s],pressure [bar]\n0,1\n1,2\n")
+    message = refused(home)
+    assert all(words in message for words in ("absent.csv", "[chamber] is missing", "'pressure [bar]'"))
+
+
+def test_missing_file_tells_where_to_get_it(tmp_path: Path) -> None:
+    toml = 'source = "ask the archive of the test stand"\n' + TOML.replace("run.csv", "gone.csv")
+    message = refused(folder(tmp_path, toml))
+    assert "gone.csv" in message
+    assert "ask the archive" in message
+
+
+def test_the_same_name_twice(tmp_path: Path) -> None:
+    assert "'run'" in refused(folder(tmp_path, TOML + TOML[TOML.index("[[") :]))
+
+
+def test_no_case_at_all(tmp_path: Path) -> None:
+    assert "no such" in refused(tmp_path / "nowhere")
+    assert "no case.toml" in refused(tmp_path)
+    (tmp_path / "case.toml").write_bytes(b"\xff\xfe")
+    assert "UTF-8" in refused(tmp_path)
+    (tmp_path / "case.toml").write_text("")
+    assert "[[recording]]" in refused(tmp_path)
+
+
+@pytest.mark.parametrize("path", sorted(CONCEALED.glob("case_*")), ids=lambda path: path.name)
+def test_sealed_cases_load(path: Path) -> None:
+    case = load_case(path)
+    assert (len(case.fit), len(case.held_out)) == (3, 2)
+    assert case.channels == ("valve_command", "supply_pressure", "muscle_pressure", "joint_angle")
+
+
+@pytest.mark.skipif(not SHARED.is_dir(), reason="the recordings are not beside the project")
+@pytest.mark.parametrize("path", sorted(CHAMBERS.glob("*/")), ids=lambda path: path.name)
+def test_chambers_load(path: Path) -> None:
+    case = load_case(path)
+    (recording,) = case.recordings
+    assert not case.rig.parameters["chamber.dead_volume"].known
+    assert {issue.kind for issue in recording.issues} <= {"gap"}
+    assert recording.sample_time == pytest.approx(0.1, rel=5e-3)
+    assert 130.0 < recording.duration < 152.0
+    pressure = recording.channels["muscle_pressure"]
+    assert 5.0e5 < pressure[0] < 7.9e5
+    assert recording.valid().mean() > 0.98
+    leaks = path.name in ("Ultimaker_015", "Ultimaker_020")
+    assert (np.nanmin(pressure) < 1e4) == leaks
+
+
+def test_there_are_seven_chambers() -> None:
+    assert len(list(CHAMBERS.glob("*/case.toml"))) == 7

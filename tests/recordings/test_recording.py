@@ -1,0 +1,491 @@
+"""Recordings: what is read, what is refused, what is masked and what is left alone."""
+
+from __future__ import annotations
+
+import gzip
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from pamrs.errors import PamrsError, RecordingError
+from pamrs.recordings import CHANNELS, Recording, load_recording
+from pamrs.recordings._faults import find_faults
+
+Array = NDArray[np.float64]
+SHARED = Path(__file__).parents[2] / ".." / "shared"
+CONCEALED = SHARED / "concealed"
+N = 4000
+DT = 0.005
+LSB = {"supply_pressure": 42.0, "muscle_pressure": 42.0, "joint_angle": 0.011}
+HEADER = "time [s],valve_command [V],supply_pressure [Pa],muscle_pressure [Pa],joint_angle [deg]"
+SENSORS = tuple(LSB)
+
+
+def lively(seed: int = 3) -> dict[str, Array]:
+    """Quantised, noisy channels with ramps, holds and a rest at the stop."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(N) * DT
+    shape = np.interp(time, [0, 1, 4, 7, 9, 13, 16, 20], [0, 0, 1, 1, 0.4, 0.4, 0.9, 0])
+    clean = {
+        "supply_pressure": 13.6e5 - 6e4 * time / time[-1] - 2e4 * shape,
+        "muscle_pressure": 2.8e5 * shape,
+        "joint_angle": 15.0 + 80.0 * shape**1.5,
+    }
+    noise = {"supply_pressure": 600.0, "muscle_pressure": 500.0, "joint_angle": 0.012}
+    data = {"time": time, "valve_command": np.round(5.0 + 0.4 * np.gradient(shape, time), 4)}
+    for name, values in clean.items():
+        data[name] = np.round((values + rng.normal(0.0, noise[name], N)) / LSB[name]) * LSB[name]
+    return data
+
+
+def text(data: dict[str, Array], header: str = HEADER, rows: Any = slice(None)) -> str:
+    table = np.column_stack([data["time"], *(data[name] for name in ("valve_command", *SENSORS))])[rows]
+    lines = [f"{t:.4f},{u:.4f},{supply:.1f},{muscle:.1f},{angle:.4f}" for t, u, supply, muscle, angle in table]
+    return "\n".join([header, *lines]) + "\n"
+
+
+def load(tmp_path: Path, content: str | dict[str, Array], **options: Any) -> Recording:
+    file = tmp_path / "run.csv"
+    file.write_text(content if isinstance(content, str) else text(content), encoding="utf-8")
+    return load_recording(file, **options)
+
+
+def refused(tmp_path: Path, content: str, **options: Any) -> str:
+    with pytest.raises(RecordingError) as caught:
+        load(tmp_path, content, **options)
+    assert "run.csv" in str(caught.value)
+    return str(caught.value)
+
+
+def kinds(recording: Recording, channel: str | None = None) -> set[str]:
+    return {issue.kind for issue in recording.issues if channel in (None, issue.channel)}
+
+
+# ------------------------------------------------------------------------- reading
+
+
+def test_clean_recording_in_si(tmp_path: Path) -> None:
+    data = lively()
+    recording = load(tmp_path, data, role="held_out")
+    assert (recording.name, recording.role, len(recording)) == ("run", "held_out", N)
+    assert recording.sample_time == DT
+    assert recording.issues == []
+    assert recording.valid().all()
+    np.testing.assert_allclose(recording.time, np.arange(N) * DT, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(recording.channels["joint_angle"], np.radians(data["joint_angle"]), atol=2e-6)
+    np.testing.assert_allclose(recording.channels["muscle_pressure"], data["muscle_pressure"], atol=0.1)
+    assert recording.units["joint_angle"] == "rad"
+    assert recording.duration == pytest.approx((N - 1) * DT)
+    assert "run" in repr(recording)
+
+
+@pytest.mark.parametrize(("unit", "scale"), [("bar", 1e5), ("kPa", 1e3), ("psi", 6894.757293168361), ("mbar", 100.0)])
+def test_units_are_converted(tmp_path: Path, unit: str, scale: float) -> None:
+    rows = "\n".join(f"{i * 10},{0.1 * i}" for i in range(30))
+    recording = load(tmp_path, f"time [ms],muscle_pressure [{unit}]\n{rows}\n")
+    assert recording.sample_time == pytest.approx(0.01)
+    np.testing.assert_allclose(recording.channels["muscle_pressure"], 0.1 * np.arange(30) * scale)
+
+
+def test_time_starts_at_zero(tmp_path: Path) -> None:
+    data = lively()
+    data["time"] = data["time"] + 1234.5
+    recording = load(tmp_path, data)
+    assert recording.time[0] == 0.0
+    assert len(recording) == N
+    assert recording.issues == []
+
+
+def test_gzip_bom_quotes_and_crlf(tmp_path: Path) -> None:
+    content = '\ufeff"time [s]","muscle_pressure [bar]"\r\n' + "".join(f"{0.1 * i},{i % 7}\r\n" for i in range(40))
+    file = tmp_path / "run.csv.gz"
+    file.write_bytes(gzip.compress(content.encode()))
+    recording = load_recording(file)
+    assert (recording.name, len(recording)) == ("run", 40)
+
+
+def test_columns_without_header_thousands_and_semicolons(tmp_path: Path) -> None:
+    stamps = [f"{i * 100_000:,}".replace(",", ".") for i in range(1200)]
+    content = "".join(f"{stamp};3.{i % 3};7.6{i % 4}\r\n" for i, stamp in enumerate(stamps))
+    recording = load(
+        tmp_path,
+        content,
+        columns=["time [us]", "", "muscle_pressure [bar]"],
+        header=False,
+        delimiter=";",
+        thousands={"time": "."},
+    )
+    assert list(recording.channels) == ["muscle_pressure"]
+    assert recording.sample_time == pytest.approx(0.1)
+    assert len(recording) == 1200
+    assert recording.channels["muscle_pressure"][1] == pytest.approx(7.61e5)
+
+
+def test_decimal_comma_and_renamed_columns(tmp_path: Path) -> None:
+    content = "t;p;junk\n" + "".join(f"{i / 10:.1f};{i / 5:.1f};x\n".replace(".", ",") for i in range(30))
+    names = {"t": "time [s]", "p": "muscle_pressure [bar]", "junk": ""}
+    recording = load(tmp_path, content, columns=names, delimiter=";", decimal=",")
+    assert recording.channels["muscle_pressure"][5] == pytest.approx(1e5)
+
+
+def test_rows_without_a_clock(tmp_path: Path) -> None:
+    content = "muscle_pressure [bar]\n" + "".join(f"{i % 9}\n" for i in range(50))
+    assert load(tmp_path, content, sample_time=0.02).time[-1] == pytest.approx(0.98)
+    assert "'time' is missing" in refused(tmp_path, content)
+
+
+def test_blank_separated(tmp_path: Path) -> None:
+    content = "".join(f"  {i * 10}   {i % 5}.5 \n" for i in range(50))
+    recording = load(tmp_path, content, columns=["time [ms]", "force [N]"], header=False, delimiter=" ")
+    assert recording.channels["force"][1] == 1.5
+
+
+def test_reference_may_be_an_angle_or_a_pressure(tmp_path: Path) -> None:
+    rows = "".join(f"{i},{i},1\n" for i in range(30))
+    header = "time [s],muscle_pressure [bar],reference "
+    assert load(tmp_path, f"{header}[bar]\n{rows}").units["reference"] == "Pa"
+    assert load(tmp_path, f"{header}[deg]\n{rows}").units["reference"] == "rad"
+    assert "reference [V]" in refused(tmp_path, f"{header}[V]\n{rows}")
+
+
+def test_to_pandas(tmp_path: Path) -> None:
+    pytest.importorskip("pandas")
+    frame = load(tmp_path, lively()).to_pandas()
+    assert frame.index.name == "time [s]"
+    assert list(frame)[-1] == "joint_angle [rad]"
+    assert len(frame) == N
+
+
+def test_valid_names_what_is_missing(tmp_path: Path) -> None:
+    recording = load(tmp_path, lively())
+    with pytest.raises(RecordingError, match="'force'"):
+        recording.valid("force")
+    assert recording.segments("joint_angle") == [(0, N)]
+    assert recording.segments(minimum=N + 1) == []
+
+
+# ----------------------------------------------------------------------- refusing
+
+ROWS = "0,1\n1,2\n2,3\n"
+BAD = [
+    ("", {}, ["empty"]),
+    ("\n\n  \n", {}, ["empty"]),
+    ("time [s],muscle_pressure [bar]\n", {}, ["header without rows"]),
+    ("time [s],muscle_pressure [bar]\n0,1\n", {}, ["one row"]),
+    ("time [s],muscle_pressure [bar]\n1,1\n1,2\n", {}, ["'time'", "different times"]),
+    ("time [s],muscle_pressure [bar]\nnan,1\n,2\n", {}, ["'time'", "no value"]),
+    ("time [s],muscle_pressure\n" + ROWS, {}, ["'muscle_pressure'", "no unit", "[Pa]"]),
+    ("time [s],muscle_pressure []\n" + ROWS, {}, ["muscle_pressure []", "no unit"]),
+    ("time,muscle_pressure [bar]\n" + ROWS, {}, ["'time'", "no unit"]),
+    ("time [s],muscle_pressure [V]\n" + ROWS, {}, ["muscle_pressure [V]", "wrong dimension", "'Pa'"]),
+    ("time [s],muscle_pressure [Bar]\n" + ROWS, {}, ["muscle_pressure [Bar]", "'bar'"]),
+    ("time [s],joint_angle [bar]\n" + ROWS, {}, ["joint_angle [bar]", "'rad'"]),
+    ("time [s],muscle_presure [bar]\n" + ROWS, {}, ["'muscle_presure [bar]'", "'muscle_pressure'"]),
+    ("time [s],zeppelin [bar]\n" + ROWS, {}, ["'zeppelin [bar]'", "valve_command"]),
+    ("time [s],force [N],force [N]\n0,1,1\n1,2,2\n", {}, ["'force'", "twice"]),
+    ("time [s],force [N]]\n" + ROWS, {}, ["force [N]]"]),
+    ("time [s]\n0\n1\n", {}, ["no channel"]),
+    ("time [s],force [N]\n0,1\n1,abc\n", {}, ["force [N]", "row 3", "'abc'"]),
+    ("time [s],force [N]\n0,1\n1.000.000,2\n", {}, ["time [s]", "row 3", "thousands"]),
+    ("time [s];force [N]\n0;1\n1;2,5\n", {"delimiter": ";"}, ["force [N]", "decimal"]),
+    ("time [s];force [N]\n0;1\n1;2\n", {}, ["time [s];force [N]"]),
+    ("time [s],force [N]\n" + "0,1,2\n" * 9, {}, ["2 cells", "row 2"]),
+    ("time [s],force [N]\n" + ROWS, {"columns": ["time [s]"]}, ["1 headings", "2 columns"]),
+    ("time [s],force [N]\n" + ROWS, {"columns": {"torque": "force [N]"}}, ["'torque'", "force [N]"]),
+    ("time [s],force [N]\n" + ROWS, {"columns": "force [N]"}, ["columns"]),
+    (ROWS, {"header": False}, ["columns must list"]),
+    ("time [s],force [N]\n" + ROWS, {"role": "test"}, ["'test'", "'held_out'"]),
+    ("time [s],force [N]\n" + ROWS, {"sample_time": 0.0}, ["sample_time"]),
+    ("time [s],force [N]\n" + ROWS, {"sample_time": math.nan}, ["sample_time"]),
+    ("time [s],force [N]\n" + ROWS, {"delimiter": ""}, ["delimiter"]),
+    ("time [s],force [N]\n" + ROWS, {"thousands": {"torque": "."}}, ["'torque'"]),
+]
+
+
+@pytest.mark.parametrize(("content", "options", "wanted"), BAD)
+def test_mistakes_name_file_and_column(tmp_path: Path, content: str, options: dict[str, Any], wanted: list[str]) -> None:
+    message = refused(tmp_path, content, **options)
+    for words in wanted:
+        assert words in message, message
+
+
+def test_all_bad_columns_at_once(tmp_path: Path) -> None:
+    message = refused(tmp_path, "time [s],force,length [V],zeppelin [m]\n0,1,2,3\n1,2,3,4\n")
+    assert "3 problems" in message
+    assert all(words in message for words in ("'force'", "length [V]", "zeppelin"))
+
+
+def test_swapped_columns_are_seen_by_impossible_values(tmp_path: Path) -> None:
+    data = lively()
+    data["muscle_pressure"], data["joint_angle"] = data["joint_angle"], data["muscle_pressure"]
+    assert "'joint_angle'" in refused(tmp_path, text(data))
+    content = "time [s],muscle_pressure [bar]\n" + "".join(f"{i},{-5 - i}\n" for i in range(50))
+    assert "'muscle_pressure'" in refused(tmp_path, content)
+
+
+def test_unreadable_files(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match=r"absent\.csv"):
+        load_recording(tmp_path / "absent.csv")
+    with pytest.raises(RecordingError, match="folder"):
+        load_recording(tmp_path)
+    for name, content in [
+        ("a.csv", b"\xff\xfe\x00\x01\x80"),
+        ("zero.csv", b"time [s]\x00,"),
+        ("broken.csv.gz", b"no gzip at all"),
+        ("cut.csv.gz", gzip.compress(b"time [s],force [N]\n0,1\n" * 50)[:30]),
+        ("sheet.xlsx", b"PK"),
+        ("broken.parquet", b"PAR1"),
+    ]:
+        (tmp_path / name).write_bytes(content)
+        with pytest.raises(RecordingError, match=name):
+            load_recording(tmp_path / name)
+
+
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.text(alphabet='time [s],force[N]\n0123456789.-e naifx"', max_size=120), st.booleans())
+def test_any_text_is_read_or_refused(tmp_path: Path, content: str, headed: bool) -> None:
+    if headed:
+        content = "time [s],force [N]\n" + content
+    try:
+        recording = load(tmp_path, content)
+    except PamrsError:
+        return
+    for name, values in recording.channels.items():
+        assert np.array_equal(np.isfinite(values), recording.mask[name])
+
+
+# ---------------------------------------------------------------------- the clock
+
+
+def test_two_samples_only(tmp_path: Path) -> None:
+    recording = load(tmp_path, "time [s],muscle_pressure [bar]\n0,1\n0.5,2\n")
+    assert len(recording) == 2
+    assert recording.valid().all()
+    assert kinds(recording) == {"short"}
+
+
+def test_nan_rows_are_masked_and_not_bridged(tmp_path: Path) -> None:
+    data = lively()
+    data["muscle_pressure"][100:140] = np.nan
+    data["joint_angle"][50] = np.inf
+    recording = load(tmp_path, data)
+    assert np.flatnonzero(~recording.mask["muscle_pressure"]).tolist() == list(range(100, 140))
+    assert np.isnan(recording.channels["muscle_pressure"][100:140]).all()
+    assert recording.mask["supply_pressure"].all()
+    issue = next(issue for issue in recording.issues if issue.channel == "muscle_pressure")
+    assert issue.kind == "nan"
+    assert [issue.start, issue.stop] == pytest.approx([0.5, 0.695])
+    assert kinds(recording, "joint_angle") == {"nan"}
+    assert recording.segments("muscle_pressure", minimum=200) == [(140, N)]
+
+
+def test_empty_cells_and_cut_last_row(tmp_path: Path) -> None:
+    lines = text(lively()).splitlines()
+    lines[11] = ",".join([*lines[11].split(",")[:-1], ""])
+    lines[12] = ",".join([*lines[12].split(",")[:-1], "NaN"])
+    lines[-1] = lines[-1][:20]
+    recording = load(tmp_path, "\n".join(lines))
+    assert not recording.mask["joint_angle"][[10, 11, -1]].any()
+    assert "nan" in kinds(recording)
+
+
+def test_missing_samples_leave_masked_holes(tmp_path: Path) -> None:
+    data = lively()
+    keep = np.random.default_rng(1).random(N) > 0.3
+    keep[[0, -1]] = True
+    recording = load(tmp_path, text(data, rows=keep))
+    assert len(recording) == N
+    assert recording.sample_time == pytest.approx(DT)
+    assert np.array_equal(recording.valid(), keep)
+    kept = recording.channels["muscle_pressure"][keep]
+    np.testing.assert_allclose(kept, data["muscle_pressure"][keep], atol=0.1)
+    gaps = [issue for issue in recording.issues if issue.kind == "gap"]
+    assert len(gaps) == 1
+    assert "30 %" in gaps[0].text or "29 %" in gaps[0].text
+
+
+def test_one_gap_is_told_with_its_times(tmp_path: Path) -> None:
+    keep = np.ones(N, dtype=bool)
+    keep[1000:1100] = False
+    recording = load(tmp_path, text(lively(), rows=keep))
+    (issue,) = recording.issues
+    assert (issue.kind, issue.channel) == ("gap", "time")
+    assert [issue.start, issue.stop] == pytest.approx([4.995, 5.5])
+    assert np.array_equal(recording.valid(), keep)
+
+
+def test_clock_jumping_back(tmp_path: Path) -> None:
+    data = lively()
+    data["time"] = np.where(np.arange(N) < 2000, data["time"], data["time"] - 3.0)
+    recording = load(tmp_path, data)
+    (issue,) = recording.issues
+    assert issue.kind == "clock_jump"
+    assert "back by 2.995 s" in issue.text
+    mask = recording.valid()
+    assert recording.segments() == [(0, 2000), (2010, N + 10)]
+    measured = recording.channels["muscle_pressure"][mask]
+    np.testing.assert_allclose(measured, data["muscle_pressure"], atol=0.1)
+
+
+def test_clock_jumping_far_forward(tmp_path: Path) -> None:
+    data = lively()
+    data["time"] = np.where(np.arange(N) < 2000, data["time"], data["time"] + 1e6)
+    recording = load(tmp_path, data)
+    assert kinds(recording) == {"clock_jump"}
+    assert len(recording) == N + 10
+    assert "forward" in recording.issues[0].text
+
+
+def test_clock_jumping_a_little_forward_is_a_hole(tmp_path: Path) -> None:
+    data = lively()
+    data["time"] = np.where(np.arange(N) < 2000, data["time"], data["time"] + 2.0)
+    recording = load(tmp_path, data)
+    assert kinds(recording) == {"gap"}
+    assert not recording.valid()[2000:2399].any()
+
+
+def test_repeated_times_are_left_out(tmp_path: Path) -> None:
+    data = lively()
+    data["time"][1500:1504] = data["time"][1500]
+    recording = load(tmp_path, data)
+    assert kinds(recording) == {"clock_jump", "gap"}
+    assert "3 rows" in next(issue.text for issue in recording.issues if issue.kind == "clock_jump")
+    assert not recording.valid()[1501:1504].any()
+    assert recording.valid()[1504:].all()
+
+
+def test_every_row_twice(tmp_path: Path) -> None:
+    recording = load(tmp_path, text(lively(), rows=np.repeat(np.arange(N), 2)))
+    assert len(recording) == N
+    assert recording.valid().all()
+    assert kinds(recording) == {"clock_jump"}
+
+
+def test_jitter_is_interpolated_between_neighbours(tmp_path: Path) -> None:
+    rng = np.random.default_rng(5)
+    stamps = np.arange(900) * 0.1 + rng.uniform(-0.02, 0.02, 900)
+    stamps[0] = 0.0
+    lines = [f"{t:.4f},{200.0 * t:.4f}" for t in stamps]
+    recording = load(tmp_path, "\n".join(["time [s],force [N]", *lines]))
+    assert recording.sample_time == pytest.approx(0.1, rel=1e-3)
+    assert recording.valid().mean() > 0.99
+    used = recording.valid()
+    error = recording.channels["force"][used] - 200.0 * recording.time[used]
+    assert np.max(np.abs(error)) < 200.0 * 0.1 * 0.06
+
+
+def test_a_given_sample_time_sets_the_grid(tmp_path: Path) -> None:
+    recording = load(tmp_path, lively(), sample_time=0.01)
+    assert recording.sample_time == 0.01
+    assert len(recording) == N // 2
+    assert recording.valid().all()
+
+
+# ------------------------------------------------------------------------- faults
+
+
+@pytest.mark.parametrize("channel", SENSORS)
+@pytest.mark.parametrize(("start", "length"), [(700, 300), (1600, 300), (N - 300, 300)])
+def test_frozen_sensors_are_masked(tmp_path: Path, channel: str, start: int, length: int) -> None:
+    data = lively()
+    data[channel][start : start + length] = data[channel][start]
+    recording = load(tmp_path, data)
+    assert kinds(recording) == {"frozen"}
+    assert not recording.mask[channel][start : start + length].any()
+    assert recording.mask[channel].sum() >= N - length - 4
+    issue = recording.issues[0]
+    assert issue.channel == channel
+    assert issue.start == pytest.approx(start * DT, abs=3 * DT)
+
+
+def test_a_command_may_stand_still(tmp_path: Path) -> None:
+    data = lively()
+    data["valve_command"][500:2500] = 5.0012
+    data["valve_command"][2600:2700] = 10.0
+    assert load(tmp_path, data).issues == []
+
+
+@pytest.mark.parametrize("channel", ["muscle_pressure", "supply_pressure"])
+def test_saturated_transducers_are_masked(tmp_path: Path, channel: str) -> None:
+    data = lively()
+    limit = np.round(np.quantile(data[channel], 0.8) / LSB[channel]) * LSB[channel]
+    clipped = data[channel] > limit
+    data[channel] = np.minimum(data[channel], limit)
+    recording = load(tmp_path, data)
+    assert kinds(recording) == {"saturated"}
+    assert recording.mask[channel][clipped].mean() < 0.1
+
+
+def test_saturation_without_noise(tmp_path: Path) -> None:
+    data = lively()
+    data["muscle_pressure"] = np.minimum(np.round(2e5 * (1 - np.cos(data["time"])) / 42) * 42, 3e5)
+    recording = load(tmp_path, data)
+    assert kinds(recording) == {"saturated"}
+
+
+def test_spikes_are_masked(tmp_path: Path) -> None:
+    data = lively()
+    for channel, size in (("muscle_pressure", 8e4), ("joint_angle", -9.0)):
+        data[channel][[333, 2222]] += size
+    recording = load(tmp_path, data)
+    assert kinds(recording) == {"outlier"}
+    for channel in ("muscle_pressure", "joint_angle"):
+        assert np.flatnonzero(~recording.mask[channel]).tolist() == [333, 2222]
+
+
+def test_constant_channels_are_told(tmp_path: Path) -> None:
+    data = lively()
+    data["muscle_pressure"][:] = 1e5
+    data["joint_angle"][:] = 30.0
+    recording = load(tmp_path, data)
+    assert kinds(recording) == {"constant"}
+    assert not recording.mask["muscle_pressure"].any()
+    assert recording.mask["joint_angle"].all()
+
+
+def test_ordinary_rest_is_no_fault() -> None:
+    """An encoder against its stop, a dry joint in mid-travel, a vented muscle cut off at zero, ideal data."""
+    data = lively()
+    time = data["time"]
+    ideal = np.round(1e5 * np.clip(np.sin(time), 0.0, 1.0), 1)
+    encoder = np.round(np.interp(time, [0, 3, 5, 9, 12, 20], [0, 0, 1, 1, 0.3, 0.3]) * 500) * 0.2
+    assert find_faults("joint_angle", encoder) == []
+    assert find_faults("muscle_pressure", np.maximum(data["muscle_pressure"], 0.0)) == []
+    assert find_faults("muscle_pressure", ideal) == []
+    assert find_faults("joint_angle", np.maximum(data["joint_angle"], 15.2)) == []
+    for channel in SENSORS:
+        coarse = np.round(data[channel] / (40 * LSB[channel])) * 40 * LSB[channel]
+        assert find_faults(channel, coarse) == []
+        assert find_faults(channel, np.repeat(data[channel][::50], 50)) == []
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("thin", [1, 4, 20])
+def test_no_false_alarms_on_sound_channels(seed: int, thin: int) -> None:
+    data = lively(seed)
+    for channel in SENSORS:
+        assert find_faults(channel, data[channel][::thin]) == []
+
+
+@pytest.mark.parametrize("case", sorted(CONCEALED.glob("case_*")), ids=lambda path: path.name)
+def test_sealed_recordings_are_sound(case: Path) -> None:
+    for file in sorted(case.glob("*.csv")):
+        recording = load_recording(file)
+        assert recording.issues == []
+        assert (len(recording), recording.sample_time) == (8000, 0.005)
+        assert recording.valid().all()
+
+
+def test_every_canonical_channel_is_read(tmp_path: Path) -> None:
+    header = ",".join(f"{name} [{channel.unit}]" for name, channel in CHANNELS.items())
+    values = {"V": "5", "Pa": "30{}", "K": "300"}
+    cells = [values.get(channel.unit, "0.5") for name, channel in CHANNELS.items() if name != "time"]
+    rows = "\n".join(f"{i}," + ",".join(cell.format(i * 7 % 11) for cell in cells) for i in range(9))
+    recording = load(tmp_path, f"{header}\n{rows}\n")
+    assert ["time", *recording.channels] == list(CHANNELS)

@@ -1,0 +1,335 @@
+"""Rigs: reading, refusing, changing and writing."""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import pamrs
+from pamrs.effects import EFFECTS
+from pamrs.errors import ParameterError, RigError
+from pamrs.rig import Rig, load_rig, parse_rig
+from pamrs.rig.schema import BLOCKS
+
+CONCEALED = Path(__file__).parents[2] / ".." / "shared" / "concealed"
+SHOULDER = (Path(pamrs.__file__).parent / "rigs" / "shoulder.toml").read_text(encoding="utf-8")
+
+
+def refused(text: str) -> str:
+    with pytest.raises(RigError) as caught:
+        parse_rig(text, source="stand.toml")
+    message = str(caught.value)
+    assert message.startswith("stand.toml")
+    return message
+
+
+def changed(old: str, new: str) -> str:
+    assert SHOULDER.count(old) == 1, old
+    return SHOULDER.replace(old, new)
+
+
+def same(one: Rig, other: Rig) -> bool:
+    return one.model == other.model and one.parameters == other.parameters and one.effect_std == other.effect_std
+
+
+# ------------------------------------------------------------------------ reading
+
+
+def test_shoulder_in_si() -> None:
+    rig = pamrs.rigs.shoulder()
+    assert rig.name == "shoulder"
+    assert rig.blocks == tuple(block for block in BLOCKS if block not in ("line", "transmission", "link", "load"))
+    braid = rig.parameter("muscle.braid_angle")
+    assert braid.value == pytest.approx(math.radians(73.5))
+    assert (braid.unit, braid.tol, braid.known) == ("rad", 0.0, True)
+    volume = rig.parameters["chamber.dead_volume"]
+    assert (volume.value, volume.unit, volume.tol) == (1.5e-4, "m3", 2.25e-5)
+    assert rig.parameters["sensors.angle_zero"].tol == pytest.approx(math.radians(0.1))
+    assert rig.parameters["muscle.count"].value == 6.0
+    assert rig.parameters["muscle.k0"].value == 1.64
+    assert rig.model["valve"]["fraction"] == [0.0, 0.2, 0.5, 0.8, 1.0]
+    assert rig.model["muscle"]["geometry"] == "elliptic"
+    assert rig.effects == []
+
+
+def test_sealed_chamber_has_no_more_than_a_chamber() -> None:
+    rig = pamrs.rigs.sealed_chamber()
+    assert rig.blocks == ("gas", "chamber", "sensors")
+    assert all(rig.model[name] is None for name in ("supply", "valve", "muscle", "joint", "arm", "load"))
+    assert rig.muscle is None
+    assert rig.parameters["chamber.dead_volume"].known
+
+
+def test_gas_and_chamber_are_enough() -> None:
+    text = 'schema="pamrs.rig/1"\n[gas]\n[chamber]\ndead_volume={value=100,unit="cm3",unknown=true}\n'
+    rig = parse_rig(text)
+    volume = rig.parameters["chamber.dead_volume"]
+    assert volume.value == pytest.approx(1e-4)
+    assert not volume.known
+    assert math.isinf(volume.tol)
+    assert rig.model["sensors"] == {"pressure_zero": 0.0, "angle_zero": 0.0}
+    assert same(rig, parse_rig(rig.to_toml_text()))
+
+
+def test_units_of_any_kind_give_the_same_rig() -> None:
+    text = changed('value = 0.015,  unit = "m3",  tol = 3.0e-4', 'value = 15, unit = "l", tol = 0.3')
+    text = text.replace('value = 73.5,     unit = "deg"', f'value = {math.radians(73.5)!r}, unit = "rad"')
+    rig = parse_rig(text)
+    assert rig.parameters["supply.volume"].value == pytest.approx(0.015, rel=1e-15)
+    assert rig.parameters["supply.volume"].tol == pytest.approx(3e-4)
+    assert rig.model["muscle"] == pamrs.rigs.shoulder().model["muscle"]
+
+
+def test_a_tolerance_of_a_temperature_has_no_offset() -> None:
+    text = changed('value = 293.15, unit = "K"', 'value = 20.0, unit = "degC", tol = 2.0')
+    temperature = parse_rig(text).parameters["gas.temperature"]
+    assert temperature.value == pytest.approx(293.15)
+    assert temperature.tol == 2.0
+
+
+@pytest.mark.parametrize("case", sorted(CONCEALED.glob("case_*")), ids=lambda path: path.name)
+def test_sealed_rigs_load(case: Path) -> None:
+    rig = load_rig(case)
+    assert same(rig, parse_rig(rig.to_toml_text()))
+
+
+def test_the_sealed_rigs_are_all_there() -> None:
+    if not CONCEALED.is_dir():
+        pytest.skip("the sealed cases are not beside the project")
+    assert len(list(CONCEALED.glob("case_*/rig.toml"))) == 24
+
+
+# ----------------------------------------------------------------------- refusing
+
+BAD = [
+    ('unit = "m3",  tol = 3.0e-4', 'unit = "bar"', ["supply.volume", "'bar'", "'m3'"]),
+    ("value = 0.015,", "value = -0.015,", ["supply.volume = -0.015 m3", "from 1e-07"]),
+    ("value = 9.07,", "value = nan,", ["arm.payload = nan kg", "finite"]),
+    ("value = 9.07,", "value = inf,", ["arm.payload = inf kg"]),
+    ("value = 9.07,", 'value = "much",', ["arm.payload", "'much'", "a number"]),
+    ("value = 9.07,", "value = true,", ["arm.payload", "a number"]),
+    ("tol = 0.18", "tol = -0.18", ["arm.payload.tol = -0.18 kg"]),
+    ("tol = 0.18", "sigma = 0.18", ["'arm.payload.sigma'", "unknown key"]),
+    ("tol = 0.18", "tol = 0.18, unknown = true", ["arm.payload", "exclude"]),
+    ("tol = 0.18", 'unknown = "yes"', ["arm.payload.unknown", "true or false"]),
+    (
+        "braid_angle ",
+        "braid_angel ",
+        ["'muscle.braid_angel'", "'braid_angle'", "muscle.braid_angle is missing"],
+    ),
+    ("value = 73.5,", "value = 95.0,", ["muscle.braid_angle", "95 deg"]),
+    ("count          = 6", "count = 6.5", ["muscle.count = 6.5", "whole"]),
+    ("count          = 6", "count = 0", ["muscle.count = 0"]),
+    ('"robinson"', '"chou"', ["muscle.model = 'chou'", "'robinson'"]),
+    ('value = 0.276,    unit = "m"', "value = 0.276", ["muscle.rest_length.unit", "'m'"]),
+    ('{ value = 0.276,    unit = "m" }', "0.276", ["muscle.rest_length", "no unit"]),
+    ('{ value = 0.276,    unit = "m" }', '{ unit = "m" }', ["muscle.rest_length.value is missing"]),
+    ("value = 0.003175,", "value = 0.02,", ["muscle.wall_thickness", "muscle.rest_diameter"]),
+    ("[3.0, -0.35, 0.0, 0.0]", "[3.0]", ["muscle.modulus_slope has 1", "muscle.modulus_offset 4"]),
+    ("[3.0, -0.35, 0.0, 0.0]", "[3.0, nan, 0.0, 0.0]", ["muscle.modulus_slope[1] = nan"]),
+    ("[3.0, -0.35, 0.0, 0.0]", "[]", ["muscle.modulus_slope", "a list of numbers"]),
+    ("opening = [0.0, 0.25, 0.5,", "opening = [0.0, 0.5, 0.25,", ["valve.area_fraction.opening", "rise"]),
+    (
+        "fraction = [0.0, 0.2, 0.5,",
+        "fraction = [0.0, 0.2,",
+        ["valve.area_fraction", "5 values and fraction 4"],
+    ),
+    ("fraction = [0.0, 0.2, 0.5,", "fraction = [0.0, 0.6, 0.5,", ["valve.area_fraction.fraction", "fall"]),
+    ("k0 = 1.64", "k1 = 1.64", ["'muscle.end_ratio.k1'", "k0, contraction_slope"]),
+    ("value = 120.0,", "value = 10.0,", ["joint.max_angle", "joint.min_angle"]),
+    ('schema = "pamrs.rig/1"', 'schema = "pamrs.rig/2"', ["schema = 'pamrs.rig/2'", "'pamrs.rig/1'"]),
+    ('name = "shoulder"', "name = 7", ["name = 7"]),
+    ("[sensors]", "[sensor]", ["unknown key 'sensor'", "'sensors'"]),
+    ("[supply]", "[[supply]]", ["supply", "a table"]),
+    ("[arm]", "[[arm", ["not valid TOML"]),
+    ("[sensors]", '[[effects]]\nid = "gremlins"\n[sensors]', ["effects[0].id = 'gremlins'", "leak_muscle"]),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "wanted"), BAD)
+def test_mistakes_are_named(old: str, new: str, wanted: list[str]) -> None:
+    message = refused(SHOULDER.replace(old, new, 1))
+    for words in wanted:
+        assert words in message, message
+
+
+def test_all_problems_at_once() -> None:
+    text = changed("value = 9.07,", "value = nan,").replace("value = 0.015,", "value = -1.0,")
+    message = refused(text.replace("coulomb_speed  =", "coulomb_sped  ="))
+    assert "3 problems" in message
+    assert all(words in message for words in ("arm.payload", "supply.volume", "arm.coulomb_sped"))
+
+
+@pytest.mark.parametrize(("block", "wanted"), [("gas", "[gas]"), ("chamber", "[chamber]")])
+def test_required_blocks(block: str, wanted: str) -> None:
+    text = {"gas": '[chamber]\ndead_volume={value=1,unit="l"}', "chamber": "[gas]"}[block]
+    message = refused('schema="pamrs.rig/1"\n' + text)
+    assert wanted in message
+    assert "missing" in message
+
+
+def test_blocks_that_need_each_other() -> None:
+    start, _, rest = SHOULDER.partition("[arm]")
+    message = refused(start + "[sensors]" + rest.partition("[sensors]")[2])
+    assert "[joint] needs the block [arm]" in message
+
+
+def test_unreadable_files(tmp_path: Path) -> None:
+    with pytest.raises(RigError, match=r"absent\.toml"):
+        load_rig(tmp_path / "absent.toml")
+    with pytest.raises(RigError, match=r"rig\.toml: cannot be read"):
+        load_rig(tmp_path)
+    binary = tmp_path / "binary.toml"
+    binary.write_bytes(b"\xff\xfe\x00\x01")
+    with pytest.raises(RigError, match="UTF-8"):
+        load_rig(binary)
+    empty = tmp_path / "empty.toml"
+    empty.write_text("")
+    with pytest.raises(RigError, match=r"\[gas\] is missing"):
+        load_rig(empty)
+
+
+JSON_LIKE = st.recursive(
+    st.one_of(st.booleans(), st.integers(-9, 9), st.floats(), st.text(max_size=5)),
+    lambda inner: st.one_of(st.lists(inner, max_size=3), st.dictionaries(st.sampled_from(["value", "unit", "x"]), inner)),
+    max_leaves=5,
+)
+
+
+@settings(max_examples=150)
+@given(st.sampled_from(list(BLOCKS)), st.text("abcdef_", min_size=1, max_size=9), JSON_LIKE, st.booleans())
+def test_nothing_but_a_rig_error(block: str, key: str, value: Any, known: bool) -> None:
+    from pamrs.rig import Reader
+
+    name = BLOCKS[block][0].where[0] if known else key
+    reader = Reader()
+    reader.document({"schema": "pamrs.rig/1", block: {name: value}, "effects": value})
+    assert reader.problems
+
+
+# ------------------------------------------------------------- changing and writing
+
+
+def test_with_parameters_leaves_the_old_rig_alone() -> None:
+    rig = pamrs.rigs.shoulder()
+    other = rig.with_parameters({"arm.payload": 5.0, "muscle.count": 4})
+    assert other.parameters["arm.payload"].value == 5.0
+    assert other.parameters["arm.payload"].tol == 0.18
+    assert other.model["muscle"]["count"] == 4
+    assert isinstance(other.model["muscle"]["count"], int)
+    assert rig.parameters["arm.payload"].value == 9.07
+    rig.model["arm"]["payload"] = 0.0
+    assert rig.parameters["arm.payload"].value == 9.07
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("arm.payload", -1.0), ("arm.payload", math.nan), ("muscle.count", 2.5), ("chamber.dead_volume", 0.0)],
+)
+def test_impossible_values_are_refused(name: str, value: float) -> None:
+    with pytest.raises(ParameterError, match=name):
+        pamrs.rigs.shoulder().with_parameters({name: value})
+
+
+@pytest.mark.parametrize("name", ["arm.mass", "payload", "valve.opening", "muscle.model", "", "wings.span"])
+def test_unknown_names_are_refused(name: str) -> None:
+    with pytest.raises(ParameterError, match="has no parameter"):
+        pamrs.rigs.shoulder().with_parameters({name: 1.0})
+    with pytest.raises(ParameterError, match="it has: gas"):
+        pamrs.rigs.shoulder().parameter(name)
+
+
+def test_parameters_of_absent_blocks_are_not_there() -> None:
+    with pytest.raises(ParameterError, match=r"arm\.payload"):
+        pamrs.rigs.sealed_chamber().with_parameters({"arm.payload": 1.0})
+
+
+@pytest.mark.parametrize("effect", sorted(EFFECTS))
+def test_effects_round_trip(effect: str) -> None:
+    first = EFFECTS[effect].parameters[0]
+    rig = pamrs.rigs.shoulder().with_effect(effect, {first.name: first.upper}, std={first.name: 0.1 * first.upper})
+    assert rig.effects[0]["id"] == effect
+    assert rig.effects[0]["parameters"][first.name] == first.upper
+    again = parse_rig(rig.to_toml_text())
+    assert same(rig, again)
+    assert again.effect_std[effect][first.name] == pytest.approx(0.1 * first.upper)
+    assert rig.without_effect(effect).effects == []
+    assert json.loads(rig.to_json())["effects"] == [{**rig.effects[0], "at": ""}]
+
+
+def test_an_effect_replaces_its_like() -> None:
+    rig = pamrs.rigs.shoulder().with_effect("leak_muscle", {"conductance": 1e-9})
+    rig = rig.with_effect("leak_muscle", {"conductance": 2e-9})
+    assert rig.effects == [{"id": "leak_muscle", "parameters": {"conductance": 2e-9, "laminar_share": 0.0}}]
+    assert pamrs.rigs.shoulder().effects == []
+
+
+def test_effects_are_checked() -> None:
+    rig = pamrs.rigs.shoulder()
+    with pytest.raises(ParameterError, match="'gremlins'"):
+        rig.with_effect("gremlins")
+    with pytest.raises(ParameterError, match="'speed'"):
+        rig.with_effect("leak_muscle", {"speed": 1.0})
+    with pytest.raises(ParameterError, match="conductance = -1"):
+        rig.with_effect("leak_muscle", {"conductance": -1.0})
+    entry = '\n[[effects]]\nid = "leak_muscle"\nparameters = { conductance = %s }\n'
+    assert "leak_muscle.conductance" in refused(SHOULDER + entry % '{ value = 1.0, unit = "bar" }')
+    assert "no unit" in refused(SHOULDER + entry % "1e-9")
+    assert "twice" in refused(SHOULDER + 2 * (entry % '{ value = 1e-9, unit = "m3/(s Pa)" }'))
+    rig = parse_rig(SHOULDER + entry % '{ value = 0.1, unit = "l/(s bar)", std = 0.01 }')
+    assert rig.effects[0]["parameters"]["conductance"] == pytest.approx(1e-9)
+    assert rig.effect_std["leak_muscle"]["conductance"] == pytest.approx(1e-10)
+
+
+def test_toml_round_trip_through_a_file(tmp_path: Path) -> None:
+    rig = pamrs.rigs.shoulder().with_parameters({"arm.payload": 1 / 3, "sensors.angle_zero": -0.1})
+    assert same(rig, load_rig(rig.to_toml(tmp_path / "again.toml")))
+    with pytest.raises(RigError, match="cannot be written"):
+        rig.to_toml(tmp_path / "no" / "such" / "folder.toml")
+
+
+def test_names_with_quotes_survive() -> None:
+    text = changed('name = "shoulder"', "name = '''a \"b\" \\ ü'''")
+    assert parse_rig(parse_rig(text).to_toml_text()).name == 'a "b" \\ ü'
+
+
+def test_json_is_what_the_core_takes() -> None:
+    model = json.loads(pamrs.rigs.shoulder().to_json())
+    lists = ("supplies", "valves", "lines", "chambers", "muscles", "joints")
+    assert list(model) == ["name", "gas", *lists, "arm", "load", "sensors", "effects"]
+    own = {"discharge_area_max", "null_voltage", "half_range", "opening", "fraction"}
+    assert set(model["valves"][0]) == {"name", "from", "to", *own}
+    assert "end_ratio" not in model["muscles"][0]["muscle"]
+
+
+def test_import_is_light() -> None:
+    code = (
+        "import sys, pamrs; pamrs.rigs.shoulder(); pamrs.load_recording; pamrs.load_case;"
+        "heavy = {'pandas', 'scipy', 'matplotlib', 'pydantic'} & set(sys.modules);"
+        "sys.exit(', '.join(heavy) or 0)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def test_the_package_offers_what_it_says() -> None:
+    assert set(pamrs.__all__) <= set(dir(pamrs))
+    assert isinstance(pamrs.__version__, str)
+    with pytest.raises(AttributeError, match="nonsense"):
+        _ = pamrs.nonsense
+
+
+def test_every_packaged_rig_is_a_function() -> None:
+    for name in pamrs.rigs.names():
+        if name != "bench":  # takes a muscle
+            assert getattr(pamrs.rigs, name)().name == pamrs.rigs.named(name).name
+    with pytest.raises(AttributeError, match="knee"):
+        pamrs.rigs.knee()
