@@ -14,7 +14,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 
-from pamrs import _core
 from pamrs.channels import dotted
 from pamrs.diagnosis import assemble
 from pamrs.diagnosis.blocks import Block, available_blocks
@@ -24,20 +23,14 @@ from pamrs.diagnosis.fitting import Problem
 from pamrs.diagnosis.hypotheses import examine
 from pamrs.diagnosis.plausible import check_plausible, check_sense
 from pamrs.diagnosis.result import Diagnosis
+from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.diagnosis.signals import Prepared, prepare
 from pamrs.errors import DiagnosisError, SimulationError
 from pamrs.recordings import Case, load_case
 from pamrs.rig import Rig
 from pamrs.simulation import core_rig, regulators_of
 
-__all__ = ["Diagnosis", "diagnose"]
-
-LEAST_SHARE = 0.2
-"""Share of usable samples below which a block is left out of the diagnosis."""
-MOST_BELIEVED = 0.4
-"""Probability of effects on a joint beside geometry that is marked unknown."""
-MOST_PULL = 3.0
-"""Standard deviations by which the noise of a regulator's drives may move its droop."""
+__all__ = ["Diagnosis", "DiagnosisSettings", "diagnose"]
 
 
 def _usable_share(block: Block, recordings: list[Prepared]) -> float:
@@ -53,11 +46,11 @@ def _unsettled(rig: Rig) -> list[str]:
     return [name for name in unknown if name.partition(".")[0] in moving]
 
 
-def _doubted(group: Group) -> Group:
+def _doubted(group: Group, factor: float) -> Group:
     """A group of joints whose names are believed less, the rest going to ``unlisted``."""
     if group.mismatch is None or group.mismatch.kind != "arm":
         return group
-    kept = {k: p if k in ("", "unlisted") else MOST_BELIEVED * p for k, p in group.probabilities.items()}
+    kept = {k: p if k in ("", "unlisted") else factor * p for k, p in group.probabilities.items()}
     kept["unlisted"] = kept.get("unlisted", 0.0) + 1.0 - sum(kept.values())
     return replace(group, probabilities=kept)
 
@@ -74,23 +67,24 @@ def _in_range(name: str) -> Iterator[None]:
         ) from error
 
 
-def _drowned(rig: Rig, blocks: list[Block], recordings: list[Prepared], core: _core.Rig) -> dict[str, str]:
+def _drowned(problem: Problem, rig: Rig) -> dict[str, str]:
     """Regulators whose outflow only the difference of two measured pressures tells, where that is mostly noise; why, by block.
 
     That noise grows with the droop, so that a fit would take the droop towards zero to be rid of it (errors in variables).
     """
-    tables = rig.tables("supply")
+    tables, most = rig.tables("supply"), problem.settings.prepare.regulator_droop_shift
     drooping = [name for name in regulators_of(rig) if tables[name]["droop"] > 0.0]
-    regulated = [b for b in blocks if b.kind == "supply" and b.name.partition(".")[2] in drooping]
+    regulated = [b for b in problem.blocks if b.kind == "supply" and b.name.partition(".")[2] in drooping]
+    recordings = problem.recordings
     found = {}
-    floor = floors(Problem(regulated, recordings, core), core) if regulated else {}
+    floor = floors(replace(problem, blocks=regulated), problem.core) if regulated else {}
     for block in regulated:
         gains = [(floor[block.name, p.recording.name].sample / p.noise[block.channel]) ** 2 - 1.0 for p in recordings]
         pull = math.sqrt(sum(max(0.0, gain) * p.n for gain, p in zip(gains, recordings, strict=True)))
-        if pull > MOST_PULL:
+        if pull > most:
             found[block.name] = (
                 f"block {block.name} was left out: only the difference of two measured pressures tells the regulator's flow, and their "
-                f"noise would move its droop by {pull:.2g} standard deviations; at most {MOST_PULL:g} is allowed (a flow meter would "
+                f"noise would move its droop by {pull:.2g} standard deviations; at most {most:g} is allowed (a flow meter would "
                 "settle it)"
             )
     return found
@@ -109,13 +103,20 @@ def _quiet(message: str) -> None:
     """Default receiver of progress."""
 
 
-def diagnose(case: Case | str | os.PathLike[str], *, progress: Callable[[str], None] | None = None) -> Diagnosis:
+def diagnose(
+    case: Case | str | os.PathLike[str],
+    *,
+    settings: DiagnosisSettings | None = None,
+    progress: Callable[[str], None] | None = None,
+) -> Diagnosis:
     """Find the physics that a rig's model leaves out.
 
     Parameters
     ----------
     case : Case or path-like
         A case, or its folder.
+    settings : DiagnosisSettings, optional
+        The numbers that the verdict rests on; those of the published trials by default.
     progress : callable, optional
         Called with a line of text now and then.
 
@@ -142,6 +143,38 @@ def diagnose(case: Case | str | os.PathLike[str], *, progress: Callable[[str], N
     say = progress or _quiet
     if not isinstance(case, Case):
         case = load_case(case)
+    _check_rig(case)
+    chosen = DiagnosisSettings() if settings is None else settings
+    check_plausible(case.recordings, case.rig, case.name, chosen.plausibility)
+    say(f"{case.name}: preparing {len(case.recordings)} recordings")
+    inner, outer, left_out = _problems(case, chosen)
+    blocks = inner.blocks
+    gas, motion = [b for b in blocks if b.kind != "arm"], [b for b in blocks if b.kind == "arm"]
+    with _in_range(case.name):
+        groups = [
+            group for members in (gas, motion) if members for group in examine(inner, outer, case.rig, members, say)
+        ]
+        unsettled = _unsettled(case.rig) if motion else []
+        factor = chosen.verdict.unknown_geometry_probability
+        if unsettled:
+            groups = [_doubted(group, factor) for group in groups]
+        say("putting the answer together")
+        diagnosis = assemble.assemble(case, inner, outer, groups)
+    diagnosis.warnings += left_out
+    if unsettled:
+        what = "length" if case.rig.model["load"] else "angle"
+        diagnosis.warnings.append(
+            f"{', '.join(unsettled)}: marked unknown, and no fit moves them; a wrong one bends the {what} as an effect would, so that "
+            f"no effect of muscles and what they move is believed by more than {100 * factor:.0f} %"
+        )
+    diagnosis.seconds = round(time.perf_counter() - began, 3)
+    if not math.isfinite(sum(diagnosis.probabilities.values())):
+        raise DiagnosisError("the probabilities are not finite: please report this case")
+    return diagnosis
+
+
+def _check_rig(case: Case) -> None:
+    """Refuse rigs that cannot be diagnosed."""
     rig = case.rig
     if rig.effects:
         raise DiagnosisError(
@@ -152,53 +185,34 @@ def diagnose(case: Case | str | os.PathLike[str], *, progress: Callable[[str], N
             f"load.kind = 'frame' of case {case.name!r} is not allowed: a frame holds the length, and its force is for pamrs fit; "
             "'mass', or a rig with [joint] and [arm], or without a muscle, can be diagnosed"
         )
-    check_plausible(case.recordings, rig, case.name)
-    say(f"{case.name}: preparing {len(case.recordings)} recordings")
-    fitted = [prepare(r, rig) for r in case.fit or case.recordings]
-    held = [prepare(r, rig) for r in case.held_out if case.fit]
-    channels = case.channels
-    blocks = available_blocks(rig, channels)
-    thin = {b.name: share for b in blocks if (share := _usable_share(b, fitted)) < LEAST_SHARE}
+
+
+def _problems(case: Case, settings: DiagnosisSettings) -> tuple[Problem, Problem, list[str]]:
+    """Recordings to fit and held-out ones (the same where there are no others) by block, and which blocks were left out, and why."""
+    rig = case.rig
+    fitted = [prepare(r, rig, settings) for r in case.fit or case.recordings]
+    held = [prepare(r, rig, settings) for r in case.held_out if case.fit]
+    channels, least = case.channels, settings.prepare.least_block_share
+    blocks = available_blocks(rig, channels, settings.prepare)
+    thin = {b.name: share for b in blocks if (share := _usable_share(b, fitted)) < least}
     blocks = [b for b in blocks if b.name not in thin]
     if thin and not blocks:
         raise DiagnosisError(
             f"case {case.name!r}: holes leave too few usable samples in every block ("
             + ", ".join(f"{name}: {100 * share:.0f} %" for name, share in thin.items())
-            + f"); at least {100 * LEAST_SHARE:.0f} % are needed"
+            + f"); at least {100 * least:.0f} % are needed"
         )
     if not blocks:
         raise DiagnosisError(
             f"case {case.name!r}: its channels ({', '.join(channels)}) do not surround any block of the rig "
             f"({', '.join(rig.blocks)}); measure {_wanted(rig)}"
         )
-    nominal_core = core_rig(rig)
+    inner = Problem(blocks, fitted, core_rig(rig), settings)
     with _in_range(case.name):
-        drowned = _drowned(rig, blocks, fitted, nominal_core)
-    blocks = [b for b in blocks if b.name not in drowned]
-    if not blocks:
+        drowned = _drowned(inner, rig)
+    inner = replace(inner, blocks=[b for b in blocks if b.name not in drowned])
+    if not inner.blocks:
         raise DiagnosisError(f"case {case.name!r}: {'; '.join(drowned.values())}")
-    check_sense(blocks, [*fitted, *held], nominal_core, case.name)
-    inner = Problem(blocks, fitted, nominal_core)
-    outer = Problem(blocks, held, nominal_core) if held else inner
-    gas = [b for b in blocks if b.kind != "arm"]
-    motion = [b for b in blocks if b.kind == "arm"]
-    with _in_range(case.name):
-        groups = [group for members in (gas, motion) if members for group in examine(inner, outer, rig, members, say)]
-        unsettled = _unsettled(rig) if motion else []
-        if unsettled:
-            groups = [_doubted(group) for group in groups]
-        say("putting the answer together")
-        diagnosis = assemble.assemble(case, inner, outer, groups)
-    for name, share in thin.items():
-        diagnosis.warnings.append(f"block {name} was left out: only {100 * share:.0f} % of its samples are usable")
-    diagnosis.warnings += drowned.values()
-    if unsettled:
-        what = "length" if rig.model["load"] else "angle"
-        diagnosis.warnings.append(
-            f"{', '.join(unsettled)}: marked unknown, and no fit moves them; a wrong one bends the {what} as an effect would, so that "
-            f"no effect of muscles and what they move is believed by more than {100 * MOST_BELIEVED:.0f} %"
-        )
-    diagnosis.seconds = round(time.perf_counter() - began, 3)
-    if not math.isfinite(sum(diagnosis.probabilities.values())):
-        raise DiagnosisError("the probabilities are not finite: please report this case")
-    return diagnosis
+    check_sense(inner.blocks, [*fitted, *held], inner.core, case.name)
+    left_out = [f"block {name} was left out: only {100 * share:.0f} % of its samples are usable" for name, share in thin.items()]
+    return inner, replace(inner, recordings=held) if held else inner, [*left_out, *drowned.values()]

@@ -13,14 +13,16 @@ from pamrs.channels import unit_of
 from pamrs.diagnosis import words
 from pamrs.diagnosis.block_entries import block_entries, unexplained
 from pamrs.diagnosis.blocks import Residual
-from pamrs.diagnosis.candidates import EXACT, Candidate, Group, colour_of, parts_of, start_of
+from pamrs.diagnosis.candidates import Candidate, Group, colour_of, parts_of, start_of
 from pamrs.diagnosis.conditions import Picture, describe
+from pamrs.diagnosis.events import events_of
 from pamrs.diagnosis.evidence import Floor
 from pamrs.diagnosis.experiment import propose
 from pamrs.diagnosis.fitting import Events, Key, Problem, fit, residuals
 from pamrs.diagnosis.result import Diagnosis, Trace
-from pamrs.diagnosis.starts import CHOICES
-from pamrs.diagnosis.verdicts import IN_SET, Judged, case_ambiguity, case_probabilities, case_verdict, is_parameter, judge, symptoms_of
+from pamrs.diagnosis.settings import DiagnosisSettings, EvidenceSettings
+from pamrs.diagnosis.starts import CHOSEN
+from pamrs.diagnosis.verdicts import Judged, case_ambiguity, case_probabilities, case_verdict, is_parameter, judge, symptoms_of
 from pamrs.diagnosis.weighing import share_left
 from pamrs.effects import CATALOGUE, EFFECTS
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError
@@ -28,11 +30,6 @@ from pamrs.recordings import Case
 from pamrs.rig import Rig
 
 __all__ = ["assemble"]
-
-SIMULATED = 0.03
-"""Probability from which a hypothesis is simulated in the search for the next experiment."""
-APART = 0.1
-"""Tolerances by which two groups differ about a sensor's zero, from which the earlier one is fitted again."""
 
 
 def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) -> Diagnosis:
@@ -47,9 +44,10 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
     groups : list of Group
         Gas blocks and arm, examined.
     """
-    nominal = case.rig
-    judged = judge(groups)
-    verdict, probabilities, ambiguity = case_verdict(judged), case_probabilities(judged), case_ambiguity(judged)
+    nominal, settings = case.rig, fitted.settings
+    judged = judge(groups, settings)
+    verdict, probabilities = case_verdict(judged), case_probabilities(judged, settings.verdict)
+    ambiguity = case_ambiguity(judged, settings.verdict)
     starts = _settled(nominal, fitted, judged, [g.candidates[0] for g in groups])
     baseline = _merged(nominal, starts)
     changed = verdict in ("effects", "unlisted") or any(j.wrong for j in judged)
@@ -63,31 +61,31 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
     events = next((c.fit.events for c in chosen if c.fit.events is not None), None) if model.effects else None
     fit_found = {s: _run(fitted, rig, events if s == "after" else None) for s, rig in stages.items()}
     out_found = fit_found if held is fitted else {s: _run(held, rig, events if s == "after" else None) for s, rig in stages.items()}
-    located = _located(judged)
+    located = _located(judged, settings)
     picture = Picture()
     if located is not None:
         block = next(b for b in fitted.blocks if b.name == located)
         picture = describe(block, fitted.recordings, nominal, fit_found["refit"], fit_found["after"], floor)
     fit_table = _table(fitted, fit_found, floor)
     held_table = _table(held, out_found, floor) if held is not fitted else {}
-    gap = _gap(held_table or fit_table) if model.effects or any(j.wrong for j in judged) else None
+    gap = _gap(held_table or fit_table, settings.verdict.least_gap) if model.effects or any(j.wrong for j in judged) else None
     blocks = block_entries(judged, fitted, fit_found, held, out_found, floor)
     named = any(j.named or j.wrong for j in judged)
     diagnosis = Diagnosis(
         case=case.name,
         verdict=verdict,
         where=words.where(located, fitted, judged, picture),
-        effects=_effects(judged, verdict),
+        effects=_effects(judged, verdict, settings.verdict.in_set),
         ambiguity=ambiguity,
         probabilities=probabilities,
-        parameters=_parameters(nominal, chosen if named else starts),
+        parameters=_parameters(nominal, chosen if named else starts, settings.fit.known_share),
         fit={"channels": fit_table, "held_out": held_table, "gap_closed": gap},
         next_experiment=_next(verdict, probabilities, ambiguity, nominal, judged, fitted, held),
         warnings=[
-            *words.absolute(case),
-            *(words.reservations(judged, chosen, held_table or fit_table) if named else []),
-            *(words.worse(held_table or fit_table) if model.effects else []),
-            *words.warnings(case, judged, held is fitted),
+            *words.absolute(case, settings.warnings),
+            *(words.reservations(judged, chosen, held_table or fit_table, settings.warnings) if named else []),
+            *(words.worse(held_table or fit_table, settings.warnings) if model.effects else []),
+            *words.warnings(case, judged, held is fitted, settings),
         ],
         rig=_with_std(model, chosen) if model.effects else model,
         traces=_traces(fitted, held, fit_found, out_found),
@@ -97,11 +95,12 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
         residuals=_block_table(groups),
         condition_map=picture.map,
         tried=_tried(groups),
-        asked=_asked(groups),
+        asked=_asked(groups, settings.evidence),
     )
     missing = [j.group for j in judged if j.verdict == "unlisted"]
     forms = [g.form for g in missing if g.closure is not None]
-    diagnosis.text = words.verdict(diagnosis, case, gap, forms, sought=any(g.sought for g in missing))
+    sought = any(g.sought for g in missing)
+    diagnosis.text = words.verdict(diagnosis, case, gap, forms, settings.warnings, sought=sought)
     return diagnosis
 
 
@@ -139,12 +138,13 @@ def _tried(groups: list[Group]) -> list[dict[str, Any]]:
     ]
 
 
-def _asked(groups: list[Group]) -> list[dict[str, Any]]:
+def _asked(groups: list[Group], settings: EvidenceSettings) -> list[dict[str, Any]]:
     """Every lasting effect that acts where a mismatch is, what it promised and what it leaves alone, the best first."""
     found = []
     for group in groups:
         for effect, promised in group.promised.items():
-            alone = [share_left(c, group.candidates[0], group.suspects) for c in group.candidates if c.effects == (effect,)]
+            singles = [c for c in group.candidates if c.effects == (effect,)]
+            alone = [share_left(c, group.candidates[0], group.suspects, settings) for c in singles]
             blocks = [b.name for b in group.suspects]
             found.append({"id": effect, "blocks": blocks, "promised": min(1.0, max(0.0, promised)), "left": min(alone, default=None)})
     return sorted(found, key=lambda a: (a["left"] is None, a["left"] if a["left"] is not None else -a["promised"]))
@@ -160,23 +160,26 @@ def _next(
     held: Problem,
 ) -> dict[str, Any]:
     """What to record next: simulated with every hypothesis that has a model, where two or more are left; else in words."""
-    left = _hypotheses(judged, probabilities, nominal)
+    settings = fitted.settings
+    left = _hypotheses(judged, probabilities, nominal, settings.next_experiment.simulated_from)
     recordings = [*fitted.recordings, *(held.recordings if held is not fitted else [])]
     if ambiguity and len(left) > 1 and not words.same_data(ambiguity):
         common = set.intersection(*(set(p.noise) for p in recordings))
         noise = {channel: float(np.median([p.noise[channel] for p in recordings])) for channel in sorted(common)}
         with contextlib.suppress(DiagnosisError, ParameterError, SimulationError):  # a rig that no experiment of the library suits
-            return propose(nominal, left, noise, recordings)
+            return propose(nominal, left, noise, recordings, settings=settings)
     missing = [j.group.mismatch.name for j in judged if j.verdict == "unlisted" and j.group.mismatch is not None]
     return words.next_experiment(verdict, probabilities, ambiguity, nominal, missing)
 
 
-def _hypotheses(judged: list[Judged], probabilities: dict[str, float], nominal: Rig) -> list[tuple[str, Rig, float]]:
+def _hypotheses(
+    judged: list[Judged], probabilities: dict[str, float], nominal: Rig, least: float
+) -> list[tuple[str, Rig, float]]:
     """The likely hypotheses that have a model, as fitted; those of an effect with times of its own can predict no other recording."""
     found = []
     for key, p in probabilities.items():
         wanted = frozenset(key.split("+"))
-        if p < SIMULATED or not all(name in CATALOGUE or is_parameter(name) for name in wanted):
+        if p < least or not all(name in CATALOGUE or is_parameter(name) for name in wanted):
             continue
         chosen = [_inside(j.group, wanted) for j in judged]
         if any(c.fit.events is not None for c in chosen):
@@ -220,18 +223,28 @@ def _settled(nominal: Rig, problem: Problem, judged: list[Judged], chosen: list[
     found = list(chosen)
     for k, candidate in enumerate(chosen):
         common = {n: chosen[owners[n]].fit for n in candidate.fit.moved if owners[n] != k and n.startswith("sensors.")}
-        apart = any(abs(candidate.fit.moved[n] - other.moved[n]) > APART for n, other in common.items())
+        settings = problem.settings.fit
+        differences = [abs(candidate.fit.moved[n] - other.moved[n]) for n, other in common.items()]
+        apart = any(difference > settings.zero_difference for difference in differences)
         if apart and candidate.fit.events is None:
             own = replace(problem, blocks=judged[k].group.blocks)
             effects = candidate.fit.effects
-            free, fixed = parts_of(start_of(candidate.fit, effect) for effect in effects)
+            free, fixed = parts_of(start_of(candidate.fit, effect, settings.least_start) for effect in effects)
             settled = {n: other.values[n] for n, other in common.items()}
             colour = colour_of(own, candidate.fit)
             with contextlib.suppress(SimulationError):  # it then stays as it was fitted
                 again = fit(
-                    own, nominal, effects, free, colour,
-                    fixed=fixed, warm=candidate.fit, share=EXACT, settled=settled, freed=candidate.fit.freed,
-                )  # fmt: skip
+                    own,
+                    nominal,
+                    effects,
+                    free,
+                    colour,
+                    fixed=fixed,
+                    warm=candidate.fit,
+                    share=settings.final_step_share,
+                    settled=settled,
+                    freed=candidate.fit.freed,
+                )
                 found[k] = replace(candidate, fit=again)
     return found
 
@@ -254,7 +267,7 @@ def _with_std(rig: Rig, candidates: list[Candidate]) -> Rig:
     return rig
 
 
-def _located(judged: list[Judged]) -> str | None:
+def _located(judged: list[Judged], settings: DiagnosisSettings) -> str | None:
     """The block that the answer is about: of those with a name first, else of those that keep something, else one at a wall."""
     named = [j.group for j in judged if j.named or j.wrong]
     missing = [j.group for j in judged if j.verdict == "unlisted"]
@@ -263,7 +276,7 @@ def _located(judged: list[Judged]) -> str | None:
         if found:
             return max(found)[1]
     for j in sorted(judged, key=lambda j: not j.wrong):
-        moved = symptoms_of(j.group)
+        moved = symptoms_of(j.group, settings)
         worst = j.wrong or tuple(sorted(moved, key=lambda n: -abs(moved[n])))
         for block in reversed(j.group.blocks):
             if worst and worst[0] in block.parameters:
@@ -290,15 +303,15 @@ def _table(problem: Problem, found: dict[str, dict[Key, Any]], floor: dict[Key, 
     return out
 
 
-def _gap(table: dict[str, dict[str, float]]) -> float | None:
+def _gap(table: dict[str, dict[str, float]], least: float) -> float | None:
     """(refit - after)/(refit - noise), pooled over channels in units of their noise."""
     refit = sum(e["refit"] / e["noise"] for e in table.values())
     after = sum(e["after"] / e["noise"] for e in table.values())
     room = refit - len(table)
-    return None if room < 0.05 else max(0.0, min(1.0, (refit - after) / room))
+    return None if room < least else max(0.0, min(1.0, (refit - after) / room))
 
 
-def _effects(judged: list[Judged], verdict: str) -> list[dict[str, Any]]:
+def _effects(judged: list[Judged], verdict: str, in_set: float) -> list[dict[str, Any]]:
     """The effects that are named, the most probable first; without a name those that come closest."""
     found: dict[str, tuple[float, Candidate]] = {}
     for j in judged:
@@ -308,7 +321,7 @@ def _effects(judged: list[Judged], verdict: str) -> list[dict[str, Any]]:
             if verdict == "effects":
                 # of one effect in two groups the model has the parameters of the group that comes last
                 found[effect] = max(p, found[effect][0] if effect in found else 0.0), j.chosen
-            elif p >= IN_SET:
+            elif p >= in_set:
                 own = [c for c in j.group.candidates if effect in c.effects]
                 found[effect] = p, max(own, key=lambda c: (j.group.probabilities.get(c.key, 0.0), c.gap_closed))
     return [
@@ -356,16 +369,13 @@ def _events(effect: str, candidate: Candidate) -> list[dict[str, Any]]:
     if events is None or events.effect != effect:
         return []
     found = []
+    rises = [p.name for p in EFFECTS[effect].with_role("rise")]
     for recording, values in events.values.items():
-        for suffix in ("", "_2", "_3"):
-            if "time" + suffix in values:
-                own = {name: values[name + suffix] for name in ("torque", "mass_change", "time", "duration") if name + suffix in values}
-                found.append({"recording": recording, **own, **({"rise": values["rise"]} if "rise" in values else {})})
+        for parameters in events_of(effect):
+            own = {p.repeats or p.name: values[p.name] for p in parameters if p.name in values}
+            if own:
+                found.append({"recording": recording, **own, **{n: values[n] for n in rises if n in values}})
     return found
-
-
-_CHOSEN = CHOICES | {"cut_in_pressure", "cut_out_pressure"}
-"""Parameters that are tried and chosen, not fitted."""
 
 
 def _effect_parameters(effect: str, candidate: Candidate) -> dict[str, Any]:
@@ -374,7 +384,7 @@ def _effect_parameters(effect: str, candidate: Candidate) -> dict[str, Any]:
     out: dict[str, Any] = {}
     for parameter in EFFECTS[effect].parameters:
         name = f"{effect}.{parameter.name}"
-        if parameter.name in _CHOSEN:
+        if parameter.role in (*CHOSEN, "threshold"):
             chosen = next(e["parameters"] for e in rig.effects if e["id"] == effect)[parameter.name]
             out[parameter.name] = {"value": chosen, "std": None, "unit": parameter.unit}
             continue
@@ -382,15 +392,29 @@ def _effect_parameters(effect: str, candidate: Candidate) -> dict[str, Any]:
             continue
         value, std = candidate.fit.values[name], candidate.fit.std[name]
         out[parameter.name] = _entry(value, std, parameter.unit, not unknown_volume and std < max(abs(value), 1e-300), parameter.lower)
-    if effect == "leak_muscle" and rig.model["valve"] is None and "" in rig.tables("chamber"):
-        gas, chamber = rig.model["gas"], rig.model["chamber"]
-        value, std = candidate.fit.values["leak_muscle.conductance"], candidate.fit.std["leak_muscle.conductance"]
+    if EFFECTS[effect].block == "chamber" and rig.model["valve"] is None and "" in rig.tables("chamber"):
+        out |= _emptying(effect, candidate)
+    return out
+
+
+_REFERENCE_DENSITY = 1.185
+"""Density of air in the reference state of ISO 6358 [kg/m3], to which conductances refer."""
+
+
+def _emptying(effect: str, candidate: Candidate) -> dict[str, Any]:
+    """How fast a conductance empties a sealed chamber, and what of it does not depend on the chamber's volume."""
+    gas, chamber = candidate.fit.rig.model["gas"], candidate.fit.rig.model["chamber"]
+    out: dict[str, Any] = {}
+    for parameter in EFFECTS[effect].parameters:
+        name = f"{effect}.{parameter.name}"
+        if parameter.unit != "m3/(s Pa)" or candidate.fit.values.get(name, 0.0) <= 0:
+            continue
+        value, std = candidate.fit.values[name], candidate.fit.std[name]
         volume = chamber["dead_volume"]
         rt = gas["gas_constant"] * gas["temperature"]
-        if value > 0:
-            tau = volume / (value * 1.185 * rt * chamber["alpha_out"])
-            out["time_constant"] = _entry(tau, tau * std / value, "s", std < value)
-            out["conductance_per_volume"] = _entry(value / volume, std / volume, "1/(s Pa)", std < value)
+        tau = volume / (value * _REFERENCE_DENSITY * rt * chamber["alpha_out"])
+        out["time_constant"] = _entry(tau, tau * std / value, "s", std < value)
+        out["conductance_per_volume"] = _entry(value / volume, std / volume, "1/(s Pa)", std < value)
     return out
 
 
@@ -404,7 +428,7 @@ def _entry(value: float, std: float, unit: str, identifiable: bool, lower: float
     }
 
 
-def _parameters(nominal: Rig, candidates: list[Candidate]) -> dict[str, dict[str, Any]]:
+def _parameters(nominal: Rig, candidates: list[Candidate], known: float) -> dict[str, dict[str, Any]]:
     out: dict[str, dict[str, Any]] = {}
     for name, k in _owners(candidates).items():
         p, own = nominal.parameter(name), candidates[k].fit
@@ -414,7 +438,7 @@ def _parameters(nominal: Rig, candidates: list[Candidate]) -> dict[str, dict[str
             "std": own.std[name],
             "unit": p.unit,
             "moved_sigmas": own.moved[name],
-            "identifiable": own.std[name] < 0.7 * p.tol,
+            "identifiable": own.std[name] < known * p.tol,
         }
     return out
 

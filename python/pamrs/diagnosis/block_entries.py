@@ -62,7 +62,7 @@ def _sizes(block: Block, problem: Problem, found: Stages, floor: dict[Key, Floor
     """What is more than noise at every stage: in noises, in the channel's unit, and whether noise could be so large."""
     sizes = {}
     for stage, residuals in found.items():
-        told = excess(block, problem.recordings, residuals, floor)
+        told = excess(block, problem.recordings, residuals, floor, problem.settings.noise)
         sizes[stage] = {
             "noises": told.systematic,
             "size": told.systematic * told.noise,

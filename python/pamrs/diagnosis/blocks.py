@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from pamrs import _core
 from pamrs.channels import channel_of, dotted
+from pamrs.diagnosis.settings import PrepareSettings
 from pamrs.diagnosis.signals import Prepared
 from pamrs.rig import Rig
 from pamrs.rig.schema import qualified
@@ -18,13 +19,6 @@ from pamrs.simulation import default_step
 __all__ = ["Block", "Residual", "available_blocks", "change", "predicted", "residual"]
 
 Array = NDArray[np.float64]
-
-ARM_WINDOW = 2.5
-"""Length of a joint's windows [s]: what its start does is gone within one, and a break-away that is told wrongly spoils no more."""
-STEP = 2.5e-3
-"""Longest RK4 step of the cut chain [s]."""
-CHAMBER_STEP = 5e-3
-"""Same for the gas blocks, between measured angles and pressures; the core divides it until it is stable."""
 
 
 @dataclass(frozen=True)
@@ -98,7 +92,8 @@ def _ways(rig: Rig) -> list[_Way]:
 class _Map:
     """Which channels and parameters belong to which block of a rig."""
 
-    def __init__(self, rig: Rig, channels: tuple[str, ...]) -> None:
+    def __init__(self, rig: Rig, channels: tuple[str, ...], settings: PrepareSettings) -> None:
+        self.settings = settings
         self.rig, self.has, self.ways = rig, frozenset(channels), _ways(rig)
         self.angles = ("length",) if rig.model["load"] else tuple(dotted("joint_angle", name) for name in rig.tables("joint"))
         self.pulling = {name: ends["chamber"].partition(".")[2] for name, ends in rig.ports("muscle").items()}
@@ -162,7 +157,8 @@ class _Map:
         names = self.of_ways(full) | {f"{full}.{key}" for key in _SUPPLY} | self.zeros(self.chambers_at(full), ())
         covers = "regulator" if table["kind"] == "regulator" else "supply"
         covers += " and valve" if self.commands(full) else (" and line" if table["kind"] != "regulator" else "")
-        return Block(full, self.pressure(full), drives, 4.0, frozenset(names), CHAMBER_STEP, covers + _called(name))
+        window, step = self.settings.supply_window, self.settings.gas_step
+        return Block(full, self.pressure(full), drives, window, frozenset(names), step, covers + _called(name))
 
     def chamber(self, name: str) -> Block | None:
         """The block of one chamber; none where nothing feeds it although it moves a joint: its pressure is then what is given."""
@@ -176,8 +172,9 @@ class _Map:
             return None
         names = self.of_ways(full) | {f"{full}.{key}" for key in _CHAMBER} | self.zeros(self.chambers_at(full), joints or [""])
         covers = ("valve, line and chamber" if self.commands(full) else "line and chamber") if fed else "chamber"
-        step = CHAMBER_STEP if fed else 0.025
-        return Block(full, self.pressure(full), drives, 2.0 if fed else None, frozenset(names), step, covers + _called(name))
+        step = self.settings.gas_step if fed else self.settings.sealed_step
+        window = self.settings.chamber_window if fed else None
+        return Block(full, self.pressure(full), drives, window, frozenset(names), step, covers + _called(name))
 
     def arm(self, joint: str) -> Block | None:
         """The block of one joint: muscles' pressures to its angle."""
@@ -189,7 +186,8 @@ class _Map:
         names |= self.zeros(self.pulling.values(), self.rig.tables("joint"))
         name = qualified("arm", joint)
         covers = "muscle, joint and arm" + _called(joint)
-        return Block(name, dotted("joint_angle", joint), drives, ARM_WINDOW, frozenset(names), STEP, covers)
+        window, step = self.settings.arm_window, self.settings.arm_step
+        return Block(name, dotted("joint_angle", joint), drives, window, frozenset(names), step, covers)
 
     def load(self) -> Block | None:
         """The block of a hanging load: muscles' pressures to their length."""
@@ -198,14 +196,15 @@ class _Map:
             return None
         names = {f"load.{key}" for key in _LOAD} | {f"{qualified('muscle', m)}.{key}" for m in self.pulling for key in _MUSCLE}
         names |= self.zeros(self.pulling.values(), ())
-        return Block("load", "length", drives, ARM_WINDOW, frozenset(names), STEP, "muscle and load")
+        window, step = self.settings.arm_window, self.settings.arm_step
+        return Block("load", "length", drives, window, frozenset(names), step, "muscle and load")
 
 
 def _called(name: str) -> str:
     return f" of {name}" if name else ""
 
 
-def available_blocks(rig: Rig, channels: tuple[str, ...]) -> list[Block]:
+def available_blocks(rig: Rig, channels: tuple[str, ...], settings: PrepareSettings) -> list[Block]:
     """The blocks that these channels can tell apart: supplies, chambers, then joints or the load, each in the order of the rig file.
 
     Every tank (or regulator), chamber, joint and hanging load is a block of its own, driven by the measured channels next to it, with
@@ -218,12 +217,14 @@ def available_blocks(rig: Rig, channels: tuple[str, ...]) -> list[Block]:
         The nominal model.
     channels : tuple of str
         What every recording has, by the names of the core.
+    settings : PrepareSettings
+        Windows and integration steps.
 
     Returns
     -------
     list of Block
     """
-    have = _Map(rig, channels)
+    have = _Map(rig, channels, settings)
     found = [have.supply(name) for name in rig.tables("supply")]
     found += [have.chamber(name) for name in rig.tables("chamber")]
     found += [have.arm(name) for name in rig.tables("joint")] if rig.tables("arm") else []
@@ -338,6 +339,7 @@ def residual(block: Block, core: _core.Rig, prepared: Prepared, parameters: list
         Dotted names for the jacobian, may be empty.
     """
     starts = prepared.starts(block.window, block.drives)
+    least = prepared.settings.prepare.window_samples_per_state
     # without parameters a free null direction is still wanted for the window's start: ask for one parameter
     names = parameters or [next((n for n in core.parameter_names if n.endswith("pressure_zero")), core.parameter_names[0])]
     prediction, jacobian = core.predict(
@@ -361,7 +363,7 @@ def residual(block: Block, core: _core.Rig, prepared: Prepared, parameters: list
     for a, b in zip(starts, [*starts[1:], prepared.n], strict=True):
         used = rows[a:b]
         start = jacobian[a:b, k:]
-        if used.sum() < 4 * start.shape[1]:
+        if used.sum() < least * start.shape[1]:
             rows[a:b] = False
             value[a:b] = 0.0
             continue

@@ -9,20 +9,15 @@ from dataclasses import dataclass, field, replace
 from pamrs.diagnosis.blocks import Block, Residual
 from pamrs.diagnosis.events import fit_events, look_for_events
 from pamrs.diagnosis.evidence import Excess, Floor, excess, inflation
-from pamrs.diagnosis.fitting import FIT_BIN, WIDEST, Fit, Key, Problem, acts_in, fit, residuals
-from pamrs.diagnosis.leastsquares import SHARE
+from pamrs.diagnosis.fitting import Fit, Key, Problem, acts_in, fit, residuals
 from pamrs.diagnosis.leaving import left_out
+from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.diagnosis.starts import Start
 from pamrs.effects import EFFECTS, find_parameter
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 
-__all__ = ["EXACT", "THOROUGH", "Attempts", "Candidate", "Group", "significant", "start_of", "without_colour"]
-
-POLISH, EXACT = 10, 1e-5
-"""Evaluations for the last stretch of a fit, and share of the sum of squares to which it goes."""
-THOROUGH = 30
-"""Evaluations of a fit of baseline parameters alone: what it leaves undone looks like missing physics."""
+__all__ = ["Attempts", "Candidate", "Group", "significant", "start_of", "without_colour"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,10 +63,9 @@ class Candidate:
         """Its names joined by ``+``, as probabilities are listed."""
         return "+".join(self.names)
 
-    @property
-    def outside(self) -> float:
+    def outside(self, walls: float) -> float:
         """How far outside its tolerances what is wrong is: the logarithm of how many times the walls, of each parameter."""
-        return sum(math.log(max(1.0, abs(self.fit.moved[name]) / WIDEST)) for name in self.wrong)
+        return sum(math.log(max(1.0, abs(self.fit.moved[name]) / walls)) for name in self.wrong)
 
     @property
     def misfit(self) -> float:
@@ -159,6 +153,11 @@ class Attempts:
     suspects: list[Block]
 
     @property
+    def settings(self) -> DiagnosisSettings:
+        """What they are made by."""
+        return self.inner.settings
+
+    @property
     def white(self) -> dict[str, float]:
         """Weights of noise without colour."""
         return without_colour(self.inner.blocks)
@@ -171,6 +170,10 @@ class Attempts:
     def colour(self, found: Fit) -> dict[str, float]:
         """Weights of the colour that a fit leaves."""
         return colour_of(self.inner, found)
+
+    def start_of(self, found: Fit, effect: str) -> Start:
+        """Where another fit goes on from an effect as it was fitted."""
+        return start_of(found, effect, self.settings.fit.least_start)
 
     def eventful(self, effect: str, beside: Candidate) -> Candidate | None:
         """An effect with times of its own in every recording, held-out ones included, beside the effects of a candidate."""
@@ -193,7 +196,8 @@ class Attempts:
         if self.same:
             return self.judged(effects, found)
         bare = found.rig.without_effect(effect)
-        size = found.values["payload_change.mass_change"] if effect == "payload_change" else None
+        leading = EFFECTS[effect].leading
+        size = found.values[f"{effect}.{leading.name}"] if leading.same_everywhere else None
         quiet = residuals(self.outer, bare)
         events = look_for_events(effect, self.outer, bare, quiet, white, size)
         if events is None:
@@ -207,7 +211,7 @@ class Attempts:
         """The lasting effects of a candidate fitted again, with the events that were found beside them held."""
         assert found.events is not None
         effect = found.events.effect
-        own, kept = parts_of([start_of(beside.fit, e) for e in beside.effects])
+        own, kept = parts_of([self.start_of(beside.fit, e) for e in beside.effects])
         warm = replace(beside.fit, values=beside.fit.values | {n: found.values[n] for n in beside.fit.moved})
         again = fit(
             self.inner,
@@ -219,7 +223,7 @@ class Attempts:
             warm=warm,
             frozen=True,
             events=found.events,
-            evaluations=6,
+            evaluations=self.settings.transients.evaluations_beside,
         )
         happened = next(iter(found.events.values.values()))
         parts = {n: (found.values[n], found.std[n]) for n in found.values if n.partition(".")[0] == effect}
@@ -231,32 +235,37 @@ class Attempts:
             std=again.std | {n: s for n, (_, s) in parts.items()},
         )
 
+    def excess(self, block: Block, problem: Problem, found: dict[Key, Residual]) -> Excess:
+        """What a block keeps of some recordings."""
+        return excess(block, problem.recordings, found, self.floor, self.settings.noise)
+
     def judged(self, effects: tuple[str, ...], found: Fit, outside: dict[Key, Residual] | None = None) -> Candidate:
         """A fitted set on the held-out recordings, or on each recording as the others predict it."""
         if outside is None:
             outside = left_out(self.inner, found, self.colour(found)) if self.same else residuals(self.outer, found.rig)
-        after = {b.name: excess(b, self.outer.recordings, outside, self.floor) for b in self.inner.blocks}
-        inside = {b.name: excess(b, self.inner.recordings, found.residuals, self.floor) for b in self.inner.blocks}
+        after = {b.name: self.excess(b, self.outer, outside) for b in self.inner.blocks}
+        inside = {b.name: self.excess(b, self.inner, found.residuals) for b in self.inner.blocks}
         gaps = [(self.out[b.name].ratio - 1.0, max(0.0, after[b.name].ratio - 1.0)) for b in self.suspects]
         total = sum(math.sqrt(max(0.0, g)) for g, _ in gaps)
         gap = 1.0 - sum(math.sqrt(a) for _, a in gaps) / total if total > 0 else 0.0
         return Candidate(effects, found, after, inside, gap, _scatter(effects, self.inner, found))
 
-    def fitted(self, starts: list[Start], warm: Fit, colour: dict[str, float], share: float = SHARE) -> Candidate | None:
+    def fitted(self, starts: list[Start], warm: Fit, colour: dict[str, float], share: float | None = None) -> Candidate | None:
         """A set of effects fitted from one start of each, residuals weighted by their own colour; None where it cannot be run.
 
-        ``share`` is the share of the sum of squares below which a step is not worth it.
+        ``share`` is another share of the sum of squares than that of the settings below which a step is not worth it.
         """
         effects = tuple(start.effect for start in starts)
         free, held = parts_of(starts)
-        limit = 30 if self.nominal.model["valve"] is None else 8
+        settings, sealed = self.settings.fit, self.nominal.model["valve"] is None
+        limit = settings.sealed_evaluations if sealed else settings.effect_evaluations
         try:
             best = fit(
                 self.inner, self.nominal, effects, free, colour, fixed=held, warm=warm, frozen=True, evaluations=limit, share=share
             )
             colour = self.colour(best)
-            if max(colour.values()) > 2:
-                again = {n: _off_zero(n, v) for n, v in best.values.items() if n.partition(".")[0] in EFFECTS}
+            if max(colour.values()) > self.settings.noise.correlated_variance:
+                again = {n: _off_zero(n, v, settings.least_start) for n, v in best.values.items() if n.partition(".")[0] in EFFECTS}
                 best = fit(
                     self.inner, self.nominal, effects, again, colour, fixed=held, warm=best, frozen=True, evaluations=limit, share=share
                 )
@@ -271,15 +280,28 @@ class Attempts:
         noise, at those that the baseline was moved to.
         """
 
+        settings = self.settings
+
         def found(colour: dict[str, float], begun: Fit | None) -> Fit:
-            return fit(self.inner, self.nominal, (), {}, colour, warm=begun, freed=names, evaluations=THOROUGH, share=EXACT)
+            return fit(
+                self.inner,
+                self.nominal,
+                (),
+                {},
+                colour,
+                warm=begun,
+                freed=names,
+                evaluations=settings.fit.baseline_evaluations,
+                share=settings.fit.final_step_share,
+            )
 
         best: Candidate | None = None
         for begin in (None, baseline):
             try:
                 first = found(self.white, begin)
                 colour = self.colour(first)
-                judged = self.judged((), found(colour, first) if max(colour.values()) > 2 else first)
+                correlated = max(colour.values()) > settings.noise.correlated_variance
+                judged = self.judged((), found(colour, first) if correlated else first)
             except SimulationError:
                 continue  # it leaves the range in which the model holds
             if best is None or judged.misfit < best.misfit:
@@ -293,11 +315,12 @@ class Attempts:
         if any(c.fit.events is not None for c in candidates):
             return None
         effects = tuple(effect for c in candidates for effect in c.effects)
-        free, held = parts_of(start_of(c.fit, effect) for c in candidates for effect in c.effects)
+        free, held = parts_of(self.start_of(c.fit, effect) for c in candidates for effect in c.effects)
         wrong = [name for c in candidates for name in c.wrong]
         warm = replace(candidates[0].fit, values=candidates[0].fit.values | {n: c.fit.values[n] for c in candidates for n in c.wrong})
+        share = self.settings.fit.final_step_share
         try:
-            return fit(self.inner, self.nominal, effects, free, self.white, fixed=held, warm=warm, freed=wrong, share=EXACT)
+            return fit(self.inner, self.nominal, effects, free, self.white, fixed=held, warm=warm, freed=wrong, share=share)
         except SimulationError:
             return None
 
@@ -310,11 +333,19 @@ class Attempts:
         found = candidate.fit
         if found.events is not None or not candidate.effects:
             return candidate
-        free, held = parts_of([start_of(found, effect) for effect in candidate.effects])
+        free, held = parts_of([self.start_of(found, effect) for effect in candidate.effects])
         colour = self.colour(found)
         try:
             best = fit(
-                self.inner, self.nominal, candidate.effects, free, colour, fixed=held, warm=found, evaluations=POLISH, share=EXACT
+                self.inner,
+                self.nominal,
+                candidate.effects,
+                free,
+                colour,
+                fixed=held,
+                warm=found,
+                evaluations=self.settings.fit.polish_evaluations,
+                share=self.settings.fit.final_step_share,
             )
             return replace(self.judged(candidate.effects, best), gain=candidate.gain)
         except SimulationError:
@@ -328,7 +359,8 @@ def without_colour(blocks: Iterable[Block]) -> dict[str, float]:
 
 def colour_of(problem: Problem, found: Fit) -> dict[str, float]:
     """Weights of the colour that a fit leaves in each block."""
-    return {b.name: inflation(b, problem.recordings, found.residuals, FIT_BIN) for b in problem.blocks}
+    width = problem.settings.noise.fit_bin_time
+    return {b.name: inflation(b, problem.recordings, found.residuals, width) for b in problem.blocks}
 
 
 def parts_of(starts: Iterable[Start]) -> tuple[dict[str, float], dict[str, float]]:
@@ -341,17 +373,20 @@ def parts_of(starts: Iterable[Start]) -> tuple[dict[str, float], dict[str, float
     return free, held
 
 
-def start_of(found: Fit, effect: str) -> Start:
-    """Where another fit goes on from an effect as it was fitted, held parameters included."""
-    own = {name: _off_zero(name, value) for name, value in found.values.items() if name.partition(".")[0] == effect}
+def start_of(found: Fit, effect: str, least: float) -> Start:
+    """Where another fit goes on from an effect as it was fitted, held parameters included.
+
+    ``least`` is the share of a typical size that a parameter has at the least.
+    """
+    own = {name: _off_zero(name, value, least) for name, value in found.values.items() if name.partition(".")[0] == effect}
     entry = next(e for e in found.rig.effects if e["id"] == effect)
     held = {f"{effect}.{n}": v for n, v in entry["parameters"].items() if f"{effect}.{n}" not in found.values}
     return Start(effect, own, held, (), False)
 
 
-def _off_zero(name: str, value: float) -> float:
+def _off_zero(name: str, value: float, share: float) -> float:
     """A parameter to start from: one that a fit left at zero tells nothing of its scale."""
-    least = 1e-3 * _typical(name)
+    least = share * _typical(name)
     return value if abs(value) > least else least
 
 
@@ -369,11 +404,10 @@ def _scatter(effects: tuple[str, ...], problem: Problem, best: Fit) -> float:
     """
     if len(effects) != 1 or len(problem.recordings) < 2:
         return 0.0
-    leading = {
-        "leak_muscle": "leak_muscle.conductance",
-        "muscle_hysteresis": "muscle_hysteresis.friction_pressure",
-    }.get(effects[0])
-    if leading is None or best.values.get(leading, 0.0) <= 0:
+    info, settings = EFFECTS[effects[0]], problem.settings
+    leading = next((f"{info.id}.{p.name}" for p in info.parameters if p.same_everywhere), None)
+    # of a transient effect one size was fitted to all recordings
+    if info.transient or leading is None or best.values.get(leading, 0.0) <= 0:
         return 0.0
     found = residuals(problem, best.rig, [leading])
     steps, errors = [], []
@@ -384,7 +418,7 @@ def _scatter(effects: tuple[str, ...], problem: Problem, best: Fit) -> float:
             if r.jacobian is None or not acts_in(effects[0], block):
                 continue
             slope = r.jacobian[:, 0] / r.noise
-            unit = inflation(block, [prepared], found, FIT_BIN)
+            unit = inflation(block, [prepared], found, settings.noise.fit_bin_time)
             num += float(slope @ (r.value / r.noise)) / unit
             den += float(slope @ slope) / unit
         if den > 0:
@@ -392,5 +426,5 @@ def _scatter(effects: tuple[str, ...], problem: Problem, best: Fit) -> float:
             errors.append(1.0 / math.sqrt(den) / best.values[leading])
     if len(steps) < 2:
         return 0.0
-    beyond = [max(0.0, abs(s) - 2.0 * e) for s, e in zip(steps, errors, strict=True)]
+    beyond = [max(0.0, abs(s) - settings.fit.scatter_stds * e) for s, e in zip(steps, errors, strict=True)]
     return float(max(beyond))

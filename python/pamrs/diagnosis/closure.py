@@ -20,6 +20,7 @@ from pamrs.diagnosis.candidates import colour_of
 from pamrs.diagnosis.closure_words import describe_closure
 from pamrs.diagnosis.evidence import correlation_time
 from pamrs.diagnosis.fitting import Fit, Problem, fit, residuals, stacked, with_priors
+from pamrs.diagnosis.settings import ClosureSettings
 from pamrs.effects import EFFECTS
 from pamrs.effects import CLOSURE_OF, MEMORY_OF, TERMS, Term
 from pamrs.errors import DiagnosisError, SimulationError
@@ -28,18 +29,6 @@ from pamrs.rig import Rig
 __all__ = ["CLOSURE_OF", "describe_closure", "find_closure"]
 
 Array = NDArray[np.float64]
-
-MOST_TERMS = 6
-"""Terms that a closure may have: more is no form that a person reads."""
-EVALUATIONS = 5
-"""Limit on the evaluations of one fit of the chosen terms; there are at most two fits."""
-SPEAKING = 0.75
-"""Share of the misfit that a closure must leave at most: with less gain it mends what the smoothing of the drives does."""
-LEAST_POWER = 1e-6
-"""Share of a term's effect on the residuals that must be left beside the baseline and the terms before it."""
-SHRUNK = ((1.0, EVALUATIONS), (0.4, 3))
-"""Multiples of the linear estimate from which a fit is tried, with its limit of evaluations; the second where the first gains
-nothing."""
 
 
 @dataclass(frozen=True)
@@ -122,14 +111,15 @@ def find_closure(
         )
     closures = _closures(blocks)
     say(f"{' and '.join(b.name for b in blocks)}: looking for a form of what is missing")
+    settings = problem.settings.closures
     candidates, columns = _at_zero(problem, baseline, inflation, blocks, closures)
-    chosen = _select(_Frame.of(problem, baseline, baseline, inflation), candidates, columns, {})
+    chosen = _select(_Frame.of(problem, baseline, baseline, inflation), candidates, columns, {}, settings)
     found = None if chosen is None else _fitted(problem, nominal, baseline, inflation, chosen, say)
     if found is None:
         return None
     colour = colour_of(problem, found)
     candidates, columns, warm = _again(problem, baseline, found, colour, blocks, closures)
-    second = _select(_Frame.of(problem, warm, found, colour), candidates, columns, found.values)
+    second = _select(_Frame.of(problem, warm, found, colour), candidates, columns, found.values, settings)
     other = None if second is None else _fitted(problem, nominal, warm, colour, second, say)
     return _better([baseline, found, *([] if other is None else [other])], problem, colour, len(candidates))
 
@@ -277,14 +267,17 @@ def _better(models: list[Fit], problem: Problem, inflation: dict[str, float], am
     terms = [sum(1 for name in model.values if name.partition(".")[0] in TERMS) for model in models]
     worth = [-samples * math.log(m) - k * _price(samples, among) for m, k in zip(misfits, terms, strict=True)]
     best = int(np.argmax(worth))
-    return models[best] if best and misfits[best] < SPEAKING * misfits[0] else None
+    most = problem.settings.closures.most_misfit_share * misfits[0]
+    return models[best] if best and misfits[best] < most else None
 
 
-def _select(frame: _Frame, candidates: list[_Candidate], columns: Array, present: dict[str, float]) -> _Choice | None:
+def _select(
+    frame: _Frame, candidates: list[_Candidate], columns: Array, present: dict[str, float], settings: ClosureSettings
+) -> _Choice | None:
     """Orthogonal forward selection of terms against the stacked residuals, the closure that is in them taken out.
 
     The misfit is that of rows and priors together, the baseline moving freely inside its tolerances: both are orthogonalised
-    against the baseline first. A term that is not worth its price alone is still looked behind: the way goes on to `MOST_TERMS`,
+    against the baseline first. A term that is not worth its price alone is still looked behind: the way goes on to `most_terms`,
     and as many of them are taken as pay for themselves together; then those are dropped that the others have made needless. A gain
     that the recordings left out confirm at the full price need only be worth BIC's in the recordings themselves.
 
@@ -298,6 +291,8 @@ def _select(frame: _Frame, candidates: list[_Candidate], columns: Array, present
         What each does to the residuals per unit of its coefficient.
     present : dict of str to float
         Coefficients with which the residuals were computed; their terms are taken first.
+    settings : ClosureSettings
+        How many terms there may be, and what must be left of one.
 
     Returns
     -------
@@ -331,13 +326,13 @@ def _select(frame: _Frame, candidates: list[_Candidate], columns: Array, present
         free = free - np.outer(direction, direction @ free)
 
     for k, candidate in enumerate(candidates):
-        if candidate.name in present and usable[k] and float(free[:, k] @ free[:, k]) > LEAST_POWER:
+        if candidate.name in present and usable[k] and float(free[:, k] @ free[:, k]) > settings.least_power:
             take(k)
     taken, misfit, proof = len(order), float(left @ left), crossed.left_out(order)
     samples = frame.independent(left[: rows.size])
-    while len(order) < MOST_TERMS:
+    while len(order) < settings.most_terms:
         power = (free**2).sum(axis=0)
-        open_ = usable & (power > LEAST_POWER)
+        open_ = usable & (power > settings.least_power)
         open_ &= np.array([c.memory not in locked or locked[c.memory] == c.shape for c in candidates])
         open_[order] = False
         if not open_.any():
@@ -431,7 +426,9 @@ def _fitted(
     say(f"trying {' + '.join(name for name in chosen.values)}")
     names = list(warm.values)
     best: Fit | None = None
-    for share, evaluations in SHRUNK:
+    settings = problem.settings.closures
+    shrunk = ((1.0, settings.evaluations), (settings.shrunk_share, settings.shrunk_evaluations))
+    for share, evaluations in shrunk:
         starts = {name: share * value for name, value in chosen.values.items()} | chosen.shapes
         shifted = {n: warm.values[n] + share * float(x) * warm.scales[n] for n, x in zip(names, chosen.shift, strict=True)}
         try:

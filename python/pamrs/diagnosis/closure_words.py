@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pamrs.diagnosis.blocks import Block, begun
 from pamrs.diagnosis.fitting import Fit, Problem
 from pamrs.effects import EFFECTS
-from pamrs.effects import CLOSURE_OF, MEMORY_OF, TERMS, Term
+from pamrs.effects import CLOSURE_OF, MEMORY_OF, TERMS, WORDS, Term
 from pamrs.errors import DiagnosisError
 from pamrs.rig import Rig
 from pamrs.simulation import default_step
@@ -21,20 +21,6 @@ __all__ = ["describe_closure"]
 Array = NDArray[np.float64]
 
 _UNITS = {"N m": ((1.0, "N m"),), "kg/s": ((1.0, "kg/s"), (1e-3, "g/s"), (1e-6, "mg/s"), (1e-9, "ug/s"))}
-_SYMBOLS = {
-    "closure_torque": "s: gauge pressure in bar, a: angle in rad, w: rate in rad/s",
-    "closure_flow": "p, ps: absolute pressures of chamber and supply in bar, x: valve opening, -1 to 1, V': rate of the volume in l/s",
-    "closure_supply": "p: absolute supply pressure in bar, x+: opening of the filling valve",
-}
-_LETTER = {"closure_torque": "tau", "closure_flow": "m", "closure_supply": "m"}
-_WHAT = {"closure_torque": "torque", "closure_flow": "flow into the chamber", "closure_supply": "flow into the supply"}
-_TURNS = {
-    "closure_torque": "the direction of motion",
-    "closure_flow": "the way in which the valve opens",
-    "closure_supply": "the valve",
-}
-SPOKEN = 0.05
-"""Share of a closure from which a kind of dependence is spoken of."""
 
 
 def describe_closure(found: Fit, problem: Problem, baseline: Fit) -> str:
@@ -72,6 +58,7 @@ def describe_closure(found: Fit, problem: Problem, baseline: Fit) -> str:
 
 def _sentence(found: Fit, problem: Problem, baseline: Fit, block: Block) -> str:
     closure = CLOSURE_OF[block.kind]
+    told = WORDS[closure]
     parts = _parts(found, problem, block, closure)
     used = {term.name: term for term in TERMS[closure] if f"{closure}.{term.name}" in found.values}
     whole = np.sum([parts[name] for name in used], axis=0)
@@ -82,15 +69,16 @@ def _sentence(found: Fit, problem: Problem, baseline: Fit, block: Block) -> str:
     shares = {k: sum(float(parts[n] @ whole) for n, t in used.items() if t.kind == k) / power if power else 0.0 for k in _KINDS}
     variables = list(dict.fromkeys(v for term in used.values() for v in term.variables)) or ["nothing: it is constant"]
     shape = {kind: found.rig.effects[_index(found.rig, closure)]["parameters"].get(name) for kind, name in MEMORY_OF.items()}
+    least = problem.settings.closures.spoken_share
     words = [
-        _kind_in_words(kind, closure, share, shape) for kind, share in shares.items() if _present(kind, used) and abs(share) > SPOKEN
+        _kind_in_words(kind, closure, share, shape) for kind, share in shares.items() if _present(kind, used) and abs(share) > least
     ]
     taken = _percent(_taken(found, baseline, problem, block))
     return (
-        f"In the block {block.name} ({block.covers}) a {_WHAT[closure]} is missing, {effective / size:.3g} {unit} effective "
+        f"In the block {block.name} ({block.covers}) a {told.what} is missing, {effective / size:.3g} {unit} effective "
         f"(99 % below {largest:.3g} {unit}); it takes {taken} of the mismatch there. "
         f"It is a function of {_listed(variables)}: {_listed(words)}. "
-        f"{_LETTER[closure]} = {_formula(found, closure, used, size)} {unit} ({_SYMBOLS[closure]}{_legend(used, shape)})."
+        f"{told.letter} = {_formula(found, closure, used, size)} {unit} ({told.symbols}{_legend(used, shape)})."
     )
 
 
@@ -140,7 +128,7 @@ def _kind_in_words(kind: str, closure: str, share: float, shape: dict[str, float
     if kind == "even":
         return f"{_percent(share)} is the same for either sign of the opening (even, without memory)"
     if kind == "odd":
-        return f"{_percent(share)} turns its sign with {_TURNS[closure]} (odd, without memory)"
+        return f"{_percent(share)} turns its sign with {WORDS[closure].odd_in} (odd, without memory)"
     if kind == "time":
         return f"{_percent(share)} remembers and forgets in {shape['time']:.3g} s (rate dependent)"
     way = f"{shape['distance']:.3g} rad"

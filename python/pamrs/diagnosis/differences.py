@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from pamrs.diagnosis.blocks import Residual, available_blocks
 from pamrs.diagnosis.evidence import bins_of, floors
-from pamrs.diagnosis.fitting import FIT_BIN, Key, Problem, bin_width, free_baseline, residuals
+from pamrs.diagnosis.fitting import Key, Problem, bin_width, free_baseline, residuals
+from pamrs.diagnosis.settings import DiagnosisSettings, NextExperimentSettings
 from pamrs.diagnosis.signals import Prepared, binned, prepare
 from pamrs.effects import EFFECTS
 from pamrs.errors import DiagnosisError, ParameterError
@@ -26,9 +27,7 @@ from pamrs.rig import Rig
 from pamrs.simulation import Simulation, core_rig
 
 __all__ = [
-    "EFFECTIVE",
     "MEASURABLE",
-    "NOISE",
     "Left",
     "Linear",
     "checked_channels",
@@ -37,20 +36,20 @@ __all__ = [
     "misfit",
     "problem_of",
     "taken",
+    "usual_noise",
     "weights_of",
 ]
 
 Array = NDArray[np.float64]
 
-EFFECTIVE = 10.0
-"""Independent samples that a block's residual over one recording counts as."""
-NOISE: dict[str, float] = {"supply_pressure": 200.0, "muscle_pressure": 200.0, "joint_angle": math.radians(0.03), "length": 3e-5}
-"""Sample noise of typical transducers [SI]: a 0 to 14 bar pressure transducer, a Hall angle sensor and a linear transducer on a 16-bit
-converter."""
 MEASURABLE = ("valve_command", "supply_pressure", "muscle_pressure", "joint_angle", "length")
 """Channels that the cut chain uses."""
-KNOWN_SHARE = 0.5
-"""Relative standard deviation of an effect's parameter of which the rig file says none."""
+
+
+def usual_noise(settings: NextExperimentSettings) -> dict[str, float]:
+    """Sample noise of usual transducers by channel [SI]."""
+    pressures = dict.fromkeys(("supply_pressure", "muscle_pressure"), settings.pressure_noise)
+    return pressures | {"joint_angle": settings.angle_noise, "length": settings.length_noise}
 
 
 def checked_channels(rig: Rig, channels: tuple[str, ...]) -> tuple[str, ...]:
@@ -76,7 +75,15 @@ def checked_channels(rig: Rig, channels: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(name for name in own if name in channels)
 
 
-def taken(run: Simulation, rig: Rig, name: str, noise: Mapping[str, float], *, rng: np.random.Generator | None = None) -> Prepared:
+def taken(
+    run: Simulation,
+    rig: Rig,
+    name: str,
+    noise: Mapping[str, float],
+    settings: DiagnosisSettings,
+    *,
+    rng: np.random.Generator | None = None,
+) -> Prepared:
     """A simulation as a recording that is ready for the cut chain.
 
     Parameters
@@ -89,6 +96,8 @@ def taken(run: Simulation, rig: Rig, name: str, noise: Mapping[str, float], *, r
         What to call it.
     noise : mapping of str to float
         Sample noise by channel [SI]; channels without one are left out.
+    settings : DiagnosisSettings
+        How it is made ready.
     rng : numpy.random.Generator, optional
         Adds that noise; none by default.
     """
@@ -99,25 +108,36 @@ def taken(run: Simulation, rig: Rig, name: str, noise: Mapping[str, float], *, r
     mask = {c: np.ones(v.size, dtype=bool) for c, v in channels.items()}
     time = np.asarray(run.time, dtype=np.float64)
     recording = Recording(name, "fit", time, float(time[1] - time[0]), channels, mask, [], {})
-    prepared = prepare(recording, rig)
+    prepared = prepare(recording, rig, settings)
     return replace(prepared, noise={c: float(noise[c]) for c in prepared.noise})
 
 
-def problem_of(rig: Rig, recordings: list[Prepared], channels: tuple[str, ...]) -> Problem:
+def problem_of(rig: Rig, recordings: list[Prepared], channels: tuple[str, ...], settings: DiagnosisSettings) -> Problem:
     """Blocks that channels can tell apart, with recordings.
+
+    Parameters
+    ----------
+    rig : Rig
+        Nominal model.
+    recordings : list of Prepared
+        Ready for the cut chain.
+    channels : tuple of str
+        Measured ones.
+    settings : DiagnosisSettings
+        Windows and steps of the blocks, and what the problem is solved by.
 
     Raises
     ------
     DiagnosisError
         If they surround no block.
     """
-    blocks = available_blocks(rig, channels)
+    blocks = available_blocks(rig, channels, settings.prepare)
     if not blocks:
         raise DiagnosisError(
             f"channels = {', '.join(channels) or 'none'} do not surround any block of rig {rig.name!r} ({', '.join(rig.blocks)}); "
             "measure muscle_pressure, and supply_pressure and joint_angle where the rig has them"
         )
-    return Problem(blocks, recordings, core_rig(rig))
+    return Problem(blocks, recordings, core_rig(rig), settings)
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,7 +186,7 @@ def _free(problem: Problem, rig: Rig) -> dict[str, float]:
         for parameter in EFFECTS[effect["id"]].parameters:
             name = f"{effect['id']}.{parameter.name}"
             value = abs(effect["parameters"][parameter.name])
-            std = spread.get(parameter.name, KNOWN_SHARE * value)
+            std = spread.get(parameter.name, problem.settings.next_experiment.known_share * value)
             if name in known and math.isfinite(std) and std > 0.0:
                 out[name] = min(std, 2.0 * value) if value > 0.0 else std
     return out
@@ -222,10 +242,11 @@ def difference(problem: Problem, truth: Mapping[Key, Residual], other: Rig, weig
 
 def _left(problem: Problem, values: Mapping[Key, Array], model: Linear, weights: Mapping[Key, float]) -> Left:
     spread = np.array(list(model.free.values()))
+    effective = problem.settings.next_experiment.effective_samples
     rows, slopes, scales = [], [], []
     keys: list[Key] = []
     for prepared in problem.recordings:
-        width = bin_width(prepared, FIT_BIN)
+        width = bin_width(prepared, problem.settings.noise.fit_bin_time)
         for block in problem.blocks:
             key = (block.name, prepared.recording.name)
             r = model.found[key]
@@ -233,7 +254,7 @@ def _left(problem: Problem, values: Mapping[Key, Array], model: Linear, weights:
             slope, _ = binned(np.zeros((values[key].size, 0)) if r.jacobian is None else r.jacobian, r.rows, width)
             floor = weights[key] * prepared.noise[block.channel] / math.sqrt(bins_of(prepared))
             # what differs is smooth over a bin of 0.1 s: its mean square in fine bins is that in coarse ones
-            scale = math.sqrt(EFFECTIVE / max(1, int((counts > 0).sum()))) / floor
+            scale = math.sqrt(effective / max(1, int((counts > 0).sum()))) / floor
             rows.append(mean * scale)
             slopes.append(-slope * spread * scale)
             scales.append(scale)
@@ -246,6 +267,6 @@ def _left(problem: Problem, values: Mapping[Key, Array], model: Linear, weights:
     for key, part, scale in zip(keys, rows, scales, strict=True):
         own = left[start : start + part.size]
         start += part.size
-        rms[key] = math.sqrt(float(own @ own) / EFFECTIVE)
+        rms[key] = math.sqrt(float(own @ own) / effective)
         kept[key] = own / scale
     return Left(rms, kept, float(left @ left + moved @ moved))

@@ -19,24 +19,47 @@ from numpy.typing import NDArray
 from pamrs.diagnosis.blocks import Residual
 from pamrs.diagnosis.fitting import Events, Fit, Key, Problem, Scaling, changes, residuals, stacked
 from pamrs.diagnosis.leastsquares import levenberg_marquardt
+from pamrs.diagnosis.settings import TransientSettings
 from pamrs.diagnosis.signals import Prepared
-from pamrs.effects import find_parameter
+from pamrs.effects import EFFECTS, EffectParameter, find_parameter
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 
-__all__ = ["EVENTS", "fit_events", "look_for_events"]
+__all__ = ["events_of", "fit_events", "look_for_events"]
 
 Array = NDArray[np.float64]
 
-EVENTS = {"external_torque": ("torque", 1.0, 3), "payload_change": ("mass_change", 0.3, 1)}
-"""Effects with times of their own: the parameter that scales them, a typical size, and how many can be told in one recording."""
-SPACING = 0.5
-"""Distance of the times that are tried [s]."""
-PUSH, RISE = 1.0, 0.4
-"""Duration of the push that is moved through time, and its edges [s]."""
-LEAST, LEAST_SHARE = 25.0, 0.03
-"""Gain in chi-square, and share of what the recording's residual is, from which an event counts."""
-SCALES = {"time": 0.2, "duration": 0.4, "rise": 0.2}
+
+def events_of(effect: str) -> list[list[EffectParameter]]:
+    """Parameters (size, time, duration) of each event that one recording can have, the first event's first.
+
+    Parameters
+    ----------
+    effect : str
+        A transient effect.
+    """
+    info = EFFECTS[effect]
+    first = [p for p in info.parameters if p is info.leading or p.role in ("time", "duration")]
+    every = [[p, *(q for q in info.parameters if q.repeats == p.name)] for p in first]
+    return [list(one) for one in zip(*every, strict=True)]
+
+
+def _tried(parameter: EffectParameter) -> float:
+    """The value that a search over times gives a parameter."""
+    return parameter.default if parameter.tried is None else parameter.tried
+
+
+def _first_of(effect: str, parameter: str) -> EffectParameter:
+    """The parameter of the first event that one of a later event repeats."""
+    info = find_parameter(f"{effect}.{parameter}")
+    return find_parameter(f"{effect}.{info.repeats}") if info.repeats else info
+
+
+def _scale(effect: str, parameter: str, settings: TransientSettings) -> float:
+    """Scale of an event's parameter in a fit [SI]."""
+    scales = {"time": settings.time_scale, "duration": settings.duration_scale, "rise": settings.rise_scale}
+    return scales.get(_first_of(effect, parameter).role, _tried(EFFECTS[effect].leading))
+
 
 
 def fit_events(effect: str, problem: Problem, nominal: Rig, baseline: Fit, inflation: dict[str, float]) -> Fit | None:
@@ -45,7 +68,7 @@ def fit_events(effect: str, problem: Problem, nominal: Rig, baseline: Fit, infla
     Parameters
     ----------
     effect : str
-        One of :data:`EVENTS`.
+        A transient one.
     problem : Problem
         Blocks and recordings.
     nominal : Rig
@@ -84,7 +107,7 @@ def look_for_events(
     Parameters
     ----------
     effect : str
-        One of :data:`EVENTS`.
+        A transient one.
     problem : Problem
         Blocks and recordings.
     rig : Rig
@@ -130,15 +153,16 @@ def _scan(
     stopped: Event,
 ) -> dict[str, float]:
     """Where the events of one recording begin, the most telling first; empty where none is worth it."""
-    leading, typical, slots = EVENTS[effect]
+    settings, slots = problem.settings.transients, len(events_of(effect))
+    typical = _tried(EFFECTS[effect].leading)
     length = prepared.n * prepared.dt
-    times = np.arange(0.25, length - 0.5, SPACING)
+    times = np.arange(settings.first_time, length - settings.last_time, settings.spacing)
     rows, _ = stacked(problem, base, inflation)
     signatures: dict[float, Array] = {}
     for group in _apart(times, slots):
         if stopped.is_set():
             return {}
-        values = _numbered([(typical if size is None else size, float(t)) for t in group], leading, effect)
+        values = _numbered([(typical if size is None else size, float(t)) for t in group], effect)
         try:
             moved, _ = stacked(problem, changes(problem, rig.with_effect(effect, values), base, effect), inflation)
         except SimulationError:
@@ -147,7 +171,8 @@ def _scan(
         share = np.arange(rows.size) % max(1, rows.size // len(problem.blocks)) / max(1, rows.size // len(problem.blocks)) * length
         for place, t in enumerate(group):
             end = group[place + 1] if place + 1 < len(group) else np.inf
-            signatures[float(t)] = np.where((share >= t - 0.1) & (share < end - 0.1), change, 0.0)
+            begins, ends = share >= t - settings.early, share < end - settings.early
+            signatures[float(t)] = np.where(begins & ends, change, 0.0)
     chosen: list[float] = []
     span, sizes = np.zeros((rows.size, 0)), np.zeros(0)
     left = rows
@@ -155,10 +180,10 @@ def _scan(
         gains = {
             t: _gain(left, signature - span @ (span.T @ signature), scaled=size is None)
             for t, signature in signatures.items()
-            if all(abs(t - s) >= PUSH for s in chosen)
+            if all(abs(t - s) >= settings.least_distance for s in chosen)
         }
         best = max(gains, key=lambda t: gains[t], default=0.0)
-        if gains.get(best, 0.0) < max(LEAST, LEAST_SHARE * float(rows @ rows)):
+        if gains.get(best, 0.0) < max(settings.least_gain, settings.least_share * float(rows @ rows)):
             break
         chosen.append(best)
         columns = np.stack([signatures[t] for t in chosen], axis=1)
@@ -169,7 +194,7 @@ def _scan(
             sizes = np.ones(len(chosen))
         left = rows + columns @ sizes
     events = [(float(factor) * (typical if size is None else size), t) for factor, t in zip(sizes, chosen, strict=True)]
-    return _numbered(sorted(events, key=lambda c: c[1]), leading, effect) if events else {}
+    return _numbered(sorted(events, key=lambda c: c[1]), effect) if events else {}
 
 
 def _gain(left: Array, signature: Array, *, scaled: bool) -> float:
@@ -189,17 +214,15 @@ def _apart(times: Array, slots: int) -> list[list[float]]:
     return [[float(t) for t in times[k::stride]] for k in range(stride)]
 
 
-def _numbered(events: list[tuple[float, float]], leading: str, effect: str) -> dict[str, float]:
-    """Parameters of a few events of one recording."""
+def _numbered(events: list[tuple[float, float]], effect: str) -> dict[str, float]:
+    """Parameters of a few events of one recording, by their sizes and times."""
     values: dict[str, float] = {}
-    for place, (size, time) in enumerate(events):
-        suffix = "" if place == 0 else f"_{place + 1}"
-        values |= {leading + suffix: size, "time" + suffix: time}
-        if effect == "external_torque":
-            values["duration" + suffix] = PUSH
-    if effect == "external_torque" and values:
-        values["rise"] = RISE
-    return values
+    for (size, time), parameters in zip(events, events_of(effect), strict=False):
+        for parameter in parameters:
+            first = _first_of(effect, parameter.name)
+            told = {"time": time, "duration": _tried(first)}
+            values[parameter.name] = told.get(first.role, size)
+    return values | {p.name: _tried(p) for p in EFFECTS[effect].with_role("rise") if values}
 
 
 def _fitted(
@@ -213,10 +236,10 @@ def _fitted(
     stopped: Event,
 ) -> dict[str, float] | None:
     """Events of one recording fitted alone, at a model that stays; None where the model leaves its range."""
-    leading, typical, _ = EVENTS[effect]
-    free = [p for p in start if not (keep_size and p.startswith(leading))]
-    scale = np.array([SCALES.get(p.rstrip("_23"), typical) for p in free])
-    limits = [_limits(effect, p, prepared) for p in free]
+    settings, leading = alone.settings, EFFECTS[effect].leading
+    free = [p for p in start if not (keep_size and _first_of(effect, p) is leading)]
+    scale = np.array([_scale(effect, p, settings.transients) for p in free])
+    limits = [_limits(effect, p, prepared, settings.transients) for p in free]
     low, high = (np.array([limit[k] for limit in limits]) / scale for k in (0, 1))
 
     def told(x: Array) -> dict[str, float]:
@@ -232,22 +255,23 @@ def _fitted(
         return rows, slope * scale, None
 
     try:
-        x, _, _ = levenberg_marquardt(evaluate, np.array([start[p] for p in free]) / scale, (low, high), 8)
+        begun, most = np.array([start[p] for p in free]) / scale, settings.transients.evaluations_alone
+        x, _, _ = levenberg_marquardt(evaluate, begun, (low, high), most, settings.fit)
     except SimulationError:
         return None
     return told(x)
 
 
-def _limits(effect: str, parameter: str, prepared: Prepared) -> tuple[float, float]:
-    kind = parameter.rstrip("_23")
-    if kind == "time":
-        return 0.0, prepared.n * prepared.dt
-    if kind == "duration":
-        return 0.05, 5.0
-    if kind == "rise":
-        return 0.02, 2.0
+def _limits(effect: str, parameter: str, prepared: Prepared, settings: TransientSettings) -> tuple[float, float]:
+    """Smallest and largest value of an event's parameter [SI]."""
     info = find_parameter(f"{effect}.{parameter}")
-    return max(info.lower, -1e3), min(info.upper, 1e3)
+    limits = {
+        "time": (0.0, prepared.n * prepared.dt),
+        "duration": (settings.least_duration, settings.most_duration),
+        "rise": (settings.least_rise, settings.most_rise),
+    }
+    size = max(info.lower, -settings.most_size), min(info.upper, settings.most_size)
+    return limits.get(_first_of(effect, parameter).role, size)
 
 
 def _jointly(events: Events, problem: Problem, nominal: Rig, baseline: Fit, inflation: dict[str, float]) -> Fit | None:
@@ -255,14 +279,14 @@ def _jointly(events: Events, problem: Problem, nominal: Rig, baseline: Fit, infl
 
     One after the other would creep: a baseline that was fitted without the events holds half of what a mass does.
     """
-    effect, (leading, typical, _) = events.effect, EVENTS[events.effect]
+    effect, settings = events.effect, problem.settings
+    leading, shared = EFFECTS[effect].leading.name, EFFECTS[effect].leading.same_everywhere
     names = list(baseline.moved)
-    scaling = Scaling(nominal, names, {})
-    shared = effect == "payload_change"
+    scaling = Scaling(nominal, names, {}, settings.fit)
     places = [(name, p) for name, values in events.values.items() for p in values if not (shared and p == leading)]
     places = ([("", leading)] if shared else []) + places
     by_name = {p.recording.name: p for p in problem.recordings}
-    scale = np.array([SCALES.get(p.rstrip("_23"), typical) for _, p in places])
+    scale = np.array([_scale(effect, p, settings.transients) for _, p in places])
     count = len(names)
     kept = []
     for prepared in problem.recordings:
@@ -298,12 +322,20 @@ def _jointly(events: Events, problem: Problem, nominal: Rig, baseline: Fit, infl
     start = [(baseline.values[n] - scaling.centre[n]) / scaling.scale[n] for n in names]
     sizes = [own[leading] for own in events.values.values()]
     begun = [float(np.median(sizes)) if name == "" else events.values[name][p] for name, p in places]
-    limits = [_limits(effect, p, by_name[name] if name else problem.recordings[0]) for name, p in places]
+    recordings = [by_name[name] if name else problem.recordings[0] for name, _ in places]
+    limits = [
+        _limits(effect, p, recording, settings.transients)
+        for (_, p), recording in zip(places, recordings, strict=True)
+    ]
     low = np.concatenate([scaling.bounds[0], np.array([limit[0] for limit in limits]) / scale])
     high = np.concatenate([scaling.bounds[1], np.array([limit[1] for limit in limits]) / scale])
     try:
         x, (values, jacobian, found), spent = levenberg_marquardt(
-            evaluate, np.concatenate([start, np.array(begun) / scale]), (low, high), 12
+            evaluate,
+            np.concatenate([start, np.array(begun) / scale]),
+            (low, high),
+            settings.transients.evaluations_together,
+            settings.fit,
         )
     except SimulationError:
         return None

@@ -15,20 +15,13 @@ from scipy.stats import t
 from pamrs import _core
 from pamrs.diagnosis.blocks import Block, Residual, change, residual
 from pamrs.diagnosis.fitting import Key, Problem, bin_width
+from pamrs.diagnosis.settings import NoiseSettings
 from pamrs.diagnosis.signals import Prepared, binned, smoothed
 from pamrs.errors import SimulationError
 
 __all__ = ["Excess", "Floor", "excess", "floors", "inflation"]
 
 Array = NDArray[np.float64]
-
-BIN = 0.1
-"""Width of the bins in which an excess is looked for [s]; at least five samples."""
-MARGIN, CHANCE = 1.1, 0.005
-"""Factor by which the variance must exceed its floor before it counts (floors are estimates), and the chance of noise doing so that is
-taken."""
-REPLICATES, MOST_LIMIT = 10, 2.5
-"""Synthetic noise realisations for a floor and its scatter; variance over the floor's that is a mismatch however noise scatters."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +56,7 @@ class Excess:
     p_value : float
         Chance of such a ratio (above the margin) from noise, by the scatter of the floors.
     limit : float
-        Ratio that noise exceeds with the chance ``CHANCE``, at most ``MOST_LIMIT``.
+        Ratio that noise exceeds with the chance ``noise.chance`` of the settings, at most ``noise.most_limit``.
     scatter : float
         Standard deviation of the ratio's logarithm from noise and from what floors are known to.
     rms, noise : float
@@ -75,13 +68,14 @@ class Excess:
     p_value: float
     rms: float
     noise: float
-    limit: float = MARGIN
+    limit: float
     scatter: float = 0.0
 
 
 def bins_of(prepared: Prepared) -> int:
     """Samples in a bin for the excess."""
-    return max(5, bin_width(prepared, BIN))
+    settings = prepared.settings.noise
+    return max(settings.least_bin_samples, bin_width(prepared, settings.bin_time))
 
 
 def floors(problem: Problem, core: _core.Rig) -> dict[Key, Floor]:
@@ -95,8 +89,9 @@ def floors(problem: Problem, core: _core.Rig) -> dict[Key, Floor]:
         A model close to the data.
     """
     found = {}
+    settings = problem.settings
     for prepared in problem.recordings:
-        rng = np.random.default_rng([20140501, crc32(prepared.recording.name.encode())])
+        rng = np.random.default_rng([settings.seed, crc32(prepared.recording.name.encode())])
         for block in problem.blocks:
             base = residual(block, core, prepared, [])
             width = bins_of(prepared)
@@ -105,7 +100,7 @@ def floors(problem: Problem, core: _core.Rig) -> dict[Key, Floor]:
             rows = base.rows
             _, counts = binned(base.value, rows, width)
             seen = counts > 0
-            for _ in range(REPLICATES if seen.any() else 0):
+            for _ in range(settings.noise.replicates if seen.any() else 0):
                 shaken = np.zeros(prepared.n)
                 with contextlib.suppress(SimulationError):  # a realisation that leaves the model's range tells nothing of the others
                     shaken = change(block, core, _shaken(prepared, noisy, rng), base) - base.value if noisy else shaken
@@ -129,7 +124,7 @@ def _shaken(prepared: Prepared, names: Iterable[str], rng: np.random.Generator) 
     for name in names:
         raw = rng.normal(0.0, prepared.noise[name], prepared.n)
         value, slope = prepared.signals[name]
-        more, steeper = smoothed(raw, prepared.dt)
+        more, steeper = smoothed(raw, prepared.dt, prepared.settings.prepare)
         signals[name] = (value + more, slope + steeper)
     return prepared.shaken(signals)
 
@@ -147,7 +142,13 @@ def correlation_time(values: Array) -> float:
     return max(1.0, 1.0 + 2.0 * float(rho[1:stop].sum()))
 
 
-def excess(block: Block, recordings: list[Prepared], found: dict[Key, Residual], floor: dict[Key, Floor]) -> Excess:
+def excess(
+    block: Block,
+    recordings: list[Prepared],
+    found: dict[Key, Residual],
+    floor: dict[Key, Floor],
+    settings: NoiseSettings,
+) -> Excess:
     """Pool a block's residual over recordings and compare it with its floor."""
     keys: list[Key] = []
     ratios, weights, squares, noises = [], [], [], []
@@ -164,21 +165,22 @@ def excess(block: Block, recordings: list[Prepared], found: dict[Key, Residual],
         squares.append(float(np.mean(r.value[r.rows] ** 2)))
         noises.append(floor[key].sample ** 2)
     if not ratios:
-        return Excess(1.0, 0.0, 1.0, float("nan"), float("nan"))
+        return Excess(1.0, 0.0, 1.0, float("nan"), float("nan"), settings.margin)
     ratio = float(np.average(ratios, weights=weights))
     share = float(np.mean([floor[key].binned ** 2 / floor[key].sample ** 2 for key in keys]))
     shares = np.array(weights) / sum(weights)
     # floors are means of as many realisations, and their scatter is known from no more
     pooled = math.sqrt(float(np.sum((shares * [floor[key].scatter for key in keys]) ** 2)))
-    scatter = max(1e-6, pooled * math.sqrt(1.0 + 1.0 / REPLICATES))
-    chance = t(len(keys) * (REPLICATES - 1))
+    scatter = max(1e-6, pooled * math.sqrt(1.0 + 1.0 / settings.replicates))
+    chance = t(len(keys) * (settings.replicates - 1))
+    beyond = min(settings.most_log_limit, float(chance.isf(settings.chance)) * scatter)
     return Excess(
         ratio,
         math.sqrt(max(0.0, (ratio - 1.0) * share)),
-        float(chance.sf(math.log(max(ratio, 1e-300) / MARGIN) / scatter)),
+        float(chance.sf(math.log(max(ratio, 1e-300) / settings.margin) / scatter)),
         math.sqrt(float(np.average(squares, weights=weights))),
         math.sqrt(float(np.average(noises, weights=weights))),
-        min(MOST_LIMIT, MARGIN * math.exp(min(1.0, float(chance.isf(CHANCE)) * scatter))),
+        min(settings.most_limit, settings.margin * math.exp(beyond)),
         scatter,
     )
 

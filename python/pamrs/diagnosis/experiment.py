@@ -17,9 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs.channels import unit_of
-from pamrs.diagnosis.differences import EFFECTIVE, MEASURABLE, NOISE, Left, checked_channels, difference, problem_of, taken, weights_of
-from pamrs.diagnosis.fitting import FIT_BIN, Key, Problem, acts_in, bin_width, residuals
-from pamrs.diagnosis.protocols import SAMPLE_TIME, SEALED_SAMPLE_TIME, Experiment, library
+from pamrs.diagnosis.differences import MEASURABLE, Left, checked_channels, difference, problem_of, taken, usual_noise, weights_of
+from pamrs.diagnosis.fitting import Key, Problem, acts_in, bin_width, residuals
+from pamrs.diagnosis.protocols import Experiment, library
+from pamrs.diagnosis.settings import DiagnosisSettings, NextExperimentSettings
 from pamrs.diagnosis.signals import Prepared
 from pamrs.effects import EFFECTS
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError
@@ -31,17 +32,6 @@ __all__ = ["Outcome", "entropy", "information", "outcome_of", "propose", "ranked
 
 Array = NDArray[np.float64]
 Hypothesis = tuple[str, Rig, float]
-
-MOST = 6
-"""Hypotheses that are simulated, the most probable ones."""
-LEAST_PROBABILITY = 0.01
-"""Probability below which a hypothesis is not simulated."""
-SENSOR_EFFORT = 900.0
-"""What one more sensor costs, as time [s]."""
-SHOWN = 5
-"""Experiments in the ranking."""
-RESOLUTION = 0.02
-"""Difference of information that counts [bit]; below it the cheaper experiment is better."""
 
 
 def entropy(probabilities: Sequence[float]) -> float:
@@ -97,6 +87,8 @@ class Outcome:
         Blocks, and the recording of the leading hypothesis.
     weights : dict
         As :func:`pamrs.diagnosis.differences.weights_of`.
+    effort : float
+        What it costs, a sensor included, as time [s].
     """
 
     experiment: Experiment
@@ -107,11 +99,7 @@ class Outcome:
     distance: Array
     problem: Problem
     weights: dict[Key, float]
-
-    @property
-    def effort(self) -> float:
-        """As time [s]."""
-        return self.experiment.effort + (SENSOR_EFFORT if self.sensor else 0.0)
+    effort: float
 
 
 def _telling(problem: Problem, rigs: Sequence[Rig]) -> Problem:
@@ -123,7 +111,12 @@ def _telling(problem: Problem, rigs: Sequence[Rig]) -> Problem:
 
 
 def outcome_of(
-    experiment: Experiment, hypotheses: Sequence[Hypothesis], noise: Mapping[str, float], channels: tuple[str, ...], sensor: str = ""
+    experiment: Experiment,
+    hypotheses: Sequence[Hypothesis],
+    noise: Mapping[str, float],
+    channels: tuple[str, ...],
+    settings: DiagnosisSettings,
+    sensor: str = "",
 ) -> Outcome:
     """Simulate an experiment with every hypothesis, and compare every pair.
 
@@ -137,6 +130,8 @@ def outcome_of(
         Sample noise by channel [SI].
     channels : tuple of str
         Measured ones, besides ``sensor``.
+    settings : DiagnosisSettings
+        How they are compared.
     sensor : str
         One more.
 
@@ -152,7 +147,7 @@ def outcome_of(
     measured = (*channels, *((sensor,) if sensor else ()))
     heard = {c: v for c, v in noise.items() if c in measured}
     problems = [
-        _telling(problem_of(rig, [taken(run, rig, experiment.name, heard)], measured), rigs)
+        _telling(problem_of(rig, [taken(run, rig, experiment.name, heard, settings)], measured, settings), rigs)
         for rig, run in zip(rigs, runs, strict=True)
     ]
     weights = weights_of(problems[0], rigs[0])
@@ -162,10 +157,11 @@ def outcome_of(
     for pair, found in left.items():
         distance[pair] = found.total
     bits = information([p for _, _, p in hypotheses], distance)
-    return Outcome(experiment, sensor, bits, runs, left, distance, problems[0], weights)
+    effort = experiment.effort + (settings.next_experiment.sensor_effort if sensor else 0.0)
+    return Outcome(experiment, sensor, bits, runs, left, distance, problems[0], weights, effort)
 
 
-def ranked(outcomes: Sequence[Outcome], probabilities: Sequence[float]) -> list[Outcome]:
+def ranked(outcomes: Sequence[Outcome], probabilities: Sequence[float], resolution: float) -> list[Outcome]:
     """Outcomes by what they tell, the most telling first; of those that tell the same, the cheapest.
 
     Parameters
@@ -174,8 +170,10 @@ def ranked(outcomes: Sequence[Outcome], probabilities: Sequence[float]) -> list[
         Of the same hypotheses.
     probabilities : sequence of float
         Of these hypotheses, which may have changed since.
+    resolution : float
+        Difference of information that counts [bit].
     """
-    return sorted(outcomes, key=lambda o: (-round(information(probabilities, o.distance) / RESOLUTION), o.effort))
+    return sorted(outcomes, key=lambda o: (-round(information(probabilities, o.distance) / resolution), o.effort))
 
 
 def propose(
@@ -186,6 +184,7 @@ def propose(
     *,
     channels: tuple[str, ...] | None = None,
     experiments: Sequence[Experiment] | None = None,
+    settings: DiagnosisSettings | None = None,
 ) -> dict[str, Any]:
     """The experiment that tells most about which hypothesis holds.
 
@@ -204,6 +203,8 @@ def propose(
         Channels that can be measured; those of the recordings, or all that the rig has, by default.
     experiments : sequence of Experiment, optional
         To choose from; the library's by default.
+    settings : DiagnosisSettings, optional
+        How experiments are compared; the published ones by default.
 
     Returns
     -------
@@ -228,22 +229,26 @@ def propose(
     >>> 0.5 < found["expected_information_bits"] <= 1.0
     True
     """
-    chosen = _checked(hypotheses)
-    sound = {**NOISE, **(noise or {})}
+    settings = DiagnosisSettings() if settings is None else settings
+    own_settings = settings.next_experiment
+    chosen = _checked(hypotheses, own_settings)
+    usual = usual_noise(own_settings)
+    sound = {**usual, **(noise or {})}
     records = [r.recording if isinstance(r, Prepared) else r for r in recordings]
     own = _channels(nominal, records, channels)
     doubt = entropy([p for _, _, p in chosen])
-    if len(chosen) < 2 or doubt < 0.01:
+    if len(chosen) < 2 or doubt < own_settings.settled_entropy:
         text = "One hypothesis is left; no experiment can add to that."
         return {"text": text, "excitation": {}, "expected_information_bits": 0.0, "ranking": [], "curves": None}
-    pool = _library(nominal, records) if experiments is None else list(experiments)
+    pool = _library(nominal, records, own_settings) if experiments is None else list(experiments)
     found: list[Outcome] = []
-    for sensor in ("", *_missing(nominal, own)):
+    for sensor in ("", *_missing(nominal, own, usual)):
         for experiment in sorted(pool, key=lambda e: e.effort):
-            if len(found) >= SHOWN and max(o.bits for o in found) > doubt - 0.5 * RESOLUTION:
+            enough = len(found) >= own_settings.most_shown
+            if enough and max(o.bits for o in found) > doubt - 0.5 * own_settings.resolution:
                 break  # what is left costs more and cannot tell more
             try:
-                found.append(outcome_of(experiment, chosen, sound, own, sensor))
+                found.append(outcome_of(experiment, chosen, sound, own, settings, sensor))
             except (SimulationError, DiagnosisError):
                 continue  # a hypothesis cannot be run there, or nothing is measured on both sides of a block
     if not found:
@@ -251,10 +256,10 @@ def propose(
             f"no experiment of rig {nominal.name!r} can be simulated with all of {', '.join(label for label, _, _ in chosen)} and "
             f"measured by {', '.join(own) or 'no channel'}"
         )
-    best_first = ranked(found, [p for _, _, p in chosen])
+    best_first = ranked(found, [p for _, _, p in chosen], own_settings.resolution)
     best = best_first[0]
     return {
-        "text": _text(best, chosen, doubt),
+        "text": _text(best, chosen, doubt, own_settings.hopeless_share),
         "excitation": {**best.experiment.excitation, **({"sensor": best.sensor} if best.sensor else {})},
         "expected_information_bits": round(best.bits, 3),
         "ranking": [
@@ -265,13 +270,13 @@ def propose(
                 "bits": round(o.bits, 3),
                 "effort_s": round(o.effort, 1),
             }
-            for o in best_first[:SHOWN]
+            for o in best_first[: own_settings.most_shown]
         ],
         "curves": _curves(best, chosen),
     }
 
 
-def _checked(hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
+def _checked(hypotheses: Sequence[Hypothesis], settings: NextExperimentSettings) -> list[Hypothesis]:
     """The hypotheses that count, the most probable first."""
     if not hypotheses:
         raise ParameterError("hypotheses is empty; at least one (label, rig, probability) is needed")
@@ -281,7 +286,8 @@ def _checked(hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
         if not (math.isfinite(probability) and 0.0 <= probability <= 1.0):
             raise ParameterError(f"hypotheses: the probability of {label!r} is {probability}, which is not allowed: from 0 to 1")
     ranked = sorted(hypotheses, key=lambda h: -h[2])
-    return [h for h in ranked if h[2] >= LEAST_PROBABILITY][:MOST] or ranked[:1]
+    likely = [h for h in ranked if h[2] >= settings.least_probability]
+    return likely[: settings.most_hypotheses] or ranked[:1]
 
 
 def _channels(rig: Rig, records: Sequence[Recording], channels: tuple[str, ...] | None) -> tuple[str, ...]:
@@ -292,17 +298,20 @@ def _channels(rig: Rig, records: Sequence[Recording], channels: tuple[str, ...] 
     return tuple(name for name in MEASURABLE if name in has and all(name in record.channels for record in records))
 
 
-def _missing(rig: Rig, own: tuple[str, ...]) -> list[str]:
+def _missing(rig: Rig, own: tuple[str, ...], sensors: Mapping[str, float]) -> list[str]:
     """Channels that the rig could have and that are not measured."""
     has = core_rig(rig).channels
-    return [name for name in NOISE if name in has and name not in own]
+    return [name for name in sensors if name in has and name not in own]
 
 
-def _library(rig: Rig, records: Sequence[Recording]) -> list[Experiment]:
+def _library(rig: Rig, records: Sequence[Recording], settings: NextExperimentSettings) -> list[Experiment]:
     """The experiments of the rig, at the sample time and up to the pressures of what was recorded."""
     if not records:
-        return library(rig)
-    usual, least, most = (SEALED_SAMPLE_TIME, 0.05, 1.0) if rig.model["valve"] is None else (SAMPLE_TIME, 0.002, 0.01)
+        return library(rig, settings)
+    usual, least, most = settings.sample_time, settings.least_sample_time, settings.most_sample_time
+    if rig.model["valve"] is None:
+        usual = settings.sealed_sample_time
+        least, most = settings.least_sealed_sample_time, settings.most_sealed_sample_time
     step = min(max(min((r.sample_time for r in records), default=usual), least), most)
     peaks = [
         float(np.nanmax(r.channels["muscle_pressure"]))
@@ -310,7 +319,7 @@ def _library(rig: Rig, records: Sequence[Recording]) -> list[Experiment]:
         if "muscle_pressure" in r.channels and np.isfinite(r.channels["muscle_pressure"]).any()
     ]
     highest = max(peaks, default=0.0)
-    return library(rig, sample_time=step, highest=1.05 * highest if highest > 2e4 else None)
+    return library(rig, settings, sample_time=step, highest=1.05 * highest if highest > 2e4 else None)
 
 
 def _spoken(label: str) -> str:
@@ -319,7 +328,7 @@ def _spoken(label: str) -> str:
     return " with ".join(names)
 
 
-def _text(best: Outcome, hypotheses: Sequence[Hypothesis], doubt: float) -> str:
+def _text(best: Outcome, hypotheses: Sequence[Hypothesis], doubt: float, hopeless: float) -> str:
     said = best.experiment.text[:1].upper() + best.experiment.text[1:]
     if best.sensor:
         said += f", with one more channel: {best.sensor.replace('_', ' ')}"
@@ -331,7 +340,7 @@ def _text(best: Outcome, hypotheses: Sequence[Hypothesis], doubt: float) -> str:
         f". If it is {_spoken(hypotheses[0][0])}, a model with {_spoken(hypotheses[j][0])} then misses the {channel} by "
         f"{size:.2g} times its noise, whatever its parameters; expected to give {best.bits:.2f} of the {doubt:.2f} bit of doubt."
     )
-    if best.bits < 0.1 * doubt:
+    if best.bits < hopeless * doubt:
         said += " No standard experiment does better with these channels: think of another sensor."
     return said
 
@@ -343,7 +352,8 @@ def _curves(best: Outcome, hypotheses: Sequence[Hypothesis]) -> dict[str, Any]:
     channel = next(b.channel for b in best.problem.blocks if b.name == key[0])
     labels = [label for label, _, _ in hypotheses]
     prepared = best.problem.recordings[0]
-    width = bin_width(prepared, FIT_BIN)
+    settings = best.problem.settings
+    width = bin_width(prepared, settings.noise.fit_bin_time)
     return {
         "experiment": best.experiment.name,
         "text": best.experiment.text,
@@ -356,5 +366,5 @@ def _curves(best: Outcome, hypotheses: Sequence[Hypothesis]) -> dict[str, Any]:
         "left": {labels[j]: best.left[0, j].rows[key] for j in others},
         "noise": prepared.noise[channel] / math.sqrt(width) * best.weights[key],
         "command": best.experiment.command,
-        "samples_counted": EFFECTIVE,
+        "samples_counted": settings.next_experiment.effective_samples,
     }

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from pamrs import _core
 from pamrs.diagnosis.blocks import Block, Residual, change, residual
-from pamrs.diagnosis.leastsquares import SHARE, levenberg_marquardt
+from pamrs.diagnosis.leastsquares import levenberg_marquardt
+from pamrs.diagnosis.settings import DiagnosisSettings, FitSettings
 from pamrs.diagnosis.signals import Prepared, binned
 from pamrs.effects import EFFECTS, find_parameter
 from pamrs.errors import ParameterError, RigError, SimulationError
@@ -41,26 +42,13 @@ ACTS: dict[str, tuple[str, ...]] = {
     "muscle": ("arm",),
     "joint": ("arm",),
     "arm": ("arm",),
-    "tube_flow_restriction": ("supply", "chamber", "arm"),
-    "pressure_lag": ("chamber", "arm"),
-    "clock_skew": ("supply", "chamber", "arm"),
 }
-"""Kinds of block of the cut rig in which the effects of a block of the rig, or one effect, act.
+"""Kinds of block of the cut rig in which the effects of a block of the rig act, unless they say others themselves.
 
 Of several tanks, chambers or joints an effect acts on every one, with the same parameters: so the core has it where the effect has no
 ``at``, and one parameter that all recordings and blocks share is what they can decide. An effect of one muscle alone shows as a block
 that keeps its mismatch while its neighbours lose theirs; ``Rig.with_effect(..., at="flexor")`` then has it.
 """
-LEAST_SCALE = 0.01
-"""Share of an effect parameter's usual start that its scale in a fit has at the least."""
-WIDEST = 3.0
-"""Tolerances that a baseline parameter may move: farther out it would stand for physics that is missing, or for a wrong rig file."""
-FARTHEST = 10.0
-"""Multiple of its nominal value, or of the walls of the others, by which a parameter that is freed from its prior may move."""
-LEAST_STEP, STIFFEST = 4e-4, 0.2
-"""Stable step [s], or for a stiff rig the share of its own, below which a model is not tried."""
-FIT_BIN = 0.02
-"""Width of the bins over which residuals are averaged for fitting [s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,11 +63,14 @@ class Problem:
         Recordings.
     core : _core.Rig
         The nominal rig, compiled; others are made from it.
+    settings : DiagnosisSettings
+        What it is solved by.
     """
 
     blocks: list[Block]
     recordings: list[Prepared]
     core: _core.Rig
+    settings: DiagnosisSettings
 
 
 @dataclass(frozen=True)
@@ -206,7 +197,8 @@ def _compiled(problem: Problem, rig: Rig) -> _core.Rig:
     """Another model compiled; one so stiff that no fit could afford it is outside the range."""
     with _inside_range():
         core = problem.core.respecified(rig.to_json())
-    least = min(LEAST_STEP, STIFFEST * problem.core.stable_step)
+    settings = problem.settings.fit
+    least = min(settings.least_step, settings.least_step_share * problem.core.stable_step)
     if core.stable_step < least:
         raise SimulationError(f"the model needs steps of {core.stable_step:.1e} s; to be fitted it may need {least:.1e} s at the least")
     return core
@@ -222,7 +214,8 @@ def depends(block: Block, name: str) -> bool:
 
 def acts_in(effect: str, block: Block) -> bool:
     """Whether an effect acts inside a block of the cut chain."""
-    return block.kind in ACTS.get(effect, ACTS.get(EFFECTS[effect].block, ()))
+    info = EFFECTS[effect]
+    return block.kind in (info.acts_in or ACTS.get(info.block, ()))
 
 
 def free_baseline(problem: Problem, nominal: Rig) -> list[str]:
@@ -238,13 +231,21 @@ def free_baseline(problem: Problem, nominal: Rig) -> list[str]:
 class Scaling:
     """Free parameters as numbers of order one: tolerances for the baseline, starts or logarithms for effects."""
 
-    def __init__(self, nominal: Rig, baseline: Sequence[str], starts: dict[str, float], freed: Collection[str] = ()) -> None:
+    def __init__(
+        self,
+        nominal: Rig,
+        baseline: Sequence[str],
+        starts: dict[str, float],
+        settings: FitSettings,
+        freed: Collection[str] = (),
+    ) -> None:
         self.names = [*baseline, *starts]
         self.nominal, self.baseline, self.starts = nominal, list(baseline), dict(starts)
         known = nominal.parameters
         self.scale = {n: known[n].tol for n in baseline}
         self.centre = {n: known[n].value for n in baseline}
-        reach = {n: _reach(known[n]) if n in freed else WIDEST * known[n].tol for n in baseline}
+        walls = {n: settings.most_tolerances * known[n].tol for n in baseline}
+        reach = {n: _reach(known[n], settings) if n in freed else walls[n] for n in baseline}
         lower = [(max(known[n].lower, self.centre[n] - reach[n]) - self.centre[n]) / self.scale[n] for n in baseline]
         upper = [(min(known[n].upper, self.centre[n] + reach[n]) - self.centre[n]) / self.scale[n] for n in baseline]
         for name, start in starts.items():
@@ -254,7 +255,8 @@ class Scaling:
                 upper.append(math.log(min(info.upper, start * 1e3) / start))
             else:
                 # a parameter that starts from next to nothing has the scale of what it may become
-                self.scale[name] = max(abs(start), LEAST_SCALE * max(abs(s) for s in info.starts)) or 10.0
+                least = settings.least_scale * max(abs(s) for s in info.starts)
+                self.scale[name] = max(abs(start), least) or 10.0
                 lower.append(info.lower / self.scale[name])
                 upper.append(info.upper / self.scale[name])
         self.bounds = (np.array(lower), np.array(upper))
@@ -284,9 +286,10 @@ class Scaling:
         return rig
 
 
-def _reach(parameter: Parameter) -> float:
+def _reach(parameter: Parameter, settings: FitSettings) -> float:
     """How far a parameter that is freed may move [SI], if its bounds allow it."""
-    return max(FARTHEST * abs(parameter.value), FARTHEST * WIDEST * parameter.tol)
+    farthest = settings.freed_multiple
+    return max(farthest * abs(parameter.value), farthest * settings.most_tolerances * parameter.tol)
 
 
 def bin_width(prepared: Prepared, seconds: float) -> int:
@@ -313,14 +316,15 @@ def stacked(problem: Problem, found: dict[Key, Residual], inflation: dict[str, f
         Derivative of the rows with respect to each parameter, SI; None without parameters.
     """
     rows, slopes = [], []
+    width = problem.settings.noise.fit_bin_time
     for prepared in problem.recordings:
         for block in problem.blocks:
             r = found[block.name, prepared.recording.name]
-            mean, counts = binned(r.value, r.rows, bin_width(prepared, FIT_BIN))
+            mean, counts = binned(r.value, r.rows, bin_width(prepared, width))
             weight = np.sqrt(counts) / (r.noise * math.sqrt(inflation[block.name]))
             rows.append(mean * weight)
             if r.jacobian is not None:
-                slope, _ = binned(r.jacobian, r.rows, bin_width(prepared, FIT_BIN))
+                slope, _ = binned(r.jacobian, r.rows, bin_width(prepared, width))
                 slopes.append(-slope * weight[:, None])
     return np.concatenate(rows), np.concatenate(slopes) if slopes else None
 
@@ -366,8 +370,8 @@ def fit(
     warm: Fit | None = None,
     frozen: bool = False,
     events: Events | None = None,
-    evaluations: int = 12,
-    share: float = SHARE,
+    evaluations: int | None = None,
+    share: float | None = None,
     settled: Mapping[str, float] | None = None,
     freed: Collection[str] = (),
 ) -> Fit:
@@ -394,7 +398,7 @@ def fit(
     events : Events, optional
         What happens in single recordings, held.
     evaluations : int, optional
-        Limit on evaluations.
+        Limit on evaluations; that of the settings by default.
     share : float, optional
         As in :func:`pamrs.diagnosis.leastsquares.levenberg_marquardt`.
     settled : mapping of str to float, optional
@@ -409,7 +413,8 @@ def fit(
     """
     nominal = nominal.with_parameters(settled or {})
     baseline = [name for name in free_baseline(problem, nominal) if name not in (settled or {})]
-    scaling = Scaling(nominal, baseline, starts, freed)
+    own = problem.settings.fit
+    scaling = Scaling(nominal, baseline, starts, own, freed)
     count = len(baseline)
     bound = np.array([0.0 if name in freed else 1.0 for name in baseline])
     kept = _jacobian_of(warm, baseline) if frozen and warm is not None else None
@@ -430,7 +435,8 @@ def fit(
     for index, name in enumerate(baseline):
         if warm is not None and name in warm.values:
             start[index] = (warm.values[name] - scaling.centre[name]) / scaling.scale[name]
-    x, (values, jacobian, found), spent = levenberg_marquardt(evaluate, start, scaling.bounds, evaluations, share)
+    limit = own.evaluations if evaluations is None else evaluations
+    x, (values, jacobian, found), spent = levenberg_marquardt(evaluate, start, scaling.bounds, limit, own, share)
     covariance: Array = np.zeros((0, 0))
     if x.size:
         covariance = np.asarray(np.linalg.pinv(jacobian.T @ jacobian, hermitian=True), dtype=np.float64)

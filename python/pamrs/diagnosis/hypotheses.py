@@ -3,52 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from pamrs.diagnosis.blocks import Block, Residual
-from pamrs.diagnosis.candidates import EXACT, THOROUGH, Attempts, Candidate, Group, colour_of, significant, start_of, without_colour
+from pamrs.diagnosis.candidates import Attempts, Candidate, Group, colour_of, significant, without_colour
 from pamrs.diagnosis.closure import describe_closure, find_closure
-from pamrs.diagnosis.events import EVENTS
-from pamrs.diagnosis.evidence import MARGIN, Floor, excess, floors
+from pamrs.diagnosis.evidence import Excess, excess, floors
 from pamrs.diagnosis.faint import faint
-from pamrs.diagnosis.fitting import FIT_BIN, Fit, Key, Problem, acts_in, bin_width, fit, residuals
+from pamrs.diagnosis.fitting import Fit, Key, Problem, acts_in, bin_width, fit, residuals
 from pamrs.diagnosis.leaving import left_out
 from pamrs.diagnosis.resampling import inclusion
 from pamrs.diagnosis.screening import Screen, by_effect, screen, stand_of
 from pamrs.diagnosis.signals import Prepared
 from pamrs.diagnosis.starts import Start
-from pamrs.diagnosis.weighing import FINE, FORM, explains, most_believed, same_recordings, share_left, visited, weigh
+from pamrs.diagnosis.weighing import Ranges, explains, most_believed, same_recordings, share_left, visited, weigh
 from pamrs.diagnosis.wrong_parameters import beside_quiet, freed
-from pamrs.effects import CATALOGUE, EFFECTS
+from pamrs.effects import CATALOGUE, EFFECTS, EffectInfo
+from pamrs.effects import SameData
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 
 __all__ = ["coloured", "examine", "fits", "refitted"]
 
-HELD_RATIO, HINT = 2.0, 1.15
-"""Variance over the floor's from which recordings that were held out show a mismatch, where the fitted ones give a hint of it."""
-MARGINAL, HARDLY, NOTHING = 1.35, 0.3, 0.6
-"""Multiple of noise's largest excess, or excess variance, up to which a mismatch that no effect explains may be none, and the
-probability that it is."""
-LIKELY, CARRIES = 0.3, 0.8
-"""Probability of ``unlisted`` from which a form of what is missing is looked for, and the share of the mismatch that it may leave."""
-UNNAMED = 0.5
-"""Probability of ``unlisted`` above which no name is more probable than its absence."""
-BESIDE, MAIN = 0.08, 0.5
-"""Shares left by the best effect of lasting kind between which events are looked for beside it."""
-DOUBTFUL = 0.15
-"""Share that every effect of lasting kind leaves, from which events are looked for."""
-LEAST_GAIN, LEAST_SHARE = 12.0, 0.08
-"""Gain in chi-square, and share of the largest, from which an effect is fitted."""
-MOST_SINGLES, PAIRED, PARTNERS, PARTNER = 5, 2, 2, 0.01
-"""Singles that are fitted; of them those that get a partner, how many each, and the share of the mismatch that one has to promise."""
-RIVAL, MOST_RIVALS = 0.03, 4
-"""Probability from which sets of effects are fitted to the end, and how many."""
-NEAR, STARTS, RICH = 0.6, 2, 3
-"""Share of an effect's best gain from which another of its starts is fitted, how many, and of how many effects."""
+Say = Callable[[str], None]
 
 
-def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], say: Callable[[str], None]) -> list[Group]:
+def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], say: Say) -> list[Group]:
     """Refit the baseline of some blocks, locate what is left, and try every effect that acts there.
 
     The blocks are one group, unless no name explains all of them and one does explain a block in which alone it acts: then that block
@@ -66,116 +46,269 @@ def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], s
         Receives progress.
     """
     inner, outer = replace(fitted, blocks=blocks), replace(held, blocks=blocks)
-    white = without_colour(blocks)
     names = " and ".join(b.name for b in blocks)
-    say(f"{names}: refitting the baseline inside its tolerances")
+
+    def tell(text: str) -> None:
+        say(f"{names}: {text}")
+
+    tell("refitting the baseline inside its tolerances")
+    refit = _refit(inner, outer, nominal, same=held is fitted)
+    kept = refit.start.fitted
+    if refit.apart and not any(significant(kept[b.name]) for b in refit.trial.suspects):
+        common = _together(refit.trial, refit.start)
+        if common is not None:
+            tell("one baseline leaves noise in all recordings")
+            return [_healthy(refit, common)]
+    if not refit.trial.suspects:
+        return [_quiet(refit, say, tell)]
+    return _explained(refit, say, tell)
+
+
+@dataclass(frozen=True, eq=False)
+class _Refit:
+    """Some blocks after the refit of their parameters inside their tolerances.
+
+    Attributes
+    ----------
+    trial : Attempts
+        Recordings, model, noise levels, and the blocks that keep an excess.
+    first : Fit
+        The refit with white noise.
+    colour : dict of str to float
+        Weights of the colour that it leaves.
+    was : dict of str to Excess
+        What the nominal model leaves of the recordings to fit, by block.
+    start : Candidate
+        The refitted baseline as a hypothesis.
+    apart : list of Block
+        Blocks whose excess the held-out recordings alone show.
+    """
+
+    trial: Attempts
+    first: Fit
+    colour: dict[str, float]
+    was: dict[str, Excess]
+    start: Candidate
+    apart: list[Block]
+
+    def group(self, candidates: list[Candidate], probabilities: dict[str, float], mismatch: Block | None) -> Group:
+        """The blocks as a group, with hypotheses and their probabilities."""
+        trial = self.trial
+        blocks, kept = trial.inner.blocks, candidates[0].fitted
+        return Group(blocks, self.was, kept, candidates, probabilities, mismatch, trial.floor, trial.suspects)
+
+
+def _refit(inner: Problem, outer: Problem, nominal: Rig, *, same: bool) -> _Refit:
+    """Fit parameters inside their tolerances, and see what each block keeps."""
+    blocks, settings = inner.blocks, inner.settings
     before = residuals(inner, nominal)
-    first = refitted(inner, nominal, white)
+    first = refitted(inner, nominal, without_colour(blocks))
     floor = floors(inner, inner.core.respecified(first.rig.to_json()))
-    if held is not fitted:
+    if not same:
         floor |= floors(outer, outer.core.respecified(first.rig.to_json()))
     baseline, colour = coloured(inner, nominal, first)
-    was = {b.name: excess(b, inner.recordings, before, floor) for b in blocks}
-    now = {b.name: excess(b, inner.recordings, baseline.residuals, floor) for b in blocks}
-    outside = residuals(outer, baseline.rig) if held is not fitted else left_out(inner, baseline, colour)
-    out = {b.name: excess(b, outer.recordings, outside, floor) for b in blocks}
-    start = Candidate((), baseline, out, now, 0.0)
+
+    def kept(problem: Problem, found: dict[Key, Residual]) -> dict[str, Excess]:
+        return {b.name: excess(b, problem.recordings, found, floor, settings.noise) for b in blocks}
+
+    was, now = kept(inner, before), kept(inner, baseline.residuals)
+    outside = left_out(inner, baseline, colour) if same else residuals(outer, baseline.rig)
+    out = kept(outer, outside)
     # what parameters could not be told from the fitted recordings shows in the others alone, and is no mismatch
-    apart = [b for b in blocks if significant(out[b.name], HELD_RATIO) and now[b.name].ratio > HINT and held is not fitted]
+    least, hint = settings.search.held_out_ratio, settings.search.fitted_hint
+    apart = [b for b in blocks if significant(out[b.name], least) and now[b.name].ratio > hint and not same]
     suspects = [b for b in blocks if significant(now[b.name]) or b in apart]
-    if apart and not any(significant(now[b.name]) for b in suspects):
-        common = _together(inner, outer, nominal, start, floor)
-        if common is not None:
-            say(f"{names}: one baseline leaves noise in all recordings")
-            # what the nominal model leaves in the held-out ones is what the parameters are moved for
-            quiet = residuals(outer, nominal)
-            ever = {b.name: max(was[b.name], excess(b, outer.recordings, quiet, floor), key=lambda e: e.ratio) for b in blocks}
-            return [Group(blocks, ever, common.fitted, [common], {"": 1.0}, None, floor, [])]
-    acting = [e for e in CATALOGUE if fits(nominal, e) and any(acts_in(e, b) for b in suspects or blocks)]
-    if not suspects:
-        # a parameter at the end of its plausible range is a symptom even where the fit is good
-        nothing = Group(blocks, was, now, [start], {"": 1.0}, None, floor, [])
-        lasting = [e for e in acting if e not in EVENTS]
-        attempts = Attempts(inner, outer, nominal, floor, out, blocks)
-        return [beside_quiet(attempts, faint(attempts, nothing, lasting, say) or nothing, lambda text: say(f"{names}: {text}"))]
-    mismatch = max(suspects, key=lambda b: out[b.name].ratio + now[b.name].ratio)
-    say(f"{names}: {mismatch.name} keeps {now[mismatch.name].systematic:.2g} noise units after the refit")
-    # so little may as well be a floor that was taken too low, which events of free times would always mend
-    marginal = all(e.ratio - 1.0 < max(MARGINAL * (e.limit - 1.0), HARDLY) for b in suspects for e in (now[b.name], out[b.name]))
-    happening = [] if marginal else [e for e in acting if e in EVENTS]
-    acting = [e for e in acting if e not in EVENTS]
     trial = Attempts(inner, outer, nominal, floor, out, suspects)
-    mistaken = freed(trial, baseline, first, lambda text: say(f"{names}: {text}"))
-    screened = screen(inner, baseline, acting, white, sealed=nominal.model["valve"] is None)
-    singles = _singles(trial, screened, baseline, lambda text: say(f"{names}: {text}"))
-    seconds = max(p.n * p.dt for p in inner.recordings)
-    singles = _with_same_data(trial, start, singles, seconds)
-    if happening and all(share_left(c, start, suspects) > DOUBTFUL for c in (*singles, *mistaken)):
-        say(f"{names}: looking for what happens at times of its own ({', '.join(happening)})")
-        singles += [c for e in happening if (c := trial.eventful(e, start)) is not None]
-    settled = any(
-        explains(c, start, suspects) or (share_left(c, start, suspects) < FORM and not _untouched(c, start, suspects))
-        for c in (*singles, *mistaken)
+    return _Refit(trial, first, colour, was, Candidate((), baseline, out, now, 0.0), apart)
+
+
+def _healthy(refit: _Refit, common: Candidate) -> Group:
+    """A group whose baseline leaves noise in all recordings, once it is fitted to all of them."""
+    trial = refit.trial
+    # what the nominal model leaves in the held-out ones is what the parameters are moved for
+    quiet = residuals(trial.outer, trial.nominal)
+    ever = {
+        b.name: max(refit.was[b.name], trial.excess(b, trial.outer, quiet), key=lambda e: e.ratio)
+        for b in trial.inner.blocks
+    }
+    return replace(refit.group([common], {"": 1.0}, None), nominal=ever, suspects=[])
+
+
+def _acting(trial: Attempts, blocks: list[Block]) -> list[str]:
+    """Effects of the catalogue that the rig can have and that act in some blocks."""
+    return [e for e in CATALOGUE if fits(trial.nominal, e) and any(acts_in(e, b) for b in blocks)]
+
+
+def _quiet(refit: _Refit, say: Say, tell: Say) -> Group:
+    """A group that keeps only noise: an effect below it, or a parameter at the end of its plausible range, may still show."""
+    nothing = refit.group([refit.start], {"": 1.0}, None)
+    blocks = refit.trial.inner.blocks
+    persistent = [e for e in _acting(refit.trial, blocks) if not EFFECTS[e].transient]
+    trial = replace(refit.trial, suspects=blocks)
+    return beside_quiet(trial, faint(trial, nothing, persistent, say) or nothing, tell)
+
+
+def _explained(refit: _Refit, say: Say, tell: Say) -> list[Group]:
+    """A group that keeps a mismatch, with every hypothesis that was tried for it; in parts where names explain parts of it."""
+    trial, start = refit.trial, refit.start
+    suspects, now, settings = trial.suspects, start.fitted, trial.settings
+    mismatch = max(suspects, key=lambda b: trial.out[b.name].ratio + now[b.name].ratio)
+    tell(f"{mismatch.name} keeps {now[mismatch.name].systematic:.2g} noise units after the refit")
+    marginal = _marginal(refit)
+    acting = _acting(trial, suspects)
+    # events of free times would always mend a noise level that was estimated too low
+    transient = [] if marginal else [e for e in acting if EFFECTS[e].transient]
+    persistent = [e for e in acting if not EFFECTS[e].transient]
+    mistaken = freed(trial, start.fit, refit.first, tell)
+    sealed = trial.nominal.model["valve"] is None
+    screened = screen(trial.inner, start.fit, persistent, trial.white, sealed=sealed)
+    terms = _Terms(
+        most_believed(trial.inner, mismatch, now[mismatch.name].rms, same=trial.same),
+        max(p.n * p.dt for p in trial.inner.recordings),
+        visited(trial.inner),
     )
-    # what a single effect leaves may be no more than the difference between its equation and the truth: a pair cannot be asked for
-    pairs = [] if settled else _pairs(trial, screened, start, singles, lambda text: say(f"{names}: {text}"))
-    for effect, beside in [] if settled else _beside(trial, screened, start, singles, happening):
-        say(f"{names}: looking for {effect} beside {beside.effects[0]}")
+    candidates = _hypotheses(refit, screened, mistaken, transient, terms.seconds, tell)
+    candidates, weighed = _weighed(trial, candidates, terms, tell)
+    if marginal:
+        none = settings.search.marginal_probability
+        weighed |= {"": none * weighed["unlisted"], "unlisted": (1.0 - none) * weighed["unlisted"]}
+    group = replace(
+        refit.group(candidates, weighed, mismatch),
+        inclusion=inclusion(screened, settings.search.least_gain, settings.search.partner_share, settings),
+        promised=_promised(screened, now[mismatch.name], settings.search.marginal_excess),
+    )
+    parts = _apart(group, trial, terms) if weighed["unlisted"] > settings.search.split_from else []
+    return parts or [_with_form(group, refit, say, tell)]
+
+
+@dataclass(frozen=True)
+class _Terms:
+    """What hypotheses are weighed by.
+
+    Attributes
+    ----------
+    most : float
+        Largest probability of a name.
+    seconds : float
+        Length of the longest recording that was fitted [s].
+    ranging : dict
+        What was visited in them, by kind of channel [SI].
+    """
+
+    most: float
+    seconds: float
+    ranging: Ranges
+
+
+def _marginal(refit: _Refit) -> bool:
+    """Whether so little is left that the noise level may as well have been estimated too low."""
+    settings, found = refit.trial.settings.search, (refit.start.fitted, refit.trial.out)
+    return all(
+        e.ratio - 1.0 < max(settings.marginal_multiple * (e.limit - 1.0), settings.marginal_excess)
+        for b in refit.trial.suspects
+        for e in (kept[b.name] for kept in found)
+    )
+
+
+def _hypotheses(
+    refit: _Refit, screened: Screen, mistaken: list[Candidate], transient: list[str], seconds: float, tell: Say
+) -> list[Candidate]:
+    """The baseline, single effects, pairs where no single one explains the mismatch, and values that are wrong."""
+    trial, start, evidence = refit.trial, refit.start, refit.trial.settings.evidence
+    singles = _singles(trial, screened, start.fit, tell)
+    singles = _with_same_data(trial, start, singles, seconds)
+    least = trial.settings.search.transient_from
+    if transient and all(share_left(c, start, trial.suspects, evidence) > least for c in (*singles, *mistaken)):
+        tell(f"looking for what happens at times of its own ({', '.join(transient)})")
+        singles += [c for e in transient if (c := trial.eventful(e, start)) is not None]
+    if any(_settles(c, trial, start) for c in (*singles, *mistaken)):
+        return [start, *singles, *mistaken]
+    pairs = _pairs(trial, screened, start, singles, tell)
+    for effect, beside in _beside(trial, screened, start, singles, transient):
+        tell(f"looking for {effect} beside {beside.effects[0]}")
         found = trial.eventful(effect, beside)
         pairs += [] if found is None else [found]
-    candidates = [start, *singles, *pairs, *mistaken]
-    most = most_believed(fitted, held, mismatch, now[mismatch.name].rms)
-    ranging = visited(inner)
-    weighed = weigh(candidates, suspects, most, seconds, ranging)
-    close = sorted((c for c in candidates[1:] if _odds(weighed, c) > RIVAL), key=lambda c: -_odds(weighed, c))[:MOST_RIVALS]
-    if len(close) > 1 or (close and not explains(close[0], start, suspects)):
-        say(f"{names}: fitting to the end " + ", ".join(c.key for c in close))
+    return [start, *singles, *pairs, *mistaken]
+
+
+def _settles(candidate: Candidate, trial: Attempts, start: Candidate) -> bool:
+    """Whether a hypothesis leaves so little that no pair can be asked for.
+
+    What a single effect leaves may be no more than the difference between its equation and the truth.
+    """
+    evidence = trial.settings.evidence
+    if explains(candidate, start, trial.suspects, evidence):
+        return True
+    little = share_left(candidate, start, trial.suspects, evidence) < evidence.form_share
+    return little and not _untouched(candidate, start, trial)
+
+
+def _weighed(
+    trial: Attempts, candidates: list[Candidate], terms: _Terms, tell: Say
+) -> tuple[list[Candidate], dict[str, float]]:
+    """Hypotheses with their probabilities, those that are close fitted to the end first."""
+    start, settings = candidates[0], trial.settings
+
+    def weights(sets: list[Candidate]) -> dict[str, float]:
+        return weigh(sets, trial.suspects, terms.most, terms.seconds, settings, terms.ranging)
+
+    found = weights(candidates)
+    likely = [c for c in candidates[1:] if _odds(found, c) > settings.search.polish_from]
+    close = sorted(likely, key=lambda c: -_odds(found, c))[: settings.search.most_polished]
+    if len(close) > 1 or (close and not explains(close[0], start, trial.suspects, settings.evidence)):
+        tell("fitting to the end " + ", ".join(c.key for c in close))
         candidates = [trial.polished(c) if c in close else c for c in candidates]
-        weighed = weigh(candidates, suspects, most, seconds, ranging)
-    if marginal:
-        weighed |= {"": NOTHING * weighed["unlisted"], "unlisted": (1.0 - NOTHING) * weighed["unlisted"]}
-    often = inclusion(screened, LEAST_GAIN, PARTNER)
+        found = weights(candidates)
+    return candidates, found
+
+
+def _promised(screened: Screen, kept: Excess, least: float) -> dict[str, float]:
+    """Share of the mismatch that each effect could take by its signature alone."""
     # of the chi-square that is left noise has its part
-    missing = screened.stand.power_left * (1.0 - 1.0 / max(now[mismatch.name].ratio, 1.0 + HARDLY))
-    promised = {e: scores[0].gain / missing for e, scores in by_effect(screened.scores()).items()}
-    group = Group(blocks, was, now, candidates, weighed, mismatch, floor, suspects, inclusion=often, promised=promised)
-    parts = _apart(group, trial, most, seconds, ranging) if weighed["unlisted"] > UNNAMED else []
-    if parts:
-        return parts
-    if weighed["unlisted"] < LIKELY or len({b.kind for b in suspects}) < len(suspects):
-        return [group]  # of two chambers one form would have to serve both
+    missing = screened.stand.power_left * (1.0 - 1.0 / max(kept.ratio, 1.0 + least))
+    return {e: scores[0].gain / missing for e, scores in by_effect(screened.scores()).items()}
+
+
+def _with_form(group: Group, refit: _Refit, say: Say, tell: Say) -> Group:
+    """A group with a form of what is missing, where no name is likely and one is found that carries over."""
+    trial, start, suspects = refit.trial, refit.start, refit.trial.suspects
+    settings = trial.settings.closures
+    if group.probabilities["unlisted"] < settings.from_probability or len({b.kind for b in suspects}) < len(suspects):
+        return group  # of two chambers one form would have to serve both
     if any(b.name == "load" for b in suspects):
-        say(f"{names}: no form of what is missing is looked for, since that of a load is not in the simulator")
-        return [group]
+        tell("no form of what is missing is looked for, since that of a load is not in the simulator")
+        return group
     group = replace(group, sought=True)
-    closed = find_closure(inner, nominal, baseline, colour, suspects, say)
+    closed = find_closure(trial.inner, trial.nominal, start.fit, refit.colour, suspects, say)
     if closed is None:
-        return [group]
+        return group
     try:
         judged = trial.judged(closed.effects, closed)
     except SimulationError:
-        return [group]
+        return group
     # what does not carry over to recordings that were held out is no form of anything
-    if share_left(judged, start, suspects) > CARRIES:
-        return [group]
-    return [replace(group, closure=judged, form=describe_closure(closed, inner, baseline))]
+    if share_left(judged, start, suspects, trial.settings.evidence) > settings.most_share_left:
+        return group
+    return replace(group, closure=judged, form=describe_closure(closed, trial.inner, start.fit))
 
 
-def _apart(group: Group, trial: Attempts, most: float, seconds: float, ranging: tuple[float, float] | None) -> list[Group]:
+def _apart(group: Group, trial: Attempts, terms: _Terms) -> list[Group]:
     """A group in parts, where a name explains a block in which alone it acts; else nothing.
 
     A leak of the tank is seen in the tank's pressure, whatever the chamber behind the valve keeps without a name, or with one of its
     own. All parts have one fit, with everything that they name.
     """
     start = group.candidates[0]
+    settings = trial.settings
     acting = {c: [b for b in group.suspects if _acts(c, b)] for c in group.candidates if c.names}
 
     def weighed(blocks: list[Block]) -> dict[str, float]:
         there = [c for c in acting if any(b in blocks for b in acting[c])]
-        return weigh([start, *there], blocks, most, seconds, ranging, acting)
+        return weigh([start, *there], blocks, terms.most, terms.seconds, settings, terms.ranging, acting)
 
     own = {b.name: weighed([b]) for b in group.suspects if any(found == [b] for found in acting.values())}
-    named = [b for b in group.suspects if own.get(b.name, {"unlisted": 1.0})["unlisted"] < UNNAMED]
+    least = settings.search.split_from
+    named = [b for b in group.suspects if own.get(b.name, {"unlisted": 1.0})["unlisted"] < least]
     rest = [b for b in group.suspects if b not in named]
     if not named:
         return []
@@ -214,14 +347,15 @@ def _odds(weighed: dict[str, float], candidate: Candidate) -> float:
     return weighed.get(candidate.key, 0.0)
 
 
-def _together(inner: Problem, outer: Problem, nominal: Rig, start: Candidate, floor: dict[Key, Floor]) -> Candidate | None:
+def _together(trial: Attempts, start: Candidate) -> Candidate | None:
     """One baseline inside its tolerances that leaves only noise in fitted and held-out recordings, taken together, if there is one."""
+    inner, outer = trial.inner, trial.outer
     both = replace(inner, recordings=[*inner.recordings, *outer.recordings])
     try:
-        found = fit(both, nominal, (), {}, without_colour(inner.blocks), warm=start.fit, evaluations=THOROUGH, share=EXACT)
+        found = _thorough(both, trial.nominal, trial.white, start.fit)
     except SimulationError:
         return None
-    fitted, held = ({b.name: excess(b, part.recordings, found.residuals, floor) for b in inner.blocks} for part in (inner, outer))
+    fitted, held = ({b.name: trial.excess(b, part, found.residuals) for b in inner.blocks} for part in (inner, outer))
     if any(significant(e[b.name]) for b in inner.blocks for e in (fitted, held)):
         return None
     return Candidate((), found, held, fitted, 0.0)
@@ -230,21 +364,33 @@ def _together(inner: Problem, outer: Problem, nominal: Rig, start: Candidate, fl
 def coloured(problem: Problem, nominal: Rig, first: Fit) -> tuple[Fit, dict[str, float]]:
     """The refitted baseline fitted on with the colour that it leaves as weights, where it leaves much, and that colour."""
     colour = colour_of(problem, first)
-    if max(colour.values()) <= 2:
+    if max(colour.values()) <= problem.settings.noise.correlated_variance:
         return first, colour
-    return fit(problem, nominal, (), {}, colour, warm=first, evaluations=THOROUGH, share=EXACT), colour
+    return _thorough(problem, nominal, colour, first), colour
+
+
+def _thorough(problem: Problem, nominal: Rig, inflation: dict[str, float], warm: Fit | None) -> Fit:
+    """Baseline parameters alone, fitted to the end."""
+    settings = problem.settings.fit
+    evaluations, share = settings.baseline_evaluations, settings.final_step_share
+    return fit(problem, nominal, (), {}, inflation, warm=warm, evaluations=evaluations, share=share)
 
 
 def refitted(problem: Problem, nominal: Rig, inflation: dict[str, float]) -> Fit:
     """The baseline refitted from the nominal values and, where that leaves more than noise could, from the other side of them."""
-    first = fit(problem, nominal, (), {}, inflation, evaluations=THOROUGH, share=EXACT)
-    rows = sum(int(r.rows.sum()) / bin_width(p, FIT_BIN) for p in problem.recordings for r in _of(p, first.residuals))
-    if 2.0 * first.cost < MARGIN * rows:
+    settings = problem.settings.noise
+    first = _thorough(problem, nominal, inflation, None)
+    rows = sum(
+        int(r.rows.sum()) / bin_width(p, settings.fit_bin_time)
+        for p in problem.recordings
+        for r in _of(p, first.residuals)
+    )
+    if 2.0 * first.cost < settings.margin * rows:
         return first
     known = nominal.parameters
     mirrored = {n: 2.0 * known[n].value - first.values[n] for n in first.moved}
     try:
-        second = fit(problem, nominal, (), {}, inflation, warm=replace(first, values=mirrored), evaluations=THOROUGH, share=EXACT)
+        second = _thorough(problem, nominal, inflation, replace(first, values=mirrored))
     except SimulationError:
         return first
     return min(first, second, key=lambda f: f.cost)
@@ -256,27 +402,28 @@ def _of(prepared: Prepared, found: dict[Key, Residual]) -> list[Residual]:
 
 def fits(rig: Rig, effect: str) -> bool:
     """Whether a rig has what an effect acts on."""
-    kinds = {supply["kind"] for supply in rig.tables("supply").values()}
-    if effect in ("compressor_cut_in", "supply_regulator_deadband"):
-        return ("tank" if effect == "compressor_cut_in" else "regulator") in kinds
-    if effect == "payload_change" and rig.model["load"]:
-        return bool(rig.model["load"]["kind"] == "mass")
-    needs = EFFECTS[effect].at or ("joint" if EFFECTS[effect].block == "arm" else "chamber")
-    return bool(rig.tables(needs))
+    info = EFFECTS[effect]
+    usual = info.at or ("joint" if info.block == "arm" else "chamber")
+    return any(
+        kind in ("", table.get("kind", "")) for block, kind in info.needs or ((usual, ""),) for table in rig.tables(block).values()
+    )
 
 
-def _singles(trial: Attempts, screened: Screen, baseline: Fit, say: Callable[[str], None]) -> list[Candidate]:
+def _singles(trial: Attempts, screened: Screen, baseline: Fit, tell: Say) -> list[Candidate]:
     """The effects that the screen finds worth it, fitted; the most telling first."""
+    settings = trial.settings.search
     ranked = by_effect(screened.scores())
     gains = {effect: scores[0].gain for effect, scores in ranked.items()}
     most = max(gains.values(), default=0.0)
-    chosen = [e for e, gain in gains.items() if gain > max(LEAST_GAIN, LEAST_SHARE * most)][:MOST_SINGLES]
-    say("screened: " + (", ".join(f"{e} {gain:.3g}" for e, gain in list(gains.items())[:8]) or "no effect acts here"))
+    least = max(settings.least_gain, settings.least_gain_share * most)
+    chosen = [e for e, gain in gains.items() if gain > least][: settings.most_singles]
+    tell("screened: " + (", ".join(f"{e} {gain:.3g}" for e, gain in list(gains.items())[:8]) or "no effect acts here"))
     white = trial.white
     found = []
     for place, effect in enumerate(chosen):
-        near = [s for s in ranked[effect] if s.gain > NEAR * gains[effect]]
-        tried = [trial.fitted([s.start.scaled(s.size)], baseline, white) for s in near[: STARTS if place < RICH else 1]]
+        near = [s for s in ranked[effect] if s.gain > settings.near_start * gains[effect]]
+        count = settings.most_starts if place < settings.effects_with_starts else 1
+        tried = [trial.fitted([s.start.scaled(s.size)], baseline, white) for s in near[:count]]
         fitted = [candidate for candidate in tried if candidate is not None]
         if fitted:
             found.append(replace(min(fitted, key=lambda c: c.misfit), gain=gains[effect]))
@@ -285,36 +432,53 @@ def _singles(trial: Attempts, screened: Screen, baseline: Fit, say: Callable[[st
 
 def _with_same_data(trial: Attempts, start: Candidate, singles: list[Candidate], seconds: float) -> list[Candidate]:
     """The singles, and beside each that may be the same data as another effect (a late clock and a dead time) that other one."""
-    found = list(singles)
-    for place, single in enumerate(singles):
-        same = EFFECTS[single.effects[0]].same_data
-        if same is None:
-            continue
-        own = start_of(single.fit, single.effects[0])
-        held = {f"{own.effect}.{name}": value for name, value in same.held}
-        if any(own.held[name] != value for name, value in held.items()):
-            # the shape that is the same data is taken where it explains as much
-            alike = trial.fitted([replace(own, held=own.held | held)], start.fit, trial.white)
-            if alike is None or share_left(alike, start, trial.suspects) > share_left(single, start, trial.suspects) + FINE:
-                continue
-            single = found[place] = replace(alike, gain=single.gain)
-        if not same_recordings(single, own.effect, seconds) or any(c.effects == (same.effect,) for c in singles):
-            continue
-        usual = {f"{same.effect}.{p.name}": p.default for p in EFFECTS[same.effect].parameters}
-        usual[f"{same.effect}.{same.parameter}"] = single.fit.values[f"{own.effect}.{same.size}"]
-        other = trial.fitted([Start(same.effect, usual, {}, (), False)], start.fit, trial.white)
-        found += [] if other is None else [other]
-    named = {c.effects for c in found}
-    for effect, same in ((e, i.same_data) for e, i in EFFECTS.items() if i.same_data is not None and (e,) not in named):
-        twin = next((c for c in singles if c.effects == (same.effect,)), None)
-        size = 0.0 if twin is None else twin.fit.values.get(f"{same.effect}.{same.parameter}", 0.0)
-        if size <= 0.0:
-            continue
-        free = {f"{effect}.{same.size}": size, f"{effect}.{same.without}": 0.0}
-        held = {f"{effect}.{name}": value for name, value in same.held}
-        other = trial.fitted([Start(effect, free, held, (), False)], start.fit, trial.white)
-        found += [] if other is None else [other]
-    return found
+    there = {c.effects for c in singles}
+    found: list[Candidate] = []
+    others: list[Candidate | None] = []
+    for single in singles:
+        (effect,) = single.effects
+        same = EFFECTS[effect].same_data
+        own = single if same is None else _in_shape(trial, start, single, same)
+        found.append(own)
+        if same is not None and (same.effect,) not in there:
+            if same_recordings(own, effect, seconds, trial.settings.evidence):
+                others.append(_as_other(trial, start, own, same))
+        twins = [i for i in EFFECTS.values() if i.same_data is not None and i.same_data.effect == effect]
+        others += [_as_twin(trial, start, own, twin) for twin in twins if (twin.id,) not in there]
+    return [*found, *(c for c in others if c is not None)]
+
+
+def _in_shape(trial: Attempts, start: Candidate, single: Candidate, same: SameData) -> Candidate:
+    """An effect in the shape in which it is the same data as another one, where it explains as much in it."""
+    own = trial.start_of(single.fit, single.effects[0])
+    held = {f"{own.effect}.{name}": value for name, value in same.held}
+    if all(own.held[name] == value for name, value in held.items()):
+        return single
+    alike = trial.fitted([replace(own, held=own.held | held)], start.fit, trial.white)
+    if alike is None:
+        return single
+    evidence = trial.settings.evidence
+    shaped, free = (share_left(c, start, trial.suspects, evidence) for c in (alike, single))
+    return single if shaped > free + evidence.form_share_alike else replace(alike, gain=single.gain)
+
+
+def _as_other(trial: Attempts, start: Candidate, single: Candidate, same: SameData) -> Candidate | None:
+    """The other effect, as large as this one, where the two leave the same recordings."""
+    usual = {f"{same.effect}.{p.name}": p.default for p in EFFECTS[same.effect].parameters}
+    usual[f"{same.effect}.{same.parameter}"] = single.fit.values[f"{single.effects[0]}.{same.size}"]
+    return trial.fitted([Start(same.effect, usual, {}, (), False)], start.fit, trial.white)
+
+
+def _as_twin(trial: Attempts, start: Candidate, single: Candidate, twin: EffectInfo) -> Candidate | None:
+    """The effect that leaves the same recordings as this one, where this one has a size."""
+    same = twin.same_data
+    assert same is not None
+    size = single.fit.values.get(f"{same.effect}.{same.parameter}", 0.0)
+    if size <= 0.0:
+        return None
+    free = {f"{twin.id}.{same.size}": size, f"{twin.id}.{same.without}": 0.0}
+    held = {f"{twin.id}.{name}": value for name, value in same.held}
+    return trial.fitted([Start(twin.id, free, held, (), False)], start.fit, trial.white)
 
 
 def _beside(
@@ -325,40 +489,48 @@ def _beside(
     That is the lasting effect that leaves least, if it leaves much; and, of those that were fitted, the one whose signature
     is in what the events leave.
     """
+    settings, evidence = trial.settings.search, trial.settings.evidence
+
+    def left_by(candidate: Candidate) -> float:
+        return share_left(candidate, start, trial.suspects, evidence)
+
     steady = [c for c in singles if c.fit.events is None]
-    best = min(steady, key=lambda c: share_left(c, start, trial.suspects), default=start)
-    found = [(e, best) for e in happening] if BESIDE < share_left(best, start, trial.suspects) < MAIN else []
+    best = min(steady, key=left_by, default=start)
+    found = [(e, best) for e in happening] if settings.transient_beside < left_by(best) < settings.much_left else []
     mismatch = float(screened.stand.rows @ screened.stand.rows)
     for single in singles:
-        if single.fit.events is None or share_left(single, start, trial.suspects) > MAIN:
+        if single.fit.events is None or left_by(single) > settings.much_left:
             continue
         # what the baseline can do is taken as without the events
         kept = start.fit.residuals
         left = {key: replace(r, jacobian=kept[key].jacobian) for key, r in single.fit.residuals.items()}
         beside = replace(start.fit, residuals=left, moved=single.fit.moved)
-        told = [s for s in screened.scores(stand_of(beside, trial.inner, trial.white)) if s.gain > max(LEAST_GAIN, PARTNER * mismatch)]
+        least = max(settings.least_gain, settings.partner_share * mismatch)
+        told = [s for s in screened.scores(stand_of(beside, trial.inner, trial.white)) if s.gain > least]
         partner = next((c for s in told for c in steady if c.effects == (s.effect,)), None)
         if partner is not None and (single.effects[0], partner) not in found:
             found.append((single.effects[0], partner))
     return found
 
 
-def _untouched(candidate: Candidate, start: Candidate, suspects: list[Block]) -> list[Block]:
+def _untouched(candidate: Candidate, start: Candidate, trial: Attempts) -> list[Block]:
     """Blocks in which a set leaves most of what was too much there, in recordings that were fitted or held out."""
+    much = trial.settings.search.much_left
     stages = ((start.fitted, candidate.fitted), (start.held_out, candidate.held_out))
     return [
         b
-        for b in suspects
-        if any(significant(now[b.name]) and now[b.name].ratio - 1.0 > MAIN * (was[b.name].ratio - 1.0) for was, now in stages)
+        for b in trial.suspects
+        if any(significant(now[b.name]) and now[b.name].ratio - 1.0 > much * (was[b.name].ratio - 1.0) for was, now in stages)
     ]
 
 
 def _pairs(
-    trial: Attempts, screened: Screen, start: Candidate, singles: list[Candidate], say: Callable[[str], None]
+    trial: Attempts, screened: Screen, start: Candidate, singles: list[Candidate], tell: Say
 ) -> list[Candidate]:
     """For the best singles that leave something: the effects that would take most of it, fitted together with them."""
+    settings = trial.settings.search
     lasting = [c for c in singles if c.fit.events is None]
-    ranked = sorted(lasting, key=lambda c: sum(c.held_out[b.name].ratio for b in trial.suspects))[:PAIRED]
+    ranked = sorted(lasting, key=lambda c: sum(c.held_out[b.name].ratio for b in trial.suspects))[: settings.most_paired]
     white = trial.white
     mismatch = float(screened.stand.rows @ screened.stand.rows)
     tried: set[frozenset[str]] = set()
@@ -366,19 +538,19 @@ def _pairs(
     for single in ranked:
         stand = stand_of(single.fit, trial.inner, white)
         partners = [scores[0] for scores in by_effect(screened.scores(stand, without=single.effects)).values()]
-        least = max(LEAST_GAIN, PARTNER * mismatch)
-        best = [score for score in partners if score.gain > least][:PARTNERS]
+        least = max(settings.least_gain, settings.partner_share * mismatch)
+        best = [score for score in partners if score.gain > least][: settings.most_partners]
         # what one block keeps may be little beside what another one had: an effect of that block alone is asked for by itself
-        for block in _untouched(single, start, trial.suspects):
-            own = [s for s in partners if s.gain > LEAST_GAIN and [b for b in trial.suspects if acts_in(s.effect, b)] == [block]]
+        for block in _untouched(single, start, trial):
+            own = [s for s in partners if s.gain > settings.least_gain and [b for b in trial.suspects if acts_in(s.effect, b)] == [block]]
             best += [score for score in own[:1] if score not in best]
         for score in best:
             both = frozenset({*single.effects, score.effect})
             if both in tried:
                 continue
             tried.add(both)
-            say(f"trying {' + '.join(sorted(both))}")
-            candidate = trial.fitted([start_of(single.fit, single.effects[0]), score.start.scaled(score.size)], single.fit, white)
+            tell(f"trying {' + '.join(sorted(both))}")
+            candidate = trial.fitted([trial.start_of(single.fit, single.effects[0]), score.start.scaled(score.size)], single.fit, white)
             if candidate is not None:
                 found.append(candidate)
     return found

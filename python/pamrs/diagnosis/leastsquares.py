@@ -14,16 +14,13 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs.diagnosis.settings import FitSettings
 from pamrs.errors import SimulationError
 
-__all__ = ["SHARE", "levenberg_marquardt"]
+__all__ = ["levenberg_marquardt"]
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
-
-WORTH, SHARE = 0.2, 2e-3
-"""Gain in chi-square, and (if nothing else is said) share of what there is, below which a step is not worth an evaluation."""
-DAMPING, HARDEST = 1e-4, 1e8
 
 
 def levenberg_marquardt(
@@ -31,7 +28,8 @@ def levenberg_marquardt(
     start: Array,
     bounds: tuple[Array, Array],
     evaluations: int,
-    share: float = SHARE,
+    settings: FitSettings,
+    share: float | None = None,
 ) -> tuple[Array, tuple[Array, Array, T], int]:
     """Minimise half the sum of squares inside a box.
 
@@ -46,8 +44,10 @@ def levenberg_marquardt(
         The box.
     evaluations : int
         Limit, the first included.
+    settings : FitSettings
+        Gain and share of the sum of squares that a step has to promise, damping.
     share : float, optional
-        Share of the sum of squares that a step has to promise; 0 where the last few units of chi-square count.
+        Another share; 0 where the last few units of chi-square count.
 
     Returns
     -------
@@ -68,18 +68,19 @@ def levenberg_marquardt(
     Marquardt (1963); active bounds as in Kanzow, Yamashita & Fukushima (2004).
     """
     low, high = bounds
+    least, hardest = settings.step_share if share is None else share, settings.most_damping
     x = np.clip(start, low, high)
     best = evaluate(x)
-    spent, damping = 1, DAMPING
+    spent, damping = 1, settings.first_damping
     while x.size and spent < evaluations:
         rows, jacobian, _ = best
         gradient = jacobian.T @ rows
         normal = jacobian.T @ jacobian
-        worth = max(WORTH, share * float(rows @ rows))
+        worth = max(settings.step_gain, least * float(rows @ rows))
         hard = damping
         step = _step(x, gradient, normal, hard, low, high)
         # a long step that the walls bend may lead uphill: a shorter one meets fewer of them
-        while (gain := _promise(step, gradient, normal)) < worth and hard < HARDEST:
+        while (gain := _promise(step, gradient, normal)) < worth and hard < hardest:
             hard = 10.0 * hard
             step = _step(x, gradient, normal, hard, low, high)
         if gain < worth:
@@ -98,7 +99,7 @@ def levenberg_marquardt(
             damping = max(damping, 1e-9)
         else:
             damping = max(10.0 * hard, 1e-2)
-            if damping > HARDEST:
+            if damping > hardest:
                 break
     return x, best, spent
 

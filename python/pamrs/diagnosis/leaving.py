@@ -14,9 +14,7 @@ __all__ = ["left_out"]
 
 Array = NDArray[np.float64]
 
-ALONE = 0.9
-"""Share of what all recordings tell of a direction from which one of them is its only source."""
-RIDGE = 1e-9
+_RIDGE = 1e-9
 
 
 def left_out(problem: Problem, found: Fit, inflation: dict[str, float]) -> dict[Key, Residual]:
@@ -53,14 +51,15 @@ def left_out(problem: Problem, found: Fit, inflation: dict[str, float]) -> dict[
         normals.append(scaled.T @ scaled)
         gradients.append(scaled.T @ rows)
     total = np.sum(normals, axis=0) + np.diag([1.0 if name in found.held_by_prior else 0.0 for name in names])
-    total += RIDGE * np.diag(np.maximum(np.diag(total), RIDGE))
+    total += _RIDGE * np.diag(np.maximum(np.diag(total), _RIDGE))
     root = np.linalg.inv(np.linalg.cholesky(total))
     out = dict(found.residuals)
+    alone = problem.settings.fit.sole_source
     for prepared, normal, gradient in zip(problem.recordings, normals, gradients, strict=True):
         # in these coordinates all recordings together tell one unit of every direction, and `shares` of it come from this one
         shares, turn = np.linalg.eigh(root @ normal @ root.T)
         step = turn.T @ (root @ gradient)
-        moved = np.where(shares < ALONE, step / np.maximum(1.0 - shares, 1.0 - ALONE), 0.0)
+        moved = np.where(shares < alone, step / np.maximum(1.0 - shares, 1.0 - alone), 0.0)
         change = root.T @ (turn @ moved) * scales
         for block in problem.blocks:
             key = (block.name, prepared.recording.name)

@@ -12,18 +12,19 @@ import itertools
 import math
 import textwrap
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pamrs.diagnosis.blocks import Block, available_blocks
-from pamrs.diagnosis.differences import EFFECTIVE, MEASURABLE, NOISE, checked_channels, taken, weights_of
+from pamrs.diagnosis.differences import MEASURABLE, checked_channels, taken, usual_noise, weights_of
 from pamrs.diagnosis.evidence import bins_of
-from pamrs.diagnosis.fitting import FIT_BIN, Key, Problem, acts_in, bin_width, changes, free_baseline, residuals
+from pamrs.diagnosis.fitting import Key, Problem, acts_in, bin_width, changes, free_baseline, residuals
 from pamrs.diagnosis.hypotheses import fits
 from pamrs.diagnosis.protocols import Experiment, library
+from pamrs.diagnosis.settings import DiagnosisSettings, PlanSettings
 from pamrs.diagnosis.signals import binned
 from pamrs.diagnosis.starts import Start, starts_of
 from pamrs.effects import CATALOGUE, find_parameter
@@ -35,18 +36,8 @@ __all__ = ["Addition", "Plan", "Sight", "plan_diagnosis"]
 
 Array = NDArray[np.float64]
 
-SEEN = 3.0
-"""Signature left, in noise units of a bin of 0.1 s, from which an effect counts as seen."""
-FAINT = math.sqrt(0.45)
-"""Same from which the excess of an arm would be called significant, which scatters most (evidence.Excess.limit)."""
-ALIKE = 0.95
-"""Cosine between signatures from which two effects are one."""
-APART = 1.0
-"""Noise units that must be left of an effect when the other one explains all that it can."""
 BASIC = ("multisine", "sealed_hold", "slow_triangle", "step_and_shut", "hold_low", "hold_high")
 """Experiments that a plan assumes by default, those of them that the rig can do."""
-LARGEST = 1e4
-"""Largest multiple of the typical size that is worth telling."""
 _LUMPED = {
     "supply": "what leaves the tank by itself and what the valve takes are one sum in its pressure; only that follows the command",
     "chamber": "no pressure is measured between the valve's outlet and the muscle, nor the temperature of the gas",
@@ -71,6 +62,8 @@ class Sight:
     typical, smallest : float
         Typical value of that parameter and the smallest one (of a restriction's conductance, the largest) that leaves three noise
         units [SI]; NaN without one.
+    verdict : str
+        ``seen``, ``faint`` or ``hidden`` at the typical size.
     """
 
     effect: str
@@ -80,11 +73,7 @@ class Sight:
     size: str = ""
     typical: float = math.nan
     smallest: float = math.nan
-
-    @property
-    def verdict(self) -> str:
-        """``seen``, ``faint`` or ``hidden`` at the typical size."""
-        return "seen" if self.left >= SEEN else "faint" if self.left >= FAINT else "hidden"
+    verdict: str = "hidden"
 
 
 @dataclass(frozen=True)
@@ -341,6 +330,7 @@ def plan_diagnosis(
     *,
     noise: Mapping[str, float] | None = None,
     experiments: Sequence[str] | None = None,
+    settings: DiagnosisSettings | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> Plan:
     """What a diagnosis could tell of a rig from some channels, before anything is recorded.
@@ -352,9 +342,11 @@ def plan_diagnosis(
     channels : iterable of str
         Channels at hand, of ``valve_command``, ``supply_pressure``, ``muscle_pressure`` and ``joint_angle``.
     noise : mapping of str to float, optional
-        Sample noise by channel [SI]; that of typical transducers by default (:data:`pamrs.diagnosis.differences.NOISE`).
+        Sample noise by channel [SI]; that of typical transducers by default (``next_experiment`` of the settings).
     experiments : sequence of str, optional
         Names of the experiments that will be made; multisine, sealed holds, slow triangle and steps by default.
+    settings : DiagnosisSettings, optional
+        From where on an effect counts as seen, and two as apart; the published ones by default.
     progress : callable, optional
         Called with a line of text now and then.
 
@@ -378,12 +370,13 @@ def plan_diagnosis(
     'seen'
     """
     _check_rig(rig)
+    settings = DiagnosisSettings() if settings is None else settings
     own = checked_channels(rig, tuple(channels))
-    sound = _noise(noise)
+    sound = _noise(noise, settings)
     say = progress or (lambda _: None)
     every = tuple(c for c in MEASURABLE if c in {*core_rig(rig).inputs, *core_rig(rig).channels})
-    whole = available_blocks(rig, every)
-    pool = {e.name: e for e in library(rig)}
+    whole = available_blocks(rig, every, settings.prepare)
+    pool = {e.name: e for e in library(rig, settings.next_experiment)}
     chosen = [name for name in BASIC if name in pool] if experiments is None else list(experiments)
     for name in chosen:
         if name not in pool:
@@ -394,27 +387,14 @@ def plan_diagnosis(
     for name, experiment in pool.items():
         say(f"{name}: {experiment.duration:.0f} s with {len(starts)} starts of {len({s.effect for s in starts})} effects")
         try:
-            parts |= _parts(rig, whole, experiment, starts, sound)
+            parts |= _parts(rig, whole, experiment, starts, sound, settings)
             usable[name] = experiment
         except SimulationError:
             continue  # the cut chain leaves the range of the model there
     chosen = [name for name in chosen if name in usable]
-    blocks = available_blocks(rig, own)
-    now = _picture(parts, blocks, chosen, starts)
-    additions = []
-    for channel in [c for c in every if c not in own]:
-        more = available_blocks(rig, checked_channels(rig, (*own, channel)))
-        additions.append(_addition("channel", channel, channel.replace("_", " "), now, _picture(parts, more, chosen, starts)))
-    pairs_needed = [c for c in every if c not in own]
-    if not blocks and len(pairs_needed) > 1:
-        for several in itertools.combinations(pairs_needed, 2):
-            more = available_blocks(rig, checked_channels(rig, (*own, *several)))
-            text = " and ".join(c.replace("_", " ") for c in several)
-            additions.append(_addition("channels", "+".join(several), text, now, _picture(parts, more, chosen, starts)))
-    for name in [n for n in usable if n not in chosen]:
-        if blocks:
-            additions.append(_addition("experiment", name, usable[name].text, now, _picture(parts, blocks, [*chosen, name], starts)))
-    additions.sort(key=lambda a: (-(len(a.seen) + len(a.separated)), -a.bits))
+    blocks = available_blocks(rig, own, settings.prepare)
+    assumed = _Assumed(rig, parts, starts, settings)
+    now = assumed.picture(blocks, chosen)
     order = [e for e in CATALOGUE if e in now.sights]
     unseparated = sorted(now.unseparated, key=lambda p: (order.index(p[0]), order.index(p[1])))
     pairs = [(a, b, now.cosine[a, b]) for a, b in unseparated]
@@ -424,7 +404,7 @@ def plan_diagnosis(
         noise={c: sound[c] for c in own if c in sound},
         blocks=[_described(block) for block in blocks],
         missing=[
-            {"name": b.name, "covers": b.covers, "needs": _needed(rig, b.name, own, every)}
+            {"name": b.name, "covers": b.covers, "needs": assumed.needed(b.name, own, every)}
             for b in whole
             if b.name not in {own_block.name for own_block in blocks}
         ],
@@ -432,18 +412,55 @@ def plan_diagnosis(
         sights=[now.sights[e] for e in order],
         pairs=pairs,
         groups=_joined([(a, b) for a, b, _ in pairs], order),
-        additions=additions,
+        additions=assumed.additions(own, every, chosen, usable),
     )
 
 
-def _needed(rig: Rig, block: str, own: tuple[str, ...], every: tuple[str, ...]) -> list[str]:
-    """The fewest channels that, added to those at hand, surround a block."""
-    lacking = [c for c in every if c not in own]
-    for count in range(1, len(lacking) + 1):
-        for several in itertools.combinations(lacking, count):
-            if any(b.name == block for b in available_blocks(rig, (*own, *several))):
-                return list(several)
-    return lacking
+@dataclass(frozen=True, eq=False)
+class _Assumed:
+    """What every block shows over every experiment, to be looked at with some channels and some experiments."""
+
+    rig: Rig
+    parts: dict[Key, _Part]
+    starts: list[Start]
+    settings: DiagnosisSettings
+
+    def blocks(self, channels: tuple[str, ...]) -> list[Block]:
+        """Blocks that some channels tell apart."""
+        return available_blocks(self.rig, checked_channels(self.rig, channels), self.settings.prepare)
+
+    def picture(self, blocks: list[Block], experiments: Sequence[str]) -> _Picture:
+        """What some blocks over some experiments show."""
+        return _picture(self.parts, blocks, experiments, self.starts, self.settings)
+
+    def needed(self, block: str, own: tuple[str, ...], every: tuple[str, ...]) -> list[str]:
+        """The fewest channels that, added to those at hand, surround a block."""
+        lacking = [c for c in every if c not in own]
+        for count in range(1, len(lacking) + 1):
+            for several in itertools.combinations(lacking, count):
+                if any(b.name == block for b in self.blocks((*own, *several))):
+                    return list(several)
+        return lacking
+
+    def additions(
+        self, own: tuple[str, ...], every: tuple[str, ...], chosen: list[str], usable: Mapping[str, Experiment]
+    ) -> list[Addition]:
+        """What each further channel (two of them where one surrounds no block) and each further experiment would add."""
+        blocks = self.blocks(own)
+        now = self.picture(blocks, chosen)
+        lacking = [c for c in every if c not in own]
+        found = []
+        for channel in lacking:
+            then = self.picture(self.blocks((*own, channel)), chosen)
+            found.append(_addition("channel", channel, channel.replace("_", " "), now, then))
+        for several in itertools.combinations(lacking, 2) if not blocks else ():
+            text = " and ".join(c.replace("_", " ") for c in several)
+            then = self.picture(self.blocks((*own, *several)), chosen)
+            found.append(_addition("channels", "+".join(several), text, now, then))
+        for name in [n for n in usable if n not in chosen] if blocks else ():
+            then = self.picture(blocks, [*chosen, name])
+            found.append(_addition("experiment", name, usable[name].text, now, then))
+        return sorted(found, key=lambda a: (-(len(a.seen) + len(a.separated)), -a.bits))
 
 
 def _check_rig(rig: Rig) -> None:
@@ -461,14 +478,15 @@ def _check_rig(rig: Rig) -> None:
         raise DiagnosisError(f"rig {rig.name!r}: {'; '.join(sorted(reasons))}")
 
 
-def _noise(given: Mapping[str, float] | None) -> dict[str, float]:
+def _noise(given: Mapping[str, float] | None, settings: DiagnosisSettings) -> dict[str, float]:
     """Sample noise of every channel [SI]."""
+    usual = usual_noise(settings.next_experiment)
     for name, value in (given or {}).items():
-        if name not in NOISE:
-            raise ParameterError(f"noise has {name!r}, which is not allowed: one of {', '.join(NOISE)}")
+        if name not in usual:
+            raise ParameterError(f"noise has {name!r}, which is not allowed: one of {', '.join(usual)}")
         if not (math.isfinite(value) and value > 0.0):
             raise ParameterError(f"noise of {name} = {value} is not allowed: a finite number > 0 is needed")
-    return {**NOISE, **{name: float(value) for name, value in (given or {}).items()}}
+    return {**usual, **{name: float(value) for name, value in (given or {}).items()}}
 
 
 def _applies(rig: Rig, effect: str, blocks: list[Block]) -> bool:
@@ -487,29 +505,36 @@ def _described(block: Block) -> dict[str, Any]:
     }
 
 
-def _parts(rig: Rig, blocks: list[Block], experiment: Experiment, starts: list[Start], noise: Mapping[str, float]) -> dict[Key, _Part]:
+def _parts(
+    rig: Rig,
+    blocks: list[Block],
+    experiment: Experiment,
+    starts: list[Start],
+    noise: Mapping[str, float],
+    settings: DiagnosisSettings,
+) -> dict[Key, _Part]:
     """Products of everything that one experiment shows, by block."""
     stands = experiment.changed(rig)
-    prepared = taken(experiment.simulate(rig), stands, experiment.name, noise)
-    problem = Problem(blocks, [prepared], core_rig(stands))
+    prepared = taken(experiment.simulate(rig), stands, experiment.name, noise, settings)
+    problem = Problem(blocks, [prepared], core_rig(stands), settings)
     baseline = free_baseline(problem, stands)
     base = residuals(problem, stands, baseline)
     weights = weights_of(problem, stands)
     spread = np.array([stands.parameter(name).tol for name in baseline])
-    width = bin_width(prepared, FIT_BIN)
+    width, effective = bin_width(prepared, settings.noise.fit_bin_time), settings.next_experiment.effective_samples
     scale, slopes, moved = {}, {}, {}
     for block in blocks:
         key = (block.name, experiment.name)
         r = base[key]
         slope, counts = binned(np.zeros((r.value.size, 0)) if r.jacobian is None else r.jacobian, r.rows, width)
         floor = weights[key] * noise[block.channel] / math.sqrt(bins_of(prepared))
-        scale[key] = math.sqrt(EFFECTIVE / max(1, int((counts > 0).sum()))) / floor
+        scale[key] = math.sqrt(effective / max(1, int((counts > 0).sum()))) / floor
         slopes[key] = slope * spread * scale[key]
         moved[key] = np.zeros((slope.shape[0], len(starts)))
     for index, start in enumerate(starts):
         acting = [b for b in blocks if acts_in(start.effect, b)]
         try:
-            found = changes(Problem(acting, [prepared], problem.core), start.applied(stands), base, start.effect)
+            found = changes(replace(problem, blocks=acting), start.applied(stands), base, start.effect)
         except SimulationError:
             continue  # this size leaves the range in which the model holds
         for block in acting:
@@ -519,10 +544,17 @@ def _parts(rig: Rig, blocks: list[Block], experiment: Experiment, starts: list[S
     return {k: _Part(slopes[k].T @ slopes[k], slopes[k].T @ moved[k], moved[k].T @ moved[k]) for k in slopes}
 
 
-def _picture(parts: Mapping[Key, _Part], blocks: list[Block], experiments: Sequence[str], starts: list[Start]) -> _Picture:
+def _picture(
+    parts: Mapping[Key, _Part],
+    blocks: list[Block],
+    experiments: Sequence[str],
+    starts: list[Start],
+    settings: DiagnosisSettings,
+) -> _Picture:
     """What some blocks over some experiments show."""
     used = {key: part for key, part in parts.items() if key[0] in {b.name for b in blocks} and key[1] in experiments}
     effects = list(dict.fromkeys(s.effect for s in starts))
+    own_settings = settings.plan
     if not used:
         return _Picture({e: Sight(e, 0.0) for e in effects}, {}, frozenset(), 0.0)
     total = _Part(sum(p.baseline for p in used.values()), sum(p.mixed for p in used.values()), sum(p.signatures for p in used.values()))  # type: ignore[arg-type]
@@ -537,7 +569,7 @@ def _picture(parts: Mapping[Key, _Part], blocks: list[Block], experiments: Seque
                 0.0,
                 None,
             )
-            / EFFECTIVE
+            / settings.next_experiment.effective_samples
         )
         for key, p in used.items()
     }
@@ -549,7 +581,7 @@ def _picture(parts: Mapping[Key, _Part], blocks: list[Block], experiments: Seque
         own = [k for k, s in enumerate(starts) if s.effect == effect]
         index, key = max(((k, key) for k in own for key in sizes), key=lambda pair: float(sizes[pair[1]][pair[0]]))
         best[effect] = index
-        sights[effect] = _sight(starts[index], float(sizes[key][index]), key)
+        sights[effect] = _sight(starts[index], float(sizes[key][index]), key, own_settings)
     cosine, unseparated = {}, set()
     for first, second in itertools.combinations(effects, 2):
         mine, theirs = best[first], best[second]
@@ -560,26 +592,29 @@ def _picture(parts: Mapping[Key, _Part], blocks: list[Block], experiments: Seque
         left = min(
             sights[first].left * math.sqrt(max(0.0, 1.0 - forward**2)), sights[second].left * math.sqrt(max(0.0, 1.0 - backward**2))
         )
-        if min(sights[first].left, sights[second].left) >= SEEN and (cosine[first, second] > ALIKE or left < APART):
+        seen = min(sights[first].left, sights[second].left) >= own_settings.seen
+        alike = cosine[first, second] > own_settings.same_cosine or left < own_settings.apart
+        if seen and alike:
             unseparated.add((first, second))
     chosen = [best[e] for e in effects]
     _, logarithm = np.linalg.slogdet(np.eye(len(chosen)) + gram[np.ix_(chosen, chosen)])
     return _Picture(sights, cosine, frozenset(unseparated), 0.5 * float(logarithm) / math.log(2.0))
 
 
-def _sight(start: Start, left: float, key: Key) -> Sight:
+def _sight(start: Start, left: float, key: Key, settings: PlanSettings) -> Sight:
     """How an effect shows from the start that shows most."""
     if left < 1e-6:
         return Sight(start.effect, 0.0)
+    verdict = "seen" if left >= settings.seen else "faint" if left >= settings.faint else "hidden"
     if not start.scalable:
-        return Sight(start.effect, left, *key)
+        return Sight(start.effect, left, *key, verdict=verdict)
     leading = start.sizes[0]
-    typical, size = abs(start.free[leading]), SEEN / left
+    typical, size = abs(start.free[leading]), settings.seen / left
     found = start.scaled(size).free[leading]
     # one that its bounds hold shows less than that
     whole = math.isclose(start.scaled(0.999 * size).free[leading], found, rel_tol=1e-9)
-    smallest = abs(found) if size < LARGEST and not whole else math.nan
-    return Sight(start.effect, left, *key, leading, typical, smallest)
+    smallest = abs(found) if size < settings.most_multiple and not whole else math.nan
+    return Sight(start.effect, left, *key, leading, typical, smallest, verdict)
 
 
 def _addition(kind: str, name: str, text: str, now: _Picture, then: _Picture) -> Addition:

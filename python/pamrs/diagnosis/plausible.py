@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from pamrs import _core
 from pamrs.channels import channel_of, dotted
 from pamrs.diagnosis.blocks import Block, predicted
+from pamrs.diagnosis.settings import PlausibilitySettings
 from pamrs.diagnosis.signals import Prepared
 from pamrs.errors import DiagnosisError, SimulationError, joined
 from pamrs.recordings import Recording
@@ -27,35 +28,12 @@ __all__ = ["check_plausible", "check_sense", "implausible"]
 
 Array = NDArray[np.float64]
 
-LEAST_PRESSURE = 100.0
-"""Gauge pressure that a channel exceeds somewhere, or it is in another unit [Pa]."""
-MOST_PRESSURE = 1e7
-"""Gauge pressure of air that no muscle sees [Pa], unless the rig file has a fifth of what was measured."""
-SUPPLY_RANGE = (0.05, 5.0)
-"""Highest measured supply pressure over that of the rig file."""
-ORDER_MARGIN, ORDER_SHARE = 0.05, 0.5
-"""Share of the supply's pressure by which a muscle's may exceed it, and share of the time for which it may do so by more."""
-ANGLE_MARGIN, ANGLE_SHARE = 0.05, 0.2
-"""Share of a joint's range (and at least 0.1 rad) by which an angle may leave it, and share of the time."""
-MOST_RATE = 200.0
-"""Joint rate that one sample in a hundred may exceed [rad/s]."""
-MOST_SPEED = 20.0
-"""Speed of a load that one sample in a hundred may exceed [m/s]."""
-LONGEST_SAMPLE = 0.25
-"""Sample time at which the motion of a joint or load can still be followed [s]."""
-FROZEN_WHILE = 2e4
-"""Change of a muscle's pressure while which a tank that feeds it cannot read one and the same value [Pa]."""
-OPPOSED, OPPOSITE = 0.6, -0.2
-"""Share of a chamber's change of pressure that may go against its valve's command, if the two are also correlated below this."""
-STILL = {"joint_angle": 0.02, "length": 1e-3}
-"""Change of a joint's angle [rad] or a load's length [m] up to which the muscles' volume hardly moves their pressure."""
-DEGREES = 180.0 / math.pi
-WRONG, RIGHT = 1.0, 0.4
-"""Misfit in standard deviations of the angle as recorded, and as it would be in another unit, from which the unit is wrong."""
-_TELLING = 12
+_DEGREES = 180.0 / math.pi
+_TOLD = 12
+"""Findings that a message lists."""
 
 
-def check_plausible(recordings: Sequence[Recording], rig: Rig, case: str) -> None:
+def check_plausible(recordings: Sequence[Recording], rig: Rig, case: str, settings: PlausibilitySettings) -> None:
     """Refuse recordings whose units or columns cannot be right.
 
     Parameters
@@ -66,24 +44,26 @@ def check_plausible(recordings: Sequence[Recording], rig: Rig, case: str) -> Non
         The nominal model.
     case : str
         Name of the case, for the message.
+    settings : PlausibilitySettings
+        What is allowed.
 
     Raises
     ------
     DiagnosisError
         With every finding: recording, channel, what was found, what is allowed.
     """
-    found = [f"recording {r.name!r}: {text}" for r in recordings for text in implausible(r, rig)]
+    found = [f"recording {r.name!r}: {text}" for r in recordings for text in implausible(r, rig, settings)]
     _refuse(case, found)
 
 
 def _refuse(case: str, found: list[str]) -> None:
     if not found:
         return
-    told = found[:_TELLING] + ([f"and {len(found) - _TELLING} more of this kind"] if len(found) > _TELLING else [])
+    told = found[:_TOLD] + ([f"and {len(found) - _TOLD} more of this kind"] if len(found) > _TOLD else [])
     raise DiagnosisError(joined(f"case {case!r}: these recordings cannot be of this rig; nothing was fitted", told))
 
 
-def implausible(recording: Recording, rig: Rig) -> list[str]:
+def implausible(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> list[str]:
     """Everything about a recording that cannot be, in words.
 
     Parameters
@@ -92,6 +72,8 @@ def implausible(recording: Recording, rig: Rig) -> list[str]:
         SI values with masks.
     rig : Rig
         The nominal model.
+    settings : PlausibilitySettings
+        What is allowed.
 
     Returns
     -------
@@ -99,11 +81,12 @@ def implausible(recording: Recording, rig: Rig) -> list[str]:
         One line for each finding; empty for a sound recording.
     """
     return [
-        *_clock(recording, rig),
-        *_pressures(recording, rig),
-        *_order(recording, rig),
-        *_motion(recording, rig),
-        *_valves(recording, rig),
+        *_clock(recording, rig, settings),
+        *_pressures(recording, rig, settings),
+        *_frozen_tanks(recording, rig, settings),
+        *_order(recording, rig, settings),
+        *_motion(recording, rig, settings),
+        *_valves(recording, rig, settings),
     ]
 
 
@@ -114,28 +97,31 @@ def _values(recording: Recording, name: str) -> Array:
     return np.asarray(recording.channels[name][recording.mask[name]], dtype=np.float64)
 
 
-def _clock(recording: Recording, rig: Rig) -> Iterator[str]:
-    if _moving(rig) and recording.sample_time > LONGEST_SAMPLE:
+def _clock(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> Iterator[str]:
+    """A sample time at which motion can be followed."""
+    longest = settings.longest_sample_time
+    if _moving(rig, settings) and recording.sample_time > longest:
         what = "a joint" if rig.tables("joint") else "a load"
         yield (
-            f"a sample every {recording.sample_time:g} s is too slow for {what}: at most {LONGEST_SAMPLE:g} s; is the unit of "
+            f"a sample every {recording.sample_time:g} s is too slow for {what}: at most {longest:g} s; is the unit of "
             "'time' (ms, us) the one its values are in?"
         )
 
 
-def _pressures(recording: Recording, rig: Rig) -> Iterator[str]:
+def _pressures(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> Iterator[str]:
     """Sizes of pressures, by themselves and beside the rig file."""
     rated = {dotted("supply_pressure", name): float(table["initial_pressure"]) for name, table in rig.tables("supply").items()}
     largest = max([*rated.values(), *(float(t["initial_pressure"]) for t in rig.tables("chamber").values())], default=0.0)
+    low, top = settings.least_pressure, max(settings.most_pressure, settings.most_rated_multiple * largest)
+    least, most = settings.supply_least_share, settings.supply_most_share
     for name in recording.channels:
         values = _values(recording, name)
         if channel_of(name) not in ("supply_pressure", "line_pressure", "muscle_pressure") or values.size < 3:
             continue
         high = float(np.quantile(np.abs(values), 0.995))
-        top = max(MOST_PRESSURE, 5.0 * largest)
-        if 0.0 < high < LEAST_PRESSURE and np.ptp(values) > 0.0:
+        if 0.0 < high < low and np.ptp(values) > 0.0:
             yield (
-                f"{name} never exceeds {high:.3g} Pa gauge; a pressure of air exceeds {LEAST_PRESSURE:g} Pa somewhere: are its "
+                f"{name} never exceeds {high:.3g} Pa gauge; a pressure of air exceeds {low:g} Pa somewhere: are its "
                 "values in bar (or is it another column, an angle or a voltage) under a heading in Pa?"
             )
         elif high > top:
@@ -143,11 +129,15 @@ def _pressures(recording: Recording, rig: Rig) -> Iterator[str]:
                 f"{name} reaches {high:.3g} Pa gauge; at most {top:.3g} Pa is allowed: are its values in Pa, kPa or psi under a "
                 "heading in bar?"
             )
-        elif name in rated and rated[name] > 0.0 and not SUPPLY_RANGE[0] <= high / rated[name] <= SUPPLY_RANGE[1]:
+        elif name in rated and rated[name] > 0.0 and not least <= high / rated[name] <= most:
             yield (
                 f"{name} is at most {high:.3g} Pa and the rig file has {rated[name]:.3g} Pa; "
-                f"{SUPPLY_RANGE[0] * rated[name]:.3g} to {SUPPLY_RANGE[1] * rated[name]:.3g} Pa is allowed: right column and unit?"
+                f"{least * rated[name]:.3g} to {most * rated[name]:.3g} Pa is allowed: right column and unit?"
             )
+
+
+def _frozen_tanks(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> Iterator[str]:
+    """Tanks that read one value although they are drawn from."""
     valves = rig.ports("valve")
     for supply, table in rig.tables("supply").items():
         name = dotted("supply_pressure", supply)
@@ -155,7 +145,7 @@ def _pressures(recording: Recording, rig: Rig) -> Iterator[str]:
         if table["kind"] != "tank" or not drawn or values.size < 16 or np.ptp(values) > 0.0:
             continue
         moved = [v for c in rig.tables("chamber") if (v := _values(recording, dotted("muscle_pressure", c))).size]
-        if any(float(np.ptp(v)) > FROZEN_WHILE for v in moved):
+        if any(float(np.ptp(v)) > settings.frozen_tank_change for v in moved):
             yield (
                 f"{name} has the one value {values[0]:.6g} Pa throughout although its tank is drawn from: a frozen transducer; leave "
                 'the column out, or say [supply] kind = "constant" if it is one'
@@ -176,7 +166,7 @@ def fed_by(rig: Rig) -> dict[str, list[str]]:
     return found
 
 
-def _order(recording: Recording, rig: Rig) -> Iterator[str]:
+def _order(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> Iterator[str]:
     """A muscle is not at a higher pressure than what feeds it."""
     for chamber, supplies in fed_by(rig).items():
         name = dotted("muscle_pressure", chamber)
@@ -195,13 +185,14 @@ def _order(recording: Recording, rig: Rig) -> Iterator[str]:
                 )
             if rows.sum() < 16:
                 continue
-            above = recording.channels[name][rows] > limit + ORDER_MARGIN * np.abs(limit) + 1e4
+            allowed = limit + settings.order_margin * np.abs(limit) + settings.order_offset
+            above = recording.channels[name][rows] > allowed
             share = float(np.mean(above))
-            if share > ORDER_SHARE:
+            if share > settings.order_time_share:
                 yield (
                     f"{name} is above {source} for {100 * share:.0f} % of the time (medians "
                     f"{float(np.median(recording.channels[name][rows])):.3g} and {float(np.median(limit)):.3g} Pa); at most "
-                    f"{100 * ORDER_SHARE:.0f} % is allowed: are the two columns swapped, or one of their units wrong?"
+                    f"{100 * settings.order_time_share:.0f} % is allowed: are the two columns swapped, or one of their units wrong?"
                 )
 
 
@@ -218,32 +209,33 @@ class _Moving:
     pulled: tuple[str, ...]
 
 
-def _moving(rig: Rig) -> list[_Moving]:
+def _moving(rig: Rig, settings: PlausibilitySettings) -> list[_Moving]:
     """The joints of a rig, or its hanging load."""
     ends = rig.ports("muscle").values()
     found = []
     for joint, table in rig.tables("joint").items():
         low, high = float(table["min_angle"]), float(table["max_angle"])
         pulled = tuple(e["chamber"].partition(".")[2] for e in ends if e["joint"] == dotted("joint", joint))
-        margin = max(0.1, ANGLE_MARGIN * (high - low))
-        found.append(_Moving(dotted("joint_angle", joint), "rad", low, high, margin, MOST_RATE, pulled))
+        margin = max(settings.least_angle_margin, settings.range_margin * (high - low))
+        found.append(_Moving(dotted("joint_angle", joint), "rad", low, high, margin, settings.fastest_joint, pulled))
     load = rig.model["load"]
     if load and load["kind"] == "mass":
         low, high = float(load["min_length"]), float(load["max_length"])
         pulled = tuple(e["chamber"].partition(".")[2] for e in ends)
-        found.append(_Moving("length", "m", low, high, max(0.01, ANGLE_MARGIN * (high - low)), MOST_SPEED, pulled))
+        margin = max(settings.least_length_margin, settings.range_margin * (high - low))
+        found.append(_Moving("length", "m", low, high, margin, settings.fastest_load, pulled))
     return found
 
 
-def _motion(recording: Recording, rig: Rig) -> Iterator[str]:
+def _motion(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> Iterator[str]:
     """Range, rate and life of joint angles and of a load's length."""
-    for moving in _moving(rig):
+    for moving in _moving(rig, settings):
         name, unit = moving.channel, moving.unit
         values = _values(recording, name)
         if values.size < 3:
             continue
         share = float(np.mean((values < moving.low - moving.margin) | (values > moving.high + moving.margin)))
-        if share > ANGLE_SHARE:
+        if share > settings.range_time_share:
             whose, units = ("its joint's range", "deg or rad") if unit == "rad" else ("its load's range", "mm or m")
             yield (
                 f"{name} is outside {whose} for {100 * share:.0f} % of the time: from {values.min():.3g} to "
@@ -263,7 +255,7 @@ def _motion(recording: Recording, rig: Rig) -> Iterator[str]:
         if (
             values.size >= 16
             and np.ptp(values) == 0.0
-            and any(float(np.ptp(v)) > 0.1 * float(np.abs(v).max()) > 1e3 for v in pressures)
+            and any(float(np.ptp(v)) > settings.frozen_motion_share * float(np.abs(v).max()) > 1e3 for v in pressures)
         ):
             what = "a frozen encoder and a joint that is held" if unit == "rad" else "a frozen transducer and a load that is held"
             yield (
@@ -272,8 +264,9 @@ def _motion(recording: Recording, rig: Rig) -> Iterator[str]:
             )
 
 
-def _valves(recording: Recording, rig: Rig) -> Iterator[str]:
+def _valves(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> Iterator[str]:
     """Commands inside the valve's range, and pressures that rise when they say fill."""
+    still_by = {"joint_angle": settings.still_angle, "length": settings.still_length}
     inlets = {dotted("line", name): e["to"] for name, e in rig.ports("line").items()}
     for valve, ends in rig.ports("valve").items():
         name, table = dotted("valve_command", valve), rig.tables("valve")[valve]
@@ -285,8 +278,8 @@ def _valves(recording: Recording, rig: Rig) -> Iterator[str]:
         if both.sum() < 32:
             continue
         opening = (recording.channels[name] - table["null_voltage"]) / table["half_range"]
-        beyond = float(np.mean(np.abs(opening[both]) > 2.0))
-        if beyond > 0.5:
+        beyond = float(np.mean(np.abs(opening[both]) > settings.command_span))
+        if beyond > settings.command_time_share:
             yield (
                 f"{name} is beyond twice its valve's range for {100 * beyond:.0f} % of the time (median "
                 f"{float(np.median(recording.channels[name][both])):.3g} V); {table['null_voltage']:g} +- {table['half_range']:g} V is "
@@ -295,20 +288,21 @@ def _valves(recording: Recording, rig: Rig) -> Iterator[str]:
             continue
         if sum(e["to"] == ends["to"] for e in rig.ports("valve").values()) > 1:
             continue  # another valve may fill while this one vents
-        width = max(2, round(0.1 / recording.sample_time))
+        width = max(2, round(settings.sense_time / recording.sample_time))
         rows = np.flatnonzero(both[:-width] & both[width // 2 : -width + width // 2] & both[width:])
         # what swings moves the pressure by its volume, whatever the valve does
-        for place, still in ((v, STILL[channel_of(c)]) for c, v in recording.channels.items() if channel_of(c) in STILL):
+        for place, still in ((v, still_by[channel_of(c)]) for c, v in recording.channels.items() if channel_of(c) in still_by):
             rows = rows[~(np.abs(place[rows + width] - place[rows]) > still)]
         change = recording.channels[pressure][rows + width] - recording.channels[pressure][rows]
         towards, moved = opening[rows + width // 2], float(np.ptp(recording.channels[pressure][both]))
-        if rows.size < 32 or moved < 2e4 or not np.ptp(towards) > 0.0 or not np.ptp(change) > 0.0:
+        if rows.size < 32 or moved < settings.sense_least_change or not np.ptp(towards) > 0.0 or not np.ptp(change) > 0.0:
             continue
         against = float(np.abs(change)[towards * change < 0.0].sum() / np.abs(change).sum())
-        if against > OPPOSED and float(np.corrcoef(towards, change)[0, 1]) < OPPOSITE:
+        correlation = float(np.corrcoef(towards, change)[0, 1])
+        if against > settings.opposed_share and correlation < settings.opposed_correlation:
             yield (
                 f"{100 * against:.0f} % of the change of {pressure} goes against {name} (rises while it says vent, falls while it says "
-                f"fill); at most {100 * OPPOSED:.0f} % is allowed: is the command's sign, unit or column right?"
+                f"fill); at most {100 * settings.opposed_share:.0f} % is allowed: is the command's sign, unit or column right?"
             )
 
 
@@ -332,10 +326,11 @@ def check_sense(blocks: Sequence[Block], recordings: Sequence[Prepared], core: _
         With every finding.
     """
     found = []
+    settings = [p.settings.plausibility for p in recordings]
     for block in (b for b in blocks if channel_of(b.channel) == "joint_angle"):
-        for prepared in recordings:
+        for prepared, own in zip(recordings, settings, strict=True):
             try:
-                text = _sense(block, core, prepared)
+                text = _sense(block, core, prepared, own)
             except SimulationError:
                 continue
             if text:
@@ -345,19 +340,20 @@ def check_sense(blocks: Sequence[Block], recordings: Sequence[Prepared], core: _
         _refuse(case, found)
 
 
-def _sense(block: Block, core: _core.Rig, prepared: Prepared) -> str | None:
+def _sense(block: Block, core: _core.Rig, prepared: Prepared, settings: PlausibilitySettings) -> str | None:
     """What would make the model's angle that of the recording: another unit, the other sign, two pressures in each other's place."""
     rows = prepared.usable(block.channel, block.drives, [0])
     measured, model = prepared.recording.channels[block.channel][rows], predicted(block, core, prepared)[rows]
-    if rows.sum() < 64 or float(np.std(measured)) < 3.0 * prepared.noise[block.channel] or _misfit(measured, model) < WRONG:
+    quiet = float(np.std(measured)) < settings.sense_least_noises * prepared.noise[block.channel]
+    if rows.sum() < 64 or quiet or _misfit(measured, model) < settings.sense_wrong:
         return None
     signals, name = prepared.signals, block.channel
     value, slope = signals[name]
     shown = f"{name} goes from {measured.min():.3g} to {measured.max():.3g} rad, not as the model says"
     turned = float(np.median(measured + model))
     others: list[tuple[float, float, dict[str, tuple[Array, Array]], str]] = [
-        (DEGREES, 0.0, {}, f"{DEGREES:.3g} times that would: are its values in rad under a heading in deg?"),
-        (1.0 / DEGREES, 0.0, {}, f"{1.0 / DEGREES:.3g} times that would: are its values in deg under a heading in rad?"),
+        (_DEGREES, 0.0, {}, f"{_DEGREES:.3g} times that would: are its values in rad under a heading in deg?"),
+        (1.0 / _DEGREES, 0.0, {}, f"{1.0 / _DEGREES:.3g} times that would: are its values in deg under a heading in rad?"),
         (-1.0, turned, {}, "it moves opposite to the model throughout: is its sign that of the rig, or are two muscles swapped?"),
     ]
     for one, two in itertools.combinations([d for d in block.drives if d in signals], 2):
@@ -368,7 +364,7 @@ def _sense(block: Block, core: _core.Rig, prepared: Prepared) -> str | None:
         raw = prepared.raw | {name: offset + factor * prepared.raw[name]}
         noise = prepared.noise | {name: abs(factor) * prepared.noise[name]}
         shown_as = {**signals, **swapped, name: (offset + factor * value, factor * slope)}
-        other = Prepared(prepared.recording, prepared.commands, shown_as, raw, noise)
+        other = Prepared(prepared.recording, prepared.commands, shown_as, raw, noise, prepared.settings)
         try:
             model = predicted(block, core, other)[rows]
         except SimulationError:
@@ -378,7 +374,7 @@ def _sense(block: Block, core: _core.Rig, prepared: Prepared) -> str | None:
             expected, model = expected - expected.mean(), model - model.mean()
         found.append((_misfit(expected, model), text))
     best, text = min(found, default=(math.inf, ""))
-    return f"{shown}; {text}" if best < RIGHT else None
+    return f"{shown}; {text}" if best < settings.sense_right else None
 
 
 def _misfit(measured: Array, model: Array) -> float:

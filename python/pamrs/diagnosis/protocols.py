@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs.diagnosis.settings import NextExperimentSettings
 from pamrs.errors import DiagnosisError, SimulationError
 from pamrs.rig import Rig
 from pamrs.simulation import Simulation, Simulator, simulate
@@ -24,12 +25,6 @@ __all__ = ["Experiment", "Range", "library", "pressure_range", "trial_of"]
 Array = NDArray[np.float64]
 Points = list[tuple[float, float]]
 
-SAMPLE_TIME = 0.005
-"""Time between samples where no recording says it [s]."""
-SEALED_SAMPLE_TIME = 0.1
-"""Same for a chamber without a valve, which changes slowly."""
-BANDWIDTH = 15.0
-"""Of the pressure loop [rad/s]."""
 _CRITICAL = 0.528
 _CHOKED = 0.0404  # sqrt(k/R) (2/(k+1))^((k+1)/(2(k-1))) of air
 
@@ -109,7 +104,7 @@ class Experiment:
         return simulate(self.changed(rig), self.command, sample_time=self.sample_time, initial=self.initial, **length)
 
 
-def trial_of(rig: Rig, reference: Array, *, sample_time: float, **options: Any) -> Array:
+def trial_of(rig: Rig, reference: Array, *, sample_time: float, bandwidth: float, **options: Any) -> Array:
     """Valve commands that make the muscle pressure of a rig follow a reference.
 
     Parameters
@@ -120,9 +115,11 @@ def trial_of(rig: Rig, reference: Array, *, sample_time: float, **options: Any) 
         Gauge pressure [Pa].
     sample_time : float
         Time between samples [s].
+    bandwidth : float
+        Of the loop [rad/s].
     **options
         ``shut`` ((n,) bool array: samples at which the command is the null voltage), ``dither`` ((n,) array added to the
-        command [V]), ``bandwidth`` (of the loop [rad/s]), ``initial`` (as for :func:`pamrs.simulate`).
+        command [V]), ``initial`` (as for :func:`pamrs.simulate`).
 
     Returns
     -------
@@ -132,7 +129,6 @@ def trial_of(rig: Rig, reference: Array, *, sample_time: float, **options: Any) 
     n = reference.size
     shut = options.get("shut", np.zeros(n, dtype=bool))
     dither = options.get("dither", np.zeros(n))
-    bandwidth = float(options.get("bandwidth", BANDWIDTH))
     model = rig.model
     valve, gas = model["valve"], model["gas"]
     ambient, warm = gas["ambient_pressure"], gas["gas_constant"] * gas["temperature"]
@@ -161,13 +157,15 @@ def trial_of(rig: Rig, reference: Array, *, sample_time: float, **options: Any) 
     return np.ascontiguousarray(found["valve_command"][:n])
 
 
-def pressure_range(rig: Rig, *, highest: float | None = None) -> Range:
+def pressure_range(rig: Rig, settings: NextExperimentSettings, *, highest: float | None = None) -> Range:
     """Pressures between which a rig is worth exciting.
 
     Parameters
     ----------
     rig : Rig
         A rig of one chain.
+    settings : NextExperimentSettings
+        Bandwidth of the loop that finds them.
     highest : float, optional
         Gauge pressure that is not to be exceeded [Pa], for example the highest that was recorded.
 
@@ -186,7 +184,8 @@ def pressure_range(rig: Rig, *, highest: float | None = None) -> Range:
     if model["arm"] is None and load is None:
         return Range(0.1 * top, min(0.75 * top, 7.0e5))
     ramp = np.linspace(0.0, top, 1501)
-    found = simulate(rig, trial_of(rig, ramp, sample_time=0.01), sample_time=0.01)
+    command = trial_of(rig, ramp, sample_time=0.01, bandwidth=settings.bandwidth)
+    found = simulate(rig, command, sample_time=0.01)
     if load is None:
         share = (found["joint_angle"] - joint["rest_angle"]) / (joint["max_angle"] - joint["rest_angle"])
     else:
@@ -219,14 +218,14 @@ def _bar(pressure: float) -> float:
 class _Maker:
     """Builds the experiments of one rig."""
 
-    def __init__(self, rig: Rig, sample_time: float, span: Range) -> None:
-        self.rig, self.dt, self.span = rig, sample_time, span
+    def __init__(self, rig: Rig, sample_time: float, span: Range, bandwidth: float) -> None:
+        self.rig, self.dt, self.span, self.bandwidth = rig, sample_time, span, bandwidth
 
     def driven(self, name: str, text: str, excitation: dict[str, Any], reference: Array, **options: Any) -> Experiment:
         changes, initial = options.pop("changes", {}), options.pop("initial", {})
-        extra = options.pop("extra", 0.0)
+        extra, bandwidth = options.pop("extra", 0.0), options.pop("bandwidth", self.bandwidth)
         rig = self.rig.with_parameters(changes) if changes else self.rig
-        command = trial_of(rig, reference, sample_time=self.dt, initial=initial, **options)
+        command = trial_of(rig, reference, sample_time=self.dt, bandwidth=bandwidth, initial=initial, **options)
         seconds = (reference.size - 1) * self.dt
         done = {"kind": name, **excitation, "duration_s": round(seconds, 1)}
         return Experiment(name, text, done, command, reference.size, self.dt, initial, changes, seconds + extra)
@@ -377,8 +376,9 @@ class _Maker:
         joint = self.rig.model["joint"]
         reference = _through([(0.0, pressure), (8.0, pressure)], self.dt)
         shut = np.ones(reference.size, dtype=bool)
-        rest = simulate(self.rig, trial_of(self.rig, _through([(0.0, 0.0), (3.0, pressure), (6.0, pressure)], 0.01), sample_time=0.01),
-                        sample_time=0.01)["joint_angle"][-1]  # fmt: skip
+        slow = _through([(0.0, 0.0), (3.0, pressure), (6.0, pressure)], 0.01)
+        command = trial_of(self.rig, slow, sample_time=0.01, bandwidth=self.bandwidth)
+        rest = simulate(self.rig, command, sample_time=0.01)["joint_angle"][-1]
         turned = min(float(rest) + 0.15 * (joint["max_angle"] - joint["min_angle"]), joint["max_angle"] - 0.05)
         shown = round(math.degrees(turned - float(rest)), 0)
         initial = {"muscle_pressure": pressure, "joint_angle": turned}
@@ -416,7 +416,12 @@ def _sealed_library(rig: Rig, sample_time: float, span: Range) -> list[Experimen
 
 
 def library(
-    rig: Rig, *, sample_time: float | None = None, highest: float | None = None, only: Collection[str] | None = None
+    rig: Rig,
+    settings: NextExperimentSettings,
+    *,
+    sample_time: float | None = None,
+    highest: float | None = None,
+    only: Collection[str] | None = None,
 ) -> list[Experiment]:
     """The standard experiments that a rig can do.
 
@@ -424,6 +429,8 @@ def library(
     ----------
     rig : Rig
         A rig of one chain: with a valve and an arm or a hanging load, with a valve alone, or a sealed chamber.
+    settings : NextExperimentSettings
+        Sample time where none is given, and bandwidth of the pressure loop.
     sample_time : float, optional
         Time between samples [s].
     highest : float, optional
@@ -441,11 +448,11 @@ def library(
         raise DiagnosisError(f"rig {rig.name!r} has named blocks ({', '.join(several)}); experiments are made for rigs of one chain")
     if not rig.tables("valve") and (rig.tables("supply") or rig.tables("muscle")):
         raise DiagnosisError(f"rig {rig.name!r} has no valve that a person could command; experiments need one, or a sealed chamber")
-    span = pressure_range(rig, highest=highest)
+    span = pressure_range(rig, settings, highest=highest)
     if rig.model["valve"] is None:
-        sealed = _sealed_library(rig, SEALED_SAMPLE_TIME if sample_time is None else sample_time, span)
+        sealed = _sealed_library(rig, settings.sealed_sample_time if sample_time is None else sample_time, span)
         return [e for e in sealed if only is None or e.name in only]
-    make = _Maker(rig, SAMPLE_TIME if sample_time is None else sample_time, span)
+    make = _Maker(rig, settings.sample_time if sample_time is None else sample_time, span, settings.bandwidth)
     makers: dict[str, Callable[[], Experiment | None]] = {
         "multisine": make.multisine,
         "sealed_hold": make.sealed,

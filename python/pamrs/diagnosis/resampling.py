@@ -13,18 +13,15 @@ from collections import Counter
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.diagnosis.fitting import FIT_BIN
 from pamrs.diagnosis.screening import Screen, best_size
+from pamrs.diagnosis.settings import DiagnosisSettings
 
 __all__ = ["inclusion"]
 
 Array = NDArray[np.float64]
 
-DRAWS, SEGMENT, SEED = 200, 2.5, 20140501
-"""Draws, length of a segment [s], and the seed, so that a diagnosis can be repeated."""
 
-
-def inclusion(screened: Screen, least: float, partner: float) -> dict[str, float]:
+def inclusion(screened: Screen, least: float, partner: float, settings: DiagnosisSettings) -> dict[str, float]:
     """Share of resamples in which forward selection takes an effect.
 
     Parameters
@@ -35,6 +32,8 @@ def inclusion(screened: Screen, least: float, partner: float) -> dict[str, float
         Gain in chi-square from which an effect is taken.
     partner : float
         Share of the resample's sum of squares from which a second one is taken beside the first (1 or more: none).
+    settings : DiagnosisSettings
+        Number and length of the resampled segments, width of the bins, seed.
 
     Returns
     -------
@@ -45,20 +44,21 @@ def inclusion(screened: Screen, least: float, partner: float) -> dict[str, float
     if not screened.signatures or stand.rows.size == 0:
         return {}
     columns = np.column_stack([stand.rows, stand.jacobian, *(signature for _, _, signature in screened.signatures)])
-    length = round(SEGMENT / FIT_BIN)
+    length = round(settings.screen.resample_time / settings.noise.fit_bin_time)
     count = -(-columns.shape[0] // length)
     parts = [columns[k * length : (k + 1) * length] for k in range(count)]
     products = np.array([part.T @ part for part in parts])
-    rng = np.random.default_rng(SEED)
+    rng = np.random.default_rng(settings.seed)
+    draws = settings.screen.resamples
     taken: Counter[str] = Counter()
-    for weights in rng.multinomial(count, np.full(count, 1.0 / count), DRAWS):
+    for weights in rng.multinomial(count, np.full(count, 1.0 / count), draws):
         taken.update(_selected(screened, np.tensordot(weights.astype(np.float64), products, 1), least, partner))
-    return {effect: number / DRAWS for effect, number in taken.most_common()}
+    return {effect: number / draws for effect, number in taken.most_common()}
 
 
 def _selected(screened: Screen, products: Array, least: float, partner: float) -> list[str]:
     """Effects that forward selection takes, from the products of residual, sensitivities and signatures with each other."""
-    stand = screened.stand
+    stand, settings = screened.stand, screened.settings
     first = 1 + stand.moved.size
     base, prior, pull = list(range(1, first)), stand.free, stand.moved * stand.free
     columns = list(range(first, products.shape[0]))
@@ -71,7 +71,7 @@ def _selected(screened: Screen, products: Array, least: float, partner: float) -
         powers = products[columns, columns] - np.sum(shared * solved, axis=0)
         alongs = products[0, columns] - (products[base, 0] + pull) @ solved
         gains = [
-            (best_size(float(along), float(power), start)[1], effect, column)
+            (best_size(float(along), float(power), start, settings)[1], effect, column)
             for column, (effect, start, _), along, power in zip(columns, screened.signatures, alongs, powers, strict=True)
             if effect not in chosen
         ]

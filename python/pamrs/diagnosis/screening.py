@@ -16,8 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs import _core
-from pamrs.diagnosis.fitting import WIDEST, Fit, Problem, changes, stacked
+from pamrs.channels import channel_of
+from pamrs.diagnosis.blocks import Block
+from pamrs.diagnosis.fitting import Fit, Problem, acts_in, changes, stacked
+from pamrs.diagnosis.settings import ScreenSettings
 from pamrs.diagnosis.starts import Start, starts_of
+from pamrs.effects import EFFECTS, EffectParameter
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 from pamrs.rig.schema import BLOCKS, qualified
@@ -25,22 +29,8 @@ from pamrs.rig.schema import BLOCKS, qualified
 __all__ = ["Score", "Screen", "Stand", "best_size", "by_effect", "screen", "stand_of"]
 
 Array = NDArray[np.float64]
-MOST = 8.0
-"""Largest multiple of the typical size that a linear gain is believed at."""
-LEVELS = 6
-"""Levels of the tank's pressure that are tried for the thresholds of a compressor."""
-REACHED = (0.5, 0.75, 0.93)
-"""Quantiles of the angles that were seen at which an upper stop is tried; a lower one at the others."""
-CORDS, BROAD = (0.06, 1.5, 14), 0.08
-"""Shortest and longest cord [m] of a swinging payload that are tried, how many, and the damping ratio that they are tried with."""
-TUBES = (0.6, 3.0)
-"""Parts of the valve's conductance at which a tube is tried."""
-INVISIBLE = 1e-6
-"""Squared length [units of noise] of a signature below which it is none."""
-LEAST = 0.002
-"""Smallest multiple that a fit starts from."""
-FAR, REFINED = 0.3, 3
-"""Multiple of a size below which (and from ``MOST``) the signature is taken again at the size that is wanted, and how often at most."""
+Signature = tuple[str, Start, Array]
+"""Effect, where it starts, and what it does to the stacked residuals there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,10 +104,13 @@ class Screen:
         The model.
     signatures : list of (effect, start, (n,) array)
         Each effect's, from each of its starts.
+    settings : ScreenSettings
+        Sizes that are relied on.
     """
 
     stand: Stand
-    signatures: list[tuple[str, Start, Array]]
+    signatures: list[Signature]
+    settings: ScreenSettings
 
     def scores(self, stand: Stand | None = None, *, without: tuple[str, ...] = ()) -> list[Score]:
         """Every start of every effect, the most telling first.
@@ -135,22 +128,22 @@ class Screen:
             if effect in without:
                 continue
             power = own.power(signature)
-            if power < INVISIBLE:
+            if power < self.settings.invisible:
                 continue
-            size, gain = best_size(float(own.left @ signature), power, start)
+            size, gain = best_size(float(own.left @ signature), power, start, self.settings)
             found.append(Score(effect, start, gain, size, signature))
         return sorted(found, key=lambda s: -s.gain)
 
 
-def best_size(along: float, power: float, start: Start) -> tuple[float, float]:
+def best_size(along: float, power: float, start: Start, settings: ScreenSettings) -> tuple[float, float]:
     """Multiple of a start's size at which its signature gains most, inside what is believed, and that gain in chi-square.
 
     ``along`` is the product of what is left of the residual with the signature, ``power`` that of the signature with itself.
     """
-    if power < INVISIBLE:
+    if power < settings.invisible:
         return 0.0, 0.0
-    low = -MOST if start.signed else LEAST
-    size = float(np.clip(-along / power, low, MOST)) if start.scalable else 1.0
+    low = -settings.most_size if start.signed else settings.least_size
+    size = float(np.clip(-along / power, low, settings.most_size)) if start.scalable else 1.0
     return size, -2.0 * size * along - size**2 * power
 
 
@@ -172,7 +165,8 @@ def stand_of(fitted: Fit, problem: Problem, inflation: dict[str, float]) -> Stan
         none = np.zeros((rows.size, 0))
         return Stand(rows, rows, none, np.zeros(0), np.zeros(0), none)
     # a parameter at the end of its range cannot go on: what it would explain is left for an effect
-    names = [n for n in fitted.values if abs(fitted.held_by_prior.get(n, 0.0)) < WIDEST - 1e-3]
+    walls = problem.settings.fit.most_tolerances
+    names = [n for n in fitted.values if abs(fitted.held_by_prior.get(n, 0.0)) < walls - 1e-3]
     scales = np.array([fitted.scales[name] for name in names])
     scaled = jacobian[:, [list(fitted.values).index(name) for name in names]] * scales
     free = np.array([name in fitted.held_by_prior for name in names], dtype=np.float64)
@@ -206,10 +200,10 @@ def screen(problem: Problem, fitted: Fit, effects: list[str], inflation: dict[st
     sealed : bool
         Whether the rig has no valve.
     """
-    stand = stand_of(fitted, problem, inflation)
-    signatures: list[tuple[str, Start, Array]] = []
+    stand, settings = stand_of(fitted, problem, inflation), problem.settings.screen
+    signatures: list[Signature] = []
 
-    def try_(start: Start, looks: int = REFINED) -> float:
+    def try_(start: Start, looks: int = settings.most_signatures) -> float:
         """Add the signature of a start; what it would bring."""
         tried, entry, score = start, None, None
         for _ in range(looks):
@@ -219,8 +213,11 @@ def screen(problem: Problem, fitted: Fit, effects: list[str], inflation: dict[st
                 break  # this size leaves the range in which the model holds
             moved, _ = stacked(problem, found, inflation)
             entry = (start.effect, tried, moved - stand.rows)
-            score = max(Screen(stand, [entry]).scores(), key=lambda s: s.gain, default=None)
-            if score is None or score.gain <= 0.0 or not start.scalable or FAR <= abs(score.size) < MOST:
+            scores = Screen(stand, [entry], settings).scores()
+            score = max(scores, key=lambda s: s.gain, default=None)
+            if score is None or score.gain <= 0.0 or not start.scalable:
+                break
+            if settings.repeat_below <= abs(score.size) < settings.most_size:
                 break
             # what a stop or a threshold does is not in proportion to its size: it is looked at where it would be
             wanted = tried.scaled(abs(score.size))
@@ -232,46 +229,60 @@ def screen(problem: Problem, fitted: Fit, effects: list[str], inflation: dict[st
         return -math.inf if score is None else score.gain
 
     for effect in effects:
-        starts = _placed(starts_of(effect, sealed=sealed), problem, fitted.rig)
-        if effect == "payload_swing":
-            for start in _nearest(starts, lambda start: try_(start, 1), signatures):
+        starts = starts_of(effect, sealed=sealed)
+        info = EFFECTS[effect]
+        if any(p.scan for p in info.parameters):
+            for start in _nearest(starts[0], lambda start: try_(start, 1), signatures):
                 try_(start)
-        elif effect == "compressor_cut_in":
+        elif info.with_role("threshold"):
             before = len(signatures)
             best = _switched(starts[0], problem, lambda start: try_(start, 1))
             signatures[before:] = [entry for entry in signatures[before:] if entry[1] is best]
         else:
-            for start in starts:
+            for start in _placed(starts, problem, fitted.rig):
                 try_(start)
-    return Screen(stand, signatures)
+    return Screen(stand, signatures, settings)
+
+
+def _seen(problem: Problem, channel: str) -> Array | None:
+    """Everything that was measured of the channels of one kind; None where there is none."""
+    seen = [p.signals[name][0] for p in problem.recordings for name in p.signals if channel_of(name) == channel]
+    return np.concatenate(seen) if seen else None
 
 
 def _placed(starts: list[Start], problem: Problem, rig: Rig) -> list[Start]:
-    """Starts moved to where they act: a stop to angles that were seen, a tube to the valve's own conductance."""
-    if starts and starts[0].effect == "tube_flow_restriction":
-        return _behind_valve(starts, problem, rig)
-    place = "joint_end_stop.angle"
-    seen = [p.signals[name][0] for p in problem.recordings for name in p.signals if name.startswith("joint_angle")]
-    if not seen or not starts or place not in starts[0].free:
+    """Starts moved to where they act: a contact to places that were reached, a restriction to the size of what it stands beside."""
+    info = EFFECTS[starts[0].effect]
+    beside = next((p for p in info.parameters if p.like), None)
+    if beside is not None:
+        return _beside(starts, beside, problem, rig)
+    place = next(iter(info.with_role("place")), None)
+    reached = None if place is None else _seen(problem, place.channel)
+    if place is None or reached is None:
         return starts
-    angles = np.concatenate(seen)
+    sides = [f"{info.id}.{side.name}" for side in info.with_role("side")]
 
     def at(start: Start, share: float) -> Start:
-        lower = start.held["joint_end_stop.side"] < 0.0
-        return replace(start, free=start.free | {place: float(np.quantile(angles, 1.0 - share if lower else share))})
+        lower = any(start.held[side] < 0.0 for side in sides)
+        there = float(np.quantile(reached, 1.0 - share if lower else share))
+        return replace(start, free=start.free | {f"{info.id}.{place.name}": there})
 
-    return [at(start, share) for start in starts for share in REACHED]
+    return [at(start, share) for start in starts for share in problem.settings.screen.place_shares]
 
 
-def _nearest(starts: list[Start], try_: Callable[[Start], float], signatures: list[tuple[str, Start, Array]]) -> list[Start]:
-    """The cords that tell most among many lengths: what swings long has to be met within a few percent of its frequency.
+def _nearest(start: Start, try_: Callable[[Start], float], signatures: list[Signature]) -> list[Start]:
+    """The values that tell most among many: what swings long has to be met within a few percent of its frequency.
 
-    They are tried with more damping than a payload has, which makes the resonance broader than the distance between two lengths.
+    They are tried with more damping than the effect has, which makes the resonance broader than the distance between two values.
     """
-    length, damping = "payload_swing.length", "payload_swing.damping_ratio"
+    parameters = EFFECTS[start.effect].parameters
+    scanned = next(p for p in parameters if p.scan)
+    assert scanned.scan is not None
+    broad = {f"{start.effect}.{p.name}": p.tried for p in parameters if p.tried is not None}
     before = len(signatures)
-    tried = [replace(starts[0], free=starts[0].free | {length: float(x), damping: BROAD}) for x in np.geomspace(*CORDS)]
-    gains = [try_(start) for start in tried]
+    name = f"{start.effect}.{scanned.name}"
+    tried = [replace(start, free=start.free | {name: float(x)} | broad) for x in np.geomspace(*scanned.scan)]
+    gains = [try_(one) for one in tried]
     del signatures[before:]
     order = sorted(range(len(tried)), key=lambda k: -gains[k])
     # the best and the best that is no neighbour of it
@@ -279,40 +290,49 @@ def _nearest(starts: list[Start], try_: Callable[[Start], float], signatures: li
     return [tried[k] for k in (order[0], *far[:1])]
 
 
-def _behind_valve(starts: list[Start], problem: Problem, rig: Rig) -> list[Start]:
-    """Tubes in parts of the largest valve's conductance; an arm, driven by what is read, sees only one behind the transducer."""
-    areas = [rig.parameter(f"{qualified('valve', name)}.discharge_area_max").value for name in rig.tables("valve")]
+def _beside(starts: list[Start], parameter: EffectParameter, problem: Problem, rig: Rig) -> list[Start]:
+    """Restrictions in parts of the conductance of the largest opening that they stand beside, where a block could show them."""
+    kind, _, area = parameter.like.partition(".")
+    areas = [rig.parameter(f"{qualified(kind, name)}.{area}").value for name in rig.tables(kind)]
     unit = _core.Gas(*(rig.model["gas"][key.name] for key in BLOCKS["gas"])).area_of_conductance(1.0)
-    arm = all(block.kind == "arm" for block in problem.blocks)
+    name = f"{starts[0].effect}.{parameter.name}"
     return [
-        replace(start, free=start.free | {"tube_flow_restriction.conductance": part * max(areas) / unit})
+        replace(start, free=start.free | {name: part * max(areas) / unit})
         for start in starts
-        for part in TUBES
-        if start.held["tube_flow_restriction.tap"] or not arm
+        for part in problem.settings.screen.opening_shares
+        if any(_shows(start, block) for block in problem.blocks)
     ]
 
 
+def _shows(start: Start, block: Block) -> bool:
+    """Whether an effect acts in a block with the choices that a start holds."""
+    values = start.free | start.held
+    parameters = [p for p in EFFECTS[start.effect].parameters if block.kind in p.needed_in]
+    return acts_in(start.effect, block) and all(values[f"{start.effect}.{p.name}"] for p in parameters)
+
+
 def _switched(start: Start, problem: Problem, try_: Callable[[Start], float]) -> Start | None:
-    """The pressures between which a compressor switches: over the range that the tank was seen in, then closer and closer.
+    """The levels of a channel between which something switches: over the range that was seen, then closer and closer.
 
     A relay that is asked once a step has no slope in its thresholds, so that no fit can move them.
     """
-    seen = [p.signals[name][0] for p in problem.recordings for name in p.signals if name.startswith("supply_pressure")]
-    if not seen:
+    on, off = EFFECTS[start.effect].with_role("threshold")
+    seen, settings = _seen(problem, on.channel), problem.settings.screen
+    if seen is None:
         return None
-    low, high = (float(f(np.concatenate(seen))) for f in (np.min, np.max))
-    step = (high - low) / LEVELS
+    low, high = (float(f(seen)) for f in (np.min, np.max))
+    step = (high - low) / settings.threshold_levels
     if step <= 0.0:
         return None
 
-    def at(cut_in: float, cut_out: float) -> Start:
-        own = {f"{start.effect}.cut_in_pressure": cut_in, f"{start.effect}.cut_out_pressure": cut_out}
+    def at(switch_on: float, switch_off: float) -> Start:
+        own = {f"{start.effect}.{on.name}": switch_on, f"{start.effect}.{off.name}": switch_off}
         return replace(start, free={n: v for n, v in start.free.items() if n not in own}, held=start.held | own)
 
-    levels = [low + (k + 0.5) * step for k in range(LEVELS)]
+    levels = [low + (k + 0.5) * step for k in range(settings.threshold_levels)]
     tried = [(try_(s), a, b, s) for a in levels for b in (*levels, high + step) if b > a for s in [at(a, b)]]
     best = max(tried, key=lambda t: t[0])
-    while step > 5e-3 * (high - low):
+    while step > settings.threshold_precision * (high - low):
         step *= 0.5
         _, a, b, _ = best
         around = [(a - step, b), (a + step, b), (a, b - step), (a, b + step)]

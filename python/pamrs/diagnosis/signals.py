@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
 from pamrs.channels import channel_of, dotted
+from pamrs.diagnosis.settings import DiagnosisSettings, PrepareSettings
 from pamrs.errors import DiagnosisError
 from pamrs.recordings import Recording
 from pamrs.rig import Rig
@@ -20,16 +21,6 @@ __all__ = ["Prepared", "binned", "noise_level", "prepare", "smoothed"]
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-SMOOTHING_TIME = 0.06
-"""Length of the smoothing filter for drive signals [s]; at least seven samples."""
-STATE_TIMES = (0.04, 0.08, 0.16)
-"""Reaches on either side of a window's start that are tried for what it starts from [s]."""
-MISSED, FIRST, LONGER, APART, LEAST_STRETCH = 1.1, 2.0, 1.5, 2.0, 8
-"""Variance over that of the noise up to which a cubic fits a stretch, standard deviations of that beside it for the first one and for
-longer ones; standard deviations by which slopes of a shorter and a longer stretch may differ; fewest samples of a stretch."""
-DITHER = 20140501
-BRIDGED = 3
-"""Longest hole in a drive signal that is bridged [samples]."""
 DRIVES = ("supply_pressure", "line_pressure", "muscle_pressure", "joint_angle", "length")
 """Channels at which a rig is cut; of a block with a name its name stands behind it."""
 COMMANDS = ("valve_command", "supply_command")
@@ -52,6 +43,8 @@ class Prepared:
         The same channels as measured, holes bridged.
     noise : dict of str to float
         Standard deviation of each channel's sample noise, quantisation included.
+    settings : DiagnosisSettings
+        What it was made ready by.
     """
 
     recording: Recording
@@ -59,6 +52,7 @@ class Prepared:
     signals: dict[str, tuple[Array, Array]]
     raw: dict[str, Array]
     noise: dict[str, float]
+    settings: DiagnosisSettings
     _begun: dict[tuple[str, tuple[int, ...]], tuple[Array, Array]] = field(repr=False, default_factory=dict)
 
     @property
@@ -75,9 +69,10 @@ class Prepared:
         """Rows at which every drive was measured: holes of up to three samples are bridged, longer ones are cut out
         together with what the smoothing carries over their edges.
         """
-        reach = round(0.5 * SMOOTHING_TIME / self.dt)
+        settings = self.settings.prepare
+        reach = round(0.5 * settings.smoothing_time / self.dt)
         out = np.ones(self.n, dtype=bool)
-        for a, b in _long_holes(self.recording.valid(*drives)) if drives else []:
+        for a, b in _long_holes(self.recording.valid(*drives), settings.bridged_samples) if drives else []:
             out[max(0, a - reach) : b + reach] = False
         return out
 
@@ -97,10 +92,11 @@ class Prepared:
         did not have slides from where it stood. At a start the longest stretch counts to which a cubic still fits but for the noise.
         """
         key = (channel, tuple(starts))
+        settings = self.settings.prepare
         if key not in self._begun:
             value, slope = (array.copy() for array in self.signals[channel])
             for at in starts:
-                state = _state(self.raw[channel], self.recording.mask[channel], self.noise[channel], self.dt, at)
+                state = _state(self.raw[channel], self.recording.mask[channel], self.noise[channel], self.dt, at, settings)
                 if state is not None:
                     value[at], slope[at] = state
             self._begun[key] = value, slope
@@ -121,7 +117,7 @@ class Prepared:
         return rows & self.recording.mask[output]
 
 
-def noise_level(values: Array, mask: Mask) -> float:
+def noise_level(values: Array, mask: Mask, *, seed: int) -> float:
     """Standard deviation of white sample noise, from third differences, robust; at least that of quantisation.
 
     Parameters
@@ -130,6 +126,8 @@ def noise_level(values: Array, mask: Mask) -> float:
         Samples on a uniform grid.
     mask : (n,) bool array
         Which may be used.
+    seed : int
+        Of the dither on a quantised channel.
 
     Returns
     -------
@@ -143,56 +141,59 @@ def noise_level(values: Array, mask: Mask) -> float:
     steps = steps[steps > 1e-12 * max(1e-12, float(np.abs(values[mask]).max()))]
     lattice = float(steps.min()) if steps.size else 0.0
     # the median of differences of whole steps moves by whole steps: as much noise as the lattice brings smears them, and is taken off
-    dithered = values + np.random.default_rng(DITHER).uniform(-0.5, 0.5, values.size) * lattice
+    dithered = values + np.random.default_rng(seed).uniform(-0.5, 0.5, values.size) * lattice
     sigma = 1.4826 * float(np.median(np.abs(np.diff(dithered, 3)[ok]))) / np.sqrt(20.0)
     return float(np.sqrt(max(sigma**2 - lattice**2 / 12.0, lattice**2 / 12.0)))
 
 
-def filter_length(dt: float) -> int:
+def filter_length(dt: float, settings: PrepareSettings) -> int:
     """Samples of the smoothing filter at a sample time [s]: odd, at least seven."""
-    return max(7, round(SMOOTHING_TIME / dt) | 1)
+    return max(7, round(settings.smoothing_time / dt) | 1)
 
 
-def smoothed(values: Array, dt: float) -> tuple[Array, Array]:
+def smoothed(values: Array, dt: float, settings: PrepareSettings) -> tuple[Array, Array]:
     """A channel smoothed by local cubics (Savitzky & Golay 1964), and its time derivative."""
-    length = filter_length(dt)
+    length = filter_length(dt, settings)
     value = savgol_filter(values, length, 3)
     slope = savgol_filter(values, length, 3, deriv=1, delta=dt)
     return np.ascontiguousarray(value), np.ascontiguousarray(slope)
 
 
-def _long_holes(mask: Mask) -> list[tuple[int, int]]:
+def _long_holes(mask: Mask, bridged: int) -> list[tuple[int, int]]:
     """First sample of each hole that is not bridged, and the first after it."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], (~mask).astype(np.int8), [0]])))
-    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a > BRIDGED]
+    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a > bridged]
 
 
-def _state(values: Array, mask: Mask, noise: float, dt: float, at: int) -> tuple[float, float] | None:
+def _state(
+    values: Array, mask: Mask, noise: float, dt: float, at: int, settings: PrepareSettings
+) -> tuple[float, float] | None:
     """Value and slope at a sample by the longest stretch around it, free of long holes, that a cubic fits but for the noise.
 
     From the shortest on, as long as the slope stays within what the shorter one leaves open (Lepski 1991): at the edge of a recording
     a cubic that hardly misses the samples may miss the slope by far. None where no cubic fits.
     """
-    holes = _long_holes(mask)
+    holes, least = _long_holes(mask, settings.bridged_samples), settings.start_least_samples
     first = max((b for _, b in holes if b <= at), default=0)
     last = min((a for a, _ in holes if a >= at), default=values.size)
     state, spread = None, math.inf
-    for reach in sorted({max(round(seconds / dt), LEAST_STRETCH // 2) for seconds in STATE_TIMES}):
+    for reach in sorted({max(round(s / dt), least // 2) for s in settings.start_reaches}):
         # a side that is cut off makes the other longer
         low, high = max(first, at - reach), min(last, at + reach + 1)
         low, high = max(first, min(low, high - 2 * reach - 1)), min(last, max(high, low + 2 * reach + 1))
         rows = low + np.flatnonzero(mask[low:high])
         count = rows.size
-        if count < LEAST_STRETCH:
+        if count < least:
             continue
         powers = np.vander((rows - at) / count, 4, increasing=True)
         inverse = np.linalg.inv(powers.T @ powers)
         found = inverse @ (powers.T @ values[rows])
         left = values[rows] - powers @ found
         slope = float(found[1]) / (count * dt)
-        scatters = LONGER if state is not None else FIRST
-        rough = float(left @ left) > (MISSED + scatters * math.sqrt(2.0 / (count - 4))) * (count - 4) * noise**2
-        if state is not None and (rough or abs(slope - state[1]) > APART * spread):
+        scatters = settings.start_longer_stds if state is not None else settings.start_first_stds
+        most = settings.start_misfit + scatters * math.sqrt(2.0 / (count - 4))
+        rough = float(left @ left) > most * (count - 4) * noise**2
+        if state is not None and (rough or abs(slope - state[1]) > settings.start_slope_stds * spread):
             break
         if not rough:
             state, spread = (float(found[0]), slope), noise * math.sqrt(inverse[1, 1]) / (count * dt)
@@ -204,8 +205,17 @@ def _bridged(values: Array, mask: Mask) -> Array:
     return np.asarray(np.interp(index, index[mask], values[mask]), dtype=np.float64)
 
 
-def prepare(recording: Recording, rig: Rig) -> Prepared:
+def prepare(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Prepared:
     """Smooth the drive signals of a recording and estimate its noise.
+
+    Parameters
+    ----------
+    recording : Recording
+        As loaded.
+    rig : Rig
+        Nominal model.
+    settings : DiagnosisSettings
+        How it is made ready.
 
     Raises
     ------
@@ -218,10 +228,11 @@ def prepare(recording: Recording, rig: Rig) -> Prepared:
             f"recording {recording.name!r} has no channel {' or '.join(wanted)}, without which no block can be cut out; "
             f"it has: {', '.join(recording.channels)}"
         )
-    length = filter_length(recording.sample_time)
-    if len(recording) < max(32, length):
+    own = settings.prepare
+    length = max(own.least_samples, filter_length(recording.sample_time, own))
+    if len(recording) < length:
         raise DiagnosisError(
-            f"recording {recording.name!r} has {len(recording)} samples; at least {max(32, length)} are needed for a diagnosis"
+            f"recording {recording.name!r} has {len(recording)} samples; at least {length} are needed for a diagnosis"
         )
     core = core_rig(rig)
     _check_commands(recording, rig, core.inputs)
@@ -230,15 +241,15 @@ def prepare(recording: Recording, rig: Rig) -> Prepared:
         if channel_of(name) not in DRIVES or name not in recording.channels:
             continue  # what is measured of a block that the rig does not have is left alone
         mask = recording.mask[name]
-        if mask.sum() < max(16, 0.2 * mask.size):
+        if mask.sum() < max(own.least_channel_samples, own.least_channel_share * mask.size):
             raise DiagnosisError(f"recording {recording.name!r}: only {int(mask.sum())} of {mask.size} samples of {name} are usable")
         raw[name] = filled = _bridged(recording.channels[name], mask)
-        signals[name] = smoothed(filled, recording.sample_time)
-        noise[name] = noise_level(recording.channels[name], mask)
+        signals[name] = smoothed(filled, recording.sample_time, own)
+        noise[name] = noise_level(recording.channels[name], mask, seed=settings.seed)
         if noise[name] <= 0:
             noise[name] = max(1e-9, 1e-6 * float(np.ptp(filled)))
     commands = {name: _command(recording, rig, name) for name in core.inputs}
-    return Prepared(recording, commands, signals, raw, noise)
+    return Prepared(recording, commands, signals, raw, noise, settings)
 
 
 def _check_commands(recording: Recording, rig: Rig, inputs: list[str]) -> None:

@@ -6,10 +6,15 @@ import itertools
 import math
 from dataclasses import dataclass, replace
 
-from pamrs.effects import EFFECTS, EffectParameter
+from pamrs.effects import EFFECTS
 from pamrs.rig import Rig
 
-__all__ = ["CHOICES", "RESTRICTIONS", "Start", "starts_of"]
+__all__ = ["CHOSEN", "Start", "starts_of"]
+
+CHOSEN = ("choice", "side")
+"""Roles of parameters that are tried at both ends of their range and not fitted."""
+_TRIED = ("shape", "place", "threshold", "time", "duration")
+"""Roles of parameters that are tried from each of their starts."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +54,7 @@ class Start:
         bounds = {f"{self.effect}.{p.name}": p for p in EFFECTS[self.effect].parameters}
 
         def sized(name: str, value: float) -> float:
-            moved = value / math.sqrt(size) if name in RESTRICTIONS else value * size
+            moved = value / math.sqrt(size) if bounds[name].restricts else value * size
             return min(max(moved, bounds[name].lower), bounds[name].upper)
 
         free = {name: sized(name, value) if name in self.sizes else value for name, value in self.free.items()}
@@ -77,37 +82,17 @@ def starts_of(effect: str, *, sealed: bool) -> list[Start]:
     signed = False
     for parameter in EFFECTS[effect].parameters:
         name = f"{effect}.{parameter.name}"
-        role = "size" if name in RESTRICTIONS else _role(parameter, sealed=sealed)
+        role = parameter.role_in(sealed=sealed)
         if role == "size":
             sizes[name] = next((value for value in parameter.starts if value != 0.0), parameter.default)
             signed = signed or parameter.lower < 0.0
-        elif role == "shape":
+        elif role in _TRIED:
             shapes.append([(name, value) for value in parameter.starts])
         else:
-            held.append([(name, value) for value in ((parameter.lower, parameter.upper) if role == "choice" else (parameter.default,))])
+            ends = (parameter.lower, parameter.upper) if role in CHOSEN else (parameter.default,)
+            held.append([(name, value) for value in ends])
     return [
         Start(effect, sizes | dict(shape), dict(fixed), tuple(sizes), signed)
         for shape in itertools.product(*shapes)
         for fixed in itertools.product(*held)
     ]
-
-
-RESTRICTIONS = frozenset({"tube_flow_restriction.conductance"})
-"""Sizes that take the less effect the larger they are: a pressure loss goes with their inverse square."""
-CHOICES = frozenset({"laminar_share", "angle_share", "side", "tap"})
-"""Parameters that are tried at both ends of their range and not fitted."""
-_SHARES = frozenset({"share"})
-_STARTS = frozenset({"initial_temperature_rise"})
-
-
-def _role(parameter: EffectParameter, *, sealed: bool) -> str:
-    """What a parameter is to a fit: a size, a shape, a choice of two, or held."""
-    if parameter.name.endswith(("_2", "_3")) or parameter.name == "rise":  # more of the same: what a recording holds, see events.py
-        return "held"
-    if parameter.name in CHOICES:
-        return "choice"
-    if parameter.name in _SHARES:  # of a sealed hold nothing but the relaxation is seen
-        return "held" if sealed else "size"
-    if parameter.name in _STARTS:  # only a sealed hold can tell it
-        return "size" if sealed else "held"
-    return "size" if parameter.neutral == 0.0 else "shape"

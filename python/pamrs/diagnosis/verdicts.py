@@ -12,29 +12,13 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from pamrs.diagnosis.candidates import Candidate, Group, significant
-from pamrs.diagnosis.wrong_parameters import AT_WALL
+from pamrs.diagnosis.settings import DiagnosisSettings, VerdictSettings
 
 __all__ = ["Judged", "case_ambiguity", "case_probabilities", "case_verdict", "is_parameter", "judge", "symptoms_of"]
 
 HEALTHY = ("none", "parameters")
 WITHOUT_NAME = (*HEALTHY, "unlisted")
 """Hypotheses that name nothing."""
-SHARED = 6.0
-"""Odds of one effect that acts in two groups to two effects."""
-SETTLED, IN_SET = 0.9, 0.05
-"""Probability from which an answer counts as settled, and from which a hypothesis belongs to the set that is left."""
-NAMED = 0.5
-"""Probability above which a name is given even where ``unlisted`` is more probable than each set of names that has it."""
-LISTED, COUNTED = 1e-4, 1e-6
-"""Probability from which a case lists a set of names (most products of what several blocks leave open are next to nothing), and from
-which a hypothesis of one group is put beside those of the others."""
-MOST_SETS = 8
-"""Sets that a case lists."""
-QUIET = {"parameters": 0.96, "none": 0.03, "unlisted": 0.01}
-"""Probabilities of a group that keeps nothing, its parameters having moved; where they have not, ``none`` and ``parameters`` change
-places."""
-STRAINED = {"parameters": 0.75, "unlisted": 0.25}
-"""The same where a parameter stands at its wall: everything is explained, at a price that the rig's owner would not have believed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,43 +66,47 @@ def is_parameter(name: str) -> bool:
     return "." in name
 
 
-def symptoms_of(group: Group) -> dict[str, float]:
+def symptoms_of(group: Group, settings: DiagnosisSettings) -> dict[str, float]:
     """Parameters that the refit without effects moved to their wall, and how far [tolerances]."""
-    return {name: moved for name, moved in group.candidates[0].fit.moved.items() if abs(moved) >= AT_WALL}
+    wall = settings.wrong_parameters.wall_tolerances
+    return {name: moved for name, moved in group.candidates[0].fit.moved.items() if abs(moved) >= wall}
 
 
-def _own(group: Group) -> dict[str, float]:
+def _own(group: Group, settings: DiagnosisSettings) -> dict[str, float]:
     """Probabilities of one group by itself; what stands under ``""`` is shared out between nothing and parameters that moved."""
     found = {key: p for key, p in group.probabilities.items() if key}
     unchanged = group.probabilities.get("", 0.0)
     shifted = bool(group.instead) or any(significant(e) for e in group.nominal.values())
     explained = any(c.wrong for c in group.candidates)
-    quiet = dict(QUIET)
-    if symptoms_of(group) and group.mismatch is None and not explained:
-        quiet = dict(STRAINED)
+    own = settings.verdict
+    quiet = {"parameters": own.quiet_likely, "none": own.quiet_other, "unlisted": own.quiet_unlisted}
+    if symptoms_of(group, settings) and group.mismatch is None and not explained:
+        quiet = {"parameters": own.strained_parameters, "unlisted": own.strained_unlisted}
     elif not shifted:
-        quiet |= {"none": QUIET["parameters"], "parameters": QUIET["none"]}
+        quiet |= {"none": own.quiet_likely, "parameters": own.quiet_other}
     for name, share in quiet.items():
         found[name] = found.get(name, 0.0) + unchanged * share
-    return {key: p for key, p in found.items() if p >= COUNTED or key in WITHOUT_NAME}
+    return {key: p for key, p in found.items() if p >= own.counted or key in WITHOUT_NAME}
 
 
-def judge(groups: Sequence[Group]) -> list[Judged]:
+def judge(groups: Sequence[Group], settings: DiagnosisSettings) -> list[Judged]:
     """The verdict of every group, an effect that acts in several being judged once.
 
     Parameters
     ----------
     groups : sequence of Group
         Examined, each by itself.
+    settings : DiagnosisSettings
+        Odds of what is shared, probabilities from which something is named or left open.
     """
-    own = [_own(group) for group in groups]
+    own = [_own(group, settings) for group in groups]
     beside: list[dict[str, float]] = [{} for _ in groups]
     for choice in itertools.product(*(p.items() for p in own)):
         effects = [n for key, _ in choice for n in key.split("+") if n not in WITHOUT_NAME]
-        weight = math.prod(p for _, p in choice) * SHARED ** (len(effects) - len(set(effects)))
+        weight = math.prod(p for _, p in choice) * settings.verdict.shared_odds ** (len(effects) - len(set(effects)))
         for found, (key, _) in zip(beside, choice, strict=True):
             found[key] = found.get(key, 0.0) + weight
-    return [_judged(group, _normalised(found)) for group, found in zip(groups, beside, strict=True)]
+    return [_judged(group, _normalised(found), settings.verdict) for group, found in zip(groups, beside, strict=True)]
 
 
 def _normalised(weights: dict[str, float]) -> dict[str, float]:
@@ -126,30 +114,30 @@ def _normalised(weights: dict[str, float]) -> dict[str, float]:
     return dict(sorted(((key, w / total) for key, w in weights.items()), key=lambda kv: -kv[1]))
 
 
-def _judged(group: Group, probabilities: dict[str, float]) -> Judged:
+def _judged(group: Group, probabilities: dict[str, float], settings: VerdictSettings) -> Judged:
     """The verdict: that of the most probable hypothesis; without a name only if no single name is more probable than not."""
     start = group.candidates[0]
     names = {key: p for key, p in probabilities.items() if key not in WITHOUT_NAME}
     healthy = max(HEALTHY, key=lambda key: probabilities.get(key, 0.0))
     without = probabilities.get("unlisted", 0.0)
     best = max(names, key=lambda key: names[key], default="")
-    ambiguity = _sets(probabilities)
+    ambiguity = _sets(probabilities, settings)
     if probabilities.get(healthy, 0.0) >= max(without, names.get(best, 0.0)):
         return Judged(group, healthy, probabilities, ambiguity, start)
     marginal = {name: sum(p for key, p in names.items() if name in key.split("+")) for name in _names(names)}
-    if names.get(best, 0.0) <= without and max(marginal.values(), default=0.0) <= NAMED:
+    if names.get(best, 0.0) <= without and max(marginal.values(), default=0.0) <= settings.named:
         return Judged(group, "unlisted", probabilities, ambiguity, start)
     chosen = next(c for c in group.candidates if c.key == best)
     return Judged(group, "effects" if chosen.effects else "parameters", probabilities, ambiguity, chosen)
 
 
-def _sets(probabilities: dict[str, float]) -> list[list[str]]:
+def _sets(probabilities: dict[str, float], settings: VerdictSettings) -> list[list[str]]:
     """Hypotheses that are left, the most probable first; none where one is settled, ``none`` and ``parameters`` being one answer."""
     healthy = sum(probabilities.get(key, 0.0) for key in HEALTHY)
     others = [p for key, p in probabilities.items() if key not in HEALTHY]
-    if max(healthy, *others, 0.0) >= SETTLED:
+    if max(healthy, *others, 0.0) >= settings.settled:
         return []
-    found = [sorted(key.split("+")) for key, p in probabilities.items() if p >= IN_SET]
+    found = [sorted(key.split("+")) for key, p in probabilities.items() if p >= settings.in_set]
     return found if len(found) > 1 else []
 
 
@@ -161,7 +149,7 @@ def case_verdict(judged: Sequence[Judged]) -> str:
     return next((verdict for verdict in ("unlisted", "parameters") if verdict in found), "none")
 
 
-def case_probabilities(judged: Sequence[Judged]) -> dict[str, float]:
+def case_probabilities(judged: Sequence[Judged], settings: VerdictSettings) -> dict[str, float]:
     """Probabilities of what a case may be told to have: the names of all its blocks together.
 
     ``unlisted`` is that something is missing and nothing has a name. What one block keeps without a name takes nothing from a name in
@@ -174,10 +162,10 @@ def case_probabilities(judged: Sequence[Judged]) -> dict[str, float]:
         rest = next((key for key in ("unlisted", "parameters") if key in keys), "none")
         key = "+".join(names) or rest
         found[key] = found.get(key, 0.0) + math.prod(p for _, p in choice)
-    return _normalised({key: p for key, p in found.items() if p >= LISTED or key in WITHOUT_NAME})
+    return _normalised({key: p for key, p in found.items() if p >= settings.listed or key in WITHOUT_NAME})
 
 
-def case_ambiguity(judged: Sequence[Judged]) -> list[list[str]]:
+def case_ambiguity(judged: Sequence[Judged], settings: VerdictSettings) -> list[list[str]]:
     """Sets of names that a case leaves open: the open sets of its blocks, each beside what is settled in the others."""
     if not any(j.ambiguity for j in judged):
         return []
@@ -191,7 +179,7 @@ def case_ambiguity(judged: Sequence[Judged]) -> list[list[str]]:
         entry = [*_names(flat), *([rest] if rest == "unlisted" or (rest and not _names(flat)) else [])]
         if entry and entry not in found:
             found.append(entry)
-    return found[:MOST_SETS] if len(found) > 1 else []
+    return found[: settings.most_sets] if len(found) > 1 else []
 
 
 def _names(keys: Iterable[str]) -> list[str]:

@@ -12,12 +12,11 @@ from pamrs.diagnosis.blocks import Block
 from pamrs.diagnosis.candidates import Candidate, significant
 from pamrs.diagnosis.evidence import Excess
 from pamrs.diagnosis.fitting import Problem
-from pamrs.effects import EFFECTS
+from pamrs.diagnosis.settings import DiagnosisSettings, EvidenceSettings
+from pamrs.effects import EFFECTS, find_parameter
 from pamrs.effects import SameData
 
 __all__ = [
-    "FORM",
-    "STANDING",
     "believed",
     "doubt",
     "explains",
@@ -31,63 +30,39 @@ __all__ = [
     "weigh",
 ]
 
-EVEN, EVEN_PLIABLE, SOFTNESS = 0.5, 2.6, 0.4
-"""Logarithm of the odds of explained to unexplained variance at which a set is named at even odds with ``unlisted`` (pushes, and
-parameters of the baseline, which take up a good part of anything, need more), and its width."""
-LOOKS, PRICE, SECOND, FILE = 12.0, 0.5, 3.0, 1.5
-"""Independent looks that a block's residual counts for, price of a parameter, of a further effect or wrong parameter, and of a rig file
-that is wrong about a parameter (more, but less and less so, the further outside its tolerances it is)."""
-TELLING = 0.5
-"""Excess variance, in units of the floor's, from which recordings are asked how much an effect leaves; those with most always are."""
-CLEARLY = 0.7
-"""Share left of a mismatch that is hardly one below which a set still explains it."""
-FORM, FINE = 0.04, 0.01
-"""Share of a mismatch's variance that the difference between a catalogue's equation and the truth may leave; share that is granted
-where sets of as many effects are compared, since what a further effect would mend is then no question."""
-DRIFT_SHARE, DRIFT_BELIEVED = 0.02, 0.45
-"""Share of the pressure below which a drift that no other recording confirms may as well be the bench's own, and how far a name of it
-is believed at most."""
-BELIEVED = 0.985
-"""How far a name is believed at most."""
-STANDING, UNSEEN = 2.0, 3.0
-"""Price of a clock that is late but does not drift; recordings' lengths beyond which a time constant was not seen."""
-ALIKE, UNTOLD = 0.1, 2.0
-"""Part of an effect's size over a recording, and standard deviations, below which what would tell it from another effect is zero."""
-HERTZ, ROUND = 1.5, 0.25
-"""Exponent of the contact of round bodies, and how far that of muscles is believed to be from it."""
-WRONG, FLOORS, DECIDED = 0.15, 0.06, 8.0
-"""Standard deviations of what a right effect of another form leaves of a mismatch's variance, and of a floor; the most that what is
-left in one block and stage counts."""
-OUTSIDE, IMPLAUSIBLE = 3.0, 4.0
-"""Factor by which a value is one standard deviation outside the usual range, and the most that it costs."""
-NEAR_END, WIDE = 0.5, 0.15
-"""Share of the angles visited over which a stop may act, and how far beyond it costs a standard deviation."""
-CONSTANCY = 0.35
-"""Relative scatter of an effect's size between recordings beyond which it is not that effect."""
+
+Ranges = dict[str, tuple[float, float]]
+"""What was visited, by kind of channel [SI]."""
 
 
-def visited(problem: Problem) -> tuple[float, float] | None:
-    """Range of the angle of a rig's only joint [rad]; None where no block is a joint's, or several are."""
-    arms = [b for b in problem.blocks if channel_of(b.channel) == "joint_angle"]
-    if len(arms) != 1:
-        return None
-    angles = [p.signals[arms[0].channel][0] for p in problem.recordings]
-    return min(float(a.min()) for a in angles), max(float(a.max()) for a in angles)
+def visited(problem: Problem) -> Ranges:
+    """Range of each kind of channel that is the output of one block alone: the angle of a rig's only joint."""
+    channels: dict[str, list[str]] = {}
+    for block in problem.blocks:
+        channels.setdefault(channel_of(block.channel), []).append(block.channel)
+    found = {}
+    for kind, names in channels.items():
+        if len(names) == 1:
+            values = [p.signals[names[0]][0] for p in problem.recordings]
+            found[kind] = min(float(v.min()) for v in values), max(float(v.max()) for v in values)
+    return found
 
 
-def most_believed(fitted: Problem, held: Problem, mismatch: Block, left: float) -> float:
+def most_believed(fitted: Problem, mismatch: Block, left: float, *, same: bool) -> float:
     """How far any name is believed at most, which is less where the proof is weak.
 
     A slow drift of less than two percent of the pressure, with no held-out recording, may as well be the bench's own loss,
-    creep of a wall or the transducer's drift.
+    creep of a wall or the transducer's drift. ``same`` says that nothing is held out, ``left`` what the refit leaves of the channel.
     """
-    if held is not fitted or mismatch.channel != "muscle_pressure":
-        return BELIEVED
+    settings = fitted.settings.evidence
+    if not same or mismatch.channel != "muscle_pressure":
+        return settings.most_probability
     typical = np.mean([np.mean(np.abs(p.signals["muscle_pressure"][0])) for p in fitted.recordings])
-    return DRIFT_BELIEVED if left < DRIFT_SHARE * float(typical) else BELIEVED
+    drifts = left < settings.drift_share * float(typical)
+    return settings.drift_probability if drifts else settings.most_probability
 
 
-def share_left(candidate: Candidate, baseline: Candidate, suspects: list[Block]) -> float:
+def share_left(candidate: Candidate, baseline: Candidate, suspects: list[Block], settings: EvidenceSettings) -> float:
     """Share of the baseline's excess variance that a set of effects leaves, the larger of fitted and held-out recordings.
 
     Recordings that hardly show the mismatch cannot say how much of it is left; what an effect brings into them, beyond what noise
@@ -95,9 +70,10 @@ def share_left(candidate: Candidate, baseline: Candidate, suspects: list[Block])
     """
     found = _excesses(candidate, baseline, suspects)
     most = max(before for before, _ in found)
-    asked = min(TELLING, 0.9 * most)
+    telling = settings.telling_excess
+    asked = min(telling, settings.telling_share * most)
     shares = [after / before for before, after in found if before > asked]
-    shares += [(after - TELLING) / max(most, TELLING) for before, after in found if before <= asked and after > TELLING]
+    shares += [(after - telling) / max(most, telling) for before, after in found if before <= asked and after > telling]
     return max(shares, default=1.0)
 
 
@@ -110,11 +86,11 @@ def _excesses(candidate: Candidate, baseline: Candidate, suspects: list[Block]) 
     return [(over(baseline.fitted), over(candidate.fitted)), (over(baseline.held_out), over(candidate.held_out))]
 
 
-def explains(candidate: Candidate, baseline: Candidate, suspects: list[Block]) -> bool:
+def explains(candidate: Candidate, baseline: Candidate, suspects: list[Block], settings: EvidenceSettings) -> bool:
     """Whether only noise is left, fitted and held out, where there was clearly more."""
     quiet = not any(significant(e[b.name]) for b in suspects for e in (candidate.fitted, candidate.held_out))
     before, after = max(_excesses(candidate, baseline, suspects))
-    return quiet and after < CLEARLY * before
+    return quiet and after < settings.clear_share * before
 
 
 def weigh(
@@ -122,36 +98,42 @@ def weigh(
     suspects: list[Block],
     most: float,
     seconds: float,
-    ranging: tuple[float, float] | None = None,
+    settings: DiagnosisSettings,
+    ranging: Ranges | None = None,
     own: Mapping[Candidate, list[Block]] | None = None,
 ) -> dict[str, float]:
     """Probabilities over sets of effects and ``unlisted``.
 
     Between sets: the logarithm of what each leaves of the mismatch, fitted and held out, on a nominal number of independent looks;
-    what the form of an equation may leave (``FORM``) is granted to all of them, so that no second effect is asked for to mend the
-    form of the first; among sets of as many effects less is granted (``FINE``). What is left of a faint mismatch counts by what noise
+    what the form of an equation may leave (``form_share`` of the settings) is granted to all of them, so that no second effect is
+    asked for to mend the form of the first; among sets of as many effects less is granted (``form_share_alike``). What is left of a faint mismatch counts by what noise
     could leave of it. Each parameter and each further effect has its price, and so have a clock that does not drift and values that an
     effect hardly has (:func:`unlikely`). Against ``unlisted``: the share of the mismatch that the set explains where it explains least,
     and whether its size is the same in all recordings; sets that are not believed themselves say nothing against one that is. The
     constants are those under which the stated probabilities came true in a trial with other seeds than the published one
     (docs/decisions/0014).
 
-    ``seconds`` is the length of the longest recording that was fitted, ``ranging`` the range of a joint's angle in them [rad], ``own``
-    the blocks in which each set is judged against ``unlisted``, where these are not all the suspects.
+    ``seconds`` is the length of the longest recording that was fitted, ``ranging`` what was visited in them, ``own`` the blocks in which each set is judged against ``unlisted``, where these are not all the suspects.
     """
     named = [c for c in candidates if c.names]
     if not named:
         return {"unlisted": 1.0}
     start = candidates[0]
-    trusted = {c: _trusted(c, start, suspects if own is None else own[c], most, seconds) for c in named}
+    evidence = settings.evidence
+    trusted = {c: _trusted(c, start, suspects if own is None else own[c], most, seconds, evidence) for c in named}
 
     def weights_of(granted: float) -> dict[Candidate, float]:
-        scores = {c: _score(c, start, suspects, granted) - STANDING * stands(c, seconds) - unlikely(c, ranging) for c in named}
-        scores = _beside_values(scores)
+        scores = {
+            c: _score(c, start, suspects, granted, settings)
+            - evidence.standing_price * stands(c, seconds)
+            - unlikely(c, ranging or {}, evidence)
+            for c in named
+        }
+        scores = _beside_values(scores, evidence)
         top = max(scores.values())
         return {c: trusted[c] * math.exp(max(-60.0, s - top)) for c, s in scores.items()}
 
-    coarse, fine = weights_of(FORM), weights_of(FINE)
+    coarse, fine = weights_of(evidence.form_share), weights_of(evidence.form_share_alike)
     weights: dict[Candidate, float] = {}
     for count in {len(c.names) for c in named}:
         alike = [c for c in named if len(c.names) == count]
@@ -161,28 +143,38 @@ def weigh(
     out: dict[str, float] = {}
     for c, weight in weights.items():
         out[c.key] = out.get(c.key, 0.0) + weight / total * trusted[c]
-    _shared_out(out, named, start, suspects, seconds)
+    _shared_out(out, named, start, suspects, seconds, evidence)
     out["unlisted"] = max(0.0, 1.0 - sum(out.values()))
     return out
 
 
-def _shared_out(out: dict[str, float], named: list[Candidate], start: Candidate, suspects: list[Block], seconds: float) -> None:
+def _shared_out(
+    out: dict[str, float],
+    named: list[Candidate],
+    start: Candidate,
+    suspects: list[Block],
+    seconds: float,
+    settings: EvidenceSettings,
+) -> None:
     """Share probabilities out between sets that are the same data, by the odds before any data."""
     for one in named:
         for effect in one.effects:
             same = EFFECTS[effect].same_data
-            if same is None or not same_recordings(one, effect, seconds):
+            if same is None or not same_recordings(one, effect, seconds, settings):
                 continue
             names = {same.effect if e == effect else e for e in one.effects}
             other = next((c for c in named if set(c.effects) == names and not c.wrong), None)
             # what explains more than the other could is something else as well
-            if other is None or share_left(one, start, suspects) > share_left(other, start, suspects) + FINE:
+            if other is None:
                 continue
-            both, odds = out.get(one.key, 0.0) + out.get(other.key, 0.0), math.exp(STANDING)
+            left, beside = (share_left(c, start, suspects, settings) for c in (one, other))
+            if left > beside + settings.form_share_alike:
+                continue
+            both, odds = out.get(one.key, 0.0) + out.get(other.key, 0.0), math.exp(settings.standing_price)
             out[one.key], out[other.key] = both / (1.0 + odds), both * odds / (1.0 + odds)
 
 
-def same_recordings(candidate: Candidate, effect: str, seconds: float) -> bool:
+def same_recordings(candidate: Candidate, effect: str, seconds: float, settings: EvidenceSettings) -> bool:
     """Whether an effect of a set leaves the very recordings that another effect of the catalogue would leave."""
     same = EFFECTS[effect].same_data
     if same is None:
@@ -191,11 +183,11 @@ def same_recordings(candidate: Candidate, effect: str, seconds: float) -> bool:
     if not own:
         return False
     telling, spread = own[same.without] * seconds, candidate.fit.std.get(f"{effect}.{same.without}", 0.0) * seconds
-    at_rest = abs(telling) < max(ALIKE * abs(own[same.size]), UNTOLD * spread)
+    at_rest = abs(telling) < max(settings.same_share * abs(own[same.size]), settings.same_stds * spread)
     return bool(own[same.size] > 0.0 and at_rest and all(own[name] == value for name, value in same.held))
 
 
-def _beside_values(scores: dict[Candidate, float]) -> dict[Candidate, float]:
+def _beside_values(scores: dict[Candidate, float], settings: EvidenceSettings) -> dict[Candidate, float]:
     """Scores of effects and of wrong values made comparable: what the priors of the other parameters lose counts between the two.
 
     A value that is wrong lets the others go back to where they were expected; sets of effects keep their order among each other,
@@ -204,23 +196,36 @@ def _beside_values(scores: dict[Candidate, float]) -> dict[Candidate, float]:
     if not any(c.wrong for c in scores):
         return scores
     effects = [c for c in scores if not c.wrong]
-    shared = strained(max(effects, key=lambda c: scores[c])) if effects else 0.0
-    return {c: score - (strained(c) if c.wrong else shared) for c, score in scores.items()}
+    shared = strained(max(effects, key=lambda c: scores[c]), settings) if effects else 0.0
+    return {c: score - (strained(c, settings) if c.wrong else shared) for c, score in scores.items()}
 
 
-def strained(candidate: Candidate) -> float:
+def strained(candidate: Candidate, settings: EvidenceSettings) -> float:
     """Half of the sum of squares of the priors of a hypothesis, as far as it counts."""
-    return min(0.5 * candidate.fit.strain, DECIDED)
+    return min(0.5 * candidate.fit.strain, settings.decided)
 
 
-def _trusted(candidate: Candidate, baseline: Candidate, suspects: list[Block], most: float, seconds: float) -> float:
+def _trusted(
+    candidate: Candidate,
+    baseline: Candidate,
+    suspects: list[Block],
+    most: float,
+    seconds: float,
+    settings: EvidenceSettings,
+) -> float:
     """Probability of a set against ``unlisted``."""
-    left = min(max(share_left(candidate, baseline, suspects), 1e-6), 1.0 - 1e-6)
-    pliable = candidate.wrong or "external_torque" in candidate.effects
-    odds = (math.log((1.0 - left) / left) - (EVEN_PLIABLE if pliable else EVEN)) / SOFTNESS
-    if explains(candidate, baseline, suspects):
-        odds = max(odds, 3.0)
-    return believed(odds - doubt(candidate, seconds), most)
+    left = min(max(share_left(candidate, baseline, suspects, settings), 1e-6), 1.0 - 1e-6)
+    even = settings.log_odds_explained_pliable if _pliable(candidate) else settings.log_odds_explained
+    odds = (math.log((1.0 - left) / left) - even) / settings.softness
+    if explains(candidate, baseline, suspects, settings):
+        odds = max(odds, settings.log_odds_noise_left)
+    return believed(odds - doubt(candidate, seconds, settings), most)
+
+
+def _pliable(candidate: Candidate) -> bool:
+    """Whether it takes up a good part of anything: values of the baseline, and what happens differently in every recording."""
+    free = (EFFECTS[effect] for effect in candidate.effects if EFFECTS[effect].transient)
+    return bool(candidate.wrong) or any(not info.leading.same_everywhere for info in free)
 
 
 def believed(odds: float, most: float) -> float:
@@ -228,10 +233,17 @@ def believed(odds: float, most: float) -> float:
     return most / (1.0 + math.exp(-min(60.0, max(-60.0, odds))))
 
 
-def doubt(candidate: Candidate, seconds: float) -> float:
-    """What a set's values take from the logarithm of its odds: a size that scatters between recordings, creep that was not seen."""
-    unseen = candidate.fit.values.get("muscle_creep.time_constant", 0.0) > UNSEEN * seconds
-    return max(0.0, candidate.scatter - CONSTANCY) / 0.1 + (5.0 if unseen else 0.0)
+def doubt(candidate: Candidate, seconds: float, settings: EvidenceSettings) -> float:
+    """What a set's values take from the logarithm of its odds: a size that scatters between recordings, a time that was not seen."""
+    times = (value for name, value in _effect_values(candidate) if find_parameter(name).time_constant)
+    unseen = any(value > settings.unseen_lengths * seconds for value in times)
+    scatter = max(0.0, candidate.scatter - settings.scatter) / settings.scatter_width
+    return scatter + (settings.unseen_price if unseen else 0.0)
+
+
+def _effect_values(candidate: Candidate) -> list[tuple[str, float]]:
+    """Fitted parameters of its effects, by dotted name."""
+    return [(n, v) for n, v in candidate.fit.values.items() if n.partition(".")[0] in EFFECTS]
 
 
 def stands(candidate: Candidate, seconds: float) -> bool:
@@ -245,43 +257,65 @@ def stands(candidate: Candidate, seconds: float) -> bool:
     return any(at_rest(effect, same) for effect, same in known if same is not None)
 
 
-def unlikely(candidate: Candidate, ranging: tuple[float, float] | None) -> float:
+def unlikely(candidate: Candidate, ranging: Ranges, settings: EvidenceSettings) -> float:
     """What a set loses by values that its physics hardly has.
 
-    Swollen muscles are round, and press like round bodies (Hertz); an end stop is met near an end of the motion, and what acts over
-    most of the range is none; other parameters lose by how many times they are outside the range of usual values, for certain.
+    A parameter with a prior loses by its distance from it; a contact is met near an end of the motion, and what acts over most of the
+    range is none; other parameters lose by how many times they are outside the range of usual values, for certain.
     """
-    lost = 0.5 * ((candidate.fit.values.get("pam_crowding_contact.exponent", HERTZ) - HERTZ) / ROUND) ** 2
-    stop = next((e["parameters"] for e in candidate.fit.rig.effects if e["id"] == "joint_end_stop"), None)
-    if stop is not None and ranging is not None and ranging[1] > ranging[0]:
-        inside = (stop["angle"] - ranging[0]) / (ranging[1] - ranging[0])
-        touched = 1.0 - inside if stop["side"] >= 0.0 else inside
-        lost += min(0.5 * (max(0.0, touched - NEAR_END) / WIDE) ** 2, IMPLAUSIBLE)
-    for name, value in candidate.fit.values.items():
-        effect, _, own = name.partition(".")
-        known = next((p for p in EFFECTS[effect].parameters if p.name == own), None) if effect in EFFECTS else None
-        if known is not None and known.expected is not None:
-            (low, high), wide = known.expected, 2.0 * candidate.fit.std.get(name, 0.0)
-            outside = math.log(max(low / max(value + wide, 1e-300), (value - wide) / high, 1.0)) / math.log(OUTSIDE)
-            lost += min(0.5 * outside**2, IMPLAUSIBLE)
+    lost = 0.0
+    for name, value in _effect_values(candidate):
+        prior = find_parameter(name).prior
+        if prior is not None:
+            lost += 0.5 * ((value - prior[0]) / prior[1]) ** 2
+    for effect in candidate.fit.rig.effects:
+        lost += _contact_price(effect["id"], effect["parameters"], ranging, settings)
+    for name, value in _effect_values(candidate):
+        expected = find_parameter(name).expected
+        if expected is not None:
+            (low, high), wide = expected, 2.0 * candidate.fit.std.get(name, 0.0)
+            times = max(low / max(value + wide, 1e-300), (value - wide) / high, 1.0)
+            outside = math.log(times) / math.log(settings.range_factor)
+            lost += min(0.5 * outside**2, settings.most_range_price)
     return lost
 
 
-def _score(candidate: Candidate, baseline: Candidate, suspects: list[Block], share: float) -> float:
+def _contact_price(effect: str, values: Mapping[str, float], ranging: Ranges, settings: EvidenceSettings) -> float:
+    """What an effect loses by a contact that is met in the middle of the motion."""
+    lost = 0.0
+    for place in EFFECTS[effect].with_role("place"):
+        low, high = ranging.get(place.channel, (0.0, 0.0))
+        if high > low:
+            inside = (values[place.name] - low) / (high - low)
+            above = all(values[side.name] >= 0.0 for side in EFFECTS[effect].with_role("side"))
+            touched = 1.0 - inside if above else inside
+            beyond = max(0.0, touched - settings.contact_share) / settings.contact_width
+            lost += min(0.5 * beyond**2, settings.most_range_price)
+    return lost
+
+
+def _score(
+    candidate: Candidate,
+    baseline: Candidate,
+    suspects: list[Block],
+    share: float,
+    settings: DiagnosisSettings,
+) -> float:
     """Logarithm of the weight of a set of effects, up to a constant; ``share`` of the mismatch is granted to the forms of equations."""
-    total = 0.0
+    total, evidence = 0.0, settings.evidence
     once = candidate.fitted == candidate.held_out  # the same recordings twice
     for was, now in ((baseline.fitted, candidate.fitted), (baseline.held_out, candidate.held_out)):
         for block in suspects:
             excess, left = (max(0.0, e[block.name].ratio - 1.0) for e in (was, now))
-            total -= 0.25 * LOOKS * math.log(1.0 + left + share * excess)
+            total -= 0.25 * evidence.looks * math.log(1.0 + left + share * excess)
             # of a faint mismatch the noise says how much may be left, of a strong one the forms
-            spread = math.hypot(now[block.name].scatter, WRONG * excess, FLOORS)
-            total -= min(0.5 * (left / spread) ** 2, DECIDED) * (0.5 if once else 1.0)
-    return total - price(candidate) - SECOND * (len(candidate.names) - 1)
+            spread = math.hypot(now[block.name].scatter, evidence.form_error * excess, evidence.noise_error)
+            total -= min(0.5 * (left / spread) ** 2, evidence.decided) * (0.5 if once else 1.0)
+    return total - price(candidate, settings) - evidence.further_price * (len(candidate.names) - 1)
 
 
-def price(candidate: Candidate) -> float:
+def price(candidate: Candidate, settings: DiagnosisSettings) -> float:
     """What a set pays for the parameters of its effects (of events of one kind only the first counts) and for a file that is wrong."""
-    own = FILE * len(candidate.wrong) + candidate.outside
-    return own + PRICE * sum(1 for n in candidate.fit.values if n.partition(".")[0] in EFFECTS and not n.endswith(("_2", "_3")))
+    own = settings.evidence.wrong_price * len(candidate.wrong) + candidate.outside(settings.fit.most_tolerances)
+    counted = [n for n, _ in _effect_values(candidate) if not find_parameter(n).repeats]
+    return own + settings.evidence.parameter_price * len(counted)

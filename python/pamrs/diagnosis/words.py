@@ -13,6 +13,7 @@ from pamrs.diagnosis.candidates import Candidate
 from pamrs.diagnosis.conditions import Picture
 from pamrs.diagnosis.fitting import Problem
 from pamrs.diagnosis.result import Diagnosis
+from pamrs.diagnosis.settings import DiagnosisSettings, WarningSettings
 from pamrs.diagnosis.verdicts import Judged, is_parameter, symptoms_of
 from pamrs.effects import CATALOGUE, EFFECTS
 from pamrs.recordings import Case
@@ -29,20 +30,9 @@ def unknown_volumes(rig: Rig) -> list[str]:
     return [name for name in names if not rig.parameter(name).known]
 
 
-_FAR_OFF, _MOVED = 3.0, 2.0
-"""Error in units of the noise, and tolerances of a parameter, from which a model with a named effect is reported with a reservation."""
-_SPOILED = 1.2
-"""Times what the nominal model misses that a new one has to miss to be reported."""
-_MENDED = 0.98
-"""Share of a channel's error from which a wrong value is not said to mend it."""
-_ATMOSPHERE = 0.01
-"""Share of the ambient pressure within which a recording begins at it."""
-_DOUBTED = 0.1
-"""Probability of no mismatch from which the words say so."""
-
-
 def where(located: str | None, problem: Problem, judged: list[Judged], picture: Picture) -> dict[str, Any]:
     """The ``where`` entry: block, channel, intervals, conditions and a sentence."""
+    settings = problem.settings.warnings
     groups = [j.group for j in judged]
     if located is None:
         text = "No block keeps more than its noise after the refit."
@@ -74,7 +64,7 @@ def where(located: str | None, problem: Problem, judged: list[Judged], picture: 
             f"No block keeps more than its noise, but the residual of the {located} block{parts} has the signature of an effect in it, "
             "in held-out recordings too."
         )
-    elif group is not None and group.probabilities.get("", 0.0) > _DOUBTED:
+    elif group is not None and group.probabilities.get("", 0.0) > settings.doubted_probability:
         text = (
             f"The {located} block{parts} keeps hardly more than its noise ({found.systematic:.2g} times it in "
             f"{block.channel.replace('_', ' ')}): its floor may as well have been taken too low."
@@ -84,7 +74,7 @@ def where(located: str | None, problem: Problem, judged: list[Judged], picture: 
             f"Every block fits to its noise, but the {located} block only with a parameter far outside its tolerance "
             "(see the warnings)."
         )
-    telling = [] if faint else [c for c in picture.conditions if c["share"] > 1.15 * c["time"]][:2]
+    telling = [] if faint else [c for c in picture.conditions if c["share"] > settings.telling_condition * c["time"]][:2]
     if telling:
         text += " It is largest under: " + "; ".join(c["text"] for c in telling) + "."
     if picture.intervals and not faint:
@@ -99,7 +89,15 @@ def where(located: str | None, problem: Problem, judged: list[Judged], picture: 
     }
 
 
-def verdict(diagnosis: Diagnosis, case: Case, gap: float | None, forms: list[str], *, sought: bool) -> str:
+def verdict(
+    diagnosis: Diagnosis,
+    case: Case,
+    gap: float | None,
+    forms: list[str],
+    settings: WarningSettings,
+    *,
+    sought: bool,
+) -> str:
     """The verdict in a few sentences; ``forms`` say what a mismatch without a name is a function of, if that was ``sought``."""
     kind = diagnosis.verdict
     missing = [b for b in diagnosis.blocks if b["verdict"] == "unlisted"]
@@ -107,7 +105,7 @@ def verdict(diagnosis: Diagnosis, case: Case, gap: float | None, forms: list[str
         text = "Nothing is missing that these recordings could show: the nominal model predicts every block to its noise."
         return text + _unsettled(diagnosis)
     if kind == "parameters" and diagnosis.wrong_parameters:
-        return _mistaken(diagnosis, case, gap) + _beside(diagnosis, missing, forms, sought=sought)
+        return _mistaken(diagnosis, case, gap, settings) + _beside(diagnosis, missing, forms, sought=sought)
     if kind == "parameters":
         shifted = sorted(diagnosis.parameters.items(), key=lambda kv: -abs(kv[1]["moved_sigmas"]))[:3]
         moved = ", ".join(f"{n} by {p['moved_sigmas']:+.1f} tolerances" for n, p in shifted)
@@ -136,7 +134,7 @@ def verdict(diagnosis: Diagnosis, case: Case, gap: float | None, forms: list[str
             f" With {it}, {100 * gap:.0f} % of the gap between refitted model and noise closes, over all channels, on {_proof(case)}."
         )
     if diagnosis.wrong_parameters:
-        text += " " + _mistaken(diagnosis, case, None)
+        text += " " + _mistaken(diagnosis, case, None, settings)
     if unknown_volumes(case.rig):
         text += (
             " The chamber's volume is not known: what the recording fixes is the time constant (and the conductance per volume); "
@@ -149,11 +147,12 @@ def _proof(case: Case) -> str:
     return "held-out recordings" if case.held_out and case.fit else "the fitted recording (no other was given)"
 
 
-def _mistaken(diagnosis: Diagnosis, case: Case, gap: float | None) -> str:
+def _mistaken(diagnosis: Diagnosis, case: Case, gap: float | None, settings: WarningSettings) -> str:
     """Which values of the rig file are wrong, and what that does to the error."""
     told = []
     for wrong in diagnosis.wrong_parameters:
-        told_by = {channel: e for channel, e in wrong["held_out"].items() if e["after"] < _MENDED * e["refit"]} or wrong["held_out"]
+        mended = {channel: e for channel, e in wrong["held_out"].items() if e["after"] < settings.mended * e["refit"]}
+        told_by = mended or wrong["held_out"]
         errors = "; ".join(
             f"the {channel.replace('_', ' ')} is then missed by {_instead(e['after'], e['refit'], unit_of(channel))}, which values "
             "inside the tolerances leave"
@@ -200,28 +199,21 @@ def _unsettled(diagnosis: Diagnosis) -> str:
     return f" It is not settled: these data do not separate {sets}." if sets else ""
 
 
-_SEPARATE = {
-    "leak_muscle": (
-        "Fill to three pressures, shut the valve and hold each for at least 60 s: a leak keeps falling in proportion to the "
-        "absolute pressure, heat exchange stops within seconds, and a valve null error follows the spool.",
-        {"kind": "sealed_hold", "levels_bar": [2.0, 4.0, 6.0], "hold_s": 60.0},
-    ),
-    "heat_transfer": (
-        "Fill fast by steps of 1:3 in size, shut the valve after each and watch the pressure for 5 s; add a fast thermocouple "
-        "in the chamber if there is one.",
-        {"kind": "step_and_shut", "steps_bar": [1.0, 3.0], "watch_s": 5.0},
-    ),
-    "muscle_hysteresis": (
-        "Drive a slow triangle with nested smaller loops at two speeds a decade apart: hysteresis does not change with speed, creep "
-        "and damping do; repeat with the muscle vented to see joint friction alone.",
-        {"kind": "nested_triangle", "periods_s": [50.0, 5.0], "levels": 4},
-    ),
-    "unlisted": (
-        "Repeat the excitation under which the excess is largest at two speeds and at two payloads: what scales with speed, with "
-        "load or with neither tells the class of the missing effect.",
-        {"kind": "repeat_scaled", "speed_ratio": 10.0, "payloads": 2},
-    ),
-}
+_SCALED = (
+    "Repeat the excitation under which the excess is largest at two speeds and at two payloads: what scales with speed, with "
+    "load or with neither tells the class of the missing effect."
+)
+_SCALED_EXCITATION: dict[str, Any] = {"kind": "repeat_scaled", "speed_ratio": 10.0, "payloads": 2}
+"""What to record of a mismatch without a name."""
+
+
+def _separating(names: Sequence[str]) -> tuple[str, dict[str, Any]]:
+    """What to record for the first of some hypotheses that says it; for what has no name where none does."""
+    told = (EFFECTS[name] for name in names if name in EFFECTS and EFFECTS[name].experiment)
+    info = next(told, None)
+    if info is None or ("unlisted" in names and names.index("unlisted") < names.index(info.id)):
+        return _SCALED, _SCALED_EXCITATION
+    return info.experiment, {key: list(value) if isinstance(value, tuple) else value for key, value in info.excitation}
 
 
 def _capital(text: str) -> str:
@@ -251,7 +243,7 @@ def next_experiment(
     """
     leading = max(probabilities, key=lambda k: probabilities[k])
     if not ambiguity and kind != "unlisted" and missing:
-        text, excitation = _SEPARATE["unlisted"]
+        text, excitation = _SCALED, _SCALED_EXCITATION
         text = f"The name is settled. For what the {' and '.join(missing)} keeps: {text[:1].lower()}{text[1:]}"
         return {"text": text, "excitation": excitation, "expected_information_bits": None}
     if not ambiguity and kind != "unlisted":
@@ -260,7 +252,7 @@ def next_experiment(
     same = same_data(ambiguity)
     if same:
         return {"text": same, "excitation": {}, "expected_information_bits": None}
-    doubted = [k for s in ambiguity for k in s if k in EFFECTS and k not in _SEPARATE]
+    doubted = [k for s in ambiguity for k in s if k in EFFECTS and not EFFECTS[k].experiment]
     parameters = [k for s in ambiguity for k in s if k == "parameters" or is_parameter(k)]
     if parameters and doubted:
         return {"text": _sentence(EFFECTS[doubted[0]].separates), "excitation": {}, "expected_information_bits": None}
@@ -268,8 +260,7 @@ def next_experiment(
     if measurable:
         text = f"Measure {' or '.join(measurable)} by itself (scale, ruler, known volume): these recordings cannot tell which is wrong."
         return {"text": text, "excitation": {}, "expected_information_bits": None}
-    key = next((k for s in [leading.split("+"), *ambiguity] for k in s if k in _SEPARATE), "unlisted")
-    text, excitation = _SEPARATE[key]
+    text, excitation = _separating([k for s in [leading.split("+"), *ambiguity] for k in s])
     if not (rig.tables("valve") or rig.tables("muscle")):
         text = (
             "Repeat the hold at a third of the pressure and with the chamber removed (transducer and fittings alone): a leak of the "
@@ -279,12 +270,12 @@ def next_experiment(
     return {"text": text, "excitation": excitation, "expected_information_bits": None}
 
 
-def warnings(case: Case, judged: list[Judged], no_held_out: bool) -> list[str]:
+def warnings(case: Case, judged: list[Judged], no_held_out: bool, settings: DiagnosisSettings) -> list[str]:
     """What a reader should know about the data and the fit."""
     out = []
     groups = [j.group for j in judged]
     mistaken = any(j.wrong for j in judged)
-    symptoms = {n: v for j in judged if not j.wrong for n, v in symptoms_of(j.group).items()}
+    symptoms = {n: v for j in judged if not j.wrong for n, v in symptoms_of(j.group, settings).items()}
     for recording in case.recordings:
         for issue in recording.issues[:8]:
             when = f"{issue.start:g} to {issue.stop:g} s"
@@ -296,7 +287,7 @@ def warnings(case: Case, judged: list[Judged], no_held_out: bool) -> list[str]:
             if channel_of(channel) not in ("muscle_pressure", "supply_pressure") or not recording.mask[channel].any():
                 continue
             largest = float(np.nanmax(np.abs(values[recording.mask[channel]])))
-            if largest < 1e4:
+            if largest < settings.warnings.least_pressure:
                 out.append(
                     f"{recording.name}: {channel} never exceeds {largest:.3g} Pa gauge, next to nothing for a muscle or a tank: is "
                     "the unit in its header the one its values are in?"
@@ -309,14 +300,14 @@ def warnings(case: Case, judged: list[Judged], no_held_out: bool) -> list[str]:
         out.append(f"there is no held-out recording: the proof is on the fitted data and counts less{how}")
     for group in groups:
         best = group.best
-        if best.effects and best.scatter > 0.35:
+        if best.effects and best.scatter > settings.warnings.scatter:
             out.append(f"the size of {best.key} scatters by {100 * best.scatter:.0f} % between recordings")
     for name in unknown_volumes(case.rig):
         out.append(f"{name} is marked unknown: values that scale with it hold for the placeholder only")
     return out
 
 
-def absolute(case: Case) -> list[str]:
+def absolute(case: Case, settings: WarningSettings) -> list[str]:
     """Muscle pressures that begin at one atmosphere in every recording: they may not be gauge."""
     ambient = float(case.rig.model["gas"]["ambient_pressure"])
     firsts: dict[str, list[float]] = {}
@@ -329,16 +320,16 @@ def absolute(case: Case) -> list[str]:
         f"{channel} begins at {np.mean(begun):.4g} Pa in every recording, one atmosphere (gas.ambient_pressure = {ambient:g} Pa): are "
         "these absolute pressures? Gauge pressures are needed; what is found below may be no more than the difference"
         for channel, begun in firsts.items()
-        if all(abs(first - ambient) < _ATMOSPHERE * ambient for first in begun)
+        if all(abs(first - ambient) < settings.ambient_share * ambient for first in begun)
     ]
 
 
-def worse(table: dict[str, dict[str, float]]) -> list[str]:
+def worse(table: dict[str, dict[str, float]], settings: WarningSettings) -> list[str]:
     """Channels that the model with what was added predicts worse than the nominal one did, or the refitted one."""
     out = []
     for channel, error in table.items():
         better, which = min((error["before"], "nominal"), (error["refit"], "refitted"))
-        if error["after"] > _SPOILED * max(better, error["noise"]):
+        if error["after"] > settings.spoiled * max(better, error["noise"]):
             unit, factor = display_unit(unit_of(channel), error["after"])
             now, was = (format_number(v * factor, 3, unicode=False) for v in (error["after"], better))
             out.append(
@@ -348,7 +339,9 @@ def worse(table: dict[str, dict[str, float]]) -> list[str]:
     return out
 
 
-def reservations(judged: list[Judged], chosen: list[Candidate], table: dict[str, dict[str, float]]) -> list[str]:
+def reservations(
+    judged: list[Judged], chosen: list[Candidate], table: dict[str, dict[str, float]], settings: WarningSettings
+) -> list[str]:
     """What a reader should know of a model with a name: what it still misses where it acts, and values that it had to move far."""
     out = []
     for j in judged:
@@ -356,7 +349,7 @@ def reservations(judged: list[Judged], chosen: list[Candidate], table: dict[str,
             continue
         for channel in dict.fromkeys(b.channel for b in j.group.blocks):
             error = table[channel]
-            if error["after"] <= _FAR_OFF * error["noise"]:
+            if error["after"] <= settings.missed_noises * error["noise"]:
                 continue
             what = "the effect" if j.named else "the other value"
             times = error["after"] / error["noise"]
@@ -367,6 +360,7 @@ def reservations(judged: list[Judged], chosen: list[Candidate], table: dict[str,
                 "standard deviations hold only as far as that matters little"
             )
     named = [c for c in chosen if any(effect in CATALOGUE for effect in c.effects)]
-    moved = {n: v for c in named for n, v in c.fit.held_by_prior.items() if abs(v) > _MOVED}
+    far = settings.moved_tolerances
+    moved = {n: v for c in named for n, v in c.fit.held_by_prior.items() if abs(v) > far}
     out += [f"with the effect the fit moves {n} by {v:+.1f} tolerances: it may make up for the effect's form" for n, v in moved.items()]
     return out

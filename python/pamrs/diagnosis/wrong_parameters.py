@@ -17,33 +17,17 @@ from numpy.typing import NDArray
 
 from pamrs.diagnosis.blocks import Block
 from pamrs.diagnosis.candidates import Attempts, Candidate, Group, significant
-from pamrs.diagnosis.fitting import WIDEST, Fit, Problem, stacked, with_priors
+from pamrs.diagnosis.fitting import Fit, Problem, stacked, with_priors
 from pamrs.diagnosis.leastsquares import levenberg_marquardt
+from pamrs.diagnosis.settings import WrongParameterSettings
 from pamrs.rig import Rig
 
-__all__ = ["AT_WALL", "beside_quiet", "freed", "suspected"]
+__all__ = ["beside_quiet", "freed", "suspected"]
 
 Array = NDArray[np.float64]
 
-AT_WALL = 2.9
-"""Tolerances from which a refitted parameter stands at its wall."""
-ONE_FILE_IN_A_HUNDRED = 4.6
-"""Logarithm of the odds against a parameter that is outside its tolerances."""
-FAINT_EFFECT = 6.0
-"""The same against an effect where only noise is left."""
-MOST_PAIRS, PROMISING, BESIDE_LARGEST = 2, 2.0 * ONE_FILE_IN_A_HUNDRED, 0.08
-"""Pairs that are fitted; gain in chi-square by the linear model from which a hypothesis is, and share of the largest for a pair."""
-ONE_MISTAKE: tuple[tuple[tuple[str, str], tuple[str, str]], ...] = (
-    (("chamber", "dead_volume"), ("valve", "discharge_area_max")),
-    (("arm", "payload"), ("arm", "first_moment")),
-    (("arm", "inertia"), ("arm", "first_moment")),
-    (("link", "mass"), ("link", "centre")),
-    (("link", "inertia"), ("link", "mass")),
-)
-"""Parameters that one mistake makes wrong together: another valve and fittings, another load, another arm."""
 
-
-def suspected(fitted: Fit, blocks: list[Block]) -> list[tuple[str, ...]]:
+def suspected(fitted: Fit, blocks: list[Block], settings: WrongParameterSettings) -> list[tuple[str, ...]]:
     """Parameters at their wall, alone and in pairs that one mistake makes wrong together.
 
     Parameters
@@ -52,29 +36,31 @@ def suspected(fitted: Fit, blocks: list[Block]) -> list[tuple[str, ...]]:
         The refitted baseline.
     blocks : list of Block
         Blocks that were fitted.
+    settings : WrongParameterSettings
+        Where the wall is, and which pairs one mistake makes wrong.
 
     Returns
     -------
     list of tuple of str
         Dotted names.
     """
-    at_wall = [name for name, moved in fitted.moved.items() if abs(moved) >= AT_WALL]
+    at_wall = [name for name, moved in fitted.moved.items() if abs(moved) >= settings.wall_tolerances]
     found: list[tuple[str, ...]] = [(name,) for name in at_wall]
     for one, other in itertools.permutations(fitted.moved, 2):
         together = any({one, other} <= block.parameters for block in blocks) and _same_owner(one, other)
-        if (_kind(one), _kind(other)) in ONE_MISTAKE and together and not {one, other}.isdisjoint(at_wall):
+        if (_kind(one), _kind(other)) in settings.wrong_together and together and not {one, other}.isdisjoint(at_wall):
             found.append((one, other))
     return found
 
 
 def _same_owner(one: str, other: str) -> bool:
     """Whether two parameters may belong to one mistake: of blocks of one kind they have to belong to the same block."""
-    return _kind(one)[0] != _kind(other)[0] or one.rpartition(".")[0] == other.rpartition(".")[0]
+    return one.partition(".")[0] != other.partition(".")[0] or one.rpartition(".")[0] == other.rpartition(".")[0]
 
 
-def _kind(name: str) -> tuple[str, str]:
-    """Kind of block and key of a dotted name."""
-    return name.partition(".")[0], name.rpartition(".")[2]
+def _kind(name: str) -> str:
+    """Kind of block and key of a dotted name, without the block's own: ``chamber.dead_volume``."""
+    return f"{name.partition('.')[0]}.{name.rpartition('.')[2]}"
 
 
 def freed(trial: Attempts, baseline: Fit, first: Fit, say: Callable[[str], None]) -> list[Candidate]:
@@ -94,17 +80,18 @@ def freed(trial: Attempts, baseline: Fit, first: Fit, say: Callable[[str], None]
     say : callable
         Receives progress.
     """
-    suspects = [names for found in (baseline, first) for names in suspected(found, trial.inner.blocks)]
+    settings, walls = trial.settings.wrong_parameters, trial.settings.fit.most_tolerances
+    suspects = [names for found in (baseline, first) for names in suspected(found, trial.inner.blocks, settings)]
     gains = _promised(trial.inner, trial.nominal, baseline, list(dict.fromkeys(suspects)), trial.white)
-    ranked = sorted((n for n, gain in gains.items() if gain > PROMISING), key=lambda n: -gains[n])
+    ranked = sorted((n for n, gain in gains.items() if gain > settings.least_promise), key=lambda n: -gains[n])
     # the linear model says little of what is far away: each parameter at its wall is fitted, whatever it promises beside others
-    least = BESIDE_LARGEST * max(gains.values(), default=0.0)
-    pairs = [names for names in ranked if len(names) > 1 and gains[names] > least][:MOST_PAIRS]
+    least = settings.pair_share * max(gains.values(), default=0.0)
+    pairs = [names for names in ranked if len(names) > 1 and gains[names] > least][: settings.most_pairs]
     found = []
     for names in [n for n in ranked if len(n) == 1 or n in pairs]:
         say(f"trying another value of {' and '.join(names)}")
         candidate = trial.freed(names, baseline)
-        if candidate is not None and all(abs(candidate.fit.moved[name]) > WIDEST for name in names):  # else it is not wrong
+        if candidate is not None and all(abs(candidate.fit.moved[name]) > walls for name in names):  # else it is not wrong
             found.append(replace(candidate, gain=gains[names]))
     return found
 
@@ -115,6 +102,7 @@ def _promised(
     """Gain in chi-square, priors included, that freeing parameters brings by the sensitivities at the baseline."""
     if not suspects:
         return {}
+    settings = problem.settings.fit
     names = list(baseline.moved)
     rows, jacobian = stacked(problem, baseline.residuals, inflation)
     if jacobian is None:
@@ -129,13 +117,16 @@ def _promised(
 
     def cost(loose: tuple[str, ...]) -> float:
         bound = np.array([n not in loose for n in names], dtype=np.float64)
-        wall = np.where(bound > 0.0, WIDEST, np.inf)
+        wall = np.where(bound > 0.0, settings.most_tolerances, np.inf)
         prior = np.diag(bound)
 
         def evaluate(x: Array) -> tuple[Array, Array, None]:
             return np.concatenate([left + slopes @ (x - begin), bound * x]), np.concatenate([slopes, prior]), None
 
-        _, (values, _, _), _ = levenberg_marquardt(evaluate, begin, (np.maximum(low, -wall), np.minimum(high, wall)), 50, 0.0)
+        limits = (np.maximum(low, -wall), np.minimum(high, wall))
+        _, (values, _, _), _ = levenberg_marquardt(
+            evaluate, begin, limits, settings.promise_evaluations, settings, 0.0
+        )
         return float(values @ values)
 
     was = cost(())
@@ -157,7 +148,9 @@ def beside_quiet(trial: Attempts, quiet: Group, say: Callable[[str], None]) -> G
     before = with_priors(trial.inner, start.fit, colour)
     effects = [c for c in quiet.candidates if c.effects and quiet.probabilities.get(c.key, 0.0) > 0.0]
     # a file that is further outside its tolerances is rarer, but less and less so
-    against = {c: ONE_FILE_IN_A_HUNDRED * len(c.wrong) + c.outside for c in shown} | dict.fromkeys(effects, FAINT_EFFECT)
+    settings, walls = trial.settings.wrong_parameters, trial.settings.fit.most_tolerances
+    against = {c: settings.file_log_odds * len(c.wrong) + c.outside(walls) for c in shown}
+    against |= dict.fromkeys(effects, settings.effect_log_odds)
     scores = {c: 0.5 * (before - with_priors(trial.inner, c.fit, colour)) - odds for c, odds in against.items()}
     top = max(0.0, *scores.values())
     weights = {c: math.exp(max(-60.0, score - top)) for c, score in scores.items()}

@@ -7,8 +7,8 @@ Equations, parameters, bounds and sources stand in the core, one file for each e
 
 from __future__ import annotations
 
-from pamrs.effects._catalogue import CATALOGUE, CLOSURE_OF, EFFECTS, MEMORY_OF, TERMS, find_parameter
-from pamrs.effects._info import EffectInfo, EffectParameter, Form, SameData, Term
+from pamrs.effects._catalogue import CATALOGUE, CLOSURE_OF, EFFECTS, MEMORY_OF, TERMS, WORDS, find_parameter
+from pamrs.effects._info import EffectInfo, EffectParameter, Form, SameData, Term, Words
 
 __all__ = [
     "CATALOGUE",
@@ -16,10 +16,12 @@ __all__ = [
     "EFFECTS",
     "MEMORY_OF",
     "TERMS",
+    "WORDS",
     "EffectInfo",
     "EffectParameter",
     "Form",
     "SameData",
     "Term",
+    "Words",
     "find_parameter",
 ]

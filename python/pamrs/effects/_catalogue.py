@@ -8,15 +8,19 @@ from importlib import resources
 from typing import Any, Final
 
 from pamrs import _core
-from pamrs.effects._info import EffectInfo, EffectParameter, Form, SameData, Term
+from pamrs.effects._info import EffectInfo, EffectParameter, Form, SameData, Term, Words
 
-__all__ = ["CATALOGUE", "CLOSURE_OF", "EFFECTS", "MEMORY_OF", "TERMS", "find_parameter"]
+__all__ = ["CATALOGUE", "CLOSURE_OF", "EFFECTS", "MEMORY_OF", "TERMS", "WORDS", "find_parameter"]
 
 
 def _words(effect: str) -> dict[str, Any]:
     """The words of an effect."""
     file = resources.files("pamrs.effects").joinpath("words", f"{effect}.toml")
     return tomllib.loads(file.read_text(encoding="utf-8"))
+
+
+#: Fields of a parameter that are the core's as they stand.
+_AS_TOLD: Final = ("channel", "repeats", "tried", "same_everywhere", "time_constant", "restricts", "like")
 
 
 def _pair(value: list[float] | None) -> tuple[float, float] | None:
@@ -34,6 +38,12 @@ def _parameter(told: dict[str, Any], meanings: dict[str, str]) -> EffectParamete
         meaning=meanings[told["name"]],
         neutral=told["neutral"],
         expected=_pair(told["expected"]),
+        prior=_pair(told["prior"]),
+        role=told["role"] or "",
+        role_sealed=told["role_sealed"] or "",
+        scan=None if told["scan"] is None else tuple(told["scan"]),
+        needed_in=tuple(told["needed_in"]),
+        **{name: told[name] for name in _AS_TOLD},
     )
 
 
@@ -73,6 +83,10 @@ def _info(told: dict[str, Any]) -> EffectInfo:
         catalogue=told["named"],
         same_data=_same_data(told["same_data"], words),
         terms=terms,
+        label=words.get("label", ""),
+        acts_in=tuple(told["acts_in"]),
+        experiment=words.get("experiment", ""),
+        excitation=tuple((k, tuple(v) if isinstance(v, list) else v) for k, v in words.get("excitation", {}).items()),
         last_only=told["last_only"],
         on_loads=told["on_loads"],
         supplies=tuple(told["supplies"]),
@@ -80,6 +94,11 @@ def _info(told: dict[str, Any]) -> EffectInfo:
         kink=None if kink is None else (tuple(kink["where_not_zero"]), kink["why"], kink["of_supplies"]),
         at_rest=tuple((act, *change) for told_change in told["at_rest"] for act, change in told_change.items()),
     )
+
+
+def _of_words(effect: str) -> Words:
+    words = _words(effect)
+    return Words(*(words[key] for key in ("what", "letter", "symbols", "odd_in")))
 
 
 EFFECTS: Final[dict[str, EffectInfo]] = {told["id"]: _info(told) for told in json.loads(_core.effects())}
@@ -90,6 +109,8 @@ TERMS: Final[dict[str, tuple[Term, ...]]] = {name: effect.terms for name, effect
 """Terms of each sum, in the order of its parameters."""
 CLOSURE_OF: Final[dict[str, str]] = {("arm" if EFFECTS[name].at == "joint" else EFFECTS[name].at): name for name in TERMS}
 """Sum of terms of each block of the cut chain."""
+WORDS: Final[dict[str, Words]] = {name: _of_words(name) for name in TERMS}
+"""How each sum of terms is put into words."""
 MEMORY_OF: Final[dict[str, str]] = {"time": "memory_time", "distance": "memory_angle"}
 """Shape that a term of a kind with memory depends on."""
 

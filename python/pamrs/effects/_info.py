@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-__all__ = ["EffectInfo", "EffectParameter", "Form", "SameData", "Term"]
+__all__ = ["EffectInfo", "EffectParameter", "Form", "SameData", "Term", "Words"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +28,41 @@ class EffectParameter:
         None for a parameter that gives the effect its shape.
     expected : (low, high) or None
         Where it usually lies; an effect is less probable the further outside it needs the parameter.
+    prior : (mean, standard deviation) or None
+        What is known of it before any data.
+    role : str
+        What it is to a fit and a search: ``size`` (scales the effect), ``shape`` (tried from its
+        starts), ``choice`` (either end of its range, not fitted), ``held`` (at its default);
+        ``time``, ``duration`` and ``rise`` of an event; ``place`` (where on ``channel`` a contact
+        begins) and ``side`` (from below or above it); ``threshold`` (a level of ``channel`` at
+        which something switches: no fit can move it; the first switches on, the second off). Empty:
+        ``size`` where zero is neutral, else ``shape``.
+    role_sealed : str
+        The same in a rig without a valve; empty where it is the same.
+    channel : str
+        Kind of the measured channel in which a place or a threshold lies.
+    repeats : str
+        Parameter of which it is another one (``torque`` of ``torque_2``); held unless an event
+        needs it.
+    tried : float or None
+        Value that a search gives it while it looks for the time of an event, or scans another
+        parameter.
+    scan : (low, high, count) or None
+        Values that are tried one by one, evenly in their logarithm, before any is fitted: a
+        resonance has to be met.
+    same_everywhere : bool
+        Whether an effect's size is the same in all recordings, so that its scatter between them
+        speaks against the effect.
+    time_constant : bool
+        Whether recordings must last as long as it, or so, to tell it.
+    restricts : bool
+        Whether the effect falls with its inverse square (a pressure loss with a conductance).
+    like : str
+        Parameter of the rig, as ``block.key``, in parts of which it is tried; an area stands for
+        the conductance of its opening.
+    needed_in : tuple of str
+        Kinds of block of the cut chain in which the effect acts only while this parameter is not
+        zero.
     """
 
     name: str
@@ -39,6 +74,25 @@ class EffectParameter:
     meaning: str
     neutral: float | None = None
     expected: tuple[float, float] | None = None
+    prior: tuple[float, float] | None = None
+    role: str = ""
+    role_sealed: str = ""
+    channel: str = ""
+    repeats: str = ""
+    tried: float | None = None
+    scan: tuple[float, float, int] | None = None
+    same_everywhere: bool = False
+    time_constant: bool = False
+    restricts: bool = False
+    like: str = ""
+    needed_in: tuple[str, ...] = ()
+
+    def role_in(self, *, sealed: bool) -> str:
+        """What it is to a fit, in a rig with a valve or in a sealed one; never empty."""
+        if self.repeats:
+            return "held"
+        usual = self.role or ("size" if self.neutral == 0.0 else "shape")
+        return (self.role_sealed or usual) if sealed else usual
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,6 +146,26 @@ class Term:
 
 
 @dataclass(frozen=True, slots=True)
+class Words:
+    """How a sum of terms is put into words.
+
+    Attributes
+    ----------
+    what, letter : str
+        What it is the sum of, and the letter for it.
+    symbols : str
+        What the symbols of its terms stand for.
+    odd_in : str
+        What its odd terms turn their sign with.
+    """
+
+    what: str
+    letter: str
+    symbols: str
+    odd_in: str
+
+
+@dataclass(frozen=True, slots=True)
 class Form:
     """One form of an effect.
 
@@ -139,6 +213,16 @@ class EffectInfo:
         Another effect whose recordings it leaves where a parameter is zero.
     terms : tuple of Term
         Of a sum of terms, in the order of its parameters; behind them stand the shapes of its memories.
+    label : str
+        Short name for tables and figures; the id in words by default.
+    acts_in : tuple of str
+        Kinds of block of the cut chain in which it acts (``supply``, ``chamber``, ``arm``), where
+        these are others than those of its block.
+    experiment : str
+        What to record to tell it from what looks like it, with numbers; empty where ``separates``
+        says it.
+    excitation : tuple of (str, value)
+        The same for a program: ``kind`` and numbers with their unit in the name.
     last_only : bool
         Whether it acts on the last block of its kind where none is named, and not on every one.
     on_loads : bool
@@ -168,6 +252,10 @@ class EffectInfo:
     catalogue: bool = True
     same_data: SameData | None = None
     terms: tuple[Term, ...] = ()
+    label: str = ""
+    acts_in: tuple[str, ...] = ()
+    experiment: str = ""
+    excitation: tuple[tuple[str, str | int | float | tuple[float, ...]], ...] = ()
     last_only: bool = False
     on_loads: bool = False
     supplies: tuple[str, ...] = ()
@@ -208,6 +296,27 @@ class EffectInfo:
         if not self.at:
             return "the whole rig"
         return f"the last {self.at}" if self.last_only else f"every {self.at}"
+
+    @property
+    def needs(self) -> tuple[tuple[str, str], ...]:
+        """What a rig must have for it: one of these blocks, each with its kind (empty: any); empty for the usual."""
+        if self.on_loads:
+            return (("load", "mass"), ("joint", ""))
+        return tuple(("supply", kind) for kind in self.supplies)
+
+    @property
+    def transient(self) -> bool:
+        """Whether it happens at times of its own in each recording, so that all recordings cannot share its parameters."""
+        return any(parameter.role == "time" for parameter in self.parameters)
+
+    @property
+    def leading(self) -> EffectParameter:
+        """The parameter that scales it: the first that is a size."""
+        return next(p for p in self.parameters if p.role_in(sealed=False) == "size")
+
+    def with_role(self, role: str) -> tuple[EffectParameter, ...]:
+        """Its parameters of a role, in their order."""
+        return tuple(p for p in self.parameters if p.role == role)
 
     def dotted(self) -> tuple[str, ...]:
         """Dotted names of the parameters, ``leak_muscle.conductance``."""

@@ -1,9 +1,11 @@
-"""Words and numbers of a diagnosis: labels, number formats, the headline. Standard library only."""
+"""Words and numbers of a diagnosis: labels, number formats, the headline."""
 
 from __future__ import annotations
 
 import math
 from typing import TYPE_CHECKING, Any, TypeGuard
+
+from pamrs.effects import EFFECTS
 
 if TYPE_CHECKING:
     from pamrs.diagnosis.result import Diagnosis
@@ -30,12 +32,7 @@ _LABELS = {
     "none": "nothing missing",
     "parameters": "parameters in tolerance",
     "unlisted": "unlisted effect",
-    "leak_muscle": "muscle leak",
-    "pam_crowding_contact": "fibre crowding contact",
-    "joint_coulomb_stribeck": "joint friction (Coulomb, Stribeck)",
-    "compressor_cut_in": "compressor cut-in",
-    "valve_centre_leakage": "valve centre leakage",
-    "input_path_lag": "input path lag",
+    **{effect.id: effect.label for effect in EFFECTS.values() if effect.label},
 }
 
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")

@@ -7,7 +7,7 @@
 //! simulation, which cannot answer a command that is still to come, takes it as no shift.
 //! D. L. Mills, "Internet time synchronization: the network time protocol", IEEE Trans. Communications 39, 1991 (offset and skew).
 
-use super::{Effect, EffectInfo, EffectParameter, Form, Kink, Port, SameData};
+use super::{Effect, EffectInfo, EffectParameter, Form, Kink, Port, SameData, Use};
 use crate::blocks::gas::Gas;
 use crate::made_by;
 use crate::scalar::Scalar;
@@ -29,13 +29,14 @@ pub const INFO: EffectInfo = EffectInfo {
         without: "rate",
         held: &[("angle_share", 1.0)],
     }),
+    acts_in: &["supply", "chamber", "arm"],
     source: "Mills (1991), offset and skew of clocks",
     forms: &[Form {
         name: "offset_and_drift",
         parameters: &[
             EffectParameter::new("offset", "s", -10.0, 10.0, 0.01).starts(&[0.005, 0.03]).off(0.0),
             EffectParameter::new("rate", "1", -0.01, 0.01, 0.0001).starts(&[0.0, 0.0003]).off(0.0),
-            EffectParameter::new("angle_share", "1", 0.0, 1.0, 1.0).starts(&[0.0, 1.0]),
+            EffectParameter::new("angle_share", "1", 0.0, 1.0, 1.0).starts(&[0.0, 1.0]).role(Use::Choice),
         ],
         states: &[],
         integrates: false,

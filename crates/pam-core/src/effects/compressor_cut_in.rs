@@ -5,7 +5,7 @@
 //! what it gives in the rest of the step in which the pressure crosses is added by the share of the step that is left, so that the
 //! moment moves with the pressures and not by whole steps. Acts on tanks.
 
-use super::{At, Effect, EffectInfo, EffectParameter, EffectState, Form, Kink, Port, Role};
+use super::{At, Effect, EffectInfo, EffectParameter, EffectState, Form, Kink, Port, Role, Use};
 use crate::blocks::gas::Gas;
 use crate::made_by;
 use crate::blocks::tube::REFERENCE_DENSITY;
@@ -27,8 +27,8 @@ pub const INFO: EffectInfo = EffectInfo {
         name: "relay",
         parameters: &[
             EffectParameter::new("free_air_delivery", "m3/s", 0.0, 1.0, 0.002).starts(&[0.002]).off(0.0),
-            EffectParameter::new("cut_in_pressure", "Pa", 0.0, 1e8, 1.2e6).starts(&[1e6, 1.3e6]),
-            EffectParameter::new("cut_out_pressure", "Pa", 0.0, 1e8, 1.4e6).starts(&[1.2e6, 1.5e6]),
+            EffectParameter::new("cut_in_pressure", "Pa", 0.0, 1e8, 1.2e6).starts(&[1e6, 1.3e6]).role(Use::Threshold).on("supply_pressure"),
+            EffectParameter::new("cut_out_pressure", "Pa", 0.0, 1e8, 1.4e6).starts(&[1.2e6, 1.5e6]).role(Use::Threshold).on("supply_pressure"),
         ],
         states: &[
             EffectState { name: "running", role: Role::Keeps },

@@ -9,7 +9,7 @@
 //! A recording may begin just after a fill: the gas is then warmer than the wall by an initial rise.
 //! Carneiro & de Almeida (2006); Al-Ibrahim & Otis (1992).
 
-use super::{AtRest, Effect, EffectInfo, EffectParameter, Form, Port};
+use super::{AtRest, Effect, EffectInfo, EffectParameter, Form, Port, Use};
 use crate::made_by;
 use crate::blocks::chamber::{gas_temperature, ChamberState};
 use crate::blocks::gas::Gas;
@@ -27,8 +27,8 @@ pub const INFO: EffectInfo = EffectInfo {
         name: "energy_balance",
         parameters: &[
             EffectParameter::new("heat_transfer_coefficient", "W/(m2 K)", 1.0, 10000.0, 50.0).starts(&[20.0, 80.0]),
-            EffectParameter::new("initial_temperature_rise", "K", 0.0, 200.0, 0.0).starts(&[5.0]),
-            EffectParameter::new("share", "1", 0.0, 1.0, 1.0).starts(&[0.2]),
+            EffectParameter::new("initial_temperature_rise", "K", 0.0, 200.0, 0.0).starts(&[5.0]).role(Use::Held).sealed(Use::Size),
+            EffectParameter::new("share", "1", 0.0, 1.0, 1.0).starts(&[0.2]).role(Use::Size).sealed(Use::Held),
         ],
         states: &[],
         integrates: false,

@@ -11,6 +11,32 @@ pub const LANES: usize = 8;
 /// The dual number of sensitivities.
 pub type Dual = DualSVec64<LANES>;
 
+/// What a parameter is to a fit and to a search.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Use {
+    /// It scales the effect.
+    Size,
+    /// It is tried from its starts.
+    Shape,
+    /// Either end of its range, not fitted.
+    Choice,
+    /// At its default.
+    Held,
+    /// When something happens.
+    Time,
+    /// How long it lasts.
+    Duration,
+    /// How long it takes to come.
+    Rise,
+    /// Where on a measured channel a contact begins.
+    Place,
+    /// From below or above that place.
+    Side,
+    /// A level of a measured channel at which something switches, which no fit can move: the first on, the second off.
+    Threshold,
+}
+
 /// One parameter of an effect, SI.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct EffectParameter {
@@ -31,13 +57,59 @@ pub struct EffectParameter {
     pub neutral: Option<f64>,
     /// Where it usually lies, as prior knowledge.
     pub expected: Option<(f64, f64)>,
+    /// Mean and standard deviation of what is known of it before any data.
+    pub prior: Option<(f64, f64)>,
+    /// What it is to a fit and a search; by default a size where zero is neutral, else a shape.
+    pub role: Option<Use>,
+    /// The same in a rig without a valve, where it is another.
+    pub role_sealed: Option<Use>,
+    /// Kind of the measured channel in which a place or a threshold lies.
+    pub channel: &'static str,
+    /// Parameter of which it is another one (`torque` of `torque_2`): held unless an event needs it.
+    pub repeats: &'static str,
+    /// Value that a search gives it while it looks for the time of an event, or scans another parameter.
+    pub tried: Option<f64>,
+    /// Least, greatest and number of values that are tried one by one, evenly in their logarithm, before any is fitted: a
+    /// resonance has to be met.
+    pub scan: Option<(f64, f64, u32)>,
+    /// The effect's size is the same in all recordings, so that its scatter between them speaks against the effect.
+    pub same_everywhere: bool,
+    /// Recordings must last as long as it, or so, to tell it.
+    pub time_constant: bool,
+    /// The effect falls with its inverse square, as a pressure loss does with a conductance.
+    pub restricts: bool,
+    /// Parameter of the rig (`valve.discharge_area_max`) in parts of which it is tried.
+    pub like: &'static str,
+    /// Kinds of block of the cut chain in which the effect acts only while this parameter is not zero.
+    pub needed_in: &'static [&'static str],
 }
 
 impl EffectParameter {
     /// A parameter between two bounds, with a typical value.
     #[must_use]
     pub const fn new(name: &'static str, unit: &'static str, lower: f64, upper: f64, default: f64) -> Self {
-        Self { name, unit, lower, upper, default, starts: &[], neutral: None, expected: None }
+        Self {
+            name,
+            unit,
+            lower,
+            upper,
+            default,
+            starts: &[],
+            neutral: None,
+            expected: None,
+            prior: None,
+            role: None,
+            role_sealed: None,
+            channel: "",
+            repeats: "",
+            tried: None,
+            scan: None,
+            same_everywhere: false,
+            time_constant: false,
+            restricts: false,
+            like: "",
+            needed_in: &[],
+        }
     }
 
     /// The same with values from which a fit starts.
@@ -56,6 +128,78 @@ impl EffectParameter {
     #[must_use]
     pub const fn usually(self, low: f64, high: f64) -> Self {
         Self { expected: Some((low, high)), ..self }
+    }
+
+    /// The same with mean and standard deviation of what is known of it before any data.
+    #[must_use]
+    pub const fn prior(self, mean: f64, std: f64) -> Self {
+        Self { prior: Some((mean, std)), ..self }
+    }
+
+    /// The same with what it is to a fit and a search.
+    #[must_use]
+    pub const fn role(self, role: Use) -> Self {
+        Self { role: Some(role), ..self }
+    }
+
+    /// The same with what it is in a rig without a valve.
+    #[must_use]
+    pub const fn sealed(self, role: Use) -> Self {
+        Self { role_sealed: Some(role), ..self }
+    }
+
+    /// The same with the kind of the measured channel in which it lies.
+    #[must_use]
+    pub const fn on(self, channel: &'static str) -> Self {
+        Self { channel, ..self }
+    }
+
+    /// The same as another one of a parameter.
+    #[must_use]
+    pub const fn again(self, repeats: &'static str) -> Self {
+        Self { repeats, ..self }
+    }
+
+    /// The same with the value that a search gives it while it looks for others.
+    #[must_use]
+    pub const fn tried(self, value: f64) -> Self {
+        Self { tried: Some(value), ..self }
+    }
+
+    /// The same with values that are tried one by one before any is fitted.
+    #[must_use]
+    pub const fn scan(self, low: f64, high: f64, count: u32) -> Self {
+        Self { scan: Some((low, high, count)), ..self }
+    }
+
+    /// The same for a size that is the same in all recordings.
+    #[must_use]
+    pub const fn same_everywhere(self) -> Self {
+        Self { same_everywhere: true, ..self }
+    }
+
+    /// The same for a time that recordings must last.
+    #[must_use]
+    pub const fn time_constant(self) -> Self {
+        Self { time_constant: true, ..self }
+    }
+
+    /// The same for one with whose inverse square the effect falls.
+    #[must_use]
+    pub const fn restricts(self) -> Self {
+        Self { restricts: true, ..self }
+    }
+
+    /// The same, tried in parts of a parameter of the rig.
+    #[must_use]
+    pub const fn like(self, parameter: &'static str) -> Self {
+        Self { like: parameter, ..self }
+    }
+
+    /// The same with the kinds of block in which the effect acts only while it is not zero.
+    #[must_use]
+    pub const fn needed_in(self, blocks: &'static [&'static str]) -> Self {
+        Self { needed_in: blocks, ..self }
     }
 }
 
@@ -187,6 +331,8 @@ pub struct EffectInfo {
     pub named: bool,
     /// Place among the effects at one port: lower ones act first.
     pub order: u8,
+    /// Kinds of block of the cut chain in which it acts, where these are others than those of its block.
+    pub acts_in: &'static [&'static str],
     /// Kinds of supply that it acts on; empty for all.
     pub supplies: &'static [&'static str],
     /// Without `at` it acts on the last block of its kind, not on every one.
@@ -217,6 +363,7 @@ impl EffectInfo {
         at: "",
         named: true,
         order: 0,
+        acts_in: &[],
         supplies: &[],
         last_only: false,
         on_loads: false,

@@ -5,7 +5,7 @@
 //! an upper stop where `side` is positive, a lower one where it is negative. K. H. Hunt & F. R. E. Crossley, "Coefficient of
 //! restitution interpreted as damping in vibroimpact", ASME J. Applied Mechanics 42, 1975.
 
-use super::{At, Effect, EffectInfo, EffectParameter, Extremes, Form, Port, beyond, progressive};
+use super::{At, Effect, EffectInfo, EffectParameter, Extremes, Form, Port, beyond, progressive, Use};
 use crate::blocks::gas::Gas;
 use crate::made_by;
 use crate::scalar::{constant, Scalar};
@@ -21,10 +21,10 @@ pub const INFO: EffectInfo = EffectInfo {
         name: "progressive",
         parameters: &[
             EffectParameter::new("stiffness", "N m/rad", 0.0, 1e9, 500.0).starts(&[200.0, 2000.0]).off(0.0),
-            EffectParameter::new("angle", "rad", -7.0, 7.0, 1.2).starts(&[1.2]),
+            EffectParameter::new("angle", "rad", -7.0, 7.0, 1.2).starts(&[1.2]).role(Use::Place).on("joint_angle"),
             EffectParameter::new("dissipation", "s/rad", 0.0, 10000.0, 0.5).starts(&[0.5]),
             EffectParameter::new("exponent", "1", 1.0, 4.0, 1.0).starts(&[1.5]),
-            EffectParameter::new("side", "1", -1.0, 1.0, 1.0).starts(&[-1.0, 1.0]),
+            EffectParameter::new("side", "1", -1.0, 1.0, 1.0).starts(&[-1.0, 1.0]).role(Use::Side),
         ],
         states: &[],
         integrates: false,

@@ -5,7 +5,7 @@
 //! `p_ref` = 500 kPa absolute. Sealed, choked and with `s = 0` the absolute pressure decays with the time constant
 //! `V/(alpha_out C rho0 R T)`. Beater, *Pneumatic Drives* (2007).
 
-use super::{Effect, EffectInfo, EffectParameter, Extremes, Form, Port};
+use super::{Effect, EffectInfo, EffectParameter, Extremes, Form, Port, Use};
 use crate::made_by;
 use crate::blocks::gas::Gas;
 use crate::scalar::{constant, Scalar};
@@ -19,8 +19,8 @@ pub const INFO: EffectInfo = EffectInfo {
     forms: &[Form {
         name: "orifice_and_laminar",
         parameters: &[
-            EffectParameter::new("conductance", "m3/(s Pa)", 0.0, 1e-7, 5e-12).starts(&[1e-11]).off(0.0),
-            EffectParameter::new("laminar_share", "1", 0.0, 1.0, 0.0).starts(&[0.3]),
+            EffectParameter::new("conductance", "m3/(s Pa)", 0.0, 1e-7, 5e-12).starts(&[1e-11]).off(0.0).same_everywhere(),
+            EffectParameter::new("laminar_share", "1", 0.0, 1.0, 0.0).starts(&[0.3]).role(Use::Choice),
         ],
         states: &[],
         integrates: false,

@@ -9,7 +9,8 @@ mod port;
 
 pub(crate) use self::info::BEGINNING;
 pub use self::info::{
-    AtRest, Dual, EffectInfo, EffectParameter, EffectState, Form, Kink, Make, Number, Role, SameData, LANES,
+    AtRest, Dual, EffectInfo, EffectParameter, EffectState, Form, Kink, Make, Number, Role, SameData, Use,
+    LANES,
 };
 pub(crate) use self::port::{begun, BAR, BEGUN, LITRE};
 pub use self::port::{At, AtMuscle, Effect, Extremes, Port};

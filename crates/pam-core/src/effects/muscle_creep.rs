@@ -21,7 +21,7 @@ pub const INFO: EffectInfo = EffectInfo {
         name: "standard_linear_solid",
         parameters: &[
             EffectParameter::new("stiffness", "N/m", 0.0, 1e7, 500.0).starts(&[200.0, 2000.0]).off(0.0),
-            EffectParameter::new("time_constant", "s", 0.001, 1e6, 3.0).starts(&[1.0, 10.0]),
+            EffectParameter::new("time_constant", "s", 0.001, 1e6, 3.0).starts(&[1.0, 10.0]).time_constant(),
         ],
         states: &[
             EffectState { name: "", role: Role::Moves },

@@ -24,7 +24,7 @@ pub const INFO: EffectInfo = EffectInfo {
         name: "maxwell_slip",
         parameters: &[
             EffectParameter::new("friction_constant", "N", 0.0, 10000.0, 5.0).starts(&[2.0]).off(0.0),
-            EffectParameter::new("friction_pressure", "m2", 0.0, 1.0, 5e-5).starts(&[2e-5]).off(0.0),
+            EffectParameter::new("friction_pressure", "m2", 0.0, 1.0, 5e-5).starts(&[2e-5]).off(0.0).same_everywhere(),
             EffectParameter::new("presliding", "m", 1e-6, 0.1, 0.001).starts(&[0.0005, 0.003]),
         ],
         states: &[

@@ -24,7 +24,7 @@ pub const INFO: EffectInfo = EffectInfo {
         parameters: &[
             EffectParameter::new("contact_area", "m2", 0.0, 1.0, 0.001).starts(&[0.0005, 0.003]).off(0.0),
             EffectParameter::new("onset_contraction", "1", -1.0, 1.0, 0.12).starts(&[0.04, 0.08, 0.15]),
-            EffectParameter::new("exponent", "1", 1.0, 2.0, 1.0).starts(&[1.5]),
+            EffectParameter::new("exponent", "1", 1.0, 2.0, 1.0).starts(&[1.5]).prior(1.5, 0.25),
             EffectParameter::new("rubbing", "1", 0.0, 1.0, 0.0).starts(&[0.1]),
         ],
         states: &[],

@@ -21,8 +21,8 @@ pub const INFO: EffectInfo = EffectInfo {
         name: "pendulum",
         parameters: &[
             EffectParameter::new("swinging_share", "1", 0.0, 1.0, 0.5).starts(&[0.2, 0.8]).off(0.0),
-            EffectParameter::new("length", "m", 0.001, 100.0, 0.3).starts(&[0.15, 0.5]).usually(0.1, 0.5),
-            EffectParameter::new("damping_ratio", "1", 0.0, 10.0, 0.02).starts(&[0.02]).usually(0.0, 0.03),
+            EffectParameter::new("length", "m", 0.001, 100.0, 0.3).starts(&[0.15, 0.5]).usually(0.1, 0.5).scan(0.06, 1.5, 14),
+            EffectParameter::new("damping_ratio", "1", 0.0, 10.0, 0.02).starts(&[0.02]).usually(0.0, 0.03).tried(0.08),
         ],
         states: &[
             EffectState { name: "angle", role: Role::Moves },

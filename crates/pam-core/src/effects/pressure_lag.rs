@@ -14,6 +14,7 @@ pub const INFO: EffectInfo = EffectInfo {
     block: "sensors",
     at: "chamber",
     at_rest: &[AtRest::OutBelow("time_constant", SHORTEST)],
+    acts_in: &["chamber", "arm"],
     source: "Doebelin, Measurement Systems, ch. 6",
     forms: &[Form {
         name: "first_order",

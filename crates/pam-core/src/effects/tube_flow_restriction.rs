@@ -11,7 +11,7 @@
 //! pressure is that to which the tube passes it ([`Tube::other_end`]); see [`crate::plant`]'s `tap.rs`. In front of a `[line]` that is the
 //! line's inlet; of two valves at one chamber the first one has the transducer.
 
-use super::{At, AtRest, Effect, EffectInfo, EffectParameter, EffectState, Form, Port, Role};
+use super::{At, AtRest, Effect, EffectInfo, EffectParameter, EffectState, Form, Port, Role, Use};
 use crate::made_by;
 use crate::blocks::gas::Gas;
 use crate::blocks::tube::Tube;
@@ -24,12 +24,13 @@ pub const INFO: EffectInfo = EffectInfo {
     block: "line",
     at: "valve",
     at_rest: &[AtRest::Set("tap", 0.0)],
+    acts_in: &["supply", "chamber", "arm"],
     source: "ISO 6358-3; Eckersten (1975)",
     forms: &[Form {
         name: "iso_6358",
         parameters: &[
-            EffectParameter::new("conductance", "m3/(s Pa)", 1e-15, 1.0, 1.2e-8).starts(&[1.2e-8]).off(1.0),
-            EffectParameter::new("tap", "1", 0.0, 1.0, 0.0).starts(&[0.0, 1.0]),
+            EffectParameter::new("conductance", "m3/(s Pa)", 1e-15, 1.0, 1.2e-8).starts(&[1.2e-8]).off(1.0).role(Use::Size).restricts().like("valve.discharge_area_max"),
+            EffectParameter::new("tap", "1", 0.0, 1.0, 0.0).starts(&[0.0, 1.0]).role(Use::Choice).needed_in(&["arm"]),
         ],
         states: &[
             EffectState { name: "reading", role: Role::Keeps },

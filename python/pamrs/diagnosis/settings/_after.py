@@ -1,0 +1,252 @@
+"""Settings of what follows a verdict: the next experiment, the plan before any data, warnings."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from pamrs.diagnosis.settings._setting import SettingsGroup, setting
+
+__all__ = ["NextExperimentSettings", "PlanSettings", "WarningSettings"]
+
+
+@dataclass(frozen=True)
+class NextExperimentSettings(SettingsGroup):
+    """How the next experiment is chosen."""
+
+    simulated_from: float = setting(
+        0.03,
+        unit="1",
+        least=0.0,
+        most=1.0,
+        reason="probability from which a hypothesis of a diagnosis is simulated",
+        origin="judgement",
+    )
+    least_probability: float = setting(
+        0.01,
+        unit="1",
+        least=0.0,
+        most=1.0,
+        reason="probability below which a given hypothesis is not simulated",
+        origin="judgement",
+    )
+    most_hypotheses: int = setting(
+        6,
+        unit="count",
+        least=2,
+        reason="hypotheses that are simulated, the most probable ones",
+        origin="judgement: every pair is compared",
+    )
+    settled_entropy: float = setting(
+        0.01,
+        unit="bit",
+        least=0.0,
+        reason="doubt below which no experiment can add to the answer",
+        origin="judgement",
+    )
+    effective_samples: float = setting(
+        10.0,
+        unit="1",
+        above=0.0,
+        reason="independent samples that a block's residual over one recording counts as: errors "
+        "of a model are correlated, and thousands of samples do not know a thousandth of a noise",
+        origin="judgement",
+    )
+    known_share: float = setting(
+        0.5,
+        unit="1",
+        above=0.0,
+        reason="relative standard deviation of an effect's parameter of which a model says none",
+        origin="judgement",
+    )
+    resolution: float = setting(
+        0.02,
+        unit="bit",
+        above=0.0,
+        reason="difference of information that counts; below it the cheaper experiment is better",
+        origin="judgement",
+    )
+    sensor_effort: float = setting(
+        900.0,
+        unit="s",
+        least=0.0,
+        reason="what one more sensor costs, as time",
+        origin="judgement",
+    )
+    most_shown: int = setting(
+        5, unit="count", least=1, reason="experiments in the ranking", origin="judgement"
+    )
+    hopeless_share: float = setting(
+        0.1,
+        unit="1",
+        least=0.0,
+        reason="share of the doubt below which the text asks for another sensor",
+        origin="judgement",
+    )
+    pressure_noise: float = setting(
+        200.0,
+        unit="Pa",
+        above=0.0,
+        reason="sample noise of a pressure where no recording tells",
+        origin="data sheet of a usual transducer of 0 to 14 bar on a 16-bit converter",
+    )
+    angle_noise: float = setting(
+        math.radians(0.03),
+        unit="rad",
+        above=0.0,
+        reason="the same of an angle",
+        origin="data sheet of a usual Hall sensor",
+    )
+    length_noise: float = setting(
+        3e-5,
+        unit="m",
+        above=0.0,
+        reason="the same of a length",
+        origin="data sheet of a usual linear transducer",
+    )
+    sample_time: float = setting(
+        0.005,
+        unit="s",
+        above=0.0,
+        reason="sample time of an experiment where no recording tells",
+        origin="judgement",
+    )
+    least_sample_time: float = setting(
+        0.002, unit="s", above=0.0, reason="shortest sample time", origin="judgement"
+    )
+    most_sample_time: float = setting(
+        0.01, unit="s", above=0.0, reason="longest sample time", origin="judgement"
+    )
+    sealed_sample_time: float = setting(
+        0.1,
+        unit="s",
+        above=0.0,
+        reason="sample time for a chamber without a valve, which changes slowly",
+        origin="judgement",
+    )
+    least_sealed_sample_time: float = setting(
+        0.05, unit="s", above=0.0, reason="shortest sample time of it", origin="judgement"
+    )
+    most_sealed_sample_time: float = setting(
+        1.0, unit="s", above=0.0, reason="longest sample time of it", origin="judgement"
+    )
+    bandwidth: float = setting(
+        15.0,
+        unit="rad/s",
+        above=0.0,
+        reason="bandwidth of the pressure loop by which commands are found on the model",
+        origin="judgement",
+    )
+
+
+@dataclass(frozen=True)
+class PlanSettings(SettingsGroup):
+    """When a plan calls an effect seen, and two effects apart."""
+
+    seen: float = setting(
+        3.0,
+        unit="noises",
+        above=0.0,
+        reason="signature left, in noises of a bin of 0.1 s, from which an effect counts as seen",
+        origin="judgement",
+    )
+    faint: float = setting(
+        math.sqrt(0.45),
+        unit="noises",
+        above=0.0,
+        reason="the same from which an arm, which scatters most, would be called suspect",
+        origin="docs/decisions/0014: 1.45 times the variance of the noise",
+    )
+    same_cosine: float = setting(
+        0.95,
+        unit="1",
+        least=0.0,
+        most=1.0,
+        reason="cosine of two signatures from which their effects are one",
+        origin="judgement; isolability as in Ding (2013)",
+    )
+    apart: float = setting(
+        1.0,
+        unit="noises",
+        least=0.0,
+        reason="what must be left of an effect when another one explains all that it can",
+        origin="judgement",
+    )
+    most_multiple: float = setting(
+        1e4,
+        unit="typical sizes",
+        above=0.0,
+        reason="largest size of an effect that is worth telling",
+        origin="judgement",
+    )
+
+
+@dataclass(frozen=True)
+class WarningSettings(SettingsGroup):
+    """From where on the result carries a warning or a sentence; none of them moves a verdict."""
+
+    missed_noises: float = setting(
+        3.0,
+        unit="noises",
+        above=0.0,
+        reason="error of a model with a name from which it is reported with a reservation",
+        origin="judgement",
+    )
+    moved_tolerances: float = setting(
+        2.0,
+        unit="tolerances",
+        above=0.0,
+        reason="movement of a parameter beside an effect from which it is",
+        origin="judgement",
+    )
+    spoiled: float = setting(
+        1.2,
+        unit="1",
+        least=1.0,
+        reason="error of a channel over that of the model before, from which it is reported",
+        origin="judgement",
+    )
+    mended: float = setting(
+        0.98,
+        unit="1",
+        above=0.0,
+        reason="share of a channel's error from which a wrong value is not said to mend it",
+        origin="judgement",
+    )
+    scatter: float = setting(
+        0.35,
+        unit="1",
+        least=0.0,
+        reason="relative scatter of an effect's size between recordings from which it is reported",
+        origin="as evidence.scatter",
+    )
+    ambient_share: float = setting(
+        0.01,
+        unit="1",
+        above=0.0,
+        reason="share of the ambient pressure within which a recording that begins at it may hold "
+        "absolute pressures",
+        origin="judgement",
+    )
+    least_pressure: float = setting(
+        1e4,
+        unit="Pa",
+        above=0.0,
+        reason="gauge pressure that a channel never exceeds, from which its unit is doubted",
+        origin="judgement",
+    )
+    doubted_probability: float = setting(
+        0.1,
+        unit="1",
+        least=0.0,
+        most=1.0,
+        reason="probability of no mismatch from which the text says that there may be none",
+        origin="judgement",
+    )
+    telling_condition: float = setting(
+        1.15,
+        unit="1",
+        least=1.0,
+        reason="share of the excess over share of the time from which a condition is told",
+        origin="judgement",
+    )

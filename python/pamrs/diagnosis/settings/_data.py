@@ -1,0 +1,423 @@
+"""Settings of the first steps: recordings made ready, what they cannot be, noise levels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pamrs.diagnosis.settings._setting import SettingsGroup, setting
+
+__all__ = ["NoiseSettings", "PlausibilitySettings", "PrepareSettings"]
+
+
+@dataclass(frozen=True)
+class PrepareSettings(SettingsGroup):
+    """How recordings are made ready for the cut chain."""
+
+    smoothing_time: float = setting(
+        0.06,
+        unit="s",
+        above=0.0,
+        reason="length of the filter (local cubics) for measured signals that drive a block, at "
+        "least seven samples: longer smears steps, shorter leaves noise in the slopes",
+        origin="docs/decisions/0022; judgement for recordings of 200 Hz",
+    )
+    start_reaches: tuple[float, ...] = setting(
+        (0.04, 0.08, 0.16),
+        unit="s",
+        above=0.0,
+        reason="stretches on either side of a window's start from which its value and slope are "
+        "estimated; the longest is taken that a cubic still fits",
+        origin="docs/decisions/0022",
+    )
+    start_misfit: float = setting(
+        1.1,
+        unit="1",
+        above=0.0,
+        reason="variance over that of the noise up to which a cubic fits such a stretch",
+        origin="docs/decisions/0022",
+    )
+    start_first_stds: float = setting(
+        2.0,
+        unit="1",
+        least=0.0,
+        reason="standard deviations of that variance that are allowed beside it for the shortest "
+        "stretch",
+        origin="docs/decisions/0022",
+    )
+    start_longer_stds: float = setting(
+        1.5,
+        unit="1",
+        least=0.0,
+        reason="the same for longer stretches",
+        origin="docs/decisions/0022",
+    )
+    start_slope_stds: float = setting(
+        2.0,
+        unit="1",
+        least=0.0,
+        reason="standard deviations by which the slopes of a shorter and a longer stretch may differ",
+        origin="Lepski (1991), docs/decisions/0022",
+    )
+    start_least_samples: int = setting(
+        8,
+        unit="count",
+        least=5,
+        reason="fewest samples of a stretch: a cubic takes four",
+        origin="judgement",
+    )
+    bridged_samples: int = setting(
+        3,
+        unit="count",
+        least=0,
+        reason="longest hole in a driving signal that is bridged by a line",
+        origin="judgement",
+    )
+    least_samples: int = setting(
+        32,
+        unit="count",
+        least=8,
+        reason="fewest samples of a recording that can be diagnosed",
+        origin="judgement",
+    )
+    least_channel_samples: int = setting(
+        16,
+        unit="count",
+        least=8,
+        reason="fewest usable samples of a channel",
+        origin="judgement",
+    )
+    least_channel_share: float = setting(
+        0.2,
+        unit="1",
+        least=0.0,
+        most=1.0,
+        reason="share of a channel's samples that must be usable",
+        origin="judgement",
+    )
+    least_block_share: float = setting(
+        0.2,
+        unit="1",
+        least=0.0,
+        most=1.0,
+        reason="share of usable samples below which a block is left out of the diagnosis",
+        origin="judgement",
+    )
+    regulator_droop_shift: float = setting(
+        3.0,
+        unit="standard deviations",
+        above=0.0,
+        reason="how far the noise of two measured pressures may move a regulator's droop before "
+        "its block is left out",
+        origin="judgement",
+    )
+    arm_window: float = setting(
+        2.5,
+        unit="s",
+        above=0.0,
+        reason="length of a joint's windows: what its start does has faded within one, and a "
+        "break-away that is predicted wrongly spoils no more; windows of 5 s left 84 times the "
+        "noise level in slow motion with stiction",
+        origin="docs/decisions/0014",
+    )
+    supply_window: float = setting(
+        4.0, unit="s", above=0.0, reason="the same for a tank or a regulator", origin="judgement"
+    )
+    chamber_window: float = setting(
+        2.0,
+        unit="s",
+        above=0.0,
+        reason="the same for a chamber that is fed; a sealed one is one window",
+        origin="judgement",
+    )
+    window_samples_per_state: int = setting(
+        4,
+        unit="count",
+        least=1,
+        reason="usable samples of a window for each state whose start is projected out; a window "
+        "with fewer is not used",
+        origin="judgement",
+    )
+    arm_step: float = setting(
+        2.5e-3,
+        unit="s",
+        above=0.0,
+        reason="longest integration step of joints and loads between measured pressures",
+        origin="judgement: the error is below the noise level (docs/convergence.md)",
+    )
+    gas_step: float = setting(
+        5e-3,
+        unit="s",
+        above=0.0,
+        reason="the same for tanks and chambers; the core divides it until it is stable",
+        origin="judgement: the error is below the noise level (docs/convergence.md)",
+    )
+    sealed_step: float = setting(
+        0.025,
+        unit="s",
+        above=0.0,
+        reason="the same for a sealed chamber, whose pressure hardly moves",
+        origin="judgement: the error is below the noise level (docs/convergence.md)",
+    )
+
+
+@dataclass(frozen=True)
+class PlausibilitySettings(SettingsGroup):
+    """What recordings cannot be: wrong units, swapped columns, dead sensors."""
+
+    least_pressure: float = setting(
+        100.0,
+        unit="Pa",
+        above=0.0,
+        reason="gauge pressure that a pressure channel exceeds somewhere, or it is in another unit",
+        origin="judgement: bar under a heading in Pa stays below it",
+    )
+    most_pressure: float = setting(
+        1e7,
+        unit="Pa",
+        above=0.0,
+        reason="gauge pressure of air that no muscle sees",
+        origin="judgement: Pa under a heading in bar is far above it",
+    )
+    most_rated_multiple: float = setting(
+        5.0,
+        unit="1",
+        above=0.0,
+        reason="multiple of the largest pressure of the rig file that is allowed above that",
+        origin="judgement",
+    )
+    supply_least_share: float = setting(
+        0.05,
+        unit="1",
+        least=0.0,
+        reason="highest measured supply pressure over that of the rig file, at the least",
+        origin="judgement",
+    )
+    supply_most_share: float = setting(
+        5.0, unit="1", above=0.0, reason="the same at the most", origin="judgement"
+    )
+    order_margin: float = setting(
+        0.05,
+        unit="1",
+        least=0.0,
+        reason="share of the supply's pressure by which a muscle's may exceed it",
+        origin="judgement: errors of two transducers",
+    )
+    order_offset: float = setting(
+        1e4,
+        unit="Pa",
+        least=0.0,
+        reason="pressure by which it may exceed it besides",
+        origin="judgement: zeros of two transducers",
+    )
+    order_time_share: float = setting(
+        0.5,
+        unit="1",
+        least=0.0,
+        most=1.0,
+        reason="share of the time for which it may exceed it by more",
+        origin="judgement",
+    )
+    range_margin: float = setting(
+        0.05,
+        unit="1",
+        least=0.0,
+        reason="share of its range by which a joint or a load may leave it",
+        origin="judgement",
+    )
+    least_angle_margin: float = setting(
+        0.1, unit="rad", least=0.0, reason="the same of a joint, at the least", origin="judgement"
+    )
+    least_length_margin: float = setting(
+        0.01, unit="m", least=0.0, reason="the same of a load, at the least", origin="judgement"
+    )
+    range_time_share: float = setting(
+        0.2,
+        unit="1",
+        least=0.0,
+        most=1.0,
+        reason="share of the time for which it may leave its range by more",
+        origin="judgement",
+    )
+    fastest_joint: float = setting(
+        200.0,
+        unit="rad/s",
+        above=0.0,
+        reason="rate of a joint that one sample in a hundred may exceed",
+        origin="judgement: degrees under a heading in rad exceed it",
+    )
+    fastest_load: float = setting(
+        20.0,
+        unit="m/s",
+        above=0.0,
+        reason="speed of a load that one sample in a hundred may exceed",
+        origin="judgement",
+    )
+    longest_sample_time: float = setting(
+        0.25,
+        unit="s",
+        above=0.0,
+        reason="sample time at which the motion of a joint or load can still be followed",
+        origin="judgement",
+    )
+    frozen_tank_change: float = setting(
+        2e4,
+        unit="Pa",
+        above=0.0,
+        reason="change of a muscle's pressure during which the tank that feeds it cannot read one "
+        "and the same value",
+        origin="judgement",
+    )
+    frozen_motion_share: float = setting(
+        0.1,
+        unit="1",
+        above=0.0,
+        reason="relative change of the muscles' pressure during which what they move cannot read "
+        "one and the same value",
+        origin="judgement",
+    )
+    opposed_share: float = setting(
+        0.6,
+        unit="1",
+        least=0.0,
+        most=1.0,
+        reason="share of a chamber's change of pressure that may go against its valve's command",
+        origin="judgement: motion and leaks move it against the command as well",
+    )
+    opposed_correlation: float = setting(
+        -0.2,
+        unit="1",
+        least=-1.0,
+        most=1.0,
+        reason="correlation of command and change below which that counts",
+        origin="judgement",
+    )
+    still_angle: float = setting(
+        0.02,
+        unit="rad",
+        above=0.0,
+        reason="change of a joint's angle up to which the muscles' volume hardly moves their pressure",
+        origin="judgement",
+    )
+    still_length: float = setting(
+        1e-3, unit="m", above=0.0, reason="the same of a load's length", origin="judgement"
+    )
+    command_span: float = setting(
+        2.0,
+        unit="half ranges",
+        above=0.0,
+        reason="distance of a command from its null beyond which it is another column or unit",
+        origin="judgement",
+    )
+    command_time_share: float = setting(
+        0.5,
+        unit="1",
+        least=0.0,
+        most=1.0,
+        reason="share of the time for which a command may be beyond that",
+        origin="judgement",
+    )
+    sense_time: float = setting(
+        0.1,
+        unit="s",
+        above=0.0,
+        reason="time over which a change of pressure is compared with the command",
+        origin="judgement",
+    )
+    sense_least_change: float = setting(
+        2e4,
+        unit="Pa",
+        above=0.0,
+        reason="range of a muscle's pressure below which its sense is not asked",
+        origin="judgement",
+    )
+    sense_least_noises: float = setting(
+        3.0,
+        unit="noises",
+        above=0.0,
+        reason="standard deviation of an angle below which its unit and sign are not asked",
+        origin="judgement",
+    )
+    sense_wrong: float = setting(
+        1.0,
+        unit="standard deviations",
+        above=0.0,
+        reason="misfit of an angle as recorded from which its unit or sign may be wrong",
+        origin="judgement",
+    )
+    sense_right: float = setting(
+        0.4,
+        unit="standard deviations",
+        above=0.0,
+        reason="misfit in another unit or sign below which that is the right one",
+        origin="judgement",
+    )
+
+
+@dataclass(frozen=True)
+class NoiseSettings(SettingsGroup):
+    """When a residual is more than noise."""
+
+    bin_time: float = setting(
+        0.1,
+        unit="s",
+        above=0.0,
+        reason="width of the bins over which residuals are averaged before they are compared with "
+        "the noise level: what is missing is slower than that",
+        origin="judgement, docs/decisions/0014",
+    )
+    least_bin_samples: int = setting(
+        5, unit="count", least=1, reason="fewest samples of such a bin", origin="judgement"
+    )
+    fit_bin_time: float = setting(
+        0.02,
+        unit="s",
+        above=0.0,
+        reason="width of the bins over which residuals are averaged for fits",
+        origin="judgement: faster than any effect of the catalogue shows",
+    )
+    replicates: int = setting(
+        10,
+        unit="count",
+        least=2,
+        reason="realisations of the sensors' noise that give a noise level and its scatter",
+        origin="docs/decisions/0022",
+    )
+    margin: float = setting(
+        1.1,
+        unit="1",
+        least=1.0,
+        reason="factor by which the variance must exceed its noise level before it counts: noise "
+        "levels are estimates",
+        origin="docs/decisions/0022, 55 healthy cases",
+    )
+    chance: float = setting(
+        0.005,
+        unit="1",
+        above=0.0,
+        most=0.5,
+        reason="chance of noise exceeding the limit of a block that is accepted: one in 200",
+        origin="docs/decisions/0022",
+    )
+    most_limit: float = setting(
+        2.5,
+        unit="1",
+        least=1.0,
+        reason="variance over that of the noise which is a mismatch however much the noise level "
+        "scatters",
+        origin="docs/decisions/0022",
+    )
+    most_log_limit: float = setting(
+        1.0,
+        unit="1",
+        least=0.0,
+        reason="largest logarithm of what the scatter adds to the margin",
+        origin="judgement",
+    )
+    correlated_variance: float = setting(
+        2.0,
+        unit="1",
+        least=1.0,
+        reason="variance times autocorrelation time of a fit's residuals, relative to white noise, "
+        "from which the fit is repeated with these as weights",
+        origin="docs/decisions/0020",
+    )

@@ -1,0 +1,662 @@
+"""Settings of the judgement: which hypotheses are fitted, and how they are weighed."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from pamrs.diagnosis.settings._setting import SettingsGroup, setting
+from pamrs.errors import ParameterError
+
+__all__ = [
+    "EvidenceSettings",
+    "FaintSettings",
+    "SearchSettings",
+    "VerdictSettings",
+    "WrongParameterSettings",
+]
+
+
+@dataclass(frozen=True)
+class SearchSettings(SettingsGroup):
+    """Which blocks are suspect, and which hypotheses are fitted for them."""
+
+    held_out_ratio: float = setting(
+        2.0,
+        unit="1",
+        least=1.0,
+        reason="variance over that of the noise from which held-out recordings show a mismatch "
+        "that the fitted ones hardly show",
+        origin="docs/decisions/0020",
+    )
+    fitted_hint: float = setting(
+        1.15,
+        unit="1",
+        least=1.0,
+        reason="variance over that of the noise that the fitted recordings must have for that",
+        origin="docs/decisions/0020",
+    )
+    marginal_multiple: float = setting(
+        1.35,
+        unit="1",
+        above=0.0,
+        reason="multiple of noise's largest excess up to which a mismatch that no effect explains "
+        "may be a noise level that was estimated too low",
+        origin="docs/decisions/0021, then 0022",
+    )
+    marginal_excess: float = setting(
+        0.3,
+        unit="1",
+        above=0.0,
+        reason="excess variance over that of the noise up to which it may",
+        origin="docs/decisions/0021, then 0022",
+    )
+    marginal_probability: float = setting(
+        0.6,
+        unit="1",
+        least=0.0,
+        most=1.0,
+        reason="probability that it is",
+        origin="docs/decisions/0021: odds 3 to 2",
+    )
+    split_from: float = setting(
+        0.5,
+        unit="1",
+        least=0.0,
+        most=1.0,
+        reason="probability of unlisted above which a group of blocks is split where a name "
+        "explains one of them: no name is then more probable than its absence",
+        origin="docs/decisions/0024",
+    )
+    least_gain: float = setting(
+        12.0,
+        unit="chi-square",
+        least=0.0,
+        reason="gain by the screen from which an effect is fitted",
+        origin="judgement; docs/decisions/0013",
+    )
+    least_gain_share: float = setting(
+        0.08,
+        unit="1",
+        least=0.0,
+        most=1.0,
+        reason="share of the largest gain from which an effect is fitted",
+        origin="judgement; docs/decisions/0013",
+    )
+    most_singles: int = setting(
+        5, unit="count", least=1, reason="single effects that are fitted", origin="docs/decisions/0013"
+    )
+    near_start: float = setting(
+        0.6,
+        unit="1",
+        least=0.0,
+        most=1.0,
+        reason="share of an effect's best gain from which another of its starts is fitted",
+        origin="judgement; docs/decisions/0013",
+    )
+    most_starts: int = setting(
+        2, unit="count", least=1, reason="starts of an effect that are fitted", origin="docs/decisions/0013"
+    )
+    effects_with_starts: int = setting(
+        3,
+        unit="count",
+        least=0,
+        reason="effects of which more than one start is fitted",
+        origin="docs/decisions/0013",
+    )
+    most_paired: int = setting(
+        2,
+        unit="count",
+        least=0,
+        reason="single effects that get a partner",
+        origin="judgement; docs/decisions/0013",
+    )
+    most_partners: int = setting(
+        2, unit="count", least=0, reason="partners of each", origin="judgement; docs/decisions/0013"
+    )
+    partner_share: float = setting(
+        0.01,
+        unit="1",
+        least=0.0,
+        reason="share of the mismatch that a partner has to promise",
+        origin="judgement; docs/decisions/0013",
+    )
+    transient_from: float = setting(
+        0.15,
+        unit="1",
+        least=0.0,
+        reason="share of the mismatch that every persistent effect leaves, from which transient "
+        "ones are looked for",
+        origin="judgement",
+    )
+    transient_beside: float = setting(
+        0.08,
+        unit="1",
+        least=0.0,
+        reason="share that the best persistent effect leaves, from which transient ones are looked "
+        "for beside it",
+        origin="docs/decisions/0020",
+    )
+    much_left: float = setting(
+        0.5,
+        unit="1",
+        least=0.0,
+        reason="share of a mismatch from which an effect leaves most of it",
+        origin="docs/decisions/0020",
+    )
+    polish_from: float = setting(
+        0.03,
+        unit="1",
+        least=0.0,
+        most=1.0,
+        reason="probability from which a hypothesis is fitted to its end",
+        origin="docs/decisions/0022",
+    )
+    most_polished: int = setting(
+        4,
+        unit="count",
+        least=0,
+        reason="hypotheses that are",
+        origin="docs/decisions/0022: two to four seconds each",
+    )
+
+
+@dataclass(frozen=True)
+class FaintSettings(SettingsGroup):
+    """How effects below the noise are looked for and weighed."""
+
+    least_gain: float = setting(
+        45.0,
+        unit="chi-square",
+        least=0.0,
+        reason="gain, autocorrelation counted, from which a signature counts in residuals that are "
+        "no larger than noise; healthy gas blocks have none above 8, arms none above 19",
+        origin="docs/decisions/0020, 14 and 5 healthy cases of seed 11",
+    )
+    rival_share: float = setting(
+        0.3,
+        unit="1",
+        least=0.0,
+        most=1.0,
+        reason="share of the largest gain from which another effect is its rival",
+        origin="judgement; docs/decisions/0020",
+    )
+    most_fitted: int = setting(
+        4, unit="count", least=1, reason="rivals that are fitted", origin="judgement"
+    )
+    held_out_share: float = setting(
+        0.05,
+        unit="1",
+        least=0.0,
+        reason="share of the gain that held-out recordings have to show",
+        origin="docs/decisions/0020",
+    )
+    gain_weight: float = setting(
+        0.1,
+        unit="1",
+        least=0.0,
+        reason="share of chi-square by which rivals are weighed: their equations are not the true "
+        "ones, and the whole of it would always be sure",
+        origin="docs/decisions/0020",
+    )
+    log_odds: float = setting(
+        6.0,
+        unit="log odds",
+        reason="for a faint effect against unlisted where nothing speaks against it",
+        origin="docs/decisions/0020",
+    )
+    most_probability: float = setting(
+        0.93,
+        unit="1",
+        above=0.0,
+        most=1.0,
+        reason="largest probability of a faint effect",
+        origin="docs/decisions/0020",
+    )
+    moved_tolerances: float = setting(
+        1.75,
+        unit="tolerances",
+        above=0.0,
+        reason="movement of a parameter from which effects that do the same are asked whether it "
+        "could go back; no parameter of 91 healthy cases moved its zero by more than 1.2",
+        origin="docs/decisions/0021",
+    )
+    same_cosine: float = setting(
+        0.8,
+        unit="1",
+        least=0.0,
+        most=1.0,
+        reason="cosine of two signatures from which an effect does the same as a parameter",
+        origin="docs/decisions/0021",
+    )
+    relief: float = setting(
+        3.0,
+        unit="chi-square",
+        least=0.0,
+        reason="fall of the priors' sum of squares that an effect has to bring",
+        origin="docs/decisions/0021",
+    )
+    parameters_log_odds: float = setting(
+        1.5,
+        unit="log odds",
+        reason="of parameters that are off to all effects that do the same",
+        origin="docs/decisions/0021: 4.5 to 1",
+    )
+    gone_back_share: float = setting(
+        0.5,
+        unit="1",
+        least=0.0,
+        reason="share of its movement to which the parameter has to go back",
+        origin="docs/decisions/0021",
+    )
+
+
+@dataclass(frozen=True)
+class WrongParameterSettings(SettingsGroup):
+    """How values of the rig file that are wrong compete with effects."""
+
+    wall_tolerances: float = setting(
+        2.9,
+        unit="tolerances",
+        above=0.0,
+        reason="movement from which a refitted parameter stands at its wall, and is a suspect",
+        origin="docs/decisions/0025; the wall is at fit.most_tolerances",
+    )
+    file_log_odds: float = setting(
+        4.6,
+        unit="log odds",
+        reason="against a parameter outside its tolerances where the baseline explains all",
+        origin="docs/decisions/0025: one file in a hundred",
+    )
+    effect_log_odds: float = setting(
+        6.0,
+        unit="log odds",
+        reason="against a faint effect beside it",
+        origin="docs/decisions/0025",
+    )
+    least_promise: float = setting(
+        9.2,
+        unit="chi-square",
+        least=0.0,
+        reason="gain by the linear model from which a parameter is freed: twice file_log_odds",
+        origin="docs/decisions/0025",
+    )
+    most_pairs: int = setting(
+        2, unit="count", least=0, reason="pairs of parameters that are fitted", origin="docs/decisions/0025"
+    )
+    pair_share: float = setting(
+        0.08,
+        unit="1",
+        least=0.0,
+        reason="share of the largest promise from which a pair is fitted",
+        origin="docs/decisions/0025",
+    )
+    wrong_together: tuple[tuple[str, str], ...] = setting(
+        (
+            ("chamber.dead_volume", "valve.discharge_area_max"),
+            ("arm.payload", "arm.first_moment"),
+            ("arm.inertia", "arm.first_moment"),
+            ("link.mass", "link.centre"),
+            ("link.inertia", "link.mass"),
+        ),
+        unit="parameters",
+        reason="pairs that one mistake makes wrong together: another valve and fittings, another "
+        "load, another arm",
+        origin="docs/decisions/0025",
+    )
+
+
+@dataclass(frozen=True)
+class EvidenceSettings(SettingsGroup):
+    """How hypotheses are weighed against each other and against unlisted."""
+
+    log_odds_explained: float = setting(
+        0.5,
+        unit="log odds",
+        reason="odds of explained to unexplained variance at which a set of effects is as probable "
+        "as unlisted: even where 38 % is left",
+        origin="docs/decisions/0014, 26 cases of seed 501",
+    )
+    log_odds_explained_pliable: float = setting(
+        2.6,
+        unit="log odds",
+        reason="the same of what takes up a good part of anything: transient effects that are "
+        "another in every recording, and parameters of the baseline (7 % left)",
+        origin="docs/decisions/0014 and 0025",
+    )
+    softness: float = setting(
+        0.4,
+        unit="log odds",
+        above=0.0,
+        reason="width of that transition",
+        origin="docs/decisions/0014",
+    )
+    log_odds_noise_left: float = setting(
+        3.0,
+        unit="log odds",
+        reason="odds to unlisted that a set has at the least where it leaves only noise",
+        origin="judgement",
+    )
+    clear_share: float = setting(
+        0.7,
+        unit="1",
+        above=0.0,
+        most=1.0,
+        reason="share that may be left of a mismatch that hardly is one, for a set to explain it",
+        origin="docs/decisions/0021: what explains it has to take 30 % of it",
+    )
+    looks: float = setting(
+        12.0,
+        unit="1",
+        above=0.0,
+        reason="independent looks that a block's residual counts for",
+        origin="docs/decisions/0014: tuned on seed 501",
+    )
+    parameter_price: float = setting(
+        0.5,
+        unit="log odds",
+        least=0.0,
+        reason="price of a parameter of an effect",
+        origin="docs/decisions/0014: tuned on seed 501",
+    )
+    further_price: float = setting(
+        3.0,
+        unit="log odds",
+        least=0.0,
+        reason="price of a further effect or wrong parameter",
+        origin="docs/decisions/0014: tuned on seed 501",
+    )
+    wrong_price: float = setting(
+        1.5,
+        unit="log odds",
+        least=0.0,
+        reason="price of a rig file that is wrong about a parameter, beside the logarithm of how "
+        "many times it is outside its tolerances",
+        origin="docs/decisions/0025",
+    )
+    telling_excess: float = setting(
+        0.5,
+        unit="1",
+        least=0.0,
+        reason="excess variance over that of the noise from which recordings are asked how much an "
+        "effect leaves",
+        origin="docs/decisions/0014",
+    )
+    telling_share: float = setting(
+        0.9,
+        unit="1",
+        above=0.0,
+        most=1.0,
+        reason="share of the largest excess from which recordings always are",
+        origin="judgement",
+    )
+    form_share: float = setting(
+        0.04,
+        unit="1",
+        least=0.0,
+        reason="share of a mismatch that the difference between an equation of the catalogue and "
+        "the truth may leave",
+        origin="docs/decisions/0014",
+    )
+    form_share_alike: float = setting(
+        0.01,
+        unit="1",
+        least=0.0,
+        reason="the same where sets of as many effects are compared",
+        origin="docs/decisions/0021",
+    )
+    form_error: float = setting(
+        0.15,
+        unit="1",
+        least=0.0,
+        reason="standard deviation of what a right effect of another form leaves of a mismatch's "
+        "variance",
+        origin="docs/decisions/0022",
+    )
+    noise_error: float = setting(
+        0.06,
+        unit="1",
+        least=0.0,
+        reason="standard deviation of a noise level",
+        origin="docs/decisions/0022",
+    )
+    decided: float = setting(
+        8.0,
+        unit="log odds",
+        above=0.0,
+        reason="the most that what is left in one block, or the priors, count",
+        origin="docs/decisions/0022 and 0025",
+    )
+    most_probability: float = setting(
+        0.985,
+        unit="1",
+        above=0.0,
+        most=1.0,
+        reason="largest probability of a name",
+        origin="docs/decisions/0014",
+    )
+    drift_share: float = setting(
+        0.02,
+        unit="1",
+        least=0.0,
+        reason="share of the pressure below which a drift that no other recording confirms may be "
+        "the bench's own",
+        origin="docs/decisions/0014: the aluminium control of the chambers has one",
+    )
+    drift_probability: float = setting(
+        0.45,
+        unit="1",
+        above=0.0,
+        most=1.0,
+        reason="largest probability of a name for such a drift",
+        origin="docs/decisions/0014",
+    )
+    standing_price: float = setting(
+        2.0,
+        unit="log odds",
+        least=0.0,
+        reason="price of an effect that leaves the same recordings as another one because a "
+        "parameter of it is next to zero: a clock that is late but does not drift",
+        origin="docs/decisions/0020: odds of 7 to 1",
+    )
+    same_share: float = setting(
+        0.1,
+        unit="1",
+        least=0.0,
+        reason="part of an effect's size over a recording below which what would tell it from "
+        "another effect is zero",
+        origin="judgement",
+    )
+    same_stds: float = setting(
+        2.0,
+        unit="standard deviations",
+        least=0.0,
+        reason="the same by its uncertainty",
+        origin="judgement",
+    )
+    unseen_lengths: float = setting(
+        3.0,
+        unit="recordings",
+        above=0.0,
+        reason="lengths of the longest recording beyond which a time constant was not seen",
+        origin="judgement",
+    )
+    unseen_price: float = setting(
+        5.0,
+        unit="log odds",
+        least=0.0,
+        reason="price of an effect with such a time constant",
+        origin="judgement",
+    )
+    scatter: float = setting(
+        0.35,
+        unit="1",
+        least=0.0,
+        reason="relative scatter of an effect's size between recordings beyond which it is not "
+        "that effect",
+        origin="judgement",
+    )
+    scatter_width: float = setting(
+        0.1,
+        unit="1",
+        above=0.0,
+        reason="further scatter that costs one unit of log odds",
+        origin="judgement",
+    )
+    range_factor: float = setting(
+        3.0,
+        unit="1",
+        above=1.0,
+        reason="factor by which a value is one standard deviation outside its usual range",
+        origin="docs/decisions/0022",
+    )
+    most_range_price: float = setting(
+        4.0,
+        unit="log odds",
+        least=0.0,
+        reason="the most that a value outside its usual range costs",
+        origin="docs/decisions/0022",
+    )
+    contact_share: float = setting(
+        0.5,
+        unit="1",
+        least=0.0,
+        most=1.0,
+        reason="share of the range that was visited over which a contact may act",
+        origin="docs/decisions/0022",
+    )
+    contact_width: float = setting(
+        0.15,
+        unit="1",
+        above=0.0,
+        reason="share beyond that which costs a standard deviation",
+        origin="docs/decisions/0022",
+    )
+
+
+@dataclass(frozen=True)
+class VerdictSettings(SettingsGroup):
+    """How probabilities become a verdict."""
+
+    shared_odds: float = setting(
+        6.0,
+        unit="1",
+        above=0.0,
+        reason="odds of one effect that acts in two groups of blocks to two effects",
+        origin="docs/decisions/0024",
+    )
+    settled: float = setting(
+        0.9,
+        unit="1",
+        above=0.0,
+        most=1.0,
+        reason="probability from which an answer is settled",
+        origin="judgement",
+    )
+    in_set: float = setting(
+        0.05,
+        unit="1",
+        least=0.0,
+        most=1.0,
+        reason="probability from which a hypothesis belongs to the set that is left",
+        origin="judgement",
+    )
+    named: float = setting(
+        0.5,
+        unit="1",
+        least=0.0,
+        most=1.0,
+        reason="probability above which a name is given even where unlisted is more probable than "
+        "each set of names that has it",
+        origin="docs/decisions/0024",
+    )
+    listed: float = setting(
+        1e-4,
+        unit="1",
+        least=0.0,
+        reason="probability from which a case lists a set of names: most products of what several "
+        "blocks leave open are next to nothing",
+        origin="judgement",
+    )
+    counted: float = setting(
+        1e-6,
+        unit="1",
+        least=0.0,
+        reason="probability from which a hypothesis of one group is put beside those of others",
+        origin="judgement",
+    )
+    most_sets: int = setting(
+        8, unit="count", least=1, reason="sets that a case lists", origin="judgement"
+    )
+    quiet_likely: float = setting(
+        0.96,
+        unit="1",
+        least=0.0,
+        most=1.0,
+        reason="probability of parameters in a group that keeps only noise after its parameters "
+        "moved, of none where they did not have to",
+        origin="judgement; docs/decisions/0004",
+    )
+    quiet_other: float = setting(
+        0.03,
+        unit="1",
+        least=0.0,
+        most=1.0,
+        reason="probability of the other one of the two",
+        origin="judgement; docs/decisions/0004",
+    )
+    quiet_unlisted: float = setting(
+        0.01,
+        unit="1",
+        least=0.0,
+        most=1.0,
+        reason="probability of unlisted in such a group",
+        origin="judgement; docs/decisions/0004",
+    )
+    strained_parameters: float = setting(
+        0.75,
+        unit="1",
+        least=0.0,
+        most=1.0,
+        reason="probability of parameters where one stands at its wall: all is explained, at a "
+        "price that the rig's owner would not have expected",
+        origin="judgement; docs/decisions/0004",
+    )
+    strained_unlisted: float = setting(
+        0.25,
+        unit="1",
+        least=0.0,
+        most=1.0,
+        reason="probability of unlisted there",
+        origin="judgement; docs/decisions/0004",
+    )
+    unknown_geometry_probability: float = setting(
+        0.4,
+        unit="1",
+        least=0.0,
+        most=1.0,
+        reason="factor of the probability of effects on a joint beside geometry that the rig file "
+        "marks unknown",
+        origin="docs/decisions/0012",
+    )
+    least_gap: float = setting(
+        0.05,
+        unit="noises",
+        least=0.0,
+        reason="gap between refit and noise, over all channels, below which nothing is said of "
+        "how much of it closes",
+        origin="judgement",
+    )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for names in (
+            ("quiet_likely", "quiet_other", "quiet_unlisted"),
+            ("strained_parameters", "strained_unlisted"),
+        ):
+            total = sum(getattr(self, name) for name in names)
+            if not math.isclose(total, 1.0, abs_tol=1e-9):
+                raise ParameterError(
+                    f"VerdictSettings.{' + '.join(names)} = {total:g} is not allowed: they are "
+                    "probabilities of all that can be, and add up to 1"
+                )
