@@ -15,6 +15,8 @@ CASE_KIND := $(if $(KIND),--kind $(KIND))
 LOCKED := $(if $(CI),--locked)
 RUST_SOURCES := $(shell find crates -name '*.rs' -path '*/src/*' 2>/dev/null) \
                 $(shell find crates -name Cargo.toml 2>/dev/null) Cargo.toml $(wildcard Cargo.lock)
+# One by one, since cargo fmt does not see modules that a macro declares.
+RUSTFMT := rustfmt --edition 2021 $(shell find crates -name '*.rs')
 PYTHON_SOURCES := python tests trial demo benchmarks fingerprints
 # Processes that pytest takes; a file of tests stays in one, so that what its tests share is computed once.
 WORKERS ?= $(shell nproc 2>/dev/null || echo 2)
@@ -90,7 +92,7 @@ test-all:  ## the same with the long trials
 lint: lint-rust lint-python  ## formatting, clippy, ruff, mypy, the stub against the compiled module
 
 lint-rust: $(VENV)/.created
-	cargo fmt --all --check
+	$(RUSTFMT) --check
 	cargo clippy --quiet --workspace --all-targets $(LOCKED) -- -D warnings
 
 lint-python: build
@@ -118,7 +120,7 @@ deny:  ## licences, sources and duplicates of the crates (needs cargo-deny)
 	cargo deny --locked check bans licenses sources
 
 format:  ## rewrite the sources in the house's layout
-	cargo fmt --all
+	$(RUSTFMT)
 	$(BIN)/ruff check --quiet --fix $(PYTHON_SOURCES)
 	$(BIN)/ruff format $(PYTHON_SOURCES)
 
