@@ -131,7 +131,8 @@ def main(argv: list[str] | None = None) -> int:
             if args.figure is not None:
                 figure(scores, args.figure)
         elif args.command == "report":
-            print(f"written: {report(args.folder, args.results or args.folder / 'results', args.out, args.words)}")
+            results = args.results or args.folder / "results"
+            print(f"written: {report(args.folder, results, args.out, args.words)}")
         elif args.command == "blocks":
             if args.first is not None and args.first < 1:
                 raise ValueError(f"--first {args.first} is not allowed: at least 1")

@@ -34,6 +34,7 @@ def hold(folder, conductance, *starts):
     (folder / "case.toml").write_text(text)
 
 
+@pytest.mark.slow
 def test_a_leak_and_a_tight_chamber(tmp_path, capsys):
     hold(tmp_path / "cases" / "leak", 3e-11, 7e5, 5e5, 6e5)
     hold(tmp_path / "cases" / "tight", 0.0, 7e5, 5e5, 6e5)

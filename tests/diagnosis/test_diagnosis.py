@@ -184,11 +184,11 @@ def test_printed_chambers(name: str, leaks: bool) -> None:
         assert slow > 1e4
 
 
-@pytest.mark.parametrize("kind", ["none", "leak_muscle"])
+@pytest.mark.parametrize("kind", [pytest.param("none", marks=pytest.mark.slow), "leak_muscle"])
 def test_small_blinded_trial(kind: str, tmp_path: Path) -> None:
     from trial import make_case
 
-    made = make_case(tmp_path / "cases", tmp_path / "keys", kind, seed=2014, recordings=4, duration=20.0)
+    made = make_case(tmp_path / "cases", tmp_path / "keys", kind, seed=2014, recordings=4, duration=12.0)
     assert made is not None
     (folder,) = sorted((tmp_path / "cases").glob("case_*"))
     found = pamrs.diagnose(folder)

@@ -40,7 +40,10 @@ def recordings(effect: str, make: dict[str, float], duration: float = 12.0, *, p
 
 @pytest.mark.parametrize(
     ("effect", "make"),
-    [("external_torque", {"torque": 3.0, "duration": 0.8}), ("payload_change", {"mass_change": 0.4})],
+    [
+        ("external_torque", {"torque": 3.0, "duration": 0.8}),
+        pytest.param("payload_change", {"mass_change": 0.4}, marks=pytest.mark.slow),
+    ],
 )
 def test_an_event_is_named_with_its_times(effect: str, make: dict[str, float]) -> None:
     found = pamrs.diagnose(pamrs.Case("events", pamrs.rigs.shoulder(), recordings(effect, make), Path()))
@@ -71,6 +74,7 @@ def test_a_recording_without_the_event_has_no_slope_in_it() -> None:
     assert without[:, 0].any()
 
 
+@pytest.mark.slow
 def test_a_push_is_found_beside_a_lasting_effect() -> None:
     plant = pamrs.rigs.shoulder().with_effect("muscle_hysteresis", {"friction_pressure": 1e-4, "presliding": 0.003})
     records = recordings("external_torque", {"torque": 5.0, "duration": 0.8}, plant=plant)

@@ -48,6 +48,7 @@ def test_an_effect_below_the_noise_is_named() -> None:
     assert abs(told["value"] - 8e-4) < max(2e-4, 4.0 * told["std"])
 
 
+@pytest.mark.slow
 def test_faint_rivals_that_look_alike_stay_a_set() -> None:
     found = pamrs.diagnose(shoulder_case(pamrs.rigs.shoulder().with_effect("input_path_lag", {"delay": 1.2e-3, "time_constant": 0.0})))
     assert found.verdict == "effects"
@@ -85,6 +86,7 @@ def test_a_zero_inside_its_tolerance_is_no_effect() -> None:
     assert found.effects == []
 
 
+@pytest.mark.slow
 def test_a_payload_on_a_cord_is_named_with_its_length() -> None:
     truth = pamrs.rigs.shoulder().with_effect("payload_swing", {"swinging_share": 0.03, "length": 0.23, "damping_ratio": 0.02})
     found = pamrs.diagnose(shoulder_case(truth))
@@ -163,6 +165,7 @@ def test_held_out_recordings_that_hardly_show_a_mismatch_do_not_veto_its_effect(
     assert named(13.0, 0.1) < 0.1  # it explains nothing
 
 
+@pytest.mark.slow
 def test_a_tube_is_named_with_the_place_of_the_transducer() -> None:
     truth = pamrs.rigs.shoulder().with_effect("tube_flow_restriction", {"conductance": 5e-8, "tap": 1.0})
     found = pamrs.diagnose(shoulder_case(truth))

@@ -71,7 +71,13 @@ def test_the_load_is_a_block_and_its_sensitivities_are_those_of_differences() ->
         assert np.abs(slope - jacobian[:, k]).max() < 1e-3 * np.abs(slope).max(), name
 
 
-@pytest.mark.parametrize("true", [{"load.mass": 40.08, "muscle.modulus_scale": 1.04}, {"muscle.rest_length": 0.277}])
+@pytest.mark.parametrize(
+    "true",
+    [
+        pytest.param({"load.mass": 40.08, "muscle.modulus_scale": 1.04}, marks=pytest.mark.slow),
+        {"muscle.rest_length": 0.277},
+    ],
+)
 def test_a_true_model_of_a_load_misses_nothing(true: dict[str, float]) -> None:
     found = pamrs.diagnose(case(RIG.with_parameters(true)))
     assert found.verdict in ("none", "parameters")
@@ -133,6 +139,7 @@ def test_the_next_experiment_with_a_load_is_simulated() -> None:
     assert told["curves"] is not None
 
 
+@pytest.mark.slow
 def test_an_effect_on_a_load_is_named() -> None:
     found = pamrs.diagnose(
         case(RIG.with_effect("muscle_hysteresis", {"friction_constant": 4.0, "friction_pressure": 4e-5, "presliding": 2e-3}))

@@ -99,6 +99,7 @@ def test_a_nominal_antagonist_has_nothing_missing(rig: pamrs.Rig) -> None:
     assert "chamber.flexor.dead_volume" in found.parameters
 
 
+@pytest.mark.slow
 def test_pressures_alone_tell_the_friction_of_the_muscles(rig: pamrs.Rig, bare: pamrs.Rig) -> None:
     assert pamrs.diagnose(case(rig, bare, pressures_only=True)).verdict in ("none", "parameters")
     found = pamrs.diagnose(case(rig.with_effect("muscle_hysteresis"), bare, pressures_only=True))

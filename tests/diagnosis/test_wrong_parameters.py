@@ -41,7 +41,10 @@ def case(true: pamrs.Rig, nominal: pamrs.Rig, *, force: float = 0.0) -> pamrs.Ca
     return pamrs.Case("case", nominal, [recorded(true, f"r{k}", role, seed=k, force=force) for k, role in enumerate(roles)], Path())
 
 
-@pytest.mark.parametrize(("name", "factor"), [("chamber.dead_volume", 2.4), ("arm.payload", 0.75)])
+@pytest.mark.parametrize(
+    ("name", "factor"),
+    [("chamber.dead_volume", 2.4), pytest.param("arm.payload", 0.75, marks=pytest.mark.slow)],
+)
 def test_a_wrong_value_is_named_with_an_interval_that_holds_it(name: str, factor: float) -> None:
     rig = pamrs.rigs.shoulder()
     true = rig.parameter(name).value * factor
@@ -69,6 +72,7 @@ def test_a_value_inside_its_tolerance_is_not_called_wrong() -> None:
     assert found.wrong_parameters == []
 
 
+@pytest.mark.slow
 def test_a_name_in_the_chamber_stands_beside_an_arm_without_one() -> None:
     rig = pamrs.rigs.shoulder()
     true = rig.with_effect("valve_dead_zone", {"half_width": 0.05})
@@ -109,6 +113,7 @@ def test_pairs_of_one_mistake_are_suspected_with_either_at_its_wall() -> None:
     assert loose.cost < 0.2 * baseline.cost
 
 
+@pytest.mark.slow
 def test_a_dead_time_of_the_command_and_a_late_clock_stay_a_set() -> None:
     rig = pamrs.rigs.shoulder()
 
@@ -130,6 +135,7 @@ def test_a_dead_time_of_the_command_and_a_late_clock_stay_a_set() -> None:
     assert "with the logger of the pressures" in found.next_experiment["text"]
 
 
+@pytest.mark.slow
 def test_a_zero_that_two_groups_share_is_named_once() -> None:
     rig = pamrs.rigs.shoulder()
     found = pamrs.diagnose(case(rig.with_parameters({"sensors.pressure_zero": 4500.0}), rig))
