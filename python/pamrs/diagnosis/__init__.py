@@ -160,17 +160,16 @@ def diagnose(
             groups = [_doubted(group, factor) for group in groups]
         say("putting the answer together")
         diagnosis = assemble.assemble(case, inner, outer, groups)
-    diagnosis.warnings += left_out
+    warnings = [*diagnosis.warnings, *left_out]
     if unsettled:
         what = "length" if case.rig.model["load"] else "angle"
-        diagnosis.warnings.append(
+        warnings.append(
             f"{', '.join(unsettled)}: marked unknown, and no fit moves them; a wrong one bends the {what} as an effect would, so that "
             f"no effect of muscles and what they move is believed by more than {100 * factor:.0f} %"
         )
-    diagnosis.seconds = round(time.perf_counter() - began, 3)
     if not math.isfinite(sum(diagnosis.probabilities.values())):
         raise DiagnosisError("the probabilities are not finite: please report this case")
-    return diagnosis
+    return replace(diagnosis, warnings=warnings, seconds=round(time.perf_counter() - began, 3))
 
 
 def _check_rig(case: Case) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -19,13 +19,27 @@ from pamrs.diagnosis.events import events_of
 from pamrs.diagnosis.evidence import Floor
 from pamrs.diagnosis.experiment import propose
 from pamrs.diagnosis.fitting import Events, Key, Problem, fit, residuals
-from pamrs.diagnosis.result import Diagnosis, Trace
+from pamrs.diagnosis.result import Diagnosis
 from pamrs.diagnosis.settings import DiagnosisSettings, EvidenceSettings
 from pamrs.diagnosis.starts import CHOSEN
 from pamrs.diagnosis.verdicts import Judged, case_ambiguity, case_probabilities, case_verdict, is_parameter, judge, symptoms_of
 from pamrs.diagnosis.weighing import share_left
 from pamrs.effects_table import CATALOGUE, EFFECTS
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError
+from pamrs.findings import (
+    Asked,
+    BlockResidual,
+    ChannelError,
+    EffectFound,
+    EffectParameterFound,
+    FitErrors,
+    NextExperiment,
+    ParameterFound,
+    StageError,
+    Trace,
+    Tried,
+    WrongParameter,
+)
 from pamrs.recordings import Case
 from pamrs.rig import Rig
 
@@ -48,19 +62,11 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
     judged = judge(groups, settings)
     verdict, probabilities = case_verdict(judged), case_probabilities(judged, settings.verdict)
     ambiguity = case_ambiguity(judged, settings.verdict)
-    starts = _settled(nominal, fitted, judged, [g.candidates[0] for g in groups])
-    baseline = _merged(nominal, starts)
-    changed = verdict in ("effects", "unlisted") or any(j.wrong for j in judged)
-    chosen = starts
-    if changed:
-        chosen = _settled(nominal, fitted, judged, [_model_of(j, start) for j, start in zip(judged, starts, strict=True)])
-        judged = [replace(j, chosen=c) if j.named or j.wrong else j for j, c in zip(judged, chosen, strict=True)]
-    model = _merged(nominal, chosen) if changed else nominal if verdict == "none" else baseline
+    models = _models(nominal, fitted, judged, verdict)
+    judged = models.judged
     floor = {k: v for g in groups for k, v in g.floor.items()}
-    stages = {"before": nominal, "refit": baseline, "after": model}
-    events = next((c.fit.events for c in chosen if c.fit.events is not None), None) if model.effects else None
-    fit_found = {s: _run(fitted, rig, events if s == "after" else None) for s, rig in stages.items()}
-    out_found = fit_found if held is fitted else {s: _run(held, rig, events if s == "after" else None) for s, rig in stages.items()}
+    fit_found = models.residuals(fitted)
+    out_found = fit_found if held is fitted else models.residuals(held)
     located = _located(judged, settings)
     picture = Picture()
     if located is not None:
@@ -68,9 +74,10 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
         picture = describe(block, fitted.recordings, nominal, fit_found["refit"], fit_found["after"], floor)
     fit_table = _table(fitted, fit_found, floor)
     held_table = _table(held, out_found, floor) if held is not fitted else {}
-    gap = _gap(held_table or fit_table, settings.verdict.least_gap) if model.effects or any(j.wrong for j in judged) else None
-    blocks = block_entries(judged, fitted, fit_found, held, out_found, floor)
+    table = held_table or fit_table
     named = any(j.named or j.wrong for j in judged)
+    gap = _gap(table, settings.verdict.least_gap) if models.final.effects or any(j.wrong for j in judged) else None
+    blocks = block_entries(judged, fitted, fit_found, held, out_found, floor)
     diagnosis = Diagnosis(
         case=case.name,
         verdict=verdict,
@@ -78,30 +85,82 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
         effects=_effects(judged, verdict, settings.verdict.in_set),
         ambiguity=ambiguity,
         probabilities=probabilities,
-        parameters=_parameters(nominal, chosen if named else starts, settings.fit.known_share),
-        fit={"channels": fit_table, "held_out": held_table, "gap_closed": gap},
+        parameters=_parameters(nominal, models.chosen if named else models.starts, settings.fit.known_share),
+        fit=FitErrors(fit_table, held_table, gap),
         next_experiment=_next(verdict, probabilities, ambiguity, nominal, judged, fitted, held),
-        warnings=[
-            *words.absolute(case, settings.warnings),
-            *(words.reservations(judged, chosen, held_table or fit_table, settings.warnings) if named else []),
-            *(words.worse(held_table or fit_table, settings.warnings) if model.effects else []),
-            *words.warnings(case, judged, held is fitted, settings),
-        ],
-        rig=_with_std(model, chosen) if model.effects else model,
+        warnings=_warnings(case, models, table, settings, same=held is fitted),
+        rig=_with_std(models.final, models.chosen) if models.final.effects else models.final,
         traces=_traces(fitted, held, fit_found, out_found),
         blocks=blocks,
         unexplained=unexplained(judged, blocks),
-        wrong_parameters=_wrong(nominal, judged, fitted, held_table or fit_table),
+        wrong_parameters=_wrong(nominal, judged, fitted, table),
         residuals=_block_table(groups),
         condition_map=picture.map,
         tried=_tried(groups),
         asked=_asked(groups, settings.evidence),
+        settings=settings,
     )
     missing = [j.group for j in judged if j.verdict == "unlisted"]
     forms = [g.form for g in missing if g.closure is not None]
     sought = any(g.sought for g in missing)
-    diagnosis.text = words.verdict(diagnosis, case, gap, forms, settings.warnings, sought=sought)
-    return diagnosis
+    return replace(diagnosis, text=words.verdict(diagnosis, case, gap, forms, settings.warnings, sought=sought))
+
+
+@dataclass(frozen=True, eq=False)
+class _Models:
+    """The rig at every stage.
+
+    Attributes
+    ----------
+    judged : list of Judged
+        The groups, what they name fitted beside what other groups know better.
+    starts, chosen : list of Candidate
+        The baseline of each group, and what goes into the final model.
+    nominal, baseline, final : Rig
+        As the rig file has it, refitted inside its tolerances, and with what was found.
+    """
+
+    judged: list[Judged]
+    starts: list[Candidate]
+    chosen: list[Candidate]
+    nominal: Rig
+    baseline: Rig
+    final: Rig
+
+    def residuals(self, problem: Problem) -> dict[str, dict[Key, Residual]]:
+        """Residuals of some recordings at every stage."""
+        happened = (c.fit.events for c in self.chosen if c.fit.events is not None)
+        events = next(happened, None) if self.final.effects else None
+        return {
+            "before": _run(problem, self.nominal, None),
+            "refit": _run(problem, self.baseline, None),
+            "after": _run(problem, self.final, events),
+        }
+
+
+def _models(nominal: Rig, fitted: Problem, judged: list[Judged], verdict: str) -> _Models:
+    """The rig at every stage, from the verdicts of the groups."""
+    starts = _settled(nominal, fitted, judged, [j.group.candidates[0] for j in judged])
+    baseline = _merged(nominal, starts)
+    if verdict not in ("effects", "unlisted") and not any(j.wrong for j in judged):
+        return _Models(judged, starts, starts, nominal, baseline, nominal if verdict == "none" else baseline)
+    wanted = [_model_of(j, start) for j, start in zip(judged, starts, strict=True)]
+    chosen = _settled(nominal, fitted, judged, wanted)
+    judged = [replace(j, chosen=c) if j.named or j.wrong else j for j, c in zip(judged, chosen, strict=True)]
+    return _Models(judged, starts, chosen, nominal, baseline, _merged(nominal, chosen))
+
+
+def _warnings(
+    case: Case, models: _Models, table: dict[str, ChannelError], settings: DiagnosisSettings, *, same: bool
+) -> list[str]:
+    """What a reader should know before trusting the rest."""
+    named = any(j.named or j.wrong for j in models.judged)
+    return [
+        *words.absolute(case, settings.warnings),
+        *(words.reservations(models.judged, models.chosen, table, settings.warnings) if named else []),
+        *(words.worse(table, settings.warnings) if models.final.effects else []),
+        *words.warnings(case, models.judged, same, settings),
+    ]
 
 
 def _model_of(judged: Judged, start: Candidate) -> Candidate:
@@ -116,29 +175,29 @@ def _run(problem: Problem, rig: Rig, events: Events | None) -> dict[Key, Residua
     return residuals(problem, rig if events is None else rig.without_effect(events.effect), (), events)
 
 
-def _tried(groups: list[Group]) -> list[dict[str, Any]]:
+def _tried(groups: list[Group]) -> list[Tried]:
     """Every set of effects that was fitted, with what it leaves of each block's excess."""
     return [
-        {
-            "blocks": [b.name for b in group.blocks],
-            "effects": list(candidate.effects),
-            "wrong_parameters": list(candidate.wrong),
-            "fitted": {b: e.ratio for b, e in candidate.fitted.items()},
-            "held_out": {b: e.ratio for b, e in candidate.held_out.items()},
-            "gap_closed": candidate.gap_closed,
-            "scatter": candidate.scatter,
-            "values": {n: v for n, v in candidate.fit.values.items() if n.partition(".")[0] in EFFECTS},
-            "std": {n: v for n, v in candidate.fit.std.items() if n.partition(".")[0] in EFFECTS},
-            "prior": sum(v * v for v in candidate.fit.moved.values()),
-            "suspects": [b.name for b in group.suspects],
-            "gain": candidate.gain,
-        }
+        Tried(
+            blocks=[b.name for b in group.blocks],
+            effects=list(candidate.effects),
+            wrong_parameters=list(candidate.wrong),
+            fitted={b: e.ratio for b, e in candidate.fitted.items()},
+            held_out={b: e.ratio for b, e in candidate.held_out.items()},
+            gap_closed=candidate.gap_closed,
+            scatter=candidate.scatter,
+            fitted_values={n: v for n, v in candidate.fit.values.items() if n.partition(".")[0] in EFFECTS},
+            std={n: v for n, v in candidate.fit.std.items() if n.partition(".")[0] in EFFECTS},
+            prior=sum(v * v for v in candidate.fit.moved.values()),
+            suspects=[b.name for b in group.suspects],
+            gain=candidate.gain,
+        )
         for group in groups
         for candidate in group.candidates
     ]
 
 
-def _asked(groups: list[Group], settings: EvidenceSettings) -> list[dict[str, Any]]:
+def _asked(groups: list[Group], settings: EvidenceSettings) -> list[Asked]:
     """Every lasting effect that acts where a mismatch is, what it promised and what it leaves alone, the best first."""
     found = []
     for group in groups:
@@ -146,8 +205,8 @@ def _asked(groups: list[Group], settings: EvidenceSettings) -> list[dict[str, An
             singles = [c for c in group.candidates if c.effects == (effect,)]
             alone = [share_left(c, group.candidates[0], group.suspects, settings) for c in singles]
             blocks = [b.name for b in group.suspects]
-            found.append({"id": effect, "blocks": blocks, "promised": min(1.0, max(0.0, promised)), "left": min(alone, default=None)})
-    return sorted(found, key=lambda a: (a["left"] is None, a["left"] if a["left"] is not None else -a["promised"]))
+            found.append(Asked(effect, blocks, min(1.0, max(0.0, promised)), min(alone, default=None)))
+    return sorted(found, key=lambda a: (a.left is None, a.left if a.left is not None else -a.promised))
 
 
 def _next(
@@ -158,7 +217,7 @@ def _next(
     judged: list[Judged],
     fitted: Problem,
     held: Problem,
-) -> dict[str, Any]:
+) -> NextExperiment:
     """What to record next: simulated with every hypothesis that has a model, where two or more are left; else in words."""
     settings = fitted.settings
     left = _hypotheses(judged, probabilities, nominal, settings.next_experiment.simulated_from)
@@ -284,34 +343,35 @@ def _located(judged: list[Judged], settings: DiagnosisSettings) -> str | None:
     return None
 
 
-def _table(problem: Problem, found: dict[str, dict[Key, Any]], floor: dict[Key, Floor]) -> dict[str, dict[str, float]]:
+def _table(problem: Problem, found: dict[str, dict[Key, Residual]], floor: dict[Key, Floor]) -> dict[str, ChannelError]:
+    """Error of every channel at every stage."""
     out = {}
     for block in problem.blocks:
-        entry = {}
+        errors = {}
         noise, weights = [], []
         for prepared in problem.recordings:
             noise.append(floor[block.name, prepared.recording.name].sample ** 2)
             weights.append(max(1, int(found["refit"][block.name, prepared.recording.name].rows.sum())))
-        entry["noise"] = math.sqrt(float(np.average(noise, weights=weights)))
+        level = math.sqrt(float(np.average(noise, weights=weights)))
         for stage in ("before", "refit", "after"):
             squares = []
             for prepared in problem.recordings:
                 r = found[stage][block.name, prepared.recording.name]
                 squares.append(float(np.mean(r.value[r.rows] ** 2)) if r.rows.any() else 0.0)
-            entry[stage] = math.sqrt(float(np.average(squares, weights=weights)))
-        out[block.channel] = entry
+            errors[stage] = math.sqrt(float(np.average(squares, weights=weights)))
+        out[block.channel] = ChannelError(level, errors["before"], errors["refit"], errors["after"])
     return out
 
 
-def _gap(table: dict[str, dict[str, float]], least: float) -> float | None:
+def _gap(table: dict[str, ChannelError], least: float) -> float | None:
     """(refit - after)/(refit - noise), pooled over channels in units of their noise."""
-    refit = sum(e["refit"] / e["noise"] for e in table.values())
-    after = sum(e["after"] / e["noise"] for e in table.values())
+    refit = sum(e.refit / e.noise for e in table.values())
+    after = sum(e.after / e.noise for e in table.values())
     room = refit - len(table)
     return None if room < least else max(0.0, min(1.0, (refit - after) / room))
 
 
-def _effects(judged: list[Judged], verdict: str, in_set: float) -> list[dict[str, Any]]:
+def _effects(judged: list[Judged], verdict: str, in_set: float) -> list[EffectFound]:
     """The effects that are named, the most probable first; without a name those that come closest."""
     found: dict[str, tuple[float, Candidate]] = {}
     for j in judged:
@@ -325,19 +385,19 @@ def _effects(judged: list[Judged], verdict: str, in_set: float) -> list[dict[str
                 own = [c for c in j.group.candidates if effect in c.effects]
                 found[effect] = p, max(own, key=lambda c: (j.group.probabilities.get(c.key, 0.0), c.gap_closed))
     return [
-        {
-            "id": effect,
-            "name": EFFECTS[effect].name,
-            "probability": p,
-            "inclusion": max((j.group.inclusion[effect] for j in judged if effect in j.group.inclusion), default=None),
-            "parameters": _effect_parameters(effect, candidate),
-            "events": _events(effect, candidate),
-        }
+        EffectFound(
+            id=effect,
+            name=EFFECTS[effect].name,
+            probability=p,
+            inclusion=max((j.group.inclusion[effect] for j in judged if effect in j.group.inclusion), default=None),
+            parameters=_effect_parameters(effect, candidate),
+            events=_events(effect, candidate),
+        )
         for effect, (p, candidate) in sorted(found.items(), key=lambda kv: -kv[1][0])
     ]
 
 
-def _wrong(nominal: Rig, judged: list[Judged], problem: Problem, table: dict[str, dict[str, float]]) -> list[dict[str, Any]]:
+def _wrong(nominal: Rig, judged: list[Judged], problem: Problem, table: dict[str, ChannelError]) -> list[WrongParameter]:
     """Parameters that the rig file is wrong about: its value, the one that the recordings ask for, and what the error becomes."""
     found = []
     owners = _owners([j.chosen for j in judged])
@@ -346,19 +406,21 @@ def _wrong(nominal: Rig, judged: list[Judged], problem: Problem, table: dict[str
         j, naming = judged[owners[name]], [j for j in judged if name in j.wrong]
         known, value, std = nominal.parameter(name), j.chosen.fit.values[name], j.chosen.fit.std[name]
         told = [b for b in problem.blocks if name in b.parameters and any(b in j.group.blocks for j in naming)]
-        errors = {b.channel: {stage: table[b.channel][stage] for stage in ("before", "refit", "after")} for b in told}
-        entry = _entry(value, std, known.unit, True, known.lower)
+        errors = {b.channel: table[b.channel] for b in told}
         found.append(
-            {
-                "name": name,
-                "block": told[-1].name if told else None,
-                "nominal": known.value,
-                "tolerance": known.tol,
-                **{key: entry[key] for key in ("value", "std", "interval", "unit")},
-                "moved_sigmas": j.chosen.fit.moved[name],
-                "probability": max(j.probability(name) for j in naming),
-                "held_out": errors,
-            }
+            WrongParameter(
+                name=name,
+                block=told[-1].name if told else None,
+                nominal=known.value,
+                tolerance=known.tol,
+                value=value,
+                std=std,
+                interval=_interval(value, std, known.lower),
+                unit=known.unit,
+                moved_sigmas=j.chosen.fit.moved[name],
+                probability=max(j.probability(name) for j in naming),
+                held_out={channel: StageError(e.before, e.refit, e.after) for channel, e in errors.items()},
+            )
         )
     return found
 
@@ -378,15 +440,16 @@ def _events(effect: str, candidate: Candidate) -> list[dict[str, Any]]:
     return found
 
 
-def _effect_parameters(effect: str, candidate: Candidate) -> dict[str, Any]:
+def _effect_parameters(effect: str, candidate: Candidate) -> dict[str, EffectParameterFound]:
+    """Parameters of an effect, fitted or chosen."""
     rig = candidate.fit.rig
     unknown_volume = bool(words.unknown_volumes(rig))
-    out: dict[str, Any] = {}
+    out: dict[str, EffectParameterFound] = {}
     for parameter in EFFECTS[effect].parameters:
         name = f"{effect}.{parameter.name}"
         if parameter.role in (*CHOSEN, "threshold"):
             chosen = next(e["parameters"] for e in rig.effects if e["id"] == effect)[parameter.name]
-            out[parameter.name] = {"value": chosen, "std": None, "unit": parameter.unit}
+            out[parameter.name] = EffectParameterFound(chosen, None, parameter.unit)
             continue
         if name not in candidate.fit.values:
             continue
@@ -401,10 +464,10 @@ _REFERENCE_DENSITY = 1.185
 """Density of air in the reference state of ISO 6358 [kg/m3], to which conductances refer."""
 
 
-def _emptying(effect: str, candidate: Candidate) -> dict[str, Any]:
+def _emptying(effect: str, candidate: Candidate) -> dict[str, EffectParameterFound]:
     """How fast a conductance empties a sealed chamber, and what of it does not depend on the chamber's volume."""
     gas, chamber = candidate.fit.rig.model["gas"], candidate.fit.rig.model["chamber"]
-    out: dict[str, Any] = {}
+    out: dict[str, EffectParameterFound] = {}
     for parameter in EFFECTS[effect].parameters:
         name = f"{effect}.{parameter.name}"
         if parameter.unit != "m3/(s Pa)" or candidate.fit.values.get(name, 0.0) <= 0:
@@ -418,43 +481,39 @@ def _emptying(effect: str, candidate: Candidate) -> dict[str, Any]:
     return out
 
 
-def _entry(value: float, std: float, unit: str, identifiable: bool, lower: float = 0.0) -> dict[str, Any]:
-    return {
-        "value": value,
-        "std": std,
-        "unit": unit,
-        "interval": [max(lower, value - 1.96 * std), value + 1.96 * std],
-        "identifiable": identifiable,
-    }
+def _entry(value: float, std: float, unit: str, identifiable: bool, lower: float = 0.0) -> EffectParameterFound:
+    """A fitted parameter with its interval of 95 %."""
+    return EffectParameterFound(value, std, unit, _interval(value, std, lower), identifiable)
 
 
-def _parameters(nominal: Rig, candidates: list[Candidate], known: float) -> dict[str, dict[str, Any]]:
-    out: dict[str, dict[str, Any]] = {}
+def _interval(value: float, std: float, lower: float) -> list[float]:
+    """Interval of 95 %, inside the lower bound."""
+    return [max(lower, value - 1.96 * std), value + 1.96 * std]
+
+
+def _parameters(nominal: Rig, candidates: list[Candidate], known: float) -> dict[str, ParameterFound]:
+    """Parameters of the baseline, each as the group has it that knows it best."""
+    out: dict[str, ParameterFound] = {}
     for name, k in _owners(candidates).items():
         p, own = nominal.parameter(name), candidates[k].fit
-        out[name] = {
-            "nominal": p.value,
-            "value": own.values[name],
-            "std": own.std[name],
-            "unit": p.unit,
-            "moved_sigmas": own.moved[name],
-            "identifiable": own.std[name] < known * p.tol,
-        }
+        out[name] = ParameterFound(
+            nominal=p.value,
+            value=own.values[name],
+            std=own.std[name],
+            unit=p.unit,
+            moved_sigmas=own.moved[name],
+            identifiable=own.std[name] < known * p.tol,
+        )
     return out
 
 
-def _block_table(groups: list[Group]) -> dict[str, dict[str, Any]]:
-    out: dict[str, dict[str, Any]] = {}
+def _block_table(groups: list[Group]) -> dict[str, BlockResidual]:
+    """Residual of each block's refitted baseline."""
+    out: dict[str, BlockResidual] = {}
     for group in groups:
         for block in group.blocks:
             found = group.baseline[block.name]
-            out[block.name] = {
-                "rms": found.rms,
-                "noise": found.noise,
-                "excess": found.systematic,
-                "p_value": found.p_value,
-                "channel": block.channel,
-            }
+            out[block.name] = BlockResidual(found.rms, found.noise, found.systematic, found.p_value, block.channel)
     return out
 
 

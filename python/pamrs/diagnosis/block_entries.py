@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from pamrs.channels import unit_of
 from pamrs.diagnosis.blocks import Block, Residual
 from pamrs.diagnosis.candidates import significant
 from pamrs.diagnosis.evidence import Floor, excess
 from pamrs.diagnosis.fitting import Key, Problem
 from pamrs.diagnosis.verdicts import Judged
+from pamrs.findings import BlockMismatch, BlockVerdict, MismatchSize, MismatchStages, Unexplained
 
 __all__ = ["block_entries", "unexplained"]
 
@@ -18,7 +17,7 @@ Stages = dict[str, dict[Key, Residual]]
 
 def block_entries(
     judged: list[Judged], fitted: Problem, fit_found: Stages, held: Problem, out_found: Stages, floor: dict[Key, Floor]
-) -> list[dict[str, Any]]:
+) -> list[BlockVerdict]:
     """One entry for each group of blocks.
 
     Parameters
@@ -33,70 +32,59 @@ def block_entries(
         Noise by block and recording.
     """
 
-    def mismatch(block: Block) -> dict[str, Any]:
+    def mismatch(block: Block) -> BlockMismatch:
         outside = None if held is fitted else _sizes(block, held, out_found, floor)
         inside = _sizes(block, fitted, fit_found, floor)
-        return {
-            "block": block.name,
-            "channel": block.channel,
-            "unit": unit_of(block.channel),
-            "fitted": inside,
-            "held_out": outside,
-        }
+        return BlockMismatch(block.name, block.channel, unit_of(block.channel), inside, outside)
 
     return [
-        {
-            "blocks": [b.name for b in j.group.blocks],
-            "verdict": j.verdict,
-            "probabilities": j.probabilities,
-            "effects": list(j.named),
-            "wrong_parameters": list(j.wrong),
-            "ambiguity": j.ambiguity,
-            "mismatch": [mismatch(b) for b in j.group.blocks],
-        }
+        BlockVerdict(
+            blocks=[b.name for b in j.group.blocks],
+            verdict=j.verdict,
+            probabilities=j.probabilities,
+            effects=list(j.named),
+            wrong_parameters=list(j.wrong),
+            ambiguity=j.ambiguity,
+            mismatch=[mismatch(b) for b in j.group.blocks],
+        )
         for j in judged
     ]
 
 
-def _sizes(block: Block, problem: Problem, found: Stages, floor: dict[Key, Floor]) -> dict[str, dict[str, Any]]:
+def _sizes(block: Block, problem: Problem, found: Stages, floor: dict[Key, Floor]) -> MismatchStages:
     """What is more than noise at every stage: in noises, in the channel's unit, and whether noise could be so large."""
     sizes = {}
     for stage, residuals in found.items():
         told = excess(block, problem.recordings, residuals, floor, problem.settings.noise)
-        sizes[stage] = {
-            "noises": told.systematic,
-            "size": told.systematic * told.noise,
-            "more_than_noise": significant(told),
-        }
-    return sizes
+        sizes[stage] = MismatchSize(told.systematic, told.systematic * told.noise, significant(told))
+    return MismatchStages(**sizes)
 
 
-def unexplained(judged: list[Judged], entries: list[dict[str, Any]]) -> list[dict[str, Any]]:
+def unexplained(judged: list[Judged], entries: list[BlockVerdict]) -> list[Unexplained]:
     """Blocks that keep a mismatch beside what is named, or without a name, the largest first.
 
     Parameters
     ----------
     judged : list of Judged
         The groups with their verdicts; blocks that were no suspects keep nothing.
-    entries : list of dict
+    entries : list of BlockVerdict
         From :func:`block_entries`. The size is that of the held-out recordings, where they show it, else of the fitted ones.
 
     Returns
     -------
-    list of dict
-        ``block``, ``channel``, ``unit``, ``noises`` and ``size`` [unit] of what names leave, and the ``verdict`` of the group.
+    list of Unexplained
+        What names leave, and the verdict of the group.
     """
     found = []
     for j, entry in zip(judged, entries, strict=True):
-        if entry["verdict"] == "none" or (entry["verdict"] == "parameters" and not entry["wrong_parameters"]):
+        if entry.verdict == "none" or (entry.verdict == "parameters" and not entry.wrong_parameters):
             continue
         suspects = {b.name for b in j.group.suspects}
-        for block in (m for m in entry["mismatch"] if m["block"] in suspects):
+        for block in (m for m in entry.mismatch if m.block in suspects):
             # a form without a name takes up what no name explains, and is no explanation
-            stage = "refit" if entry["verdict"] == "unlisted" else "after"
-            sizes = [part[stage] for part in (block["held_out"], block["fitted"]) if part is not None]
-            left = next((size for size in sizes if size["more_than_noise"]), None)
+            stage = "refit" if entry.verdict == "unlisted" else "after"
+            sizes: list[MismatchSize] = [part[stage] for part in (block.held_out, block.fitted) if part is not None]
+            left = next((size for size in sizes if size.more_than_noise), None)
             if left is not None:
-                size = {key: left[key] for key in ("noises", "size")}
-                found.append({**{key: block[key] for key in ("block", "channel", "unit")}, **size, "verdict": entry["verdict"]})
-    return sorted(found, key=lambda u: -u["noises"])
+                found.append(Unexplained(block.block, block.channel, block.unit, left.noises, left.size, entry.verdict))
+    return sorted(found, key=lambda u: -(u.noises or 0.0))

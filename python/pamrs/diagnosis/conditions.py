@@ -13,12 +13,14 @@ from pamrs.diagnosis.blocks import Block
 from pamrs.diagnosis.evidence import Floor, bins_of
 from pamrs.diagnosis.fitting import Key
 from pamrs.diagnosis.signals import Prepared, binned
+from pamrs.findings import Condition, ConditionMap
 from pamrs.rig import Rig
 
 __all__ = ["Picture", "describe"]
 
 Array = NDArray[np.float64]
-MAP_CELLS = 8
+_MAP_CELLS = 8
+"""Cells of the conditions map in each direction."""
 
 
 @dataclass
@@ -27,20 +29,20 @@ class Picture:
 
     Attributes
     ----------
-    conditions : list of dict
-        ``name``, share of the excess, share of the time, mean residual; most telling first.
+    conditions : list of Condition
+        The most telling first.
     intervals : list of [t0, t1]
         In the recording with the largest excess [s].
     recording : str
         That recording.
-    map : dict or None
+    map : ConditionMap or None
         Mean residual (in noise units) over two conditions, before and after.
     """
 
-    conditions: list[dict[str, Any]] = field(default_factory=list)
+    conditions: list[Condition] = field(default_factory=list)
     intervals: list[list[float]] = field(default_factory=list)
     recording: str = ""
-    map: dict[str, Any] | None = None
+    map: ConditionMap | None = None
 
 
 def _binned(values: Array, rows: NDArray[np.bool_], width: int) -> Array:
@@ -156,10 +158,8 @@ def describe(
         time = float(mask.mean())
         mean = float(z[mask].mean())
         text = f"{name}: {100 * share:.0f} % of the excess in {100 * time:.0f} % of the time, mean {mean:+.2g} noise units"
-        picture.conditions.append(
-            {"name": name, "share": share, "time": time, "mean": mean, "text": text}
-        )  # fmt: skip
-    picture.conditions.sort(key=lambda c: -c["share"] / max(0.02, c["time"]) * c["share"])
+        picture.conditions.append(Condition(name, share, time, mean, text))
+    picture.conditions.sort(key=lambda c: -c.share / max(0.02, c.time) * c.share)
     picture.map = _map(joined, z, np.concatenate(scaled_after) if scaled_after else None, block)
     return picture
 
@@ -181,12 +181,12 @@ def _intervals(flags: NDArray[np.bool_], bin_time: float, most: int = 12) -> lis
     return [[round(float(a * bin_time), 3), round(float(b * bin_time), 3)] for a, b in sorted(spans)]
 
 
-def _map(columns: dict[str, Array], z: Array, after: Array | None, block: Block) -> dict[str, Any] | None:
+def _map(columns: dict[str, Array], z: Array, after: Array | None, block: Block) -> ConditionMap | None:
     """Mean residual over the two conditions that tell most of it apart."""
     names = [n for n, v in columns.items() if np.ptp(v) > 1e-9]
     if len(names) < 2:
         return None
-    edges = {n: np.unique(np.quantile(columns[n], np.linspace(0, 1, MAP_CELLS + 1))) for n in names}
+    edges = {n: np.unique(np.quantile(columns[n], np.linspace(0, 1, _MAP_CELLS + 1))) for n in names}
     names = [n for n in names if edges[n].size >= 3]
     if len(names) < 2:
         return None
@@ -201,15 +201,15 @@ def _map(columns: dict[str, Array], z: Array, after: Array | None, block: Block)
     x, y = max(((a, b) for i, a in enumerate(names) for b in names[i + 1 :]), key=lambda ab: explained(*ab))
     grid = _cells(columns[x], columns[y], edges[x], edges[y], z)[0]
     rest = _cells(columns[x], columns[y], edges[x], edges[y], after)[0] if after is not None else None
-    return {
-        "x_label": x,
-        "y_label": y,
-        "x_edges": edges[x].tolist(),
-        "y_edges": edges[y].tolist(),
-        "z": grid.tolist(),
-        "z_after": None if rest is None else rest.tolist(),
-        "block": block.name,
-    }
+    return ConditionMap(
+        x_label=x,
+        y_label=y,
+        x_edges=edges[x].tolist(),
+        y_edges=edges[y].tolist(),
+        z=grid.tolist(),
+        z_after=None if rest is None else rest.tolist(),
+        block=block.name,
+    )
 
 
 def _cells(x: Array, y: Array, x_edges: Array, y_edges: Array, z: Array) -> tuple[Array, Array]:

@@ -11,8 +11,6 @@ import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,6 +21,7 @@ from pamrs.diagnosis.protocols import Experiment, library
 from pamrs.diagnosis.settings import DiagnosisSettings, NextExperimentSettings
 from pamrs.diagnosis.signals import Prepared
 from pamrs.effects_table import EFFECTS
+from pamrs.findings import Curves, NextExperiment, RankedExperiment
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError
 from pamrs.recordings import Recording
 from pamrs.rig import Rig
@@ -185,7 +184,7 @@ def propose(
     channels: tuple[str, ...] | None = None,
     experiments: Sequence[Experiment] | None = None,
     settings: DiagnosisSettings | None = None,
-) -> dict[str, Any]:
+) -> NextExperiment:
     """The experiment that tells most about which hypothesis holds.
 
     Parameters
@@ -208,7 +207,7 @@ def propose(
 
     Returns
     -------
-    dict
+    NextExperiment
         ``text`` (what to do and why), ``excitation`` (kind and numbers), ``expected_information_bits`` (at most the entropy of the
         hypotheses), ``ranking`` (the best few: ``name``, ``text``, ``sensor``, ``bits``, ``effort_s``) and ``curves`` (what
         :func:`pamrs.report.figures.separating_curves` draws; None when there is nothing to tell apart).
@@ -239,7 +238,7 @@ def propose(
     doubt = entropy([p for _, _, p in chosen])
     if len(chosen) < 2 or doubt < own_settings.settled_entropy:
         text = "One hypothesis is left; no experiment can add to that."
-        return {"text": text, "excitation": {}, "expected_information_bits": 0.0, "ranking": [], "curves": None}
+        return NextExperiment(text, {}, 0.0)
     pool = _library(nominal, records, own_settings) if experiments is None else list(experiments)
     found: list[Outcome] = []
     for sensor in ("", *_missing(nominal, own, usual)):
@@ -258,22 +257,16 @@ def propose(
         )
     best_first = ranked(found, [p for _, _, p in chosen], own_settings.resolution)
     best = best_first[0]
-    return {
-        "text": _text(best, chosen, doubt, own_settings.hopeless_share),
-        "excitation": {**best.experiment.excitation, **({"sensor": best.sensor} if best.sensor else {})},
-        "expected_information_bits": round(best.bits, 3),
-        "ranking": [
-            {
-                "name": o.experiment.name,
-                "text": o.experiment.text,
-                "sensor": o.sensor,
-                "bits": round(o.bits, 3),
-                "effort_s": round(o.effort, 1),
-            }
+    return NextExperiment(
+        text=_text(best, chosen, doubt, own_settings.hopeless_share),
+        excitation={**best.experiment.excitation, **({"sensor": best.sensor} if best.sensor else {})},
+        expected_information_bits=round(best.bits, 3),
+        ranking=[
+            RankedExperiment(o.experiment.name, o.experiment.text, o.sensor, round(o.bits, 3), round(o.effort, 1))
             for o in best_first[: own_settings.most_shown]
         ],
-        "curves": _curves(best, chosen),
-    }
+        curves=_curves(best, chosen),
+    )
 
 
 def _checked(hypotheses: Sequence[Hypothesis], settings: NextExperimentSettings) -> list[Hypothesis]:
@@ -345,7 +338,7 @@ def _text(best: Outcome, hypotheses: Sequence[Hypothesis], doubt: float, hopeles
     return said
 
 
-def _curves(best: Outcome, hypotheses: Sequence[Hypothesis]) -> dict[str, Any]:
+def _curves(best: Outcome, hypotheses: Sequence[Hypothesis]) -> Curves:
     """The channel that separates most: as each hypothesis predicts it, and what each leaves of the leading one's outcome."""
     others = range(1, len(hypotheses))
     key = max(best.left[0, 1].rms, key=lambda k: max(best.left[0, j].rms[k] for j in others))
@@ -354,17 +347,17 @@ def _curves(best: Outcome, hypotheses: Sequence[Hypothesis]) -> dict[str, Any]:
     prepared = best.problem.recordings[0]
     settings = best.problem.settings
     width = bin_width(prepared, settings.noise.fit_bin_time)
-    return {
-        "experiment": best.experiment.name,
-        "text": best.experiment.text,
-        "channel": channel,
-        "unit": unit_of(channel),
-        "time": best.runs[0].time,
-        "values": {label: run[channel] for label, run in zip(labels, best.runs, strict=True)},
-        "leading": labels[0],
-        "bin_time": (np.arange(prepared.n // width) + 0.5) * width * prepared.dt,
-        "left": {labels[j]: best.left[0, j].rows[key] for j in others},
-        "noise": prepared.noise[channel] / math.sqrt(width) * best.weights[key],
-        "command": best.experiment.command,
-        "samples_counted": settings.next_experiment.effective_samples,
-    }
+    return Curves(
+        experiment=best.experiment.name,
+        text=best.experiment.text,
+        channel=channel,
+        unit=unit_of(channel),
+        time=best.runs[0].time,
+        predicted={label: run[channel] for label, run in zip(labels, best.runs, strict=True)},
+        leading=labels[0],
+        bin_time=np.asarray((np.arange(prepared.n // width) + 0.5) * width * prepared.dt, dtype=np.float64),
+        left={labels[j]: best.left[0, j].rows[key] for j in others},
+        noise=prepared.noise[channel] / math.sqrt(width) * best.weights[key],
+        command=best.experiment.command,
+        samples_counted=settings.next_experiment.effective_samples,
+    )

@@ -12,10 +12,10 @@ from pamrs.channels import channel_of, unit_of
 from pamrs.diagnosis.candidates import Candidate
 from pamrs.diagnosis.conditions import Picture
 from pamrs.diagnosis.fitting import Problem
-from pamrs.diagnosis.result import Diagnosis
 from pamrs.diagnosis.settings import DiagnosisSettings, WarningSettings
 from pamrs.diagnosis.verdicts import Judged, is_parameter, symptoms_of
 from pamrs.effects_table import CATALOGUE, EFFECTS
+from pamrs.findings import BlockVerdict, ChannelError, Findings, NextExperiment, Where
 from pamrs.recordings import Case
 from pamrs.report.text import display_unit, format_number, kept_sentence, sentence_of
 from pamrs.rig import Rig
@@ -30,13 +30,13 @@ def unknown_volumes(rig: Rig) -> list[str]:
     return [name for name in names if not rig.parameter(name).known]
 
 
-def where(located: str | None, problem: Problem, judged: list[Judged], picture: Picture) -> dict[str, Any]:
+def where(located: str | None, problem: Problem, judged: list[Judged], picture: Picture) -> Where:
     """The ``where`` entry: block, channel, intervals, conditions and a sentence."""
     settings = problem.settings.warnings
     groups = [j.group for j in judged]
     if located is None:
         text = "No block keeps more than its noise after the refit."
-        return {"block": None, "channel": None, "intervals": [], "conditions": [], "text": text}
+        return Where(text=text)
     block = next(b for b in problem.blocks if b.name == located)
     found = next(g.baseline[located] for g in groups if located in g.baseline)
     parts = "" if block.covers == located else f" ({block.covers})"
@@ -74,23 +74,23 @@ def where(located: str | None, problem: Problem, judged: list[Judged], picture: 
             f"Every block fits to its noise, but the {located} block only with a parameter far outside its tolerance "
             "(see the warnings)."
         )
-    telling = [] if faint else [c for c in picture.conditions if c["share"] > settings.telling_condition * c["time"]][:2]
+    telling = [] if faint else [c for c in picture.conditions if c.share > settings.telling_condition * c.time][:2]
     if telling:
-        text += " It is largest under: " + "; ".join(c["text"] for c in telling) + "."
+        text += " It is largest under: " + "; ".join(c.text for c in telling) + "."
     if picture.intervals and not faint:
         text += f" The intervals are those of recording {picture.recording}."
-    return {
-        "block": located,
-        "channel": block.channel,
-        "intervals": [] if faint else picture.intervals,
-        "conditions": [] if faint else picture.conditions[:6],
-        "text": text,
-        "recording": picture.recording,
-    }
+    return Where(
+        block=located,
+        channel=block.channel,
+        intervals=[] if faint else picture.intervals,
+        conditions=[] if faint else picture.conditions[:6],
+        text=text,
+        recording=picture.recording,
+    )
 
 
 def verdict(
-    diagnosis: Diagnosis,
+    diagnosis: Findings,
     case: Case,
     gap: float | None,
     forms: list[str],
@@ -100,22 +100,22 @@ def verdict(
 ) -> str:
     """The verdict in a few sentences; ``forms`` say what a mismatch without a name is a function of, if that was ``sought``."""
     kind = diagnosis.verdict
-    missing = [b for b in diagnosis.blocks if b["verdict"] == "unlisted"]
+    missing = [b for b in diagnosis.blocks if b.verdict == "unlisted"]
     if kind == "none":
         text = "Nothing is missing that these recordings could show: the nominal model predicts every block to its noise."
         return text + _unsettled(diagnosis)
     if kind == "parameters" and diagnosis.wrong_parameters:
         return _mistaken(diagnosis, case, gap, settings) + _beside(diagnosis, missing, forms, sought=sought)
     if kind == "parameters":
-        shifted = sorted(diagnosis.parameters.items(), key=lambda kv: -abs(kv[1]["moved_sigmas"]))[:3]
-        moved = ", ".join(f"{n} by {p['moved_sigmas']:+.1f} tolerances" for n, p in shifted)
+        shifted = sorted(diagnosis.parameters.items(), key=lambda kv: -abs(kv[1].moved_sigmas))[:3]
+        moved = ", ".join(f"{n} by {p.moved_sigmas:+.1f} tolerances" for n, p in shifted)
         return (
             "No physics is missing that these recordings could show, but parameters differ from the nominal ones: with values "
             f"inside their tolerances the model predicts every block to its noise. Moved most: {moved}." + _unsettled(diagnosis)
         )
-    place = diagnosis.where["text"]
+    place = diagnosis.where.text
     if kind == "unlisted":
-        tried = ", ".join(f"{e['id']} ({e['probability']:.0%})" for e in diagnosis.effects)
+        tried = ", ".join(f"{e.id} ({e.probability:.0%})" for e in diagnosis.effects)
         text = (
             f"Physics is missing that is not in the catalogue, or no effect of the catalogue explains the data well enough to be "
             f"named. {place}" + (f" Closest: {tried}." if tried else "")
@@ -126,7 +126,7 @@ def verdict(
             return text + " No form of it was found that carries over to other recordings: the model stays the refitted one."
         closes = "" if gap is None else f" With it in the model, {100 * gap:.0f} % of the gap between refitted model and noise closes."
         return text + "\n\nWhat is missing, as a form without a name. " + " ".join(forms) + closes
-    names = " and ".join(f"{e['name']} ({e['id']}, probability {e['probability']:.2f})" for e in diagnosis.effects)
+    names = " and ".join(f"{e.name} ({e.id}, probability {e.probability:.2f})" for e in diagnosis.effects)
     text = f"The model leaves out: {names}. {place}"
     if gap is not None:
         it = "it" if len(diagnosis.effects) == 1 else "them"
@@ -147,19 +147,19 @@ def _proof(case: Case) -> str:
     return "held-out recordings" if case.held_out and case.fit else "the fitted recording (no other was given)"
 
 
-def _mistaken(diagnosis: Diagnosis, case: Case, gap: float | None, settings: WarningSettings) -> str:
+def _mistaken(diagnosis: Findings, case: Case, gap: float | None, settings: WarningSettings) -> str:
     """Which values of the rig file are wrong, and what that does to the error."""
     told = []
     for wrong in diagnosis.wrong_parameters:
-        mended = {channel: e for channel, e in wrong["held_out"].items() if e["after"] < settings.mended * e["refit"]}
-        told_by = mended or wrong["held_out"]
+        mended = {channel: e for channel, e in wrong.held_out.items() if e.after < settings.mended * e.refit}
+        told_by = mended or wrong.held_out
         errors = "; ".join(
-            f"the {channel.replace('_', ' ')} is then missed by {_instead(e['after'], e['refit'], unit_of(channel))}, which values "
+            f"the {channel.replace('_', ' ')} is then missed by {_instead(e.after, e.refit, unit_of(channel))}, which values "
             "inside the tolerances leave"
             for channel, e in told_by.items()
         )
         told.append(
-            f"{sentence_of(wrong)} (probability {wrong['probability']:.2f}, {abs(wrong['moved_sigmas']):.0f} tolerances away); "
+            f"{sentence_of(wrong)} (probability {wrong.probability:.2f}, {abs(wrong.moved_sigmas):.0f} tolerances away); "
             f"on {_proof(case)} {errors}."
         )
     text = "The rig file is wrong: " + " ".join(told)
@@ -177,13 +177,13 @@ def _instead(value: float, before: float, unit: str) -> str:
     return f"{now} {shown} instead of {was} {shown}".replace("°", "deg")
 
 
-def _beside(diagnosis: Diagnosis, missing: list[dict[str, Any]], forms: list[str], *, sought: bool) -> str:
+def _beside(diagnosis: Findings, missing: list[BlockVerdict], forms: list[str], *, sought: bool) -> str:
     """What stays open beside a name: sets that are left, and blocks that keep a mismatch without one."""
     text = _unsettled(diagnosis)
     if not missing:
         return text
-    kept = [u for u in diagnosis.unexplained if u["verdict"] == "unlisted"]
-    blocks = " and ".join(name for b in missing for name in b["blocks"])
+    kept = [u for u in diagnosis.unexplained if u.verdict == "unlisted"]
+    blocks = " and ".join(name for b in missing for name in b.blocks)
     said = [_capital(kept_sentence(u)) + "." for u in kept] or [f"Something acts in {blocks} that no listed effect explains."]
     text += "\n\nWhat stays open. " + " ".join(said)
     if forms:
@@ -193,7 +193,7 @@ def _beside(diagnosis: Diagnosis, missing: list[dict[str, Any]], forms: list[str
     return text
 
 
-def _unsettled(diagnosis: Diagnosis) -> str:
+def _unsettled(diagnosis: Findings) -> str:
     """The sets that are left, as a sentence; empty where the answer is settled."""
     sets = " or ".join("{" + ", ".join(s) + "}" for s in diagnosis.ambiguity)
     return f" It is not settled: these data do not separate {sets}." if sets else ""
@@ -236,7 +236,7 @@ def same_data(ambiguity: list[list[str]]) -> str:
 
 def next_experiment(
     kind: str, probabilities: dict[str, float], ambiguity: list[list[str]], rig: Rig, missing: Sequence[str] = ()
-) -> dict[str, Any]:
+) -> NextExperiment:
     """What to record next: the experiment that separates the leading hypotheses, or tells of blocks that keep something without a name.
 
     It is not simulated, so that nothing is said of how much it would tell.
@@ -245,21 +245,21 @@ def next_experiment(
     if not ambiguity and kind != "unlisted" and missing:
         text, excitation = _SCALED, _SCALED_EXCITATION
         text = f"The name is settled. For what the {' and '.join(missing)} keeps: {text[:1].lower()}{text[1:]}"
-        return {"text": text, "excitation": excitation, "expected_information_bits": None}
+        return NextExperiment(text, excitation)
     if not ambiguity and kind != "unlisted":
         text = "The name is settled by these recordings; no further one is needed for it."
-        return {"text": text, "excitation": {}, "expected_information_bits": 0.0}
+        return NextExperiment(text, {}, 0.0)
     same = same_data(ambiguity)
     if same:
-        return {"text": same, "excitation": {}, "expected_information_bits": None}
+        return NextExperiment(same)
     doubted = [k for s in ambiguity for k in s if k in EFFECTS and not EFFECTS[k].experiment]
     parameters = [k for s in ambiguity for k in s if k == "parameters" or is_parameter(k)]
     if parameters and doubted:
-        return {"text": _sentence(EFFECTS[doubted[0]].separates), "excitation": {}, "expected_information_bits": None}
+        return NextExperiment(_sentence(EFFECTS[doubted[0]].separates))
     measurable = [k for k in parameters if is_parameter(k)]
     if measurable:
         text = f"Measure {' or '.join(measurable)} by itself (scale, ruler, known volume): these recordings cannot tell which is wrong."
-        return {"text": text, "excitation": {}, "expected_information_bits": None}
+        return NextExperiment(text)
     text, excitation = _separating([k for s in [leading.split("+"), *ambiguity] for k in s])
     if not (rig.tables("valve") or rig.tables("muscle")):
         text = (
@@ -267,7 +267,7 @@ def next_experiment(
             "chamber scales with absolute pressure and goes with it; cooling, the bench's own loss and the transducer's drift stay."
         )
         excitation = {"kind": "sealed_hold", "levels_bar": [2.5, 7.5], "hold_s": 600.0}
-    return {"text": text, "excitation": excitation, "expected_information_bits": None}
+    return NextExperiment(text, excitation)
 
 
 def warnings(case: Case, judged: list[Judged], no_held_out: bool, settings: DiagnosisSettings) -> list[str]:
@@ -324,14 +324,14 @@ def absolute(case: Case, settings: WarningSettings) -> list[str]:
     ]
 
 
-def worse(table: dict[str, dict[str, float]], settings: WarningSettings) -> list[str]:
+def worse(table: dict[str, ChannelError], settings: WarningSettings) -> list[str]:
     """Channels that the model with what was added predicts worse than the nominal one did, or the refitted one."""
     out = []
     for channel, error in table.items():
-        better, which = min((error["before"], "nominal"), (error["refit"], "refitted"))
-        if error["after"] > settings.spoiled * max(better, error["noise"]):
-            unit, factor = display_unit(unit_of(channel), error["after"])
-            now, was = (format_number(v * factor, 3, unicode=False) for v in (error["after"], better))
+        better, which = min((error.before, "nominal"), (error.refit, "refitted"))
+        if error.after > settings.spoiled * max(better, error.noise):
+            unit, factor = display_unit(unit_of(channel), error.after)
+            now, was = (format_number(v * factor, 3, unicode=False) for v in (error.after, better))
             out.append(
                 f"the new model misses {channel.replace('_', ' ')} by {now} {unit}, the {which} one by {was} {unit}: what was added "
                 "spoils this channel".replace("°", "deg")
@@ -340,7 +340,7 @@ def worse(table: dict[str, dict[str, float]], settings: WarningSettings) -> list
 
 
 def reservations(
-    judged: list[Judged], chosen: list[Candidate], table: dict[str, dict[str, float]], settings: WarningSettings
+    judged: list[Judged], chosen: list[Candidate], table: dict[str, ChannelError], settings: WarningSettings
 ) -> list[str]:
     """What a reader should know of a model with a name: what it still misses where it acts, and values that it had to move far."""
     out = []
@@ -349,10 +349,10 @@ def reservations(
             continue
         for channel in dict.fromkeys(b.channel for b in j.group.blocks):
             error = table[channel]
-            if error["after"] <= settings.missed_noises * error["noise"]:
+            if error.after <= settings.missed_noises * error.noise:
                 continue
             what = "the effect" if j.named else "the other value"
-            times = error["after"] / error["noise"]
+            times = error.after / error.noise
             why = "its equation is not the whole truth" if j.named else "something acts beside it"
             name = "" if j.ambiguity else "the name stands, "
             out.append(
