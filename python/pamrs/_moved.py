@@ -1,7 +1,7 @@
 """Modules that stood directly in ``pamrs`` and are parts of its packages now.
 
-The old paths go on working for a while: ``from pamrs.recording import Recording`` gives the class of ``pamrs.recordings`` and a
-:class:`DeprecationWarning` that names the new path.
+The old paths go on working for a while: ``from pamrs.recording import Recording`` gives the class of
+``pamrs.recordings`` and a :class:`DeprecationWarning` that names the new path.
 """
 
 from __future__ import annotations
@@ -53,4 +53,5 @@ def module(name: str) -> ModuleType:
 def register() -> None:
     """Make the old paths importable."""
     for name, home in PACKAGES.items():
-        sys.modules.setdefault(f"pamrs.{name}", _Moved(f"pamrs.{name}", f"The names of :mod:`{home}`, by their old path."))
+        text = f"The names of :mod:`{home}`, by their old path."
+        sys.modules.setdefault(f"pamrs.{name}", _Moved(f"pamrs.{name}", text))

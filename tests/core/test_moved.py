@@ -1,4 +1,4 @@
-"""Modules that stood directly in pamrs: their names are still found there, with a warning that says where they are now."""
+"""Modules that stood directly in pamrs: their names are found there still, with a warning."""
 
 import importlib
 import subprocess

@@ -1,4 +1,4 @@
-"""What may import what: the order of the packages, no cycles, nothing private from outside, the reproduction on top."""
+"""What may import what: the order of the packages, no cycles, nothing private from outside."""
 
 import ast
 import graphlib
@@ -10,7 +10,8 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 
-#: From the bottom to the top; a package imports only what stands in lines above its own. Those in one line do not know each other.
+#: From the bottom to the top; a package imports only what stands in lines above its own.
+#: Those in one line do not know each other.
 LAYERS = (
     ("errors",),
     ("channels", "comparison", "units", "_checks", "_writing", "_moved"),
@@ -26,25 +27,26 @@ LAYERS = (
     ("reproduce",),
     ("cli",),
 )
-#: Imports against that order, which are to go: the page of a diagnosis names the result that it shows, and is written by it.
+#: Imports against that order, which are to go: the page of a diagnosis names the result that it
+#: shows, and the result writes it.
 REPORT_OF_A_DIAGNOSIS = {
     ("pamrs.report", "pamrs.diagnosis.result"),
     ("pamrs.report.figures", "pamrs.diagnosis.result"),
     ("pamrs.report.html", "pamrs.diagnosis.result"),
     ("pamrs.report.text", "pamrs.diagnosis.result"),
 }
-#: Names that a module may take from the root package: it loads all others when they are first used, from above.
+#: Names that a module may take from the root package, which loads all others on first use.
 FROM_ROOT = {"_core", "__version__"}
 
 
 @cache
 def graph(*, annotations: bool = True) -> grimp.ImportGraph:
-    """Imports between the modules of pamrs, those inside functions too; on demand without those for annotations alone."""
+    """Imports between the modules of pamrs, those inside functions too."""
     return grimp.build_graph("pamrs", cache_dir=None, exclude_type_checking_imports=not annotations)
 
 
 def edges(*, annotations: bool = True) -> set[tuple[str, str]]:
-    """Who imports whom; the root package and entry points (``__main__``), which nothing imports, are left out."""
+    """Who imports whom; the root package and entry points, which nothing imports, are left out."""
     found = graph(annotations=annotations)
     return {
         (importer, imported)
@@ -75,7 +77,11 @@ def test_no_package_imports_one_beside_or_above_it():
 
 
 def test_no_modules_import_each_other():
-    """Annotations are left out: a result draws itself, and what draws it names it in its signature; nothing is imported then."""
+    """Imports for annotations alone are left out.
+
+    A result has a method that draws it, and what draws it names the result in its signature; that
+    import never runs. Between packages these imports count, see above.
+    """
     needs: dict[str, set[str]] = {}
     for importer, imported in edges(annotations=False) - REPORT_OF_A_DIAGNOSIS:
         needs.setdefault(importer, set()).add(imported)

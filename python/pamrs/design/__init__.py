@@ -1,8 +1,9 @@
 """Design: what a requirement asks of a joint, of its muscles, and what an arm then lifts.
 
-A joint (dissertation 3.5): four lengths of a tendon joint that give a wanted torque at the least pressure.
-:mod:`pamrs.design.sizing` counts the muscles that a force over a stroke needs; :func:`lift` says what an arm lifts and holds;
-:mod:`pamrs.design.elbow_muscles` is the dissertation's own choice of muscles (3.2.3); :mod:`pamrs.design.figures` draws.
+A joint (dissertation 3.5): four lengths of a tendon joint that give a wanted torque at the least
+pressure. :mod:`pamrs.design.sizing` counts the muscles that a force over a stroke needs;
+:func:`lift` says what an arm lifts and holds; :mod:`pamrs.design.elbow_muscles` is the
+dissertation's own choice of muscles (3.2.3); :mod:`pamrs.design.figures` draws.
 
 >>> import math, pamrs
 >>> from pamrs.design import JointProblem, optimise

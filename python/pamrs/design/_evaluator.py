@@ -1,4 +1,4 @@
-"""What a search is given and gives: the objective under a budget, the settings of the genetic algorithm, the course of it."""
+"""What a search is given and gives: objective under a budget, settings, course, result."""
 
 from __future__ import annotations
 

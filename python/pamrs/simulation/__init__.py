@@ -1,7 +1,7 @@
 """Run a rig: once, sample by sample, many at once, or driven by a recording.
 
-:func:`simulate` returns a :class:`Simulation`; :class:`Simulator` goes from sample to sample, :class:`Batch` runs many rigs on
-all processors, :func:`replay` gives a rig the inputs of a recording.
+:func:`simulate` returns a :class:`Simulation`; :class:`Simulator` goes from sample to sample,
+:class:`Batch` runs many rigs on all processors, :func:`replay` gives a rig the inputs of a recording.
 """
 
 from __future__ import annotations
