@@ -2,7 +2,7 @@
 
 Each line is a question that one recording leaves open: two or three effects are fitted to it, all fit. The truth is a plant with one
 of them and with baseline parameters drawn inside their tolerances. Experiments are then made one after the other, chosen either by
-the expected information (as :func:`pamrs.diagnosis.experiment.propose` does) or at random from the same library, and the hypotheses
+the expected information (as :func:`pamrs.diagnosis.next_experiment.propose` does) or at random from the same library, and the hypotheses
 are weighed by the same likelihood each time, until one is above 0.95. Everything is simulated by the core.
 
 Run it with ``python -m benchmarks.next_experiment``; numbers of lines as arguments choose some.
@@ -18,11 +18,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 import pamrs
-from pamrs.diagnosis.differences import EFFECTIVE, MEASURABLE, NOISE, linear, misfit, problem_of, taken, weights_of
-from pamrs.diagnosis.experiment import Hypothesis, Outcome, outcome_of, ranked
-from pamrs.diagnosis.fitting import FIT_BIN, Fit, Problem, bin_width, fit, free_baseline
-from pamrs.diagnosis.protocols import Experiment, library
-from pamrs.diagnosis.starts import starts_of
+from pamrs.diagnosis.fit import FIT_BIN, Fit, Problem, bin_width, fit, free_baseline, starts_of
+from pamrs.diagnosis.next_experiment import (
+    EFFECTIVE,
+    MEASURABLE,
+    NOISE,
+    Experiment,
+    Hypothesis,
+    Outcome,
+    library,
+    linear,
+    misfit,
+    outcome_of,
+    problem_of,
+    ranked,
+    taken,
+    weights_of,
+)
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 

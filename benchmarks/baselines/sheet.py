@@ -10,11 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from pamrs.diagnosis.blocks import Block, Residual, available_blocks
-from pamrs.diagnosis.evidence import Floor, bins_of, floors
-from pamrs.diagnosis.fitting import Key, Problem, residuals
-from pamrs.diagnosis.hypotheses import coloured, refitted
-from pamrs.diagnosis.signals import Prepared, binned, prepare
+from pamrs.diagnosis.fit import Key, Problem, residuals
+from pamrs.diagnosis.noise import Floor, bins_of, floors
+from pamrs.diagnosis.prepare import Block, Prepared, Residual, available_blocks, binned, prepare
+from pamrs.diagnosis.search import coloured, refitted
 from pamrs.recordings import load_case
 from pamrs.rig import Rig
 from pamrs.simulation import core_rig

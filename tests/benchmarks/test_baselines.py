@@ -13,7 +13,7 @@ pytest.importorskip("sklearn")
 from benchmarks.baselines import sindy  # noqa: E402
 from benchmarks.baselines.__main__ import main  # noqa: E402
 from benchmarks.baselines.sheet import _signals, gap_closed  # noqa: E402
-from pamrs.diagnosis.signals import prepare  # noqa: E402
+from pamrs.diagnosis.prepare import prepare
 from pamrs.recordings import Recording  # noqa: E402
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 import pamrs
-from pamrs.diagnosis.blocks import available_blocks
+from pamrs.diagnosis.prepare import available_blocks
 
 FOLDER = Path(__file__).parents[2] / "cases" / "pam_arm_shaj"
 

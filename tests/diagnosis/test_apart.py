@@ -8,13 +8,11 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis.blocks import available_blocks
-from pamrs.diagnosis.candidates import Attempts, Candidate, Group
-from pamrs.diagnosis.evidence import Excess
-from pamrs.diagnosis.fitting import Fit, Problem
-from pamrs.diagnosis.hypotheses import _apart
-from pamrs.diagnosis.verdicts import case_verdict, judge
-from pamrs.diagnosis.weighing import weigh
+from pamrs.diagnosis.evidence import Attempts, Candidate, Group, case_verdict, judge, weigh
+from pamrs.diagnosis.fit import Fit, Problem
+from pamrs.diagnosis.noise import Excess
+from pamrs.diagnosis.prepare import available_blocks
+from pamrs.diagnosis.search._hypotheses import _apart
 from pamrs.simulation import core_rig
 
 RIG = pamrs.rigs.shoulder()

@@ -9,14 +9,12 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis import words
-from pamrs.diagnosis.assemble import _merged, _settled
-from pamrs.diagnosis.blocks import available_blocks
-from pamrs.diagnosis.candidates import Candidate, Group
-from pamrs.diagnosis.fitting import Problem, fit, residuals
-from pamrs.diagnosis.protocols import library
-from pamrs.diagnosis.signals import prepare
-from pamrs.diagnosis.verdicts import judge
+from pamrs.diagnosis.evidence import Candidate, Group, judge
+from pamrs.diagnosis.explain import _words as words
+from pamrs.diagnosis.explain._assemble import _merged, _settled
+from pamrs.diagnosis.fit import Problem, fit, residuals
+from pamrs.diagnosis.next_experiment import library
+from pamrs.diagnosis.prepare import available_blocks, prepare
 from pamrs.errors import DiagnosisError
 from pamrs.recordings import Recording
 from pamrs.simulation import core_rig

@@ -7,12 +7,11 @@ import pytest
 
 import pamrs
 from pamrs import _core
-from pamrs.diagnosis.blocks import Block, available_blocks
-from pamrs.diagnosis.closure import MOST_TERMS, describe_closure, find_closure
-from pamrs.diagnosis.evidence import Floor, excess, floors, inflation
-from pamrs.diagnosis.fitting import FIT_BIN, Fit, Key, Problem, fit, residuals
-from pamrs.diagnosis.hypotheses import fits
-from pamrs.diagnosis.signals import prepare
+from pamrs.diagnosis.explain import describe_closure
+from pamrs.diagnosis.fit import FIT_BIN, Fit, Key, Problem, fit, fits, residuals
+from pamrs.diagnosis.noise import Floor, excess, floors, inflation
+from pamrs.diagnosis.prepare import Block, available_blocks, prepare
+from pamrs.diagnosis.search import MOST_TERMS, find_closure
 from pamrs.effects_table import CATALOGUE, EFFECTS
 from pamrs.effects_table.closure import CLOSURES, MEMORY_OF, TERMS
 from pamrs.errors import DiagnosisError, RigError

@@ -11,9 +11,8 @@ import pytest
 
 import pamrs
 from pamrs import _core
-from pamrs.diagnosis.blocks import available_blocks
+from pamrs.diagnosis.prepare import available_blocks, noise_level, prepare
 from pamrs.diagnosis.result import schema
-from pamrs.diagnosis.signals import noise_level, prepare
 from pamrs.effects_table import EFFECTS
 from pamrs.recordings import Recording
 from pamrs.simulation import core_rig

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis.blocks import available_blocks
-from pamrs.diagnosis.fitting import Events, Problem, residuals
-from pamrs.diagnosis.signals import prepare
+from pamrs.diagnosis.fit import Events, Problem, residuals
+from pamrs.diagnosis.prepare import available_blocks, prepare
 from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
 

@@ -10,9 +10,7 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis.differences import MEASURABLE, NOISE, taken
-from pamrs.diagnosis.experiment import entropy, information, propose
-from pamrs.diagnosis.protocols import library
+from pamrs.diagnosis.next_experiment import MEASURABLE, NOISE, entropy, information, library, propose, taken
 from pamrs.diagnosis.result import schema
 from tests.diagnosis import synthetic
 

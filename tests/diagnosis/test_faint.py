@@ -9,12 +9,11 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis import hypotheses
-from pamrs.diagnosis.blocks import available_blocks
-from pamrs.diagnosis.candidates import Candidate
-from pamrs.diagnosis.evidence import Excess
-from pamrs.diagnosis.fitting import Fit
-from pamrs.diagnosis.weighing import weigh
+from pamrs.diagnosis.evidence import Candidate, weigh
+from pamrs.diagnosis.fit import Fit
+from pamrs.diagnosis.noise import Excess
+from pamrs.diagnosis.prepare import available_blocks
+from pamrs.diagnosis.search import _hypotheses as hypotheses
 from pamrs.recordings import Recording
 
 NOISE = {"supply_pressure": 400.0, "muscle_pressure": 400.0, "joint_angle": 3e-4}

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 import pamrs
 from pamrs.control import trajectories
-from pamrs.diagnosis.plausible import implausible
+from pamrs.diagnosis.prepare import implausible
 from pamrs.reproduce import _lift as lift
 from pamrs.reproduce._lift_diagnosis import recorded
 

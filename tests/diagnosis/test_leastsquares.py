@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import least_squares, lsq_linear
 
-from pamrs.diagnosis.leastsquares import levenberg_marquardt
+from pamrs.diagnosis.fit import levenberg_marquardt
 from pamrs.errors import SimulationError
 
 Array = NDArray[np.float64]

@@ -8,10 +8,9 @@ from pathlib import Path
 import numpy as np
 
 import pamrs
-from pamrs.diagnosis.blocks import available_blocks
-from pamrs.diagnosis.fitting import Fit, Problem, fit, residuals
-from pamrs.diagnosis.leaving import left_out
-from pamrs.diagnosis.signals import prepare
+from pamrs.diagnosis.fit import Fit, Problem, fit, residuals
+from pamrs.diagnosis.prepare import available_blocks, prepare
+from pamrs.diagnosis.screen import left_out
 from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
 

@@ -10,14 +10,9 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis.blocks import available_blocks
-from pamrs.diagnosis.events import look_for_events
-from pamrs.diagnosis.experiment import propose
-from pamrs.diagnosis.fitting import Problem, residuals
-from pamrs.diagnosis.hypotheses import fits
-from pamrs.diagnosis.plausible import implausible
-from pamrs.diagnosis.protocols import library
-from pamrs.diagnosis.signals import prepare
+from pamrs.diagnosis.fit import Problem, fits, look_for_events, residuals
+from pamrs.diagnosis.next_experiment import library, propose
+from pamrs.diagnosis.prepare import available_blocks, implausible, prepare
 from pamrs.errors import DiagnosisError, SimulationError
 from pamrs.recordings import Recording
 from pamrs.rig import parse_rig

@@ -9,8 +9,8 @@ import pytest
 
 import pamrs
 from pamrs.diagnosis import _doubted, _unsettled
-from pamrs.diagnosis.blocks import available_blocks
-from pamrs.diagnosis.candidates import Group
+from pamrs.diagnosis.evidence import Group
+from pamrs.diagnosis.prepare import available_blocks
 from pamrs.recordings import Recording
 
 ROOT = Path(__file__).parents[2]

@@ -9,8 +9,8 @@ import pytest
 
 import pamrs
 from pamrs.cli import main
-from pamrs.diagnosis import plan
-from pamrs.diagnosis.protocols import library, pressure_range
+from pamrs.diagnosis.next_experiment import _plan as plan
+from pamrs.diagnosis.next_experiment import library, pressure_range
 from pamrs.effects_table import CATALOGUE, EFFECTS
 
 ALL = ("valve_command", "supply_pressure", "muscle_pressure", "joint_angle")

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.diagnosis.resampling import inclusion
-from pamrs.diagnosis.screening import Screen, Stand
-from pamrs.diagnosis.starts import Start
+from pamrs.diagnosis.fit import Start
+from pamrs.diagnosis.screen import Screen, Stand, inclusion
 
 Array = NDArray[np.float64]
 ROWS = 6000

@@ -8,12 +8,10 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis.blocks import available_blocks, begun
-from pamrs.diagnosis.candidates import Candidate, significant
-from pamrs.diagnosis.evidence import Excess, excess, floors
-from pamrs.diagnosis.fitting import Fit, Problem, residuals
-from pamrs.diagnosis.signals import Prepared, noise_level, prepare
-from pamrs.diagnosis.weighing import weigh
+from pamrs.diagnosis.evidence import Candidate, significant, weigh
+from pamrs.diagnosis.fit import Fit, Problem, residuals
+from pamrs.diagnosis.noise import Excess, excess, floors
+from pamrs.diagnosis.prepare import Prepared, available_blocks, begun, noise_level, prepare
 from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
 

@@ -7,11 +7,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import pamrs
-from pamrs.diagnosis.blocks import Block, available_blocks
-from pamrs.diagnosis.candidates import Candidate, Group
-from pamrs.diagnosis.evidence import Excess
-from pamrs.diagnosis.fitting import Fit
-from pamrs.diagnosis.verdicts import Judged, case_ambiguity, case_probabilities, case_verdict, judge
+from pamrs.diagnosis.evidence import Candidate, Group, Judged, case_ambiguity, case_probabilities, case_verdict, judge
+from pamrs.diagnosis.fit import Fit
+from pamrs.diagnosis.noise import Excess
+from pamrs.diagnosis.prepare import Block, available_blocks
 from pamrs.report.text import kept_sentence, sentence_of
 
 RIG = pamrs.rigs.shoulder()

@@ -10,12 +10,11 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis import wrong_parameters
-from pamrs.diagnosis.blocks import available_blocks
-from pamrs.diagnosis.fitting import Problem, fit
+from pamrs.diagnosis.fit import Problem, fit
+from pamrs.diagnosis.prepare import available_blocks, prepare
 from pamrs.diagnosis.result import schema
-from pamrs.diagnosis.signals import prepare
-from pamrs.diagnosis.wrong_parameters import suspected
+from pamrs.diagnosis.search import _wrong_parameters as wrong_parameters
+from pamrs.diagnosis.search import suspected
 from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
 

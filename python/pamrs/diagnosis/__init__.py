@@ -15,16 +15,14 @@ from contextlib import contextmanager
 from dataclasses import replace
 
 from pamrs.channels import dotted
-from pamrs.diagnosis import assemble
-from pamrs.diagnosis.blocks import Block, available_blocks
-from pamrs.diagnosis.candidates import Group
-from pamrs.diagnosis.evidence import floors
-from pamrs.diagnosis.fitting import Problem
-from pamrs.diagnosis.hypotheses import examine
-from pamrs.diagnosis.plausible import check_plausible, check_sense
+from pamrs.diagnosis.evidence import Group
+from pamrs.diagnosis.explain import _assemble as assemble
+from pamrs.diagnosis.fit import Problem
+from pamrs.diagnosis.noise import floors
+from pamrs.diagnosis.prepare import Block, Prepared, available_blocks, check_plausible, check_sense, prepare
 from pamrs.diagnosis.result import Diagnosis
+from pamrs.diagnosis.search import examine
 from pamrs.diagnosis.settings import DiagnosisSettings
-from pamrs.diagnosis.signals import Prepared, prepare
 from pamrs.errors import DiagnosisError, SimulationError
 from pamrs.recordings import Case, load_case
 from pamrs.rig import Rig

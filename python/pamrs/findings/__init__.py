@@ -10,35 +10,28 @@ which they become JSON, `object_of`, `reference` and `DEFINITIONS`, by which a s
 
 from __future__ import annotations
 
-from pamrs.findings._entry import Entry, to_plain, told
-from pamrs.findings._schema import DEFINITIONS, object_of, reference
-from pamrs.findings._types import (
+from pamrs.findings._details import Asked, BlockResidual, ConditionMap, Curves, NextExperiment, RankedExperiment, Tried
+from pamrs.findings._entries import (
     VERDICTS,
-    Asked,
     BlockMismatch,
-    BlockResidual,
     BlockVerdict,
     ChannelError,
     Condition,
-    ConditionMap,
-    Curves,
     EffectFound,
     EffectParameterFound,
-    Findings,
     FitErrors,
     MismatchSize,
     MismatchStages,
-    ModelFile,
-    NextExperiment,
     ParameterFound,
-    RankedExperiment,
     StageError,
-    Trace,
-    Tried,
     Unexplained,
     Where,
     WrongParameter,
 )
+from pamrs.findings._entry import Entry, to_plain, told
+from pamrs.findings._findings import Findings
+from pamrs.findings._schema import DEFINITIONS, object_of, reference
+from pamrs.findings._trace import ModelFile, Trace
 
 __all__ = [
     "DEFINITIONS",

@@ -29,7 +29,6 @@ from pamrs.report.text import (
     ranked_probabilities,
 )
 
-
 __all__ = [
     "COLOURS",
     "STYLE",
