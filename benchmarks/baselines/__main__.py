@@ -12,7 +12,7 @@ import sys
 from pathlib import Path
 
 from pamrs.errors import PamrsError
-from pamrs.prove import cases_of
+from pamrs.diagnosis.prove import cases_of
 from trial.sidebyside import compared, side_by_side
 
 

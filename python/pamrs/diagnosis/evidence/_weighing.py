@@ -108,10 +108,10 @@ def weigh(
     what the form of an equation may leave (``form_share`` of the settings) is granted to all of them, so that no second effect is
     asked for to mend the form of the first; among sets of as many effects less is granted (``form_share_alike``). What is left of a
     faint mismatch counts by what noise could leave of it. Each parameter and each further effect has its price, and so have a clock
-    that does not drift and values that an effect hardly has (:func:`unlikely`). Against ``unlisted``: the share of the mismatch that the set explains where it explains least,
-    and whether its size is the same in all recordings; sets that are not believed themselves say nothing against one that is. The
-    constants are those under which the stated probabilities came true in a trial with other seeds than the published one
-    (docs/decisions/0014).
+    that does not drift and values that an effect hardly has (:func:`unlikely`). Against ``unlisted``: the share of the mismatch that
+    the set explains where it explains least, and whether its size is the same in all recordings; sets that are not believed
+    themselves say nothing against one that is. The constants are those under which the stated probabilities came true in a trial
+    with other seeds than the published one (docs/decisions/0014).
 
     ``seconds`` is the length of the longest recording that was fitted, ``ranging`` what was visited in them,
     ``own`` the blocks in which each set is judged against ``unlisted``, where these are not all the suspects.

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from threading import Event
 
 import numpy as np
@@ -278,79 +278,130 @@ def _jointly(events: Events, problem: Problem, nominal: Rig, baseline: Fit, infl
 
     One after the other would creep: a baseline that was fitted without the events holds half of what a mass does.
     """
-    effect, settings = events.effect, problem.settings
-    leading, shared = EFFECTS[effect].leading.name, EFFECTS[effect].leading.same_everywhere
-    names = list(baseline.moved)
-    scaling = Scaling(nominal, names, {}, settings.fit)
-    places = [(name, p) for name, values in events.values.items() for p in values if not (shared and p == leading)]
-    places = ([("", leading)] if shared else []) + places
-    by_name = {p.recording.name: p for p in problem.recordings}
-    scale = np.array([_scale(effect, p, settings.transients) for _, p in places])
-    count = len(names)
-    kept = []
-    for prepared in problem.recordings:
-        rows, slope = stacked(replace(problem, recordings=[prepared]), baseline.residuals, inflation)
-        kept.append(np.zeros((rows.size, 0)) if slope is None else slope[:, :count])
-
-    def told(x: Array) -> Events:
-        values = {name: dict(own) for name, own in events.values.items()}
-        for (name, p), value in zip(places, x[count:] * scale, strict=True):
-            for own in values.values() if name == "" else [values[name]]:
-                own[p] = float(value)
-        return Events(effect, values)
-
-    def evaluate(x: Array) -> tuple[Array, Array, dict[Key, Residual]]:
-        happened = told(x)
-        wanted = sorted({p for own in events.values.values() for p in own})
-        found = residuals(problem, scaling.rig(x[:count], {}), [f"{effect}.{p}" for p in wanted], happened)
-        slopes = np.array([scaling.slope(n, float(v)) for n, v in zip(names, x[:count], strict=True)])
-        parts, columns = [], []
-        for prepared, fixed in zip(problem.recordings, kept, strict=True):
-            rows, slope = stacked(replace(problem, recordings=[prepared]), found, inflation)
-            assert slope is not None
-            own = events.values.get(prepared.recording.name, {})
-            block = np.zeros((rows.size, len(places)))
-            for k, (name, p) in enumerate(places):
-                if p in own and name in ("", prepared.recording.name):
-                    block[:, k] = slope[:, wanted.index(p)] * scale[k]
-            parts.append(rows)
-            columns.append(np.concatenate([fixed * slopes, block], axis=1))
-        prior = np.eye(count, count + len(places))
-        return np.concatenate([*parts, x[:count]]), np.concatenate([*columns, prior]), found
-
-    start = [(baseline.values[n] - scaling.centre[n]) / scaling.scale[n] for n in names]
-    sizes = [own[leading] for own in events.values.values()]
-    begun = [float(np.median(sizes)) if name == "" else events.values[name][p] for name, p in places]
-    recordings = [by_name[name] if name else problem.recordings[0] for name, _ in places]
-    limits = [
-        _limits(effect, p, recording, settings.transients)
-        for (_, p), recording in zip(places, recordings, strict=True)
-    ]
-    low = np.concatenate([scaling.bounds[0], np.array([limit[0] for limit in limits]) / scale])
-    high = np.concatenate([scaling.bounds[1], np.array([limit[1] for limit in limits]) / scale])
+    joint = _Joint.of(events, problem, nominal, baseline, inflation)
+    settings, count = problem.settings, len(joint.names)
     try:
         x, (values, jacobian, found), spent = levenberg_marquardt(
-            evaluate,
-            np.concatenate([start, np.array(begun) / scale]),
-            (low, high),
+            joint.evaluate,
+            joint.begin(baseline),
+            joint.bounds(),
             settings.transients.evaluations_together,
             settings.fit,
         )
     except SimulationError:
         return None
     spread = np.sqrt(np.clip(np.diag(np.linalg.pinv(jacobian.T @ jacobian, hermitian=True)), 0.0, None))
-    told_std = {place: float(s) for place, s in zip(places, spread[count:] * scale, strict=True)}
+    told_std = {place: float(s) for place, s in zip(joint.places, spread[count:] * joint.scale, strict=True)}
     first = next(iter(events.values))
     own_std = {p: told_std.get((first, p), told_std.get(("", p), math.nan)) for p in events.values[first]}
+    names, scaling = joint.names, joint.scaling
     return replace(
         baseline,
-        effects=(effect,),
+        effects=(events.effect,),
         rig=scaling.rig(x[:count], {}),
         values={n: scaling.value(n, float(v)) for n, v in zip(names, x[:count], strict=True)},
-        std={n: baseline.std[n] for n in names} | {f"{effect}.{p}": s for p, s in own_std.items()},
+        std={n: baseline.std[n] for n in names} | {f"{events.effect}.{p}": s for p, s in own_std.items()},
         cost=0.5 * float(values @ values),
         residuals=found,
         moved={n: float(v) for n, v in zip(names, x[:count], strict=True)},
         evaluations=spent,
-        events=told(x),
+        events=joint.told(x),
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _Joint:
+    """Baseline and events of every recording as one vector.
+
+    Attributes
+    ----------
+    events : Events
+        Where they begin.
+    problem : Problem
+        Blocks and recordings.
+    inflation : dict of str to float
+        As in :func:`pamrs.diagnosis.fit.fit`.
+    names : list of str
+        Baseline parameters, the first elements of the vector.
+    scaling : Scaling
+        Of them.
+    places : list of (recording, parameter)
+        The other elements; one that all recordings share has no recording.
+    scale : (k,) array
+        Scale of each of these [SI].
+    kept : list of array
+        Sensitivities to the baseline parameters in each recording, which stay as they were without the events.
+    """
+
+    events: Events
+    problem: Problem
+    inflation: dict[str, float]
+    names: list[str]
+    scaling: Scaling
+    places: list[tuple[str, str]]
+    scale: Array
+    kept: list[Array]
+
+    @staticmethod
+    def of(events: Events, problem: Problem, nominal: Rig, baseline: Fit, inflation: dict[str, float]) -> _Joint:
+        """The vector of a problem."""
+        effect, settings = events.effect, problem.settings
+        leading, shared = EFFECTS[effect].leading.name, EFFECTS[effect].leading.same_everywhere
+        names = list(baseline.moved)
+        places = [(name, p) for name, values in events.values.items() for p in values if not (shared and p == leading)]
+        places = ([("", leading)] if shared else []) + places
+        scale = np.array([_scale(effect, p, settings.transients) for _, p in places])
+        kept = []
+        for prepared in problem.recordings:
+            rows, slope = stacked(replace(problem, recordings=[prepared]), baseline.residuals, inflation)
+            kept.append(np.zeros((rows.size, 0)) if slope is None else slope[:, : len(names)])
+        scaling = Scaling(nominal, names, {}, settings.fit)
+        return _Joint(events, problem, inflation, names, scaling, places, scale, kept)
+
+    def told(self, x: Array) -> Events:
+        """The events that a vector says."""
+        values = {name: dict(own) for name, own in self.events.values.items()}
+        for (name, p), value in zip(self.places, x[len(self.names) :] * self.scale, strict=True):
+            for own in values.values() if name == "" else [values[name]]:
+                own[p] = float(value)
+        return Events(self.events.effect, values)
+
+    def evaluate(self, x: Array) -> tuple[Array, Array, dict[Key, Residual]]:
+        """Stacked residuals and priors, their sensitivities, and the residuals by block and recording."""
+        effect, count = self.events.effect, len(self.names)
+        wanted = sorted({p for own in self.events.values.values() for p in own})
+        names = [f"{effect}.{p}" for p in wanted]
+        found = residuals(self.problem, self.scaling.rig(x[:count], {}), names, self.told(x))
+        slopes = np.array([self.scaling.slope(n, float(v)) for n, v in zip(self.names, x[:count], strict=True)])
+        parts, columns = [], []
+        for prepared, fixed in zip(self.problem.recordings, self.kept, strict=True):
+            rows, slope = stacked(replace(self.problem, recordings=[prepared]), found, self.inflation)
+            assert slope is not None
+            own = self.events.values.get(prepared.recording.name, {})
+            block = np.zeros((rows.size, len(self.places)))
+            for k, (name, p) in enumerate(self.places):
+                if p in own and name in ("", prepared.recording.name):
+                    block[:, k] = slope[:, wanted.index(p)] * self.scale[k]
+            parts.append(rows)
+            columns.append(np.concatenate([fixed * slopes, block], axis=1))
+        prior = np.eye(count, count + len(self.places))
+        return np.concatenate([*parts, x[:count]]), np.concatenate([*columns, prior]), found
+
+    def begin(self, baseline: Fit) -> Array:
+        """Where the fit begins: the baseline as it was, each event where it was found."""
+        leading = EFFECTS[self.events.effect].leading.name
+        start = [(baseline.values[n] - self.scaling.centre[n]) / self.scaling.scale[n] for n in self.names]
+        sizes = [own[leading] for own in self.events.values.values()]
+        median = float(np.median(sizes))
+        begun = [median if name == "" else self.events.values[name][p] for name, p in self.places]
+        return np.concatenate([start, np.array(begun) / self.scale])
+
+    def bounds(self) -> tuple[Array, Array]:
+        """Smallest and largest value of each element."""
+        by_name = {p.recording.name: p for p in self.problem.recordings}
+        own = [by_name[name] if name else self.problem.recordings[0] for name, _ in self.places]
+        effect, settings = self.events.effect, self.problem.settings.transients
+        limits = [_limits(effect, p, r, settings) for (_, p), r in zip(self.places, own, strict=True)]
+        low = np.concatenate([self.scaling.bounds[0], np.array([limit[0] for limit in limits]) / self.scale])
+        high = np.concatenate([self.scaling.bounds[1], np.array([limit[1] for limit in limits]) / self.scale])
+        return low, high

@@ -137,7 +137,7 @@ def case_digest(folder: Path) -> str:
 
 def code_digest() -> str:
     """SHA-256 over every file of the installed package, so that results of different code can be told apart."""
-    return _digest(Path(__file__).parent, lambda path: path.suffix in (".py", ".so", ".pyd", ".toml", ".json"))
+    return _digest(Path(__file__).parents[1], lambda path: path.suffix in (".py", ".so", ".pyd", ".toml", ".json"))
 
 
 def _digest(home: Path, wanted: Callable[[Path], bool]) -> str:
@@ -158,7 +158,7 @@ def _machine() -> dict[str, Any]:
 
 
 def worker(words: Sequence[str] | None = None) -> int:
-    """Diagnose one case: ``python -m pamrs.prove CASE OUT``.
+    """Diagnose one case: ``python -m pamrs.diagnosis.prove CASE OUT``.
 
     Parameters
     ----------
@@ -322,72 +322,106 @@ def prove(
     for name, value in (("jobs", jobs), ("limit", limit)):
         if value is not None and value < 1:
             raise ParameterError(f"{name} = {value} is not allowed: it must be at least 1")
-    from pamrs import __version__
-
     found, manifest = cases_of(folder)
-    found = found[:limit]
     target = Path(folder) / "results" if results is None else Path(results)
     target.mkdir(parents=True, exist_ok=True)
     tell = say or (lambda text: None)
-    code, earlier, digests = code_digest(), _before(target), {case.name: case_digest(case) for case in found}
-    proof = Proof(target)
-    waiting: list[Path] = []
-    for case in found:
-        result = None if fresh else valid_result(target / case.name / "out.json")
-        known = earlier.get(case.name, {})
-        if result is None or known.get("case_sha256", digests[case.name]) != digests[case.name]:
-            waiting.append(case)
-        else:
-            proof.cases[case.name] = {**_entry(result), **{k: v for k, v in known.items() if k != "error"}}
-    proof = Proof(target, proof.cases, len(proof.cases))
-    other = sum(entry.get("code") != code for entry in proof.cases.values())
-    if proof.kept:
+    run = _Run.of(found[:limit], target, jobs, manifest, fresh=fresh)
+    kept = len(run.entries)
+    other = sum(entry.get("code") != run.code for entry in run.entries.values())
+    if kept:
         tell(
-            f"{proof.kept} of {len(found)} results are there"
+            f"{kept} of {len(run.cases)} results are there"
             + (f", {other} of them made by other code (--fresh makes them again)" * bool(other))
         )
-    head = {
-        "schema": SCHEMA, "version": __version__, "code": code, "machine": _machine(), "jobs": jobs,
-        "manifest_sha256": manifest,
-    }  # fmt: skip
+    run.record()
+    run.finish(command or (sys.executable, "-m", "pamrs.diagnosis.prove"), jobs, timeout, tell)
+    return Proof(target, {case.name: run.entries[case.name] for case in run.cases}, kept)
 
-    def record() -> None:
-        ordered = {case.name: proof.cases[case.name] for case in found if case.name in proof.cases}
-        write_atomically(target / "run.json", json.dumps({**head, "cases": ordered}, indent=1) + "\n")
 
-    record()
-    began, todo, done = time.perf_counter(), len(waiting), 0
-    running: list[_Running] = []
-    words = command or (sys.executable, "-m", "pamrs.prove")
-    try:
-        while waiting or running:
-            while waiting and len(running) < jobs:
-                case = waiting.pop(0)
-                out = target / case.name / "out.json"
-                out.parent.mkdir(exist_ok=True)
-                out.unlink(missing_ok=True)
-                running.append(_launch(words, case, out))
-            for slow in (r for r in running if time.perf_counter() - r.began > timeout):
-                slow.process.kill()
-                slow.process.wait()
-                slow.late = True
-            ended = [r for r in running if r.process.poll() is not None]
-            for one in ended:
-                running.remove(one)
-                entry = _ended(one, target / one.case.name / "out.json")
+@dataclass
+class _Run:
+    """Cases, what is known of them, and those that are still to be diagnosed."""
+
+    cases: list[Path]
+    target: Path
+    code: str
+    digests: dict[str, str]
+    head: dict[str, Any]
+    entries: dict[str, dict[str, Any]]
+    waiting: list[Path]
+
+    @classmethod
+    def of(cls, cases: list[Path], target: Path, jobs: int, manifest: str | None, *, fresh: bool) -> _Run:
+        """What an earlier run left of these cases."""
+        from pamrs import __version__
+
+        code, earlier, digests = code_digest(), _before(target), {case.name: case_digest(case) for case in cases}
+        entries: dict[str, dict[str, Any]] = {}
+        waiting: list[Path] = []
+        for case in cases:
+            result = None if fresh else valid_result(target / case.name / "out.json")
+            known = earlier.get(case.name, {})
+            if result is None or known.get("case_sha256", digests[case.name]) != digests[case.name]:
+                waiting.append(case)
+            else:
+                entries[case.name] = {**_entry(result), **{k: v for k, v in known.items() if k != "error"}}
+        told = {"schema": SCHEMA, "version": __version__, "code": code, "machine": _machine(), "jobs": jobs}
+        return cls(cases, target, code, digests, {**told, "manifest_sha256": manifest}, entries, waiting)
+
+    def record(self) -> None:
+        """Write what is known to ``run.json``."""
+        ordered = {case.name: self.entries[case.name] for case in self.cases if case.name in self.entries}
+        write_atomically(self.target / "run.json", json.dumps({**self.head, "cases": ordered}, indent=1) + "\n")
+
+    def finish(self, command: Sequence[str], jobs: int, timeout: float, tell: Callable[[str], None]) -> None:
+        """Diagnose what waits, so many cases at a time, each in a process of its own."""
+        began, todo, kept = time.perf_counter(), len(self.waiting), len(self.entries)
+        running: list[_Running] = []
+        done = 0
+        try:
+            while self.waiting or running:
+                while self.waiting and len(running) < jobs:
+                    running.append(self._started(command, self.waiting.pop(0)))
+                for slow in (r for r in running if time.perf_counter() - r.began > timeout):
+                    slow.process.kill()
+                    slow.process.wait()
+                    slow.late = True
+                ended = [r for r in running if r.process.poll() is not None]
+                for one in ended:
+                    running.remove(one)
+                    entry = self._entered(one)
+                    done += 1
+                    left = (time.perf_counter() - began) / done * (todo - done)
+                    rest = f"; about {_span(left)} left" if done < todo else ""
+                    place = f"[{kept + done}/{len(self.cases)}]"
+                    tell(f"{place} {one.case.name}: {_said(entry)}, {entry['wall_seconds']:.1f} s{rest}")
+                if not ended:
+                    time.sleep(_POLL)
+        finally:
+            for one in running:
                 one.close()
-                done += 1
-                proof.cases[one.case.name] = {**entry, "version": __version__, "code": code, "case_sha256": digests[one.case.name]}
-                record()
-                left = (time.perf_counter() - began) / done * (todo - done)
-                rest = f"; about {_span(left)} left" if done < todo else ""
-                tell(f"[{proof.kept + done}/{len(found)}] {one.case.name}: {_said(entry)}, {entry['wall_seconds']:.1f} s{rest}")
-            if not ended:
-                time.sleep(_POLL)
-    finally:
-        for one in running:
-            one.close()
-    return Proof(target, {case.name: proof.cases[case.name] for case in found}, proof.kept)
+
+    def _started(self, command: Sequence[str], case: Path) -> _Running:
+        """A worker on a case, whose earlier result is gone."""
+        out = self.target / case.name / "out.json"
+        out.parent.mkdir(exist_ok=True)
+        out.unlink(missing_ok=True)
+        return _launch(command, case, out)
+
+    def _entered(self, ended: _Running) -> dict[str, Any]:
+        """The entry of a case whose worker has ended, recorded."""
+        name = ended.case.name
+        entry = _ended(ended, self.target / name / "out.json")
+        ended.close()
+        self.entries[name] = {
+            **entry,
+            "version": self.head["version"],
+            "code": self.code,
+            "case_sha256": self.digests[name],
+        }
+        self.record()
+        return entry
 
 
 if __name__ == "__main__":
