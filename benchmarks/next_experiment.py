@@ -2,7 +2,7 @@
 
 Each line is a question that one recording leaves open: two or three effects are fitted to it, all fit. The truth is a plant with one
 of them and with baseline parameters drawn inside their tolerances. Experiments are then made one after the other, chosen either by
-the expected information (as :func:`pamrs.diagnosis.next_experiment.propose` does) or at random from the same library, and the hypotheses
+the expected information (as :func:`pamrs.diagnosis.next_experiment.propose` does) or at random from the same library, and the hypo
 are weighed by the same likelihood each time, until one is above 0.95. Everything is simulated by the core.
 
 Run it with ``python -m benchmarks.next_experiment``; numbers of lines as arguments choose some.

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from fingerprints.table import EXPERIMENTS
-from pamrs.effects_table import EFFECTS, EffectInfo
-from pamrs.effects_table.text import catalogue, snippet, where
+from pamrs.effects import EFFECTS, EffectInfo
+from pamrs.effects.text import catalogue, snippet, where
 
 __all__ = ["COMMAND", "pages"]
 
@@ -13,7 +13,7 @@ COMMAND = "make effects"
 INDEX = f"""\
 # The physics that a model can leave out
 
-Made by `{COMMAND}` from the table of the package (`pamrs.effects_table`); `pamrs effects` prints it, `pamrs effects ID` one entry.
+Made by `{COMMAND}` from the table of the package (`pamrs.effects`); `pamrs effects` prints it, `pamrs effects ID` one entry.
 Every page has the equation, the parameters, what is confused with the effect and what separates the two, the lines of a rig file, and
 the fingerprint as the simulator draws it: the same experiment without the effect (orange) and with it (blue).
 """

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from pamrs import cli
-from pamrs.effects_table import EFFECTS, text
+from pamrs.effects import EFFECTS, text
 from pamrs.errors import ParameterError
 from pamrs.rig import parse_rig
 from tests.effects.test_effects import rig_for

@@ -10,7 +10,7 @@ from pamrs.control import PID, closed_loop
 from pamrs.control.linear import equilibrium, linear_controller, linearise
 from pamrs.control.stability import margins, spectral_radius, stable_region
 from pamrs.control.trajectories import step
-from pamrs.effects_table import EFFECTS
+from pamrs.effects import EFFECTS
 from pamrs.errors import ParameterError
 from tests.control.helpers import SmallPid
 

@@ -12,8 +12,7 @@ from pamrs.diagnosis.fit import FIT_BIN, Fit, Key, Problem, fit, fits, residuals
 from pamrs.diagnosis.noise import Floor, excess, floors, inflation
 from pamrs.diagnosis.prepare import Block, available_blocks, prepare
 from pamrs.diagnosis.search import MOST_TERMS, find_closure
-from pamrs.effects_table import CATALOGUE, EFFECTS
-from pamrs.effects_table.closure import CLOSURES, MEMORY_OF, TERMS
+from pamrs.effects import CATALOGUE, CLOSURES, EFFECTS, MEMORY_OF, TERMS
 from pamrs.errors import DiagnosisError, RigError
 from pamrs.recordings import Recording
 from pamrs.simulation import core_rig

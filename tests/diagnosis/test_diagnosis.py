@@ -13,7 +13,7 @@ import pamrs
 from pamrs import _core
 from pamrs.diagnosis.prepare import available_blocks, noise_level, prepare
 from pamrs.diagnosis.result import schema
-from pamrs.effects_table import EFFECTS
+from pamrs.effects import EFFECTS
 from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
 

@@ -11,7 +11,7 @@ import pamrs
 from pamrs.cli import main
 from pamrs.diagnosis.next_experiment import _plan as plan
 from pamrs.diagnosis.next_experiment import library, pressure_range
-from pamrs.effects_table import CATALOGUE, EFFECTS
+from pamrs.effects import CATALOGUE, EFFECTS
 
 ALL = ("valve_command", "supply_pressure", "muscle_pressure", "joint_angle")
 

@@ -10,7 +10,7 @@ import pytest
 from fingerprints.pages import pages
 from fingerprints.sheet import Sheet
 from fingerprints.table import EXPERIMENTS
-from pamrs.effects_table.text import catalogue
+from pamrs.effects.text import catalogue
 
 DOCS = Path(__file__).parents[2] / "docs" / "effects"
 IDS = [info.id for infos in catalogue().values() for info in infos]

@@ -8,7 +8,7 @@ import pytest
 import pamrs
 from pamrs import _core
 from pamrs.diagnosis.fit import ACTS, RESTRICTIONS, starts_of
-from pamrs.effects_table import EFFECTS
+from pamrs.effects import EFFECTS
 from pamrs.errors import ParameterError, RigError
 from pamrs.rig import parse_rig
 from pamrs.units import parse_unit

@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[2]
 LAYERS = (
     ("errors",),
     ("channels", "comparison", "units", "_checks", "_writing", "_moved"),
-    ("effects_table",),
+    ("effects",),
     ("rig",),
     ("recordings", "rigs"),
     ("simulation",),

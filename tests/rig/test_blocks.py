@@ -367,8 +367,11 @@ def test_an_effect_on_one_block() -> None:
     assert same(rig, parse_rig(rig.to_toml_text()))
     assert same(rig, pickle.loads(pickle.dumps(rig)))
     other = rig.with_effect("leak_muscle", at="flexor")
-    assert [entry.get("at") for entry in other.effects] == [None, "flexor"]
-    assert other.effect_std == {}
+    assert [entry.get("at") for entry in other.effects] == ["extensor", None, "flexor"]
+    assert other.effect_std == {"leak_muscle.extensor": {"conductance": 1e-12}}
+    assert same(other, parse_rig(other.to_toml_text()))
+    assert other.without_effect("leak_muscle", at="flexor").effects == rig.effects
+    assert [entry.get("at") for entry in other.with_effect("leak_muscle").effects] == [None, None]
     assert rig.without_effect("leak_muscle").effects == pair.with_effect("muscle_hysteresis").effects
     with pytest.raises(ParameterError, match="leak_muscle: at = 'flexr' names no chamber; did you mean 'flexor'"):
         pair.with_effect("leak_muscle", at="flexr")
@@ -384,7 +387,11 @@ def test_effects_in_a_file_name_their_block() -> None:
     assert parse_rig(text + leak + 'at = "chamber.b"\n').effects[0]["at"] == "b"
     assert "leak_muscle: at = 'c' names no chamber; there are: a, b" in refused(text + leak + 'at = "c"\n')
     assert "effects[0].at = 3 is not allowed: the name of a chamber" in refused(text + leak + "at = 3\n")
-    assert "effects[1].id = 'leak_muscle' is there twice" in refused(text + leak + 'at = "a"\n' + leak + 'at = "b"\n')
+    both = parse_rig(text + leak + 'at = "a"\n' + leak + 'at = "b"\n')
+    assert [entry["at"] for entry in both.effects] == ["a", "b"]
+    for other in ('at = "a"\n', ""):
+        assert "effects[1].id = 'leak_muscle' is there twice" in refused(text + leak + 'at = "a"\n' + leak + other)
+    assert "effects[0].form = 'wide' is not allowed" in refused(text + leak + 'form = "wide"\n')
     assert "there is none with a name" in refused(stand("chamber") + leak + 'at = "a"\n')
 
 

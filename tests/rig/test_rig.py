@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import pamrs
-from pamrs.effects_table import EFFECTS
+from pamrs.effects import EFFECTS
 from pamrs.errors import ParameterError, RigError
 from pamrs.rig import Rig, load_rig, parse_rig
 from pamrs.rig.schema import BLOCKS

@@ -2,8 +2,8 @@
 //! eight sensitivities.
 
 use criterion::{criterion_main, Criterion};
-use pam_core::measured::{Measured, Signal};
-use pam_core::residual::{predict, Block};
+use pam_core::cut_chain::{predict, Block};
+use pam_core::cut_chain::{Measured, Signal};
 use pam_core::simulate::{simulate, Initial, Timing};
 use pam_core::{Rig, RigSpec};
 use std::hint::black_box;

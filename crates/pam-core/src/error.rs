@@ -73,3 +73,18 @@ pub fn check_range(name: &str, value: f64, low: f64, high: f64, unit: &str) -> R
         Err(Error::parameter(name, value, format!("a finite number from {low} to {high} {unit}")))
     }
 }
+
+/// The value of a name in a list of them.
+///
+/// # Errors
+/// [`Error::Choice`] that names the parameter and lists what it may be.
+pub(crate) fn named<T: Copy>(parameter: &str, name: &str, names: &[(&'static str, T)]) -> Result<T> {
+    names.iter().find(|(known, _)| *known == name).map(|(_, value)| *value).ok_or_else(|| {
+        let known: Vec<_> = names.iter().map(|(known, _)| format!("\"{known}\"")).collect();
+        Error::Choice {
+            name: parameter.into(),
+            value: format!("\"{name}\""),
+            allowed: format!("one of {}", known.join(", ")),
+        }
+    })
+}

@@ -11,24 +11,17 @@
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
-pub mod arm;
-pub mod batch;
-pub mod drive;
+pub mod blocks;
+pub mod braid;
+pub mod cut_chain;
+pub mod description;
 pub mod effects;
 pub mod error;
-pub mod events;
-pub mod gas;
-pub mod geometry;
-mod initial;
-pub mod integrate;
-pub mod joint;
-pub mod measured;
 pub mod muscle;
-pub mod residual;
-pub mod rig;
-pub mod run;
+pub mod plant;
 pub mod scalar;
 pub mod simulate;
 
+pub use description::RigSpec;
 pub use error::{Error, Result};
-pub use rig::{Rig, RigSpec};
+pub use plant::Rig;

@@ -4,9 +4,9 @@ use num_dual::DualNum;
 
 /// A real number or a dual number over one. Every equation of this crate is generic over it, so
 /// that one source of the physics gives values and exact first derivatives.
-pub trait Scalar: DualNum<Primitive = f64> + Copy + nalgebra::Scalar {}
+pub trait Scalar: DualNum<Primitive = f64> + Copy + nalgebra::Scalar + Send + Sync {}
 
-impl<T: DualNum<Primitive = f64> + Copy + nalgebra::Scalar> Scalar for T {}
+impl<T: DualNum<Primitive = f64> + Copy + nalgebra::Scalar + Send + Sync> Scalar for T {}
 
 /// A constant of type `S` (all derivatives zero).
 #[inline(always)]

@@ -1,7 +1,7 @@
 //! Laws of a batch: each row is the plant alone to the last bit, whoever advances it; a row that ends takes none along.
 
-use pam_core::batch::{Batch, Failure};
-use pam_core::drive::Drive;
+use pam_core::simulate::batch::{Batch, Failure};
+use pam_core::simulate::drive::Drive;
 use pam_core::simulate::{Initial, Progress, Timing, Trajectory};
 use pam_core::{Error, Result, Rig, RigSpec};
 use std::sync::Arc;

@@ -2,7 +2,7 @@
 
 mod rigs;
 
-use pam_core::rig::spec::{ArmSpec, EffectSpec, JointSpec, LinkSpec};
+use pam_core::description::{ArmSpec, EffectSpec, JointSpec, LinkSpec};
 use pam_core::simulate::{simulate, Initial, Timing, Trajectory};
 use pam_core::{Rig, RigSpec};
 use rigs::{effect, lone_tank, regulated, shoulder, TYPICAL};
@@ -148,7 +148,7 @@ fn centre_leakage_settles_where_both_flows_are_equal() {
     };
     let (up, down) = (from(1e5), from(1.3e6));
     assert!((up - down).abs() < 100.0, "{up} {down}");
-    let gas = pam_core::gas::orifice::Gas::new(AMBIENT, 293.15, 287.05, 1.4);
+    let gas = pam_core::blocks::gas::Gas::new(AMBIENT, 293.15, 287.05, 1.4);
     let p = up + AMBIENT;
     let (fills, vents) = (gas.mass_flow(1e-9, 1.38e6 + AMBIENT, p), gas.mass_flow(1e-9, p, AMBIENT));
     // alpha_in is 1.4 here and alpha_out 1: the pressure stands still where the one is less by that.
@@ -174,8 +174,8 @@ fn a_transducer_at_the_valve_reads_the_node_of_the_tube() {
     for name in ["air_mass", "supply_pressure"] {
         assert_eq!(valve.get(name), muscle.get(name));
     }
-    let gas = pam_core::gas::orifice::Gas::new(AMBIENT, 293.15, 287.05, 1.4);
-    let hose = pam_core::gas::tube::Tube::<f64>::of_conductance(2e-8, 0.3, 293.15);
+    let gas = pam_core::blocks::gas::Gas::new(AMBIENT, 293.15, 287.05, 1.4);
+    let hose = pam_core::blocks::tube::Tube::<f64>::of_conductance(2e-8, 0.3, 293.15);
     // it opens as far at 2 V as at 8 V
     let free = Run::new(with(rigid_chamber(1.0), vec![]), 2, 0.001, 1, |_| 8.0, &[]);
     let area = (free.last("air_mass") - free.get("air_mass")[0])

@@ -3,10 +3,10 @@
 
 mod rigs;
 
-use pam_core::drive::Drive;
+use pam_core::cut_chain::{predict, Block};
+use pam_core::cut_chain::{Measured, Signal};
 use pam_core::effects::EFFECTS;
-use pam_core::measured::{Measured, Signal};
-use pam_core::residual::{predict, Block};
+use pam_core::simulate::drive::Drive;
 use pam_core::simulate::{Initial, Progress, Timing, Trajectory};
 use pam_core::{Rig, RigSpec};
 use rigs::{antagonists, effect, effect_at, lone_tank, regulated, shoulder, two_joints, Typical, TYPICAL};
@@ -61,7 +61,7 @@ fn run(rig: &Rig, rows: usize) -> Trajectory {
     pam_core::simulate::simulate(rig, rows, &borrowed(&signals), TIMING.stable(rig), &initial(rig)).unwrap()
 }
 
-fn with(spec: RigSpec, effects: Vec<pam_core::rig::spec::EffectSpec>) -> Rig {
+fn with(spec: RigSpec, effects: Vec<pam_core::description::EffectSpec>) -> Rig {
     Rig::new(RigSpec { effects, ..spec }).unwrap()
 }
 
@@ -70,7 +70,7 @@ fn every_effect_is_tested() {
     let others = ["heat_transfer"]; // it replaces an equation and has no neutral value
     for info in EFFECTS.iter().filter(|e| !others.contains(&e.id)) {
         let typical = TYPICAL.iter().find(|t| t.id == info.id).unwrap_or_else(|| panic!("{}", info.id));
-        assert!(info.parameters.iter().map(|p| p.name).eq(typical.parameters.iter().map(|(n, _)| *n)));
+        assert!(info.parameters().iter().map(|p| p.name).eq(typical.parameters.iter().map(|(n, _)| *n)));
     }
 }
 

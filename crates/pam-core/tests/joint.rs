@@ -1,8 +1,8 @@
 //! Laws of the joints: the moment arm is the slope of the shortening, so that a joint conserves power.
 
 use num_dual::Dual64;
-use pam_core::joint::tendon::{TendonJoint, Torque};
-use pam_core::joint::{Joint, Polynomial, Pulley};
+use pam_core::blocks::joint::tendon::{TendonJoint, Torque};
+use pam_core::blocks::joint::{Joint, Polynomial, Pulley};
 use proptest::prelude::*;
 
 fn each(lengths: [f64; 4], radius: f64, coefficients: &[f64]) -> Vec<Joint> {

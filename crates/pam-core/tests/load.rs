@@ -1,7 +1,7 @@
 //! Linear loads: a mass hangs where the muscle carries it and keeps its energy, a frame gives the static force.
 
-use pam_core::drive::Drive;
 use pam_core::muscle::{Muscle, MuscleSpec};
+use pam_core::simulate::drive::Drive;
 use pam_core::simulate::{Initial, Progress, Timing, Trajectory};
 use pam_core::{Rig, RigSpec};
 

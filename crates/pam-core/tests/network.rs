@@ -1,6 +1,6 @@
 //! Laws of rigs of several blocks: what is conserved, what they come to rest at, order, stability, and what is refused.
 
-use pam_core::rig::spec::{ArmSpec, ChamberSpec, LineSpec, LinkSpec, SupplySpec};
+use pam_core::description::{ArmSpec, ChamberSpec, LineSpec, LinkSpec, SupplySpec};
 use pam_core::simulate::{simulate, Initial, Progress, Timing, Trajectory};
 use pam_core::{Rig, RigSpec};
 
@@ -302,7 +302,7 @@ fn a_rig_goes_on_from_its_numbers_bit_for_bit() {
     let timing = Timing::new(0.005, 1e-3).unwrap().stable(&rig);
     let (a, b) = (wave(120, 0.0), wave(120, 1.0));
     let signals: [(&str, &[f64]); 2] = [("valve_command.elbow", &a), ("valve_command.wrist", &b)];
-    let drive = pam_core::drive::Drive::new(&rig, 120, &signals).unwrap();
+    let drive = pam_core::simulate::drive::Drive::new(&rig, 120, &signals).unwrap();
     let mut whole = Progress::start(&rig, &Initial::rest(&rig)).unwrap();
     let mut out = Trajectory::new(&rig, 120);
     whole.advance(&rig, timing, &drive.part(0..120), &mut out).unwrap();
@@ -373,8 +373,9 @@ fn light_bodies_on_stiff_muscles_are_stable_at_a_millisecond() {
 
 #[test]
 fn fast_leaks_and_walls_are_stable() {
-    let effect = |id: &str, values: &[(&str, f64)]| pam_core::rig::spec::EffectSpec {
+    let effect = |id: &str, values: &[(&str, f64)]| pam_core::description::EffectSpec {
         id: id.into(),
+        form: String::new(),
         at: String::new(),
         parameters: values.iter().map(|(n, v)| ((*n).to_string(), *v)).collect(),
     };

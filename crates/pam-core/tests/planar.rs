@@ -2,10 +2,10 @@
 
 use nalgebra::{SMatrix, SVector};
 use num_dual::{Dual64, DualStruct};
-use pam_core::arm::one_link::OneLink;
-use pam_core::arm::planar::{Link, PlanarArm, Stops};
-use pam_core::integrate::Rk4;
+use pam_core::blocks::arm::one_link::OneLink;
+use pam_core::blocks::arm::planar::{Link, PlanarArm, Stops};
 use pam_core::scalar::{constant, Scalar};
+use pam_core::simulate::integrate::Rk4;
 use pam_core::Error;
 use proptest::prelude::*;
 

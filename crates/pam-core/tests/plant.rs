@@ -1,8 +1,8 @@
 //! Laws of the composed plant: order, sensitivities against differences, typed errors, determinism.
 
-use pam_core::measured::{Measured, Signal};
-use pam_core::residual::{predict, Block};
-use pam_core::rig::spec::EffectSpec;
+use pam_core::cut_chain::{predict, Block};
+use pam_core::cut_chain::{Measured, Signal};
+use pam_core::description::EffectSpec;
 use pam_core::simulate::{simulate, Initial, Timing, Trajectory};
 use pam_core::{Error, Rig, RigSpec};
 use std::collections::BTreeMap;
@@ -13,7 +13,7 @@ fn spec() -> RigSpec {
 
 fn effect(id: &str, parameters: &[(&str, f64)]) -> EffectSpec {
     let parameters: BTreeMap<_, _> = parameters.iter().map(|(n, v)| ((*n).to_string(), *v)).collect();
-    EffectSpec { id: id.into(), at: String::new(), parameters }
+    EffectSpec { id: id.into(), form: String::new(), at: String::new(), parameters }
 }
 
 fn command(n: usize) -> Vec<f64> {

@@ -7,7 +7,7 @@ use crate::convert::{array, error, values};
 use crate::rig::{borrowed, owned, Rig, Signals};
 use crate::simulator::watched;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1};
-use pam_core::batch::{of_row, Batch as Plants, Failure};
+use pam_core::simulate::batch::{of_row, Batch as Plants, Failure};
 use pam_core::simulate::{Initial, Timing};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;

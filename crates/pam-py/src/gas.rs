@@ -2,8 +2,8 @@
 
 use crate::convert::{array, error, values};
 use numpy::{PyArray1, PyReadonlyArray1};
+use pam_core::blocks::gas::Gas as CoreGas;
 use pam_core::error::check_range;
-use pam_core::gas::orifice::Gas as CoreGas;
 use pyo3::prelude::*;
 
 /// A gas with its orifice law (SI units, absolute pressures).

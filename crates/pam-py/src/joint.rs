@@ -2,9 +2,9 @@
 
 use crate::convert::{array, error, values};
 use numpy::{PyArray1, PyReadonlyArray1};
+use pam_core::blocks::joint::{Joint as CoreJoint, JointPoint};
+use pam_core::description::TransmissionSpec;
 use pam_core::error::check_range;
-use pam_core::joint::{Joint as CoreJoint, JointPoint};
-use pam_core::rig::spec::TransmissionSpec;
 use pyo3::prelude::*;
 
 /// A joint made from a JSON description (SI, radians).

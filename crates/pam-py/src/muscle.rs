@@ -4,8 +4,8 @@ use std::sync::OnceLock;
 
 use crate::convert::{array, error, values};
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1};
+use pam_core::description::muscle_from_json;
 use pam_core::muscle::{CompiledMuscle, Muscle as CoreMuscle};
-use pam_core::rig::spec::muscle_from_json;
 use pam_core::Result;
 use pyo3::prelude::*;
 

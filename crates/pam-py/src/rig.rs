@@ -6,11 +6,13 @@ use std::sync::Arc;
 use crate::convert::{array, error, values};
 use crate::simulator::{channels, events, initial, run, EventRow};
 use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray1};
-use pam_core::drive::Drive;
-use pam_core::measured::{Measured, Signal};
-use pam_core::residual::{closure_terms, predict, Block};
-use pam_core::rig::RigSpec;
+use pam_core::cut_chain::{closure_terms, predict, Block};
+use pam_core::cut_chain::{Measured, Signal};
+use pam_core::effects::EFFECTS;
+use pam_core::simulate::drive::Drive;
 use pam_core::simulate::{Progress, Timing, Trajectory};
+use pam_core::RigSpec;
+use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -85,6 +87,39 @@ impl Rig {
     fn respecified(&self, py: Python<'_>, json: &str) -> PyResult<Self> {
         let made = py.detach(|| RigSpec::from_json(json).and_then(|spec| self.inner.respecified(spec)));
         Ok(Self { inner: Arc::new(made.map_err(|e| error(py, &e))?) })
+    }
+
+    /// The same rig with other values of its parameters, in the order of their names; nothing is wired again.
+    fn with_values(&self, py: Python<'_>, values: PyReadonlyArray1<'_, f64>) -> PyResult<Self> {
+        let values = crate::convert::values(&values);
+        let made = py.detach(|| self.inner.with_values(&values));
+        Ok(Self { inner: Arc::new(made.map_err(|e| error(py, &e))?) })
+    }
+
+    /// The same rig with other values of some parameters by name; None where one of them is not a parameter that can vary, so
+    /// that the rig has to be made again.
+    fn revalued(&self, py: Python<'_>, values: BTreeMap<String, f64>) -> PyResult<Option<Self>> {
+        let table = self.inner.parameters();
+        let mut all = table.values().to_vec();
+        for (name, value) in &values {
+            match table.find(name) {
+                Ok(id) => all[id.index()] = *value,
+                Err(_) => return Ok(None),
+            }
+        }
+        let made = py.detach(|| self.inner.with_values(&all));
+        Ok(Some(Self { inner: Arc::new(made.map_err(|e| error(py, &e))?) }))
+    }
+
+    /// Values of the parameters, in the order of their names.
+    #[getter]
+    fn values<'py>(&self, py: Python<'py>) -> Bound<'py, numpy::PyArray1<f64>> {
+        array(py, self.inner.parameters().values().to_vec())
+    }
+
+    /// Name and role of every number of a fresh simulation's state, in its order.
+    fn state_map(&self) -> Vec<(String, &'static str)> {
+        self.inner.state_map().into_iter().map(|place| (place.name, place.role.name())).collect()
     }
 
     /// Names of the commands that a simulation takes.
@@ -205,12 +240,8 @@ impl Rig {
     }
 }
 
-type EffectRow = (&'static str, &'static str, Vec<(&'static str, &'static str)>);
-
-/// Effects of the core: (id, block, [(parameter, SI unit), ...]).
+/// What every effect of the core is, as JSON text: a list in the order of the chain.
 #[pyfunction]
-pub fn effects() -> Vec<EffectRow> {
-    let parameters =
-        |e: &pam_core::effects::EffectInfo| e.parameters.iter().map(|p| (p.name, p.unit)).collect();
-    pam_core::effects::EFFECTS.iter().map(|e| (e.id, e.block, parameters(e))).collect()
+pub fn effects() -> PyResult<String> {
+    serde_json::to_string(EFFECTS).map_err(|e| PyRuntimeError::new_err(e.to_string()))
 }

@@ -13,6 +13,6 @@ def effects_command(
     effect: Annotated[str | None, typer.Argument(metavar="ID", help="An effect of the catalogue; without it, all are listed.")] = None,
 ) -> None:
     """List the physics that a model can leave out, or print one effect: equation, fingerprint, rivals, parameters, rig file."""
-    from pamrs.effects_table import text
+    from pamrs.effects import text
 
     typer.echo(text.overview() if effect is None else text.description(effect))

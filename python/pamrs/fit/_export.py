@@ -76,7 +76,7 @@ def to_rig(fit: MuscleFit, rig: Rig | None) -> Rig:
         parameters["count"] = base["muscle"]["count"]
     known = {name: given.tol for name, given in rig.parameters.items() if given.tol > 0.0 and _kept(name, given.value, parameters)}
     fitted = {f"muscle.{free.name}": fit.params[free.name].stderr for free in fit.free}
-    return Rig(rig.name, {**base, "muscle": parameters}, {**known, **fitted}, rig.effect_std, rig.source)
+    return Rig(rig.name, {**base, "muscle": parameters}, {**known, **fitted}, rig._effect_std, rig.source)
 
 
 def _kept(name: str, value: float, muscle: Mapping[str, Any]) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any, TypeGuard
 
-from pamrs.effects_table import EFFECTS
+from pamrs.effects import EFFECTS
 from pamrs.findings import BlockVerdict, EffectParameterFound, Findings, Unexplained, WrongParameter
 
 __all__ = [

@@ -55,7 +55,7 @@ def bare(block: str, text: str) -> str:
 
 def effect_problem(model: Mapping[str, Any], effect: str, place: str) -> str:
     """What is wrong with the block that an effect acts on, ``""`` where nothing is."""
-    from pamrs.effects_table import EFFECTS
+    from pamrs.effects import EFFECTS
 
     block = EFFECTS[effect].at
     if not block:

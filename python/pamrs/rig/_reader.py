@@ -322,30 +322,38 @@ class Reader:
             return []
         if not raw:
             return []
-        from pamrs.effects_table import CATALOGUE, EFFECTS
+        from pamrs.effects import CATALOGUE, EFFECTS
 
         found: list[dict[str, Any]] = []
         for index, entry in enumerate(raw):
             label = f"effects[{index}]"
-            self.unknown_keys(f"{label}.", entry, ("id", "at", "parameters"))
+            self.unknown_keys(f"{label}.", entry, ("id", "at", "form", "parameters"))
             identity = entry.get("id")
             if not isinstance(identity, str) or identity not in EFFECTS:
                 self.problem(f"{label}.id = {_shown(identity)} is not in the catalogue{near_name(str(identity), CATALOGUE)}")
                 continue
-            if any(identity == other["id"] for other in found):
-                self.problem(f"{label}.id = {identity!r} is there twice")
+            info = EFFECTS[identity]
+            place = self.place(label, info.at or "rig", entry.get("at", ""))
+            if any(identity == other["id"] and (not place or other.get("at", "") in ("", place)) for other in found):
+                self.problem(f"{label}.id = {identity!r} is there twice: of several each needs another block (at)")
                 continue
             given = entry.get("parameters", {})
             if not isinstance(given, Mapping):
                 self.problem(f"{label}.parameters = {_shown(given)} is not allowed: a table is needed")
                 continue
-            info = EFFECTS[identity]
-            self.unknown_keys(f"{identity}.", given, [parameter.name for parameter in info.parameters])
+            name = entry.get("form", "")
+            form = next((form for form in info.forms if name in ("", form.name)), None)
+            if form is None:
+                names = ", ".join(repr(form.name) for form in info.forms)
+                self.problem(f"{label}.form = {_shown(name)} is not allowed: {identity} has {names}")
+                continue
+            self.unknown_keys(f"{identity}.", given, [parameter.name for parameter in form.parameters])
             values = {
-                parameter.name: self.effect_value(identity, parameter, given.get(parameter.name)) for parameter in info.parameters
+                parameter.name: self.effect_value(identity, place, parameter, given.get(parameter.name))
+                for parameter in form.parameters
             }
-            place = self.place(label, info.at or "rig", entry.get("at", ""))
-            found.append({"id": identity, **({"at": place} if place else {}), "parameters": values})
+            own = {"form": name} if name and name != info.forms[0].name else {}
+            found.append({"id": identity, **({"at": place} if place else {}), **own, "parameters": values})
         return found
 
     def place(self, label: str, block: str, raw: Any) -> str:
@@ -355,7 +363,7 @@ class Reader:
             return ""
         return bare(block, raw)
 
-    def effect_value(self, identity: str, parameter: Any, raw: Any) -> float | None:
+    def effect_value(self, identity: str, place: str, parameter: Any, raw: Any) -> float | None:
         """One parameter of an effect, its default where it is left out."""
         label = f"{identity}.{parameter.name}"
         if raw is None:
@@ -372,7 +380,7 @@ class Reader:
         if "std" in raw:
             std = self.scalar(f"{label}.std", parameter.unit, raw["std"], unit, 0.0, 1e300, difference=True)
             if std is not None:
-                self.effect_std.setdefault(identity, {})[parameter.name] = std
+                self.effect_std.setdefault(qualified(identity, place), {})[parameter.name] = std
         return value
 
 

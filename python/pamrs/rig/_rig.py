@@ -27,7 +27,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Parameter", "Rig", "load_rig", "parse_rig"]
 
-_MADE_AGAIN = ("_compiled", "_connected")  # by the core and from the ports when they are needed
+#: By the core and from the ports when they are needed; what a rig differs from by numbers only, and what was made of it.
+_MADE_AGAIN = ("_compiled", "_connected", "_origin", "_grown")
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,14 +159,26 @@ class Rig:
 
     @property
     def effects(self) -> list[dict[str, Any]]:
-        """The omitted physics already in the model: ``{"id", "parameters": {name: SI value}}`` each, ``"at"`` if on one block only."""
+        """The omitted physics already in the model: ``{"id", "parameters": {name: SI value}}`` each.
+
+        With ``"at"`` if it acts on one block only, and ``"form"`` if it has another form than the first.
+        """
         effects: list[dict[str, Any]] = copy.deepcopy(self._model["effects"])
         return effects
 
     @property
     def effect_std(self) -> dict[str, dict[str, float]]:
-        """Standard deviations of the effects' parameters, where the file gives them: id -> name -> SI."""
-        return copy.deepcopy(self._effect_std)
+        """Standard deviations of the effects' parameters, where the file gives them: id -> name -> SI.
+
+        Of several effects of one id each has the name of its block behind a dot, ``"leak_muscle.flexor"``.
+        """
+        found: dict[str, dict[str, float]] = {}
+        ids = [entry["id"] for entry in self._model["effects"]]
+        for entry in self._model["effects"]:
+            full = qualified(entry["id"], entry.get("at", ""))
+            if full in self._effect_std:
+                found[entry["id"] if ids.count(entry["id"]) == 1 else full] = dict(self._effect_std[full])
+        return found
 
     @property
     def blocks(self) -> tuple[str, ...]:
@@ -269,7 +282,7 @@ class Rig:
         ParameterError
             For an unknown name, or a value outside the bounds of the possible.
         """
-        model = self.model
+        model = _opened(self._model, {split_name(name)[:2] for name in values})
         problems = []
         for name, value in values.items():
             table, key = self._scalar(model, name)
@@ -283,7 +296,32 @@ class Rig:
             table[key.name] = int(number) if whole else number
         if problems:
             raise ParameterError(joined(f"rig {self.name!r}", problems))
-        return Rig(self.name, model, self._tolerances, self._effect_std, self.source)
+        found = Rig(self.name, model, self._tolerances, self._effect_std, self.source)
+        return found._with_origin(self, {name: float(value) for name, value in values.items()})
+
+    # A rig that differs from another one by numbers only is not wired again: the core takes the numbers.
+
+    def _with_origin(self, base: Rig, values: Mapping[str, float]) -> Rig:
+        """Note that this rig is another one with other numbers."""
+        origin, before = base.__dict__.get("_origin", (base, {}))
+        object.__setattr__(self, "_origin", (origin, {**before, **values}))
+        return self
+
+    def _with_entry(self, entry: dict[str, Any], std: dict[str, dict[str, float]]) -> Rig:
+        """This rig with one effect more, as an entry of its model."""
+        model = {**self._model, "effects": [*self._model["effects"], entry]}
+        found = Rig(self.name, model, self._tolerances, {**self._effect_std, **std}, self.source)
+        origin, before = self.__dict__.get("_origin", (self, {}))
+        grown: dict[tuple[str, str, str], Rig] = origin.__dict__.get("_grown", {})
+        kind = (entry["id"], entry.get("at", ""), entry.get("form", ""))
+        if kind not in grown:
+            same = {**origin._model, "effects": [*origin._model["effects"], entry]}
+            grown[kind] = Rig(self.name, same, self._tolerances, origin._effect_std, self.source)
+            object.__setattr__(origin, "_grown", grown)
+        full = qualified(entry["id"], entry.get("at", ""))
+        own = {f"{full}.{name}": value for name, value in entry["parameters"].items()}
+        object.__setattr__(found, "_origin", (grown[kind], {**before, **own}))
+        return found
 
     def with_effect(
         self,
@@ -292,8 +330,12 @@ class Rig:
         *,
         std: Mapping[str, float] | None = None,
         at: str = "",
+        form: str = "",
     ) -> Rig:
-        """A rig with one effect more; an effect of the same id is replaced.
+        """A rig with one effect more.
+
+        Several of one id can be there, each at a block of its own and with its own parameters. One at the same block is
+        replaced; one that acts everywhere replaces all of its id, and is replaced by one at a block.
 
         Parameters
         ----------
@@ -305,6 +347,8 @@ class Rig:
             Standard deviations, SI; written to the file as a note of how well each is known.
         at : str, optional
             Name of the one block on which it acts, for example of a chamber; by default it acts on every block of its kind.
+        form : str, optional
+            Name of one of its forms; by default the first.
 
         Returns
         -------
@@ -314,20 +358,23 @@ class Rig:
         Raises
         ------
         ParameterError
-            For an unknown effect, parameter or block, or a value outside its bounds.
+            For an unknown effect, form, parameter or block, or a value outside its bounds.
         """
-        from pamrs.effects_table import CATALOGUE, EFFECTS
+        from pamrs.effects import CATALOGUE, EFFECTS
 
         info = EFFECTS.get(effect)
         if info is None:
             raise ParameterError(f"effect = {effect!r} is not in the catalogue{near_name(str(effect), CATALOGUE)}")
         at = bare(info.at, at)
         given = dict(parameters or {})
-        names = [parameter.name for parameter in info.parameters]
+        if form and form not in (allowed := [known.name for known in info.forms]):
+            raise ParameterError(f"form = {form!r} is not allowed: {effect} has {', '.join(map(repr, allowed))}")
+        chosen_form = info.form(form)
+        names = [parameter.name for parameter in chosen_form.parameters]
         problems = [f"unknown parameter {name!r}; it has: {', '.join(names)}" for name in {*given, *(std or {})} if name not in names]
         problems += [text] if (text := effect_problem(self._model, effect, at)) else []
         chosen: dict[str, float] = {}
-        for parameter in info.parameters:
+        for parameter in chosen_form.parameters:
             value = float(given.get(parameter.name, parameter.default))
             if not (math.isfinite(value) and parameter.lower <= value <= parameter.upper):
                 problems.append(
@@ -337,27 +384,38 @@ class Rig:
             chosen[parameter.name] = value
         if problems:
             raise ParameterError(joined(f"effect {effect!r}", problems))
-        base = self.without_effect(effect)
-        model = base.model
-        model["effects"].append({"id": effect, **({"at": at} if at else {}), "parameters": chosen})
-        kept = {**base._effect_std, **({effect: {k: float(v) for k, v in std.items()}} if std else {})}
-        return Rig(self.name, model, self._tolerances, kept, self.source)
+        base = self.without_effect(effect, at=at or None)
+        base = base.without_effect(effect, at="") if at else base
+        place = {"at": at} if at else {}
+        own = {"form": form} if form and form != info.forms[0].name else {}
+        known = {qualified(effect, at): {k: float(v) for k, v in std.items()}} if std else {}
+        return base._with_entry({"id": effect, **place, **own, "parameters": chosen}, known)
 
-    def without_effect(self, effect: str | None = None) -> Rig:
+    def without_effect(self, effect: str | None = None, *, at: str | None = None) -> Rig:
         """A rig without one effect; an effect that is not there is no error.
 
         Parameters
         ----------
         effect : str, optional
             Its id; None removes all.
+        at : str, optional
+            Only the one at the block of this name, ``""`` for the one that acts everywhere; by default wherever it acts.
 
         Returns
         -------
         Rig
         """
-        model = self.model
-        model["effects"] = [entry for entry in model["effects"] if effect is not None and entry["id"] != effect]
-        kept = {k: v for k, v in self._effect_std.items() if effect is not None and k != effect}
+        def stays(entry: Mapping[str, Any]) -> bool:
+            if effect is None:
+                return False
+            return entry["id"] != effect or (at is not None and entry.get("at", "") != at)
+
+        entries = [entry for entry in self._model["effects"] if stays(entry)]
+        if len(entries) == len(self._model["effects"]):
+            return self
+        model = {**self._model, "effects": entries}
+        left = {qualified(entry["id"], entry.get("at", "")) for entry in model["effects"]}
+        kept = {name: std for name, std in self._effect_std.items() if name in left}
         return Rig(self.name, model, self._tolerances, kept, self.source)
 
     # ------------------------------------------------------------------ writing
@@ -404,6 +462,20 @@ class Rig:
             return write_atomically(path, self.to_toml_text())
         except OSError as error:
             raise RigError(f"{path}: cannot be written ({error.strerror or error})") from error
+
+
+def _opened(model: dict[str, Any], tables: set[tuple[str, str]]) -> dict[str, Any]:
+    """A model with copies of some of its tables, by block and name; what is not changed is shared."""
+    opened = dict(model)
+    for block, name in tables:
+        content: Any = opened.get(block)
+        if not isinstance(content, dict):
+            continue
+        if content is model.get(block):
+            opened[block] = content = copy.copy(content)
+        if name in content:
+            content[name] = dict(content[name])
+    return opened
 
 
 def _range(key: Key) -> str:

@@ -42,10 +42,11 @@ def toml_text(content: Content) -> str:
             "[[effects]]",
             f"id = {_text(effect['id'])}",
             *([f"at = {_text(place)}"] if place else []),
+            *([f"form = {_text(effect['form'])}"] if "form" in effect else []),
             "[effects.parameters]",
         ]
-        units = _effect_units(effect["id"])
-        spread = content.effect_std.get(effect["id"], {})
+        units = _effect_units(effect["id"], effect.get("form", ""))
+        spread = content.effect_std.get(qualified(effect["id"], place), {})
         for name, value in effect["parameters"].items():
             std = f", std = {_number(spread[name])}" if name in spread else ""
             lines.append(f"{name} = {{ value = {_number(value)}, unit = {_text(units[name])}{std} }}")
@@ -86,10 +87,10 @@ def _entry(key: Key, value: Any, tol: float) -> str:
     return f"{{ value = {_number(value)}, unit = {_text(key.unit)}{note} }}"
 
 
-def _effect_units(effect: str) -> dict[str, str]:
-    from pamrs.effects_table import EFFECTS
+def _effect_units(effect: str, form: str) -> dict[str, str]:
+    from pamrs.effects import EFFECTS
 
-    return {parameter.name: parameter.unit for parameter in EFFECTS[effect].parameters}
+    return {parameter.name: parameter.unit for parameter in EFFECTS[effect].form(form).parameters}
 
 
 def _text(value: str) -> str:
@@ -139,7 +140,9 @@ def core_json(model: Mapping[str, Any], ports: Ports) -> str:
             for name, table in tables_of(model, "sensors").items()
         ],
         "effects": [
-            {"id": effect["id"], "at": effect.get("at", ""), "parameters": effect["parameters"]} for effect in model["effects"]
+            {key: effect.get(key, "") for key in ("id", "at", "form") if key != "form" or key in effect}
+            | {"parameters": effect["parameters"]}
+            for effect in model["effects"]
         ],
     }
     return json.dumps(document)

@@ -67,7 +67,7 @@ def _plain(value: object) -> str:
 
 
 def _effects() -> list[str]:
-    from pamrs.effects_table import EFFECTS
+    from pamrs.effects import EFFECTS
 
     lines = ["# [[effects]]                physics that the blocks leave out, as often as needed"]
     for name, info in EFFECTS.items():

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pamrs import _core
 from pamrs.channels import channel_of, dotted
-from pamrs.errors import ParameterError
+from pamrs.errors import PamrsError, ParameterError
 from pamrs.rig import Rig
 from pamrs.simulation._driving import Signals, initial_values, sensor_zero, signals_of
 
@@ -276,14 +276,29 @@ def _motion() -> ModuleType:
 def core_rig(rig: Rig, like: _core.Rig | None = None) -> _core.Rig:
     """The compiled rig of a description, kept with it so that a second simulation costs no compilation.
 
-    Muscles that are those of ``like`` are not compiled again.
+    A rig that differs from another one by the values of its parameters only is that one with other values: nothing is read or
+    wired again. Of any other, muscles that are those of ``like`` are not compiled again.
     """
     cached: Any = rig.__dict__.get("_compiled")
     if cached is None:
-        cached = _core.Rig(rig.to_json()) if like is None else like.respecified(rig.to_json())
+        cached = _revalued(rig, like)
+        if cached is None:
+            cached = _core.Rig(rig.to_json()) if like is None else like.respecified(rig.to_json())
         object.__setattr__(rig, "_compiled", cached)
     compiled: _core.Rig = cached
     return compiled
+
+
+def _revalued(rig: Rig, like: _core.Rig | None) -> _core.Rig | None:
+    """The compiled rig from which this one differs by numbers, with these; None where there is none or it cannot be."""
+    origin, values = rig.__dict__.get("_origin", (None, {}))
+    if origin is None:
+        return None
+    try:
+        compiled = core_rig(origin, like)
+    except PamrsError:  # what it began from is not possible, this one may be
+        return None
+    return compiled.revalued(values)
 
 
 def simulate(

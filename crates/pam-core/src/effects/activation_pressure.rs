@@ -5,15 +5,28 @@
 //! muscle actuators", ICRA 2000; E. G. Hocking & N. M. Wereley, "Analysis of nonlinear elastic behavior in miniature pneumatic artificial
 //! muscles", Smart Materials and Structures 22, 2013.
 
-use super::{EffectInfo, EffectParameter};
+use super::{Effect, EffectInfo, EffectParameter, Form, Port};
+use crate::blocks::gas::Gas;
+use crate::made_by;
 use crate::scalar::{constant, Scalar};
 
-/// Table entry.
+/// What it is.
 pub const INFO: EffectInfo = EffectInfo {
     id: "activation_pressure",
     block: "muscle",
     at: "muscle",
-    parameters: &[EffectParameter::new("threshold", "Pa")],
+    source: "Tsagarakis & Caldwell (2000); Hocking & Wereley (2013)",
+    forms: &[Form {
+        name: "threshold",
+        parameters: &[
+            EffectParameter::new("threshold", "Pa", 0.0, 1e7, 20000.0).starts(&[10000.0, 50000.0]).off(0.0),
+        ],
+        states: &[],
+        integrates: false,
+        ports: &[Port::Gauge],
+        make: made_by!(make),
+    }],
+    ..EffectInfo::USUAL
 };
 
 const CORNER: f64 = 0.1;
@@ -30,6 +43,22 @@ pub fn effective<S: Scalar>(pressure: S, threshold: S) -> S {
         into * into / (width * 4.0)
     } else {
         constant(0.0)
+    }
+}
+
+/// Pressure that a muscle needs before it pulls.
+#[derive(Debug, Clone, Copy)]
+struct Activation<S> {
+    threshold: S,
+}
+
+fn make<S: Scalar>(values: &[S], _gas: &Gas) -> Box<dyn Effect<S>> {
+    Box::new(Activation { threshold: values[0] })
+}
+
+impl<S: Scalar> Effect<S> for Activation<S> {
+    fn gauge(&self, gauge: S) -> S {
+        effective(gauge, self.threshold)
     }
 }
 

@@ -7,19 +7,43 @@
 //! simulation, which cannot answer a command that is still to come, takes it as no shift.
 //! D. L. Mills, "Internet time synchronization: the network time protocol", IEEE Trans. Communications 39, 1991 (offset and skew).
 
-use super::{EffectInfo, EffectParameter};
+use super::{Effect, EffectInfo, EffectParameter, Form, Kink, Port, SameData, Use};
+use crate::blocks::gas::Gas;
+use crate::made_by;
 use crate::scalar::Scalar;
 
-/// Table entry.
+/// What it is.
 pub const INFO: EffectInfo = EffectInfo {
     id: "clock_skew",
     block: "sensors",
     at: "",
-    parameters: &[
-        EffectParameter::new("offset", "s").within(-10.0, 10.0),
-        EffectParameter::new("rate", "1").within(-0.01, 0.01),
-        EffectParameter::new("angle_share", "1").within(0.0, 1.0),
-    ],
+    kink: Some(Kink {
+        where_not_zero: &["offset", "rate"],
+        why: "its delay is no state of the rig; take it out, and give it as the delay of the loop",
+        of_supplies: false,
+    }),
+    same_data: Some(SameData {
+        effect: "input_path_lag",
+        parameter: "delay",
+        size: "offset",
+        without: "rate",
+        held: &[("angle_share", 1.0)],
+    }),
+    acts_in: &["supply", "chamber", "arm"],
+    source: "Mills (1991), offset and skew of clocks",
+    forms: &[Form {
+        name: "offset_and_drift",
+        parameters: &[
+            EffectParameter::new("offset", "s", -10.0, 10.0, 0.01).starts(&[0.005, 0.03]).off(0.0),
+            EffectParameter::new("rate", "1", -0.01, 0.01, 0.0001).starts(&[0.0, 0.0003]).off(0.0),
+            EffectParameter::new("angle_share", "1", 0.0, 1.0, 1.0).starts(&[0.0, 1.0]).role(Use::Choice),
+        ],
+        states: &[],
+        integrates: false,
+        ports: &[Port::Clock],
+        make: made_by!(make),
+    }],
+    ..EffectInfo::USUAL
 };
 
 /// How late a pressure is recorded at a time [s].
@@ -61,6 +85,25 @@ pub fn held_mean<S: Scalar>(value: impl Fn(i64) -> S, time: f64, step: f64, samp
         k += 1.0;
     }
     (sum + (to - last) * value(last as i64)) / (step / sample_time)
+}
+
+/// Another clock of what is recorded.
+#[derive(Debug, Clone, Copy)]
+struct ClockSkew<S> {
+    offset: S,
+    rate: S,
+    angle_share: S,
+}
+
+fn make<S: Scalar>(values: &[S], _gas: &Gas) -> Box<dyn Effect<S>> {
+    Box::new(ClockSkew { offset: values[0], rate: values[1], angle_share: values[2] })
+}
+
+impl<S: Scalar> Effect<S> for ClockSkew<S> {
+    fn clock(&self, time: f64) -> (S, S) {
+        let shift = shift(self.offset, self.rate, time);
+        (shift, shift * self.angle_share)
+    }
 }
 
 #[cfg(test)]

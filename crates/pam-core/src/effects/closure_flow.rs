@@ -5,7 +5,9 @@
 //! Two memories, `z' = (p - z)/T` and `zx' = (x - zx)/T`; around the null `n = exp(-(x/0.05)^2/2)`, on one side of it
 //! `tanh(x/0.01)`. See `closure_torque`.
 
-use super::{EffectInfo, EffectParameter};
+use super::{At, BAR, Effect, EffectInfo, EffectParameter, EffectState, Extremes, Form, LITRE, Port, Role};
+use crate::blocks::gas::Gas;
+use crate::made_by;
 use crate::scalar::{constant, tanh, Scalar};
 
 /// Number of terms.
@@ -20,33 +22,47 @@ const NULL: f64 = 0.05;
 const SIDE: f64 = 0.01;
 
 const fn term(name: &'static str) -> EffectParameter {
-    EffectParameter::new(name, "kg/s").within(-1e6, 1e6)
+    EffectParameter::new(name, "kg/s", -1e6, 1e6, 0.0).starts(&[-1e-5, 1e-5]).off(0.0)
 }
 
-/// Table entry.
+/// What it is.
 pub const INFO: EffectInfo = EffectInfo {
     id: "closure_flow",
     block: "chamber",
     at: "chamber",
-    parameters: &[
-        term("constant"),
-        term("pressure"),
-        term("pressure_squared"),
-        term("opening"),
-        term("abs_opening"),
-        term("opening_pressure"),
-        term("abs_opening_pressure"),
-        term("filling"),
-        term("sign_filling"),
-        term("sign_venting"),
-        term("at_null"),
-        term("supply_difference"),
-        term("volume_rate"),
-        term("pressure_memory"),
-        term("opening_memory"),
-        term("opening_memory_pressure"),
-        EffectParameter::new("memory_time", "s").within(0.01, 1e6),
-    ],
+    named: false,
+    order: 3,
+    source: "Brunton, Proctor & Kutz (2016), sparse dictionaries",
+    forms: &[Form {
+        name: "sum_of_terms",
+        parameters: &[
+            term("constant"),
+            term("pressure"),
+            term("pressure_squared"),
+            term("opening"),
+            term("abs_opening"),
+            term("opening_pressure"),
+            term("abs_opening_pressure"),
+            term("filling"),
+            term("sign_filling"),
+            term("sign_venting"),
+            term("at_null"),
+            term("supply_difference"),
+            term("volume_rate"),
+            term("pressure_memory"),
+            term("opening_memory"),
+            term("opening_memory_pressure"),
+            EffectParameter::new("memory_time", "s", 0.01, 1e6, 1.0).starts(&[0.1, 0.5, 2.0, 8.0]),
+        ],
+        states: &[
+            EffectState { name: "pressure", role: Role::Moves },
+            EffectState { name: "opening", role: Role::Moves },
+        ],
+        integrates: true,
+        ports: &[Port::Inflow],
+        make: made_by!(make),
+    }],
+    ..EffectInfo::USUAL
 };
 
 /// A chamber at one instant.
@@ -109,7 +125,7 @@ impl<S: Scalar> Here<S> {
 /// Largest change of the flow per pressure of the chamber [kg/(s bar)], up to an absolute pressure [bar].
 pub fn steepest(values: &[f64; PARAMETERS], pressure: f64) -> f64 {
     let c = |name: &str| {
-        let k = INFO.parameters.iter().position(|p| p.name == name);
+        let k = INFO.parameters().iter().position(|p| p.name == name);
         k.map_or(0.0, |k| values[k].abs())
     };
     c("pressure")
@@ -125,12 +141,65 @@ pub fn steepest(values: &[f64; PARAMETERS], pressure: f64) -> f64 {
         + 2.0 * c("opening_memory_pressure")
 }
 
+/// A sum of flows into a chamber; its states are the remembered pressure and opening.
+#[derive(Debug, Clone, Copy)]
+struct ClosureFlow<S>([S; PARAMETERS]);
+
+fn make<S: Scalar>(values: &[S], _gas: &Gas) -> Box<dyn Effect<S>> {
+    Box::new(ClosureFlow(std::array::from_fn(|k| values[k])))
+}
+
+/// What it sees of a chamber, None elsewhere.
+fn here<S: Scalar>(at: &At<S>, own: &[S]) -> Option<Here<S>> {
+    match at {
+        At::Chamber { pressure, supply, opening, volume_rate } => Some(Here {
+            pressure: *pressure / BAR,
+            supply: *supply / BAR,
+            opening: *opening,
+            volume_rate: *volume_rate / LITRE,
+            memory: [own[0], own[1]],
+        }),
+        _ => None,
+    }
+}
+
+impl<S: Scalar> Effect<S> for ClosureFlow<S> {
+    fn start(&self, _gas: &Gas, at: &At<S>, own: &mut [S]) {
+        if let At::Chamber { pressure, .. } = at {
+            own.copy_from_slice(&[*pressure / BAR, constant(0.0)]);
+        }
+    }
+
+    fn rates(&self, at: &At<S>, own: &[S], rates: &mut [S]) {
+        if let Some(here) = here(at, own) {
+            rates.copy_from_slice(&here.rates(self.0[TERMS]));
+        }
+    }
+
+    fn inflow(&self, at: &At<S>, own: &[S]) -> S {
+        here(at, own).map_or(constant(0.0), |here| here.mass_flow(&self.0))
+    }
+
+    fn fastest(&self) -> f64 {
+        1.0 / self.0[TERMS].re()
+    }
+
+    fn steepest(&self, _gas: &Gas, most: &Extremes) -> f64 {
+        // Openings of several valves add up.
+        steepest(&self.0.map(|v| v.re()), most.pressure / BAR) * most.valves.max(1) as f64 / BAR
+    }
+
+    fn terms(&self, at: &At<S>, own: &[S]) -> Vec<S> {
+        here(at, own).map_or(Vec::new(), |here| here.terms().to_vec())
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn place(name: &str) -> usize {
-        INFO.parameters.iter().position(|p| p.name == name).unwrap()
+        INFO.parameters().iter().position(|p| p.name == name).unwrap()
     }
 
     #[test]

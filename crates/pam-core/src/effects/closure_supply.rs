@@ -3,7 +3,9 @@
 //! `m = sum_k c_k t_k`, every coefficient in kg/s: `p` is the absolute pressure in bar, `x` the sum of the openings through which its valves fill.
 //! One memory, `z' = (p - z)/T`: of a tank whose gas has been cooled or warmed by its change. See `closure_torque`.
 
-use super::{EffectInfo, EffectParameter};
+use super::{At, BAR, Effect, EffectInfo, EffectParameter, EffectState, Extremes, Form, Port, Role};
+use crate::blocks::gas::Gas;
+use crate::made_by;
 use crate::scalar::{constant, Scalar};
 
 /// Number of terms.
@@ -12,22 +14,35 @@ pub const TERMS: usize = 5;
 pub const PARAMETERS: usize = TERMS + 1;
 
 const fn term(name: &'static str) -> EffectParameter {
-    EffectParameter::new(name, "kg/s").within(-1e6, 1e6)
+    EffectParameter::new(name, "kg/s", -1e6, 1e6, 0.0).starts(&[-1e-4, 1e-4]).off(0.0)
 }
 
-/// Table entry.
+/// What it is.
 pub const INFO: EffectInfo = EffectInfo {
     id: "closure_supply",
     block: "supply",
     at: "supply",
-    parameters: &[
-        term("constant"),
-        term("pressure"),
-        term("opening"),
-        term("filling"),
-        term("pressure_memory"),
-        EffectParameter::new("memory_time", "s").within(0.01, 1e6),
-    ],
+    named: false,
+    order: 4,
+    source: "Brunton, Proctor & Kutz (2016), sparse dictionaries",
+    forms: &[Form {
+        name: "sum_of_terms",
+        parameters: &[
+            term("constant"),
+            term("pressure"),
+            term("opening"),
+            term("filling"),
+            term("pressure_memory"),
+            EffectParameter::new("memory_time", "s", 0.01, 1e6, 1.0).starts(&[0.1, 0.5, 2.0, 8.0]),
+        ],
+        states: &[
+            EffectState { name: "pressure", role: Role::Moves },
+        ],
+        integrates: true,
+        ports: &[Port::Inflow],
+        make: made_by!(make),
+    }],
+    ..EffectInfo::USUAL
 };
 
 /// A supply at one instant.
@@ -65,6 +80,54 @@ impl<S: Scalar> Here<S> {
 /// Largest change of the flow per pressure of the supply [kg/(s bar)], with all of so many valves open.
 pub fn steepest(values: &[f64; PARAMETERS], valves: f64) -> f64 {
     values[1].abs() + values[3].abs() * valves + values[4].abs()
+}
+
+/// A sum of flows into a supply; its state is the remembered pressure.
+#[derive(Debug, Clone, Copy)]
+struct ClosureSupply<S>([S; PARAMETERS]);
+
+fn make<S: Scalar>(values: &[S], _gas: &Gas) -> Box<dyn Effect<S>> {
+    Box::new(ClosureSupply(std::array::from_fn(|k| values[k])))
+}
+
+/// What it sees of a supply, None elsewhere.
+fn here<S: Scalar>(at: &At<S>, own: &[S]) -> Option<Here<S>> {
+    match at {
+        At::Supply { pressure, opening } => {
+            Some(Here { pressure: *pressure / BAR, opening: *opening, memory: own[0] })
+        }
+        _ => None,
+    }
+}
+
+impl<S: Scalar> Effect<S> for ClosureSupply<S> {
+    fn start(&self, _gas: &Gas, at: &At<S>, own: &mut [S]) {
+        if let At::Supply { pressure, .. } = at {
+            own[0] = *pressure / BAR;
+        }
+    }
+
+    fn rates(&self, at: &At<S>, own: &[S], rates: &mut [S]) {
+        if let Some(here) = here(at, own) {
+            rates[0] = here.rate(self.0[TERMS]);
+        }
+    }
+
+    fn inflow(&self, at: &At<S>, own: &[S]) -> S {
+        here(at, own).map_or(constant(0.0), |here| here.mass_flow(&self.0))
+    }
+
+    fn fastest(&self) -> f64 {
+        1.0 / self.0[TERMS].re()
+    }
+
+    fn steepest(&self, _gas: &Gas, most: &Extremes) -> f64 {
+        steepest(&self.0.map(|v| v.re()), most.valves as f64) / BAR
+    }
+
+    fn terms(&self, at: &At<S>, own: &[S]) -> Vec<S> {
+        here(at, own).map_or(Vec::new(), |here| here.terms().to_vec())
+    }
 }
 
 #[cfg(test)]

@@ -6,7 +6,9 @@
 //! -1 after one back (P. R. Dahl, *A solid friction model*, 1968). A model of a mismatch, not a name for it: S. L. Brunton, J. L. Proctor &
 //! J. N. Kutz, PNAS 113, 2016 (sparse dictionaries).
 
-use super::{EffectInfo, EffectParameter};
+use super::{At, BAR, Effect, EffectInfo, EffectParameter, EffectState, Extremes, Form, Port, Role};
+use crate::blocks::gas::Gas;
+use crate::made_by;
 use crate::scalar::{constant, tanh, Scalar};
 
 /// Number of terms.
@@ -17,40 +19,55 @@ pub const PARAMETERS: usize = TERMS + 2;
 pub const STATES: usize = 3;
 
 const fn term(name: &'static str) -> EffectParameter {
-    EffectParameter::new(name, "N m").within(-1e9, 1e9)
+    EffectParameter::new(name, "N m", -1e9, 1e9, 0.0).starts(&[-1.0, 1.0]).off(0.0)
 }
 
-/// Table entry.
+/// What it is.
 pub const INFO: EffectInfo = EffectInfo {
     id: "closure_torque",
     block: "joint",
     at: "joint",
-    parameters: &[
-        term("constant"),
-        term("angle"),
-        term("angle_squared"),
-        term("sine_4"),
-        term("cosine_4"),
-        term("sine_8"),
-        term("cosine_8"),
-        term("pressure"),
-        term("pressure_squared"),
-        term("pressure_angle"),
-        term("pressure_angle_squared"),
-        term("rate"),
-        term("angle_rate"),
-        term("rate_quadratic"),
-        term("pressure_rate"),
-        term("sign"),
-        term("pressure_sign"),
-        term("creep"),
-        term("pressure_creep"),
-        term("pressure_memory"),
-        term("slip"),
-        term("pressure_slip"),
-        EffectParameter::new("memory_time", "s").within(0.01, 1e6),
-        EffectParameter::new("memory_angle", "rad").within(0.01, 10.0),
-    ],
+    named: false,
+    order: 2,
+    source: "Brunton, Proctor & Kutz (2016), sparse dictionaries; Dahl (1968), solid friction",
+    forms: &[Form {
+        name: "sum_of_terms",
+        parameters: &[
+            term("constant"),
+            term("angle"),
+            term("angle_squared"),
+            term("sine_4"),
+            term("cosine_4"),
+            term("sine_8"),
+            term("cosine_8"),
+            term("pressure"),
+            term("pressure_squared"),
+            term("pressure_angle"),
+            term("pressure_angle_squared"),
+            term("rate"),
+            term("angle_rate"),
+            term("rate_quadratic"),
+            term("pressure_rate"),
+            term("sign"),
+            term("pressure_sign"),
+            term("creep"),
+            term("pressure_creep"),
+            term("pressure_memory"),
+            term("slip"),
+            term("pressure_slip"),
+            EffectParameter::new("memory_time", "s", 0.01, 1e6, 1.0).starts(&[0.1, 0.5, 2.0, 8.0]),
+            EffectParameter::new("memory_angle", "rad", 0.01, 10.0, 0.1).starts(&[0.02, 0.05, 0.15, 0.4]),
+        ],
+        states: &[
+            EffectState { name: "angle", role: Role::Moves },
+            EffectState { name: "pressure", role: Role::Moves },
+            EffectState { name: "slip", role: Role::Follows },
+        ],
+        integrates: true,
+        ports: &[Port::Torque],
+        make: made_by!(make),
+    }],
+    ..EffectInfo::USUAL
 };
 
 /// Speed over which the terms `sign` and `pressure_sign` turn [rad/s].
@@ -130,7 +147,7 @@ impl<S: Scalar> Here<S> {
 /// Damping [N m s/rad] and stiffness [N m/rad] that it adds at most, up to a gauge pressure [bar] and an angle [rad].
 pub fn resistance(values: &[f64; PARAMETERS], pressure: f64, angle: f64) -> (f64, f64) {
     let c = |name: &str| {
-        let k = INFO.parameters.iter().position(|p| p.name == name);
+        let k = INFO.parameters().iter().position(|p| p.name == name);
         k.map_or(0.0, |k| values[k].abs())
     };
     let damping = c("rate")
@@ -155,17 +172,70 @@ pub fn fastest(time: f64, angle: f64) -> f64 {
     (1.0 / time).max(FASTEST_SLIP / angle)
 }
 
+/// A sum of torques of a joint; its states are the remembered angle and pressure, and the slip.
+#[derive(Debug, Clone, Copy)]
+struct ClosureTorque<S>([S; PARAMETERS]);
+
+fn make<S: Scalar>(values: &[S], _gas: &Gas) -> Box<dyn Effect<S>> {
+    Box::new(ClosureTorque(std::array::from_fn(|k| values[k])))
+}
+
+/// What it sees of a joint, None elsewhere.
+fn here<S: Scalar>(at: &At<S>, own: &[S]) -> Option<Here<S>> {
+    match at {
+        At::Joint { pressure, angle, rate } => Some(Here {
+            pressure: *pressure,
+            angle: *angle,
+            rate: *rate,
+            memory: std::array::from_fn(|k| own[k]),
+        }),
+        _ => None,
+    }
+}
+
+impl<S: Scalar> Effect<S> for ClosureTorque<S> {
+    fn start(&self, _gas: &Gas, at: &At<S>, own: &mut [S]) {
+        if let At::Joint { pressure, angle, .. } = at {
+            own.copy_from_slice(&[*angle, *pressure, constant(0.0)]);
+        }
+    }
+
+    fn rates(&self, at: &At<S>, own: &[S], rates: &mut [S]) {
+        if let Some(here) = here(at, own) {
+            rates.copy_from_slice(&here.rates(self.0[TERMS], self.0[TERMS + 1]));
+        }
+    }
+
+    fn torque(&self, at: &At<S>, own: &[S]) -> S {
+        here(at, own).map_or(constant(0.0), |here| here.torque(&self.0))
+    }
+
+    fn fastest(&self) -> f64 {
+        fastest(self.0[TERMS].re(), self.0[TERMS + 1].re())
+    }
+
+    fn resistance(&self, most: &Extremes) -> (f64, f64) {
+        let pressure = (most.pressure - most.ambient) / BAR;
+        let angle = most.angles.0.abs().max(most.angles.1.abs());
+        resistance(&self.0.map(|v| v.re()), pressure, angle)
+    }
+
+    fn terms(&self, at: &At<S>, own: &[S]) -> Vec<S> {
+        here(at, own).map_or(Vec::new(), |here| here.terms().to_vec())
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::integrate::Rk4;
+    use crate::simulate::integrate::Rk4;
 
     fn here(pressure: f64, angle: f64, rate: f64, memory: [f64; STATES]) -> Here<f64> {
         Here { pressure, angle, rate, memory }
     }
 
     fn place(name: &str) -> usize {
-        INFO.parameters.iter().position(|p| p.name == name).unwrap()
+        INFO.parameters().iter().position(|p| p.name == name).unwrap()
     }
 
     #[test]

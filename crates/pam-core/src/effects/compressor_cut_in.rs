@@ -5,21 +5,43 @@
 //! what it gives in the rest of the step in which the pressure crosses is added by the share of the step that is left, so that the
 //! moment moves with the pressures and not by whole steps. Acts on tanks.
 
-use super::{EffectInfo, EffectParameter};
-use crate::gas::tube::REFERENCE_DENSITY;
-use crate::scalar::Scalar;
+use super::{At, Effect, EffectInfo, EffectParameter, EffectState, Form, Kink, Port, Role, Use};
+use crate::blocks::gas::Gas;
+use crate::made_by;
+use crate::blocks::tube::REFERENCE_DENSITY;
+use crate::scalar::{constant, Scalar};
 
-/// Table entry.
+/// What it is.
 pub const INFO: EffectInfo = EffectInfo {
     id: "compressor_cut_in",
     block: "supply",
     at: "supply",
-    parameters: &[
-        EffectParameter::new("free_air_delivery", "m3/s"),
-        EffectParameter::new("cut_in_pressure", "Pa"),
-        EffectParameter::new("cut_out_pressure", "Pa"),
-    ],
+    supplies: &["tank"],
+    kink: Some(Kink {
+        where_not_zero: &["free_air_delivery"],
+        why: "it is a relay; hold supply_pressure",
+        of_supplies: true,
+    }),
+    source: "Beater, Pneumatic Drives (2007); ISO 1217",
+    forms: &[Form {
+        name: "relay",
+        parameters: &[
+            EffectParameter::new("free_air_delivery", "m3/s", 0.0, 1.0, 0.002).starts(&[0.002]).off(0.0),
+            EffectParameter::new("cut_in_pressure", "Pa", 0.0, 1e8, 1.2e6).starts(&[1e6, 1.3e6]).role(Use::Threshold).on("supply_pressure"),
+            EffectParameter::new("cut_out_pressure", "Pa", 0.0, 1e8, 1.4e6).starts(&[1.2e6, 1.5e6]).role(Use::Threshold).on("supply_pressure"),
+        ],
+        states: &[
+            EffectState { name: "running", role: Role::Keeps },
+        ],
+        integrates: false,
+        ports: &[Port::Feed],
+        make: made_by!(make),
+    }],
+    ..EffectInfo::USUAL
 };
+
+/// State of a compressor that runs.
+const RUNNING: f64 = 1.0;
 
 /// Mass flow [kg/s] of a running compressor from its free air delivery [m3/s].
 #[inline]
@@ -43,6 +65,48 @@ pub fn turned<S: Scalar>(running: bool, from: S, to: S, cut_in: S, cut_out: S) -
             left
         }
     })
+}
+
+/// A compressor at a tank; its state is 1 while it runs.
+#[derive(Debug, Clone, Copy)]
+struct Compressor<S> {
+    free_air_delivery: S,
+    cut_in: S,
+    cut_out: S,
+}
+
+fn make<S: Scalar>(values: &[S], _gas: &Gas) -> Box<dyn Effect<S>> {
+    Box::new(Compressor { free_air_delivery: values[0], cut_in: values[1], cut_out: values[2] })
+}
+
+impl<S: Scalar> Compressor<S> {
+    /// Its limits, absolute [Pa].
+    fn limits(&self, gas: &Gas) -> (S, S) {
+        (self.cut_in + gas.ambient_pressure, self.cut_out + gas.ambient_pressure)
+    }
+}
+
+impl<S: Scalar> Effect<S> for Compressor<S> {
+    fn start(&self, gas: &Gas, at: &At<S>, own: &mut [S]) {
+        if let At::Supply { pressure, .. } = at {
+            let low = pressure.re() - gas.ambient_pressure < self.cut_in.re();
+            own[0] = constant(if low { RUNNING } else { 0.0 });
+        }
+    }
+
+    fn feed(&self, own: &[S], _pressure: S, drawn: &mut S, _set: &mut S) {
+        if own[0].re() > 0.5 {
+            *drawn -= mass_flow(self.free_air_delivery);
+        }
+    }
+
+    fn switched(&self, gas: &Gas, own: &mut [S], from: S, to: S, step: f64) -> Option<(S, f64)> {
+        let running = own[0].re() == RUNNING;
+        let (cut_in, cut_out) = self.limits(gas);
+        let left = turned(running, from, to, cut_in, cut_out)?;
+        own[0] = constant(if running { 0.0 } else { RUNNING });
+        Some((mass_flow(self.free_air_delivery) * left, if running { -step } else { step }))
+    }
 }
 
 #[cfg(test)]

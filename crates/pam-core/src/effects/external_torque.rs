@@ -5,26 +5,37 @@
 //! from the start of the recording. K. Ohnishi, M. Shibata & T. Murakami, "Motion control for advanced mechatronics", IEEE/ASME Trans.
 //! Mechatronics 1, 1996 (disturbance torque).
 
-use super::{risen_over, EffectInfo, EffectParameter, RISE};
+use super::{Effect, EffectInfo, EffectParameter, Form, Port, risen_over, Use};
+use crate::blocks::gas::Gas;
+use crate::made_by;
 use crate::scalar::Scalar;
 
-/// Table entry.
+/// What it is.
 pub const INFO: EffectInfo = EffectInfo {
     id: "external_torque",
     block: "arm",
     at: "joint",
-    parameters: &[
-        EffectParameter::new("torque", "N m").within(-1e9, 1e9),
-        EffectParameter::new("time", "s").within(-1e9, 1e9),
-        EffectParameter::new("duration", "s"),
-        EffectParameter::new("torque_2", "N m").within(-1e9, 1e9),
-        EffectParameter::new("time_2", "s").within(-1e9, 1e9),
-        EffectParameter::new("duration_2", "s"),
-        EffectParameter::new("torque_3", "N m").within(-1e9, 1e9),
-        EffectParameter::new("time_3", "s").within(-1e9, 1e9),
-        EffectParameter::new("duration_3", "s"),
-        EffectParameter::new("rise", "s").within(RISE, 1e9),
-    ],
+    source: "Ohnishi, Shibata & Murakami (1996), disturbance torque",
+    forms: &[Form {
+        name: "pushes",
+        parameters: &[
+            EffectParameter::new("torque", "N m", -1e9, 1e9, 5.0).starts(&[-5.0, 5.0]).off(0.0).tried(1.0),
+            EffectParameter::new("time", "s", -1e9, 1e9, 5.0).starts(&[5.0, 15.0]).role(Use::Time),
+            EffectParameter::new("duration", "s", 0.0, 1e9, 1.0).starts(&[0.5, 3.0]).role(Use::Duration).tried(1.0),
+            EffectParameter::new("torque_2", "N m", -1e9, 1e9, 0.0).starts(&[0.0]).off(0.0).again("torque"),
+            EffectParameter::new("time_2", "s", -1e9, 1e9, 0.0).starts(&[0.0]).again("time"),
+            EffectParameter::new("duration_2", "s", 0.0, 1e9, 1.0).starts(&[1.0]).again("duration"),
+            EffectParameter::new("torque_3", "N m", -1e9, 1e9, 0.0).starts(&[0.0]).off(0.0).again("torque"),
+            EffectParameter::new("time_3", "s", -1e9, 1e9, 0.0).starts(&[0.0]).again("time"),
+            EffectParameter::new("duration_3", "s", 0.0, 1e9, 1.0).starts(&[1.0]).again("duration"),
+            EffectParameter::new("rise", "s", 0.02, 1e9, 0.02).starts(&[0.02]).role(Use::Rise).tried(0.4),
+        ],
+        states: &[],
+        integrates: false,
+        ports: &[Port::Push],
+        make: made_by!(make),
+    }],
+    ..EffectInfo::USUAL
 };
 
 /// Torque [N m] at a time [s] of pushes, each with its torque, time and duration.
@@ -38,9 +49,24 @@ pub fn torque<S: Scalar>(pushes: [S; 10], now: f64) -> S {
     push(0) + push(3) + push(6)
 }
 
+/// Pushes from outside.
+#[derive(Debug, Clone, Copy)]
+struct Pushes<S>([S; 10]);
+
+fn make<S: Scalar>(values: &[S], _gas: &Gas) -> Box<dyn Effect<S>> {
+    Box::new(Pushes(std::array::from_fn(|k| values[k])))
+}
+
+impl<S: Scalar> Effect<S> for Pushes<S> {
+    fn push(&self, time: f64) -> S {
+        torque(self.0, time)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::effects::RISE;
 
     #[test]
     fn it_comes_and_goes() {

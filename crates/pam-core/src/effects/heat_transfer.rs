@@ -9,42 +9,36 @@
 //! A recording may begin just after a fill: the gas is then warmer than the wall by an initial rise.
 //! Carneiro & de Almeida (2006); Al-Ibrahim & Otis (1992).
 
-use super::{EffectInfo, EffectParameter};
-use crate::gas::chamber::ChamberState;
-use crate::gas::orifice::Gas;
+use super::{AtRest, Effect, EffectInfo, EffectParameter, Form, Port, Use};
+use crate::made_by;
+use crate::blocks::chamber::{gas_temperature, ChamberState};
+use crate::blocks::gas::Gas;
 use crate::scalar::Scalar;
 
-/// Table entry.
+/// What it is.
 pub const INFO: EffectInfo = EffectInfo {
     id: "heat_transfer",
     block: "chamber",
     at: "chamber",
-    parameters: &[
-        EffectParameter::new("heat_transfer_coefficient", "W/(m2 K)"),
-        EffectParameter::new("initial_temperature_rise", "K"),
-        EffectParameter::new("share", "1").within(0.0, 1.0),
-    ],
+    frees_mass: true,
+    at_rest: &[AtRest::Set("initial_temperature_rise", 0.0)],
+    source: "Carneiro & de Almeida (2006); Al-Ibrahim & Otis (1992)",
+    forms: &[Form {
+        name: "energy_balance",
+        parameters: &[
+            EffectParameter::new("heat_transfer_coefficient", "W/(m2 K)", 1.0, 10000.0, 50.0).starts(&[20.0, 80.0]),
+            EffectParameter::new("initial_temperature_rise", "K", 0.0, 200.0, 0.0).starts(&[5.0]).role(Use::Held).sealed(Use::Size),
+            EffectParameter::new("share", "1", 0.0, 1.0, 1.0).starts(&[0.2]).role(Use::Size).sealed(Use::Held),
+        ],
+        states: &[],
+        integrates: false,
+        ports: &[Port::Balance],
+        make: made_by!(make),
+    }],
+    ..EffectInfo::USUAL
 };
 
 const REFERENCE_PRESSURE: f64 = 1e5;
-
-/// Wall area [m2] of `count` cylinders of one muscle's air volume [m3] and length [m].
-#[inline]
-pub fn cylinder_area<S: Scalar>(count: f64, volume: S, length: S) -> S {
-    (volume * length * std::f64::consts::PI).sqrt() * (2.0 * count)
-}
-
-/// Wall area [m2] of a cube of a volume [m3].
-#[inline]
-pub fn cube_area<S: Scalar>(volume: S) -> S {
-    volume.powf(2.0 / 3.0) * 6.0
-}
-
-/// Gas temperature [K] of a mass [kg] at a pressure [Pa] in a volume [m3].
-#[inline]
-pub fn temperature<S: Scalar>(gas: &Gas, pressure: S, volume: S, mass: S) -> S {
-    pressure * volume / (mass * gas.gas_constant)
-}
 
 /// Rate of the absolute pressure [Pa/s].
 #[inline]
@@ -62,6 +56,37 @@ pub fn pressure_rate<S: Scalar>(
     (flow - c.pressure * c.volume_rate * kappa + wall * (kappa - 1.0)) / c.volume
 }
 
+/// Heat exchange of a chamber with its wall.
+#[derive(Debug, Clone, Copy)]
+struct Heat<S> {
+    coefficient: S,
+    rise: S,
+    share: S,
+}
+
+fn make<S: Scalar>(values: &[S], _gas: &Gas) -> Box<dyn Effect<S>> {
+    Box::new(Heat { coefficient: values[0], rise: values[1], share: values[2] })
+}
+
+impl<S: Scalar> Effect<S> for Heat<S> {
+    fn balance(&self, gas: &Gas, chamber: &ChamberState<S>, wall: S, mass: S, fixed: S) -> (S, S) {
+        let temperature = gas_temperature(gas, chamber.pressure, chamber.volume, mass);
+        let balance = pressure_rate(gas, chamber, temperature, wall, self.coefficient);
+        let rest = (-self.share + 1.0) * (fixed - balance);
+        // The temperature follows the balance, whatever the pressure does.
+        (balance + rest, mass * rest / chamber.pressure)
+    }
+
+    fn initial_mass(&self, gas: &Gas, rest: S) -> S {
+        let temperature = gas.temperature;
+        rest * temperature / (self.rise + temperature)
+    }
+
+    fn wall_rate(&self, gas: &Gas, volume: f64, wall: f64) -> f64 {
+        (gas.gamma - 1.0) * self.coefficient.re() * wall * gas.temperature / (gas.ambient_pressure * volume)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -74,7 +99,7 @@ mod tests {
         let adiabatic = pressure_rate(&gas, &state, 293.15, 0.05, 0.0);
         assert!((adiabatic + 1.4 * 4e5 * 0.1_f64).abs() < 1e-9);
         let mass = 4e5 * 1e-3 / (287.05 * 293.15);
-        assert!((temperature(&gas, 4e5, 1e-3, mass) - 293.15_f64).abs() < 1e-10);
+        assert!((gas_temperature(&gas, 4e5, 1e-3, mass) - 293.15_f64).abs() < 1e-10);
         assert!(pressure_rate(&gas, &state, 330.0, 0.05, 50.0) < adiabatic, "hot gas cools at the wall");
     }
 }

@@ -5,18 +5,35 @@
 //! exponential integrators (M. Hochbruck & A. Ostermann, *Acta Numerica* 19, 2010), and no step is too long for it.
 //! E. Richer & Y. Hurmuzlu (2000); J. F. Carneiro & F. G. de Almeida (2006).
 
-use super::{EffectInfo, EffectParameter};
+use super::{BEGINNING, BEGUN, Effect, EffectInfo, EffectParameter, EffectState, Form, Port, Role, begun};
+use crate::blocks::gas::Gas;
+use crate::made_by;
 use crate::scalar::{constant, Scalar};
 
-/// Table entry.
+/// What it is.
 pub const INFO: EffectInfo = EffectInfo {
     id: "input_path_lag",
     block: "valve",
     at: "valve",
-    parameters: &[
-        EffectParameter::new("time_constant", "s").within(0.0, 100.0),
-        EffectParameter::new("delay", "s").within(0.0, 100.0),
-    ],
+    source: "Richer & Hurmuzlu (2000); Carneiro & de Almeida (2006); Hochbruck & Ostermann (2010) for its closed form",
+    forms: &[Form {
+        name: "lag_and_delay",
+        parameters: &[
+            EffectParameter::new("time_constant", "s", 0.0, 100.0, 0.005).starts(&[0.003, 0.015]).off(0.0),
+            EffectParameter::new("delay", "s", 0.0, 100.0, 0.0).starts(&[0.005]).off(0.0),
+        ],
+        states: &[
+            BEGINNING,
+            EffectState { name: "lag", role: Role::Opens },
+            EffectState { name: "delay_1", role: Role::Opens },
+            EffectState { name: "delay_2", role: Role::Opens },
+            EffectState { name: "delay_3", role: Role::Opens },
+        ],
+        integrates: false,
+        ports: &[Port::Command],
+        make: made_by!(make),
+    }],
+    ..EffectInfo::USUAL
 };
 
 /// Lags of which the delay is made.
@@ -74,6 +91,46 @@ fn phi<S: Scalar>(x: S, e: S, ex: S) -> [S; 3] {
 pub fn fastest(time_constant: f64, delay: f64) -> f64 {
     let rate = |time: f64| if time > SHORTEST { 1.0 / time } else { 0.0 };
     rate(time_constant).max(rate(delay / STAGES))
+}
+
+/// Lag and delay of a command; its states say that it has begun, and the chain.
+#[derive(Debug, Clone, Copy)]
+struct InputPath<S> {
+    time_constant: S,
+    delay: S,
+}
+
+fn make<S: Scalar>(values: &[S], _gas: &Gas) -> Box<dyn Effect<S>> {
+    Box::new(InputPath { time_constant: values[0], delay: values[1] })
+}
+
+impl<S: Scalar> InputPath<S> {
+    /// The chain so long after a step began.
+    fn chain(&self, own: &[S], input: S, age: f64) -> Chain<S> {
+        if begun(own) {
+            let was = std::array::from_fn(|k| own[1 + k]);
+            moved(&was, input, self.time_constant, self.delay, age)
+        } else {
+            [input; 4]
+        }
+    }
+}
+
+impl<S: Scalar> Effect<S> for InputPath<S> {
+    fn position(&self, own: &[S], input: S, age: f64) -> S {
+        self.chain(own, input, age)[3]
+    }
+
+    fn follow(&self, own: &mut [S], input: S, step: f64) -> S {
+        let chain = self.chain(own, input, step);
+        own[0] = constant(BEGUN);
+        own[1..].copy_from_slice(&chain);
+        chain[3]
+    }
+
+    fn fastest(&self) -> f64 {
+        fastest(self.time_constant.re(), self.delay.re())
+    }
 }
 
 #[cfg(test)]

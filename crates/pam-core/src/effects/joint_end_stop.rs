@@ -5,21 +5,33 @@
 //! an upper stop where `side` is positive, a lower one where it is negative. K. H. Hunt & F. R. E. Crossley, "Coefficient of
 //! restitution interpreted as damping in vibroimpact", ASME J. Applied Mechanics 42, 1975.
 
-use super::{beyond, progressive, EffectInfo, EffectParameter};
+use super::{At, Effect, EffectInfo, EffectParameter, Extremes, Form, Port, beyond, progressive, Use};
+use crate::blocks::gas::Gas;
+use crate::made_by;
 use crate::scalar::{constant, Scalar};
 
-/// Table entry.
+/// What it is.
 pub const INFO: EffectInfo = EffectInfo {
     id: "joint_end_stop",
     block: "joint",
     at: "joint",
-    parameters: &[
-        EffectParameter::new("stiffness", "N m/rad"),
-        EffectParameter::new("angle", "rad").within(-7.0, 7.0),
-        EffectParameter::new("dissipation", "s/rad"),
-        EffectParameter::new("exponent", "1").within(1.0, 4.0),
-        EffectParameter::new("side", "1").within(-1.0, 1.0),
-    ],
+    order: 1,
+    source: "Hunt & Crossley (1975)",
+    forms: &[Form {
+        name: "progressive",
+        parameters: &[
+            EffectParameter::new("stiffness", "N m/rad", 0.0, 1e9, 500.0).starts(&[200.0, 2000.0]).off(0.0),
+            EffectParameter::new("angle", "rad", -7.0, 7.0, 1.2).starts(&[1.2]).role(Use::Place).on("joint_angle"),
+            EffectParameter::new("dissipation", "s/rad", 0.0, 10000.0, 0.5).starts(&[0.5]),
+            EffectParameter::new("exponent", "1", 1.0, 4.0, 1.0).starts(&[1.5]),
+            EffectParameter::new("side", "1", -1.0, 1.0, 1.0).starts(&[-1.0, 1.0]).role(Use::Side),
+        ],
+        states: &[],
+        integrates: false,
+        ports: &[Port::Torque],
+        make: made_by!(make),
+    }],
+    ..EffectInfo::USUAL
 };
 
 /// Width of the round corner [rad].
@@ -42,6 +54,34 @@ pub fn torque<S: Scalar>(stop: [S; 5], angle: S, rate: S) -> S {
 /// Stiffness at a depth [N m/rad]: the tangent.
 pub fn tangent(stiffness: f64, exponent: f64, depth: f64) -> f64 {
     stiffness * exponent * (depth / SECANT).powf(exponent - 1.0)
+}
+
+/// A stop of a joint.
+#[derive(Debug, Clone, Copy)]
+struct EndStop<S>([S; 5]);
+
+fn make<S: Scalar>(values: &[S], _gas: &Gas) -> Box<dyn Effect<S>> {
+    Box::new(EndStop(std::array::from_fn(|k| values[k])))
+}
+
+impl<S: Scalar> Effect<S> for EndStop<S> {
+    fn torque(&self, at: &At<S>, _own: &[S]) -> S {
+        match at {
+            At::Joint { angle, rate, .. } => torque(self.0, *angle, *rate),
+            _ => constant(0.0),
+        }
+    }
+
+    fn resistance(&self, most: &Extremes) -> (f64, f64) {
+        let [stiffness, angle, dissipation, exponent, side] = self.0.map(|v| v.re());
+        let (low, high) = most.angles;
+        let depth = if side >= 0.0 { high - angle } else { angle - low }.max(0.0);
+        let blow = (high - low).min(0.1);
+        (
+            tangent(stiffness, exponent, blow) / exponent * blow * dissipation,
+            tangent(stiffness, exponent, depth),
+        )
+    }
 }
 
 #[cfg(test)]

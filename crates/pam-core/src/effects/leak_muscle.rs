@@ -5,19 +5,29 @@
 //! `p_ref` = 500 kPa absolute. Sealed, choked and with `s = 0` the absolute pressure decays with the time constant
 //! `V/(alpha_out C rho0 R T)`. Beater, *Pneumatic Drives* (2007).
 
-use super::{EffectInfo, EffectParameter};
-use crate::gas::orifice::Gas;
+use super::{Effect, EffectInfo, EffectParameter, Extremes, Form, Port, Use};
+use crate::made_by;
+use crate::blocks::gas::Gas;
 use crate::scalar::{constant, Scalar};
 
-/// Table entry.
+/// What it is.
 pub const INFO: EffectInfo = EffectInfo {
     id: "leak_muscle",
     block: "chamber",
     at: "chamber",
-    parameters: &[
-        EffectParameter::new("conductance", "m3/(s Pa)"),
-        EffectParameter::new("laminar_share", "1"),
-    ],
+    source: "Beater, Pneumatic Drives (2007); ISO 6358",
+    forms: &[Form {
+        name: "orifice_and_laminar",
+        parameters: &[
+            EffectParameter::new("conductance", "m3/(s Pa)", 0.0, 1e-7, 5e-12).starts(&[1e-11]).off(0.0).same_everywhere(),
+            EffectParameter::new("laminar_share", "1", 0.0, 1.0, 0.0).starts(&[0.3]).role(Use::Choice),
+        ],
+        states: &[],
+        integrates: false,
+        ports: &[Port::Leak],
+        make: made_by!(make),
+    }],
+    ..EffectInfo::USUAL
 };
 
 /// Absolute pressure at which a laminar path of the same conductance leaks as much as a choked orifice, up to
@@ -33,6 +43,30 @@ pub fn mass_flow<S: Scalar>(gas: &Gas, conductance: S, laminar_share: S, pressur
     let choked = gas.choked_flow(area, pressure);
     let laminar = choked * (pressure - constant::<S>(ambient * ambient) / pressure) / REFERENCE_PRESSURE;
     orifice + laminar_share * (laminar - orifice)
+}
+
+/// A leak of a chamber.
+#[derive(Debug, Clone, Copy)]
+struct Leak<S> {
+    conductance: S,
+    laminar_share: S,
+}
+
+fn make<S: Scalar>(values: &[S], _gas: &Gas) -> Box<dyn Effect<S>> {
+    Box::new(Leak { conductance: values[0], laminar_share: values[1] })
+}
+
+impl<S: Scalar> Effect<S> for Leak<S> {
+    fn leak(&self, gas: &Gas, pressure: S) -> S {
+        mass_flow(gas, self.conductance, self.laminar_share, pressure)
+    }
+
+    fn steepest(&self, gas: &Gas, most: &Extremes) -> f64 {
+        let (conductance, share) = (self.conductance.re(), self.laminar_share.re());
+        let area = gas.area_of_conductance(conductance);
+        let laminar = 2.0 * gas.choked_flow(area, most.pressure) / REFERENCE_PRESSURE;
+        (1.0 - share) * gas.steepest(area) + share * laminar
+    }
 }
 
 #[cfg(test)]

@@ -1,108 +1,61 @@
-//! Physics that a nominal model leaves out: one file each, plugged into a block.
+//! Physics that a nominal model leaves out: one file each, plugged into the ports of the blocks.
 //!
-//! An effect that is absent costs the step loop at most one branch on a flag. What it remembers (a spool's position, a creeping
-//! strain, a relay) stands behind the states of the rig, see [`crate::rig::Layout`].
+//! A file says what the effect is ([`EffectInfo`]) and what it does at its ports ([`Effect`]); nothing else in this crate
+//! knows it by name. An effect that is absent costs the step loop at most one branch on a flag. What it remembers (a
+//! spool's position, a creeping strain, a relay) stands behind the states of the rig, see [`crate::plant::Layout`].
 
-pub mod activation_pressure;
-pub mod base_flexibility;
-pub mod clock_skew;
-pub mod closure_flow;
-pub mod closure_supply;
-pub mod closure_torque;
-pub mod compressor_cut_in;
-pub mod external_torque;
-pub mod heat_transfer;
-pub mod input_path_lag;
-pub mod joint_coulomb_stribeck;
-pub mod joint_end_stop;
-pub mod leak_muscle;
-pub mod mullins_softening;
-pub mod muscle_creep;
-pub mod muscle_hysteresis;
-pub mod muscle_rate_damping;
-pub mod pam_crowding_contact;
-pub mod payload_change;
-pub mod payload_swing;
-pub mod pressure_lag;
-pub mod supply_leak;
-pub mod supply_regulator_deadband;
-pub mod tube_flow_restriction;
-pub mod valve_centre_leakage;
-pub mod valve_dead_zone;
-pub mod valve_hysteresis;
+mod info;
+mod port;
 
+pub(crate) use self::info::BEGINNING;
+pub use self::info::{
+    AtRest, Dual, EffectInfo, EffectParameter, EffectState, Form, Kink, Make, Number, Role, SameData, Use,
+    LANES,
+};
+pub(crate) use self::port::{begun, BAR, BEGUN, LITRE};
+pub use self::port::{At, AtMuscle, Effect, Extremes, Port};
 use crate::scalar::{constant, Scalar};
 
-/// One parameter of an effect.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct EffectParameter {
-    /// Name, public API.
-    pub name: &'static str,
-    /// SI unit.
-    pub unit: &'static str,
-    /// Least possible value.
-    pub lower: f64,
-    /// Greatest possible value.
-    pub upper: f64,
+/// The modules of the effects, and the list of what they are.
+macro_rules! catalogue {
+    ($($effect:ident,)*) => {
+        $(pub mod $effect;)*
+
+        /// Every effect of the core, in the order of the chain; behind them the closures, which model a mismatch without
+        /// naming it.
+        pub const EFFECTS: &[&EffectInfo] = &[$(&$effect::INFO,)*];
+    };
 }
 
-impl EffectParameter {
-    /// A parameter that is not negative.
-    #[must_use]
-    pub const fn new(name: &'static str, unit: &'static str) -> Self {
-        Self { name, unit, lower: 0.0, upper: f64::MAX }
-    }
-
-    /// The same with bounds of the possible.
-    #[must_use]
-    pub const fn within(self, lower: f64, upper: f64) -> Self {
-        Self { lower, upper, ..self }
-    }
+catalogue! {
+    supply_leak,
+    compressor_cut_in,
+    supply_regulator_deadband,
+    valve_dead_zone,
+    valve_hysteresis,
+    valve_centre_leakage,
+    input_path_lag,
+    tube_flow_restriction,
+    leak_muscle,
+    heat_transfer,
+    muscle_hysteresis,
+    muscle_creep,
+    muscle_rate_damping,
+    activation_pressure,
+    mullins_softening,
+    pam_crowding_contact,
+    joint_coulomb_stribeck,
+    joint_end_stop,
+    payload_swing,
+    payload_change,
+    external_torque,
+    base_flexibility,
+    pressure_lag,
+    clock_skew,
+    closure_supply,
+    closure_flow,
+    closure_torque,
 }
-
-/// Identifier, block and parameters of an effect.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct EffectInfo {
-    /// Identifier, public API.
-    pub id: &'static str,
-    /// Block in which it acts.
-    pub block: &'static str,
-    /// Kind of the blocks of which an effect can take one, by its name; empty for an effect on the whole rig.
-    pub at: &'static str,
-    /// Its parameters.
-    pub parameters: &'static [EffectParameter],
-}
-
-/// Every effect of the core, in the order of the chain; behind them the closures, which model a mismatch without naming it.
-pub const EFFECTS: &[EffectInfo] = &[
-    supply_leak::INFO,
-    compressor_cut_in::INFO,
-    supply_regulator_deadband::INFO,
-    valve_dead_zone::INFO,
-    valve_hysteresis::INFO,
-    valve_centre_leakage::INFO,
-    input_path_lag::INFO,
-    tube_flow_restriction::INFO,
-    leak_muscle::INFO,
-    heat_transfer::INFO,
-    muscle_hysteresis::INFO,
-    muscle_creep::INFO,
-    muscle_rate_damping::INFO,
-    activation_pressure::INFO,
-    mullins_softening::INFO,
-    pam_crowding_contact::INFO,
-    joint_coulomb_stribeck::INFO,
-    joint_end_stop::INFO,
-    payload_swing::INFO,
-    payload_change::INFO,
-    external_torque::INFO,
-    base_flexibility::INFO,
-    pressure_lag::INFO,
-    clock_skew::INFO,
-    closure_supply::INFO,
-    closure_flow::INFO,
-    closure_torque::INFO,
-];
 
 /// Time that a sudden change takes [s]: short for an arm, long enough for a step, so that its moment can be fitted.
 pub const RISE: f64 = 0.02;
@@ -173,8 +126,8 @@ mod tests {
         ids.dedup();
         assert_eq!(ids.len(), EFFECTS.len());
         let named = EFFECTS.iter().filter(|e| !e.id.starts_with("closure_"));
-        assert!(named.clone().all(|e| (1..=10).contains(&e.parameters.len())));
+        assert!(named.clone().all(|e| (1..=10).contains(&e.parameters().len())));
         assert_eq!(named.count() + 3, EFFECTS.len());
-        assert!(EFFECTS.iter().flat_map(|e| e.parameters).all(|p| p.lower < p.upper));
+        assert!(EFFECTS.iter().flat_map(|e| e.parameters()).all(|p| p.lower < p.upper));
     }
 }

@@ -7,20 +7,32 @@
 //! N. M. Wereley, "Variable recruitment testing of pneumatic artificial muscles for robotic manipulators", IEEE/ASME Trans. Mechatronics 20,
 //! 2015.
 
-use super::{beyond, progressive, EffectInfo, EffectParameter};
+use super::{AtMuscle, Effect, EffectInfo, EffectParameter, Extremes, Form, Port, beyond, progressive};
+use crate::blocks::gas::Gas;
+use crate::made_by;
 use crate::scalar::{constant, Scalar};
 
-/// Table entry.
+/// What it is.
 pub const INFO: EffectInfo = EffectInfo {
     id: "pam_crowding_contact",
     block: "muscle",
     at: "muscle",
-    parameters: &[
-        EffectParameter::new("contact_area", "m2"),
-        EffectParameter::new("onset_contraction", "1").within(-1.0, 1.0),
-        EffectParameter::new("exponent", "1").within(1.0, 2.0),
-        EffectParameter::new("rubbing", "1").within(0.0, 1.0),
-    ],
+    order: 4,
+    source: "Robinson, Kothera & Wereley (2015)",
+    forms: &[Form {
+        name: "progressive",
+        parameters: &[
+            EffectParameter::new("contact_area", "m2", 0.0, 1.0, 0.001).starts(&[0.0005, 0.003]).off(0.0),
+            EffectParameter::new("onset_contraction", "1", -1.0, 1.0, 0.12).starts(&[0.04, 0.08, 0.15]),
+            EffectParameter::new("exponent", "1", 1.0, 2.0, 1.0).starts(&[1.5]).prior(1.5, 0.25),
+            EffectParameter::new("rubbing", "1", 0.0, 1.0, 0.0).starts(&[0.1]),
+        ],
+        states: &[],
+        integrates: false,
+        ports: &[Port::Force],
+        make: made_by!(make),
+    }],
+    ..EffectInfo::USUAL
 };
 
 const CORNER: f64 = 0.005;
@@ -51,6 +63,26 @@ pub fn stiffest(contact: [f64; 4], pressure: f64, contraction: f64) -> f64 {
     let [area, onset, exponent, rubbing] = contact;
     let depth = (contraction - onset).max(0.0);
     area * pressure.max(0.0) * exponent * (depth / SECANT).powf(exponent - 1.0) * (1.0 + rubbing)
+}
+
+/// Contact of a muscle that swells.
+#[derive(Debug, Clone, Copy)]
+struct Contact<S>([S; 4]);
+
+fn make<S: Scalar>(values: &[S], _gas: &Gas) -> Box<dyn Effect<S>> {
+    Box::new(Contact(std::array::from_fn(|k| values[k])))
+}
+
+impl<S: Scalar> Effect<S> for Contact<S> {
+    fn force(&self, at: &AtMuscle<S>, _own: &[S]) -> S {
+        force(self.0, at.gauge, at.contraction, at.rate)
+    }
+
+    fn resistance(&self, most: &Extremes) -> (f64, f64) {
+        let contact = self.0.map(|v| v.re());
+        let gauge = most.pressure - most.ambient;
+        (largest(contact, gauge, most.contraction), stiffest(contact, gauge, most.contraction))
+    }
 }
 
 #[cfg(test)]

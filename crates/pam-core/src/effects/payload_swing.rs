@@ -5,19 +5,34 @@
 //! `l phi'' = -(a + g) t - 2 zeta sqrt(g/l) l phi'`, pull on the link `-mu [((a + g) r - l phi'^2) r - 2 zeta sqrt(g/l) l phi' t]`. At `s = 0`
 //! nothing pulls. Double pendulum, L. D. Landau & E. M. Lifshitz, *Mechanics*, section 5. Two states; at the start the cord hangs at rest.
 
-use super::{EffectInfo, EffectParameter};
+use super::{Effect, EffectInfo, EffectParameter, EffectState, Form, Port, Role};
+use crate::blocks::gas::Gas;
+use crate::made_by;
 use crate::scalar::Scalar;
 
-/// Table entry.
+/// What it is.
 pub const INFO: EffectInfo = EffectInfo {
     id: "payload_swing",
     block: "arm",
     at: "joint",
-    parameters: &[
-        EffectParameter::new("swinging_share", "1").within(0.0, 1.0),
-        EffectParameter::new("length", "m").within(1e-3, 100.0),
-        EffectParameter::new("damping_ratio", "1").within(0.0, 10.0),
-    ],
+    last_only: true,
+    source: "Landau & Lifshitz, Mechanics, section 5 (double pendulum)",
+    forms: &[Form {
+        name: "pendulum",
+        parameters: &[
+            EffectParameter::new("swinging_share", "1", 0.0, 1.0, 0.5).starts(&[0.2, 0.8]).off(0.0),
+            EffectParameter::new("length", "m", 0.001, 100.0, 0.3).starts(&[0.15, 0.5]).usually(0.1, 0.5).scan(0.06, 1.5, 14),
+            EffectParameter::new("damping_ratio", "1", 0.0, 10.0, 0.02).starts(&[0.02]).usually(0.0, 0.03).tried(0.08),
+        ],
+        states: &[
+            EffectState { name: "angle", role: Role::Moves },
+            EffectState { name: "rate", role: Role::Moves },
+        ],
+        integrates: false,
+        ports: &[Port::Hanging],
+        make: made_by!(make),
+    }],
+    ..EffectInfo::USUAL
 };
 
 /// A hanging mass at one instant.
@@ -53,6 +68,32 @@ impl<S: Scalar> Cord<S> {
 /// Bound of the pendulum's frequency [rad/s], the link's inertia without the swinging mass being smaller by `ratio`.
 pub fn fastest(length: f64, gravity: f64, ratio: f64) -> f64 {
     (gravity.abs() / length * (1.0 + ratio)).sqrt()
+}
+
+/// A part of the payload on a cord; its states are the angle of the cord and its rate.
+#[derive(Debug, Clone, Copy)]
+struct Swing<S> {
+    share: S,
+    length: S,
+    damping: S,
+}
+
+fn make<S: Scalar>(values: &[S], _gas: &Gas) -> Box<dyn Effect<S>> {
+    Box::new(Swing { share: values[0], length: values[1], damping: values[2] })
+}
+
+impl<S: Scalar> Effect<S> for Swing<S> {
+    fn hanging(&self) -> S {
+        self.share
+    }
+
+    fn cord(&self, gravity: f64, own: &[S]) -> Option<Cord<S>> {
+        Some(Cord::new(self.length, self.damping, gravity, own[0], own[1]))
+    }
+
+    fn swing_rate(&self, gravity: f64, ratio: f64) -> f64 {
+        fastest(self.length.re(), gravity, ratio)
+    }
 }
 
 #[cfg(test)]

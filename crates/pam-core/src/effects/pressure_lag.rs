@@ -3,16 +3,36 @@
 //! `T y' = p - y`. Over a step the true pressure is taken as straight, which has a closed form: no lag is too short for a step. Where the
 //! recorded pressure drives a block, the true one is `y + T y'`. At `T = 0` both are the same. E. O. Doebelin, *Measurement Systems*, ch. 6.
 
-use super::{EffectInfo, EffectParameter};
+use super::{At, AtRest, Effect, EffectInfo, EffectParameter, EffectState, Form, Port, Role};
+use crate::blocks::gas::Gas;
+use crate::made_by;
 use crate::scalar::{constant, Scalar};
 
-/// Table entry.
+/// What it is.
 pub const INFO: EffectInfo = EffectInfo {
     id: "pressure_lag",
     block: "sensors",
     at: "chamber",
-    parameters: &[EffectParameter::new("time_constant", "s").within(0.0, 100.0)],
+    at_rest: &[AtRest::OutBelow("time_constant", SHORTEST)],
+    acts_in: &["chamber", "arm"],
+    source: "Doebelin, Measurement Systems, ch. 6",
+    forms: &[Form {
+        name: "first_order",
+        parameters: &[
+            EffectParameter::new("time_constant", "s", 0.0, 100.0, 0.005).starts(&[0.003, 0.02]).off(0.0),
+        ],
+        states: &[
+            EffectState { name: "", role: Role::Moves },
+        ],
+        integrates: false,
+        ports: &[Port::Reading],
+        make: made_by!(make),
+    }],
+    ..EffectInfo::USUAL
 };
+
+/// A lag that no sample shows [s].
+const SHORTEST: f64 = 2e-5;
 
 /// Reading after a step [s] in which the pressure went from one value to another.
 #[inline]
@@ -22,6 +42,32 @@ pub fn read<S: Scalar>(reading: S, from: S, to: S, time_constant: S, step: f64) 
     // Further back than the number's last digit reaches.
     let left = if steps < 700.0 { (-constant::<S>(step) / time_constant).exp() } else { constant(0.0) };
     to - behind + (reading - from + behind) * left
+}
+
+/// Lag of a pressure sensor; its state is the reading.
+#[derive(Debug, Clone, Copy)]
+struct PressureLag<S> {
+    time_constant: S,
+}
+
+fn make<S: Scalar>(values: &[S], _gas: &Gas) -> Box<dyn Effect<S>> {
+    Box::new(PressureLag { time_constant: values[0] })
+}
+
+impl<S: Scalar> Effect<S> for PressureLag<S> {
+    fn start(&self, _gas: &Gas, at: &At<S>, own: &mut [S]) {
+        if let At::Chamber { pressure, .. } = at {
+            own[0] = *pressure;
+        }
+    }
+
+    fn read(&self, reading: S, from: S, to: S, step: f64) -> S {
+        read(reading, from, to, self.time_constant, step)
+    }
+
+    fn lag(&self) -> S {
+        self.time_constant
+    }
 }
 
 #[cfg(test)]

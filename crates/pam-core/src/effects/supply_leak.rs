@@ -4,22 +4,51 @@
 //! with every valve shut loses its absolute pressure with the time constant `V/(C rho0 R T)`; behind a regulator the leak shows as
 //! droop. P. Beater, *Pneumatic Drives* (2007).
 
-use super::{EffectInfo, EffectParameter};
-use crate::gas::orifice::Gas;
+use super::{Effect, EffectInfo, EffectParameter, Form, Port};
+use crate::made_by;
+use crate::blocks::gas::Gas;
 use crate::scalar::{constant, Scalar};
 
-/// Table entry.
+/// What it is.
 pub const INFO: EffectInfo = EffectInfo {
     id: "supply_leak",
     block: "supply",
     at: "supply",
-    parameters: &[EffectParameter::new("conductance", "m3/(s Pa)")],
+    order: 2,
+    source: "Beater, Pneumatic Drives (2007); ISO 6358",
+    forms: &[Form {
+        name: "orifice",
+        parameters: &[
+            EffectParameter::new("conductance", "m3/(s Pa)", 0.0, 1e-6, 1e-11).starts(&[1e-11, 1e-9]).off(0.0),
+        ],
+        states: &[],
+        integrates: false,
+        ports: &[Port::Leak],
+        make: made_by!(make),
+    }],
+    ..EffectInfo::USUAL
 };
 
 /// Leaking mass flow [kg/s] out of a supply at an absolute pressure [Pa].
 #[inline]
 pub fn mass_flow<S: Scalar>(gas: &Gas, conductance: S, pressure: S) -> S {
     gas.mass_flow(gas.area_of_conductance(conductance), pressure, constant(gas.ambient_pressure))
+}
+
+/// A leak of a supply.
+#[derive(Debug, Clone, Copy)]
+struct SupplyLeak<S> {
+    conductance: S,
+}
+
+fn make<S: Scalar>(values: &[S], _gas: &Gas) -> Box<dyn Effect<S>> {
+    Box::new(SupplyLeak { conductance: values[0] })
+}
+
+impl<S: Scalar> Effect<S> for SupplyLeak<S> {
+    fn leak(&self, gas: &Gas, pressure: S) -> S {
+        mass_flow(gas, self.conductance, pressure)
+    }
 }
 
 #[cfg(test)]

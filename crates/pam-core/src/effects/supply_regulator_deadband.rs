@@ -5,15 +5,34 @@
 //! C. Robinson, *Modeling and control of pneumatic artificial muscles* (2014), ch. 3; P. Beater, *Pneumatic Drives* (2007), ch. 8.
 //! Acts on regulators.
 
-use super::{EffectInfo, EffectParameter};
+use super::{Effect, EffectInfo, EffectParameter, Form, Kink, Port};
+use crate::blocks::gas::Gas;
+use crate::made_by;
 use crate::scalar::{constant, Scalar};
 
-/// Table entry.
+/// What it is.
 pub const INFO: EffectInfo = EffectInfo {
     id: "supply_regulator_deadband",
     block: "supply",
     at: "supply",
-    parameters: &[EffectParameter::new("dead_band", "Pa")],
+    supplies: &["regulator"],
+    kink: Some(Kink {
+        where_not_zero: &["dead_band"],
+        why: "inside its band it does not answer; hold supply_pressure",
+        of_supplies: true,
+    }),
+    source: "Robinson (2014), ch. 3; Beater, Pneumatic Drives (2007)",
+    forms: &[Form {
+        name: "symmetric",
+        parameters: &[
+            EffectParameter::new("dead_band", "Pa", 0.0, 1e7, 20000.0).starts(&[5000.0, 50000.0]).off(0.0),
+        ],
+        states: &[],
+        integrates: false,
+        ports: &[Port::Feed],
+        make: made_by!(make),
+    }],
+    ..EffectInfo::USUAL
 };
 
 /// The error that the regulator answers [Pa].
@@ -25,6 +44,24 @@ pub fn answered<S: Scalar>(error: S, dead_band: S) -> S {
         error + dead_band
     } else {
         constant(0.0)
+    }
+}
+
+/// Dead band of a regulator.
+#[derive(Debug, Clone, Copy)]
+struct DeadBand<S> {
+    dead_band: S,
+}
+
+fn make<S: Scalar>(values: &[S], _gas: &Gas) -> Box<dyn Effect<S>> {
+    Box::new(DeadBand { dead_band: values[0] })
+}
+
+impl<S: Scalar> Effect<S> for DeadBand<S> {
+    fn feed(&self, _own: &[S], pressure: S, _drawn: &mut S, set: &mut S) {
+        let error = *set - pressure;
+        let ignored = error - answered(error, self.dead_band);
+        *set -= ignored;
     }
 }
 

@@ -8,24 +8,38 @@
 //!
 //! With a `tap` of [`AT_VALVE`] or more the transducer of what the valve feeds sits at the valve's end of the tube and reads the node,
 //! which leads the muscle's pressure while air flows. Where such a reading drives a block, it gives the valve's flow, and the muscle's
-//! pressure is that to which the tube passes it ([`Tube::other_end`]); see [`crate::rig`]'s `tap.rs`. In front of a `[line]` that is the
+//! pressure is that to which the tube passes it ([`Tube::other_end`]); see [`crate::plant`]'s `tap.rs`. In front of a `[line]` that is the
 //! line's inlet; of two valves at one chamber the first one has the transducer.
 
-use super::{EffectInfo, EffectParameter};
-use crate::gas::orifice::Gas;
-use crate::gas::tube::Tube;
+use super::{At, AtRest, Effect, EffectInfo, EffectParameter, EffectState, Form, Port, Role, Use};
+use crate::made_by;
+use crate::blocks::gas::Gas;
+use crate::blocks::tube::Tube;
 use crate::scalar::{constant, Scalar};
 use num_dual::Dual64;
 
-/// Table entry.
+/// What it is.
 pub const INFO: EffectInfo = EffectInfo {
     id: "tube_flow_restriction",
     block: "line",
     at: "valve",
-    parameters: &[
-        EffectParameter::new("conductance", "m3/(s Pa)").within(1e-15, NONE),
-        EffectParameter::new("tap", "1").within(0.0, 1.0),
-    ],
+    at_rest: &[AtRest::Set("tap", 0.0)],
+    acts_in: &["supply", "chamber", "arm"],
+    source: "ISO 6358-3; Eckersten (1975)",
+    forms: &[Form {
+        name: "iso_6358",
+        parameters: &[
+            EffectParameter::new("conductance", "m3/(s Pa)", 1e-15, 1.0, 1.2e-8).starts(&[1.2e-8]).off(1.0).role(Use::Size).restricts().like("valve.discharge_area_max"),
+            EffectParameter::new("tap", "1", 0.0, 1.0, 0.0).starts(&[0.0, 1.0]).role(Use::Choice).needed_in(&["arm"]),
+        ],
+        states: &[
+            EffectState { name: "reading", role: Role::Keeps },
+        ],
+        integrates: false,
+        ports: &[Port::Passage],
+        make: made_by!(make),
+    }],
+    ..EffectInfo::USUAL
 };
 
 /// Conductance that restricts nothing [m3/(s Pa)].
@@ -149,6 +163,51 @@ trait Parts {
 impl Parts for Dual64 {
     fn re_and_eps(self) -> (f64, f64) {
         (self.re, self.eps)
+    }
+}
+
+/// A hose behind a valve; its state is what a pressure sensor at its beginning reads.
+#[derive(Debug, Clone, Copy)]
+struct Hose<S> {
+    /// None where it restricts nothing.
+    tube: Option<Tube<S>>,
+    tapped: bool,
+}
+
+fn make<S: Scalar>(values: &[S], gas: &Gas) -> Box<dyn Effect<S>> {
+    Box::new(Hose {
+        tube: (values[0].re() < NONE).then(|| tube(values[0], gas.temperature)),
+        tapped: values[1].re() >= AT_VALVE,
+    })
+}
+
+impl<S: Scalar> Effect<S> for Hose<S> {
+    fn start(&self, _gas: &Gas, at: &At<S>, own: &mut [S]) {
+        if let At::Valve { fed } = at {
+            own[0] = *fed;
+        }
+    }
+
+    fn through(&self, gas: &Gas, area: S, upstream: S, downstream: S, venting: bool) -> S {
+        match &self.tube {
+            Some(tube) => mass_flow(gas, area, tube, upstream, downstream, venting),
+            None => gas.mass_flow(area, upstream, downstream),
+        }
+    }
+
+    fn taps(&self) -> bool {
+        self.tapped && self.tube.is_some()
+    }
+
+    fn between(&self, gas: &Gas, area: S, upstream: S, downstream: S, venting: bool) -> S {
+        match &self.tube {
+            Some(tube) => node(gas, area, tube, upstream, downstream, venting),
+            None => downstream,
+        }
+    }
+
+    fn behind(&self, there: S, flow: S) -> S {
+        self.tube.as_ref().map_or(there, |tube| tube.other_end(there, flow))
     }
 }
 

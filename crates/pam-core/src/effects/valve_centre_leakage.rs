@@ -4,25 +4,57 @@
 //! pressure goes to where both are the same, from either side. M. Belgharbi, S. Sesmat, S. Scavarda & D. Thomasset, "Analytical model
 //! of the flow stage of a pneumatic servo-distributor", 1999; *Energies* 12, 1096 (2019).
 
-use super::{EffectInfo, EffectParameter};
-use crate::gas::orifice::Gas;
+use super::{Effect, EffectInfo, EffectParameter, Extremes, Form, Port};
+use crate::made_by;
+use crate::blocks::gas::Gas;
 use crate::scalar::Scalar;
 
-/// Table entry.
+/// What it is.
 pub const INFO: EffectInfo = EffectInfo {
     id: "valve_centre_leakage",
     block: "valve",
     at: "valve",
-    parameters: &[
-        EffectParameter::new("conductance", "m3/(s Pa)"),
-        EffectParameter::new("opening", "1").within(1e-4, 1e3),
-    ],
+    order: 1,
+    source: "Belgharbi, Sesmat, Scavarda & Thomasset (1999); Energies 12, 1096 (2019)",
+    forms: &[Form {
+        name: "exponential",
+        parameters: &[
+            EffectParameter::new("conductance", "m3/(s Pa)", 0.0, 1e-6, 3e-11).starts(&[3e-11, 5e-10]).off(0.0),
+            EffectParameter::new("opening", "1", 0.0001, 1000.0, 0.02).starts(&[0.02]),
+        ],
+        states: &[],
+        integrates: false,
+        ports: &[Port::Clearance],
+        make: made_by!(make),
+    }],
+    ..EffectInfo::USUAL
 };
 
 /// Discharge area [m2] of either path at a normalised spool position; `opening` is that over which it fades.
 #[inline]
 pub fn area<S: Scalar>(gas: &Gas, conductance: S, opening: S, x: S) -> S {
     gas.area_of_conductance(conductance) * (-x.abs() / opening).exp()
+}
+
+/// Clearance around the null of a spool.
+#[derive(Debug, Clone, Copy)]
+struct Clearance<S> {
+    conductance: S,
+    opening: S,
+}
+
+fn make<S: Scalar>(values: &[S], _gas: &Gas) -> Box<dyn Effect<S>> {
+    Box::new(Clearance { conductance: values[0], opening: values[1] })
+}
+
+impl<S: Scalar> Effect<S> for Clearance<S> {
+    fn clearance(&self, gas: &Gas, position: S) -> S {
+        area(gas, self.conductance, self.opening, position)
+    }
+
+    fn steepest(&self, gas: &Gas, _most: &Extremes) -> f64 {
+        gas.steepest(gas.area_of_conductance(self.conductance.re()))
+    }
 }
 
 #[cfg(test)]

@@ -5,15 +5,34 @@
 //! system", ASME J. Dyn. Syst. Meas. Control 122, 2000; A. C. Valdiero et al., "Nonlinear mathematical modeling in pneumatic servo
 //! position applications", Math. Probl. Eng. 2011.
 
-use super::{EffectInfo, EffectParameter};
+use super::{Effect, EffectInfo, EffectParameter, Form, Kink, Port};
+use crate::blocks::gas::Gas;
+use crate::made_by;
 use crate::scalar::{constant, Scalar};
 
-/// Table entry.
+/// What it is.
 pub const INFO: EffectInfo = EffectInfo {
     id: "valve_dead_zone",
     block: "valve",
     at: "valve",
-    parameters: &[EffectParameter::new("half_width", "1").within(0.0, 0.9)],
+    order: 2,
+    kink: Some(Kink {
+        where_not_zero: &["half_width"],
+        why: "at its centre no small command reaches the flow",
+        of_supplies: false,
+    }),
+    source: "Valdiero, Ritter, Rios & Rafikov (2011); Richer & Hurmuzlu (2000)",
+    forms: &[Form {
+        name: "symmetric",
+        parameters: &[
+            EffectParameter::new("half_width", "1", 0.0, 0.9, 0.03).starts(&[0.01, 0.05]).off(0.0),
+        ],
+        states: &[],
+        integrates: false,
+        ports: &[Port::Command],
+        make: made_by!(make),
+    }],
+    ..EffectInfo::USUAL
 };
 
 /// The position that opens the valve, for a normalised spool position.
@@ -26,6 +45,22 @@ pub fn effective<S: Scalar>(x: S, half_width: S) -> S {
         (x + half_width) / full
     } else {
         constant(0.0)
+    }
+}
+
+/// Overlap of a spool.
+#[derive(Debug, Clone, Copy)]
+struct DeadZone<S> {
+    half_width: S,
+}
+
+fn make<S: Scalar>(values: &[S], _gas: &Gas) -> Box<dyn Effect<S>> {
+    Box::new(DeadZone { half_width: values[0] })
+}
+
+impl<S: Scalar> Effect<S> for DeadZone<S> {
+    fn position(&self, _own: &[S], input: S, _age: f64) -> S {
+        effective(input, self.half_width)
     }
 }
 

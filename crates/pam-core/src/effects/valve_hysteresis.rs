@@ -4,15 +4,37 @@
 //! exact; a data sheet's hysteresis is `2 h` of the stroke. M. Al Janaideh, S. Rakheja & C.-Y. Su, "An analytical generalized
 //! Prandtl-Ishlinskii model inversion for hysteresis compensation", IEEE/ASME Trans. Mechatronics 16, 2011 (play operator).
 
-use super::{EffectInfo, EffectParameter};
-use crate::scalar::Scalar;
+use super::{BEGINNING, BEGUN, Effect, EffectInfo, EffectParameter, EffectState, Form, Kink, Port, Role, begun};
+use crate::blocks::gas::Gas;
+use crate::made_by;
+use crate::scalar::{constant, Scalar};
 
-/// Table entry.
+/// What it is.
 pub const INFO: EffectInfo = EffectInfo {
     id: "valve_hysteresis",
     block: "valve",
     at: "valve",
-    parameters: &[EffectParameter::new("half_width", "1").within(0.0, 0.9)],
+    order: 1,
+    kink: Some(Kink {
+        where_not_zero: &["half_width"],
+        why: "inside its play no small command moves the spool",
+        of_supplies: false,
+    }),
+    source: "Al Janaideh, Rakheja & Su (2011), play operator",
+    forms: &[Form {
+        name: "play",
+        parameters: &[
+            EffectParameter::new("half_width", "1", 0.0, 0.9, 0.004).starts(&[0.003, 0.02]).off(0.0),
+        ],
+        states: &[
+            BEGINNING,
+            EffectState { name: "spool", role: Role::Keeps },
+        ],
+        integrates: false,
+        ports: &[Port::Command],
+        make: made_by!(make),
+    }],
+    ..EffectInfo::USUAL
 };
 
 /// Where the spool is once the commanded position has moved.
@@ -24,6 +46,32 @@ pub fn followed<S: Scalar>(spool: S, commanded: S, half_width: S) -> S {
     } else if spool.re() >= high.re() {
         high
     } else {
+        spool
+    }
+}
+
+/// Play of a spool; its states say that it has begun, and where the spool is.
+#[derive(Debug, Clone, Copy)]
+struct Play<S> {
+    half_width: S,
+}
+
+fn make<S: Scalar>(values: &[S], _gas: &Gas) -> Box<dyn Effect<S>> {
+    Box::new(Play { half_width: values[0] })
+}
+
+impl<S: Scalar> Effect<S> for Play<S> {
+    fn position(&self, own: &[S], input: S, _age: f64) -> S {
+        if begun(own) {
+            followed(own[1], input, self.half_width)
+        } else {
+            input
+        }
+    }
+
+    fn follow(&self, own: &mut [S], input: S, step: f64) -> S {
+        let spool = self.position(own, input, step);
+        own.copy_from_slice(&[constant(BEGUN), spool]);
         spool
     }
 }

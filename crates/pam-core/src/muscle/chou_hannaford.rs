@@ -14,7 +14,7 @@
 use std::f64::consts::PI;
 
 use super::gaylord;
-use crate::geometry::{Braid, Shape};
+use crate::braid::{Braid, Shape};
 use crate::scalar::Scalar;
 
 /// Force per gauge pressure [m2].

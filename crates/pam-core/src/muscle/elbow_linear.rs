@@ -17,7 +17,7 @@ use std::f64::consts::PI;
 
 use super::gaylord;
 use super::kothera::Wall;
-use crate::geometry::{Braid, Shape};
+use crate::braid::{Braid, Shape};
 use crate::scalar::{constant, Scalar};
 
 /// Factors on the wall's pressure, on `FL` and on `FT`.

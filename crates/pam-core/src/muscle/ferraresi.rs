@@ -10,7 +10,7 @@
 //! ```
 
 use super::kothera::Wall;
-use crate::geometry::{Braid, Shape};
+use crate::braid::{Braid, Shape};
 use crate::scalar::{constant, Scalar};
 
 /// Force [N] of the moduli [Pa] (or per pressure [m2] of their slopes), from k = 1.

@@ -11,7 +11,7 @@
 use std::f64::consts::PI;
 
 use super::gaylord;
-use crate::geometry::{Braid, Shape};
+use crate::braid::{Braid, Shape};
 use crate::scalar::{constant, Scalar};
 
 /// What stresses in the wall act on.

@@ -1,6 +1,6 @@
 //! One muscle: its parameters, exact force and geometry, and the compiled table of both.
 //!
-//! Equations: geometry after the physics reference, section 1 (see [`crate::geometry`]); force after section 2, one file
+//! Equations: geometry after the physics reference, section 1 (see [`crate::braid`]); force after section 2, one file
 //! for each model (see [`model`]). Radius, thickness, volume and the coefficients of the force depend on the contraction
 //! ratio `e = 1 - L/L0` alone, so they are compiled once to a [`Table`] with a checked error bound.
 
@@ -21,8 +21,8 @@ pub use self::friction::Friction;
 pub use self::model::{Coefficients, Elasticity, ForceModel};
 pub use self::spec::{MuscleSpec, HIGHEST_ORDER};
 pub use self::table::{Table, TablePoint};
+use crate::braid::{MuscleGeometry, Shape};
 use crate::error::{check_range, Result};
-use crate::geometry::{MuscleGeometry, Shape};
 use crate::scalar::{constant, Scalar};
 
 /// Lowest gauge pressure [Pa]: vacuum at standard ambient pressure.
@@ -48,7 +48,7 @@ impl Muscle {
     /// # Errors
     /// As [`MuscleSpec::validate`].
     pub fn new(spec: &MuscleSpec) -> Result<Self> {
-        let geometry = MuscleGeometry::new(spec)?;
+        let geometry = spec.shape()?;
         let contracting = Elasticity::contracting(spec)?;
         let lengthening = contracting.lengthening(spec);
         Ok(Self { spec: spec.clone(), geometry, contracting, lengthening, friction: spec.friction() })
@@ -237,7 +237,7 @@ pub(crate) mod tests {
 
     #[test]
     fn published_constants_of_the_elbow_muscle() {
-        let geometry = MuscleGeometry::new(&elbow()).unwrap();
+        let geometry = elbow().shape().unwrap();
         assert!((geometry.braid().turns - 1.25).abs() < 5e-3);
         assert!((geometry.braid().fibre_length / 0.0254 - 8.16).abs() < 5e-3);
     }

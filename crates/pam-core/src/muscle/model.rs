@@ -12,8 +12,8 @@
 use super::elbow_linear::{Factors, CONTRACTION};
 use super::spec::MuscleSpec;
 use super::{chou_hannaford, elbow_linear, ferraresi, gaylord, kothera, mooney_rivlin, robinson};
-use crate::error::{Error, Result};
-use crate::geometry::{Braid, Profile, Shape};
+use crate::braid::{Braid, Profile, Shape};
+use crate::error::{named, Result};
 use crate::scalar::{constant, Scalar};
 
 /// Coefficients of the force of one muscle at one length: `F = P a_gas + scale (P a_elastic + b_elastic)`.
@@ -111,21 +111,6 @@ impl ForceModel {
             Self::ElbowLinear => elbow_linear::elastic(moduli, braid, shape, factors),
         }
     }
-}
-
-/// The value of a name in a list of them.
-///
-/// # Errors
-/// [`Error::Choice`] that names the parameter and lists what it may be.
-pub(crate) fn named<T: Copy>(parameter: &str, name: &str, names: &[(&'static str, T)]) -> Result<T> {
-    names.iter().find(|(known, _)| *known == name).map(|(_, value)| *value).ok_or_else(|| {
-        let known: Vec<_> = names.iter().map(|(known, _)| format!("\"{known}\"")).collect();
-        Error::Choice {
-            name: parameter.into(),
-            value: format!("\"{name}\""),
-            allowed: format!("one of {}", known.join(", ")),
-        }
-    })
 }
 
 /// A force model with its elastic parameters, for one direction of motion.

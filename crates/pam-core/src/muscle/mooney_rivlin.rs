@@ -17,7 +17,7 @@
 
 use std::f64::consts::PI;
 
-use crate::geometry::{Braid, Shape};
+use crate::braid::{Braid, Shape};
 use crate::scalar::{constant, Scalar};
 
 /// Force [N] of the constants `[C10, C01]` [Pa].
@@ -40,14 +40,13 @@ pub fn elastic<S: Scalar>(constants: &[f64], braid: &Braid, shape: &Shape<S>) ->
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::MuscleGeometry;
     use crate::muscle::tests::shoulder;
 
     #[test]
     fn the_bladder_takes_up_the_energy_that_the_muscle_does_not_give() {
         let mut spec = shoulder();
         spec.geometry = Some("cylinder".into());
-        let geometry = MuscleGeometry::new(&spec).unwrap();
+        let geometry = spec.shape().unwrap();
         let braid = geometry.braid();
         let (c10, c01) = (2.0e5, 0.7e5);
         let energy = |e: f64| {

@@ -10,6 +10,9 @@ use crate::scalar::{constant, Scalar};
 pub const ELEMENTS: usize = 4;
 const SHARE: [f64; ELEMENTS] = [0.125, 0.25, 0.5, 1.0];
 
+/// Slope of the mean of the elements where all of them stick, times the presliding distance.
+pub const STUCK: f64 = 3.75;
+
 /// Relative stretch of each element, -1 to 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Slip<S> {

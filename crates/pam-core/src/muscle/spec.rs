@@ -5,9 +5,11 @@ use serde::Deserialize;
 use super::elbow_linear::Factors;
 use super::friction::Friction;
 use super::model::ForceModel;
+use crate::braid::{Dimensions, EndRatio, MuscleGeometry, Profile};
 use crate::error::{check_range, Error, Result};
-use crate::geometry::Profile;
 
+/// Bounds of the factor on every modulus, with its unit.
+pub const MODULUS_SCALE: (f64, f64, &str) = (0.0, 1e3, "(1)");
 /// Largest order of the stress polynomial.
 pub const HIGHEST_ORDER: usize = 12;
 
@@ -150,6 +152,27 @@ impl MuscleSpec {
         }
     }
 
+    /// The geometry of one muscle of this kind.
+    ///
+    /// # Errors
+    /// As [`Self::validate`].
+    pub fn shape(&self) -> Result<MuscleGeometry> {
+        self.validate()?;
+        Ok(MuscleGeometry::new(&Dimensions {
+            rest_length: self.rest_length,
+            rest_diameter: self.rest_diameter,
+            braid_angle: self.braid_angle,
+            wall_thickness: self.wall_thickness,
+            ends: EndRatio {
+                k0: self.k0,
+                contraction_slope: self.contraction_slope,
+                extension_slope: self.extension_slope,
+            },
+            neck_floor: self.neck_floor,
+            profile: self.profile()?,
+        }))
+    }
+
     /// The friction of the muscle, none if it has none.
     #[must_use]
     pub fn friction(&self) -> Option<Friction> {
@@ -199,7 +222,8 @@ impl MuscleSpec {
         let thickest = 0.45 * self.rest_diameter;
         check_range("muscle.wall_thickness", self.wall_thickness, 0.0, thickest, "m (0.45 rest diameters)")?;
         self.check_elastic(model)?;
-        check_range("muscle.modulus_scale", self.modulus_scale, 0.0, 1e3, "(1)")?;
+        let (low, high, unit) = MODULUS_SCALE;
+        check_range("muscle.modulus_scale", self.modulus_scale, low, high, unit)?;
         for (factor, name) in self.extension_factors.iter().zip(["0", "1", "2"]) {
             check_range(&format!("muscle.extension_factors[{name}]"), *factor, -10.0, 10.0, "(1)")?;
         }

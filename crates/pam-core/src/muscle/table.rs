@@ -17,8 +17,8 @@
 use num_dual::Dual64;
 
 use super::model::Elasticity;
+use crate::braid::MuscleGeometry;
 use crate::error::{Error, Result};
-use crate::geometry::MuscleGeometry;
 use crate::scalar::{constant, Scalar};
 
 /// Degree of the polynomials.

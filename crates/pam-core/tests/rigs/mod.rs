@@ -1,7 +1,7 @@
 //! Rigs that several tests use.
 #![allow(dead_code)]
 
-use pam_core::rig::spec::{
+use pam_core::description::{
     ArmSpec, ChamberSpec, EffectSpec, JointSpec, LinkSpec, TransmissionSpec, ValveSpec,
 };
 use pam_core::RigSpec;
@@ -98,7 +98,7 @@ pub fn lone_tank() -> RigSpec {
 /// An effect at one block, or at all.
 pub fn effect_at(id: &str, at: &str, parameters: &[(&str, f64)]) -> EffectSpec {
     let parameters = parameters.iter().map(|(n, v)| ((*n).to_string(), *v)).collect();
-    EffectSpec { id: id.into(), at: at.into(), parameters }
+    EffectSpec { id: id.into(), form: String::new(), at: at.into(), parameters }
 }
 
 /// An effect everywhere.

@@ -11,7 +11,7 @@ from pamrs.diagnosis.noise import Excess, Floor, excess, inflation
 from pamrs.diagnosis.prepare import Block, Residual
 from pamrs.diagnosis.screen import left_out
 from pamrs.diagnosis.settings import DiagnosisSettings
-from pamrs.effects_table import EFFECTS, find_parameter
+from pamrs.effects import EFFECTS, find_parameter
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 

@@ -13,8 +13,7 @@ from pamrs.diagnosis.fit import Problem
 from pamrs.diagnosis.noise import Excess
 from pamrs.diagnosis.prepare import Block
 from pamrs.diagnosis.settings import DiagnosisSettings, EvidenceSettings
-from pamrs.effects_table import EFFECTS, find_parameter
-from pamrs.effects_table.entry import SameData
+from pamrs.effects import EFFECTS, SameData, find_parameter
 
 __all__ = [
     "believed",

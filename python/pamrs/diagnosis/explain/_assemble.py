@@ -35,7 +35,7 @@ from pamrs.diagnosis.noise import Floor
 from pamrs.diagnosis.prepare import Residual
 from pamrs.diagnosis.result import Diagnosis
 from pamrs.diagnosis.settings import DiagnosisSettings, EvidenceSettings
-from pamrs.effects_table import CATALOGUE, EFFECTS
+from pamrs.effects import CATALOGUE, EFFECTS
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError
 from pamrs.findings import (
     Asked,

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from pamrs.diagnosis.fit import Fit, Problem
 from pamrs.diagnosis.prepare import Block, begun
-from pamrs.effects_table import EFFECTS
-from pamrs.effects_table.closure import CLOSURE_OF, MEMORY_OF, TERMS, WORDS, Term
+from pamrs.effects import CLOSURE_OF, EFFECTS, MEMORY_OF, TERMS, WORDS, Term
 from pamrs.errors import DiagnosisError
 from pamrs.rig import Rig
 from pamrs.simulation import default_step

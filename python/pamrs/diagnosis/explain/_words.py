@@ -13,7 +13,7 @@ from pamrs.diagnosis.evidence import Candidate, Judged, is_parameter, symptoms_o
 from pamrs.diagnosis.explain._conditions import Picture
 from pamrs.diagnosis.fit import Problem
 from pamrs.diagnosis.settings import DiagnosisSettings, WarningSettings
-from pamrs.effects_table import CATALOGUE, EFFECTS
+from pamrs.effects import CATALOGUE, EFFECTS
 from pamrs.findings import BlockVerdict, ChannelError, Findings, NextExperiment, Where
 from pamrs.recordings import Case
 from pamrs.report.text import display_unit, format_number, kept_sentence, sentence_of

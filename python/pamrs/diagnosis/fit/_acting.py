@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pamrs.diagnosis.prepare import Block
-from pamrs.effects_table import EFFECTS
+from pamrs.effects import EFFECTS
 from pamrs.rig import Rig
 
 __all__ = ["ACTS", "acts_in", "depends", "fits"]

@@ -16,7 +16,7 @@ from pamrs.diagnosis.fit._acting import acts_in, depends
 from pamrs.diagnosis.fit._leastsquares import levenberg_marquardt
 from pamrs.diagnosis.prepare import Block, Prepared, Residual, binned, change, residual
 from pamrs.diagnosis.settings import DiagnosisSettings, FitSettings
-from pamrs.effects_table import EFFECTS, find_parameter
+from pamrs.effects import EFFECTS, find_parameter
 from pamrs.errors import ParameterError, RigError, SimulationError
 from pamrs.rig import Parameter, Rig
 from pamrs.simulation import core_rig

@@ -6,7 +6,7 @@ import itertools
 import math
 from dataclasses import dataclass, replace
 
-from pamrs.effects_table import EFFECTS
+from pamrs.effects import EFFECTS
 from pamrs.rig import Rig
 
 __all__ = ["CHOSEN", "Start", "starts_of"]

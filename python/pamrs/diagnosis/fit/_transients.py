@@ -20,7 +20,7 @@ from pamrs.diagnosis.fit._fitting import Events, Fit, Key, Problem, Scaling, cha
 from pamrs.diagnosis.fit._leastsquares import levenberg_marquardt
 from pamrs.diagnosis.prepare import Prepared, Residual
 from pamrs.diagnosis.settings import TransientSettings
-from pamrs.effects_table import EFFECTS, EffectParameter, find_parameter
+from pamrs.effects import EFFECTS, EffectParameter, find_parameter
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 

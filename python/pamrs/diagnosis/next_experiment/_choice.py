@@ -30,7 +30,7 @@ from pamrs.diagnosis.next_experiment._differences import (
 from pamrs.diagnosis.next_experiment._protocols import Experiment, library
 from pamrs.diagnosis.prepare import Prepared
 from pamrs.diagnosis.settings import DiagnosisSettings, NextExperimentSettings
-from pamrs.effects_table import EFFECTS
+from pamrs.effects import EFFECTS
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError
 from pamrs.findings import Curves, NextExperiment, RankedExperiment
 from pamrs.recordings import Recording

@@ -19,7 +19,7 @@ from pamrs.diagnosis.fit import Key, Problem, bin_width, free_baseline, residual
 from pamrs.diagnosis.noise import bins_of, floors
 from pamrs.diagnosis.prepare import Prepared, Residual, available_blocks, binned, prepare
 from pamrs.diagnosis.settings import DiagnosisSettings, NextExperimentSettings
-from pamrs.effects_table import EFFECTS
+from pamrs.effects import EFFECTS
 from pamrs.errors import DiagnosisError, ParameterError
 from pamrs.recordings import Recording
 from pamrs.rig import Rig

@@ -7,7 +7,7 @@ import textwrap
 from dataclasses import dataclass, field
 from typing import Any
 
-from pamrs.effects_table import CATALOGUE, find_parameter
+from pamrs.effects import CATALOGUE, find_parameter
 from pamrs.errors import ParameterError
 
 __all__ = ["Addition", "Plan", "Sight"]

@@ -24,7 +24,7 @@ from pamrs.diagnosis.next_experiment._protocols import Experiment, library
 from pamrs.diagnosis.noise import bins_of
 from pamrs.diagnosis.prepare import Block, available_blocks, binned
 from pamrs.diagnosis.settings import DiagnosisSettings, PlanSettings
-from pamrs.effects_table import CATALOGUE
+from pamrs.effects import CATALOGUE
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError
 from pamrs.rig import Rig
 from pamrs.simulation import core_rig, has_frame, regulators_of

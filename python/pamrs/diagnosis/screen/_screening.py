@@ -20,7 +20,7 @@ from pamrs.channels import channel_of
 from pamrs.diagnosis.fit import Fit, Problem, Start, acts_in, changes, stacked, starts_of
 from pamrs.diagnosis.prepare import Block
 from pamrs.diagnosis.settings import ScreenSettings
-from pamrs.effects_table import EFFECTS, EffectParameter
+from pamrs.effects import EFFECTS, EffectParameter
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 from pamrs.rig.schema import BLOCKS, qualified

@@ -21,8 +21,7 @@ from pamrs.diagnosis.fit import Fit, Problem, fit, residuals, stacked, with_prio
 from pamrs.diagnosis.noise import correlation_time
 from pamrs.diagnosis.prepare import Block
 from pamrs.diagnosis.settings import ClosureSettings
-from pamrs.effects_table import EFFECTS
-from pamrs.effects_table.closure import CLOSURE_OF, MEMORY_OF, TERMS, Term
+from pamrs.effects import CLOSURE_OF, EFFECTS, MEMORY_OF, TERMS, Term
 from pamrs.errors import DiagnosisError, SimulationError
 from pamrs.rig import Rig
 

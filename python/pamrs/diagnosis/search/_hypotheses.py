@@ -27,8 +27,7 @@ from pamrs.diagnosis.search._baseline import coloured, refitted, thorough
 from pamrs.diagnosis.search._closure import find_closure
 from pamrs.diagnosis.search._faint import faint
 from pamrs.diagnosis.search._wrong_parameters import beside_quiet, freed
-from pamrs.effects_table import CATALOGUE, EFFECTS, EffectInfo
-from pamrs.effects_table.entry import SameData
+from pamrs.effects import CATALOGUE, EFFECTS, EffectInfo, SameData
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 

@@ -1,0 +1,101 @@
+//! Joints: how a muscle's shortening turns a link.
+//!
+//! Every joint gives the muscle's shortening `d(theta)` and its slope, the moment arm `dd/dtheta`; the torque of a pull `F` is
+//! `F dd/dtheta`, so that `tau dtheta = F dd`: what the muscle gives, the link gets. Only the printed tendon joint
+//! ([`tendon::Torque::Published`]) gives less.
+
+pub mod polynomial;
+pub mod pulley;
+pub mod tendon;
+
+pub use self::polynomial::Polynomial;
+pub use self::pulley::Pulley;
+pub use self::tendon::TendonJoint;
+use crate::description::TransmissionSpec;
+use crate::error::{check_range, Error, Result};
+use crate::scalar::{constant, Scalar};
+
+/// Shortening and moment arms at one angle.
+#[derive(Debug, Clone, Copy)]
+pub struct JointPoint<S> {
+    /// Shortening of the muscle [m].
+    pub shortening: S,
+    /// Moment arm dd/dtheta [m]: rate of shortening per rate of angle.
+    pub moment_arm: S,
+    /// Torque per pull [m]: the moment arm, less what the printed equations lose.
+    pub torque_arm: S,
+}
+
+/// A joint of any kind.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Joint {
+    /// Four-parameter tendon.
+    Tendon(TendonJoint),
+    /// Constant radius.
+    Pulley(Pulley),
+    /// Polynomial of the angle.
+    Polynomial(Polynomial),
+    /// No joint: the coordinate is the shortening itself, of a linear load.
+    Direct,
+}
+
+impl Joint {
+    /// Names in descriptions.
+    pub const NAMES: [&'static str; 4] = ["tendon", "published", "pulley", "polynomial"];
+
+    /// The joint of a description.
+    ///
+    /// # Errors
+    /// [`Error::Choice`] for an unknown kind, [`Error::Parameter`] for an impossible length.
+    pub fn new(spec: &TransmissionSpec) -> Result<Self> {
+        let rest = spec.rest_angle;
+        match spec.kind.as_str() {
+            "tendon" | "published" => {
+                let torque =
+                    if spec.kind == "tendon" { tendon::Torque::Power } else { tendon::Torque::Published };
+                let [upper_axial, upper_offset, lower_axial, lower_offset] = [
+                    ("joint.upper_axial", spec.upper_axial),
+                    ("joint.upper_offset", spec.upper_offset),
+                    ("joint.lower_axial", spec.lower_axial),
+                    ("joint.lower_offset", spec.lower_offset),
+                ]
+                .map(|(name, value)| check_range(name, value, -10.0, 10.0, "m"));
+                let joint = TendonJoint::new(upper_axial?, upper_offset?, lower_axial?, lower_offset?, rest)?;
+                Ok(Self::Tendon(joint.with_torque(torque)))
+            }
+            "pulley" => Ok(Self::Pulley(Pulley::new(spec.radius, rest)?)),
+            "polynomial" => Ok(Self::Polynomial(Polynomial::new(&spec.coefficients, rest)?)),
+            other => {
+                let names: Vec<_> = Self::NAMES.iter().map(|n| format!("\"{n}\"")).collect();
+                Err(Error::Choice {
+                    name: "joint.kind".into(),
+                    value: format!("\"{other}\""),
+                    allowed: format!("one of {}", names.join(", ")),
+                })
+            }
+        }
+    }
+
+    /// Whether the joint can have an angle [rad].
+    #[must_use]
+    pub fn reaches(&self, angle: f64) -> bool {
+        match self {
+            Self::Tendon(joint) => joint.reaches(angle),
+            Self::Pulley(_) | Self::Polynomial(_) | Self::Direct => true,
+        }
+    }
+
+    /// Shortening and moment arms at a joint angle [rad].
+    #[inline]
+    pub fn eval<S: Scalar>(&self, angle: S) -> JointPoint<S> {
+        match self {
+            Self::Tendon(joint) => joint.eval(angle),
+            Self::Pulley(joint) => joint.eval(angle),
+            Self::Polynomial(joint) => joint.eval(angle),
+            Self::Direct => {
+                let one = constant(1.0);
+                JointPoint { shortening: angle, moment_arm: one, torque_arm: one }
+            }
+        }
+    }
+}

@@ -1,0 +1,152 @@
+//! The blocks between which a chain is cut, and what each needs measured.
+
+use super::boundary::Measured;
+use crate::description::dotted;
+use crate::plant::{Layout, Place, Rig, Simulated};
+use crate::{Error, Result};
+
+/// A block whose output channel is predicted from its measured neighbours.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Block {
+    /// Commands and the pressures it feeds to a supply's pressure.
+    Supply(usize),
+    /// Commands, neighbouring pressures and the angles of its muscles to a chamber's pressure.
+    Chamber(usize),
+    /// Chamber pressures to the angle of a joint (muscles, joints and arm), or to the length of the muscle on a linear load.
+    Arm(usize),
+}
+
+impl Block {
+    /// The block of a name: `supply`, `chamber` or `arm` (`load` of a linear load), with the name of the supply, chamber or
+    /// joint behind it where it has one (`chamber.flexor`).
+    ///
+    /// # Errors
+    /// [`Error::Model`] for another name.
+    pub fn from_name(rig: &Rig, name: &str) -> Result<Self> {
+        let spec = rig.spec();
+        let joints = rig.names().coordinates.iter().map(|n| n.replacen("joint", "arm", 1));
+        let blocks = (spec
+            .supplies
+            .iter()
+            .enumerate()
+            .map(|(k, s)| (dotted("supply", &s.name), Self::Supply(k))))
+        .chain(spec.chambers.iter().enumerate().map(|(k, c)| (dotted("chamber", &c.name), Self::Chamber(k))))
+        .chain(joints.enumerate().map(|(k, name)| (name, Self::Arm(k))));
+        let blocks: Vec<_> = blocks.collect();
+        blocks.iter().find(|(n, _)| n == name).map(|(_, block)| *block).ok_or_else(|| {
+            let names: Vec<_> = blocks.iter().map(|(n, _)| n.as_str()).collect();
+            Error::Model(format!("no block '{name}' in this rig; there are: {}", names.join(", ")))
+        })
+    }
+
+    /// Longest stable step [s] while its neighbours are driven.
+    pub fn longest_step(self, rig: &Rig) -> f64 {
+        match self {
+            Self::Arm(_) => rig.body_step(),
+            Self::Supply(_) | Self::Chamber(_) => rig.gas_step(),
+        }
+    }
+
+    /// Place of the predicted state.
+    pub(super) fn output(self, layout: &Layout) -> usize {
+        match self {
+            Self::Supply(k) => layout.supply(k),
+            Self::Chamber(k) => layout.pressure(k),
+            Self::Arm(k) => layout.angle(k),
+        }
+    }
+
+    /// States of the block that a window starts from, in the order of their sensitivities.
+    pub(super) fn initial_states(self, layout: &Layout) -> Vec<usize> {
+        match self {
+            Self::Supply(_) | Self::Chamber(_) => vec![self.output(layout)],
+            Self::Arm(_) => (layout.angle(0)..layout.effect(0)).collect(),
+        }
+    }
+
+    /// Number of initial states per window.
+    pub fn initial_count(self, rig: &Rig) -> usize {
+        self.initial_states(rig.layout()).len()
+    }
+
+    /// States that are integrated: the block's, and those of line inlets, which nobody measures.
+    pub(super) fn simulated(self, rig: &Rig, measured: &Measured<'_>) -> Simulated {
+        let layout = rig.layout();
+        let mut places = self.initial_states(layout);
+        match self {
+            Self::Arm(_) => places.extend(layout.effect(0)..layout.states()),
+            Self::Chamber(k) => {
+                places.push(layout.mass(k));
+                places.extend(effect_states(rig, Place::Gas(k)));
+            }
+            Self::Supply(k) => places.extend(effect_states(rig, Place::Supply(k))),
+        }
+        if !matches!(self, Self::Arm(_)) {
+            places.extend(hidden(layout, measured));
+        }
+        Simulated::only(layout, &places)
+    }
+}
+
+/// Integrated states of the effects on a block.
+fn effect_states(rig: &Rig, place: Place) -> impl Iterator<Item = usize> + '_ {
+    let here = rig.wiring.ports.integrated().filter(move |(at, _)| *at == place);
+    here.flat_map(|(_, acting)| {
+        let first = rig.layout.effect(acting.first);
+        first..first + acting.count
+    })
+}
+
+/// Pressures of line inlets that were not measured.
+pub(super) fn hidden(layout: &Layout, measured: &Measured<'_>) -> Vec<usize> {
+    let inlets = (layout.chambers..layout.gases).map(|k| layout.pressure(k));
+    inlets.filter(|place| measured.signal(*place).is_none()).collect()
+}
+
+pub(super) fn check(rig: &Rig, block: Block, measured: &Measured<'_>, starts: &[usize]) -> Result<()> {
+    let n = measured.samples;
+    if starts.first() != Some(&0)
+        || starts.windows(2).any(|w| w[1] <= w[0])
+        || starts.last().is_some_and(|s| *s >= n)
+    {
+        let worst = starts.last().copied().unwrap_or(0) as f64;
+        return Err(Error::parameter("starts", worst, format!("sample indices rising from 0, below {n}")));
+    }
+    if matches!(block, Block::Arm(_)) && rig.spec().load.as_ref().is_some_and(|load| load.is_frame()) {
+        return Err(Error::Model("the block load cannot be predicted: a frame holds the length".into()));
+    }
+    let hidden = hidden(rig.layout(), measured);
+    for place in neighbours(rig, block) {
+        if measured.signal(place).is_none() && !hidden.contains(&place) {
+            let name = rig.names().initial.iter().find(|(_, p)| *p == place).map_or("?", |(n, _)| n.as_str());
+            return Err(Error::Model(format!(
+                "block '{block:?}' cannot be predicted: {name} was not measured"
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// Places of the states that a block needs measured: its own, every angle, and the pressures next to it.
+fn neighbours(rig: &Rig, block: Block) -> Vec<usize> {
+    let (layout, wiring) = (rig.layout(), &rig.wiring);
+    let mut places: Vec<usize> = (layout.angle(0)..layout.rate(0)).collect();
+    places.push(block.output(layout));
+    if matches!(block, Block::Arm(_)) {
+        places.extend(wiring.groups.iter().map(|g| layout.pressure(g.chamber)));
+        return places;
+    }
+    let valves = wiring.valves.iter().map(|v| (v.from.place(layout), Some(layout.pressure(v.to))));
+    let lines = wiring.lines.iter().map(|l| (l.from.place(layout), l.to.place(layout)));
+    for (a, b) in valves.chain(lines) {
+        if a == Some(block.output(layout)) {
+            places.extend(b);
+        } else if b == Some(block.output(layout)) {
+            places.extend(a);
+        }
+    }
+    // The pressure of a constant supply is known without measuring it.
+    let constant = |place: &usize| rig.spec().supplies.get(*place).is_some_and(|s| s.kind == "constant");
+    places.retain(|place| !constant(place));
+    places
+}

@@ -1,0 +1,238 @@
+//! Measured channels that drive blocks of a cut chain.
+
+use super::block::Block;
+use crate::plant::{Channel, Plant, Rig};
+use crate::scalar::{constant, Scalar};
+use crate::{Error, Result};
+
+/// A measured signal, smoothed, with its time derivative at each sample; as the sensor reads it, SI, gauge.
+#[derive(Debug, Clone, Copy)]
+pub struct Signal<'a> {
+    /// Values, one per sample.
+    pub value: &'a [f64],
+    /// Time derivatives, one per sample.
+    pub slope: &'a [f64],
+}
+
+impl Signal<'_> {
+    fn check(&self, name: &str, n: usize) -> Result<()> {
+        for (part, data) in [("value", self.value), ("slope", self.slope)] {
+            if data.len() != n {
+                return Err(Error::Length {
+                    name: format!("{name}.{part}"),
+                    found: data.len(),
+                    expected: n,
+                    why: "one per sample of valve_command".into(),
+                });
+            }
+            if let Some((k, v)) = data.iter().enumerate().find(|(_, v)| !v.is_finite()) {
+                return Err(Error::parameter(format!("{name}.{part}[{k}]"), *v, "a finite value"));
+            }
+        }
+        Ok(())
+    }
+
+    /// Sample and fraction some time [s] after a fraction of sample `k`, inside the recording, and whether that is where it asks for.
+    pub(crate) fn later(&self, k: usize, fraction: f64, dt: f64, shift: f64) -> (usize, f64, bool) {
+        let last = (self.value.len() - 1) as f64;
+        let wanted = k as f64 + fraction + shift / dt;
+        let place = wanted.clamp(0.0, last);
+        let cell = place.floor().min((last - 1.0).max(0.0));
+        (cell as usize, place - cell, wanted == place)
+    }
+
+    /// Values at both ends of sample `k`, and slopes there per sample.
+    #[inline]
+    fn ends(&self, k: usize, dt: f64) -> [f64; 4] {
+        let next = (k + 1).min(self.value.len() - 1);
+        [self.value[k], self.slope[k] * dt, self.value[next], self.slope[next] * dt]
+    }
+
+    /// Cubic Hermite value and derivative at a fraction of sample `k`.
+    #[inline]
+    pub(crate) fn at(&self, k: usize, fraction: f64, dt: f64) -> (f64, f64) {
+        let [p0, m0, p1, m1] = self.ends(k, dt);
+        let (t, t2) = (fraction, fraction * fraction);
+        let t3 = t2 * t;
+        let value = p0 + m0 * (t - 2.0 * t2 + t3) + (p1 - p0) * (3.0 * t2 - 2.0 * t3) + m1 * (t3 - t2);
+        let slope = m0 * (1.0 - 4.0 * t + 3.0 * t2) + (p1 - p0) * 6.0 * (t - t2) + m1 * (3.0 * t2 - 2.0 * t);
+        (value, slope / dt)
+    }
+
+    /// Second derivative there.
+    pub(crate) fn curvature(&self, k: usize, t: f64, dt: f64) -> f64 {
+        let [p0, m0, p1, m1] = self.ends(k, dt);
+        ((p1 - p0) * (6.0 - 12.0 * t) + m0 * (6.0 * t - 4.0) + m1 * (6.0 * t - 2.0)) / (dt * dt)
+    }
+}
+
+/// Measured signals around a block.
+#[derive(Debug, Clone)]
+pub struct Measured<'a> {
+    pub(crate) samples: usize,
+    pub(crate) commands: Vec<&'a [f64]>,
+    /// Place of the state and its signal.
+    pub(crate) signals: Vec<(usize, Signal<'a>)>,
+}
+
+impl<'a> Measured<'a> {
+    /// Commands (one for each input of the rig, held over each sample) and measured channels by name: `supply_pressure`,
+    /// `muscle_pressure`, `line_pressure`, `joint_angle`, `length` of the muscle on a linear load, each with the name of its block
+    /// behind it where it has one.
+    ///
+    /// # Errors
+    /// [`Error::Length`] or [`Error::Parameter`] for bad arrays; [`Error::Model`] for a name that the rig does not have, or a
+    /// command that is missing.
+    pub fn new(
+        rig: &Rig,
+        samples: usize,
+        commands: &[(&str, &'a [f64])],
+        signals: &[(&str, Signal<'a>)],
+    ) -> Result<Self> {
+        let mut own = Vec::new();
+        for name in &rig.names().inputs {
+            let Some((_, values)) = commands.iter().find(|(n, _)| n == name) else {
+                return Err(Error::Model(format!("{name} is missing: one value per sample is needed")));
+            };
+            if values.len() != samples {
+                let why = "one per sample".into();
+                let (found, expected) = (values.len(), samples);
+                return Err(Error::Length { name: name.clone(), found, expected, why });
+            }
+            if let Some((k, u)) = values.iter().enumerate().find(|(_, u)| !u.is_finite()) {
+                return Err(Error::parameter(format!("{name}[{k}]"), *u, "a finite value"));
+            }
+            own.push(*values);
+        }
+        let layout = rig.layout();
+        let mut places = Vec::new();
+        for (name, signal) in signals {
+            let place = rig.names().channels.iter().find(|(n, _)| n == name).and_then(|(_, c)| match *c {
+                Channel::Supply(k) => Some(layout.supply(k)),
+                Channel::Pressure(k) => Some(layout.pressure(k)),
+                Channel::Angle(k) => Some(layout.angle(k)),
+                Channel::Length => Some(layout.angle(0)),
+                _ => None,
+            });
+            let Some(place) = place else {
+                return Err(Error::Model(format!("{name} is not a channel at which this rig can be cut")));
+            };
+            signal.check(name, samples)?;
+            places.push((place, *signal));
+        }
+        Ok(Self { samples, commands: own, signals: places })
+    }
+
+    #[inline]
+    pub(crate) fn signal(&self, place: usize) -> Option<&Signal<'a>> {
+        self.signals.iter().find(|(p, _)| *p == place).map(|(_, signal)| signal)
+    }
+}
+
+/// A measured state with what to subtract from its sensor's reading.
+pub(super) struct Driven<'a, S> {
+    pub place: usize,
+    signal: Signal<'a>,
+    zero: S,
+    /// Time constant of its sensor [s].
+    lag: S,
+    /// Whether another clock than the block's records it.
+    shifted: bool,
+    /// Length of the muscles at rest [m], where a length stands for the shortening of a linear load; `zero` is then that of the
+    /// shortening, the length's with the other sign.
+    rest: Option<f64>,
+}
+
+/// The measured states, as they drive a block.
+pub(super) fn driven<'a, S: Scalar>(
+    plant: &Plant<'_, S>,
+    block: Block,
+    measured: &Measured<'a>,
+) -> Vec<Driven<'a, S>> {
+    let (rig, layout) = (plant.rig(), plant.rig().layout());
+    let rest = rest_length(rig);
+    let driver = |(place, signal): &(usize, Signal<'a>)| {
+        let (zero, rest) = (zero(plant, *place), rest.filter(|_| *place == layout.angle(0)));
+        Driven {
+            place: *place,
+            signal: *signal,
+            zero: if rest.is_some() { -zero } else { zero },
+            lag: lag(plant, *place),
+            rest,
+            // a block's own clock is that of what it predicts
+            shifted: plant.skewed() && (*place < layout.angle(0)) == matches!(block, Block::Arm(_)),
+        }
+    };
+    measured.signals.iter().map(driver).collect()
+}
+
+/// Length at rest of the muscles on a linear load [m].
+pub(super) fn rest_length(rig: &Rig) -> Option<f64> {
+    rig.spec().load.as_ref().and_then(|_| rig.wiring.groups.first()).map(|group| group.rest_length)
+}
+
+/// Zero of the sensor of a state.
+#[inline]
+pub(super) fn zero<S: Scalar>(plant: &Plant<'_, S>, place: usize) -> S {
+    let (rig, layout) = (plant.rig(), plant.rig().layout());
+    let id = if place < layout.supplies {
+        None
+    } else if place < layout.mass(0) {
+        rig.wiring.gases[place - layout.supplies].pressure_zero
+    } else {
+        rig.wiring.coordinates[place - layout.angle(0)].zero
+    };
+    id.map_or(constant(0.0), |id| plant.values()[id])
+}
+
+/// Time constant of the sensor of a state [s].
+fn lag<S: Scalar>(plant: &Plant<'_, S>, place: usize) -> S {
+    let layout = plant.rig().layout();
+    let gas = (layout.pressure(0)..layout.mass(0)).contains(&place).then(|| place - layout.supplies);
+    gas.and_then(|gas| plant.lagging(gas)).map_or(constant(0.0), |(_, lag)| lag)
+}
+
+impl<S: Scalar> Driven<'_, S> {
+    /// True state at a fraction of sample `k`, read so much later [s] where another clock records it; an angle brings its rate along.
+    #[inline]
+    pub fn write(&self, rig: &Rig, k: usize, fraction: f64, dt: f64, shift: S, state: &mut [S]) {
+        let layout = rig.layout();
+        let (cell, t, inside) =
+            if self.shifted { self.signal.later(k, fraction, dt, shift.re()) } else { (k, fraction, false) };
+        let (value, slope) = self.signal.at(cell, t, dt);
+        let (value, slope, sign) = self.rest.map_or((value, slope, 1.0), |rest| (rest - value, -slope, -1.0));
+        let pressure = self.place < layout.angle(0);
+        if pressure {
+            state[self.place] = -self.zero + (value + rig.gas.ambient_pressure) + self.lag * slope;
+        } else {
+            state[self.place] = -self.zero + value;
+            state[self.place + layout.coordinates] = constant(slope);
+        }
+        if inside {
+            // what the shift's own derivatives add
+            let (more, bend) = (shift - shift.re(), self.signal.curvature(cell, t, dt) * sign);
+            if pressure {
+                state[self.place] += more * slope + self.lag * more * bend;
+            } else {
+                state[self.place] += more * slope;
+                state[self.place + layout.coordinates] += more * bend;
+            }
+        }
+    }
+}
+
+/// Gases (and their valves) whose measured pressure is that in front of a tube, where what feeds the valve is measured, constant or
+/// the block's own: the pressure behind can then be told.
+pub(super) fn taps<S: Scalar>(
+    plant: &Plant<'_, S>,
+    block: Block,
+    measured: &Measured<'_>,
+) -> Vec<(usize, usize)> {
+    let (rig, layout) = (plant.rig(), plant.rig().layout());
+    let known = |place: usize| {
+        let constant = rig.spec().supplies.get(place).is_some_and(|s| s.kind == "constant");
+        constant || place == block.output(layout) || measured.signal(place).is_some()
+    };
+    let fed = plant.taps().filter(|(gas, _)| measured.signal(layout.pressure(*gas)).is_some());
+    fed.filter(|(_, valve)| rig.wiring.valves[*valve].from.place(layout).is_none_or(known)).collect()
+}

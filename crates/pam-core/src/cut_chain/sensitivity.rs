@@ -1,0 +1,107 @@
+//! Prediction of a block with its derivatives, some parameters at a time in the lanes of a dual number.
+
+use super::block::{check, Block};
+use super::boundary::Measured;
+use super::window::Cut;
+use crate::effects::{Dual, LANES};
+use crate::plant::parameters::unit;
+use crate::plant::{ParameterId, Place, Plant, Rig};
+use crate::scalar::constant;
+use crate::simulate::Timing;
+use crate::{Error, Result};
+use nalgebra::Const;
+
+/// Prediction of a block's output with its sensitivities.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Prediction {
+    /// Predicted output at each sample, as the sensor reads it.
+    pub value: Vec<f64>,
+    /// Row-major `samples x (parameters + initial states)`: derivatives with respect to each parameter and to the
+    /// initial states of the window that the row belongs to.
+    pub jacobian: Vec<f64>,
+    /// Columns of the jacobian.
+    pub columns: usize,
+}
+
+/// Predict a block's output over windows.
+///
+/// `starts` are the sample indices at which windows begin (rising, the first one 0). `parameters` are those to
+/// differentiate with respect to; pass none for values alone (`columns` is then 0).
+///
+/// # Errors
+/// [`Error::Parameter`] for bad arguments; [`Error::Model`] when the block lacks a measured neighbour;
+/// [`Error::Integration`] when the state leaves the model's range.
+pub fn predict(
+    rig: &Rig,
+    block: Block,
+    measured: &Measured<'_>,
+    timing: Timing,
+    starts: &[usize],
+    parameters: &[ParameterId],
+) -> Result<Prediction> {
+    let n = measured.samples;
+    check(rig, block, measured, starts)?;
+    let initial = block.initial_count(rig);
+    let mut out = Prediction { value: vec![0.0; n], jacobian: Vec::new(), columns: 0 };
+    if parameters.is_empty() {
+        let plant = Plant::new(rig, rig.parameters().lift(), false)?;
+        let bumps = vec![0.0; initial];
+        Cut::new(plant, block, measured, timing, bumps).run(starts, |k, y, _, _, _| out.value[k] = y)?;
+        return Ok(out);
+    }
+    out.columns = parameters.len() + initial;
+    out.jacobian = vec![0.0; n * out.columns];
+    let columns: Vec<usize> = (0..out.columns).collect();
+    for chunk in columns.chunks(LANES) {
+        let mut values = rig.parameters().lift::<Dual>();
+        let mut bumps = vec![constant::<Dual>(0.0); initial];
+        for (lane, column) in chunk.iter().enumerate() {
+            match parameters.get(*column) {
+                Some(id) => values.seed(*id, lane),
+                None => bumps[column - parameters.len()].eps = unit(lane),
+            }
+        }
+        let plant = Plant::new(rig, values, false)?;
+        let (value, jacobian, width) = (&mut out.value, &mut out.jacobian, out.columns);
+        Cut::new(plant, block, measured, timing, bumps).run(starts, |k, y, _, _, _| {
+            value[k] = y.re;
+            let gradient = y.eps.unwrap_generic(Const::<LANES>, Const::<1>);
+            for (column, slope) in chunk.iter().zip(gradient.iter()) {
+                jacobian[k * width + column] = *slope;
+            }
+        })?;
+    }
+    Ok(out)
+}
+
+/// Terms of the closure in a block at each sample of a prediction, row-major `samples x terms`, and their number: what its
+/// coefficients multiply.
+///
+/// # Errors
+/// As [`predict`]; [`Error::Model`] for a block without a closure.
+pub fn closure_terms(
+    rig: &Rig,
+    block: Block,
+    measured: &Measured<'_>,
+    timing: Timing,
+    starts: &[usize],
+) -> Result<(Vec<f64>, usize)> {
+    check(rig, block, measured, starts)?;
+    let at = match block {
+        Block::Supply(k) => Place::Supply(k),
+        Block::Chamber(k) => Place::Gas(k),
+        Block::Arm(k) => Place::Joint(k),
+    };
+    let plant = Plant::new(rig, rig.parameters().lift(), false)?;
+    let (mut found, mut count) = (Vec::new(), 0);
+    let bumps = vec![0.0; block.initial_count(rig)];
+    Cut::new(plant, block, measured, timing, bumps).run(starts, |_, _, stepper, state, controls| {
+        let terms = stepper.plant.terms(at, state, controls, &stepper.scratch);
+        count = terms.len();
+        found.extend(terms);
+    })?;
+    if count == 0 {
+        return Err(Error::Model(format!("block '{block:?}' has no closure: no sum of terms acts there")));
+    }
+    Ok((found, count))
+}

@@ -1,0 +1,264 @@
+//! The windows of a prediction: each starts from the measurement, and measured neighbours drive the block through it.
+
+use super::block::Block;
+use super::boundary::{driven, rest_length, taps, zero, Driven, Measured};
+use super::clock::Clocks;
+use crate::effects::Number;
+use crate::plant::{moves, Controls, Memory, Plant, Simulated};
+use crate::scalar::{constant, Scalar};
+use crate::simulate::{check_state, Stepper, Timing};
+use crate::Result;
+
+/// One block, cut out of its chain.
+pub(super) struct Cut<'a, S> {
+    stepper: Stepper<'a, S>,
+    block: Block,
+    measured: &'a Measured<'a>,
+    timing: Timing,
+    simulated: Simulated,
+    /// Changes of the initial states of each window.
+    bumps: Vec<S>,
+    /// States that a window starts from.
+    own: Vec<usize>,
+    /// Every measured state, and which of them are not the block's own: those drive it.
+    drivers: Vec<Driven<'a, S>>,
+    driving: Vec<usize>,
+    /// Gases and valves between which a transducer sits, and those that drive the block.
+    taps: Vec<(usize, usize)>,
+    driving_taps: Vec<(usize, usize)>,
+    output: Output<S>,
+}
+
+/// How the predicted channel is read off the state.
+struct Output<S> {
+    /// Place of what is read.
+    reading: usize,
+    /// The same of a sensor that lags, whose reading a window starts from too.
+    lagging: Option<usize>,
+    /// What the sensor adds.
+    offset: S,
+    /// Length of the muscles at rest [m], where a length is read in the place of a shortening.
+    mirrored: Option<f64>,
+}
+
+/// What is carried from sample to sample.
+struct Course<S> {
+    state: Vec<S>,
+    memory: Vec<Memory<S>>,
+    /// Openings under which the present sample was read: those before it.
+    last: Controls<S>,
+}
+
+impl<'a, S: Number> Cut<'a, S> {
+    /// A block of a plant with what was measured around it.
+    pub fn new(
+        plant: Plant<'a, S>,
+        block: Block,
+        measured: &'a Measured<'a>,
+        timing: Timing,
+        bumps: Vec<S>,
+    ) -> Self {
+        let rig = plant.rig();
+        let own = block.initial_states(rig.layout());
+        let (drivers, taps) = (driven(&plant, block, measured), taps(&plant, block, measured));
+        let (output, simulated) = (Output::new(&plant, block), block.simulated(rig, measured));
+        let mut stepper = Stepper::new(plant);
+        stepper.reads = matches!(block, Block::Chamber(_));
+        Self {
+            stepper,
+            block,
+            measured,
+            timing,
+            simulated,
+            bumps,
+            driving: (0..drivers.len()).filter(|d| !own.contains(&drivers[*d].place)).collect(),
+            driving_taps: taps
+                .iter()
+                .copied()
+                .filter(|(gas, _)| !own.contains(&rig.layout().pressure(*gas)))
+                .collect(),
+            own,
+            drivers,
+            taps,
+            output,
+        }
+    }
+
+    /// Predict every sample; `sink` gets its number, the output and what it was read from.
+    pub fn run(
+        mut self,
+        starts: &[usize],
+        mut sink: impl FnMut(usize, S, &Stepper<'_, S>, &[S], &Controls<S>),
+    ) -> Result<()> {
+        let (n, dt) = (self.measured.samples, self.timing.sample_time);
+        let mut course = self.at_rest();
+        let mut starts = starts.iter().peekable();
+        for k in 0..n {
+            if starts.next_if(|s| **s == k).is_some() {
+                self.start_window(k, &mut course);
+            }
+            check_state(&self.stepper.plant, &course.state, k as f64 * dt)?;
+            let time = k as f64 * dt;
+            let clocks = Clocks::of(&self.stepper.plant, self.block, time);
+            let controls = self.controls(k, time, &clocks);
+            sink(k, self.output.read(&course.state), &self.stepper, &course.state, &controls);
+            if k + 1 < n {
+                self.sample(k, &mut course, clocks, controls);
+            }
+        }
+        Ok(())
+    }
+
+    /// What nobody measures begins at rest, and stays there unless it is a line's inlet.
+    fn at_rest(&self) -> Course<S> {
+        let plant = &self.stepper.plant;
+        let (rig, layout) = (plant.rig(), plant.rig().layout());
+        let ambient = rig.gas.ambient_pressure;
+        let mut last = plant.controls(|_| 0.0);
+        last.spool.fill(constant(0.0));
+        let mut state = vec![constant::<S>(0.0); plant.states()];
+        for (k, supply) in rig.spec().supplies.iter().enumerate() {
+            state[layout.supply(k)] = constant(supply.initial_pressure + ambient);
+        }
+        for (k, gas) in rig.wiring.gases.iter().enumerate() {
+            state[layout.pressure(k)] = constant(gas.initial_pressure + ambient);
+        }
+        for (k, coordinate) in rig.wiring.coordinates.iter().enumerate() {
+            state[layout.angle(k)] = constant(coordinate.rest);
+        }
+        Course { state, memory: plant.fresh_memory(), last }
+    }
+
+    /// Start a window from the measurement.
+    fn start_window(&self, k: usize, course: &mut Course<S>) {
+        let plant = &self.stepper.plant;
+        let (rig, layout) = (plant.rig(), plant.rig().layout());
+        let before = course.state.clone();
+        let state = &mut course.state;
+        let dt = self.timing.sample_time;
+        let shift = Clocks::of(plant, self.block, k as f64 * dt).neighbour;
+        self.drivers.iter().for_each(|driver| driver.write(rig, k, 0.0, dt, shift, state));
+        for (gas, valve) in &self.taps {
+            let place = layout.pressure(*gas);
+            state[place] = plant.behind_tube(*gas, state[place], state, course.last.spool[*valve]);
+        }
+        for (place, bump) in self.own.iter().zip(&self.bumps) {
+            state[*place] += *bump;
+        }
+        if k == 0 {
+            self.start_recording(state);
+        } else {
+            self.go_on(&before, course);
+        }
+        let state = &mut course.state;
+        plant.read_taps(state, &course.last);
+        let signal = self.measured.signal(self.block.output(layout));
+        if let (Some(reading), Some(signal)) = (self.output.lagging, signal) {
+            state[reading] = self.bumps[0] - self.output.offset + signal.value[k];
+        }
+    }
+
+    /// The first window: gas at rest temperature, effects that have not moved.
+    fn start_recording(&self, state: &mut [S]) {
+        let plant = &self.stepper.plant;
+        let (rig, layout) = (plant.rig(), plant.rig().layout());
+        for (inlet, (_, end)) in rig.wiring.inlets.iter().enumerate() {
+            let place = layout.pressure(rig.wiring.chambers + inlet);
+            if let (None, Some(end)) = (self.measured.signal(place), end.place(layout)) {
+                state[place] = state[end];
+            }
+        }
+        for gas in 0..layout.gases {
+            state[layout.mass(gas)] = plant.initial_mass(gas, state);
+        }
+        plant.start_effects(state);
+    }
+
+    /// A new window keeps the gas temperature and the memory of the motion.
+    fn go_on(&self, before: &[S], course: &mut Course<S>) {
+        let plant = &self.stepper.plant;
+        let layout = plant.rig().layout();
+        let Course { state, memory, .. } = course;
+        for gas in 0..layout.gases {
+            let (rest, was) = (plant.rest_mass(gas, state), plant.rest_mass(gas, before));
+            state[layout.mass(gas)] = rest * before[layout.mass(gas)] / was;
+        }
+        let contractions = |state: &[S]| {
+            let mut now = vec![constant::<S>(0.0); memory.len()];
+            plant.contractions(state, &mut now);
+            now
+        };
+        let (from, to) = (contractions(before), contractions(state));
+        plant.follow_muscles(state, memory, &from, &to);
+    }
+
+    /// Controls of sample `k` from a time [s] on.
+    fn controls(&self, k: usize, time: f64, clocks: &Clocks<S>) -> Controls<S> {
+        let (plant, commands) = (&self.stepper.plant, &self.measured.commands);
+        if !plant.skewed() {
+            return plant.controls(|input| commands[input][k]);
+        }
+        let last = self.measured.samples as i64 - 1;
+        let command = |input: usize, sample: i64| commands[input][sample.clamp(0, last) as usize];
+        plant.skewed_controls(clocks.command, time, self.timing.step(), self.timing.sample_time, command)
+    }
+
+    /// The steps from sample `k` to the next.
+    fn sample(&mut self, k: usize, course: &mut Course<S>, clocks: Clocks<S>, controls: Controls<S>) {
+        let (dt, step) = (self.timing.sample_time, self.timing.step());
+        let h = 1.0 / self.timing.substeps as f64;
+        let (mut clocks, mut controls) = (clocks, controls);
+        let Course { state, memory, last } = course;
+        for i in 0..self.timing.substeps {
+            let time = (k as f64 + i as f64 * h) * dt;
+            if i > 0 && self.stepper.plant.skewed() {
+                clocks = Clocks::of(&self.stepper.plant, self.block, time);
+                controls = self.controls(k, time, &clocks);
+            }
+            let (drivers, driving, taps) = (&self.drivers, &self.driving, &self.driving_taps);
+            let drive = |plant: &Plant<'a, S>, controls: &Controls<S>, fraction: f64, y: &mut [S]| {
+                let (rig, share) = (plant.rig(), (i as f64 + fraction) * h);
+                for driver in driving {
+                    drivers[*driver].write(rig, k, share, dt, clocks.neighbour, y);
+                }
+                for (gas, valve) in taps {
+                    let place = rig.layout().pressure(*gas);
+                    // a smooth signal goes from one reading to the next, and so do the commands that they were read under
+                    let (was, now) = (last.spool[*valve], controls.spool[*valve]);
+                    // a spool with a motion of its own is already where it is at that instant
+                    let moving = moves(&rig.wiring.ports.command[*valve]);
+                    let spool = if moving { now } else { was + (now - was) * share };
+                    y[place] = plant.behind_tube(*gas, y[place], y, spool);
+                }
+            };
+            self.stepper.step(state, memory, &controls, time, step, &self.simulated, drive);
+        }
+        if !self.taps.is_empty() {
+            last.spool.clone_from(&self.stepper.controls(&controls, 2).spool);
+        }
+    }
+}
+
+impl<S: Scalar> Output<S> {
+    fn new(plant: &Plant<'_, S>, block: Block) -> Self {
+        let rig = plant.rig();
+        let place = block.output(rig.layout());
+        let zero = zero(plant, place);
+        let gas = match block {
+            Block::Chamber(k) => Some(k),
+            _ => None,
+        };
+        let arm = matches!(block, Block::Arm(_));
+        Self {
+            reading: gas.map_or(place, |k| plant.reading(k)),
+            lagging: gas.and_then(|k| plant.lagging(k)).map(|(reading, _)| reading),
+            offset: if arm { zero } else { zero - rig.gas.ambient_pressure },
+            mirrored: rest_length(rig).filter(|_| arm),
+        }
+    }
+
+    /// The channel at a state.
+    fn read(&self, state: &[S]) -> S {
+        self.mirrored.map_or(state[self.reading], |rest| -state[self.reading] + rest) + self.offset
+    }
+}

@@ -1,0 +1,323 @@
+//! A rig as data: the description that a TOML file (read and unit-converted outside) comes down to.
+
+mod check;
+
+use crate::muscle::MuscleSpec;
+use crate::{Error, Result};
+use serde::Deserialize;
+use std::collections::BTreeMap;
+
+/// Gas constants; pressures absolute [Pa], temperature [K].
+#[allow(missing_docs)]
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GasSpec {
+    pub ambient_pressure: f64,
+    pub temperature: f64,
+    pub gas_constant: f64,
+    pub heat_capacity_ratio: f64,
+}
+
+/// Where a flow begins or ends, as a description names it: `supply`, `chamber.flexor`, `line.flexor`, `ambient`.
+pub type Port = String;
+
+/// Supply of air; initial pressure gauge [Pa].
+#[allow(missing_docs)]
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SupplySpec {
+    #[serde(default)]
+    pub name: String,
+    /// `tank`, `constant` or `regulator`.
+    pub kind: String,
+    #[serde(default)]
+    pub volume: f64,
+    pub initial_pressure: f64,
+    #[serde(default)]
+    pub time_constant: f64,
+    #[serde(default)]
+    pub droop: f64,
+}
+
+/// Proportional servo-valve from a supply (or a chamber: a manifold) to a chamber or the inlet of a line.
+#[allow(missing_docs)]
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ValveSpec {
+    #[serde(default)]
+    pub name: String,
+    pub from: Port,
+    pub to: Port,
+    pub discharge_area_max: f64,
+    pub null_voltage: f64,
+    pub half_range: f64,
+    pub opening: Vec<f64>,
+    pub fraction: Vec<f64>,
+}
+
+/// Tube or orifice; an empty `from` means that valves feed an inlet node of its own.
+#[allow(missing_docs)]
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LineSpec {
+    #[serde(default)]
+    pub name: String,
+    /// `tube` or `orifice`.
+    pub kind: String,
+    #[serde(default)]
+    pub from: Port,
+    pub to: Port,
+    #[serde(default)]
+    pub length: f64,
+    #[serde(default)]
+    pub diameter: f64,
+    #[serde(default)]
+    pub discharge_area: f64,
+    #[serde(default)]
+    pub inlet_volume: f64,
+}
+
+/// Chamber: dead (or, without a muscle, total) volume and polytropic coefficients; initial pressure gauge [Pa].
+#[allow(missing_docs)]
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ChamberSpec {
+    #[serde(default)]
+    pub name: String,
+    pub dead_volume: f64,
+    #[serde(default)]
+    pub initial_pressure: f64,
+    pub alpha_in: f64,
+    pub alpha_out: f64,
+    pub alpha: f64,
+}
+
+/// How a muscle pulls on a joint; the lengths are those of its kind, see [`crate::blocks::joint::Joint`].
+#[allow(missing_docs)]
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TransmissionSpec {
+    pub kind: String,
+    #[serde(default)]
+    pub upper_axial: f64,
+    #[serde(default)]
+    pub upper_offset: f64,
+    #[serde(default)]
+    pub lower_axial: f64,
+    #[serde(default)]
+    pub lower_offset: f64,
+    #[serde(default)]
+    pub radius: f64,
+    #[serde(default)]
+    pub coefficients: Vec<f64>,
+    pub rest_angle: f64,
+}
+
+impl TransmissionSpec {
+    /// Read a transmission on its own from JSON text.
+    ///
+    /// # Errors
+    /// [`Error::Model`] for text that is not of this form (unknown keys included).
+    pub fn from_json(text: &str) -> Result<Self> {
+        serde_json::from_str(text).map_err(|e| Error::Model(format!("joint description: {e}")))
+    }
+}
+
+/// Muscles of one kind that share a chamber and pull on one joint (`joint.elbow`, or `load`).
+#[allow(missing_docs)]
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MuscleGroupSpec {
+    #[serde(default)]
+    pub name: String,
+    pub chamber: Port,
+    pub joint: Port,
+    /// In place of the joint's own.
+    #[serde(default)]
+    pub transmission: Option<TransmissionSpec>,
+    pub muscle: MuscleSpec,
+}
+
+/// Joint with elastic stops, and how muscles pull on it that have no transmission of their own.
+#[allow(missing_docs)]
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct JointSpec {
+    #[serde(default)]
+    pub name: String,
+    #[serde(default)]
+    pub transmission: Option<TransmissionSpec>,
+    pub rest_angle: f64,
+    pub min_angle: f64,
+    pub max_angle: f64,
+    pub stop_stiffness: f64,
+    pub stop_damping: f64,
+}
+
+/// Arm: `one_link` about the only joint, or `planar` links in series, base first.
+#[allow(missing_docs)]
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ArmSpec {
+    pub kind: String,
+    #[serde(default)]
+    pub inertia: f64,
+    #[serde(default)]
+    pub first_moment: f64,
+    #[serde(default)]
+    pub length: f64,
+    #[serde(default)]
+    pub payload: f64,
+    #[serde(default)]
+    pub viscous: f64,
+    #[serde(default)]
+    pub coulomb: f64,
+    #[serde(default = "default_coulomb_speed")]
+    pub coulomb_speed: f64,
+    pub gravity: f64,
+    #[serde(default)]
+    pub links: Vec<LinkSpec>,
+}
+
+fn default_coulomb_speed() -> f64 {
+    0.02
+}
+
+/// One link of a planar arm with the joint at its base.
+#[allow(missing_docs)]
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LinkSpec {
+    #[serde(default)]
+    pub name: String,
+    pub joint: Port,
+    pub length: f64,
+    pub mass: f64,
+    pub centre: f64,
+    pub inertia: f64,
+    pub payload: f64,
+    pub viscous: f64,
+    pub coulomb: f64,
+    pub coulomb_speed: f64,
+}
+
+/// Linear load on a muscle, in the place of joint and arm: a hanging `mass`, or a `frame` that prescribes the length.
+#[allow(missing_docs)]
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LoadSpec {
+    pub kind: String,
+    #[serde(default)]
+    pub mass: f64,
+    #[serde(default)]
+    pub viscous: f64,
+    #[serde(default)]
+    pub coulomb: f64,
+    #[serde(default)]
+    pub coulomb_speed: f64,
+    #[serde(default)]
+    pub gravity: f64,
+    pub min_length: f64,
+    pub max_length: f64,
+    #[serde(default)]
+    pub stop_stiffness: f64,
+    #[serde(default)]
+    pub stop_damping: f64,
+}
+
+impl LoadSpec {
+    /// Whether the length is prescribed.
+    #[must_use]
+    pub fn is_frame(&self) -> bool {
+        self.kind == "frame"
+    }
+}
+
+/// Constant sensor errors: measured = true + zero; of the chamber or joint of its name, of all (and of a load) without a name.
+#[allow(missing_docs)]
+#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SensorSpec {
+    #[serde(default)]
+    pub name: String,
+    pub pressure_zero: f64,
+    pub angle_zero: f64,
+    #[serde(default)]
+    pub length_zero: f64,
+}
+
+/// An effect that is switched on, with its parameters.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct EffectSpec {
+    /// Identifier, see [`crate::effects::EFFECTS`].
+    pub id: String,
+    /// Name of the one block that it acts on; empty for every block of its kind.
+    #[serde(default)]
+    pub at: String,
+    /// Its form; empty for the first one.
+    #[serde(default)]
+    pub form: String,
+    /// Values by parameter name, SI.
+    pub parameters: BTreeMap<String, f64>,
+}
+
+/// A rig: blocks and what joins them. SI units, radians.
+#[allow(missing_docs)]
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RigSpec {
+    pub name: String,
+    pub gas: GasSpec,
+    #[serde(default)]
+    pub supplies: Vec<SupplySpec>,
+    #[serde(default)]
+    pub valves: Vec<ValveSpec>,
+    #[serde(default)]
+    pub lines: Vec<LineSpec>,
+    pub chambers: Vec<ChamberSpec>,
+    #[serde(default)]
+    pub muscles: Vec<MuscleGroupSpec>,
+    #[serde(default)]
+    pub joints: Vec<JointSpec>,
+    pub arm: Option<ArmSpec>,
+    pub load: Option<LoadSpec>,
+    #[serde(default)]
+    pub sensors: Vec<SensorSpec>,
+    #[serde(default)]
+    pub effects: Vec<EffectSpec>,
+}
+
+impl RigSpec {
+    /// Read a specification from JSON text.
+    ///
+    /// # Errors
+    /// [`Error::Model`] for text that is not of this form (unknown keys included), and as [`Self::validate`].
+    pub fn from_json(text: &str) -> Result<Self> {
+        let spec: Self =
+            serde_json::from_str(text).map_err(|e| Error::Model(format!("rig description: {e}")))?;
+        spec.validate()?;
+        Ok(spec)
+    }
+}
+
+/// `valve.flexor`, or `valve` for a block without a name.
+#[must_use]
+pub fn dotted(block: &str, name: &str) -> String {
+    if name.is_empty() {
+        block.into()
+    } else {
+        format!("{block}.{name}")
+    }
+}
+
+/// Read a muscle on its own from JSON text.
+///
+/// # Errors
+/// [`Error::Model`] for text that is not of this form; [`Error::Parameter`] for an impossible value.
+pub fn muscle_from_json(text: &str) -> Result<MuscleSpec> {
+    let spec: MuscleSpec =
+        serde_json::from_str(text).map_err(|e| Error::Model(format!("muscle description: {e}")))?;
+    spec.validate()?;
+    Ok(spec)
+}

@@ -1,0 +1,315 @@
+//! Where an effect meets its rig: the ports of the blocks, and what it sees there.
+
+use crate::blocks::chamber::ChamberState;
+use crate::blocks::gas::Gas;
+use crate::scalar::{constant, Scalar};
+use serde::Serialize;
+use std::fmt::Debug;
+
+use super::payload_swing::Cord;
+
+/// A place in the equations of a rig at which an effect acts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Port {
+    /// Valve: the way from the command to the opening.
+    Command,
+    /// Valve: what its flow passes through. One effect at most.
+    Passage,
+    /// Valve: a path beside its opening, from the supply to the chamber and from the chamber to the ambient.
+    Clearance,
+    /// Supply or chamber: gas lost to the ambient.
+    Leak,
+    /// Supply or chamber: gas that comes in from nowhere.
+    Inflow,
+    /// Supply: what it is asked for, and what fills it.
+    Feed,
+    /// Chamber: the balance that gives its pressure. One effect at most.
+    Balance,
+    /// Muscle: the pressure that its force is that of.
+    Gauge,
+    /// Muscle: the bladder's part of its force.
+    Bladder,
+    /// Muscle: a force of its own.
+    Force,
+    /// Joint: a torque between its two links.
+    Torque,
+    /// Joint: a torque from outside on its link.
+    Push,
+    /// Arm: the mass at the end of a link.
+    Payload,
+    /// Arm: a part of that mass that hangs on a cord. One effect at most.
+    Hanging,
+    /// Arm: what it stands on. One effect at most.
+    Mounting,
+    /// Chamber: what its pressure sensor reads. One effect at most.
+    Reading,
+    /// The clock of what is recorded.
+    Clock,
+}
+
+/// What an effect sees of the block that it acts on. Pressures absolute [Pa] where nothing else is said.
+#[derive(Debug, Clone, Copy)]
+pub enum At<S> {
+    /// A supply.
+    Supply {
+        /// Its pressure.
+        pressure: S,
+        /// Sum of the openings through which its valves fill from it, 0 to 1 each.
+        opening: S,
+    },
+    /// A valve.
+    Valve {
+        /// Pressure of what it feeds.
+        fed: S,
+    },
+    /// A chamber.
+    Chamber {
+        /// Its pressure.
+        pressure: S,
+        /// Pressure before its valve; its own without one.
+        supply: S,
+        /// Opening of its valves, -1 to 1 each.
+        opening: S,
+        /// Rate of its volume [m3/s].
+        volume_rate: S,
+    },
+    /// A group of muscles.
+    Muscle(AtMuscle<S>),
+    /// A joint.
+    Joint {
+        /// Gauge pressure [bar], the mean over the muscles that pull on it.
+        pressure: S,
+        /// Angle [rad].
+        angle: S,
+        /// Rate [rad/s].
+        rate: S,
+    },
+    /// The arm.
+    Arm {
+        /// Torque on the first joint that holds it against gravity [N m].
+        weight: S,
+    },
+}
+
+/// What an effect sees of a group of muscles.
+#[derive(Debug, Clone, Copy)]
+pub struct AtMuscle<S> {
+    /// Gauge pressure that the force is that of [Pa].
+    pub gauge: S,
+    /// Contraction ratio [1].
+    pub contraction: S,
+    /// Length [m].
+    pub length: S,
+    /// Rate of the length [m/s].
+    pub rate: S,
+    /// Stretch since the step began [m].
+    pub stretched: S,
+}
+
+/// Extremes of a block, for the fastest rate of what acts there.
+#[derive(Debug, Clone, Copy)]
+pub struct Extremes {
+    /// Highest pressure that is to be reckoned with [Pa, absolute], and that of the ambient.
+    pub pressure: f64,
+    /// Ambient pressure [Pa].
+    pub ambient: f64,
+    /// Range of the joint's angle [rad], zeros for one without stops.
+    pub angles: (f64, f64),
+    /// Largest contraction ratio [1].
+    pub contraction: f64,
+    /// Valves at the block.
+    pub valves: usize,
+}
+
+/// An effect that is switched on, with its parameters in a scalar type: what it does at its ports, what it remembers, how
+/// fast it is. `own` are its states at one block; what is not said does nothing.
+pub trait Effect<S: Scalar>: Debug + Send + Sync {
+    /// Write its states where a recording begins: nothing has moved for long.
+    fn start(&self, _gas: &Gas, _at: &At<S>, _own: &mut [S]) {}
+
+    /// Write the rates of its states.
+    fn rates(&self, _at: &At<S>, _own: &[S], _rates: &mut [S]) {}
+
+    /// [`Port::Command`]: normalised position of the valve so long [s] after a step began with the states `own`, the
+    /// position that comes in being held.
+    fn position(&self, _own: &[S], input: S, _age: f64) -> S {
+        input
+    }
+
+    /// [`Port::Command`]: bring the states to the end of a step [s]; the position there.
+    fn follow(&self, own: &mut [S], input: S, step: f64) -> S {
+        self.position(own, input, step)
+    }
+
+    /// [`Port::Passage`]: mass flow [kg/s] through an area [m2] between two pressures; against the arrow where it vents.
+    fn through(&self, gas: &Gas, area: S, upstream: S, downstream: S, _venting: bool) -> S {
+        gas.mass_flow(area, upstream, downstream)
+    }
+
+    /// [`Port::Passage`]: whether the pressure sensor sits between the valve and what the flow passes through.
+    fn taps(&self) -> bool {
+        false
+    }
+
+    /// [`Port::Passage`]: pressure there, with the arguments of [`Self::through`].
+    fn between(&self, _gas: &Gas, _area: S, _upstream: S, downstream: S, _venting: bool) -> S {
+        downstream
+    }
+
+    /// [`Port::Passage`]: pressure at the other end, for the pressure there and a mass flow [kg/s] to that end.
+    fn behind(&self, there: S, _flow: S) -> S {
+        there
+    }
+
+    /// [`Port::Clearance`]: discharge area [m2] of either path at a normalised position.
+    fn clearance(&self, _gas: &Gas, _position: S) -> S {
+        constant(0.0)
+    }
+
+    /// [`Port::Leak`]: mass flow to the ambient [kg/s].
+    fn leak(&self, _gas: &Gas, _pressure: S) -> S {
+        constant(0.0)
+    }
+
+    /// [`Port::Inflow`]: mass flow in [kg/s].
+    fn inflow(&self, _at: &At<S>, _own: &[S]) -> S {
+        constant(0.0)
+    }
+
+    /// [`Port::Feed`]: change the mass flow that is drawn [kg/s] and the set pressure of a supply.
+    fn feed(&self, _own: &[S], _pressure: S, _drawn: &mut S, _set: &mut S) {}
+
+    /// [`Port::Feed`]: bring the states to the end of a step [s] from one pressure to another; where it switched on the
+    /// way, a mass flow [kg/s] and the time for which the supply gets it [s], negative where it had got too much.
+    fn switched(&self, _gas: &Gas, _own: &mut [S], _from: S, _to: S, _step: f64) -> Option<(S, f64)> {
+        None
+    }
+
+    /// [`Port::Balance`]: rate of the pressure [Pa/s], and what it adds to the rate of the mass [kg/s]. `fixed` is the
+    /// rate by fixed coefficients.
+    fn balance(&self, _gas: &Gas, _chamber: &ChamberState<S>, _wall: S, _mass: S, fixed: S) -> (S, S) {
+        (fixed, constant(0.0))
+    }
+
+    /// [`Port::Balance`]: mass [kg] where a recording begins, of the one at rest temperature.
+    fn initial_mass(&self, _gas: &Gas, rest: S) -> S {
+        rest
+    }
+
+    /// [`Port::Gauge`]: gauge pressure that the force is that of [Pa].
+    fn gauge(&self, gauge: S) -> S {
+        gauge
+    }
+
+    /// [`Port::Bladder`]: what it adds to the force of one muscle [N] whose bladder's part is `bladder`.
+    fn bladder(&self, _own: &[S], _bladder: S, _contraction: S) -> S {
+        constant(0.0)
+    }
+
+    /// [`Port::Force`]: what it adds to the force of one muscle [N].
+    fn force(&self, _at: &AtMuscle<S>, _own: &[S]) -> S {
+        constant(0.0)
+    }
+
+    /// Bring the states to the end of a step in which a muscle of a rest length [m] moved between two contraction ratios.
+    fn moved(&self, _own: &mut [S], _from: S, _to: S, _rest_length: f64) {}
+
+    /// [`Port::Torque`]: what it adds to the torque of a joint [N m].
+    fn torque(&self, _at: &At<S>, _own: &[S]) -> S {
+        constant(0.0)
+    }
+
+    /// [`Port::Push`]: torque from outside [N m] at a time [s].
+    fn push(&self, _time: f64) -> S {
+        constant(0.0)
+    }
+
+    /// [`Port::Payload`]: what it adds to the mass [kg] at a time [s]; infinite times ask for what is there in the end.
+    fn payload(&self, _time: f64) -> S {
+        constant(0.0)
+    }
+
+    /// [`Port::Hanging`]: share of the mass that hangs [1].
+    fn hanging(&self) -> S {
+        constant(0.0)
+    }
+
+    /// [`Port::Hanging`]: the cord, under gravity [m/s2].
+    fn cord(&self, _gravity: f64, _own: &[S]) -> Option<Cord<S>> {
+        None
+    }
+
+    /// [`Port::Mounting`]: angular acceleration [rad/s2] under a torque [N m]; its states are angle and rate.
+    fn mounting(&self, _own: &[S], _torque: S) -> S {
+        constant(0.0)
+    }
+
+    /// [`Port::Reading`]: what the sensor reads after a step [s] from one pressure to another.
+    fn read(&self, _reading: S, _from: S, to: S, _step: f64) -> S {
+        to
+    }
+
+    /// [`Port::Reading`]: how far the sensor lags [s].
+    fn lag(&self) -> S {
+        constant(0.0)
+    }
+
+    /// [`Port::Clock`]: how late pressures and angles are recorded at a time [s].
+    fn clock(&self, _time: f64) -> (S, S) {
+        (constant(0.0), constant(0.0))
+    }
+
+    /// Fastest rate of what it moves by itself [1/s].
+    fn fastest(&self) -> f64 {
+        0.0
+    }
+
+    /// Flow ports: largest change of the flow with the pressure of its block [kg/(s Pa)].
+    fn steepest(&self, _gas: &Gas, _most: &Extremes) -> f64 {
+        0.0
+    }
+
+    /// [`Port::Balance`]: fastest rate of a chamber of a volume [m3] with a wall [m2].
+    fn wall_rate(&self, _gas: &Gas, _volume: f64, _wall: f64) -> f64 {
+        0.0
+    }
+
+    /// Largest damping and stiffness: of one muscle [N s/m] and by its contraction ratio [N], of a joint [N m s/rad] and
+    /// [N m/rad].
+    fn resistance(&self, _most: &Extremes) -> (f64, f64) {
+        (0.0, 0.0)
+    }
+
+    /// Stiffness of one muscle's friction before it slips [N/m] at a gauge pressure [Pa].
+    fn presliding(&self, _gauge: f64) -> f64 {
+        0.0
+    }
+
+    /// [`Port::Mounting`]: how much a torque accelerates it [1/(kg m2)].
+    fn mobility(&self) -> f64 {
+        0.0
+    }
+
+    /// [`Port::Hanging`]: fastest rate [1/s], the link's inertia without the hanging mass being smaller by a ratio.
+    fn swing_rate(&self, _gravity: f64, _ratio: f64) -> f64 {
+        0.0
+    }
+
+    /// What its coefficients multiply, for an effect that is a sum of terms.
+    fn terms(&self, _at: &At<S>, _own: &[S]) -> Vec<S> {
+        Vec::new()
+    }
+}
+
+/// One bar [Pa].
+pub(crate) const BAR: f64 = 1e5;
+/// One litre [m3].
+pub(crate) const LITRE: f64 = 1e-3;
+/// A first state that says that something has begun.
+pub(crate) const BEGUN: f64 = 1.0;
+
+/// Whether the first state says so.
+pub(crate) fn begun<S: Scalar>(own: &[S]) -> bool {
+    own[0].re() == BEGUN
+}

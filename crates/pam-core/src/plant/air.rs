@@ -1,0 +1,313 @@
+//! Flows between the nodes of a rig, what they do to the pressures, and how fast.
+
+use super::ports::{Flow, Place};
+use super::rates::{Controls, Line, Plant, Scratch};
+use super::units::Node;
+use crate::blocks::chamber::{cube_area, cylinder_area, pressure_rate, ChamberState};
+use crate::effects::Extremes;
+use crate::scalar::{constant, Scalar};
+
+impl<S: Scalar> Plant<'_, S> {
+    #[inline]
+    pub(super) fn pressure_at(&self, node: Node, state: &[S]) -> S {
+        match node {
+            Node::Ambient => constant(self.rig.gas.ambient_pressure),
+            Node::Supply(k) => state[self.layout.supply(k)],
+            Node::Gas(k) => state[self.layout.pressure(k)],
+        }
+    }
+
+    /// Mass flows between all nodes, written to the scratch.
+    #[inline(always)]
+    pub(super) fn flows(&self, state: &[S], controls: &Controls<S>, here: &mut Scratch<S>) {
+        let zero = constant::<S>(0.0);
+        let gas = &self.rig.gas;
+        let ambient = constant::<S>(gas.ambient_pressure);
+        here.inflow.fill(zero);
+        here.outflow.fill(zero);
+        here.drawn.fill(zero);
+        here.vented = zero;
+        for (k, (unit, valve)) in self.rig.wiring.valves.iter().zip(&self.valves).enumerate() {
+            let spool = controls.spool[k];
+            let pressure = state[self.layout.pressure(unit.to)];
+            if spool.re() > 0.0 {
+                let area = valve.area * unit.table.eval(spool);
+                let upstream = self.pressure_at(unit.from, state);
+                let flow = self.valve_flow(k, area, upstream, pressure, false);
+                here.pass(unit.from, Node::Gas(unit.to), flow);
+            } else if spool.re() < 0.0 {
+                let area = valve.area * unit.table.eval(-spool);
+                let flow = self.valve_flow(k, area, pressure, ambient, true);
+                here.pass(Node::Gas(unit.to), Node::Ambient, flow);
+            }
+        }
+        for (unit, line) in self.rig.wiring.lines.iter().zip(&self.lines) {
+            let (from, to) = (self.pressure_at(unit.from, state), self.pressure_at(unit.to, state));
+            let flow = match line {
+                Line::Orifice(area) => gas.mass_flow(*area, from, to),
+                Line::Tube(tube) => tube.mass_flow(from, to),
+            };
+            here.pass(unit.from, unit.to, flow);
+        }
+        if !self.rig.wiring.ports.flows.is_empty() {
+            self.effect_flows(state, controls, here);
+        }
+    }
+
+    /// Mass flow through an opening of a valve [kg/s], and what lies behind it.
+    #[inline]
+    fn valve_flow(&self, valve: usize, area: S, upstream: S, downstream: S, venting: bool) -> S {
+        match &self.rig.wiring.ports.passage[valve] {
+            None => self.rig.gas.mass_flow(area, upstream, downstream),
+            Some(acting) => self.effect(acting).through(&self.rig.gas, area, upstream, downstream, venting),
+        }
+    }
+
+    /// Flows of effects, written to the scratch.
+    #[inline(never)]
+    fn effect_flows(&self, state: &[S], controls: &Controls<S>, here: &mut Scratch<S>) {
+        let gas = &self.rig.gas;
+        for (flow, acting) in &self.rig.wiring.ports.flows {
+            let effect = self.effect(acting);
+            match *flow {
+                Flow::Leak(node) => {
+                    let lost = effect.leak(gas, self.pressure_at(node, state));
+                    here.take(node, lost);
+                    here.vented += lost;
+                }
+                Flow::Clearance(valve) => {
+                    let unit = &self.rig.wiring.valves[valve];
+                    let area = effect.clearance(gas, controls.spool[valve]);
+                    let chamber = Node::Gas(unit.to);
+                    for (from, to) in [(unit.from, chamber), (chamber, Node::Ambient)] {
+                        let (upstream, downstream) =
+                            (self.pressure_at(from, state), self.pressure_at(to, state));
+                        here.pass(from, to, gas.mass_flow(area, upstream, downstream));
+                    }
+                }
+                Flow::Inflow(node) => {
+                    let at = self.at_node(node, state, controls, here);
+                    here.pass(Node::Ambient, node, effect.inflow(&at, self.own(acting, state)));
+                }
+            }
+        }
+    }
+
+    /// Rate of a supply's pressure with the effects on it [Pa/s].
+    #[inline(never)]
+    fn altered_supply(&self, k: usize, state: &[S], drawn: S, rt: f64, set: S) -> S {
+        let pressure = state[self.layout.supply(k)];
+        let (mut drawn, mut set) = (drawn, set);
+        for acting in &self.rig.wiring.ports.feed[k] {
+            self.effect(acting).feed(self.own(acting, state), pressure, &mut drawn, &mut set);
+        }
+        self.supplies[k].pressure_rate(pressure, drawn, rt, set)
+    }
+
+    #[inline(always)]
+    pub(super) fn gas_rates(
+        &self,
+        state: &[S],
+        controls: &Controls<S>,
+        here: &mut Scratch<S>,
+        out: &mut [S],
+    ) {
+        let (gas, layout) = (&self.rig.gas, &self.layout);
+        let rt = gas.gas_constant * gas.temperature;
+        for (k, supply) in self.supplies.iter().enumerate() {
+            let set = controls.set_pressure[k];
+            out[layout.supply(k)] = if self.supplies_altered {
+                self.altered_supply(k, state, here.drawn[k], rt, set)
+            } else {
+                supply.pressure_rate(state[layout.supply(k)], here.drawn[k], rt, set)
+            };
+        }
+        for k in 0..layout.gases {
+            let chamber = ChamberState {
+                pressure: state[layout.pressure(k)],
+                volume: here.volume[k],
+                volume_rate: here.volume_rate[k],
+                inflow: here.inflow[k],
+                outflow: here.outflow[k],
+            };
+            out[layout.mass(k)] = chamber.inflow - chamber.outflow;
+            let fixed = pressure_rate(&chamber, &self.alphas[k], rt);
+            out[layout.pressure(k)] = match &self.rig.wiring.ports.balance[k] {
+                None => fixed,
+                Some(acting) => {
+                    let mass = state[layout.mass(k)];
+                    let (rate, more) = self.effect(acting).balance(gas, &chamber, here.wall[k], mass, fixed);
+                    out[layout.mass(k)] += more;
+                    rate
+                }
+            };
+        }
+    }
+}
+
+impl<S: Scalar> Scratch<S> {
+    /// A mass flow along the arrow; what goes against it goes out of its end and into its beginning.
+    #[inline]
+    pub(super) fn pass(&mut self, from: Node, to: Node, flow: S) {
+        let (giver, taker, flow) = if flow.re() >= 0.0 { (from, to, flow) } else { (to, from, -flow) };
+        self.take(giver, flow);
+        self.give(taker, flow);
+    }
+
+    #[inline]
+    pub(super) fn take(&mut self, node: Node, flow: S) {
+        match node {
+            Node::Ambient => self.vented -= flow,
+            Node::Supply(k) => self.drawn[k] += flow,
+            Node::Gas(k) => self.outflow[k] += flow,
+        }
+    }
+
+    #[inline]
+    fn give(&mut self, node: Node, flow: S) {
+        match node {
+            Node::Ambient => self.vented += flow,
+            Node::Supply(k) => self.drawn[k] -= flow,
+            Node::Gas(k) => self.inflow[k] += flow,
+        }
+    }
+}
+
+impl Plant<'_, f64> {
+    /// Pressure ratio (1 where nothing can flow) and critical ratio of each valve and line.
+    pub(crate) fn ratios<'b>(
+        &'b self,
+        state: &'b [f64],
+        controls: &'b Controls<f64>,
+    ) -> impl Iterator<Item = (f64, f64)> + 'b {
+        let gas = &self.rig.gas;
+        let ratio = |a: f64, b: f64| a.min(b) / a.max(b).max(f64::MIN_POSITIVE);
+        let valves = self.rig.wiring.valves.iter().zip(&self.valves).zip(&controls.spool);
+        let valves = valves.map(move |((unit, valve), spool)| {
+            let here = state[self.layout.pressure(unit.to)];
+            let other = if *spool > 0.0 { self.pressure_at(unit.from, state) } else { gas.ambient_pressure };
+            let open = valve.area * unit.table.eval(spool.abs()) > 0.0;
+            (if open { ratio(here, other) } else { 1.0 }, gas.critical_ratio())
+        });
+        let lines = self.rig.wiring.lines.iter().zip(&self.lines).map(move |(unit, line)| {
+            let critical = match line {
+                Line::Orifice(_) => gas.critical_ratio(),
+                Line::Tube(tube) => tube.critical_ratio(),
+            };
+            (ratio(self.pressure_at(unit.from, state), self.pressure_at(unit.to, state)), critical)
+        });
+        valves.chain(lines)
+    }
+
+    /// Fastest rate of the gas [1/s], and the gas that it is in (none for a supply): a bound by Gershgorin's rows, every
+    /// valve open, next to equal pressures.
+    pub(crate) fn fastest_gas(&self) -> (f64, Option<usize>) {
+        let (wiring, gas) = (&self.rig.wiring, &self.rig.gas);
+        let rt = gas.gas_constant * gas.temperature;
+        let mut steepest = vec![0.0; wiring.gases.len()];
+        let mut drawn = vec![0.0; wiring.supplies.len()];
+        let mut add = |node: Node, other: Node, slope: f64| {
+            // The other end answers with the same slope where its pressure is a state.
+            let twice = if matches!(other, Node::Ambient) { slope } else { 2.0 * slope };
+            match node {
+                Node::Gas(k) => steepest[k] += twice,
+                Node::Supply(k) => drawn[k] += twice,
+                Node::Ambient => {}
+            }
+        };
+        for (unit, valve) in wiring.valves.iter().zip(&self.valves) {
+            let slope = gas.steepest(valve.area * unit.table.eval(1.0));
+            add(Node::Gas(unit.to), unit.from, slope);
+            add(unit.from, Node::Gas(unit.to), slope);
+        }
+        for (unit, line) in wiring.lines.iter().zip(&self.lines) {
+            let slope = match line {
+                Line::Orifice(area) => gas.steepest(*area),
+                Line::Tube(tube) => tube.steepest(),
+            };
+            add(unit.from, unit.to, slope);
+            add(unit.to, unit.from, slope);
+        }
+        for (flow, acting) in &wiring.ports.flows {
+            if let Flow::Clearance(valve) = *flow {
+                let slope = self.effect(acting).steepest(gas, &self.extremes(0));
+                let unit = &wiring.valves[valve];
+                add(Node::Gas(unit.to), unit.from, slope);
+                add(unit.from, Node::Gas(unit.to), slope);
+                add(Node::Gas(unit.to), Node::Ambient, slope);
+            }
+        }
+        let mut worst =
+            (self.fastest_effect(|place| matches!(place, Place::Supply(_) | Place::Gas(_))), None);
+        for (k, slope) in steepest.iter().enumerate() {
+            let alpha = self.alphas[k].inflow.max(self.alphas[k].outflow).max(gas.gamma);
+            let (volume, wall) = self.least_volume(k);
+            let leak = self.steepest_flows(Node::Gas(k));
+            let rate = alpha * rt * (slope + leak) / volume + self.wall_rate(k, volume, wall);
+            if rate > worst.0 {
+                worst = (rate, Some(k));
+            }
+        }
+        for (k, (supply, slope)) in self.supplies.iter().zip(&drawn).enumerate() {
+            let rate = supply.fastest(*slope + self.steepest_flows(Node::Supply(k)), rt);
+            if rate > worst.0 {
+                worst = (rate, None);
+            }
+        }
+        worst
+    }
+
+    /// Largest change of what effects let in or out per pressure of a block [kg/(s Pa)].
+    fn steepest_flows(&self, node: Node) -> f64 {
+        let wiring = &self.rig.wiring;
+        let valves = wiring.valves.iter().filter(|v| v.from == node || Node::Gas(v.to) == node).count();
+        let most = self.extremes(valves);
+        let at = |flow: &Flow| matches!(flow, Flow::Leak(n) | Flow::Inflow(n) if *n == node);
+        let flows = wiring.ports.flows.iter().filter(|(flow, _)| at(flow));
+        flows.map(|(_, acting)| self.effect(acting).steepest(&self.rig.gas, &most)).sum()
+    }
+
+    /// Extremes of a block of the air.
+    fn extremes(&self, valves: usize) -> Extremes {
+        let (pressure, ambient) = (self.rig.highest_pressure(), self.rig.gas.ambient_pressure);
+        Extremes { pressure, ambient, angles: (0.0, 0.0), contraction: 0.0, valves }
+    }
+
+    /// Rate at which a gas takes the temperature of its wall [1/s], with the least of it: at ambient pressure.
+    fn wall_rate(&self, gas: usize, volume: f64, wall: f64) -> f64 {
+        let balance = self.rig.wiring.ports.balance[gas].as_ref();
+        balance.map_or(0.0, |acting| self.effect(acting).wall_rate(&self.rig.gas, volume, wall))
+    }
+
+    /// Fastest rate of what effects move by themselves at some blocks [1/s].
+    pub(super) fn fastest_effect(&self, here: impl Fn(Place) -> bool) -> f64 {
+        let all = self.rig.wiring.ports.integrated().filter(|(place, _)| here(*place));
+        all.map(|(_, acting)| self.effect(&acting).fastest()).fold(0.0, f64::max)
+    }
+
+    /// Fastest rate on the way from commands to openings [1/s].
+    pub(crate) fn fastest_command(&self) -> f64 {
+        let all = self.rig.wiring.ports.command.iter().flatten();
+        all.map(|acting| self.effect(acting).fastest()).fold(0.0, f64::max)
+    }
+
+    /// Least volume of a gas over the range of its muscles [m3], with the largest wall [m2].
+    fn least_volume(&self, gas: usize) -> (f64, f64) {
+        let (mut volume, mut wall) = (self.fixed_volume[gas], 0.0);
+        for group in self.rig.wiring.groups.iter().filter(|g| g.chamber == gas) {
+            let (low, high) = self.rig.range(group);
+            let (mut least, mut most) = (f64::INFINITY, 0.0_f64);
+            for i in 0..=32 {
+                let contraction = low + (high - low) * f64::from(i) / 32.0;
+                let here = group.muscle.table.eval(contraction).volume.max(0.0);
+                least = least.min(here);
+                let length = (1.0 - contraction) * group.rest_length;
+                most = most.max(cylinder_area(group.count, here, length));
+            }
+            volume += least * group.count;
+            wall += most;
+        }
+        let volume = volume.max(f64::MIN_POSITIVE);
+        (volume, if wall > 0.0 { wall } else { cube_area(volume) })
+    }
+}

@@ -1,0 +1,149 @@
+//! Commands as the valves and regulators see them, within a step and from one step to the next, and where effects begin.
+
+use super::ports::{moves, Acting};
+use super::rates::{Controls, Plant};
+use super::units::SupplyUnit;
+use crate::blocks::supply::Supply;
+use crate::blocks::valve::spool_position;
+use crate::effects::clock_skew::held_mean;
+use crate::scalar::{constant, Scalar};
+
+impl<S: Scalar> Plant<'_, S> {
+    /// Commands [V, Pa gauge] of one sample, in the order of the rig's inputs.
+    pub fn controls(&self, commands: impl Fn(usize) -> f64) -> Controls<S> {
+        let wiring = &self.rig.wiring;
+        let mut regulator = wiring.valves.len();
+        let spec = self.rig.spec();
+        let set_pressure = wiring.supplies.iter().zip(&spec.supplies).map(|(unit, supply)| match unit {
+            SupplyUnit::Regulator { .. } => {
+                regulator += 1;
+                self.set_pressure(commands(regulator - 1))
+            }
+            _ => self.set_pressure(supply.initial_pressure),
+        });
+        let set_pressure = set_pressure.collect();
+        let spool = (0..wiring.valves.len()).map(|k| self.opened(k, self.commanded(k, commands(k))));
+        Controls { set_pressure, spool: spool.collect(), time: 0.0 }
+    }
+
+    fn set_pressure(&self, gauge: f64) -> S {
+        constant(gauge + self.rig.gas.ambient_pressure)
+    }
+
+    /// Normalised position that a command asks of a valve.
+    fn commanded(&self, valve: usize, command: f64) -> S {
+        spool_position(command, self.valves[valve].null, self.rig.wiring.valves[valve].half_range)
+    }
+
+    /// The position that opens a valve, for the commanded one; where something on the way moves by itself it is left as it is.
+    fn opened(&self, valve: usize, commanded: S) -> S {
+        let path = &self.rig.wiring.ports.command[valve];
+        if moves(path) {
+            return commanded;
+        }
+        path.iter().fold(commanded, |x, acting| self.effect(acting).position(&[], x, 0.0))
+    }
+
+    /// Whether commands act later than they are recorded.
+    pub fn skewed(&self) -> bool {
+        !self.rig.wiring.ports.clock.is_empty()
+    }
+
+    /// How late pressures and angles are recorded at a time [s]; negative where their clock is ahead.
+    pub fn skew(&self, time: f64) -> (S, S) {
+        let none = (constant(0.0), constant(0.0));
+        self.rig.wiring.ports.clock.iter().fold(none, |(pressures, angles), acting| {
+            let (more, later) = self.effect(acting).clock(time);
+            (pressures + more, angles + later)
+        })
+    }
+
+    /// Commands over a step that begins at a time [s], later by a shift [s]; `command` gives those of a sample.
+    pub fn skewed_controls(
+        &self,
+        shift: S,
+        time: f64,
+        step: f64,
+        sample_time: f64,
+        command: impl Fn(usize, i64) -> f64,
+    ) -> Controls<S> {
+        let wiring = &self.rig.wiring;
+        let mut controls = self.controls(|_| 0.0);
+        for (k, spool) in controls.spool.iter_mut().enumerate() {
+            let position = |sample| self.commanded(k, command(k, sample));
+            let mean = held_mean(position, time, step, sample_time, shift);
+            *spool = self.opened(k, mean);
+        }
+        let mut input = wiring.valves.len();
+        for (unit, set) in wiring.supplies.iter().zip(&mut controls.set_pressure) {
+            if matches!(unit, SupplyUnit::Regulator { .. }) {
+                let pressure = |sample| self.set_pressure(command(input, sample));
+                *set = held_mean(pressure, time, step, sample_time, shift);
+                input += 1;
+            }
+        }
+        controls
+    }
+
+    /// What an instant of a step sees of its controls: `age` after the step began at `time` [s], the state being that of the
+    /// beginning.
+    pub fn stage(&self, state: &[S], controls: &Controls<S>, time: f64, age: f64, out: &mut Controls<S>) {
+        out.set_pressure.clone_from(&controls.set_pressure);
+        out.spool.clone_from(&controls.spool);
+        out.time = time + age;
+        for (k, path) in self.rig.wiring.ports.command.iter().enumerate().filter(|(_, path)| moves(path)) {
+            out.spool[k] = path.iter().fold(out.spool[k], |x, acting| {
+                self.effect(acting).position(self.own(acting, state), x, age)
+            });
+        }
+    }
+
+    /// What effects do between steps: from one state to that a step [s] later, which they complete.
+    pub fn discrete_update(&self, before: &[S], state: &mut [S], controls: &Controls<S>, step: f64) {
+        let ports = &self.rig.wiring.ports;
+        for (k, path) in ports.command.iter().enumerate().filter(|(_, path)| moves(path)) {
+            let mut position = controls.spool[k];
+            for acting in path {
+                let own = self.own_mut(acting, state);
+                own.copy_from_slice(self.own(acting, before));
+                position = self.effect(acting).follow(own, position, step);
+            }
+        }
+        for (k, feed) in ports.feed.iter().enumerate() {
+            for acting in feed.iter().filter(|acting| acting.count > 0) {
+                self.switch(k, acting, before, state, step);
+            }
+        }
+    }
+
+    /// What fills a tank may have switched on or off in a step: its gas for the part of the step after that.
+    fn switch(&self, supply: usize, acting: &Acting, before: &[S], state: &mut [S], step: f64) {
+        let gas = &self.rig.gas;
+        let place = self.layout.supply(supply);
+        let (from, to) = (before[place], state[place]);
+        let own = self.own_mut(acting, state);
+        let (Some((flow, time)), Supply::Tank(volume)) =
+            (self.effect(acting).switched(gas, own, from, to, step), &self.supplies[supply])
+        else {
+            return;
+        };
+        let given = flow * (time.abs() * (gas.gas_constant * gas.temperature)) / *volume;
+        if time < 0.0 {
+            state[place] -= given;
+        } else {
+            state[place] += given;
+        }
+    }
+
+    /// What sensors read at the end of a step [s], written to the state; `ends` are the controls at its beginning and its end.
+    pub fn read(&self, before: &[S], state: &mut [S], ends: [&Controls<S>; 2], step: f64) {
+        let (wiring, layout) = (&self.rig.wiring, &self.layout);
+        self.read_taps(state, ends[1]);
+        for (k, reading) in wiring.ports.reading.iter().enumerate() {
+            let Some(acting) = reading else { continue };
+            let place = layout.effect(acting.first);
+            let (from, to) = (self.at_sensor(k, before, ends[0]), self.at_sensor(k, state, ends[1]));
+            state[place] = self.effect(acting).read(before[place], from, to, step);
+        }
+    }
+}

@@ -1,0 +1,273 @@
+//! The arm with the effects that act on it: torques of their own, another payload, a cord, a base that gives way.
+
+use num_dual::Dual64;
+
+use super::body::Body;
+use super::ports::{Acting, Place};
+use super::rates::{Plant, Scratch};
+use super::units::{BodyUnit, Group};
+use crate::effects::payload_swing::Cord;
+use crate::effects::Extremes;
+use crate::error::check_range;
+use crate::muscle::slip::STUCK;
+use crate::scalar::{constant, Scalar};
+use crate::{Error, Result};
+use std::borrow::Cow;
+
+/// Points of a range at which its largest moment arm is looked for, less one.
+const ARM_POINTS: u32 = 16;
+
+impl<S: Scalar> Plant<'_, S> {
+    /// Accelerations of the coordinates and of what effects move beside them.
+    #[inline(never)]
+    pub(super) fn altered_motion(&self, state: &[S], time: f64, here: &mut Scratch<S>, out: &mut [S]) {
+        let (layout, ports) = (&self.layout, &self.rig.wiring.ports);
+        let (angles, rates) = state[layout.angle(0)..layout.effect(0)].split_at(layout.coordinates);
+        let [pose, turn, load, column] = &mut here.arm;
+        pose.copy_from_slice(angles);
+        turn.copy_from_slice(rates);
+        load.copy_from_slice(&here.torque);
+        for (k, load) in load.iter_mut().enumerate() {
+            *load = self.joint_torque(k, *load, state);
+        }
+        let reaction = ports.mounting.as_ref().map(|acting| {
+            let own = self.own(acting, state);
+            pose[0] += own[0];
+            turn[0] += own[1];
+            // Friction and stops belong to the joint, whatever the base does.
+            let joint = self.body.passive(0, angles[0], rates[0]);
+            let exchanged = load[0] + joint;
+            load[0] += joint - self.body.passive(0, pose[0], turn[0]);
+            self.effect(acting).mounting(own, exchanged)
+        });
+        for (load, push) in load.iter_mut().zip(&ports.push) {
+            for acting in push {
+                *load += self.effect(acting).push(time);
+            }
+        }
+        let body = self.carrying(time);
+        let accelerations = layout.rate(0)..layout.effect(0);
+        body.accelerations(pose, turn, load, &mut out[accelerations.clone()]);
+        if let Some((link, acting)) = &ports.hanging {
+            let gravity = body.gravity();
+            if let Some(cord) = self.effect(acting).cord(gravity, self.own(acting, state)) {
+                let mass = self.effect(acting).hanging() * self.payload(*link, time);
+                let moving = [pose, turn, column];
+                let felt = hang(&body, *link, &cord, mass, gravity, moving, &mut out[accelerations]);
+                let rates = [self.own(acting, state)[1], cord.acceleration(felt)];
+                self.own_mut(acting, out).copy_from_slice(&rates);
+            }
+        }
+        if let (Some(acting), Some(acceleration)) = (&ports.mounting, reaction) {
+            out[layout.rate(0)] -= acceleration;
+            let rates = [self.own(acting, state)[1], acceleration];
+            self.own_mut(acting, out).copy_from_slice(&rates);
+        }
+    }
+
+    /// Torque of a joint with those of the effects on it [N m].
+    #[inline]
+    fn joint_torque(&self, coordinate: usize, load: S, state: &[S]) -> S {
+        let here = &self.rig.wiring.ports.torque[coordinate];
+        if here.is_empty() {
+            return load;
+        }
+        let at = self.at_joint(coordinate, state);
+        here.iter().fold(load, |load, acting| load + self.effect(acting).torque(&at, self.own(acting, state)))
+    }
+
+    /// Payload at the end of a link [kg] (the mass of a linear load) at a time [s].
+    fn payload(&self, link: usize, time: f64) -> S {
+        let changes = self.rig.wiring.ports.payload.iter().filter(|(changed, _)| *changed == link);
+        changes
+            .fold(self.body.payload(link), |payload, (_, acting)| payload + self.effect(acting).payload(time))
+    }
+
+    /// The body with the payloads that its links carry rigidly at a time [s].
+    fn carrying(&self, time: f64) -> Cow<'_, Body<S>> {
+        let ports = &self.rig.wiring.ports;
+        let mut body = Cow::Borrowed(&self.body);
+        for (link, _) in &ports.payload {
+            body = Cow::Owned(body.with_payload(*link, self.payload(*link, time)));
+        }
+        if let Some((link, acting)) = &ports.hanging {
+            let rigid = self.payload(*link, time) * (-self.effect(acting).hanging() + 1.0);
+            body = Cow::Owned(body.with_payload(*link, rigid));
+        }
+        body
+    }
+}
+
+/// Hang a mass on the end of a link: correct the accelerations of the body for its pull. What the cord's upper end feels [m/s2].
+fn hang<S: Scalar>(
+    body: &Body<S>,
+    link: usize,
+    cord: &Cord<S>,
+    mass: S,
+    gravity: f64,
+    [pose, turn, column]: [&mut Vec<S>; 3],
+    out: &mut [S],
+) -> [S; 2] {
+    let (sides, own) = body.end(link, pose, turn);
+    let along = |v: &[S; 2]| v[0] * cord.along[0] + v[1] * cord.along[1];
+    // The pull is linear in the accelerations: mass (column . q'') column on the left, the rest on the right.
+    let steady = along(&[own[0], own[1] + gravity]) - cord.centripetal;
+    for (entry, side) in column.iter_mut().zip(&sides) {
+        let across = side[0] * cord.across[0] + side[1] * cord.across[1];
+        *entry = mass * (across * cord.damping - along(side) * steady);
+    }
+    let (direct, unit) = (body.response(pose, column), sides.iter().map(along).collect::<Vec<S>>());
+    let answer = body.response(pose, &unit);
+    let zero = constant::<S>(0.0);
+    let (mut moved, mut mobility) = (zero, zero);
+    for k in 0..out.len() {
+        out[k] += direct[k];
+        moved += unit[k] * out[k];
+        mobility += unit[k] * answer[k];
+    }
+    let share = mass * moved / (mass * mobility + 1.0);
+    let mut felt = [own[0], own[1] + gravity];
+    for k in 0..out.len() {
+        out[k] -= answer[k] * share;
+        felt[0] += sides[k][0] * out[k];
+        felt[1] += sides[k][1] * out[k];
+    }
+    felt
+}
+
+impl Plant<'_, f64> {
+    /// Refuse masses that are not possible: an arm without inertia, more taken away from a payload than is there.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] that names what is too small.
+    pub(crate) fn check_masses(&self) -> Result<()> {
+        let wiring = &self.rig.wiring;
+        if let BodyUnit::OneLink { inertia, payload, length, .. } = &wiring.body {
+            let total = self.values[*inertia] + self.values[*payload] * length.powi(2);
+            check_range("arm.inertia + payload length^2", total, 1e-9, 1e9, "kg m2")?;
+        }
+        let least = if matches!(wiring.body, BodyUnit::Mass { .. }) { 1e-6 } else { 0.0 };
+        for (link, acting) in &wiring.ports.payload {
+            let now = self.body.payload(*link);
+            let changes = wiring.ports.payload.iter().filter(|(changed, _)| changed == link);
+            let taken: f64 = changes.map(|(_, a)| self.effect(a).payload(f64::INFINITY).min(0.0)).sum();
+            if now + taken < least {
+                let effect = &wiring.ports.effects[acting.effect];
+                let name = format!("{}.{}", effect.name, effect.form.parameters[0].name);
+                let allowed = format!("at least {} kg: no more can be taken away than is there", least - now);
+                return Err(Error::parameter(name, self.effect(acting).payload(f64::INFINITY), allowed));
+            }
+        }
+        Ok(())
+    }
+
+    /// Fastest rate of the body [1/s], and of what effects move beside it.
+    pub(crate) fn fastest_body(&self) -> f64 {
+        let (wiring, ports) = (&self.rig.wiring, &self.rig.wiring.ports);
+        let spring = |k| {
+            let (damping, stiffness) = self.resistance(k);
+            (damping, stiffness + self.stiffness(k))
+        };
+        let mut loads: Vec<(f64, f64)> = (0..wiring.coordinates.len()).map(spring).collect();
+        loads.resize(wiring.coordinates.len().max(1), (0.0, 0.0));
+        let mounting = ports.mounting.as_ref().map(|acting| self.effect(acting));
+        let (mobility, own) = mounting.map_or((0.0, 0.0), |base| (base.mobility(), base.fastest()));
+        let mut bodies = vec![self.carrying(f64::NEG_INFINITY)];
+        if !ports.payload.is_empty() {
+            bodies.push(self.carrying(f64::INFINITY));
+        }
+        let body = |b: &Cow<'_, Body<f64>>| b.fastest(&loads, mobility);
+        let mut fastest = bodies.iter().map(body).fold(own, f64::max);
+        if let Some((link, acting)) = &ports.hanging {
+            let effect = self.effect(acting);
+            let heaviest = self.payload(*link, f64::NEG_INFINITY).max(self.payload(*link, f64::INFINITY));
+            let ratio = |b: &Cow<'_, Body<f64>>| effect.hanging() * heaviest * b.end_mobility(*link);
+            let ratio = bodies.iter().map(ratio).fold(0.0, f64::max);
+            fastest = fastest.max(effect.swing_rate(self.body.gravity(), ratio));
+        }
+        fastest.max(self.fastest_effect(|place| matches!(place, Place::Group(_) | Place::Joint(_))))
+    }
+
+    /// Largest stiffness [N m/rad] of what pulls on a coordinate, over its range, at the highest pressure.
+    fn stiffness(&self, coordinate: usize) -> f64 {
+        let wiring = &self.rig.wiring;
+        let pressure = self.rig.highest_pressure();
+        let gauge = pressure - self.rig.gas.ambient_pressure;
+        let mut total = 0.0;
+        for (k, group) in wiring.groups.iter().enumerate().filter(|(_, g)| g.coordinate == coordinate) {
+            let (low, high) = self.rig.angles(group);
+            let mut most = 0.0_f64;
+            for i in 0..=32 {
+                let angle = Dual64::new(low + (high - low) * f64::from(i) / 32.0, 1.0);
+                let point = group.joint.eval(angle);
+                let table = group.muscle.table.eval(point.shortening / group.rest_length);
+                let torque =
+                    table.force(Dual64::from(gauge), Dual64::from(self.scales[k])) * point.torque_arm;
+                let arm = point.moment_arm.re.abs();
+                let volume = (self.fixed_volume[group.chamber] + table.volume.re.max(0.0) * group.count)
+                    .max(f64::MIN_POSITIVE);
+                let swept = table.volume_slope.re * arm * group.count / group.rest_length;
+                let air = self.alphas[group.chamber].volume * pressure * swept * swept / volume;
+                let friction = self.presliding_stiffness(
+                    k,
+                    group,
+                    table.force(Dual64::from(gauge), Dual64::from(1.0)).re.abs(),
+                    gauge,
+                );
+                most = most.max(group.count * (torque.eps.abs() + friction * arm * arm) + air);
+            }
+            total += most;
+        }
+        total
+    }
+
+    /// Stiffness of one muscle's friction before it slips [N/m]: every element of the bank still sticks.
+    fn presliding_stiffness(&self, k: usize, group: &Group, force: f64, gauge: f64) -> f64 {
+        let mut total = 0.0;
+        if group.direction {
+            let spec = &group.muscle.exact.spec;
+            let width = spec.friction_coefficient.abs() + (spec.friction_pressure_slope * gauge).abs();
+            total += width.max(spec.friction_floor) * force * STUCK / group.muscle.presliding();
+        }
+        for acting in &self.rig.wiring.ports.muscles[k].force {
+            total += self.effect(acting).presliding(gauge);
+        }
+        total
+    }
+
+    /// Damping and stiffness that effects add to a coordinate at most, those on its muscles included.
+    fn resistance(&self, coordinate: usize) -> (f64, f64) {
+        let wiring = &self.rig.wiring;
+        let stops = wiring.coordinates[coordinate].stops;
+        let angles = stops.map_or((0.0, 0.0), |s| (s.min_angle, s.max_angle));
+        let most = self.reach(angles, 0.0);
+        let (mut damping, mut stiffness) = self.summed(&wiring.ports.torque[coordinate], &most);
+        for (k, group) in wiring.groups.iter().enumerate().filter(|(_, g)| g.coordinate == coordinate) {
+            let (low, high) = self.rig.angles(group);
+            let share = |i: u32| low + (high - low) * f64::from(i) / f64::from(ARM_POINTS);
+            let points = (0..=ARM_POINTS).map(|i| group.joint.eval(share(i)));
+            let (arm, contracted) = points.fold((0.0_f64, 0.0_f64), |(arm, contracted), point| {
+                (arm.max(point.moment_arm.abs()), contracted.max(point.shortening / group.rest_length))
+            });
+            let side = group.count * arm * arm;
+            let most = self.reach(angles, contracted);
+            let (rubbing, contact) = self.summed(&wiring.ports.muscles[k].force, &most);
+            damping += rubbing * side;
+            stiffness += contact / group.rest_length * side;
+        }
+        (damping, stiffness)
+    }
+
+    fn summed(&self, acting: &[Acting], most: &Extremes) -> (f64, f64) {
+        acting
+            .iter()
+            .map(|acting| self.effect(acting).resistance(most))
+            .fold((0.0, 0.0), |sum, here| (sum.0 + here.0, sum.1 + here.1))
+    }
+
+    /// Extremes of a joint or of a muscle on it.
+    fn reach(&self, angles: (f64, f64), contraction: f64) -> Extremes {
+        let (pressure, ambient) = (self.rig.highest_pressure(), self.rig.gas.ambient_pressure);
+        Extremes { pressure, ambient, angles, contraction, valves: 0 }
+    }
+}

@@ -1,0 +1,155 @@
+//! What the muscles pull, with what they remember and what effects make of it.
+
+use super::memory::Memory;
+use super::rates::Plant;
+use super::units::Group;
+use crate::blocks::joint::JointPoint;
+use crate::effects::AtMuscle;
+use crate::muscle::TablePoint;
+use crate::scalar::{constant, Scalar};
+
+/// One group at one instant.
+pub(super) struct MuscleForce<S> {
+    pub contraction: S,
+    /// Of all its muscles [N].
+    pub force: S,
+    pub moment_arm: S,
+    pub torque_arm: S,
+    pub table: TablePoint<S>,
+}
+
+impl<S: Scalar> Plant<'_, S> {
+    #[inline(always)]
+    pub(super) fn muscle_force(
+        &self,
+        k: usize,
+        group: &Group,
+        state: &[S],
+        memory: &Memory<S>,
+        start: S,
+    ) -> MuscleForce<S> {
+        let point = group.joint.eval(state[self.layout.angle(group.coordinate)]);
+        let contraction = point.shortening / group.rest_length;
+        let table = group.muscle.table.eval(contraction);
+        let gauge = state[self.layout.pressure(group.chamber)] - self.rig.gas.ambient_pressure;
+        let scale = self.scales[k];
+        let force = if self.rig.wiring.ports.muscles[k].some {
+            self.altered_force(k, group, state, memory, start, &point, &table)
+        } else {
+            let force = table.force(gauge, scale);
+            self.directed(group, memory, start, contraction, gauge, scale, force)
+        };
+        MuscleForce {
+            contraction,
+            force: force * group.count,
+            moment_arm: point.moment_arm,
+            torque_arm: point.torque_arm,
+            table,
+        }
+    }
+
+    /// The force of one muscle for the way in which it has been moving.
+    #[inline(always)]
+    #[allow(clippy::too_many_arguments)]
+    fn directed(
+        &self,
+        group: &Group,
+        memory: &Memory<S>,
+        start: S,
+        contraction: S,
+        gauge: S,
+        scale: S,
+        force: S,
+    ) -> S {
+        if !group.direction {
+            return force;
+        }
+        let stretched = (start - contraction) * group.rest_length;
+        let slip = memory.direction.moved(stretched, constant(group.muscle.presliding()));
+        group.muscle.moving(force, contraction, gauge, scale, slip.mean())
+    }
+
+    /// Force of one muscle with the effects on its group.
+    #[inline(never)]
+    #[allow(clippy::too_many_arguments)]
+    fn altered_force(
+        &self,
+        k: usize,
+        group: &Group,
+        state: &[S],
+        memory: &Memory<S>,
+        start: S,
+        point: &JointPoint<S>,
+        table: &TablePoint<S>,
+    ) -> S {
+        let here = &self.rig.wiring.ports.muscles[k];
+        let scale = self.scales[k];
+        let mut at = self.at_muscle(group, state, point);
+        at.stretched = (start - at.contraction) * group.rest_length;
+        for acting in &here.gauge {
+            at.gauge = self.effect(acting).gauge(at.gauge);
+        }
+        let mut force = table.force(at.gauge, scale);
+        for acting in &here.bladder {
+            let bladder = scale * (at.gauge * table.a_elastic + table.b_elastic);
+            force += self.effect(acting).bladder(self.own(acting, state), bladder, at.contraction);
+        }
+        force = self.directed(group, memory, start, at.contraction, at.gauge, scale, force);
+        for acting in &here.force {
+            force += self.effect(acting).force(&at, self.own(acting, state));
+        }
+        force
+    }
+
+    /// What effects see of a group of muscles that have not moved since the step began.
+    fn at_muscle(&self, group: &Group, state: &[S], point: &JointPoint<S>) -> AtMuscle<S> {
+        AtMuscle {
+            gauge: state[self.layout.pressure(group.chamber)] - self.rig.gas.ambient_pressure,
+            contraction: point.shortening / group.rest_length,
+            length: -point.shortening + group.rest_length,
+            rate: -(point.moment_arm * state[self.layout.rate(group.coordinate)]),
+            stretched: constant(0.0),
+        }
+    }
+
+    /// The same for a group by its number.
+    pub(super) fn at_group(&self, k: usize, state: &[S]) -> AtMuscle<S> {
+        let group = &self.rig.wiring.groups[k];
+        let point = group.joint.eval(state[self.layout.angle(group.coordinate)]);
+        self.at_muscle(group, state, &point)
+    }
+
+    /// Contraction ratio of each group at a state.
+    pub fn contractions(&self, state: &[S], out: &mut [S]) {
+        for (out, group) in out.iter_mut().zip(&self.rig.wiring.groups) {
+            *out =
+                group.joint.eval(state[self.layout.angle(group.coordinate)]).shortening / group.rest_length;
+        }
+    }
+
+    /// Memories of muscles that have not moved.
+    pub fn fresh_memory(&self) -> Vec<Memory<S>> {
+        vec![Memory::default(); self.rig.wiring.groups.len()]
+    }
+
+    /// Memories, and the states of effects that follow the muscles, after a step that moved these between contraction ratios.
+    pub fn follow_muscles(&self, state: &mut [S], memory: &mut [Memory<S>], from: &[S], to: &[S]) {
+        for (k, group) in self.rig.wiring.groups.iter().enumerate() {
+            if group.direction {
+                let stretched = (from[k] - to[k]) * group.rest_length;
+                memory[k].direction =
+                    memory[k].direction.moved(stretched, constant(group.muscle.presliding()));
+            }
+        }
+        for (k, acting) in self.rig.wiring.ports.follow_muscles() {
+            let rest = self.rig.wiring.groups[k].rest_length;
+            self.effect(&acting).moved(self.own_mut(&acting, state), from[k], to[k], rest);
+        }
+    }
+
+    /// Whether any muscle remembers its motion.
+    pub fn remembers(&self) -> bool {
+        let wiring = &self.rig.wiring;
+        wiring.groups.iter().any(|g| g.direction) || wiring.ports.follow_muscles().next().is_some()
+    }
+}

@@ -1,0 +1,428 @@
+//! Which effect acts where: each at the ports of the blocks that it was put on, with its states there.
+
+use super::parameters::{ParameterId, Parameters};
+use super::units::{BodyUnit, Node, SupplyUnit, Wiring};
+use super::wiring::model;
+use super::wiring_motion::coordinate_names;
+use crate::description::{dotted, EffectSpec, RigSpec};
+use crate::effects::{EffectInfo, Form, Port, Role};
+use crate::Result;
+
+/// An effect that is switched on.
+#[derive(Debug, Clone)]
+pub(crate) struct Instance {
+    pub info: &'static EffectInfo,
+    pub form: &'static Form,
+    /// Name in front of its parameters: its id, and the block behind a dot where another of its kind is there.
+    pub name: String,
+    pub parameters: Vec<ParameterId>,
+}
+
+/// An effect at one block: which one, and its states there among those of all effects.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Acting {
+    pub effect: usize,
+    pub first: usize,
+    pub count: usize,
+}
+
+/// The block that an effect acts on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Place {
+    Supply(usize),
+    Valve(usize),
+    Gas(usize),
+    Group(usize),
+    Joint(usize),
+    /// The arm as a whole, or the clock.
+    Whole,
+}
+
+/// How gas passes by the valves and lines.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Flow {
+    Leak(Node),
+    Clearance(usize),
+    Inflow(Node),
+}
+
+/// Effects at a group of muscles.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct MusclePorts {
+    /// Any of them.
+    pub some: bool,
+    pub gauge: Vec<Acting>,
+    pub bladder: Vec<Acting>,
+    pub force: Vec<Acting>,
+}
+
+/// Effects by the ports at which they act, in the order in which they act there.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Ports {
+    pub effects: Vec<Instance>,
+    /// Everything that acts somewhere.
+    pub all: Vec<(Place, Acting)>,
+    /// Of each valve.
+    pub command: Vec<Vec<Acting>>,
+    pub passage: Vec<Option<Acting>>,
+    pub flows: Vec<(Flow, Acting)>,
+    /// Of each supply.
+    pub feed: Vec<Vec<Acting>>,
+    /// Of each gas.
+    pub balance: Vec<Option<Acting>>,
+    pub reading: Vec<Option<Acting>>,
+    /// Of each gas the first valve with something between it and the gas.
+    pub tap: Vec<Option<(usize, Acting)>>,
+    /// Of each group of muscles.
+    pub muscles: Vec<MusclePorts>,
+    /// Of each coordinate.
+    pub torque: Vec<Vec<Acting>>,
+    pub push: Vec<Vec<Acting>>,
+    /// With the link at whose end they act.
+    pub payload: Vec<(usize, Acting)>,
+    pub hanging: Option<(usize, Acting)>,
+    pub mounting: Option<Acting>,
+    pub clock: Vec<Acting>,
+    /// States of all effects.
+    pub states: usize,
+}
+
+impl Ports {
+    /// Some effect acts on what supplies are asked for.
+    pub fn on_supplies(&self) -> bool {
+        self.feed.iter().any(|acting| !acting.is_empty())
+    }
+
+    /// Some effect acts on joints, arm or load.
+    pub fn on_motion(&self) -> bool {
+        let joints = self.torque.iter().chain(&self.push).any(|acting| !acting.is_empty());
+        joints || !self.payload.is_empty() || self.hanging.is_some() || self.mounting.is_some()
+    }
+
+    /// Some chamber has a balance of its own.
+    pub fn on_balance(&self) -> bool {
+        self.balance.iter().any(Option::is_some)
+    }
+
+    /// Positions of valves move within a sample.
+    pub fn moves_valves(&self) -> bool {
+        self.command.iter().any(|acting| moves(acting))
+    }
+
+    /// Controls are not the same at every stage of a step: moving valves, or a time that an effect asks for.
+    pub fn staged(&self) -> bool {
+        let pushed = self.push.iter().any(|acting| !acting.is_empty());
+        self.moves_valves() || pushed || !self.payload.is_empty()
+    }
+
+    /// Something happens between steps.
+    pub fn updates(&self) -> bool {
+        let switches = self.feed.iter().any(|acting| moves(acting));
+        let reads = self.reading.iter().any(Option::is_some) || self.tap.iter().any(Option::is_some);
+        self.moves_valves() || switches || reads
+    }
+
+    /// With what balances a gas its mass is a state of its own.
+    pub fn frees_mass(&self, gas: usize) -> bool {
+        self.balance[gas].is_some_and(|acting| self.effects[acting.effect].info.frees_mass)
+    }
+
+    /// What acts on a block and is integrated.
+    pub fn integrated(&self) -> impl Iterator<Item = (Place, Acting)> + '_ {
+        self.all.iter().copied().filter(|(_, acting)| self.effects[acting.effect].form.integrates)
+    }
+
+    /// What remembers the way of a group of muscles.
+    pub fn follow_muscles(&self) -> impl Iterator<Item = (usize, Acting)> + '_ {
+        self.all.iter().filter_map(|(place, acting)| match place {
+            Place::Group(k) if acting.count > 0 && !self.effects[acting.effect].form.integrates => {
+                Some((*k, *acting))
+            }
+            _ => None,
+        })
+    }
+
+    /// Names of the states of all effects, with what they are to a linear model.
+    pub fn state_names(&self, spec: &RigSpec, wiring: &Wiring) -> Vec<(String, Role)> {
+        let mut names = vec![(String::new(), Role::Keeps); self.states];
+        for (place, acting) in &self.all {
+            let instance = &self.effects[acting.effect];
+            let block = block_name(spec, wiring, *place);
+            for (k, state) in instance.form.states.iter().enumerate().take(acting.count) {
+                let own = dotted(instance.info.id, state.name);
+                names[acting.first + k] = (dotted(&own, &block), state.role);
+            }
+        }
+        names
+    }
+}
+
+/// Whether any of these has states.
+pub(crate) fn moves(acting: &[Acting]) -> bool {
+    acting.iter().any(|a| a.count > 0)
+}
+
+/// Name of a block, empty where it has none.
+fn block_name(spec: &RigSpec, wiring: &Wiring, place: Place) -> String {
+    match place {
+        Place::Supply(k) => spec.supplies[k].name.clone(),
+        Place::Valve(k) => spec.valves[k].name.clone(),
+        Place::Gas(k) if k < wiring.chambers => spec.chambers[k].name.clone(),
+        Place::Gas(k) => spec.lines[wiring.inlets[k - wiring.chambers].0].name.clone(),
+        Place::Group(k) => spec.muscles[k].name.clone(),
+        Place::Joint(k) => coordinate_names(spec).get(k).cloned().unwrap_or_default(),
+        Place::Whole => String::new(),
+    }
+}
+
+/// Switch on every effect of a description; `known` are all that there are.
+pub(super) fn switch_on(
+    spec: &RigSpec,
+    known: &[&'static EffectInfo],
+    table: &mut Parameters,
+    wiring: &mut Wiring,
+) -> Result<()> {
+    let mut ports = Ports {
+        command: vec![Vec::new(); wiring.valves.len()],
+        passage: vec![None; wiring.valves.len()],
+        feed: vec![Vec::new(); wiring.supplies.len()],
+        balance: vec![None; wiring.gases.len()],
+        reading: vec![None; wiring.gases.len()],
+        tap: vec![None; wiring.gases.len()],
+        muscles: vec![MusclePorts::default(); wiring.groups.len()],
+        torque: vec![Vec::new(); wiring.coordinates.len()],
+        push: vec![Vec::new(); wiring.coordinates.len()],
+        ..Ports::default()
+    };
+    let mut places = Vec::new();
+    for effect in &spec.effects {
+        let info = find(known, &effect.id)?;
+        let instance = instance(spec, effect, info, table)?;
+        places.push(acted_on(spec, wiring, effect, info)?);
+        ports.effects.push(instance);
+    }
+    twice(spec, wiring, &ports.effects, &places)?;
+    let mut order: Vec<usize> = (0..places.len()).collect();
+    order.sort_by_key(|k| ports.effects[*k].info.order);
+    for effect in order {
+        for place in &places[effect] {
+            let count = ports.effects[effect].form.states.len();
+            let acting = Acting { effect, first: ports.states, count };
+            ports.states += count;
+            ports.all.push((*place, acting));
+            for port in ports.effects[effect].form.ports {
+                ports.plug(*port, *place, acting, wiring, spec)?;
+            }
+        }
+    }
+    wiring.ports = ports;
+    Ok(())
+}
+
+fn find(known: &[&'static EffectInfo], id: &str) -> Result<&'static EffectInfo> {
+    match known.iter().find(|e| e.id == id) {
+        Some(info) => Ok(info),
+        None => {
+            let ids: Vec<_> = known.iter().map(|e| e.id).collect();
+            model(format!("no effect '{id}'; there are: {}", ids.join(", ")))
+        }
+    }
+}
+
+/// An effect with its values among the parameters of the rig.
+fn instance(
+    spec: &RigSpec,
+    effect: &EffectSpec,
+    info: &'static EffectInfo,
+    table: &mut Parameters,
+) -> Result<Instance> {
+    let Some(form) = info.form(&effect.form) else {
+        let names: Vec<_> = info.forms.iter().map(|f| format!("\"{}\"", f.name)).collect();
+        let (form, names) = (&effect.form, names.join(", "));
+        return model(format!("effect '{}' has no form \"{form}\"; one of {names}", effect.id));
+    };
+    let alone = spec.effects.iter().filter(|e| e.id == effect.id).count() == 1;
+    let full = dotted(&effect.id, &effect.at);
+    let name = if alone { effect.id.clone() } else { full.clone() };
+    let mut parameters = Vec::new();
+    for parameter in form.parameters {
+        let (key, unit) = (parameter.name, parameter.unit);
+        let Some(value) = effect.parameters.get(key).copied() else {
+            return model(format!("effect '{}' lacks its parameter '{key}' [{unit}]", effect.id));
+        };
+        let id = table.add(format!("{name}.{key}"), value, (parameter.lower, parameter.upper, unit))?;
+        table.also(format!("{full}.{key}"), id);
+        parameters.push(id);
+    }
+    if let Some(unknown) = effect.parameters.keys().find(|k| form.parameters.iter().all(|p| p.name != *k)) {
+        return model(format!("effect '{}' has no parameter '{unknown}'", effect.id));
+    }
+    Ok(Instance { info, form, name, parameters })
+}
+
+/// The blocks that an effect acts on.
+fn acted_on(spec: &RigSpec, wiring: &Wiring, effect: &EffectSpec, info: &EffectInfo) -> Result<Vec<Place>> {
+    let names = names(spec, info.at);
+    if !has(wiring, info, &names) {
+        let place = if info.at.is_empty() || info.block == "arm" { info.block } else { info.at };
+        return model(format!("effect '{}' acts in the {place}, and the rig has none", effect.id));
+    }
+    if info.at.is_empty() {
+        if !effect.at.is_empty() {
+            return model(format!(
+                "effect '{}' acts at '{}', and it acts on the whole rig",
+                effect.id, effect.at
+            ));
+        }
+        return Ok(vec![Place::Whole]);
+    }
+    if !effect.at.is_empty() && !names.contains(&effect.at) {
+        return model(format!(
+            "effect '{}' acts at '{}', and the rig has no {} of that name",
+            effect.id, effect.at, info.at
+        ));
+    }
+    let here = |k: &usize| match (effect.at.is_empty(), info.last_only) {
+        (true, true) => *k + 1 == names.len(),
+        (true, false) => true,
+        (false, _) => names[*k] == effect.at,
+    };
+    // A load has no joint of a name, and an effect on its mass acts there.
+    let blocks = names.len().max(usize::from(info.on_loads));
+    let chosen = (0..blocks).filter(|k| names.is_empty() || here(k));
+    let fits = |k: &usize| info.supplies.is_empty() || fits_supply(&wiring.supplies[*k], info.supplies);
+    let places: Vec<Place> =
+        chosen.filter(|k| info.at != "supply" || fits(k)).map(|k| place(info.at, k)).collect();
+    if places.is_empty() && !effect.at.is_empty() {
+        return model(format!(
+            "effect '{}' acts at '{}', a supply of a kind that it does not act on",
+            effect.id, effect.at
+        ));
+    }
+    Ok(places)
+}
+
+fn fits_supply(supply: &SupplyUnit, kinds: &[&str]) -> bool {
+    kinds.contains(&match supply {
+        SupplyUnit::Tank(_) => "tank",
+        SupplyUnit::Constant => "constant",
+        SupplyUnit::Regulator { .. } => "regulator",
+    })
+}
+
+fn place(kind: &str, k: usize) -> Place {
+    match kind {
+        "supply" => Place::Supply(k),
+        "valve" => Place::Valve(k),
+        "chamber" => Place::Gas(k),
+        "muscle" => Place::Group(k),
+        _ => Place::Joint(k),
+    }
+}
+
+/// Whether the rig has anything that an effect can act on.
+fn has(wiring: &Wiring, info: &EffectInfo, names: &[String]) -> bool {
+    let arm = matches!(wiring.body, BodyUnit::OneLink { .. } | BodyUnit::Planar { .. });
+    match info.block {
+        _ if info.on_loads => !matches!(wiring.body, BodyUnit::Fixed),
+        "arm" | "joint" => arm,
+        _ => info.at.is_empty() || !names.is_empty(),
+    }
+}
+
+/// Names of the blocks of a kind; joints in the order of the coordinates.
+fn names(spec: &RigSpec, kind: &str) -> Vec<String> {
+    match kind {
+        "supply" => spec.supplies.iter().map(|b| b.name.clone()).collect(),
+        "valve" => spec.valves.iter().map(|b| b.name.clone()).collect(),
+        "chamber" => spec.chambers.iter().map(|b| b.name.clone()).collect(),
+        "muscle" => spec.muscles.iter().map(|b| b.name.clone()).collect(),
+        "joint" => coordinate_names(spec),
+        _ => Vec::new(),
+    }
+}
+
+/// One effect must not act on a block twice.
+fn twice(spec: &RigSpec, wiring: &Wiring, effects: &[Instance], places: &[Vec<Place>]) -> Result<()> {
+    for (k, (one, here)) in effects.iter().zip(places).enumerate() {
+        let others = effects.iter().zip(places).take(k).filter(|(other, _)| other.info.id == one.info.id);
+        for (_, there) in others {
+            if let Some(place) = here.iter().find(|place| there.contains(place)) {
+                let (id, block) = (one.info.id, block_name(spec, wiring, *place));
+                let block = dotted(if one.info.at.is_empty() { "rig" } else { one.info.at }, &block);
+                return model(format!("effect '{id}' acts on {block} twice: one of them is needed"));
+            }
+        }
+    }
+    Ok(())
+}
+
+impl Ports {
+    /// Plug an effect into a port of a block.
+    fn plug(
+        &mut self,
+        port: Port,
+        place: Place,
+        acting: Acting,
+        wiring: &Wiring,
+        spec: &RigSpec,
+    ) -> Result<()> {
+        let taken = match (port, place) {
+            (Port::Command, Place::Valve(k)) => push(&mut self.command[k], acting),
+            (Port::Passage, Place::Valve(k)) => {
+                let gas = wiring.valves[k].to;
+                self.tap[gas] = self.tap[gas].or(Some((k, acting)));
+                self.passage[k].replace(acting)
+            }
+            (Port::Clearance, Place::Valve(k)) => push(&mut self.flows, (Flow::Clearance(k), acting)),
+            (Port::Leak, Place::Supply(k)) => push(&mut self.flows, (Flow::Leak(Node::Supply(k)), acting)),
+            (Port::Leak, Place::Gas(k)) => push(&mut self.flows, (Flow::Leak(Node::Gas(k)), acting)),
+            (Port::Inflow, Place::Supply(k)) => {
+                push(&mut self.flows, (Flow::Inflow(Node::Supply(k)), acting))
+            }
+            (Port::Inflow, Place::Gas(k)) => push(&mut self.flows, (Flow::Inflow(Node::Gas(k)), acting)),
+            (Port::Feed, Place::Supply(k)) => push(&mut self.feed[k], acting),
+            (Port::Balance, Place::Gas(k)) => self.balance[k].replace(acting),
+            (Port::Reading, Place::Gas(k)) => self.reading[k].replace(acting),
+            (Port::Gauge | Port::Bladder | Port::Force, Place::Group(k)) => {
+                self.muscles[k].some = true;
+                let at = &mut self.muscles[k];
+                push(
+                    match port {
+                        Port::Gauge => &mut at.gauge,
+                        Port::Bladder => &mut at.bladder,
+                        _ => &mut at.force,
+                    },
+                    acting,
+                )
+            }
+            (Port::Torque, Place::Joint(k)) => push(&mut self.torque[k], acting),
+            (Port::Push, Place::Joint(k)) => push(&mut self.push[k], acting),
+            (Port::Payload, Place::Joint(k)) => push(&mut self.payload, (k, acting)),
+            (Port::Hanging, Place::Joint(k)) => self.hanging.replace((k, acting)).map(|(_, other)| other),
+            (Port::Mounting, Place::Whole) => self.mounting.replace(acting),
+            (Port::Clock, Place::Whole) => push(&mut self.clock, acting),
+            _ => {
+                let id = self.effects[acting.effect].info.id;
+                return model(format!("effect '{id}' acts at a port that its block does not have"));
+            }
+        };
+        match taken {
+            None => Ok(()),
+            Some(other) => {
+                let [one, other] = [acting, other].map(|a| self.effects[a.effect].info.id);
+                let block = block_name(spec, wiring, place);
+                let place = dotted(self.effects[acting.effect].info.at, &block);
+                model(format!(
+                    "the effects '{other}' and '{one}' cannot both act on {place}: one of them is needed"
+                ))
+            }
+        }
+    }
+}
+
+/// Append; nothing had to go.
+fn push<T>(list: &mut Vec<T>, item: T) -> Option<Acting> {
+    list.push(item);
+    None
+}

@@ -1,0 +1,429 @@
+//! The state equation of a rig, composed of its blocks.
+//!
+//! States as in [`Layout`]: absolute pressures of supplies and gases [Pa], gas masses [kg], joint angles [rad] and rates
+//! [rad/s], then what effects need and, where they are kept, the sums of [`super::layout::BALANCE`]. Any of them can be *driven* by a signal
+//! instead of being integrated: that is where the rig is cut.
+
+use super::body::Body;
+use super::layout::{Channel, Layout, BALANCE_COUNT};
+use super::memory::Memory;
+use super::ports::Acting;
+use super::units::{LineUnit, Path, SupplyUnit};
+use super::{Rig, Values};
+use crate::blocks::chamber::Polytropic;
+use crate::blocks::chamber::{cube_area, cylinder_area, gas_temperature};
+use crate::blocks::supply::Supply;
+use crate::blocks::tube::Tube;
+use crate::effects::{Effect, Number};
+use crate::scalar::{constant, Scalar};
+use crate::Result;
+
+/// What is integrated; the other states are driven.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Simulated {
+    /// One for each state of the layout: not integrated.
+    driven: Vec<bool>,
+    /// Some pressure is integrated.
+    gas: bool,
+    /// Some motion is integrated.
+    motion: bool,
+    /// Some state of an effect is integrated.
+    effects: bool,
+}
+
+impl Simulated {
+    /// Everything is integrated but the states of these places.
+    pub fn all_but(layout: &Layout, places: &[usize]) -> Self {
+        let driven: Vec<bool> = (0..layout.states()).map(|k| places.contains(&k)).collect();
+        let some = |from: usize, to: usize| driven[from..to].iter().any(|d| !d);
+        let end = layout.effect(0);
+        Self {
+            gas: some(0, layout.angle(0)),
+            motion: some(layout.angle(0), end),
+            effects: some(end, layout.states()),
+            driven,
+        }
+    }
+
+    /// Only the states of these places are integrated.
+    pub fn only(layout: &Layout, places: &[usize]) -> Self {
+        let others: Vec<usize> = (0..layout.states()).filter(|k| !places.contains(k)).collect();
+        Self::all_but(layout, &others)
+    }
+}
+
+/// Commands over one sample.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Controls<S> {
+    /// Normalised spool position of each valve, -1 to 1.
+    pub(crate) spool: Vec<S>,
+    /// Set pressure of each supply [Pa, absolute].
+    pub(crate) set_pressure: Vec<S>,
+    /// Time since the start [s], where an effect asks for it.
+    pub(crate) time: f64,
+}
+
+#[derive(Debug, Clone)]
+pub(super) struct Valve<S> {
+    pub area: S,
+    pub null: S,
+}
+
+#[derive(Debug, Clone)]
+pub(super) enum Line<S> {
+    Orifice(S),
+    Tube(Tube<S>),
+}
+
+/// A rig with the values of its parameters in a scalar type.
+#[derive(Debug)]
+pub struct Plant<'a, S> {
+    pub(super) rig: &'a Rig,
+    pub(super) layout: Layout,
+    pub(super) values: Values<S>,
+    balanced: bool,
+    pub(super) supplies: Vec<Supply<S>>,
+    /// Fixed volume of each gas, halves of tubes included [m3].
+    pub(super) fixed_volume: Vec<S>,
+    pub(super) alphas: Vec<Polytropic<S>>,
+    pub(super) valves: Vec<Valve<S>>,
+    pub(super) lines: Vec<Line<S>>,
+    pub(super) scales: Vec<S>,
+    pub(super) body: Body<S>,
+    /// Effects that are switched on.
+    effects: Vec<Box<dyn Effect<S>>>,
+    /// Effects act on supplies, on joints or arm.
+    pub(super) supplies_altered: bool,
+    motion_altered: bool,
+}
+
+/// What the equations need to write down on the way.
+#[derive(Debug, Clone)]
+pub struct Scratch<S> {
+    pub(super) volume: Vec<S>,
+    pub(super) volume_rate: Vec<S>,
+    pub(super) wall: Vec<S>,
+    pub(super) inflow: Vec<S>,
+    pub(super) outflow: Vec<S>,
+    pub(super) drawn: Vec<S>,
+    pub(super) torque: Vec<S>,
+    pub(super) vented: S,
+    pub(super) muscle_work: S,
+    /// Poses, rates and torques that effects on the arm change.
+    pub(super) arm: [Vec<S>; 4],
+    /// Contraction ratio and force of each group.
+    contraction: Vec<S>,
+    force: Vec<S>,
+    /// Contraction ratio that each group has come to, where a muscle remembers its motion.
+    now: Vec<S>,
+}
+
+impl<'a, S: Number> Plant<'a, S> {
+    /// Compose a rig with parameter values; `balanced` keeps the sums of [`super::layout::BALANCE`] behind the states.
+    ///
+    /// # Errors
+    /// [`crate::Error::Parameter`] for links that cannot be.
+    pub fn new(rig: &'a Rig, values: Values<S>, balanced: bool) -> Result<Self> {
+        let wiring = &rig.wiring;
+        let line = |line: &LineUnit| match line.path {
+            Path::Orifice(area) => Line::Orifice(values[area]),
+            Path::Tube { length, diameter } => {
+                Line::Tube(Tube::new(values[length], values[diameter], rig.gas.temperature))
+            }
+        };
+        let lines: Vec<Line<S>> = wiring.lines.iter().map(line).collect();
+        let half_volume = |line: usize| match wiring.lines[line].path {
+            Path::Tube { length, diameter } => {
+                values[diameter] * values[diameter] * values[length] * (std::f64::consts::PI / 8.0)
+            }
+            Path::Orifice(_) => constant(0.0),
+        };
+        let isothermal = Polytropic { inflow: constant(1.0), outflow: constant(1.0), volume: constant(1.0) };
+        Ok(Self {
+            layout: rig.layout,
+            balanced,
+            supplies: (wiring.supplies.iter())
+                .map(|supply| match supply {
+                    SupplyUnit::Tank(volume) => Supply::Tank(values[*volume]),
+                    SupplyUnit::Constant => Supply::Constant,
+                    SupplyUnit::Regulator { time_constant, droop } => {
+                        Supply::Regulator { time_constant: values[*time_constant], droop: values[*droop] }
+                    }
+                })
+                .collect(),
+            fixed_volume: (wiring.gases.iter())
+                .map(|gas| gas.tubes.iter().fold(values[gas.volume], |sum, line| sum + half_volume(*line)))
+                .collect(),
+            alphas: (wiring.gases.iter())
+                .map(|gas| match gas.alphas {
+                    Some([inflow, outflow, volume]) => Polytropic {
+                        inflow: values[inflow],
+                        outflow: values[outflow],
+                        volume: values[volume],
+                    },
+                    None => isothermal,
+                })
+                .collect(),
+            valves: (wiring.valves.iter())
+                .map(|valve| Valve { area: values[valve.area], null: values[valve.null] })
+                .collect(),
+            lines,
+            scales: wiring.groups.iter().map(|group| values[group.scale]).collect(),
+            body: Body::new(&wiring.body, &wiring.coordinates, &values)?,
+            supplies_altered: wiring.ports.on_supplies(),
+            motion_altered: wiring.ports.on_motion(),
+            effects: (wiring.ports.effects.iter())
+                .map(|effect| {
+                    let own: Vec<S> = effect.parameters.iter().map(|id| values[*id]).collect();
+                    S::effect(&effect.form.make, &own, &rig.gas)
+                })
+                .collect(),
+            rig,
+            values,
+        })
+    }
+}
+
+impl<'a, S: Scalar> Plant<'a, S> {
+    /// Parameter values.
+    pub fn values(&self) -> &Values<S> {
+        &self.values
+    }
+
+    /// What acts.
+    #[inline]
+    pub(super) fn effect(&self, acting: &Acting) -> &dyn Effect<S> {
+        &*self.effects[acting.effect]
+    }
+
+    /// The states of what acts.
+    #[inline]
+    pub(super) fn own<'s>(&self, acting: &Acting, state: &'s [S]) -> &'s [S] {
+        let first = self.layout.effect(acting.first);
+        &state[first..first + acting.count]
+    }
+
+    /// The same, to be written.
+    #[inline]
+    pub(super) fn own_mut<'s>(&self, acting: &Acting, state: &'s mut [S]) -> &'s mut [S] {
+        let first = self.layout.effect(acting.first);
+        &mut state[first..first + acting.count]
+    }
+
+    /// The rig.
+    pub fn rig(&self) -> &'a Rig {
+        self.rig
+    }
+
+    /// Length of the state, the sums of the balance included.
+    pub fn states(&self) -> usize {
+        self.layout.states() + if self.balanced { BALANCE_COUNT } else { 0 }
+    }
+
+    /// Room for the equations.
+    pub fn scratch(&self) -> Scratch<S> {
+        let zeros = |n: usize| vec![constant::<S>(0.0); n];
+        let Layout { supplies, gases, coordinates, .. } = self.layout;
+        Scratch {
+            volume: zeros(gases),
+            volume_rate: zeros(gases),
+            wall: zeros(gases),
+            inflow: zeros(gases),
+            outflow: zeros(gases),
+            drawn: zeros(supplies),
+            torque: zeros(coordinates),
+            vented: constant(0.0),
+            muscle_work: constant(0.0),
+            arm: std::array::from_fn(|_| zeros(coordinates)),
+            contraction: zeros(self.rig.wiring.groups.len()),
+            force: zeros(self.rig.wiring.groups.len()),
+            now: zeros(self.rig.wiring.groups.len()),
+        }
+    }
+
+    /// Volumes, torques and what the muscles do, written to the scratch.
+    #[inline(always)]
+    fn mechanics(&self, state: &[S], memory: &[Memory<S>], start: &[S], here: &mut Scratch<S>) {
+        let zero = constant::<S>(0.0);
+        here.volume.copy_from_slice(&self.fixed_volume);
+        here.volume_rate.fill(zero);
+        here.torque.fill(zero);
+        here.muscle_work = zero;
+        let heat = self.rig.wiring.ports.on_balance();
+        if heat {
+            here.wall.fill(zero);
+        }
+        for (k, group) in self.rig.wiring.groups.iter().enumerate() {
+            let muscle = self.muscle_force(k, group, state, &memory[k], start[k]);
+            let rate = state[self.layout.rate(group.coordinate)];
+            (here.contraction[k], here.force[k]) = (muscle.contraction, muscle.force);
+            here.volume[group.chamber] += muscle.table.volume * group.count;
+            here.volume_rate[group.chamber] +=
+                muscle.table.volume_slope * muscle.moment_arm * rate * (group.count / group.rest_length);
+            here.torque[group.coordinate] += muscle.force * muscle.torque_arm;
+            if self.balanced {
+                here.muscle_work += muscle.force * muscle.moment_arm * rate;
+            }
+            if heat {
+                let length = (-muscle.contraction + 1.0) * group.rest_length;
+                here.wall[group.chamber] += cylinder_area(group.count, muscle.table.volume, length);
+            }
+        }
+        if heat {
+            self.cubes(here);
+        }
+    }
+
+    /// Wall area of the gases without muscles [m2]: the cube of their volume.
+    fn cubes(&self, here: &mut Scratch<S>) {
+        for (k, balance) in self.rig.wiring.ports.balance.iter().enumerate() {
+            if balance.is_some() && self.rig.wiring.groups.iter().all(|g| g.chamber != k) {
+                here.wall[k] = cube_area(here.volume[k]);
+            }
+        }
+    }
+
+    /// Mass of a gas [kg] at rest temperature for a state.
+    pub fn rest_mass(&self, gas: usize, state: &[S]) -> S {
+        let mut volume = self.fixed_volume[gas];
+        for group in self.rig.wiring.groups.iter().filter(|g| g.chamber == gas) {
+            let point = group.joint.eval(state[self.layout.angle(group.coordinate)]);
+            volume += group.muscle.table.eval(point.shortening / group.rest_length).volume * group.count;
+        }
+        state[self.layout.pressure(gas)] * volume / (self.rig.gas.gas_constant * self.rig.gas.temperature)
+    }
+
+    /// Mass of a gas [kg] at the start of a recording: at rest temperature plus the initial rise.
+    pub fn initial_mass(&self, gas: usize, state: &[S]) -> S {
+        let rest = self.rest_mass(gas, state);
+        match &self.rig.wiring.ports.balance[gas] {
+            Some(acting) => self.effect(acting).initial_mass(&self.rig.gas, rest),
+            None => rest,
+        }
+    }
+
+    /// Time derivative of the state; entries of driven states are zero.
+    #[inline]
+    #[allow(clippy::too_many_arguments)]
+    pub fn rates(
+        &self,
+        state: &[S],
+        controls: &Controls<S>,
+        memory: &[Memory<S>],
+        start: &[S],
+        simulated: &Simulated,
+        here: &mut Scratch<S>,
+        out: &mut [S],
+    ) {
+        let layout = &self.layout;
+        self.mechanics(state, memory, start, here);
+        if simulated.gas {
+            self.flows(state, controls, here);
+            self.gas_rates(state, controls, here, out);
+        } else {
+            out[..layout.angle(0)].fill(constant(0.0));
+        }
+        let (angle, rate) = (layout.angle(0), layout.rate(0));
+        let end = layout.effect(0);
+        if simulated.effects {
+            self.effect_rates(state, controls, here, out);
+        }
+        if simulated.motion && self.body.moves() {
+            let (angles, rates) = state[angle..end].split_at(layout.coordinates);
+            out[angle..rate].copy_from_slice(rates);
+            if self.motion_altered {
+                self.altered_motion(state, controls.time, here, out);
+            } else {
+                self.body.accelerations(angles, rates, &here.torque, &mut out[rate..end]);
+            }
+        } else {
+            out[angle..end].fill(constant(0.0));
+        }
+        if self.balanced {
+            self.balances(state, here, out);
+        }
+        for (out, driven) in out.iter_mut().zip(&simulated.driven) {
+            if *driven {
+                *out = constant(0.0);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn balances(&self, state: &[S], here: &Scratch<S>, out: &mut [S]) {
+        let (gas, layout) = (&self.rig.gas, &self.layout);
+        let rt = gas.gas_constant * gas.temperature;
+        let (mut drawn, mut exergy, mut vented) = (constant::<S>(0.0), constant::<S>(0.0), here.vented);
+        for (k, flow) in here.drawn.iter().enumerate() {
+            if flow.re() == 0.0 {
+                continue; // most of the time, and the logarithm is dear
+            }
+            if flow.re() < 0.0 && matches!(self.supplies[k], Supply::Regulator { .. }) {
+                vented -= *flow; // a regulator relieves to the ambient what it takes back
+                continue;
+            }
+            drawn += *flow;
+            exergy += (state[layout.supply(k)] / gas.ambient_pressure).ln() * *flow * rt;
+        }
+        let mut work = constant::<S>(0.0);
+        for (k, torque) in here.torque.iter().enumerate() {
+            let power = *torque * state[layout.rate(k)];
+            if power.re() > 0.0 {
+                work += power;
+            }
+        }
+        let sums = [drawn, vented, drawn * rt, exergy, here.muscle_work, work];
+        out[layout.states()..].copy_from_slice(&sums);
+    }
+}
+
+impl Plant<'_, f64> {
+    /// Value of each channel of the rig at a state, appended to `out`.
+    pub fn observe(
+        &self,
+        state: &[f64],
+        memory: &[Memory<f64>],
+        here: &mut Scratch<f64>,
+        out: &mut [Vec<f64>],
+    ) {
+        if out.is_empty() {
+            return; // nobody looks
+        }
+        let (layout, wiring) = (&self.layout, &self.rig.wiring);
+        let ambient = self.rig.gas.ambient_pressure;
+        let mut now = std::mem::take(&mut here.now);
+        if self.remembers() {
+            self.contractions(state, &mut now);
+        }
+        self.mechanics(state, memory, &now, here);
+        let zero = |id: Option<super::ParameterId>| id.map_or(0.0, |id| self.values[id]);
+        for ((_, channel), out) in self.rig.names.channels.iter().zip(out) {
+            out.push(match *channel {
+                Channel::Supply(k) => state[layout.supply(k)] - ambient,
+                Channel::Pressure(k) => {
+                    state[self.reading(k)] - ambient + zero(wiring.gases[k].pressure_zero)
+                }
+                Channel::Angle(k) => state[layout.angle(k)] + zero(wiring.coordinates[k].zero),
+                Channel::Rate(k) => state[layout.rate(k)],
+                Channel::Length => {
+                    wiring.groups[0].rest_length - state[layout.angle(0)] + zero(wiring.coordinates[0].zero)
+                }
+                Channel::LengthRate => -state[layout.rate(0)],
+                Channel::Contraction(k) => here.contraction[k],
+                Channel::Force(k) => here.force[k],
+                Channel::Torque(k) => here.torque[k],
+                Channel::Volume(k) => here.volume[k],
+                Channel::Mass(k) => state[layout.mass(k)],
+                Channel::Temperature(k) if wiring.ports.balance[k].is_some() => gas_temperature(
+                    &self.rig.gas,
+                    state[layout.pressure(k)],
+                    here.volume[k],
+                    state[layout.mass(k)],
+                ),
+                Channel::Temperature(_) => self.rig.gas.temperature,
+                Channel::Balance(k) => state.get(layout.balance(k)).copied().unwrap_or(f64::NAN),
+            });
+        }
+        here.now = now;
+    }
+}

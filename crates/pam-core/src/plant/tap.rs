@@ -1,0 +1,89 @@
+//! Where the transducer of a gas sits: at the gas, or in front of the tube through which a valve feeds it.
+
+use super::ports::Acting;
+use super::rates::{Controls, Plant};
+use crate::scalar::{constant, Scalar};
+
+impl<S: Scalar> Plant<'_, S> {
+    /// Gases whose transducers sit at the valve's end of what it feeds them through, with the valves there.
+    pub fn taps(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        (0..self.layout.gases).filter_map(|gas| self.tap(gas).map(|(valve, _)| (gas, valve)))
+    }
+
+    /// The valve in front of a gas at which its transducer sits, and what is between them.
+    fn tap(&self, gas: usize) -> Option<(usize, &Acting)> {
+        let (valve, acting) = self.rig.wiring.ports.tap[gas].as_ref()?;
+        self.effect(acting).taps().then_some((*valve, acting))
+    }
+
+    /// Place of what the sensor of a gas reads.
+    pub fn reading(&self, gas: usize) -> usize {
+        let lag = self.rig.wiring.ports.reading[gas].as_ref();
+        let acting = lag.or(self.tap(gas).map(|(_, acting)| acting));
+        acting.map_or(self.layout.pressure(gas), |acting| self.layout.effect(acting.first))
+    }
+
+    /// Place of the reading of a sensor that lags, and how far it does [s]; None for one that does not.
+    pub fn lagging(&self, gas: usize) -> Option<(usize, S)> {
+        let acting = self.rig.wiring.ports.reading[gas].as_ref()?;
+        Some((self.layout.effect(acting.first), self.effect(acting).lag()))
+    }
+
+    /// Write the pressures between valves and tubes, where sensors sit there: those of a state, its commands held.
+    pub fn read_taps(&self, state: &mut [S], controls: &Controls<S>) {
+        for gas in 0..self.layout.gases {
+            if let Some((_, acting)) = self.tap(gas) {
+                state[self.layout.effect(acting.first)] = self.at_sensor(gas, state, controls);
+            }
+        }
+    }
+
+    /// Absolute pressure where the sensor of a gas sits [Pa]: that of the gas while its valve is shut.
+    pub fn at_sensor(&self, gas: usize, state: &[S], controls: &Controls<S>) -> S {
+        let inside = state[self.layout.pressure(gas)];
+        let Some((valve, acting)) = self.tap(gas) else { return inside };
+        let (area, filling) = self.opening(valve, controls.spool[valve]);
+        let (air, effect) = (&self.rig.gas, self.effect(acting));
+        if area.re() <= 0.0 {
+            inside
+        } else if filling {
+            let outside = self.pressure_at(self.rig.wiring.valves[valve].from, state);
+            effect.between(air, area, outside, inside, false)
+        } else {
+            effect.between(air, area, inside, constant(air.ambient_pressure), true)
+        }
+    }
+
+    /// Absolute pressure of a gas [Pa] whose sensor sits where the pressure is `there`: the valve's flow is known from the
+    /// pressures at its two sides, and the tube passes it to one pressure. At most the highest that the rig can have.
+    pub fn behind_tube(&self, gas: usize, there: S, state: &[S], spool: S) -> S {
+        let Some((valve, acting)) = self.tap(gas) else { return there };
+        let (area, filling) = self.opening(valve, spool);
+        let air = &self.rig.gas;
+        if area.re() <= 0.0 || there.re() <= 0.0 {
+            return there;
+        }
+        let flow = if filling {
+            air.mass_flow(area, self.pressure_at(self.rig.wiring.valves[valve].from, state), there)
+        } else {
+            -air.mass_flow(area, there, constant(air.ambient_pressure))
+        };
+        let inside = self.effect(acting).behind(there, flow);
+        let highest = self.rig.highest_pressure().max(there.re());
+        if inside.re() <= highest {
+            inside
+        } else {
+            constant(highest)
+        }
+    }
+
+    /// Discharge area of a valve [m2], and whether it opens to where it is fed from.
+    fn opening(&self, valve: usize, spool: S) -> (S, bool) {
+        let filling = spool.re() > 0.0;
+        let table = &self.rig.wiring.valves[valve].table;
+        if spool.re() == 0.0 {
+            return (constant(0.0), filling);
+        }
+        (self.valves[valve].area * table.eval(if filling { spool } else { -spool }), filling)
+    }
+}

@@ -1,0 +1,153 @@
+//! The blocks of a rig with their ports resolved to indices and their numbers to parameters.
+
+use super::parameters::ParameterId;
+use super::ports::Ports;
+use crate::blocks::arm::planar::Stops;
+use crate::blocks::joint::Joint;
+use crate::blocks::valve::AreaTable;
+use crate::muscle::CompiledMuscle;
+
+/// Most links of a planar arm.
+pub const MOST_LINKS: usize = 4;
+
+/// An end of a flow.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Node {
+    Ambient,
+    Supply(usize),
+    /// A chamber, or behind all chambers the inlet of a line.
+    Gas(usize),
+}
+
+impl Node {
+    /// Place of its pressure among the states.
+    pub fn place(self, layout: &super::Layout) -> Option<usize> {
+        match self {
+            Self::Ambient => None,
+            Self::Supply(k) => Some(layout.supply(k)),
+            Self::Gas(k) => Some(layout.pressure(k)),
+        }
+    }
+}
+
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum SupplyUnit {
+    Tank(ParameterId),
+    Constant,
+    Regulator { time_constant: ParameterId, droop: ParameterId },
+}
+
+#[derive(Debug, Clone)]
+pub(crate) struct ValveUnit {
+    pub from: Node,
+    pub to: usize,
+    pub table: AreaTable,
+    pub area: ParameterId,
+    pub null: ParameterId,
+    pub half_range: f64,
+}
+
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Path {
+    Orifice(ParameterId),
+    Tube { length: ParameterId, diameter: ParameterId },
+}
+
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct LineUnit {
+    pub from: Node,
+    pub to: Node,
+    pub path: Path,
+}
+
+/// Volume of gas: a chamber, or the rigid inlet of a line.
+#[derive(Debug, Clone)]
+pub(crate) struct GasUnit {
+    /// Fixed volume [m3].
+    pub volume: ParameterId,
+    /// Lines of which half the tube's volume is here.
+    pub tubes: Vec<usize>,
+    /// Inflow, outflow, volume change; an inlet, all wall, is isothermal.
+    pub alphas: Option<[ParameterId; 3]>,
+    pub pressure_zero: Option<ParameterId>,
+    /// Gauge [Pa]; an inlet begins at the pressure of the line's end.
+    pub initial_pressure: f64,
+}
+
+/// Muscles of one kind that share a chamber and a joint.
+#[derive(Debug, Clone)]
+pub(crate) struct Group {
+    pub chamber: usize,
+    pub coordinate: usize,
+    pub joint: Joint,
+    pub muscle: CompiledMuscle,
+    pub scale: ParameterId,
+    pub count: f64,
+    pub rest_length: f64,
+    pub direction: bool,
+}
+
+/// What moves: a joint angle, or the shortening of a linear load.
+#[derive(Debug, Clone)]
+pub(crate) struct Coordinate {
+    pub rest: f64,
+    pub stops: Option<Stops>,
+    pub zero: Option<ParameterId>,
+}
+
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct LinkUnit {
+    pub length: ParameterId,
+    pub mass: ParameterId,
+    pub centre: ParameterId,
+    pub inertia: ParameterId,
+    pub payload: ParameterId,
+    pub viscous: ParameterId,
+    pub coulomb: ParameterId,
+    pub coulomb_speed: f64,
+}
+
+#[derive(Debug, Clone)]
+pub(crate) enum BodyUnit {
+    /// Nothing moves by itself.
+    Fixed,
+    OneLink {
+        inertia: ParameterId,
+        first_moment: ParameterId,
+        payload: ParameterId,
+        viscous: ParameterId,
+        coulomb: ParameterId,
+        length: f64,
+        coulomb_speed: f64,
+        gravity: f64,
+    },
+    Planar {
+        gravity: f64,
+        links: Vec<LinkUnit>,
+    },
+    Mass {
+        mass: ParameterId,
+        viscous: ParameterId,
+        coulomb: ParameterId,
+        coulomb_speed: f64,
+        gravity: f64,
+    },
+}
+
+/// A whole rig, resolved.
+#[derive(Debug, Clone)]
+pub(crate) struct Wiring {
+    pub supplies: Vec<SupplyUnit>,
+    pub gases: Vec<GasUnit>,
+    /// The first `chambers` of `gases` are chambers, the rest inlets of lines.
+    pub chambers: usize,
+    /// Line and end of line of each inlet.
+    pub inlets: Vec<(usize, Node)>,
+    pub valves: Vec<ValveUnit>,
+    pub lines: Vec<LineUnit>,
+    pub groups: Vec<Group>,
+    pub coordinates: Vec<Coordinate>,
+    pub body: BodyUnit,
+    /// Effects at the ports of the blocks.
+    pub ports: Ports,
+}

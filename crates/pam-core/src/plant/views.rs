@@ -1,0 +1,123 @@
+//! What effects see of the blocks that they act on, and the rates and beginnings of their states.
+
+use super::ports::Place;
+use super::rates::{Controls, Plant, Scratch};
+use super::units::Node;
+use crate::effects::{At, BAR};
+use crate::scalar::{constant, Scalar};
+
+impl<S: Scalar> Plant<'_, S> {
+    /// A supply or a gas.
+    pub(super) fn at_node(
+        &self,
+        node: Node,
+        state: &[S],
+        controls: &Controls<S>,
+        here: &Scratch<S>,
+    ) -> At<S> {
+        match node {
+            Node::Supply(k) => self.at_supply(k, state, &controls.spool),
+            Node::Gas(k) => self.at_chamber(k, state, &controls.spool, here.volume_rate[k]),
+            Node::Ambient => At::Valve { fed: constant(self.rig.gas.ambient_pressure) },
+        }
+    }
+
+    fn at_supply(&self, supply: usize, state: &[S], spool: &[S]) -> At<S> {
+        let mut opening = constant::<S>(0.0);
+        for (_, spool) in
+            self.rig.wiring.valves.iter().zip(spool).filter(|(v, _)| v.from == Node::Supply(supply))
+        {
+            if spool.re() > 0.0 {
+                opening += *spool;
+            }
+        }
+        At::Supply { pressure: state[self.layout.supply(supply)], opening }
+    }
+
+    fn at_chamber(&self, gas: usize, state: &[S], spool: &[S], volume_rate: S) -> At<S> {
+        let (layout, wiring) = (&self.layout, &self.rig.wiring);
+        let pressure = state[layout.pressure(gas)];
+        let (mut opening, mut supply) = (constant::<S>(0.0), pressure);
+        for (unit, spool) in wiring.valves.iter().zip(spool) {
+            // Through the line that begins at the valve, if there is one.
+            let end = unit.to.checked_sub(wiring.chambers).and_then(|k| wiring.inlets.get(k));
+            if unit.to == gas || end.is_some_and(|(_, end)| *end == Node::Gas(gas)) {
+                opening += *spool;
+                supply = unit.from.place(layout).map_or(supply, |place| state[place]);
+            }
+        }
+        At::Chamber { pressure, supply, opening, volume_rate }
+    }
+
+    /// A joint.
+    pub(super) fn at_joint(&self, coordinate: usize, state: &[S]) -> At<S> {
+        let layout = &self.layout;
+        let mut pressure = constant::<S>(0.0);
+        let mut groups = 0.0;
+        for group in self.rig.wiring.groups.iter().filter(|g| g.coordinate == coordinate) {
+            pressure += (state[layout.pressure(group.chamber)] - self.rig.gas.ambient_pressure) / BAR;
+            groups += 1.0;
+        }
+        At::Joint {
+            pressure: if groups > 1.0 { pressure / groups } else { pressure },
+            angle: state[layout.angle(coordinate)],
+            rate: state[layout.rate(coordinate)],
+        }
+    }
+
+    /// Any block, with the openings of the valves and the rates of the gases' volumes.
+    fn at(&self, place: Place, state: &[S], spool: &[S], volume_rate: &[S]) -> At<S> {
+        match place {
+            Place::Supply(k) => self.at_supply(k, state, spool),
+            Place::Valve(k) => At::Valve { fed: state[self.layout.pressure(self.rig.wiring.valves[k].to)] },
+            Place::Gas(k) => self.at_chamber(k, state, spool, volume_rate[k]),
+            Place::Group(k) => At::Muscle(self.at_group(k, state)),
+            Place::Joint(k) => self.at_joint(k, state),
+            Place::Whole => {
+                let angles = &state[self.layout.angle(0)..self.layout.rate(0)];
+                At::Arm { weight: self.body.weight(angles) }
+            }
+        }
+    }
+
+    /// Rates of the states of effects at the air, the muscles and the joints; of the rest zero.
+    #[inline(never)]
+    pub(super) fn effect_rates(&self, state: &[S], controls: &Controls<S>, here: &Scratch<S>, out: &mut [S]) {
+        let layout = &self.layout;
+        out[layout.effect(0)..layout.states()].fill(constant(0.0));
+        for (place, acting) in self.rig.wiring.ports.integrated() {
+            let at = self.at(place, state, &controls.spool, &here.volume_rate);
+            self.effect(&acting).rates(&at, self.own(&acting, state), self.own_mut(&acting, out));
+        }
+    }
+
+    /// What effects remember, where a recording begins: nothing has moved for long, valves are shut.
+    pub fn start_effects(&self, state: &mut [S]) {
+        let wiring = &self.rig.wiring;
+        let shut = vec![constant(0.0); wiring.valves.len()];
+        let still = vec![constant(0.0); wiring.gases.len()];
+        for (place, acting) in wiring.ports.all.iter().filter(|(_, acting)| acting.count > 0) {
+            let at = self.at(*place, state, &shut, &still);
+            self.effect(acting).start(&self.rig.gas, &at, self.own_mut(acting, state));
+        }
+    }
+
+    /// Terms of the first sum of terms that acts on a block, at an instant; empty where there is none.
+    pub(crate) fn terms(
+        &self,
+        place: Place,
+        state: &[S],
+        controls: &Controls<S>,
+        here: &Scratch<S>,
+    ) -> Vec<S> {
+        let ports = &self.rig.wiring.ports;
+        let unnamed = |effect: usize| !ports.effects[effect].info.named;
+        match ports.all.iter().find(|(at, acting)| *at == place && unnamed(acting.effect)) {
+            Some((_, acting)) => {
+                let at = self.at(place, state, &controls.spool, &here.volume_rate);
+                self.effect(acting).terms(&at, self.own(acting, state))
+            }
+            None => Vec::new(),
+        }
+    }
+}

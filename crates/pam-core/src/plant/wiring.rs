@@ -1,0 +1,289 @@
+//! How the air and the effects of a description fit together: ports become indices, numbers become parameters.
+
+use super::parameters::Parameters;
+use super::ports::{switch_on, Ports as EffectPorts};
+use super::units::{Coordinate, GasUnit, Group, LineUnit, Node, Path, SupplyUnit, ValveUnit, Wiring};
+use super::wiring_motion::{body, coordinate_names, coordinates, groups};
+use crate::blocks::valve::AreaTable;
+use crate::description::{dotted, RigSpec, SupplySpec};
+use crate::effects::EffectInfo;
+use crate::{Error, Result};
+
+pub(super) fn model<T>(text: impl Into<String>) -> Result<T> {
+    Err(Error::Model(text.into()))
+}
+
+/// Finds ports.
+struct Ports<'a> {
+    spec: &'a RigSpec,
+    /// Lines that have an inlet of their own.
+    inlets: Vec<usize>,
+}
+
+impl<'a> Ports<'a> {
+    fn new(spec: &'a RigSpec) -> Self {
+        let own = |(k, line): (usize, &crate::description::LineSpec)| line.from.is_empty().then_some(k);
+        Self { spec, inlets: spec.lines.iter().enumerate().filter_map(own).collect() }
+    }
+
+    fn node(&self, owner: &str, port: &str) -> Result<Node> {
+        let spec = self.spec;
+        if port == "ambient" {
+            return Ok(Node::Ambient);
+        }
+        if let Some(k) = spec.supplies.iter().position(|s| dotted("supply", &s.name) == port) {
+            return Ok(Node::Supply(k));
+        }
+        if let Some(k) = spec.chambers.iter().position(|c| dotted("chamber", &c.name) == port) {
+            return Ok(Node::Gas(k));
+        }
+        if let Some(k) = spec.lines.iter().position(|l| dotted("line", &l.name) == port) {
+            return match self.inlets.iter().position(|line| *line == k) {
+                Some(inlet) => Ok(Node::Gas(spec.chambers.len() + inlet)),
+                None => model(format!("{owner} = \"{port}\" is not allowed: that line begins at \"{}\", it has no inlet for valves", spec.lines[k].from)),
+            };
+        }
+        if port.is_empty() {
+            return model(format!("{owner} is missing: a port is needed, one of {}", self.names()));
+        }
+        model(format!(
+            "{owner} = \"{port}\" is not allowed: the rig has no such block; one of {}",
+            self.names()
+        ))
+    }
+
+    fn names(&self) -> String {
+        let spec = self.spec;
+        let supplies = spec.supplies.iter().map(|s| dotted("supply", &s.name));
+        let chambers = spec.chambers.iter().map(|c| dotted("chamber", &c.name));
+        let lines = self.inlets.iter().map(|k| dotted("line", &spec.lines[*k].name));
+        supplies.chain(chambers).chain(lines).chain(["ambient".to_string()]).collect::<Vec<_>>().join(", ")
+    }
+}
+
+impl Wiring {
+    /// Resolve a description whose words are checked, with the numbers of its blocks; `known` are compiled muscles to use
+    /// again, `effects` all that there are.
+    pub fn new(
+        spec: &RigSpec,
+        known: &[Group],
+        effects: &[&'static EffectInfo],
+    ) -> Result<(Self, Parameters)> {
+        no_twins(spec)?;
+        let ports = Ports::new(spec);
+        let mut table = Parameters::default();
+        let supplies = supplies(spec, &mut table)?;
+        let valves = valves(spec, &ports, &mut table)?;
+        let (lines, inlets) = lines(spec, &ports, &valves, &mut table)?;
+        let mut gases = gases(spec, &inlets, &mut table)?;
+        for (k, line) in lines.iter().enumerate().filter(|(_, l)| matches!(l.path, Path::Tube { .. })) {
+            for end in [line.from, line.to] {
+                if let Node::Gas(gas) = end {
+                    gases[gas].tubes.push(k);
+                }
+            }
+        }
+        let coordinates = coordinates(spec)?;
+        let groups = groups(spec, known, &mut table)?;
+        let body = body(spec, &mut table)?;
+        sensors(spec, &mut table, &mut gases)?;
+        let coordinates = zeros(spec, &table, coordinates);
+        let mut wiring = Self {
+            chambers: spec.chambers.len(),
+            supplies,
+            gases,
+            inlets,
+            valves,
+            lines,
+            groups,
+            coordinates,
+            body,
+            ports: EffectPorts::default(),
+        };
+        switch_on(spec, effects, &mut table, &mut wiring)?;
+        Ok((wiring, table))
+    }
+}
+
+/// Two blocks of one kind must not have one name.
+fn no_twins(spec: &RigSpec) -> Result<()> {
+    if spec.chambers.is_empty() {
+        return model("a rig needs at least one chamber");
+    }
+    fn twins<'a>(kind: &str, names: impl Iterator<Item = &'a String>) -> Result<()> {
+        let mut seen: Vec<&String> = Vec::new();
+        for name in names {
+            if seen.contains(&name) {
+                return model(format!("[{}] is there twice", dotted(kind, name)));
+            }
+            seen.push(name);
+        }
+        Ok(())
+    }
+    twins("supply", spec.supplies.iter().map(|b| &b.name))?;
+    twins("valve", spec.valves.iter().map(|b| &b.name))?;
+    twins("line", spec.lines.iter().map(|b| &b.name))?;
+    twins("chamber", spec.chambers.iter().map(|b| &b.name))?;
+    twins("muscle", spec.muscles.iter().map(|b| &b.name))?;
+    twins("joint", spec.joints.iter().map(|b| &b.name))?;
+    twins("sensors", spec.sensors.iter().map(|b| &b.name))
+}
+
+fn supplies(spec: &RigSpec, table: &mut Parameters) -> Result<Vec<SupplyUnit>> {
+    let mut unit = |supply: &SupplySpec| {
+        let name = |key: &str| format!("{}.{key}", dotted("supply", &supply.name));
+        Ok(match supply.kind.as_str() {
+            "tank" => SupplyUnit::Tank(table.add(name("volume"), supply.volume, (1e-7, 1e4, "m3"))?),
+            "regulator" => SupplyUnit::Regulator {
+                time_constant: table.add(name("time_constant"), supply.time_constant, (1e-5, 1e3, "s"))?,
+                droop: table.add(name("droop"), supply.droop, (0.0, 1e13, "Pa s/kg"))?,
+            },
+            _ => SupplyUnit::Constant,
+        })
+    };
+    spec.supplies.iter().map(&mut unit).collect()
+}
+
+fn valves(spec: &RigSpec, ports: &Ports<'_>, table: &mut Parameters) -> Result<Vec<ValveUnit>> {
+    let mut units = Vec::new();
+    for valve in &spec.valves {
+        let block = dotted("valve", &valve.name);
+        let from = ports.node(&format!("{block}.from"), &valve.from)?;
+        let to = ports.node(&format!("{block}.to"), &valve.to)?;
+        let Node::Gas(to) = to else {
+            return model(format!(
+                "{block}.to = \"{}\" is not allowed: a valve feeds a chamber or the inlet of a line",
+                valve.to
+            ));
+        };
+        if from == Node::Ambient || from == Node::Gas(to) {
+            return model(format!(
+                "{block}.from = \"{}\" is not allowed: a supply or another chamber is needed",
+                valve.from
+            ));
+        }
+        units.push(ValveUnit {
+            from,
+            to,
+            table: AreaTable::new(&valve.opening, &valve.fraction)?,
+            area: table.add(
+                format!("{block}.discharge_area_max"),
+                valve.discharge_area_max,
+                (0.0, 1.0, "m2"),
+            )?,
+            null: table.add(format!("{block}.null_voltage"), valve.null_voltage, (-1e3, 1e3, "V"))?,
+            half_range: valve.half_range,
+        });
+    }
+    Ok(units)
+}
+
+type Lines = (Vec<LineUnit>, Vec<(usize, Node)>);
+
+fn lines(spec: &RigSpec, ports: &Ports<'_>, valves: &[ValveUnit], table: &mut Parameters) -> Result<Lines> {
+    let (mut units, mut inlets) = (Vec::new(), Vec::new());
+    for (k, line) in spec.lines.iter().enumerate() {
+        let block = dotted("line", &line.name);
+        let to = ports.node(&format!("{block}.to"), &line.to)?;
+        let from = match line.from.as_str() {
+            "" => Node::Gas(spec.chambers.len() + inlets.len()),
+            port => ports.node(&format!("{block}.from"), port)?,
+        };
+        if from == to || from == Node::Ambient {
+            return model(format!("{block}.from = \"{}\" is not allowed: another end than {block}.to, with gas in it, is needed", line.from));
+        }
+        if line.from.is_empty() {
+            if !valves.iter().any(|v| Node::Gas(v.to) == from) {
+                return model(format!(
+                    "{block}.from is missing: no valve feeds that line, and it begins nowhere"
+                ));
+            }
+            inlets.push((k, to));
+        }
+        let name = |key: &str| format!("{block}.{key}");
+        let path = if line.kind == "tube" {
+            Path::Tube {
+                length: table.add(name("length"), line.length, (1e-4, 1e4, "m"))?,
+                diameter: table.add(name("diameter"), line.diameter, (1e-5, 1.0, "m"))?,
+            }
+        } else {
+            Path::Orifice(table.add(name("discharge_area"), line.discharge_area, (0.0, 1.0, "m2"))?)
+        };
+        units.push(LineUnit { from, to, path });
+    }
+    Ok((units, inlets))
+}
+
+fn gases(spec: &RigSpec, inlets: &[(usize, Node)], table: &mut Parameters) -> Result<Vec<GasUnit>> {
+    let mut units = Vec::new();
+    let plain = |volume, alphas, initial_pressure| GasUnit {
+        volume,
+        alphas,
+        initial_pressure,
+        tubes: Vec::new(),
+        pressure_zero: None,
+    };
+    for chamber in &spec.chambers {
+        let name = |key: &str| format!("{}.{key}", dotted("chamber", &chamber.name));
+        let filled = spec.muscles.iter().any(|m| m.chamber == dotted("chamber", &chamber.name));
+        let least = if filled { 0.0 } else { 1e-9 };
+        let volume = table.add(name("dead_volume"), chamber.dead_volume, (least, 1e4, "m3"))?;
+        let polytropic = (0.2, 3.0, "");
+        let alphas = [
+            table.add(name("alpha_in"), chamber.alpha_in, polytropic)?,
+            table.add(name("alpha_out"), chamber.alpha_out, polytropic)?,
+            table.add(name("alpha"), chamber.alpha, polytropic)?,
+        ];
+        units.push(plain(volume, Some(alphas), chamber.initial_pressure));
+    }
+    for (k, end) in inlets {
+        let line = &spec.lines[*k];
+        let name = format!("{}.inlet_volume", dotted("line", &line.name));
+        let volume = table.add(name, line.inlet_volume, (0.0, 1e3, "m3"))?;
+        let pressure = match end {
+            Node::Gas(gas) => spec.chambers.get(*gas).map_or(0.0, |c| c.initial_pressure),
+            Node::Supply(supply) => spec.supplies[*supply].initial_pressure,
+            Node::Ambient => 0.0,
+        };
+        units.push(plain(volume, None, pressure));
+    }
+    Ok(units)
+}
+
+fn sensors(spec: &RigSpec, table: &mut Parameters, gases: &mut [GasUnit]) -> Result<()> {
+    for sensor in &spec.sensors {
+        let name = |key: &str| format!("{}.{key}", dotted("sensors", &sensor.name));
+        let pressure = table.add(name("pressure_zero"), sensor.pressure_zero, (-1e7, 1e7, "Pa"))?;
+        table.add(name("angle_zero"), sensor.angle_zero, (-7.0, 7.0, "rad"))?;
+        if spec.load.is_some() && sensor.name.is_empty() {
+            table.add(name("length_zero"), sensor.length_zero, (-10.0, 10.0, "m"))?;
+        }
+        let chambers = spec.chambers.iter().map(|c| &c.name);
+        let known = chambers.clone().chain(spec.joints.iter().map(|j| &j.name)).any(|n| *n == sensor.name);
+        if !sensor.name.is_empty() && !known {
+            return model(format!(
+                "[sensors.{}] is not allowed: the rig has no chamber and no joint of that name",
+                sensor.name
+            ));
+        }
+        for (gas, chamber) in gases.iter_mut().zip(chambers) {
+            // One of its own wins over the common one.
+            if *chamber == sensor.name || (sensor.name.is_empty() && gas.pressure_zero.is_none()) {
+                gas.pressure_zero = Some(pressure);
+            }
+        }
+    }
+    Ok(())
+}
+
+fn zeros(spec: &RigSpec, table: &Parameters, mut coordinates: Vec<Coordinate>) -> Vec<Coordinate> {
+    if spec.load.as_ref().is_some_and(|load| !load.is_frame()) {
+        coordinates[0].zero = table.find("sensors.length_zero").ok();
+        return coordinates;
+    }
+    for (coordinate, name) in coordinates.iter_mut().zip(coordinate_names(spec)) {
+        let own = |name: &str| table.find(&format!("{}.angle_zero", dotted("sensors", name))).ok();
+        coordinate.zero = own(&name).or_else(|| own(""));
+    }
+    coordinates
+}

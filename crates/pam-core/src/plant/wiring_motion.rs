@@ -1,0 +1,203 @@
+//! How the muscles, joints and bodies of a description fit together.
+
+use super::parameters::Parameters;
+use super::units::{BodyUnit, Coordinate, Group, LinkUnit, MOST_LINKS};
+use super::wiring::model;
+use crate::blocks::arm::planar::Stops;
+use crate::blocks::joint::Joint;
+use crate::description::{dotted, ArmSpec, LinkSpec, LoadSpec, RigSpec};
+use crate::muscle::spec::MODULUS_SCALE;
+use crate::muscle::{CompiledMuscle, Muscle};
+use crate::Result;
+
+pub(super) fn coordinates(spec: &RigSpec) -> Result<Vec<Coordinate>> {
+    if let Some(load) = &spec.load {
+        if !spec.joints.is_empty() || spec.arm.is_some() {
+            return model("a rig has either [joint] and [arm] or [load], not both");
+        }
+        let Some(first) = spec.muscles.first() else {
+            return model("a rig with [load] needs [muscle]");
+        };
+        let rest = first.muscle.rest_length;
+        if spec.muscles.iter().any(|m| m.muscle.rest_length != rest) {
+            return model("muscles on one load must have the same rest_length");
+        }
+        return Ok(vec![Coordinate { rest: 0.0, stops: load_stops(load, rest), zero: None }]);
+    }
+    let coordinate = |joint: &crate::description::JointSpec| Coordinate {
+        rest: joint.rest_angle,
+        stops: Some(Stops {
+            min_angle: joint.min_angle,
+            max_angle: joint.max_angle,
+            stiffness: joint.stop_stiffness,
+            damping: joint.stop_damping,
+        }),
+        zero: None,
+    };
+    let named = |port: &str| spec.joints.iter().position(|j| dotted("joint", &j.name) == port);
+    match &spec.arm {
+        None if spec.joints.is_empty() && spec.muscles.is_empty() => Ok(Vec::new()),
+        None if spec.joints.is_empty() => model("a rig with [muscle] needs [joint] and [arm], or [load]"),
+        None => model("a rig with [joint] needs [arm]"),
+        Some(_) if spec.joints.is_empty() => model("a rig with [arm] needs [joint]"),
+        Some(arm) if arm.kind == "one_link" => match spec.joints.as_slice() {
+            [joint] => Ok(vec![coordinate(joint)]),
+            _ => model(format!("a one-link arm has one joint, and the rig has {}", spec.joints.len())),
+        },
+        Some(arm) => {
+            let links = arm.links.len();
+            if !(1..=MOST_LINKS).contains(&links) || links != spec.joints.len() {
+                return model(format!(
+                    "a planar arm has 1 to {MOST_LINKS} links and as many joints; the rig has {links} links and {} joints",
+                    spec.joints.len()
+                ));
+            }
+            let mut order = Vec::new();
+            for link in &arm.links {
+                let Some(k) = named(&link.joint).filter(|k| !order.contains(k)) else {
+                    return model(format!(
+                        "{}.joint = \"{}\" is not allowed: a joint of its own is needed",
+                        dotted("link", &link.name),
+                        link.joint
+                    ));
+                };
+                order.push(k);
+            }
+            Ok(order.iter().map(|k| coordinate(&spec.joints[*k])).collect())
+        }
+    }
+}
+
+/// The coordinate that a joint's port names, in the order of the links.
+pub(crate) fn coordinate_of(spec: &RigSpec, port: &str) -> Option<usize> {
+    match &spec.arm {
+        Some(arm) if arm.kind == "planar" => arm.links.iter().position(|l| l.joint == port),
+        _ => spec.joints.iter().position(|j| dotted("joint", &j.name) == port),
+    }
+}
+
+/// Names of the coordinates (joints), in their order.
+pub(crate) fn coordinate_names(spec: &RigSpec) -> Vec<String> {
+    match &spec.arm {
+        Some(arm) if arm.kind == "planar" => {
+            let bare = |port: &str| port.split_once('.').map_or(String::new(), |(_, name)| name.to_string());
+            arm.links.iter().map(|l| bare(&l.joint)).collect()
+        }
+        _ => spec.joints.iter().map(|j| j.name.clone()).collect(),
+    }
+}
+
+fn load_stops(load: &LoadSpec, rest: f64) -> Option<Stops> {
+    (!load.is_frame()).then_some(Stops {
+        min_angle: rest - load.max_length,
+        max_angle: rest - load.min_length,
+        stiffness: load.stop_stiffness,
+        damping: load.stop_damping,
+    })
+}
+
+pub(super) fn groups(spec: &RigSpec, known: &[Group], table: &mut Parameters) -> Result<Vec<Group>> {
+    let mut units: Vec<Group> = Vec::new();
+    for (k, group) in spec.muscles.iter().enumerate() {
+        let block = dotted("muscle", &group.name);
+        let chamber = spec.chambers.iter().position(|c| dotted("chamber", &c.name) == group.chamber);
+        let Some(chamber) = chamber else {
+            return model(format!(
+                "{block}.chamber = \"{}\" is not allowed: the rig has no such chamber",
+                group.chamber
+            ));
+        };
+        let (coordinate, joint) = if spec.load.is_some() {
+            if group.joint != "load" {
+                return model(format!(
+                    "{block}.joint = \"{}\" is not allowed: the rig has a load, \"load\" is needed",
+                    group.joint
+                ));
+            }
+            (0, Joint::Direct)
+        } else {
+            let found = coordinate_of(spec, &group.joint)
+                .zip(spec.joints.iter().find(|j| dotted("joint", &j.name) == group.joint));
+            let Some((coordinate, joint)) = found else {
+                return model(format!(
+                    "{block}.joint = \"{}\" is not allowed: the rig has no such joint",
+                    group.joint
+                ));
+            };
+            let Some(transmission) = group.transmission.as_ref().or(joint.transmission.as_ref()) else {
+                return model(format!(
+                    "{block} has no transmission: neither [transmission] nor its joint says how it pulls"
+                ));
+            };
+            (coordinate, Joint::new(transmission)?)
+        };
+        let again = known.get(k).and_then(|old| old.muscle.respecified(&group.muscle));
+        let muscle = match again {
+            Some(muscle) => muscle,
+            None => match spec.muscles[..k].iter().position(|m| m.muscle == group.muscle) {
+                Some(same) => units[same].muscle.clone(),
+                None => CompiledMuscle::new(Muscle::new(&group.muscle)?)?,
+            },
+        };
+        units.push(Group {
+            chamber,
+            coordinate,
+            joint,
+            scale: table.add(format!("{block}.modulus_scale"), group.muscle.modulus_scale, MODULUS_SCALE)?,
+            count: f64::from(group.muscle.count),
+            rest_length: group.muscle.rest_length,
+            direction: muscle.has_direction(),
+            muscle,
+        });
+    }
+    if !spec.joints.is_empty() && units.is_empty() {
+        return model("a rig with [joint] needs [muscle]");
+    }
+    Ok(units)
+}
+
+pub(super) fn body(spec: &RigSpec, table: &mut Parameters) -> Result<BodyUnit> {
+    if let Some(load) = spec.load.as_ref().filter(|load| !load.is_frame()) {
+        return Ok(BodyUnit::Mass {
+            mass: table.add("load.mass".into(), load.mass, (1e-6, 1e6, "kg"))?,
+            viscous: table.add("load.viscous".into(), load.viscous, (0.0, 1e9, "N s/m"))?,
+            coulomb: table.add("load.coulomb".into(), load.coulomb, (0.0, 1e9, "N"))?,
+            coulomb_speed: load.coulomb_speed,
+            gravity: load.gravity,
+        });
+    }
+    let Some(arm) = &spec.arm else { return Ok(BodyUnit::Fixed) };
+    if arm.kind == "planar" {
+        return planar(arm, table);
+    }
+    Ok(BodyUnit::OneLink {
+        inertia: table.add("arm.inertia".into(), arm.inertia, (0.0, 1e6, "kg m2"))?,
+        first_moment: table.add("arm.first_moment".into(), arm.first_moment, (-1e6, 1e6, "kg m"))?,
+        payload: table.add("arm.payload".into(), arm.payload, (0.0, 1e6, "kg"))?,
+        viscous: table.add("arm.viscous".into(), arm.viscous, (0.0, 1e6, "N m s/rad"))?,
+        coulomb: table.add("arm.coulomb".into(), arm.coulomb, (0.0, 1e6, "N m"))?,
+        length: arm.length,
+        coulomb_speed: arm.coulomb_speed,
+        gravity: arm.gravity,
+    })
+}
+
+fn planar(arm: &ArmSpec, table: &mut Parameters) -> Result<BodyUnit> {
+    let mut unit = |link: &LinkSpec| -> Result<LinkUnit> {
+        let mut add = |key: &str, value, (low, high, unit)| {
+            table.add(format!("{}.{key}", dotted("link", &link.name)), value, (low, high, unit))
+        };
+        Ok(LinkUnit {
+            length: add("length", link.length, (0.0, 1e3, "m"))?,
+            mass: add("mass", link.mass, (0.0, 1e6, "kg"))?,
+            centre: add("centre", link.centre, (-1e3, 1e3, "m"))?,
+            inertia: add("inertia", link.inertia, (0.0, 1e6, "kg m2"))?,
+            payload: add("payload", link.payload, (0.0, 1e6, "kg"))?,
+            viscous: add("viscous", link.viscous, (0.0, 1e6, "N m s/rad"))?,
+            coulomb: add("coulomb", link.coulomb, (0.0, 1e6, "N m"))?,
+            coulomb_speed: link.coulomb_speed,
+        })
+    };
+    let links = arm.links.iter().map(&mut unit).collect::<Result<_>>()?;
+    Ok(BodyUnit::Planar { gravity: arm.gravity, links })
+}

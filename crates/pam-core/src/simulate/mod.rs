@@ -1,0 +1,564 @@
+//! Fixed-step simulation: commands are held over each sample, RK4 steps fill it.
+
+pub mod batch;
+pub mod drive;
+pub mod events;
+mod initial;
+pub mod integrate;
+pub mod run;
+
+use self::drive::Drive;
+use self::events::Event;
+pub use self::initial::Initial;
+use self::integrate::Rk4;
+use self::run::Run;
+use crate::description::dotted;
+use crate::effects::clock_skew::late;
+use crate::error::check_range;
+use crate::plant::{Channel, Memory, Rig};
+use crate::plant::{Controls, Plant, Scratch, Simulated};
+use crate::scalar::{constant, Scalar};
+use crate::{Error, Result};
+use std::ops::Range;
+
+/// Sample time and step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Timing {
+    /// Sample time [s]: one output row and one held command each.
+    pub sample_time: f64,
+    /// RK4 steps per sample.
+    pub substeps: usize,
+}
+
+impl Timing {
+    /// Timing from a sample time and a step [s] that divides it.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] when either is not positive or the step does not divide the sample time.
+    pub fn new(sample_time: f64, step: f64) -> Result<Self> {
+        if !(sample_time.is_finite() && sample_time > 0.0) {
+            return Err(Error::parameter("sample_time", sample_time, "a finite time > 0 s"));
+        }
+        let ratio = sample_time / step;
+        let rounded = ratio.round();
+        let divides = (1.0..=1e7).contains(&rounded) && (ratio - rounded).abs() <= 1e-6 * rounded;
+        if !(step.is_finite() && step > 0.0 && divides) {
+            let allowed =
+                format!("a time > 0 s that divides sample_time = {sample_time} s into 1 to 1e7 steps");
+            return Err(Error::parameter("step", step, allowed));
+        }
+        Ok(Self { sample_time, substeps: rounded as usize })
+    }
+
+    /// The same with each step divided until it is at most as long as a rig allows.
+    #[must_use]
+    pub fn stable(self, rig: &Rig) -> Self {
+        self.at_most(rig.stable_step())
+    }
+
+    /// The same with each step divided until it is at most so long [s].
+    #[must_use]
+    pub fn at_most(self, longest: f64) -> Self {
+        let parts = (self.step() / longest - 1e-9).ceil().max(1.0);
+        Self { substeps: self.substeps.saturating_mul(parts as usize), ..self }
+    }
+
+    /// Step [s].
+    pub fn step(&self) -> f64 {
+        self.sample_time / self.substeps as f64
+    }
+}
+
+/// Steps between two looks outside: some ten milliseconds of a large rig.
+const STEPS_UNSEEN: usize = 8_000;
+/// Rows that room is made for at once.
+const MOST_ROOM: usize = 65_536;
+
+/// A plant with the memory that a step needs.
+pub(crate) struct Stepper<'a, S> {
+    pub plant: Plant<'a, S>,
+    pub scratch: Scratch<S>,
+    method: Rk4<S>,
+    start: Vec<S>,
+    end: Vec<S>,
+    remembers: bool,
+    /// Controls at the beginning, the middle and the end of a step, where they differ.
+    stages: Option<[Controls<S>; 3]>,
+    /// State before a step, where something happens between steps.
+    before: Option<Vec<S>>,
+    /// Whether anybody asks what the sensors read.
+    pub reads: bool,
+}
+
+impl<'a, S: Scalar> Stepper<'a, S> {
+    pub fn new(plant: Plant<'a, S>) -> Self {
+        let groups = plant.rig().wiring.groups.len();
+        let zeros = || vec![constant(0.0); groups];
+        let ports = &plant.rig().wiring.ports;
+        let stages = ports.staged().then(|| std::array::from_fn(|_| plant.controls(|_| 0.0)));
+        let before = ports.updates().then(|| vec![constant(0.0); plant.states()]);
+        Self {
+            stages,
+            before,
+            reads: true,
+            scratch: plant.scratch(),
+            method: Rk4::new(plant.states()),
+            start: zeros(),
+            end: zeros(),
+            remembers: plant.remembers(),
+            plant,
+        }
+    }
+
+    /// Controls as they are at the beginning (0), the middle or the end (2) of the step that began last.
+    pub fn controls<'b>(&'b self, held: &'b Controls<S>, stage: usize) -> &'b Controls<S> {
+        self.stages.as_ref().map_or(held, |stages| &stages[stage])
+    }
+
+    /// Controls at the beginning of a step that is still to come.
+    pub fn begin(&mut self, state: &[S], held: &Controls<S>, time: f64) {
+        if let Some([first, ..]) = &mut self.stages {
+            self.plant.stage(state, held, time, 0.0, first);
+        }
+    }
+
+    /// One RK4 step from a time [s] on; driven states are written by `drive(plant, controls, fraction, state)`, the controls being
+    /// those of that instant.
+    #[inline]
+    #[allow(clippy::too_many_arguments)]
+    pub fn step(
+        &mut self,
+        state: &mut [S],
+        memory: &mut [Memory<S>],
+        controls: &Controls<S>,
+        time: f64,
+        dt: f64,
+        simulated: &Simulated,
+        mut drive: impl FnMut(&Plant<'a, S>, &Controls<S>, f64, &mut [S]),
+    ) {
+        let Self { plant, scratch, method, start, end, remembers, stages, before, reads } = self;
+        if let Some(stages) = stages {
+            for (k, stage) in stages.iter_mut().enumerate() {
+                plant.stage(state, controls, time, 0.5 * k as f64 * dt, stage);
+            }
+        }
+        let held = controls;
+        let at = |stage: usize| stages.as_ref().map_or(held, |stages| &stages[stage]);
+        if *remembers {
+            drive(plant, at(0), 0.0, state);
+            plant.contractions(state, start);
+        }
+        if let Some(before) = before {
+            drive(plant, at(0), 0.0, state);
+            before.copy_from_slice(state);
+        }
+        method.step(state, dt, |fraction, y, out| {
+            let controls = at((2.0 * fraction) as usize);
+            drive(plant, controls, fraction, y);
+            plant.rates(y, controls, memory, start, simulated, scratch, out);
+        });
+        drive(plant, at(2), 1.0, state);
+        if let Some(before) = before {
+            plant.discrete_update(before, state, held, dt);
+            if *reads {
+                plant.read(before, state, [at(0), at(2)], dt);
+            }
+        }
+        if *remembers {
+            plant.contractions(state, end);
+            plant.follow_muscles(state, memory, start, end);
+        }
+    }
+}
+
+/// Error for a state that has left the model's range, if it has.
+pub(crate) fn check_state<S: Scalar>(plant: &Plant<'_, S>, state: &[S], time: f64) -> Result<()> {
+    let rig = plant.rig();
+    let layout = &rig.layout;
+    let failure = |name: &str, value: f64, allowed: &str| {
+        Err(Error::Integration { time, name: name.into(), value, allowed: allowed.into() })
+    };
+    for (name, place) in &rig.names.initial {
+        let value = state[*place].re();
+        if !value.is_finite() {
+            return failure(name, value, "a finite value (a smaller step may help)");
+        }
+        if *place < layout.mass(0) && value < 0.0 {
+            return failure(name, value, "an absolute pressure >= 0 Pa (a smaller step may help)");
+        }
+    }
+    for k in 0..layout.gases {
+        if !state[layout.mass(k)].re().is_finite() {
+            return failure(
+                "gas_mass",
+                state[layout.mass(k)].re(),
+                "a finite value (a smaller step may help)",
+            );
+        }
+    }
+    for (group, spec) in rig.wiring.groups.iter().zip(&rig.spec().muscles) {
+        let angle = state[layout.angle(group.coordinate)];
+        if !group.joint.reaches(angle.re()) {
+            return failure("joint_angle", angle.re(), "an angle that the tendon reaches");
+        }
+        let contraction = (group.joint.eval(angle).shortening / group.rest_length).re();
+        let table = &group.muscle.table;
+        if !table.contains(contraction) {
+            let allowed = format!("inside the muscle's range {:.4} to {:.4}", table.e_min, table.e_max);
+            return failure(&dotted("contraction_ratio", &spec.name), contraction, &allowed);
+        }
+    }
+    Ok(())
+}
+
+/// Simulated channels in the order of [`crate::plant::Names::channels`], one row per sample; row 0 is the initial state. SI,
+/// pressures gauge and as the sensors read them (zeros included). And what happened on the way.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trajectory {
+    /// One vector for each channel.
+    pub channels: Vec<Vec<f64>>,
+    /// In the order of time.
+    pub events: Vec<Event>,
+}
+
+impl Trajectory {
+    /// Without rows.
+    #[must_use]
+    pub fn new(rig: &Rig, rows: usize) -> Self {
+        let room = rows.min(MOST_ROOM);
+        let channels = rig.names.channels.iter().map(|_| Vec::with_capacity(room)).collect();
+        Self { channels, events: Vec::new() }
+    }
+
+    /// The channel of a name.
+    #[must_use]
+    pub fn get(&self, rig: &Rig, name: &str) -> Option<&[f64]> {
+        let k = rig.names.channels.iter().position(|(n, _)| n == name)?;
+        self.channels.get(k).map(Vec::as_slice)
+    }
+}
+
+/// A running simulation at a sample: all that its future depends on.
+#[derive(Debug, Default, PartialEq)]
+pub struct Progress {
+    state: Vec<f64>,
+    memory: Vec<Memory<f64>>,
+    /// Conditions that an event ends, see [`Watch`].
+    flags: Vec<bool>,
+    samples: u64,
+    /// Commands and pressure readings of the samples before, newest last, as far back as the effect `clock_skew` reaches.
+    past: Vec<f64>,
+    /// How many of them a sample has: all commands and readings, or none.
+    kept: usize,
+}
+
+impl Clone for Progress {
+    fn clone(&self) -> Self {
+        let (state, memory) = (self.state.clone(), self.memory.clone());
+        let (flags, past) = (self.flags.clone(), self.past.clone());
+        Self { state, memory, flags, past, ..*self }
+    }
+
+    /// Without new memory: what every sample begins with.
+    fn clone_from(&mut self, other: &Self) {
+        let Self { state, memory, flags, samples, past, kept } = self;
+        state.clone_from(&other.state);
+        memory.clone_from(&other.memory);
+        flags.clone_from(&other.flags);
+        past.clone_from(&other.past);
+        (*samples, *kept) = (other.samples, other.kept);
+    }
+}
+
+impl Progress {
+    /// The start of a simulation.
+    ///
+    /// # Errors
+    /// As [`Plant::new`].
+    pub fn start(rig: &Rig, initial: &Initial) -> Result<Self> {
+        let plant = Plant::new(rig, rig.parameters().lift(), true)?;
+        let mut state = initial.state(rig, plant.states());
+        for gas in 0..rig.layout.gases {
+            state[rig.layout.mass(gas)] = plant.initial_mass(gas, &state);
+        }
+        plant.start_effects(&mut state);
+        let memory = plant.fresh_memory();
+        let mut flags = Vec::new();
+        for (k, coordinate) in rig.wiring.coordinates.iter().enumerate() {
+            let x = state[rig.layout.angle(k)];
+            flags.push(coordinate.stops.is_some_and(|s| x < s.min_angle));
+            flags.push(coordinate.stops.is_some_and(|s| x > s.max_angle));
+        }
+        flags.extend(std::iter::repeat_n(false, rig.wiring.valves.len() + rig.wiring.lines.len()));
+        let kept = if plant.skewed() { rig.names.inputs.len() + gauges(rig).count() } else { 0 };
+        Ok(Self { state, memory, flags, samples: 0, past: Vec::new(), kept })
+    }
+
+    /// Samples since the start.
+    #[must_use]
+    pub fn samples(&self) -> u64 {
+        self.samples
+    }
+
+    /// The numbers that [`Self::restored`] makes the same progress of, bit for bit.
+    #[must_use]
+    pub fn to_vec(&self) -> Vec<f64> {
+        let memory = self.memory.iter().flat_map(Memory::to_array);
+        let flags = self.flags.iter().map(|f| f64::from(u8::from(*f)));
+        let numbers = self.state.iter().copied().chain(memory).chain(flags).chain([self.samples as f64]);
+        numbers.chain(self.past.iter().copied()).collect()
+    }
+
+    /// This progress with the numbers of another [`Self::to_vec`] of the same rig.
+    ///
+    /// # Errors
+    /// [`Error::Length`] for another number of them, [`Error::Parameter`] for one that is not finite.
+    pub fn restored(&self, numbers: &[f64]) -> Result<Self> {
+        let parts = [self.state.len(), self.memory.len() * Memory::<f64>::NUMBERS, self.flags.len(), 1];
+        let expected: usize = parts.iter().sum();
+        let past = numbers.len().wrapping_sub(expected);
+        let whole = past == 0 || (past < numbers.len() && self.kept > 0 && past % self.kept == 0);
+        if !whole {
+            let why = "as it was read".into();
+            return Err(Error::Length { name: "state".into(), found: numbers.len(), expected, why });
+        }
+        for (k, value) in numbers.iter().enumerate() {
+            check_range(&format!("state[{k}]"), *value, -1e15, 1e15, "(as it was read)")?;
+        }
+        let (state, rest) = numbers.split_at(parts[0]);
+        let (memory, rest) = rest.split_at(parts[1]);
+        let (flags, rest) = rest.split_at(parts[2]);
+        let (samples, past) = rest.split_at(1);
+        Ok(Self {
+            past: past.to_vec(),
+            kept: self.kept,
+            state: state.to_vec(),
+            memory: memory.chunks(Memory::<f64>::NUMBERS).map(Memory::from_slice).collect(),
+            flags: flags.iter().map(|f| *f > 0.5).collect(),
+            samples: samples.first().map_or(0, |n| n.max(0.0) as u64),
+        })
+    }
+
+    /// Append this sample to a trajectory.
+    ///
+    /// # Errors
+    /// [`Error::Integration`] when the state has left the model's range.
+    pub fn observe(&self, rig: &Rig, timing: Timing, out: &mut Trajectory) -> Result<()> {
+        let plant = Plant::new(rig, rig.parameters().lift(), true)?;
+        let mut scratch = plant.scratch();
+        self.observed(&plant, &mut scratch, timing, out)
+    }
+
+    /// As [`Self::observe`], with a run of the same rig.
+    ///
+    /// # Errors
+    /// As [`Self::observe`].
+    pub fn observe_in(&self, run: &mut Run<'_>, timing: Timing, out: &mut Trajectory) -> Result<()> {
+        self.observed(&run.stepper.plant, &mut run.stepper.scratch, timing, out)
+    }
+
+    fn observed(
+        &self,
+        plant: &Plant<'_, f64>,
+        scratch: &mut Scratch<f64>,
+        timing: Timing,
+        out: &mut Trajectory,
+    ) -> Result<()> {
+        check_state(plant, &self.state, self.samples as f64 * timing.sample_time)?;
+        plant.observe(&self.state, &self.memory, scratch, &mut out.channels);
+        if self.kept > 0 {
+            let (pressures, angles) = plant.skew(self.samples as f64 * timing.sample_time);
+            let later = (pressures.max(0.0) - angles.max(0.0)) / timing.sample_time;
+            let first = plant.rig().names.inputs.len();
+            for (column, channel) in gauges(plant.rig()).enumerate() {
+                let rows = || self.past.chunks(self.kept).rev();
+                if let Some(reading) = out.channels[channel].last_mut() {
+                    *reading = late(|ago| rows().nth(ago).map(|r| r[first + column]), *reading, later);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Note the commands and the pressures of a sample, and forget what nobody asks for any more.
+    fn remember(
+        &mut self,
+        plant: &Plant<'_, f64>,
+        scratch: &mut Scratch<f64>,
+        drive: &Drive<'_>,
+        sample: usize,
+        timing: Timing,
+    ) {
+        let mut readings = vec![Vec::new(); plant.rig().names.channels.len()];
+        plant.observe(&self.state, &self.memory, scratch, &mut readings);
+        self.past.extend(drive.commands.iter().map(|commands| commands[sample]));
+        self.past.extend(gauges(plant.rig()).flat_map(|channel| readings[channel].last().copied()));
+        let (skew, _) = plant.skew(self.samples as f64 * timing.sample_time);
+        let most = self.kept * (2 + (skew.max(0.0) / timing.sample_time).ceil() as usize);
+        self.past.drain(..self.past.len().saturating_sub(most));
+    }
+
+    /// Commands over the step that begins at a time, the newest being those of the present sample: as late as the angles.
+    fn skewed(&self, plant: &Plant<'_, f64>, time: f64, timing: Timing) -> Controls<f64> {
+        let rows = self.past.len() / self.kept;
+        let command = |input: usize, sample: i64| {
+            let back = (self.samples as i64 - sample).clamp(0, rows as i64 - 1) as usize;
+            self.past[(rows - 1 - back) * self.kept + input]
+        };
+        let (_, shift) = plant.skew(time);
+        plant.skewed_controls(shift.max(0.0), time, timing.step(), timing.sample_time, command)
+    }
+
+    /// Hold the commands of each sample and append the sample after it. What is prescribed moves evenly to its value for the
+    /// end of each sample.
+    ///
+    /// # Errors
+    /// [`Error::Integration`] when the state leaves the model's range; what was appended before stays, and the progress is
+    /// that of the last good sample.
+    pub fn advance(
+        &mut self,
+        rig: &Rig,
+        timing: Timing,
+        drive: &Drive<'_>,
+        out: &mut Trajectory,
+    ) -> Result<()> {
+        self.advance_watched(rig, timing, drive, out, &mut || Ok(()))
+    }
+
+    /// As [`Self::advance`], with a look outside every few milliseconds: an error of `look` ends the run at the last sample.
+    ///
+    /// # Errors
+    /// As [`Self::advance`], and that of `look`.
+    pub fn advance_watched(
+        &mut self,
+        rig: &Rig,
+        timing: Timing,
+        drive: &Drive<'_>,
+        out: &mut Trajectory,
+        look: &mut dyn FnMut() -> Result<()>,
+    ) -> Result<()> {
+        self.advance_in(&mut Run::new(rig)?, timing, drive, 0..drive.samples, out, look)
+    }
+
+    /// As [`Self::advance_watched`] over some samples of a drive, with a run of the same rig.
+    ///
+    /// # Errors
+    /// As [`Self::advance_watched`].
+    pub fn advance_in(
+        &mut self,
+        run: &mut Run<'_>,
+        timing: Timing,
+        drive: &Drive<'_>,
+        samples: Range<usize>,
+        out: &mut Trajectory,
+        look: &mut dyn FnMut() -> Result<()>,
+    ) -> Result<()> {
+        run.prescribe(drive);
+        let Run { stepper, simulated, before, after, next, unseen, .. } = run;
+        let rig = stepper.plant.rig();
+        let dt = timing.step();
+        for k in samples {
+            let mut controls = stepper.plant.controls(|input| drive.commands[input][k]);
+            next.clone_from(self);
+            let happened = out.events.len();
+            let ends = drive.ends(rig, &self.state, k);
+            let began = self.samples as f64 * timing.sample_time;
+            if self.kept > 0 {
+                next.remember(&stepper.plant, &mut stepper.scratch, drive, k, timing);
+                controls = next.skewed(&stepper.plant, began, timing);
+            }
+            stepper.begin(&next.state, &controls, began);
+            before.look(&stepper.plant, &next.state, stepper.controls(&controls, 0));
+            before.report(rig, None, began, &mut next.flags, &mut out.events);
+            for sub in 0..timing.substeps {
+                let from = began + sub as f64 * dt;
+                if self.kept > 0 {
+                    controls = next.skewed(&stepper.plant, from, timing);
+                }
+                let (state, memory) = (&mut next.state, &mut next.memory);
+                stepper.step(state, memory, &controls, from, dt, simulated, |_, _, fraction, y| {
+                    let share = (sub as f64 + fraction) / timing.substeps as f64;
+                    for (place, from, to) in &ends {
+                        y[*place] = from + (to - from) * share;
+                        if *place >= rig.layout.angle(0) {
+                            y[place + rig.layout.coordinates] = (to - from) / timing.sample_time;
+                        }
+                    }
+                });
+                after.look(&stepper.plant, &next.state, stepper.controls(&controls, 2));
+                let time = began + (sub + 1) as f64 * dt;
+                after.report(rig, Some((before, dt)), time, &mut next.flags, &mut out.events);
+                std::mem::swap(before, after);
+                *unseen += 1;
+                if *unseen >= STEPS_UNSEEN {
+                    *unseen = 0;
+                    if let Err(error) = look() {
+                        out.events.truncate(happened);
+                        return Err(error);
+                    }
+                }
+            }
+            for (place, ..) in &ends {
+                held_mass(&stepper.plant, *place, &mut next.state);
+            }
+            // Within a step they were found block by block.
+            if let Some(new) = out.events.get_mut(happened..) {
+                new.sort_by(|a, b| a.time.total_cmp(&b.time));
+            }
+            next.samples += 1;
+            if let Err(error) = next.observed(&stepper.plant, &mut stepper.scratch, timing, out) {
+                out.events.truncate(happened);
+                return Err(error);
+            }
+            std::mem::swap(self, next);
+        }
+        Ok(())
+    }
+}
+
+/// Channels that are readings of pressures.
+fn gauges(rig: &Rig) -> impl Iterator<Item = usize> + '_ {
+    let pressure = |channel: &Channel| matches!(channel, Channel::Supply(_) | Channel::Pressure(_));
+    rig.names.channels.iter().enumerate().filter(move |(_, (_, c))| pressure(c)).map(|(k, _)| k)
+}
+
+/// The gas of a prescribed pressure is at the temperature of the room, and what that takes was supplied from outside (or,
+/// where it is less, vented).
+fn held_mass(plant: &Plant<'_, f64>, place: usize, state: &mut [f64]) {
+    let layout = plant.rig().layout;
+    if place >= layout.mass(0) {
+        return;
+    }
+    let gas = place - layout.supplies;
+    let (mass, pressure) = (plant.rest_mass(gas, state), state[place]);
+    let more = mass - state[layout.mass(gas)];
+    let air = &plant.rig().gas;
+    let rt = air.gas_constant * air.temperature;
+    state[layout.mass(gas)] = mass;
+    if more > 0.0 {
+        state[layout.balance(0)] += more;
+        state[layout.balance(2)] += more * rt;
+        state[layout.balance(3)] += more * rt * (pressure / air.ambient_pressure).ln();
+    } else {
+        state[layout.balance(1)] -= more;
+    }
+}
+
+/// Simulate `rows` rows: the initial state, and one for each held sample but the last.
+///
+/// # Errors
+/// As [`Drive::new`] and [`Progress::advance`].
+pub fn simulate(
+    rig: &Rig,
+    rows: usize,
+    signals: &[(&str, &[f64])],
+    timing: Timing,
+    initial: &Initial,
+) -> Result<Trajectory> {
+    let mut out = Trajectory::new(rig, rows);
+    let mut progress = Progress::start(rig, initial)?;
+    progress.observe(rig, timing, &mut out)?;
+    let drive = Drive::new(rig, rows, signals)?;
+    progress.advance(rig, timing, &drive.part(0..rows.saturating_sub(1)), &mut out)?;
+    Ok(out)
+}

@@ -1,0 +1,76 @@
+//! What the samples of one rig need on the way, kept from one to the next.
+
+use crate::plant::Rig;
+use crate::plant::{Plant, Simulated};
+use crate::simulate::drive::Drive;
+use crate::simulate::events::Watch;
+use crate::simulate::{Progress, Stepper};
+use crate::Result;
+use self_cell::self_cell;
+use std::sync::Arc;
+
+/// What samples of one rig need on the way and do not depend on: made once, whatever runs with it.
+pub struct Run<'a> {
+    pub(crate) stepper: Stepper<'a, f64>,
+    pub(crate) simulated: Simulated,
+    /// Places that are prescribed.
+    places: Vec<usize>,
+    pub(crate) before: Watch,
+    pub(crate) after: Watch,
+    /// The sample that is on its way.
+    pub(crate) next: Progress,
+    /// Steps since the last look outside.
+    pub(crate) unseen: usize,
+}
+
+impl<'a> Run<'a> {
+    /// Room for a rig.
+    ///
+    /// # Errors
+    /// As [`Plant::new`].
+    pub fn new(rig: &'a Rig) -> Result<Self> {
+        Ok(Self {
+            stepper: Stepper::new(Plant::new(rig, rig.parameters().lift(), true)?),
+            simulated: Simulated::all_but(&rig.layout, &[]),
+            places: Vec::new(),
+            before: Watch::default(),
+            after: Watch::default(),
+            next: Progress::default(),
+            unseen: 0,
+        })
+    }
+
+    /// Integrate everything but what a drive prescribes.
+    pub(crate) fn prescribe(&mut self, drive: &Drive<'_>) {
+        if !drive.places().eq(self.places.iter().copied()) {
+            self.places = drive.places().collect();
+            self.simulated = Simulated::all_but(&self.stepper.plant.rig().layout, &self.places);
+        }
+    }
+}
+
+self_cell!(
+    struct Held {
+        owner: Arc<Rig>,
+        #[covariant]
+        dependent: Run,
+    }
+);
+
+/// A [`Run`] that keeps its rig alive, so that it can wait for the next command.
+pub struct OwnedRun(Held);
+
+impl OwnedRun {
+    /// Room for a rig.
+    ///
+    /// # Errors
+    /// As [`Run::new`].
+    pub fn new(rig: Arc<Rig>) -> Result<Self> {
+        Ok(Self(Held::try_new(rig, |rig| Run::new(rig))?))
+    }
+
+    /// Do something with the run.
+    pub fn with<T>(&mut self, work: impl FnOnce(&mut Run<'_>) -> T) -> T {
+        self.0.with_dependent_mut(|_, run| work(run))
+    }
+}

@@ -1,0 +1,327 @@
+"""What the catalogue knows of an effect and of its parameters."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+__all__ = ["EffectInfo", "EffectParameter", "Form", "SameData", "Term", "Words"]
+
+
+@dataclass(frozen=True, slots=True)
+class EffectParameter:
+    """One parameter of an effect, in SI units.
+
+    Attributes
+    ----------
+    name, unit : str
+        Name and SI unit.
+    default : float
+        A typical value.
+    lower, upper : float
+        Bounds of the possible.
+    starts : tuple of float
+        Values from which a fit starts, small to large.
+    meaning : str
+        What it is.
+    neutral : float or None
+        Value that switches the effect off (with the other parameters that have one at theirs);
+        None for a parameter that gives the effect its shape.
+    expected : (low, high) or None
+        Where it usually lies; an effect is less probable the further outside it needs the parameter.
+    prior : (mean, standard deviation) or None
+        What is known of it before any data.
+    role : str
+        What it is to a fit and a search: ``size`` (scales the effect), ``shape`` (tried from its
+        starts), ``choice`` (either end of its range, not fitted), ``held`` (at its default);
+        ``time``, ``duration`` and ``rise`` of an event; ``place`` (where on ``channel`` a contact
+        begins) and ``side`` (from below or above it); ``threshold`` (a level of ``channel`` at
+        which something switches: no fit can move it; the first switches on, the second off). Empty:
+        ``size`` where zero is neutral, else ``shape``.
+    role_sealed : str
+        The same in a rig without a valve; empty where it is the same.
+    channel : str
+        Kind of the measured channel in which a place or a threshold lies.
+    repeats : str
+        Parameter of which it is another one (``torque`` of ``torque_2``); held unless an event
+        needs it.
+    tried : float or None
+        Value that a search gives it while it looks for the time of an event, or scans another
+        parameter.
+    scan : (low, high, count) or None
+        Values that are tried one by one, evenly in their logarithm, before any is fitted: a
+        resonance has to be met.
+    same_everywhere : bool
+        Whether an effect's size is the same in all recordings, so that its scatter between them
+        speaks against the effect.
+    time_constant : bool
+        Whether recordings must last as long as it, or so, to tell it.
+    restricts : bool
+        Whether the effect falls with its inverse square (a pressure loss with a conductance).
+    like : str
+        Parameter of the rig, as ``block.key``, in parts of which it is tried; an area stands for
+        the conductance of its opening.
+    needed_in : tuple of str
+        Kinds of block of the cut chain in which the effect acts only while this parameter is not
+        zero.
+    """
+
+    name: str
+    unit: str
+    default: float
+    lower: float
+    upper: float
+    starts: tuple[float, ...]
+    meaning: str
+    neutral: float | None = None
+    expected: tuple[float, float] | None = None
+    prior: tuple[float, float] | None = None
+    role: str = ""
+    role_sealed: str = ""
+    channel: str = ""
+    repeats: str = ""
+    tried: float | None = None
+    scan: tuple[float, float, int] | None = None
+    same_everywhere: bool = False
+    time_constant: bool = False
+    restricts: bool = False
+    like: str = ""
+    needed_in: tuple[str, ...] = ()
+
+    def role_in(self, *, sealed: bool) -> str:
+        """What it is to a fit, in a rig with a valve or in a sealed one; never empty."""
+        if self.repeats:
+            return "held"
+        usual = self.role or ("size" if self.neutral == 0.0 else "shape")
+        return (self.role_sealed or usual) if sealed else usual
+
+
+@dataclass(frozen=True, slots=True)
+class SameData:
+    """When an effect leaves the very recordings that another one leaves: nothing in them can tell the two apart.
+
+    Attributes
+    ----------
+    effect, parameter : str
+        The other effect, and its parameter that is then as large as ``size``.
+    size : str
+        The own parameter that is the effect's size; the two are the same where it is positive.
+    without : str
+        The own parameter that would tell the two apart, if it were not zero.
+    held : tuple of (str, float)
+        Own parameters with the values at which the two are the same.
+    told_by : str
+        What tells the two apart, since no recording of the same channels does.
+    """
+
+    effect: str
+    parameter: str
+    size: str
+    without: str
+    held: tuple[tuple[str, float], ...]
+    told_by: str
+
+
+@dataclass(frozen=True, slots=True)
+class Term:
+    """One term of a sum that stands where no name does.
+
+    Attributes
+    ----------
+    name : str
+        Name of its coefficient.
+    formula : str
+        What the coefficient multiplies, in the symbols of the sum's equation.
+    variables : tuple of str
+        What it is a function of, in words.
+    kind : str
+        ``static`` (of where things are), ``odd`` or ``even`` (in the rate of the joint or in the
+        opening of the valve, without memory), ``time`` (with a memory that fades in time) or
+        ``distance`` (with one that fades over a way).
+    """
+
+    name: str
+    formula: str
+    variables: tuple[str, ...]
+    kind: str
+
+
+@dataclass(frozen=True, slots=True)
+class Words:
+    """How a sum of terms is put into words.
+
+    Attributes
+    ----------
+    what, letter : str
+        What it is the sum of, and the letter for it.
+    symbols : str
+        What the symbols of its terms stand for.
+    odd_in : str
+        What its odd terms turn their sign with.
+    """
+
+    what: str
+    letter: str
+    symbols: str
+    odd_in: str
+
+
+@dataclass(frozen=True, slots=True)
+class Form:
+    """One form of an effect.
+
+    Attributes
+    ----------
+    name : str
+        Its name.
+    parameters : tuple of EffectParameter
+        Its parameters.
+    states : tuple of str
+        Names of its states at each block; an only one may have none.
+    ports : tuple of str
+        Where it acts in the equations of the rig.
+    """
+
+    name: str
+    parameters: tuple[EffectParameter, ...]
+    states: tuple[str, ...] = ()
+    ports: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class EffectInfo:
+    """One effect of the catalogue.
+
+    Attributes
+    ----------
+    id, name, block : str
+        Public identifier, words, and the block in which it acts.
+    at : str
+        Kind of the blocks of which it can take one by its name, ``""`` for an effect on the whole rig.
+    equation, fingerprint, separates : str
+        Governing equation; what it looks like in recordings; what it is confused with and what
+        separates them.
+    forms : tuple of Form
+        Its forms; the first one is meant where none is named.
+    reference : str
+        Where it comes from.
+    rivals : tuple of str
+        What looks like it in recordings: ids of the catalogue first, then other causes in words. Of
+        two effects each names the other.
+    catalogue : bool
+        Whether it is a name for physics, which a diagnosis may give; a sum of terms is none.
+    same_data : SameData or None
+        Another effect whose recordings it leaves where a parameter is zero.
+    terms : tuple of Term
+        Of a sum of terms, in the order of its parameters; behind them stand the shapes of its memories.
+    label : str
+        Short name for tables and figures; the id in words by default.
+    acts_in : tuple of str
+        Kinds of block of the cut chain in which it acts (``supply``, ``chamber``, ``arm``), where
+        these are others than those of its block.
+    experiment : str
+        What to record to tell it from what looks like it, with numbers; empty where ``separates``
+        says it.
+    excitation : tuple of (str, value)
+        The same for a program: ``kind`` and numbers with their unit in the name.
+    last_only : bool
+        Whether it acts on the last block of its kind where none is named, and not on every one.
+    on_loads : bool
+        Whether it acts on a linear load too.
+    supplies : tuple of str
+        Kinds of supply that it acts on; empty for all.
+    dry_friction : bool
+        Whether a motion that does not turn round does not feel it as damping.
+    kink : (names, why, of_supplies) or None
+        Why it has no linear model: it is there where any of these parameters is not zero, maybe only
+        while the pressure of a supply moves.
+    at_rest : tuple of (str, str, float)
+        How it is changed for a linear model about a state of rest: ``("set", parameter, value)``, or
+        ``("out_below", parameter, value)`` where it is left out below a value.
+    """
+
+    id: str
+    name: str
+    block: str
+    at: str
+    equation: str
+    fingerprint: str
+    separates: str
+    forms: tuple[Form, ...]
+    reference: str
+    rivals: tuple[str, ...] = ()
+    catalogue: bool = True
+    same_data: SameData | None = None
+    terms: tuple[Term, ...] = ()
+    label: str = ""
+    acts_in: tuple[str, ...] = ()
+    experiment: str = ""
+    excitation: tuple[tuple[str, str | int | float | tuple[float, ...]], ...] = ()
+    last_only: bool = False
+    on_loads: bool = False
+    supplies: tuple[str, ...] = ()
+    dry_friction: bool = False
+    kink: tuple[tuple[str, ...], str, bool] | None = None
+    at_rest: tuple[tuple[str, str, float], ...] = ()
+
+    @property
+    def parameters(self) -> tuple[EffectParameter, ...]:
+        """The parameters of the first form."""
+        return self.forms[0].parameters
+
+    def form(self, name: str = "") -> Form:
+        """One of its forms.
+
+        Parameters
+        ----------
+        name : str
+            Its name; ``""`` for the first.
+
+        Returns
+        -------
+        Form
+
+        Raises
+        ------
+        KeyError
+            If it has no such form.
+        """
+        found = next((form for form in self.forms if name in ("", form.name)), None)
+        if found is None:
+            raise KeyError(name)
+        return found
+
+    @property
+    def everywhere(self) -> str:
+        """Where it acts when no block is named, in words."""
+        if not self.at:
+            return "the whole rig"
+        return f"the last {self.at}" if self.last_only else f"every {self.at}"
+
+    @property
+    def needs(self) -> tuple[tuple[str, str], ...]:
+        """What a rig must have for it: one of these blocks, each with its kind (empty: any); empty for the usual."""
+        if self.on_loads:
+            return (("load", "mass"), ("joint", ""))
+        return tuple(("supply", kind) for kind in self.supplies)
+
+    @property
+    def transient(self) -> bool:
+        """Whether it happens at times of its own in each recording, so that all recordings cannot share its parameters."""
+        return any(parameter.role == "time" for parameter in self.parameters)
+
+    @property
+    def leading(self) -> EffectParameter:
+        """The parameter that scales it: the first that is a size."""
+        return next(p for p in self.parameters if p.role_in(sealed=False) == "size")
+
+    def with_role(self, role: str) -> tuple[EffectParameter, ...]:
+        """Its parameters of a role, in their order."""
+        return tuple(p for p in self.parameters if p.role == role)
+
+    def dotted(self) -> tuple[str, ...]:
+        """Dotted names of the parameters, ``leak_muscle.conductance``."""
+        return tuple(f"{self.id}.{parameter.name}" for parameter in self.parameters)
+
+    def neutral(self) -> dict[str, float]:
+        """The parameters at which it does nothing; empty for an effect that replaces an equation and has none."""
+        return {p.name: p.neutral for p in self.parameters if p.neutral is not None}
