@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from pamrs.diagnosis import diagnose
     from pamrs.diagnosis.next_experiment import Plan, plan_diagnosis
     from pamrs.diagnosis.result import Diagnosis
+    from pamrs.diagnosis.settings import DiagnosisSettings
     from pamrs.errors import (
         CaseError,
         DiagnosisError,
@@ -39,6 +40,7 @@ __all__ = [
     "CaseError",
     "Diagnosis",
     "DiagnosisError",
+    "DiagnosisSettings",
     "FitError",
     "Issue",
     "Joint",
@@ -77,6 +79,7 @@ _HOMES: Final[dict[str, str]] = {
     "CaseError": "pamrs.errors",
     "Diagnosis": "pamrs.diagnosis.result",
     "DiagnosisError": "pamrs.errors",
+    "DiagnosisSettings": "pamrs.diagnosis.settings",
     "FitError": "pamrs.errors",
     "Issue": "pamrs.recordings",
     "Joint": "pamrs.rig",

@@ -1,8 +1,12 @@
 """Diagnosis: locate a mismatch between model and recordings, name the omitted physics or say that it is not listed.
 
 A rig is cut at every measured channel, so that each tank, chamber, joint and hanging load has a residual of its own. The baseline is
-refitted inside its tolerances first; what then exceeds the noise floor is located by block and condition, and the effects of the
+refitted inside its tolerances first; what then exceeds the noise level is located by block and condition, and the effects of the
 catalogue compete with each other and with "unlisted" on held-out recordings.
+
+Public are `diagnose`, `Diagnosis`, `DiagnosisSettings`, and these packages and modules, each with its own list: `settings` (every
+number that steers a verdict), `result` and `schema` (what is returned), `prove` (many cases, each in a process of its own), and the
+steps in the order in which they work: `prepare`, `fit`, `noise`, `screen`, `evidence`, `search`, `next_experiment`, `explain`.
 """
 
 from __future__ import annotations
@@ -16,7 +20,7 @@ from dataclasses import replace
 
 from pamrs.channels import dotted
 from pamrs.diagnosis.evidence import Group
-from pamrs.diagnosis.explain import _assemble as assemble
+from pamrs.diagnosis.explain import assemble
 from pamrs.diagnosis.fit import Problem
 from pamrs.diagnosis.noise import floors
 from pamrs.diagnosis.prepare import Block, Prepared, available_blocks, check_plausible, check_sense, prepare
@@ -157,7 +161,7 @@ def diagnose(
         if unsettled:
             groups = [_doubted(group, factor) for group in groups]
         say("putting the answer together")
-        diagnosis = assemble.assemble(case, inner, outer, groups)
+        diagnosis = assemble(case, inner, outer, groups)
     warnings = [*diagnosis.warnings, *left_out]
     if unsettled:
         what = "length" if case.rig.model["load"] else "angle"

@@ -33,7 +33,7 @@ def describe_closure(found: Fit, problem: Problem, baseline: Fit) -> str:
     Parameters
     ----------
     found : Fit
-        What :func:`find_closure` returned.
+        What :func:`pamrs.diagnosis.search.find_closure` returned.
     problem : Problem
         The same problem.
     baseline : Fit

@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs.diagnosis.evidence import colour_of
-from pamrs.diagnosis.explain import describe_closure
 from pamrs.diagnosis.fit import Fit, Problem, fit, residuals, stacked, with_priors
 from pamrs.diagnosis.noise import correlation_time
 from pamrs.diagnosis.prepare import Block
@@ -25,7 +24,7 @@ from pamrs.effects import CLOSURE_OF, EFFECTS, MEMORY_OF, TERMS, Term
 from pamrs.errors import DiagnosisError, SimulationError
 from pamrs.rig import Rig
 
-__all__ = ["CLOSURE_OF", "describe_closure", "find_closure"]
+__all__ = ["find_closure"]
 
 Array = NDArray[np.float64]
 
