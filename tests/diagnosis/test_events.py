@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis.blocks import available_blocks
-from pamrs.diagnosis.fitting import Events, Problem, residuals
-from pamrs.diagnosis.signals import prepare
+from pamrs.diagnosis import DiagnosisSettings
+from pamrs.diagnosis.fit import Events, Problem, residuals
+from pamrs.diagnosis.prepare import available_blocks, prepare
 from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
+
+SETTINGS = DiagnosisSettings()
 
 TIMES = {"lift": 4.3, "lower": 7.1, "again": 5.6}
 ROLES = {"lift": "fit", "lower": "fit", "again": "held_out"}
@@ -61,11 +63,11 @@ def test_an_event_is_named_with_its_times(effect: str, make: dict[str, float]) -
 
 def test_a_recording_without_the_event_has_no_slope_in_it() -> None:
     rig = pamrs.rigs.shoulder()
-    prepared = [prepare(r, rig) for r in recordings("payload_change", {"mass_change": 0.4}, 4.0)[:2]]
-    blocks = [b for b in available_blocks(rig, tuple(prepared[0].recording.channels)) if b.name == "arm"]
+    prepared = [prepare(r, rig, SETTINGS) for r in recordings("payload_change", {"mass_change": 0.4}, 4.0)[:2]]
+    blocks = [b for b in available_blocks(rig, tuple(prepared[0].recording.channels), SETTINGS.prepare) if b.name == "arm"]
     happened = Events("payload_change", {"lift": {"mass_change": 0.4, "time": 2.0}})
     names = ["arm.payload", "payload_change.mass_change"]
-    found = residuals(Problem(blocks, prepared, core_rig(rig)), rig, names, happened)
+    found = residuals(Problem(blocks, prepared, core_rig(rig), SETTINGS), rig, names, happened)
     with_event, without = found["arm", "lift"].jacobian, found["arm", "lower"].jacobian
     assert with_event is not None
     assert without is not None

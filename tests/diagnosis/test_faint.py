@@ -9,13 +9,15 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis import hypotheses
-from pamrs.diagnosis.blocks import available_blocks
-from pamrs.diagnosis.candidates import Candidate
-from pamrs.diagnosis.evidence import Excess
-from pamrs.diagnosis.fitting import Fit
-from pamrs.diagnosis.weighing import weigh
+from pamrs.diagnosis import DiagnosisSettings
+from pamrs.diagnosis.evidence import Candidate, weigh
+from pamrs.diagnosis.fit import Fit
+from pamrs.diagnosis.noise import Excess
+from pamrs.diagnosis.prepare import available_blocks
+from pamrs.diagnosis.search import _hypotheses as hypotheses
 from pamrs.recordings import Recording
+
+SETTINGS = DiagnosisSettings()
 
 NOISE = {"supply_pressure": 400.0, "muscle_pressure": 400.0, "joint_angle": 3e-4}
 SECONDS = 15.0
@@ -105,8 +107,8 @@ def candidate(effects: tuple[str, ...], left: float, **values: float) -> Candida
 def weighed(*sets: Candidate, start: Candidate | None = None) -> dict[str, float]:
     """Probabilities beside a baseline that leaves ten times the noise's variance in the chamber, of recordings of 30 s."""
     rig = pamrs.rigs.shoulder()
-    blocks = available_blocks(rig, ("supply_pressure", "muscle_pressure", "valve_command", "joint_angle"))
-    return weigh([start or candidate((), 10.0), *sets], [b for b in blocks if b.name == "chamber"], 0.985, 30.0)
+    blocks = available_blocks(rig, ("supply_pressure", "muscle_pressure", "valve_command", "joint_angle"), SETTINGS.prepare)
+    return weigh([start or candidate((), 10.0), *sets], [b for b in blocks if b.name == "chamber"], 0.985, 30.0, SETTINGS)
 
 
 def test_a_set_that_explains_nothing_says_nothing_against_one_that_does() -> None:

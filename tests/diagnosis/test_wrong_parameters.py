@@ -10,14 +10,16 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis import wrong_parameters
-from pamrs.diagnosis.blocks import available_blocks
-from pamrs.diagnosis.fitting import Problem, fit
+from pamrs.diagnosis import DiagnosisSettings
+from pamrs.diagnosis.fit import Problem, fit
+from pamrs.diagnosis.prepare import available_blocks, prepare
 from pamrs.diagnosis.result import schema
-from pamrs.diagnosis.signals import prepare
-from pamrs.diagnosis.wrong_parameters import suspected
+from pamrs.diagnosis.search import _wrong_parameters as wrong_parameters
+from pamrs.diagnosis.search import suspected
 from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
+
+SETTINGS = DiagnosisSettings()
 
 NAMES = ("valve_command", "supply_pressure", "muscle_pressure", "joint_angle")
 NOISE = {"supply_pressure": 400.0, "muscle_pressure": 400.0, "joint_angle": 3e-4}
@@ -97,11 +99,11 @@ def test_a_name_in_the_chamber_stands_beside_an_arm_without_one() -> None:
 def test_pairs_of_one_mistake_are_suspected_with_either_at_its_wall() -> None:
     rig = pamrs.rigs.shoulder()
     true = rig.with_parameters({"arm.payload": 0.7 * 9.07})
-    prepared = [prepare(recorded(true, "r", "fit", seed=1), rig)]
-    (arm,) = (b for b in available_blocks(rig, NAMES) if b.name == "arm")
-    problem = Problem([arm], prepared, core_rig(rig))
+    prepared = [prepare(recorded(true, "r", "fit", seed=1), rig, SETTINGS)]
+    (arm,) = (b for b in available_blocks(rig, NAMES, SETTINGS.prepare) if b.name == "arm")
+    problem = Problem([arm], prepared, core_rig(rig), SETTINGS)
     baseline = fit(problem, rig, (), {}, {"arm": 1.0}, evaluations=20)
-    found = suspected(baseline, [arm])
+    found = suspected(baseline, [arm], SETTINGS.wrong_parameters)
     assert ("arm.payload",) in found
     assert ("arm.payload", "arm.first_moment") in found
     assert all(abs(baseline.moved[name]) <= 3.0 + 1e-9 for name in baseline.moved)
@@ -159,7 +161,7 @@ def test_every_parameter_at_its_wall_is_freed_whatever_pairs_promise(monkeypatch
     asked: list[tuple[str, ...]] = []
 
     class Trial:
-        inner, nominal, white = Problem([], [], core_rig(pamrs.rigs.shoulder())), pamrs.rigs.shoulder(), {}
+        inner, nominal, white = Problem([], [], core_rig(pamrs.rigs.shoulder()), SETTINGS), pamrs.rigs.shoulder(), {}
 
         def freed(self, names: tuple[str, ...], baseline: object) -> None:
             asked.append(names)

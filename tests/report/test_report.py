@@ -122,13 +122,13 @@ def test_decimation_keeps_extremes_and_gaps() -> None:
 
 
 def test_map_of_wrong_shape_is_refused() -> None:
-    bad = {"x_edges": [0, 1, 2], "y_edges": [0, 1], "z": [[1.0, 2.0, 3.0]]}
+    bad = {"x_label": "", "y_label": "", "x_edges": [0, 1, 2], "y_edges": [0, 1], "z": [[1.0, 2.0, 3.0]]}
     with pytest.raises(ValueError, match="shape"):
         figures.map_svg(synthetic.diagnosis(condition_map=bad))
 
 
 def test_empty_map_is_left_out() -> None:
-    empty = {"x_edges": [0, 1, 2], "y_edges": [0, 1], "z": [[np.nan, np.nan]], "z_after": None}
+    empty = {"x_label": "", "y_label": "", "x_edges": [0, 1, 2], "y_edges": [0, 1], "z": [[np.nan, np.nan]], "z_after": None}
     assert figures.map_svg(synthetic.diagnosis(condition_map=empty)) is None
 
 
