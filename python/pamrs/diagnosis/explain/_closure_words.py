@@ -13,7 +13,7 @@ from pamrs.diagnosis.prepare import Block, begun
 from pamrs.effects import CLOSURE_OF, EFFECTS, MEMORY_OF, TERMS, WORDS, Term
 from pamrs.errors import DiagnosisError
 from pamrs.rig import Rig
-from pamrs.simulation import default_step
+from pamrs.simulation import core_rig, default_step
 
 __all__ = ["describe_closure"]
 
@@ -86,7 +86,7 @@ _KINDS = ("static", "even", "odd", "time", "distance")
 
 def _parts(found: Fit, problem: Problem, block: Block, closure: str) -> dict[str, Array]:
     """Each term times its coefficient over all usable rows, along the measured signals."""
-    core = problem.core.respecified(found.rig.to_json())
+    core = core_rig(found.rig, problem.core)
     rows = []
     for prepared in problem.recordings:
         starts = prepared.starts(block.window, block.drives)

@@ -179,7 +179,7 @@ def _inside_range() -> Iterator[None]:
 def _compiled(problem: Problem, rig: Rig) -> _core.Rig:
     """Another model compiled; one so stiff that no fit could afford it is outside the range."""
     with _inside_range():
-        core = problem.core.respecified(rig.to_json())
+        core = core_rig(rig, problem.core)
     settings = problem.settings.fit
     least = min(settings.least_step, settings.least_step_share * problem.core.stable_step)
     if core.stable_step < least:

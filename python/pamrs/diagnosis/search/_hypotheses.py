@@ -30,6 +30,7 @@ from pamrs.diagnosis.search._wrong_parameters import beside_quiet, freed
 from pamrs.effects import CATALOGUE, EFFECTS, EffectInfo, SameData
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
+from pamrs.simulation import core_rig
 
 __all__ = ["examine"]
 
@@ -111,9 +112,9 @@ def _refit(inner: Problem, outer: Problem, nominal: Rig, *, same: bool) -> _Refi
     blocks, settings = inner.blocks, inner.settings
     before = residuals(inner, nominal)
     first = refitted(inner, nominal, without_colour(blocks))
-    floor = floors(inner, inner.core.respecified(first.rig.to_json()))
+    floor = floors(inner, core_rig(first.rig, inner.core))
     if not same:
-        floor |= floors(outer, outer.core.respecified(first.rig.to_json()))
+        floor |= floors(outer, core_rig(first.rig, outer.core))
     baseline, colour = coloured(inner, nominal, first)
 
     def kept(problem: Problem, found: dict[Key, Residual]) -> dict[str, Excess]:
