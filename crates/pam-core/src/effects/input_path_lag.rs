@@ -87,6 +87,20 @@ fn phi<S: Scalar>(x: S, e: S, ex: S) -> [S; 3] {
     [one, two, (two - e * 0.5) / x]
 }
 
+/// Rates of the chain [1/s], its input held; of a lag that counts as none they are zero, and what follows it is fed by its
+/// input.
+pub fn rates<S: Scalar>(chain: &Chain<S>, input: S, time_constant: S, delay: S) -> Chain<S> {
+    let zero = constant::<S>(0.0);
+    let lagging = time_constant.re() > SHORTEST;
+    let first = if lagging { (input - chain[0]) / time_constant } else { zero };
+    let part = delay / STAGES;
+    if part.re() <= SHORTEST {
+        return [first, zero, zero, zero];
+    }
+    let fed = if lagging { chain[0] } else { input };
+    [first, (fed - chain[1]) / part, (chain[1] - chain[2]) / part, (chain[2] - chain[3]) / part]
+}
+
 /// Fastest rate of the chain [1/s].
 pub fn fastest(time_constant: f64, delay: f64) -> f64 {
     let rate = |time: f64| if time > SHORTEST { 1.0 / time } else { 0.0 };
@@ -126,6 +140,11 @@ impl<S: Scalar> Effect<S> for InputPath<S> {
         own[0] = constant(BEGUN);
         own[1..].copy_from_slice(&chain);
         chain[3]
+    }
+
+    fn linear_rates(&self, own: &[S], input: S, out: &mut [S]) {
+        let chain = std::array::from_fn(|k| own[1 + k]);
+        out[1..].copy_from_slice(&rates(&chain, input, self.time_constant, self.delay));
     }
 
     fn fastest(&self) -> f64 {

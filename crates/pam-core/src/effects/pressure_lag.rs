@@ -64,6 +64,10 @@ impl<S: Scalar> Effect<S> for PressureLag<S> {
         read(reading, from, to, self.time_constant, step)
     }
 
+    fn linear_rates(&self, own: &[S], input: S, rates: &mut [S]) {
+        rates[0] = (input - own[0]) / self.time_constant;
+    }
+
     fn lag(&self) -> S {
         self.time_constant
     }
