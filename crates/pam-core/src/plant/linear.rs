@@ -4,9 +4,9 @@
 //! them, what effects move. What follows a small motion of a joint ([`Role::Follows`]) is no state: it moves by its joint's
 //! angle. What a muscle remembers of its way stays as it is, and its force changes with the stretch since then.
 //!
-//! Two things have a slope to each side. A valve fills on one side of its null and vents on the other: its position is taken
-//! next to the null, where [`Side`] says. Air that rests may flow either way through a line, and gas may warm otherwise while
-//! it comes in than while it goes out: there the slope is the mean of both.
+//! Some things have a slope to each side. A valve fills on one side of its null and vents on the other: its position is taken
+//! next to the null, where [`Side`] says. Air that rests may flow either way, with other coefficients while it comes in than
+//! while it goes out, and a muscle at ambient pressure may not feel a lower one: there the slope is the mean of both.
 
 use super::memory::Memory;
 use super::parameters::unit;
@@ -20,8 +20,26 @@ use crate::scalar::{constant, Scalar};
 use crate::{Error, Result};
 use nalgebra::Const;
 
-/// How far next to its null a valve is [1]: on one side of it, and nothing flows for that.
-const BESIDE: f64 = 1e-100;
+/// How far next to its null a valve is [1]: no slope changes by more than this, and what flows through a hose behind it is
+/// more than the last digit of a pressure.
+const BESIDE: f64 = 1e-9;
+/// How far on either side of their values pressures are [1], where the slope is the mean of both.
+const ASIDE: f64 = 1e-9;
+
+/// On which side of what has two slopes: position of the valves beside their null [1], shift of the pressures of gases [1],
+/// and whether a flow that is none goes against its arrow.
+#[derive(Clone, Copy)]
+struct Beside {
+    position: f64,
+    shift: f64,
+    backwards: bool,
+}
+
+/// Both sides of what rests.
+const SHUT: [Beside; 2] = [
+    Beside { position: 0.0, shift: ASIDE, backwards: false },
+    Beside { position: 0.0, shift: -ASIDE, backwards: true },
+];
 
 /// The side of its null on which a valve opens.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -52,12 +70,13 @@ impl Side {
         }
     }
 
-    /// Positions of a valve [1] over which the slope is the mean.
-    fn positions(self) -> &'static [f64] {
+    /// Where the slope by an opening is the mean of.
+    fn open(self) -> Vec<Beside> {
+        let at = |position| Beside { position, shift: 0.0, backwards: false };
         match self {
-            Self::Fill => &[BESIDE],
-            Self::Vent => &[-BESIDE],
-            Self::Mean => &[BESIDE, -BESIDE],
+            Self::Fill => vec![at(BESIDE)],
+            Self::Vent => vec![at(-BESIDE)],
+            Self::Mean => vec![at(BESIDE), at(-BESIDE)],
         }
     }
 }
@@ -114,9 +133,8 @@ impl Rig {
         let opening = moving.iter().filter(|m| m.opens).map(|m| By::State(m.place));
         let opening: Vec<By> = opening.chain(commands.clone().map(By::Command)).collect();
         let shut: Vec<By> = moving.iter().filter(|m| !m.opens).map(|m| By::State(m.place)).collect();
-        let ways: Vec<(f64, bool)> = side.positions().iter().map(|position| (*position, false)).collect();
-        let mut opened = point.mean_slopes(&opening, &ways)?.into_iter();
-        let mut others = point.mean_slopes(&shut, &[(0.0, false), (0.0, true)])?.into_iter();
+        let mut opened = point.mean_slopes(&opening, &side.open())?.into_iter();
+        let mut others = point.mean_slopes(&shut, &SHUT)?.into_iter();
         let mut columns: Vec<Vec<f64>> =
             moving.iter().filter_map(|m| if m.opens { opened.next() } else { others.next() }).collect();
         self.let_follow(&point, &moving, &mut columns)?;
@@ -181,7 +199,7 @@ impl Rig {
             .map(|(place, _)| place)
             .collect();
         let by: Vec<By> = following.iter().map(|place| By::State(*place)).collect();
-        let slopes = point.mean_slopes(&by, &[(0.0, false), (0.0, true)])?;
+        let slopes = point.mean_slopes(&by, &SHUT)?;
         let at = |place: usize| moving.iter().position(|m| m.place == place);
         for k in 0..self.layout.coordinates {
             let (Some(angle), Some(rate)) = (at(self.layout.angle(k)), at(self.layout.rate(k))) else {
@@ -226,18 +244,18 @@ impl<'a> Point<'a> {
         Self { rig, state, memory: memory.iter().map(Memory::lift).collect() }
     }
 
-    /// Slopes of the rates of all states, the mean over some positions of the valves with ways of what rests.
-    fn mean_slopes(&self, by: &[By], ways: &[(f64, bool)]) -> Result<Vec<Vec<f64>>> {
+    /// Slopes of the rates of all states, the mean over some sides.
+    fn mean_slopes(&self, by: &[By], sides: &[Beside]) -> Result<Vec<Vec<f64>>> {
         let mut sums = vec![vec![0.0; self.state.len()]; by.len()];
-        for (position, backwards) in ways {
+        for beside in sides {
             for (chunk, sums) in by.chunks(LANES).zip(sums.chunks_mut(LANES)) {
-                let rates = self.rates(chunk, *position, *backwards)?;
+                let rates = self.rates(chunk, *beside)?;
                 for (k, rate) in rates.into_iter().enumerate() {
                     let gradient = rate.eps.unwrap_generic(Const::<LANES>, Const::<1>);
                     for ((by, sum), slope) in chunk.iter().zip(sums.iter_mut()).zip(gradient.iter()) {
                         // A command counts from the null: more of the one is less of the other.
                         let sign = if matches!(by, By::Command(_)) { -1.0 } else { 1.0 };
-                        sum[k] += sign * slope / ways.len() as f64;
+                        sum[k] += sign * slope / sides.len() as f64;
                     }
                 }
             }
@@ -246,9 +264,14 @@ impl<'a> Point<'a> {
     }
 
     /// Rates of all states, each lane with the derivative by one thing.
-    fn rates(&self, by: &[By], position: f64, backwards: bool) -> Result<Vec<Dual>> {
+    fn rates(&self, by: &[By], beside: Beside) -> Result<Vec<Dual>> {
         let mut values = self.rig.parameters().lift::<Dual>();
-        let mut state: Vec<Dual> = self.state.iter().map(|x| constant(*x)).collect();
+        let layout = &self.rig.layout;
+        let gases = layout.pressure(0)..layout.mass(0);
+        let shifted = |(place, x): (usize, &f64)| {
+            constant(if gases.contains(&place) { x * (1.0 + beside.shift) } else { *x })
+        };
+        let mut state: Vec<Dual> = self.state.iter().enumerate().map(shifted).collect();
         for (lane, by) in by.iter().enumerate() {
             match *by {
                 By::State(place) => state[place].eps = unit(lane),
@@ -260,30 +283,22 @@ impl<'a> Point<'a> {
         let still: Vec<Dual> = self.state.iter().map(|x| constant(*x)).collect();
         let mut start = vec![constant(0.0); self.memory.len()];
         plant.contractions(&still, &mut start);
-        Ok(plant.rates_beside_null(&state, &self.memory, &start, position, backwards))
+        Ok(plant.rates_beside(&state, &self.memory, &start, beside))
     }
 }
 
 impl<S: Scalar> Plant<'_, S> {
-    /// Rates of all states at the start of a recording, valves by a position beside their null; with what effects move in
-    /// closed form. Of air that rests in a line the way is the one along its arrow, or against it.
-    fn rates_beside_null(
-        &self,
-        state: &[S],
-        memory: &[Memory<S>],
-        start: &[S],
-        position: f64,
-        backwards: bool,
-    ) -> Vec<S> {
+    /// Rates of all states at the start of a recording, with what effects move in closed form.
+    fn rates_beside(&self, state: &[S], memory: &[Memory<S>], start: &[S], beside: Beside) -> Vec<S> {
         let (wiring, layout) = (&self.rig.wiring, &self.layout);
         let mut closed: Vec<(&Acting, S)> = Vec::new();
         let mut controls = self.held();
         for (k, path) in wiring.ports.command.iter().enumerate() {
             let null = self.valves[k].null;
-            let mut spool = spool_position(null.re(), null, wiring.valves[k].half_range) + position;
+            let mut spool = spool_position(null.re(), null, wiring.valves[k].half_range) + beside.position;
             for acting in path {
                 closed.push((acting, spool));
-                spool = self.effect(acting).position(self.own(acting, state), spool, 0.0) + position;
+                spool = self.effect(acting).position(self.own(acting, state), spool, 0.0) + beside.position;
             }
             controls.spool[k] = spool;
         }
@@ -292,7 +307,7 @@ impl<S: Scalar> Plant<'_, S> {
         }
         let mut rates = vec![constant(0.0); layout.states()];
         let mut here = self.scratch();
-        here.backwards = backwards;
+        here.backwards = beside.backwards;
         let all = Simulated::all_but(layout, &[]);
         self.rates(state, &controls, memory, start, &all, &mut here, &mut rates);
         for (acting, input) in closed {
