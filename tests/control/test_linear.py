@@ -256,6 +256,25 @@ def test_at_rest_effects_are_as_the_catalogue_says():
     assert changed.effects[1:] == rig.effects[2:]
 
 
+def test_the_core_counts_a_load_by_its_length():
+    rig = pamrs.rigs.named("hanging_mass")
+    (states, inputs, outputs), (a, b, c) = core_rig(rig).linearise({}, "mean")
+    assert states == outputs == ["supply_pressure", "muscle_pressure", "length", "length_rate"]
+    assert inputs == ["valve_command"]
+    mass = rig.tables("load")[""]["mass"]
+
+    def force(**start):
+        return pamrs.Simulator(rig, sample_time=SAMPLE, initial=start).observe()["muscle_force"]
+
+    length = rig.tables("muscle")[""]["rest_length"]
+    by_length = (force(length=length) - force(length=length - 1e-6)) / 1e-6
+    assert a[2].tolist() == [0.0, 0.0, 0.0, 1.0]
+    assert a[3, 1] == pytest.approx(-(force(muscle_pressure=10.0) - force(muscle_pressure=-10.0)) / 20.0 / mass, rel=1e-6)
+    assert a[3, 2] == pytest.approx(-by_length / mass, rel=1e-2)
+    assert b[0, 0] < 0.0 < b[1, 0]
+    assert c.tolist() == np.eye(4).tolist()
+
+
 def test_the_core_names_a_side_that_it_does_not_know():
     rig, given = settled("shoulder")
     with pytest.raises(ParameterError, match='side = "left".*"fill"'):

@@ -1,4 +1,4 @@
-"""What a linear model leaves of a rig: effects without a derivative are refused, and what only a motion shows is set to rest.
+"""What a linear model leaves of a rig: effects without a derivative are refused, the others at rest.
 
 What each effect asks for stands in the catalogue (:class:`pamrs.effects.EffectInfo`).
 """
@@ -39,8 +39,8 @@ def check_smooth(rig: Rig, *, supplies: bool) -> None:
 
 
 def resting(rig: Rig) -> Rig:
-    """The rig as its effects are at rest: air as warm as the wall, sensors without a lag that no sample shows and without what
-    only flowing air shows them.
+    """The rig as its effects are at rest: air as warm as the wall, sensors without a lag that no
+    sample shows and without what only flowing air shows them.
 
     Parameters
     ----------
@@ -62,14 +62,14 @@ def resting(rig: Rig) -> Rig:
         return rig
     rig = rig.without_effect()
     for effect in kept:  # in their order, which is that of the states
-        rig = rig.with_effect(
-            effect["id"], effect["parameters"], at=effect.get("at", ""), form=effect.get("form", "")
-        )
+        place = {key: effect[key] for key in ("at", "form") if key in effect}
+        rig = rig.with_effect(effect["id"], effect["parameters"], **place)
     return rig
 
 
 def without_dry_friction(rig: Rig) -> Rig:
-    """The rig as a motion feels it that does not turn round: its dry friction is a constant then, and damps nothing.
+    """The rig as a motion feels it that does not turn round: its dry friction is a constant then,
+    and damps nothing.
 
     Parameters
     ----------

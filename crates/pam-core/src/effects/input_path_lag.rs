@@ -198,6 +198,20 @@ mod tests {
     }
 
     #[test]
+    fn the_closed_form_begins_with_the_rates() {
+        let (start, h) = ([0.3, 0.1, -0.2, 0.05], 1e-9);
+        for (tc, delay) in [(5e-3, 9e-3), (4e-3, 0.0), (0.0, 30e-3), (30e-3, 3e-3)] {
+            let (was, now) = (moved(&start, 0.8, tc, delay, 0.0), moved(&start, 0.8, tc, delay, h));
+            let (first, last) = (usize::from(tc == 0.0), if delay > 0.0 { 4 } else { 1 });
+            for (k, rate) in rates(&start, 0.8, tc, delay).into_iter().enumerate() {
+                let counts = (first..last).contains(&k);
+                let expected: f64 = if counts { (now[k] - was[k]) / h } else { 0.0 };
+                assert!((rate - expected).abs() < 1e-4 * expected.abs() + 1e-5, "{tc} {delay} {k}: {rate}");
+            }
+        }
+    }
+
+    #[test]
     fn sensitivities_are_those_of_differences() {
         let start = [0.3, 0.1, -0.2, 0.05].map(Dual64::from);
         for (tc, delay) in [(5e-3, 9e-3), (4e-3, 12e-3)] {

@@ -1,12 +1,15 @@
-//! Linear model of a rig about a state in which its valves hold their null, by dual numbers through its equations.
+//! Linear model of a rig about a state in which its valves hold their null, by dual numbers through
+//! its equations.
 //!
-//! `x' = A x + B u, y = C x`. States are the pressures, angles and rates that an initial value can be given for and, behind
-//! them, what effects move. What follows a small motion of a joint ([`Role::Follows`]) is no state: it moves by its joint's
-//! angle. What a muscle remembers of its way stays as it is, and its force changes with the stretch since then.
+//! `x' = A x + B u, y = C x`. States are the pressures, angles and rates that an initial value can
+//! be given for and, behind them, what effects move. What follows a small motion of a joint
+//! ([`Role::Follows`]) is no state: it moves by its joint's angle. What a muscle remembers of its
+//! way stays as it is, and its force changes with the stretch since then.
 //!
-//! Some things have a slope to each side. A valve fills on one side of its null and vents on the other: its position is taken
-//! next to the null, where [`Side`] says. Air that rests may flow either way, with other coefficients while it comes in than
-//! while it goes out, and a muscle at ambient pressure may not feel a lower one: there the slope is the mean of both.
+//! Some things have a slope to each side. A valve fills on one side of its null and vents on the
+//! other: its position is taken next to the null, where [`Side`] says. Air that rests may flow
+//! either way, with other coefficients while it comes in than while it goes out, and a muscle at
+//! ambient pressure may not feel a lower one: there the slope is the mean of both.
 
 use super::memory::Memory;
 use super::parameters::unit;
@@ -20,14 +23,14 @@ use crate::scalar::{constant, Scalar};
 use crate::{Error, Result};
 use nalgebra::Const;
 
-/// How far next to its null a valve is [1]: no slope changes by more than this, and what flows through a hose behind it is
-/// more than the last digit of a pressure.
+/// How far next to its null a valve is [1]: so near that no slope changes by more than 1e-7 of itself,
+/// so far that what flows shows in the last digits of the pressure behind a hose.
 const BESIDE: f64 = 1e-9;
 /// How far on either side of their values pressures are [1], where the slope is the mean of both.
 const ASIDE: f64 = 1e-9;
 
-/// On which side of what has two slopes: position of the valves beside their null [1], shift of the pressures of gases [1],
-/// and whether a flow that is none goes against its arrow.
+/// On which side of what has two slopes: position of the valves beside their null [1], shift of the
+/// pressures of gases [1], and whether a flow that is none goes against its arrow.
 #[derive(Clone, Copy)]
 struct Beside {
     position: f64,
@@ -70,7 +73,7 @@ impl Side {
         }
     }
 
-    /// Where the slope by an opening is the mean of.
+    /// Where the slopes are taken whose mean is the slope by an opening.
     fn open(self) -> Vec<Beside> {
         let at = |position| Beside { position, shift: 0.0, backwards: false };
         match self {
@@ -84,8 +87,8 @@ impl Side {
 /// `x' = A x + B u, y = C x`, in SI; matrices row by row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LinearModel {
-    /// States: first those that an initial value can be given for, then what effects move, in the order in which the effects
-    /// were given.
+    /// States: first those that an initial value can be given for, then what effects move, in the
+    /// order in which the effects were given.
     pub states: Vec<String>,
     /// Commands of the valves.
     pub inputs: Vec<String>,
@@ -117,8 +120,9 @@ enum By {
 }
 
 impl Rig {
-    /// The linear model about a state, its valves at their null. For effects with a [`crate::effects::Kink`] it is not
-    /// meaningful; what [`crate::effects::AtRest`] asks for must have been done.
+    /// The linear model about a state, its valves at their null. For effects with a
+    /// [`crate::effects::Kink`] it is not meaningful; what [`crate::effects::AtRest`] asks for must
+    /// have been done.
     ///
     /// # Errors
     /// [`Error::Model`] where a derivative is not finite.
@@ -141,8 +145,11 @@ impl Rig {
         let (mut a, mut b) = (Vec::new(), Vec::new());
         let inputs: Vec<Vec<f64>> = opened.collect();
         for row in &moving {
-            a.extend(moving.iter().zip(&columns).map(|(by, column)| row.sign * by.sign * column[row.place]));
-            b.extend(inputs.iter().map(|column| row.sign * column[row.place]));
+            // (a sum with zero has no negative one)
+            a.extend(
+                moving.iter().zip(&columns).map(|(by, column)| row.sign * by.sign * column[row.place] + 0.0),
+            );
+            b.extend(inputs.iter().map(|column| row.sign * column[row.place] + 0.0));
             if a.iter().chain(&b).any(|slope| !slope.is_finite()) {
                 let name = &row.name;
                 return Err(Error::Model(format!("the rate of {name} has no finite slope: no linear model")));
@@ -191,7 +198,8 @@ impl Rig {
         named.chain(extra.into_iter().map(|(_, moving)| moving)).collect()
     }
 
-    /// Let what follows a joint move by its angle: its rate is a slope times the rate of the joint, and nothing else.
+    /// Let what follows a joint move by its angle: its rate is a slope times the rate of the joint,
+    /// and nothing else.
     fn let_follow(&self, point: &Point<'_>, moving: &[Moving], columns: &mut [Vec<f64>]) -> Result<()> {
         let places = self.state_map().into_iter().enumerate();
         let following: Vec<usize> = places
@@ -311,12 +319,17 @@ impl<S: Scalar> Plant<'_, S> {
         let all = Simulated::all_but(layout, &[]);
         self.rates(state, &controls, memory, start, &all, &mut here, &mut rates);
         for (acting, input) in closed {
-            self.effect(acting).linear_rates(self.own(acting, state), input, self.own_mut(acting, &mut rates));
+            self.effect(acting).linear_rates(
+                self.own(acting, state),
+                input,
+                self.own_mut(acting, &mut rates),
+            );
         }
         rates
     }
 
-    /// Controls with every valve shut and every supply at its first pressure, at the start of a recording.
+    /// Controls with every valve shut and every supply at its first pressure, at the start of a
+    /// recording.
     fn held(&self) -> Controls<S> {
         let ambient = self.rig.gas.ambient_pressure;
         let supplies = self.rig.spec().supplies.iter();
