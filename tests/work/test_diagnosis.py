@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-
-import pamrs
-from pamrs.diagnosis import fitting
 from pamrs.diagnosis.blocks import available_blocks
 from pamrs.diagnosis.hypotheses import refitted
 from pamrs.diagnosis.signals import prepare
+
+import pamrs
+from pamrs.diagnosis import fitting
 from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
 from tests.work.snapshot import compare
