@@ -4,7 +4,6 @@
 SHELL := bash
 .SHELLFLAGS := -eu -o pipefail -c
 .DELETE_ON_ERROR:
-.NOTPARALLEL:
 MAKEFLAGS += --no-builtin-rules --no-print-directory
 .DEFAULT_GOAL := help
 
@@ -16,7 +15,12 @@ CASE_KIND := $(if $(KIND),--kind $(KIND))
 LOCKED := $(if $(CI),--locked)
 RUST_SOURCES := $(shell find crates -name '*.rs' -path '*/src/*' 2>/dev/null) \
                 $(shell find crates -name Cargo.toml 2>/dev/null) Cargo.toml $(wildcard Cargo.lock)
+# One by one, since cargo fmt does not see modules that a macro declares.
+RUSTFMT := rustfmt --edition 2021 $(shell find crates -name '*.rs')
 PYTHON_SOURCES := python tests trial demo benchmarks fingerprints
+# Processes that pytest takes; a file of tests stays in one, so that what its tests share is computed once.
+WORKERS ?= $(shell nproc 2>/dev/null || echo 2)
+PYTEST := $(BIN)/python -m pytest -q -n $(WORKERS) --dist loadfile
 
 # A blinded trial: where it is, which cases, and where its page goes (a trial of a few cases does not replace the published page).
 FOLDER ?= prove_out
@@ -35,7 +39,8 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export MPLBACKEND := Agg
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: FORCE help setup build demo prove test test-rust test-python lint format bench convergence effects golden lock clean
+.PHONY: FORCE help setup build demo prove test test-all checks lint lint-rust lint-python test-rust test-python \
+        test-python-all snapshots deny format bench convergence effects golden lock clean
 
 help:  ## this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -72,25 +77,50 @@ prove: build  ## blinded trial from cases to docs/proof/trial.md, hours (SEED=7 
 	$(BIN)/python -m benchmarks.baselines $(FOLDER) --jobs $(JOBS) || test $$? -eq 3
 	$(BIN)/python -m trial report $(FOLDER) --out $(PAGE) --command "$(PROVE_COMMAND)"
 
-test: build lint test-rust test-python  ## everything that CI checks
+# The last step of the extension's build takes one processor for a minute: the rest is compiled meanwhile. What each check
+# has to say is printed when it ends.
+checks: build lint-rust test-rust lint-python
 
-lint: build  ## formatting, clippy, ruff, mypy, the stub against the compiled module
-	cargo fmt --all --check
+test:  ## everything that CI checks: the long trials are left to test-all
+	@$(MAKE) --jobs=2 --output-sync=target checks
+	@$(MAKE) test-python
+
+test-all:  ## the same with the long trials
+	@$(MAKE) --jobs=2 --output-sync=target checks
+	@$(MAKE) test-python-all
+
+lint: lint-rust lint-python  ## formatting, clippy, ruff, mypy, the stub against the compiled module
+
+lint-rust: $(VENV)/.created
+	$(RUSTFMT) --check
 	cargo clippy --quiet --workspace --all-targets $(LOCKED) -- -D warnings
+
+lint-python: build
 	$(BIN)/ruff check --quiet $(PYTHON_SOURCES)
 	$(BIN)/ruff format --quiet --check $(PYTHON_SOURCES)
 	$(BIN)/mypy --no-error-summary python/pamrs trial
 	$(BIN)/python -m mypy.stubtest pamrs._core
 
-test-rust: build  ## the core's tests, documentation examples included
-	cargo test --quiet --release --workspace --exclude pam-py $(LOCKED) --lib --tests
-	cargo test --quiet --release -p pam-core $(LOCKED) --doc
+test-rust:  ## the core's tests, documentation examples included
+	cargo test --quiet --workspace --exclude pam-py $(LOCKED) --lib --tests
+	cargo test --quiet -p pam-core $(LOCKED) --doc
 
-test-python: build  ## pytest
-	$(BIN)/python -m pytest -q
+test-python: build  ## pytest without what is marked slow (WORKERS=2 to choose)
+	$(PYTEST) -m "not slow"
+
+test-python-all: build
+	$(PYTEST)
+
+snapshots: build  ## write the files of the work done anew, where it has changed on purpose
+	PAMRS_SNAPSHOTS=write $(BIN)/python -m pytest -q tests/work
+	PAMRS_SNAPSHOTS=write cargo test --quiet -p pam-core $(LOCKED) --test work
+
+deny:  ## licences, sources and duplicates of the crates (needs cargo-deny)
+	@command -v cargo-deny > /dev/null || { echo "cargo-deny is not installed; it is with: cargo install --locked cargo-deny"; exit 1; }
+	cargo deny --locked check bans licenses sources
 
 format:  ## rewrite the sources in the house's layout
-	cargo fmt --all
+	$(RUSTFMT)
 	$(BIN)/ruff check --quiet --fix $(PYTHON_SOURCES)
 	$(BIN)/ruff format $(PYTHON_SOURCES)
 

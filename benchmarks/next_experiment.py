@@ -2,8 +2,8 @@
 
 Each line is a question that one recording leaves open: two or three effects are fitted to it, all fit. The truth is a plant with one
 of them and with baseline parameters drawn inside their tolerances. Experiments are then made one after the other, chosen either by
-the expected information (as :func:`pamrs.diagnosis.experiment.propose` does) or at random from the same library, and the hypotheses
-are weighed by the same likelihood each time, until one is above 0.95. Everything is simulated by the core.
+the expected information (as :func:`pamrs.diagnosis.next_experiment.propose` does) or at random from the same library, and the
+hypotheses are weighed by the same likelihood each time, until one is above 0.95. Everything is simulated by the core.
 
 Run it with ``python -m benchmarks.next_experiment``; numbers of lines as arguments choose some.
 """
@@ -18,15 +18,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 import pamrs
-from pamrs.diagnosis.differences import EFFECTIVE, MEASURABLE, NOISE, linear, misfit, problem_of, taken, weights_of
-from pamrs.diagnosis.experiment import Hypothesis, Outcome, outcome_of, ranked
-from pamrs.diagnosis.fitting import FIT_BIN, Fit, Problem, bin_width, fit, free_baseline
-from pamrs.diagnosis.protocols import Experiment, library
-from pamrs.diagnosis.starts import starts_of
+from pamrs.diagnosis import DiagnosisSettings
+from pamrs.diagnosis.fit import Fit, Problem, bin_width, fit, free_baseline, starts_of
+from pamrs.diagnosis.next_experiment import (
+    MEASURABLE,
+    Experiment,
+    Hypothesis,
+    Outcome,
+    library,
+    linear,
+    misfit,
+    outcome_of,
+    problem_of,
+    ranked,
+    taken,
+    usual_noise,
+    weights_of,
+)
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 
 Array = NDArray[np.float64]
+SETTINGS = DiagnosisSettings()
+NOISE = usual_noise(SETTINGS.next_experiment)
 DECIDED = 0.95
 OPEN = 0.9
 ORDERS = 20
@@ -69,15 +83,16 @@ QUESTIONS = (
 def drawn(rig: Rig, rng: np.random.Generator) -> Rig:
     """The rig with its baseline parameters somewhere inside their tolerances."""
     known = rig.parameters
-    names = free_baseline(problem_of(rig, [], MEASURABLE), rig)
+    names = free_baseline(problem_of(rig, [], MEASURABLE, SETTINGS), rig)
     return rig.with_parameters({n: known[n].value + 0.5 * known[n].tol * float(rng.standard_normal()) for n in names})
 
 
 def fitted(problem: Problem, nominal: Rig, effect: str, weights: dict[tuple[str, str], float]) -> Fit | None:
     """One effect fitted from its starts, on the effective number of samples."""
     (prepared,) = problem.recordings
-    bins = prepared.n // bin_width(prepared, FIT_BIN)
-    inflation = {b.name: weights[b.name, prepared.recording.name] ** 2 * bins / (5.0 * EFFECTIVE) for b in problem.blocks}
+    bins = prepared.n // bin_width(prepared, SETTINGS.noise.fit_bin_time)
+    counted = 5.0 * SETTINGS.next_experiment.effective_samples
+    inflation = {b.name: weights[b.name, prepared.recording.name] ** 2 * bins / counted for b in problem.blocks}
     found = []
     for start in starts_of(effect, sealed=False):
         try:
@@ -95,11 +110,11 @@ def normalised(logs: Array) -> Array:
 
 def likelihoods(experiment: Experiment, truth: Rig, hypotheses: list[Hypothesis], rng: np.random.Generator) -> Array:
     """Logarithm of the likelihood of each hypothesis for the experiment on the truth, with noise."""
-    real = taken(experiment.simulate(truth), truth, experiment.name, NOISE, rng=rng)
+    real = taken(experiment.simulate(truth), truth, experiment.name, NOISE, SETTINGS, rng=rng)
     out = []
     for _, rig, _ in hypotheses:
         changed = experiment.changed(rig)
-        problem = problem_of(changed, [real], MEASURABLE)
+        problem = problem_of(changed, [real], MEASURABLE, SETTINGS)
         out.append(-0.5 * misfit(problem, linear(problem, changed), weights_of(problem, changed)).total)
     return np.array(out)
 
@@ -125,8 +140,9 @@ def opened(question: Question, nominal: Rig, experiments: list[Experiment], rng:
         scaled = {n.partition(".")[2] for s in starts_of(question.truth, sealed=False) for n in s.sizes}
         parameters = {n: v * size if n in scaled else v for n, v in question.parameters.items()}
         truth = plant.with_effect(question.truth, parameters)
-        seen = taken(first.simulate(truth), truth, first.name, NOISE, rng=rng)
-        hypotheses, prior = explained(question, nominal, problem_of(nominal, [seen], MEASURABLE))
+        seen = taken(first.simulate(truth), truth, first.name, NOISE, SETTINGS, rng=rng)
+        problem = problem_of(nominal, [seen], MEASURABLE, SETTINGS)
+        hypotheses, prior = explained(question, nominal, problem)
         if prior.max() <= OPEN or size < 0.1:
             return Case(question, size, truth, hypotheses, prior)
 
@@ -146,6 +162,11 @@ def explained(question: Question, nominal: Rig, problem: Problem) -> tuple[list[
         logs.append(-found.cost)
     prior = normalised(np.array(logs))
     return [(label, rig, float(p)) for (label, rig), p in zip(fits, prior, strict=True)], prior
+
+
+def first_of(outcomes: list[Outcome], probabilities: Array) -> Outcome:
+    """The most telling experiment."""
+    return ranked(outcomes, list(probabilities), SETTINGS.next_experiment.resolution)[0]
 
 
 @dataclass(frozen=True)
@@ -169,7 +190,7 @@ class Answers:
         """Experiments until it is decided, in an order; ``None`` chooses by information each time."""
         p, left, used, spent = np.log(np.maximum(self.prior, 1e-300)), list(self.outcomes), 0, 0.0
         while normalised(p).max() <= DECIDED and left:
-            chosen = ranked(left, list(normalised(p)))[0] if order is None else order[used]
+            chosen = first_of(left, normalised(p)) if order is None else order[used]
             left.remove(chosen)
             p = p + self.gains[chosen.experiment.name]
             used, spent = used + 1, spent + chosen.experiment.effort / 60.0
@@ -182,7 +203,7 @@ def answered(case: Case, experiments: list[Experiment], rng: np.random.Generator
     gains: dict[str, Array] = {}
     for experiment in experiments:
         try:
-            outcomes.append(outcome_of(experiment, case.hypotheses, NOISE, MEASURABLE))
+            outcomes.append(outcome_of(experiment, case.hypotheses, NOISE, MEASURABLE, SETTINGS))
             gains[experiment.name] = likelihoods(experiment, case.truth, case.hypotheses, rng)
         except SimulationError:
             outcomes = [o for o in outcomes if o.experiment is not experiment]
@@ -212,13 +233,13 @@ def run(question: Question, nominal: Rig, experiments: list[Experiment], seed: i
     ours = answers.count(None)
     orders = [[outcomes[i] for i in rng.permutation(len(outcomes))] for _ in range(ORDERS)]
     random = [answers.count(order) for order in orders]
-    best = ranked(outcomes, list(case.prior))[0].experiment.name if outcomes else "-"
+    best = first_of(outcomes, case.prior).experiment.name if outcomes else "-"
     print(line(case, best, ours, random, time.perf_counter() - began), flush=True)
 
 
 def main() -> None:
     nominal = pamrs.rigs.shoulder()
-    experiments = library(nominal)
+    experiments = library(nominal, SETTINGS.next_experiment)
     print(f"library: {', '.join(e.name for e in experiments)}")
     print("truth and its size            first          after it        proposed first    recordings to p > 0.95: proposed, random")
     chosen = [int(a) for a in sys.argv[1:]] or range(len(QUESTIONS))

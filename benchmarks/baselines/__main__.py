@@ -11,8 +11,8 @@ import os
 import sys
 from pathlib import Path
 
+from pamrs.diagnosis.prove import cases_of
 from pamrs.errors import PamrsError
-from pamrs.prove import cases_of
 from trial.sidebyside import compared, side_by_side
 
 

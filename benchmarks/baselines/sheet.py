@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from pamrs.diagnosis.blocks import Block, Residual, available_blocks
-from pamrs.diagnosis.evidence import Floor, bins_of, floors
-from pamrs.diagnosis.fitting import Key, Problem, residuals
-from pamrs.diagnosis.hypotheses import coloured, refitted
-from pamrs.diagnosis.signals import Prepared, binned, prepare
+from pamrs.diagnosis import DiagnosisSettings
+from pamrs.diagnosis.fit import Key, Problem, residuals
+from pamrs.diagnosis.noise import Floor, bins_of, floors
+from pamrs.diagnosis.prepare import Block, Prepared, Residual, available_blocks, binned, prepare
+from pamrs.diagnosis.search import coloured, refitted
 from pamrs.recordings import load_case
 from pamrs.rig import Rig
 from pamrs.simulation import core_rig
@@ -156,9 +156,10 @@ def sheet(folder: str | os.PathLike[str]) -> Sheet:
     """
     case = load_case(folder)
     rig = case.rig
-    fitted = [prepare(r, rig) for r in case.fit or case.recordings]
-    held = [prepare(r, rig) for r in case.held_out if case.fit]
-    blocks = available_blocks(rig, case.channels)
+    settings = DiagnosisSettings()
+    fitted = [prepare(r, rig, settings) for r in case.fit or case.recordings]
+    held = [prepare(r, rig, settings) for r in case.held_out if case.fit]
+    blocks = available_blocks(rig, case.channels, settings.prepare)
     core = core_rig(rig)
     columns: list[Column] = []
     moved: dict[str, float] = {}
@@ -171,8 +172,8 @@ def sheet(folder: str | os.PathLike[str]) -> Sheet:
     for members in ([b for b in blocks if b.name != "arm"], [b for b in blocks if b.name == "arm"]):
         if not members:
             continue
-        inner = Problem(members, fitted, core)
-        outer = Problem(members, held, core) if held else inner
+        inner = Problem(members, fitted, core, settings)
+        outer = Problem(members, held, core, settings) if held else inner
         model, distances = _refitted(inner, rig)
         for name, value in distances.items():
             moved[name] = max(value, moved.get(name, 0.0), key=abs)

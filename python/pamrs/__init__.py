@@ -14,8 +14,9 @@ if TYPE_CHECKING:
     from pamrs import fit, library, rigs
     from pamrs.design import Lift, lift, sizing
     from pamrs.diagnosis import diagnose
-    from pamrs.diagnosis.plan import Plan, plan_diagnosis
+    from pamrs.diagnosis.next_experiment import Plan, plan_diagnosis
     from pamrs.diagnosis.result import Diagnosis
+    from pamrs.diagnosis.settings import DiagnosisSettings
     from pamrs.errors import (
         CaseError,
         DiagnosisError,
@@ -39,6 +40,7 @@ __all__ = [
     "CaseError",
     "Diagnosis",
     "DiagnosisError",
+    "DiagnosisSettings",
     "FitError",
     "Issue",
     "Joint",
@@ -77,6 +79,7 @@ _HOMES: Final[dict[str, str]] = {
     "CaseError": "pamrs.errors",
     "Diagnosis": "pamrs.diagnosis.result",
     "DiagnosisError": "pamrs.errors",
+    "DiagnosisSettings": "pamrs.diagnosis.settings",
     "FitError": "pamrs.errors",
     "Issue": "pamrs.recordings",
     "Joint": "pamrs.rig",
@@ -85,7 +88,7 @@ _HOMES: Final[dict[str, str]] = {
     "PamrsError": "pamrs.errors",
     "Parameter": "pamrs.rig",
     "ParameterError": "pamrs.errors",
-    "Plan": "pamrs.diagnosis.plan",
+    "Plan": "pamrs.diagnosis.next_experiment",
     "Recording": "pamrs.recordings",
     "RecordingError": "pamrs.errors",
     "Rig": "pamrs.rig",
@@ -98,7 +101,7 @@ _HOMES: Final[dict[str, str]] = {
     "load_case": "pamrs.recordings",
     "load_recording": "pamrs.recordings",
     "load_rig": "pamrs.rig",
-    "plan_diagnosis": "pamrs.diagnosis.plan",
+    "plan_diagnosis": "pamrs.diagnosis.next_experiment",
     "simulate": "pamrs.simulation",
 }
 

@@ -22,6 +22,7 @@ PACKAGES: Final[dict[str, str]] = {
     "lifting": "pamrs.design",
     "muscle": "pamrs.rig",
     "muscle_models": "pamrs.rig.muscle_models",
+    "prove": "pamrs.diagnosis.prove",
     "recording": "pamrs.recordings",
     "replay": "pamrs.simulation",
     "simulator": "pamrs.simulation",

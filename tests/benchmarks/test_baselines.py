@@ -13,8 +13,11 @@ pytest.importorskip("sklearn")
 from benchmarks.baselines import sindy  # noqa: E402
 from benchmarks.baselines.__main__ import main  # noqa: E402
 from benchmarks.baselines.sheet import _signals, gap_closed  # noqa: E402
-from pamrs.diagnosis.signals import prepare  # noqa: E402
+from pamrs.diagnosis import DiagnosisSettings
+from pamrs.diagnosis.prepare import prepare
 from pamrs.recordings import Recording  # noqa: E402
+
+SETTINGS = DiagnosisSettings()
 
 
 def hold(folder, conductance, *starts):
@@ -34,6 +37,7 @@ def hold(folder, conductance, *starts):
     (folder / "case.toml").write_text(text)
 
 
+@pytest.mark.slow
 def test_a_leak_and_a_tight_chamber(tmp_path, capsys):
     hold(tmp_path / "cases" / "leak", 3e-11, 7e5, 5e5, 6e5)
     hold(tmp_path / "cases" / "tight", 0.0, 7e5, 5e5, 6e5)
@@ -89,7 +93,7 @@ def test_the_features_of_a_whole_arm_have_the_valves_opening():
     channels = {"valve_command": command, **{n: run[n] for n in names}}
     mask = {n: np.ones(command.size, dtype=bool) for n in channels}
     units = dict.fromkeys(channels, "")
-    prepared = prepare(Recording("r", "fit", run.time, 0.005, channels, mask, [], units), rig)
+    prepared = prepare(Recording("r", "fit", run.time, 0.005, channels, mask, [], units), rig, SETTINGS)
     found = _signals(prepared, rig)
     assert set(found) == {"p", "dp", "q", "dq", "ps", "x"}
     assert np.allclose(found["x"], (command - 5.0) / rig.model["valve"]["half_range"])

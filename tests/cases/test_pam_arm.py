@@ -9,7 +9,10 @@ from pathlib import Path
 import numpy as np
 
 import pamrs
-from pamrs.diagnosis.blocks import available_blocks
+from pamrs.diagnosis import DiagnosisSettings
+from pamrs.diagnosis.prepare import available_blocks
+
+SETTINGS = DiagnosisSettings()
 
 FOLDER = Path(__file__).parents[2] / "cases" / "pam_arm_shaj"
 
@@ -32,5 +35,5 @@ def test_episodes_become_a_case(tmp_path: Path) -> None:
     assert len(case.held_out) == convert.HELD_OUT
     assert case.recordings[0].sample_time == 0.02
     assert len(case.recordings[0]) == 60 - 2 * convert.RESET
-    assert [b.name for b in available_blocks(case.rig, case.channels)] == ["arm.base"]
+    assert [b.name for b in available_blocks(case.rig, case.channels, SETTINGS.prepare)] == ["arm.base"]
     assert not case.rig.parameter("transmission.plus.radius").known

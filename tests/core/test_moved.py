@@ -16,6 +16,7 @@ NAMES = {
     "lifting": ("Lift", "lift"),
     "muscle": ("Muscle",),
     "muscle_models": ("GEOMETRIES", "MODELS"),
+    "prove": ("Proof", "cases_of", "prove"),
     "recording": ("CHANNELS", "Issue", "Recording", "load_recording"),
     "replay": ("differences", "replay"),
     "simulator": ("Simulator",),

@@ -7,6 +7,19 @@ from typing import Any
 import numpy as np
 
 from pamrs.diagnosis.result import Diagnosis, Trace
+from pamrs.findings import (
+    Asked,
+    BlockResidual,
+    ChannelError,
+    Condition,
+    ConditionMap,
+    EffectFound,
+    EffectParameterFound,
+    FitErrors,
+    NextExperiment,
+    ParameterFound,
+    Where,
+)
 
 
 class ModelText:
@@ -52,13 +65,8 @@ def diagnosis(**changes: Any) -> Diagnosis:
             "recording": "sine_sweep",
             "intervals": [[0.0, 2.4], [9.0, 11.2], [18.0, 20.3]],
             "conditions": [
-                "the pressure has just risen: 81 % of the excess lies within 2.5 s of a fill",
-                {
-                    "variable": "muscle_pressure",
-                    "low": 3.1e5,
-                    "high": 4.9e5,
-                    "text": "muscle pressure 310 to 490 kPa",
-                },
+                Condition("filled", 0.81, 0.2, 3.1, "the pressure has just risen: 81 % of the excess lies within 2.5 s of a fill"),
+                Condition("muscle pressure", 0.6, 0.3, 2.0, "muscle pressure 310 to 490 kPa"),
             ],
             "text": "The excess is in the chamber: after each fill the pressure sags by 8 kPa.",
         },
@@ -163,7 +171,28 @@ def diagnosis(**changes: Any) -> Diagnosis:
         "timings": {"locate": 4.2, "refit": 12.0, "name": 15.2},
     }
     content.update(changes)
-    return Diagnosis(**content)
+    return Diagnosis(**content | entries(content))
+
+
+def entries(content: dict[str, Any]) -> dict[str, Any]:
+    """The parts of a result that were written as dictionaries, as entries."""
+
+    def each(cls: Any, values: dict[str, Any]) -> dict[str, Any]:
+        return {name: cls(**value) for name, value in values.items()}
+
+    effects = [e | {"parameters": each(EffectParameterFound, e["parameters"])} for e in content["effects"]]
+    errors = {part: each(ChannelError, content["fit"].get(part, {})) for part in ("channels", "held_out")}
+    shown = content["condition_map"]
+    return {
+        "where": Where(**content["where"]),
+        "effects": [EffectFound(**effect) for effect in effects],
+        "parameters": each(ParameterFound, content["parameters"]),
+        "fit": FitErrors(**errors, gap_closed=content["fit"].get("gap_closed")),
+        "next_experiment": NextExperiment(**content["next_experiment"]),
+        "asked": [Asked(**asked) for asked in content["asked"]],
+        "residuals": each(BlockResidual, content["residuals"]),
+        "condition_map": None if shown is None else ConditionMap(**shown),
+    }
 
 
 def sealed_chamber() -> Diagnosis:
@@ -213,5 +242,5 @@ def nothing() -> Diagnosis:
         traces=[same],
         text="",
         rig=None,
-        fit={"channels": {"muscle_pressure": {"noise": 1.0, "before": 1.0, "refit": float("nan"), "after": None}}},
+        fit={"channels": {"muscle_pressure": {"noise": 1.0, "before": 1.0, "refit": float("nan"), "after": float("nan")}}},
     )

@@ -8,18 +8,21 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis.blocks import available_blocks
-from pamrs.diagnosis.candidates import Attempts, Candidate, Group
-from pamrs.diagnosis.evidence import Excess
-from pamrs.diagnosis.fitting import Fit, Problem
-from pamrs.diagnosis.hypotheses import _apart
-from pamrs.diagnosis.verdicts import case_verdict, judge
-from pamrs.diagnosis.weighing import weigh
+from pamrs.diagnosis import DiagnosisSettings
+from pamrs.diagnosis.evidence import Attempts, Candidate, Group, case_verdict, judge, weigh
+from pamrs.diagnosis.fit import Fit, Problem
+from pamrs.diagnosis.noise import Excess
+from pamrs.diagnosis.prepare import available_blocks
+from pamrs.diagnosis.search._hypotheses import _apart, _Terms
 from pamrs.simulation import core_rig
 
+SETTINGS = DiagnosisSettings()
+
 RIG = pamrs.rigs.shoulder()
-BLOCKS = [b for b in available_blocks(RIG, ("supply_pressure", "muscle_pressure", "valve_command", "joint_angle")) if b.kind != "arm"]
-TRIAL = Attempts(Problem(BLOCKS, [], core_rig(RIG)), Problem(BLOCKS, [], core_rig(RIG)), RIG, {}, {}, BLOCKS)
+CHANNELS = ("supply_pressure", "muscle_pressure", "valve_command", "joint_angle")
+BLOCKS = [b for b in available_blocks(RIG, CHANNELS, SETTINGS.prepare) if b.kind != "arm"]
+TERMS = _Terms(0.985, 30.0, {})
+TRIAL = Attempts(Problem(BLOCKS, [], core_rig(RIG), SETTINGS), Problem(BLOCKS, [], core_rig(RIG), SETTINGS), RIG, {}, {}, BLOCKS)
 
 
 def candidate(key: str, supply: float, chamber: float, **values: float) -> Candidate:
@@ -38,7 +41,7 @@ def candidate(key: str, supply: float, chamber: float, **values: float) -> Candi
 
 def group(*found: Candidate) -> Group:
     start = candidate("", 2.5, 64.0)
-    probabilities = weigh([start, *found], BLOCKS, 0.985, 30.0)
+    probabilities = weigh([start, *found], BLOCKS, 0.985, 30.0, SETTINGS)
     chamber = next(b for b in BLOCKS if b.name == "chamber")
     return Group(BLOCKS, start.fitted, start.fitted, [start, *found], probabilities, chamber, {}, BLOCKS)
 
@@ -50,9 +53,9 @@ def leak(supply: float, chamber: float) -> Candidate:
 def test_a_leak_of_the_tank_is_named_beside_a_chamber_without_a_name() -> None:
     whole = group(leak(0.02, 64.0), candidate("valve_hysteresis", 2.4, 58.0, **{"valve_hysteresis.half_width": 0.01}))
     assert whole.probabilities["unlisted"] > 0.95
-    tank, chamber = _apart(whole, TRIAL, 0.985, 30.0, None)
+    tank, chamber = _apart(whole, TRIAL, TERMS)
     assert ([b.name for b in tank.blocks], [b.name for b in chamber.blocks]) == (["supply"], ["chamber"])
-    judged = judge([tank, chamber])
+    judged = judge([tank, chamber], SETTINGS)
     assert [(j.verdict, j.named) for j in judged] == [("effects", ("supply_leak",)), ("unlisted", ())]
     assert case_verdict(judged) == "effects"
     # one fit for both, so that the model has the tank's parameters beside the leak
@@ -62,12 +65,12 @@ def test_a_leak_of_the_tank_is_named_beside_a_chamber_without_a_name() -> None:
 def test_a_valve_that_explains_the_tank_alone_is_no_name() -> None:
     # it acts in both blocks, and leaves one of them as it was
     whole = group(candidate("valve_hysteresis", 0.02, 60.0, **{"valve_hysteresis.half_width": 0.01}))
-    assert _apart(whole, TRIAL, 0.985, 30.0, None) == []
+    assert _apart(whole, TRIAL, TERMS) == []
 
 
 def test_each_block_may_have_a_name_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
     volume = candidate("supply.volume", 0.0, 64.0, **{"supply.volume": 0.02})
-    heat = candidate("heat_transfer", 2.5, 0.6, **{"heat_transfer.coefficient": 20.0})
+    heat = candidate("heat_transfer", 2.5, 0.6, **{"heat_transfer.heat_transfer_coefficient": 20.0})
     asked: list[list[str]] = []
 
     def united(self: Attempts, candidates: list[Candidate]) -> Fit:
@@ -75,8 +78,8 @@ def test_each_block_may_have_a_name_of_its_own(monkeypatch: pytest.MonkeyPatch) 
         return replace(candidates[0].fit, effects=("heat_transfer",))
 
     monkeypatch.setattr(Attempts, "united", united)
-    parts = _apart(group(volume, heat), TRIAL, 0.985, 30.0, None)
+    parts = _apart(group(volume, heat), TRIAL, TERMS)
     assert asked == [["heat_transfer", "supply.volume"]]
-    judged = judge(parts)
+    judged = judge(parts, SETTINGS)
     assert {name for j in judged for name in (*j.named, *j.wrong)} == {"supply.volume", "heat_transfer"}
     assert sorted(b.name for p in parts for b in p.blocks) == ["chamber", "supply"]

@@ -9,17 +9,18 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis import words
-from pamrs.diagnosis.assemble import _merged, _settled
-from pamrs.diagnosis.blocks import available_blocks
-from pamrs.diagnosis.candidates import Candidate, Group
-from pamrs.diagnosis.fitting import Problem, fit, residuals
-from pamrs.diagnosis.protocols import library
-from pamrs.diagnosis.signals import prepare
-from pamrs.diagnosis.verdicts import judge
+from pamrs.diagnosis import DiagnosisSettings
+from pamrs.diagnosis.evidence import Candidate, Group, judge
+from pamrs.diagnosis.explain import _words as words
+from pamrs.diagnosis.explain._assemble import _merged, _settled
+from pamrs.diagnosis.fit import Problem, fit, residuals
+from pamrs.diagnosis.next_experiment import library
+from pamrs.diagnosis.prepare import available_blocks, prepare
 from pamrs.errors import DiagnosisError
 from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
+
+SETTINGS = DiagnosisSettings()
 
 NAMES = ("valve_command", "supply_pressure", "muscle_pressure", "joint_angle")
 
@@ -77,23 +78,23 @@ def test_a_rig_without_tolerances_can_be_diagnosed() -> None:
 @pytest.mark.parametrize("name", ["antagonistic_joint", "two_joint_arm", "recruitment", "regulated_joint"])
 def test_experiments_are_refused_for_rigs_that_nobody_could_command(name: str) -> None:
     with pytest.raises(DiagnosisError, match=r"named blocks|no valve"):
-        library(pamrs.rigs.named(name))
+        library(pamrs.rigs.named(name), SETTINGS.next_experiment)
 
 
 def test_one_zero_serves_both_groups_and_the_others_are_fitted_beside_it() -> None:
     rig = pamrs.rigs.shoulder()
     true = rig.with_parameters({"sensors.pressure_zero": 800.0, "chamber.alpha": 1.25})
-    prepared = prepare(recorded(true, "all", "fit"), rig)
-    blocks = {b.name: b for b in available_blocks(rig, NAMES)}
-    chamber = Problem([blocks["chamber"]], [prepared], core_rig(rig))
+    prepared = prepare(recorded(true, "all", "fit"), rig, SETTINGS)
+    blocks = {b.name: b for b in available_blocks(rig, NAMES, SETTINGS.prepare)}
+    chamber = Problem([blocks["chamber"]], [prepared], core_rig(rig), SETTINGS)
     # as if its own data had said another zero
     moved = fit(chamber, rig, (), {}, {"chamber": 1.0}, settled={"sensors.pressure_zero": -2500.0})
     values, tolerances = ({**found, "sensors.pressure_zero": zero} for found, zero in ((moved.values, -2500.0), (moved.moved, -2.5)))
     first = replace(moved, values=values, moved=tolerances)
-    last = fit(Problem([blocks["arm"]], [prepared], core_rig(rig)), rig, (), {}, {"arm": 1.0})
+    last = fit(Problem([blocks["arm"]], [prepared], core_rig(rig), SETTINGS), rig, (), {}, {"arm": 1.0})
     candidates = [Candidate((), found, {}, {}, 0.0) for found in (first, last)]
     groups = [Group([blocks[n]], {}, {}, [c], {"": 1.0}, None, {}, []) for n, c in zip(("chamber", "arm"), candidates, strict=True)]
-    judged = judge(groups)
+    judged = judge(groups, SETTINGS)
     settled = _settled(rig, chamber, judged, candidates)
     assert settled[1] is candidates[1]
     model = _merged(rig, settled)

@@ -7,17 +7,19 @@ import pytest
 
 import pamrs
 from pamrs import _core
-from pamrs.diagnosis.blocks import Block, available_blocks
-from pamrs.diagnosis.closure import MOST_TERMS, describe_closure, find_closure
-from pamrs.diagnosis.evidence import Floor, excess, floors, inflation
-from pamrs.diagnosis.fitting import FIT_BIN, Fit, Key, Problem, fit, residuals
-from pamrs.diagnosis.hypotheses import fits
-from pamrs.diagnosis.signals import prepare
-from pamrs.effects import CATALOGUE, EFFECTS
-from pamrs.effects import CLOSURES, MEMORY_OF, TERMS
+from pamrs.diagnosis import DiagnosisSettings
+from pamrs.diagnosis.explain import describe_closure
+from pamrs.diagnosis.fit import Fit, Key, Problem, fit, fits, residuals
+from pamrs.diagnosis.noise import Floor, excess, floors, inflation
+from pamrs.diagnosis.prepare import Block, available_blocks, prepare
+from pamrs.diagnosis.search import find_closure
+from pamrs.effects import CATALOGUE, EFFECTS, MEMORY_OF, TERMS
 from pamrs.errors import DiagnosisError, RigError
 from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
+
+SETTINGS = DiagnosisSettings()
+CLOSURES = [effect for effect in EFFECTS.values() if not effect.catalogue]
 
 DT, ROWS = 0.005, 1600
 NOISE = {"valve_command": 0.0, "supply_pressure": 400.0, "muscle_pressure": 400.0, "joint_angle": 3e-4}
@@ -47,14 +49,20 @@ class Case:
     """Three recordings of a truth with the nominal model fitted to them, and one of another excitation."""
 
     def __init__(self, truth: pamrs.Rig, names: tuple[str, ...]) -> None:
-        self.blocks: list[Block] = [b for b in available_blocks(NOMINAL, tuple(NOISE)) if b.name in names]
+        self.blocks: list[Block] = [b for b in available_blocks(NOMINAL, tuple(NOISE), SETTINGS.prepare) if b.name in names]
         self.problem, self.held = (
-            Problem(self.blocks, [prepare(recorded(truth, kind, seed), NOMINAL) for seed, kind in enumerate(kinds)], core_rig(NOMINAL))
+            Problem(
+                self.blocks,
+                [prepare(recorded(truth, kind, seed), NOMINAL, SETTINGS) for seed, kind in enumerate(kinds)],
+                core_rig(NOMINAL),
+                SETTINGS,
+            )
             for kinds in (("slow", "fast", "mixed"), ("steps",))
         )
         white = dict.fromkeys(names, 1.0)
         first = fit(self.problem, NOMINAL, (), {}, white)
-        self.colour = {b.name: inflation(b, self.problem.recordings, first.residuals, FIT_BIN) for b in self.blocks}
+        width = SETTINGS.noise.fit_bin_time
+        self.colour = {b.name: inflation(b, self.problem.recordings, first.residuals, width) for b in self.blocks}
         self.baseline = fit(self.problem, NOMINAL, (), {}, self.colour, warm=first)
         self.evaluations = 0
 
@@ -63,15 +71,16 @@ class Case:
             self.evaluations += 1
             return residuals(*arguments, **more)  # type: ignore[arg-type]
 
-        monkeypatch.setattr("pamrs.diagnosis.closure.residuals", counted)
-        monkeypatch.setattr("pamrs.diagnosis.fitting.residuals", counted)
+        monkeypatch.setattr("pamrs.diagnosis.search._closure.residuals", counted)
+        monkeypatch.setattr("pamrs.diagnosis.fit._fitting.residuals", counted)
         return find_closure(self.problem, NOMINAL, self.baseline, self.colour, blocks, lambda _: None)
 
     def gap_closed(self, model: Fit, block: str) -> float:
         """Share of the excess beyond noise that a model removes on the held-out recording."""
         floor: dict[Key, Floor] = floors(self.held, self.held.core.respecified(model.rig.to_json()))
         own = next(b for b in self.blocks if b.name == block)
-        ratios = [excess(own, self.held.recordings, residuals(self.held, m.rig), floor).ratio - 1.0 for m in (self.baseline, model)]
+        found = [residuals(self.held, m.rig) for m in (self.baseline, model)]
+        ratios = [excess(own, self.held.recordings, r, floor, SETTINGS.noise).ratio - 1.0 for r in found]
         return 1.0 - float(np.sqrt(max(0.0, ratios[1]) / ratios[0]))
 
 
@@ -93,7 +102,7 @@ def test_a_hidden_torque_is_modelled_and_predicts_what_was_held_out(monkeypatch:
     assert found is not None
     assert case.evaluations <= 18
     assert found.values["closure_torque.sine_4"] == pytest.approx(2.5, rel=0.1)
-    assert 2 <= sum(name.startswith("closure_torque.") for name in found.values) <= MOST_TERMS + 2
+    assert 2 <= sum(name.startswith("closure_torque.") for name in found.values) <= SETTINGS.closures.most_terms + 2
     assert case.gap_closed(found, "arm") > 0.85
     text = describe_closure(found, case.problem, case.baseline)
     assert "a torque is missing" in text
@@ -128,7 +137,7 @@ def test_a_hidden_flow_is_modelled(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_null_keeps_no_excess_and_next_to_no_terms(names: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:
     case = Case(NOMINAL, names)
     floor = floors(case.problem, case.problem.core.respecified(case.baseline.rig.to_json()))
-    assert all(excess(b, case.problem.recordings, case.baseline.residuals, floor).ratio < 1.2 for b in case.blocks)
+    assert all(excess(b, case.problem.recordings, case.baseline.residuals, floor, SETTINGS.noise).ratio < 1.2 for b in case.blocks)
     # a form that is asked for all the same mends what the smoothing of the drives does at reversals: hundredths of the arm's torque
     found = case.found(monkeypatch, case.blocks)
     assert found is None or set(found.effects) == {"closure_torque"}

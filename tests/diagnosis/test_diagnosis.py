@@ -11,12 +11,14 @@ import pytest
 
 import pamrs
 from pamrs import _core
-from pamrs.diagnosis.blocks import available_blocks
+from pamrs.diagnosis import DiagnosisSettings
+from pamrs.diagnosis.prepare import available_blocks, noise_level, prepare
 from pamrs.diagnosis.result import schema
-from pamrs.diagnosis.signals import noise_level, prepare
 from pamrs.effects import EFFECTS
 from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
+
+SETTINGS = DiagnosisSettings()
 
 ROOT = Path(__file__).parents[2]
 CHAMBERS = ROOT / "cases" / "zillen_chambers"
@@ -77,13 +79,13 @@ def test_a_diagnosis_repeats_exactly() -> None:
 def test_noise_level_is_recovered(level: float) -> None:
     rng = np.random.default_rng(0)
     slow = 500.0 * np.sin(np.arange(4000) * 0.01)
-    estimate = noise_level(slow + rng.normal(0.0, level, 4000), np.ones(4000, dtype=bool))
+    estimate = noise_level(slow + rng.normal(0.0, level, 4000), np.ones(4000, dtype=bool), seed=SETTINGS.seed)
     assert estimate == pytest.approx(level, rel=0.08)
 
 
 def test_quantised_rest_has_the_noise_of_its_lattice() -> None:
     values = np.where(np.arange(400) % 50 == 0, 42.0, 0.0)
-    assert noise_level(values, np.ones(400, dtype=bool)) == pytest.approx(42.0 / np.sqrt(12.0))
+    assert noise_level(values, np.ones(400, dtype=bool), seed=SETTINGS.seed) == pytest.approx(42.0 / np.sqrt(12.0))
 
 
 def test_too_few_samples_are_refused_in_words() -> None:
@@ -134,9 +136,9 @@ def test_a_hole_in_a_drive_costs_only_itself() -> None:
     recording = shoulder_recording()
     recording.mask["muscle_pressure"][500:520] = False
     recording.mask["valve_command"][900:930] = False
-    prepared = prepare(recording, pamrs.rigs.shoulder())
+    prepared = prepare(recording, pamrs.rigs.shoulder(), SETTINGS)
     lost = {}
-    for block in available_blocks(pamrs.rigs.shoulder(), tuple(recording.channels)):
+    for block in available_blocks(pamrs.rigs.shoulder(), tuple(recording.channels), SETTINGS.prepare):
         rows = prepared.usable(block.channel, block.drives, prepared.starts(block.window, block.drives))
         lost[block.name] = int((~rows).sum())
         if "valve_command" in block.drives:
@@ -162,8 +164,8 @@ def test_mostly_missing_data_are_refused_in_words() -> None:
 
 def _share(name: str, recording: Recording) -> float:
     rig = pamrs.rigs.shoulder()
-    prepared = prepare(recording, rig)
-    block = next(b for b in available_blocks(rig, tuple(recording.channels)) if b.name == name)
+    prepared = prepare(recording, rig, SETTINGS)
+    block = next(b for b in available_blocks(rig, tuple(recording.channels), SETTINGS.prepare) if b.name == name)
     return float(prepared.usable(block.channel, block.drives, prepared.starts(block.window, block.drives)).mean())
 
 
@@ -184,11 +186,11 @@ def test_printed_chambers(name: str, leaks: bool) -> None:
         assert slow > 1e4
 
 
-@pytest.mark.parametrize("kind", ["none", "leak_muscle"])
+@pytest.mark.parametrize("kind", [pytest.param("none", marks=pytest.mark.slow), "leak_muscle"])
 def test_small_blinded_trial(kind: str, tmp_path: Path) -> None:
     from trial import make_case
 
-    made = make_case(tmp_path / "cases", tmp_path / "keys", kind, seed=2014, recordings=4, duration=20.0)
+    made = make_case(tmp_path / "cases", tmp_path / "keys", kind, seed=2014, recordings=4, duration=12.0)
     assert made is not None
     (folder,) = sorted((tmp_path / "cases").glob("case_*"))
     found = pamrs.diagnose(folder)

@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis.blocks import available_blocks
-from pamrs.diagnosis.fitting import Events, Problem, residuals
-from pamrs.diagnosis.signals import prepare
+from pamrs.diagnosis import DiagnosisSettings
+from pamrs.diagnosis.fit import Events, Problem, residuals
+from pamrs.diagnosis.prepare import available_blocks, prepare
 from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
+
+SETTINGS = DiagnosisSettings()
 
 TIMES = {"lift": 4.3, "lower": 7.1, "again": 5.6}
 ROLES = {"lift": "fit", "lower": "fit", "again": "held_out"}
@@ -40,7 +42,10 @@ def recordings(effect: str, make: dict[str, float], duration: float = 12.0, *, p
 
 @pytest.mark.parametrize(
     ("effect", "make"),
-    [("external_torque", {"torque": 3.0, "duration": 0.8}), ("payload_change", {"mass_change": 0.4})],
+    [
+        ("external_torque", {"torque": 3.0, "duration": 0.8}),
+        pytest.param("payload_change", {"mass_change": 0.4}, marks=pytest.mark.slow),
+    ],
 )
 def test_an_event_is_named_with_its_times(effect: str, make: dict[str, float]) -> None:
     found = pamrs.diagnose(pamrs.Case("events", pamrs.rigs.shoulder(), recordings(effect, make), Path()))
@@ -58,11 +63,11 @@ def test_an_event_is_named_with_its_times(effect: str, make: dict[str, float]) -
 
 def test_a_recording_without_the_event_has_no_slope_in_it() -> None:
     rig = pamrs.rigs.shoulder()
-    prepared = [prepare(r, rig) for r in recordings("payload_change", {"mass_change": 0.4}, 4.0)[:2]]
-    blocks = [b for b in available_blocks(rig, tuple(prepared[0].recording.channels)) if b.name == "arm"]
+    prepared = [prepare(r, rig, SETTINGS) for r in recordings("payload_change", {"mass_change": 0.4}, 4.0)[:2]]
+    blocks = [b for b in available_blocks(rig, tuple(prepared[0].recording.channels), SETTINGS.prepare) if b.name == "arm"]
     happened = Events("payload_change", {"lift": {"mass_change": 0.4, "time": 2.0}})
     names = ["arm.payload", "payload_change.mass_change"]
-    found = residuals(Problem(blocks, prepared, core_rig(rig)), rig, names, happened)
+    found = residuals(Problem(blocks, prepared, core_rig(rig), SETTINGS), rig, names, happened)
     with_event, without = found["arm", "lift"].jacobian, found["arm", "lower"].jacobian
     assert with_event is not None
     assert without is not None
@@ -71,6 +76,7 @@ def test_a_recording_without_the_event_has_no_slope_in_it() -> None:
     assert without[:, 0].any()
 
 
+@pytest.mark.slow
 def test_a_push_is_found_beside_a_lasting_effect() -> None:
     plant = pamrs.rigs.shoulder().with_effect("muscle_hysteresis", {"friction_pressure": 1e-4, "presliding": 0.003})
     records = recordings("external_torque", {"torque": 5.0, "duration": 0.8}, plant=plant)

@@ -10,18 +10,20 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis.differences import MEASURABLE, NOISE, taken
-from pamrs.diagnosis.experiment import entropy, information, propose
-from pamrs.diagnosis.protocols import library
+from pamrs.diagnosis import DiagnosisSettings
+from pamrs.diagnosis.next_experiment import MEASURABLE, entropy, information, library, propose, taken, usual_noise
 from pamrs.diagnosis.result import schema
 from tests.diagnosis import synthetic
+
+SETTINGS = DiagnosisSettings()
+NOISE = usual_noise(SETTINGS.next_experiment)
 
 
 @pytest.fixture(scope="module")
 def pool():
     """The experiments of the shoulder."""
     names = ("null_ramp", "nested_triangles", "slow_triangle")
-    return {e.name: e for e in library(pamrs.rigs.shoulder(), sample_time=0.01, only=names)}
+    return {e.name: e for e in library(pamrs.rigs.shoulder(), SETTINGS.next_experiment, sample_time=0.01, only=names)}
 
 
 @pytest.fixture(scope="module")
@@ -99,7 +101,7 @@ def test_recordings_say_the_channels_the_clock_and_the_pressure() -> None:
     rig = pamrs.rigs.sealed_chamber()
     leak = rig.with_effect("leak_muscle", {"conductance": 1e-13})
     run = pamrs.simulate(rig, duration=60.0, sample_time=0.2, initial={"muscle_pressure": 4e5})
-    prepared = taken(run, rig, "hold", NOISE)
+    prepared = taken(run, rig, "hold", NOISE, SETTINGS)
     found = propose(rig, [("none", rig, 0.6), ("leak_muscle", leak, 0.4)], {"muscle_pressure": 50.0}, [prepared])
     assert max(found["excitation"]["levels_bar"]) <= 4.21
     assert found["curves"]["time"][1] == pytest.approx(0.2)
@@ -122,6 +124,7 @@ def test_one_hypothesis_needs_no_experiment() -> None:
     rig = pamrs.rigs.sealed_chamber()
     found = propose(rig, [("none", rig, 0.999), ("leak_muscle", rig.with_effect("leak_muscle"), 0.0)])
     assert found["expected_information_bits"] == 0.0
+    assert found.curves is None
     assert found["curves"] is None
 
 

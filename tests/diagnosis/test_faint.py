@@ -9,13 +9,15 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis import hypotheses
-from pamrs.diagnosis.blocks import available_blocks
-from pamrs.diagnosis.candidates import Candidate
-from pamrs.diagnosis.evidence import Excess
-from pamrs.diagnosis.fitting import Fit
-from pamrs.diagnosis.weighing import weigh
+from pamrs.diagnosis import DiagnosisSettings
+from pamrs.diagnosis.evidence import Candidate, weigh
+from pamrs.diagnosis.fit import Fit
+from pamrs.diagnosis.noise import Excess
+from pamrs.diagnosis.prepare import available_blocks
+from pamrs.diagnosis.search import _hypotheses as hypotheses
 from pamrs.recordings import Recording
+
+SETTINGS = DiagnosisSettings()
 
 NOISE = {"supply_pressure": 400.0, "muscle_pressure": 400.0, "joint_angle": 3e-4}
 SECONDS = 15.0
@@ -48,6 +50,7 @@ def test_an_effect_below_the_noise_is_named() -> None:
     assert abs(told["value"] - 8e-4) < max(2e-4, 4.0 * told["std"])
 
 
+@pytest.mark.slow
 def test_faint_rivals_that_look_alike_stay_a_set() -> None:
     found = pamrs.diagnose(shoulder_case(pamrs.rigs.shoulder().with_effect("input_path_lag", {"delay": 1.2e-3, "time_constant": 0.0})))
     assert found.verdict == "effects"
@@ -85,6 +88,7 @@ def test_a_zero_inside_its_tolerance_is_no_effect() -> None:
     assert found.effects == []
 
 
+@pytest.mark.slow
 def test_a_payload_on_a_cord_is_named_with_its_length() -> None:
     truth = pamrs.rigs.shoulder().with_effect("payload_swing", {"swinging_share": 0.03, "length": 0.23, "damping_ratio": 0.02})
     found = pamrs.diagnose(shoulder_case(truth))
@@ -103,8 +107,8 @@ def candidate(effects: tuple[str, ...], left: float, **values: float) -> Candida
 def weighed(*sets: Candidate, start: Candidate | None = None) -> dict[str, float]:
     """Probabilities beside a baseline that leaves ten times the noise's variance in the chamber, of recordings of 30 s."""
     rig = pamrs.rigs.shoulder()
-    blocks = available_blocks(rig, ("supply_pressure", "muscle_pressure", "valve_command", "joint_angle"))
-    return weigh([start or candidate((), 10.0), *sets], [b for b in blocks if b.name == "chamber"], 0.985, 30.0)
+    blocks = available_blocks(rig, ("supply_pressure", "muscle_pressure", "valve_command", "joint_angle"), SETTINGS.prepare)
+    return weigh([start or candidate((), 10.0), *sets], [b for b in blocks if b.name == "chamber"], 0.985, 30.0, SETTINGS)
 
 
 def test_a_set_that_explains_nothing_says_nothing_against_one_that_does() -> None:
@@ -163,6 +167,7 @@ def test_held_out_recordings_that_hardly_show_a_mismatch_do_not_veto_its_effect(
     assert named(13.0, 0.1) < 0.1  # it explains nothing
 
 
+@pytest.mark.slow
 def test_a_tube_is_named_with_the_place_of_the_transducer() -> None:
     truth = pamrs.rigs.shoulder().with_effect("tube_flow_restriction", {"conductance": 5e-8, "tap": 1.0})
     found = pamrs.diagnose(shoulder_case(truth))

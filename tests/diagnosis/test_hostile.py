@@ -12,9 +12,12 @@ from numpy.typing import NDArray
 
 import pamrs
 from pamrs.control import trajectories
-from pamrs.diagnosis.plausible import implausible
+from pamrs.diagnosis import DiagnosisSettings
+from pamrs.diagnosis.prepare import implausible
 from pamrs.reproduce import _lift as lift
 from pamrs.reproduce._lift_diagnosis import recorded
+
+SETTINGS = DiagnosisSettings()
 
 Array = NDArray[np.float64]
 Table = dict[str, Array]
@@ -142,9 +145,9 @@ def test_what_cannot_be_is_refused_in_words(name: str, plain: Table, tmp_path: P
 
 def test_sound_recordings_are_plausible(plain: Table, tmp_path: Path) -> None:
     case = loaded(tmp_path, plain)
-    assert implausible(case.recordings[0], case.rig) == []
+    assert implausible(case.recordings[0], case.rig, SETTINGS.plausibility) == []
     resting = {c: v[:400] for c, v in plain.items()} | {"muscle_pressure": np.zeros(400), "joint_angle": np.full(400, 0.2618)}
-    assert implausible(loaded(tmp_path, resting).recordings[0], case.rig) == []
+    assert implausible(loaded(tmp_path, resting).recordings[0], case.rig, SETTINGS.plausibility) == []
 
 
 def test_every_finding_is_told_at_once(plain: Table, tmp_path: Path) -> None:
@@ -161,6 +164,6 @@ def test_an_arm_whose_swing_moves_the_pressure_is_not_refused() -> None:
     model = lift.believed(lift.VARIANTS[name]).with_parameters({"arm.payload": payload})
     record = recorded(truth, model, trajectories.compound(), "fit", 0, 25.0)
     assert np.ptp(record.channels["joint_angle"]) > 1.0
-    assert implausible(record, model) == []
+    assert implausible(record, model, SETTINGS.plausibility) == []
     turned = replace(record, channels=record.channels | {"valve_command": 10.0 - record.channels["valve_command"]})
-    assert any("goes against valve_command" in text for text in implausible(turned, model))
+    assert any("goes against valve_command" in text for text in implausible(turned, model, SETTINGS.plausibility))

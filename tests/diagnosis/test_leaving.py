@@ -8,12 +8,14 @@ from pathlib import Path
 import numpy as np
 
 import pamrs
-from pamrs.diagnosis.blocks import available_blocks
-from pamrs.diagnosis.fitting import Fit, Problem, fit, residuals
-from pamrs.diagnosis.leaving import left_out
-from pamrs.diagnosis.signals import prepare
+from pamrs.diagnosis import DiagnosisSettings
+from pamrs.diagnosis.fit import Fit, Problem, fit, residuals
+from pamrs.diagnosis.prepare import available_blocks, prepare
+from pamrs.diagnosis.screen import left_out
 from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
+
+SETTINGS = DiagnosisSettings()
 
 RIG = pamrs.rigs.sealed_chamber()
 CHANNEL = {"muscle_pressure": "Pa"}
@@ -29,8 +31,8 @@ def hold(name: str, conductance: float, seconds: float = 60.0, seed: int = 0) ->
 
 
 def problem(*recordings: Recording) -> Problem:
-    blocks = available_blocks(RIG, ("muscle_pressure",))
-    return Problem(blocks, [prepare(r, RIG) for r in recordings], core_rig(RIG))
+    blocks = available_blocks(RIG, ("muscle_pressure",), SETTINGS.prepare)
+    return Problem(blocks, [prepare(r, RIG, SETTINGS) for r in recordings], core_rig(RIG), SETTINGS)
 
 
 def leaking(given: Problem) -> Fit:

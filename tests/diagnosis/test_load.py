@@ -10,18 +10,16 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis.blocks import available_blocks
-from pamrs.diagnosis.events import look_for_events
-from pamrs.diagnosis.experiment import propose
-from pamrs.diagnosis.fitting import Problem, residuals
-from pamrs.diagnosis.hypotheses import fits
-from pamrs.diagnosis.plausible import implausible
-from pamrs.diagnosis.protocols import library
-from pamrs.diagnosis.signals import prepare
+from pamrs.diagnosis import DiagnosisSettings
+from pamrs.diagnosis.fit import Problem, fits, look_for_events, residuals
+from pamrs.diagnosis.next_experiment import library, propose
+from pamrs.diagnosis.prepare import available_blocks, implausible, prepare
 from pamrs.errors import DiagnosisError, SimulationError
 from pamrs.recordings import Recording
 from pamrs.rig import parse_rig
 from pamrs.simulation import core_rig
+
+SETTINGS = DiagnosisSettings()
 
 RIG = pamrs.rigs.hanging_mass()
 NOISE = {"valve_command": 0.0, "supply_pressure": 300.0, "muscle_pressure": 300.0, "length": 3e-5}
@@ -51,10 +49,10 @@ def case(rig: pamrs.Rig) -> pamrs.Case:
 
 
 def test_the_load_is_a_block_and_its_sensitivities_are_those_of_differences() -> None:
-    blocks = {b.name: b for b in available_blocks(RIG, tuple(NOISE))}
+    blocks = {b.name: b for b in available_blocks(RIG, tuple(NOISE), SETTINGS.prepare)}
     assert blocks["load"].kind == "arm"
     assert "length" in blocks["chamber"].drives
-    problem = Problem([blocks["load"]], [prepare(recording(RIG, "slow", "fit", 0, 6.0), RIG)], core_rig(RIG))
+    problem = Problem([blocks["load"]], [prepare(recording(RIG, "slow", "fit", 0, 6.0), RIG, SETTINGS)], core_rig(RIG), SETTINGS)
     names = ["load.mass", "load.viscous", "load.coulomb", "muscle.modulus_scale", "sensors.pressure_zero", "sensors.length_zero"]
     found = residuals(problem, RIG, names)["load", "slow"]
     assert float(np.sqrt(np.mean(found.value**2))) < 2.0 * found.noise
@@ -71,7 +69,13 @@ def test_the_load_is_a_block_and_its_sensitivities_are_those_of_differences() ->
         assert np.abs(slope - jacobian[:, k]).max() < 1e-3 * np.abs(slope).max(), name
 
 
-@pytest.mark.parametrize("true", [{"load.mass": 40.08, "muscle.modulus_scale": 1.04}, {"muscle.rest_length": 0.277}])
+@pytest.mark.parametrize(
+    "true",
+    [
+        pytest.param({"load.mass": 40.08, "muscle.modulus_scale": 1.04}, marks=pytest.mark.slow),
+        {"muscle.rest_length": 0.277},
+    ],
+)
 def test_a_true_model_of_a_load_misses_nothing(true: dict[str, float]) -> None:
     found = pamrs.diagnose(case(RIG.with_parameters(true)))
     assert found.verdict in ("none", "parameters")
@@ -93,21 +97,21 @@ def test_a_length_that_cannot_be_is_refused() -> None:
     def told(change: Callable[[np.ndarray], np.ndarray]) -> str:
         sound = recording(RIG, "slow", "fit", 0, 4.0)
         channels = sound.channels | {"length": change(sound.channels["length"])}
-        return "; ".join(implausible(replace(sound, channels=channels), RIG))
+        return "; ".join(implausible(replace(sound, channels=channels), RIG, SETTINGS.plausibility))
 
     assert told(lambda x: x) == ""
     assert "length has the one value" in told(lambda x: np.full_like(x, 0.25))
     assert "length is outside its load's range" in told(lambda x: 1e-3 * x)
     assert "length moves with" in told(lambda x: 0.24 + 100.0 * (x - x.mean()) * np.sign(np.sin(1e4 * np.arange(x.size))))
     slow = replace(recording(RIG, "slow", "fit", 0, 4.0), sample_time=0.4)
-    assert "too slow for a load" in "; ".join(implausible(slow, RIG))
+    assert "too slow for a load" in "; ".join(implausible(slow, RIG, SETTINGS.plausibility))
 
 
 def test_a_load_behind_a_valve_that_was_not_recorded_is_driven_by_its_pressure() -> None:
     whole = recording(RIG, "slow", "fit", 0, 4.0)
     bare = replace(whole, channels={n: v for n, v in whole.channels.items() if n in ("muscle_pressure", "length")})
-    assert [b.name for b in available_blocks(RIG, tuple(bare.channels))] == ["load"]
-    assert prepare(bare, RIG).n == whole.time.size
+    assert [b.name for b in available_blocks(RIG, tuple(bare.channels), SETTINGS.prepare)] == ["load"]
+    assert prepare(bare, RIG, SETTINGS).n == whole.time.size
 
 
 def test_a_mass_that_changes_is_looked_for_and_found() -> None:
@@ -115,8 +119,8 @@ def test_a_mass_that_changes_is_looked_for_and_found() -> None:
     assert fits(RIG, "payload_change")
     assert not fits(pamrs.rigs.bench(RIG.muscle), "payload_change")
     changed = RIG.with_effect("payload_change", {"mass_change": -2.0, "time": 7.0})  # of which 4 s are not recorded
-    load = [b for b in available_blocks(RIG, tuple(NOISE)) if b.name == "load"]
-    problem = Problem(load, [prepare(recording(changed, "slow", "fit", 0, 6.0), RIG)], core_rig(RIG))
+    load = [b for b in available_blocks(RIG, tuple(NOISE), SETTINGS.prepare) if b.name == "load"]
+    problem = Problem(load, [prepare(recording(changed, "slow", "fit", 0, 6.0), RIG, SETTINGS)], core_rig(RIG), SETTINGS)
     found = look_for_events("payload_change", problem, RIG, residuals(problem, RIG), {"load": 1.0})
     assert found is not None
     (values,) = found.values.values()
@@ -124,7 +128,7 @@ def test_a_mass_that_changes_is_looked_for_and_found() -> None:
 
 
 def test_the_next_experiment_with_a_load_is_simulated() -> None:
-    experiments = library(RIG, only={"staircase", "other_payload"})
+    experiments = library(RIG, SETTINGS.next_experiment, only={"staircase", "other_payload"})
     assert [e.name for e in experiments] == ["staircase", "other_payload"]
     assert experiments[1].changes == {"load.mass": pytest.approx(20.0)}
     creeping = RIG.with_effect("muscle_creep")
@@ -133,6 +137,7 @@ def test_the_next_experiment_with_a_load_is_simulated() -> None:
     assert told["curves"] is not None
 
 
+@pytest.mark.slow
 def test_an_effect_on_a_load_is_named() -> None:
     found = pamrs.diagnose(
         case(RIG.with_effect("muscle_hysteresis", {"friction_constant": 4.0, "friction_pressure": 4e-5, "presliding": 2e-3}))
@@ -147,7 +152,7 @@ def test_an_effect_on_a_load_is_named() -> None:
 def test_a_frame_holds_the_length_and_has_no_block_of_its_own() -> None:
     assert RIG.muscle is not None
     bench = pamrs.rigs.bench(RIG.muscle)
-    assert not [b for b in available_blocks(bench, ("muscle_pressure", "length")) if b.name == "load"]
+    assert not [b for b in available_blocks(bench, ("muscle_pressure", "length"), SETTINGS.prepare) if b.name == "load"]
     signals = {n: (np.full(64, v), np.zeros(64)) for n, v in (("muscle_pressure", 2e5), ("length", 0.25))}
     with pytest.raises((SimulationError, ValueError), match="frame"):
         core_rig(bench).predict("load", {}, DT, DT, [0], [], signals, 64)

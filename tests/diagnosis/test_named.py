@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis import _doubted, _unsettled
-from pamrs.diagnosis.blocks import available_blocks
-from pamrs.diagnosis.candidates import Group
+from pamrs.diagnosis import DiagnosisSettings, _doubted, _unsettled
+from pamrs.diagnosis.evidence import Group
+from pamrs.diagnosis.prepare import available_blocks
 from pamrs.recordings import Recording
+
+SETTINGS = DiagnosisSettings()
 
 ROOT = Path(__file__).parents[2]
 RIGS = ROOT / "python" / "pamrs" / "rigs"
@@ -56,7 +58,7 @@ def bare(tmp_path_factory: pytest.TempPathFactory) -> pamrs.Rig:
 
 
 def test_every_block_has_its_own_drives_and_parameters(rig: pamrs.Rig) -> None:
-    blocks = {b.name: b for b in available_blocks(rig, tuple(recorded(rig, 1, "fit", n=40).channels))}
+    blocks = {b.name: b for b in available_blocks(rig, tuple(recorded(rig, 1, "fit", n=40).channels), SETTINGS.prepare)}
     assert list(blocks) == ["supply", "chamber.flexor", "chamber.extensor", "arm.elbow"]
     assert [b.kind for b in blocks.values()] == ["supply", "chamber", "chamber", "arm"]
     flexor = blocks["chamber.flexor"]
@@ -88,7 +90,7 @@ def test_every_block_has_its_own_drives_and_parameters(rig: pamrs.Rig) -> None:
     ],
 )
 def test_the_channels_decide_what_can_be_told_apart(name: str, channels: tuple[str, ...], expected: list[str]) -> None:
-    assert [b.name for b in available_blocks(pamrs.load_rig(RIGS / f"{name}.toml"), channels)] == expected
+    assert [b.name for b in available_blocks(pamrs.load_rig(RIGS / f"{name}.toml"), channels, SETTINGS.prepare)] == expected
 
 
 def test_a_nominal_antagonist_has_nothing_missing(rig: pamrs.Rig) -> None:
@@ -99,6 +101,7 @@ def test_a_nominal_antagonist_has_nothing_missing(rig: pamrs.Rig) -> None:
     assert "chamber.flexor.dead_volume" in found.parameters
 
 
+@pytest.mark.slow
 def test_pressures_alone_tell_the_friction_of_the_muscles(rig: pamrs.Rig, bare: pamrs.Rig) -> None:
     assert pamrs.diagnose(case(rig, bare, pressures_only=True)).verdict in ("none", "parameters")
     found = pamrs.diagnose(case(rig.with_effect("muscle_hysteresis"), bare, pressures_only=True))
@@ -115,7 +118,7 @@ def test_no_confident_name_beside_unknown_geometry(rig: pamrs.Rig, bare: pamrs.R
     )
     assert _unsettled(bare) == []
     assert _unsettled(pamrs.load_rig(tmp_path / "rig.toml")) == ["transmission.flexor.radius"]
-    arm = available_blocks(bare, tuple(recorded(rig, 1, "fit", pressures_only=True, n=40).channels))[0]
+    arm = available_blocks(bare, tuple(recorded(rig, 1, "fit", pressures_only=True, n=40).channels), SETTINGS.prepare)[0]
     group = Group([arm], {}, {}, [], {"muscle_hysteresis": 0.9, "muscle_creep": 0.05, "unlisted": 0.05}, arm, {}, [arm])
     doubted = _doubted(group).probabilities
     assert doubted["muscle_hysteresis"] < 0.5

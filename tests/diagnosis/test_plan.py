@@ -9,9 +9,12 @@ import pytest
 
 import pamrs
 from pamrs.cli import main
-from pamrs.diagnosis import plan
-from pamrs.diagnosis.protocols import library, pressure_range
+from pamrs.diagnosis import DiagnosisSettings
+from pamrs.diagnosis.next_experiment import _plan as plan
+from pamrs.diagnosis.next_experiment import library, pressure_range
 from pamrs.effects import CATALOGUE, EFFECTS
+
+SETTINGS = DiagnosisSettings()
 
 ALL = ("valve_command", "supply_pressure", "muscle_pressure", "joint_angle")
 
@@ -19,9 +22,9 @@ ALL = ("valve_command", "supply_pressure", "muscle_pressure", "joint_angle")
 def test_levels_follow_from_the_rig() -> None:
     for name in ("shoulder", "elbow"):
         rig = pamrs.rigs.named(name)
-        span = pressure_range(rig)
+        span = pressure_range(rig, SETTINGS.next_experiment)
         assert 0.0 < span.low < span.high < rig.model["supply"]["initial_pressure"]
-    assert pressure_range(pamrs.rigs.shoulder(), highest=2e5).high <= 2e5
+    assert pressure_range(pamrs.rigs.shoulder(), SETTINGS.next_experiment, highest=2e5).high <= 2e5
 
 
 def test_a_sealed_chamber_is_planned_quickly(capsys: pytest.CaptureFixture[str], tmp_path) -> None:
@@ -64,7 +67,7 @@ def test_a_case_or_a_plan(words: list[str]) -> None:
 @pytest.fixture(scope="module")
 def few():
     """Plans of the shoulder from one experiment in the place of all, computed once, so that the tests are quick."""
-    pool = library(pamrs.rigs.shoulder(), sample_time=0.01, only=["slow_triangle"])
+    pool = library(pamrs.rigs.shoulder(), SETTINGS.next_experiment, sample_time=0.01, only=["slow_triangle"])
     made = plan._parts
     kept: dict[str, Any] = {}
 
@@ -120,7 +123,7 @@ def test_without_the_supply_the_arm_alone_is_left(few) -> None:
 
 def test_holds_on_both_sides_separate_a_leak_from_centre_leakage(monkeypatch: pytest.MonkeyPatch) -> None:
     rig = pamrs.rigs.shoulder()
-    (both,) = pool = library(rig, sample_time=0.01, only=["holds_both_sides"])
+    (both,) = pool = library(rig, SETTINGS.next_experiment, sample_time=0.01, only=["holds_both_sides"])
     monkeypatch.setattr(plan, "library", lambda rig: pool)
     leaks = {name: EFFECTS[name] for name in ("leak_muscle", "valve_centre_leakage")}
     monkeypatch.setattr(plan, "CATALOGUE", leaks)

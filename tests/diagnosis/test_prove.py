@@ -10,8 +10,8 @@ import pytest
 
 import pamrs
 from pamrs import cli
+from pamrs.diagnosis.prove import cases_of, code_digest, prove, valid_result, worker
 from pamrs.errors import CaseError, ParameterError
-from pamrs.prove import cases_of, code_digest, prove, valid_result, worker
 
 #: A worker that writes down what it was given and answers by the name of the case.
 WORKER = """

@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.diagnosis.resampling import inclusion
-from pamrs.diagnosis.screening import Screen, Stand
-from pamrs.diagnosis.starts import Start
+from pamrs.diagnosis import DiagnosisSettings
+from pamrs.diagnosis.fit import Start
+from pamrs.diagnosis.screen import Screen, Stand, inclusion
+
+SETTINGS = DiagnosisSettings()
 
 Array = NDArray[np.float64]
 ROWS = 6000
@@ -20,7 +22,9 @@ def screened(rows: Array, signatures: dict[str, Array], jacobian: Array | None =
     normal = slopes.T @ slopes + np.eye(count)
     left = rows - slopes @ np.linalg.solve(normal, slopes.T @ rows + moved)
     stand = Stand(rows, left, slopes, np.full(count, moved), np.ones(count), slopes @ np.linalg.cholesky(np.linalg.inv(normal)))
-    return Screen(stand, [(e, Start(e, {f"{e}.size": 1.0}, {}, (f"{e}.size",), False), s) for e, s in signatures.items()])
+    return Screen(
+        stand, [(e, Start(e, {f"{e}.size": 1.0}, {}, (f"{e}.size",), False), s) for e, s in signatures.items()], SETTINGS.screen
+    )
 
 
 def waves(count: int) -> list[Array]:
@@ -32,7 +36,7 @@ def waves(count: int) -> list[Array]:
 def test_an_effect_that_is_there_is_always_taken_and_one_that_is_not_hardly_ever() -> None:
     there, absent = waves(2)
     rows = np.random.default_rng(5).normal(size=ROWS) - 0.3 * there
-    found = inclusion(screened(rows, {"there": there, "absent": absent}), 12.0, 0.01)
+    found = inclusion(screened(rows, {"there": there, "absent": absent}), 12.0, 0.01, SETTINGS)
     assert found["there"] == 1.0
     assert found.get("absent", 0.0) < 0.1
 
@@ -40,15 +44,15 @@ def test_an_effect_that_is_there_is_always_taken_and_one_that_is_not_hardly_ever
 def test_a_second_effect_is_taken_beside_the_first() -> None:
     first, second = waves(2)
     rows = np.random.default_rng(6).normal(size=ROWS) - 0.5 * first - 0.3 * second
-    both = inclusion(screened(rows, {"first": first, "second": second}), 12.0, 0.01)
+    both = inclusion(screened(rows, {"first": first, "second": second}), 12.0, 0.01, SETTINGS)
     assert min(both.values()) == 1.0
-    assert inclusion(screened(rows, {"first": first, "second": second}), 12.0, 1.0) == {"first": 1.0}
+    assert inclusion(screened(rows, {"first": first, "second": second}), 12.0, 1.0, SETTINGS) == {"first": 1.0}
 
 
 def test_twins_share_the_resamples() -> None:
     common, own, other = waves(3)
     rows = np.random.default_rng(7).normal(size=ROWS) - 0.5 * common
-    found = inclusion(screened(rows, {"one": common + 0.02 * own, "twin": common + 0.02 * other}), 12.0, 1.0)
+    found = inclusion(screened(rows, {"one": common + 0.02 * own, "twin": common + 0.02 * other}), 12.0, 1.0, SETTINGS)
     assert 0.02 < found["one"] < 0.98
     assert abs(found["one"] + found["twin"] - 1.0) < 1e-9
 
@@ -58,10 +62,10 @@ def test_what_a_parameter_does_is_no_effect_unless_it_is_held() -> None:
     noise = np.random.default_rng(8).normal(size=ROWS)
     # a parameter with little prior information has taken the signal up: the residual is noise, the pull of its prior is nothing
     taken = screened(noise, {"effect": signal}, 50.0 * signal[:, None])
-    assert inclusion(taken, 12.0, 1.0).get("effect", 0.0) < 0.05
-    assert inclusion(screened(noise - signal, {"effect": signal}, 1e-3 * signal[:, None]), 12.0, 1.0) == {"effect": 1.0}
+    assert inclusion(taken, 12.0, 1.0, SETTINGS).get("effect", 0.0) < 0.05
+    assert inclusion(screened(noise - signal, {"effect": signal}, 1e-3 * signal[:, None]), 12.0, 1.0, SETTINGS) == {"effect": 1.0}
 
 
 def test_nothing_to_choose_from_is_nothing() -> None:
-    assert inclusion(screened(np.zeros(0), {}), 12.0, 0.01) == {}
-    assert inclusion(screened(np.ones(ROWS), {}), 12.0, 0.01) == {}
+    assert inclusion(screened(np.zeros(0), {}), 12.0, 0.01, SETTINGS) == {}
+    assert inclusion(screened(np.ones(ROWS), {}), 12.0, 0.01, SETTINGS) == {}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from pathlib import Path
 
@@ -10,6 +11,8 @@ import numpy as np
 import pytest
 
 from pamrs.diagnosis.result import Diagnosis, Trace, schema
+from pamrs.diagnosis.schema import FILE, is_current
+from pamrs.findings import Condition, EffectParameterFound, Where
 from pamrs.report import text as words
 from tests.diagnosis import synthetic
 
@@ -33,6 +36,31 @@ def test_schema_is_closed() -> None:
             jsonschema.validate({**content, **change}, schema())
 
 
+def test_the_committed_schema_is_made_from_the_types() -> None:
+    assert is_current(), "python -m pamrs.diagnosis.schema writes it"
+    assert json.loads(FILE.read_text(encoding="utf-8")) == schema()
+
+
+def test_entries_have_attributes_and_keys() -> None:
+    found = synthetic.diagnosis()
+    effect = found.effects[0]
+    assert effect.id == effect["id"] == effect.get("id") == "heat_transfer"
+    assert found.where["text"] == found.where.text
+    assert list(found.fit) == ["channels", "held_out", "gap_closed"]
+    # a key that has no value is absent, as in JSON
+    chosen = EffectParameterFound(1.0, None, "1")
+    assert dict(chosen) == {"value": 1.0, "std": None, "unit": "1"} == chosen
+    assert chosen.get("identifiable", True)
+    assert "interval" not in chosen
+    with pytest.raises(KeyError):
+        _ = chosen["interval"]
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        chosen.value = 2.0  # type: ignore[misc]
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        found.verdict = "none"  # type: ignore[misc]
+    assert Where() == {"block": None, "channel": None, "intervals": [], "conditions": [], "text": ""}
+
+
 def test_not_finite_becomes_null() -> None:
     content = json.loads(synthetic.diagnosis(seconds=float("inf")).to_json())
     assert content["seconds"] is None
@@ -44,10 +72,11 @@ def test_numpy_values_become_json() -> None:
     where = {
         "block": "arm",
         "intervals": np.array([[0.0, 1.0]]).tolist(),
-        "conditions": [{"low": np.float32(0.5)}],
+        "conditions": [Condition("time", float(np.float32(0.5)), 0.25, 1.0, "late")],
     }
     content = json.loads(synthetic.diagnosis(where=where, probabilities={"none": np.float64(0.25)}).to_json())
-    assert content["where"]["conditions"] == [{"low": 0.5}]
+    told = {"name": "time", "share": 0.5, "time": 0.25, "mean": 1.0, "text": "late"}
+    assert content["where"]["conditions"] == [told]
     assert content["probabilities"] == {"none": 0.25}
 
 

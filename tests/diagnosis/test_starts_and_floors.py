@@ -8,14 +8,15 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis.blocks import available_blocks, begun
-from pamrs.diagnosis.candidates import Candidate, significant
-from pamrs.diagnosis.evidence import Excess, excess, floors
-from pamrs.diagnosis.fitting import Fit, Problem, residuals
-from pamrs.diagnosis.signals import Prepared, noise_level, prepare
-from pamrs.diagnosis.weighing import weigh
+from pamrs.diagnosis import DiagnosisSettings
+from pamrs.diagnosis.evidence import Candidate, significant, weigh
+from pamrs.diagnosis.fit import Fit, Problem, residuals
+from pamrs.diagnosis.noise import Excess, excess, floors
+from pamrs.diagnosis.prepare import Prepared, available_blocks, begun, noise_level, prepare
 from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
+
+SETTINGS = DiagnosisSettings()
 
 DT, ROWS = 0.005, 1600
 NOISE = {"valve_command": 0.0, "supply_pressure": 300.0, "muscle_pressure": 300.0, "joint_angle": 4e-4}
@@ -29,7 +30,7 @@ def recorded(seed: int, angle: np.ndarray | None = None) -> Prepared:
     rng = np.random.default_rng(seed)
     channels = {n: (angle if n == "joint_angle" and angle is not None else run[n]) + rng.normal(0.0, s, ROWS) for n, s in NOISE.items()}
     mask = {n: np.ones(ROWS, dtype=bool) for n in channels}
-    return prepare(Recording(f"slow{seed}", "fit", time, DT, channels, mask, [], dict.fromkeys(channels, "SI")), RIG)
+    return prepare(Recording(f"slow{seed}", "fit", time, DT, channels, mask, [], dict.fromkeys(channels, "SI")), RIG, SETTINGS)
 
 
 def test_a_joint_at_rest_is_not_thrown_off() -> None:
@@ -71,12 +72,12 @@ def test_what_lies_beyond_a_hole_is_not_asked() -> None:
 
 def test_noise_stays_inside_its_limit_and_the_scatter_is_that_of_the_noise() -> None:
     core = core_rig(RIG)
-    blocks = available_blocks(RIG, tuple(NOISE))
-    problem = Problem(blocks, [recorded(seed) for seed in range(12)], core)
+    blocks = available_blocks(RIG, tuple(NOISE), SETTINGS.prepare)
+    problem = Problem(blocks, [recorded(seed) for seed in range(12)], core, SETTINGS)
     floor, found = floors(problem, core), residuals(problem, RIG)
     for block in blocks:
-        each = [excess(block, [p], found, floor) for p in problem.recordings]
-        together = excess(block, problem.recordings, found, floor)
+        each = [excess(block, [p], found, floor, SETTINGS.noise) for p in problem.recordings]
+        together = excess(block, problem.recordings, found, floor, SETTINGS.noise)
         assert not significant(together)
         assert 0.8 < together.ratio < 1.2
         assert sum(significant(e) for e in each) <= 1
@@ -93,21 +94,21 @@ def named(effects: tuple[str, ...], ratio: float, values: dict[str, float], scat
 
 
 def test_of_a_faint_mismatch_the_noise_says_how_much_may_be_left() -> None:
-    blocks = [b for b in available_blocks(RIG, tuple(NOISE)) if b.name == "arm"]
+    blocks = [b for b in available_blocks(RIG, tuple(NOISE), SETTINGS.prepare) if b.name == "arm"]
     start, right, wrong = named((), 1.4, {}), named(("leak_muscle",), 1.0, {}), named(("supply_leak",), 1.25, {})
-    odds = weigh([start, right, wrong], blocks, 0.985, 30.0)
+    odds = weigh([start, right, wrong], blocks, 0.985, 30.0, SETTINGS)
     assert odds["leak_muscle"] > 20.0 * odds["supply_leak"]
     # where the noise scatters as much, it says nothing
     noisy = [named(c.effects, c.fitted["arm"].ratio, {}, scatter=0.5) for c in (start, right, wrong)]
-    odds = weigh(noisy, blocks, 0.985, 30.0)
+    odds = weigh(noisy, blocks, 0.985, 30.0, SETTINGS)
     assert odds["leak_muscle"] < 6.0 * odds["supply_leak"]
 
 
 def test_what_is_still_more_than_noise_is_not_explained() -> None:
-    blocks = [b for b in available_blocks(RIG, tuple(NOISE)) if b.name == "arm"]
+    blocks = [b for b in available_blocks(RIG, tuple(NOISE), SETTINGS.prepare) if b.name == "arm"]
     start, little, most = named((), 1.4, {}, 0.03), named(("leak_muscle",), 1.27, {}, 0.03), named(("leak_muscle",), 1.1, {}, 0.03)
-    assert weigh([start, little], blocks, 0.985, 30.0)["unlisted"] > 0.8
-    assert weigh([start, most], blocks, 0.985, 30.0)["unlisted"] < 0.2
+    assert weigh([start, little], blocks, 0.985, 30.0, SETTINGS)["unlisted"] > 0.8
+    assert weigh([start, most], blocks, 0.985, 30.0, SETTINGS)["unlisted"] < 0.2
 
 
 def test_every_joint_of_an_arm_starts_where_it_was() -> None:
@@ -119,8 +120,10 @@ def test_every_joint_of_an_arm_starts_where_it_was() -> None:
     rng = np.random.default_rng(0)
     channels = {n: v + rng.normal(0.0, 4e-4 if n.startswith("joint") else 100.0, ROWS) for n, v in channels.items()}
     mask = {n: np.ones(ROWS, dtype=bool) for n in channels}
-    prepared = prepare(Recording("rest", "fit", DT * np.arange(ROWS), DT, channels, mask, [], dict.fromkeys(channels, "SI")), rig)
-    arms = [b for b in available_blocks(rig, tuple(channels)) if b.kind == "arm"]
+    prepared = prepare(
+        Recording("rest", "fit", DT * np.arange(ROWS), DT, channels, mask, [], dict.fromkeys(channels, "SI")), rig, SETTINGS
+    )
+    arms = [b for b in available_blocks(rig, tuple(channels), SETTINGS.prepare) if b.kind == "arm"]
     assert len(arms) == 2
     for block in arms:
         given = begun(block, prepared, [0])
@@ -133,26 +136,28 @@ def test_the_noise_of_a_quantised_channel_is_that_of_noise_and_lattice(steps: fl
     for seed in range(4):
         rng = np.random.default_rng(seed)
         values = np.round(rng.normal(0.0, steps, 20000) + 30.0 * np.sin(np.arange(20000) / 900.0))
-        assert noise_level(values, np.ones(20000, dtype=bool)) == pytest.approx(np.hypot(steps, 12.0**-0.5), rel=0.1)
+        assert noise_level(values, np.ones(20000, dtype=bool), seed=SETTINGS.seed) == pytest.approx(
+            np.hypot(steps, 12.0**-0.5), rel=0.1
+        )
 
 
 def test_a_value_that_nobody_has_published_costs_odds() -> None:
-    blocks = [b for b in available_blocks(RIG, tuple(NOISE)) if b.name == "arm"]
+    blocks = [b for b in available_blocks(RIG, tuple(NOISE), SETTINGS.prepare) if b.name == "arm"]
     start, rival = named((), 3.0, {}), named(("base_flexibility",), 1.0, {"base_flexibility.natural_frequency": 7.0})
     for length, least, most in ((0.3, 0.5, 2.0), (0.005, 10.0, 60.0)):
-        odds = weigh([start, rival, named(("payload_swing",), 1.0, {"payload_swing.length": length})], blocks, 0.985, 30.0)
+        odds = weigh([start, rival, named(("payload_swing",), 1.0, {"payload_swing.length": length})], blocks, 0.985, 30.0, SETTINGS)
         assert least < odds["base_flexibility"] / odds["payload_swing"] < most
 
 
 def test_what_acts_over_most_of_the_motion_is_no_end_stop() -> None:
-    blocks = [b for b in available_blocks(RIG, tuple(NOISE)) if b.name == "arm"]
+    blocks = [b for b in available_blocks(RIG, tuple(NOISE), SETTINGS.prepare) if b.name == "arm"]
     start, rival = named((), 3.0, {}), named(("muscle_creep",), 1.0, {})
     odds = []
     for angle in (1.2, 0.35):
         rig = RIG.with_effect("joint_end_stop", {"angle": angle})
         stop = named(("joint_end_stop",), 1.0, {})
         stop = replace(stop, fit=replace(stop.fit, rig=rig))
-        found = weigh([start, rival, stop], blocks, 0.985, 30.0, (0.3, 1.4))
+        found = weigh([start, rival, stop], blocks, 0.985, 30.0, SETTINGS, {"joint_angle": (0.3, 1.4)})
         odds.append(found["joint_end_stop"] / found["muscle_creep"])
     assert odds[0] == pytest.approx(1.0)
     assert odds[1] < 0.1

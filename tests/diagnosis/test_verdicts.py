@@ -7,15 +7,19 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import pamrs
-from pamrs.diagnosis.blocks import Block, available_blocks
-from pamrs.diagnosis.candidates import Candidate, Group
-from pamrs.diagnosis.evidence import Excess
-from pamrs.diagnosis.fitting import Fit
-from pamrs.diagnosis.verdicts import Judged, case_ambiguity, case_probabilities, case_verdict, judge
+from pamrs.diagnosis import DiagnosisSettings
+from pamrs.diagnosis.evidence import Candidate, Group, Judged, case_ambiguity, case_probabilities, case_verdict, judge
+from pamrs.diagnosis.fit import Fit
+from pamrs.diagnosis.noise import Excess
+from pamrs.diagnosis.prepare import Block, available_blocks
+from pamrs.findings import Unexplained, WrongParameter
 from pamrs.report.text import kept_sentence, sentence_of
 
+SETTINGS = DiagnosisSettings()
+
 RIG = pamrs.rigs.shoulder()
-BLOCKS = {b.name: b for b in available_blocks(RIG, ("valve_command", "supply_pressure", "muscle_pressure", "joint_angle"))}
+CHANNELS = ("valve_command", "supply_pressure", "muscle_pressure", "joint_angle")
+BLOCKS = {b.name: b for b in available_blocks(RIG, CHANNELS, SETTINGS.prepare)}
 HEALTHY = ("none", "parameters", "unlisted")
 
 
@@ -31,7 +35,7 @@ def group(name: str, probabilities: dict[str, float], *, moved: dict[str, float]
     """A group of one block with given probabilities."""
     block: Block = BLOCKS[name]
     keys = [key for key in probabilities if key not in ("", "unlisted")]
-    size = Excess(4.0 if shifted else 1.0, 1.0, 0.0, 1.0, 1.0)
+    size = Excess(4.0 if shifted else 1.0, 1.0, 0.0, 1.0, 1.0, 1.1)
     mismatch = None if set(probabilities) == {""} else block
     return Group(
         [block], {name: size}, {name: size}, [candidate("", moved), *(candidate(k) for k in keys)], probabilities, mismatch, {}, []
@@ -39,12 +43,12 @@ def group(name: str, probabilities: dict[str, float], *, moved: dict[str, float]
 
 
 def said(*groups: Group) -> tuple[list[Judged], str]:
-    judged = judge(groups)
+    judged = judge(groups, SETTINGS)
     return judged, case_verdict(judged)
 
 
 def test_one_block_without_a_name_takes_nothing_from_a_name_in_another() -> None:
-    alone = judge([group("chamber", {"valve_dead_zone": 0.98, "unlisted": 0.02})])
+    alone = judge([group("chamber", {"valve_dead_zone": 0.98, "unlisted": 0.02})], SETTINGS)
     judged, verdict = said(
         group("chamber", {"valve_dead_zone": 0.98, "unlisted": 0.02}), group("arm", {"muscle_creep": 0.01, "unlisted": 0.99})
     )
@@ -52,10 +56,10 @@ def test_one_block_without_a_name_takes_nothing_from_a_name_in_another() -> None
     assert [j.verdict for j in judged] == ["effects", "unlisted"]
     assert judged[0].named == ("valve_dead_zone",)
     assert judged[0].probability("valve_dead_zone") == pytest.approx(alone[0].probability("valve_dead_zone"))
-    found = case_probabilities(judged)
+    found = case_probabilities(judged, SETTINGS.verdict)
     assert max(found, key=lambda key: found[key]) == "valve_dead_zone"
     assert found["unlisted"] < 0.03
-    assert case_ambiguity(judged) == []
+    assert case_ambiguity(judged, SETTINGS.verdict) == []
 
 
 def test_a_second_effect_in_another_block_lowers_nothing() -> None:
@@ -63,7 +67,7 @@ def test_a_second_effect_in_another_block_lowers_nothing() -> None:
     judged, _ = said(group("chamber", gas), group("arm", {"muscle_hysteresis": 0.92, "unlisted": 0.08}))
     assert judged[0].probabilities["leak_muscle"] == pytest.approx(0.92)
     # each is settled, although the two together are less so
-    assert case_ambiguity(judged) == []
+    assert case_ambiguity(judged, SETTINGS.verdict) == []
     assert {n for j in judged for n in j.named} == {"leak_muscle", "muscle_hysteresis"}
 
 
@@ -72,7 +76,7 @@ def test_an_effect_of_two_groups_is_judged_once() -> None:
     judged, _ = said(group("chamber", gas), group("arm", {"pressure_lag": 0.9, "unlisted": 0.1}))
     # what the arm tells of it counts in the chamber too
     assert judged[0].probability("pressure_lag") > 0.8
-    assert case_probabilities(judged)["pressure_lag"] > 0.7
+    assert case_probabilities(judged, SETTINGS.verdict)["pressure_lag"] > 0.7
     assert judged[1].probability("pressure_lag") > 0.9
 
 
@@ -80,28 +84,28 @@ def test_open_sets_stand_beside_what_is_settled() -> None:
     gas = {"leak_muscle": 0.6, "chamber.dead_volume": 0.4}
     judged, verdict = said(group("chamber", gas), group("arm", {"muscle_creep": 0.98, "unlisted": 0.02}))
     assert verdict == "effects"
-    assert case_ambiguity(judged) == [["leak_muscle", "muscle_creep"], ["chamber.dead_volume", "muscle_creep"]]
+    assert case_ambiguity(judged, SETTINGS.verdict) == [["leak_muscle", "muscle_creep"], ["chamber.dead_volume", "muscle_creep"]]
     judged, _ = said(group("chamber", gas), group("arm", {"unlisted": 0.98, "muscle_creep": 0.02}))
-    assert case_ambiguity(judged) == [["leak_muscle"], ["chamber.dead_volume"]]
+    assert case_ambiguity(judged, SETTINGS.verdict) == [["leak_muscle"], ["chamber.dead_volume"]]
 
 
 def test_a_wrong_parameter_is_the_verdict_parameters() -> None:
     judged, verdict = said(group("chamber", {"chamber.dead_volume": 0.97, "unlisted": 0.03}), group("arm", {"": 1.0}))
     assert verdict == "parameters"
     assert judged[0].wrong == ("chamber.dead_volume",)
-    assert case_probabilities(judged)["chamber.dead_volume"] > 0.9
+    assert case_probabilities(judged, SETTINGS.verdict)["chamber.dead_volume"] > 0.9
     # and stays it where another block keeps something without a name; an effect comes first
     assert said(group("chamber", {"chamber.dead_volume": 1.0}), group("arm", {"unlisted": 1.0}))[1] == "parameters"
     assert said(group("chamber", {"chamber.dead_volume": 1.0}), group("arm", {"muscle_creep": 1.0}))[1] == "effects"
 
 
 def test_a_name_that_is_more_probable_than_not_is_given() -> None:
-    (one,) = judge([group("arm", {"muscle_creep": 0.35, "muscle_creep+payload_swing": 0.25, "unlisted": 0.4})])
+    (one,) = judge([group("arm", {"muscle_creep": 0.35, "muscle_creep+payload_swing": 0.25, "unlisted": 0.4})], SETTINGS)
     assert (one.verdict, one.named) == ("effects", ("muscle_creep",))
     assert one.ambiguity == [["unlisted"], ["muscle_creep"], ["muscle_creep", "payload_swing"]]
-    (two,) = judge([group("arm", {"muscle_creep": 0.45, "muscle_hysteresis": 0.4, "unlisted": 0.15})])
+    (two,) = judge([group("arm", {"muscle_creep": 0.45, "muscle_hysteresis": 0.4, "unlisted": 0.15})], SETTINGS)
     assert (two.verdict, two.named) == ("effects", ("muscle_creep",))
-    (none,) = judge([group("arm", {"muscle_creep": 0.35, "muscle_hysteresis": 0.25, "unlisted": 0.4})])
+    (none,) = judge([group("arm", {"muscle_creep": 0.35, "muscle_hysteresis": 0.25, "unlisted": 0.4})], SETTINGS)
     assert none.verdict == "unlisted"
 
 
@@ -113,10 +117,10 @@ def test_healthy_groups() -> None:
     # a parameter at its wall, and nobody knows why
     assert judged[0].ambiguity == [["parameters"], ["unlisted"]]
     judged, _ = said(group("chamber", {"": 1.0}, moved={"chamber.alpha": 3.0}), group("arm", {"": 1.0}, moved={"arm.payload": 3.0}))
-    assert case_ambiguity(judged) == [["parameters"], ["unlisted"]]
+    assert case_ambiguity(judged, SETTINGS.verdict) == [["parameters"], ["unlisted"]]
     # what is open in a block keeps that it may have no name
     judged, _ = said(group("chamber", {"valve_dead_zone": 1.0}), group("arm", {"muscle_creep": 0.5, "unlisted": 0.5}))
-    assert sorted(case_ambiguity(judged)) == [["muscle_creep", "valve_dead_zone"], ["valve_dead_zone", "unlisted"]]
+    assert sorted(case_ambiguity(judged, SETTINGS.verdict)) == [["muscle_creep", "valve_dead_zone"], ["valve_dead_zone", "unlisted"]]
 
 
 @settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -128,18 +132,18 @@ def test_healthy_groups() -> None:
 )
 def test_probabilities_add_to_one_and_verdicts_follow_them(gas: dict[str, float], arm: dict[str, float]) -> None:
     found = [{k: v / sum(p.values()) for k, v in p.items()} for p in (gas, arm)]
-    judged = judge([group("chamber", found[0]), group("arm", found[1])])
+    judged = judge([group("chamber", found[0]), group("arm", found[1])], SETTINGS)
     for j in judged:
         assert sum(j.probabilities.values()) == pytest.approx(1.0)
         assert bool(j.named or j.wrong) == (j.verdict in ("effects", "parameters"))
         best = max(j.probabilities.values())
         assert j.ambiguity == [] if best >= 0.9 else all(j.probabilities[k] >= 0.05 for k in ("+".join(s) for s in j.ambiguity))
-    sets = case_ambiguity(judged)
+    sets = case_ambiguity(judged, SETTINGS.verdict)
     assert len({tuple(s) for s in sets}) == len(sets)
     assert not sets or any(j.ambiguity for j in judged)
     # a set is names, maybe with what has none; or one word
     assert all(s and (len(s) == 1 or set(s).isdisjoint({"none", "parameters"})) for s in sets)
-    case = case_probabilities(judged)
+    case = case_probabilities(judged, SETTINGS.verdict)
     assert sum(case.values()) == pytest.approx(1.0)
     assert set(HEALTHY) <= set(case)
     named = [j.verdict for j in judged]
@@ -147,7 +151,7 @@ def test_probabilities_add_to_one_and_verdicts_follow_them(gas: dict[str, float]
 
 
 def test_sentences_have_units_of_the_field() -> None:
-    wrong = {"name": "chamber.dead_volume", "unit": "m3", "nominal": 1.5e-4, "tolerance": 2.25e-5, "value": 3.6e-4, "std": 5e-6}
+    wrong = WrongParameter("chamber.dead_volume", "chamber", 1.5e-4, 2.25e-5, 3.6e-4, 5e-6, [3.5e-4, 3.7e-4], "m3", 9.3, 0.98, {})
     assert sentence_of(wrong) == "chamber dead volume is 360.0 +- 5.0 cm3, not 150 +- 22"
-    kept = {"block": "arm", "unit": "rad", "noises": 15.2, "size": 0.007, "verdict": "unlisted"}
+    kept = Unexplained("arm", "joint_angle", "rad", 15.2, 0.007, "unlisted")
     assert kept_sentence(kept) == "the arm keeps 15 times its noise (0.40 deg) that no listed effect explains"

@@ -10,14 +10,16 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis import wrong_parameters
-from pamrs.diagnosis.blocks import available_blocks
-from pamrs.diagnosis.fitting import Problem, fit
+from pamrs.diagnosis import DiagnosisSettings
+from pamrs.diagnosis.fit import Problem, fit
+from pamrs.diagnosis.prepare import available_blocks, prepare
 from pamrs.diagnosis.result import schema
-from pamrs.diagnosis.signals import prepare
-from pamrs.diagnosis.wrong_parameters import suspected
+from pamrs.diagnosis.search import _wrong_parameters as wrong_parameters
+from pamrs.diagnosis.search import suspected
 from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
+
+SETTINGS = DiagnosisSettings()
 
 NAMES = ("valve_command", "supply_pressure", "muscle_pressure", "joint_angle")
 NOISE = {"supply_pressure": 400.0, "muscle_pressure": 400.0, "joint_angle": 3e-4}
@@ -41,7 +43,10 @@ def case(true: pamrs.Rig, nominal: pamrs.Rig, *, force: float = 0.0) -> pamrs.Ca
     return pamrs.Case("case", nominal, [recorded(true, f"r{k}", role, seed=k, force=force) for k, role in enumerate(roles)], Path())
 
 
-@pytest.mark.parametrize(("name", "factor"), [("chamber.dead_volume", 2.4), ("arm.payload", 0.75)])
+@pytest.mark.parametrize(
+    ("name", "factor"),
+    [("chamber.dead_volume", 2.4), pytest.param("arm.payload", 0.75, marks=pytest.mark.slow)],
+)
 def test_a_wrong_value_is_named_with_an_interval_that_holds_it(name: str, factor: float) -> None:
     rig = pamrs.rigs.shoulder()
     true = rig.parameter(name).value * factor
@@ -69,6 +74,7 @@ def test_a_value_inside_its_tolerance_is_not_called_wrong() -> None:
     assert found.wrong_parameters == []
 
 
+@pytest.mark.slow
 def test_a_name_in_the_chamber_stands_beside_an_arm_without_one() -> None:
     rig = pamrs.rigs.shoulder()
     true = rig.with_effect("valve_dead_zone", {"half_width": 0.05})
@@ -93,11 +99,11 @@ def test_a_name_in_the_chamber_stands_beside_an_arm_without_one() -> None:
 def test_pairs_of_one_mistake_are_suspected_with_either_at_its_wall() -> None:
     rig = pamrs.rigs.shoulder()
     true = rig.with_parameters({"arm.payload": 0.7 * 9.07})
-    prepared = [prepare(recorded(true, "r", "fit", seed=1), rig)]
-    (arm,) = (b for b in available_blocks(rig, NAMES) if b.name == "arm")
-    problem = Problem([arm], prepared, core_rig(rig))
+    prepared = [prepare(recorded(true, "r", "fit", seed=1), rig, SETTINGS)]
+    (arm,) = (b for b in available_blocks(rig, NAMES, SETTINGS.prepare) if b.name == "arm")
+    problem = Problem([arm], prepared, core_rig(rig), SETTINGS)
     baseline = fit(problem, rig, (), {}, {"arm": 1.0}, evaluations=20)
-    found = suspected(baseline, [arm])
+    found = suspected(baseline, [arm], SETTINGS.wrong_parameters)
     assert ("arm.payload",) in found
     assert ("arm.payload", "arm.first_moment") in found
     assert all(abs(baseline.moved[name]) <= 3.0 + 1e-9 for name in baseline.moved)
@@ -109,6 +115,7 @@ def test_pairs_of_one_mistake_are_suspected_with_either_at_its_wall() -> None:
     assert loose.cost < 0.2 * baseline.cost
 
 
+@pytest.mark.slow
 def test_a_dead_time_of_the_command_and_a_late_clock_stay_a_set() -> None:
     rig = pamrs.rigs.shoulder()
 
@@ -130,6 +137,7 @@ def test_a_dead_time_of_the_command_and_a_late_clock_stay_a_set() -> None:
     assert "with the logger of the pressures" in found.next_experiment["text"]
 
 
+@pytest.mark.slow
 def test_a_zero_that_two_groups_share_is_named_once() -> None:
     rig = pamrs.rigs.shoulder()
     found = pamrs.diagnose(case(rig.with_parameters({"sensors.pressure_zero": 4500.0}), rig))
@@ -153,7 +161,7 @@ def test_every_parameter_at_its_wall_is_freed_whatever_pairs_promise(monkeypatch
     asked: list[tuple[str, ...]] = []
 
     class Trial:
-        inner, nominal, white = Problem([], [], core_rig(pamrs.rigs.shoulder())), pamrs.rigs.shoulder(), {}
+        inner, nominal, white = Problem([], [], core_rig(pamrs.rigs.shoulder()), SETTINGS), pamrs.rigs.shoulder(), {}
 
         def freed(self, names: tuple[str, ...], baseline: object) -> None:
             asked.append(names)

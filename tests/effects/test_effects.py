@@ -7,8 +7,7 @@ import pytest
 
 import pamrs
 from pamrs import _core
-from pamrs.diagnosis.fitting import ACTS
-from pamrs.diagnosis.starts import RESTRICTIONS, starts_of
+from pamrs.diagnosis.fit import ACTS, starts_of
 from pamrs.effects import EFFECTS
 from pamrs.errors import ParameterError, RigError
 from pamrs.rig import parse_rig
@@ -118,7 +117,8 @@ def test_the_core_takes_every_bound_of_the_table(effect: str) -> None:
 
 @pytest.mark.parametrize("effect", EFFECTS)
 def test_the_diagnosis_knows_where_an_effect_acts_and_where_to_begin(effect: str) -> None:
-    assert ACTS.get(effect) or ACTS[EFFECTS[effect].block]
+    assert EFFECTS[effect].acts_in or ACTS[EFFECTS[effect].block]
+    restricting = {f"{effect}.{p.name}" for p in EFFECTS[effect].parameters if p.restricts}
     for sealed in (True, False):
         starts = starts_of(effect, sealed=sealed)
         assert starts
@@ -127,7 +127,7 @@ def test_the_diagnosis_knows_where_an_effect_acts_and_where_to_begin(effect: str
             assert all(value != 0.0 for name, value in start.free.items() if name in start.sizes)
             half = start.scaled(0.5)
             assert all(
-                half.free[name] == pytest.approx(start.free[name] * (2.0**0.5 if name in RESTRICTIONS else 0.5)) for name in start.sizes
+                half.free[name] == pytest.approx(start.free[name] * (2.0**0.5 if name in restricting else 0.5)) for name in start.sizes
             )
 
 

@@ -19,6 +19,12 @@ pytest.importorskip("jinja2")
 from pamrs.report import figures, render_html
 
 
+@pytest.fixture(scope="module")
+def page() -> str:
+    """The whole page of the made-up diagnosis."""
+    return render_html(synthetic.diagnosis())
+
+
 @pytest.mark.parametrize("make", [synthetic.diagnosis, synthetic.sealed_chamber, synthetic.nothing])
 def test_page_is_self_contained(make, tmp_path: Path) -> None:
     path = tmp_path / "report.html"
@@ -46,16 +52,14 @@ def test_a_set_with_parameters_in_it_is_no_missing_physics_yet(verdict: str, amb
     assert words in replace(synthetic.diagnosis(), verdict=verdict, ambiguity=ambiguity).headline
 
 
-def test_ids_are_unique_and_resolve() -> None:
-    html = render_html(synthetic.diagnosis())
-    ids = re.findall(r'\bid="([^"]+)"', html)
+def test_ids_are_unique_and_resolve(page: str) -> None:
+    ids = re.findall(r'\bid="([^"]+)"', page)
     assert len(ids) == len(set(ids))
-    for target in re.findall(r'(?:url\(|href=")#([^)"]+)', html):
+    for target in re.findall(r'(?:url\(|href=")#([^)"]+)', page):
         assert target in ids
 
 
-def test_page_tells_the_story() -> None:
-    html = render_html(synthetic.diagnosis())
+def test_page_tells_the_story(page: str) -> None:
     for part in (
         "leaves out: heat transfer",
         "41.3 ± 2.2",
@@ -76,12 +80,12 @@ def test_page_tells_the_story() -> None:
         "under 1 %",
         "not fitted",
     ):
-        assert part in html, part
-    assert html.count("<svg") == 5
+        assert part in page, part
+    assert page.count("<svg") == 5
 
 
-def test_ambiguity_is_shown_only_when_open() -> None:
-    assert "cannot separate" not in render_html(synthetic.diagnosis())
+def test_ambiguity_is_shown_only_when_open(page: str) -> None:
+    assert "cannot separate" not in page
     html = render_html(synthetic.diagnosis(ambiguity=[["leak_muscle"], ["leak_muscle", "heat_transfer"]]))
     assert "cannot separate" in html
     assert "<li>muscle leak + heat transfer</li>" in html
@@ -118,13 +122,13 @@ def test_decimation_keeps_extremes_and_gaps() -> None:
 
 
 def test_map_of_wrong_shape_is_refused() -> None:
-    bad = {"x_edges": [0, 1, 2], "y_edges": [0, 1], "z": [[1.0, 2.0, 3.0]]}
+    bad = {"x_label": "", "y_label": "", "x_edges": [0, 1, 2], "y_edges": [0, 1], "z": [[1.0, 2.0, 3.0]]}
     with pytest.raises(ValueError, match="shape"):
         figures.map_svg(synthetic.diagnosis(condition_map=bad))
 
 
 def test_empty_map_is_left_out() -> None:
-    empty = {"x_edges": [0, 1, 2], "y_edges": [0, 1], "z": [[np.nan, np.nan]], "z_after": None}
+    empty = {"x_label": "", "y_label": "", "x_edges": [0, 1, 2], "y_edges": [0, 1], "z": [[np.nan, np.nan]], "z_after": None}
     assert figures.map_svg(synthetic.diagnosis(condition_map=empty)) is None
 
 

@@ -349,6 +349,7 @@ def run(capsys, *words):
 
 
 @pytest.mark.slow
+@pytest.mark.slow
 def test_command_writes_its_files(capsys, tmp_path):
     folder = tmp_path / "new" / "folder"
     code, out, err = run(capsys, "ch3", "ch3", "--output", folder, "--no-search")

@@ -65,8 +65,7 @@ def _plan(rig: Path, channels: str | None, pressure_noise: str | None, angle_noi
     """What a diagnosis could tell, to standard output and a file."""
     from json import dumps
 
-    from pamrs.diagnosis.differences import MEASURABLE
-    from pamrs.diagnosis.plan import plan_diagnosis
+    from pamrs.diagnosis.next_experiment import MEASURABLE, plan_diagnosis
     from pamrs.simulation import core_rig
 
     loaded = rig_named(rig)

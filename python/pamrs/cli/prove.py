@@ -25,7 +25,7 @@ def prove_command(
 
     A run that was stopped goes on where it was. Exit code 0: every case has a result; 3: some case could not be diagnosed.
     """
-    from pamrs.prove import prove
+    from pamrs.diagnosis.prove import prove
 
     def say(text: str) -> None:
         typer.echo(text, err=True)

@@ -1,8 +1,12 @@
 """Diagnosis: locate a mismatch between model and recordings, name the omitted physics or say that it is not listed.
 
 A rig is cut at every measured channel, so that each tank, chamber, joint and hanging load has a residual of its own. The baseline is
-refitted inside its tolerances first; what then exceeds the noise floor is located by block and condition, and the effects of the
+refitted inside its tolerances first; what then exceeds the noise level is located by block and condition, and the effects of the
 catalogue compete with each other and with "unlisted" on held-out recordings.
+
+Public are `diagnose`, `Diagnosis`, `DiagnosisSettings`, and these packages and modules, each with its own list: `settings` (every
+number that steers a verdict), `result` and `schema` (what is returned), `prove` (many cases, each in a process of its own), and the
+steps in the order in which they work: `prepare`, `fit`, `noise`, `screen`, `evidence`, `search`, `next_experiment`, `explain`.
 """
 
 from __future__ import annotations
@@ -15,16 +19,14 @@ from contextlib import contextmanager
 from dataclasses import replace
 
 from pamrs.channels import dotted
-from pamrs.diagnosis import assemble
-from pamrs.diagnosis.blocks import Block, available_blocks
-from pamrs.diagnosis.candidates import Group
-from pamrs.diagnosis.evidence import floors
-from pamrs.diagnosis.fitting import Problem
-from pamrs.diagnosis.hypotheses import examine
-from pamrs.diagnosis.plausible import check_plausible, check_sense
+from pamrs.diagnosis.evidence import Group
+from pamrs.diagnosis.explain import assemble
+from pamrs.diagnosis.fit import Problem
+from pamrs.diagnosis.noise import floors
+from pamrs.diagnosis.prepare import Block, Prepared, available_blocks, check_plausible, check_sense, prepare
 from pamrs.diagnosis.result import Diagnosis
+from pamrs.diagnosis.search import examine
 from pamrs.diagnosis.settings import DiagnosisSettings
-from pamrs.diagnosis.signals import Prepared, prepare
 from pamrs.errors import DiagnosisError, SimulationError
 from pamrs.recordings import Case, load_case
 from pamrs.rig import Rig
@@ -159,18 +161,17 @@ def diagnose(
         if unsettled:
             groups = [_doubted(group, factor) for group in groups]
         say("putting the answer together")
-        diagnosis = assemble.assemble(case, inner, outer, groups)
-    diagnosis.warnings += left_out
+        diagnosis = assemble(case, inner, outer, groups)
+    warnings = [*diagnosis.warnings, *left_out]
     if unsettled:
         what = "length" if case.rig.model["load"] else "angle"
-        diagnosis.warnings.append(
+        warnings.append(
             f"{', '.join(unsettled)}: marked unknown, and no fit moves them; a wrong one bends the {what} as an effect would, so that "
             f"no effect of muscles and what they move is believed by more than {100 * factor:.0f} %"
         )
-    diagnosis.seconds = round(time.perf_counter() - began, 3)
     if not math.isfinite(sum(diagnosis.probabilities.values())):
         raise DiagnosisError("the probabilities are not finite: please report this case")
-    return diagnosis
+    return replace(diagnosis, warnings=warnings, seconds=round(time.perf_counter() - began, 3))
 
 
 def _check_rig(case: Case) -> None:

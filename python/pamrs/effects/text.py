@@ -7,8 +7,7 @@ import textwrap
 from collections.abc import Mapping
 from typing import Final
 
-from pamrs.effects import CATALOGUE
-from pamrs.effects import EffectInfo, EffectParameter
+from pamrs.effects import CATALOGUE, EffectInfo, EffectParameter
 from pamrs.errors import ParameterError
 
 __all__ = ["catalogue", "description", "entry", "overview", "range_of", "snippet", "where"]

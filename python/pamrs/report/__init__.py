@@ -5,10 +5,8 @@ from __future__ import annotations
 import importlib
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from pamrs.diagnosis.result import Diagnosis
+from pamrs.findings import Findings
 
 __all__ = ["render_html", "write_figure", "write_report"]
 
@@ -34,7 +32,7 @@ def require(*packages: str) -> None:
             raise ImportError(text, name=error.name) from error
 
 
-def render_html(diagnosis: Diagnosis) -> str:
+def render_html(diagnosis: Findings) -> str:
     """Return the report as one self-contained HTML page.
 
     Raises
@@ -48,7 +46,7 @@ def render_html(diagnosis: Diagnosis) -> str:
     return render(diagnosis)
 
 
-def write_report(diagnosis: Diagnosis, path: str | os.PathLike[str]) -> Path:
+def write_report(diagnosis: Findings, path: str | os.PathLike[str]) -> Path:
     """Write the HTML report to `path` and return the path.
 
     Raises
@@ -61,7 +59,7 @@ def write_report(diagnosis: Diagnosis, path: str | os.PathLike[str]) -> Path:
     return write_atomically(path, render_html(diagnosis))
 
 
-def write_figure(diagnosis: Diagnosis, path: str | os.PathLike[str]) -> Path:
+def write_figure(diagnosis: Findings, path: str | os.PathLike[str]) -> Path:
     """Write the one-picture summary, a PNG of 1600 x 1000 pixels, and return the path.
 
     Raises

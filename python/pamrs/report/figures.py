@@ -7,7 +7,7 @@ import math
 import re
 import textwrap
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -16,6 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
 
+from pamrs.findings import ConditionMap, Curves, Findings, Trace
 from pamrs.report.text import (
     display_unit,
     format_number,
@@ -27,9 +28,6 @@ from pamrs.report.text import (
     label,
     ranked_probabilities,
 )
-
-if TYPE_CHECKING:
-    from pamrs.diagnosis.result import Diagnosis, Trace
 
 __all__ = [
     "COLOURS",
@@ -137,11 +135,11 @@ def _has(values: FloatArray | None, besides: FloatArray | None = None) -> bool:
     return besides is None or not np.allclose(values, besides, equal_nan=True)
 
 
-def telling_trace(diagnosis: Diagnosis) -> Trace | None:
+def telling_trace(diagnosis: Findings) -> Trace | None:
     """Trace that shows the most: the telling channel, held out if possible, with the largest improvement."""
     if not diagnosis.traces:
         return None
-    channel = diagnosis.where.get("channel")
+    channel = diagnosis.where.channel
 
     def merit(trace: Trace) -> tuple[bool, bool, float]:
         gain = _rms(trace.residual_before) / max(_rms(trace.residual_after), 1e-300)
@@ -150,11 +148,12 @@ def telling_trace(diagnosis: Diagnosis) -> Trace | None:
     return max(diagnosis.traces, key=merit)
 
 
-def _noise(diagnosis: Diagnosis, trace: Trace) -> float | None:
-    for part in ("held_out", "channels") if trace.role == "held_out" else ("channels", "held_out"):
-        noise = ((diagnosis.fit.get(part) or {}).get(trace.channel) or {}).get("noise")
-        if is_number(noise) and float(noise) > 0:
-            return float(noise)
+def _noise(diagnosis: Findings, trace: Trace) -> float | None:
+    parts = [diagnosis.fit.channels, diagnosis.fit.held_out]
+    for part in reversed(parts) if trace.role == "held_out" else parts:
+        noise = part[trace.channel].noise if trace.channel in part else None
+        if is_number(noise) and noise > 0:
+            return noise
     return None
 
 
@@ -204,11 +203,11 @@ def legend_above(axes: Axes, *, columns: int = 4) -> None:
     )
 
 
-def _shade(axes: Axes, diagnosis: Diagnosis, trace: Trace) -> None:
+def _shade(axes: Axes, diagnosis: Findings, trace: Trace) -> None:
     """Mark the intervals that carry the excess, where they are known to belong to this recording."""
-    if diagnosis.where.get("recording") == trace.recording:
-        for start, stop in diagnosis.where.get("intervals") or []:
-            axes.axvspan(float(start), float(stop), color="#f5e6b8", alpha=0.5, lw=0, zorder=0)
+    if diagnosis.where.recording == trace.recording:
+        for start, stop in diagnosis.where.intervals:
+            axes.axvspan(start, stop, color="#f5e6b8", alpha=0.5, lw=0, zorder=0)
 
 
 def svg_text(figure: Figure, prefix: str) -> str:
@@ -225,12 +224,12 @@ def svg_text(figure: Figure, prefix: str) -> str:
     return text.strip()
 
 
-def traces_svg(diagnosis: Diagnosis, traces: Sequence[Trace], prefix: str) -> str:
+def traces_svg(diagnosis: Findings, traces: Sequence[Trace], prefix: str) -> str:
     """Measured and simulated channels of one recording, each with its residual below.
 
     Parameters
     ----------
-    diagnosis : Diagnosis
+    diagnosis : Findings
         For noise floors and marked intervals.
     traces : sequence of Trace
         Channels of one recording, at least one.
@@ -269,14 +268,13 @@ HYPOTHESES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#c79a00", "#56b4e9")
 """Colours of hypotheses, the leading one first (Okabe and Ito)."""
 
 
-def separating_curves(curves: dict[str, Any], prefix: str = "next") -> str:
+def separating_curves(curves: Curves, prefix: str = "next") -> str:
     """The next experiment as every hypothesis predicts it, and what each cannot explain of the leading one's outcome.
 
     Parameters
     ----------
-    curves : dict
-        ``curves`` of :func:`pamrs.diagnosis.experiment.propose`: ``channel``, ``unit``, ``time`` (n,), ``values`` {label: (n,)},
-        ``leading``, ``bin_time`` (m,), ``left`` {label: (m,)}, ``noise``.
+    curves : Curves
+        Those of the next experiment.
     prefix : str
         Prefix of the element ids.
 
@@ -289,30 +287,30 @@ def separating_curves(curves: dict[str, Any], prefix: str = "next") -> str:
         return svg_text(_separating(curves), prefix)
 
 
-def _separating(curves: dict[str, Any]) -> Figure:
+def _separating(curves: Curves) -> Figure:
     """Two panels over time: the channel, and what is left of it."""
-    time, values, left = np.asarray(curves["time"]), curves["values"], curves["left"]
+    time, values, left = np.asarray(curves.time), curves.predicted, curves.left
     colours = dict(zip(values, HYPOTHESES, strict=False))
     figure = Figure(figsize=(10.0, 5.0), layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True, gridspec_kw={"height_ratios": [1.5, 1.2]})
-    unit, factor = display_unit(curves["unit"], _largest(*values.values()))
+    unit, factor = display_unit(curves.unit, _largest(*values.values()))
     for place, (name, curve) in enumerate(values.items()):
         x, y = decimate(time, np.asarray(curve, dtype=np.float64))
         # the leading one is broad, the others are dashed over it: they often lie on it
         style: dict[str, Any] = {"lw": 2.6, "alpha": 0.75} if place == 0 else {"lw": 1.2, "ls": (0, (4 + place, 2))}
         upper.plot(x, factor * y, color=colours[name], label=hypothesis_label(name), **style)
-    upper.set_ylabel(f"{label(curves['channel'])} [{unit}]" if unit else label(curves["channel"]))
+    upper.set_ylabel(f"{label(curves.channel)} [{unit}]" if unit else label(curves.channel))
     upper.set_title("predicted from the same commands")
     legend_above(upper)
-    unit, factor = display_unit(curves["unit"], _largest(*left.values()))
-    noise = float(curves["noise"]) * factor
+    unit, factor = display_unit(curves.unit, _largest(*left.values()))
+    noise = curves.noise * factor
     lower.axhspan(-2.0 * noise, 2.0 * noise, color="#dfe3e8", lw=0, label="noise (± 2 std)")
     lower.axhline(0.0, color="#6b7280", lw=0.7)
     for name, curve in left.items():
-        x, y = decimate(np.asarray(curves["bin_time"]), np.asarray(curve, dtype=np.float64))
+        x, y = decimate(np.asarray(curves.bin_time), np.asarray(curve, dtype=np.float64))
         lower.plot(x, factor * y, color=colours[name], lw=1.1, label=hypothesis_label(name))
     lower.set_ylabel(f"cannot explain [{unit}]" if unit else "cannot explain")
-    lower.set_title(f"what is left if it is {hypothesis_label(curves['leading'])}")
+    lower.set_title(f"what is left if it is {hypothesis_label(curves.leading)}")
     lower.set_xlabel("time [s]")
     legend_above(lower)
     for panel in (upper, lower):
@@ -321,13 +319,12 @@ def _separating(curves: dict[str, Any]) -> Figure:
     return figure
 
 
-def _block_rows(diagnosis: Diagnosis) -> list[tuple[str, float, bool]]:
+def _block_rows(diagnosis: Findings) -> list[tuple[str, float, bool]]:
     """Name, residual in units of the noise floor, whether located; in the order of the chain."""
     rows = []
     for name, entry in diagnosis.residuals.items():
-        rms, noise = entry.get("rms"), entry.get("noise")
-        if is_number(rms) and is_number(noise) and float(noise) > 0:
-            rows.append((name, float(rms) / float(noise), name == diagnosis.where.get("block")))
+        if is_number(entry.rms) and is_number(entry.noise) and entry.noise > 0:
+            rows.append((name, entry.rms / entry.noise, name == diagnosis.where.block))
     return sorted(rows, key=lambda r: CHAIN.index(r[0]) if r[0] in CHAIN else len(CHAIN))
 
 
@@ -351,7 +348,7 @@ def _draw_blocks(axes: Axes, rows: Sequence[tuple[str, float, bool]], least_rows
     axes.set_xlabel("residual of the refitted baseline / noise floor")
 
 
-def blocks_svg(diagnosis: Diagnosis, prefix: str = "blocks") -> str | None:
+def blocks_svg(diagnosis: Findings, prefix: str = "blocks") -> str | None:
     """Bar chart of each block's residual against its noise floor; None when there are no blocks."""
     rows = _block_rows(diagnosis)
     if not rows:
@@ -363,14 +360,14 @@ def blocks_svg(diagnosis: Diagnosis, prefix: str = "blocks") -> str | None:
 
 
 def _grids(
-    condition_map: dict[str, Any],
+    condition_map: ConditionMap,
 ) -> tuple[FloatArray, FloatArray, list[tuple[str, Any]], float] | None:
     """Edges, titled grids and colour limit of a conditions map."""
-    x = np.asarray(condition_map["x_edges"], dtype=np.float64)
-    y = np.asarray(condition_map["y_edges"], dtype=np.float64)
+    x = np.asarray(condition_map.x_edges, dtype=np.float64)
+    y = np.asarray(condition_map.y_edges, dtype=np.float64)
     grids = []
     for key, title in (("z", "before"), ("z_after", "after")):
-        if condition_map.get(key) is not None:
+        if condition_map[key] is not None:
             z = np.asarray(condition_map[key], dtype=np.float64)
             if z.shape != (len(y) - 1, len(x) - 1) and z.T.shape == (len(y) - 1, len(x) - 1):
                 z = z.T
@@ -391,7 +388,7 @@ def _draw_map(axes: Axes, x: FloatArray, y: FloatArray, z: Any, limit: float) ->
     return mesh
 
 
-def map_svg(diagnosis: Diagnosis, prefix: str = "map") -> str | None:
+def map_svg(diagnosis: Findings, prefix: str = "map") -> str | None:
     """Heat maps of the mean residual over the two telling conditions, before and after; None without data."""
     content = diagnosis.condition_map and _grids(diagnosis.condition_map)
     if not content or diagnosis.condition_map is None:
@@ -402,19 +399,19 @@ def map_svg(diagnosis: Diagnosis, prefix: str = "map") -> str | None:
         return svg_text(figure, prefix)
 
 
-def _draw_maps(part: Any, condition_map: dict[str, Any], content: Any, title_style: dict[str, Any], bar_style: dict[str, Any]) -> None:
+def _draw_maps(part: Any, condition_map: ConditionMap, content: Any, title_style: dict[str, Any], bar_style: dict[str, Any]) -> None:
     """Heat maps side by side in a figure or a part of one, with one label for both and one colour bar."""
     x, y, grids, limit = content
     axes = part.subplots(1, len(grids), sharey=True, squeeze=False)[0]
     for panel, (title, z) in zip(axes, grids, strict=True):
         mesh = _draw_map(panel, x, y, z, limit)
         panel.set_title(title, **title_style)
-    axes[0].set_ylabel(str(condition_map.get("y_label", "")))
-    part.supxlabel(str(condition_map.get("x_label", "")), fontsize=mpl.rcParams["axes.labelsize"])
+    axes[0].set_ylabel(condition_map.y_label)
+    part.supxlabel(condition_map.x_label, fontsize=mpl.rcParams["axes.labelsize"])
     part.colorbar(mesh, ax=list(axes), label="mean residual / noise", extend="both", **bar_style)
 
 
-def _draw_probabilities(axes: Axes, diagnosis: Diagnosis) -> None:
+def _draw_probabilities(axes: Axes, diagnosis: Findings) -> None:
     rows = ranked_probabilities(diagnosis, 6)
     position = np.arange(len(rows))
     colours = [COLOURS["after" if is_named(diagnosis, name) else "quiet"] for name, _ in rows]
@@ -428,12 +425,12 @@ def _draw_probabilities(axes: Axes, diagnosis: Diagnosis) -> None:
     axes.grid(axis="y", visible=False)
 
 
-def summary_png(diagnosis: Diagnosis) -> bytes:
+def summary_png(diagnosis: Findings) -> bytes:
     """One picture: the telling channel and its residual, probabilities, conditions map, verdict.
 
     Parameters
     ----------
-    diagnosis : Diagnosis
+    diagnosis : Findings
         Result to draw; parts that it lacks are left out.
 
     Returns
@@ -479,7 +476,7 @@ def _head(part: Any, text: str) -> None:
     part.suptitle(text, x=0.03, ha="left", fontsize=9.5, fontweight="bold")
 
 
-def _draw_right(right: Any, diagnosis: Diagnosis) -> None:
+def _draw_right(right: Any, diagnosis: Findings) -> None:
     """Right column of the summary: probabilities above, conditions map or blocks below."""
     content = diagnosis.condition_map and _grids(diagnosis.condition_map)
     rows = _block_rows(diagnosis)

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from markupsafe import Markup
 
 from pamrs.channels import UNITS
+from pamrs.findings import ChannelError, Findings, Trace
 from pamrs.report import figures
 from pamrs.report import text as words
 from pamrs.report.page import render_page
-
-if TYPE_CHECKING:
-    from pamrs.diagnosis.result import Diagnosis, Trace
 
 __all__ = ["render"]
 
@@ -51,54 +49,53 @@ def _unit(unit: Any) -> str:
     return text
 
 
-def _effects(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+def _effects(diagnosis: Findings) -> list[dict[str, Any]]:
     rows = []
     for effect in diagnosis.effects:
         parameters = []
-        for name, p in (effect.get("parameters") or {}).items():
-            known = bool(p.get("identifiable", True)) and words.is_number(p.get("value"))
+        for name, p in effect.parameters.items():
+            known = p.identifiable is not False and words.is_number(p.value)
             parameters.append(
                 {
-                    "name": words.label(str(name)),
+                    "name": words.label(name),
                     "known": known,
-                    "value": words.format_uncertain(p.get("value"), p.get("std")),
+                    "value": words.format_uncertain(p.value, p.std),
                     "interval": _span(words.span95(p)),
-                    "unit": _unit(p.get("unit")),
+                    "unit": _unit(p.unit),
                 }
             )
         rows.append(
             {
-                "id": str(effect["id"]),
-                "name": str(effect.get("name") or words.label(str(effect["id"]))),
-                "probability": words.format_probability(effect.get("probability")),
-                "inclusion": "" if effect.get("inclusion") is None else f"{100 * effect['inclusion']:.0f} %",
+                "id": effect.id,
+                "name": effect.name or words.label(effect.id),
+                "probability": words.format_probability(effect.probability),
+                "inclusion": "" if effect.inclusion is None else f"{100 * effect.inclusion:.0f} %",
                 "parameters": parameters,
             }
         )
     return rows
 
 
-def _blocks(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+def _blocks(diagnosis: Findings) -> list[dict[str, Any]]:
     """The verdict of each group of blocks, and what each block misses before and after."""
     rows = []
     for entry in diagnosis.blocks:
-        found = [*entry["effects"], *entry["wrong_parameters"]]
-        leading, chance = max(entry["probabilities"].items(), key=lambda kv: kv[1], default=("none", math.nan))
+        found = [*entry.effects, *entry.wrong_parameters]
+        leading, chance = max(entry.probabilities.items(), key=lambda kv: kv[1], default=("none", math.nan))
         sizes = []
-        for block in entry["mismatch"]:
-            part = block["held_out"] or block["fitted"]
-            unit, factor = words.display_unit(block["unit"], abs(float(part["refit"]["size"])))
-            stages = [part[stage] for stage in ("refit", "after")]
+        for block in entry.mismatch:
+            part = block.held_out or block.fitted
+            unit, factor = words.display_unit(block.unit, abs(part.refit.size))
             shown = [
-                f"{words.format_number(s['noises'], 2)} ({words.format_number(s['size'] * factor, 2)} {unit})"
-                if s["more_than_noise"]
+                f"{words.format_number(s.noises, 2)} ({words.format_number(s.size * factor, 2)} {unit})"
+                if s.more_than_noise
                 else "noise only"
-                for s in stages
+                for s in (part.refit, part.after)
             ]
-            sizes.append({"block": words.label(block["block"].replace(".", " ")), "refit": shown[0], "after": shown[1]})
+            sizes.append({"block": words.label(block.block.replace(".", " ")), "refit": shown[0], "after": shown[1]})
         rows.append(
             {
-                "verdict": WRONG if entry["wrong_parameters"] else BADGES[entry["verdict"]],
+                "verdict": WRONG if entry.wrong_parameters else BADGES[entry.verdict],
                 "names": words.set_label(found) if found else "–",
                 "probability": words.format_probability(chance),
                 "leading": words.hypothesis_label(leading),
@@ -108,61 +105,60 @@ def _blocks(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     return rows
 
 
-def _wrong(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+def _wrong(diagnosis: Findings) -> list[dict[str, Any]]:
     """Values of the rig file that are wrong."""
     rows = []
     for entry in diagnosis.wrong_parameters:
-        unit, factor = words.display_unit(str(entry["unit"]), abs(float(entry["nominal"])))
+        unit, factor = words.display_unit(entry.unit, abs(entry.nominal))
         errors = []
-        for channel, error in entry["held_out"].items():
+        for channel, error in entry.held_out.items():
             shown, scale = words.display_unit(UNITS.get(channel.partition(".")[0], ""), max(error.values()))
             before, after = (words.format_number(error[key] * scale) for key in ("refit", "after"))
             errors.append(f"{words.label(channel)}: {before} to {after} {shown}")
-        interval = [float(v) * factor for v in entry["interval"]]
+        interval = [float(v) * factor for v in entry.interval]
         rows.append(
             {
-                "name": entry["name"],
+                "name": entry.name,
                 "unit": _unit(unit),
-                "stated": words.format_uncertain(entry["nominal"] * factor, entry["tolerance"] * factor),
-                "value": words.format_uncertain(entry["value"] * factor, entry["std"] * factor),
+                "stated": words.format_uncertain(entry.nominal * factor, entry.tolerance * factor),
+                "value": words.format_uncertain(entry.value * factor, entry.std * factor),
                 "interval": _span((interval[0], interval[1]), 4),
-                "moved": f"{entry['moved_sigmas']:+.1f}".replace("-", "−"),
-                "probability": words.format_probability(entry["probability"]),
+                "moved": f"{entry.moved_sigmas:+.1f}".replace("-", "−"),
+                "probability": words.format_probability(entry.probability),
                 "errors": "; ".join(errors),
             }
         )
     return rows
 
 
-def _asked(diagnosis: Diagnosis) -> list[dict[str, str]]:
+def _asked(diagnosis: Findings) -> list[dict[str, str]]:
     """Effects that were asked, in percent of the mismatch."""
 
     def percent(share: float | None) -> str:
         return "not fitted" if share is None else "all" if share >= 1.0 else f"{100 * share:.0f} %" if share > 0.005 else "under 1 %"
 
     return [
-        {"name": words.label(a["id"]), "blocks": ", ".join(a["blocks"]), "promised": percent(a["promised"]), "left": percent(a["left"])}
+        {"name": words.label(a.id), "blocks": ", ".join(a.blocks), "promised": percent(a.promised), "left": percent(a.left)}
         for a in diagnosis.asked
     ]
 
 
-def _intervals(diagnosis: Diagnosis) -> list[str]:
+def _intervals(diagnosis: Findings) -> list[str]:
     """Where in time the excess is, in words."""
-    spans = [(float(a), float(b)) for a, b in diagnosis.where.get("intervals") or []]
-    told = next((t for t in diagnosis.traces if t.recording == diagnosis.where.get("recording")), None)
+    spans = [(float(a), float(b)) for a, b in diagnosis.where.intervals]
+    told = next((t for t in diagnosis.traces if t.recording == diagnosis.where.recording), None)
     if told is not None and sum(b - a for a, b in spans) > THROUGHOUT * float(told.time[-1] - told.time[0]):
         return ["throughout the recording"]
     return [f"{a:.2f} to {b:.2f} s" for a, b in spans]
 
 
-def _parameters(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+def _parameters(diagnosis: Findings) -> list[dict[str, Any]]:
     rows = []
     for name, p in diagnosis.parameters.items():
-        known = bool(p.get("identifiable", True))
-        raw = p.get("moved_sigmas")
-        moved = float(raw) if words.is_number(raw) else math.nan
+        known = p.identifiable is not False
+        moved = p.moved_sigmas
         flag = ""
-        if name in {w["name"] for w in diagnosis.wrong_parameters}:
+        if name in {w.name for w in diagnosis.wrong_parameters}:
             flag = "the rig file is wrong"
         elif not known:
             flag = "not determined by these recordings"
@@ -172,10 +168,10 @@ def _parameters(diagnosis: Diagnosis) -> list[dict[str, Any]]:
             flag = "at the edge of its tolerance"
         rows.append(
             {
-                "name": str(name),
-                "nominal": words.format_number(p.get("nominal"), 4),
-                "value": words.format_uncertain(p.get("value"), p.get("std")) if known else "–",
-                "unit": _unit(p.get("unit")),
+                "name": name,
+                "nominal": words.format_number(p.nominal, 4),
+                "value": words.format_uncertain(p.value, p.std) if known else "–",
+                "unit": _unit(p.unit),
                 "moved": f"{moved:+.1f}".replace("-", "−") if known and math.isfinite(moved) else "–",
                 "bar": min(1.0, abs(moved) / 4.0) if known and math.isfinite(moved) else 0.0,
                 "right": moved >= 0,
@@ -187,15 +183,15 @@ def _parameters(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     return rows
 
 
-def _fit(diagnosis: Diagnosis, part: str) -> list[dict[str, Any]]:
+def _fit(errors: dict[str, ChannelError]) -> list[dict[str, Any]]:
     rows = []
-    for channel, entry in (diagnosis.fit.get(part) or {}).items():
+    for channel, entry in errors.items():
         sizes = [abs(float(v)) for v in entry.values() if words.is_number(v)]
         unit, factor = words.display_unit(UNITS.get(channel, ""), max(sizes, default=math.nan))
-        noise = entry.get("noise")
+        noise = entry.noise
         cells = []
         for key in ("noise", "before", "refit", "after"):
-            value = entry.get(key)
+            value = entry[key]
             good = words.is_number(value)
             ratio = float(value) / float(noise) if good and words.is_number(noise) and float(noise) > 0 else math.nan
             times = "–" if math.isnan(ratio) else f"{words.format_number(ratio, 2)}×"
@@ -205,7 +201,7 @@ def _fit(diagnosis: Diagnosis, part: str) -> list[dict[str, Any]]:
     return rows
 
 
-def _recordings(diagnosis: Diagnosis) -> tuple[list[dict[str, Any]], int]:
+def _recordings(diagnosis: Findings) -> tuple[list[dict[str, Any]], int]:
     """One fitted and up to two held-out recordings with their figure, and how many are not shown."""
     telling = figures.telling_trace(diagnosis)
     groups: dict[tuple[str, str], list[Trace]] = {}
@@ -217,7 +213,7 @@ def _recordings(diagnosis: Diagnosis) -> tuple[list[dict[str, Any]], int]:
     chosen = [k for k in keys if k[0] != "held_out"][:1] + [k for k in keys if k[0] == "held_out"][:HELD_OUT_SHOWN]
     shown = []
     for i, key in enumerate(chosen):
-        traces = sorted(groups[key], key=lambda t: t.channel != diagnosis.where.get("channel"))
+        traces = sorted(groups[key], key=lambda t: t.channel != diagnosis.where.channel)
         shown.append(
             {
                 "name": key[1],
@@ -228,23 +224,7 @@ def _recordings(diagnosis: Diagnosis) -> tuple[list[dict[str, Any]], int]:
     return shown, len(groups) - len(shown)
 
 
-def _conditions(diagnosis: Diagnosis) -> list[str]:
-    """Each condition as a sentence."""
-    lines = []
-    for condition in diagnosis.where.get("conditions") or []:
-        if isinstance(condition, dict):
-            text = condition.get("text")
-            if not text:
-                text = ", ".join(
-                    f"{words.label(str(k))} {words.format_number(v) if words.is_number(v) else v}" for k, v in condition.items()
-                )
-            lines.append(str(text))
-        else:
-            lines.append(str(condition))
-    return lines
-
-
-def _probabilities(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+def _probabilities(diagnosis: Findings) -> list[dict[str, Any]]:
     return [
         {
             "name": words.hypothesis_label(name),
@@ -260,13 +240,13 @@ def _markup(svg: str | None) -> Markup | None:
     return None if svg is None else Markup(svg)  # noqa: S704
 
 
-def _facts(diagnosis: Diagnosis) -> list[tuple[str, str]]:
+def _facts(diagnosis: Findings) -> list[tuple[str, str]]:
     """The few numbers under the headline."""
     facts = []
     if diagnosis.probabilities:
         name, p = words.ranked_probabilities(diagnosis, len(diagnosis.probabilities))[0]
         facts.append((words.format_probability(p), f"probability of: {words.hypothesis_label(name)}"))
-    gap = diagnosis.fit.get("gap_closed")
+    gap = diagnosis.fit.gap_closed
     if words.is_number(gap):
         facts.append(
             (
@@ -274,10 +254,10 @@ def _facts(diagnosis: Diagnosis) -> list[tuple[str, str]]:
                 f"of the gap to the noise closed on {diagnosis.proof}",
             )
         )
-    if diagnosis.where.get("block"):
-        channel = diagnosis.where.get("channel")
-        seen = f"block; seen in {words.label(str(channel))}" if channel else "block"
-        facts.append((words.label(str(diagnosis.where["block"])), seen))
+    if diagnosis.where.block:
+        channel = diagnosis.where.channel
+        seen = f"block; seen in {words.label(channel)}" if channel else "block"
+        facts.append((words.label(diagnosis.where.block), seen))
     facts.append(
         (
             f"{diagnosis.seconds:.0f} s" if diagnosis.seconds >= 10 else f"{diagnosis.seconds:.1f} s",
@@ -287,8 +267,8 @@ def _facts(diagnosis: Diagnosis) -> list[tuple[str, str]]:
     return facts
 
 
-def _excitation(diagnosis: Diagnosis) -> list[tuple[str, str]]:
-    content = diagnosis.next_experiment.get("excitation") or {}
+def _excitation(diagnosis: Findings) -> list[tuple[str, str]]:
+    content = diagnosis.next_experiment.excitation
     return [
         (
             words.label(str(k)),
@@ -298,30 +278,30 @@ def _excitation(diagnosis: Diagnosis) -> list[tuple[str, str]]:
     ]
 
 
-def _separating(diagnosis: Diagnosis) -> str | None:
+def _separating(diagnosis: Findings) -> str | None:
     """The curves of the next experiment, where it was simulated."""
-    curves = diagnosis.next_experiment.get("curves")
+    curves = diagnosis.next_experiment.curves
     return figures.separating_curves(curves) if curves else None
 
 
-def _ranking(diagnosis: Diagnosis) -> list[dict[str, str]]:
+def _ranking(diagnosis: Findings) -> list[dict[str, str]]:
     """The experiments that were compared, the most telling first."""
     return [
         {
-            "name": words.label(str(entry["name"])) + (f" with {words.label(str(entry['sensor']))}" if entry.get("sensor") else ""),
-            "bits": words.format_number(entry["bits"], 2),
-            "effort": f"{float(entry['effort_s']) / 60.0:.1f} min",
+            "name": words.label(entry.name) + (f" with {words.label(entry.sensor)}" if entry.sensor else ""),
+            "bits": words.format_number(entry.bits, 2),
+            "effort": f"{entry.effort_s / 60.0:.1f} min",
         }
-        for entry in diagnosis.next_experiment.get("ranking") or []
+        for entry in diagnosis.next_experiment.ranking
     ]
 
 
-def render(diagnosis: Diagnosis) -> str:
+def render(diagnosis: Findings) -> str:
     """Return the report of a diagnosis as one HTML page without references to anything outside it.
 
     Parameters
     ----------
-    diagnosis : Diagnosis
+    diagnosis : Findings
         Result to show; parts that it lacks are left out.
 
     Returns
@@ -330,7 +310,8 @@ def render(diagnosis: Diagnosis) -> str:
         HTML text.
     """
     recordings, hidden = _recordings(diagnosis)
-    bits = diagnosis.next_experiment.get("expected_information_bits")
+    bits = diagnosis.next_experiment.expected_information_bits
+    shown = diagnosis.condition_map.block if diagnosis.condition_map else ""
     return render_page(
         Path(__file__).with_name("template.html.j2"),
         d=diagnosis,
@@ -338,12 +319,12 @@ def render(diagnosis: Diagnosis) -> str:
         headline=words.headline(diagnosis),
         paragraphs=[p.strip() for p in diagnosis.text.split("\n\n") if p.strip()],
         facts=_facts(diagnosis),
-        where_text=str(diagnosis.where.get("text") or ""),
+        where_text=diagnosis.where.text,
         intervals=_intervals(diagnosis),
-        conditions=_conditions(diagnosis),
+        conditions=[condition.text for condition in diagnosis.where.conditions],
         blocks=_markup(figures.blocks_svg(diagnosis)),
         map=_markup(figures.map_svg(diagnosis)),
-        map_block=words.label(str((diagnosis.condition_map or {}).get("block") or diagnosis.where.get("block") or "")),
+        map_block=words.label(shown or diagnosis.where.block or ""),
         probabilities=_probabilities(diagnosis),
         effects=_effects(diagnosis),
         verdicts=_blocks(diagnosis),
@@ -351,7 +332,7 @@ def render(diagnosis: Diagnosis) -> str:
         kept=[words.kept_sentence(u) for u in diagnosis.unexplained],
         ambiguity=[words.set_label(list(s)) for s in diagnosis.ambiguity],
         asked=_asked(diagnosis),
-        experiment=str(diagnosis.next_experiment.get("text") or ""),
+        experiment=diagnosis.next_experiment.text,
         excitation=_excitation(diagnosis),
         bits=words.format_number(bits, 2) if words.is_number(bits) else "",
         separating=_markup(_separating(diagnosis)),
@@ -359,8 +340,8 @@ def render(diagnosis: Diagnosis) -> str:
         fits=[
             (title, rows)
             for title, rows in (
-                ("Held-out recordings (not used for the fit)", _fit(diagnosis, "held_out")),
-                ("Fitted recordings", _fit(diagnosis, "channels")),
+                ("Held-out recordings (not used for the fit)", _fit(diagnosis.fit.held_out)),
+                ("Fitted recordings", _fit(diagnosis.fit.channels)),
             )
             if rows
         ],

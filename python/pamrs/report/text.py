@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, TypeGuard
+from typing import Any, TypeGuard
 
 from pamrs.effects import EFFECTS
-
-if TYPE_CHECKING:
-    from pamrs.diagnosis.result import Diagnosis
+from pamrs.findings import BlockVerdict, EffectParameterFound, Findings, Unexplained, WrongParameter
 
 __all__ = [
     "display_unit",
@@ -138,18 +136,18 @@ def format_probability(p: Any) -> str:
     return "< 0.01" if float(p) < 0.005 else f"{float(p):.2f}"
 
 
-def span95(entry: dict[str, Any]) -> tuple[float, float] | None:
+def span95(entry: EffectParameterFound) -> tuple[float, float] | None:
     """95 % interval of a parameter entry: its ``interval`` if given, else value ± 1.96 std."""
-    interval = entry.get("interval")
+    interval = entry.interval
     if interval is not None and len(interval) == 2 and all(is_number(v) for v in interval):
         return float(interval[0]), float(interval[1])
-    value, std = entry.get("value"), entry.get("std")
+    value, std = entry.value, entry.std
     if is_number(value) and is_number(std):
         return float(value) - 1.96 * float(std), float(value) + 1.96 * float(std)
     return None
 
 
-def ranked_probabilities(diagnosis: Diagnosis, count: int = 8) -> list[tuple[str, float]]:
+def ranked_probabilities(diagnosis: Findings, count: int = 8) -> list[tuple[str, float]]:
     """Most probable hypotheses first, at most `count`; the rest is pooled under ``all others``."""
     known = [(k, float(v)) for k, v in diagnosis.probabilities.items() if is_number(v)]
     known.sort(key=lambda item: (-item[1], item[0]))
@@ -159,42 +157,42 @@ def ranked_probabilities(diagnosis: Diagnosis, count: int = 8) -> list[tuple[str
     return [*known[: count - 1], (f"all others ({len(rest)})", sum(p for _, p in rest))]
 
 
-def is_named(diagnosis: Diagnosis, hypothesis: str) -> bool:
+def is_named(diagnosis: Findings, hypothesis: str) -> bool:
     """Whether `hypothesis` (an id, or ids joined by ``+``) is the one that the verdict names."""
-    wrong = {str(w["name"]) for w in diagnosis.wrong_parameters}
-    effects = {str(e["id"]) for e in diagnosis.effects} if diagnosis.verdict == "effects" else set()
+    wrong = {w.name for w in diagnosis.wrong_parameters}
+    effects = {e.id for e in diagnosis.effects} if diagnosis.verdict == "effects" else set()
     named = effects | wrong or {diagnosis.verdict}
     return set(hypothesis.replace(" ", "").split("+")) == named
 
 
-def moved_parameters(diagnosis: Diagnosis, least: float = 1.0) -> list[str]:
+def moved_parameters(diagnosis: Findings, least: float = 1.0) -> list[str]:
     """Names of identifiable parameters that moved by at least `least` tolerances, farthest first."""
     moved = [
-        (abs(float(p["moved_sigmas"])), name)
+        (abs(p.moved_sigmas), name)
         for name, p in diagnosis.parameters.items()
-        if is_number(p.get("moved_sigmas")) and p.get("identifiable", True)
+        if is_number(p.moved_sigmas) and p.identifiable is not False
     ]
     return [name for size, name in sorted(moved, reverse=True) if size >= least]
 
 
-def sentence_of(wrong: dict[str, Any]) -> str:
+def sentence_of(wrong: WrongParameter) -> str:
     """What the rig file says of a parameter and what the recordings say: ``chamber dead volume is 360 +- 5 cm3, not 150 +- 23``."""
-    unit, factor = display_unit(str(wrong.get("unit") or ""), abs(float(wrong["nominal"])))
+    unit, factor = display_unit(wrong.unit, abs(wrong.nominal))
     keys = ("value", "std", "nominal", "tolerance")
-    values = {key: float(v) * factor if is_number(v := wrong.get(key)) else math.nan for key in keys}
+    values = {key: float(v) * factor if is_number(v := wrong[key]) else math.nan for key in keys}
     found = format_uncertain(values["value"], values["std"], unicode=False)
     stated = format_uncertain(values["nominal"], values["tolerance"], unicode=False)
     shown = "" if unit in ("", "1") else f" {unit}".replace("°", "deg")
-    return f"{_spoken(str(wrong['name']))} is {found}{shown}, not {stated}"
+    return f"{_spoken(wrong.name)} is {found}{shown}, not {stated}"
 
 
-def kept_sentence(kept: dict[str, Any]) -> str:
+def kept_sentence(kept: Unexplained) -> str:
     """What a block keeps: ``the arm keeps 15 times its noise (0.4 deg) that no listed effect explains``."""
-    unit, factor = display_unit(str(kept.get("unit") or ""), abs(float(kept["size"])))
-    size = format_number(float(kept["size"]) * factor, 2, unicode=False)
-    why = "no listed effect explains" if kept.get("verdict") == "unlisted" else "what is named does not explain"
-    times = format_number(kept["noises"], 2, unicode=False)
-    return f"the {_spoken(str(kept['block']))} keeps {times} times its noise ({size} {unit}) that {why}".replace("°", "deg")
+    unit, factor = display_unit(kept.unit, abs(kept.size))
+    size = format_number(kept.size * factor, 2, unicode=False)
+    why = "no listed effect explains" if kept.verdict == "unlisted" else "what is named does not explain"
+    times = format_number(kept.noises, 2, unicode=False)
+    return f"the {_spoken(kept.block)} keeps {times} times its noise ({size} {unit}) that {why}".replace("°", "deg")
 
 
 def _spoken(name: str) -> str:
@@ -202,67 +200,70 @@ def _spoken(name: str) -> str:
     return label(name.replace(".", " "))
 
 
-def headline(diagnosis: Diagnosis) -> str:
+def headline(diagnosis: Findings) -> str:
     """One sentence that states the verdict: what was found in each block, then what stays open."""
     blocks = _blocks(diagnosis)
-    named = [b for b in blocks if b["effects"] or b["wrong_parameters"]]
-    doubtful = [b for b in blocks if b.get("verdict") == "unlisted" and len(b["ambiguity"]) > 1]
+    named = [b for b in blocks if b.effects or b.wrong_parameters]
+    doubtful = [b for b in blocks if b.verdict == "unlisted" and len(b.ambiguity) > 1]
     if not named and not doubtful:
         return _unnamed(diagnosis)
-    found = [_found(diagnosis, block) for block in sorted(named, key=lambda b: not b["effects"])]
+    found = [_found(diagnosis, block) for block in sorted(named, key=lambda b: not b.effects)]
     text = "; ".join(dict.fromkeys([*found, *(_found(diagnosis, block) for block in doubtful)]))
-    open_ = {name for b in doubtful for name in b["blocks"]}
-    kept = [kept_sentence(u) for u in diagnosis.unexplained if u.get("verdict") == "unlisted" and u["block"] not in open_]
+    open_ = {name for b in doubtful for name in b.blocks}
+    kept = [kept_sentence(u) for u in diagnosis.unexplained if u.verdict == "unlisted" and u.block not in open_]
     return "; ".join([text[:1].upper() + text[1:], *kept[:2]])
 
 
-def _blocks(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+def _blocks(diagnosis: Findings) -> list[BlockVerdict]:
     """The groups of blocks with their names; one of the whole case where a result does not tell them apart."""
     if diagnosis.blocks:
         return diagnosis.blocks
-    block = diagnosis.where.get("block")
+    block = diagnosis.where.block
     return [
-        {
-            "blocks": [str(block)] if block else [],
-            "effects": [str(e["id"]) for e in diagnosis.effects] if diagnosis.verdict == "effects" else [],
-            "wrong_parameters": [str(w["name"]) for w in diagnosis.wrong_parameters],
-            "ambiguity": diagnosis.ambiguity,
-        }
+        BlockVerdict(
+            blocks=[block] if block else [],
+            verdict="",  # that of the case, which is told apart
+            probabilities={},
+            effects=[e.id for e in diagnosis.effects] if diagnosis.verdict == "effects" else [],
+            wrong_parameters=[w.name for w in diagnosis.wrong_parameters],
+            ambiguity=diagnosis.ambiguity,
+        )
     ]
 
 
-def _place(diagnosis: Diagnosis, block: dict[str, Any]) -> str:
+def _place(diagnosis: Findings, block: BlockVerdict) -> str:
     """Where a group has its mismatch, as the end of a sentence."""
-    located = diagnosis.where.get("block")
-    if located not in block["blocks"]:
+    located = diagnosis.where.block
+    if located not in block.blocks:
         # not the block that the answer is about first: the one of the group that misses most
-        worst = max(block.get("mismatch") or [], key=lambda m: float(m["fitted"]["refit"]["noises"] or 0.0), default=None)
-        located = worst["block"] if worst else next(iter(block["blocks"]), None)
-    return f" in the {_spoken(str(located))}" if located else ""
+        worst = max(block.mismatch, key=lambda m: m.fitted.refit.noises, default=None)
+        located = worst.block if worst else next(iter(block.blocks), None)
+    return f" in the {_spoken(located)}" if located else ""
 
 
-def _found(diagnosis: Diagnosis, block: dict[str, Any]) -> str:
+def _found(diagnosis: Findings, block: BlockVerdict) -> str:
     """What was found in one group of blocks."""
     place = _place(diagnosis, block)
-    if len(block["ambiguity"]) > 1:
-        rivals = f"these recordings cannot tell {_from_each_other(block['ambiguity'])}"
-        healthy = any(s in (["none"], ["parameters"]) for s in block["ambiguity"])
-        if all("." in name or name in ("none", "parameters") for s in block["ambiguity"] for name in s):
+    if len(block.ambiguity) > 1:
+        rivals = f"these recordings cannot tell {_from_each_other(block.ambiguity)}"
+        healthy = any(s in (["none"], ["parameters"]) for s in block.ambiguity)
+        if all("." in name or name in ("none", "parameters") for s in block.ambiguity for name in s):
             return f"the rig file {'may be' if healthy else 'is'} wrong: {rivals}"
         if healthy:
             return f"physics may be missing{place}: {rivals}"
-        if any("." in name for s in block["ambiguity"] for name in s):
+        if any("." in name for s in block.ambiguity for name in s):
             return f"physics is missing{place}, or the rig file is wrong: {rivals}"
         return f"physics is missing{place}: {rivals}"
-    told = {str(e["id"]): e for e in diagnosis.effects}
-    if block["effects"]:
-        names = " and ".join(str(told.get(e, {}).get("name") or label(e)) for e in block["effects"])
-        chance = min((float(p) for e in block["effects"] if is_number(p := told.get(e, {}).get("probability"))), default=math.nan)
+    told = {e.id: e for e in diagnosis.effects}
+    if block.effects:
+        names = " and ".join((told[e].name if e in told else "") or label(e) for e in block.effects)
+        chances = [told[e].probability for e in block.effects if e in told]
+        chance = min((p for p in chances if is_number(p)), default=math.nan)
         how_sure = f", probability {format_probability(chance)}" if math.isfinite(chance) else ""
         return f"the model leaves out: {names}{place}{how_sure}"
-    wrong = {str(w["name"]): w for w in diagnosis.wrong_parameters}
-    values = " and ".join(sentence_of(wrong[name]) for name in block["wrong_parameters"])
-    chance = min(float(wrong[name]["probability"]) for name in block["wrong_parameters"])
+    wrong = {w.name: w for w in diagnosis.wrong_parameters}
+    values = " and ".join(sentence_of(wrong[name]) for name in block.wrong_parameters)
+    chance = min(wrong[name].probability for name in block.wrong_parameters)
     return f"the rig file is wrong: {values}, probability {format_probability(chance)}"
 
 
@@ -283,10 +284,10 @@ def _answer(names: list[str]) -> str:
     return " + ".join(f"a {set_label([name])}" if "." in name else label(name) for name in names)
 
 
-def _unnamed(diagnosis: Diagnosis) -> str:
+def _unnamed(diagnosis: Findings) -> str:
     """The headline of a diagnosis without a name."""
-    block = diagnosis.where.get("block")
-    place = f" in the {_spoken(str(block))}" if block else ""
+    block = diagnosis.where.block
+    place = f" in the {_spoken(block)}" if block else ""
     doubtful = [s for s in diagnosis.ambiguity if s not in (["none"], ["parameters"])]
     rivals = " or ".join(_answer(s) for s in doubtful)
     if diagnosis.verdict == "none" and doubtful:
@@ -301,5 +302,5 @@ def _unnamed(diagnosis: Diagnosis) -> str:
         return f"No physics is missing; parameter values explain the difference{which}"
     if len(doubtful) > 1:
         return f"Physics is missing{place}: these recordings cannot tell {_from_each_other(doubtful)}"
-    kept = [kept_sentence(u) for u in diagnosis.unexplained if u.get("verdict") == "unlisted"]
+    kept = [kept_sentence(u) for u in diagnosis.unexplained if u.verdict == "unlisted"]
     return "; ".join([f"Physics outside the catalogue acts{place or ' on this rig'}", *kept[:2]])

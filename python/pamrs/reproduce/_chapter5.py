@@ -497,6 +497,7 @@ def in_short(rows: list[Comparison]) -> list[str]:
         for row in held
         if "restored: " in row.note
     ]
+    left = ours("hysteresis", "sliding error with compensation over without, plant with hysteresis")
     rms = ", ".join(f"{kind} {ours('compound', f'{kind}, {MIDDLE:g} lb: rms')}" for kind in KINDS)
     lift = ", ".join(f"{kind} {ours('lift', f'{kind}, {MIDDLE:g} lb: rms')}" for kind in KINDS)
     return [
@@ -509,6 +510,5 @@ def in_short(rows: list[Comparison]) -> list[str]:
         "Networks that know nothing come within "
         f"{ours('neural', 'error of the last fifth, from zero, 50 lb', 1)} deg with 50 lb in 100 s, and what 15 lb taught leaves "
         f"{ours('neural', 'squared error after 15 lb of training, over from zero, 50 lb')} of the squared error.",
-        "Compensation of the diagnosed hysteresis leaves "
-        f"{ours('hysteresis', 'sliding error with compensation over without, plant with hysteresis')} of sliding's error.",
+        f"Compensation of the diagnosed hysteresis leaves {left} of sliding's error.",
     ]

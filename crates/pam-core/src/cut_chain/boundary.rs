@@ -130,6 +130,7 @@ impl<'a> Measured<'a> {
 }
 
 /// A measured state with what to subtract from its sensor's reading.
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Driven<'a, S> {
     pub place: usize,
     signal: Signal<'a>,

@@ -22,7 +22,7 @@ pub(super) struct Cut<'a, S> {
     own: Vec<usize>,
     /// Every measured state, and which of them are not the block's own: those drive it.
     drivers: Vec<Driven<'a, S>>,
-    driving: Vec<usize>,
+    driving: Vec<Driven<'a, S>>,
     /// Gases and valves between which a transducer sits, and those that drive the block.
     taps: Vec<(usize, usize)>,
     driving_taps: Vec<(usize, usize)>,
@@ -71,7 +71,7 @@ impl<'a, S: Number> Cut<'a, S> {
             timing,
             simulated,
             bumps,
-            driving: (0..drivers.len()).filter(|d| !own.contains(&drivers[*d].place)).collect(),
+            driving: drivers.iter().filter(|driver| !own.contains(&driver.place)).copied().collect(),
             driving_taps: taps
                 .iter()
                 .copied()
@@ -215,11 +215,11 @@ impl<'a, S: Number> Cut<'a, S> {
                 clocks = Clocks::of(&self.stepper.plant, self.block, time);
                 controls = self.controls(k, time, &clocks);
             }
-            let (drivers, driving, taps) = (&self.drivers, &self.driving, &self.driving_taps);
+            let (driving, taps) = (&self.driving, &self.driving_taps);
             let drive = |plant: &Plant<'a, S>, controls: &Controls<S>, fraction: f64, y: &mut [S]| {
                 let (rig, share) = (plant.rig(), (i as f64 + fraction) * h);
                 for driver in driving {
-                    drivers[*driver].write(rig, k, share, dt, clocks.neighbour, y);
+                    driver.write(rig, k, share, dt, clocks.neighbour, y);
                 }
                 for (gas, valve) in taps {
                     let place = rig.layout().pressure(*gas);

@@ -16,14 +16,14 @@ pub(crate) use self::port::{begun, BAR, BEGUN, LITRE};
 pub use self::port::{At, AtMuscle, Effect, Extremes, Port};
 use crate::scalar::{constant, Scalar};
 
-/// The modules of the effects, and the list of what they are.
+/// The modules of the effects, and the list of what they are; a file that stands elsewhere is named behind its module.
 macro_rules! catalogue {
-    ($($effect:ident,)*) => {
-        $(pub mod $effect;)*
+    ($($(#[$when:meta])? $effect:ident $(= $file:literal)?,)*) => {
+        $($(#[$when])? $(#[path = $file])? pub mod $effect;)*
 
         /// Every effect of the core, in the order of the chain; behind them the closures, which model a mismatch without
         /// naming it.
-        pub const EFFECTS: &[&EffectInfo] = &[$(&$effect::INFO,)*];
+        pub const EFFECTS: &[&EffectInfo] = &[$($(#[$when])? &$effect::INFO,)*];
     };
 }
 
@@ -52,6 +52,8 @@ catalogue! {
     base_flexibility,
     pressure_lag,
     clock_skew,
+    #[cfg(feature = "toy")]
+    toy_joint_spring = "../../tests/toy/toy_spring.rs",
     closure_supply,
     closure_flow,
     closure_torque,

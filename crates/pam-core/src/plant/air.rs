@@ -27,7 +27,7 @@ impl<S: Scalar> Plant<'_, S> {
         here.outflow.fill(zero);
         here.drawn.fill(zero);
         here.vented = zero;
-        for (k, (unit, valve)) in self.rig.wiring.valves.iter().zip(&self.valves).enumerate() {
+        for (k, (unit, valve)) in self.wiring.valves.iter().zip(&self.valves).enumerate() {
             let spool = controls.spool[k];
             let pressure = state[self.layout.pressure(unit.to)];
             if spool.re() > 0.0 {
@@ -41,7 +41,7 @@ impl<S: Scalar> Plant<'_, S> {
                 here.pass(Node::Gas(unit.to), Node::Ambient, flow);
             }
         }
-        for (unit, line) in self.rig.wiring.lines.iter().zip(&self.lines) {
+        for (unit, line) in self.wiring.lines.iter().zip(&self.lines) {
             let (from, to) = (self.pressure_at(unit.from, state), self.pressure_at(unit.to, state));
             let flow = match line {
                 Line::Orifice(area) => gas.mass_flow(*area, from, to),
@@ -49,17 +49,27 @@ impl<S: Scalar> Plant<'_, S> {
             };
             here.pass(unit.from, unit.to, flow);
         }
-        if !self.rig.wiring.ports.flows.is_empty() {
+        if self.altered.flows {
             self.effect_flows(state, controls, here);
         }
     }
 
     /// Mass flow through an opening of a valve [kg/s], and what lies behind it.
-    #[inline]
+    #[inline(always)]
     fn valve_flow(&self, valve: usize, area: S, upstream: S, downstream: S, venting: bool) -> S {
-        match &self.rig.wiring.ports.passage[valve] {
-            None => self.rig.gas.mass_flow(area, upstream, downstream),
-            Some(acting) => self.effect(acting).through(&self.rig.gas, area, upstream, downstream, venting),
+        if self.altered.passages {
+            self.altered_valve_flow(valve, area, upstream, downstream, venting)
+        } else {
+            self.rig.gas.mass_flow(area, upstream, downstream)
+        }
+    }
+
+    #[inline(never)]
+    fn altered_valve_flow(&self, valve: usize, area: S, upstream: S, downstream: S, venting: bool) -> S {
+        let gas = &self.rig.gas;
+        match &self.wiring.ports.passage[valve] {
+            None => gas.mass_flow(area, upstream, downstream),
+            Some(acting) => self.effect(acting).through(gas, area, upstream, downstream, venting),
         }
     }
 
@@ -67,7 +77,7 @@ impl<S: Scalar> Plant<'_, S> {
     #[inline(never)]
     fn effect_flows(&self, state: &[S], controls: &Controls<S>, here: &mut Scratch<S>) {
         let gas = &self.rig.gas;
-        for (flow, acting) in &self.rig.wiring.ports.flows {
+        for (flow, acting) in &self.wiring.ports.flows {
             let effect = self.effect(acting);
             match *flow {
                 Flow::Leak(node) => {
@@ -76,7 +86,7 @@ impl<S: Scalar> Plant<'_, S> {
                     here.vented += lost;
                 }
                 Flow::Clearance(valve) => {
-                    let unit = &self.rig.wiring.valves[valve];
+                    let unit = &self.wiring.valves[valve];
                     let area = effect.clearance(gas, controls.spool[valve]);
                     let chamber = Node::Gas(unit.to);
                     for (from, to) in [(unit.from, chamber), (chamber, Node::Ambient)] {
@@ -98,7 +108,7 @@ impl<S: Scalar> Plant<'_, S> {
     fn altered_supply(&self, k: usize, state: &[S], drawn: S, rt: f64, set: S) -> S {
         let pressure = state[self.layout.supply(k)];
         let (mut drawn, mut set) = (drawn, set);
-        for acting in &self.rig.wiring.ports.feed[k] {
+        for acting in &self.wiring.ports.feed[k] {
             self.effect(acting).feed(self.own(acting, state), pressure, &mut drawn, &mut set);
         }
         self.supplies[k].pressure_rate(pressure, drawn, rt, set)
@@ -116,7 +126,7 @@ impl<S: Scalar> Plant<'_, S> {
         let rt = gas.gas_constant * gas.temperature;
         for (k, supply) in self.supplies.iter().enumerate() {
             let set = controls.set_pressure[k];
-            out[layout.supply(k)] = if self.supplies_altered {
+            out[layout.supply(k)] = if self.altered.supplies {
                 self.altered_supply(k, state, here.drawn[k], rt, set)
             } else {
                 supply.pressure_rate(state[layout.supply(k)], here.drawn[k], rt, set)
@@ -132,7 +142,8 @@ impl<S: Scalar> Plant<'_, S> {
             };
             out[layout.mass(k)] = chamber.inflow - chamber.outflow;
             let fixed = pressure_rate(&chamber, &self.alphas[k], rt);
-            out[layout.pressure(k)] = match &self.rig.wiring.ports.balance[k] {
+            let balance = if self.altered.balances { self.wiring.ports.balance[k].as_ref() } else { None };
+            out[layout.pressure(k)] = match balance {
                 None => fixed,
                 Some(acting) => {
                     let mass = state[layout.mass(k)];
@@ -149,12 +160,13 @@ impl<S: Scalar> Scratch<S> {
     /// A mass flow along the arrow; what goes against it goes out of its end and into its beginning.
     #[inline]
     pub(super) fn pass(&mut self, from: Node, to: Node, flow: S) {
-        let (giver, taker, flow) = if flow.re() >= 0.0 { (from, to, flow) } else { (to, from, -flow) };
+        let along = flow.re() > 0.0 || (flow.re() == 0.0 && !self.backwards);
+        let (giver, taker, flow) = if along { (from, to, flow) } else { (to, from, -flow) };
         self.take(giver, flow);
         self.give(taker, flow);
     }
 
-    #[inline]
+    #[inline(always)]
     pub(super) fn take(&mut self, node: Node, flow: S) {
         match node {
             Node::Ambient => self.vented -= flow,
@@ -163,7 +175,7 @@ impl<S: Scalar> Scratch<S> {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn give(&mut self, node: Node, flow: S) {
         match node {
             Node::Ambient => self.vented += flow,
@@ -182,14 +194,14 @@ impl Plant<'_, f64> {
     ) -> impl Iterator<Item = (f64, f64)> + 'b {
         let gas = &self.rig.gas;
         let ratio = |a: f64, b: f64| a.min(b) / a.max(b).max(f64::MIN_POSITIVE);
-        let valves = self.rig.wiring.valves.iter().zip(&self.valves).zip(&controls.spool);
+        let valves = self.wiring.valves.iter().zip(&self.valves).zip(&controls.spool);
         let valves = valves.map(move |((unit, valve), spool)| {
             let here = state[self.layout.pressure(unit.to)];
             let other = if *spool > 0.0 { self.pressure_at(unit.from, state) } else { gas.ambient_pressure };
             let open = valve.area * unit.table.eval(spool.abs()) > 0.0;
             (if open { ratio(here, other) } else { 1.0 }, gas.critical_ratio())
         });
-        let lines = self.rig.wiring.lines.iter().zip(&self.lines).map(move |(unit, line)| {
+        let lines = self.wiring.lines.iter().zip(&self.lines).map(move |(unit, line)| {
             let critical = match line {
                 Line::Orifice(_) => gas.critical_ratio(),
                 Line::Tube(tube) => tube.critical_ratio(),
@@ -202,7 +214,7 @@ impl Plant<'_, f64> {
     /// Fastest rate of the gas [1/s], and the gas that it is in (none for a supply): a bound by Gershgorin's rows, every
     /// valve open, next to equal pressures.
     pub(crate) fn fastest_gas(&self) -> (f64, Option<usize>) {
-        let (wiring, gas) = (&self.rig.wiring, &self.rig.gas);
+        let (wiring, gas) = (&self.wiring, &self.rig.gas);
         let rt = gas.gas_constant * gas.temperature;
         let mut steepest = vec![0.0; wiring.gases.len()];
         let mut drawn = vec![0.0; wiring.supplies.len()];
@@ -259,7 +271,7 @@ impl Plant<'_, f64> {
 
     /// Largest change of what effects let in or out per pressure of a block [kg/(s Pa)].
     fn steepest_flows(&self, node: Node) -> f64 {
-        let wiring = &self.rig.wiring;
+        let wiring = &self.wiring;
         let valves = wiring.valves.iter().filter(|v| v.from == node || Node::Gas(v.to) == node).count();
         let most = self.extremes(valves);
         let at = |flow: &Flow| matches!(flow, Flow::Leak(n) | Flow::Inflow(n) if *n == node);
@@ -275,26 +287,26 @@ impl Plant<'_, f64> {
 
     /// Rate at which a gas takes the temperature of its wall [1/s], with the least of it: at ambient pressure.
     fn wall_rate(&self, gas: usize, volume: f64, wall: f64) -> f64 {
-        let balance = self.rig.wiring.ports.balance[gas].as_ref();
+        let balance = self.wiring.ports.balance[gas].as_ref();
         balance.map_or(0.0, |acting| self.effect(acting).wall_rate(&self.rig.gas, volume, wall))
     }
 
     /// Fastest rate of what effects move by themselves at some blocks [1/s].
     pub(super) fn fastest_effect(&self, here: impl Fn(Place) -> bool) -> f64 {
-        let all = self.rig.wiring.ports.integrated().filter(|(place, _)| here(*place));
+        let all = self.wiring.ports.integrated().filter(|(place, _)| here(*place));
         all.map(|(_, acting)| self.effect(&acting).fastest()).fold(0.0, f64::max)
     }
 
     /// Fastest rate on the way from commands to openings [1/s].
     pub(crate) fn fastest_command(&self) -> f64 {
-        let all = self.rig.wiring.ports.command.iter().flatten();
+        let all = self.wiring.ports.command.iter().flatten();
         all.map(|acting| self.effect(acting).fastest()).fold(0.0, f64::max)
     }
 
     /// Least volume of a gas over the range of its muscles [m3], with the largest wall [m2].
     fn least_volume(&self, gas: usize) -> (f64, f64) {
         let (mut volume, mut wall) = (self.fixed_volume[gas], 0.0);
-        for group in self.rig.wiring.groups.iter().filter(|g| g.chamber == gas) {
+        for group in self.wiring.groups.iter().filter(|g| g.chamber == gas) {
             let (low, high) = self.rig.range(group);
             let (mut least, mut most) = (f64::INFINITY, 0.0_f64);
             for i in 0..=32 {

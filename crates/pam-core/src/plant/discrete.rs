@@ -11,7 +11,7 @@ use crate::scalar::{constant, Scalar};
 impl<S: Scalar> Plant<'_, S> {
     /// Commands [V, Pa gauge] of one sample, in the order of the rig's inputs.
     pub fn controls(&self, commands: impl Fn(usize) -> f64) -> Controls<S> {
-        let wiring = &self.rig.wiring;
+        let wiring = &self.wiring;
         let mut regulator = wiring.valves.len();
         let spec = self.rig.spec();
         let set_pressure = wiring.supplies.iter().zip(&spec.supplies).map(|(unit, supply)| match unit {
@@ -32,12 +32,12 @@ impl<S: Scalar> Plant<'_, S> {
 
     /// Normalised position that a command asks of a valve.
     fn commanded(&self, valve: usize, command: f64) -> S {
-        spool_position(command, self.valves[valve].null, self.rig.wiring.valves[valve].half_range)
+        spool_position(command, self.valves[valve].null, self.wiring.valves[valve].half_range)
     }
 
     /// The position that opens a valve, for the commanded one; where something on the way moves by itself it is left as it is.
     fn opened(&self, valve: usize, commanded: S) -> S {
-        let path = &self.rig.wiring.ports.command[valve];
+        let path = &self.wiring.ports.command[valve];
         if moves(path) {
             return commanded;
         }
@@ -46,13 +46,13 @@ impl<S: Scalar> Plant<'_, S> {
 
     /// Whether commands act later than they are recorded.
     pub fn skewed(&self) -> bool {
-        !self.rig.wiring.ports.clock.is_empty()
+        !self.wiring.ports.clock.is_empty()
     }
 
     /// How late pressures and angles are recorded at a time [s]; negative where their clock is ahead.
     pub fn skew(&self, time: f64) -> (S, S) {
         let none = (constant(0.0), constant(0.0));
-        self.rig.wiring.ports.clock.iter().fold(none, |(pressures, angles), acting| {
+        self.wiring.ports.clock.iter().fold(none, |(pressures, angles), acting| {
             let (more, later) = self.effect(acting).clock(time);
             (pressures + more, angles + later)
         })
@@ -67,7 +67,7 @@ impl<S: Scalar> Plant<'_, S> {
         sample_time: f64,
         command: impl Fn(usize, i64) -> f64,
     ) -> Controls<S> {
-        let wiring = &self.rig.wiring;
+        let wiring = &self.wiring;
         let mut controls = self.controls(|_| 0.0);
         for (k, spool) in controls.spool.iter_mut().enumerate() {
             let position = |sample| self.commanded(k, command(k, sample));
@@ -91,7 +91,7 @@ impl<S: Scalar> Plant<'_, S> {
         out.set_pressure.clone_from(&controls.set_pressure);
         out.spool.clone_from(&controls.spool);
         out.time = time + age;
-        for (k, path) in self.rig.wiring.ports.command.iter().enumerate().filter(|(_, path)| moves(path)) {
+        for (k, path) in self.wiring.ports.command.iter().enumerate().filter(|(_, path)| moves(path)) {
             out.spool[k] = path.iter().fold(out.spool[k], |x, acting| {
                 self.effect(acting).position(self.own(acting, state), x, age)
             });
@@ -100,7 +100,7 @@ impl<S: Scalar> Plant<'_, S> {
 
     /// What effects do between steps: from one state to that a step [s] later, which they complete.
     pub fn discrete_update(&self, before: &[S], state: &mut [S], controls: &Controls<S>, step: f64) {
-        let ports = &self.rig.wiring.ports;
+        let ports = &self.wiring.ports;
         for (k, path) in ports.command.iter().enumerate().filter(|(_, path)| moves(path)) {
             let mut position = controls.spool[k];
             for acting in path {
@@ -137,7 +137,7 @@ impl<S: Scalar> Plant<'_, S> {
 
     /// What sensors read at the end of a step [s], written to the state; `ends` are the controls at its beginning and its end.
     pub fn read(&self, before: &[S], state: &mut [S], ends: [&Controls<S>; 2], step: f64) {
-        let (wiring, layout) = (&self.rig.wiring, &self.layout);
+        let (wiring, layout) = (&self.wiring, &self.layout);
         self.read_taps(state, ends[1]);
         for (k, reading) in wiring.ports.reading.iter().enumerate() {
             let Some(acting) = reading else { continue };

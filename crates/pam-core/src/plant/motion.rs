@@ -21,7 +21,7 @@ impl<S: Scalar> Plant<'_, S> {
     /// Accelerations of the coordinates and of what effects move beside them.
     #[inline(never)]
     pub(super) fn altered_motion(&self, state: &[S], time: f64, here: &mut Scratch<S>, out: &mut [S]) {
-        let (layout, ports) = (&self.layout, &self.rig.wiring.ports);
+        let (layout, ports) = (&self.layout, &self.wiring.ports);
         let (angles, rates) = state[layout.angle(0)..layout.effect(0)].split_at(layout.coordinates);
         let [pose, turn, load, column] = &mut here.arm;
         pose.copy_from_slice(angles);
@@ -68,7 +68,7 @@ impl<S: Scalar> Plant<'_, S> {
     /// Torque of a joint with those of the effects on it [N m].
     #[inline]
     fn joint_torque(&self, coordinate: usize, load: S, state: &[S]) -> S {
-        let here = &self.rig.wiring.ports.torque[coordinate];
+        let here = &self.wiring.ports.torque[coordinate];
         if here.is_empty() {
             return load;
         }
@@ -78,14 +78,14 @@ impl<S: Scalar> Plant<'_, S> {
 
     /// Payload at the end of a link [kg] (the mass of a linear load) at a time [s].
     fn payload(&self, link: usize, time: f64) -> S {
-        let changes = self.rig.wiring.ports.payload.iter().filter(|(changed, _)| *changed == link);
+        let changes = self.wiring.ports.payload.iter().filter(|(changed, _)| *changed == link);
         changes
             .fold(self.body.payload(link), |payload, (_, acting)| payload + self.effect(acting).payload(time))
     }
 
     /// The body with the payloads that its links carry rigidly at a time [s].
     fn carrying(&self, time: f64) -> Cow<'_, Body<S>> {
-        let ports = &self.rig.wiring.ports;
+        let ports = &self.wiring.ports;
         let mut body = Cow::Borrowed(&self.body);
         for (link, _) in &ports.payload {
             body = Cow::Owned(body.with_payload(*link, self.payload(*link, time)));
@@ -141,7 +141,7 @@ impl Plant<'_, f64> {
     /// # Errors
     /// [`Error::Parameter`] that names what is too small.
     pub(crate) fn check_masses(&self) -> Result<()> {
-        let wiring = &self.rig.wiring;
+        let wiring = &self.wiring;
         if let BodyUnit::OneLink { inertia, payload, length, .. } = &wiring.body {
             let total = self.values[*inertia] + self.values[*payload] * length.powi(2);
             check_range("arm.inertia + payload length^2", total, 1e-9, 1e9, "kg m2")?;
@@ -163,7 +163,7 @@ impl Plant<'_, f64> {
 
     /// Fastest rate of the body [1/s], and of what effects move beside it.
     pub(crate) fn fastest_body(&self) -> f64 {
-        let (wiring, ports) = (&self.rig.wiring, &self.rig.wiring.ports);
+        let (wiring, ports) = (&self.wiring, &self.wiring.ports);
         let spring = |k| {
             let (damping, stiffness) = self.resistance(k);
             (damping, stiffness + self.stiffness(k))
@@ -190,7 +190,7 @@ impl Plant<'_, f64> {
 
     /// Largest stiffness [N m/rad] of what pulls on a coordinate, over its range, at the highest pressure.
     fn stiffness(&self, coordinate: usize) -> f64 {
-        let wiring = &self.rig.wiring;
+        let wiring = &self.wiring;
         let pressure = self.rig.highest_pressure();
         let gauge = pressure - self.rig.gas.ambient_pressure;
         let mut total = 0.0;
@@ -229,7 +229,7 @@ impl Plant<'_, f64> {
             let width = spec.friction_coefficient.abs() + (spec.friction_pressure_slope * gauge).abs();
             total += width.max(spec.friction_floor) * force * STUCK / group.muscle.presliding();
         }
-        for acting in &self.rig.wiring.ports.muscles[k].force {
+        for acting in &self.wiring.ports.muscles[k].force {
             total += self.effect(acting).presliding(gauge);
         }
         total
@@ -237,7 +237,7 @@ impl Plant<'_, f64> {
 
     /// Damping and stiffness that effects add to a coordinate at most, those on its muscles included.
     fn resistance(&self, coordinate: usize) -> (f64, f64) {
-        let wiring = &self.rig.wiring;
+        let wiring = &self.wiring;
         let stops = wiring.coordinates[coordinate].stops;
         let angles = stops.map_or((0.0, 0.0), |s| (s.min_angle, s.max_angle));
         let most = self.reach(angles, 0.0);

@@ -33,7 +33,7 @@ impl<S: Scalar> Plant<'_, S> {
         let table = group.muscle.table.eval(contraction);
         let gauge = state[self.layout.pressure(group.chamber)] - self.rig.gas.ambient_pressure;
         let scale = self.scales[k];
-        let force = if self.rig.wiring.ports.muscles[k].some {
+        let force = if self.altered.muscles && self.wiring.ports.muscles[k].some {
             self.altered_force(k, group, state, memory, start, &point, &table)
         } else {
             let force = table.force(gauge, scale);
@@ -82,7 +82,7 @@ impl<S: Scalar> Plant<'_, S> {
         point: &JointPoint<S>,
         table: &TablePoint<S>,
     ) -> S {
-        let here = &self.rig.wiring.ports.muscles[k];
+        let here = &self.wiring.ports.muscles[k];
         let scale = self.scales[k];
         let mut at = self.at_muscle(group, state, point);
         at.stretched = (start - at.contraction) * group.rest_length;
@@ -114,14 +114,14 @@ impl<S: Scalar> Plant<'_, S> {
 
     /// The same for a group by its number.
     pub(super) fn at_group(&self, k: usize, state: &[S]) -> AtMuscle<S> {
-        let group = &self.rig.wiring.groups[k];
+        let group = &self.wiring.groups[k];
         let point = group.joint.eval(state[self.layout.angle(group.coordinate)]);
         self.at_muscle(group, state, &point)
     }
 
     /// Contraction ratio of each group at a state.
     pub fn contractions(&self, state: &[S], out: &mut [S]) {
-        for (out, group) in out.iter_mut().zip(&self.rig.wiring.groups) {
+        for (out, group) in out.iter_mut().zip(&self.wiring.groups) {
             *out =
                 group.joint.eval(state[self.layout.angle(group.coordinate)]).shortening / group.rest_length;
         }
@@ -129,27 +129,27 @@ impl<S: Scalar> Plant<'_, S> {
 
     /// Memories of muscles that have not moved.
     pub fn fresh_memory(&self) -> Vec<Memory<S>> {
-        vec![Memory::default(); self.rig.wiring.groups.len()]
+        vec![Memory::default(); self.wiring.groups.len()]
     }
 
     /// Memories, and the states of effects that follow the muscles, after a step that moved these between contraction ratios.
     pub fn follow_muscles(&self, state: &mut [S], memory: &mut [Memory<S>], from: &[S], to: &[S]) {
-        for (k, group) in self.rig.wiring.groups.iter().enumerate() {
+        for (k, group) in self.wiring.groups.iter().enumerate() {
             if group.direction {
                 let stretched = (from[k] - to[k]) * group.rest_length;
                 memory[k].direction =
                     memory[k].direction.moved(stretched, constant(group.muscle.presliding()));
             }
         }
-        for (k, acting) in self.rig.wiring.ports.follow_muscles() {
-            let rest = self.rig.wiring.groups[k].rest_length;
+        for (k, acting) in self.wiring.ports.follow_muscles() {
+            let rest = self.wiring.groups[k].rest_length;
             self.effect(&acting).moved(self.own_mut(&acting, state), from[k], to[k], rest);
         }
     }
 
     /// Whether any muscle remembers its motion.
     pub fn remembers(&self) -> bool {
-        let wiring = &self.rig.wiring;
+        let wiring = &self.wiring;
         wiring.groups.iter().any(|g| g.direction) || wiring.ports.follow_muscles().next().is_some()
     }
 }

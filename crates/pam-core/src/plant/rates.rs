@@ -8,7 +8,7 @@ use super::body::Body;
 use super::layout::{Channel, Layout, BALANCE_COUNT};
 use super::memory::Memory;
 use super::ports::Acting;
-use super::units::{LineUnit, Path, SupplyUnit};
+use super::units::{LineUnit, Path, SupplyUnit, Wiring};
 use super::{Rig, Values};
 use crate::blocks::chamber::Polytropic;
 use crate::blocks::chamber::{cube_area, cylinder_area, gas_temperature};
@@ -79,6 +79,7 @@ pub(super) enum Line<S> {
 #[derive(Debug)]
 pub struct Plant<'a, S> {
     pub(super) rig: &'a Rig,
+    pub(super) wiring: &'a Wiring,
     pub(super) layout: Layout,
     pub(super) values: Values<S>,
     balanced: bool,
@@ -92,9 +93,18 @@ pub struct Plant<'a, S> {
     pub(super) body: Body<S>,
     /// Effects that are switched on.
     effects: Vec<Box<dyn Effect<S>>>,
-    /// Effects act on supplies, on joints or arm.
-    pub(super) supplies_altered: bool,
-    motion_altered: bool,
+    pub(super) altered: Altered,
+}
+
+/// Where effects act at all: what they do not touch costs nothing.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Altered {
+    pub supplies: bool,
+    pub passages: bool,
+    pub flows: bool,
+    pub balances: bool,
+    pub muscles: bool,
+    pub motion: bool,
 }
 
 /// What the equations need to write down on the way.
@@ -108,6 +118,8 @@ pub struct Scratch<S> {
     pub(super) drawn: Vec<S>,
     pub(super) torque: Vec<S>,
     pub(super) vented: S,
+    /// A flow that is none goes against its arrow, and not along it.
+    pub(super) backwards: bool,
     pub(super) muscle_work: S,
     /// Poses, rates and torques that effects on the arm change.
     pub(super) arm: [Vec<S>; 4],
@@ -124,7 +136,7 @@ impl<'a, S: Number> Plant<'a, S> {
     /// # Errors
     /// [`crate::Error::Parameter`] for links that cannot be.
     pub fn new(rig: &'a Rig, values: Values<S>, balanced: bool) -> Result<Self> {
-        let wiring = &rig.wiring;
+        let wiring: &'a Wiring = &rig.wiring;
         let line = |line: &LineUnit| match line.path {
             Path::Orifice(area) => Line::Orifice(values[area]),
             Path::Tube { length, diameter } => {
@@ -170,8 +182,15 @@ impl<'a, S: Number> Plant<'a, S> {
             lines,
             scales: wiring.groups.iter().map(|group| values[group.scale]).collect(),
             body: Body::new(&wiring.body, &wiring.coordinates, &values)?,
-            supplies_altered: wiring.ports.on_supplies(),
-            motion_altered: wiring.ports.on_motion(),
+            altered: Altered {
+                supplies: wiring.ports.on_supplies(),
+                passages: wiring.ports.passage.iter().any(Option::is_some),
+                flows: !wiring.ports.flows.is_empty(),
+                balances: wiring.ports.on_balance(),
+                muscles: wiring.ports.muscles.iter().any(|muscle| muscle.some),
+                motion: wiring.ports.on_motion(),
+            },
+            wiring,
             effects: (wiring.ports.effects.iter())
                 .map(|effect| {
                     let own: Vec<S> = effect.parameters.iter().map(|id| values[*id]).collect();
@@ -233,11 +252,12 @@ impl<'a, S: Scalar> Plant<'a, S> {
             drawn: zeros(supplies),
             torque: zeros(coordinates),
             vented: constant(0.0),
+            backwards: false,
             muscle_work: constant(0.0),
             arm: std::array::from_fn(|_| zeros(coordinates)),
-            contraction: zeros(self.rig.wiring.groups.len()),
-            force: zeros(self.rig.wiring.groups.len()),
-            now: zeros(self.rig.wiring.groups.len()),
+            contraction: zeros(self.wiring.groups.len()),
+            force: zeros(self.wiring.groups.len()),
+            now: zeros(self.wiring.groups.len()),
         }
     }
 
@@ -249,11 +269,11 @@ impl<'a, S: Scalar> Plant<'a, S> {
         here.volume_rate.fill(zero);
         here.torque.fill(zero);
         here.muscle_work = zero;
-        let heat = self.rig.wiring.ports.on_balance();
+        let heat = self.altered.balances;
         if heat {
             here.wall.fill(zero);
         }
-        for (k, group) in self.rig.wiring.groups.iter().enumerate() {
+        for (k, group) in self.wiring.groups.iter().enumerate() {
             let muscle = self.muscle_force(k, group, state, &memory[k], start[k]);
             let rate = state[self.layout.rate(group.coordinate)];
             (here.contraction[k], here.force[k]) = (muscle.contraction, muscle.force);
@@ -276,8 +296,8 @@ impl<'a, S: Scalar> Plant<'a, S> {
 
     /// Wall area of the gases without muscles [m2]: the cube of their volume.
     fn cubes(&self, here: &mut Scratch<S>) {
-        for (k, balance) in self.rig.wiring.ports.balance.iter().enumerate() {
-            if balance.is_some() && self.rig.wiring.groups.iter().all(|g| g.chamber != k) {
+        for (k, balance) in self.wiring.ports.balance.iter().enumerate() {
+            if balance.is_some() && self.wiring.groups.iter().all(|g| g.chamber != k) {
                 here.wall[k] = cube_area(here.volume[k]);
             }
         }
@@ -286,7 +306,7 @@ impl<'a, S: Scalar> Plant<'a, S> {
     /// Mass of a gas [kg] at rest temperature for a state.
     pub fn rest_mass(&self, gas: usize, state: &[S]) -> S {
         let mut volume = self.fixed_volume[gas];
-        for group in self.rig.wiring.groups.iter().filter(|g| g.chamber == gas) {
+        for group in self.wiring.groups.iter().filter(|g| g.chamber == gas) {
             let point = group.joint.eval(state[self.layout.angle(group.coordinate)]);
             volume += group.muscle.table.eval(point.shortening / group.rest_length).volume * group.count;
         }
@@ -296,7 +316,7 @@ impl<'a, S: Scalar> Plant<'a, S> {
     /// Mass of a gas [kg] at the start of a recording: at rest temperature plus the initial rise.
     pub fn initial_mass(&self, gas: usize, state: &[S]) -> S {
         let rest = self.rest_mass(gas, state);
-        match &self.rig.wiring.ports.balance[gas] {
+        match &self.wiring.ports.balance[gas] {
             Some(acting) => self.effect(acting).initial_mass(&self.rig.gas, rest),
             None => rest,
         }
@@ -331,7 +351,7 @@ impl<'a, S: Scalar> Plant<'a, S> {
         if simulated.motion && self.body.moves() {
             let (angles, rates) = state[angle..end].split_at(layout.coordinates);
             out[angle..rate].copy_from_slice(rates);
-            if self.motion_altered {
+            if self.altered.motion {
                 self.altered_motion(state, controls.time, here, out);
             } else {
                 self.body.accelerations(angles, rates, &here.torque, &mut out[rate..end]);
@@ -389,7 +409,7 @@ impl Plant<'_, f64> {
         if out.is_empty() {
             return; // nobody looks
         }
-        let (layout, wiring) = (&self.layout, &self.rig.wiring);
+        let (layout, wiring) = (&self.layout, &self.wiring);
         let ambient = self.rig.gas.ambient_pressure;
         let mut now = std::mem::take(&mut here.now);
         if self.remembers() {

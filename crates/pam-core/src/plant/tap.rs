@@ -12,20 +12,20 @@ impl<S: Scalar> Plant<'_, S> {
 
     /// The valve in front of a gas at which its transducer sits, and what is between them.
     fn tap(&self, gas: usize) -> Option<(usize, &Acting)> {
-        let (valve, acting) = self.rig.wiring.ports.tap[gas].as_ref()?;
+        let (valve, acting) = self.wiring.ports.tap[gas].as_ref()?;
         self.effect(acting).taps().then_some((*valve, acting))
     }
 
     /// Place of what the sensor of a gas reads.
     pub fn reading(&self, gas: usize) -> usize {
-        let lag = self.rig.wiring.ports.reading[gas].as_ref();
+        let lag = self.wiring.ports.reading[gas].as_ref();
         let acting = lag.or(self.tap(gas).map(|(_, acting)| acting));
         acting.map_or(self.layout.pressure(gas), |acting| self.layout.effect(acting.first))
     }
 
     /// Place of the reading of a sensor that lags, and how far it does [s]; None for one that does not.
     pub fn lagging(&self, gas: usize) -> Option<(usize, S)> {
-        let acting = self.rig.wiring.ports.reading[gas].as_ref()?;
+        let acting = self.wiring.ports.reading[gas].as_ref()?;
         Some((self.layout.effect(acting.first), self.effect(acting).lag()))
     }
 
@@ -47,7 +47,7 @@ impl<S: Scalar> Plant<'_, S> {
         if area.re() <= 0.0 {
             inside
         } else if filling {
-            let outside = self.pressure_at(self.rig.wiring.valves[valve].from, state);
+            let outside = self.pressure_at(self.wiring.valves[valve].from, state);
             effect.between(air, area, outside, inside, false)
         } else {
             effect.between(air, area, inside, constant(air.ambient_pressure), true)
@@ -64,7 +64,7 @@ impl<S: Scalar> Plant<'_, S> {
             return there;
         }
         let flow = if filling {
-            air.mass_flow(area, self.pressure_at(self.rig.wiring.valves[valve].from, state), there)
+            air.mass_flow(area, self.pressure_at(self.wiring.valves[valve].from, state), there)
         } else {
             -air.mass_flow(area, there, constant(air.ambient_pressure))
         };
@@ -80,7 +80,7 @@ impl<S: Scalar> Plant<'_, S> {
     /// Discharge area of a valve [m2], and whether it opens to where it is fed from.
     fn opening(&self, valve: usize, spool: S) -> (S, bool) {
         let filling = spool.re() > 0.0;
-        let table = &self.rig.wiring.valves[valve].table;
+        let table = &self.wiring.valves[valve].table;
         if spool.re() == 0.0 {
             return (constant(0.0), filling);
         }

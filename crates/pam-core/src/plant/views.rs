@@ -24,8 +24,7 @@ impl<S: Scalar> Plant<'_, S> {
 
     fn at_supply(&self, supply: usize, state: &[S], spool: &[S]) -> At<S> {
         let mut opening = constant::<S>(0.0);
-        for (_, spool) in
-            self.rig.wiring.valves.iter().zip(spool).filter(|(v, _)| v.from == Node::Supply(supply))
+        for (_, spool) in self.wiring.valves.iter().zip(spool).filter(|(v, _)| v.from == Node::Supply(supply))
         {
             if spool.re() > 0.0 {
                 opening += *spool;
@@ -35,7 +34,7 @@ impl<S: Scalar> Plant<'_, S> {
     }
 
     fn at_chamber(&self, gas: usize, state: &[S], spool: &[S], volume_rate: S) -> At<S> {
-        let (layout, wiring) = (&self.layout, &self.rig.wiring);
+        let (layout, wiring) = (&self.layout, &self.wiring);
         let pressure = state[layout.pressure(gas)];
         let (mut opening, mut supply) = (constant::<S>(0.0), pressure);
         for (unit, spool) in wiring.valves.iter().zip(spool) {
@@ -54,7 +53,7 @@ impl<S: Scalar> Plant<'_, S> {
         let layout = &self.layout;
         let mut pressure = constant::<S>(0.0);
         let mut groups = 0.0;
-        for group in self.rig.wiring.groups.iter().filter(|g| g.coordinate == coordinate) {
+        for group in self.wiring.groups.iter().filter(|g| g.coordinate == coordinate) {
             pressure += (state[layout.pressure(group.chamber)] - self.rig.gas.ambient_pressure) / BAR;
             groups += 1.0;
         }
@@ -69,7 +68,7 @@ impl<S: Scalar> Plant<'_, S> {
     fn at(&self, place: Place, state: &[S], spool: &[S], volume_rate: &[S]) -> At<S> {
         match place {
             Place::Supply(k) => self.at_supply(k, state, spool),
-            Place::Valve(k) => At::Valve { fed: state[self.layout.pressure(self.rig.wiring.valves[k].to)] },
+            Place::Valve(k) => At::Valve { fed: state[self.layout.pressure(self.wiring.valves[k].to)] },
             Place::Gas(k) => self.at_chamber(k, state, spool, volume_rate[k]),
             Place::Group(k) => At::Muscle(self.at_group(k, state)),
             Place::Joint(k) => self.at_joint(k, state),
@@ -85,7 +84,7 @@ impl<S: Scalar> Plant<'_, S> {
     pub(super) fn effect_rates(&self, state: &[S], controls: &Controls<S>, here: &Scratch<S>, out: &mut [S]) {
         let layout = &self.layout;
         out[layout.effect(0)..layout.states()].fill(constant(0.0));
-        for (place, acting) in self.rig.wiring.ports.integrated() {
+        for (place, acting) in self.wiring.ports.integrated() {
             let at = self.at(place, state, &controls.spool, &here.volume_rate);
             self.effect(&acting).rates(&at, self.own(&acting, state), self.own_mut(&acting, out));
         }
@@ -93,7 +92,7 @@ impl<S: Scalar> Plant<'_, S> {
 
     /// What effects remember, where a recording begins: nothing has moved for long, valves are shut.
     pub fn start_effects(&self, state: &mut [S]) {
-        let wiring = &self.rig.wiring;
+        let wiring = &self.wiring;
         let shut = vec![constant(0.0); wiring.valves.len()];
         let still = vec![constant(0.0); wiring.gases.len()];
         for (place, acting) in wiring.ports.all.iter().filter(|(_, acting)| acting.count > 0) {
@@ -110,7 +109,7 @@ impl<S: Scalar> Plant<'_, S> {
         controls: &Controls<S>,
         here: &Scratch<S>,
     ) -> Vec<S> {
-        let ports = &self.rig.wiring.ports;
+        let ports = &self.wiring.ports;
         let unnamed = |effect: usize| !ports.effects[effect].info.named;
         match ports.all.iter().find(|(at, acting)| *at == place && unnamed(acting.effect)) {
             Some((_, acting)) => {

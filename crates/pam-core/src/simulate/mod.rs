@@ -15,7 +15,7 @@ use self::run::Run;
 use crate::description::dotted;
 use crate::effects::clock_skew::late;
 use crate::error::check_range;
-use crate::plant::{Channel, Memory, Rig};
+use crate::plant::{Channel, LinearModel, Memory, Rig, Side};
 use crate::plant::{Controls, Plant, Scratch, Simulated};
 use crate::scalar::{constant, Scalar};
 use crate::{Error, Result};
@@ -337,6 +337,15 @@ impl Progress {
             flags: flags.iter().map(|f| *f > 0.5).collect(),
             samples: samples.first().map_or(0, |n| n.max(0.0) as u64),
         })
+    }
+
+    /// The linear model of a rig about this sample, with its valves at their null.
+    ///
+    /// # Errors
+    /// [`Error::Integration`] when the state has left the model's range, [`Error::Model`] where a derivative is not finite.
+    pub fn linearised(&self, rig: &Rig, side: Side) -> Result<LinearModel> {
+        check_state(&Plant::new(rig, rig.parameters().lift::<f64>(), true)?, &self.state, 0.0)?;
+        rig.linearised(&self.state, &self.memory, side)
     }
 
     /// Append this sample to a trajectory.

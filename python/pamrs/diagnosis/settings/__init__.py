@@ -13,19 +13,14 @@ from typing import Any
 
 from pamrs.diagnosis.settings._after import NextExperimentSettings, PlanSettings, WarningSettings
 from pamrs.diagnosis.settings._data import NoiseSettings, PlausibilitySettings, PrepareSettings
-from pamrs.diagnosis.settings._judgement import (
-    EvidenceSettings,
-    FaintSettings,
-    SearchSettings,
-    VerdictSettings,
-    WrongParameterSettings,
-)
+from pamrs.diagnosis.settings._judgement import EvidenceSettings, VerdictSettings
 from pamrs.diagnosis.settings._models import (
     ClosureSettings,
     FitSettings,
     ScreenSettings,
     TransientSettings,
 )
+from pamrs.diagnosis.settings._search import FaintSettings, SearchSettings, WrongParameterSettings
 from pamrs.diagnosis.settings._setting import SettingsGroup
 from pamrs.errors import ParameterError
 

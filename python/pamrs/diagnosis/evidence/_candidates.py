@@ -1,0 +1,424 @@
+"""Sets of effects that are tried: what each is, how it is fitted, and how it is judged on held-out recordings."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+
+from pamrs.diagnosis.fit import Fit, Key, Problem, Start, acts_in, fit, fit_events, look_for_events, residuals
+from pamrs.diagnosis.noise import Excess, Floor, excess, inflation
+from pamrs.diagnosis.prepare import Block, Residual
+from pamrs.diagnosis.screen import left_out
+from pamrs.diagnosis.settings import DiagnosisSettings
+from pamrs.effects import EFFECTS, find_parameter
+from pamrs.errors import SimulationError
+from pamrs.rig import Rig
+
+__all__ = ["Attempts", "Candidate", "Group", "significant", "start_of", "without_colour"]
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A hypothesis, fitted: a set of effects, or values of the rig file that are wrong.
+
+    Attributes
+    ----------
+    effects : tuple of str
+        Its effects; empty for the baseline.
+    fit : Fit
+        On the recordings to fit.
+    held_out : dict of str to Excess
+        By block, on held-out recordings (on the fitted ones if there are no others).
+    fitted : dict of str to Excess
+        By block, on the recordings to fit.
+    gap_closed : float
+        Share of the baseline's excess that it removes on held-out recordings.
+    scatter : float
+        Relative scatter of its size between recordings, beyond its uncertainty.
+    gain : float
+        Gain in chi-square that the screen promised of a single effect.
+    wrong : tuple of str
+        Dotted names of the parameters that were freed from their tolerance.
+    """
+
+    effects: tuple[str, ...]
+    fit: Fit
+    held_out: dict[str, Excess]
+    fitted: dict[str, Excess]
+    gap_closed: float
+    scatter: float = 0.0
+    gain: float = 0.0
+    wrong: tuple[str, ...] = ()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What it names: effects, and parameters that are wrong; nothing for the baseline."""
+        return (*self.effects, *self.wrong)
+
+    @property
+    def key(self) -> str:
+        """Its names joined by ``+``, as probabilities are listed."""
+        return "+".join(self.names)
+
+    def outside(self, walls: float) -> float:
+        """How far outside its tolerances what is wrong is: the logarithm of how many times the walls, of each parameter."""
+        return sum(math.log(max(1.0, abs(self.fit.moved[name]) / walls)) for name in self.wrong)
+
+    @property
+    def misfit(self) -> float:
+        """Sum over the blocks of the residual in units of its noise, squared, on the recordings to fit."""
+        return sum(float(((r.value[r.rows] / r.noise) ** 2).sum()) for r in self.fit.residuals.values())
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Blocks that are judged together, with everything found out about them.
+
+    Attributes
+    ----------
+    blocks : list of Block
+        Gas blocks (supply, chamber) or the arm.
+    nominal, baseline : dict of str to Excess
+        Excess by block before and after the refit, on fitted recordings.
+    candidates : list of Candidate
+        The baseline first, then every set of effects tried.
+    probabilities : dict of str to float
+        Over the hypotheses (names joined by ``+``: ids of effects, dotted names of wrong parameters), ``unlisted`` and ``""``
+        (nothing missing here, or parameters that are off inside their tolerances).
+    mismatch : Block or None
+        The block with the largest significant excess after the refit.
+    floor : dict
+        Noise floors.
+    suspects : list of Block
+        Blocks that keep an excess.
+    closure : Candidate or None
+        Where no name is likely: a form of what is missing that predicts held-out recordings better than the baseline.
+    sought : bool
+        Whether one was looked for.
+    faint : bool
+        Whether no block keeps an excess, and an effect was found by its signature, or by a parameter that it lets go back:
+        ``mismatch`` (and the only suspect) is then the block in which it acts.
+    instead : tuple of str
+        Parameters that would have to be far from their nominal values instead of it.
+    inclusion : dict of str to float
+        Share of resampled recordings in which the screen would have taken each lasting effect.
+    promised : dict of str to float
+        Share of the mismatch that each effect that was asked could take by its signature alone.
+    """
+
+    blocks: list[Block]
+    nominal: dict[str, Excess]
+    baseline: dict[str, Excess]
+    candidates: list[Candidate]
+    probabilities: dict[str, float]
+    mismatch: Block | None
+    floor: dict[Key, Floor]
+    suspects: list[Block]
+    closure: Candidate | None = None
+    sought: bool = False
+    faint: bool = False
+    instead: tuple[str, ...] = ()
+    inclusion: dict[str, float] = field(default_factory=dict)
+    promised: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def best(self) -> Candidate:
+        """The most probable hypothesis (the baseline when none is)."""
+        named = [c for c in self.candidates if c.names]
+        if self.mismatch is None or not named:
+            return self.candidates[0]
+        return max(named, key=lambda c: self.probabilities.get(c.key, 0.0))
+
+
+def significant(found: Excess, ratio: float = 1.0) -> bool:
+    """Whether a block keeps more than its noise, and so many times its floor at least."""
+    return found.ratio > max(ratio, found.limit)
+
+
+@dataclass(frozen=True, eq=False)
+class Attempts:
+    """What every attempt at an explanation needs: recordings to fit and held out, model, floors, blocks that keep an excess."""
+
+    inner: Problem
+    outer: Problem
+    nominal: Rig
+    floor: dict[Key, Floor]
+    out: dict[str, Excess]
+    suspects: list[Block]
+
+    @property
+    def settings(self) -> DiagnosisSettings:
+        """What they are made by."""
+        return self.inner.settings
+
+    @property
+    def white(self) -> dict[str, float]:
+        """Weights of noise without colour."""
+        return without_colour(self.inner.blocks)
+
+    @property
+    def same(self) -> bool:
+        """Whether there is no held-out recording."""
+        return self.outer.recordings is self.inner.recordings
+
+    def colour(self, found: Fit) -> dict[str, float]:
+        """Weights of the colour that a fit leaves."""
+        return colour_of(self.inner, found)
+
+    def start_of(self, found: Fit, effect: str) -> Start:
+        """Where another fit goes on from an effect as it was fitted."""
+        return start_of(found, effect, self.settings.fit.least_start)
+
+    def eventful(self, effect: str, beside: Candidate) -> Candidate | None:
+        """An effect with times of its own in every recording, held-out ones included, beside the effects of a candidate."""
+        try:
+            return self._eventful(effect, beside)
+        except SimulationError:
+            return None  # it leaves the range in which the model holds
+
+    def _eventful(self, effect: str, beside: Candidate) -> Candidate | None:
+        white = self.white
+        model = self.nominal
+        for entry in beside.fit.rig.effects:
+            model = model.with_effect(entry["id"], entry["parameters"])
+        found = fit_events(effect, self.inner, model, beside.fit, white)
+        if found is None:
+            return None
+        if beside.effects:
+            found = self._beside(found, beside, white)
+        effects = (*beside.effects, effect)
+        if self.same:
+            return self.judged(effects, found)
+        bare = found.rig.without_effect(effect)
+        leading = EFFECTS[effect].leading
+        size = found.values[f"{effect}.{leading.name}"] if leading.same_everywhere else None
+        quiet = residuals(self.outer, bare)
+        events = look_for_events(effect, self.outer, bare, quiet, white, size)
+        if events is None:
+            return self.judged(effects, found, quiet)
+        everywhere = replace(
+            found, events=replace(events, values=found.events.values | events.values if found.events else events.values)
+        )
+        return self.judged(effects, everywhere, residuals(self.outer, bare, events=events))
+
+    def _beside(self, found: Fit, beside: Candidate, colour: dict[str, float]) -> Fit:
+        """The lasting effects of a candidate fitted again, with the events that were found beside them held."""
+        assert found.events is not None
+        effect = found.events.effect
+        own, kept = parts_of([self.start_of(beside.fit, e) for e in beside.effects])
+        warm = replace(beside.fit, values=beside.fit.values | {n: found.values[n] for n in beside.fit.moved})
+        again = fit(
+            self.inner,
+            self.nominal,
+            beside.effects,
+            own,
+            colour,
+            fixed=kept,
+            warm=warm,
+            frozen=True,
+            events=found.events,
+            evaluations=self.settings.transients.evaluations_beside,
+        )
+        happened = next(iter(found.events.values.values()))
+        parts = {n: (found.values[n], found.std[n]) for n in found.values if n.partition(".")[0] == effect}
+        return replace(
+            again,
+            effects=(*beside.effects, effect),
+            rig=again.rig.with_effect(effect, happened),
+            values=again.values | {n: v for n, (v, _) in parts.items()},
+            std=again.std | {n: s for n, (_, s) in parts.items()},
+        )
+
+    def excess(self, block: Block, problem: Problem, found: dict[Key, Residual]) -> Excess:
+        """What a block keeps of some recordings."""
+        return excess(block, problem.recordings, found, self.floor, self.settings.noise)
+
+    def judged(self, effects: tuple[str, ...], found: Fit, outside: dict[Key, Residual] | None = None) -> Candidate:
+        """A fitted set on the held-out recordings, or on each recording as the others predict it."""
+        if outside is None:
+            outside = left_out(self.inner, found, self.colour(found)) if self.same else residuals(self.outer, found.rig)
+        after = {b.name: self.excess(b, self.outer, outside) for b in self.inner.blocks}
+        inside = {b.name: self.excess(b, self.inner, found.residuals) for b in self.inner.blocks}
+        gaps = [(self.out[b.name].ratio - 1.0, max(0.0, after[b.name].ratio - 1.0)) for b in self.suspects]
+        total = sum(math.sqrt(max(0.0, g)) for g, _ in gaps)
+        gap = 1.0 - sum(math.sqrt(a) for _, a in gaps) / total if total > 0 else 0.0
+        return Candidate(effects, found, after, inside, gap, _scatter(effects, self.inner, found))
+
+    def fitted(self, starts: list[Start], warm: Fit, colour: dict[str, float], share: float | None = None) -> Candidate | None:
+        """A set of effects fitted from one start of each, residuals weighted by their own colour; None where it cannot be run.
+
+        ``share`` is another share of the sum of squares than that of the settings below which a step is not worth it.
+        """
+        effects = tuple(start.effect for start in starts)
+        free, held = parts_of(starts)
+        settings, sealed = self.settings.fit, self.nominal.model["valve"] is None
+        limit = settings.sealed_evaluations if sealed else settings.effect_evaluations
+        try:
+            best = fit(
+                self.inner, self.nominal, effects, free, colour, fixed=held, warm=warm, frozen=True, evaluations=limit, share=share
+            )
+            colour = self.colour(best)
+            if max(colour.values()) > self.settings.noise.correlated_variance:
+                again = {n: _off_zero(n, v, settings.least_start) for n, v in best.values.items() if n.partition(".")[0] in EFFECTS}
+                best = fit(
+                    self.inner, self.nominal, effects, again, colour, fixed=held, warm=best, frozen=True, evaluations=limit, share=share
+                )
+            return self.judged(effects, best)
+        except SimulationError:
+            return None  # it leaves the range in which the model holds
+
+    def freed(self, names: tuple[str, ...], baseline: Fit) -> Candidate | None:
+        """The baseline with some parameters freed from their tolerance, fitted to its end; None where it cannot be run.
+
+        It begins at the nominal values, where the other parameters belong if these are the wrong ones; and, where that leaves more than
+        noise, at those that the baseline was moved to.
+        """
+        settings = self.settings
+
+        def found(colour: dict[str, float], begun: Fit | None) -> Fit:
+            return fit(
+                self.inner,
+                self.nominal,
+                (),
+                {},
+                colour,
+                warm=begun,
+                freed=names,
+                evaluations=settings.fit.baseline_evaluations,
+                share=settings.fit.final_step_share,
+            )
+
+        best: Candidate | None = None
+        for begin in (None, baseline):
+            try:
+                first = found(self.white, begin)
+                colour = self.colour(first)
+                correlated = max(colour.values()) > settings.noise.correlated_variance
+                judged = self.judged((), found(colour, first) if correlated else first)
+            except SimulationError:
+                continue  # it leaves the range in which the model holds
+            if best is None or judged.misfit < best.misfit:
+                best = replace(judged, wrong=names)
+            if not any(significant(e) for e in best.fitted.values()):
+                break
+        return best
+
+    def united(self, candidates: list[Candidate]) -> Fit | None:
+        """One fit with everything that some hypotheses name, each for a block of its own; None where it cannot be run."""
+        if any(c.fit.events is not None for c in candidates):
+            return None
+        effects = tuple(effect for c in candidates for effect in c.effects)
+        free, held = parts_of(self.start_of(c.fit, effect) for c in candidates for effect in c.effects)
+        wrong = [name for c in candidates for name in c.wrong]
+        warm = replace(candidates[0].fit, values=candidates[0].fit.values | {n: c.fit.values[n] for c in candidates for n in c.wrong})
+        share = self.settings.fit.final_step_share
+        try:
+            return fit(self.inner, self.nominal, effects, free, self.white, fixed=held, warm=warm, freed=wrong, share=share)
+        except SimulationError:
+            return None
+
+    def polished(self, candidate: Candidate) -> Candidate:
+        """A fitted set of lasting effects, fitted on with the sensitivities of every parameter where it is.
+
+        The first fit keeps the baseline's sensitivities as they were without the effects and ends where little is to be gained; of sets
+        that nearly say the same the one that was left further from its end would lose.
+        """
+        found = candidate.fit
+        if found.events is not None or not candidate.effects:
+            return candidate
+        free, held = parts_of([self.start_of(found, effect) for effect in candidate.effects])
+        colour = self.colour(found)
+        try:
+            best = fit(
+                self.inner,
+                self.nominal,
+                candidate.effects,
+                free,
+                colour,
+                fixed=held,
+                warm=found,
+                evaluations=self.settings.fit.polish_evaluations,
+                share=self.settings.fit.final_step_share,
+            )
+            return replace(self.judged(candidate.effects, best), gain=candidate.gain)
+        except SimulationError:
+            return candidate
+
+
+def without_colour(blocks: Iterable[Block]) -> dict[str, float]:
+    """Weights of blocks whose noise is white."""
+    return dict.fromkeys((b.name for b in blocks), 1.0)
+
+
+def colour_of(problem: Problem, found: Fit) -> dict[str, float]:
+    """Weights of the colour that a fit leaves in each block."""
+    width = problem.settings.noise.fit_bin_time
+    return {b.name: inflation(b, problem.recordings, found.residuals, width) for b in problem.blocks}
+
+
+def parts_of(starts: Iterable[Start]) -> tuple[dict[str, float], dict[str, float]]:
+    """Parameters of several effects that are free, and those that are held."""
+    free: dict[str, float] = {}
+    held: dict[str, float] = {}
+    for start in starts:
+        free |= start.free
+        held |= start.held
+    return free, held
+
+
+def start_of(found: Fit, effect: str, least: float) -> Start:
+    """Where another fit goes on from an effect as it was fitted, held parameters included.
+
+    ``least`` is the share of a typical size that a parameter has at the least.
+    """
+    own = {name: _off_zero(name, value, least) for name, value in found.values.items() if name.partition(".")[0] == effect}
+    entry = next(e for e in found.rig.effects if e["id"] == effect)
+    held = {f"{effect}.{n}": v for n, v in entry["parameters"].items() if f"{effect}.{n}" not in found.values}
+    return Start(effect, own, held, (), False)
+
+
+def _off_zero(name: str, value: float, share: float) -> float:
+    """A parameter to start from: one that a fit left at zero tells nothing of its scale."""
+    least = share * _typical(name)
+    return value if abs(value) > least else least
+
+
+def _typical(name: str) -> float:
+    """A typical size of an effect's parameter, at least its lower bound."""
+    parameter = find_parameter(name)
+    return max(parameter.default or parameter.starts[-1], parameter.lower, 1e-3 * parameter.starts[0])
+
+
+def _scatter(effects: tuple[str, ...], problem: Problem, best: Fit) -> float:
+    """Relative scatter of a single effect's size between recordings, beyond its uncertainty.
+
+    One Gauss-Newton step of the effect's leading parameter alone in each recording: a wrong effect needs another size in
+    every regime.
+    """
+    if len(effects) != 1 or len(problem.recordings) < 2:
+        return 0.0
+    info, settings = EFFECTS[effects[0]], problem.settings
+    leading = next((f"{info.id}.{p.name}" for p in info.parameters if p.same_everywhere), None)
+    # of a transient effect one size was fitted to all recordings
+    if info.transient or leading is None or best.values.get(leading, 0.0) <= 0:
+        return 0.0
+    found = residuals(problem, best.rig, [leading])
+    steps, errors = [], []
+    for prepared in problem.recordings:
+        num = den = 0.0
+        for block in problem.blocks:
+            r = found[block.name, prepared.recording.name]
+            if r.jacobian is None or not acts_in(effects[0], block):
+                continue
+            slope = r.jacobian[:, 0] / r.noise
+            unit = inflation(block, [prepared], found, settings.noise.fit_bin_time)
+            num += float(slope @ (r.value / r.noise)) / unit
+            den += float(slope @ slope) / unit
+        if den > 0:
+            steps.append(num / den / best.values[leading])
+            errors.append(1.0 / math.sqrt(den) / best.values[leading])
+    if len(steps) < 2:
+        return 0.0
+    beyond = [max(0.0, abs(s) - settings.fit.scatter_stds * e) for s, e in zip(steps, errors, strict=True)]
+    return float(max(beyond))

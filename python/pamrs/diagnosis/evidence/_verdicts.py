@@ -1,0 +1,187 @@
+"""What each group of blocks says, beside what the others say, and what the case comes to.
+
+Groups of blocks are judged by themselves: what one keeps without a name says nothing of what another one has. Only an effect that acts
+in two groups ties them: it is one effect, so that its evidence in both counts together.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from pamrs.diagnosis.evidence._candidates import Candidate, Group, significant
+from pamrs.diagnosis.settings import DiagnosisSettings, VerdictSettings
+
+__all__ = ["Judged", "case_ambiguity", "case_probabilities", "case_verdict", "is_parameter", "judge", "symptoms_of"]
+
+HEALTHY = ("none", "parameters")
+WITHOUT_NAME = (*HEALTHY, "unlisted")
+"""Hypotheses that name nothing."""
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """A group of blocks with its verdict.
+
+    Attributes
+    ----------
+    group : Group
+        The blocks, and everything found out about them.
+    verdict : str
+        ``none``, ``parameters``, ``effects`` or ``unlisted``.
+    probabilities : dict of str to float
+        Over ``none``, ``parameters``, ``unlisted``, sets of effects and wrong parameters (names joined by ``+``), the most probable
+        first.
+    ambiguity : list of list of str
+        Hypotheses that are left, each as its names; empty when settled.
+    chosen : Candidate
+        The hypothesis that is named; the baseline where none is.
+    """
+
+    group: Group
+    verdict: str
+    probabilities: dict[str, float]
+    ambiguity: list[list[str]]
+    chosen: Candidate
+
+    @property
+    def named(self) -> tuple[str, ...]:
+        """Effects that are named."""
+        return self.chosen.effects if self.verdict == "effects" else ()
+
+    @property
+    def wrong(self) -> tuple[str, ...]:
+        """Parameters that are named as wrong."""
+        return self.chosen.wrong if self.verdict == "parameters" else ()
+
+    def probability(self, name: str) -> float:
+        """Probability of an effect or of a wrong parameter, whatever else acts in these blocks."""
+        return min(1.0, sum(p for key, p in self.probabilities.items() if name in key.split("+")))
+
+
+def is_parameter(name: str) -> bool:
+    """Whether a name in a hypothesis is that of a parameter of the rig file: ``chamber.dead_volume``."""
+    return "." in name
+
+
+def symptoms_of(group: Group, settings: DiagnosisSettings) -> dict[str, float]:
+    """Parameters that the refit without effects moved to their wall, and how far [tolerances]."""
+    wall = settings.wrong_parameters.wall_tolerances
+    return {name: moved for name, moved in group.candidates[0].fit.moved.items() if abs(moved) >= wall}
+
+
+def _own(group: Group, settings: DiagnosisSettings) -> dict[str, float]:
+    """Probabilities of one group by itself; what stands under ``""`` is shared out between nothing and parameters that moved."""
+    found = {key: p for key, p in group.probabilities.items() if key}
+    unchanged = group.probabilities.get("", 0.0)
+    shifted = bool(group.instead) or any(significant(e) for e in group.nominal.values())
+    explained = any(c.wrong for c in group.candidates)
+    own = settings.verdict
+    quiet = {"parameters": own.quiet_likely, "none": own.quiet_other, "unlisted": own.quiet_unlisted}
+    if symptoms_of(group, settings) and group.mismatch is None and not explained:
+        quiet = {"parameters": own.strained_parameters, "unlisted": own.strained_unlisted}
+    elif not shifted:
+        quiet |= {"none": own.quiet_likely, "parameters": own.quiet_other}
+    for name, share in quiet.items():
+        found[name] = found.get(name, 0.0) + unchanged * share
+    return {key: p for key, p in found.items() if p >= own.counted or key in WITHOUT_NAME}
+
+
+def judge(groups: Sequence[Group], settings: DiagnosisSettings) -> list[Judged]:
+    """The verdict of every group, an effect that acts in several being judged once.
+
+    Parameters
+    ----------
+    groups : sequence of Group
+        Examined, each by itself.
+    settings : DiagnosisSettings
+        Odds of what is shared, probabilities from which something is named or left open.
+    """
+    own = [_own(group, settings) for group in groups]
+    beside: list[dict[str, float]] = [{} for _ in groups]
+    for choice in itertools.product(*(p.items() for p in own)):
+        effects = [n for key, _ in choice for n in key.split("+") if n not in WITHOUT_NAME]
+        weight = math.prod(p for _, p in choice) * settings.verdict.shared_odds ** (len(effects) - len(set(effects)))
+        for found, (key, _) in zip(beside, choice, strict=True):
+            found[key] = found.get(key, 0.0) + weight
+    return [_judged(group, _normalised(found), settings.verdict) for group, found in zip(groups, beside, strict=True)]
+
+
+def _normalised(weights: dict[str, float]) -> dict[str, float]:
+    total = sum(weights.values())
+    return dict(sorted(((key, w / total) for key, w in weights.items()), key=lambda kv: -kv[1]))
+
+
+def _judged(group: Group, probabilities: dict[str, float], settings: VerdictSettings) -> Judged:
+    """The verdict: that of the most probable hypothesis; without a name only if no single name is more probable than not."""
+    start = group.candidates[0]
+    names = {key: p for key, p in probabilities.items() if key not in WITHOUT_NAME}
+    healthy = max(HEALTHY, key=lambda key: probabilities.get(key, 0.0))
+    without = probabilities.get("unlisted", 0.0)
+    best = max(names, key=lambda key: names[key], default="")
+    ambiguity = _sets(probabilities, settings)
+    if probabilities.get(healthy, 0.0) >= max(without, names.get(best, 0.0)):
+        return Judged(group, healthy, probabilities, ambiguity, start)
+    marginal = {name: sum(p for key, p in names.items() if name in key.split("+")) for name in _names(names)}
+    if names.get(best, 0.0) <= without and max(marginal.values(), default=0.0) <= settings.named:
+        return Judged(group, "unlisted", probabilities, ambiguity, start)
+    chosen = next(c for c in group.candidates if c.key == best)
+    return Judged(group, "effects" if chosen.effects else "parameters", probabilities, ambiguity, chosen)
+
+
+def _sets(probabilities: dict[str, float], settings: VerdictSettings) -> list[list[str]]:
+    """Hypotheses that are left, the most probable first; none where one is settled, ``none`` and ``parameters`` being one answer."""
+    healthy = sum(probabilities.get(key, 0.0) for key in HEALTHY)
+    others = [p for key, p in probabilities.items() if key not in HEALTHY]
+    if max(healthy, *others, 0.0) >= settings.settled:
+        return []
+    found = [sorted(key.split("+")) for key, p in probabilities.items() if p >= settings.in_set]
+    return found if len(found) > 1 else []
+
+
+def case_verdict(judged: Sequence[Judged]) -> str:
+    """The verdict of a case: a name wherever a block has one, what is missing without a name only where there is none."""
+    found = [j.verdict for j in judged]
+    if "effects" in found or any(j.wrong for j in judged):
+        return "effects" if "effects" in found else "parameters"
+    return next((verdict for verdict in ("unlisted", "parameters") if verdict in found), "none")
+
+
+def case_probabilities(judged: Sequence[Judged], settings: VerdictSettings) -> dict[str, float]:
+    """Probabilities of what a case may be told to have: the names of all its blocks together.
+
+    ``unlisted`` is that something is missing and nothing has a name. What one block keeps without a name takes nothing from a name in
+    another.
+    """
+    found = dict.fromkeys(WITHOUT_NAME, 0.0)
+    for choice in itertools.product(*(j.probabilities.items() for j in judged)):
+        keys = [key for key, _ in choice]
+        names = _names(keys)
+        rest = next((key for key in ("unlisted", "parameters") if key in keys), "none")
+        key = "+".join(names) or rest
+        found[key] = found.get(key, 0.0) + math.prod(p for _, p in choice)
+    return _normalised({key: p for key, p in found.items() if p >= settings.listed or key in WITHOUT_NAME})
+
+
+def case_ambiguity(judged: Sequence[Judged], settings: VerdictSettings) -> list[list[str]]:
+    """Sets of names that a case leaves open: the open sets of its blocks, each beside what is settled in the others."""
+    if not any(j.ambiguity for j in judged):
+        return []
+    # what a block is settled to keep without a name is no part of the question
+    options = [j.ambiguity or [[*j.named, *j.wrong]] for j in judged]
+    found: list[list[str]] = []
+    for choice in itertools.product(*options):
+        flat = [name for names in choice for name in names]
+        rest = next((word for word in reversed(WITHOUT_NAME) if word in flat), None)
+        # nothing else counts beside a name but that something else is missing
+        entry = [*_names(flat), *([rest] if rest == "unlisted" or (rest and not _names(flat)) else [])]
+        if entry and entry not in found:
+            found.append(entry)
+    return found[: settings.most_sets] if len(found) > 1 else []
+
+
+def _names(keys: Iterable[str]) -> list[str]:
+    """Names of effects and of parameters in hypotheses, each once, in alphabetical order."""
+    return sorted({name for key in keys for name in key.split("+") if name not in WITHOUT_NAME})

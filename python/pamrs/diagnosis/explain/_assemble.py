@@ -1,0 +1,555 @@
+"""From fitted hypotheses to a verdict: probabilities, model, traces, words."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from pamrs.channels import unit_of
+from pamrs.diagnosis.evidence import (
+    Candidate,
+    Group,
+    Judged,
+    case_ambiguity,
+    case_probabilities,
+    case_verdict,
+    colour_of,
+    is_parameter,
+    judge,
+    parts_of,
+    share_left,
+    start_of,
+    symptoms_of,
+)
+from pamrs.diagnosis.explain import _words as words
+from pamrs.diagnosis.explain._block_entries import block_entries, unexplained
+from pamrs.diagnosis.explain._closure_words import describe_closure
+from pamrs.diagnosis.explain._conditions import Picture, describe
+from pamrs.diagnosis.fit import CHOSEN, Events, Key, Problem, events_of, fit, residuals
+from pamrs.diagnosis.next_experiment import propose
+from pamrs.diagnosis.noise import Floor
+from pamrs.diagnosis.prepare import Residual
+from pamrs.diagnosis.result import Diagnosis
+from pamrs.diagnosis.settings import DiagnosisSettings, EvidenceSettings
+from pamrs.effects import CATALOGUE, EFFECTS
+from pamrs.errors import DiagnosisError, ParameterError, SimulationError
+from pamrs.findings import (
+    Asked,
+    BlockResidual,
+    ChannelError,
+    EffectFound,
+    EffectParameterFound,
+    FitErrors,
+    NextExperiment,
+    ParameterFound,
+    StageError,
+    Trace,
+    Tried,
+    WrongParameter,
+)
+from pamrs.recordings import Case
+from pamrs.rig import Rig
+
+__all__ = ["assemble"]
+
+
+def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) -> Diagnosis:
+    """Build the diagnosis from the groups of blocks.
+
+    Parameters
+    ----------
+    case : Case
+        The case.
+    fitted, held : Problem
+        Recordings to fit and held-out ones (the same object when there are no others).
+    groups : list of Group
+        Gas blocks and arm, examined.
+    """
+    nominal, settings = case.rig, fitted.settings
+    judged = judge(groups, settings)
+    verdict, probabilities = case_verdict(judged), case_probabilities(judged, settings.verdict)
+    ambiguity = case_ambiguity(judged, settings.verdict)
+    models = _models(nominal, fitted, judged, verdict)
+    judged = models.judged
+    floor = {k: v for g in groups for k, v in g.floor.items()}
+    fit_found = models.residuals(fitted)
+    out_found = fit_found if held is fitted else models.residuals(held)
+    located = _located(judged, settings)
+    picture = Picture()
+    if located is not None:
+        block = next(b for b in fitted.blocks if b.name == located)
+        picture = describe(block, fitted.recordings, nominal, fit_found["refit"], fit_found["after"], floor)
+    fit_table = _table(fitted, fit_found, floor)
+    held_table = _table(held, out_found, floor) if held is not fitted else {}
+    table = held_table or fit_table
+    named = any(j.named or j.wrong for j in judged)
+    gap = _gap(table, settings.verdict.least_gap) if models.final.effects or any(j.wrong for j in judged) else None
+    blocks = block_entries(judged, fitted, fit_found, held, out_found, floor)
+    diagnosis = Diagnosis(
+        case=case.name,
+        verdict=verdict,
+        where=words.where(located, fitted, judged, picture),
+        effects=_effects(judged, verdict, settings.verdict.in_set),
+        ambiguity=ambiguity,
+        probabilities=probabilities,
+        parameters=_parameters(nominal, models.chosen if named else models.starts, settings.fit.known_share),
+        fit=FitErrors(fit_table, held_table, gap),
+        next_experiment=_next(verdict, probabilities, ambiguity, nominal, judged, fitted, held),
+        warnings=_warnings(case, models, table, settings, same=held is fitted),
+        rig=_with_std(models.final, models.chosen) if models.final.effects else models.final,
+        traces=_traces(fitted, held, fit_found, out_found),
+        blocks=blocks,
+        unexplained=unexplained(judged, blocks),
+        wrong_parameters=_wrong(nominal, judged, fitted, table),
+        residuals=_block_table(groups),
+        condition_map=picture.map,
+        tried=_tried(groups),
+        asked=_asked(groups, settings.evidence),
+        settings=settings,
+    )
+    missing = [j.group for j in judged if j.verdict == "unlisted"]
+    forms = [
+        describe_closure(g.closure.fit, replace(fitted, blocks=g.blocks), g.candidates[0].fit)
+        for g in missing
+        if g.closure is not None
+    ]
+    sought = any(g.sought for g in missing)
+    return replace(diagnosis, text=words.verdict(diagnosis, case, gap, forms, settings.warnings, sought=sought))
+
+
+@dataclass(frozen=True, eq=False)
+class _Models:
+    """The rig at every stage.
+
+    Attributes
+    ----------
+    judged : list of Judged
+        The groups, what they name fitted beside what other groups know better.
+    starts, chosen : list of Candidate
+        The baseline of each group, and what goes into the final model.
+    nominal, baseline, final : Rig
+        As the rig file has it, refitted inside its tolerances, and with what was found.
+    """
+
+    judged: list[Judged]
+    starts: list[Candidate]
+    chosen: list[Candidate]
+    nominal: Rig
+    baseline: Rig
+    final: Rig
+
+    def residuals(self, problem: Problem) -> dict[str, dict[Key, Residual]]:
+        """Residuals of some recordings at every stage."""
+        happened = (c.fit.events for c in self.chosen if c.fit.events is not None)
+        events = next(happened, None) if self.final.effects else None
+        return {
+            "before": _run(problem, self.nominal, None),
+            "refit": _run(problem, self.baseline, None),
+            "after": _run(problem, self.final, events),
+        }
+
+
+def _models(nominal: Rig, fitted: Problem, judged: list[Judged], verdict: str) -> _Models:
+    """The rig at every stage, from the verdicts of the groups."""
+    starts = _settled(nominal, fitted, judged, [j.group.candidates[0] for j in judged])
+    baseline = _merged(nominal, starts)
+    if verdict not in ("effects", "unlisted") and not any(j.wrong for j in judged):
+        return _Models(judged, starts, starts, nominal, baseline, nominal if verdict == "none" else baseline)
+    wanted = [_model_of(j, start) for j, start in zip(judged, starts, strict=True)]
+    chosen = _settled(nominal, fitted, judged, wanted)
+    judged = [replace(j, chosen=c) if j.named or j.wrong else j for j, c in zip(judged, chosen, strict=True)]
+    return _Models(judged, starts, chosen, nominal, baseline, _merged(nominal, chosen))
+
+
+def _warnings(
+    case: Case, models: _Models, table: dict[str, ChannelError], settings: DiagnosisSettings, *, same: bool
+) -> list[str]:
+    """What a reader should know before trusting the rest."""
+    named = any(j.named or j.wrong for j in models.judged)
+    return [
+        *words.absolute(case, settings.warnings),
+        *(words.reservations(models.judged, models.chosen, table, settings.warnings) if named else []),
+        *(words.worse(table, settings.warnings) if models.final.effects else []),
+        *words.warnings(case, models.judged, same, settings),
+    ]
+
+
+def _model_of(judged: Judged, start: Candidate) -> Candidate:
+    """What of a group goes into the model: what is named, or a form of what has no name, or parameters alone."""
+    if judged.named or judged.wrong:
+        return judged.chosen
+    return (judged.group.closure if judged.verdict == "unlisted" else None) or start
+
+
+def _run(problem: Problem, rig: Rig, events: Events | None) -> dict[Key, Residual]:
+    """Residuals of a model; what happened in single recordings in the place of what its file says."""
+    return residuals(problem, rig if events is None else rig.without_effect(events.effect), (), events)
+
+
+def _tried(groups: list[Group]) -> list[Tried]:
+    """Every set of effects that was fitted, with what it leaves of each block's excess."""
+    return [
+        Tried(
+            blocks=[b.name for b in group.blocks],
+            effects=list(candidate.effects),
+            wrong_parameters=list(candidate.wrong),
+            fitted={b: e.ratio for b, e in candidate.fitted.items()},
+            held_out={b: e.ratio for b, e in candidate.held_out.items()},
+            gap_closed=candidate.gap_closed,
+            scatter=candidate.scatter,
+            fitted_values={n: v for n, v in candidate.fit.values.items() if n.partition(".")[0] in EFFECTS},
+            std={n: v for n, v in candidate.fit.std.items() if n.partition(".")[0] in EFFECTS},
+            prior=sum(v * v for v in candidate.fit.moved.values()),
+            suspects=[b.name for b in group.suspects],
+            gain=candidate.gain,
+        )
+        for group in groups
+        for candidate in group.candidates
+    ]
+
+
+def _asked(groups: list[Group], settings: EvidenceSettings) -> list[Asked]:
+    """Every lasting effect that acts where a mismatch is, what it promised and what it leaves alone, the best first."""
+    found = []
+    for group in groups:
+        for effect, promised in group.promised.items():
+            singles = [c for c in group.candidates if c.effects == (effect,)]
+            alone = [share_left(c, group.candidates[0], group.suspects, settings) for c in singles]
+            blocks = [b.name for b in group.suspects]
+            found.append(Asked(effect, blocks, min(1.0, max(0.0, promised)), min(alone, default=None)))
+    return sorted(found, key=lambda a: (a.left is None, a.left if a.left is not None else -a.promised))
+
+
+def _next(
+    verdict: str,
+    probabilities: dict[str, float],
+    ambiguity: list[list[str]],
+    nominal: Rig,
+    judged: list[Judged],
+    fitted: Problem,
+    held: Problem,
+) -> NextExperiment:
+    """What to record next: simulated with every hypothesis that has a model, where two or more are left; else in words."""
+    settings = fitted.settings
+    left = _hypotheses(judged, probabilities, nominal, settings.next_experiment.simulated_from)
+    recordings = [*fitted.recordings, *(held.recordings if held is not fitted else [])]
+    if ambiguity and len(left) > 1 and not words.same_data(ambiguity):
+        common = set.intersection(*(set(p.noise) for p in recordings))
+        noise = {channel: float(np.median([p.noise[channel] for p in recordings])) for channel in sorted(common)}
+        with contextlib.suppress(DiagnosisError, ParameterError, SimulationError):  # a rig that no experiment of the library suits
+            return propose(nominal, left, noise, recordings, settings=settings)
+    missing = [j.group.mismatch.name for j in judged if j.verdict == "unlisted" and j.group.mismatch is not None]
+    return words.next_experiment(verdict, probabilities, ambiguity, nominal, missing)
+
+
+def _hypotheses(
+    judged: list[Judged], probabilities: dict[str, float], nominal: Rig, least: float
+) -> list[tuple[str, Rig, float]]:
+    """The likely hypotheses that have a model, as fitted; those of an effect with times of its own can predict no other recording."""
+    found = []
+    for key, p in probabilities.items():
+        wanted = frozenset(key.split("+"))
+        if p < least or not all(name in CATALOGUE or is_parameter(name) for name in wanted):
+            continue
+        chosen = [_inside(j.group, wanted) for j in judged]
+        if any(c.fit.events is not None for c in chosen):
+            continue
+        if {name for c in chosen for name in c.names} == wanted:
+            found.append((key, _with_std(_merged(nominal, chosen), chosen), p))
+    return found
+
+
+def _inside(group: Group, wanted: frozenset[str]) -> Candidate:
+    """The most probable hypothesis of a group that names nothing else than what is wanted; the baseline where there is none."""
+    named = [c for c in group.candidates if c.names and set(c.names) <= wanted]
+    return max(named, key=lambda c: group.probabilities.get(c.key, 0.0), default=group.candidates[0])
+
+
+def _owners(candidates: list[Candidate]) -> dict[str, int]:
+    """The group that tells most of each parameter that several have (sensors' zeros): the one with the least standard deviation.
+
+    What a group leaves without a name is in its colour, and so in its standard deviations. Events are fitted with the values beside
+    them, which stay.
+    """
+
+    def spread(k: int, name: str) -> float:
+        own = candidates[k].fit
+        return own.std.get(name, math.inf) if own.events is None else 0.0
+
+    found: dict[str, int] = {}
+    for k, candidate in enumerate(candidates):
+        for name in candidate.fit.moved:
+            if spread(k, name) <= spread(found.get(name, k), name):
+                found[name] = k
+    return found
+
+
+def _settled(nominal: Rig, problem: Problem, judged: list[Judged], chosen: list[Candidate]) -> list[Candidate]:
+    """The fits of the groups again, with what another group knows better (the sensors' zeros) held, where theirs are others.
+
+    A rig has one zero of a sensor; the other values of a fit are right beside its own only.
+    """
+    owners = _owners(chosen)
+    found = list(chosen)
+    for k, candidate in enumerate(chosen):
+        common = {n: chosen[owners[n]].fit for n in candidate.fit.moved if owners[n] != k and n.startswith("sensors.")}
+        settings = problem.settings.fit
+        differences = [abs(candidate.fit.moved[n] - other.moved[n]) for n, other in common.items()]
+        apart = any(difference > settings.zero_difference for difference in differences)
+        if apart and candidate.fit.events is None:
+            own = replace(problem, blocks=judged[k].group.blocks)
+            effects = candidate.fit.effects
+            free, fixed = parts_of(start_of(candidate.fit, effect, settings.least_start) for effect in effects)
+            settled = {n: other.values[n] for n, other in common.items()}
+            colour = colour_of(own, candidate.fit)
+            with contextlib.suppress(SimulationError):  # it then stays as it was fitted
+                again = fit(
+                    own,
+                    nominal,
+                    effects,
+                    free,
+                    colour,
+                    fixed=fixed,
+                    warm=candidate.fit,
+                    share=settings.final_step_share,
+                    settled=settled,
+                    freed=candidate.fit.freed,
+                )
+                found[k] = replace(candidate, fit=again)
+    return found
+
+
+def _merged(nominal: Rig, candidates: list[Candidate]) -> Rig:
+    """One rig from the groups' fits; where two have a value of their own, that of the group that knows it best."""
+    rig = nominal
+    for candidate in candidates:
+        for effect in candidate.fit.rig.effects:
+            rig = rig.with_effect(effect["id"], effect["parameters"])
+    return rig.with_parameters({name: candidates[k].fit.values[name] for name, k in _owners(candidates).items()})
+
+
+def _with_std(rig: Rig, candidates: list[Candidate]) -> Rig:
+    for candidate in candidates:
+        for effect in candidate.fit.rig.effects:
+            own = effect["id"] + "."
+            std = {n.removeprefix(own): s for n, s in candidate.fit.std.items() if n.startswith(own)}
+            rig = rig.with_effect(effect["id"], effect["parameters"], std=std)
+    return rig
+
+
+def _located(judged: list[Judged], settings: DiagnosisSettings) -> str | None:
+    """The block that the answer is about: of those with a name first, else of those that keep something, else one at a wall."""
+    named = [j.group for j in judged if j.named or j.wrong]
+    missing = [j.group for j in judged if j.verdict == "unlisted"]
+    for groups in (named, missing, [j.group for j in judged]):
+        found = [(g.candidates[0].held_out[g.mismatch.name].ratio, g.mismatch.name) for g in groups if g.mismatch]
+        if found:
+            return max(found)[1]
+    for j in sorted(judged, key=lambda j: not j.wrong):
+        moved = symptoms_of(j.group, settings)
+        worst = j.wrong or tuple(sorted(moved, key=lambda n: -abs(moved[n])))
+        for block in reversed(j.group.blocks):
+            if worst and worst[0] in block.parameters:
+                return block.name
+    return None
+
+
+def _table(problem: Problem, found: dict[str, dict[Key, Residual]], floor: dict[Key, Floor]) -> dict[str, ChannelError]:
+    """Error of every channel at every stage."""
+    out = {}
+    for block in problem.blocks:
+        errors = {}
+        noise, weights = [], []
+        for prepared in problem.recordings:
+            noise.append(floor[block.name, prepared.recording.name].sample ** 2)
+            weights.append(max(1, int(found["refit"][block.name, prepared.recording.name].rows.sum())))
+        level = math.sqrt(float(np.average(noise, weights=weights)))
+        for stage in ("before", "refit", "after"):
+            squares = []
+            for prepared in problem.recordings:
+                r = found[stage][block.name, prepared.recording.name]
+                squares.append(float(np.mean(r.value[r.rows] ** 2)) if r.rows.any() else 0.0)
+            errors[stage] = math.sqrt(float(np.average(squares, weights=weights)))
+        out[block.channel] = ChannelError(level, errors["before"], errors["refit"], errors["after"])
+    return out
+
+
+def _gap(table: dict[str, ChannelError], least: float) -> float | None:
+    """(refit - after)/(refit - noise), pooled over channels in units of their noise."""
+    refit = sum(e.refit / e.noise for e in table.values())
+    after = sum(e.after / e.noise for e in table.values())
+    room = refit - len(table)
+    return None if room < least else max(0.0, min(1.0, (refit - after) / room))
+
+
+def _effects(judged: list[Judged], verdict: str, in_set: float) -> list[EffectFound]:
+    """The effects that are named, the most probable first; without a name those that come closest."""
+    found: dict[str, tuple[float, Candidate]] = {}
+    for j in judged:
+        names = {effect for c in j.group.candidates for effect in c.effects}
+        for effect in j.named if verdict == "effects" else names & set(CATALOGUE):
+            p = j.probability(effect)
+            if verdict == "effects":
+                # of one effect in two groups the model has the parameters of the group that comes last
+                found[effect] = max(p, found[effect][0] if effect in found else 0.0), j.chosen
+            elif p >= in_set:
+                own = [c for c in j.group.candidates if effect in c.effects]
+                found[effect] = p, max(own, key=lambda c: (j.group.probabilities.get(c.key, 0.0), c.gap_closed))
+    return [
+        EffectFound(
+            id=effect,
+            name=EFFECTS[effect].name,
+            probability=p,
+            inclusion=max((j.group.inclusion[effect] for j in judged if effect in j.group.inclusion), default=None),
+            parameters=_effect_parameters(effect, candidate),
+            events=_events(effect, candidate),
+        )
+        for effect, (p, candidate) in sorted(found.items(), key=lambda kv: -kv[1][0])
+    ]
+
+
+def _wrong(nominal: Rig, judged: list[Judged], problem: Problem, table: dict[str, ChannelError]) -> list[WrongParameter]:
+    """Parameters that the rig file is wrong about: its value, the one that the recordings ask for, and what the error becomes."""
+    found = []
+    owners = _owners([j.chosen for j in judged])
+    for name in dict.fromkeys(name for j in judged for name in j.wrong):
+        # of a zero that two groups name, the value is that of the group that knows it best
+        j, naming = judged[owners[name]], [j for j in judged if name in j.wrong]
+        known, value, std = nominal.parameter(name), j.chosen.fit.values[name], j.chosen.fit.std[name]
+        told = [b for b in problem.blocks if name in b.parameters and any(b in j.group.blocks for j in naming)]
+        errors = {b.channel: table[b.channel] for b in told}
+        found.append(
+            WrongParameter(
+                name=name,
+                block=told[-1].name if told else None,
+                nominal=known.value,
+                tolerance=known.tol,
+                value=value,
+                std=std,
+                interval=_interval(value, std, known.lower),
+                unit=known.unit,
+                moved_sigmas=j.chosen.fit.moved[name],
+                probability=max(j.probability(name) for j in naming),
+                held_out={channel: StageError(e.before, e.refit, e.after) for channel, e in errors.items()},
+            )
+        )
+    return found
+
+
+def _events(effect: str, candidate: Candidate) -> list[dict[str, Any]]:
+    """What happened in each recording, one entry for each event."""
+    events = candidate.fit.events
+    if events is None or events.effect != effect:
+        return []
+    found = []
+    rises = [p.name for p in EFFECTS[effect].with_role("rise")]
+    for recording, values in events.values.items():
+        for parameters in events_of(effect):
+            own = {p.repeats or p.name: values[p.name] for p in parameters if p.name in values}
+            if own:
+                found.append({"recording": recording, **own, **{n: values[n] for n in rises if n in values}})
+    return found
+
+
+def _effect_parameters(effect: str, candidate: Candidate) -> dict[str, EffectParameterFound]:
+    """Parameters of an effect, fitted or chosen."""
+    rig = candidate.fit.rig
+    unknown_volume = bool(words.unknown_volumes(rig))
+    out: dict[str, EffectParameterFound] = {}
+    for parameter in EFFECTS[effect].parameters:
+        name = f"{effect}.{parameter.name}"
+        if parameter.role in (*CHOSEN, "threshold"):
+            chosen = next(e["parameters"] for e in rig.effects if e["id"] == effect)[parameter.name]
+            out[parameter.name] = EffectParameterFound(chosen, None, parameter.unit)
+            continue
+        if name not in candidate.fit.values:
+            continue
+        value, std = candidate.fit.values[name], candidate.fit.std[name]
+        out[parameter.name] = _entry(value, std, parameter.unit, not unknown_volume and std < max(abs(value), 1e-300), parameter.lower)
+    if EFFECTS[effect].block == "chamber" and rig.model["valve"] is None and "" in rig.tables("chamber"):
+        out |= _emptying(effect, candidate)
+    return out
+
+
+_REFERENCE_DENSITY = 1.185
+"""Density of air in the reference state of ISO 6358 [kg/m3], to which conductances refer."""
+
+
+def _emptying(effect: str, candidate: Candidate) -> dict[str, EffectParameterFound]:
+    """How fast a conductance empties a sealed chamber, and what of it does not depend on the chamber's volume."""
+    gas, chamber = candidate.fit.rig.model["gas"], candidate.fit.rig.model["chamber"]
+    out: dict[str, EffectParameterFound] = {}
+    for parameter in EFFECTS[effect].parameters:
+        name = f"{effect}.{parameter.name}"
+        if parameter.unit != "m3/(s Pa)" or candidate.fit.values.get(name, 0.0) <= 0:
+            continue
+        value, std = candidate.fit.values[name], candidate.fit.std[name]
+        volume = chamber["dead_volume"]
+        rt = gas["gas_constant"] * gas["temperature"]
+        tau = volume / (value * _REFERENCE_DENSITY * rt * chamber["alpha_out"])
+        out["time_constant"] = _entry(tau, tau * std / value, "s", std < value)
+        out["conductance_per_volume"] = _entry(value / volume, std / volume, "1/(s Pa)", std < value)
+    return out
+
+
+def _entry(value: float, std: float, unit: str, identifiable: bool, lower: float = 0.0) -> EffectParameterFound:
+    """A fitted parameter with its interval of 95 %."""
+    return EffectParameterFound(value, std, unit, _interval(value, std, lower), identifiable)
+
+
+def _interval(value: float, std: float, lower: float) -> list[float]:
+    """Interval of 95 %, inside the lower bound."""
+    return [max(lower, value - 1.96 * std), value + 1.96 * std]
+
+
+def _parameters(nominal: Rig, candidates: list[Candidate], known: float) -> dict[str, ParameterFound]:
+    """Parameters of the baseline, each as the group has it that knows it best."""
+    out: dict[str, ParameterFound] = {}
+    for name, k in _owners(candidates).items():
+        p, own = nominal.parameter(name), candidates[k].fit
+        out[name] = ParameterFound(
+            nominal=p.value,
+            value=own.values[name],
+            std=own.std[name],
+            unit=p.unit,
+            moved_sigmas=own.moved[name],
+            identifiable=own.std[name] < known * p.tol,
+        )
+    return out
+
+
+def _block_table(groups: list[Group]) -> dict[str, BlockResidual]:
+    """Residual of each block's refitted baseline."""
+    out: dict[str, BlockResidual] = {}
+    for group in groups:
+        for block in group.blocks:
+            found = group.baseline[block.name]
+            out[block.name] = BlockResidual(found.rms, found.noise, found.systematic, found.p_value, block.channel)
+    return out
+
+
+def _traces(fitted: Problem, held: Problem, inner: dict[str, Any], outer: dict[str, Any]) -> list[Trace]:
+    traces = []
+    stock = [(fitted, inner)] if held is fitted else [(fitted, inner), (held, outer)]
+    for problem, found in stock:
+        for prepared in problem.recordings:
+            for block in problem.blocks:
+                stages = {s: found[s][block.name, prepared.recording.name] for s in ("before", "refit", "after")}
+                shown = {s: np.where(r.rows, r.prediction, np.nan) for s, r in stages.items()}
+                recording = prepared.recording
+                traces.append(
+                    Trace(
+                        recording.name,
+                        recording.role,
+                        block.channel,
+                        unit_of(block.channel),
+                        recording.time,
+                        recording.channels[block.channel],
+                        **shown,
+                    )
+                )
+    return traces

@@ -1,0 +1,53 @@
+"""Models fitted to all blocks and recordings together: parameters inside their tolerances, effects from several starts.
+
+Public: `Problem`, `Fit`, `Scaling`, `fit`, `residuals`, `changes`, `stacked`, `with_priors`, `free_baseline`, `bin_width`, `Key`;
+`levenberg_marquardt`; `Start`, `starts_of`, `CHOSEN` (where the fit of an effect begins); `Events`, `events_of`, `fit_events`,
+`look_for_events` (transient effects); `ACTS`, `acts_in`, `depends`, `fits` (where effects act).
+"""
+
+from __future__ import annotations
+
+from pamrs.diagnosis.fit._acting import ACTS, acts_in, depends, fits
+from pamrs.diagnosis.fit._fitting import (
+    Events,
+    Fit,
+    Key,
+    Problem,
+    Scaling,
+    bin_width,
+    changes,
+    fit,
+    free_baseline,
+    residuals,
+    stacked,
+    with_priors,
+)
+from pamrs.diagnosis.fit._leastsquares import levenberg_marquardt
+from pamrs.diagnosis.fit._starts import CHOSEN, Start, starts_of
+from pamrs.diagnosis.fit._transients import events_of, fit_events, look_for_events
+
+__all__ = [
+    "ACTS",
+    "CHOSEN",
+    "Events",
+    "Fit",
+    "Key",
+    "Problem",
+    "Scaling",
+    "Start",
+    "acts_in",
+    "bin_width",
+    "changes",
+    "depends",
+    "events_of",
+    "fit",
+    "fit_events",
+    "fits",
+    "free_baseline",
+    "levenberg_marquardt",
+    "look_for_events",
+    "residuals",
+    "stacked",
+    "starts_of",
+    "with_priors",
+]

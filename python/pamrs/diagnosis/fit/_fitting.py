@@ -1,0 +1,429 @@
+"""Joint fit of all blocks to all recordings: parameters inside their tolerances, effects from several starts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pamrs import _core
+from pamrs.diagnosis.fit._acting import acts_in, depends
+from pamrs.diagnosis.fit._leastsquares import levenberg_marquardt
+from pamrs.diagnosis.prepare import Block, Prepared, Residual, binned, change, residual
+from pamrs.diagnosis.settings import DiagnosisSettings, FitSettings
+from pamrs.effects import EFFECTS, find_parameter
+from pamrs.errors import ParameterError, RigError, SimulationError
+from pamrs.rig import Parameter, Rig
+from pamrs.simulation import core_rig
+
+__all__ = ["Events", "Fit", "Problem", "Scaling", "changes", "fit", "residuals", "stacked", "with_priors"]
+
+Array = NDArray[np.float64]
+Key = tuple[str, str]
+"""Block and recording."""
+
+LOGARITHMIC = frozenset(
+    f"{effect.id}.{parameter.name}"
+    for effect in EFFECTS.values()
+    for parameter in effect.parameters
+    if parameter.neutral != 0.0 and parameter.lower > 0.0
+)
+"""Shapes that are positive: fitted by their logarithm."""
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Blocks and recordings to be explained together.
+
+    Attributes
+    ----------
+    blocks : list of Block
+        Blocks that the channels can tell apart.
+    recordings : list of Prepared
+        Recordings.
+    core : _core.Rig
+        The nominal rig, compiled; others are made from it.
+    settings : DiagnosisSettings
+        What it is solved by.
+    """
+
+    blocks: list[Block]
+    recordings: list[Prepared]
+    core: _core.Rig
+    settings: DiagnosisSettings
+
+
+@dataclass(frozen=True)
+class Events:
+    """An effect that happens at times of its own in each recording.
+
+    Attributes
+    ----------
+    effect : str
+        Its id.
+    values : dict of str to dict
+        Its parameters (SI) by recording; a recording without an entry has none.
+    """
+
+    effect: str
+    values: dict[str, dict[str, float]]
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A model fitted to a problem.
+
+    Attributes
+    ----------
+    effects : tuple of str
+        Effects in the model.
+    rig : Rig
+        The model.
+    values, std : dict of str to float
+        Free parameters and their standard deviations, SI; effects' parameters included.
+    covariance : (k, k) array
+        Of the scaled free parameters.
+    cost : float
+        Half the weighted sum of squares, priors included.
+    residuals : dict
+        Residual by block and recording.
+    moved : dict of str to float
+        Distance of each baseline parameter from nominal in tolerances.
+    evaluations : int
+        Number of evaluations.
+    scales : dict of str to float
+        Change of each free parameter per unit of its scaled one, SI.
+    events : Events or None
+        What happens in single recordings.
+    freed : tuple of str
+        Baseline parameters that no prior holds.
+    """
+
+    effects: tuple[str, ...]
+    rig: Rig
+    values: dict[str, float]
+    std: dict[str, float]
+    covariance: Array
+    cost: float
+    residuals: dict[Key, Residual]
+    moved: dict[str, float] = field(default_factory=dict)
+    evaluations: int = 0
+    scales: dict[str, float] = field(default_factory=dict)
+    events: Events | None = None
+    freed: tuple[str, ...] = ()
+
+    @property
+    def held_by_prior(self) -> dict[str, float]:
+        """Baseline parameters that a prior holds, and how far each moved [tolerances]."""
+        return {name: moved for name, moved in self.moved.items() if name not in self.freed}
+
+    @property
+    def strain(self) -> float:
+        """How far it had to leave the nominal values: the sum of squares of its priors."""
+        return sum(moved * moved for moved in self.held_by_prior.values())
+
+
+def residuals(problem: Problem, rig: Rig, names: Sequence[str] = (), events: Events | None = None) -> dict[Key, Residual]:
+    """Residuals of a model for every block and recording; jacobians for the names that a block depends on.
+
+    Parameters
+    ----------
+    problem : Problem
+        Blocks and recordings.
+    rig : Rig
+        The model.
+    names : sequence of str, optional
+        Dotted parameters to differentiate with respect to.
+    events : Events, optional
+        What happens in single recordings, beside the model.
+    """
+    core = _compiled(problem, rig)
+    own = {
+        prepared.recording.name: _compiled(problem, rig.with_effect(events.effect, values))
+        for prepared in problem.recordings
+        if events is not None and (values := events.values.get(prepared.recording.name))
+    }
+    tasks = [(block, prepared) for prepared in problem.recordings for block in problem.blocks]
+
+    def one(task: tuple[Block, Prepared]) -> Residual:
+        block, prepared = task
+        relevant = [name for name in names if depends(block, name)]
+        if events is not None and prepared.recording.name not in own:  # nothing happens here that could be differentiated
+            relevant = [name for name in relevant if name.partition(".")[0] != events.effect]
+        found = residual(block, own.get(prepared.recording.name, core), prepared, relevant)
+        if len(relevant) == len(names):
+            return found
+        full = np.zeros((found.value.size, len(names)))
+        for column, name in enumerate(relevant):
+            assert found.jacobian is not None
+            full[:, list(names).index(name)] = found.jacobian[:, column]
+        return replace(found, jacobian=full)
+
+    with _inside_range(), ThreadPoolExecutor(max_workers=2) as pool:
+        found = list(pool.map(one, tasks))
+    return {(b.name, p.recording.name): r for (b, p), r in zip(tasks, found, strict=True)}
+
+
+@contextmanager
+def _inside_range() -> Iterator[None]:
+    """A trial model that cannot be (more payload taken away than there is, next to no inertia) is outside the model's range."""
+    try:
+        yield
+    except (ParameterError, RigError) as error:
+        raise SimulationError(str(error)) from error
+
+
+def _compiled(problem: Problem, rig: Rig) -> _core.Rig:
+    """Another model compiled; one so stiff that no fit could afford it is outside the range."""
+    with _inside_range():
+        core = core_rig(rig, problem.core)
+    settings = problem.settings.fit
+    least = min(settings.least_step, settings.least_step_share * problem.core.stable_step)
+    if core.stable_step < least:
+        raise SimulationError(f"the model needs steps of {core.stable_step:.1e} s; to be fitted it may need {least:.1e} s at the least")
+    return core
+
+
+def free_baseline(problem: Problem, nominal: Rig) -> list[str]:
+    """Baseline parameters with a finite tolerance that some block depends on."""
+    differentiable = set(core_rig(nominal).parameter_names)
+    return [
+        name
+        for name, parameter in nominal.parameters.items()
+        if name in differentiable and 0.0 < parameter.tol < math.inf and any(name in block.parameters for block in problem.blocks)
+    ]
+
+
+class Scaling:
+    """Free parameters as numbers of order one: tolerances for the baseline, starts or logarithms for effects."""
+
+    def __init__(
+        self,
+        nominal: Rig,
+        baseline: Sequence[str],
+        starts: dict[str, float],
+        settings: FitSettings,
+        freed: Collection[str] = (),
+    ) -> None:
+        self.names = [*baseline, *starts]
+        self.nominal, self.baseline, self.starts = nominal, list(baseline), dict(starts)
+        known = nominal.parameters
+        self.scale = {n: known[n].tol for n in baseline}
+        self.centre = {n: known[n].value for n in baseline}
+        walls = {n: settings.most_tolerances * known[n].tol for n in baseline}
+        reach = {n: _reach(known[n], settings) if n in freed else walls[n] for n in baseline}
+        lower = [(max(known[n].lower, self.centre[n] - reach[n]) - self.centre[n]) / self.scale[n] for n in baseline]
+        upper = [(min(known[n].upper, self.centre[n] + reach[n]) - self.centre[n]) / self.scale[n] for n in baseline]
+        for name, start in starts.items():
+            info = find_parameter(name)
+            if name in LOGARITHMIC:
+                lower.append(math.log(max(info.lower, start * 1e-3) / start))
+                upper.append(math.log(min(info.upper, start * 1e3) / start))
+            else:
+                # a parameter that starts from next to nothing has the scale of what it may become
+                least = settings.least_scale * max(abs(s) for s in info.starts)
+                self.scale[name] = max(abs(start), least) or 10.0
+                lower.append(info.lower / self.scale[name])
+                upper.append(info.upper / self.scale[name])
+        self.bounds = (np.array(lower), np.array(upper))
+        self.start = np.array([0.0] * len(self.baseline) + [0.0 if n in LOGARITHMIC else s / self.scale[n] for n, s in starts.items()])
+
+    def value(self, name: str, x: float) -> float:
+        """A parameter [SI] from its scaled number."""
+        if name in self.centre:
+            known = self.nominal.parameter(name)
+            return min(max(self.centre[name] + x * self.scale[name], known.lower), known.upper)
+        info = find_parameter(name)
+        found = self.starts[name] * math.exp(x) if name in LOGARITHMIC else x * self.scale[name]
+        return min(max(found, info.lower), info.upper)
+
+    def slope(self, name: str, x: float) -> float:
+        """Change of a parameter [SI] with its scaled number."""
+        return self.value(name, x) if name in LOGARITHMIC else self.scale[name]
+
+    def rig(self, x: Array, fixed: dict[str, float]) -> Rig:
+        """The model of scaled numbers, with effect parameters that are held."""
+        values = {n: self.value(n, float(v)) for n, v in zip(self.names, x, strict=True)}
+        rig = self.nominal.with_parameters({n: values[n] for n in self.baseline})
+        chosen = {**fixed, **{n: v for n, v in values.items() if n not in self.centre}}
+        for effect in dict.fromkeys(n.partition(".")[0] for n in chosen):
+            own = {n.partition(".")[2]: v for n, v in chosen.items() if n.startswith(effect + ".")}
+            rig = rig.with_effect(effect, own)
+        return rig
+
+
+def _reach(parameter: Parameter, settings: FitSettings) -> float:
+    """How far a parameter that is freed may move [SI], if its bounds allow it."""
+    farthest = settings.freed_multiple
+    return max(farthest * abs(parameter.value), farthest * settings.most_tolerances * parameter.tol)
+
+
+def bin_width(prepared: Prepared, seconds: float) -> int:
+    """Number of samples in a bin."""
+    return max(1, round(seconds / prepared.dt))
+
+
+def stacked(problem: Problem, found: dict[Key, Residual], inflation: dict[str, float]) -> tuple[Array, Array | None]:
+    """Residuals of all blocks and recordings as one vector of bin means in units of their standard deviation.
+
+    Parameters
+    ----------
+    problem : Problem
+        Blocks and recordings.
+    found : dict
+        Their residuals.
+    inflation : dict of str to float
+        As in :func:`fit`.
+
+    Returns
+    -------
+    rows : (n,) array
+    jacobian : (n, k) array or None
+        Derivative of the rows with respect to each parameter, SI; None without parameters.
+    """
+    rows, slopes = [], []
+    width = problem.settings.noise.fit_bin_time
+    for prepared in problem.recordings:
+        for block in problem.blocks:
+            r = found[block.name, prepared.recording.name]
+            mean, counts = binned(r.value, r.rows, bin_width(prepared, width))
+            weight = np.sqrt(counts) / (r.noise * math.sqrt(inflation[block.name]))
+            rows.append(mean * weight)
+            if r.jacobian is not None:
+                slope, _ = binned(r.jacobian, r.rows, bin_width(prepared, width))
+                slopes.append(-slope * weight[:, None])
+    return np.concatenate(rows), np.concatenate(slopes) if slopes else None
+
+
+def with_priors(problem: Problem, found: Fit, inflation: dict[str, float]) -> float:
+    """Sum of squares of a fit's stacked residuals and priors under a weighting of its own."""
+    rows, _ = stacked(problem, found.residuals, inflation)
+    return float(rows @ rows) + found.strain
+
+
+def changes(problem: Problem, rig: Rig, base: dict[Key, Residual], effect: str) -> dict[Key, Residual]:
+    """Residuals of a model near to another whose residuals (with the starts of their windows) are known; values alone.
+
+    Only blocks in which the effect that makes the difference acts are predicted again.
+
+    Raises
+    ------
+    SimulationError
+        If the model leaves the range in which it holds.
+    """
+    core = _compiled(problem, rig)
+    tasks = [(block, prepared) for prepared in problem.recordings for block in problem.blocks]
+
+    def one(task: tuple[Block, Prepared]) -> tuple[Key, Residual]:
+        block, prepared = task
+        key = (block.name, prepared.recording.name)
+        if not acts_in(effect, block):
+            return key, replace(base[key], jacobian=None)
+        return key, replace(base[key], value=change(block, core, prepared, base[key]), jacobian=None)
+
+    with _inside_range(), ThreadPoolExecutor(max_workers=2) as pool:
+        return dict(pool.map(one, tasks))
+
+
+def fit(
+    problem: Problem,
+    nominal: Rig,
+    effects: tuple[str, ...],
+    starts: dict[str, float],
+    inflation: dict[str, float],
+    *,
+    fixed: dict[str, float] | None = None,
+    warm: Fit | None = None,
+    frozen: bool = False,
+    events: Events | None = None,
+    evaluations: int | None = None,
+    share: float | None = None,
+    settled: Mapping[str, float] | None = None,
+    freed: Collection[str] = (),
+) -> Fit:
+    """Fit baseline parameters (with their tolerances as priors) and effects to the recordings.
+
+    Parameters
+    ----------
+    problem : Problem
+        Blocks and recordings.
+    nominal : Rig
+        Nominal model.
+    effects : tuple of str
+        Effects to include.
+    starts : dict of str to float
+        Dotted effect parameters that are free, with their starts.
+    inflation : dict of str to float
+        Variance of each block's binned residual relative to white sample noise (coloured residuals count less).
+    fixed : dict of str to float, optional
+        Effect parameters that are held.
+    warm : Fit, optional
+        A fit of the same problem from whose baseline values to start.
+    frozen : bool, optional
+        Take the sensitivities of the baseline parameters from ``warm`` and compute those of the effects alone.
+    events : Events, optional
+        What happens in single recordings, held.
+    evaluations : int, optional
+        Limit on evaluations; that of the settings by default.
+    share : float, optional
+        As in :func:`pamrs.diagnosis.fit.levenberg_marquardt`.
+    settled : mapping of str to float, optional
+        Baseline parameters that are held at other values than the nominal ones.
+    freed : collection of str, optional
+        Baseline parameters that no prior holds, and that may leave their tolerance.
+
+    Raises
+    ------
+    SimulationError
+        If the model leaves the range in which it holds where the fit starts.
+    """
+    nominal = nominal.with_parameters(settled or {})
+    baseline = [name for name in free_baseline(problem, nominal) if name not in (settled or {})]
+    own = problem.settings.fit
+    scaling = Scaling(nominal, baseline, starts, own, freed)
+    count = len(baseline)
+    bound = np.array([0.0 if name in freed else 1.0 for name in baseline])
+    kept = _jacobian_of(warm, baseline) if frozen and warm is not None else None
+    asked = scaling.names if kept is None else list(starts)
+    prior = np.zeros((count, len(scaling.names)))
+    prior[:, :count] = np.diag(bound)
+
+    def evaluate(x: Array) -> tuple[Array, Array, dict[Key, Residual]]:
+        found = residuals(problem, scaling.rig(x, fixed or {}), asked, events)
+        if kept is not None:
+            found = {key: replace(r, jacobian=_beside(kept[key], r.jacobian)) for key, r in found.items()}
+        rows, slope = stacked(problem, found, inflation)
+        slopes = np.array([scaling.slope(n, float(v)) for n, v in zip(scaling.names, x, strict=True)])
+        jacobian = np.zeros((rows.size, 0)) if slope is None else slope * slopes
+        return np.concatenate([rows, bound * x[:count]]), np.concatenate([jacobian, prior]), found
+
+    start = scaling.start.copy()
+    for index, name in enumerate(baseline):
+        if warm is not None and name in warm.values:
+            start[index] = (warm.values[name] - scaling.centre[name]) / scaling.scale[name]
+    limit = own.evaluations if evaluations is None else evaluations
+    x, (values, jacobian, found), spent = levenberg_marquardt(evaluate, start, scaling.bounds, limit, own, share)
+    covariance: Array = np.zeros((0, 0))
+    if x.size:
+        covariance = np.asarray(np.linalg.pinv(jacobian.T @ jacobian, hermitian=True), dtype=np.float64)
+    spread = np.sqrt(np.clip(np.diag(covariance), 0.0, None))
+    named = {n: scaling.value(n, float(v)) for n, v in zip(scaling.names, x, strict=True)}
+    scales = {n: scaling.slope(n, float(v)) for n, v in zip(scaling.names, x, strict=True)}
+    std = {n: float(s) * scales[n] for n, s in zip(scaling.names, spread, strict=True)}
+    moved = {n: float(v) for n, v in zip(baseline, x[:count], strict=True)}
+    rig = scaling.rig(x, fixed or {})
+    loose = tuple(name for name in baseline if name in freed)
+    return Fit(effects, rig, named, std, covariance, 0.5 * float(values @ values), found, moved, spent, scales, events, loose)
+
+
+def _jacobian_of(fitted: Fit, names: Sequence[str]) -> dict[Key, Array]:
+    """Sensitivities that a fit ended with, for some of its parameters."""
+    columns = [list(fitted.values).index(name) for name in names]
+    return {key: np.zeros((r.value.size, 0)) if r.jacobian is None else r.jacobian[:, columns] for key, r in fitted.residuals.items()}
+
+
+def _beside(left: Array, right: Array | None) -> Array:
+    return left if right is None else np.concatenate([left, right], axis=1)

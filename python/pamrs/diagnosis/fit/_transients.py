@@ -1,0 +1,407 @@
+"""Effects that happen at times of their own in every recording: pushes from outside, a payload that changes.
+
+No parameter that all recordings share can describe them. In each recording a pulse or a step of a typical size is moved through
+time; where its signature takes most of the residual a fit begins. On a held-out recording the times are looked for again, since
+nothing can predict them; what the event is (a mass) is not. Pushes have no property that carries over, so that they are believed
+only if little is left.
+"""
+
+from __future__ import annotations
+
+import math
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from threading import Event
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pamrs.diagnosis.fit._fitting import Events, Fit, Key, Problem, Scaling, changes, residuals, stacked
+from pamrs.diagnosis.fit._leastsquares import levenberg_marquardt
+from pamrs.diagnosis.prepare import Prepared, Residual
+from pamrs.diagnosis.settings import TransientSettings
+from pamrs.effects import EFFECTS, EffectParameter, find_parameter
+from pamrs.errors import SimulationError
+from pamrs.rig import Rig
+
+__all__ = ["events_of", "fit_events", "look_for_events"]
+
+Array = NDArray[np.float64]
+
+
+def events_of(effect: str) -> list[list[EffectParameter]]:
+    """Parameters (size, time, duration) of each event that one recording can have, the first event's first.
+
+    Parameters
+    ----------
+    effect : str
+        A transient effect.
+    """
+    info = EFFECTS[effect]
+    first = [p for p in info.parameters if p is info.leading or p.role in ("time", "duration")]
+    every = [[p, *(q for q in info.parameters if q.repeats == p.name)] for p in first]
+    return [list(one) for one in zip(*every, strict=True)]
+
+
+def _tried(parameter: EffectParameter) -> float:
+    """The value that a search over times gives a parameter."""
+    return parameter.default if parameter.tried is None else parameter.tried
+
+
+def _first_of(effect: str, parameter: str) -> EffectParameter:
+    """The parameter of the first event that one of a later event repeats."""
+    info = find_parameter(f"{effect}.{parameter}")
+    return find_parameter(f"{effect}.{info.repeats}") if info.repeats else info
+
+
+def _scale(effect: str, parameter: str, settings: TransientSettings) -> float:
+    """Scale of an event's parameter in a fit [SI]."""
+    scales = {"time": settings.time_scale, "duration": settings.duration_scale, "rise": settings.rise_scale}
+    return scales.get(_first_of(effect, parameter).role, _tried(EFFECTS[effect].leading))
+
+
+
+def fit_events(effect: str, problem: Problem, nominal: Rig, baseline: Fit, inflation: dict[str, float]) -> Fit | None:
+    """Find the events of an effect in every recording and refit the baseline beside them.
+
+    Parameters
+    ----------
+    effect : str
+        A transient one.
+    problem : Problem
+        Blocks and recordings.
+    nominal : Rig
+        Nominal model.
+    baseline : Fit
+        The refitted baseline.
+    inflation : dict of str to float
+        As in :func:`pamrs.diagnosis.fit.fit`.
+
+    Returns
+    -------
+    Fit or None
+        With ``events``; its ``values`` hold the parameters of the first recording that has one. None where nothing was found.
+    """
+    found = look_for_events(effect, problem, baseline.rig, baseline.residuals, inflation)
+    if found is None:
+        return None
+    last = _jointly(found, problem, nominal, baseline, inflation)
+    if last is None or last.events is None:
+        return None
+    first = next(iter(last.events.values.values()))
+    values = {f"{effect}.{name}": value for name, value in first.items()}
+    return replace(
+        last,
+        effects=(effect,),
+        rig=last.rig.with_effect(effect, first),
+        values=last.values | values,
+    )
+
+
+def look_for_events(
+    effect: str, problem: Problem, rig: Rig, base: dict[Key, Residual], inflation: dict[str, float], size: float | None = None
+) -> Events | None:
+    """The events of an effect in each recording, at a model that stays.
+
+    Parameters
+    ----------
+    effect : str
+        A transient one.
+    problem : Problem
+        Blocks and recordings.
+    rig : Rig
+        The model.
+    base : dict
+        Its residuals.
+    inflation : dict of str to float
+        As in :func:`pamrs.diagnosis.fit.fit`.
+    size : float, optional
+        Size that is known; times alone are looked for.
+
+    Returns
+    -------
+    Events or None
+        None where no recording has one.
+    """
+
+    def one(prepared: Prepared) -> dict[str, float] | None:
+        alone = replace(problem, recordings=[prepared])
+        own = {key: r for key, r in base.items() if key[1] == prepared.recording.name}
+        started = _scan(effect, alone, prepared, rig, own, inflation, size, stopped)
+        return _fitted(effect, started, alone, prepared, rig, inflation, size is not None, stopped) if started else None
+
+    stopped = Event()
+    with ThreadPoolExecutor(max_workers=2) as pool:
+        try:
+            found = list(pool.map(one, problem.recordings))
+        except BaseException:  # an interrupt is not to wait for two whole searches
+            stopped.set()
+            raise
+    values = {p.recording.name: own for p, own in zip(problem.recordings, found, strict=True) if own is not None}
+    return Events(effect, values) if values else None
+
+
+def _scan(
+    effect: str,
+    problem: Problem,
+    prepared: Prepared,
+    rig: Rig,
+    base: dict[Key, Residual],
+    inflation: dict[str, float],
+    size: float | None,
+    stopped: Event,
+) -> dict[str, float]:
+    """Where the events of one recording begin, the most telling first; empty where none is worth it."""
+    settings, slots = problem.settings.transients, len(events_of(effect))
+    typical = _tried(EFFECTS[effect].leading)
+    length = prepared.n * prepared.dt
+    times = np.arange(settings.first_time, length - settings.last_time, settings.spacing)
+    rows, _ = stacked(problem, base, inflation)
+    signatures: dict[float, Array] = {}
+    for group in _apart(times, slots):
+        if stopped.is_set():
+            return {}
+        values = _numbered([(typical if size is None else size, float(t)) for t in group], effect)
+        try:
+            moved, _ = stacked(problem, changes(problem, rig.with_effect(effect, values), base, effect), inflation)
+        except SimulationError:
+            continue
+        change = moved - rows
+        share = np.arange(rows.size) % max(1, rows.size // len(problem.blocks)) / max(1, rows.size // len(problem.blocks)) * length
+        for place, t in enumerate(group):
+            end = group[place + 1] if place + 1 < len(group) else np.inf
+            begins, ends = share >= t - settings.early, share < end - settings.early
+            signatures[float(t)] = np.where(begins & ends, change, 0.0)
+    chosen: list[float] = []
+    span, sizes = np.zeros((rows.size, 0)), np.zeros(0)
+    left = rows
+    while len(chosen) < slots:
+        gains = {
+            t: _gain(left, signature - span @ (span.T @ signature), scaled=size is None)
+            for t, signature in signatures.items()
+            if all(abs(t - s) >= settings.least_distance for s in chosen)
+        }
+        best = max(gains, key=lambda t: gains[t], default=0.0)
+        if gains.get(best, 0.0) < max(settings.least_gain, settings.least_share * float(rows @ rows)):
+            break
+        chosen.append(best)
+        columns = np.stack([signatures[t] for t in chosen], axis=1)
+        if size is None:
+            # what the events that were found can still do is no gain of another one
+            span, sizes = np.linalg.qr(columns)[0], np.asarray(np.linalg.lstsq(columns, -rows, rcond=None)[0])
+        else:
+            sizes = np.ones(len(chosen))
+        left = rows + columns @ sizes
+    events = [(float(factor) * (typical if size is None else size), t) for factor, t in zip(sizes, chosen, strict=True)]
+    return _numbered(sorted(events, key=lambda c: c[1]), effect) if events else {}
+
+
+def _gain(left: Array, signature: Array, *, scaled: bool) -> float:
+    """Gain in the sum of squares by a signature, of the best size or of its own."""
+    power = float(signature @ signature)
+    if power < 1e-9:
+        return 0.0
+    along = float(left @ signature)
+    return along**2 / power if scaled else -2.0 * along - power
+
+
+def _apart(times: Array, slots: int) -> list[list[float]]:
+    """Times in groups that can be tried in one simulation, far from each other."""
+    if slots == 1:
+        return [[float(t)] for t in times]
+    stride = -(-times.size // slots)
+    return [[float(t) for t in times[k::stride]] for k in range(stride)]
+
+
+def _numbered(events: list[tuple[float, float]], effect: str) -> dict[str, float]:
+    """Parameters of a few events of one recording, by their sizes and times."""
+    values: dict[str, float] = {}
+    for (size, time), parameters in zip(events, events_of(effect), strict=False):
+        for parameter in parameters:
+            first = _first_of(effect, parameter.name)
+            told = {"time": time, "duration": _tried(first)}
+            values[parameter.name] = told.get(first.role, size)
+    return values | {p.name: _tried(p) for p in EFFECTS[effect].with_role("rise") if values}
+
+
+def _fitted(
+    effect: str,
+    start: dict[str, float],
+    alone: Problem,
+    prepared: Prepared,
+    rig: Rig,
+    inflation: dict[str, float],
+    keep_size: bool,
+    stopped: Event,
+) -> dict[str, float] | None:
+    """Events of one recording fitted alone, at a model that stays; None where the model leaves its range."""
+    settings, leading = alone.settings, EFFECTS[effect].leading
+    free = [p for p in start if not (keep_size and _first_of(effect, p) is leading)]
+    scale = np.array([_scale(effect, p, settings.transients) for p in free])
+    limits = [_limits(effect, p, prepared, settings.transients) for p in free]
+    low, high = (np.array([limit[k] for limit in limits]) / scale for k in (0, 1))
+
+    def told(x: Array) -> dict[str, float]:
+        return start | {p: float(v) for p, v in zip(free, x * scale, strict=True)}
+
+    def evaluate(x: Array) -> tuple[Array, Array, None]:
+        if stopped.is_set():
+            raise SimulationError("the search for events was stopped")
+        events = Events(effect, {prepared.recording.name: told(x)})
+        found = residuals(alone, rig, [f"{effect}.{p}" for p in free], events)
+        rows, slope = stacked(alone, found, inflation)
+        assert slope is not None
+        return rows, slope * scale, None
+
+    try:
+        begun, most = np.array([start[p] for p in free]) / scale, settings.transients.evaluations_alone
+        x, _, _ = levenberg_marquardt(evaluate, begun, (low, high), most, settings.fit)
+    except SimulationError:
+        return None
+    return told(x)
+
+
+def _limits(effect: str, parameter: str, prepared: Prepared, settings: TransientSettings) -> tuple[float, float]:
+    """Smallest and largest value of an event's parameter [SI]."""
+    info = find_parameter(f"{effect}.{parameter}")
+    limits = {
+        "time": (0.0, prepared.n * prepared.dt),
+        "duration": (settings.least_duration, settings.most_duration),
+        "rise": (settings.least_rise, settings.most_rise),
+    }
+    size = max(info.lower, -settings.most_size), min(info.upper, settings.most_size)
+    return limits.get(_first_of(effect, parameter).role, size)
+
+
+def _jointly(events: Events, problem: Problem, nominal: Rig, baseline: Fit, inflation: dict[str, float]) -> Fit | None:
+    """Baseline and events of every recording in one fit, a changed mass the same in all; None where the model leaves its range.
+
+    One after the other would creep: a baseline that was fitted without the events holds half of what a mass does.
+    """
+    joint = _Joint.of(events, problem, nominal, baseline, inflation)
+    settings, count = problem.settings, len(joint.names)
+    try:
+        x, (values, jacobian, found), spent = levenberg_marquardt(
+            joint.evaluate,
+            joint.begin(baseline),
+            joint.bounds(),
+            settings.transients.evaluations_together,
+            settings.fit,
+        )
+    except SimulationError:
+        return None
+    spread = np.sqrt(np.clip(np.diag(np.linalg.pinv(jacobian.T @ jacobian, hermitian=True)), 0.0, None))
+    told_std = {place: float(s) for place, s in zip(joint.places, spread[count:] * joint.scale, strict=True)}
+    first = next(iter(events.values))
+    own_std = {p: told_std.get((first, p), told_std.get(("", p), math.nan)) for p in events.values[first]}
+    names, scaling = joint.names, joint.scaling
+    return replace(
+        baseline,
+        effects=(events.effect,),
+        rig=scaling.rig(x[:count], {}),
+        values={n: scaling.value(n, float(v)) for n, v in zip(names, x[:count], strict=True)},
+        std={n: baseline.std[n] for n in names} | {f"{events.effect}.{p}": s for p, s in own_std.items()},
+        cost=0.5 * float(values @ values),
+        residuals=found,
+        moved={n: float(v) for n, v in zip(names, x[:count], strict=True)},
+        evaluations=spent,
+        events=joint.told(x),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Joint:
+    """Baseline and events of every recording as one vector.
+
+    Attributes
+    ----------
+    events : Events
+        Where they begin.
+    problem : Problem
+        Blocks and recordings.
+    inflation : dict of str to float
+        As in :func:`pamrs.diagnosis.fit.fit`.
+    names : list of str
+        Baseline parameters, the first elements of the vector.
+    scaling : Scaling
+        Of them.
+    places : list of (recording, parameter)
+        The other elements; one that all recordings share has no recording.
+    scale : (k,) array
+        Scale of each of these [SI].
+    kept : list of array
+        Sensitivities to the baseline parameters in each recording, which stay as they were without the events.
+    """
+
+    events: Events
+    problem: Problem
+    inflation: dict[str, float]
+    names: list[str]
+    scaling: Scaling
+    places: list[tuple[str, str]]
+    scale: Array
+    kept: list[Array]
+
+    @staticmethod
+    def of(events: Events, problem: Problem, nominal: Rig, baseline: Fit, inflation: dict[str, float]) -> _Joint:
+        """The vector of a problem."""
+        effect, settings = events.effect, problem.settings
+        leading, shared = EFFECTS[effect].leading.name, EFFECTS[effect].leading.same_everywhere
+        names = list(baseline.moved)
+        places = [(name, p) for name, values in events.values.items() for p in values if not (shared and p == leading)]
+        places = ([("", leading)] if shared else []) + places
+        scale = np.array([_scale(effect, p, settings.transients) for _, p in places])
+        kept = []
+        for prepared in problem.recordings:
+            rows, slope = stacked(replace(problem, recordings=[prepared]), baseline.residuals, inflation)
+            kept.append(np.zeros((rows.size, 0)) if slope is None else slope[:, : len(names)])
+        scaling = Scaling(nominal, names, {}, settings.fit)
+        return _Joint(events, problem, inflation, names, scaling, places, scale, kept)
+
+    def told(self, x: Array) -> Events:
+        """The events that a vector says."""
+        values = {name: dict(own) for name, own in self.events.values.items()}
+        for (name, p), value in zip(self.places, x[len(self.names) :] * self.scale, strict=True):
+            for own in values.values() if name == "" else [values[name]]:
+                own[p] = float(value)
+        return Events(self.events.effect, values)
+
+    def evaluate(self, x: Array) -> tuple[Array, Array, dict[Key, Residual]]:
+        """Stacked residuals and priors, their sensitivities, and the residuals by block and recording."""
+        effect, count = self.events.effect, len(self.names)
+        wanted = sorted({p for own in self.events.values.values() for p in own})
+        names = [f"{effect}.{p}" for p in wanted]
+        found = residuals(self.problem, self.scaling.rig(x[:count], {}), names, self.told(x))
+        slopes = np.array([self.scaling.slope(n, float(v)) for n, v in zip(self.names, x[:count], strict=True)])
+        parts, columns = [], []
+        for prepared, fixed in zip(self.problem.recordings, self.kept, strict=True):
+            rows, slope = stacked(replace(self.problem, recordings=[prepared]), found, self.inflation)
+            assert slope is not None
+            own = self.events.values.get(prepared.recording.name, {})
+            block = np.zeros((rows.size, len(self.places)))
+            for k, (name, p) in enumerate(self.places):
+                if p in own and name in ("", prepared.recording.name):
+                    block[:, k] = slope[:, wanted.index(p)] * self.scale[k]
+            parts.append(rows)
+            columns.append(np.concatenate([fixed * slopes, block], axis=1))
+        prior = np.eye(count, count + len(self.places))
+        return np.concatenate([*parts, x[:count]]), np.concatenate([*columns, prior]), found
+
+    def begin(self, baseline: Fit) -> Array:
+        """Where the fit begins: the baseline as it was, each event where it was found."""
+        leading = EFFECTS[self.events.effect].leading.name
+        start = [(baseline.values[n] - self.scaling.centre[n]) / self.scaling.scale[n] for n in self.names]
+        sizes = [own[leading] for own in self.events.values.values()]
+        median = float(np.median(sizes))
+        begun = [median if name == "" else self.events.values[name][p] for name, p in self.places]
+        return np.concatenate([start, np.array(begun) / self.scale])
+
+    def bounds(self) -> tuple[Array, Array]:
+        """Smallest and largest value of each element."""
+        by_name = {p.recording.name: p for p in self.problem.recordings}
+        own = [by_name[name] if name else self.problem.recordings[0] for name, _ in self.places]
+        effect, settings = self.events.effect, self.problem.settings.transients
+        limits = [_limits(effect, p, r, settings) for (_, p), r in zip(self.places, own, strict=True)]
+        low = np.concatenate([self.scaling.bounds[0], np.array([limit[0] for limit in limits]) / self.scale])
+        high = np.concatenate([self.scaling.bounds[1], np.array([limit[1] for limit in limits]) / self.scale])
+        return low, high

@@ -1,0 +1,57 @@
+"""What to record next, and what some channels could tell before anything is recorded.
+
+Public: `propose`, `Outcome`, `Hypothesis`, `outcome_of`, `ranked`, `information`, `entropy` (experiments compared); `Experiment`,
+`Range`, `library`, `pressure_range`, `trial_of` (what a person can record); `Plan`, `Sight`, `Addition`, `plan_diagnosis` (before
+there are data); `MEASURABLE`, `Left`, `Linear`, `checked_channels`, `difference`, `linear`, `misfit`, `problem_of`, `taken`,
+`usual_noise`, `weights_of` (how far two models differ).
+"""
+
+from __future__ import annotations
+
+from pamrs.diagnosis.next_experiment._choice import Hypothesis, Outcome, entropy, information, outcome_of, propose, ranked
+from pamrs.diagnosis.next_experiment._differences import (
+    MEASURABLE,
+    Left,
+    Linear,
+    checked_channels,
+    difference,
+    linear,
+    misfit,
+    problem_of,
+    taken,
+    usual_noise,
+    weights_of,
+)
+from pamrs.diagnosis.next_experiment._plan import Addition, Plan, Sight
+from pamrs.diagnosis.next_experiment._planning import plan_diagnosis
+from pamrs.diagnosis.next_experiment._protocols import Experiment, Range, library, pressure_range, trial_of
+
+__all__ = [
+    "MEASURABLE",
+    "Addition",
+    "Experiment",
+    "Hypothesis",
+    "Left",
+    "Linear",
+    "Outcome",
+    "Plan",
+    "Range",
+    "Sight",
+    "checked_channels",
+    "difference",
+    "entropy",
+    "information",
+    "library",
+    "linear",
+    "misfit",
+    "outcome_of",
+    "plan_diagnosis",
+    "pressure_range",
+    "problem_of",
+    "propose",
+    "ranked",
+    "taken",
+    "trial_of",
+    "usual_noise",
+    "weights_of",
+]

@@ -1,0 +1,271 @@
+"""What a change of the model leaves in the cut chain when everything else that is free has been fitted again.
+
+Residuals are counted in bins of 0.1 s in units of the floor that the noise of the sensors (output and drives) leaves there, and a
+recording as a modest number of independent ones: errors of a model are coloured, and a recording of 6000 samples does not know a
+difference of a thousandth of its noise. Baseline parameters move inside their tolerances, an effect's own parameters inside what
+is known of them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pamrs.diagnosis.fit import Key, Problem, bin_width, free_baseline, residuals
+from pamrs.diagnosis.noise import bins_of, floors
+from pamrs.diagnosis.prepare import Prepared, Residual, available_blocks, binned, prepare
+from pamrs.diagnosis.settings import DiagnosisSettings, NextExperimentSettings
+from pamrs.effects import EFFECTS
+from pamrs.errors import DiagnosisError, ParameterError
+from pamrs.recordings import Recording
+from pamrs.rig import Rig
+from pamrs.simulation import Simulation, core_rig
+
+__all__ = [
+    "MEASURABLE",
+    "Left",
+    "Linear",
+    "checked_channels",
+    "difference",
+    "linear",
+    "misfit",
+    "problem_of",
+    "taken",
+    "usual_noise",
+    "weights_of",
+]
+
+Array = NDArray[np.float64]
+
+MEASURABLE = ("valve_command", "supply_pressure", "muscle_pressure", "joint_angle", "length")
+"""Channels that the cut chain uses."""
+
+
+def usual_noise(settings: NextExperimentSettings) -> dict[str, float]:
+    """Sample noise of usual transducers by channel [SI]."""
+    pressures = dict.fromkeys(("supply_pressure", "muscle_pressure"), settings.pressure_noise)
+    return pressures | {"joint_angle": settings.angle_noise, "length": settings.length_noise}
+
+
+def checked_channels(rig: Rig, channels: tuple[str, ...]) -> tuple[str, ...]:
+    """The channels that are given, or an error that names one that is unknown or not of this rig.
+
+    Parameters
+    ----------
+    rig : Rig
+        The rig.
+    channels : tuple of str
+        Canonical names.
+
+    Raises
+    ------
+    ParameterError
+        For a channel that the cut chain does not use, or that this rig does not have.
+    """
+    has = [*core_rig(rig).inputs, *core_rig(rig).channels]
+    own = [name for name in MEASURABLE if name in has]
+    for name in channels:
+        if name not in own:
+            raise ParameterError(f"channels has {name!r}, which is not allowed: of rig {rig.name!r} one of {', '.join(own)}")
+    return tuple(name for name in own if name in channels)
+
+
+def taken(
+    run: Simulation,
+    rig: Rig,
+    name: str,
+    noise: Mapping[str, float],
+    settings: DiagnosisSettings,
+    *,
+    rng: np.random.Generator | None = None,
+) -> Prepared:
+    """A simulation as a recording that is ready for the cut chain.
+
+    Parameters
+    ----------
+    run : Simulation
+        What happened.
+    rig : Rig
+        The rig whose blocks are to be cut.
+    name : str
+        What to call it.
+    noise : mapping of str to float
+        Sample noise by channel [SI]; channels without one are left out.
+    settings : DiagnosisSettings
+        How it is made ready.
+    rng : numpy.random.Generator, optional
+        Adds that noise; none by default.
+    """
+    names = [c for c in MEASURABLE if c in run and (c == "valve_command" or c in noise)]
+    channels = {c: np.asarray(run[c], dtype=np.float64) for c in names}
+    if rng is not None:
+        channels = {c: v + rng.normal(0.0, noise[c], v.size) if c in noise else v for c, v in channels.items()}
+    mask = {c: np.ones(v.size, dtype=bool) for c, v in channels.items()}
+    time = np.asarray(run.time, dtype=np.float64)
+    recording = Recording(name, "fit", time, float(time[1] - time[0]), channels, mask, [], {})
+    prepared = prepare(recording, rig, settings)
+    return replace(prepared, noise={c: float(noise[c]) for c in prepared.noise})
+
+
+def problem_of(rig: Rig, recordings: list[Prepared], channels: tuple[str, ...], settings: DiagnosisSettings) -> Problem:
+    """Blocks that channels can tell apart, with recordings.
+
+    Parameters
+    ----------
+    rig : Rig
+        Nominal model.
+    recordings : list of Prepared
+        Ready for the cut chain.
+    channels : tuple of str
+        Measured ones.
+    settings : DiagnosisSettings
+        Windows and steps of the blocks, and what the problem is solved by.
+
+    Raises
+    ------
+    DiagnosisError
+        If they surround no block.
+    """
+    blocks = available_blocks(rig, channels, settings.prepare)
+    if not blocks:
+        raise DiagnosisError(
+            f"channels = {', '.join(channels) or 'none'} do not surround any block of rig {rig.name!r} ({', '.join(rig.blocks)}); "
+            "measure muscle_pressure, and supply_pressure and joint_angle where the rig has them"
+        )
+    return Problem(blocks, recordings, core_rig(rig), settings)
+
+
+@dataclass(frozen=True, eq=False)
+class Left:
+    """What stays of a difference.
+
+    Attributes
+    ----------
+    rms : dict
+        By block and recording: root mean square of bin means [floors].
+    rows : dict
+        By block and recording: the difference in each bin of the fit [channel's unit].
+    total : float
+        Sum of squares on the effective number of samples, the priors' share included.
+    """
+
+    rms: dict[Key, float]
+    rows: dict[Key, Array]
+    total: float
+
+    @property
+    def largest(self) -> tuple[Key, float]:
+        """Where it is largest, and how large [floors]."""
+        key = max(self.rms, key=lambda k: self.rms[k])
+        return key, self.rms[key]
+
+
+def weights_of(problem: Problem, rig: Rig) -> dict[Key, float]:
+    """Floor of a block's bin means over a recording, as a multiple of its white part: what drives' noise adds (>= 1)."""
+    found = floors(problem, core_rig(rig))
+    out = {}
+    for prepared in problem.recordings:
+        for block in problem.blocks:
+            key = (block.name, prepared.recording.name)
+            white = prepared.noise[block.channel] / math.sqrt(bins_of(prepared))
+            out[key] = max(1.0, found[key].binned / white)
+    return out
+
+
+def _free(problem: Problem, rig: Rig) -> dict[str, float]:
+    """Parameters that may move, with the standard deviation of what is known [SI]."""
+    out = {name: rig.parameter(name).tol for name in free_baseline(problem, rig.without_effect())}
+    known = set(core_rig(rig).parameter_names)
+    for effect in rig.effects:
+        spread = rig.effect_std.get(effect["id"], {})
+        for parameter in EFFECTS[effect["id"]].parameters:
+            name = f"{effect['id']}.{parameter.name}"
+            value = abs(effect["parameters"][parameter.name])
+            std = spread.get(parameter.name, problem.settings.next_experiment.known_share * value)
+            if name in known and math.isfinite(std) and std > 0.0:
+                out[name] = min(std, 2.0 * value) if value > 0.0 else std
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class Linear:
+    """A model near to some recordings.
+
+    Attributes
+    ----------
+    rig : Rig
+        The model.
+    free : dict of str to float
+        Parameters that may move, with the standard deviation of what is known [SI].
+    found : dict
+        Residuals by block and recording, with sensitivities to them.
+    """
+
+    rig: Rig
+    free: dict[str, float]
+    found: dict[Key, Residual]
+
+
+def linear(problem: Problem, rig: Rig) -> Linear:
+    """Residuals of a model and their sensitivities to all that is free."""
+    free = _free(problem, rig)
+    return Linear(rig, free, residuals(problem, rig, list(free)))
+
+
+def misfit(problem: Problem, model: Linear, weights: Mapping[Key, float]) -> Left:
+    """What a model leaves of recordings after its free parameters have moved as far as they may."""
+    return _left(problem, {key: r.value for key, r in model.found.items()}, model, weights)
+
+
+def difference(problem: Problem, truth: Mapping[Key, Residual], other: Rig, weights: Mapping[Key, float]) -> Left:
+    """What a model leaves of the recordings that another one makes.
+
+    Parameters
+    ----------
+    problem : Problem
+        Blocks, and recordings without noise.
+    truth : mapping
+        Residuals of the model that makes them; what it leaves itself (smoothing and the longer step of the cut chain) is taken off.
+    other : Rig
+        The model that is to explain them.
+    weights : mapping
+        As :func:`weights_of`.
+    """
+    model = linear(problem, other)
+    return _left(problem, {key: r.value - truth[key].value for key, r in model.found.items()}, model, weights)
+
+
+def _left(problem: Problem, values: Mapping[Key, Array], model: Linear, weights: Mapping[Key, float]) -> Left:
+    spread = np.array(list(model.free.values()))
+    effective = problem.settings.next_experiment.effective_samples
+    rows, slopes, scales = [], [], []
+    keys: list[Key] = []
+    for prepared in problem.recordings:
+        width = bin_width(prepared, problem.settings.noise.fit_bin_time)
+        for block in problem.blocks:
+            key = (block.name, prepared.recording.name)
+            r = model.found[key]
+            mean, counts = binned(np.where(r.rows, values[key], 0.0), r.rows, width)
+            slope, _ = binned(np.zeros((values[key].size, 0)) if r.jacobian is None else r.jacobian, r.rows, width)
+            floor = weights[key] * prepared.noise[block.channel] / math.sqrt(bins_of(prepared))
+            # what differs is smooth over a bin of 0.1 s: its mean square in fine bins is that in coarse ones
+            scale = math.sqrt(effective / max(1, int((counts > 0).sum()))) / floor
+            rows.append(mean * scale)
+            slopes.append(-slope * spread * scale)
+            scales.append(scale)
+            keys.append(key)
+    stacked, jacobian = np.concatenate(rows), np.concatenate(slopes)
+    moved = np.linalg.solve(jacobian.T @ jacobian + np.eye(spread.size), jacobian.T @ stacked)
+    left = stacked - jacobian @ moved
+    rms, kept = {}, {}
+    start = 0
+    for key, part, scale in zip(keys, rows, scales, strict=True):
+        own = left[start : start + part.size]
+        start += part.size
+        rms[key] = math.sqrt(float(own @ own) / effective)
+        kept[key] = own / scale
+    return Left(rms, kept, float(left @ left + moved @ moved))

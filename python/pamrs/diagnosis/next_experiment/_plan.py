@@ -1,0 +1,263 @@
+"""A plan: what some channels can tell of a rig, as data and as a page for a terminal."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from dataclasses import dataclass, field
+from typing import Any
+
+from pamrs.effects import CATALOGUE, find_parameter
+from pamrs.errors import ParameterError
+
+__all__ = ["Addition", "Plan", "Sight"]
+
+
+@dataclass(frozen=True)
+class Sight:
+    """How an effect would show.
+
+    Attributes
+    ----------
+    effect : str
+        Its id.
+    left : float
+        What is left of its signature, root mean square over the recording where that is largest [noise units].
+    block, recording : str
+        Where; empty when it acts in no block that the channels surround.
+    size : str
+        Dotted name of the parameter that scales it; empty where no number does.
+    typical, smallest : float
+        Typical value of that parameter and the smallest one (of a restriction's conductance, the largest) that leaves three noise
+        units [SI]; NaN without one.
+    verdict : str
+        ``seen``, ``faint`` or ``hidden`` at the typical size.
+    """
+
+    effect: str
+    left: float
+    block: str = ""
+    recording: str = ""
+    size: str = ""
+    typical: float = math.nan
+    smallest: float = math.nan
+    verdict: str = "hidden"
+
+
+@dataclass(frozen=True)
+class Addition:
+    """What one more channel or experiment would add.
+
+    Attributes
+    ----------
+    kind, name, text : str
+        ``channel`` or ``experiment``, which one, and in words.
+    seen : tuple of str
+        Effects that are seen only with it.
+    separated : tuple of (str, str)
+        Pairs that are told apart only with it.
+    bits : float
+        Gain of half the logarithm of the determinant of the effects' information at their typical sizes [bit].
+    """
+
+    kind: str
+    name: str
+    text: str
+    seen: tuple[str, ...]
+    separated: tuple[tuple[str, str], ...]
+    bits: float
+
+
+@dataclass(frozen=True, repr=False)
+class Plan:
+    """What some channels and experiments can tell of a rig.
+
+    Attributes
+    ----------
+    rig : str
+        Its name.
+    channels : tuple of str
+        Measured ones.
+    noise : dict of str to float
+        Sample noise of each [SI].
+    blocks : list of dict
+        ``name``, ``channel``, ``drives``, ``covers``, ``why`` its parts are lumped.
+    missing : list of dict
+        Blocks that would be there with more channels: ``name``, ``covers``, ``needs``.
+    experiments : list of dict
+        ``name``, ``text``, ``duration`` [s] of those assumed.
+    sights : list of Sight
+        One for each effect that the rig can have, in the order of the catalogue.
+    pairs : list of (str, str, float)
+        Effects seen that are not told apart, with the cosine of their signatures.
+    groups : list of tuple of str
+        The same, joined.
+    additions : list of Addition
+        What would add most, first.
+    """
+
+    rig: str
+    channels: tuple[str, ...]
+    noise: dict[str, float]
+    blocks: list[dict[str, Any]]
+    missing: list[dict[str, Any]]
+    experiments: list[dict[str, Any]]
+    sights: list[Sight]
+    pairs: list[tuple[str, str, float]]
+    groups: list[tuple[str, ...]]
+    additions: list[Addition] = field(default_factory=list)
+
+    @property
+    def seen(self) -> tuple[str, ...]:
+        """Effects that would be seen at their typical size."""
+        return tuple(s.effect for s in self.sights if s.verdict == "seen")
+
+    def sight(self, effect: str) -> Sight:
+        """How one effect would show.
+
+        Parameters
+        ----------
+        effect : str
+            Its id.
+
+        Returns
+        -------
+        Sight
+            What is left of it beside the baseline's freedom.
+
+        Raises
+        ------
+        ParameterError
+            If the plan does not have it.
+        """
+        found = next((s for s in self.sights if s.effect == effect), None)
+        if found is None:
+            raise ParameterError(f"effect = {effect!r} is not allowed: one of {', '.join(s.effect for s in self.sights)}")
+        return found
+
+    def separable(self, first: str, second: str) -> bool:
+        """Whether two effects that are seen would be told apart; False when one of them is not seen.
+
+        Parameters
+        ----------
+        first, second : str
+            Their ids.
+
+        Returns
+        -------
+        bool
+        """
+        both = {self.sight(first).effect, self.sight(second).effect}
+        return both <= set(self.seen) and not any({a, b} == both for a, b, _ in self.pairs)
+
+    @property
+    def not_asked(self) -> tuple[str, ...]:
+        """Effects of the catalogue that have no place in this rig, or none that these channels surround."""
+        return tuple(e for e in CATALOGUE if e not in {sight.effect for sight in self.sights})
+
+    def to_dict(self) -> dict[str, Any]:
+        """The plan as plain values, null for no number."""
+
+        def number(value: float) -> float | None:
+            return value if math.isfinite(value) else None
+
+        return {
+            "schema": "pamrs.plan/1",
+            "rig": self.rig,
+            "channels": list(self.channels),
+            "noise": dict(self.noise),
+            "blocks": self.blocks,
+            "missing": self.missing,
+            "experiments": self.experiments,
+            "effects": [
+                {
+                    "id": s.effect,
+                    "verdict": s.verdict,
+                    "left": number(s.left),
+                    "block": s.block or None,
+                    "recording": s.recording or None,
+                    "size": s.size or None,
+                    "typical": number(s.typical),
+                    "smallest": number(s.smallest),
+                }
+                for s in self.sights
+            ],
+            "not_asked": list(self.not_asked),
+            "pairs": [{"effects": [a, b], "cosine": round(c, 4)} for a, b, c in self.pairs],
+            "groups": [list(group) for group in self.groups],
+            "additions": [
+                {
+                    "kind": a.kind,
+                    "name": a.name,
+                    "text": a.text,
+                    "seen": list(a.seen),
+                    "separated": [list(pair) for pair in a.separated],
+                    "bits": round(a.bits, 3),
+                }
+                for a in self.additions
+            ],
+        }
+
+    def text(self) -> str:
+        """The plan as a page for a terminal."""
+        lines = [f"Plan of a diagnosis of {self.rig}, with {', '.join(self.channels) or 'no channel'}", ""]
+        lines += ["Blocks that these channels tell apart"]
+        for block in self.blocks:
+            lines.append(f"  {block['name']:<8} {', '.join(block['drives']) or '(its start)'} -> {block['channel']}")
+            lines += _wrapped(f"lumps {block['covers']}: {block['why']}" if block["why"] else block["covers"], 11)
+        lines += [] if self.blocks else ["  none"]
+        for block in self.missing:
+            needs = ", ".join(block["needs"])
+            lines += _wrapped(f"not {block['name']} ({block['covers']}): without {needs} nothing drives or shows it", 2)
+        if self.experiments:
+            lines += ["", "Experiments assumed"]
+            for experiment in self.experiments:
+                lines += _wrapped(f"{experiment['name']}: {experiment['text']} ({experiment['duration']:.0f} s)", 2)
+        return "\n".join([*lines, *(self._effects() if self.blocks else ["", "No effect can be seen"]), *self._gains()])
+
+    def _effects(self) -> list[str]:
+        """The table of the effects, and what is not told apart."""
+        lines = ["", "Effects of a small but usual size, after the baseline has moved inside its tolerances (noise units of 0.1 s)"]
+        lines += [
+            f"  {'effect':<25}{'':<8}{'left':>7}  {'in':<9}{'recording':<17}{'at size':>10}{'seen from':>11}  {'unit':<13}taken for"
+        ]
+        for sight in self.sights:
+            rivals = [b if a == sight.effect else a for a, b, _ in self.pairs if sight.effect in (a, b)]
+            unit = find_parameter(sight.size).unit if sight.size else ""
+            typical = f"{sight.typical:.3g}" if math.isfinite(sight.typical) else ""
+            smallest = f"{sight.smallest:.2g}" if math.isfinite(sight.smallest) else ""
+            where = f"{sight.block or '-':<9}{sight.recording or '-':<17}"
+            if sight.verdict == "hidden":
+                rivals += ["the parameters inside their tolerances, or noise" if sight.block else "(nothing here shows it)"]
+            lines.append(
+                f"  {sight.effect:<25}{sight.verdict:<8}{sight.left:>7.2g}  {where}{typical:>10}"
+                f"{smallest:>11}  {'' if unit == '1' else unit:<13}{', '.join(rivals)}".rstrip()
+            )
+        return [
+            *lines,
+            *(["", f"Not asked of this rig and these channels: {', '.join(self.not_asked)}"] if self.not_asked else []),
+            "",
+            "Not told apart: " + ("; ".join(", ".join(g) for g in self.groups) if self.groups else "none of those seen"),
+        ]
+
+    def _gains(self) -> list[str]:
+        """What would add most."""
+        lines = []
+        if self.additions:
+            lines += ["", "What would add most"]
+            for addition in self.additions:
+                gains = [f"shows {', '.join(addition.seen)}"] if addition.seen else []
+                gains += [f"tells {', '.join(f'{a} from {b}' for a, b in addition.separated)}"] if addition.separated else []
+                gains += [] if gains else ["sharper, nothing new"]
+                lines += _wrapped(f"{addition.kind} {addition.name}: {'; '.join(gains)} (+{addition.bits:.0f} bit)", 2)
+        return lines
+
+    def __repr__(self) -> str:
+        return (
+            f"Plan({self.rig}: {len(self.blocks)} blocks, {len(self.seen)} of {len(self.sights)} effects seen, "
+            f"{len(self.groups)} groups not told apart)"
+        )
+
+
+def _wrapped(text: str, indent: int) -> list[str]:
+    return textwrap.wrap(text, 130, initial_indent=" " * indent, subsequent_indent=" " * (indent + 2))

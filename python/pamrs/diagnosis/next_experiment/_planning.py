@@ -1,0 +1,379 @@
+"""Before any data: which blocks some channels tell apart, which effects they show, and which they cannot tell from each other.
+
+The rig is simulated under a few standard experiments. Each effect of the catalogue, at a typical size, changes the residuals of the
+cut chain by a signature; what the baseline can do inside its tolerances, and the starts of the windows, are taken off it. What is
+left, in units of the noise, says whether the effect would be seen, and the angle between what is left of two effects whether one
+would be taken for the other (Ding, Model-Based Fault Diagnosis Techniques, 2013, isolability by projected signatures).
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pamrs.diagnosis.fit import Key, Problem, Start, acts_in, bin_width, changes, fits, free_baseline, residuals, starts_of
+from pamrs.diagnosis.next_experiment._differences import MEASURABLE, checked_channels, taken, usual_noise, weights_of
+from pamrs.diagnosis.next_experiment._plan import Addition, Plan, Sight
+from pamrs.diagnosis.next_experiment._protocols import Experiment, library
+from pamrs.diagnosis.noise import bins_of
+from pamrs.diagnosis.prepare import Block, available_blocks, binned
+from pamrs.diagnosis.settings import DiagnosisSettings, PlanSettings
+from pamrs.effects import CATALOGUE
+from pamrs.errors import DiagnosisError, ParameterError, SimulationError
+from pamrs.rig import Rig
+from pamrs.simulation import core_rig, has_frame, regulators_of
+
+__all__ = ["plan_diagnosis"]
+
+Array = NDArray[np.float64]
+
+BASIC = ("multisine", "sealed_hold", "slow_triangle", "step_and_shut", "hold_low", "hold_high")
+"""Experiments that a plan assumes by default, those of them that the rig can do."""
+_LUMPED = {
+    "supply": "what leaves the tank by itself and what the valve takes are one sum in its pressure; only that follows the command",
+    "chamber": "no pressure is measured between the valve's outlet and the muscle, nor the temperature of the gas",
+    "arm": "neither force nor torque is measured between the muscle and the arm",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """What one block over one experiment says: products of baseline sensitivities and signatures, which add up.
+
+    Attributes
+    ----------
+    baseline : (k, k) array
+        Of the baseline's sensitivities.
+    mixed : (k, m) array
+        Of these with the signatures.
+    signatures : (m, m) array
+        Of the signatures.
+    """
+
+    baseline: Array
+    mixed: Array
+    signatures: Array
+
+
+@dataclass(frozen=True, eq=False)
+class _Picture:
+    """What a choice of blocks and experiments shows: of each effect, and between every two."""
+
+    sights: dict[str, Sight]
+    cosine: dict[tuple[str, str], float]
+    unseparated: frozenset[tuple[str, str]]
+    bits: float
+
+
+def plan_diagnosis(
+    rig: Rig,
+    channels: Iterable[str],
+    *,
+    noise: Mapping[str, float] | None = None,
+    experiments: Sequence[str] | None = None,
+    settings: DiagnosisSettings | None = None,
+    progress: Callable[[str], None] | None = None,
+) -> Plan:
+    """What a diagnosis could tell of a rig from some channels, before anything is recorded.
+
+    Parameters
+    ----------
+    rig : Rig
+        Nominal model, one that can be diagnosed: a tank or a constant supply, valve, chamber and arm without names, or a part.
+    channels : iterable of str
+        Channels at hand, of ``valve_command``, ``supply_pressure``, ``muscle_pressure`` and ``joint_angle``.
+    noise : mapping of str to float, optional
+        Sample noise by channel [SI]; that of typical transducers by default (``next_experiment`` of the settings).
+    experiments : sequence of str, optional
+        Names of the experiments that will be made; multisine, sealed holds, slow triangle and steps by default.
+    settings : DiagnosisSettings, optional
+        From where on an effect counts as seen, and two as apart; the published ones by default.
+    progress : callable, optional
+        Called with a line of text now and then.
+
+    Returns
+    -------
+    Plan
+        Blocks, effects seen, groups that are not told apart, what would add most.
+
+    Raises
+    ------
+    ParameterError
+        For an unknown channel or experiment, or a noise that is not above zero.
+    DiagnosisError
+        If rigs of this kind cannot be diagnosed.
+
+    Examples
+    --------
+    >>> import pamrs
+    >>> plan = pamrs.plan_diagnosis(pamrs.rigs.sealed_chamber(), ["muscle_pressure"])
+    >>> plan.sight("leak_muscle").verdict
+    'seen'
+    """
+    _check_rig(rig)
+    settings = DiagnosisSettings() if settings is None else settings
+    own = checked_channels(rig, tuple(channels))
+    sound = _noise(noise, settings)
+    say = progress or (lambda _: None)
+    every = tuple(c for c in MEASURABLE if c in {*core_rig(rig).inputs, *core_rig(rig).channels})
+    whole = available_blocks(rig, every, settings.prepare)
+    pool = {e.name: e for e in library(rig, settings.next_experiment)}
+    chosen = [name for name in BASIC if name in pool] if experiments is None else list(experiments)
+    for name in chosen:
+        if name not in pool:
+            raise ParameterError(f"experiments has {name!r}, which is not allowed: of rig {rig.name!r} one of {', '.join(pool)}")
+    starts = [s for e in CATALOGUE if _applies(rig, e, whole) for s in starts_of(e, sealed=rig.model["valve"] is None)]
+    parts: dict[Key, _Part] = {}
+    usable = {}
+    for name, experiment in pool.items():
+        say(f"{name}: {experiment.duration:.0f} s with {len(starts)} starts of {len({s.effect for s in starts})} effects")
+        try:
+            parts |= _parts(rig, whole, experiment, starts, sound, settings)
+            usable[name] = experiment
+        except SimulationError:
+            continue  # the cut chain leaves the range of the model there
+    chosen = [name for name in chosen if name in usable]
+    blocks = available_blocks(rig, own, settings.prepare)
+    assumed = _Assumed(rig, parts, starts, settings)
+    now = assumed.picture(blocks, chosen)
+    order = [e for e in CATALOGUE if e in now.sights]
+    unseparated = sorted(now.unseparated, key=lambda p: (order.index(p[0]), order.index(p[1])))
+    pairs = [(a, b, now.cosine[a, b]) for a, b in unseparated]
+    return Plan(
+        rig=rig.name,
+        channels=own,
+        noise={c: sound[c] for c in own if c in sound},
+        blocks=[_described(block) for block in blocks],
+        missing=[
+            {"name": b.name, "covers": b.covers, "needs": assumed.needed(b.name, own, every)}
+            for b in whole
+            if b.name not in {own_block.name for own_block in blocks}
+        ],
+        experiments=[{"name": n, "text": usable[n].text, "duration": usable[n].duration} for n in chosen],
+        sights=[now.sights[e] for e in order],
+        pairs=pairs,
+        groups=_joined([(a, b) for a, b, _ in pairs], order),
+        additions=assumed.additions(own, every, chosen, usable),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Assumed:
+    """What every block shows over every experiment, to be looked at with some channels and some experiments."""
+
+    rig: Rig
+    parts: dict[Key, _Part]
+    starts: list[Start]
+    settings: DiagnosisSettings
+
+    def blocks(self, channels: tuple[str, ...]) -> list[Block]:
+        """Blocks that some channels tell apart."""
+        return available_blocks(self.rig, checked_channels(self.rig, channels), self.settings.prepare)
+
+    def picture(self, blocks: list[Block], experiments: Sequence[str]) -> _Picture:
+        """What some blocks over some experiments show."""
+        return _picture(self.parts, blocks, experiments, self.starts, self.settings)
+
+    def needed(self, block: str, own: tuple[str, ...], every: tuple[str, ...]) -> list[str]:
+        """The fewest channels that, added to those at hand, surround a block."""
+        lacking = [c for c in every if c not in own]
+        for count in range(1, len(lacking) + 1):
+            for several in itertools.combinations(lacking, count):
+                if any(b.name == block for b in self.blocks((*own, *several))):
+                    return list(several)
+        return lacking
+
+    def additions(
+        self, own: tuple[str, ...], every: tuple[str, ...], chosen: list[str], usable: Mapping[str, Experiment]
+    ) -> list[Addition]:
+        """What each further channel (two of them where one surrounds no block) and each further experiment would add."""
+        blocks = self.blocks(own)
+        now = self.picture(blocks, chosen)
+        lacking = [c for c in every if c not in own]
+        found = []
+        for channel in lacking:
+            then = self.picture(self.blocks((*own, channel)), chosen)
+            found.append(_addition("channel", channel, channel.replace("_", " "), now, then))
+        for several in itertools.combinations(lacking, 2) if not blocks else ():
+            text = " and ".join(c.replace("_", " ") for c in several)
+            then = self.picture(self.blocks((*own, *several)), chosen)
+            found.append(_addition("channels", "+".join(several), text, now, then))
+        for name in [n for n in usable if n not in chosen] if blocks else ():
+            then = self.picture(blocks, [*chosen, name])
+            found.append(_addition("experiment", name, usable[name].text, now, then))
+        return sorted(found, key=lambda a: (-(len(a.seen) + len(a.separated)), -a.bits))
+
+
+def _check_rig(rig: Rig) -> None:
+    """Refuse rigs that no experiment is made for."""
+    if not isinstance(rig, Rig):
+        raise ParameterError(f"rig is a {type(rig).__name__}; a Rig is needed: pamrs.rigs.shoulder(), pamrs.load_rig(path)")
+    several = [block for block in rig.blocks if "" not in rig.tables(block)]
+    reasons = {
+        f"it already has the effect {rig.effects[0]['id']!r}; plan with a rig without effects" if rig.effects else "",
+        f"it has named blocks ({', '.join(several)}); rigs of one chain can be planned, without names" if several else "",
+        "it is fed by a regulator; rigs fed by a tank or a constant supply can be planned" if regulators_of(rig) else "",
+        "its load is a frame; a mass, [joint] and [arm], or no muscle can be planned" if has_frame(rig) else "",
+    } - {""}
+    if reasons:
+        raise DiagnosisError(f"rig {rig.name!r}: {'; '.join(sorted(reasons))}")
+
+
+def _noise(given: Mapping[str, float] | None, settings: DiagnosisSettings) -> dict[str, float]:
+    """Sample noise of every channel [SI]."""
+    usual = usual_noise(settings.next_experiment)
+    for name, value in (given or {}).items():
+        if name not in usual:
+            raise ParameterError(f"noise has {name!r}, which is not allowed: one of {', '.join(usual)}")
+        if not (math.isfinite(value) and value > 0.0):
+            raise ParameterError(f"noise of {name} = {value} is not allowed: a finite number > 0 is needed")
+    return {**usual, **{name: float(value) for name, value in (given or {}).items()}}
+
+
+def _applies(rig: Rig, effect: str, blocks: list[Block]) -> bool:
+    """Whether a rig has what an effect acts on, and a block of the cut chain in which it could show."""
+    return fits(rig, effect) and any(acts_in(effect, block) for block in blocks)
+
+
+def _described(block: Block) -> dict[str, Any]:
+    lumped = block.covers != block.name
+    return {
+        "name": block.name,
+        "channel": block.channel,
+        "drives": list(block.drives),
+        "covers": block.covers,
+        "why": _LUMPED.get(block.name, "") if lumped else "",
+    }
+
+
+def _parts(
+    rig: Rig,
+    blocks: list[Block],
+    experiment: Experiment,
+    starts: list[Start],
+    noise: Mapping[str, float],
+    settings: DiagnosisSettings,
+) -> dict[Key, _Part]:
+    """Products of everything that one experiment shows, by block."""
+    stands = experiment.changed(rig)
+    prepared = taken(experiment.simulate(rig), stands, experiment.name, noise, settings)
+    problem = Problem(blocks, [prepared], core_rig(stands), settings)
+    baseline = free_baseline(problem, stands)
+    base = residuals(problem, stands, baseline)
+    weights = weights_of(problem, stands)
+    spread = np.array([stands.parameter(name).tol for name in baseline])
+    width, effective = bin_width(prepared, settings.noise.fit_bin_time), settings.next_experiment.effective_samples
+    scale, slopes, moved = {}, {}, {}
+    for block in blocks:
+        key = (block.name, experiment.name)
+        r = base[key]
+        slope, counts = binned(np.zeros((r.value.size, 0)) if r.jacobian is None else r.jacobian, r.rows, width)
+        floor = weights[key] * noise[block.channel] / math.sqrt(bins_of(prepared))
+        scale[key] = math.sqrt(effective / max(1, int((counts > 0).sum()))) / floor
+        slopes[key] = slope * spread * scale[key]
+        moved[key] = np.zeros((slope.shape[0], len(starts)))
+    for index, start in enumerate(starts):
+        acting = [b for b in blocks if acts_in(start.effect, b)]
+        try:
+            found = changes(replace(problem, blocks=acting), start.applied(stands), base, start.effect)
+        except SimulationError:
+            continue  # this size leaves the range in which the model holds
+        for block in acting:
+            key = (block.name, experiment.name)
+            mean, _ = binned(found[key].value - base[key].value, base[key].rows, width)
+            moved[key][:, index] = mean * scale[key]
+    return {k: _Part(slopes[k].T @ slopes[k], slopes[k].T @ moved[k], moved[k].T @ moved[k]) for k in slopes}
+
+
+def _picture(
+    parts: Mapping[Key, _Part],
+    blocks: list[Block],
+    experiments: Sequence[str],
+    starts: list[Start],
+    settings: DiagnosisSettings,
+) -> _Picture:
+    """What some blocks over some experiments show."""
+    used = {key: part for key, part in parts.items() if key[0] in {b.name for b in blocks} and key[1] in experiments}
+    effects = list(dict.fromkeys(s.effect for s in starts))
+    own_settings = settings.plan
+    if not used:
+        return _Picture({e: Sight(e, 0.0) for e in effects}, {}, frozenset(), 0.0)
+    total = _Part(sum(p.baseline for p in used.values()), sum(p.mixed for p in used.values()), sum(p.signatures for p in used.values()))  # type: ignore[arg-type]
+    freed = np.linalg.solve(total.baseline + np.eye(len(total.baseline)), total.mixed)
+    gram = total.signatures - total.mixed.T @ freed
+    sizes = {
+        key: np.sqrt(
+            np.clip(
+                np.diag(p.signatures)
+                - 2.0 * np.einsum("km,km->m", p.mixed, freed)
+                + np.einsum("km,kl,lm->m", freed, p.baseline, freed),
+                0.0,
+                None,
+            )
+            / settings.next_experiment.effective_samples
+        )
+        for key, p in used.items()
+    }
+    power = np.sqrt(np.clip(np.diag(gram), 1e-12, None))
+    cosines = np.abs(gram) / np.outer(power, power)
+    sights: dict[str, Sight] = {}
+    best: dict[str, int] = {}
+    for effect in effects:
+        own = [k for k, s in enumerate(starts) if s.effect == effect]
+        index, key = max(((k, key) for k in own for key in sizes), key=lambda pair: float(sizes[pair[1]][pair[0]]))
+        best[effect] = index
+        sights[effect] = _sight(starts[index], float(sizes[key][index]), key, own_settings)
+    cosine, unseparated = {}, set()
+    for first, second in itertools.combinations(effects, 2):
+        mine, theirs = best[first], best[second]
+        shapes = {e: [k for k, s in enumerate(starts) if s.effect == e] for e in (first, second)}
+        forward = float(max(cosines[mine, k] for k in shapes[second]))
+        backward = float(max(cosines[theirs, k] for k in shapes[first]))
+        cosine[first, second] = min(1.0, max(forward, backward))
+        left = min(
+            sights[first].left * math.sqrt(max(0.0, 1.0 - forward**2)), sights[second].left * math.sqrt(max(0.0, 1.0 - backward**2))
+        )
+        seen = min(sights[first].left, sights[second].left) >= own_settings.seen
+        alike = cosine[first, second] > own_settings.same_cosine or left < own_settings.apart
+        if seen and alike:
+            unseparated.add((first, second))
+    chosen = [best[e] for e in effects]
+    _, logarithm = np.linalg.slogdet(np.eye(len(chosen)) + gram[np.ix_(chosen, chosen)])
+    return _Picture(sights, cosine, frozenset(unseparated), 0.5 * float(logarithm) / math.log(2.0))
+
+
+def _sight(start: Start, left: float, key: Key, settings: PlanSettings) -> Sight:
+    """How an effect shows from the start that shows most."""
+    if left < 1e-6:
+        return Sight(start.effect, 0.0)
+    verdict = "seen" if left >= settings.seen else "faint" if left >= settings.faint else "hidden"
+    if not start.scalable:
+        return Sight(start.effect, left, *key, verdict=verdict)
+    leading = start.sizes[0]
+    typical, size = abs(start.free[leading]), settings.seen / left
+    found = start.scaled(size).free[leading]
+    # one that its bounds hold shows less than that
+    whole = math.isclose(start.scaled(0.999 * size).free[leading], found, rel_tol=1e-9)
+    smallest = abs(found) if size < settings.most_multiple and not whole else math.nan
+    return Sight(start.effect, left, *key, leading, typical, smallest, verdict)
+
+
+def _addition(kind: str, name: str, text: str, now: _Picture, then: _Picture) -> Addition:
+    seen = tuple(e for e, s in then.sights.items() if s.verdict == "seen" and now.sights[e].verdict != "seen")
+    separated = tuple(sorted(now.unseparated - then.unseparated))
+    return Addition(kind, name, text, seen, separated, then.bits - now.bits)
+
+
+def _joined(pairs: list[tuple[str, str]], order: list[str]) -> list[tuple[str, ...]]:
+    """Groups out of pairs that share a member."""
+    groups: list[set[str]] = []
+    for pair in pairs:
+        touching = [g for g in groups if g & set(pair)]
+        groups = [g for g in groups if g not in touching] + [set(pair).union(*touching)]
+    return sorted((tuple(sorted(g, key=order.index)) for g in groups), key=lambda g: order.index(g[0]))

@@ -1,0 +1,171 @@
+"""How much of a block's residual is more than noise: floors, excess, coloured-residual statistics."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from zlib import crc32
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import t
+
+from pamrs import _core
+from pamrs.diagnosis.fit import Key, Problem, bin_width
+from pamrs.diagnosis.prepare import Block, Prepared, Residual, binned, change, residual, smoothed
+from pamrs.diagnosis.settings import NoiseSettings
+from pamrs.errors import SimulationError
+
+__all__ = ["Excess", "Floor", "excess", "bins_of", "floors"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Floor:
+    """What noise alone leaves in a block's residual over one recording.
+
+    Attributes
+    ----------
+    sample : float
+        Standard deviation of single samples: the output's own noise and that of the drives.
+    binned : float
+        Standard deviation of bin means.
+    scatter : float
+        Standard deviation, from one realisation of the noise to another, of the logarithm of the mean square of the bin means.
+    """
+
+    sample: float
+    binned: float
+    scatter: float = 0.0
+
+
+@dataclass(frozen=True)
+class Excess:
+    """Residual of a block against its floor, pooled over recordings.
+
+    Attributes
+    ----------
+    ratio : float
+        Variance of bin means over that of the floor; 1 when only noise is left.
+    systematic : float
+        Standard deviation of what is not noise, in units of the noise.
+    p_value : float
+        Chance of such a ratio (above the margin) from noise, by the scatter of the floors.
+    limit : float
+        Ratio that noise exceeds with the chance ``noise.chance`` of the settings, at most ``noise.most_limit``.
+    scatter : float
+        Standard deviation of the ratio's logarithm from noise and from what floors are known to.
+    rms, noise : float
+        Residual and floor of single samples, in the channel's unit.
+    """
+
+    ratio: float
+    systematic: float
+    p_value: float
+    rms: float
+    noise: float
+    limit: float
+    scatter: float = 0.0
+
+
+def bins_of(prepared: Prepared) -> int:
+    """Samples in a bin for the excess."""
+    settings = prepared.settings.noise
+    return max(settings.least_bin_samples, bin_width(prepared, settings.bin_time))
+
+
+def floors(problem: Problem, core: _core.Rig) -> dict[Key, Floor]:
+    """Floors of all blocks and recordings, the drives' noise carried through the model by simulation.
+
+    Parameters
+    ----------
+    problem : Problem
+        Blocks and recordings.
+    core : _core.Rig
+        A model close to the data.
+    """
+    found = {}
+    settings = problem.settings
+    for prepared in problem.recordings:
+        rng = np.random.default_rng([settings.seed, crc32(prepared.recording.name.encode())])
+        for block in problem.blocks:
+            base = residual(block, core, prepared, [])
+            width = bins_of(prepared)
+            powers: list[list[float]] = []
+            noisy = [name for name in block.drives if name in prepared.signals]
+            rows = base.rows
+            _, counts = binned(base.value, rows, width)
+            seen = counts > 0
+            for _ in range(settings.noise.replicates if seen.any() else 0):
+                shaken = np.zeros(prepared.n)
+                with contextlib.suppress(SimulationError):  # a realisation that leaves the model's range tells nothing of the others
+                    shaken = change(block, core, _shaken(prepared, noisy, rng), base) - base.value if noisy else shaken
+                means, _ = binned(shaken, rows, width)
+                own = rng.normal(0.0, base.noise, int(seen.sum())) / np.sqrt(counts[seen])
+                squares = [float(np.mean(v**2)) for v in (shaken[rows], means[seen], means[seen] + own)]
+                powers.append(squares)
+            sample, drives, _ = np.mean(powers, axis=0) if powers else (0.0, 0.0, 0.0)
+            white = float(np.mean(1.0 / counts[seen])) if seen.any() else 1.0
+            # mean squares of few modes are skew, their logarithms hardly
+            scatter = float(np.std(np.log([both for *_, both in powers]), ddof=1)) if powers else 0.0
+            found[block.name, prepared.recording.name] = Floor(
+                math.sqrt(base.noise**2 + sample), math.sqrt(base.noise**2 * white + drives), scatter
+            )
+    return found
+
+
+def _shaken(prepared: Prepared, names: Iterable[str], rng: np.random.Generator) -> Prepared:
+    """The recording with one more realisation of noise, as smoothed, on some drives."""
+    signals = {}
+    for name in names:
+        raw = rng.normal(0.0, prepared.noise[name], prepared.n)
+        value, slope = prepared.signals[name]
+        more, steeper = smoothed(raw, prepared.dt, prepared.settings.prepare)
+        signals[name] = (value + more, slope + steeper)
+    return prepared.shaken(signals)
+
+
+def excess(
+    block: Block,
+    recordings: list[Prepared],
+    found: dict[Key, Residual],
+    floor: dict[Key, Floor],
+    settings: NoiseSettings,
+) -> Excess:
+    """Pool a block's residual over recordings and compare it with its floor."""
+    keys: list[Key] = []
+    ratios, weights, squares, noises = [], [], [], []
+    for prepared in recordings:
+        key = (block.name, prepared.recording.name)
+        r = found[key]
+        means, counts = binned(r.value, r.rows, bins_of(prepared))
+        means = means[counts > 0]
+        if means.size == 0:
+            continue
+        keys.append(key)
+        ratios.append(float(np.mean(means**2)) / floor[key].binned ** 2)
+        weights.append(means.size)
+        squares.append(float(np.mean(r.value[r.rows] ** 2)))
+        noises.append(floor[key].sample ** 2)
+    if not ratios:
+        return Excess(1.0, 0.0, 1.0, float("nan"), float("nan"), settings.margin)
+    ratio = float(np.average(ratios, weights=weights))
+    share = float(np.mean([floor[key].binned ** 2 / floor[key].sample ** 2 for key in keys]))
+    shares = np.array(weights) / sum(weights)
+    # floors are means of as many realisations, and their scatter is known from no more
+    pooled = math.sqrt(float(np.sum((shares * [floor[key].scatter for key in keys]) ** 2)))
+    scatter = max(1e-6, pooled * math.sqrt(1.0 + 1.0 / settings.replicates))
+    chance = t(len(keys) * (settings.replicates - 1))
+    beyond = min(settings.most_log_limit, float(chance.isf(settings.chance)) * scatter)
+    return Excess(
+        ratio,
+        math.sqrt(max(0.0, (ratio - 1.0) * share)),
+        float(chance.sf(math.log(max(ratio, 1e-300) / settings.margin) / scatter)),
+        math.sqrt(float(np.average(squares, weights=weights))),
+        math.sqrt(float(np.average(noises, weights=weights))),
+        min(settings.most_limit, settings.margin * math.exp(beyond)),
+        scatter,
+    )

@@ -1,0 +1,379 @@
+"""The blocks of a rig between measured channels, and the residual of each with exact sensitivities."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pamrs import _core
+from pamrs.channels import channel_of, dotted
+from pamrs.diagnosis.prepare._signals import Prepared
+from pamrs.diagnosis.settings import PrepareSettings
+from pamrs.rig import Rig
+from pamrs.rig.schema import qualified
+from pamrs.simulation import default_step
+
+__all__ = ["Block", "Residual", "available_blocks", "change", "predicted", "residual"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Block:
+    """A stretch of the chain with a measured output.
+
+    Attributes
+    ----------
+    name, channel : str
+        Name of the block as the core has it (``chamber``, ``chamber.flexor``, ``arm.elbow``) and of the channel that it predicts.
+    drives : tuple of str
+        Measured channels that drive it.
+    window : float or None
+        Length of its windows [s]; None: the whole recording at once.
+    parameters : frozenset of str
+        Dotted names of baseline parameters that its output depends on.
+    step : float
+        Longest integration step [s].
+    covers : str
+        Blocks of the rig that it stands for, in words.
+    """
+
+    name: str
+    channel: str
+    drives: tuple[str, ...]
+    window: float | None
+    parameters: frozenset[str]
+    step: float
+    covers: str
+
+    @property
+    def kind(self) -> str:
+        """``supply``, ``chamber`` or ``arm`` (of a hanging load too): its name without that of the tank, chamber or joint."""
+        kind = self.name.partition(".")[0]
+        return "arm" if kind == "load" else kind
+
+
+_SUPPLY = ("volume", "time_constant", "droop")
+_VALVE = ("discharge_area_max", "null_voltage")
+_LINE = ("length", "diameter", "discharge_area")
+_CHAMBER = ("dead_volume", "alpha_in", "alpha_out", "alpha")
+_MUSCLE = ("modulus_scale",)
+_ARM = ("inertia", "first_moment", "payload", "viscous", "coulomb")
+_LOAD = ("mass", "viscous", "coulomb")
+_LINK = ("length", "mass", "centre", "inertia", "payload", "viscous", "coulomb")
+
+
+@dataclass(frozen=True)
+class _Way:
+    """A valve or a line: its own full name, what it leads from and to (chambers and supplies in full), the command that opens it."""
+
+    name: str
+    ends: tuple[str, str]
+    command: tuple[str, ...]
+    between: tuple[str, ...]
+
+
+def _ways(rig: Rig) -> list[_Way]:
+    """Every way of the air, a valve and the line behind it being one."""
+    valves, lines = rig.ports("valve"), rig.ports("line")
+    behind = {qualified("line", name): ends["to"] for name, ends in lines.items()}
+    found = []
+    for name, ends in valves.items():
+        line = (ends["to"],) if ends["to"] in behind else ()
+        end = behind.get(ends["to"], ends["to"])
+        found.append(_Way(qualified("valve", name), (ends["from"], end), (dotted("valve_command", name),), line))
+    found += [_Way(qualified("line", name), (ends["from"], ends["to"]), (), ()) for name, ends in lines.items() if ends["from"]]
+    return found
+
+
+class _Map:
+    """Which channels and parameters belong to which block of a rig."""
+
+    def __init__(self, rig: Rig, channels: tuple[str, ...], settings: PrepareSettings) -> None:
+        self.settings = settings
+        self.rig, self.has, self.ways = rig, frozenset(channels), _ways(rig)
+        self.angles = ("length",) if rig.model["load"] else tuple(dotted("joint_angle", name) for name in rig.tables("joint"))
+        self.pulling = {name: ends["chamber"].partition(".")[2] for name, ends in rig.ports("muscle").items()}
+        self.joint_of = {name: ends["joint"].partition(".")[2] for name, ends in rig.ports("muscle").items()}
+
+    def pressure(self, block: str) -> str:
+        """Channel of a supply's or chamber's pressure by its full name."""
+        kind, _, name = block.partition(".")
+        return dotted("supply_pressure" if kind == "supply" else "muscle_pressure", name)
+
+    def around(self, block: str) -> list[_Way]:
+        """The ways that begin or end at a supply or chamber."""
+        return [way for way in self.ways if block in way.ends]
+
+    def neighbours(self, block: str) -> tuple[str, ...]:
+        """Channels of the pressures next to a block; that of a constant supply is known without measuring it."""
+        others = [end for way in self.around(block) for end in way.ends if end not in (block, "ambient")]
+        inlets = [dotted("line_pressure", name.partition(".")[2]) for way in self.around(block) for name in way.between]
+        known = [end for end in others if self._constant(end) and self.pressure(end) not in self.has]
+        wanted = [self.pressure(end) for end in others if end not in known]
+        return tuple(dict.fromkeys([*wanted, *(name for name in inlets if name in self.has)]))
+
+    def _constant(self, block: str) -> bool:
+        kind, _, name = block.partition(".")
+        return kind == "supply" and self.rig.tables("supply")[name]["kind"] == "constant"
+
+    def commands(self, block: str) -> tuple[str, ...]:
+        """Commands of the valves at a block."""
+        return tuple(dict.fromkeys(command for way in self.around(block) for command in way.command))
+
+    def zero(self, key: str, name: str) -> str:
+        """Dotted name of the zero of a block's sensor, its own or the common one."""
+        own = self.rig.tables("sensors")
+        return f"sensors.{name}.{key}" if name and name in own else f"sensors.{key}"
+
+    def zeros(self, chambers: Iterable[str], joints: Iterable[str]) -> set[str]:
+        """Those of the sensors of some chambers and joints."""
+        moving = {"sensors.length_zero"} if self.rig.model["load"] else {self.zero("angle_zero", j) for j in joints}
+        return {self.zero("pressure_zero", c) for c in chambers} | moving
+
+    def of_ways(self, block: str) -> set[str]:
+        """Parameters of the valves and lines at a block."""
+        names: set[str] = set()
+        for way in self.around(block):
+            for full in (way.name, *way.between):
+                names |= {f"{full}.{key}" for key in (_VALVE if full.partition(".")[0] == "valve" else _LINE)}
+        return names
+
+    def chambers_at(self, block: str) -> set[str]:
+        """Names of the chambers that a block's ways lead to, its own included."""
+        ends = {block, *(end for way in self.around(block) for end in way.ends)}
+        return {end.partition(".")[2] for end in ends if end.partition(".")[0] == "chamber"}
+
+    def supply(self, name: str) -> Block | None:
+        """The block of one supply."""
+        full, table = qualified("supply", name), self.rig.tables("supply")[name]
+        commands = (*self.commands(full), *((dotted("supply_command", name),) if table["kind"] == "regulator" else ()))
+        drives = (*self.neighbours(full), *commands)
+        if not self.around(full) or not {self.pressure(full), *drives, *self.angles} <= self.has:
+            return None
+        names = self.of_ways(full) | {f"{full}.{key}" for key in _SUPPLY} | self.zeros(self.chambers_at(full), ())
+        covers = "regulator" if table["kind"] == "regulator" else "supply"
+        covers += " and valve" if self.commands(full) else (" and line" if table["kind"] != "regulator" else "")
+        window, step = self.settings.supply_window, self.settings.gas_step
+        return Block(full, self.pressure(full), drives, window, frozenset(names), step, covers + _called(name))
+
+    def chamber(self, name: str) -> Block | None:
+        """The block of one chamber; none where nothing feeds it although it moves a joint: its pressure is then what is given."""
+        full = qualified("chamber", name)
+        fed = bool(self.neighbours(full) or self.commands(full))
+        joints = tuple(dict.fromkeys(self.joint_of[m] for m, chamber in self.pulling.items() if chamber == name))
+        if self.angles and not self.rig.tables("valve") and not self.rig.tables("supply"):
+            return None
+        drives = (*self.neighbours(full), *self.commands(full), *(a for a in self.angles if a.partition(".")[2] in joints))
+        if not {self.pressure(full), *drives, *self.angles} <= self.has:
+            return None
+        names = self.of_ways(full) | {f"{full}.{key}" for key in _CHAMBER} | self.zeros(self.chambers_at(full), joints or [""])
+        covers = ("valve, line and chamber" if self.commands(full) else "line and chamber") if fed else "chamber"
+        step = self.settings.gas_step if fed else self.settings.sealed_step
+        window = self.settings.chamber_window if fed else None
+        return Block(full, self.pressure(full), drives, window, frozenset(names), step, covers + _called(name))
+
+    def arm(self, joint: str) -> Block | None:
+        """The block of one joint: muscles' pressures to its angle."""
+        drives = tuple(dict.fromkeys(dotted("muscle_pressure", chamber) for chamber in self.pulling.values()))
+        if not {*drives, *self.angles} <= self.has:
+            return None
+        names = {f"arm.{key}" for key in _ARM} | {f"{qualified('muscle', m)}.{key}" for m in self.pulling for key in _MUSCLE}
+        names |= {f"{qualified('link', link)}.{key}" for link in self.rig.tables("link") for key in _LINK}
+        names |= self.zeros(self.pulling.values(), self.rig.tables("joint"))
+        name = qualified("arm", joint)
+        covers = "muscle, joint and arm" + _called(joint)
+        window, step = self.settings.arm_window, self.settings.arm_step
+        return Block(name, dotted("joint_angle", joint), drives, window, frozenset(names), step, covers)
+
+    def load(self) -> Block | None:
+        """The block of a hanging load: muscles' pressures to their length."""
+        drives = tuple(dict.fromkeys(dotted("muscle_pressure", chamber) for chamber in self.pulling.values()))
+        if not {*drives, *self.angles} <= self.has:
+            return None
+        names = {f"load.{key}" for key in _LOAD} | {f"{qualified('muscle', m)}.{key}" for m in self.pulling for key in _MUSCLE}
+        names |= self.zeros(self.pulling.values(), ())
+        window, step = self.settings.arm_window, self.settings.arm_step
+        return Block("load", "length", drives, window, frozenset(names), step, "muscle and load")
+
+
+def _called(name: str) -> str:
+    return f" of {name}" if name else ""
+
+
+def available_blocks(rig: Rig, channels: tuple[str, ...], settings: PrepareSettings) -> list[Block]:
+    """The blocks that these channels can tell apart: supplies, chambers, then joints or the load, each in the order of the rig file.
+
+    Every tank (or regulator), chamber, joint and hanging load is a block of its own, driven by the measured channels next to it, with
+    the baseline parameters of what it stands for. A rig with joints or a load and without valves and supplies is driven by the
+    pressures of its muscles: these are given, and only what they move is judged.
+
+    Parameters
+    ----------
+    rig : Rig
+        The nominal model.
+    channels : tuple of str
+        What every recording has, by the names of the core.
+    settings : PrepareSettings
+        Windows and integration steps.
+
+    Returns
+    -------
+    list of Block
+    """
+    have = _Map(rig, channels, settings)
+    found = [have.supply(name) for name in rig.tables("supply")]
+    found += [have.chamber(name) for name in rig.tables("chamber")]
+    found += [have.arm(name) for name in rig.tables("joint")] if rig.tables("arm") else []
+    found += [have.load()] if (rig.model["load"] or {}).get("kind") == "mass" else []
+    return [block for block in found if block is not None]
+
+
+@dataclass(frozen=True, eq=False)
+class Residual:
+    """Measured minus predicted output of one block over one recording, with the window's start projected out.
+
+    Attributes
+    ----------
+    value : (n,) array
+        Residual in the channel's unit; 0 in unusable rows.
+    jacobian : (n, k) array or None
+        Derivative of the *prediction* with respect to each parameter, start projected out as well.
+    prediction : (n,) array
+        Predicted channel, for looking at.
+    rows : (n,) bool array
+        Usable rows.
+    noise : float
+        Noise of the channel.
+    starts : list of (a, b, q)
+        Windows with an orthonormal basis of what their start can do; what a residual without a jacobian is freed of.
+    """
+
+    value: Array
+    jacobian: Array | None
+    prediction: Array
+    rows: NDArray[np.bool_]
+    noise: float
+    starts: list[tuple[int, int, Array]] = field(default_factory=list)
+
+
+def change(block: Block, core: _core.Rig, prepared: Prepared, base: Residual) -> Array:
+    """Residual under another model, freed of the same starts as one that was computed with its sensitivities.
+
+    Parameters
+    ----------
+    block : Block
+        Which block.
+    core : _core.Rig
+        The other model, compiled.
+    prepared : Prepared
+        The recording.
+    base : Residual
+        The residual of a model near to it.
+
+    Returns
+    -------
+    (n,) array
+        In the channel's unit; 0 in unusable rows.
+    """
+    prediction = predicted(block, core, prepared)
+    measured = np.where(prepared.recording.mask[block.channel], prepared.recording.channels[block.channel], 0.0)
+    value = np.where(base.rows, measured - prediction, 0.0)
+    for a, b, q in base.starts:
+        value[a:b] -= q @ (q.T @ value[a:b])
+    return np.where(base.rows, value, 0.0)
+
+
+def begun(block: Block, prepared: Prepared, starts: list[int]) -> dict[str, tuple[Array, Array]]:
+    """The smoothed channels, with the best that can be told where windows start of what a block integrates (an arm: all joints)."""
+    state = [n for n in prepared.signals if n == block.channel or (block.kind == "arm" and channel_of(n) == "joint_angle")]
+    return prepared.signals | {name: prepared.begun(name, starts) for name in state}
+
+
+def predicted(block: Block, core: _core.Rig, prepared: Prepared) -> Array:
+    """A block's output over a recording, every window from its measured start.
+
+    Parameters
+    ----------
+    block : Block
+        Which block.
+    core : _core.Rig
+        The compiled model.
+    prepared : Prepared
+        The recording.
+
+    Returns
+    -------
+    (n,) array
+        In the channel's unit.
+    """
+    starts = prepared.starts(block.window, block.drives)
+    prediction, _ = core.predict(
+        block.name,
+        prepared.commands,
+        prepared.dt,
+        default_step(prepared.dt, longest=block.step),
+        starts,
+        [],
+        begun(block, prepared, starts),
+        prepared.n,
+    )
+    return prediction
+
+
+def residual(block: Block, core: _core.Rig, prepared: Prepared, parameters: list[str]) -> Residual:
+    """Predict a block's output over a recording and compare.
+
+    Parameters
+    ----------
+    block : Block
+        Which block.
+    core : _core.Rig
+        The compiled model.
+    prepared : Prepared
+        The recording.
+    parameters : list of str
+        Dotted names for the jacobian, may be empty.
+    """
+    starts = prepared.starts(block.window, block.drives)
+    least = prepared.settings.prepare.window_samples_per_state
+    # without parameters a free null direction is still wanted for the window's start: ask for one parameter
+    names = parameters or [next((n for n in core.parameter_names if n.endswith("pressure_zero")), core.parameter_names[0])]
+    prediction, jacobian = core.predict(
+        block.name,
+        prepared.commands,
+        prepared.dt,
+        default_step(prepared.dt, longest=block.step),
+        starts,
+        names,
+        begun(block, prepared, starts),
+        prepared.n,
+    )
+    if jacobian is None:
+        raise AssertionError("the core returns a jacobian when parameters are named")
+    measured = np.where(prepared.recording.mask[block.channel], prepared.recording.channels[block.channel], 0.0)
+    rows = prepared.usable(block.channel, block.drives, starts)
+    value = np.where(rows, measured - prediction, 0.0)
+    shifted = prediction.copy()
+    k = len(names)
+    bases: list[tuple[int, int, Array]] = []
+    for a, b in zip(starts, [*starts[1:], prepared.n], strict=True):
+        used = rows[a:b]
+        start = jacobian[a:b, k:]
+        if used.sum() < least * start.shape[1]:
+            rows[a:b] = False
+            value[a:b] = 0.0
+            continue
+        q, _ = np.linalg.qr(np.where(used[:, None], start, 0.0))
+        bases.append((a, b, q))
+        correction = q @ (q.T @ value[a:b])
+        value[a:b] -= correction
+        shifted[a:b] += correction
+        jacobian[a:b, :k] -= q @ (q.T @ np.where(used[:, None], jacobian[a:b, :k], 0.0))
+    jac = np.where(rows[:, None], jacobian[:, :k], 0.0) if parameters else None
+    # a whole recording is shown from its measured start; a window from the start that suits it best
+    shown = prediction if block.window is None else shifted
+    return Residual(value, jac, shown, rows, prepared.noise[block.channel], bases)

@@ -1,0 +1,382 @@
+"""What a recording cannot be: units, swapped columns and dead sensors that are seen before anything is fitted.
+
+A mismatch that a wrong heading makes is not physics. What is looked at needs no fit: sizes against the rig file, the order
+of pressures, the range of joints, the sense in which a pressure follows its valve and an angle its pressures. Each finding says what
+was found and what is allowed; nothing is repaired.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pamrs import _core
+from pamrs.channels import channel_of, dotted
+from pamrs.diagnosis.prepare._blocks import Block, predicted
+from pamrs.diagnosis.prepare._signals import Prepared
+from pamrs.diagnosis.settings import PlausibilitySettings
+from pamrs.errors import DiagnosisError, SimulationError, joined
+from pamrs.recordings import Recording
+from pamrs.rig import Rig
+
+__all__ = ["check_plausible", "check_sense", "implausible"]
+
+Array = NDArray[np.float64]
+
+_DEGREES = 180.0 / math.pi
+_TOLD = 12
+"""Findings that a message lists."""
+
+
+def check_plausible(recordings: Sequence[Recording], rig: Rig, case: str, settings: PlausibilitySettings) -> None:
+    """Refuse recordings whose units or columns cannot be right.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        As loaded.
+    rig : Rig
+        The nominal model.
+    case : str
+        Name of the case, for the message.
+    settings : PlausibilitySettings
+        What is allowed.
+
+    Raises
+    ------
+    DiagnosisError
+        With every finding: recording, channel, what was found, what is allowed.
+    """
+    found = [f"recording {r.name!r}: {text}" for r in recordings for text in implausible(r, rig, settings)]
+    _refuse(case, found)
+
+
+def _refuse(case: str, found: list[str]) -> None:
+    if not found:
+        return
+    told = found[:_TOLD] + ([f"and {len(found) - _TOLD} more of this kind"] if len(found) > _TOLD else [])
+    raise DiagnosisError(joined(f"case {case!r}: these recordings cannot be of this rig; nothing was fitted", told))
+
+
+def implausible(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> list[str]:
+    """Everything about a recording that cannot be, in words.
+
+    Parameters
+    ----------
+    recording : Recording
+        SI values with masks.
+    rig : Rig
+        The nominal model.
+    settings : PlausibilitySettings
+        What is allowed.
+
+    Returns
+    -------
+    list of str
+        One line for each finding; empty for a sound recording.
+    """
+    return [
+        *_clock(recording, rig, settings),
+        *_pressures(recording, rig, settings),
+        *_frozen_tanks(recording, rig, settings),
+        *_order(recording, rig, settings),
+        *_motion(recording, rig, settings),
+        *_valves(recording, rig, settings),
+    ]
+
+
+def _values(recording: Recording, name: str) -> Array:
+    """Usable samples of a channel; none where it was not measured."""
+    if name not in recording.channels:
+        return np.zeros(0)
+    return np.asarray(recording.channels[name][recording.mask[name]], dtype=np.float64)
+
+
+def _clock(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> Iterator[str]:
+    """A sample time at which motion can be followed."""
+    longest = settings.longest_sample_time
+    if _moving(rig, settings) and recording.sample_time > longest:
+        what = "a joint" if rig.tables("joint") else "a load"
+        yield (
+            f"a sample every {recording.sample_time:g} s is too slow for {what}: at most {longest:g} s; is the unit of "
+            "'time' (ms, us) the one its values are in?"
+        )
+
+
+def _pressures(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> Iterator[str]:
+    """Sizes of pressures, by themselves and beside the rig file."""
+    rated = {dotted("supply_pressure", name): float(table["initial_pressure"]) for name, table in rig.tables("supply").items()}
+    largest = max([*rated.values(), *(float(t["initial_pressure"]) for t in rig.tables("chamber").values())], default=0.0)
+    low, top = settings.least_pressure, max(settings.most_pressure, settings.most_rated_multiple * largest)
+    least, most = settings.supply_least_share, settings.supply_most_share
+    for name in recording.channels:
+        values = _values(recording, name)
+        if channel_of(name) not in ("supply_pressure", "line_pressure", "muscle_pressure") or values.size < 3:
+            continue
+        high = float(np.quantile(np.abs(values), 0.995))
+        if 0.0 < high < low and np.ptp(values) > 0.0:
+            yield (
+                f"{name} never exceeds {high:.3g} Pa gauge; a pressure of air exceeds {low:g} Pa somewhere: are its "
+                "values in bar (or is it another column, an angle or a voltage) under a heading in Pa?"
+            )
+        elif high > top:
+            yield (
+                f"{name} reaches {high:.3g} Pa gauge; at most {top:.3g} Pa is allowed: are its values in Pa, kPa or psi under a "
+                "heading in bar?"
+            )
+        elif name in rated and rated[name] > 0.0 and not least <= high / rated[name] <= most:
+            yield (
+                f"{name} is at most {high:.3g} Pa and the rig file has {rated[name]:.3g} Pa; "
+                f"{least * rated[name]:.3g} to {most * rated[name]:.3g} Pa is allowed: right column and unit?"
+            )
+
+
+def _frozen_tanks(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> Iterator[str]:
+    """Tanks that read one value although they are drawn from."""
+    valves = rig.ports("valve")
+    for supply, table in rig.tables("supply").items():
+        name = dotted("supply_pressure", supply)
+        values, drawn = _values(recording, name), any(ends["from"] == dotted("supply", supply) for ends in valves.values())
+        if table["kind"] != "tank" or not drawn or values.size < 16 or np.ptp(values) > 0.0:
+            continue
+        moved = [v for c in rig.tables("chamber") if (v := _values(recording, dotted("muscle_pressure", c))).size]
+        if any(float(np.ptp(v)) > settings.frozen_tank_change for v in moved):
+            yield (
+                f"{name} has the one value {values[0]:.6g} Pa throughout although its tank is drawn from: a frozen transducer; leave "
+                'the column out, or say [supply] kind = "constant" if it is one'
+            )
+
+
+def fed_by(rig: Rig) -> dict[str, list[str]]:
+    """Names of the supplies that feed each chamber through valves or lines."""
+    ports = {block: rig.ports(block) for block in ("valve", "line")}
+    into = [(e["from"], e["to"]) for block in ports.values() for e in block.values() if e["from"]]
+    inlets = {dotted("line", name): e["to"] for name, e in ports["line"].items()}
+    found: dict[str, list[str]] = {name: [] for name in rig.tables("chamber")}
+    for start, end in into:
+        kind, _, supply = start.partition(".")
+        other, _, chamber = inlets.get(end, end).partition(".")
+        if kind == "supply" and other == "chamber":
+            found[chamber].append(supply)
+    return found
+
+
+def _order(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> Iterator[str]:
+    """A muscle is not at a higher pressure than what feeds it."""
+    for chamber, supplies in fed_by(rig).items():
+        name = dotted("muscle_pressure", chamber)
+        for supply in supplies:
+            full = dotted("supply_pressure", supply)
+            if name not in recording.channels:
+                continue
+            if full in recording.channels:
+                rows = recording.valid(name, full)
+                source, limit = full, recording.channels[full][rows]
+            else:
+                rows = recording.mask[name]
+                source, limit = (
+                    f"{full} of the rig file",
+                    np.full(int(rows.sum()), float(rig.tables("supply")[supply]["initial_pressure"])),
+                )
+            if rows.sum() < 16:
+                continue
+            allowed = limit + settings.order_margin * np.abs(limit) + settings.order_offset
+            above = recording.channels[name][rows] > allowed
+            share = float(np.mean(above))
+            if share > settings.order_time_share:
+                yield (
+                    f"{name} is above {source} for {100 * share:.0f} % of the time (medians "
+                    f"{float(np.median(recording.channels[name][rows])):.3g} and {float(np.median(limit)):.3g} Pa); at most "
+                    f"{100 * settings.order_time_share:.0f} % is allowed: are the two columns swapped, or one of their units wrong?"
+                )
+
+
+@dataclass(frozen=True)
+class _Moving:
+    """What muscles move: its channel, unit and range, how far and fast it may be, and the chambers of its muscles."""
+
+    channel: str
+    unit: str
+    low: float
+    high: float
+    margin: float
+    fastest: float
+    pulled: tuple[str, ...]
+
+
+def _moving(rig: Rig, settings: PlausibilitySettings) -> list[_Moving]:
+    """The joints of a rig, or its hanging load."""
+    ends = rig.ports("muscle").values()
+    found = []
+    for joint, table in rig.tables("joint").items():
+        low, high = float(table["min_angle"]), float(table["max_angle"])
+        pulled = tuple(e["chamber"].partition(".")[2] for e in ends if e["joint"] == dotted("joint", joint))
+        margin = max(settings.least_angle_margin, settings.range_margin * (high - low))
+        found.append(_Moving(dotted("joint_angle", joint), "rad", low, high, margin, settings.fastest_joint, pulled))
+    load = rig.model["load"]
+    if load and load["kind"] == "mass":
+        low, high = float(load["min_length"]), float(load["max_length"])
+        pulled = tuple(e["chamber"].partition(".")[2] for e in ends)
+        margin = max(settings.least_length_margin, settings.range_margin * (high - low))
+        found.append(_Moving("length", "m", low, high, margin, settings.fastest_load, pulled))
+    return found
+
+
+def _motion(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> Iterator[str]:
+    """Range, rate and life of joint angles and of a load's length."""
+    for moving in _moving(rig, settings):
+        name, unit = moving.channel, moving.unit
+        values = _values(recording, name)
+        if values.size < 3:
+            continue
+        share = float(np.mean((values < moving.low - moving.margin) | (values > moving.high + moving.margin)))
+        if share > settings.range_time_share:
+            whose, units = ("its joint's range", "deg or rad") if unit == "rad" else ("its load's range", "mm or m")
+            yield (
+                f"{name} is outside {whose} for {100 * share:.0f} % of the time: from {values.min():.3g} to "
+                f"{values.max():.3g} {unit}, where {moving.low:.3g} to {moving.high:.3g} {unit} are possible: right column, unit "
+                f"({units}) and sign?"
+            )
+        rows = recording.mask[name]
+        steps = np.abs(np.diff(recording.channels[name]))[rows[1:] & rows[:-1]] / recording.sample_time
+        fast = float(np.quantile(steps, 0.99)) if steps.size >= 16 else 0.0
+        if fast > moving.fastest:
+            yield (
+                f"{name} {'turns' if unit == 'rad' else 'moves'} with {fast:.3g} {unit}/s, one sample in a hundred faster; at most "
+                f"{moving.fastest:g} {unit}/s is allowed: are the units of 'time' (s, ms, us) and of the "
+                f"{'angle' if unit == 'rad' else 'length'} those that their values are in?"
+            )
+        pressures = [v for c in moving.pulled if (v := _values(recording, dotted("muscle_pressure", c))).size]
+        if (
+            values.size >= 16
+            and np.ptp(values) == 0.0
+            and any(float(np.ptp(v)) > settings.frozen_motion_share * float(np.abs(v).max()) > 1e3 for v in pressures)
+        ):
+            what = "a frozen encoder and a joint that is held" if unit == "rad" else "a frozen transducer and a load that is held"
+            yield (
+                f"{name} has the one value {values[0]:.4g} {unit} throughout while its muscles' pressures change: {what} cannot be "
+                "told apart, and neither is in the model; leave the recording out"
+            )
+
+
+def _valves(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> Iterator[str]:
+    """Commands inside the valve's range, and pressures that rise when they say fill."""
+    still_by = {"joint_angle": settings.still_angle, "length": settings.still_length}
+    inlets = {dotted("line", name): e["to"] for name, e in rig.ports("line").items()}
+    for valve, ends in rig.ports("valve").items():
+        name, table = dotted("valve_command", valve), rig.tables("valve")[valve]
+        chamber = inlets.get(ends["to"], ends["to"]).partition(".")[2]
+        pressure = dotted("muscle_pressure", chamber)
+        if name not in recording.channels or pressure not in recording.channels:
+            continue
+        both = recording.valid(name, pressure)
+        if both.sum() < 32:
+            continue
+        opening = (recording.channels[name] - table["null_voltage"]) / table["half_range"]
+        beyond = float(np.mean(np.abs(opening[both]) > settings.command_span))
+        if beyond > settings.command_time_share:
+            yield (
+                f"{name} is beyond twice its valve's range for {100 * beyond:.0f} % of the time (median "
+                f"{float(np.median(recording.channels[name][both])):.3g} V); {table['null_voltage']:g} +- {table['half_range']:g} V is "
+                "the range: right column and unit?"
+            )
+            continue
+        if sum(e["to"] == ends["to"] for e in rig.ports("valve").values()) > 1:
+            continue  # another valve may fill while this one vents
+        width = max(2, round(settings.sense_time / recording.sample_time))
+        rows = np.flatnonzero(both[:-width] & both[width // 2 : -width + width // 2] & both[width:])
+        # what swings moves the pressure by its volume, whatever the valve does
+        for place, still in ((v, still_by[channel_of(c)]) for c, v in recording.channels.items() if channel_of(c) in still_by):
+            rows = rows[~(np.abs(place[rows + width] - place[rows]) > still)]
+        change = recording.channels[pressure][rows + width] - recording.channels[pressure][rows]
+        towards, moved = opening[rows + width // 2], float(np.ptp(recording.channels[pressure][both]))
+        if rows.size < 32 or moved < settings.sense_least_change or not np.ptp(towards) > 0.0 or not np.ptp(change) > 0.0:
+            continue
+        against = float(np.abs(change)[towards * change < 0.0].sum() / np.abs(change).sum())
+        correlation = float(np.corrcoef(towards, change)[0, 1])
+        if against > settings.opposed_share and correlation < settings.opposed_correlation:
+            yield (
+                f"{100 * against:.0f} % of the change of {pressure} goes against {name} (rises while it says vent, falls while it says "
+                f"fill); at most {100 * settings.opposed_share:.0f} % is allowed: is the command's sign, unit or column right?"
+            )
+
+
+def check_sense(blocks: Sequence[Block], recordings: Sequence[Prepared], core: _core.Rig, case: str) -> None:
+    """Refuse joint angles that are the model's own in another unit, or that go the opposite way throughout.
+
+    Parameters
+    ----------
+    blocks : sequence of Block
+        Those whose output is an angle are looked at.
+    recordings : sequence of Prepared
+        Recordings with drives.
+    core : _core.Rig
+        The nominal rig, compiled.
+    case : str
+        Name of the case, for the message.
+
+    Raises
+    ------
+    DiagnosisError
+        With every finding.
+    """
+    found = []
+    settings = [p.settings.plausibility for p in recordings]
+    for block in (b for b in blocks if channel_of(b.channel) == "joint_angle"):
+        for prepared, own in zip(recordings, settings, strict=True):
+            try:
+                text = _sense(block, core, prepared, own)
+            except SimulationError:
+                continue
+            if text:
+                found.append(f"recording {prepared.recording.name!r}: {text}")
+    # one recording may be odd; a heading is wrong in all of them
+    if found and len(found) * 2 > len(recordings):
+        _refuse(case, found)
+
+
+def _sense(block: Block, core: _core.Rig, prepared: Prepared, settings: PlausibilitySettings) -> str | None:
+    """What would make the model's angle that of the recording: another unit, the other sign, two pressures in each other's place."""
+    rows = prepared.usable(block.channel, block.drives, [0])
+    measured, model = prepared.recording.channels[block.channel][rows], predicted(block, core, prepared)[rows]
+    quiet = float(np.std(measured)) < settings.sense_least_noises * prepared.noise[block.channel]
+    if rows.sum() < 64 or quiet or _misfit(measured, model) < settings.sense_wrong:
+        return None
+    signals, name = prepared.signals, block.channel
+    value, slope = signals[name]
+    shown = f"{name} goes from {measured.min():.3g} to {measured.max():.3g} rad, not as the model says"
+    turned = float(np.median(measured + model))
+    others: list[tuple[float, float, dict[str, tuple[Array, Array]], str]] = [
+        (_DEGREES, 0.0, {}, f"{_DEGREES:.3g} times that would: are its values in rad under a heading in deg?"),
+        (1.0 / _DEGREES, 0.0, {}, f"{1.0 / _DEGREES:.3g} times that would: are its values in deg under a heading in rad?"),
+        (-1.0, turned, {}, "it moves opposite to the model throughout: is its sign that of the rig, or are two muscles swapped?"),
+    ]
+    for one, two in itertools.combinations([d for d in block.drives if d in signals], 2):
+        text = f"with {one} and {two} in each other's place it would: are these columns swapped?"
+        others.append((1.0, 0.0, {one: signals[two], two: signals[one]}, text))
+    found = []
+    for factor, offset, swapped, text in others:
+        raw = prepared.raw | {name: offset + factor * prepared.raw[name]}
+        noise = prepared.noise | {name: abs(factor) * prepared.noise[name]}
+        shown_as = {**signals, **swapped, name: (offset + factor * value, factor * slope)}
+        other = Prepared(prepared.recording, prepared.commands, shown_as, raw, noise, prepared.settings)
+        try:
+            model = predicted(block, core, other)[rows]
+        except SimulationError:
+            continue
+        expected = offset + factor * measured
+        if factor < 0.0:  # where it turns about is not known
+            expected, model = expected - expected.mean(), model - model.mean()
+        found.append((_misfit(expected, model), text))
+    best, text = min(found, default=(math.inf, ""))
+    return f"{shown}; {text}" if best < settings.sense_right else None
+
+
+def _misfit(measured: Array, model: Array) -> float:
+    """Root mean square of measured minus model in standard deviations of the measured."""
+    return float(np.sqrt(np.mean((measured - model) ** 2))) / max(float(np.std(measured)), 1e-300)

@@ -1,0 +1,428 @@
+"""Blinded trials: every case of a folder diagnosed in a process of its own that is given that case's folder only.
+
+The answer keys of a trial (``python -m trial write``) lie beside the cases; nothing here opens them. A result that is there is kept, so
+a run that was stopped goes on where it was.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import math
+import os
+import platform
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+from pamrs._writing import write_atomically
+from pamrs.errors import CaseError, ParameterError
+
+__all__ = ["MANIFEST", "SCHEMA", "Proof", "case_digest", "cases_of", "code_digest", "prove", "valid_result", "worker"]
+
+SCHEMA: Final = "pamrs.prove/1"
+MANIFEST: Final = "manifest.json"
+_RESULT: Final = "pamrs.diagnosis/1"
+_VERDICTS: Final = ("none", "parameters", "effects", "unlisted")
+TIMEOUT: Final = 1800.0
+"""Time after which a case is given up [s]."""
+_POLL: Final = 0.05
+"""Time between two looks at the workers [s]."""
+
+
+@dataclass(frozen=True)
+class Proof:
+    """What a run over a folder of cases came to.
+
+    Attributes
+    ----------
+    results : Path
+        Folder with ``NAME/out.json`` and ``run.json``.
+    cases : dict of str to dict
+        By name: ``verdict``, ``effects``, ``wrong_parameters``, ``unexplained`` (blocks without a name) and ``seconds``, or ``error``;
+        as in ``run.json``.
+    kept : int
+        Results that were there before.
+    """
+
+    results: Path
+    cases: dict[str, dict[str, Any]] = field(default_factory=dict)
+    kept: int = 0
+
+    @property
+    def failed(self) -> dict[str, str]:
+        """Error by case, of those without a result."""
+        return {name: str(entry["error"]) for name, entry in self.cases.items() if "error" in entry}
+
+    @property
+    def verdicts(self) -> dict[str, int]:
+        """Number of cases by verdict, ``error`` last."""
+        found = [str(entry.get("verdict", "error")) for entry in self.cases.values()]
+        return {word: found.count(word) for word in (*_VERDICTS, "error") if word != "error" or word in found}
+
+    def table(self) -> str:
+        """The verdicts counted, and the time that a diagnosis took, as text."""
+        counts = self.verdicts
+        seconds = sorted(float(e["seconds"]) for e in self.cases.values() if "seconds" in e)
+        lines = [f"{'verdict':<12}{'cases':>7}", *(f"{word:<12}{count:>7}" for word, count in counts.items())]
+        lines.append(f"{'all':<12}{sum(counts.values()):>7}")
+        if seconds:
+            lines += ["", f"seconds for a diagnosis: median {seconds[len(seconds) // 2]:.1f}, longest {seconds[-1]:.1f}"]
+        return "\n".join(lines)
+
+
+def cases_of(folder: str | os.PathLike[str]) -> tuple[list[Path], str | None]:
+    """The cases below a folder, and the digest of the manifest that lists them.
+
+    Parameters
+    ----------
+    folder : path-like
+        Holds ``cases/NAME/case.toml``, or ``NAME/case.toml``, and maybe ``manifest.json``.
+
+    Returns
+    -------
+    cases : list of Path
+        Case folders by name.
+    digest : str or None
+        SHA-256 of the manifest; None without one.
+
+    Raises
+    ------
+    CaseError
+        If there is no case, or the manifest does not list exactly the cases that are there.
+    """
+    home = Path(folder)
+    if not home.is_dir():
+        raise CaseError(f"{home}: no such folder")
+    inside = home / "cases" if (home / "cases").is_dir() else home
+    found = sorted(p.parent for p in inside.glob("*/case.toml"))
+    if not found:
+        raise CaseError(f"{home}: no case below it; NAME/case.toml or cases/NAME/case.toml is needed")
+    manifest = home / MANIFEST
+    if not manifest.is_file():
+        return found, None
+    content = manifest.read_bytes()
+    try:
+        listed = set(json.loads(content)["keys"])
+    except (ValueError, KeyError, TypeError) as error:
+        raise CaseError(f"{manifest}: not a manifest, a table 'keys' from cases to digests is needed") from error
+    names = {p.name for p in found}
+    for wrong, words in ((names - listed, "does not list"), (listed - names, "lists cases that are not there:")):
+        if wrong:
+            more = f" and {len(wrong) - 3} more" if len(wrong) > 3 else ""
+            raise CaseError(f"{manifest}: {words} {', '.join(sorted(wrong)[:3])}{more}")
+    return found, hashlib.sha256(content).hexdigest()
+
+
+def valid_result(path: Path) -> dict[str, Any] | None:
+    """A result that was written whole, or None."""
+    try:
+        told = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    good = isinstance(told, dict) and told.get("schema") == _RESULT and told.get("verdict") in _VERDICTS
+    return told if good else None
+
+
+def case_digest(folder: Path) -> str:
+    """SHA-256 over every file of a case, so that a result of another case of the same name is not kept."""
+    return _digest(Path(folder).resolve(), lambda path: True)
+
+
+def code_digest() -> str:
+    """SHA-256 over every file of the installed package, so that results of different code can be told apart."""
+    return _digest(Path(__file__).parents[1], lambda path: path.suffix in (".py", ".so", ".pyd", ".toml", ".json"))
+
+
+def _digest(home: Path, wanted: Callable[[Path], bool]) -> str:
+    total = hashlib.sha256()
+    for path in sorted(home.rglob("*")):
+        if path.is_file() and wanted(path):
+            total.update(path.relative_to(home).as_posix().encode() + b"\0" + hashlib.sha256(path.read_bytes()).digest())
+    return total.hexdigest()
+
+
+def _machine() -> dict[str, Any]:
+    """What the seconds were measured on."""
+    model = platform.processor()
+    with contextlib.suppress(OSError):
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+        model = next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), model)
+    return {"system": platform.platform(), "processor": model, "cores": os.cpu_count(), "python": platform.python_version()}
+
+
+def worker(words: Sequence[str] | None = None) -> int:
+    """Diagnose one case: ``python -m pamrs.diagnosis.prove CASE OUT``.
+
+    Parameters
+    ----------
+    words : sequence of str, optional
+        The case's folder and the file to write; those of this process by default.
+
+    Returns
+    -------
+    int
+        0, or 2 with one line on standard error when the case cannot be diagnosed.
+    """
+    case, out = sys.argv[1:] if words is None else words
+    from pamrs.diagnosis import diagnose
+    from pamrs.errors import PamrsError
+
+    try:
+        result = diagnose(case)
+        write_atomically(out, result.to_json())
+    except (PamrsError, OSError) as error:
+        print(f"{type(error).__name__}: {error}", file=sys.stderr)
+        return 2
+    spent = os.times()
+    print(json.dumps({"cpu_seconds": round(spent.user + spent.system, 2)}))
+    return 0
+
+
+@dataclass
+class _Running:
+    """A worker at work."""
+
+    case: Path
+    process: subprocess.Popen[bytes]
+    home: tempfile.TemporaryDirectory[str]
+    began: float
+    late: bool = False
+
+    def text(self, name: str) -> str:
+        return (Path(self.home.name) / name).read_text(encoding="utf-8", errors="replace").strip()
+
+    def close(self) -> None:
+        if self.process.poll() is None:
+            self.process.kill()
+        self.process.wait()
+        self.home.cleanup()
+
+
+def _launch(command: Sequence[str], case: Path, out: Path) -> _Running:
+    """Start a worker in an empty folder, with one thread for linear algebra and its words in files."""
+    home = tempfile.TemporaryDirectory(prefix="pamrs-prove-")
+    paths = [os.path.abspath(p) for p in os.environ.get("PYTHONPATH", "").split(os.pathsep) if p]
+    threads = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+    environment = {**os.environ, **threads, **({"PYTHONPATH": os.pathsep.join(paths)} if paths else {})}
+    with open(Path(home.name, "stdout"), "wb") as told, open(Path(home.name, "stderr"), "wb") as cried:
+        process = subprocess.Popen(
+            [*command, str(case.resolve()), str(out.resolve())],
+            cwd=home.name, env=environment, stdin=subprocess.DEVNULL, stdout=told, stderr=cried,
+        )  # fmt: skip
+    return _Running(case, process, home, time.perf_counter())
+
+
+def _ended(running: _Running, out: Path) -> dict[str, Any]:
+    """The entry of a case whose worker has ended."""
+    result = valid_result(out) if running.process.returncode == 0 else None
+    wall = round(time.perf_counter() - running.began, 2)
+    if running.late:
+        return {"error": f"given up after {wall:.0f} s", "wall_seconds": wall}
+    if result is None:
+        lines = running.text("stderr").splitlines()
+        code = running.process.returncode
+        why = lines[-1].strip() if lines else f"the worker ended with code {code} and wrote no result"
+        return {"error": why if code >= 0 else f"the worker was killed by signal {-code}", "wall_seconds": wall}
+    entry = _entry(result)
+    with contextlib.suppress(ValueError, IndexError):  # what it cost is not worth a result
+        entry |= json.loads(running.text("stdout").splitlines()[-1])
+    return {**entry, "wall_seconds": wall}
+
+
+def _entry(result: dict[str, Any]) -> dict[str, Any]:
+    seconds = result.get("seconds")
+    known = isinstance(seconds, int | float) and math.isfinite(seconds)
+    named = {
+        "effects": [e.get("id") for e in result.get("effects") or []] if result["verdict"] == "effects" else [],
+        "wrong_parameters": [w.get("name") for w in result.get("wrong_parameters") or []],
+        "unexplained": [u.get("block") for u in result.get("unexplained") or [] if u.get("verdict") == "unlisted"],
+    }
+    return {"verdict": result["verdict"], **{key: v for key, v in named.items() if v}, **({"seconds": seconds} if known else {})}
+
+
+def _said(entry: dict[str, Any]) -> str:
+    """What a case came to, in one line: verdict, names, and blocks that keep a mismatch without one."""
+    if "error" in entry:
+        return f"error: {entry['error']}"
+    names = ", ".join([*entry.get("effects", []), *(f"wrong {name}" for name in entry.get("wrong_parameters", []))])
+    kept = ", ".join(entry.get("unexplained", []))
+    beside = f"; without a name in {kept}" if kept and entry["verdict"] != "unlisted" else ""
+    return f"{entry['verdict']}{' ' * bool(names)}{names}{beside}"
+
+
+def _before(results: Path) -> dict[str, Any]:
+    """Entries of an earlier run."""
+    try:
+        cases = json.loads((results / "run.json").read_text(encoding="utf-8"))["cases"]
+    except (OSError, ValueError, KeyError, TypeError):
+        return {}
+    return cases if isinstance(cases, dict) else {}
+
+
+def _span(seconds: float) -> str:
+    minutes = round(seconds / 60.0)
+    if minutes < 1:
+        return "less than a minute"
+    return f"{minutes} min" if minutes < 90 else f"{seconds / 3600.0:.1f} h"
+
+
+def prove(
+    folder: str | os.PathLike[str],
+    *,
+    results: str | os.PathLike[str] | None = None,
+    jobs: int = 1,
+    limit: int | None = None,
+    fresh: bool = False,
+    timeout: float = TIMEOUT,
+    say: Callable[[str], None] | None = None,
+    command: Sequence[str] | None = None,
+) -> Proof:
+    """Diagnose every case of a folder, each in a process of its own.
+
+    Parameters
+    ----------
+    folder : path-like
+        See :func:`cases_of`.
+    results : path-like, optional
+        Where ``NAME/out.json`` and ``run.json`` go; ``results`` in the folder by default.
+    jobs : int
+        Cases at a time.
+    limit : int, optional
+        Only the first so many cases.
+    fresh : bool
+        Diagnose again what has a result.
+    timeout : float
+        Time after which a case is given up [s].
+    say : callable, optional
+        Called with a line of text for each case.
+    command : sequence of str, optional
+        The worker, given a case's folder and the file to write; this module by default.
+
+    Returns
+    -------
+    Proof
+        Verdicts and errors. A case that fails is an error in it, and is tried again by the next run.
+
+    Raises
+    ------
+    CaseError
+        If there is no case, or the manifest lists others.
+    ParameterError
+        If `jobs` or `limit` is less than 1, or `timeout` not positive.
+    """
+    if not timeout > 0.0:
+        raise ParameterError(f"timeout = {timeout} s is not allowed: it must be positive")
+    for name, value in (("jobs", jobs), ("limit", limit)):
+        if value is not None and value < 1:
+            raise ParameterError(f"{name} = {value} is not allowed: it must be at least 1")
+    found, manifest = cases_of(folder)
+    target = Path(folder) / "results" if results is None else Path(results)
+    target.mkdir(parents=True, exist_ok=True)
+    tell = say or (lambda text: None)
+    run = _Run.of(found[:limit], target, jobs, manifest, fresh=fresh)
+    kept = len(run.entries)
+    other = sum(entry.get("code") != run.code for entry in run.entries.values())
+    if kept:
+        tell(
+            f"{kept} of {len(run.cases)} results are there"
+            + (f", {other} of them made by other code (--fresh makes them again)" * bool(other))
+        )
+    run.record()
+    run.finish(command or (sys.executable, "-m", "pamrs.diagnosis.prove"), jobs, timeout, tell)
+    return Proof(target, {case.name: run.entries[case.name] for case in run.cases}, kept)
+
+
+@dataclass
+class _Run:
+    """Cases, what is known of them, and those that are still to be diagnosed."""
+
+    cases: list[Path]
+    target: Path
+    code: str
+    digests: dict[str, str]
+    head: dict[str, Any]
+    entries: dict[str, dict[str, Any]]
+    waiting: list[Path]
+
+    @classmethod
+    def of(cls, cases: list[Path], target: Path, jobs: int, manifest: str | None, *, fresh: bool) -> _Run:
+        """What an earlier run left of these cases."""
+        from pamrs import __version__
+
+        code, earlier, digests = code_digest(), _before(target), {case.name: case_digest(case) for case in cases}
+        entries: dict[str, dict[str, Any]] = {}
+        waiting: list[Path] = []
+        for case in cases:
+            result = None if fresh else valid_result(target / case.name / "out.json")
+            known = earlier.get(case.name, {})
+            if result is None or known.get("case_sha256", digests[case.name]) != digests[case.name]:
+                waiting.append(case)
+            else:
+                entries[case.name] = {**_entry(result), **{k: v for k, v in known.items() if k != "error"}}
+        told = {"schema": SCHEMA, "version": __version__, "code": code, "machine": _machine(), "jobs": jobs}
+        return cls(cases, target, code, digests, {**told, "manifest_sha256": manifest}, entries, waiting)
+
+    def record(self) -> None:
+        """Write what is known to ``run.json``."""
+        ordered = {case.name: self.entries[case.name] for case in self.cases if case.name in self.entries}
+        write_atomically(self.target / "run.json", json.dumps({**self.head, "cases": ordered}, indent=1) + "\n")
+
+    def finish(self, command: Sequence[str], jobs: int, timeout: float, tell: Callable[[str], None]) -> None:
+        """Diagnose what waits, so many cases at a time, each in a process of its own."""
+        began, todo, kept = time.perf_counter(), len(self.waiting), len(self.entries)
+        running: list[_Running] = []
+        done = 0
+        try:
+            while self.waiting or running:
+                while self.waiting and len(running) < jobs:
+                    running.append(self._started(command, self.waiting.pop(0)))
+                for slow in (r for r in running if time.perf_counter() - r.began > timeout):
+                    slow.process.kill()
+                    slow.process.wait()
+                    slow.late = True
+                ended = [r for r in running if r.process.poll() is not None]
+                for one in ended:
+                    running.remove(one)
+                    entry = self._entered(one)
+                    done += 1
+                    left = (time.perf_counter() - began) / done * (todo - done)
+                    rest = f"; about {_span(left)} left" if done < todo else ""
+                    place = f"[{kept + done}/{len(self.cases)}]"
+                    tell(f"{place} {one.case.name}: {_said(entry)}, {entry['wall_seconds']:.1f} s{rest}")
+                if not ended:
+                    time.sleep(_POLL)
+        finally:
+            for one in running:
+                one.close()
+
+    def _started(self, command: Sequence[str], case: Path) -> _Running:
+        """A worker on a case, whose earlier result is gone."""
+        out = self.target / case.name / "out.json"
+        out.parent.mkdir(exist_ok=True)
+        out.unlink(missing_ok=True)
+        return _launch(command, case, out)
+
+    def _entered(self, ended: _Running) -> dict[str, Any]:
+        """The entry of a case whose worker has ended, recorded."""
+        name = ended.case.name
+        entry = _ended(ended, self.target / name / "out.json")
+        ended.close()
+        self.entries[name] = {
+            **entry,
+            "version": self.head["version"],
+            "code": self.code,
+            "case_sha256": self.digests[name],
+        }
+        self.record()
+        return entry
+
+
+if __name__ == "__main__":
+    raise SystemExit(worker())

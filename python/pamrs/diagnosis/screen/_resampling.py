@@ -1,0 +1,85 @@
+"""How often resampled recordings would have led to the same effects: bootstrap inclusion frequencies.
+
+A single screen says which effect tells most, not whether another few minutes of the same recordings would say so too. Segments of all
+recordings, longer than the residual remembers, are drawn anew with replacement (H. R. Kuensch, "The jackknife and the bootstrap for
+general stationary observations", Annals of Statistics 17, 1989), and forward selection by the score test is done again: the effect that
+tells most, then the one that tells most beside it. Signatures and sensitivities stay those of the whole, so a draw is cheap.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pamrs.diagnosis.screen._screening import Screen, best_size
+from pamrs.diagnosis.settings import DiagnosisSettings
+
+__all__ = ["inclusion"]
+
+Array = NDArray[np.float64]
+
+
+def inclusion(screened: Screen, least: float, partner: float, settings: DiagnosisSettings) -> dict[str, float]:
+    """Share of resamples in which forward selection takes an effect.
+
+    Parameters
+    ----------
+    screened : Screen
+        Signatures at the refitted baseline.
+    least : float
+        Gain in chi-square from which an effect is taken.
+    partner : float
+        Share of the resample's sum of squares from which a second one is taken beside the first (1 or more: none).
+    settings : DiagnosisSettings
+        Number and length of the resampled segments, width of the bins, seed.
+
+    Returns
+    -------
+    dict of str to float
+        By effect, those that were ever taken.
+    """
+    stand = screened.stand
+    if not screened.signatures or stand.rows.size == 0:
+        return {}
+    columns = np.column_stack([stand.rows, stand.jacobian, *(signature for _, _, signature in screened.signatures)])
+    length = round(settings.screen.resample_time / settings.noise.fit_bin_time)
+    count = -(-columns.shape[0] // length)
+    parts = [columns[k * length : (k + 1) * length] for k in range(count)]
+    products = np.array([part.T @ part for part in parts])
+    rng = np.random.default_rng(settings.seed)
+    draws = settings.screen.resamples
+    taken: Counter[str] = Counter()
+    for weights in rng.multinomial(count, np.full(count, 1.0 / count), draws):
+        taken.update(_selected(screened, np.tensordot(weights.astype(np.float64), products, 1), least, partner))
+    return {effect: number / draws for effect, number in taken.most_common()}
+
+
+def _selected(screened: Screen, products: Array, least: float, partner: float) -> list[str]:
+    """Effects that forward selection takes, from the products of residual, sensitivities and signatures with each other."""
+    stand, settings = screened.stand, screened.settings
+    first = 1 + stand.moved.size
+    base, prior, pull = list(range(1, first)), stand.free, stand.moved * stand.free
+    columns = list(range(first, products.shape[0]))
+    chosen: list[str] = []
+    for threshold in (least, max(least, partner * float(products[0, 0]))):
+        normal = products[np.ix_(base, base)] + np.diag(prior)
+        normal += 1e-9 * np.diag(np.diag(normal)) + 1e-12 * np.eye(len(base))
+        shared = products[np.ix_(base, columns)]
+        solved = np.linalg.solve(normal, shared)
+        powers = products[columns, columns] - np.sum(shared * solved, axis=0)
+        alongs = products[0, columns] - (products[base, 0] + pull) @ solved
+        gains = [
+            (best_size(float(along), float(power), start, settings)[1], effect, column)
+            for column, (effect, start, _), along, power in zip(columns, screened.signatures, alongs, powers, strict=True)
+            if effect not in chosen
+        ]
+        gain, effect, column = max(gains, default=(0.0, "", 0))
+        if gain <= threshold:
+            break
+        chosen.append(effect)
+        # what was taken is as free as a parameter without a prior
+        base.append(column)
+        prior, pull = np.append(prior, 0.0), np.append(pull, 0.0)
+    return chosen

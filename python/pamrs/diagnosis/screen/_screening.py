@@ -1,0 +1,340 @@
+"""Which effects are worth a fit: the score of each, the baseline's own freedom taken away first.
+
+An effect at a typical size changes the residuals by a signature. What the baseline parameters (inside their tolerances) and the starts
+of the windows can do is projected out of the signature and of the residual; what is left of the residual along what is left of the
+signature is the gain in chi-square that the effect would bring (a score test, Rao 1948, with a finite change in the place
+of the derivative, since many effects have none at zero).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pamrs import _core
+from pamrs.channels import channel_of
+from pamrs.diagnosis.fit import Fit, Problem, Start, acts_in, changes, stacked, starts_of
+from pamrs.diagnosis.prepare import Block
+from pamrs.diagnosis.settings import ScreenSettings
+from pamrs.effects import EFFECTS, EffectParameter
+from pamrs.errors import SimulationError
+from pamrs.rig import Rig
+from pamrs.rig.schema import BLOCKS, qualified
+
+__all__ = ["Score", "Screen", "Stand", "best_size", "by_effect", "screen", "stand_of"]
+
+Array = NDArray[np.float64]
+Signature = tuple[str, Start, Array]
+"""Effect, where it starts, and what it does to the stacked residuals there."""
+
+
+@dataclass(frozen=True, eq=False)
+class Score:
+    """What one effect, from one start, would bring.
+
+    Attributes
+    ----------
+    effect : str
+        Its id.
+    start : Start
+        Where it starts.
+    gain : float
+        Gain in chi-square.
+    size : float
+        Multiple of the start's size at which it is largest.
+    signature : (n,) array
+        Change of the stacked residuals at the start's size.
+    """
+
+    effect: str
+    start: Start
+    gain: float
+    size: float
+    signature: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Stand:
+    """Where a fitted model stands, and what its free parameters could still do.
+
+    Attributes
+    ----------
+    rows : (n,) array
+        Stacked residuals.
+    left : (n,) array
+        What of them the free parameters leave, the pull of their priors included: where an effect would let a parameter go back to
+        its nominal value, that counts for the effect.
+    jacobian : (n, k) array
+        Change of the rows with each free parameter that is not at the end of its range, in tolerances or its own scale.
+    moved, free : (k,) array
+        How far each is from its nominal value, and 1 where a prior holds it, 0 where none does.
+    basis : (n, k) array
+        Basis of what the free parameters can do, each column as long as the priors let it: its product with its transpose projects.
+    """
+
+    rows: Array
+    left: Array
+    jacobian: Array
+    moved: Array
+    free: Array
+    basis: Array
+
+    @property
+    def power_left(self) -> float:
+        """Squared length of what the free parameters leave of the residuals."""
+        return max(float(self.left @ self.left), 1e-300)
+
+    def power(self, signature: Array) -> float:
+        """Squared length of what the free parameters leave of a signature."""
+        return float(signature @ (signature - self.basis @ (self.basis.T @ signature)))
+
+
+@dataclass(frozen=True, eq=False)
+class Screen:
+    """Signatures of effects at a fitted model, to be scored against any residual near to it.
+
+    Attributes
+    ----------
+    stand : Stand
+        The model.
+    signatures : list of (effect, start, (n,) array)
+        Each effect's, from each of its starts.
+    settings : ScreenSettings
+        Sizes that are relied on.
+    """
+
+    stand: Stand
+    signatures: list[Signature]
+    settings: ScreenSettings
+
+    def scores(self, stand: Stand | None = None, *, without: tuple[str, ...] = ()) -> list[Score]:
+        """Every start of every effect, the most telling first.
+
+        Parameters
+        ----------
+        stand : Stand, optional
+            Another model than the screen's own (a fitted effect).
+        without : tuple of str
+            Effects to leave out.
+        """
+        own = self.stand if stand is None else stand
+        found = []
+        for effect, start, signature in self.signatures:
+            if effect in without:
+                continue
+            power = own.power(signature)
+            if power < self.settings.invisible:
+                continue
+            size, gain = best_size(float(own.left @ signature), power, start, self.settings)
+            found.append(Score(effect, start, gain, size, signature))
+        return sorted(found, key=lambda s: -s.gain)
+
+
+def best_size(along: float, power: float, start: Start, settings: ScreenSettings) -> tuple[float, float]:
+    """Multiple of a start's size at which its signature gains most, inside what is believed, and that gain in chi-square.
+
+    ``along`` is the product of what is left of the residual with the signature, ``power`` that of the signature with itself.
+    """
+    if power < settings.invisible:
+        return 0.0, 0.0
+    low = -settings.most_size if start.signed else settings.least_size
+    size = float(np.clip(-along / power, low, settings.most_size)) if start.scalable else 1.0
+    return size, -2.0 * size * along - size**2 * power
+
+
+def by_effect(scores: list[Score]) -> dict[str, list[Score]]:
+    """Scores of each effect, effects and starts in the order of their gain."""
+    found: dict[str, list[Score]] = {}
+    for score in scores:
+        found.setdefault(score.effect, []).append(score)
+    return found
+
+
+def stand_of(fitted: Fit, problem: Problem, inflation: dict[str, float]) -> Stand:
+    """Stacked residuals of a fit, and what its free parameters can do.
+
+    The priors enter as rows of their own, so that a parameter that its tolerance holds cannot explain anything away.
+    """
+    rows, jacobian = stacked(problem, fitted.residuals, inflation)
+    if jacobian is None or jacobian.shape[1] == 0:
+        none = np.zeros((rows.size, 0))
+        return Stand(rows, rows, none, np.zeros(0), np.zeros(0), none)
+    # a parameter at the end of its range cannot go on: what it would explain is left for an effect
+    walls = problem.settings.fit.most_tolerances
+    names = [n for n in fitted.values if abs(fitted.held_by_prior.get(n, 0.0)) < walls - 1e-3]
+    scales = np.array([fitted.scales[name] for name in names])
+    scaled = jacobian[:, [list(fitted.values).index(name) for name in names]] * scales
+    free = np.array([name in fitted.held_by_prior for name in names], dtype=np.float64)
+    # J (J'J + prior)^-1 J' is the projector that a prior leaves; its square root's columns are the basis
+    values, vectors = np.linalg.eigh(scaled.T @ scaled)
+    keep = values > 1e-10 * max(float(values[-1]), 1e-300)
+    u = scaled @ vectors[:, keep] / np.sqrt(values[keep])
+    inner = (vectors[:, keep] * np.sqrt(values[keep])).T
+    normal = inner.T @ inner + np.diag(free) + 1e-12 * np.eye(free.size)
+    shrunk = inner @ np.linalg.solve(normal, inner.T)
+    weights, turn = np.linalg.eigh(0.5 * (shrunk + shrunk.T))
+    basis = (u @ turn) * np.sqrt(np.clip(weights, 0.0, 1.0))
+    moved = np.array([fitted.held_by_prior.get(name, 0.0) for name in names])
+    pull = u @ (inner @ np.linalg.solve(normal, moved))
+    return Stand(rows, rows - basis @ (basis.T @ rows) - pull, scaled, moved, free, basis)
+
+
+def screen(problem: Problem, fitted: Fit, effects: list[str], inflation: dict[str, float], *, sealed: bool) -> Screen:
+    """Signatures of effects at a fitted model.
+
+    Parameters
+    ----------
+    problem : Problem
+        Blocks and recordings.
+    fitted : Fit
+        The model.
+    effects : list of str
+        Ids to screen.
+    inflation : dict of str to float
+        As in :func:`pamrs.diagnosis.fit.fit`.
+    sealed : bool
+        Whether the rig has no valve.
+    """
+    stand, settings = stand_of(fitted, problem, inflation), problem.settings.screen
+    signatures: list[Signature] = []
+
+    def try_(start: Start, looks: int = settings.most_signatures) -> float:
+        """Add the signature of a start; what it would bring."""
+        tried, entry, score = start, None, None
+        for _ in range(looks):
+            try:
+                found = changes(problem, tried.applied(fitted.rig), fitted.residuals, start.effect)
+            except SimulationError:
+                break  # this size leaves the range in which the model holds
+            moved, _ = stacked(problem, found, inflation)
+            entry = (start.effect, tried, moved - stand.rows)
+            scores = Screen(stand, [entry], settings).scores()
+            score = max(scores, key=lambda s: s.gain, default=None)
+            if score is None or score.gain <= 0.0 or not start.scalable:
+                break
+            if settings.repeat_below <= abs(score.size) < settings.most_size:
+                break
+            # what a stop or a threshold does is not in proportion to its size: it is looked at where it would be
+            wanted = tried.scaled(abs(score.size))
+            if wanted == tried:
+                break  # its bounds hold it
+            tried = wanted
+        if entry is not None:
+            signatures.append(entry)
+        return -math.inf if score is None else score.gain
+
+    for effect in effects:
+        starts = starts_of(effect, sealed=sealed)
+        info = EFFECTS[effect]
+        if any(p.scan for p in info.parameters):
+            for start in _nearest(starts[0], lambda start: try_(start, 1), signatures):
+                try_(start)
+        elif info.with_role("threshold"):
+            before = len(signatures)
+            best = _switched(starts[0], problem, lambda start: try_(start, 1))
+            signatures[before:] = [entry for entry in signatures[before:] if entry[1] is best]
+        else:
+            for start in _placed(starts, problem, fitted.rig):
+                try_(start)
+    return Screen(stand, signatures, settings)
+
+
+def _seen(problem: Problem, channel: str) -> Array | None:
+    """Everything that was measured of the channels of one kind; None where there is none."""
+    seen = [p.signals[name][0] for p in problem.recordings for name in p.signals if channel_of(name) == channel]
+    return np.concatenate(seen) if seen else None
+
+
+def _placed(starts: list[Start], problem: Problem, rig: Rig) -> list[Start]:
+    """Starts moved to where they act: a contact to places that were reached, a restriction to the size of what it stands beside."""
+    info = EFFECTS[starts[0].effect]
+    beside = next((p for p in info.parameters if p.like), None)
+    if beside is not None:
+        return _beside(starts, beside, problem, rig)
+    place = next(iter(info.with_role("place")), None)
+    reached = None if place is None else _seen(problem, place.channel)
+    if place is None or reached is None:
+        return starts
+    sides = [f"{info.id}.{side.name}" for side in info.with_role("side")]
+
+    def at(start: Start, share: float) -> Start:
+        lower = any(start.held[side] < 0.0 for side in sides)
+        there = float(np.quantile(reached, 1.0 - share if lower else share))
+        return replace(start, free=start.free | {f"{info.id}.{place.name}": there})
+
+    return [at(start, share) for start in starts for share in problem.settings.screen.place_shares]
+
+
+def _nearest(start: Start, try_: Callable[[Start], float], signatures: list[Signature]) -> list[Start]:
+    """The values that tell most among many: what swings long has to be met within a few percent of its frequency.
+
+    They are tried with more damping than the effect has, which makes the resonance broader than the distance between two values.
+    """
+    parameters = EFFECTS[start.effect].parameters
+    scanned = next(p for p in parameters if p.scan)
+    assert scanned.scan is not None
+    broad = {f"{start.effect}.{p.name}": p.tried for p in parameters if p.tried is not None}
+    before = len(signatures)
+    name = f"{start.effect}.{scanned.name}"
+    tried = [replace(start, free=start.free | {name: float(x)} | broad) for x in np.geomspace(*scanned.scan)]
+    gains = [try_(one) for one in tried]
+    del signatures[before:]
+    order = sorted(range(len(tried)), key=lambda k: -gains[k])
+    # the best and the best that is no neighbour of it
+    far = [k for k in order[1:] if abs(k - order[0]) > 1]
+    return [tried[k] for k in (order[0], *far[:1])]
+
+
+def _beside(starts: list[Start], parameter: EffectParameter, problem: Problem, rig: Rig) -> list[Start]:
+    """Restrictions in parts of the conductance of the largest opening that they stand beside, where a block could show them."""
+    kind, _, area = parameter.like.partition(".")
+    areas = [rig.parameter(f"{qualified(kind, name)}.{area}").value for name in rig.tables(kind)]
+    unit = _core.Gas(*(rig.model["gas"][key.name] for key in BLOCKS["gas"])).area_of_conductance(1.0)
+    name = f"{starts[0].effect}.{parameter.name}"
+    return [
+        replace(start, free=start.free | {name: part * max(areas) / unit})
+        for start in starts
+        for part in problem.settings.screen.opening_shares
+        if any(_shows(start, block) for block in problem.blocks)
+    ]
+
+
+def _shows(start: Start, block: Block) -> bool:
+    """Whether an effect acts in a block with the choices that a start holds."""
+    values = start.free | start.held
+    parameters = [p for p in EFFECTS[start.effect].parameters if block.kind in p.needed_in]
+    return acts_in(start.effect, block) and all(values[f"{start.effect}.{p.name}"] for p in parameters)
+
+
+def _switched(start: Start, problem: Problem, try_: Callable[[Start], float]) -> Start | None:
+    """The levels of a channel between which something switches: over the range that was seen, then closer and closer.
+
+    A relay that is asked once a step has no slope in its thresholds, so that no fit can move them.
+    """
+    on, off = EFFECTS[start.effect].with_role("threshold")
+    seen, settings = _seen(problem, on.channel), problem.settings.screen
+    if seen is None:
+        return None
+    low, high = (float(f(seen)) for f in (np.min, np.max))
+    step = (high - low) / settings.threshold_levels
+    if step <= 0.0:
+        return None
+
+    def at(switch_on: float, switch_off: float) -> Start:
+        own = {f"{start.effect}.{on.name}": switch_on, f"{start.effect}.{off.name}": switch_off}
+        return replace(start, free={n: v for n, v in start.free.items() if n not in own}, held=start.held | own)
+
+    levels = [low + (k + 0.5) * step for k in range(settings.threshold_levels)]
+    tried = [(try_(s), a, b, s) for a in levels for b in (*levels, high + step) if b > a for s in [at(a, b)]]
+    best = max(tried, key=lambda t: t[0])
+    while step > settings.threshold_precision * (high - low):
+        step *= 0.5
+        _, a, b, _ = best
+        around = [(a - step, b), (a + step, b), (a, b - step), (a, b + step)]
+        tried = [(try_(s), c, d, s) for c, d in around if 0.0 < c < d for s in [at(c, d)]]
+        best = max([best, *tried], key=lambda t: t[0])
+    return best[3]

@@ -1,0 +1,52 @@
+"""The baseline alone: its parameters refitted inside their tolerances, to the end."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from pamrs.diagnosis.evidence import colour_of
+from pamrs.diagnosis.fit import Fit, Key, Problem, bin_width, fit
+from pamrs.diagnosis.prepare import Prepared, Residual
+from pamrs.errors import SimulationError
+from pamrs.rig import Rig
+
+__all__ = ["coloured", "refitted", "thorough"]
+
+
+def coloured(problem: Problem, nominal: Rig, first: Fit) -> tuple[Fit, dict[str, float]]:
+    """The refitted baseline fitted on with the colour that it leaves as weights, where it leaves much, and that colour."""
+    colour = colour_of(problem, first)
+    if max(colour.values()) <= problem.settings.noise.correlated_variance:
+        return first, colour
+    return thorough(problem, nominal, colour, first), colour
+
+
+def thorough(problem: Problem, nominal: Rig, inflation: dict[str, float], warm: Fit | None) -> Fit:
+    """Baseline parameters alone, fitted to the end."""
+    settings = problem.settings.fit
+    evaluations, share = settings.baseline_evaluations, settings.final_step_share
+    return fit(problem, nominal, (), {}, inflation, warm=warm, evaluations=evaluations, share=share)
+
+
+def refitted(problem: Problem, nominal: Rig, inflation: dict[str, float]) -> Fit:
+    """The baseline refitted from the nominal values and, where that leaves more than noise could, from the other side of them."""
+    settings = problem.settings.noise
+    first = thorough(problem, nominal, inflation, None)
+    rows = sum(
+        int(r.rows.sum()) / bin_width(p, settings.fit_bin_time)
+        for p in problem.recordings
+        for r in _of(p, first.residuals)
+    )
+    if 2.0 * first.cost < settings.margin * rows:
+        return first
+    known = nominal.parameters
+    mirrored = {n: 2.0 * known[n].value - first.values[n] for n in first.moved}
+    try:
+        second = thorough(problem, nominal, inflation, replace(first, values=mirrored))
+    except SimulationError:
+        return first
+    return min(first, second, key=lambda f: f.cost)
+
+
+def _of(prepared: Prepared, found: dict[Key, Residual]) -> list[Residual]:
+    return [r for (_, recording), r in found.items() if recording == prepared.recording.name]

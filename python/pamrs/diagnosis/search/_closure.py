@@ -1,0 +1,443 @@
+"""What a mismatch is a function of, where no catalogue entry explains it: a sparse closure at the located cut.
+
+A closure is linear in its coefficients, so that at zero (where it changes nothing) one evaluation gives what every term of its
+dictionary would do to the residuals, and a few more what those with memory would do at other memory times and angles. Terms are
+then chosen by orthogonal forward selection (Chen, Billings & Luo 1989) with the freedom of the baseline taken away, and only the
+chosen ones are fitted in the nonlinear model. Linearising again at that fit corrects a choice that was made far from it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pamrs.diagnosis.evidence import colour_of
+from pamrs.diagnosis.fit import Fit, Problem, fit, residuals, stacked, with_priors
+from pamrs.diagnosis.noise import correlation_time
+from pamrs.diagnosis.prepare import Block
+from pamrs.diagnosis.settings import ClosureSettings
+from pamrs.effects import CLOSURE_OF, EFFECTS, MEMORY_OF, TERMS, Term
+from pamrs.errors import DiagnosisError, SimulationError
+from pamrs.rig import Rig
+
+__all__ = ["find_closure"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class _Candidate:
+    """One term of one closure, with the shape of its memory."""
+
+    closure: str
+    term: Term
+    shape: float | None
+
+    @property
+    def name(self) -> str:
+        return f"{self.closure}.{self.term.name}"
+
+    @property
+    def memory(self) -> str:
+        """Dotted name of the shape it depends on, ``""`` for a term without memory."""
+        return f"{self.closure}.{MEMORY_OF[self.term.kind]}" if self.term.kind in MEMORY_OF else ""
+
+
+@dataclass(frozen=True, eq=False)
+class _Choice:
+    """Terms chosen, with their linear estimates.
+
+    Attributes
+    ----------
+    values : dict of str to float
+        Dotted coefficients, SI.
+    shapes : dict of str to float
+        Dotted shapes of the memories that they need.
+    shift : (b,) array
+        What the baseline parameters move beside them, in tolerances.
+    """
+
+    values: dict[str, float]
+    shapes: dict[str, float]
+    shift: Array
+
+
+def find_closure(
+    problem: Problem, nominal: Rig, baseline: Fit, inflation: dict[str, float], blocks: list[Block], say: Callable[[str], None]
+) -> Fit | None:
+    """Fit a sparse closure where blocks keep an excess.
+
+    Sensitivities at zero coefficients are taken at four memory times and angles (the first evaluation with all terms, the others
+    with those that remember); all chosen terms of a closure share one memory time and one memory angle, which the fit then refines.
+    A term is taken while the logarithm of the misfit falls by more than its price, counted on independent samples of what is left,
+    and while recordings left out are predicted better with it (with one recording only the price decides). The choice is made a
+    second time at the fit, residuals weighted by the colour that they have there, and the best of the fits and the baseline is
+    kept. This takes ten to fifteen evaluations of the problem.
+
+    Parameters
+    ----------
+    problem : Problem
+        Blocks and recordings.
+    nominal : Rig
+        Nominal model.
+    baseline : Fit
+        Its fit to the problem without effects, with sensitivities.
+    inflation : dict of str to float
+        Variance of each block's binned residual relative to white sample noise, as in :func:`pamrs.diagnosis.fit.fit`.
+    blocks : list of Block
+        Blocks of the problem that keep an excess: ``supply``, ``chamber``, ``arm``.
+    say : callable
+        Receives progress.
+
+    Returns
+    -------
+    Fit or None
+        Model with the closure (effects ``closure_*``), baseline refitted beside it; None where no term is worth its price.
+
+    Raises
+    ------
+    DiagnosisError
+        For a block without a closure, or a baseline with effects.
+    """
+    if baseline.effects:
+        raise DiagnosisError(
+            f"baseline.effects = {', '.join(baseline.effects)} is not allowed: a closure needs the fit without effects"
+        )
+    closures = _closures(blocks)
+    say(f"{' and '.join(b.name for b in blocks)}: looking for a form of what is missing")
+    settings = problem.settings.closures
+    candidates, columns = _at_zero(problem, baseline, inflation, blocks, closures)
+    chosen = _select(_Frame.of(problem, baseline, baseline, inflation), candidates, columns, {}, settings)
+    found = None if chosen is None else _fitted(problem, nominal, baseline, inflation, chosen, say)
+    if found is None:
+        return None
+    colour = colour_of(problem, found)
+    candidates, columns, warm = _again(problem, baseline, found, colour, blocks, closures)
+    second = _select(_Frame.of(problem, warm, found, colour), candidates, columns, found.values, settings)
+    other = None if second is None else _fitted(problem, nominal, warm, colour, second, say)
+    return _better([baseline, found, *([] if other is None else [other])], problem, colour, len(candidates))
+
+
+def _closures(blocks: Sequence[Block]) -> dict[str, str]:
+    """Closures by the block that each acts in."""
+    unknown = [b.name for b in blocks if b.kind not in CLOSURE_OF]
+    if unknown or not blocks:
+        raise DiagnosisError(f"blocks = {unknown} is not allowed: one or more of {', '.join(CLOSURE_OF)}")
+    return {b.name: CLOSURE_OF[b.kind] for b in blocks}
+
+
+def _shapes(closure: str) -> dict[str, tuple[float, ...]]:
+    """Values of each memory shape of a closure that are tried."""
+    return {p.name: p.starts for p in EFFECTS[closure].parameters if p.neutral is None}
+
+
+def _columns(problem: Problem, base: Fit, rig: Rig, names: list[str], inflation: dict[str, float], blocks: list[Block]) -> Array:
+    """Derivative of the stacked residuals of the whole problem with respect to coefficients that act in some of its blocks."""
+    found = residuals(replace(problem, blocks=blocks), rig, names)
+    full = {key: replace(r, jacobian=np.zeros((r.value.size, len(names)))) for key, r in base.residuals.items()}
+    _, columns = stacked(problem, full | found, inflation)
+    assert columns is not None
+    return columns
+
+
+def _at_zero(
+    problem: Problem, baseline: Fit, inflation: dict[str, float], blocks: list[Block], closures: dict[str, str]
+) -> tuple[list[_Candidate], Array]:
+    """Every term at every shape of its memory, and what each does to the stacked residuals per unit of its coefficient (n, m)."""
+    tried = {closure: _shapes(closure) for closure in closures.values()}
+    rounds = max(len(values) for shapes in tried.values() for values in shapes.values())
+    candidates: list[_Candidate] = []
+    columns = []
+    for k in range(rounds):
+        rig = baseline.rig
+        now: list[_Candidate] = []
+        for closure, shapes in tried.items():
+            here = {name: values[min(k, len(values) - 1)] for name, values in shapes.items()}
+            rig = rig.with_effect(closure, here)
+            for term in TERMS[closure]:
+                shape = MEMORY_OF.get(term.kind)
+                if shape is not None or k == 0:
+                    now.append(_Candidate(closure, term, here[shape] if shape else None))
+        columns.append(_columns(problem, baseline, rig, [c.name for c in now], inflation, blocks))
+        candidates += now
+    return candidates, np.concatenate(columns, axis=1)
+
+
+def _again(
+    problem: Problem, baseline: Fit, found: Fit, inflation: dict[str, float], blocks: list[Block], closures: dict[str, str]
+) -> tuple[list[_Candidate], Array, Fit]:
+    """The same at a fitted closure, every memory as it is there; and the baseline there, with sensitivities beside the closure."""
+    rig = found.rig
+    for closure in closures.values():
+        if closure not in found.effects:
+            rig = rig.with_effect(closure)
+    shapes = {e["id"]: e["parameters"] for e in rig.effects}
+    candidates = [
+        _Candidate(closure, term, shapes[closure][MEMORY_OF[term.kind]] if term.kind in MEMORY_OF else None)
+        for closure in closures.values()
+        for term in TERMS[closure]
+    ]
+    names = list(baseline.values)
+    evaluated = residuals(problem, rig, [*names, *(c.name for c in candidates)])
+    own = {key: replace(r, jacobian=None if r.jacobian is None else r.jacobian[:, : len(names)]) for key, r in evaluated.items()}
+    values = {name: found.values[name] for name in names}
+    warm = replace(baseline, rig=found.rig, values=values, residuals=own, moved={name: found.moved[name] for name in names})
+    _, every = stacked(problem, evaluated, inflation)
+    assert every is not None
+    return candidates, every[:, len(names) :], warm
+
+
+@dataclass(frozen=True, eq=False)
+class _Frame:
+    """Stacked residuals of a fit with what the baseline can do beside a closure.
+
+    Attributes
+    ----------
+    rows : (n,) array
+        Stacked residuals.
+    freedom : (n, b) array
+        Their derivative with respect to each baseline parameter in tolerances.
+    moved : (b,) array
+        Distance of each from nominal in tolerances, the residual of its prior.
+    recording : (n,) int array
+        Recording of each row.
+    series : list of slice
+        Rows of each block of each recording.
+    """
+
+    rows: Array
+    freedom: Array
+    moved: Array
+    recording: NDArray[np.int64]
+    series: list[slice]
+
+    @staticmethod
+    def of(problem: Problem, baseline: Fit, found: Fit, inflation: dict[str, float]) -> _Frame:
+        """Residuals of a fit, sensitivities of the baseline it grew from."""
+        rows, _ = stacked(problem, found.residuals, inflation)
+        _, jacobian = stacked(problem, baseline.residuals, inflation)
+        names = list(baseline.values)
+        scales = np.array([baseline.scales[name] for name in names])
+        freedom = np.zeros((rows.size, 0)) if jacobian is None or not names else jacobian * scales
+        recording, series, start = [], [], 0
+        for k, prepared in enumerate(problem.recordings):
+            for block in problem.blocks:
+                key = (block.name, prepared.recording.name)
+                size = stacked(replace(problem, blocks=[block], recordings=[prepared]), {key: found.residuals[key]}, inflation)[0].size
+                series.append(slice(start, start + size))
+                recording.append(np.full(size, k))
+                start += size
+        return _Frame(rows, freedom, np.array([found.moved[name] for name in names]), np.concatenate(recording), series)
+
+    def independent(self, rows: Array) -> float:
+        """Number of independent samples among residuals: rows over their correlation time."""
+        return max(4.0, sum(float(s.stop - s.start) / correlation_time(rows[s]) for s in self.series if s.stop - s.start >= 4))
+
+
+def _price(samples: float, among: int) -> float:
+    """Chi-square that a term must gain: BIC on independent samples, and risk inflation, the best of so many (Foster & George 1994)."""
+    return math.log(samples) + 2.0 * math.log(among)
+
+
+def _better(models: list[Fit], problem: Problem, inflation: dict[str, float], among: int) -> Fit | None:
+    """The model that is worth most by misfit and price, all on the independent samples of that with the least misfit; None for the
+    first.
+
+    Parameters
+    ----------
+    models : list of Fit
+        The baseline first.
+    problem : Problem
+        Blocks and recordings.
+    inflation : dict of str to float
+        One weighting for all.
+    among : int
+        Number of terms that there were to choose from.
+    """
+    misfits = [with_priors(problem, model, inflation) for model in models]
+    least = models[int(np.argmin(misfits))]
+    frame = _Frame.of(problem, models[0], least, inflation)
+    samples = frame.independent(frame.rows)
+    terms = [sum(1 for name in model.values if name.partition(".")[0] in TERMS) for model in models]
+    worth = [-samples * math.log(m) - k * _price(samples, among) for m, k in zip(misfits, terms, strict=True)]
+    best = int(np.argmax(worth))
+    most = problem.settings.closures.most_misfit_share * misfits[0]
+    return models[best] if best and misfits[best] < most else None
+
+
+def _select(
+    frame: _Frame, candidates: list[_Candidate], columns: Array, present: dict[str, float], settings: ClosureSettings
+) -> _Choice | None:
+    """Orthogonal forward selection of terms against the stacked residuals, the closure that is in them taken out.
+
+    The misfit is that of rows and priors together, the baseline moving freely inside its tolerances: both are orthogonalised
+    against the baseline first. A term that is not worth its price alone is still looked behind: the way goes on to `most_terms`,
+    and as many of them are taken as pay for themselves together; then those are dropped that the others have made needless. A gain
+    that the recordings left out confirm at the full price need only be worth BIC's in the recordings themselves.
+
+    Parameters
+    ----------
+    frame : _Frame
+        Residuals to explain and what the baseline can do.
+    candidates : list of _Candidate
+        Terms.
+    columns : (n, m) array
+        What each does to the residuals per unit of its coefficient.
+    present : dict of str to float
+        Coefficients with which the residuals were computed; their terms are taken first.
+    settings : ClosureSettings
+        How many terms there may be, and what must be left of one.
+
+    Returns
+    -------
+    _Choice or None
+        None where nothing is worth its price.
+    """
+    rows = frame.rows - columns @ np.array([present.get(c.name, 0.0) for c in candidates])
+    size = np.linalg.norm(columns, axis=0)
+    usable = size > 1e-12 * max(float(size.max(initial=0.0)), 1e-300)
+    unit = columns / np.where(usable, size, 1.0)
+    b = frame.freedom.shape[1]
+    target = np.concatenate([rows, frame.moved])
+    wide = np.concatenate([unit, np.zeros((b, unit.shape[1]))])
+    if b:
+        q, _ = np.linalg.qr(np.concatenate([frame.freedom, np.eye(b)]))
+        target = target - q @ (q.T @ target)
+        wide = wide - q @ (q.T @ wide)
+    crossed = _Crossed.of(frame, rows, unit)
+    left, free = target.copy(), wide.copy()
+    order: list[int] = []
+    locked: dict[str, float | None] = {}
+
+    def take(k: int) -> None:
+        """Add a term, and take what it explains out of everything."""
+        nonlocal left, free
+        order.append(k)
+        if candidates[k].memory:
+            locked.setdefault(candidates[k].memory, candidates[k].shape)
+        direction = free[:, k] / max(float(np.linalg.norm(free[:, k])), 1e-150)
+        left = left - direction * float(direction @ left)
+        free = free - np.outer(direction, direction @ free)
+
+    for k, candidate in enumerate(candidates):
+        if candidate.name in present and usable[k] and float(free[:, k] @ free[:, k]) > settings.least_power:
+            take(k)
+    taken, misfit, proof = len(order), float(left @ left), crossed.left_out(order)
+    samples = frame.independent(left[: rows.size])
+    while len(order) < settings.most_terms:
+        power = (free**2).sum(axis=0)
+        open_ = usable & (power > settings.least_power)
+        open_ &= np.array([c.memory not in locked or locked[c.memory] == c.shape for c in candidates])
+        open_[order] = False
+        if not open_.any():
+            break
+        take(int(np.argmax(np.where(open_, (free.T @ left) ** 2 / np.where(open_, power, 1.0), -1.0))))
+        now, outside = float(left @ left), crossed.left_out(order)
+        here = frame.independent(left[: rows.size])
+        inner, outer = here * math.log(misfit / max(now, 1e-300)), here * math.log(proof / max(outside, 1e-300))
+        new = len(order) - taken
+        price = new * _price(here, len(candidates))
+        if outer > 0.0 and (inner > price or (outer > price and inner > new * math.log(here))):
+            taken, misfit, proof, samples = len(order), now, outside, here
+    kept = _pruned(target, wide, order[:taken], misfit, samples, _price(samples, len(candidates)))
+    if not kept:
+        return None
+    design = np.concatenate(
+        [np.concatenate([frame.freedom, np.eye(b)]), np.concatenate([unit[:, kept], np.zeros((b, len(kept)))])], axis=1
+    )
+    solution, *_ = np.linalg.lstsq(design, -np.concatenate([rows, frame.moved]), rcond=1e-10)
+    values = {candidates[k].name: float(v) / float(size[k]) for k, v in zip(kept, solution[b:], strict=True)}
+    shapes = {c.memory: c.shape for c in (candidates[k] for k in kept) if c.memory and c.shape is not None}
+    return _Choice(values, shapes, solution[:b])
+
+
+def _pruned(target: Array, wide: Array, kept: list[int], misfit: float, samples: float, price: float) -> list[int]:
+    """Terms without those that others have made needless: backward, the cheapest first, while its loss is less than its price."""
+
+    def without(k: int) -> float:
+        others = wide[:, [j for j in kept if j != k]]
+        solution, *_ = np.linalg.lstsq(others, target, rcond=1e-10)
+        return float(np.sum((target - others @ solution) ** 2))
+
+    while kept:
+        losses = {k: without(k) for k in kept}
+        cheapest = min(kept, key=lambda k: losses[k])
+        if samples * math.log(losses[cheapest] / max(misfit, 1e-300)) > price:
+            break
+        kept, misfit = [k for k in kept if k != cheapest], losses[cheapest]
+    return kept
+
+
+@dataclass(frozen=True, eq=False)
+class _Crossed:
+    """Normal equations of baseline and terms by recording, to leave one out at a time.
+
+    Attributes
+    ----------
+    grams : (r, b + m + 1, b + m + 1) array
+        Inner products of baseline columns, terms and rows in each recording.
+    prior : (b,) array
+        Residual of each baseline parameter's prior.
+    """
+
+    grams: Array
+    prior: Array
+
+    @staticmethod
+    def of(frame: _Frame, rows: Array, unit: Array) -> _Crossed:
+        everything = np.concatenate([frame.freedom, unit, rows[:, None]], axis=1)
+        parts = [everything[frame.recording == k] for k in np.unique(frame.recording)]
+        return _Crossed(np.array([part.T @ part for part in parts]), frame.moved)
+
+    def left_out(self, terms: Sequence[int]) -> float:
+        """Misfit of each recording by the baseline and terms that the others ask for, summed; with one recording the misfit itself."""
+        b = self.prior.size
+        index = np.array([*range(b), *(b + t for t in terms)], dtype=np.int64)
+        total = self.grams.sum(axis=0)
+        misfit = 0.0
+        for own in self.grams:
+            rest = total - own if len(self.grams) > 1 else total
+            normal = rest[np.ix_(index, index)].copy()
+            right = -rest[index, -1].copy()
+            normal[np.arange(b), np.arange(b)] += 1.0
+            right[:b] -= self.prior
+            solution = np.linalg.lstsq(normal, right, rcond=1e-12)[0]
+            misfit += float(own[-1, -1] + 2.0 * solution @ own[index, -1] + solution @ own[np.ix_(index, index)] @ solution)
+        return misfit
+
+
+def _fitted(
+    problem: Problem, nominal: Rig, warm: Fit, inflation: dict[str, float], chosen: _Choice, say: Callable[[str], None]
+) -> Fit | None:
+    """The chosen terms and the shapes of their memories in the nonlinear model; None where it cannot be run."""
+    effects = tuple(dict.fromkeys(name.partition(".")[0] for name in chosen.values))
+    every = {
+        name: parameter
+        for effect in effects
+        for name, parameter in zip(EFFECTS[effect].dotted(), EFFECTS[effect].parameters, strict=True)
+    }
+    held = {n: 0.0 if p.neutral == 0.0 else p.default for n, p in every.items() if n not in chosen.values and n not in chosen.shapes}
+    say(f"trying {' + '.join(name for name in chosen.values)}")
+    names = list(warm.values)
+    best: Fit | None = None
+    settings = problem.settings.closures
+    shrunk = ((1.0, settings.evaluations), (settings.shrunk_share, settings.shrunk_evaluations))
+    for share, evaluations in shrunk:
+        starts = {name: share * value for name, value in chosen.values.items()} | chosen.shapes
+        shifted = {n: warm.values[n] + share * float(x) * warm.scales[n] for n, x in zip(names, chosen.shift, strict=True)}
+        try:
+            tried = fit(
+                problem, nominal, effects, starts, inflation,
+                fixed=held, warm=replace(warm, values=shifted), frozen=True, evaluations=evaluations,
+            )  # fmt: skip
+        except SimulationError:
+            continue
+        if best is None or tried.cost < best.cost:
+            best = tried
+        if 2.0 * best.cost < with_priors(problem, warm, inflation):
+            break
+    return best

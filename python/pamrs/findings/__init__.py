@@ -1,0 +1,68 @@
+"""What a diagnosis found, as types: what `pamrs.diagnosis` fills, and `pamrs.report` shows.
+
+Entries have attributes and can be read like dictionaries. This package computes nothing; it lies
+below reports and diagnosis, so that neither has to know the other to name what lies between them.
+
+Public: `Findings` and the entries it is made of (`Where`, `EffectFound`, `BlockVerdict`,
+`WrongParameter`, `Unexplained`, ...), `Trace`, `Entry`, `VERDICTS`; `to_plain` and `told`, by
+which they become JSON, `object_of`, `reference` and `DEFINITIONS`, by which a schema comes of them.
+"""
+
+from __future__ import annotations
+
+from pamrs.findings._details import Asked, BlockResidual, ConditionMap, Curves, NextExperiment, RankedExperiment, Tried
+from pamrs.findings._entries import (
+    VERDICTS,
+    BlockMismatch,
+    BlockVerdict,
+    ChannelError,
+    Condition,
+    EffectFound,
+    EffectParameterFound,
+    FitErrors,
+    MismatchSize,
+    MismatchStages,
+    ParameterFound,
+    StageError,
+    Unexplained,
+    Where,
+    WrongParameter,
+)
+from pamrs.findings._entry import Entry, to_plain, told
+from pamrs.findings._findings import Findings
+from pamrs.findings._schema import DEFINITIONS, object_of, reference
+from pamrs.findings._trace import ModelFile, Trace
+
+__all__ = [
+    "DEFINITIONS",
+    "VERDICTS",
+    "Asked",
+    "BlockMismatch",
+    "BlockResidual",
+    "BlockVerdict",
+    "ChannelError",
+    "Condition",
+    "ConditionMap",
+    "Curves",
+    "EffectFound",
+    "EffectParameterFound",
+    "Entry",
+    "Findings",
+    "FitErrors",
+    "MismatchSize",
+    "MismatchStages",
+    "ModelFile",
+    "NextExperiment",
+    "ParameterFound",
+    "RankedExperiment",
+    "StageError",
+    "Trace",
+    "Tried",
+    "Unexplained",
+    "Where",
+    "WrongParameter",
+    "object_of",
+    "reference",
+    "to_plain",
+    "told",
+]

@@ -1,0 +1,220 @@
+"""What stands beside the answer: the next experiment, residuals, conditions, everything that was tried."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from pamrs.findings._entry import Entry, told
+
+__all__ = [
+    "Asked",
+    "BlockResidual",
+    "ConditionMap",
+    "Curves",
+    "NextExperiment",
+    "RankedExperiment",
+    "Tried",
+]
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class RankedExperiment(Entry):
+    """An experiment that was compared.
+
+    Attributes
+    ----------
+    name, text, sensor : str
+        Its kind, in words, and the channel that it needs besides those there are.
+    bits : float
+        Expected information about the model [bit].
+    effort_s : float
+        What it costs, as time [s].
+    """
+
+    name: str
+    text: str
+    sensor: str
+    bits: float
+    effort_s: float
+
+
+@dataclass(frozen=True, eq=False)
+class Curves(Entry):
+    """The channel that separates hypotheses most, in the next experiment.
+
+    Attributes
+    ----------
+    experiment, text : str
+        Which one, and in words.
+    channel, unit : str
+        The channel and its SI unit.
+    time : (n,) array
+        [s].
+    predicted : dict of str to (n,) array
+        The channel by hypothesis (key ``values``).
+    leading : str
+        The most probable hypothesis.
+    bin_time : (m,) array
+        [s].
+    left : dict of str to (m,) array
+        What each other hypothesis cannot explain of the leading one's outcome.
+    noise : float
+        Noise level of a bin.
+    command : (n,) array or None
+        Valve command [V].
+    samples_counted : float
+        Independent samples that a recording counts as.
+    """
+
+    experiment: str
+    text: str
+    channel: str
+    unit: str
+    time: FloatArray
+    predicted: Mapping[str, FloatArray] = field(metadata=told(key="values"))
+    leading: str
+    bin_time: FloatArray
+    left: Mapping[str, FloatArray]
+    noise: float
+    command: FloatArray | None
+    samples_counted: float
+
+
+@dataclass(frozen=True, eq=False)
+class NextExperiment(Entry):
+    """What to record next.
+
+    Attributes
+    ----------
+    text : str
+        What to do and why.
+    excitation : dict
+        The same for a program: ``kind`` and numbers with their unit in the name.
+    expected_information_bits : float or None
+        What it would tell about the model; None where it was not simulated.
+    ranking : list of RankedExperiment
+        The experiments that were compared, the most telling first.
+    curves : Curves or None
+        The channel that separates most.
+    """
+
+    text: str = ""
+    excitation: dict[str, Any] = field(default_factory=dict)
+    expected_information_bits: float | None = None
+    ranking: list[RankedExperiment] = field(default_factory=list, metadata=told(json=False))
+    curves: Curves | None = field(default=None, metadata=told(json=False))
+
+
+@dataclass(frozen=True, eq=False)
+class BlockResidual(Entry):
+    """Residual of a block's refitted baseline against its noise.
+
+    Attributes
+    ----------
+    rms, noise : float
+        Residual and noise level of single samples, in the channel's unit.
+    excess : float
+        What is not noise, in units of the noise.
+    p_value : float
+        Chance of that from noise.
+    channel : str
+        Channel that the block predicts.
+    """
+
+    rms: float
+    noise: float
+    excess: float
+    p_value: float
+    channel: str
+
+
+@dataclass(frozen=True, eq=False)
+class ConditionMap(Entry):
+    """Mean residual over two conditions.
+
+    Attributes
+    ----------
+    x_label, y_label : str
+        The conditions.
+    x_edges, y_edges : list of float
+        Edges of the cells, lengths m + 1 and n + 1.
+    z, z_after : (n, m) list of list of float
+        Mean residual in units of the noise before and after; NaN where there are no data.
+    block : str
+        The block.
+    """
+
+    x_label: str
+    y_label: str
+    x_edges: Any
+    y_edges: Any
+    z: Any
+    z_after: Any = None
+    block: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Tried(Entry):
+    """A set of effects, or of wrong values, that was fitted.
+
+    Attributes
+    ----------
+    blocks, effects, wrong_parameters : list of str
+        Blocks of its group, and what it names.
+    fitted, held_out : dict of str to float
+        What it leaves of each block's variance, in units of the noise's.
+    gap_closed : float
+        Share of the baseline's excess that it takes on held-out recordings.
+    scatter : float
+        Relative scatter of its size between recordings.
+    fitted_values, std : dict of str to float
+        Parameters of its effects, SI (key ``values``), and their standard deviations.
+    prior : float
+        Sum of squares of the baseline's movement [tolerances].
+    suspects : list of str
+        Blocks that kept an excess.
+    gain : float
+        Gain in chi-square that the screen promised.
+    """
+
+    blocks: list[str]
+    effects: list[str]
+    wrong_parameters: list[str]
+    fitted: dict[str, float]
+    held_out: dict[str, float]
+    gap_closed: float
+    scatter: float
+    fitted_values: dict[str, float] = field(metadata=told(key="values"))
+    std: dict[str, float]
+    prior: float
+    suspects: list[str]
+    gain: float
+
+
+@dataclass(frozen=True, eq=False)
+class Asked(Entry):
+    """A persistent effect that acts where the mismatch is.
+
+    Attributes
+    ----------
+    id : str
+        Its id.
+    blocks : list of str
+        Where.
+    promised : float
+        Share of the mismatch that its signature could take before any fit.
+    left : float or None
+        Share that it leaves fitted alone; None where it promised too little.
+    """
+
+    id: str
+    blocks: list[str]
+    promised: float
+    left: float | None

@@ -1,0 +1,385 @@
+"""The entries of a diagnosis that JSON has: where, effects, blocks, parameters, errors."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+from pamrs.findings._entry import Entry, told
+
+__all__ = [
+    "VERDICTS",
+    "BlockMismatch",
+    "BlockVerdict",
+    "ChannelError",
+    "Condition",
+    "EffectFound",
+    "EffectParameterFound",
+    "FitErrors",
+    "MismatchSize",
+    "MismatchStages",
+    "ParameterFound",
+    "StageError",
+    "Unexplained",
+    "Where",
+    "WrongParameter",
+]
+
+VERDICTS: Final = ("none", "parameters", "effects", "unlisted")
+"""Allowed verdicts."""
+
+
+@dataclass(frozen=True, eq=False)
+class Condition(Entry):
+    """An operating condition that carries an excess.
+
+    Attributes
+    ----------
+    name : str
+        Which one, ``valve closed``.
+    share, time : float
+        Share of the excess that lies there, and share of the time.
+    mean : float
+        Mean residual there [noises].
+    text : str
+        The same as a sentence.
+    """
+
+    name: str
+    share: float
+    time: float
+    mean: float
+    text: str
+
+
+@dataclass(frozen=True, eq=False)
+class Where(Entry):
+    """Where the mismatch is.
+
+    Attributes
+    ----------
+    block, channel : str or None
+        Block of the chain that carries the excess residual, and the channel that tells.
+    intervals : list of (start, stop)
+        When [s].
+    conditions : list of Condition
+        Under which conditions, the most telling first.
+    text : str
+        In words.
+    recording : str or None
+        Recording to which the intervals belong.
+    """
+
+    block: str | None = field(
+        default=None, metadata=told("block of the chain that carries the excess residual")
+    )
+    channel: str | None = field(default=None, metadata=told("channel that tells"))
+    intervals: list[list[float]] = field(
+        default_factory=list, metadata=told("start and stop in s", kind="pairs")
+    )
+    conditions: list[Condition] = field(
+        default_factory=list, metadata=told("operating conditions that carry the excess")
+    )
+    text: str = ""
+    recording: str | None = field(default=None, metadata=told(json=False, optional=True))
+
+
+@dataclass(frozen=True, eq=False)
+class EffectParameterFound(Entry):
+    """A parameter of an effect, as fitted; SI.
+
+    Attributes
+    ----------
+    value : float
+        Its value.
+    std : float or None
+        Standard deviation; None where the value was chosen of a few.
+    unit : str
+        SI unit.
+    interval : list of two floats, optional
+        95 % interval.
+    identifiable : bool, optional
+        Whether the recordings determine it.
+    """
+
+    value: float
+    std: float | None
+    unit: str
+    interval: list[float] | None = field(
+        default=None, metadata=told("95 % interval", optional=True, kind="pair")
+    )
+    identifiable: bool | None = field(default=None, metadata=told(optional=True))
+
+
+@dataclass(frozen=True, eq=False)
+class EffectFound(Entry):
+    """An effect that is named, or that comes closest.
+
+    Attributes
+    ----------
+    id, name : str
+        Id in the catalogue, and in words.
+    probability : float
+        Of the effect, whatever else acts.
+    inclusion : float or None
+        Share of resampled recordings in which the screen would have taken it.
+    parameters : dict of str to EffectParameterFound
+        By name.
+    events : list of dict
+        What happened in single recordings: ``recording``, ``time`` and the effect's other
+        parameters, SI.
+    """
+
+    id: str = field(metadata=told(least_length=1))
+    name: str = field(default="", metadata=told(json=False))
+    probability: float = field(default=math.nan, metadata=told(kind="probability"))
+    inclusion: float | None = field(
+        default=None,
+        metadata=told(
+            "share of resampled recordings in which the screen would have taken the effect",
+            kind="probability",
+            omit_empty=True,
+        ),
+    )
+    parameters: dict[str, EffectParameterFound] = field(default_factory=dict)
+    events: list[dict[str, Any]] = field(
+        default_factory=list,
+        metadata=told("what happened in single recordings, SI", omit_empty=True, kind="events"),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class MismatchSize(Entry):
+    """What is more than noise.
+
+    Attributes
+    ----------
+    noises, size : float
+        In units of the noise, and in the unit of the channel.
+    more_than_noise : bool
+        Whether it is more than noise could leave.
+    """
+
+    noises: float = field(metadata=told("in units of the noise"))
+    size: float = field(metadata=told("in the unit of the channel"))
+    more_than_noise: bool = field(metadata=told("whether it is more than noise could leave"))
+
+
+@dataclass(frozen=True, eq=False)
+class MismatchStages(Entry):
+    """What is more than noise, before and after.
+
+    Attributes
+    ----------
+    before, refit, after : MismatchSize
+        With the nominal model, refitted inside its tolerances, and with what was found.
+    """
+
+    before: MismatchSize
+    refit: MismatchSize
+    after: MismatchSize
+
+
+@dataclass(frozen=True, eq=False)
+class BlockMismatch(Entry):
+    """What one block misses.
+
+    Attributes
+    ----------
+    block, channel, unit : str
+        The block, the channel that it predicts, and its SI unit.
+    fitted : MismatchStages
+        On the recordings that were fitted.
+    held_out : MismatchStages or None
+        On those held out; None where there are none.
+    """
+
+    block: str
+    channel: str
+    unit: str
+    fitted: MismatchStages
+    held_out: MismatchStages | None = field(metadata=told("null where nothing was held out"))
+
+
+@dataclass(frozen=True, eq=False)
+class BlockVerdict(Entry):
+    """The verdict of a group of blocks that is judged by itself.
+
+    Attributes
+    ----------
+    blocks : list of str
+        Names of its blocks.
+    verdict : str
+        ``none``, ``parameters``, ``effects`` or ``unlisted``.
+    probabilities : dict of str to float
+        Over its hypotheses: effects by id, wrong parameters by dotted name, sets joined by ``+``.
+    effects, wrong_parameters : list of str
+        What is named.
+    ambiguity : list of list of str
+        Sets that the data cannot separate.
+    mismatch : list of BlockMismatch
+        What each block misses.
+    """
+
+    blocks: list[str] = field(metadata=told("names of its blocks"))
+    verdict: str = field(metadata=told(enum=VERDICTS))
+    probabilities: dict[str, float] = field(
+        metadata=told(
+            "over its hypotheses: effects by id, wrong parameters by dotted name, sets joined by +",
+            kind="probability",
+        )
+    )
+    effects: list[str] = field(metadata=told("ids that are named"))
+    wrong_parameters: list[str] = field(metadata=told("parameters that are named"))
+    ambiguity: list[list[str]]
+    mismatch: list[BlockMismatch] = field(default_factory=list)
+
+
+@dataclass(frozen=True, eq=False)
+class Unexplained(Entry):
+    """A block that keeps a mismatch.
+
+    Attributes
+    ----------
+    block, channel, unit : str
+        The block, the channel that it predicts, and its SI unit.
+    noises, size : float
+        How much, in units of the noise and in the unit of the channel.
+    verdict : str
+        Of its group of blocks.
+    """
+
+    block: str
+    channel: str
+    unit: str
+    noises: float = field(metadata=told("in units of the noise"))
+    size: float = field(metadata=told("in the unit of the channel"))
+    verdict: str = field(metadata=told("of its group of blocks", enum=VERDICTS[1:]))
+
+
+@dataclass(frozen=True, eq=False)
+class StageError(Entry):
+    """Root mean square error of a channel, before and after, SI.
+
+    Attributes
+    ----------
+    before, refit, after : float
+        Of the nominal model, refitted inside its tolerances, and with what was found.
+    """
+
+    before: float
+    refit: float
+    after: float
+
+
+@dataclass(frozen=True, eq=False)
+class ChannelError(Entry):
+    """Root mean square error of a channel beside its noise, SI.
+
+    Attributes
+    ----------
+    noise : float
+        Standard deviation of the sensor's noise.
+    before, refit, after : float
+        Error of the nominal model, after refitting parameters only, and with what was found.
+    """
+
+    noise: float = field(metadata=told("standard deviation of the sensor noise"))
+    before: float = field(metadata=told("root mean square error of the nominal model"))
+    refit: float = field(
+        metadata=told("root mean square error after refitting parameters only")
+    )
+    after: float = field(metadata=told("root mean square error with the effect"))
+
+
+@dataclass(frozen=True, eq=False)
+class WrongParameter(Entry):
+    """A value of the rig file that is wrong; SI.
+
+    Attributes
+    ----------
+    name : str
+        Dotted name, ``chamber.dead_volume``.
+    block : str or None
+        Block of the chain that tells.
+    nominal, tolerance : float
+        Value in the rig file, and one standard deviation by it.
+    value, std : float
+        Value that the recordings ask for, and its standard deviation.
+    interval : list of two floats
+        95 % interval.
+    unit : str
+        SI unit.
+    moved_sigmas : float
+        Distance of the two values in tolerances.
+    probability : float
+        That the file is wrong about it.
+    held_out : dict of str to StageError
+        Error of each channel that it acts on.
+    """
+
+    name: str
+    block: str | None
+    nominal: float = field(metadata=told("value in the rig file"))
+    tolerance: float = field(metadata=told("one standard deviation, by the rig file"))
+    value: float = field(metadata=told("value that the recordings ask for"))
+    std: float
+    interval: list[float] = field(metadata=told("95 %", kind="pair"))
+    unit: str
+    moved_sigmas: float = field(metadata=told("distance of the two in tolerances"))
+    probability: float = field(metadata=told(kind="probability"))
+    held_out: dict[str, StageError] = field(
+        metadata=told(
+            "root mean square error of each channel it acts on: nominal model, refitted inside "
+            "the tolerances, with the other value"
+        )
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class ParameterFound(Entry):
+    """A parameter of the baseline, as fitted; SI.
+
+    Attributes
+    ----------
+    nominal, value, std : float
+        Value in the rig file, fitted value and its standard deviation.
+    unit : str
+        SI unit.
+    moved_sigmas : float
+        Distance of the two values in tolerances.
+    identifiable : bool, optional
+        Whether the recordings determine it.
+    """
+
+    nominal: float
+    value: float
+    std: float
+    unit: str
+    moved_sigmas: float
+    identifiable: bool | None = field(default=None, metadata=told(optional=True))
+
+
+@dataclass(frozen=True, eq=False)
+class FitErrors(Entry):
+    """How well the models predict each channel.
+
+    Attributes
+    ----------
+    channels, held_out : dict of str to ChannelError
+        On the recordings that were fitted, and on those held out.
+    gap_closed : float or None
+        (refit - after)/(refit - noise), held-out recordings, channels pooled in units of their
+        noise; 1 is down to the noise.
+    """
+
+    channels: dict[str, ChannelError] = field(default_factory=dict)
+    held_out: dict[str, ChannelError] = field(default_factory=dict)
+    gap_closed: float | None = field(
+        default=None,
+        metadata=told(
+            "(refit - after)/(refit - noise), held-out data, channels pooled in units of their "
+            "noise; 1 is down to the noise"
+        ),
+    )

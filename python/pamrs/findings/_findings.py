@@ -1,0 +1,130 @@
+"""What a diagnosis found, as a whole."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from pamrs.findings._details import Asked, BlockResidual, ConditionMap, NextExperiment, Tried
+from pamrs.findings._entries import VERDICTS, BlockVerdict, EffectFound, FitErrors, ParameterFound, Unexplained, Where, WrongParameter
+from pamrs.findings._entry import told
+from pamrs.findings._trace import ModelFile, Trace
+
+__all__ = ["Findings"]
+
+
+@dataclass(frozen=True)
+class Findings:
+    """What a diagnosis found, as plain data; `pamrs.Diagnosis` adds what can be done with it.
+
+    Attributes
+    ----------
+    case : str
+        Name of the case.
+    verdict : str
+        ``none``, ``parameters``, ``effects`` or ``unlisted``.
+    where : Where
+        Block, channel, intervals, conditions, and a sentence.
+    effects : list of EffectFound
+        What is named (with the verdict ``unlisted`` what comes closest), most probable first.
+    ambiguity : list of list of str
+        Sets of names (effects, wrong parameters by dotted name, ``unlisted``, ``parameters``) that
+        the data cannot separate; empty when settled.
+    probabilities : dict
+        Probability of what the case may be told to have: names of all its blocks joined by ``+``,
+        ``none``, ``parameters`` (that moved inside their tolerances), or ``unlisted`` (something
+        is missing and nothing has a name). Those of each block are in ``blocks``.
+    blocks : list of BlockVerdict
+        The verdict of each group of blocks.
+    unexplained : list of Unexplained
+        Blocks that keep a mismatch, the largest first.
+    wrong_parameters : list of WrongParameter
+        Values of the rig file that are wrong.
+    parameters : dict of str to ParameterFound
+        Parameters of the baseline, SI.
+    fit : FitErrors
+        Error of each channel, and how much of the gap to the noise is closed.
+    next_experiment : NextExperiment
+        What to record next.
+    warnings : list of str
+        What the user should know before trusting the rest.
+    seconds : float
+        Wall time.
+    text : str
+        The verdict in words, several sentences; paragraphs are separated by a blank line.
+    rig : Rig or None
+        Final model, with what was found.
+    traces : list of Trace
+        Measured and simulated channels.
+    residuals : dict of str to BlockResidual
+        Residual of each block's refitted baseline against its noise.
+    condition_map : ConditionMap or None
+        Mean residual over two conditions.
+    timings : dict
+        Seconds of each stage, optional.
+    tried : list of Tried
+        Every set of effects that was fitted.
+    asked : list of Asked
+        Every persistent effect that acts where the mismatch is.
+
+    Raises
+    ------
+    ValueError
+        If `verdict` is none of the allowed four.
+    """
+
+    case: str = field(metadata=told(json=False))
+    verdict: str = field(metadata=told(enum=VERDICTS))
+    where: Where = field(default_factory=Where)
+    effects: list[EffectFound] = field(
+        default_factory=list, metadata=told("the named physics, most probable first")
+    )
+    ambiguity: list[list[str]] = field(
+        default_factory=list,
+        metadata=told("sets of effects that the data cannot separate; empty when settled"),
+    )
+    probabilities: dict[str, float] = field(
+        default_factory=dict, metadata=told("over all hypotheses", kind="probability")
+    )
+    blocks: list[BlockVerdict] = field(
+        default_factory=list,
+        metadata=told(
+            "the verdict of each group of blocks that is judged by itself", required=False
+        ),
+    )
+    unexplained: list[Unexplained] = field(
+        default_factory=list,
+        metadata=told("blocks that keep a mismatch, the largest first", required=False),
+    )
+    wrong_parameters: list[WrongParameter] = field(
+        default_factory=list,
+        metadata=told("values of the rig file that are wrong", required=False),
+    )
+    parameters: dict[str, ParameterFound] = field(default_factory=dict)
+    fit: FitErrors = field(default_factory=FitErrors)
+    next_experiment: NextExperiment = field(default_factory=NextExperiment)
+    warnings: list[str] = field(default_factory=list)
+    seconds: float = 0.0
+    text: str = field(default="", metadata=told(json=False))
+    rig: ModelFile | None = field(default=None, metadata=told(json=False))
+    traces: list[Trace] = field(default_factory=list, metadata=told(json=False))
+    residuals: dict[str, BlockResidual] = field(default_factory=dict, metadata=told(json=False))
+    condition_map: ConditionMap | None = field(default=None, metadata=told(json=False))
+    timings: dict[str, float] = field(default_factory=dict, metadata=told(json=False))
+    tried: list[Tried] = field(default_factory=list, metadata=told(json=False))
+    asked: list[Asked] = field(default_factory=list, metadata=told(json=False))
+
+    def __post_init__(self) -> None:
+        if self.verdict not in VERDICTS:
+            raise ValueError(f"verdict is {self.verdict!r}; allowed are {', '.join(VERDICTS)}")
+
+    @property
+    def model(self) -> str:
+        """The model with the effect, as TOML; empty when there is no model."""
+        return "" if self.rig is None else self.rig.to_toml_text()
+
+    @property
+    def proof(self) -> str:
+        """The recordings on which the gap was measured, in words."""
+        if self.fit.held_out:
+            return "held-out recordings"
+        return "the fitted recordings (none was held out)"

@@ -1,0 +1,105 @@
+"""Fits, evaluations and predictions that the diagnosis of fixed recordings takes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pamrs
+from pamrs.diagnosis import fitting
+from pamrs.diagnosis.blocks import available_blocks
+from pamrs.diagnosis.hypotheses import refitted
+from pamrs.diagnosis.signals import prepare
+from pamrs.recordings import Recording
+from pamrs.simulation import core_rig
+from tests.work.snapshot import compare
+
+TOLERANCE = 0.1
+NOISE = {"supply_pressure": 400.0, "muscle_pressure": 400.0, "joint_angle": 3e-4}
+
+
+class Work:
+    """What is spent: counting stand-ins for the prediction of a block and for the least squares of a fit."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.predicted: list[tuple[int, int]] = []
+        self.evaluated: list[int] = []
+        predict, solve = fitting.residual, fitting.levenberg_marquardt
+
+        def residual(block: Any, core: Any, prepared: Any, parameters: list[str]) -> Any:
+            self.predicted.append((prepared.n, len(parameters)))
+            return predict(block, core, prepared, parameters)
+
+        def least_squares(*arguments: Any, **options: Any) -> Any:
+            found = solve(*arguments, **options)
+            self.evaluated.append(found[2])
+            return found
+
+        monkeypatch.setattr(fitting, "residual", residual)
+        monkeypatch.setattr(fitting, "levenberg_marquardt", least_squares)
+
+    def of(self, name: str, job: Callable[[], object]) -> dict[str, int]:
+        """Counts of a job by what they count."""
+        self.predicted.clear()
+        self.evaluated.clear()
+        job()
+        return {
+            f"{name}: fits": len(self.evaluated),
+            f"{name}: evaluations of the fits": sum(self.evaluated),
+            f"{name}: predictions of a block": len(self.predicted),
+            f"{name}: samples predicted": sum(rows for rows, _ in self.predicted),
+            f"{name}: sensitivities of a sample": sum(rows * columns for rows, columns in self.predicted),
+        }
+
+
+def recorded(rig: pamrs.Rig, seed: int) -> Recording:
+    """Eight seconds of a shoulder at 200 Hz, with the noise of transducers."""
+    rng = np.random.default_rng(seed)
+    time = 0.005 * np.arange(1600)
+    command = 5.0 + 0.5 * np.sin(2 * np.pi * 0.2 * time + seed) + 0.25 * np.sin(2 * np.pi * 0.7 * time)
+    run = pamrs.simulate(rig, valve_command=command, sample_time=0.005)
+    channels = {name: run[name] + sigma * rng.standard_normal(time.size) for name, sigma in NOISE.items()}
+    channels["valve_command"] = command
+    mask = {name: np.ones(time.size, dtype=bool) for name in channels}
+    return Recording(f"r{seed}", "fit", time, 0.005, channels, mask, [], dict.fromkeys(channels, ""))
+
+
+def hold(conductance: float) -> pamrs.Case:
+    """A sealed chamber held for 60 s."""
+    rig = pamrs.rigs.sealed_chamber()
+    truth = rig.with_effect("leak_muscle", {"conductance": conductance}) if conductance else rig
+    run = pamrs.simulate(truth, duration=60.0, sample_time=0.1, initial={"muscle_pressure": 7e5})
+    pressure = run["muscle_pressure"] + np.random.default_rng(1).normal(0.0, 150.0, run.time.size)
+    mask = {"muscle_pressure": np.ones(run.time.size, dtype=bool)}
+    recording = Recording("hold", "fit", run.time, 0.1, {"muscle_pressure": pressure}, mask, [], {"muscle_pressure": "Pa"})
+    return pamrs.Case("hold", rig, [recording], Path())
+
+
+def test_work_of_the_refit_and_of_an_effect_of_a_shoulder(monkeypatch: pytest.MonkeyPatch) -> None:
+    rig = pamrs.rigs.shoulder()
+    truth = rig.with_effect("muscle_hysteresis").with_parameters({"chamber.dead_volume": 1.7e-4})
+    recordings = [prepare(recorded(truth, seed), rig) for seed in (1, 2)]
+    blocks = available_blocks(rig, (*NOISE, "valve_command"))
+    work, counts = Work(monkeypatch), {}
+    for kind in ("supply", "chamber", "arm"):
+        chosen = [block for block in blocks if block.kind == kind]
+        problem, white = fitting.Problem(chosen, recordings, core_rig(rig)), {block.name: 1.0 for block in chosen}
+        counts |= work.of(f"refit of the {kind}", lambda p=problem, w=white: refitted(p, rig, w))
+    starts = {"muscle_hysteresis.friction_pressure": 1e-5, "muscle_hysteresis.friction_constant": 1.0}
+    counts |= work.of(
+        "hysteresis of the arm",
+        lambda: fitting.fit(problem, rig, ("muscle_hysteresis",), starts, white, evaluations=30),
+    )
+    compare("shoulder", counts, tolerance=TOLERANCE)
+
+
+def test_work_of_whole_diagnoses_of_a_sealed_chamber(monkeypatch: pytest.MonkeyPatch) -> None:
+    work, counts = Work(monkeypatch), {}
+    for name, conductance in (("tight chamber", 0.0), ("leak", 3e-11)):
+        case = hold(conductance)
+        counts |= work.of(name, lambda case=case: pamrs.diagnose(case))
+    compare("sealed_chamber", counts, tolerance=TOLERANCE)
