@@ -107,18 +107,9 @@ def target_table(found: Sequence[Target]) -> str:
     )
 
 
-def markdown(scores: Scores, catalogue: Sequence[str] = LISTED) -> str:
-    """All tables of a trial."""
-    rows = scores.rows
-    parts = ["## Targets\n", target_table(targets(scores, catalogue)), "\n## Measures\n"]
-    body = [(name, percent(*share), f"{share[0]} of {share[1]}") for name, share in scores.shares.items()]
-    for name, value in scores.totals.items():
-        if name not in scores.shares:
-            body.append((name, "-" if value is None else f"{value}" if isinstance(value, int) else f"{value:.3f}", ""))
-    parts.append(table(("measure", "value (95 % interval)", "count"), body))
+def _by_effect(rows: list[Row]) -> str:
+    """Detected, rightly named and gap closed: a row for each effect, a column for each strength."""
     labels = (*STRENGTHS, "pair")
-    parts.append("\n## Detected, rightly named and gap closed, by effect and strength\n")
-    parts.append("Detected, right name first, of so many; median share of the gap to the noise closed on held-out recordings.\n")
     closed = gaps(rows)
     split = by_strength(rows)
     lines = []
@@ -132,7 +123,21 @@ def markdown(scores: Scores, catalogue: Sequence[str] = LISTED) -> str:
         hit = [c[label] for c in split.values() if label in c]
         a, b, n = (sum(c[i] for c in hit) for i in range(3))
         every.append(f"{percent(a, n)}, {percent(b, n)}" if n else "-")
-    parts.append(table(("effect", *labels), [*lines, ("all", *every)]))
+    return table(("effect", *labels), [*lines, ("all", *every)])
+
+
+def markdown(scores: Scores, catalogue: Sequence[str] = LISTED) -> str:
+    """All tables of a trial."""
+    rows = scores.rows
+    parts = ["## Targets\n", target_table(targets(scores, catalogue)), "\n## Measures\n"]
+    body = [(name, percent(*share), f"{share[0]} of {share[1]}") for name, share in scores.shares.items()]
+    for name, value in scores.totals.items():
+        if name not in scores.shares:
+            body.append((name, "-" if value is None else f"{value}" if isinstance(value, int) else f"{value:.3f}", ""))
+    parts.append(table(("measure", "value (95 % interval)", "count"), body))
+    parts.append("\n## Detected, rightly named and gap closed, by effect and strength\n")
+    parts.append("Detected, right name first, of so many; median share of the gap to the noise closed on held-out recordings.\n")
+    parts.append(_by_effect(rows))
     parts.append("\n## What was named first\n")
     matrix = confusion(rows)
     parts.append(

@@ -187,33 +187,63 @@ def compare_models(
     pairs = [(name, order) for name in chosen for order in (wanted if name in POLYNOMIAL_MODELS else [None])]
     if not pairs:
         raise ParameterError("orders is empty: the models with a stress polynomial need one order at least")
+    rows: list[dict[str, Any]] = []
     fits: dict[tuple[str, int | None], MuscleFit] = {}
-    rows, names = [], tuple(free)
+    names = tuple(free)
+    shared = {"weights": weights, "direction": direction, "noise": noise}
     for name, order in pairs:
         blank = template(muscle, name, None if name != muscle.model else muscle.geometry, order)
         used = tuple(item for item in names if has_effect(item, name, blank.geometry))
-        spread = {key: value for key, value in (tolerance or {}).items() if key not in COEFFICIENTS or key in ELASTIC_PARAMETERS[name]}
-        settings: dict[str, Any] = {"model": name, "order": order, "free": used, "tolerance": spread, "weights": weights}
-        row, fit = _candidate(data, muscle, {**settings, "direction": direction, "noise": noise}, levels)
+        spread = _of_model(tolerance or {}, name)
+        settings = {"model": name, "order": order, "free": used, "tolerance": spread, **shared}
+        row, fit = _candidate(data, muscle, settings, levels)
         rows.append({**row, "geometry": blank.geometry, "free": list(used)})
         if fit is not None:
             fits[name, order] = fit
-    ranked = sorted((row for row in rows if row["reason"] is None), key=lambda row: (row["lopo_rms"], row["nvarys"]))
+    ranked, size = _ranked(rows, fits)
+    subset = [] if levels is None else [float(data.levels[i]) for i in level_indices(data, levels)]
+    rows = ranked + [row for row in rows if row["reason"] is not None]
+    count = int(data.used.sum())
+    return ModelComparison(rows, fits, size, count, subset, _loops(data, muscle, direction))
+
+
+def _of_model(tolerance: Mapping[str, float], model: str) -> dict[str, float]:
+    """What is known of the geometry, and of those coefficients that a model has."""
+    foreign = set(COEFFICIENTS) - set(ELASTIC_PARAMETERS[model])
+    return {key: value for key, value in tolerance.items() if key not in foreign}
+
+
+def _ranked(
+    rows: list[dict[str, Any]], fits: Mapping[tuple[str, int | None], MuscleFit]
+) -> tuple[list[dict[str, Any]], float]:
+    """The candidates by rank, their criteria written into them, and the number of independent points.
+
+    Raises
+    ------
+    FitError
+        If no candidate was fitted.
+    """
+    ranked = [row for row in rows if row["reason"] is None]
+    ranked.sort(key=lambda row: (row["lopo_rms"], row["nvarys"]))
     if not ranked:
-        raise FitError("the data determine none of the candidates: " + "; ".join(f"{row['model']}: {row['reason']}" for row in rows))
-    size = effective_size(fits[ranked[0]["model"], ranked[0]["order"]])
-    least = _level_squares(fits[ranked[0]["model"], ranked[0]["order"]])
+        reasons = "; ".join(f"{row['model']}: {row['reason']}" for row in rows)
+        raise FitError(f"the data determine none of the candidates: {reasons}")
+    first = fits[ranked[0]["model"], ranked[0]["order"]]
+    size, least = effective_size(first), _level_squares(first)
     for place, row in enumerate(ranked, start=1):
         fit = fits[row["model"], row["order"]]
         _, row["aicc"], row["bic"] = fit.criteria(size)
         row["rank"] = place
         row["lopo_excess"], row["lopo_excess_stderr"] = _paired(_level_squares(fit) - least)
-    near = _NEAR * ranked[0]["lopo_rms"]  # a candidate that fails at one level only has an excess of one standard error, however large
-    eligible = [row for row in ranked if row["lopo_excess"] <= row["lopo_excess_stderr"] and row["lopo_rms"] <= near]
+    # a candidate that fails at one level only has an excess of one standard error, however large
+    near = _NEAR * ranked[0]["lopo_rms"]
+    eligible = [
+        row
+        for row in ranked
+        if row["lopo_excess"] <= row["lopo_excess_stderr"] and row["lopo_rms"] <= near
+    ]
     min(eligible, key=lambda row: (row["nvarys"], row["lopo_rms"]))["recommended"] = True
-    subset = [] if levels is None else [float(data.levels[index]) for index in level_indices(data, levels)]
-    rows = ranked + [row for row in rows if row["reason"] is not None]
-    return ModelComparison(rows, fits, size, int(data.used.sum()), subset, _loops(data, muscle, direction))
+    return ranked, size
 
 
 def _loops(data: ForceMap, muscle: Muscle, direction: str | None) -> tuple[str, ...]:

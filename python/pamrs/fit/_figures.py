@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from pamrs.report.figures import COLOURS, STYLE, svg_text
 
 if TYPE_CHECKING:
+    from pamrs.fit._data import ForceMap
     from pamrs.fit._result import MuscleFit
     from pamrs.fit._statistics import FitStatistics
 
@@ -95,44 +96,74 @@ def _draw_family(axes: Axes, fit: MuscleFit, *, size: float = 26.0) -> Any:
     data = fit.data
     cmap, norm = pressure_colours(data.levels)
     contraction, shown = 100.0 * data.contraction, _fitted_levels(fit)
+    _draw_unused(axes, data, contraction, size)
+    force = data.force[data.used]
+    largest = float(force.max())
+    floor = min(float(force.min()), -0.04 * largest)
+    for index, level in enumerate(data.levels.tolist()):
+        rows = np.flatnonzero(data.level == index)
+        colour = cmap(norm(level / 1e3))
+        _draw_model(axes, fit, level, contraction[rows], floor, colour)
+        rows = thinned(rows)
+        face = colour if index in shown else "white"
+        axes.scatter(
+            contraction[rows], data.force[rows], s=size, facecolor=face, edgecolor=colour, lw=1.1, zorder=3
+        )
+    _family_legend(axes, fit, size)
+    axes.set_ylim(floor - 0.02 * largest, 1.06 * largest)
+    axes.set_xlabel("contraction [%]")
+    axes.set_ylabel("pulling force [N]")
+    axes.legend(loc="upper right")
+    return mpl.cm.ScalarMappable(norm, cmap)
+
+
+def _draw_unused(axes: Axes, data: ForceMap, contraction: Array, size: float) -> None:
+    """Crosses at the rows that are not used, as far as they are near the others."""
     off = thinned(np.flatnonzero((data.level < 0) & np.isfinite(contraction) & np.isfinite(data.force)))
     used = contraction[data.used]
     low, high = float(used.min()), float(used.max())
     inside = off[(contraction[off] >= low - 20) & (contraction[off] <= high + 20)]
     if len(inside):
-        axes.scatter(contraction[inside], data.force[inside], marker="x", s=0.55 * size, color=_QUIET, lw=0.8, label="not used")
-    floor = min(float(data.force[data.used].min()), -0.04 * float(data.force[data.used].max()))
-    largest, fitted = float(data.force[data.used].max()), data.levels[sorted(shown)]
-    grid = np.linspace(low, high, _FINE)
-    both = bool(np.any(data.direction[data.used]))
-    ways: list[tuple[float | None, Any]] = [(-1.0, "-"), (1.0, (0, (5, 2)))] if both else [(None, "-")]
+        axes.scatter(
+            contraction[inside], data.force[inside],
+            marker="x", s=0.55 * size, color=_QUIET, lw=0.8, label="not used",
+        )  # fmt: skip
+
+
+def _draw_model(
+    axes: Axes, fit: MuscleFit, level: float, contraction: Array, floor: float, colour: Any
+) -> None:
+    """The model at one pressure: a line where it was measured, dotted beyond, dashed while lengthening."""
+    data, shown = fit.data, sorted(_fitted_levels(fit))
+    fitted = data.levels[shown]
+    if fit.moduli_kind != "linear" and not fitted.min() <= level <= fitted.max():
+        return  # free moduli have no law beyond
+    used = 100.0 * data.contraction[data.used]
+    grid = np.linspace(float(used.min()), float(used.max()), _FINE)
     lengths = (1.0 - grid / 100.0) * data.rest_length
-    for index, level in enumerate(data.levels.tolist()):
-        rows = np.flatnonzero(data.level == index)
-        colour = cmap(norm(level / 1e3))
-        if fit.moduli_kind == "linear" or fitted.min() <= level <= fitted.max():  # free moduli have no law beyond
-            own = (grid >= contraction[rows].min() - 1e-9) & (grid <= contraction[rows].max() + 1e-9)
-            for way, dash in ways:
-                force = fit.predict(level, length=lengths, direction=way)
-                axes.plot(grid, np.where(force > floor, force, np.nan), color=colour, lw=0.8, ls=(0, (1, 2)))
-                axes.plot(grid[own], force[own], color=colour, lw=1.3, ls=dash)
-        rows = thinned(rows)
-        face = colour if index in shown else "white"
-        axes.scatter(contraction[rows], data.force[rows], s=size, facecolor=face, edgecolor=colour, lw=1.1, zorder=3)
-    if shown != set(range(len(data.levels))):
+    own = (grid >= contraction.min() - 1e-9) & (grid <= contraction.max() + 1e-9)
+    ways: list[tuple[float | None, Any]] = [(-1.0, "-"), (1.0, (0, (5, 2)))]
+    for way, dash in ways if np.any(data.direction[data.used]) else [(None, "-")]:
+        force = fit.predict(level, length=lengths, direction=way)
+        beyond = np.where(force > floor, force, np.nan)
+        axes.plot(grid, beyond, color=colour, lw=0.8, ls=(0, (1, 2)))
+        axes.plot(grid[own], force[own], color=colour, lw=1.3, ls=dash)
+
+
+def _family_legend(axes: Axes, fit: MuscleFit, size: float) -> None:
+    """One entry for each kind of point and line."""
+    data, both = fit.data, bool(np.any(fit.data.direction[fit.data.used]))
+    if _fitted_levels(fit) != set(range(len(data.levels))):
         axes.scatter([], [], s=size, facecolor=_INK, edgecolor=_INK, label="measured, fitted")
-        axes.scatter([], [], s=size, facecolor="white", edgecolor=_INK, lw=1.1, label="measured, left out of the fit")
+        axes.scatter(
+            [], [], s=size, facecolor="white", edgecolor=_INK, lw=1.1, label="measured, left out of the fit"
+        )
     else:
         axes.scatter([], [], s=size, facecolor=_INK, edgecolor=_INK, label="measured")
     axes.plot([], [], color=_INK, lw=1.3, label="model, contracting" if both else "model")
     if both:
         axes.plot([], [], color=_INK, lw=1.3, ls=(0, (5, 2)), label="model, lengthening")
     axes.plot([], [], color=_INK, lw=0.8, ls=(0, (1, 2)), label="model beyond the level's data")
-    axes.set_ylim(floor - 0.02 * largest, 1.06 * largest)
-    axes.set_xlabel("contraction [%]")
-    axes.set_ylabel("pulling force [N]")
-    axes.legend(loc="upper right")
-    return mpl.cm.ScalarMappable(norm, cmap)
 
 
 def family_svg(fit: MuscleFit, prefix: str = "family") -> str:

@@ -89,12 +89,7 @@ def read_map(
     keep, notes = _kept(table, wanted, decimal, source)
     if where is None:
         _one_specimen(table, strange, source)
-    strange = [heading for heading in strange if heading not in wanted]
-    if strange:
-        notes.append(f"columns not used: {', '.join(strange)}")
-    if table.ragged:
-        rows = "1 row has" if len(table.ragged) == 1 else f"{len(table.ragged)} rows have"
-        notes.append(f"{rows} too few or too many cells (first: row {table.ragged[0]})")
+    notes += _left_over(table, [heading for heading in strange if heading not in wanted])
     values = {channel: _numbers(table, column, channel, source, decimal)[keep] for channel, column in found.items()}
     if "length" not in values:
         contraction = _fraction(values["contraction"], source)
@@ -114,6 +109,15 @@ def read_map(
         row_numbers=np.asarray(table.row_numbers)[keep].tolist(),
         units={channel: column.unit for channel, column in found.items() if channel in ("length", "pressure", "force")},
     )
+
+
+def _left_over(table: Table, strange: Sequence[str]) -> list[str]:
+    """Notes on what of a table is not used: columns of unknown meaning, and rows with a wrong number of cells."""
+    notes = [f"columns not used: {', '.join(strange)}"] if strange else []
+    if table.ragged:
+        rows = "1 row has" if len(table.ragged) == 1 else f"{len(table.ragged)} rows have"
+        notes.append(f"{rows} too few or too many cells (first: row {table.ragged[0]})")
+    return notes
 
 
 def _one_character(delimiter: str | None, decimal: str | None, source: str) -> None:

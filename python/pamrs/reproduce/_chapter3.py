@@ -340,11 +340,16 @@ def step_by_area(law: str = "conserving") -> tuple[elbow.Step, ...]:
 
 def _step() -> list[Comparison]:
     """The step of Fig. 3.8."""
-    group, figure = _Group("step"), "3.2.4, Fig. 3.8"
-    ours, peak = elbow.step(), math.radians(200.0)
-    fitted = elbow.step(elbow.valve_for_peak(peak))
-    spread = [1e6 * elbow.valve_for_peak(peak, law="conserving", **change) for change in (*_FRICTION, *_DEAD, _HEAVY)]
-    slow = max((item for item in step_by_area() if item.mean < math.radians(57.3)), key=lambda item: item.area)
+    group, peak = _Group("step"), math.radians(200.0)
+    ours, fitted = elbow.step(), elbow.step(elbow.valve_for_peak(peak))
+    _rotation_of_step(group, ours, fitted)
+    _rates_of_step(group, ours, fitted, peak)
+    return group.rows
+
+
+def _rotation_of_step(group: _Group, ours: elbow.Step, fitted: elbow.Step) -> None:
+    """How far the arm turns."""
+    figure = "3.2.4, Fig. 3.8"
     group.say(
         "rotation swept",
         figure,
@@ -354,6 +359,13 @@ def _step() -> list[Comparison]:
         note=f"where the arm comes to rest; with the valve chosen below it swings to {math.degrees(fitted.first_turn):.0f} deg first",
     )
     group.say(f"rotation swept, {_PRINTED}", figure, 90.0, math.degrees(elbow.rotation_reached(100.0, 150.0, law="printed")), "deg")
+
+
+def _rates_of_step(group: _Group, ours: elbow.Step, fitted: elbow.Step, peak: float) -> None:
+    """How fast it turns, with the rig's valve and with one chosen for a peak rate [rad/s]."""
+    figure = "3.2.4, Fig. 3.8"
+    spread = [1e6 * elbow.valve_for_peak(peak, law="conserving", **change) for change in (*_FRICTION, *_DEAD, _HEAVY)]
+    slow = max((item for item in step_by_area() if item.mean < math.radians(57.3)), key=lambda item: item.area)
     group.say(
         "peak rate with the rig's valve",
         figure,
@@ -390,7 +402,6 @@ def _step() -> list[Comparison]:
         "deg/s",
         relation="above",
     )
-    return group.rows
 
 
 # ------------------------------------------------------- 3.3.2, Figures 3.12 and 3.13
@@ -406,16 +417,22 @@ def _sides(hysteresis: bool) -> tuple[float, float]:
 
 def _triangle() -> list[Comparison]:
     """The triangular pressure of Figs. 3.12 and 3.13."""
+    group = _Group("triangle")
+    static, printed = (elbow.static_curve(135.0, law=law) for law in elbow.LAWS)
+    _rates_of_triangle(group, static, printed)
+    _loops_of_triangle(group, static)
+    return group.rows
+
+
+def _rates_of_triangle(group: _Group, static: elbow.StaticCurve, printed: elbow.StaticCurve) -> None:
+    """The rate where the arm sets off, at its largest, and at the top of the pressure."""
     from pamrs.library.evaluate import activation_pressure
 
-    group, speed = _Group("triangle"), 150.0 / 10.0  # psi/s
-    static, printed = (elbow.static_curve(135.0, law=law) for law in elbow.LAWS)
+    speed = 150.0 / 10.0  # psi/s
     rate = np.degrees(static.slope) * speed
     rubber = activation_pressure(_muscle()) / PSI
     joint, rest = Joint.from_model(elbow.arm_rig().model["joint"]), float(_muscle().parameters["rest_length"])
     contraction = float(joint.shortening(elbow.rest_angle() + static.rotation[-1])) / rest
-    (turned, loop), (turned_plain, loop_plain) = _sides(True), _sides(False)
-    lower, upper = elbow.payload_torque(135.0, elbow.rest_angle() + np.interp([75.0, 150.0], static.psi, static.rotation)) / FOOT_POUND
     group.say(
         "largest rate over the rate when the arm sets off",
         "3.3.2: 'increases significantly'",
@@ -434,6 +451,12 @@ def _triangle() -> list[Comparison]:
         note=f"{rate[-1]:.1f} deg/s (printed torque law {math.degrees(printed.slope[-1]) * speed:.1f}): at 150 psi our muscles are "
         f"shortened by {100.0 * contraction:.0f} %, where the payload holds them, not by their largest contraction of 37 %",
     )
+
+
+def _loops_of_triangle(group: _Group, static: elbow.StaticCurve) -> None:
+    """Rotation and torque on the falling side beside the rising one, and the torque over the pressure."""
+    (turned, loop), (turned_plain, loop_plain) = _sides(True), _sides(False)
+    lower, upper = elbow.payload_torque(135.0, elbow.rest_angle() + np.interp([75.0, 150.0], static.psi, static.rotation)) / FOOT_POUND
     group.say(
         "rotation at the same pressure, falling less rising",
         "3.3.2: 'slightly asymmetrical'",
@@ -461,7 +484,6 @@ def _triangle() -> list[Comparison]:
         relation="above",
         note=f"{lower:.0f} and {upper:.0f} ft lbf; 135 lb at 20 in are 225 at most",
     )
-    return group.rows
 
 
 # -------------------------------------------------------------------- 3.4, Figure 3.16
@@ -526,13 +548,18 @@ def _ramp() -> list[Comparison]:
 def _construction() -> list[Comparison]:
     """What is said of the arm as it was built."""
     group = _Group("construction")
+    _payloads(group)
+    _bending(group)
+    _not_modelled(group)
+    return group.rows
+
+
+def _payloads(group: _Group) -> None:
+    """What the arm lifts."""
     limit = lift(elbow.arm_rig(), pressure=150.0 * PSI, to=elbow.rest_angle() + math.radians(90.0)).payload_limit or 0.0
     lever = 2.0 * _LEAST / (316.0 * POUND * 9.80665 * INCH)
     lifted = math.degrees(elbow.rotation_reached(380.0, 150.0))
     wrist = float(elbow.payload_torque(380.0, 0.5 * math.pi, 7.0 * INCH)) / FOOT_POUND
-    # a cantilever of steel, 200 GPa, under a force at its end
-    moment = to_si(500.0, "lbf", "force") * (33.0 * INCH) ** 3 / (3.0 * 200e9 * 0.5 * INCH)
-    bar = (64.0 * moment / math.pi) ** 0.25
     group.say(
         "payload of one arm of two that lift 316 lb",
         "3.2.1",
@@ -551,6 +578,12 @@ def _construction() -> list[Comparison]:
         cannot_tell="on which joint and how far is not said",
         note=f"ours lifts 380 lb at the elbow by {lifted:.1f} deg at 150 psi; at the wrist, 7 in, it is {wrist:.0f} ft lbf at most",
     )
+
+
+def _bending(group: _Group) -> None:
+    """A cantilever of steel, 200 GPa, under a force at its end."""
+    moment = to_si(500.0, "lbf", "force") * (33.0 * INCH) ** 3 / (3.0 * 200e9 * 0.5 * INCH)
+    bar = (64.0 * moment / math.pi) ** 0.25
     group.say(
         "bending under 500 lb at the tip",
         "3.2.5: not more than 0.5 in",
@@ -561,6 +594,10 @@ def _construction() -> list[Comparison]:
         cannot_tell="links are rigid here, and no section is published",
         note=f"a steel cantilever of 33 in needs {1e8 * moment:.0f} cm4 for it, as a round bar of {1e3 * bar:.0f} mm has",
     )
+
+
+def _not_modelled(group: _Group) -> None:
+    """What no simulation of ours can tell."""
     for fact, where, value, unit, reason in (
         ("safety factor of the joints at the largest torque", "3.2.5", 1.5, "", "stresses of the structure are not modelled"),
         ("pressure without catastrophic failure", "3.2.2", 1000.0, "psi", "bursting is not modelled"),
@@ -569,7 +606,6 @@ def _construction() -> list[Comparison]:
         ("force, model against measurement", "3.4, Figs. 3.1, 3.3, 3.14", math.nan, "", "measured forces are in the figures only"),
     ):
         group.say(fact, where, value, math.nan, unit, relation="above", cannot_tell=reason)
-    return group.rows
 
 
 # ----------------------------------------------------------------------------------- 3.5

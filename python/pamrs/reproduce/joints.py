@@ -103,16 +103,36 @@ def facts_of_geometry(case: PublishedCase) -> list[Comparison]:
     -------
     list of Comparison
     """
-    problem = case.problem()
-    printed = case.design()
+    problem, printed = case.problem(), case.design()
+    rows = [*_lengths(case, problem, printed), *_torques(case, problem, printed), *_pressures(case, problem)]
+    if case.name == "shoulder":
+        # 6.3 states the torque at 13 bar up to 90 deg, of the same joint
+        at = float(printed.joint.torque(problem.muscle, 13e5, radians(90.0), count=case.count))
+        reason = (
+            "the dissertation against itself: 1068 N m to 120 deg in 3.5, 850 N m to 90 deg in 6.3; "
+            "the moduli follow 6.3"
+        )
+        torque = case.torque * _FOOT_POUND
+        say = _Speaker(case)
+        rows.append(say("torque at 13 bar and 90 deg", "N m", torque, at, cannot_tell=reason))
+    return rows
+
+
+def _lengths(case: PublishedCase, problem: JointProblem, printed: JointDesign) -> list[Comparison]:
+    """The muscle's length, its stroke, and the angle within the largest stroke: geometry alone."""
+    say, muscle = _Speaker(case), problem.muscle.parameters["rest_length"] / _INCH
     reached = float(np.degrees(printed.scores.max_angle[0]))
-    free = case.design(problem.replace(max_contraction=0.3))
-    torque = printed.scores.torque[0] / _FOOT_POUND
     stroke = 100.0 * float(printed.scores.contraction[0].max())
-    say, unknown = _Speaker(case), _MODULI[case.name]
-    rows = [
-        say("muscle length", "in", case.muscle_length, problem.muscle.parameters["rest_length"] / _INCH, tolerance=0.01),
-        say("stroke of Table 3.5 over the range", "%", 15.0, stroke, "below", "the printed lengths miss (3.26)"),
+    return [
+        say("muscle length", "in", case.muscle_length, muscle, tolerance=0.01),
+        say(
+            "stroke of Table 3.5 over the range",
+            "%",
+            15.0,
+            stroke,
+            "below",
+            "the printed lengths miss (3.26)",
+        ),
         say(
             "largest angle within 15 % of stroke",
             "deg",
@@ -121,31 +141,63 @@ def facts_of_geometry(case: PublishedCase) -> list[Comparison]:
             tolerance=0.02,
             note="geometry alone: as the line above",
         ),
+    ]
+
+
+def _torques(case: PublishedCase, problem: JointProblem, printed: JointDesign) -> list[Comparison]:
+    """The torque of the printed lengths, with the library's muscle and with others."""
+    say, unknown = _Speaker(case), _MODULI[case.name]
+    torque = printed.scores.torque[0] / _FOOT_POUND
+    needed = _angle_needed(case, problem, torque[0])
+    rows = [
         say(
             "torque of Table 3.5 at the least angle",
             "ft lbf",
             case.torque,
             torque[0],
             "above",
-            f"3.5.2: 'well above'; at rest length the moduli play no part{_angle_needed(case, problem, torque[0])}",
+            f"3.5.2: 'well above'; at rest length the moduli play no part{needed}",
         ),
-        say("least torque of Table 3.5", "ft lbf", case.torque, torque.min(), "above", cannot_tell=unknown),
+        say(
+            "least torque of Table 3.5",
+            "ft lbf",
+            case.torque,
+            torque.min(),
+            "above",
+            cannot_tell=unknown,
+        ),
     ]
     for title, other in _others(case, problem):
         least = case.design(other).scores.torque[0].min() / _FOOT_POUND
         bound = title == _BRAID and least < case.torque
         note = "no rubber at all: with this braid angle no moduli give it" if bound else ""
         rows.append(say(f"the same, {title}", "ft lbf", case.torque, least, "above", note))
-    needed = free.needed_pressure or np.nan
-    rows.append(say("pressure that Table 3.5 needs, any stroke", "psi", case.pressure, needed / _PSI, cannot_tell=unknown))
-    least_any = problem.least_possible_pressure() / _PSI
-    rows.append(say("pressure that any joint needs (work)", "psi", case.pressure, least_any, "below", cannot_tell=unknown))
-    if case.name == "shoulder":
-        # 6.3 states the torque at 13 bar up to 90 deg, of the same joint
-        at = float(printed.joint.torque(problem.muscle, 13e5, radians(90.0), count=case.count))
-        reason = "the dissertation against itself: 1068 N m to 120 deg in 3.5, 850 N m to 90 deg in 6.3; the moduli follow 6.3"
-        rows.append(say("torque at 13 bar and 90 deg", "N m", case.torque * _FOOT_POUND, at, cannot_tell=reason))
     return rows
+
+
+def _pressures(case: PublishedCase, problem: JointProblem) -> list[Comparison]:
+    """The pressure that the printed lengths need, and the least that any joint needs."""
+    say, unknown = _Speaker(case), _MODULI[case.name]
+    free = case.design(problem.replace(max_contraction=0.3))
+    needed = (free.needed_pressure or np.nan) / _PSI
+    least = problem.least_possible_pressure() / _PSI
+    return [
+        say(
+            "pressure that Table 3.5 needs, any stroke",
+            "psi",
+            case.pressure,
+            needed,
+            cannot_tell=unknown,
+        ),
+        say(
+            "pressure that any joint needs (work)",
+            "psi",
+            case.pressure,
+            least,
+            "below",
+            cannot_tell=unknown,
+        ),
+    ]
 
 
 def facts_of_search(case: PublishedCase, *, seeds: int = 10, progress: Callable[[str], None] | None = None) -> list[Comparison]:
