@@ -119,10 +119,19 @@ def likelihoods(experiment: Experiment, truth: Rig, hypotheses: list[Hypothesis]
     return np.array(out)
 
 
-def run(question: Question, nominal: Rig, experiments: list[Experiment], seed: int) -> None:
-    """One line."""
-    began = time.perf_counter()
-    rng = np.random.default_rng(seed)
+@dataclass(frozen=True)
+class Case:
+    """A question with the size at which it is open, its true plant, and the hypotheses after one recording."""
+
+    question: Question
+    size: float
+    truth: Rig
+    hypotheses: list[Hypothesis]
+    prior: Array
+
+
+def opened(question: Question, nominal: Rig, experiments: list[Experiment], rng: np.random.Generator) -> Case:
+    """The question with its sizes halved until one recording leaves it open."""
     plant = drawn(nominal, rng)
     first = next(e for e in experiments if e.name == question.first)
     size = 2.0
@@ -133,53 +142,99 @@ def run(question: Question, nominal: Rig, experiments: list[Experiment], seed: i
         truth = plant.with_effect(question.truth, parameters)
         seen = taken(first.simulate(truth), truth, first.name, NOISE, SETTINGS, rng=rng)
         problem = problem_of(nominal, [seen], MEASURABLE, SETTINGS)
-        weights = weights_of(problem, nominal)
-        hypotheses: list[Hypothesis] = []
-        logs = []
-        for effect in (question.truth, *question.rivals):
-            found = fitted(problem, nominal, effect, weights)
-            if found is None:
-                continue
-            entry = next(e for e in found.rig.effects if e["id"] == effect)
-            std = {n.partition(".")[2]: s for n, s in found.std.items() if n.partition(".")[0] == effect}
-            hypotheses.append((effect, found.rig.with_effect(effect, entry["parameters"], std=std), 0.5))
-            logs.append(-found.cost)
-        prior = normalised(np.array(logs))
+        hypotheses, prior = explained(question, nominal, problem)
         if prior.max() <= OPEN or size < 0.1:
-            break
-    hypotheses = [(label, rig, float(p)) for (label, rig, _), p in zip(hypotheses, prior, strict=True)]
+            return Case(question, size, truth, hypotheses, prior)
+
+
+def explained(question: Question, nominal: Rig, problem: Problem) -> tuple[list[Hypothesis], Array]:
+    """The truth and its rivals fitted to a recording, with their probabilities after it."""
+    weights = weights_of(problem, nominal)
+    fits: list[tuple[str, Rig]] = []
+    logs = []
+    for effect in (question.truth, *question.rivals):
+        found = fitted(problem, nominal, effect, weights)
+        if found is None:
+            continue
+        entry = next(e for e in found.rig.effects if e["id"] == effect)
+        std = {n.partition(".")[2]: s for n, s in found.std.items() if n.partition(".")[0] == effect}
+        fits.append((effect, found.rig.with_effect(effect, entry["parameters"], std=std)))
+        logs.append(-found.cost)
+    prior = normalised(np.array(logs))
+    return [(label, rig, float(p)) for (label, rig), p in zip(fits, prior, strict=True)], prior
+
+
+def first_of(outcomes: list[Outcome], probabilities: Array) -> Outcome:
+    """The most telling experiment."""
+    return ranked(outcomes, list(probabilities), SETTINGS.next_experiment.resolution)[0]
+
+
+@dataclass(frozen=True)
+class Count:
+    """How many recordings decided, how long they take [min], and whether for the truth."""
+
+    recordings: int
+    minutes: float
+    right: bool
+
+
+@dataclass(frozen=True)
+class Answers:
+    """What every experiment would tell: its expected outcome, and the likelihoods on the truth by its name."""
+
+    prior: Array
+    outcomes: list[Outcome]
+    gains: dict[str, Array]
+
+    def count(self, order: list[Outcome] | None) -> Count:
+        """Experiments until it is decided, in an order; ``None`` chooses by information each time."""
+        p, left, used, spent = np.log(np.maximum(self.prior, 1e-300)), list(self.outcomes), 0, 0.0
+        while normalised(p).max() <= DECIDED and left:
+            chosen = first_of(left, normalised(p)) if order is None else order[used]
+            left.remove(chosen)
+            p = p + self.gains[chosen.experiment.name]
+            used, spent = used + 1, spent + chosen.experiment.effort / 60.0
+        return Count(used, spent, int(np.argmax(p)) == 0)
+
+
+def answered(case: Case, experiments: list[Experiment], rng: np.random.Generator) -> Answers:
+    """Every experiment that can be simulated, made on the truth."""
     outcomes: list[Outcome] = []
-    resolution = SETTINGS.next_experiment.resolution
     gains: dict[str, Array] = {}
     for experiment in experiments:
         try:
-            outcomes.append(outcome_of(experiment, hypotheses, NOISE, MEASURABLE, SETTINGS))
-            gains[experiment.name] = likelihoods(experiment, truth, hypotheses, rng)
+            outcomes.append(outcome_of(experiment, case.hypotheses, NOISE, MEASURABLE, SETTINGS))
+            gains[experiment.name] = likelihoods(experiment, case.truth, case.hypotheses, rng)
         except SimulationError:
             outcomes = [o for o in outcomes if o.experiment is not experiment]
+    return Answers(case.prior, outcomes, gains)
 
-    def count(order: list[Outcome] | None) -> tuple[int, float, bool]:
-        """Recordings, minutes, and whether the truth won; ``None`` chooses by information each time."""
-        p, left, used, spent = np.log(np.maximum(prior, 1e-300)), list(outcomes), 0, 0.0
-        while normalised(p).max() <= DECIDED and left:
-            chosen = ranked(left, list(normalised(p)), resolution)[0] if order is None else order[used]
-            left.remove(chosen)
-            p = p + gains[chosen.experiment.name]
-            used, spent = used + 1, spent + chosen.experiment.effort / 60.0
-        return used, spent, int(np.argmax(p)) == 0
 
-    ours = count(None)
-    orders = [[outcomes[i] for i in rng.permutation(len(outcomes))] for _ in range(ORDERS)]
-    random = [count(order) for order in orders]
-    best = ranked(outcomes, list(prior), resolution)[0].experiment.name if outcomes else "-"
-    worst = max(r[0] for r in random)
-    print(
-        f"{question.truth:<21} x {size:<5g} {question.first:<14} {' '.join(f'{p:.2f}' for p in prior):<15} {best:<17} "
-        f"{ours[0]:>2} {'right' if ours[2] else 'wrong'} {ours[1]:>5.1f} min   "
-        f"{np.mean([r[0] for r in random]):>5.2f} (at most {worst}) {100 * np.mean([r[2] for r in random]):>4.0f} % right "
-        f"{np.mean([r[1] for r in random]):>5.1f} min   [{time.perf_counter() - began:.0f} s]",
-        flush=True,
+def line(case: Case, best: str, ours: Count, random: list[Count], seconds: float) -> str:
+    """What is printed of a question."""
+    worst = max(r.recordings for r in random)
+    return (
+        f"{case.question.truth:<21} x {case.size:<5g} {case.question.first:<14} "
+        f"{' '.join(f'{p:.2f}' for p in case.prior):<15} {best:<17} "
+        f"{ours.recordings:>2} {'right' if ours.right else 'wrong'} {ours.minutes:>5.1f} min   "
+        f"{np.mean([r.recordings for r in random]):>5.2f} (at most {worst}) "
+        f"{100 * np.mean([r.right for r in random]):>4.0f} % right "
+        f"{np.mean([r.minutes for r in random]):>5.1f} min   [{seconds:.0f} s]"
     )
+
+
+def run(question: Question, nominal: Rig, experiments: list[Experiment], seed: int) -> None:
+    """One line."""
+    began = time.perf_counter()
+    rng = np.random.default_rng(seed)
+    case = opened(question, nominal, experiments, rng)
+    answers = answered(case, experiments, rng)
+    outcomes = answers.outcomes
+    ours = answers.count(None)
+    orders = [[outcomes[i] for i in rng.permutation(len(outcomes))] for _ in range(ORDERS)]
+    random = [answers.count(order) for order in orders]
+    best = first_of(outcomes, case.prior).experiment.name if outcomes else "-"
+    print(line(case, best, ours, random, time.perf_counter() - began), flush=True)
 
 
 def main() -> None:

@@ -187,20 +187,27 @@ def _verdict(kind: str, ids: Sequence[str]) -> str:
     return "effects" if any(i in LISTED for i in ids) else "unlisted"
 
 
-def generate(spec: Spec, rig: Path) -> Case:
-    """Make one case in memory; the same arguments give the same bytes."""
-    model, tolerance = read_rig(rig)
-    rng = np.random.default_rng([spec.seed, 20140517])
-    wrong = dict(spec.wrong)
-    true, moved = draw_parameters(spec.kind, model, tolerance, rng, wrong)
-    ids = [p for p in spec.kind.split("+") if p not in _NO_EFFECT]
-    noise = Noise(
+def _noise(rng: np.random.Generator) -> Noise:
+    """Noise and steps of the transducers of one case."""
+    return Noise(
         pressure=float(rng.uniform(300.0, 600.0)),
         pressure_step=float(rng.choice([42.0, 84.0])),
         angle=math.radians(float(rng.uniform(0.01, 0.02))),
         angle_step=ANGLE_STEP,
     )
-    bench = _Bench(spec, true, tolerance, _nominal(rig), noise, _put(true, _values(model, wrong)) if wrong else None)
+
+
+@dataclass(frozen=True)
+class _Chosen:
+    """The effects of a case, the reach of each alone where it was aimed at, and the recordings of the last one alone."""
+
+    effects: Effects
+    alone: dict[str, float]
+    known: dict[int, Measured]
+
+
+def _choose(spec: Spec, ids: Sequence[str], bench: _Bench, rng: np.random.Generator) -> _Chosen:
+    """Draw the effects and scale them to what is wanted."""
     start = float(np.median(bench.supply))
     setting = Setting(len(spec.recordings), spec.duration, start, bench.par.payload, bench.par.coulomb)
     alone: dict[str, float] = {}
@@ -218,43 +225,73 @@ def generate(spec: Spec, rig: Path) -> Case:
                     break
             effect = effect.scaled(factor)
         chosen.append(effect)
-    effects = Effects(*chosen)
-    measured = bench.measure(effects, known if len(ids) == 1 else None)
+    return _Chosen(Effects(*chosen), alone, known)
+
+
+def _reached(bench: _Bench, measured: dict[int, Measured], concealed: bool) -> dict[str, Any]:
+    """What the key says of how far the channels move; nothing moves where nothing is concealed."""
     channel, size, left = None, 0.0, 0.0
-    if ids or wrong:
+    if concealed:
         channel, size = bench.most_moved(measured)
         left = bench.left(measured)
-    runs: dict[str, Any] = {}
-    for i, (name, role) in enumerate(spec.recordings):
-        runs[name] = {"role": role, "initial_supply_pressure": bench.supply[i], "reach": reach(measured[i][1], noise)}
+    return {"reach": size, "reach_channel": channel, "reach_left": left}
+
+
+def generate(spec: Spec, rig: Path) -> Case:
+    """Make one case in memory; the same arguments give the same bytes."""
+    model, tolerance = read_rig(rig)
+    rng = np.random.default_rng([spec.seed, 20140517])
+    wrong = dict(spec.wrong)
+    true, moved = draw_parameters(spec.kind, model, tolerance, rng, wrong)
+    ids = [p for p in spec.kind.split("+") if p not in _NO_EFFECT]
+    noise = _noise(rng)
+    believed = _put(true, _values(model, wrong)) if wrong else None
+    bench = _Bench(spec, true, tolerance, _nominal(rig), noise, believed)
+    chosen = _choose(spec, ids, bench, rng)
+    measured = bench.measure(chosen.effects, chosen.known if len(ids) == 1 else None)
+    reached = _reached(bench, measured, bool(ids or wrong))
     key: dict[str, Any] = {
         "schema": "pamrs.trial-key/1",
         "case": spec.name,
         "kind": spec.kind,
         "verdict": _verdict(spec.kind, ids),
         "effects": ids,
-        "blocks": {e.id: e.block for e in effects},
-        "effect_parameters": effects.to_dict(),
+        "blocks": {e.id: e.block for e in chosen.effects},
+        "effect_parameters": chosen.effects.to_dict(),
         "strength": spec.strength,
         "wanted": dict(zip(ids, spec.wanted, strict=False)),
         "measure": spec.measure,
         "duration": spec.duration,
-        "reach": size,
-        "reach_channel": channel,
-        "reach_alone": alone,
-        "reach_left": left,
+        "reach": reached["reach"],
+        "reach_channel": reached["reach_channel"],
+        "reach_alone": chosen.alone,
+        "reach_left": reached["reach_left"],
         "parameters": _values(true, moved),
         "moved_tolerances": moved,
         "noise": asdict(noise),
-        "recordings": runs,
+        "recordings": {
+            name: {
+                "role": role,
+                "initial_supply_pressure": bench.supply[i],
+                "reach": reach(measured[i][1], noise),
+            }
+            for i, (name, role) in enumerate(spec.recordings)
+        },
         "seed": spec.seed,
     }
     if wrong:
-        nominal, value = _values(model, wrong), _values(true, wrong)
-        key["wrong_parameters"] = {k: {"nominal": nominal[k], "value": value[k], "tolerances": z} for k, z in wrong.items()}
+        key["wrong_parameters"] = _wrong_entries(model, true, wrong)
     files = {f"{name}.csv": _csv(measured[i][0]) for i, (name, _) in enumerate(spec.recordings)}
     files = {"rig.toml": rig.read_text(encoding="utf-8"), **files, "case.toml": _case_toml(spec.recordings)}
     return Case(spec.name, json.dumps(key, indent=1) + "\n", files)
+
+
+def _wrong_entries(
+    model: dict[str, Any], true: dict[str, Any], wrong: dict[str, float]
+) -> dict[str, dict[str, float]]:
+    """The parameters that are far off: what the rig file says, what is true, and by how many tolerances."""
+    nominal, value = _values(model, wrong), _values(true, wrong)
+    return {k: {"nominal": nominal[k], "value": value[k], "tolerances": z} for k, z in wrong.items()}
 
 
 def _check_wrong(wrong: Sequence[tuple[str, float]], rig: Path) -> None:

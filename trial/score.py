@@ -274,6 +274,159 @@ def _said(result: dict[str, Any], named: Sequence[str], wrong: Sequence[str], un
     return text + (f"; not told apart: {' or '.join(sets)}" if len(sets) > 1 else "")
 
 
+@dataclass(frozen=True)
+class _Truth:
+    """What a key conceals, and what of it a diagnosis can name.
+
+    `known` are the names that count as such: the catalogue, and what this diagnosis gave a probability. `listed` are
+    the effects that can be named, `parts` what is to be claimed: effects, "unlisted", parameters that are `far` off.
+    """
+
+    case: str
+    kind: str
+    ids: list[str]
+    known: set[str]
+    listed: tuple[str, ...]
+    far: dict[str, Any]
+    parts: set[str]
+
+    @property
+    def mixed(self) -> bool:
+        """Whether an effect that can be named stands beside one that cannot."""
+        return 0 < len(self.listed) < len(self.ids)
+
+
+def _truth(key: dict[str, Any], probabilities: dict[str, float], catalogue: Sequence[str]) -> _Truth:
+    ids = [str(i) for i in key["effects"]]
+    known = {*catalogue, *(i for i in ids if i in probabilities)}
+    far: dict[str, Any] = key.get("wrong_parameters", {})
+    parts = {i if i in known else "unlisted" for i in ids} | set(far)
+    listed = tuple(i for i in ids if i in known)
+    return _Truth(str(key["case"]), str(key["kind"]), ids, known, listed, far, parts)
+
+
+@dataclass(frozen=True)
+class _Told:
+    """What a result claims: its verdict, the effects best first, those of them that are judged, the parameters that
+    it calls wrong, the blocks that keep a mismatch, and the sets that it cannot tell apart."""
+
+    verdict: str
+    named: list[str]
+    top: list[str]
+    wrong: tuple[str, ...]
+    unexplained: tuple[str, ...]
+    sets: list[set[str]]
+
+    @property
+    def plain(self) -> str:
+        """Verdict, or the wrong parameters where it names them."""
+        return "+".join(self.wrong) if self.verdict == "parameters" and self.wrong else self.verdict
+
+
+def _told(result: dict[str, Any], truth: _Truth) -> _Told:
+    verdict = str(result["verdict"])
+    # effects, best first: a single name is judged, a pair must be named whole
+    named = [str(e["id"]) for e in result.get("effects", [])]
+    judged = max(1, len(truth.listed) if truth.mixed else len(truth.parts))
+    # what a name leaves is no claim of its own
+    left = [e for e in result.get("unexplained") or [] if e.get("verdict", "unlisted") == "unlisted"]
+    groups = result.get("ambiguity", [])
+    return _Told(
+        verdict,
+        named,
+        named[:judged] if verdict == "effects" else [],
+        tuple(str(e["name"]) for e in result.get("wrong_parameters") or []),
+        tuple(str(e["block"]) for e in left),
+        [{part for i in group for part in str(i).split("+")} for group in groups],
+    )
+
+
+def _outcome(truth: _Truth, told: _Told) -> tuple[str, bool]:
+    """Right, ambiguous or wrong, and whether the answer or a set holds the truth."""
+    verdict, parts, sets = told.verdict, truth.parts, told.sets
+    near = False
+    if truth.far:
+        right = verdict == "parameters" and set(told.wrong) == parts
+        contains = right or parts in sets
+        near = verdict in HEALTHY
+    elif truth.mixed:
+        listed = set(truth.listed)
+        right = verdict == "effects" and set(told.top) == listed
+        contains = right or any(s - {"unlisted"} == listed for s in sets)
+    elif not truth.ids:
+        right = verdict == truth.kind
+        # "parameters" and "none" both say that no physics is missing
+        contains = verdict in HEALTHY or any(s <= set(HEALTHY) for s in sets)
+    else:
+        claim = told.top if verdict == "effects" else told.named
+        right = _answer(verdict, claim) == parts
+        contains = right or parts in sets
+    return "right" if right else "ambiguous" if near or contains else "wrong", contains
+
+
+def _chance(truth: _Truth, result: dict[str, Any], probabilities: dict[str, float]) -> float | None:
+    """Stated probability of the truth; None where it is not stated."""
+    if truth.mixed:
+        return _among(result, truth.listed)
+    pooled = _pooled(probabilities, bool(truth.far))
+    if not truth.ids:
+        # "none" and "parameters" say that no physics is missing, and which of them is a matter of degree
+        return pooled.get(frozenset(truth.parts), 0.0)
+    if len(truth.parts) == 1:
+        return pooled.get(frozenset(truth.parts))
+    ids = truth.ids
+    joint = [probabilities.get(sep.join(order)) for sep in ("+", ",") for order in (ids, ids[::-1])]
+    each = min((probabilities.get(i, 0.0) for i in truth.parts), default=0.0)
+    return next((p for p in joint if p is not None), each)
+
+
+def _utility(truth: _Truth, told: _Told) -> float:
+    """Utility of the sets that a result cannot tell apart, or of its answer."""
+    far = bool(truth.far)
+    answer = _answer(told.verdict, told.named)
+    # wrong parameters are healthy, unless the truth is one
+    groups = told.sets if told.sets else [answer | (set(told.wrong) if far else set())]
+    whole = bool(truth.ids) and len(truth.listed) == len(truth.ids)
+    rest = {"unlisted"} if told.unexplained and not whole else set[str]()
+    groups = [s - set(HEALTHY) | rest for s in groups]
+    groups = groups if far else [s - _parameters(s) for s in groups]
+    names = {*truth.known, "unlisted", *told.named, *truth.parts, *(told.wrong if far else ())}
+    return utility(truth.parts, groups, len(names))
+
+
+def _of_key(key: dict[str, Any], truth: _Truth) -> dict[str, Any]:
+    """What the row of a case has from its key, with or without a result."""
+    labels = list(key.get("wanted", {}).values())
+    return {
+        "reach": float(key.get("reach", 0.0)),
+        "ids": tuple(truth.ids),
+        "wanted": "pair" if len(truth.ids) > 1 else str(labels[0]) if labels else "",
+        "left": _number(key.get("reach_left")),
+        "labels": tuple(map(str, labels)),
+        "listed": truth.listed,
+        "wrong": tuple((str(k), float(e["tolerances"])) for k, e in truth.far.items()),
+        "seed": int(key.get("seed", 0)),
+    }
+
+
+def _missing(key: dict[str, Any], truth: _Truth) -> Row:
+    """The row of a case without a result."""
+    return Row(
+        case=truth.case,
+        truth=truth.kind,
+        verdict="missing",
+        named="-",
+        probability=None,
+        outcome="wrong",
+        gap=0.0 if truth.ids else None,
+        utility=None,
+        contains=False,
+        seconds=None,
+        rest_said=False if truth.mixed else None,
+        **_of_key(key, truth),
+    )
+
+
 def score_case(key: dict[str, Any], result: dict[str, Any] | None, catalogue: Sequence[str]) -> Row:
     """Score one case; a missing result is wrong.
 
@@ -281,104 +434,41 @@ def score_case(key: dict[str, Any], result: dict[str, Any] | None, catalogue: Se
     probability. Of a listed effect beside such a one, the listed one must be named first; what is said of the rest is
     scored apart.
     """
-    case, kind, ids = str(key["case"]), str(key["kind"]), [str(i) for i in key["effects"]]
-    reach = float(key.get("reach", 0.0))
-    labels = list(key.get("wanted", {}).values())
-    wanted = "pair" if len(ids) > 1 else str(labels[0]) if labels else ""
-    left = _number(key.get("reach_left"))
-    far: dict[str, Any] = key.get("wrong_parameters", {})
-    wrong = tuple((str(k), float(e["tolerances"])) for k, e in far.items())
     probabilities = _numbers((result or {}).get("probabilities", {}))
-    known = {*catalogue, *(i for i in ids if i in probabilities)}
-    listed = tuple(i for i in ids if i in known)
-    mixed = 0 < len(listed) < len(ids)
-    common: dict[str, Any] = {
-        "ids": tuple(ids),
-        "wanted": wanted,
-        "left": left,
-        "labels": tuple(map(str, labels)),
-        "listed": listed,
-        "wrong": wrong,
-        "seed": int(key.get("seed", 0)),
-    }
+    truth = _truth(key, probabilities, catalogue)
     if result is None:
-        gap, missed = 0.0 if ids else None, False if mixed else None
-        return Row(case, kind, "missing", "-", None, "wrong", gap, reach, None, False, None, **common, rest_said=missed)
-    verdict = str(result["verdict"])
-    # effects, best first: a single name is judged, a pair must be named whole
-    named = [str(e["id"]) for e in result.get("effects", [])]
-    truth = {i if i in known else "unlisted" for i in ids} | set(far)
-    top = named[: max(1, len(listed) if mixed else len(truth))] if verdict == "effects" else []
-    told_wrong = list(result.get("wrong_parameters") or [])
-    wrong_named = tuple(str(e["name"]) for e in told_wrong)
-    # what a name leaves is no claim of its own
-    unexplained = tuple(str(e["block"]) for e in result.get("unexplained") or [] if e.get("verdict", "unlisted") == "unlisted")
-    rest = {"unlisted"} if unexplained else set[str]()
-    answer = _answer(verdict, named)
-    sets = [{part for i in group for part in str(i).split("+")} for group in result.get("ambiguity", [])]
-    if far:
-        right = verdict == "parameters" and set(wrong_named) == truth
-        contains = right or truth in sets
-        outcome = "right" if right else ("ambiguous" if contains or verdict in HEALTHY else "wrong")
-    elif mixed:
-        right = verdict == "effects" and set(top) == set(listed)
-        contains = right or any(s - {"unlisted"} == set(listed) for s in sets)
-        outcome = "right" if right else ("ambiguous" if contains else "wrong")
-    elif not ids:
-        right = verdict == kind
-        # "parameters" and "none" both say that no physics is missing
-        harmless = verdict in ("none", "parameters")
-        contains = harmless or any(s <= {"none", "parameters"} for s in sets)
-        outcome = "right" if right else ("ambiguous" if harmless or contains else "wrong")
-    else:
-        right = _answer(verdict, top) == truth if verdict == "effects" else answer == truth
-        contains = right or truth in sets
-        outcome = "right" if right else ("ambiguous" if contains else "wrong")
-    chance: float | None
-    pooled = _pooled(probabilities, bool(far))
-    if mixed:
-        chance = _among(result, listed)
-    elif not ids:
-        # "none" and "parameters" say that no physics is missing, and which of them is a matter of degree
-        chance = pooled.get(frozenset(truth), 0.0)
-    elif len(truth) == 1:
-        chance = pooled.get(frozenset(truth))
-    else:
-        joint = [probabilities.get(sep.join(order)) for sep in ("+", ",") for order in (ids, ids[::-1])]
-        chance = next((p for p in joint if p is not None), min((probabilities.get(i, 0.0) for i in truth), default=0.0))
-    gap = gap_of(result)
-    # wrong parameters are healthy, unless the truth is one
-    groups = sets if sets else [answer | (set(wrong_named) if far else set())]
-    groups = [s - {"none", "parameters"} | (set() if ids and len(listed) == len(ids) else rest) for s in groups]
-    groups = groups if far else [s - _parameters(s) for s in groups]
-    components = len({*known, "unlisted", *named, *truth, *(wrong_named if far else ())})
-    mark = utility(truth, groups, components)
-    plain = "+".join(wrong_named) if verdict == "parameters" and wrong_named else verdict
-    label = "+".join(top) if verdict == "effects" else plain
-    claimed = verdict in ("effects", "unlisted") or bool(rest)
+        return _missing(key, truth)
+    told = _told(result, truth)
+    outcome, contains = _outcome(truth, told)
+    chance = _chance(truth, result, probabilities)
+    effects = told.verdict == "effects"
+    claimed = told.verdict in ("effects", "unlisted") or bool(told.unexplained)
+    rest_said = None
+    if truth.mixed:
+        hidden = [_block_of(i) for i in truth.ids if i not in truth.known]
+        rest_said = any(b.startswith(block) for b in told.unexplained for block in hidden)
     return Row(
-        case,
-        kind,
-        verdict,
-        label,
-        chance if chance is not None else 0.0,
-        outcome,
-        gap,
-        reach,
-        mark,
-        contains,
-        _number(result.get("seconds")),
-        **common,
-        first=(named[0] if named else "effects") if verdict == "effects" else plain,
-        claim=_claim(truth, probabilities),
-        name_probability=_among(result, listed) if listed else None,
-        rest_said=any(b.startswith(_block_of(i)) for b in unexplained for i in ids if i not in known) if mixed else None,
-        unexplained=unexplained,
-        wrong_named=wrong_named,
-        interval_holds=_holds(far, told_wrong),
-        false_name=not ids and (claimed or bool(wrong_named and not far)),
+        case=truth.case,
+        truth=truth.kind,
+        verdict=told.verdict,
+        named="+".join(told.top) if effects else told.plain,
+        probability=chance if chance is not None else 0.0,
+        outcome=outcome,
+        gap=gap_of(result),
+        utility=_utility(truth, told),
+        contains=contains,
+        seconds=_number(result.get("seconds")),
+        **_of_key(key, truth),
+        first=(told.named[0] if told.named else "effects") if effects else told.plain,
+        claim=_claim(truth.parts, probabilities),
+        name_probability=_among(result, truth.listed) if truth.listed else None,
+        rest_said=rest_said,
+        unexplained=told.unexplained,
+        wrong_named=told.wrong,
+        interval_holds=_holds(truth.far, list(result.get("wrong_parameters") or [])),
+        false_name=not truth.ids and (claimed or bool(told.wrong and not truth.far)),
         held_out=_held_out(result),
-        said=_said(result, named, wrong_named, unexplained),
+        said=_said(result, told.named, told.wrong, told.unexplained),
     )
 
 

@@ -87,6 +87,9 @@ class Rig:
     def simulate(
         self, rows: int, signals: dict[str, _Array], sample_time: float, step: float, start: dict[str, float]
     ) -> tuple[dict[str, _Array], list[_Event]]: ...
+    def linearise(
+        self, start: dict[str, float], side: str
+    ) -> tuple[tuple[list[str], list[str], list[str]], tuple[_Array, _Array, _Array]]: ...
     def predict(
         self,
         block: str,

@@ -153,7 +153,7 @@ def test_what_does_not_fit_together_is_named(monkeypatch: pytest.MonkeyPatch) ->
         describe_closure(case.baseline, case.problem, case.baseline)
     prepared = case.problem.recordings[0]
     given = ("arm", prepared.commands, DT, DT, [0], prepared.signals, prepared.n)
-    with pytest.raises(RigError, match="closure_torque"):
+    with pytest.raises(RigError, match="no sum of terms"):
         core_rig(NOMINAL).closure_terms(*given)
     terms = _core.Rig(NOMINAL.with_effect("closure_torque").to_json()).closure_terms(*given)
     assert terms.shape == (ROWS, len(TERMS["closure_torque"]))

@@ -69,6 +69,7 @@ fn motion<const N: usize>(rows: &[[f64; 3]; N]) -> [SVector<f64, N>; 3] {
 }
 
 /// Every law that holds at one instant.
+#[allow(clippy::too_many_lines, reason = "one law after another of the same drawn case")]
 fn check_laws<const N: usize>((numbers, rows): &Case<N>) -> Result<(), TestCaseError> {
     let links = numbers.map(|n| link(&n, [0.7, 1.5]));
     let [q, r, a] = motion(rows);

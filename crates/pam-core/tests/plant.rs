@@ -61,6 +61,7 @@ fn slopes(values: &[f64], dt: f64) -> Vec<f64> {
 }
 
 #[test]
+#[allow(clippy::too_many_lines, reason = "a table of the parameters and one check of each")]
 fn sensitivities_agree_with_differences() {
     let mut with_effects = spec();
     with_effects.effects = vec![

@@ -9,6 +9,7 @@ use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray1};
 use pam_core::cut_chain::{closure_terms, predict, Block};
 use pam_core::cut_chain::{Measured, Signal};
 use pam_core::effects::EFFECTS;
+use pam_core::plant::{LinearModel, Side};
 use pam_core::simulate::drive::Drive;
 use pam_core::simulate::{Progress, Timing, Trajectory};
 use pam_core::RigSpec;
@@ -32,6 +33,10 @@ impl Rig {
 /// Signals by name as Python gives them.
 pub type Signals<'py> = BTreeMap<String, PyReadonlyArray1<'py, f64>>;
 type Pair<'py> = (PyReadonlyArray1<'py, f64>, PyReadonlyArray1<'py, f64>);
+/// Of states, inputs and outputs.
+type Names = (Vec<String>, Vec<String>, Vec<String>);
+/// A, B and C.
+type Matrices<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>);
 type Owned = Vec<(String, Vec<f64>)>;
 
 /// Signals by name as the core takes them.
@@ -176,6 +181,25 @@ impl Rig {
         run(py, rig, timing, &mut progress, &drive.part(0..rows.saturating_sub(1)), &mut out)?;
         let happened = events(&out);
         Ok((channels(py, rig, out)?, happened))
+    }
+
+    /// Linear model about a start with every valve at its null: names of states, inputs and outputs, then the matrices of
+    /// `x' = A x + B u, y = C x`. `side` is that on which valves open.
+    fn linearise<'py>(
+        &self,
+        py: Python<'py>,
+        start: BTreeMap<String, f64>,
+        side: &str,
+    ) -> PyResult<(Names, Matrices<'py>)> {
+        let rig = &*self.inner;
+        let made = py.detach(|| {
+            let side = Side::from_name(side)?;
+            Progress::start(rig, &initial(rig, &start)?)?.linearised(rig, side)
+        });
+        let LinearModel { states, inputs, outputs, a, b, c } = made.map_err(|e| error(py, &e))?;
+        let (n, m, p) = (states.len(), inputs.len(), outputs.len());
+        let matrix = |values, shape: [usize; 2]| array(py, values).reshape(shape);
+        Ok(((states, inputs, outputs), (matrix(a, [n, n])?, matrix(b, [n, m])?, matrix(c, [p, n])?)))
     }
 
     /// Predict a block's output from its measured neighbours, with the jacobian (None without parameters).

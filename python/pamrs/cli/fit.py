@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import shlex
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
@@ -86,40 +87,32 @@ def _muscle(
     png: _Picture = None,
 ) -> None:
     """Fit a muscle's force model to measured forces over length and pressure."""
-    outputs = (report, rig, json, png)
-    check_writable(*outputs)
+    outputs = _Outputs(report=report, rig=rig, json=json, png=png)
+    check_writable(report, rig, json, png)
     if per_level and rig is not None:
         raise typer.BadParameter("a rig needs moduli linear in pressure: leave out --per-level or --rig")
-    sizes = {"rest_length": rest_length, "rest_diameter": rest_diameter, "braid_angle": braid_angle, "wall_thickness": wall_thickness}
-    map_, start, tolerance, stated, base = _inputs(
-        data, muscle, {k: v for k, v in sizes.items() if v is not None}, where or [], clipped
-    )
-    pressures = None if levels is None else [quantity("levels", text, "pressure")[0] for text in levels.split(",")]
-    names = [] if free is None else [name.strip().replace("-", "_") for name in free.split(",") if name.strip()]
-    from pamrs.rig.muscle_models import ELASTIC_PARAMETERS
-
-    elastic = ELASTIC_PARAMETERS.get(model or start.model, ())  # a description may know of coefficients that another model has
-    tolerance = {name: value for name, value in tolerance.items() if name in GEOMETRY or name in elastic}
-    known = {name: value for name, value in tolerance.items() if math.isfinite(value)} | _prior(prior)
-    scatter = stated if noise is None else _noise(noise, map_)
-    idle = [name for name in known if name in GEOMETRY and name not in names]
-    notes = [f"tolerance of {', '.join(idle)} is not used: not free (--free {','.join([*names, *idle])})"] if idle else []
+    sizes = _stated(rest_length, rest_diameter, braid_angle, wall_thickness)
+    inputs = _inputs(data, muscle, sizes, where or [], clipped)
+    shape, notes = _shape(inputs, model, geometry, levels, free, prior, noise)
     from pamrs.fit import FitError, fit_muscle
 
-    shape: dict[str, Any] = {"geometry": geometry, "free": names, "tolerance": known, "levels": pressures, "noise": scatter}
+    map_, moduli = inputs.data, "per_level" if per_level else "linear"
     with progress(f"fitting {map_.label}"):
         try:
-            start, rubbing, words = _rubbing(map_, start, friction, model, pressures)
-            fit = fit_muscle(map_, start, model=model, order=order, moduli="per_level" if per_level else "linear", **shape)
+            start, rubbing, words = _rubbing(map_, inputs.muscle, friction, model, shape["levels"])
+            fit = fit_muscle(map_, start, model=model, order=order, moduli=moduli, **shape)
             comparison = _comparison(map_, start, fit.order, shape) if compare else None
-            contents = _contents(fit, comparison, rubbing, _command(context), base, report=report, rig=rig, json=json, png=png)
+            contents = _contents(fit, comparison, rubbing, _command(context), inputs.rig, outputs)
             summary = _summary(fit, comparison, words, notes)
         except FitError as error:
             raise FitError("; ".join([str(error), *map_.notes])) from error
     typer.echo(summary, nl=False)
     write(contents)
-    if rig is not None and base is None:
-        typer.echo(f"{rig} is the muscle on a load frame: simulate it with a length, or give it [joint] and [arm]", err=True)
+    if rig is not None and inputs.rig is None:
+        typer.echo(
+            f"{rig} is the muscle on a load frame: simulate it with a length, or give it [joint] and [arm]",
+            err=True,
+        )
 
 
 @fit_app.command("friction")
@@ -139,8 +132,8 @@ def _friction(
 ) -> None:
     """Fit the friction c_F = max(c0 + c1 P, floor) of a muscle to its hysteresis loops; of its geometry, the rest length is enough."""
     check_writable(json, png)
-    sizes = {"rest_length": rest_length, "rest_diameter": rest_diameter, "braid_angle": braid_angle, "wall_thickness": wall_thickness}
-    map_ = _loops(data, muscle, {k: v for k, v in sizes.items() if v is not None}, where or [], clipped)
+    sizes = _stated(rest_length, rest_diameter, braid_angle, wall_thickness)
+    map_ = _loops(data, muscle, sizes, where or [], clipped)
     from pamrs.fit import fit_friction
 
     contents: dict[Path, str | bytes] = {}
@@ -209,10 +202,75 @@ def _comparison(data: ForceMap, muscle: Muscle, order: int | None, shape: dict[s
 # ------------------------------------------------------------------------- inputs
 
 
-def _inputs(
-    data: Path, muscle: str | None, sizes: Mapping[str, str], where: Sequence[str], clipped: str | None
-) -> tuple[ForceMap, Muscle, dict[str, float], float | None, Rig | None]:
-    """Map, muscle, tolerances, noise, and the rig of the muscle if it is of one; from a description or from a table and the options."""
+@dataclass(frozen=True)
+class _Inputs:
+    """A force map, the muscle it is of, and what is known of both.
+
+    The tolerances are standard deviations of the muscle's parameters in SI, the noise is that of the
+    forces [N], and the rig is the one that the muscle is a part of.
+    """
+
+    data: ForceMap
+    muscle: Muscle
+    tolerance: dict[str, float]
+    noise: float | None = None
+    rig: Rig | None = None
+
+
+def _stated(
+    rest_length: str | None,
+    rest_diameter: str | None,
+    braid_angle: str | None,
+    wall_thickness: str | None,
+) -> dict[str, str]:
+    """The sizes that were given, by their name in :data:`GEOMETRY`."""
+    sizes = {
+        "rest_length": rest_length,
+        "rest_diameter": rest_diameter,
+        "braid_angle": braid_angle,
+        "wall_thickness": wall_thickness,
+    }
+    return {name: text for name, text in sizes.items() if text is not None}
+
+
+def _shape(
+    inputs: _Inputs,
+    model: str | None,
+    geometry: str | None,
+    levels: str | None,
+    free: str | None,
+    prior: str | None,
+    noise: str | None,
+) -> tuple[dict[str, Any], list[str]]:
+    """What a fit and a comparison both take, and notes on what is not used."""
+    from pamrs.rig.muscle_models import ELASTIC_PARAMETERS
+
+    pressures = None
+    if levels is not None:
+        pressures = [quantity("levels", text, "pressure")[0] for text in levels.split(",")]
+    names = [name.strip().replace("-", "_") for name in (free or "").split(",") if name.strip()]
+    # a description may know of coefficients that another model has
+    own = {*GEOMETRY, *ELASTIC_PARAMETERS.get(model or inputs.muscle.model, ())}
+    stated = inputs.tolerance.items()
+    known = {name: value for name, value in stated if name in own and math.isfinite(value)}
+    known |= _prior(prior)
+    idle = [name for name in known if name in GEOMETRY and name not in names]
+    notes = []
+    if idle:
+        both = ",".join([*names, *idle])
+        notes = [f"tolerance of {', '.join(idle)} is not used: not free (--free {both})"]
+    shape = {
+        "geometry": geometry,
+        "free": names,
+        "tolerance": known,
+        "levels": pressures,
+        "noise": inputs.noise if noise is None else _noise(noise, inputs.data),
+    }
+    return shape, notes
+
+
+def _inputs(data: Path, muscle: str | None, sizes: Mapping[str, str], where: Sequence[str], clipped: str | None) -> _Inputs:
+    """From a description, or from a table and the options."""
     from pamrs.errors import ParameterError
 
     if data.suffix.lower() == ".toml":
@@ -224,10 +282,10 @@ def _inputs(
         from pamrs.fit import load_measured_muscle
 
         measured = load_measured_muscle(data)
-        return measured.data, measured.muscle, measured.tolerance, measured.noise, None
+        return _Inputs(measured.data, measured.muscle, measured.tolerance, measured.noise)
     start, tolerance, base = _start(muscle, sizes)
     map_ = _table(data, float(start.parameters["rest_length"]), where, clipped)
-    return map_.checked_against(start), start, tolerance, None, base
+    return _Inputs(map_.checked_against(start), start, tolerance, rig=base)
 
 
 def _table(data: Path, rest_length: float, where: Sequence[str], clipped: str | None) -> ForceMap:
@@ -247,7 +305,7 @@ def _loops(data: Path, muscle: str | None, sizes: Mapping[str, str], where: Sequ
     from pamrs.errors import ParameterError
 
     if data.suffix.lower() == ".toml" or muscle is not None or set(sizes) - {"rest_length"}:
-        return _inputs(data, muscle, sizes, where, clipped)[0]
+        return _inputs(data, muscle, sizes, where, clipped).data
     if not sizes:
         raise ParameterError(
             "the rest length is missing: give --rest-length (like '300 mm'), or --muscle with a rig file or a name of the library"
@@ -326,30 +384,36 @@ def _summary(fit: MuscleFit, comparison: ModelComparison | None, friction: str, 
     return text if comparison is None else f"{text}\n{comparison.to_text()}"
 
 
+@dataclass(frozen=True)
+class _Outputs:
+    """The files to write."""
+
+    report: Path | None
+    rig: Path | None
+    json: Path | None
+    png: Path | None
+
+
 def _contents(
     fit: MuscleFit,
     comparison: ModelComparison | None,
     friction: FrictionFit | None,
     command: str,
     base: Rig | None,
-    *,
-    report: Path | None,
-    rig: Path | None,
-    json: Path | None,
-    png: Path | None,
+    files: _Outputs,
 ) -> dict[Path, str | bytes]:
     """Every file to write with its content; made before the first is written."""
     from pamrs.fit import report as pages
 
     contents: dict[Path, str | bytes] = {}
-    if report is not None:
-        contents[report] = pages.render_html(fit, comparison, command=command)
-    if png is not None:
-        contents[png] = pages.render_png(fit, comparison)
-    if rig is not None:
-        contents[rig] = fit.to_rig(base).to_toml_text()
-    if json is not None:
-        contents[json] = _json(fit, comparison, friction, command)
+    if files.report is not None:
+        contents[files.report] = pages.render_html(fit, comparison, command=command)
+    if files.png is not None:
+        contents[files.png] = pages.render_png(fit, comparison)
+    if files.rig is not None:
+        contents[files.rig] = fit.to_rig(base).to_toml_text()
+    if files.json is not None:
+        contents[files.json] = _json(fit, comparison, friction, command)
     return contents
 
 

@@ -1,9 +1,9 @@
-"""Linear models of rigs about an operating point, by differences of what they do; those of controllers are in ``controller_model``."""
+"""Linear models of rigs about an operating point; those of controllers are in ``_controller_model``."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs.channels import channel_of, dotted
+from pamrs.control._at_rest import check_smooth, resting, without_dry_friction
 from pamrs.control._controller_model import LinearController, heard, linear_controller
-from pamrs.control.rig_state import COMMAND, Place, RigState, check_smooth, resting, without_dry_friction
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
-from pamrs.simulation import Simulator
+from pamrs.simulation import Simulator, core_rig
 
 if TYPE_CHECKING:
     import control  # type: ignore[import-untyped]
@@ -25,7 +25,7 @@ __all__ = ["LinearController", "LinearModel", "equilibrium", "linear_controller"
 Array = NDArray[np.float64]
 
 _SAMPLE: Final = 2.5e-4  # s
-_REST: Final = 1e-5  # rad/s, what a joint at rest may have after a sample; as small as the differences in the rate
+_REST: Final = 1e-5  # rad/s, what a joint at rest may have after a sample
 SIDES: Final = ("mean", "fill", "vent")
 FRICTIONS: Final = ("rest", "moving")
 
@@ -186,11 +186,10 @@ def linearise(
 ) -> LinearModel:
     """A rig about an angle that it holds with its valves closed.
 
-    The core simulates a quarter of a millisecond from states and commands on both sides of the point; the central differences are
-    the sampled matrices, whose logarithm is A and B. That is exact for a linear plant up to the integrator's error, and takes whatever
-    effects are in the rig: what they move (a lag, a delay, a creeping strain, a mounting that gives way, the air's mass where its
-    temperature counts) are states like the others. Memories of direction (``muscle_hysteresis``) are as they are in presliding, springs
-    about the point. What begins later (``payload_change``, ``external_torque``) has not begun.
+    A and B are the exact derivatives of the core's state equation, by dual numbers, with whatever effects are in the rig: what they
+    move (a lag, a delay, a creeping strain, a mounting that gives way, the air's mass where its temperature counts) are states like
+    the others. Memories of direction (``muscle_hysteresis``) are as they are in presliding, springs about the point. What begins
+    later (``payload_change``, ``external_torque``) has not begun.
 
     Two things have no derivative or a local one. **A valve** lets air in on one side of its null and out on the other, with different
     slopes: ``side`` chooses. **Coulomb friction** ``f tanh(rate/w)`` is at rest a viscous damping with the slope ``f/w``, which no
@@ -222,8 +221,7 @@ def linearise(
     ------
     ParameterError
         As :func:`equilibrium`, or if the side or the friction is unknown, the rig has an effect without a linear model (play, dead
-        zone, relay: the message names it), another joint does not rest, a command moves nothing, or the sampled motion belongs to
-        no continuous one.
+        zone, relay: the message names it), another joint does not rest, or a command moves nothing.
     """
     if side not in SIDES:
         raise ParameterError(f"side = {side!r} is not allowed: one of {', '.join(SIDES)}")
@@ -235,88 +233,20 @@ def linearise(
     simulator, commands = Simulator(rig, sample_time=_SAMPLE, initial=start), _closed(rig)
     first = simulator.observe()
     _check_rest(simulator, commands)
-    plant = _Differences(simulator, commands, side)
-    named, extra = (
-        [place for place in some if channel_of(place.name) not in held] for some in (plant.places.named, plant.places.extra)
-    )
-    places, outputs = [*named, *extra], tuple(place.name for place in named)
-    sampled, read = plant.sampled(places, outputs)
-    n, m = len(places), len(commands)
-    for k, name in enumerate(commands, n):
-        if not set(heard(sampled[:n, :n].T, sampled[:n, k])) & set(range(len(named))):
+    (states, inputs, outputs), (a, b, c) = core_rig(rig).linearise(start, side)
+    free = [k for k, name in enumerate(states) if channel_of(name) not in held]
+    read = [k for k, name in enumerate(outputs) if channel_of(name) not in held]
+    a, b, c = a[np.ix_(free, free)], b[free], c[np.ix_(read, free)]
+    named = [row for row, k in enumerate(free) if states[k] in outputs]
+    for k, name in enumerate(inputs):
+        if not set(heard(a.T, b[:, k])) & set(named):
             raise ParameterError(f"{name} moves nothing about {commands[name]:g} V (side = {side!r}): no linear model is there")
     # what an effect moves and nothing feels (a lag of no time, a share of nothing) is no state
-    felt = np.abs(read).sum(axis=0) + (np.arange(n) < len(named))
-    kept = heard(sampled[:n, :n], felt)
-    continuous, size = _logarithm(sampled[np.ix_([*kept, *range(n, n + m)], [*kept, *range(n, n + m)])]), len(kept)
-    widths = np.array([plant.width(places[k]) for k in kept])
-    a, b = (continuous[:size, :size] * widths[:, None] / widths, continuous[:size, size:] * widths[:, None] / COMMAND)
-    names = tuple(places[k].name for k in kept), tuple(commands), outputs
-    return LinearModel(a, b, read[:, kept] / widths, *names, {**first, **commands}, side)
-
-
-class _Differences:
-    """Differences of short samples about a state, everything in half widths."""
-
-    def __init__(self, simulator: Simulator, commands: Mapping[str, float], side: str) -> None:
-        self._simulator, self._commands = simulator, commands
-        self._sides = {"mean": (1.0, -1.0), "fill": (1.0, 0.0), "vent": (0.0, -1.0)}[side]
-        self._at = simulator.state
-        self.places = RigState(simulator.rig, self._at.size)
-        self._at[self.places.begun] = 1.0  # valves that hold their null, not ones that wait for a first command
-        self._follow = self._followed()
-
-    def width(self, place: Place) -> float:
-        """Half width of a place [SI]."""
-        return place.width * (float(self._at[place.index]) if place.relative else 1.0)
-
-    def sampled(self, places: Sequence[Place], outputs: Sequence[str]) -> tuple[Array, Array]:
-        """State and input matrix of a sample, the inputs staying; and what the sensors read [SI] by half width of each state."""
-        n, m = len(places), len(self._commands)
-        index, widths = [place.index for place in places], np.array([self.width(place) for place in places])
-        out, read = np.eye(n + m), np.zeros((len(outputs), n))
-        for k, place in enumerate(places):
-            above, below = self._sides if place.spool else (1.0, -1.0)
-            up, down = (self._moved(place, sign * widths[k]) for sign in (above, below))
-            out[:n, k] = (self._after(up) - self._after(down))[index] / ((above - below) * widths)
-            read[:, k] = (self._read(up, outputs) - self._read(down, outputs)) / (above - below)
-        above, below = self._sides
-        for k, (name, null) in enumerate(self._commands.items(), n):
-            up, down = (self._after(self._at, **{name: null + sign * COMMAND}) for sign in (above, below))
-            out[:n, k] = (up - down)[index] / ((above - below) * widths)
-        return out, read
-
-    def _moved(self, place: Place, change: float) -> Array:
-        """The state with a place changed, and with it what follows the motion of a joint."""
-        state = self._at.copy()
-        state[place.index] += change
-        if place.index in self.places.angles:
-            state[self.places.slaved] += self._follow[:, self.places.angles.index(place.index)] * change
-        return state
-
-    def _after(self, state: Array, **changed: float) -> Array:
-        """The state a sample later, with valves closed but for some commands."""
-        self._simulator.restore(state)
-        self._simulator._advance(1, {name: np.array([value]) for name, value in {**self._commands, **changed}.items()})
-        return self._simulator.state
-
-    def _read(self, state: Array, channels: Sequence[str]) -> Array:
-        self._simulator.restore(state)
-        sample = self._simulator.observe()
-        return np.array([sample[channel] for channel in channels])
-
-    def _followed(self) -> Array:
-        """What memories of the motion change by per angle of each joint, from a slow motion of each."""
-        places = self.places
-        rest = self._after(self._at)
-        moved, turned = [], []
-        for rate in places.rates:
-            state = self._at.copy()
-            state[rate] += 1e-3
-            change = self._after(state) - rest
-            moved.append(change[places.slaved])
-            turned.append(change[places.angles])
-        return np.linalg.solve(np.array(turned), np.array(moved)).T
+    felt = np.abs(c).sum(axis=0)
+    felt[named] += 1.0
+    kept = heard(a, felt)
+    names = tuple(states[free[k]] for k in kept), tuple(inputs), tuple(outputs[k] for k in read)
+    return LinearModel(a[np.ix_(kept, kept)], b[kept], c[:, kept], *names, {**first, **commands}, side)
 
 
 def _check_rest(simulator: Simulator, commands: Mapping[str, float]) -> None:
@@ -330,16 +260,6 @@ def _check_rest(simulator: Simulator, commands: Mapping[str, float]) -> None:
                 f"{name} is {values[0]:.3g} rad/s a quarter of a millisecond after the start: the joint does not rest; give initial "
                 "values that hold it: those of equilibrium for each joint in turn, until none moves"
             )
-
-
-def _logarithm(sampled: Array) -> Array:
-    """Continuous matrices of sampled ones."""
-    from scipy.linalg import logm
-
-    found = np.asarray(logm(sampled), dtype=np.complex128)
-    if not np.isfinite(found).all() or float(np.abs(found.imag).max()) > 1e-6 * max(1.0, float(np.abs(found.real).max())):
-        raise ParameterError("the rig's motion over a quarter of a millisecond belongs to no linear one in continuous time")
-    return np.asarray(found.real / _SAMPLE, dtype=np.float64)
 
 
 def python_control() -> Any:

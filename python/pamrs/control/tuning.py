@@ -251,59 +251,102 @@ def search_gains(
     """
     low, high = _box(bounds)
     given = None if start is None else _within(start, bounds)
+    _check_search(method, evaluations, population, seed, scale)
+    loops = _Loops(plant, controller, trajectory, {**loop, "unit": unit}, tuple(bounds), low, high, given)
+    rng = np.random.default_rng(seed)
+    by = _first_scale(loops, rng.random((population, low.size))) if scale is None else scale
+
+    def objective(points: Array) -> Array:
+        nu, omega = loops.run(points)
+        value = weights[0] * nu / by[0] + weights[1] * omega / by[1]
+        return np.where(np.isfinite(value), np.minimum(value, _FAILED), _FAILED)
+
+    left = evaluations - sum(map(len, loops.tried))
+    searched = _cma if method == "cma" else _optuna
+    searched(objective, low.size, left, population, rng, loops.begin)
+    nu, omega = (np.concatenate([pair[k] for pair in loops.metrics]) for k in range(2))
+    values = weights[0] * nu / by[0] + weights[1] * omega / by[1]
+    values = np.where(np.isfinite(values), values, np.inf)
+    points = np.concatenate(loops.tried)
+    best = int(np.argmin(values))
+    if math.isinf(values[best]):
+        raise ParameterError("every run failed: there is nothing to compare; narrow the bounds")
+    gains = {name: float(points[best, k]) for k, name in enumerate(bounds)}
+    return GainSearch(gains, float(values[best]), by, points, values, nu, omega, method, seed)
+
+
+def _check_search(method: str, evaluations: int, population: int, seed: int, scale: tuple[float, float] | None) -> None:
+    """Refuse the arguments of a search that cannot be.
+
+    Raises
+    ------
+    ParameterError
+        Which argument, its value and what is allowed.
+    """
     if method not in METHODS:
         raise ParameterError(f"method = {method!r} is not allowed: one of {', '.join(METHODS)}")
     if not 4 <= population <= evaluations:
         raise ParameterError(f"population = {population} is not allowed: from 4 to evaluations = {evaluations} is needed")
     if scale is None and evaluations < 2 * population:
         raise ParameterError(
-            f"evaluations = {evaluations} is not allowed: without a scale two populations = {2 * population} are needed, as the first "
-            "finds it"
+            f"evaluations = {evaluations} is not allowed: without a scale two populations = "
+            f"{2 * population} are needed, as the first finds it"
         )
     if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed < 2**32:
         raise ParameterError(f"seed = {seed!r} is not allowed: a whole number from 0 to 2**32 - 1 is needed")
     if scale is not None and not all(math.isfinite(s) and s > 0.0 for s in scale):
         raise ParameterError(f"scale = {scale} is not allowed: two numbers above zero are needed")
-    begin = None if given is None else (given - low) / (high - low)
-    tried: list[Array] = []
-    metrics: list[tuple[Array, Array]] = []
 
-    def runs(points: Array) -> tuple[Array, Array]:
-        """Nu and omega of points in the unit cube."""
-        gains = low + points * (high - low)
-        if begin is not None and given is not None:
-            gains[np.all(points == begin, axis=1)] = given  # to the last bit
-        named = {name: np.ascontiguousarray(gains[:, k]) for k, name in enumerate(bounds)}
-        done = sweep([plant] * len(gains), controller(**named), trajectory, unit=unit, **loop)
-        tried.append(gains)
-        metrics.append((done.squared_error, done.curvature))
-        return metrics[-1]
 
-    rng = np.random.default_rng(seed)
-    if scale is None:
-        first = runs(rng.random((population, low.size)))
-        ok = np.isfinite(first[0]) & np.isfinite(first[1])
-        if not ok.any():
-            raise ParameterError("every run of the first population failed: there is nothing to compare; narrow the bounds")
-        scale = float(first[0][ok].min()), float(first[1][ok].min())
-    by = scale
+@dataclass
+class _Loops:
+    """Closed loops of points of the unit cube between the lowest and highest gains; every one is kept.
 
-    def objective(points: Array) -> Array:
-        nu, omega = runs(points)
-        value = weights[0] * nu / by[0] + weights[1] * omega / by[1]
-        return np.where(np.isfinite(value), np.minimum(value, _FAILED), _FAILED)
+    ``given`` are the gains of the start. ``tried`` holds the gains of each batch, ``metrics`` its nu and omega.
+    """
 
-    left = evaluations - sum(map(len, tried))
-    (_cma if method == "cma" else _optuna)(objective, low.size, left, population, rng, begin)
-    nu, omega = (np.concatenate([pair[k] for pair in metrics]) for k in range(2))
-    values = weights[0] * nu / by[0] + weights[1] * omega / by[1]
-    values = np.where(np.isfinite(values), values, np.inf)
-    points = np.concatenate(tried)
-    best = int(np.argmin(values))
-    if math.isinf(values[best]):
-        raise ParameterError("every run failed: there is nothing to compare; narrow the bounds")
-    gains = {name: float(points[best, k]) for k, name in enumerate(bounds)}
-    return GainSearch(gains, float(values[best]), by, points, values, nu, omega, method, seed)
+    plant: Rig
+    controller: Factory
+    trajectory: Trajectory
+    settings: dict[str, Any]
+    names: tuple[str, ...]
+    low: Array
+    high: Array
+    given: Array | None
+    tried: list[Array] = field(default_factory=list)
+    metrics: list[tuple[Array, Array]] = field(default_factory=list)
+
+    @property
+    def begin(self) -> Array | None:
+        """The start in the unit cube."""
+        return None if self.given is None else (self.given - self.low) / (self.high - self.low)
+
+    def run(self, points: Array) -> tuple[Array, Array]:
+        """Nu and omega of points in the unit cube, in one batch."""
+        gains = self.low + points * (self.high - self.low)
+        if self.begin is not None and self.given is not None:
+            gains[np.all(points == self.begin, axis=1)] = self.given  # to the last bit
+        named = {name: np.ascontiguousarray(gains[:, k]) for k, name in enumerate(self.names)}
+        plants = [self.plant] * len(gains)
+        done = sweep(plants, self.controller(**named), self.trajectory, **self.settings)
+        self.tried.append(gains)
+        self.metrics.append((done.squared_error, done.curvature))
+        return self.metrics[-1]
+
+
+def _first_scale(loops: _Loops, points: Array) -> tuple[float, float]:
+    """The smallest nu and omega of a first population.
+
+    Raises
+    ------
+    ParameterError
+        If every run failed.
+    """
+    nu, omega = loops.run(points)
+    ok = np.isfinite(nu) & np.isfinite(omega)
+    if not ok.any():
+        raise ParameterError("every run of the first population failed: there is nothing to compare; narrow the bounds")
+    return float(nu[ok].min()), float(omega[ok].min())
 
 
 def perturbed(

@@ -153,9 +153,7 @@ def diagnose(
     blocks = inner.blocks
     gas, motion = [b for b in blocks if b.kind != "arm"], [b for b in blocks if b.kind == "arm"]
     with _in_range(case.name):
-        groups = [
-            group for members in (gas, motion) if members for group in examine(inner, outer, case.rig, members, say)
-        ]
+        groups = [group for members in (gas, motion) if members for group in examine(inner, outer, case.rig, members, say)]
         unsettled = _unsettled(case.rig) if motion else []
         factor = chosen.verdict.unknown_geometry_probability
         if unsettled:

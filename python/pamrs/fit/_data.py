@@ -163,33 +163,32 @@ class ForceMap:
         rest = _rest_length(rest_length)
         if level_tolerance is not None and not (math.isfinite(level_tolerance) and level_tolerance > 0.0):
             raise ParameterError(f"level_tolerance = {level_tolerance!r} Pa is not allowed: a positive number is needed")
-        n = len(long)
-        reason = np.full(n, "", dtype=object)
-
-        def flag(rows: Mask, why: str) -> None:
-            reason[rows & (reason == "")] = why
-
-        if faulty is not None:
-            flag(np.asarray(faulty, dtype=bool), "sensor fault")
-        finite = np.isfinite(long) & np.isfinite(gas) & np.isfinite(pull)
-        flag(~finite, "not a number")
         given = dict(units or {})
+        finite = np.isfinite(long) & np.isfinite(gas) & np.isfinite(pull)
         check_units(label, long[finite], gas[finite], rest, given)
-        if clipped is not None:
-            flag(finite & np.isclose(pull, clipped, rtol=1e-9, atol=1e-12), "clipped")
-        flag(finite & (gas < 0.0), "negative pressure")
-        flag(finite & (gas > PRESSURE_HIGH), "pressure out of range")
-        flag(finite & ~reachable(long, rest), "length out of range")
-        way = _directions(direction, n, label)
+        way = _directions(direction, len(long), label)
+        reason = _reasons(long, gas, pull, rest, faulty=faulty, clipped=clipped)
         if check_duplicates:
-            flag(finite & _duplicates(long, gas, pull, way.astype(np.float64)), "duplicate")
+            again = finite & _duplicates(long, gas, pull, way.astype(np.float64))
+            reason[again & (reason == "")] = "duplicate"
         found = list(notes)
         zeros = int(np.sum((reason == "") & (pull == 0.0) & (gas > 0.0)))
         if clipped is None and zeros >= 3:
             hint = "if the reading stops at zero, say so: clipped = 0 (--clipped '0 N')"
             found.insert(0, f"{zeros} rows have a force of exactly 0 N under pressure and are used; {hint}")
         map_ = cls(
-            *(long, gas, pull, rest, way, reason == "", tuple(reason), np.full(n, -1), np.empty(0), name, source, tuple(found)),
+            length=long,
+            pressure=gas,
+            force=pull,
+            rest_length=rest,
+            direction=way,
+            used=reason == "",
+            reason=tuple(reason),
+            level=np.full(len(long), -1),
+            levels=np.empty(0),
+            name=name,
+            source=source,
+            notes=tuple(found),
             row_numbers=None if row_numbers is None else np.asarray(row_numbers, dtype=np.intp),
             units=given,
         )
@@ -400,6 +399,33 @@ def _rest_length(value: float) -> float:
         hint = "; in mm, probably" if 10.0 < rest < 1e4 else ""
         raise ParameterError(f"rest_length = {rest:g} m is not allowed: from {_REST_LOW:g} to {_REST_HIGH:g} m{hint}")
     return rest
+
+
+def _reasons(
+    length: Array,
+    pressure: Array,
+    force: Array,
+    rest: float,
+    *,
+    faulty: ArrayLike | None,
+    clipped: float | None,
+) -> NDArray[np.object_]:
+    """Why each row by itself is not used, ``""`` where it is; the first reason that applies."""
+    reason = np.full(len(length), "", dtype=object)
+
+    def flag(rows: Mask, why: str) -> None:
+        reason[rows & (reason == "")] = why
+
+    if faulty is not None:
+        flag(np.asarray(faulty, dtype=bool), "sensor fault")
+    finite = np.isfinite(length) & np.isfinite(pressure) & np.isfinite(force)
+    flag(~finite, "not a number")
+    if clipped is not None:
+        flag(finite & np.isclose(force, clipped, rtol=1e-9, atol=1e-12), "clipped")
+    flag(finite & (pressure < 0.0), "negative pressure")
+    flag(finite & (pressure > PRESSURE_HIGH), "pressure out of range")
+    flag(finite & ~reachable(length, rest), "length out of range")
+    return reason
 
 
 def _directions(direction: ArrayLike | None, n: int, label: str) -> NDArray[np.int8]:

@@ -320,32 +320,80 @@ def _search(problem: Problem, design: Design, rows: Mask, start: Estimate | None
     """
     from scipy.optimize import least_squares
 
-    nominal = np.array([free.nominal for free in problem.free])
-    scale = np.array([free.scale for free in problem.free])
-    prior = np.array([1.0 / free.tolerance for free in problem.free])  # 0 without a tolerance
-    weighted = problem.force[rows] * problem.weight[rows]
-    least = 1e-9 * float(np.abs(weighted).max())
-    n, k = len(weighted), len(design.names)
-    priors = int(np.count_nonzero(problem.expected(design)[1]))
-    impossible = np.full(n + priors + len(nominal), np.inf)
+    space = _Geometry(problem, design, rows)
+    z = np.zeros(len(space.nominal)) if start is None else (start.geometry - space.nominal) / space.scale
+    sigma = problem.noise or (start.sigma if start else space.scatter(z))
+    found = None
+    settled = problem.noise is not None
+    for _ in range(_SIGMA_ROUNDS):
+        found = least_squares(space.residuals, z, jac=space.jacobian, args=(sigma,), x_scale=1.0, xtol=1e-12)
+        z = np.asarray(found.x)
+        if problem.noise is not None:
+            break
+        new = space.scatter_at(z, np.asarray(found.fun), sigma)
+        settled = abs(new / sigma - 1.0) < 1e-3 or new == space.least
+        sigma = new
+        if settled:
+            break
+    assert found is not None
+    success = bool(found.success) and settled
+    message = f"variable projection: {found.message}"
+    message += "" if settled else " The noise estimate did not settle."
+    values = space.nominal + z * space.scale
+    result = _at(problem, design, rows, problem.muscle(values), values, sigma, message, success)
+    _check_identified(problem, result)
+    return result
 
-    def residuals(z: Array, sigma: float) -> Array:
-        values = nominal + z * scale
+
+class _Geometry:
+    """The space that is searched: the free geometry ``z`` in steps of its scale from the nominal one.
+
+    Parameters
+    ----------
+    problem : Problem
+        Data and unknowns.
+    design : Design
+        Of the fitted rows.
+    rows : (n,) bool array
+        The rows to fit.
+    """
+
+    def __init__(self, problem: Problem, design: Design, rows: Mask) -> None:
+        self.problem, self.design, self.rows = problem, design, rows
+        self.nominal = np.array([free.nominal for free in problem.free])
+        self.scale = np.array([free.scale for free in problem.free])
+        # 0 without a tolerance
+        self.prior = np.array([1.0 / free.tolerance for free in problem.free])
+        weighted = problem.force[rows] * problem.weight[rows]
+        #: the least standard deviation that rounding leaves
+        self.least = 1e-9 * float(np.abs(weighted).max())
+        self.n, self.k = len(weighted), len(design.names)
+        priors = int(np.count_nonzero(problem.expected(design)[1]))
+        self.impossible = np.full(self.n + priors + len(self.nominal), np.inf)
+
+    def residuals(self, z: Array, sigma: float) -> Array:
+        """Data residuals over ``sigma``, those of coefficients with a prior, those of the geometry.
+
+        Infinite where the geometry is impossible: the search then shortens its step.
+        """
+        values = self.nominal + z * self.scale
         try:
-            blank = problem.muscle(values)
-            problem.check_reach(blank)
-            matrix, target = problem.equations(design, blank, rows)
-        except (ParameterError, FitError):  # least_squares shortens a step that ends in infinity
-            return impossible
-        return np.concatenate([project_out(matrix, target) / sigma, (values - nominal) * prior])
+            blank = self.problem.muscle(values)
+            self.problem.check_reach(blank)
+            matrix, target = self.problem.equations(self.design, blank, self.rows)
+        except (ParameterError, FitError):
+            return self.impossible
+        own = (values - self.nominal) * self.prior
+        return np.concatenate([project_out(matrix, target) / sigma, own])
 
-    def jacobian(z: Array, sigma: float) -> Array:
-        here = residuals(z, sigma)
+    def jacobian(self, z: Array, sigma: float) -> Array:
+        """Derivative of the residuals, central where both sides are possible."""
+        here = self.residuals(z, sigma)
         columns = []
         for j in range(len(z)):
             step = np.zeros_like(z)
             step[j] = _STEP
-            up, down = residuals(z + step, sigma), residuals(z - step, sigma)
+            up, down = self.residuals(z + step, sigma), self.residuals(z - step, sigma)
             ends = np.isfinite(up[0]), np.isfinite(down[0])
             if all(ends):
                 columns.append((up - down) / (2.0 * _STEP))
@@ -355,32 +403,22 @@ def _search(problem: Problem, design: Design, rows: Mask, start: Estimate | None
                 columns.append((here - down) / _STEP if ends[1] else np.zeros_like(here))
         return np.stack(columns, axis=1)
 
-    z = np.zeros(len(nominal)) if start is None else (start.geometry - nominal) / scale
-    first = residuals(z, 1.0)[:n]
-    sigma = problem.noise or (start.sigma if start else max(math.sqrt(float(first @ first) / max(n - k, 1)), least))
-    found = None
-    settled = problem.noise is not None
-    for _ in range(_SIGMA_ROUNDS):
-        found = least_squares(residuals, z, jac=jacobian, args=(sigma,), x_scale=1.0, xtol=1e-12)
-        z = np.asarray(found.x)
-        if problem.noise is not None:
-            break
-        slopes = jacobian(z, sigma)[:n]
-        share = np.linalg.lstsq(slopes.T @ slopes + np.diag((prior * scale) ** 2), slopes.T @ slopes, rcond=None)[0]
-        rest = found.fun[:n] * sigma
-        freedom = max(n - k - float(np.trace(share)), 1.0)
-        new = max(math.sqrt(float(rest @ rest) / freedom), least)
-        settled = abs(new / sigma - 1.0) < 1e-3 or new == least
-        sigma = new
-        if settled:
-            break
-    assert found is not None
-    success = bool(found.success) and settled
-    message = f"variable projection: {found.message}" + ("" if settled else " The noise estimate did not settle.")
-    values = nominal + z * scale
-    result = _at(problem, design, rows, problem.muscle(values), values, sigma, message, success)
-    _check_identified(problem, result)
-    return result
+    def scatter(self, z: Array) -> float:
+        """Standard deviation of the data residuals before a search."""
+        first = self.residuals(z, 1.0)[: self.n]
+        return max(math.sqrt(float(first @ first) / max(self.n - self.k, 1)), self.least)
+
+    def scatter_at(self, z: Array, residuals: Array, sigma: float) -> float:
+        """Standard deviation of the data residuals at the end of a search with ``sigma``.
+
+        The geometry takes as many degrees of freedom as the data, not the priors, determine.
+        """
+        slopes = self.jacobian(z, sigma)[: self.n]
+        told = slopes.T @ slopes
+        share = np.linalg.lstsq(told + np.diag((self.prior * self.scale) ** 2), told, rcond=None)[0]
+        rest = residuals[: self.n] * sigma
+        freedom = max(self.n - self.k - float(np.trace(share)), 1.0)
+        return max(math.sqrt(float(rest @ rest) / freedom), self.least)
 
 
 def _check_identified(problem: Problem, result: Estimate) -> None:

@@ -8,7 +8,7 @@ is ``F``, whatever the force model: friction comes from the loops alone, and the
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -275,65 +275,22 @@ def fit_friction(
         raise ParameterError(f"floor = {floor!r} is not allowed: at least 0 and below 1")
     rested = data is not None or rest_length is not None
     if data is None:
-        missing = [
-            word
-            for word, values in (("pressure", pressure), ("contraction", contraction), ("force", force), ("direction", direction))
-            if values is None
-        ]
-        if missing or pressure is None or contraction is None or force is None:
-            raise ParameterError(f"{', '.join(missing)}: needed when no ForceMap is given")
-        rest = 1.0 if rest_length is None else rest_length
-        length = rest * (1.0 - np.asarray(contraction, dtype=np.float64))
-        data = ForceMap.from_arrays(length, pressure, force, rest_length=rest, direction=direction, check_duplicates=False)
-    gas, e, pull, level, way = data.used_rows()
-    if not np.any(way != 0):
-        raise RecordingError(f"{data.label}: no row has a direction of motion; friction needs both branches of the loop")
-    issues = list(data.issues)
-    unknown = int(np.sum(way == 0))
-    if unknown:
-        issues.append(f"{unknown} rows have no direction of motion: not used here")
-    levels: list[FrictionLevel] = []
-    least = WEAK * float(np.abs(pull).max())
-    for index, nominal in enumerate(data.levels.tolist()):
-        rows = level == index
-        if float(np.abs(pull[rows]).max()) < least:
-            issues.append(f"{nominal / 1e3:.0f} kPa: forces below {100 * WEAK:g} % of the map's largest: no coefficient")
-            continue
-        found = _loop(float(np.median(gas[rows])), e[rows], pull[rows], way[rows])
-        if isinstance(found, str):
-            issues.append(f"{nominal / 1e3:.0f} kPa: {found}: no coefficient")
-        else:
-            levels.append(found)
-    if not levels:
-        raise RecordingError(f"{data.label}: no pressure gives a coefficient ({'; '.join(issues)})")
-    if len(levels) < 2:
-        raise RecordingError(f"{data.label}: one pressure only ({levels[0].pressure / 1e3:.0f} kPa): the slope c1 is not determinable")
+        data = _map(pressure, contraction, force, direction, rest_length)
+    levels, issues = _loops(data)
     line, above = _law(levels, floor)
     above &= np.array([x.coefficient > floor for x in levels])
-    if above.sum() == 1:
-        issues.append(
-            f"one pressure only stands above the floor of {floor:g}: the slope c1 is hardly determined by it and its neighbour"
-        )
-    pooled, spread = _pooled(levels)
-    if pooled < -_SURE * spread:
-        issues.append(
-            f"forces while lengthening lie below those while contracting (c_F = {pooled:.2g} +- {spread:.1g}): "
-            "are the directions exchanged?"
-        )
-    if not above.any():
-        issues.append(f"no coefficient stands above the floor of {floor:g}: the law is its floor at every pressure")
-    levels = [
-        FrictionLevel(x.pressure, x.coefficient, x.stderr, x.contraction, x.force, x.half_width, x.rows, not bool(on))
-        for x, on in zip(levels, above, strict=True)
-    ]
+    issues += _doubts(levels, above, floor)
+    levels = [replace(x, at_floor=not bool(on)) for x, on in zip(levels, above, strict=True)]
     free = max(int(above.sum()) - 2, 0)
-    distance, reason = _presliding(data, levels) if rested else (None, "not determinable: a length, and rest_length is not given")
-    pressures = np.array([x.pressure for x in levels])
-    best = np.maximum(line.values[0] + line.values[1] * pressures, floor)
+    if rested:
+        distance, reason = _presliding(data, levels)
+    else:
+        distance, reason = None, "not determinable: a length, and rest_length is not given"
+    best = np.maximum(line.values[0] + line.values[1] * np.array([x.pressure for x in levels]), floor)
+    names = {"friction_coefficient": "1", "friction_pressure_slope": "1/Pa"}
     return FrictionFit(
         params={
-            "friction_coefficient": LawParameter("friction_coefficient", float(line.values[0]), float(line.stderr[0]), "1"),
-            "friction_pressure_slope": LawParameter("friction_pressure_slope", float(line.values[1]), float(line.stderr[1]), "1/Pa"),
+            name: LawParameter(name, float(line.values[k]), float(line.stderr[k]), unit) for k, (name, unit) in enumerate(names.items())
         },
         floor=floor,
         presliding=distance,
@@ -350,6 +307,81 @@ def fit_friction(
         slope_pvalue=_pvalue(line, free),
         issues=issues,
     )
+
+
+def _map(
+    pressure: ArrayLike | None,
+    contraction: ArrayLike | None,
+    force: ArrayLike | None,
+    direction: ArrayLike | None,
+    rest_length: float | None,
+) -> ForceMap:
+    """The map of arrays; one of a muscle 1 m long where no length is known.
+
+    Raises
+    ------
+    ParameterError
+        If an array is missing.
+    """
+    given = {"pressure": pressure, "contraction": contraction, "force": force, "direction": direction}
+    missing = [word for word, values in given.items() if values is None]
+    if missing or pressure is None or contraction is None or force is None:
+        raise ParameterError(f"{', '.join(missing)}: needed when no ForceMap is given")
+    rest = 1.0 if rest_length is None else rest_length
+    length = rest * (1.0 - np.asarray(contraction, dtype=np.float64))
+    return ForceMap.from_arrays(length, pressure, force, rest_length=rest, direction=direction, check_duplicates=False)
+
+
+def _loops(data: ForceMap) -> tuple[list[FrictionLevel], list[str]]:
+    """The loop of every pressure that has one, and what was found of the others.
+
+    Raises
+    ------
+    RecordingError
+        If no direction is known, or fewer than two pressures have both branches.
+    """
+    gas, e, pull, level, way = data.used_rows()
+    if not np.any(way != 0):
+        raise RecordingError(f"{data.label}: no row has a direction of motion; friction needs both branches of the loop")
+    issues = list(data.issues)
+    unknown = int(np.sum(way == 0))
+    if unknown:
+        issues.append(f"{unknown} rows have no direction of motion: not used here")
+    levels: list[FrictionLevel] = []
+    least = WEAK * float(np.abs(pull).max())
+    for index, nominal in enumerate(data.levels.tolist()):
+        rows, title = level == index, f"{nominal / 1e3:.0f} kPa"
+        if float(np.abs(pull[rows]).max()) < least:
+            issues.append(f"{title}: forces below {100 * WEAK:g} % of the map's largest: no coefficient")
+            continue
+        found = _loop(float(np.median(gas[rows])), e[rows], pull[rows], way[rows])
+        if isinstance(found, str):
+            issues.append(f"{title}: {found}: no coefficient")
+        else:
+            levels.append(found)
+    if not levels:
+        raise RecordingError(f"{data.label}: no pressure gives a coefficient ({'; '.join(issues)})")
+    if len(levels) < 2:
+        raise RecordingError(f"{data.label}: one pressure only ({levels[0].pressure / 1e3:.0f} kPa): the slope c1 is not determinable")
+    return levels, issues
+
+
+def _doubts(levels: list[FrictionLevel], above: Mask, floor: float) -> list[str]:
+    """What speaks against a law: levels at the floor, branches that are exchanged."""
+    found: list[str] = []
+    if above.sum() == 1:
+        found.append(
+            f"one pressure only stands above the floor of {floor:g}: the slope c1 is hardly determined by it and its neighbour"
+        )
+    pooled, spread = _pooled(levels)
+    if pooled < -_SURE * spread:
+        found.append(
+            f"forces while lengthening lie below those while contracting (c_F = {pooled:.2g} "
+            f"+- {spread:.1g}): are the directions exchanged?"
+        )
+    if not above.any():
+        found.append(f"no coefficient stands above the floor of {floor:g}: the law is its floor at every pressure")
+    return found
 
 
 def _or_none(value: float) -> float | None:

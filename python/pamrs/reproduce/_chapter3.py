@@ -14,6 +14,7 @@ from functools import cache, partial
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pamrs.comparison import Comparison, Told, judge
 from pamrs.design import lift
@@ -24,6 +25,8 @@ from pamrs.simulation import Simulation
 from pamrs.units import parse_unit, to_si
 
 __all__ = ["CHOSEN", "GROUPS", "SHARE", "TITLE", "chosen", "facts", "headings", "in_short", "step_by_area"]
+
+Array = NDArray[np.float64]
 
 TITLE: Final = "Chapter 3: structural design of manipulators"
 #: Largest relative deviation that counts as agreement: the chapter claims errors "on the order of a few percent" (3.6).
@@ -195,18 +198,29 @@ def _chapter_torque(rotation: Any, share: float) -> Any:
 
 def _torque() -> list[Comparison]:
     """Torque at 150 psi over the rotation."""
-    group, rest, end = _Group("torque"), elbow.rest_angle(), math.radians(_RANGE)
-    ranges = {law: np.degrees(elbow.torque_range(partial(elbow.elbow_torque, law=law), _LEAST)) for law in elbow.LAWS}
+    group = _Group("torque")
+    _torque_at_rest(group)
+    _range_of_torque(group, *_ranges())
+    _torque_overall(group)
+    return group.rows
+
+
+def _ranges() -> tuple[dict[str, Array], dict[float, Array]]:
+    """Rotations with 200 ft lbf [deg], shape (2,).
+
+    By torque law, and with the muscle of (3.21) by its share of C01.
+    """
+    laws = {law: np.degrees(elbow.torque_range(partial(elbow.elbow_torque, law=law), _LEAST)) for law in elbow.LAWS}
     own = {share: np.degrees(elbow.torque_range(partial(_chapter_torque, share=share), _LEAST)) for share in (0.0, 0.5, 1.0)}
-    at_end = {law: float(elbow.elbow_torque(end, law=law)) / FOOT_POUND for law in elbow.LAWS}
+    return laws, own
+
+
+def _torque_at_rest(group: _Group) -> None:
+    """Where the range begins: the rest angle, and the torque there."""
+    rest = elbow.rest_angle()
     at_rest = float(elbow.elbow_torque(0.0)) / FOOT_POUND
     blocked = float(_muscle().force(150.0 * PSI, 0.0)) / to_si(1.0, "lbf", "force")
     steep = np.degrees(elbow.torque_range(partial(elbow.elbow_torque, law="printed", muscle=elbow.steeper_braid()), _LEAST))
-    low, high = (float(elbow.elbow_torque(end, law="printed", psi=psi)) for psi in (50.0, 150.0))
-    upright = float(elbow.elbow_torque(end - rest, law="printed")) / FOOT_POUND
-    rotation = np.linspace(0.0, 100.0, 401)
-    torque = elbow.elbow_torque(np.radians(rotation)) / FOOT_POUND
-    figure = "3.2.4, Fig. 3.7"
     group.say(
         "rest angle of the lower link from the vertical",
         "3.3.1 against l0, r0, lT of 3.2.4",
@@ -226,6 +240,15 @@ def _torque() -> list[Comparison]:
         note=f"our blocked force is {blocked:.0f} lbf, with the published 820 lbf it would be {at_rest * 820.0 / blocked:.0f}; a braid "
         f"of 73.5 deg has that force (and 200 ft lbf from {steep[0]:.1f} to {steep[1]:.1f} deg, torque as printed)",
     )
+
+
+def _range_of_torque(group: _Group, ranges: dict[str, Array], own: dict[float, Array]) -> None:
+    """Rotations between which there are 200 ft lbf: as we have the torque, as printed, and read otherwise."""
+    rest, end = elbow.rest_angle(), math.radians(_RANGE)
+    at_end = {law: float(elbow.elbow_torque(end, law=law)) / FOOT_POUND for law in elbow.LAWS}
+    low, high = (float(elbow.elbow_torque(end, law="printed", psi=psi)) for psi in (50.0, 150.0))
+    upright = float(elbow.elbow_torque(end - rest, law="printed")) / FOOT_POUND
+    figure = "3.2.4, Fig. 3.7"
     group.say(
         "first rotation with 200 ft lbf",
         figure,
@@ -269,6 +292,12 @@ def _torque() -> list[Comparison]:
         "deg",
         note=f"read so, the torque at {_RANGE:g} deg would be {upright:.0f} ft lbf; rotation from the rest angle is what fits",
     )
+
+
+def _torque_overall(group: _Group) -> None:
+    """The largest torque, and what a seventh muscle adds."""
+    rotation = np.linspace(0.0, 100.0, 401)
+    torque = elbow.elbow_torque(np.radians(rotation)) / FOOT_POUND
     group.say(
         "largest torque",
         "3.6: in excess of 200 ft-lb",
@@ -288,7 +317,6 @@ def _torque() -> list[Comparison]:
         note="'modestly' read as less than half in proportion; 200 ft lbf with "
         + ", ".join(f"{n} muscles from {a:.1f} to {b:.1f} deg" for n, (a, b) in ends.items()),
     )
-    return group.rows
 
 
 # ------------------------------------------------------------------ 3.2.4, Figure 3.8

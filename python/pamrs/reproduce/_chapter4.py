@@ -221,52 +221,70 @@ def _told(best: list[tuple[float, float]], names: tuple[str, str]) -> str:
 def _maps(group: str, done: Experiments, name: str) -> list[Comparison]:
     """Optima of the maps by J, with the angle in radians; in degrees in the remark."""
     pid, fuzzy = done.maps[name, "pid"], done.maps[name, "fuzzy"]
-    rows = []
+    rows = _OfMaps(group, {**pid.axes, **fuzzy.axes})
+    _pid_map(rows, pid)
+    _fuzzy_map(rows, fuzzy)
+    return rows.found
 
-    def say(fact: str, where: str, published: float, ours: float, unit: str, **more: Any) -> None:
-        rows.append(judge(group, fact, where, published, ours, unit, **more))
 
-    best = {unit: pid.best(j) for unit, j in pid.j.items()}
-    step = {key: (_AXES[key][1] - _AXES[key][0]) / (axis.size - 1) for key, axis in {**pid.axes, **fuzzy.axes}.items()}
+class _OfMaps:
+    """Statements about maps, and what counts as the same gain in them."""
 
-    def near(least: float, key: str) -> float:
+    def __init__(self, group: str, axes: Mapping[str, Any]) -> None:
+        self.group = group
+        self.found: list[Comparison] = []
+        self.step: dict[str, float] = {key: (_AXES[key][1] - _AXES[key][0]) / (axis.size - 1) for key, axis in axes.items()}
+
+    def say(self, fact: str, where: str, published: float, ours: float, unit: str, **more: Any) -> None:
+        """One statement more."""
+        self.found.append(judge(self.group, fact, where, published, ours, unit, **more))
+
+    def near(self, least: float, key: str) -> float:
         """What counts as the same gain: no less than a step of the map, on which rounding must not decide."""
-        return max(least, step[key] + 1e-9)
+        return max(least, self.step[key] + 1e-9)
 
+
+def _pid_map(rows: _OfMaps, pid: Map) -> None:
+    """4.5.1.2: the gains of PID control, and the cost of the least error."""
+    best = {unit: pid.best(j) for unit, j in pid.j.items()}
     other = "in degrees " + _told(best["deg"], ("kP", "kI"))
     told = _told(best["rad"], ("kP", "kI"))
-    say(
+    rows.say(
         "PID: kP of the smallest J, 11 kg", "4.5.1.2, Fig. 4.9: just above 1", 1.1, best["rad"][0][0], "V/rad",
-        tolerance=near(0.3, "kP"), note=f"{told}; {other}",
+        tolerance=rows.near(0.3, "kP"), note=f"{told}; {other}",
     )  # fmt: skip
-    say(
+    rows.say(
         "PID: kI of the smallest J, 11 kg", "4.5.1.2, Fig. 4.9: near 4", 4.0, best["rad"][0][1], "V/(rad s)",
-        tolerance=near(0.8, "kI"),
+        tolerance=rows.near(0.8, "kI"),
     )  # fmt: skip
-    say("PID: kP, 34 kg less 11 kg", "4.5.1.2: decreases", 0.0, best["rad"][2][0] - best["rad"][0][0], "V/rad", relation="below")
-    say(
-        "PID: kP of the smallest J, 23 kg", "4.5.1.2, experiment", 1.4, best["rad"][1][0], "V/rad", tolerance=near(0.3, "kP"),
+    rows.say("PID: kP, 34 kg less 11 kg", "4.5.1.2: decreases", 0.0, best["rad"][2][0] - best["rad"][0][0], "V/rad", relation="below")
+    rows.say(
+        "PID: kP of the smallest J, 23 kg", "4.5.1.2, experiment", 1.4, best["rad"][1][0], "V/rad", tolerance=rows.near(0.3, "kP"),
     )  # fmt: skip
-    say(
+    rows.say(
         "PID: kI of the smallest J, 23 kg", "4.5.1.2, experiment", 2.5, best["rad"][1][1], "V/(rad s)",
-        tolerance=near(0.6, "kI"), note="3.0 was nearly as good there",
+        tolerance=rows.near(0.6, "kI"), note="3.0 was nearly as good there",
     )  # fmt: skip
     least, smooth = pid.best(pid.nu)[1], pid.best(pid.omega["rad"])[1]
     at = {label: _at(pid, pid.omega["rad"], 1, gains) for label, gains in (("nu", least), ("j", best["rad"][1]))}
-    say(
+    rows.say(
         "PID, 23 kg: omega at the least nu over that at the least J", "4.5.1.2: 'best error' has the largest oscillations",
         1.0, at["nu"] / at["j"], "", relation="above",
         note=f"least nu at kP {least[0]:.2f}, kI {least[1]:.2f}, least omega at kP {smooth[0]:.2f}, kI {smooth[1]:.2f}",
     )  # fmt: skip
+
+
+def _fuzzy_map(rows: _OfMaps, fuzzy: Map) -> None:
+    """4.4.1.2: the gains of fuzzy control, and the shape of J about them."""
     best = {unit: fuzzy.best(j) for unit, j in fuzzy.j.items()}
     told, other = _told(best["rad"], ("g1", "h")), "in degrees " + _told(best["deg"], ("g1", "h"))
     where = "4.4.1.2, Fig. 4.5 (c)"
-    say(
-        "fuzzy: g1 of the smallest J, 23 kg", where, 0.45, best["rad"][1][0], "rad", tolerance=near(0.1, "g1"),
+    rows.say(
+        "fuzzy: g1 of the smallest J, 23 kg", where, 0.45, best["rad"][1][0], "rad", tolerance=rows.near(0.1, "g1"),
         note=f"{told}; {other}",
     )  # fmt: skip
-    say("fuzzy: h of the smallest J, 23 kg", where, 0.65, best["rad"][1][1], "V", tolerance=near(0.13, "h"))
-    say(
+    rows.say("fuzzy: h of the smallest J, 23 kg", where, 0.65, best["rad"][1][1], "V", tolerance=rows.near(0.13, "h"))
+    rows.say(
         "fuzzy: h, 34 kg less 11 kg",
         "4.5.1.2: increases with payload",
         0.0,
@@ -275,21 +293,20 @@ def _maps(group: str, done: Experiments, name: str) -> list[Comparison]:
         relation="above",
     )
     one, two = fuzzy.best(fuzzy.nu)[1], fuzzy.best(fuzzy.omega["rad"])[1]
-    apart = max(abs(one[0] - two[0]) / step["g1"], abs(one[1] - two[1]) / step["h"])
-    say(
+    apart = max(abs(one[0] - two[0]) / rows.step["g1"], abs(one[1] - two[1]) / rows.step["h"])
+    rows.say(
         "fuzzy, 23 kg: optima of nu and omega apart, steps of the map", f"{where}: 'different'", 1.0, apart, "",
         relation="above", note=f"nu at g1 {one[0]:.2f}, h {one[1]:.2f}; omega at g1 {two[0]:.2f}, h {two[1]:.2f}",
     )  # fmt: skip
-    say(
+    rows.say(
         "fuzzy, 23 kg: J beside its optimum over J there", f"{where}: 'smooth'", 1.25, float(fuzzy.smooth("rad")[1]), "",
         relation="below", note="smooth read as within a quarter at the neighbours in the map",
     )  # fmt: skip
     quoted = _at(fuzzy, fuzzy.j["rad"], 1, (0.45, 0.65)) / float(np.nanmin(fuzzy.j["rad"][1]))
-    say(
+    rows.say(
         "fuzzy, 23 kg: J at the published gains over the smallest", where, 1.0, quoted, "", tolerance=0.25,
         note="at the nearest gains of the map",
     )  # fmt: skip
-    return rows
 
 
 def _at(gains: Map, values: Any, payload: int, place: tuple[float, float]) -> float:

@@ -96,12 +96,12 @@ def _simulated(runs: Mapping[str, Lifts]) -> list[Row]:
 def _feedback(runs: Mapping[str, Lifts]) -> list[Row]:
     """4.5.1.3: PID and fuzzy control, 11, 23 and 34 kg."""
     pid, fuzzy = runs["PID"], runs["fuzzy"]
+    return [*_fuzzy_alone(fuzzy), *_pid_alone(pid), *_beside(pid, fuzzy)]
+
+
+def _fuzzy_alone(fuzzy: Lifts) -> list[Row]:
+    """Fuzzy control: lag, overshoot and what is left at the end of the hold."""
     lag = np.asarray(fuzzy.metrics.lag)[:3]
-    nu = np.asarray(pid.metrics.squared_error)
-    late = np.abs(pid.error("return", "mean")[1]) / np.abs(fuzzy.error("return", "mean")[1])
-    early = fuzzy.error("lift", "mean")[1] / pid.error("lift", "mean")[1]
-    lifting = slice(round(5.0 / 0.01), round(10.0 / 0.01) + 1)
-    reversals = [int((np.diff(np.sign(run.rate[1, lifting])) != 0).sum()) for run in (fuzzy, pid)]
     settled = fuzzy.error("hold", "final")[:3]
     return [
         ("fuzzy: lag, mean of 11, 23, 34 kg", "4.5.1.3", 0.75, float(lag.mean()), "s", {"tolerance": 0.15, "note": _list(lag, 2)}),
@@ -129,6 +129,13 @@ def _feedback(runs: Mapping[str, Lifts]) -> list[Row]:
             "deg",
             {"relation": "above", "note": _list(settled)},
         ),
+    ]
+
+
+def _pid_alone(pid: Lifts) -> list[Row]:
+    """PID control: delay, and what grows with payload."""
+    nu = np.asarray(pid.metrics.squared_error)
+    return [
         (
             "PID, 23 kg: delay until the arm moves",
             "4.5.1.3: 'about 1 s'",
@@ -164,6 +171,16 @@ def _feedback(runs: Mapping[str, Lifts]) -> list[Row]:
             "",
             {"relation": "above"},
         ),
+    ]
+
+
+def _beside(pid: Lifts, fuzzy: Lifts) -> list[Row]:
+    """Both with 23 kg: errors in lift and return, oscillation."""
+    late = np.abs(pid.error("return", "mean")[1]) / np.abs(fuzzy.error("return", "mean")[1])
+    early = fuzzy.error("lift", "mean")[1] / pid.error("lift", "mean")[1]
+    lifting = slice(round(5.0 / 0.01), round(10.0 / 0.01) + 1)
+    reversals = [int((np.diff(np.sign(run.rate[1, lifting])) != 0).sum()) for run in (fuzzy, pid)]
+    return [
         ("lift, 23 kg: mean error, fuzzy over PID", "4.5.1.3, Fig. 4.12: lags more", 1.0, float(early), "", {"relation": "above"}),
         (
             "return, 23 kg: mean error, PID over fuzzy",
@@ -186,13 +203,12 @@ def _feedback(runs: Mapping[str, Lifts]) -> list[Row]:
 
 def _model(runs: Mapping[str, Lifts]) -> list[Row]:
     """4.5.2: 45 kg, and the series of kM with 23 kg."""
-    heavy = runs["FF+fuzzy, kM 0.5"].error("rest", "final")
-    total = {km: float(np.degrees(np.asarray(runs[name].metrics.rms)[1])) for km, name in SERIES.items()}
-    rest = {km: abs(float(runs[name].error("rest", "final")[1])) for km, name in SERIES.items()}
-    lag = {km: float(np.asarray(runs[name].metrics.lag)[1]) for km, name in SERIES.items()}
-    told = "; ".join(f"kM {km:g}: {value:.2f}" for km, value in total.items())
-    settled = "; ".join(f"kM {km:g}: {value:.2f}" for km, value in rest.items())
-    run = runs["FF+fuzzy, kM 0.5"]
+    return [*_heavy(runs["FF+fuzzy, kM 0.5"]), *_series(runs)]
+
+
+def _heavy(run: Lifts) -> list[Row]:
+    """45 kg: the pressure at rest, and the error that stays."""
+    heavy = run.error("rest", "final")
     low, high = (run.between(*span, run.pressure)[3].mean() / PSI for span in ((4.0, 5.0), (14.0, 15.0)))
     return [
         (
@@ -211,6 +227,17 @@ def _model(runs: Mapping[str, Lifts]) -> list[Row]:
             "deg",
             {"relation": "above", "note": "from 1 deg on; the text's reason is its model below 40 psi, with friction and hysteresis"},
         ),
+    ]
+
+
+def _series(runs: Mapping[str, Lifts]) -> list[Row]:
+    """23 kg: errors and lag over kM."""
+    total = {km: float(np.degrees(np.asarray(runs[name].metrics.rms)[1])) for km, name in SERIES.items()}
+    rest = {km: abs(float(runs[name].error("rest", "final")[1])) for km, name in SERIES.items()}
+    lag = {km: float(np.asarray(runs[name].metrics.lag)[1]) for km, name in SERIES.items()}
+    told = "; ".join(f"kM {km:g}: {value:.2f}" for km, value in total.items())
+    settled = "; ".join(f"kM {km:g}: {value:.2f}" for km, value in rest.items())
+    return [
         (
             "kM with the smallest RMS error, 23 kg",
             "4.5.2.2",

@@ -260,13 +260,21 @@ def share_by_angle(angle: Array, values: Array, bins: int = 12) -> float:
 
 
 def _adaptive(plan: Plan) -> list[Comparison]:
-    group, run, names = Group("adaptive"), plan.adaptation(), list(TRIALS)
+    group, run = Group("adaptive"), plan.adaptation()
+    notes = {name: np.array(run.noted[name]) for name in ("inertia", "viscous", "weight")}
+    _learning(group, run)
+    _estimates(group, run, notes)
+    _weight_by_angle(group, run, notes["weight"])
+    _long_run(group, plan)
+    return group.rows
+
+
+def _learning(group: Group, run: Track) -> None:
+    """Fig. 5.9: the error of each trial, early and late."""
     end = float(run.time[-1])
     early, late = run.rms(min(SETTLED, 0.1 * end), 0.3 * end), run.rms(0.8 * end)
-    notes = {name: np.array(run.noted[name]) for name in ("inertia", "viscous", "weight")}
     ripple = run.ripple(0.8 * end)
-    own = names.index("ours")
-    for k, name in enumerate(names):
+    for k, name in enumerate(TRIALS):
         text = f"{early[k]:.2f} deg to {0.3 * end:.0f} s, {late[k]:.2f} deg in the last fifth; above 1.5 Hz {ripple[k]:.2f} deg"
         if name.startswith("Trial"):
             group.smaller(
@@ -276,6 +284,10 @@ def _adaptive(plan: Plan) -> list[Comparison]:
         else:
             group.smaller(f"late error over early error, {name}", "5.4.2: 'somewhat useful after a learning period'",
                           late[k] / early[k], text)  # fmt: skip
+
+
+def _estimates(group: Group, run: Track, notes: dict[str, Array]) -> None:
+    """Fig. 5.10: the estimates of I and b, where they end and whether they come to rest."""
     final = notes["inertia"][-1]
     group.say(
         "largest over smallest final estimate of I, Trials 1 to 3",
@@ -298,11 +310,16 @@ def _adaptive(plan: Plan) -> list[Comparison]:
             relation="above",
             note=f"Trials 1 to 3: {listed(moved)}",
         )
+
+
+def _weight_by_angle(group: Group, run: Track, weight: Array) -> None:
+    """Fig. 5.10: how far the estimate of m g r goes with the angle."""
+    own = list(TRIALS).index("ours")
     half = len(run.noted_at) // 2
     shares = []
-    for k in range(len(names)):
+    for k in range(len(TRIALS)):
         bent = np.interp(run.noted_at, run.time, run.angle[k])
-        shares.append(share_by_angle(bent[half:], notes["weight"][half:, k]))
+        shares.append(share_by_angle(bent[half:], weight[half:, k]))
     group.say(
         "share of the estimate of m g r that goes with the angle, Trial 1",
         "5.4.2, Fig. 5.10: 'angle dependence, most notably in Trial 1'",
@@ -310,7 +327,7 @@ def _adaptive(plan: Plan) -> list[Comparison]:
         shares[0],
         relation="above",
         cannot_tell="the unit of m g r in Table 5.2 cannot be recovered (Fig. 5.10 has 0.2 to 0.8 where 25 lb weigh 118 N m)",
-        note=f"as printed it moves by {np.ptp(notes['weight'][:, 0]):.2f} N m only",
+        note=f"as printed it moves by {np.ptp(weight[:, 0]):.2f} N m only",
     )
     group.say(
         "the same with our gain of m g r",
@@ -318,25 +335,29 @@ def _adaptive(plan: Plan) -> list[Comparison]:
         0.25,
         shares[own],
         relation="above",
-        note=f"second half, its trend taken off; {np.ptp(notes['weight'][half:, own]):.1f} N m of ripple: what the cubic C1 and C2 "
+        note=f"second half, its trend taken off; {np.ptp(weight[half:, own]):.1f} N m of ripple: what the cubic C1 and C2 "
         "miss is taken for weight, as the chapter supposes",
     )
+
+
+def _long_run(group: Group, plan: Plan) -> None:
+    """5.5: the error after a long time of learning."""
     trained = plan.trained("adaptive sliding")
-    if trained is not None:
-        rows = [k for k, case in enumerate(plan.cases) if case[1] == ""]
-        last = float(trained.time[-1])
-        first, end_ = trained.rms(SETTLED, 0.1 * last + SETTLED), trained.rms(0.9 * last)
-        worst = max(rows, key=lambda k: end_[k] / first[k])
-        group.say(
-            f"error at the end of {plan.training:g} s over that at its begin, worst payload",
-            "5.5: 'appeared to diverge; if the system runs for an extended duration, instability may occur'",
-            1.0,
-            float(end_[worst] / first[worst]),
-            relation="above",
-            note=f"{listed(first[rows])} deg, then {listed(end_[rows])} deg with {listed([plan.cases[k][0] for k in rows], 0)} lb; "
-            f"estimates of I {listed(np.asarray(trained.learnt['inertia'])[rows], 1)} kg m2",
-        )
-    return group.rows
+    if trained is None:
+        return
+    rows = [k for k, case in enumerate(plan.cases) if case[1] == ""]
+    last = float(trained.time[-1])
+    first, end_ = trained.rms(SETTLED, 0.1 * last + SETTLED), trained.rms(0.9 * last)
+    worst = max(rows, key=lambda k: end_[k] / first[k])
+    group.say(
+        f"error at the end of {plan.training:g} s over that at its begin, worst payload",
+        "5.5: 'appeared to diverge; if the system runs for an extended duration, instability may occur'",
+        1.0,
+        float(end_[worst] / first[worst]),
+        relation="above",
+        note=f"{listed(first[rows])} deg, then {listed(end_[rows])} deg with {listed([plan.cases[k][0] for k in rows], 0)} lb; "
+        f"estimates of I {listed(np.asarray(trained.learnt['inertia'])[rows], 1)} kg m2",
+    )
 
 
 # ------------------------------------------------------------------------------- 5.4.3
@@ -344,11 +365,24 @@ def _adaptive(plan: Plan) -> list[Comparison]:
 
 def _neural(plan: Plan) -> list[Comparison]:
     group, zero, later = Group("neural"), plan.learning(), plan.prepared()
+    _from_zero(group, zero)
+    _from_model(group, zero, later)
+    _from_training(group, zero, later)
+    _from_gaylord(group, zero, later)
+    return group.rows
+
+
+#: Runs from zero by their payload, and the runs that begin otherwise, as :data:`STARTS` and ``Plan.prepared`` have them.
+_ZERO: Final = {payload: k for k, (_, payload) in enumerate(STARTS)}
+_MODEL, _TAUGHT, _GUESS = 0, 1, 2
+
+
+def _from_zero(group: Group, zero: Track) -> None:
+    """Fig. 5.14: networks that know nothing, by payload."""
     end = float(zero.time[-1])
     early, late, whole = zero.rms(0.0, 0.2 * end), zero.rms(0.8 * end), zero.rms(0.0)
-    by = {payload: k for k, (_, payload) in enumerate(STARTS)}
     for payload in PAYLOADS:
-        k = by[payload]
+        k = _ZERO[payload]
         group.smaller(
             f"error of the last fifth over the first, from zero, {payload:g} lb", "5.4.3, Fig. 5.14", late[k] / early[k],
             "rms by fifths of the record " + listed([float(zero.rms(a * end / 5, (a + 1) * end / 5)[k]) for a in range(5)]) + " deg",
@@ -356,23 +390,34 @@ def _neural(plan: Plan) -> list[Comparison]:
     for low, high in ((0.0, 25.0), (25.0, 50.0)):
         group.say(
             f"error over the record, {high:g} lb over {low:g} lb", "5.4.3: 'generally, error increases with payload'", 1.0,
-            whole[by[high]] / whole[by[low]], relation="above", note=f"last fifth {late[by[high]]:.2f} against {late[by[low]]:.2f} deg",
+            whole[_ZERO[high]] / whole[_ZERO[low]], relation="above",
+            note=f"last fifth {late[_ZERO[high]]:.2f} against {late[_ZERO[low]]:.2f} deg",
         )  # fmt: skip
     group.say(
         "error of the last fifth, from zero, 50 lb",
         "5.4.3: 'nearly converged ... very low error'",
         math.nan,
-        late[by[50.0]],
+        late[_ZERO[50.0]],
         "deg",
         cannot_tell="no number is printed",
     )
-    model, taught, guess = 0, 1, 2
-    nu, nu_later = zero.nu(), later.nu()
-    group.smaller("squared error with a start from the model, over from zero, 50 lb", "5.4.3, Fig. 5.11",
-                  nu_later[model] / nu[by[50.0]],
-                  "the simplified model with the right numbers; the chapter's was an overestimate")  # fmt: skip
-    weights, other = np.array(zero.noted["G"][-1])[by[50.0]], np.array(later.noted["G"][-1])[model]
-    seen = (weights > 0.0) & _visited(zero, by[50.0], weights.size)
+
+
+def _gravity(zero: Track) -> tuple[Array, NDArray[np.bool_]]:
+    """The network of G that 50 lb teach from zero, and where the arm was with them."""
+    weights = np.array(zero.noted["G"][-1])[_ZERO[50.0]]
+    return weights, (weights > 0.0) & _visited(zero, _ZERO[50.0], weights.size)
+
+
+def _from_model(group: Group, zero: Track, later: Track) -> None:
+    """Figs. 5.11 to 5.13: a start from the simplified model, and what both networks come to."""
+    group.smaller(
+        "squared error with a start from the model, over from zero, 50 lb",
+        "5.4.3, Fig. 5.11",
+        later.nu()[_MODEL] / zero.nu()[_ZERO[50.0]],
+        "the simplified model with the right numbers; the chapter's was an overestimate",
+    )
+    (weights, seen), other = _gravity(zero), np.array(later.noted["G"][-1])[_MODEL]
     group.say(
         "deviation of G from zero from G from the model, over its mean, where the arm was",
         "5.4.3, Figs. 5.12 and 5.13: 'final structures very similar'",
@@ -391,22 +436,37 @@ def _neural(plan: Plan) -> list[Comparison]:
         relation="below",
         note="the arm falls back where it has not been; half counts as limited",
     )
-    group.smaller("squared error after 15 lb of training, over from zero, 50 lb", "5.4.3, Fig. 5.17", nu_later[taught] / nu[by[50.0]],
-                  "the figure's legend has 10 lb, the text 15")  # fmt: skip
-    old, new = (float(np.array(later.noted["G"][k])[taught][seen].mean()) for k in (0, -1))
+
+
+def _from_training(group: Group, zero: Track, later: Track) -> None:
+    """Figs. 5.16 and 5.17: a start from what 15 lb taught."""
+    group.smaller(
+        "squared error after 15 lb of training, over from zero, 50 lb",
+        "5.4.3, Fig. 5.17",
+        later.nu()[_TAUGHT] / zero.nu()[_ZERO[50.0]],
+        "the figure's legend has 10 lb, the text 15",
+    )
+    _, seen = _gravity(zero)
+    old, new = (float(np.array(later.noted["G"][k])[_TAUGHT][seen].mean()) for k in (0, -1))
     group.say("mean G after 50 lb over that after 15 lb", "5.4.3, Fig. 5.16", 1.0, new / old, relation="above")
-    ratio = nu_later[guess] / nu[by[0.0]]
-    group.smaller("squared error with Gaylord's estimate, over from zero, 0 lb", "5.5, Fig. 5.21: 'slightly reduces'", ratio,
-                  "the approach from rest included, of either")  # fmt: skip
+
+
+def _from_gaylord(group: Group, zero: Track, later: Track) -> None:
+    """Figs. 5.21 and 5.22: a start from Gaylord's estimate."""
+    group.smaller(
+        "squared error with Gaylord's estimate, over from zero, 0 lb",
+        "5.5, Fig. 5.21: 'slightly reduces'",
+        later.nu()[_GUESS] / zero.nu()[_ZERO[0.0]],
+        "the approach from rest included, of either",
+    )
     for name in ("C", "G"):
-        first, last = (np.array(later.noted[name][k])[guess] for k in (0, -1))
-        there = _visited(later, guess, first.size)
+        first, last = (np.array(later.noted[name][k])[_GUESS] for k in (0, -1))
+        there = _visited(later, _GUESS, first.size)
         group.say(
             f"mean {name} after learning over Gaylord's estimate, 0 lb", "5.5, Fig. 5.22: 'initial estimate is low'", 1.0,
             float(last[there].mean() / first[there].mean()), relation="above",
             note="as printed (5.25) is negative (3 L^2 < B^2): the shoulder's own length, braid and turns, r_eff of 0.7 in",
         )  # fmt: skip
-    return group.rows
 
 
 def _visited(run: Track, row: int, nodes: int) -> NDArray[np.bool_]:

@@ -87,6 +87,20 @@ fn phi<S: Scalar>(x: S, e: S, ex: S) -> [S; 3] {
     [one, two, (two - e * 0.5) / x]
 }
 
+/// Rates of the chain [1/s], its input held; of a lag that counts as none they are zero, and what follows it is fed by its
+/// input.
+pub fn rates<S: Scalar>(chain: &Chain<S>, input: S, time_constant: S, delay: S) -> Chain<S> {
+    let zero = constant::<S>(0.0);
+    let lagging = time_constant.re() > SHORTEST;
+    let first = if lagging { (input - chain[0]) / time_constant } else { zero };
+    let part = delay / STAGES;
+    if part.re() <= SHORTEST {
+        return [first, zero, zero, zero];
+    }
+    let fed = if lagging { chain[0] } else { input };
+    [first, (fed - chain[1]) / part, (chain[1] - chain[2]) / part, (chain[2] - chain[3]) / part]
+}
+
 /// Fastest rate of the chain [1/s].
 pub fn fastest(time_constant: f64, delay: f64) -> f64 {
     let rate = |time: f64| if time > SHORTEST { 1.0 / time } else { 0.0 };
@@ -126,6 +140,11 @@ impl<S: Scalar> Effect<S> for InputPath<S> {
         own[0] = constant(BEGUN);
         own[1..].copy_from_slice(&chain);
         chain[3]
+    }
+
+    fn linear_rates(&self, own: &[S], input: S, out: &mut [S]) {
+        let chain = std::array::from_fn(|k| own[1 + k]);
+        out[1..].copy_from_slice(&rates(&chain, input, self.time_constant, self.delay));
     }
 
     fn fastest(&self) -> f64 {
@@ -176,6 +195,20 @@ mod tests {
         assert!(once.iter().zip(twice).all(|(a, b): (&f64, f64)| (a - b).abs() < 1e-14));
         assert_eq!(moved(&start, 0.8, 0.0, 0.0, 1e-3), [0.8; 4]);
         assert_eq!(moved(&start, 0.8, 1e-4, 1e-3, 1e9), [0.8; 4]);
+    }
+
+    #[test]
+    fn the_closed_form_begins_with_the_rates() {
+        let (start, h) = ([0.3, 0.1, -0.2, 0.05], 1e-9);
+        for (tc, delay) in [(5e-3, 9e-3), (4e-3, 0.0), (0.0, 30e-3), (30e-3, 3e-3)] {
+            let (was, now) = (moved(&start, 0.8, tc, delay, 0.0), moved(&start, 0.8, tc, delay, h));
+            let (first, last) = (usize::from(tc == 0.0), if delay > 0.0 { 4 } else { 1 });
+            for (k, rate) in rates(&start, 0.8, tc, delay).into_iter().enumerate() {
+                let counts = (first..last).contains(&k);
+                let expected: f64 = if counts { (now[k] - was[k]) / h } else { 0.0 };
+                assert!((rate - expected).abs() < 1e-4 * expected.abs() + 1e-5, "{tc} {delay} {k}: {rate}");
+            }
+        }
     }
 
     #[test]

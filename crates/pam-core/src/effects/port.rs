@@ -260,6 +260,10 @@ pub trait Effect<S: Scalar>: Debug + Send + Sync {
         (constant(0.0), constant(0.0))
     }
 
+    /// Write the rates of states that [`Self::follow`] or [`Self::read`] moves in closed form, where a linear model asks for
+    /// them; `input` is the position, or the pressure [Pa], that comes in.
+    fn linear_rates(&self, _own: &[S], _input: S, _rates: &mut [S]) {}
+
     /// Fastest rate of what it moves by itself [1/s].
     fn fastest(&self) -> f64 {
         0.0

@@ -65,6 +65,10 @@ impl<S: Scalar> Effect<S> for PressureLag<S> {
         read(reading, from, to, self.time_constant, step)
     }
 
+    fn linear_rates(&self, own: &[S], input: S, rates: &mut [S]) {
+        rates[0] = (input - own[0]) / self.time_constant;
+    }
+
     fn lag(&self) -> S {
         self.time_constant
     }
@@ -88,5 +92,15 @@ mod tests {
         }
         assert!((y - (0.5 - 0.01_f64)).abs() < 1e-12);
         assert_eq!(read(7.0, 1.0, 3.0, 0.0, 1e-3), 3.0);
+    }
+
+    #[test]
+    fn the_closed_form_begins_with_the_rate() {
+        let (sensor, mut rate) = (PressureLag { time_constant: 0.02_f64 }, [0.0]);
+        sensor.linear_rates(&[1e5], 1.4e5, &mut rate);
+        assert_eq!(rate, [2e6]);
+        let step = 1e-8;
+        let moved = sensor.read(1e5, 1.4e5, 1.4e5, step) - 1e5;
+        assert!((moved / step / rate[0] - 1.0).abs() < 1e-6);
     }
 }

@@ -160,7 +160,8 @@ impl<S: Scalar> Scratch<S> {
     /// A mass flow along the arrow; what goes against it goes out of its end and into its beginning.
     #[inline]
     pub(super) fn pass(&mut self, from: Node, to: Node, flow: S) {
-        let (giver, taker, flow) = if flow.re() >= 0.0 { (from, to, flow) } else { (to, from, -flow) };
+        let along = flow.re() > 0.0 || (flow.re() == 0.0 && !self.backwards);
+        let (giver, taker, flow) = if along { (from, to, flow) } else { (to, from, -flow) };
         self.take(giver, flow);
         self.give(taker, flow);
     }

@@ -1,7 +1,7 @@
 //! What a muscle remembers of its motion.
 
 use crate::muscle::slip::{Slip, ELEMENTS};
-use crate::scalar::Scalar;
+use crate::scalar::{constant, Scalar};
 
 /// What a muscle by itself remembers of its motion; what effects on it remember is among their states.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -17,6 +17,11 @@ impl<S: Scalar> Default for Memory<S> {
 }
 
 impl Memory<f64> {
+    /// The same in another number type, without derivatives.
+    pub(super) fn lift<S: Scalar>(&self) -> Memory<S> {
+        Memory { direction: Slip::from_elements(self.direction.elements().map(constant)) }
+    }
+
     /// Length of [`Self::to_array`].
     pub const NUMBERS: usize = ELEMENTS;
 

@@ -4,6 +4,7 @@ mod air;
 mod body;
 mod discrete;
 pub mod layout;
+pub mod linear;
 pub mod memory;
 mod motion;
 mod muscle_force;
@@ -17,6 +18,7 @@ mod wiring;
 mod wiring_motion;
 
 pub use layout::{Channel, Layout, Names, StatePlace, StateRole, BALANCE};
+pub use linear::{LinearModel, Side};
 pub use memory::Memory;
 pub use parameters::{ParameterId, Parameters, Values};
 pub(crate) use ports::{moves, Place};

@@ -118,6 +118,8 @@ pub struct Scratch<S> {
     pub(super) drawn: Vec<S>,
     pub(super) torque: Vec<S>,
     pub(super) vented: S,
+    /// A flow that is none goes against its arrow, and not along it.
+    pub(super) backwards: bool,
     pub(super) muscle_work: S,
     /// Poses, rates and torques that effects on the arm change.
     pub(super) arm: [Vec<S>; 4],
@@ -250,6 +252,7 @@ impl<'a, S: Scalar> Plant<'a, S> {
             drawn: zeros(supplies),
             torque: zeros(coordinates),
             vented: constant(0.0),
+            backwards: false,
             muscle_work: constant(0.0),
             arm: std::array::from_fn(|_| zeros(coordinates)),
             contraction: zeros(self.wiring.groups.len()),

@@ -15,7 +15,7 @@ use self::run::Run;
 use crate::description::dotted;
 use crate::effects::clock_skew::late;
 use crate::error::check_range;
-use crate::plant::{Channel, Memory, Rig};
+use crate::plant::{Channel, LinearModel, Memory, Rig, Side};
 use crate::plant::{Controls, Plant, Scratch, Simulated};
 use crate::scalar::{constant, Scalar};
 use crate::{Error, Result};
@@ -339,6 +339,15 @@ impl Progress {
         })
     }
 
+    /// The linear model of a rig about this sample, with its valves at their null.
+    ///
+    /// # Errors
+    /// [`Error::Integration`] when the state has left the model's range, [`Error::Model`] where a derivative is not finite.
+    pub fn linearised(&self, rig: &Rig, side: Side) -> Result<LinearModel> {
+        check_state(&Plant::new(rig, rig.parameters().lift::<f64>(), true)?, &self.state, 0.0)?;
+        rig.linearised(&self.state, &self.memory, side)
+    }
+
     /// Append this sample to a trajectory.
     ///
     /// # Errors
@@ -454,64 +463,61 @@ impl Progress {
         look: &mut dyn FnMut() -> Result<()>,
     ) -> Result<()> {
         run.prescribe(drive);
-        let Run { stepper, simulated, before, after, next, unseen, .. } = run;
-        let rig = stepper.plant.rig();
-        let dt = timing.step();
         for k in samples {
-            let mut controls = stepper.plant.controls(|input| drive.commands[input][k]);
-            next.clone_from(self);
             let happened = out.events.len();
-            let ends = drive.ends(rig, &self.state, k);
-            let began = self.samples as f64 * timing.sample_time;
-            if self.kept > 0 {
-                next.remember(&stepper.plant, &mut stepper.scratch, drive, k, timing);
-                controls = next.skewed(&stepper.plant, began, timing);
-            }
-            stepper.begin(&next.state, &controls, began);
-            before.look(&stepper.plant, &next.state, stepper.controls(&controls, 0));
-            before.report(rig, None, began, &mut next.flags, &mut out.events);
-            for sub in 0..timing.substeps {
-                let from = began + sub as f64 * dt;
-                if self.kept > 0 {
-                    controls = next.skewed(&stepper.plant, from, timing);
-                }
-                let (state, memory) = (&mut next.state, &mut next.memory);
-                stepper.step(state, memory, &controls, from, dt, simulated, |_, _, fraction, y| {
-                    let share = (sub as f64 + fraction) / timing.substeps as f64;
-                    for (place, from, to) in &ends {
-                        y[*place] = from + (to - from) * share;
-                        if *place >= rig.layout.angle(0) {
-                            y[place + rig.layout.coordinates] = (to - from) / timing.sample_time;
-                        }
-                    }
-                });
-                after.look(&stepper.plant, &next.state, stepper.controls(&controls, 2));
-                let time = began + (sub + 1) as f64 * dt;
-                after.report(rig, Some((before, dt)), time, &mut next.flags, &mut out.events);
-                std::mem::swap(before, after);
-                *unseen += 1;
-                if *unseen >= STEPS_UNSEEN {
-                    *unseen = 0;
-                    if let Err(error) = look() {
-                        out.events.truncate(happened);
-                        return Err(error);
-                    }
-                }
-            }
-            for (place, ..) in &ends {
-                held_mass(&stepper.plant, *place, &mut next.state);
-            }
-            // Within a step they were found block by block.
-            if let Some(new) = out.events.get_mut(happened..) {
-                new.sort_by(|a, b| a.time.total_cmp(&b.time));
-            }
-            next.samples += 1;
-            if let Err(error) = next.observed(&stepper.plant, &mut stepper.scratch, timing, out) {
+            if let Err(error) = self.sample(run, timing, drive, k, out, look) {
                 out.events.truncate(happened);
                 return Err(error);
             }
-            std::mem::swap(self, next);
         }
+        Ok(())
+    }
+
+    /// One sample of a drive. Where it fails, this is still where the sample began.
+    #[inline]
+    fn sample(
+        &mut self,
+        run: &mut Run<'_>,
+        timing: Timing,
+        drive: &Drive<'_>,
+        k: usize,
+        out: &mut Trajectory,
+        look: &mut dyn FnMut() -> Result<()>,
+    ) -> Result<()> {
+        let rig = run.stepper.plant.rig();
+        let mut controls = run.stepper.plant.controls(|input| drive.commands[input][k]);
+        run.next.clone_from(self);
+        let happened = out.events.len();
+        let ends = drive.ends(rig, &self.state, k);
+        let began = self.samples as f64 * timing.sample_time;
+        if self.kept > 0 {
+            run.next.remember(&run.stepper.plant, &mut run.stepper.scratch, drive, k, timing);
+            controls = run.next.skewed(&run.stepper.plant, began, timing);
+        }
+        run.begin(&controls, began, &mut out.events);
+        for sub in 0..timing.substeps {
+            if self.kept > 0 {
+                let from = began + sub as f64 * timing.step();
+                controls = run.next.skewed(&run.stepper.plant, from, timing);
+            }
+            run.step(&controls, &ends, timing, began, sub, &mut out.events);
+            run.unseen += 1;
+            if run.unseen >= STEPS_UNSEEN {
+                run.unseen = 0;
+                look()?;
+            }
+        }
+        let Run { stepper, next, .. } = run;
+        for (place, ..) in &ends {
+            held_mass(&stepper.plant, *place, &mut next.state);
+        }
+        // Within a step they were found block by block.
+        if let Some(new) = out.events.get_mut(happened..) {
+            new.sort_by(|a, b| a.time.total_cmp(&b.time));
+        }
+        next.samples += 1;
+        next.observed(&stepper.plant, &mut stepper.scratch, timing, out)?;
+        std::mem::swap(self, next);
         Ok(())
     }
 }

@@ -113,9 +113,7 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
     )
     missing = [j.group for j in judged if j.verdict == "unlisted"]
     forms = [
-        describe_closure(g.closure.fit, replace(fitted, blocks=g.blocks), g.candidates[0].fit)
-        for g in missing
-        if g.closure is not None
+        describe_closure(g.closure.fit, replace(fitted, blocks=g.blocks), g.candidates[0].fit) for g in missing if g.closure is not None
     ]
     sought = any(g.sought for g in missing)
     return replace(diagnosis, text=words.verdict(diagnosis, case, gap, forms, settings.warnings, sought=sought))
@@ -165,9 +163,7 @@ def _models(nominal: Rig, fitted: Problem, judged: list[Judged], verdict: str) -
     return _Models(judged, starts, chosen, nominal, baseline, _merged(nominal, chosen))
 
 
-def _warnings(
-    case: Case, models: _Models, table: dict[str, ChannelError], settings: DiagnosisSettings, *, same: bool
-) -> list[str]:
+def _warnings(case: Case, models: _Models, table: dict[str, ChannelError], settings: DiagnosisSettings, *, same: bool) -> list[str]:
     """What a reader should know before trusting the rest."""
     named = any(j.named or j.wrong for j in models.judged)
     return [
@@ -246,9 +242,7 @@ def _next(
     return words.next_experiment(verdict, probabilities, ambiguity, nominal, missing)
 
 
-def _hypotheses(
-    judged: list[Judged], probabilities: dict[str, float], nominal: Rig, least: float
-) -> list[tuple[str, Rig, float]]:
+def _hypotheses(judged: list[Judged], probabilities: dict[str, float], nominal: Rig, least: float) -> list[tuple[str, Rig, float]]:
     """The likely hypotheses that have a model, as fitted; those of an effect with times of its own can predict no other recording."""
     found = []
     for key, p in probabilities.items():

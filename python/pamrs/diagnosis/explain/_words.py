@@ -338,9 +338,7 @@ def worse(table: dict[str, ChannelError], settings: WarningSettings) -> list[str
     return out
 
 
-def reservations(
-    judged: list[Judged], chosen: list[Candidate], table: dict[str, ChannelError], settings: WarningSettings
-) -> list[str]:
+def reservations(judged: list[Judged], chosen: list[Candidate], table: dict[str, ChannelError], settings: WarningSettings) -> list[str]:
     """What a reader should know of a model with a name: what it still misses where it acts, and values that it had to move far."""
     out = []
     for j in judged:

@@ -34,6 +34,8 @@ LOGARITHMIC = frozenset(
     if parameter.neutral != 0.0 and parameter.lower > 0.0
 )
 """Shapes that are positive: fitted by their logarithm."""
+
+
 @dataclass(frozen=True, eq=False)
 class Problem:
     """Blocks and recordings to be explained together.

@@ -32,11 +32,7 @@ def refitted(problem: Problem, nominal: Rig, inflation: dict[str, float]) -> Fit
     """The baseline refitted from the nominal values and, where that leaves more than noise could, from the other side of them."""
     settings = problem.settings.noise
     first = thorough(problem, nominal, inflation, None)
-    rows = sum(
-        int(r.rows.sum()) / bin_width(p, settings.fit_bin_time)
-        for p in problem.recordings
-        for r in _of(p, first.residuals)
-    )
+    rows = sum(int(r.rows.sum()) / bin_width(p, settings.fit_bin_time) for p in problem.recordings for r in _of(p, first.residuals))
     if 2.0 * first.cost < settings.margin * rows:
         return first
     known = nominal.parameters

@@ -151,8 +151,7 @@ def _group(found: _Found, quiet: Group, starts: dict[str, Begun], trial: Attempt
     top = max(odds, key=lambda c: odds[c])
     # against noise what is faint stands alone, against parameters that may be off what eases them has a rival
     weights = {
-        c: math.exp(max(-30.0, score - (odds[top] if shown else 0.0))) / (1 if shown else len(odds))
-        for c, score in odds.items()
+        c: math.exp(max(-30.0, score - (odds[top] if shown else 0.0))) / (1 if shown else len(odds)) for c, score in odds.items()
     }
     total = sum(weights.values()) + (0.0 if shown else 1.0)
     most = settings.most_probability

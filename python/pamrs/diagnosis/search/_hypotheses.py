@@ -136,10 +136,7 @@ def _healthy(refit: _Refit, common: Candidate) -> Group:
     trial = refit.trial
     # what the nominal model leaves in the held-out ones is what the parameters are moved for
     quiet = residuals(trial.outer, trial.nominal)
-    ever = {
-        b.name: max(refit.was[b.name], trial.excess(b, trial.outer, quiet), key=lambda e: e.ratio)
-        for b in trial.inner.blocks
-    }
+    ever = {b.name: max(refit.was[b.name], trial.excess(b, trial.outer, quiet), key=lambda e: e.ratio) for b in trial.inner.blocks}
     return replace(refit.group([common], {"": 1.0}, None), nominal=ever, suspects=[])
 
 
@@ -252,9 +249,7 @@ def _settles(candidate: Candidate, trial: Attempts, start: Candidate) -> bool:
     return little and not _untouched(candidate, start, trial)
 
 
-def _weighed(
-    trial: Attempts, candidates: list[Candidate], terms: _Terms, tell: Say
-) -> tuple[list[Candidate], dict[str, float]]:
+def _weighed(trial: Attempts, candidates: list[Candidate], terms: _Terms, tell: Say) -> tuple[list[Candidate], dict[str, float]]:
     """Hypotheses with their probabilities, those that are close fitted to the end first."""
     start, settings = candidates[0], trial.settings
 
@@ -485,9 +480,7 @@ def _untouched(candidate: Candidate, start: Candidate, trial: Attempts) -> list[
     ]
 
 
-def _pairs(
-    trial: Attempts, screened: Screen, start: Candidate, singles: list[Candidate], tell: Say
-) -> list[Candidate]:
+def _pairs(trial: Attempts, screened: Screen, start: Candidate, singles: list[Candidate], tell: Say) -> list[Candidate]:
     """For the best singles that leave something: the effects that would take most of it, fitted together with them."""
     settings = trial.settings.search
     lasting = [c for c in singles if c.fit.events is None]

@@ -123,9 +123,7 @@ def _promised(
             return np.concatenate([left + slopes @ (x - begin), bound * x]), np.concatenate([slopes, prior]), None
 
         limits = (np.maximum(low, -wall), np.minimum(high, wall))
-        _, (values, _, _), _ = levenberg_marquardt(
-            evaluate, begin, limits, settings.promise_evaluations, settings, 0.0
-        )
+        _, (values, _, _), _ = levenberg_marquardt(evaluate, begin, limits, settings.promise_evaluations, settings, 0.0)
         return float(values @ values)
 
     was = cost(())

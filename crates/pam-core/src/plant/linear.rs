@@ -1,0 +1,342 @@
+//! Linear model of a rig about a state in which its valves hold their null, by dual numbers through
+//! its equations.
+//!
+//! `x' = A x + B u, y = C x`. States are the pressures, angles and rates that an initial value can
+//! be given for and, behind them, what effects move. What follows a small motion of a joint
+//! ([`Role::Follows`]) is no state: it moves by its joint's angle. What a muscle remembers of its
+//! way stays as it is, and its force changes with the stretch since then.
+//!
+//! Some things have a slope to each side. A valve fills on one side of its null and vents on the
+//! other: its position is taken next to the null, where [`Side`] says. Air that rests may flow
+//! either way, with other coefficients while it comes in than while it goes out, and a muscle at
+//! ambient pressure may not feel a lower one: there the slope is the mean of both.
+
+use super::memory::Memory;
+use super::parameters::unit;
+use super::ports::Acting;
+use super::rates::{Controls, Plant, Simulated};
+use super::{Rig, StateRole};
+use crate::blocks::valve::spool_position;
+use crate::description::dotted;
+use crate::effects::{Dual, Role, BEGUN, LANES};
+use crate::scalar::{constant, Scalar};
+use crate::{Error, Result};
+use nalgebra::Const;
+
+/// How far next to its null a valve is [1]: so near that no slope changes by more than 1e-7 of itself,
+/// so far that what flows shows in the last digits of the pressure behind a hose.
+const BESIDE: f64 = 1e-9;
+/// How far on either side of their values pressures are [1], where the slope is the mean of both.
+const ASIDE: f64 = 1e-9;
+
+/// On which side of what has two slopes: position of the valves beside their null [1], shift of the
+/// pressures of gases [1], and whether a flow that is none goes against its arrow.
+#[derive(Clone, Copy)]
+struct Beside {
+    position: f64,
+    shift: f64,
+    backwards: bool,
+}
+
+/// Both sides of what rests.
+const SHUT: [Beside; 2] = [
+    Beside { position: 0.0, shift: ASIDE, backwards: false },
+    Beside { position: 0.0, shift: -ASIDE, backwards: true },
+];
+
+/// The side of its null on which a valve opens.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Side {
+    /// Above, where it fills.
+    Fill,
+    /// Below, where it vents.
+    Vent,
+    /// The mean of both.
+    Mean,
+}
+
+impl Side {
+    /// The side of a name.
+    ///
+    /// # Errors
+    /// [`Error::Choice`] for another name.
+    pub fn from_name(name: &str) -> Result<Self> {
+        match name {
+            "fill" => Ok(Self::Fill),
+            "vent" => Ok(Self::Vent),
+            "mean" => Ok(Self::Mean),
+            _ => Err(Error::Choice {
+                name: "side".into(),
+                value: format!("\"{name}\""),
+                allowed: "one of \"mean\", \"fill\", \"vent\"".into(),
+            }),
+        }
+    }
+
+    /// Where the slopes are taken whose mean is the slope by an opening.
+    fn open(self) -> Vec<Beside> {
+        let at = |position| Beside { position, shift: 0.0, backwards: false };
+        match self {
+            Self::Fill => vec![at(BESIDE)],
+            Self::Vent => vec![at(-BESIDE)],
+            Self::Mean => vec![at(BESIDE), at(-BESIDE)],
+        }
+    }
+}
+
+/// `x' = A x + B u, y = C x`, in SI; matrices row by row.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LinearModel {
+    /// States: first those that an initial value can be given for, then what effects move, in the
+    /// order in which the effects were given.
+    pub states: Vec<String>,
+    /// Commands of the valves.
+    pub inputs: Vec<String>,
+    /// Readings of the states that an initial value can be given for.
+    pub outputs: Vec<String>,
+    /// `states x states`.
+    pub a: Vec<f64>,
+    /// `states x inputs`.
+    pub b: Vec<f64>,
+    /// `outputs x states`.
+    pub c: Vec<f64>,
+}
+
+/// A state of the model.
+struct Moving {
+    name: String,
+    place: usize,
+    /// -1 where it is counted the other way round among the states of the rig.
+    sign: f64,
+    /// It moves an opening.
+    opens: bool,
+}
+
+/// What a derivative is taken by.
+#[derive(Clone, Copy)]
+enum By {
+    State(usize),
+    Command(usize),
+}
+
+impl Rig {
+    /// The linear model about a state, its valves at their null. For effects with a
+    /// [`crate::effects::Kink`] it is not meaningful; what [`crate::effects::AtRest`] asks for must
+    /// have been done.
+    ///
+    /// # Errors
+    /// [`Error::Model`] where a derivative is not finite.
+    pub(crate) fn linearised(
+        &self,
+        state: &[f64],
+        memory: &[Memory<f64>],
+        side: Side,
+    ) -> Result<LinearModel> {
+        let (moving, point) = (self.moving(), Point::new(self, state, memory));
+        let commands = 0..self.wiring.valves.len();
+        let opening = moving.iter().filter(|m| m.opens).map(|m| By::State(m.place));
+        let opening: Vec<By> = opening.chain(commands.clone().map(By::Command)).collect();
+        let shut: Vec<By> = moving.iter().filter(|m| !m.opens).map(|m| By::State(m.place)).collect();
+        let mut opened = point.mean_slopes(&opening, &side.open())?.into_iter();
+        let mut others = point.mean_slopes(&shut, &SHUT)?.into_iter();
+        let mut columns: Vec<Vec<f64>> =
+            moving.iter().filter_map(|m| if m.opens { opened.next() } else { others.next() }).collect();
+        self.let_follow(&point, &moving, &mut columns)?;
+        let (mut a, mut b) = (Vec::new(), Vec::new());
+        let inputs: Vec<Vec<f64>> = opened.collect();
+        for row in &moving {
+            // (a sum with zero has no negative one)
+            a.extend(
+                moving.iter().zip(&columns).map(|(by, column)| row.sign * by.sign * column[row.place] + 0.0),
+            );
+            b.extend(inputs.iter().map(|column| row.sign * column[row.place] + 0.0));
+            if a.iter().chain(&b).any(|slope| !slope.is_finite()) {
+                let name = &row.name;
+                return Err(Error::Model(format!("the rate of {name} has no finite slope: no linear model")));
+            }
+        }
+        let named = self.names.initial.len();
+        let c = (0..named).flat_map(|k| self.reading_of(k, &moving)).collect();
+        let inputs = self.names.inputs[commands].to_vec();
+        let outputs = self.names.initial.iter().map(|(name, _)| name.clone()).collect();
+        Ok(LinearModel { states: moving.into_iter().map(|m| m.name).collect(), inputs, outputs, a, b, c })
+    }
+
+    /// The states of the model.
+    fn moving(&self) -> Vec<Moving> {
+        let (layout, ports) = (&self.layout, &self.wiring.ports);
+        let load = self.spec().load.is_some();
+        let named = self.names.initial.iter().map(|(name, place)| Moving {
+            name: name.clone(),
+            place: *place,
+            sign: if load && *place >= layout.angle(0) { -1.0 } else { 1.0 },
+            opens: false,
+        });
+        let mut extra: Vec<(usize, Moving)> = Vec::new();
+        for (place, state) in self.state_map().into_iter().enumerate() {
+            let opens = state.role == StateRole::Effect(Role::Opens);
+            let found = match state.role {
+                StateRole::FreeMass => {
+                    let gas = place - layout.mass(0);
+                    let block = state.name.split_once('.').map_or("", |(_, block)| block);
+                    ports.balance[gas].map(|acting| {
+                        let id = ports.effects[acting.effect].info.id;
+                        (acting.effect, dotted(&format!("{id}.air_mass"), block))
+                    })
+                }
+                StateRole::Effect(Role::Moves | Role::Opens) => {
+                    let own = place - layout.effect(0);
+                    let here = |acting: &Acting| (acting.first..acting.first + acting.count).contains(&own);
+                    let acting = ports.all.iter().map(|(_, acting)| acting).find(|acting| here(acting));
+                    acting.map(|acting| (acting.effect, state.name))
+                }
+                _ => None,
+            };
+            extra.extend(found.map(|(effect, name)| (effect, Moving { name, place, sign: 1.0, opens })));
+        }
+        extra.sort_by_key(|(effect, _)| *effect);
+        named.chain(extra.into_iter().map(|(_, moving)| moving)).collect()
+    }
+
+    /// Let what follows a joint move by its angle: its rate is a slope times the rate of the joint,
+    /// and nothing else.
+    fn let_follow(&self, point: &Point<'_>, moving: &[Moving], columns: &mut [Vec<f64>]) -> Result<()> {
+        let places = self.state_map().into_iter().enumerate();
+        let following: Vec<usize> = places
+            .filter(|(_, state)| state.role == StateRole::Effect(Role::Follows))
+            .map(|(place, _)| place)
+            .collect();
+        let by: Vec<By> = following.iter().map(|place| By::State(*place)).collect();
+        let slopes = point.mean_slopes(&by, &SHUT)?;
+        let at = |place: usize| moving.iter().position(|m| m.place == place);
+        for k in 0..self.layout.coordinates {
+            let (Some(angle), Some(rate)) = (at(self.layout.angle(k)), at(self.layout.rate(k))) else {
+                continue;
+            };
+            for (place, slope) in following.iter().zip(&slopes) {
+                let follows = columns[rate][*place];
+                for (entry, slope) in columns[angle].iter_mut().zip(slope) {
+                    *entry += slope * follows;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// What the sensor of a named state reads, by all states of the model.
+    fn reading_of(&self, named: usize, moving: &[Moving]) -> Vec<f64> {
+        let (layout, place) = (&self.layout, self.names.initial[named].1);
+        let gas = place.checked_sub(layout.pressure(0)).filter(|gas| *gas < layout.gases);
+        let lagging = gas.and_then(|gas| self.wiring.ports.reading[gas]);
+        let read = lagging.map_or(place, |acting| layout.effect(acting.first));
+        moving.iter().map(|m| f64::from(u8::from(m.place == read))).collect()
+    }
+}
+
+/// What slopes are taken about.
+struct Point<'a> {
+    rig: &'a Rig,
+    state: Vec<f64>,
+    memory: Vec<Memory<Dual>>,
+}
+
+impl<'a> Point<'a> {
+    /// A state, the valves' paths having begun.
+    fn new(rig: &'a Rig, state: &[f64], memory: &[Memory<f64>]) -> Self {
+        let mut state = state[..rig.layout.states()].to_vec();
+        for (value, place) in state.iter_mut().zip(rig.state_map()) {
+            if place.role == StateRole::Effect(Role::Begun) {
+                *value = BEGUN;
+            }
+        }
+        Self { rig, state, memory: memory.iter().map(Memory::lift).collect() }
+    }
+
+    /// Slopes of the rates of all states, the mean over some sides.
+    fn mean_slopes(&self, by: &[By], sides: &[Beside]) -> Result<Vec<Vec<f64>>> {
+        let mut sums = vec![vec![0.0; self.state.len()]; by.len()];
+        for beside in sides {
+            for (chunk, sums) in by.chunks(LANES).zip(sums.chunks_mut(LANES)) {
+                let rates = self.rates(chunk, *beside)?;
+                for (k, rate) in rates.into_iter().enumerate() {
+                    let gradient = rate.eps.unwrap_generic(Const::<LANES>, Const::<1>);
+                    for ((by, sum), slope) in chunk.iter().zip(sums.iter_mut()).zip(gradient.iter()) {
+                        // A command counts from the null: more of the one is less of the other.
+                        let sign = if matches!(by, By::Command(_)) { -1.0 } else { 1.0 };
+                        sum[k] += sign * slope / sides.len() as f64;
+                    }
+                }
+            }
+        }
+        Ok(sums)
+    }
+
+    /// Rates of all states, each lane with the derivative by one thing.
+    fn rates(&self, by: &[By], beside: Beside) -> Result<Vec<Dual>> {
+        let mut values = self.rig.parameters().lift::<Dual>();
+        let layout = &self.rig.layout;
+        let gases = layout.pressure(0)..layout.mass(0);
+        let shifted = |(place, x): (usize, &f64)| {
+            constant(if gases.contains(&place) { x * (1.0 + beside.shift) } else { *x })
+        };
+        let mut state: Vec<Dual> = self.state.iter().enumerate().map(shifted).collect();
+        for (lane, by) in by.iter().enumerate() {
+            match *by {
+                By::State(place) => state[place].eps = unit(lane),
+                By::Command(valve) => values.seed(self.rig.wiring.valves[valve].null, lane),
+            }
+        }
+        let plant = Plant::new(self.rig, values, false)?;
+        // What a muscle remembers does not move with the state.
+        let still: Vec<Dual> = self.state.iter().map(|x| constant(*x)).collect();
+        let mut start = vec![constant(0.0); self.memory.len()];
+        plant.contractions(&still, &mut start);
+        Ok(plant.rates_beside(&state, &self.memory, &start, beside))
+    }
+}
+
+impl<S: Scalar> Plant<'_, S> {
+    /// Rates of all states at the start of a recording, with what effects move in closed form.
+    fn rates_beside(&self, state: &[S], memory: &[Memory<S>], start: &[S], beside: Beside) -> Vec<S> {
+        let (wiring, layout) = (&self.rig.wiring, &self.layout);
+        let mut closed: Vec<(&Acting, S)> = Vec::new();
+        let mut controls = self.held();
+        for (k, path) in wiring.ports.command.iter().enumerate() {
+            let null = self.valves[k].null;
+            let mut spool = spool_position(null.re(), null, wiring.valves[k].half_range) + beside.position;
+            for acting in path {
+                closed.push((acting, spool));
+                spool = self.effect(acting).position(self.own(acting, state), spool, 0.0) + beside.position;
+            }
+            controls.spool[k] = spool;
+        }
+        for (gas, acting) in wiring.ports.reading.iter().enumerate() {
+            closed.extend(acting.as_ref().map(|acting| (acting, state[layout.pressure(gas)])));
+        }
+        let mut rates = vec![constant(0.0); layout.states()];
+        let mut here = self.scratch();
+        here.backwards = beside.backwards;
+        let all = Simulated::all_but(layout, &[]);
+        self.rates(state, &controls, memory, start, &all, &mut here, &mut rates);
+        for (acting, input) in closed {
+            self.effect(acting).linear_rates(
+                self.own(acting, state),
+                input,
+                self.own_mut(acting, &mut rates),
+            );
+        }
+        rates
+    }
+
+    /// Controls with every valve shut and every supply at its first pressure, at the start of a
+    /// recording.
+    fn held(&self) -> Controls<S> {
+        let ambient = self.rig.gas.ambient_pressure;
+        let supplies = self.rig.spec().supplies.iter();
+        Controls {
+            spool: vec![constant(0.0); self.valves.len()],
+            set_pressure: supplies.map(|s| constant(s.initial_pressure + ambient)).collect(),
+            time: 0.0,
+        }
+    }
+}

@@ -1,0 +1,87 @@
+"""What a linear model leaves of a rig: effects without a derivative are refused, the others at rest.
+
+What each effect asks for stands in the catalogue (:class:`pamrs.effects.EffectInfo`).
+"""
+
+from __future__ import annotations
+
+from pamrs.effects import EFFECTS
+from pamrs.errors import ParameterError
+from pamrs.rig import Rig
+
+__all__ = ["check_smooth", "resting", "without_dry_friction"]
+
+
+def check_smooth(rig: Rig, *, supplies: bool) -> None:
+    """Refuse a rig with an effect that has no derivative where a valve is closed and a joint rests.
+
+    Parameters
+    ----------
+    rig : Rig
+        The model.
+    supplies : bool
+        Whether pressures of supplies move.
+
+    Raises
+    ------
+    ParameterError
+        With the effect's name.
+    """
+    for effect in rig.effects:
+        kink = EFFECTS[effect["id"]].kink
+        if kink is None:
+            continue
+        names, why, of_supplies = kink
+        values = {name: effect["parameters"].get(name, 0.0) for name in names}
+        if any(values.values()) and (supplies or not of_supplies):
+            said = ", ".join(f"{effect['id']}.{name} = {value:g}" for name, value in values.items())
+            raise ParameterError(f"{said} is not allowed: the effect has no linear model, {why}")
+
+
+def resting(rig: Rig) -> Rig:
+    """The rig as its effects are at rest: air as warm as the wall, sensors without a lag that no
+    sample shows and without what only flowing air shows them.
+
+    Parameters
+    ----------
+    rig : Rig
+        The model.
+
+    Returns
+    -------
+    Rig
+    """
+    kept = []
+    for effect in rig.effects:
+        values, changes = effect["parameters"], EFFECTS[effect["id"]].at_rest
+        if any(act == "out_below" and values.get(key, bound) < bound for act, key, bound in changes):
+            continue
+        held = {key: value for act, key, value in changes if act == "set" and key in values}
+        kept.append({**effect, "parameters": {**values, **held}})
+    if kept == rig.effects:
+        return rig
+    rig = rig.without_effect()
+    for effect in kept:  # in their order, which is that of the states
+        place = {key: effect[key] for key in ("at", "form") if key in effect}
+        rig = rig.with_effect(effect["id"], effect["parameters"], **place)
+    return rig
+
+
+def without_dry_friction(rig: Rig) -> Rig:
+    """The rig as a motion feels it that does not turn round: its dry friction is a constant then,
+    and damps nothing.
+
+    Parameters
+    ----------
+    rig : Rig
+        The model.
+
+    Returns
+    -------
+    Rig
+        Without Coulomb friction and without the effects that are dry friction.
+    """
+    for name in {effect["id"] for effect in rig.effects}:
+        if EFFECTS[name].dry_friction:
+            rig = rig.without_effect(name)
+    return rig.with_parameters({name: 0.0 for name in rig.parameters if name.rpartition(".")[2] == "coulomb"})
