@@ -91,9 +91,9 @@ def test_a_name_in_the_chamber_stands_beside_an_arm_without_one() -> None:
     kept = found.unexplained[0]
     assert (kept["block"], kept["unit"], kept["verdict"]) == ("arm", "rad", "unlisted")
     assert 1e-3 < kept["size"] < 1e-2
-    assert "the arm keeps" in found.headline
-    assert found.headline.index("dead zone") < found.headline.index("the arm keeps")
-    assert "the arm keeps" in found.summary().replace("\n", " ").replace("  ", " ")
+    assert "the residual of the arm" in found.headline
+    assert found.headline.index("dead zone") < found.headline.index("the residual of the arm")
+    assert "the residual of the arm" in found.summary().replace("\n", " ").replace("  ", " ")
 
 
 def test_pairs_of_one_mistake_are_suspected_with_either_at_its_wall() -> None:

@@ -166,8 +166,8 @@ def diagnose(
     if unsettled:
         what = "length" if case.rig.model["load"] else "angle"
         warnings.append(
-            f"{', '.join(unsettled)}: marked unknown, and no fit moves them; a wrong one bends the {what} as an effect would, so that "
-            f"no effect of muscles and what they move is believed by more than {100 * factor:.0f} %"
+            f"{', '.join(unsettled)}: marked unknown, and no fit moves them; a wrong one bends the {what} as an effect would, so "
+            f"the probability of an effect of muscles and what they move is capped at {100 * factor:.0f} %"
         )
     if not math.isfinite(sum(diagnosis.probabilities.values())):
         raise DiagnosisError("the probabilities are not finite: please report this case")

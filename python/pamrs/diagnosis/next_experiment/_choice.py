@@ -341,10 +341,11 @@ def _text(best: Outcome, hypotheses: Sequence[Hypothesis], doubt: float, hopeles
     channel = next(b.channel for b in best.problem.blocks if b.name == key[0]).replace("_", " ")
     said += (
         f". If it is {_spoken(hypotheses[0][0])}, a model with {_spoken(hypotheses[j][0])} then misses the {channel} by "
-        f"{size:.2g} times its noise, whatever its parameters; expected to give {best.bits:.2f} of the {doubt:.2f} bit of doubt."
+        f"{size:.2g} times the noise level, whatever its parameters. The expected information is {best.bits:.2f} of the "
+        f"{doubt:.2f} bit of uncertainty."
     )
     if best.bits < hopeless * doubt:
-        said += " No standard experiment does better with these channels: think of another sensor."
+        said += " No standard experiment does better with these channels: consider another sensor."
     return said
 
 
