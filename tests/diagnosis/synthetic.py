@@ -8,7 +8,6 @@ import numpy as np
 
 from pamrs.diagnosis.result import Diagnosis, Trace
 from pamrs.findings import (
-    Tested,
     BlockResidual,
     ChannelError,
     Condition,
@@ -18,6 +17,7 @@ from pamrs.findings import (
     FitErrors,
     NextExperiment,
     ParameterFound,
+    Tested,
     Where,
 )
 
@@ -189,7 +189,7 @@ def entries(content: dict[str, Any]) -> dict[str, Any]:
         "parameters": each(ParameterFound, content["parameters"]),
         "fit": FitErrors(**errors, gap_closed=content["fit"].get("gap_closed")),
         "next_experiment": NextExperiment(**content["next_experiment"]),
-        "tested": [Tested(**asked) for asked in content["asked"]],
+        "tested": [Tested(**row) for row in content["tested"]],
         "residuals": each(BlockResidual, content["residuals"]),
         "condition_map": None if shown is None else ConditionMap(**shown),
     }

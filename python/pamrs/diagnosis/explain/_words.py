@@ -45,8 +45,8 @@ def where(located: str | None, problem: Problem, judged: list[Judged], picture: 
     )
     group = next((g for g in groups if g.mismatch is not None and g.mismatch.name == located), None)
     wrong = next((j.wrong for j in judged if block in j.group.blocks), ())
-    faint = group is not None and group.faint
-    mistaken = bool(wrong) and (group is None or faint)
+    below_noise = group is not None and group.below_noise
+    mistaken = bool(wrong) and (group is None or below_noise)
     if mistaken:
         text = (
             f"The {located} block{parts} fits down to the noise level, but only with parameters at the ends of "
@@ -58,12 +58,12 @@ def where(located: str | None, problem: Problem, judged: list[Judged], picture: 
             f"No block's residual is above the noise level, but the refit of the {located} block{parts} had to move "
             f"{moved}. An effect explains the same data without that."
         )
-    elif faint:
+    elif below_noise:
         text = (
             f"No block's residual is above the noise level, but the residual of the {located} block{parts} "
             "contains the signature of an effect, in held-out recordings too."
         )
-    elif group is not None and group.probabilities.get("", 0.0) > settings.doubted_probability:
+    elif group is not None and group.probabilities.get("", 0.0) > settings.no_mismatch_probability:
         text = (
             f"The residual of the {located} block{parts} is barely above the noise level "
             f"({found.systematic:.2g} times it in {block.channel.replace('_', ' ')}). "
@@ -74,16 +74,16 @@ def where(located: str | None, problem: Problem, judged: list[Judged], picture: 
             f"Every block fits down to the noise level, but the {located} block only with a parameter far outside its tolerance "
             "(see the warnings)."
         )
-    telling = [] if faint else [c for c in picture.conditions if c.share > settings.telling_condition * c.time][:2]
+    telling = [] if below_noise else [c for c in picture.conditions if c.share > settings.telling_condition * c.time][:2]
     if telling:
         text += " It is largest under: " + "; ".join(c.text for c in telling) + "."
-    if picture.intervals and not faint:
+    if picture.intervals and not below_noise:
         text += f" The intervals are those of recording {picture.recording}."
     return Where(
         block=located,
         channel=block.channel,
-        intervals=[] if faint else picture.intervals,
-        conditions=[] if faint else picture.conditions[:6],
+        intervals=[] if below_noise else picture.intervals,
+        conditions=[] if below_noise else picture.conditions[:6],
         text=text,
         recording=picture.recording,
     )
@@ -111,7 +111,8 @@ def verdict(
         moved = ", ".join(f"{n} by {p.moved_sigmas:+.1f} tolerances" for n, p in shifted)
         return (
             "These recordings show no missing physics, but parameters differ from their nominal values. With values "
-            f"inside their tolerances the model predicts every block down to the noise level. Moved most: {moved}." + _unsettled(diagnosis)
+            "inside their tolerances the model predicts every block down to the noise level. "
+            f"Moved most: {moved}." + _unsettled(diagnosis)
         )
     place = diagnosis.where.text
     if kind == "unlisted":
@@ -252,10 +253,10 @@ def next_experiment(
     same = same_data(ambiguity)
     if same:
         return NextExperiment(same)
-    doubted = [k for s in ambiguity for k in s if k in EFFECTS and not EFFECTS[k].experiment]
+    untold = [k for s in ambiguity for k in s if k in EFFECTS and not EFFECTS[k].experiment]
     parameters = [k for s in ambiguity for k in s if k == "parameters" or is_parameter(k)]
-    if parameters and doubted:
-        return NextExperiment(_sentence(EFFECTS[doubted[0]].separates))
+    if parameters and untold:
+        return NextExperiment(_sentence(EFFECTS[untold[0]].separates))
     measurable = [k for k in parameters if is_parameter(k)]
     if measurable:
         text = f"Measure {' or '.join(measurable)} by itself (scale, ruler, known volume): these recordings cannot tell which is wrong."
@@ -356,11 +357,14 @@ def reservations(
             why = "its equation is not the whole truth" if j.named else "something acts beside it"
             name = "" if j.ambiguity else "the name stands, "
             out.append(
-                f"with {what} the model still misses {channel.replace('_', ' ')} by {times:.2g} times the noise level: {name}{why}, and "
-                "standard deviations hold only as far as that matters little"
+                f"with {what} the model still misses {channel.replace('_', ' ')} by {times:.2g} times the noise level: "
+                f"{name}{why}, and standard deviations hold only as far as that matters little"
             )
     named = [c for c in chosen if any(effect in CATALOGUE for effect in c.effects)]
     far = settings.moved_tolerances
     moved = {n: v for c in named for n, v in c.fit.held_by_prior.items() if abs(v) > far}
-    out += [f"with the effect the fit moves {n} by {v:+.1f} tolerances: it may compensate for the effect's form" for n, v in moved.items()]
+    out += [
+        f"with the effect the fit moves {n} by {v:+.1f} tolerances: it may compensate for the effect's form"
+        for n, v in moved.items()
+    ]
     return out
