@@ -1,4 +1,4 @@
-"""Recordings made ready for the cut chain: smoothed drive signals, noise floors, windows."""
+"""Recordings made ready for the cut chain: smoothed drive signals, noise levels, windows."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.diagnosis.evidence import colour_of
+from pamrs.diagnosis.evidence import autocorrelation_of
 from pamrs.diagnosis.fit import Fit, Problem, fit, residuals, stacked, with_priors
 from pamrs.diagnosis.noise import correlation_time
 from pamrs.diagnosis.prepare import Block
@@ -75,7 +75,7 @@ def find_closure(
     with those that remember); all chosen terms of a closure share one memory time and one memory angle, which the fit then refines.
     A term is taken while the logarithm of the misfit falls by more than its price, counted on independent samples of what is left,
     and while recordings left out are predicted better with it (with one recording only the price decides). The choice is made a
-    second time at the fit, residuals weighted by the colour that they have there, and the best of the fits and the baseline is
+    second time at the fit, residuals weighted by the autocorrelation that they have there, and the best of the fits and the baseline is
     kept. This takes ten to fifteen evaluations of the problem.
 
     Parameters
@@ -115,11 +115,11 @@ def find_closure(
     found = None if chosen is None else _fitted(problem, nominal, baseline, inflation, chosen, say)
     if found is None:
         return None
-    colour = colour_of(problem, found)
-    candidates, columns, warm = _again(problem, baseline, found, colour, blocks, closures)
-    second = _select(_Frame.of(problem, warm, found, colour), candidates, columns, found.values, settings)
-    other = None if second is None else _fitted(problem, nominal, warm, colour, second, say)
-    return _better([baseline, found, *([] if other is None else [other])], problem, colour, len(candidates))
+    autocorrelation = autocorrelation_of(problem, found)
+    candidates, columns, warm = _again(problem, baseline, found, autocorrelation, blocks, closures)
+    second = _select(_Frame.of(problem, warm, found, autocorrelation), candidates, columns, found.values, settings)
+    other = None if second is None else _fitted(problem, nominal, warm, autocorrelation, second, say)
+    return _better([baseline, found, *([] if other is None else [other])], problem, autocorrelation, len(candidates))
 
 
 def _closures(blocks: Sequence[Block]) -> dict[str, str]:

@@ -20,15 +20,15 @@ from pamrs.diagnosis.settings._models import (
     ScreenSettings,
     TransientSettings,
 )
-from pamrs.diagnosis.settings._search import FaintSettings, SearchSettings, WrongParameterSettings
+from pamrs.diagnosis.settings._search import BelowNoiseSettings, SearchSettings, WrongParameterSettings
 from pamrs.diagnosis.settings._setting import SettingsGroup
 from pamrs.errors import ParameterError
 
 __all__ = [
+    "BelowNoiseSettings",
     "ClosureSettings",
     "DiagnosisSettings",
     "EvidenceSettings",
-    "FaintSettings",
     "FitSettings",
     "NextExperimentSettings",
     "NoiseSettings",
@@ -67,7 +67,7 @@ class DiagnosisSettings:
         Scores of effects before any fit.
     search : SearchSettings
         Hypotheses that are fitted.
-    faint : FaintSettings
+    below_noise : BelowNoiseSettings
         Effects below the noise.
     wrong_parameters : WrongParameterSettings
         Values of the rig file that are wrong.
@@ -106,7 +106,7 @@ class DiagnosisSettings:
     transients: TransientSettings = field(default_factory=TransientSettings)
     screen: ScreenSettings = field(default_factory=ScreenSettings)
     search: SearchSettings = field(default_factory=SearchSettings)
-    faint: FaintSettings = field(default_factory=FaintSettings)
+    below_noise: BelowNoiseSettings = field(default_factory=BelowNoiseSettings)
     wrong_parameters: WrongParameterSettings = field(default_factory=WrongParameterSettings)
     evidence: EvidenceSettings = field(default_factory=EvidenceSettings)
     closures: ClosureSettings = field(default_factory=ClosureSettings)
@@ -187,7 +187,7 @@ _GROUPS: dict[str, type[SettingsGroup]] = {
     "transients": TransientSettings,
     "screen": ScreenSettings,
     "search": SearchSettings,
-    "faint": FaintSettings,
+    "below_noise": BelowNoiseSettings,
     "wrong_parameters": WrongParameterSettings,
     "evidence": EvidenceSettings,
     "closures": ClosureSettings,

@@ -312,14 +312,14 @@ class PlausibilitySettings(SettingsGroup):
         2e4,
         unit="Pa",
         above=0.0,
-        reason="range of a muscle's pressure below which its sense is not asked",
+        reason="range of a muscle's pressure below which its sense is not tested",
         origin="judgement",
     )
     sense_least_noises: float = setting(
         3.0,
         unit="noises",
         above=0.0,
-        reason="standard deviation of an angle below which its unit and sign are not asked",
+        reason="standard deviation of an angle below which its unit and sign are not tested",
         origin="judgement",
     )
     sense_wrong: float = setting(

@@ -60,14 +60,14 @@ class FitSettings(SettingsGroup):
         0.2,
         unit="chi-square",
         least=0.0,
-        reason="gain that a step has to promise, or the fit ends: noise makes as much",
+        reason="least predicted gain of a step, or the fit ends: noise makes as much",
         origin="judgement, docs/decisions/0014",
     )
     step_share: float = setting(
         2e-3,
         unit="1",
         least=0.0,
-        reason="share of the sum of squares that a step has to promise in a first fit",
+        reason="least predicted gain of a step in a first fit, as a share of the sum of squares",
         origin="docs/decisions/0014",
     )
     final_step_share: float = setting(
@@ -100,11 +100,11 @@ class FitSettings(SettingsGroup):
         reason="the same for the last stretch of a fit",
         origin="docs/decisions/0022",
     )
-    promise_evaluations: int = setting(
+    predicted_gain_evaluations: int = setting(
         50,
         unit="count",
         least=1,
-        reason="the same of the linear model that tells what freeing a parameter promises",
+        reason="the same of the linear model that predicts the gain of freeing a parameter",
         origin="judgement: to its end",
     )
     first_damping: float = setting(
@@ -255,7 +255,7 @@ class ScreenSettings(SettingsGroup):
         3,
         unit="count",
         least=1,
-        reason="signatures of one start at the most, each at the size that the last one asked for",
+        reason="signatures of one start at the most, each at the size that the last one suggested",
         origin="judgement",
     )
     invisible: float = setting(

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from pamrs.diagnosis.settings._setting import SettingsGroup, setting
 
-__all__ = ["FaintSettings", "SearchSettings", "WrongParameterSettings"]
+__all__ = ["BelowNoiseSettings", "SearchSettings", "WrongParameterSettings"]
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,7 @@ class SearchSettings(SettingsGroup):
         0.01,
         unit="1",
         least=0.0,
-        reason="share of the mismatch that a partner has to promise",
+        reason="least predicted gain of a partner, as a share of the mismatch",
         origin="judgement; docs/decisions/0013",
     )
     transient_from: float = setting(
@@ -145,7 +145,7 @@ class SearchSettings(SettingsGroup):
 
 
 @dataclass(frozen=True)
-class FaintSettings(SettingsGroup):
+class BelowNoiseSettings(SettingsGroup):
     """How effects below the noise are looked for and weighed."""
 
     least_gain: float = setting(
@@ -183,7 +183,7 @@ class FaintSettings(SettingsGroup):
     log_odds: float = setting(
         6.0,
         unit="log odds",
-        reason="for a faint effect against unlisted where nothing speaks against it",
+        reason="for an effect below the noise against unlisted where nothing speaks against it",
         origin="docs/decisions/0020",
     )
     most_probability: float = setting(
@@ -191,15 +191,15 @@ class FaintSettings(SettingsGroup):
         unit="1",
         above=0.0,
         most=1.0,
-        reason="largest probability of a faint effect",
+        reason="largest probability of an effect below the noise",
         origin="docs/decisions/0020",
     )
     moved_tolerances: float = setting(
         1.75,
         unit="tolerances",
         above=0.0,
-        reason="movement of a parameter from which effects that do the same are asked whether it "
-        "could go back; no parameter of 91 healthy cases moved its zero by more than 1.2",
+        reason="movement of a parameter from which effects that do the same are tested for whether "
+        "it could go back; no parameter of 91 healthy cases moved its zero by more than 1.2",
         origin="docs/decisions/0021",
     )
     same_cosine: float = setting(
@@ -252,10 +252,10 @@ class WrongParameterSettings(SettingsGroup):
     effect_log_odds: float = setting(
         6.0,
         unit="log odds",
-        reason="against a faint effect beside it",
+        reason="against an effect below the noise beside it",
         origin="docs/decisions/0025",
     )
-    least_promise: float = setting(
+    least_predicted_gain: float = setting(
         9.2,
         unit="chi-square",
         least=0.0,
@@ -267,7 +267,7 @@ class WrongParameterSettings(SettingsGroup):
         0.08,
         unit="1",
         least=0.0,
-        reason="share of the largest promise from which a pair is fitted",
+        reason="share of the largest predicted gain from which a pair is fitted",
         origin="docs/decisions/0025",
     )
     wrong_together: tuple[tuple[str, str], ...] = setting(
