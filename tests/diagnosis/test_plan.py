@@ -71,9 +71,9 @@ def few():
     made = plan._parts
     kept: dict[str, Any] = {}
 
-    def once(rig, blocks, experiment, starts, noise):
+    def once(rig, blocks, experiment, starts, noise, settings):
         if experiment.name not in kept:
-            kept[experiment.name] = made(rig, blocks, experiment, starts, noise)
+            kept[experiment.name] = made(rig, blocks, experiment, starts, noise, settings)
         return kept[experiment.name]
 
     with pytest.MonkeyPatch.context() as patch:
