@@ -10,7 +10,7 @@ import pytest
 import pamrs
 from pamrs.cli import main
 from pamrs.diagnosis import DiagnosisSettings
-from pamrs.diagnosis.next_experiment import _plan as plan
+from pamrs.diagnosis.next_experiment import _planning as plan
 from pamrs.diagnosis.next_experiment import library, pressure_range
 from pamrs.effects import CATALOGUE, EFFECTS
 
@@ -71,13 +71,13 @@ def few():
     made = plan._parts
     kept: dict[str, Any] = {}
 
-    def once(rig, blocks, experiment, starts, noise):
+    def once(rig, blocks, experiment, starts, noise, settings):
         if experiment.name not in kept:
-            kept[experiment.name] = made(rig, blocks, experiment, starts, noise)
+            kept[experiment.name] = made(rig, blocks, experiment, starts, noise, settings)
         return kept[experiment.name]
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(plan, "library", lambda rig: pool)
+        patch.setattr(plan, "library", lambda *_: pool)
         patch.setattr(plan, "_parts", once)
         yield lambda *channels: pamrs.plan_diagnosis(pamrs.rigs.shoulder(), channels, experiments=["slow_triangle"])
 
@@ -124,7 +124,7 @@ def test_without_the_supply_the_arm_alone_is_left(few) -> None:
 def test_holds_on_both_sides_separate_a_leak_from_centre_leakage(monkeypatch: pytest.MonkeyPatch) -> None:
     rig = pamrs.rigs.shoulder()
     (both,) = pool = library(rig, SETTINGS.next_experiment, sample_time=0.01, only=["holds_both_sides"])
-    monkeypatch.setattr(plan, "library", lambda rig: pool)
+    monkeypatch.setattr(plan, "library", lambda *_: pool)
     leaks = {name: EFFECTS[name] for name in ("leak_muscle", "valve_centre_leakage")}
     monkeypatch.setattr(plan, "CATALOGUE", leaks)
     quiet = {"muscle_pressure": 20.0, "supply_pressure": 20.0, "joint_angle": 1e-4}

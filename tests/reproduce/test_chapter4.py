@@ -104,7 +104,7 @@ def test_a_lift_of_a_batch_is_the_one_alone():
 
 def test_a_plant_hides_its_effects_and_shares_its_valve():
     variant = VARIANTS["damping 6000 N s/m, valve 4.2 mm2"]
-    rig, model = lift.plant(variant, 20.0), lift.believed(variant)
+    rig, model = lift.plant(variant, 20.0), lift.assumed(variant)
     assert [effect["id"] for effect in rig.effects] == ["muscle_rate_damping"]
     assert model.effects == []
     for one in (rig, model):
@@ -141,7 +141,7 @@ def test_a_map_has_the_metrics_of_its_loops_in_both_units():
 
 def test_records_for_the_diagnosis_have_what_is_measured():
     name = chapter4.DAMPED
-    truth, model = lift.plant(VARIANTS[name], PAYLOADS[1], seed=None), lift.believed().with_parameters({"arm.payload": PAYLOADS[1]})
+    truth, model = lift.plant(VARIANTS[name], PAYLOADS[1], seed=None), lift.assumed().with_parameters({"arm.payload": PAYLOADS[1]})
     one, again = (lift_diagnosis.recorded(truth, model, PATH, "fit", 3, 1.0) for _ in range(2))
     assert {"valve_command", "supply_pressure", "muscle_pressure", "joint_angle"} <= set(one.channels)
     np.testing.assert_array_equal(one.channels["joint_angle"], again.channels["joint_angle"])

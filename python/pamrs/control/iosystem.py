@@ -48,8 +48,8 @@ def iosystem(
     -------
     control.NonlinearIOSystem
         Inputs and outputs have the names of the channels, of a named block ``joint_angle_elbow``, as python-control allows no dot.
-        Its states are ``x[0] ...``: the physical ones first (absolute pressures), then memories and balances; :func:`initial_state` makes
-        them from initial values by name.
+        Its states are ``x[0] ...``: the physical ones first (absolute pressures), then memories and balances; :func:`initial_state`
+        makes them from initial values by name.
 
     Raises
     ------

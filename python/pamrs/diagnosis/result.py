@@ -70,14 +70,15 @@ class Diagnosis(Findings):
     blocks : list of BlockVerdict
         The verdict of each group of blocks: ``blocks`` (their names), ``verdict``, ``probabilities``, ``effects``,
         ``wrong_parameters``, ``ambiguity``, and ``mismatch``: for each block its ``channel``, ``unit``, and ``fitted`` and ``held_out``
-        {before, refit, after: {noises, size, more_than_noise}}, what is more than noise in units of the noise and in SI.
+        {before, refit, after: {noises, size, more_than_noise}}, the residual above the noise, in units of the noise and in SI.
     unexplained : list of Unexplained
-        Blocks that keep a mismatch: ``block``, ``channel``, ``unit``, ``noises``, ``size`` (SI), and the ``verdict`` of their group.
+        Blocks with a mismatch that stays unexplained: ``block``, ``channel``, ``unit``, ``noises``, ``size`` (SI), and the
+        ``verdict`` of their group.
     wrong_parameters : list of WrongParameter
         Values of the rig file that are wrong: ``name``, ``block``, ``nominal``, ``tolerance``, ``value``, ``std``, ``interval`` (95 %),
         ``unit``, ``moved_sigmas``, ``probability``, and ``held_out`` {channel: {before, refit, after}}, the error as in ``fit``, SI.
     residuals : dict of str to BlockResidual
-        {block: {rms, noise, excess, p_value, channel}}, residual of each block's refitted baseline against its noise.
+        {block: {rms, noise, excess, p_value, channel}}, residual of each block's refitted baseline against the noise level.
     condition_map : ConditionMap or None
         ``x_label``, ``y_label``, ``x_edges`` (m+1,), ``y_edges`` (n+1,), ``z`` and ``z_after`` (n, m): mean
         residual in units of the noise, NaN where there are no data; ``block``.
@@ -156,7 +157,7 @@ class Diagnosis(Findings):
             lines += ["", *textwrap.wrap(words.sentence_of(wrong), 96)]
         lines += self._summary_fit()
         for kept in self.unexplained:
-            lines += textwrap.wrap(f"Open: {words.kept_sentence(kept)}", 96, subsequent_indent="  ")
+            lines += textwrap.wrap(f"Unexplained: {words.kept_sentence(kept)}", 96, subsequent_indent="  ")
         if len(self.ambiguity) > 1:
             sets = "; ".join(words.set_label(s) for s in self.ambiguity)
             lines += ["", *textwrap.wrap(f"Not separable: {sets}.", 96, subsequent_indent="  ")]

@@ -114,7 +114,7 @@ class NextExperiment(Entry):
 
 @dataclass(frozen=True, eq=False)
 class BlockResidual(Entry):
-    """Residual of a block's refitted baseline against its noise.
+    """Residual of a block's refitted baseline against the noise level.
 
     Attributes
     ----------
@@ -179,7 +179,7 @@ class Tried(Entry):
     prior : float
         Sum of squares of the baseline's movement [tolerances].
     suspects : list of str
-        Blocks that kept an excess.
+        Blocks whose residual exceeds the noise.
     gain : float
         Gain in chi-square that the screen predicted.
     """

@@ -230,14 +230,14 @@ class BlockVerdict(Entry):
 
 @dataclass(frozen=True, eq=False)
 class Unexplained(Entry):
-    """A block that keeps a mismatch.
+    """A block with a mismatch that stays unexplained.
 
     Attributes
     ----------
     block, channel, unit : str
         The block, the channel that it predicts, and its SI unit.
     noises, size : float
-        How much, in units of the noise and in the unit of the channel.
+        How large it is, in units of the noise and in the unit of the channel.
     verdict : str
         Of its group of blocks.
     """

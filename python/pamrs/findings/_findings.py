@@ -36,7 +36,7 @@ class Findings:
     blocks : list of BlockVerdict
         The verdict of each group of blocks.
     unexplained : list of Unexplained
-        Blocks that keep a mismatch, the largest first.
+        Blocks with a mismatch that stays unexplained, the largest first.
     wrong_parameters : list of WrongParameter
         Values of the rig file that are wrong.
     parameters : dict of str to ParameterFound
@@ -56,7 +56,7 @@ class Findings:
     traces : list of Trace
         Measured and simulated channels.
     residuals : dict of str to BlockResidual
-        Residual of each block's refitted baseline against its noise.
+        Residual of each block's refitted baseline against the noise level.
     condition_map : ConditionMap or None
         Mean residual over two conditions.
     timings : dict
@@ -87,7 +87,7 @@ class Findings:
     )
     unexplained: list[Unexplained] = field(
         default_factory=list,
-        metadata=told("blocks that keep a mismatch, the largest first", required=False),
+        metadata=told("blocks with a mismatch that stays unexplained, the largest first", required=False),
     )
     wrong_parameters: list[WrongParameter] = field(
         default_factory=list,

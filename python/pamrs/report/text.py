@@ -201,7 +201,7 @@ def _spoken(name: str) -> str:
 
 
 def headline(diagnosis: Findings) -> str:
-    """One sentence that states the verdict: what was found in each block, then what stays open."""
+    """One sentence that states the verdict: what was found in each block, then what stays unexplained."""
     blocks = _blocks(diagnosis)
     named = [b for b in blocks if b.effects or b.wrong_parameters]
     doubtful = [b for b in blocks if b.verdict == "unlisted" and len(b.ambiguity) > 1]

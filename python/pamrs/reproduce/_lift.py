@@ -32,7 +32,7 @@ __all__ = [
     "Lifts",
     "Map",
     "Variant",
-    "believed",
+    "assumed",
     "fuzzy_map",
     "lifts",
     "pid_map",
@@ -136,7 +136,7 @@ def trajectory() -> Trajectory:
     return lift_hold_return(*degrees(LOW, HIGH), delay=5.0)
 
 
-def believed(variant: Variant = VARIANTS["the rig"]) -> Rig:
+def assumed(variant: Variant = VARIANTS["the rig"]) -> Rig:
     """The rig as the controllers know it."""
     return named("elbow").with_parameters(variant.known)
 
@@ -157,7 +157,7 @@ def plant(variant: Variant = VARIANTS["the rig"], payload: float = PAYLOADS[1], 
     -------
     Rig
     """
-    rig = perturbed(believed(variant).with_parameters({"arm.payload": payload}), seed).with_parameters(variant.hidden)
+    rig = perturbed(assumed(variant).with_parameters({"arm.payload": payload}), seed).with_parameters(variant.hidden)
     if variant.regulated:
         model = rig.model
         fed = {**named("regulated_joint").model["supply"], "initial_pressure": model["supply"]["initial_pressure"]}
@@ -303,7 +303,7 @@ def _run(
         rigs += made[i * len(payloads) : (i + 1) * len(payloads)] * len(gains)
     each = [values for _ in members for values in gains.values() for _ in payloads]
     mass = np.array([m for _ in members for _ in gains for m in payloads])
-    path, base = trajectory(), believed(VARIANTS[members[0]])
+    path, base = trajectory(), assumed(VARIANTS[members[0]])
     run = sweep(
         rigs,
         _controller(each, base, mass, anti_windup),

@@ -10,7 +10,7 @@ import numpy as np
 from pamrs.control import AirModel, ArmModel, Feedforward, Fuzzy, Parallel, closed_loop
 from pamrs.control.trajectories import Trajectory, compound, cosine_cycles, degrees
 from pamrs.recordings import Case, Recording
-from pamrs.reproduce._lift import GAINS, HIGH, LOW, PAYLOADS, PERIOD, VARIANTS, believed, plant, trajectory
+from pamrs.reproduce._lift import GAINS, HIGH, LOW, PAYLOADS, PERIOD, VARIANTS, assumed, plant, trajectory
 from pamrs.rig import Rig
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ def recorded(truth: Rig, model: Rig, path: Trajectory, role: str, seed: int, dur
     Parameters
     ----------
     truth, model : Rig
-        The plant, and what the controller believes.
+        The plant, and what the controller assumes.
     path : Trajectory
         What it follows.
     role : {"fit", "held_out"}
@@ -74,7 +74,7 @@ def diagnosed(name: str, *, payload: float = PAYLOADS[1], duration: float = 25.0
     from pamrs.diagnosis import diagnose
 
     truth = plant(VARIANTS[name], payload, seed=None)
-    model = believed(VARIANTS[name]).with_parameters({"arm.payload": payload})
+    model = assumed(VARIANTS[name]).with_parameters({"arm.payload": payload})
     paths = (("fit", trajectory()), ("fit", cosine_cycles(*degrees(LOW, HIGH), rise=3.0, hold=2.0)), ("held_out", compound()))
     records = [recorded(truth, model, path, role, seed, duration) for seed, (role, path) in enumerate(paths)]
     return diagnose(Case("chapter4", model, records, Path()))

@@ -106,9 +106,9 @@ def weigh(
     Between sets: the logarithm of what each leaves of the mismatch, fitted and held out, on a nominal number of independent looks;
     what the form of an equation may leave (``form_share`` of the settings) is granted to all of them, so that no second effect is
     asked for to mend the form of the first; among sets of as many effects less is granted (``form_share_alike``). What is left of a
-    mismatch near the noise counts by what noise could leave of it. Each parameter and each further effect has
-    its price, and so have a clock that does not drift and values that an effect hardly has (:func:`unlikely`). Against ``unlisted``: the share of the mismatch that
-    the set explains where it explains least, and whether its size is the same in all recordings; improbable sets
+    mismatch near the noise counts by what noise could leave of it. Each parameter and each further effect has its price, and so
+    have a clock that does not drift and values that an effect hardly has (:func:`unlikely`). Against ``unlisted``: the share of the
+    mismatch that the set explains where it explains least, and whether its size is the same in all recordings; improbable sets
     themselves say nothing against one that is. The constants are those under which the stated probabilities came true in a trial
     with other seeds than the published one (docs/decisions/0014).
 

@@ -60,7 +60,7 @@ def _sizes(block: Block, problem: Problem, found: Stages, noise_level: dict[Key,
 
 
 def unexplained(judged: list[Judged], entries: list[BlockVerdict]) -> list[Unexplained]:
-    """Blocks that keep a mismatch beside what is named, or without a name, the largest first.
+    """Blocks with a mismatch beside what is named, or without a name, the largest first.
 
     Parameters
     ----------

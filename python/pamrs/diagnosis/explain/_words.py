@@ -179,14 +179,14 @@ def _instead(value: float, before: float, unit: str) -> str:
 
 
 def _beside(diagnosis: Findings, missing: list[BlockVerdict], forms: list[str], *, sought: bool) -> str:
-    """What stays open beside a name: sets that are left, and blocks that keep a mismatch without one."""
+    """What stays unexplained beside a name: sets that are left, and blocks with a mismatch without a name."""
     text = _unsettled(diagnosis)
     if not missing:
         return text
     kept = [u for u in diagnosis.unexplained if u.verdict == "unlisted"]
     blocks = " and ".join(name for b in missing for name in b.blocks)
     said = [_capital(kept_sentence(u)) + "." for u in kept] or [f"No listed effect explains the residual in {blocks}."]
-    text += "\n\nWhat stays open. " + " ".join(said)
+    text += "\n\nWhat stays unexplained. " + " ".join(said)
     if forms:
         text += " The model contains it as a form without a name: " + " ".join(forms)
     else:
@@ -238,7 +238,7 @@ def same_data(ambiguity: list[list[str]]) -> str:
 def next_experiment(
     kind: str, probabilities: dict[str, float], ambiguity: list[list[str]], rig: Rig, missing: Sequence[str] = ()
 ) -> NextExperiment:
-    """What to record next: the experiment that separates the leading hypotheses, or tells of blocks that keep something without a name.
+    """What to record next: the experiment that separates the leading hypotheses, or describes blocks with a mismatch that has no name.
 
     It is not simulated, so that nothing is said of how much it would tell.
     """

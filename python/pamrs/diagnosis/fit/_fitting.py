@@ -389,12 +389,12 @@ def fit(
     count = len(baseline)
     bound = np.array([0.0 if name in freed else 1.0 for name in baseline])
     kept = _jacobian_of(warm, baseline) if frozen and warm is not None else None
-    asked = scaling.names if kept is None else list(starts)
+    wanted = scaling.names if kept is None else list(starts)
     prior = np.zeros((count, len(scaling.names)))
     prior[:, :count] = np.diag(bound)
 
     def evaluate(x: Array) -> tuple[Array, Array, dict[Key, Residual]]:
-        found = residuals(problem, scaling.rig(x, fixed or {}), asked, events)
+        found = residuals(problem, scaling.rig(x, fixed or {}), wanted, events)
         if kept is not None:
             found = {key: replace(r, jacobian=_beside(kept[key], r.jacobian)) for key, r in found.items()}
         rows, slope = stacked(problem, found, inflation)

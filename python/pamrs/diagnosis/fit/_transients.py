@@ -2,7 +2,7 @@
 
 No parameter that all recordings share can describe them. In each recording a pulse or a step of a typical size is moved through
 time; where its signature takes most of the residual a fit begins. On a held-out recording the times are looked for again, since
-nothing can predict them; what the event is (a mass) is not. Pushes have no property that carries over, so that they are believed
+nothing can predict them; what the event is (a mass) is not. Pushes have no property that carries over, so they are accepted
 only if little is left.
 """
 

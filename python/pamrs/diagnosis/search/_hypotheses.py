@@ -238,7 +238,7 @@ def _hypotheses(
 
 
 def _settles(candidate: Candidate, trial: Attempts, start: Candidate) -> bool:
-    """Whether a hypothesis leaves so little that no pair can be asked for.
+    """Whether a hypothesis leaves so little that no pair can be called for.
 
     What a single effect leaves may be no more than the difference between its equation and the truth.
     """
@@ -494,7 +494,7 @@ def _pairs(trial: Attempts, screened: Screen, start: Candidate, singles: list[Ca
         partners = [scores[0] for scores in by_effect(screened.scores(stand, without=single.effects)).values()]
         least = max(settings.least_gain, settings.partner_share * mismatch)
         best = [score for score in partners if score.gain > least][: settings.most_partners]
-        # what one block keeps may be little beside what another one had: an effect of that block alone is asked for by itself
+        # what is left in one block may be little beside what another one had: an effect of that block alone is tested by itself
         for block in _untouched(single, start, trial):
             there = [s for s in partners if [b for b in trial.suspects if acts_in(s.effect, b)] == [block]]
             own = [s for s in there if s.gain > settings.least_gain]
