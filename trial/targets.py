@@ -18,8 +18,8 @@ SEEN = 3.0
 class Target:
     """One target and its measurement.
 
-    `measured` is None where no case of that class exists; `interval` is that of 95 %, `share` the hits and cases of a share.
-    `least` tells whether the target is a lower bound.
+    `measured` is None where no case of that class exists; `interval` is that of 95 %, `share` the
+    hits and cases of a share. `least` tells whether the target is a lower bound.
     """
 
     name: str
@@ -62,13 +62,19 @@ def wilson(hits: int, cases: int, z: float = 1.959964) -> tuple[float, float]:
         raise ValueError(f"{hits} of {cases} is no share")
     share, zz = hits / cases, z * z
     middle = (share + zz / (2.0 * cases)) / (1.0 + zz / cases)
-    half = z / (1.0 + zz / cases) * math.sqrt(share * (1.0 - share) / cases + zz / (4.0 * cases * cases))
+    half = (
+        z
+        / (1.0 + zz / cases)
+        * math.sqrt(share * (1.0 - share) / cases + zz / (4.0 * cases * cases))
+    )
     low = 0.0 if hits == 0 else max(middle - half, 0.0)
     return low, 1.0 if hits == cases else min(middle + half, 1.0)
 
 
 def median_interval(values: Sequence[float]) -> tuple[float, float] | None:
-    """Interval of at least 95 % of the median by order statistics (binomial); None below six values."""
+    """Interval of at least 95 % of the median by order statistics (binomial); None below six
+    values.
+    """
     n = len(values)
     ordered = sorted(values)
     below, k = 0.5**n, 0
@@ -140,9 +146,10 @@ def _right(row: Row) -> bool:
 def targets(scores: Scores, catalogue: Sequence[str] = LISTED) -> list[Target]:
     """Every target of the proof against the rows of a trial.
 
-    What can be meant two ways is given both ways: over all cases, weak ones that nobody can find included, and over those
-    of which a refit of the parameters leaves 3 times the noise. A missing result is a miss, and a case whose gap was not closed
-    because nothing was named counts with a gap closed of 0.
+    What can be meant two ways is given both ways: over all cases, weak ones that nobody can find
+    included, and over those of which a refit of the parameters leaves 3 times the noise. A missing
+    result is a miss, and a case whose gap was not closed because nothing was named counts with a
+    gap closed of 0.
     """
     rows, sheet = scores.rows, _Sheet()
     listed = [r for r in rows if r.ids and all(i in catalogue for i in r.ids)]

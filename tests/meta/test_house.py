@@ -49,10 +49,14 @@ def test_every_argument_is_documented(name):
     function = CALLABLES[name]
     text = inspect.getdoc(function)
     assert text, f"{name} has no docstring"
-    arguments = [word for word in inspect.signature(function).parameters if word not in ("self", "cls")]
+    arguments = [
+        word for word in inspect.signature(function).parameters if word not in ("self", "cls")
+    ]
     if not arguments:
         return
-    section = re.search(r"^Parameters\n-{3,}\n(.*?)(?=^\w[^\n]*\n-{3,}$|\Z)", text, re.MULTILINE | re.DOTALL)
+    section = re.search(
+        r"^Parameters\n-{3,}\n(.*?)(?=^\w[^\n]*\n-{3,}$|\Z)", text, re.MULTILINE | re.DOTALL
+    )
     assert section, f"{name}: the docstring has no Parameters section"
     documented = set()
     for line in section[1].splitlines():
@@ -99,7 +103,8 @@ def test_public_names_exist():
 
 
 MOST_LINES = 60
-#: Functions that may be longer, as file and name. Those of the diagnosis are still to be taken apart.
+#: Functions that may be longer, as file and name. Those of the diagnosis are still to be taken
+#: apart.
 LONGER = {
     ("python/pamrs/diagnosis/explain/_words.py", "where"),
     ("python/pamrs/diagnosis/search/_closure.py", "_select"),
@@ -107,7 +112,9 @@ LONGER = {
 
 
 def functions(path):
-    """Name and lines of code of every function: without its signature, docstring, comments and blank lines, as clippy counts."""
+    """Name and lines of code of every function: without its signature, docstring, comments and
+    blank lines, as clippy counts.
+    """
     text = path.read_text(encoding="utf-8")
     lines = text.splitlines()
     for node in ast.walk(ast.parse(text)):
@@ -115,7 +122,10 @@ def functions(path):
             continue
         body = node.body[ast.get_docstring(node) is not None :]
         own = lines[body[0].lineno - 1 : node.end_lineno] if body else []
-        yield node.name, sum(bool(line.strip()) and not line.strip().startswith("#") for line in own)
+        yield (
+            node.name,
+            sum(bool(line.strip()) and not line.strip().startswith("#") for line in own),
+        )
 
 
 def test_functions_can_be_read_in_one_sitting():
@@ -132,7 +142,10 @@ def test_functions_can_be_read_in_one_sitting():
 def test_lock_pins_every_dependency():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     lock = (ROOT / "requirements-dev.lock").read_text(encoding="utf-8")
-    wanted = [*project["dependencies"], *chain.from_iterable(project["optional-dependencies"].values())]
+    wanted = [
+        *project["dependencies"],
+        *chain.from_iterable(project["optional-dependencies"].values()),
+    ]
 
     def plain(name):
         return re.sub(r"[-_.]+", "-", name).lower()

@@ -10,7 +10,15 @@ which they become JSON, `object_of`, `reference` and `DEFINITIONS`, by which a s
 
 from __future__ import annotations
 
-from pamrs.findings._details import BlockResidual, ConditionMap, Curves, NextExperiment, RankedExperiment, Tested, Tried
+from pamrs.findings._details import (
+    BlockResidual,
+    ConditionMap,
+    Curves,
+    NextExperiment,
+    RankedExperiment,
+    Tested,
+    Tried,
+)
 from pamrs.findings._entries import (
     VERDICTS,
     BlockMismatch,

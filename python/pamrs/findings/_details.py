@@ -1,4 +1,6 @@
-"""What stands beside the answer: the next experiment, residuals, conditions, everything that was tried."""
+"""What stands beside the answer: the next experiment, residuals, conditions, everything that was
+tried.
+"""
 
 from __future__ import annotations
 

@@ -5,7 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from pamrs.findings._details import BlockResidual, ConditionMap, NextExperiment, Tested, Tried
-from pamrs.findings._entries import VERDICTS, BlockVerdict, EffectFound, FitErrors, ParameterFound, Unexplained, Where, WrongParameter
+from pamrs.findings._entries import (
+    VERDICTS,
+    BlockVerdict,
+    EffectFound,
+    FitErrors,
+    ParameterFound,
+    Unexplained,
+    Where,
+    WrongParameter,
+)
 from pamrs.findings._entry import told
 from pamrs.findings._trace import ModelFile, Trace
 
@@ -75,19 +84,27 @@ class Findings:
     case: str = field(metadata=told(json=False))
     verdict: str = field(metadata=told(enum=VERDICTS))
     where: Where = field(default_factory=Where)
-    effects: list[EffectFound] = field(default_factory=list, metadata=told("the named physics, most probable first"))
+    effects: list[EffectFound] = field(
+        default_factory=list, metadata=told("the named physics, most probable first")
+    )
     ambiguity: list[list[str]] = field(
         default_factory=list,
         metadata=told("sets of effects that the data cannot separate; empty when settled"),
     )
-    probabilities: dict[str, float] = field(default_factory=dict, metadata=told("over all hypotheses", kind="probability"))
+    probabilities: dict[str, float] = field(
+        default_factory=dict, metadata=told("over all hypotheses", kind="probability")
+    )
     blocks: list[BlockVerdict] = field(
         default_factory=list,
-        metadata=told("the verdict of each group of blocks that is judged by itself", required=False),
+        metadata=told(
+            "the verdict of each group of blocks that is judged by itself", required=False
+        ),
     )
     unexplained: list[Unexplained] = field(
         default_factory=list,
-        metadata=told("blocks with a mismatch that stays unexplained, the largest first", required=False),
+        metadata=told(
+            "blocks with a mismatch that stays unexplained, the largest first", required=False
+        ),
     )
     wrong_parameters: list[WrongParameter] = field(
         default_factory=list,

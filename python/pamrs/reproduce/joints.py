@@ -1,4 +1,5 @@
-"""The two joints of dissertation 3.5 (Tables 3.4 and 3.5): what is printed beside what the package gives.
+"""The two joints of dissertation 3.5 (Tables 3.4 and 3.5): what is printed beside what the package
+gives.
 
 ``python -m pamrs.reproduce.joints`` prints both, and the search methods side by side.
 """
@@ -14,7 +15,15 @@ from typing import Final
 import numpy as np
 
 from pamrs.comparison import Comparison, judge, table
-from pamrs.design import LENGTHS, JointDesign, JointProblem, compare_methods, least_pressure, minimum_pressure, optimise
+from pamrs.design import (
+    LENGTHS,
+    JointDesign,
+    JointProblem,
+    compare_methods,
+    least_pressure,
+    minimum_pressure,
+    optimise,
+)
 from pamrs.library import entry
 from pamrs.units import to_si
 
@@ -24,12 +33,16 @@ _FOOT_POUND: Final = to_si(1.0, "ft lbf", "torque")
 _PSI: Final = to_si(1.0, "psi", "pressure")
 _INCH: Final = 0.0254
 
-#: Share of a torque or pressure within which "agree" is said, where both sides mean the same muscle.
+#: Share of a torque or pressure within which "agree" is said, where both sides mean the same
+#: muscle.
 _TOLERANCE: Final = 0.05
 
 _BRAID: Final = "braid's force alone"
 _MODULI = {
-    "shoulder": "the muscle's moduli are not published; the library's are chosen by 6.3 (850 N m at 13 bar, 90 deg)",
+    ("shoulder"): (
+        "the muscle's moduli are not published; the library's are chosen by 6.3 (850 N m at 13 "
+        "bar, 90 deg)"
+    ),
     "elbow": "the muscle's moduli are not published; the library's are a prior for its rubber",
 }
 
@@ -71,7 +84,13 @@ class PublishedCase:
         """The design problem in SI units, in the package's bounds (none are printed)."""
         first, last = (radians(value) for value in self.angles)
         return JointProblem(
-            entry(self.muscle).muscle, self.count, self.torque * _FOOT_POUND, first, last, self.pressure * _PSI, points=_points(self)
+            entry(self.muscle).muscle,
+            self.count,
+            self.torque * _FOOT_POUND,
+            first,
+            last,
+            self.pressure * _PSI,
+            points=_points(self),
         )
 
     def design(self, problem: JointProblem | None = None) -> JointDesign:
@@ -84,10 +103,15 @@ def _points(case: PublishedCase) -> int:
     return 1 + round(case.angles[1] - case.angles[0])
 
 
-#: The joints; the elbow's muscle is the 0.75-in one of Table 6.1, whose length (12.5 cm) is that of Table 3.5.
+#: The joints; the elbow's muscle is the 0.75-in one of Table 6.1, whose length (12.5 cm) is that of
+#: Table 3.5.
 CASES: Final = (
-    PublishedCase("shoulder", "pam_a_1in", 6, 788.0, (15.0, 120.0), 190.0, 10.88, (1.00, 1.08, 1.08, 0.19)),
-    PublishedCase("elbow", "pam_b_075in", 8, 362.0, (10.0, 80.0), 150.0, 4.94, (0.70, 0.70, 1.15, -0.20)),
+    PublishedCase(
+        "shoulder", "pam_a_1in", 6, 788.0, (15.0, 120.0), 190.0, 10.88, (1.00, 1.08, 1.08, 0.19)
+    ),
+    PublishedCase(
+        "elbow", "pam_b_075in", 8, 362.0, (10.0, 80.0), 150.0, 4.94, (0.70, 0.70, 1.15, -0.20)
+    ),
 )
 
 
@@ -104,13 +128,17 @@ def facts_of_geometry(case: PublishedCase) -> list[Comparison]:
     list of Comparison
     """
     problem, printed = case.problem(), case.design()
-    rows = [*_lengths(case, problem, printed), *_torques(case, problem, printed), *_pressures(case, problem)]
+    rows = [
+        *_lengths(case, problem, printed),
+        *_torques(case, problem, printed),
+        *_pressures(case, problem),
+    ]
     if case.name == "shoulder":
         # 6.3 states the torque at 13 bar up to 90 deg, of the same joint
         at = float(printed.joint.torque(problem.muscle, 13e5, radians(90.0), count=case.count))
         reason = (
-            "the dissertation against itself: 1068 N m to 120 deg in 3.5, 850 N m to 90 deg in 6.3; "
-            "the moduli follow 6.3"
+            "the dissertation against itself: 1068 N m to 120 deg in 3.5, 850 N m to 90 deg in "
+            "6.3; the moduli follow 6.3"
         )
         torque = case.torque * _FOOT_POUND
         say = _Speaker(case)
@@ -200,7 +228,9 @@ def _pressures(case: PublishedCase, problem: JointProblem) -> list[Comparison]:
     ]
 
 
-def facts_of_search(case: PublishedCase, *, seeds: int = 10, progress: Callable[[str], None] | None = None) -> list[Comparison]:
+def facts_of_search(
+    case: PublishedCase, *, seeds: int = 10, progress: Callable[[str], None] | None = None
+) -> list[Comparison]:
     """What the searches find; takes about half a minute.
 
     Parameters
@@ -223,39 +253,67 @@ def facts_of_search(case: PublishedCase, *, seeds: int = 10, progress: Callable[
     outer = minimum_pressure(problem)
     direct = least_pressure(problem)
     tell(f"{case.name}: with Table 3.5's lengths as least ones")
-    least = {name: (value * _INCH, problem.bounds[name][1]) for name, value in zip(LENGTHS[:3], case.lengths[:3], strict=True)}
+    least = {
+        name: (value * _INCH, problem.bounds[name][1])
+        for name, value in zip(LENGTHS[:3], case.lengths[:3], strict=True)
+    }
     second = least_pressure(problem.replace(bounds=least))
     tell(f"{case.name}: spread of the genetic algorithm")
     reachable = problem.replace(pressure=1.1 * (outer.pressure or problem.pressure))
     values = compare_methods(reachable, methods=("ga",), seeds=range(seeds)).fitness[0]
     best = optimise(reachable, "cma").scores.fitness[0]
     rows = []
-    for title, found in (("GA and bisection", outer.design if outer.met else None), ("direct search", direct)):
+    for title, found in (
+        ("GA and bisection", outer.design if outer.met else None),
+        ("direct search", direct),
+    ):
         value = np.nan if found is None else found.problem.pressure / _PSI
-        rows.append(say(f"minimum pressure, {title}", "psi", case.pressure, value, cannot_tell=unknown))
+        rows.append(
+            say(f"minimum pressure, {title}", "psi", case.pressure, value, cannot_tell=unknown)
+        )
     if direct is not None and second is not None:
         first, later = direct.problem.pressure / _PSI, second.problem.pressure / _PSI
         note = "3.5.2: enlarged parts 'required higher pressures'; least lengths = Table 3.5's"
         rows.append(say("minimum pressure with larger parts", "psi", first, later, "above", note))
-    note = f"3.5.2: runs 'consistently converged to the same final values'; ours by {seeds} seeds, 1.1 times the minimum pressure"
-    rows.append(say("worst J of the GA over the best known", "", 1.0, values.max() / best, tolerance=_TOLERANCE, note=note))
+    note = (
+        f"3.5.2: runs 'consistently converged to the same final values'; ours by {seeds} seeds, "
+        "1.1 times the minimum pressure"
+    )
+    rows.append(
+        say(
+            "worst J of the GA over the best known",
+            "",
+            1.0,
+            values.max() / best,
+            tolerance=_TOLERANCE,
+            note=note,
+        )
+    )
     return rows
 
 
 def _angle_needed(case: PublishedCase, problem: JointProblem, torque: float) -> str:
-    """The braid angle with which the rest torque is the wanted one, in words; empty where it is there already."""
+    """The braid angle with which the rest torque is the wanted one, in words; empty where it is
+    there already.
+    """
     from pamrs.library.evaluate import root_between
 
     if torque >= case.torque:
         return ""
     force = float(problem.muscle.force(problem.pressure, 0.0)) * case.torque / torque
     found = root_between(
-        lambda angle: float(problem.muscle.replace(braid_angle=angle).force(problem.pressure, 0.0)) - force,
+        lambda angle: (
+            float(problem.muscle.replace(braid_angle=angle).force(problem.pressure, 0.0)) - force
+        ),
         radians(60.0),
         radians(85.0),
     )
     given = np.degrees(problem.muscle.parameters["braid_angle"])
-    return "" if found is None else f"; a braid angle of {np.degrees(found):.1f} deg instead of {given:.4g} would give it"
+    return (
+        ""
+        if found is None
+        else f"; a braid angle of {np.degrees(found):.1f} deg instead of {given:.4g} would give it"
+    )
 
 
 def _others(case: PublishedCase, problem: JointProblem) -> list[tuple[str, JointProblem]]:
@@ -308,7 +366,10 @@ class _Speaker:
 
 if __name__ == "__main__":
     for case in CASES:
-        rows = [*facts_of_geometry(case), *facts_of_search(case, progress=lambda text: print(f"{text} ...", file=sys.stderr))]
+        rows = [
+            *facts_of_geometry(case),
+            *facts_of_search(case, progress=lambda text: print(f"{text} ...", file=sys.stderr)),
+        ]
         print(table(rows), end="\n\n")
         problem = case.problem()
         for pressure in (problem.pressure, 1.1 * problem.least_possible_pressure()):

@@ -1,10 +1,10 @@
 """Hypotheses, what speaks for each, and the verdict of each group of blocks.
 
-Public: `Candidate`, `Group`, `Attempts`, `significant`, `autocorrelation_of`, `without_autocorrelation`,
-`parts_of`, `start_of` (hypotheses and their fits); `weigh`, `explains`, `share_left`, `same_recordings`,
-`probability_cap`, `capped`, `penalty`, `price`, `stands`, `unlikely`,
-`visited`, `Ranges` (their weights); `Judged`, `judge`, `case_verdict`, `case_probabilities`, `case_ambiguity`, `is_parameter`,
-`symptoms_of` (verdicts).
+Public: `Candidate`, `Group`, `Attempts`, `significant`, `autocorrelation_of`,
+`without_autocorrelation`, `parts_of`, `start_of` (hypotheses and their fits); `weigh`, `explains`,
+`share_left`, `same_recordings`, `probability_cap`, `capped`, `penalty`, `price`, `stands`,
+`unlikely`, `visited`, `Ranges` (their weights); `Judged`, `judge`, `case_verdict`,
+`case_probabilities`, `case_ambiguity`, `is_parameter`, `symptoms_of` (verdicts).
 """
 
 from __future__ import annotations

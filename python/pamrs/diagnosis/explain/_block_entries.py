@@ -1,4 +1,6 @@
-"""What is said of each group of blocks: verdict, names, and how large its mismatch is before and after."""
+"""What is said of each group of blocks: verdict, names, and how large its mismatch is before and
+after.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,12 @@ Stages = dict[str, dict[Key, Residual]]
 
 
 def block_entries(
-    judged: list[Judged], fitted: Problem, fit_found: Stages, held: Problem, out_found: Stages, noise_level: dict[Key, NoiseLevel]
+    judged: list[Judged],
+    fitted: Problem,
+    fit_found: Stages,
+    held: Problem,
+    out_found: Stages,
+    noise_level: dict[Key, NoiseLevel],
 ) -> list[BlockVerdict]:
     """One entry for each group of blocks.
 
@@ -50,12 +57,18 @@ def block_entries(
     ]
 
 
-def _sizes(block: Block, problem: Problem, found: Stages, noise_level: dict[Key, NoiseLevel]) -> MismatchStages:
-    """What is more than noise at every stage: in noises, in the channel's unit, and whether noise could be so large."""
+def _sizes(
+    block: Block, problem: Problem, found: Stages, noise_level: dict[Key, NoiseLevel]
+) -> MismatchStages:
+    """What is more than noise at every stage: in noises, in the channel's unit, and whether noise
+    could be so large.
+    """
     sizes = {}
     for stage, residuals in found.items():
         told = excess(block, problem.recordings, residuals, noise_level, problem.settings.noise)
-        sizes[stage] = MismatchSize(told.systematic, told.systematic * told.noise, significant(told))
+        sizes[stage] = MismatchSize(
+            told.systematic, told.systematic * told.noise, significant(told)
+        )
     return MismatchStages(**sizes)
 
 
@@ -67,7 +80,8 @@ def unexplained(judged: list[Judged], entries: list[BlockVerdict]) -> list[Unexp
     judged : list of Judged
         The groups with their verdicts; blocks that were no suspects keep nothing.
     entries : list of BlockVerdict
-        From :func:`block_entries`. The size is that of the held-out recordings, where they show it, else of the fitted ones.
+        From :func:`block_entries`. The size is that of the held-out recordings, where they show it,
+        else of the fitted ones.
 
     Returns
     -------
@@ -76,14 +90,27 @@ def unexplained(judged: list[Judged], entries: list[BlockVerdict]) -> list[Unexp
     """
     found = []
     for j, entry in zip(judged, entries, strict=True):
-        if entry.verdict == "none" or (entry.verdict == "parameters" and not entry.wrong_parameters):
+        if entry.verdict == "none" or (
+            entry.verdict == "parameters" and not entry.wrong_parameters
+        ):
             continue
         suspects = {b.name for b in j.group.suspects}
         for block in (m for m in entry.mismatch if m.block in suspects):
             # a form without a name takes up what no name explains, and is no explanation
             stage = "refit" if entry.verdict == "unlisted" else "after"
-            sizes: list[MismatchSize] = [part[stage] for part in (block.held_out, block.fitted) if part is not None]
+            sizes: list[MismatchSize] = [
+                part[stage] for part in (block.held_out, block.fitted) if part is not None
+            ]
             left = next((size for size in sizes if size.more_than_noise), None)
             if left is not None:
-                found.append(Unexplained(block.block, block.channel, block.unit, left.noises, left.size, entry.verdict))
+                found.append(
+                    Unexplained(
+                        block.block,
+                        block.channel,
+                        block.unit,
+                        left.noises,
+                        left.size,
+                        entry.verdict,
+                    )
+                )
     return sorted(found, key=lambda u: -(u.noises or 0.0))

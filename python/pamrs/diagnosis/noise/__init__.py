@@ -1,6 +1,8 @@
-"""When a residual is more than noise: noise levels with the noise of the drives, excess over them, autocorrelation.
+"""When a residual is more than noise: noise levels with the noise of the drives, excess over them,
+autocorrelation.
 
-Public: `NoiseLevel`, `noise_levels`, `Excess`, `excess`, `bins_of`, `correlation_time`, `inflation`.
+Public: `NoiseLevel`, `noise_levels`, `Excess`, `excess`, `bins_of`, `correlation_time`,
+`inflation`.
 """
 
 from __future__ import annotations

@@ -1,4 +1,6 @@
-"""How much of a block's residual is more than noise: noise levels, excess, statistics of autocorrelated residuals."""
+"""How much of a block's residual is more than noise: noise levels, excess, statistics of
+autocorrelated residuals.
+"""
 
 from __future__ import annotations
 
@@ -34,7 +36,8 @@ class NoiseLevel:
     binned : float
         Standard deviation of bin means.
     scatter : float
-        Standard deviation, from one realisation of the noise to another, of the logarithm of the mean square of the bin means.
+        Standard deviation, from one realisation of the noise to another, of the logarithm of the
+        mean square of the bin means.
     """
 
     sample: float
@@ -55,9 +58,11 @@ class Excess:
     p_value : float
         Chance of such a ratio (above the margin) from noise, by the scatter of the noise levels.
     limit : float
-        Ratio that noise exceeds with the chance ``noise.chance`` of the settings, at most ``noise.most_limit``.
+        Ratio that noise exceeds with the chance ``noise.chance`` of the settings, at most
+        ``noise.most_limit``.
     scatter : float
-        Standard deviation of the ratio's logarithm from noise and from what noise levels are known to.
+        Standard deviation of the ratio's logarithm from noise and from what noise levels are known
+        to.
     rms, noise : float
         Residual and noise level of single samples, in the channel's unit.
     """
@@ -78,7 +83,8 @@ def bins_of(prepared: Prepared) -> int:
 
 
 def noise_levels(problem: Problem, core: _core.Rig) -> dict[Key, NoiseLevel]:
-    """Floors of all blocks and recordings, the drives' noise carried through the model by simulation.
+    """Floors of all blocks and recordings, the drives' noise carried through the model by
+    simulation.
 
     Parameters
     ----------
@@ -101,18 +107,30 @@ def noise_levels(problem: Problem, core: _core.Rig) -> dict[Key, NoiseLevel]:
             seen = counts > 0
             for _ in range(settings.noise.replicates if seen.any() else 0):
                 shaken = np.zeros(prepared.n)
-                with contextlib.suppress(SimulationError):  # a realisation that leaves the model's range tells nothing of the others
-                    shaken = change(block, core, _shaken(prepared, noisy, rng), base) - base.value if noisy else shaken
+                with contextlib.suppress(
+                    SimulationError
+                ):  # a realisation that leaves the model's range tells nothing of the others
+                    shaken = (
+                        change(block, core, _shaken(prepared, noisy, rng), base) - base.value
+                        if noisy
+                        else shaken
+                    )
                 means, _ = binned(shaken, rows, width)
                 own = rng.normal(0.0, base.noise, int(seen.sum())) / np.sqrt(counts[seen])
-                squares = [float(np.mean(v**2)) for v in (shaken[rows], means[seen], means[seen] + own)]
+                squares = [
+                    float(np.mean(v**2)) for v in (shaken[rows], means[seen], means[seen] + own)
+                ]
                 powers.append(squares)
             sample, drives, _ = np.mean(powers, axis=0) if powers else (0.0, 0.0, 0.0)
             white = float(np.mean(1.0 / counts[seen])) if seen.any() else 1.0
             # mean squares of few modes are skew, their logarithms hardly
-            scatter = float(np.std(np.log([both for *_, both in powers]), ddof=1)) if powers else 0.0
+            scatter = (
+                float(np.std(np.log([both for *_, both in powers]), ddof=1)) if powers else 0.0
+            )
             found[block.name, prepared.recording.name] = NoiseLevel(
-                math.sqrt(base.noise**2 + sample), math.sqrt(base.noise**2 * white + drives), scatter
+                math.sqrt(base.noise**2 + sample),
+                math.sqrt(base.noise**2 * white + drives),
+                scatter,
             )
     return found
 
@@ -153,7 +171,9 @@ def excess(
     if not ratios:
         return Excess(1.0, 0.0, 1.0, float("nan"), float("nan"), settings.margin)
     ratio = float(np.average(ratios, weights=weights))
-    share = float(np.mean([noise_level[key].binned ** 2 / noise_level[key].sample ** 2 for key in keys]))
+    share = float(
+        np.mean([noise_level[key].binned ** 2 / noise_level[key].sample ** 2 for key in keys])
+    )
     shares = np.array(weights) / sum(weights)
     # noise levels are means of as many realisations, and their scatter is known from no more
     pooled = math.sqrt(float(np.sum((shares * [noise_level[key].scatter for key in keys]) ** 2)))

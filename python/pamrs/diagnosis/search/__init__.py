@@ -1,7 +1,8 @@
-"""Hypotheses tried for a mismatch: effects alone and in pairs, wrong parameters, what is below the noise, forms without a name.
+"""Hypotheses tried for a mismatch: effects alone and in pairs, wrong parameters, what is below the
+noise, forms without a name.
 
-Public: `examine` (all of it, for some blocks), `refitted`, `with_autocorrelation` (the baseline alone), `find_closure`,
-`below_noise`, `freed`, `beside_quiet`, `suspected`.
+Public: `examine` (all of it, for some blocks), `refitted`, `with_autocorrelation` (the baseline
+alone), `find_closure`, `below_noise`, `freed`, `beside_quiet`, `suspected`.
 """
 
 from __future__ import annotations

@@ -20,7 +20,11 @@ from pamrs.diagnosis.settings._models import (
     ScreenSettings,
     TransientSettings,
 )
-from pamrs.diagnosis.settings._search import BelowNoiseSettings, SearchSettings, WrongParameterSettings
+from pamrs.diagnosis.settings._search import (
+    BelowNoiseSettings,
+    SearchSettings,
+    WrongParameterSettings,
+)
 from pamrs.diagnosis.settings._setting import SettingsGroup
 from pamrs.errors import ParameterError
 
@@ -120,10 +124,15 @@ class DiagnosisSettings:
         for name, group in _GROUPS.items():
             value = getattr(self, name)
             if not isinstance(value, group):
-                raise ParameterError(f"DiagnosisSettings.{name} is a {type(value).__name__}; a {group.__name__} is needed")
+                raise ParameterError(
+                    f"DiagnosisSettings.{name} is a {type(value).__name__}; a {group.__name__} is "
+                    "needed"
+                )
         seed = self.seed
         if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
-            raise ParameterError(f"DiagnosisSettings.seed = {seed!r} is not allowed: a whole number, 0 or more")
+            raise ParameterError(
+                f"DiagnosisSettings.seed = {seed!r} is not allowed: a whole number, 0 or more"
+            )
 
     def to_dict(self) -> dict[str, Any]:
         """The values by group and name, as JSON has them."""
@@ -147,9 +156,14 @@ class DiagnosisSettings:
         given: dict[str, Any] = {}
         for name, value in values.items():
             if name != "seed" and name not in _GROUPS:
-                raise ParameterError(f"settings has {name!r}, which is not allowed: one of {', '.join(_GROUPS)}, seed")
+                raise ParameterError(
+                    f"settings has {name!r}, which is not allowed: one of {', '.join(_GROUPS)}, "
+                    "seed"
+                )
             if name != "seed" and not isinstance(value, Mapping):
-                raise ParameterError(f"settings.{name} is a {type(value).__name__}; a table of values is needed")
+                raise ParameterError(
+                    f"settings.{name} is a {type(value).__name__}; a table of values is needed"
+                )
             given[name] = value if name == "seed" else _GROUPS[name].from_dict(value)
         return cls(**given)
 

@@ -17,7 +17,10 @@ class SearchSettings(SettingsGroup):
         2.0,
         unit="1",
         least=1.0,
-        reason="variance over that of the noise from which held-out recordings show a mismatch that the fitted ones hardly show",
+        reason=(
+            "variance over that of the noise from which held-out recordings show a mismatch that "
+            "the fitted ones hardly show"
+        ),
         origin="docs/decisions/0020",
     )
     fitted_hint: float = setting(
@@ -74,7 +77,13 @@ class SearchSettings(SettingsGroup):
         reason="share of the largest gain from which an effect is fitted",
         origin="judgement; docs/decisions/0013",
     )
-    most_singles: int = setting(5, unit="count", least=1, reason="single effects that are fitted", origin="docs/decisions/0013")
+    most_singles: int = setting(
+        5,
+        unit="count",
+        least=1,
+        reason="single effects that are fitted",
+        origin="docs/decisions/0013",
+    )
     near_start: float = setting(
         0.6,
         unit="1",
@@ -83,7 +92,13 @@ class SearchSettings(SettingsGroup):
         reason="share of an effect's best gain from which another of its starts is fitted",
         origin="judgement; docs/decisions/0013",
     )
-    most_starts: int = setting(2, unit="count", least=1, reason="starts of an effect that are fitted", origin="docs/decisions/0013")
+    most_starts: int = setting(
+        2,
+        unit="count",
+        least=1,
+        reason="starts of an effect that are fitted",
+        origin="docs/decisions/0013",
+    )
     effects_with_starts: int = setting(
         3,
         unit="count",
@@ -98,7 +113,9 @@ class SearchSettings(SettingsGroup):
         reason="single effects that get a partner",
         origin="judgement; docs/decisions/0013",
     )
-    most_partners: int = setting(2, unit="count", least=0, reason="partners of each", origin="judgement; docs/decisions/0013")
+    most_partners: int = setting(
+        2, unit="count", least=0, reason="partners of each", origin="judgement; docs/decisions/0013"
+    )
     partner_share: float = setting(
         0.01,
         unit="1",
@@ -110,14 +127,20 @@ class SearchSettings(SettingsGroup):
         0.15,
         unit="1",
         least=0.0,
-        reason="share of the mismatch that every persistent effect leaves, from which transient ones are looked for",
+        reason=(
+            "share of the mismatch that every persistent effect leaves, from which transient ones "
+            "are looked for"
+        ),
         origin="judgement",
     )
     transient_beside: float = setting(
         0.08,
         unit="1",
         least=0.0,
-        reason="share that the best persistent effect leaves, from which transient ones are looked for beside it",
+        reason=(
+            "share that the best persistent effect leaves, from which transient ones are looked "
+            "for beside it"
+        ),
         origin="docs/decisions/0020",
     )
     much_left: float = setting(
@@ -164,7 +187,9 @@ class BelowNoiseSettings(SettingsGroup):
         reason="share of the largest gain from which another effect is its rival",
         origin="judgement; docs/decisions/0020",
     )
-    most_fitted: int = setting(4, unit="count", least=1, reason="rivals that are fitted", origin="judgement")
+    most_fitted: int = setting(
+        4, unit="count", least=1, reason="rivals that are fitted", origin="judgement"
+    )
     held_out_share: float = setting(
         0.05,
         unit="1",
@@ -262,7 +287,13 @@ class WrongParameterSettings(SettingsGroup):
         reason="gain by the linear model from which a parameter is freed: twice file_log_odds",
         origin="docs/decisions/0025",
     )
-    most_pairs: int = setting(2, unit="count", least=0, reason="pairs of parameters that are fitted", origin="docs/decisions/0025")
+    most_pairs: int = setting(
+        2,
+        unit="count",
+        least=0,
+        reason="pairs of parameters that are fitted",
+        origin="docs/decisions/0025",
+    )
     pair_share: float = setting(
         0.08,
         unit="1",
@@ -279,6 +310,9 @@ class WrongParameterSettings(SettingsGroup):
             ("link.inertia", "link.mass"),
         ),
         unit="parameters",
-        reason="pairs that one mistake makes wrong together: another valve and fittings, another load, another arm",
+        reason=(
+            "pairs that one mistake makes wrong together: another valve and fittings, another "
+            "load, another arm"
+        ),
         origin="docs/decisions/0025",
     )
