@@ -138,9 +138,8 @@ def _fitness(axes: Axes, design: JointDesign) -> None:
         ha="right",
         color=_SERIES[0],
     )
-    axes.set(
-        xlabel=f"generation ({_NAMES[design.search.method].replace(chr(10), ' ')})", ylabel="J [J]"
-    )  # type: ignore[union-attr]
+    method = _NAMES[design.search.method].replace("\n", " ")  # type: ignore[union-attr]
+    axes.set(xlabel=f"generation ({method})", ylabel="J [J]")
     axes.legend(loc="upper right")
 
 

@@ -392,11 +392,8 @@ def _picture(
     own_settings = settings.plan
     if not used:
         return _Picture({e: Sight(e, 0.0) for e in effects}, {}, frozenset(), 0.0)
-    total = _Part(
-        sum(p.baseline for p in used.values()),
-        sum(p.mixed for p in used.values()),
-        sum(p.signatures for p in used.values()),
-    )  # type: ignore[arg-type]
+    shares = [(p.baseline, p.mixed, p.signatures) for p in used.values()]
+    total = _Part(*(np.asarray(sum(share)) for share in zip(*shares, strict=True)))
     freed = np.linalg.solve(total.baseline + np.eye(len(total.baseline)), total.mixed)
     gram = total.signatures - total.mixed.T @ freed
     sizes = {
