@@ -17,6 +17,7 @@ from pamrs.diagnosis.fit import Problem, fit, residuals
 from pamrs.diagnosis.next_experiment import library
 from pamrs.diagnosis.prepare import available_blocks, prepare
 from pamrs.errors import DiagnosisError
+from pamrs.findings import ChannelError
 from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
 
@@ -162,8 +163,8 @@ def test_pressures_that_begin_at_one_atmosphere_are_asked_about() -> None:
         )
         for zero in (0.0, 101325.0)
     ]
-    assert words.absolute(cases[0]) == []
-    (told,) = words.absolute(cases[1])
+    assert words.absolute(cases[0], SETTINGS.warnings) == []
+    (told,) = words.absolute(cases[1], SETTINGS.warnings)
     assert "absolute pressures" in told
 
 
@@ -172,6 +173,8 @@ def test_a_channel_that_a_new_model_spoils_is_told() -> None:
         "muscle_pressure": {"noise": 400.0, "before": 7500.0, "refit": 26900.0, "after": 8910.0},
         "joint_angle": {"noise": 1e-3, "before": 1e-2, "refit": 5e-3, "after": 1e-3},
     }
-    (told,) = words.worse(table | {"muscle_pressure": table["muscle_pressure"] | {"after": 9100.0}})
+    channels = {name: ChannelError(**row) for name, row in table.items()}
+    spoiled = replace(channels["muscle_pressure"], after=9100.0)
+    (told,) = words.worse({**channels, "muscle_pressure": spoiled}, SETTINGS.warnings)
     assert "muscle pressure by 9.10 kPa, the nominal one by 7.50 kPa" in told
-    assert words.worse({"joint_angle": table["joint_angle"]}) == []
+    assert words.worse({"joint_angle": channels["joint_angle"]}, SETTINGS.warnings) == []

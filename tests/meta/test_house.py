@@ -102,12 +102,11 @@ def test_public_names_exist():
         assert getattr(pamrs, name) is not None
 
 
-MOST_LINES = 60
-#: Functions that may be longer, as file and name. Those of the diagnosis are still to be taken
-#: apart.
+MOST_LINES = 70
+#: Functions that may be longer, as file and name: lists of pictures, one entry after the other.
 LONGER = {
-    ("python/pamrs/diagnosis/explain/_words.py", "where"),
-    ("python/pamrs/diagnosis/search/_closure.py", "_select"),
+    ("python/pamrs/reproduce/_chapter3_figures.py", "_pictures"),
+    ("python/pamrs/reproduce/_chapter5_figures.py", "_pictures"),
 }
 
 
