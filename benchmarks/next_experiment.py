@@ -1,9 +1,11 @@
 """How many more recordings a question needs: the proposed experiment against one drawn at random.
 
-Each line is a question that one recording leaves open: two or three effects are fitted to it, all fit. The truth is a plant with one
-of them and with baseline parameters drawn inside their tolerances. Experiments are then made one after the other, chosen either by
-the expected information (as :func:`pamrs.diagnosis.next_experiment.propose` does) or at random from the same library, and the
-hypotheses are weighed by the same likelihood each time, until one is above 0.95. Everything is simulated by the core.
+Each line is a question that one recording leaves open: two or three effects are fitted to it, all
+fit. The truth is a plant with one of them and with baseline parameters drawn inside their
+tolerances. Experiments are then made one after the other, chosen either by the expected information
+(as :func:`pamrs.diagnosis.next_experiment.propose` does) or at random from the same library, and
+the hypotheses are weighed by the same likelihood each time, until one is above 0.95. Everything is
+simulated by the core.
 
 Run it with ``python -m benchmarks.next_experiment``; numbers of lines as arguments choose some.
 """
@@ -58,24 +60,51 @@ class Question:
 
 
 QUESTIONS = (
-    Question("slow_triangle", "valve_centre_leakage", {"conductance": 4e-12}, ("leak_muscle", "valve_dead_zone")),
-    Question("slow_triangle", "muscle_creep", {"stiffness": 60.0, "time_constant": 2.0}, ("muscle_hysteresis", "muscle_rate_damping")),
+    Question(
+        "slow_triangle",
+        "valve_centre_leakage",
+        {"conductance": 4e-12},
+        ("leak_muscle", "valve_dead_zone"),
+    ),
+    Question(
+        "slow_triangle",
+        "muscle_creep",
+        {"stiffness": 60.0, "time_constant": 2.0},
+        ("muscle_hysteresis", "muscle_rate_damping"),
+    ),
     Question(
         "staircase",
         "muscle_hysteresis",
         {"friction_constant": 0.1, "friction_pressure": 1e-6},
         ("joint_coulomb_stribeck", "muscle_creep"),
     ),
-    Question("slow_triangle", "pressure_lag", {"time_constant": 0.004}, ("input_path_lag", "clock_skew")),
-    Question("slow_triangle", "mullins_softening", {"softening": 0.01}, ("muscle_creep", "muscle_hysteresis")),
+    Question(
+        "slow_triangle", "pressure_lag", {"time_constant": 0.004}, ("input_path_lag", "clock_skew")
+    ),
+    Question(
+        "slow_triangle",
+        "mullins_softening",
+        {"softening": 0.01},
+        ("muscle_creep", "muscle_hysteresis"),
+    ),
     Question(
         "slow_triangle",
         "pam_crowding_contact",
         {"contact_area": 5e-5, "onset_contraction": 0.1},
         ("joint_end_stop", "activation_pressure"),
     ),
-    Question("staircase", "valve_hysteresis", {"half_width": 0.0002}, ("valve_dead_zone", "input_path_lag")),
-    Question("slow_triangle", "leak_muscle", {"conductance": 1e-11}, ("valve_centre_leakage", "supply_leak")),
+    Question(
+        "staircase",
+        "valve_hysteresis",
+        {"half_width": 0.0002},
+        ("valve_dead_zone", "input_path_lag"),
+    ),
+    Question(
+        "slow_triangle",
+        "leak_muscle",
+        {"conductance": 1e-11},
+        ("valve_centre_leakage", "supply_leak"),
+    ),
 )
 """Sizes are halved until one recording does leave the question open."""
 
@@ -84,19 +113,36 @@ def drawn(rig: Rig, rng: np.random.Generator) -> Rig:
     """The rig with its baseline parameters somewhere inside their tolerances."""
     known = rig.parameters
     names = free_baseline(problem_of(rig, [], MEASURABLE, SETTINGS), rig)
-    return rig.with_parameters({n: known[n].value + 0.5 * known[n].tol * float(rng.standard_normal()) for n in names})
+    return rig.with_parameters(
+        {n: known[n].value + 0.5 * known[n].tol * float(rng.standard_normal()) for n in names}
+    )
 
 
-def fitted(problem: Problem, nominal: Rig, effect: str, weights: dict[tuple[str, str], float]) -> Fit | None:
+def fitted(
+    problem: Problem, nominal: Rig, effect: str, weights: dict[tuple[str, str], float]
+) -> Fit | None:
     """One effect fitted from its starts, on the effective number of samples."""
     (prepared,) = problem.recordings
     bins = prepared.n // bin_width(prepared, SETTINGS.noise.fit_bin_time)
     counted = 5.0 * SETTINGS.next_experiment.effective_samples
-    inflation = {b.name: weights[b.name, prepared.recording.name] ** 2 * bins / counted for b in problem.blocks}
+    inflation = {
+        b.name: weights[b.name, prepared.recording.name] ** 2 * bins / counted
+        for b in problem.blocks
+    }
     found = []
     for start in starts_of(effect, sealed=False):
         try:
-            found.append(fit(problem, nominal, (effect,), start.scaled(0.2).free, inflation, fixed=start.held, evaluations=8))
+            found.append(
+                fit(
+                    problem,
+                    nominal,
+                    (effect,),
+                    start.scaled(0.2).free,
+                    inflation,
+                    fixed=start.held,
+                    evaluations=8,
+                )
+            )
         except SimulationError:
             continue
     return min(found, key=lambda f: f.cost) if found else None
@@ -108,20 +154,28 @@ def normalised(logs: Array) -> Array:
     return np.asarray(weights / weights.sum(), dtype=np.float64)
 
 
-def likelihoods(experiment: Experiment, truth: Rig, hypotheses: list[Hypothesis], rng: np.random.Generator) -> Array:
-    """Logarithm of the likelihood of each hypothesis for the experiment on the truth, with noise."""
+def likelihoods(
+    experiment: Experiment, truth: Rig, hypotheses: list[Hypothesis], rng: np.random.Generator
+) -> Array:
+    """Logarithm of the likelihood of each hypothesis for the experiment on the truth, with
+    noise.
+    """
     real = taken(experiment.simulate(truth), truth, experiment.name, NOISE, SETTINGS, rng=rng)
     out = []
     for _, rig, _ in hypotheses:
         changed = experiment.changed(rig)
         problem = problem_of(changed, [real], MEASURABLE, SETTINGS)
-        out.append(-0.5 * misfit(problem, linear(problem, changed), weights_of(problem, changed)).total)
+        out.append(
+            -0.5 * misfit(problem, linear(problem, changed), weights_of(problem, changed)).total
+        )
     return np.array(out)
 
 
 @dataclass(frozen=True)
 class Case:
-    """A question with the size at which it is open, its true plant, and the hypotheses after one recording."""
+    """A question with the size at which it is open, its true plant, and the hypotheses after one
+    recording.
+    """
 
     question: Question
     size: float
@@ -130,14 +184,18 @@ class Case:
     prior: Array
 
 
-def opened(question: Question, nominal: Rig, experiments: list[Experiment], rng: np.random.Generator) -> Case:
+def opened(
+    question: Question, nominal: Rig, experiments: list[Experiment], rng: np.random.Generator
+) -> Case:
     """The question with its sizes halved until one recording leaves it open."""
     plant = drawn(nominal, rng)
     first = next(e for e in experiments if e.name == question.first)
     size = 2.0
     while True:
         size *= 0.5
-        scaled = {n.partition(".")[2] for s in starts_of(question.truth, sealed=False) for n in s.sizes}
+        scaled = {
+            n.partition(".")[2] for s in starts_of(question.truth, sealed=False) for n in s.sizes
+        }
         parameters = {n: v * size if n in scaled else v for n, v in question.parameters.items()}
         truth = plant.with_effect(question.truth, parameters)
         seen = taken(first.simulate(truth), truth, first.name, NOISE, SETTINGS, rng=rng)
@@ -157,7 +215,9 @@ def explained(question: Question, nominal: Rig, problem: Problem) -> tuple[list[
         if found is None:
             continue
         entry = next(e for e in found.rig.effects if e["id"] == effect)
-        std = {n.partition(".")[2]: s for n, s in found.std.items() if n.partition(".")[0] == effect}
+        std = {
+            n.partition(".")[2]: s for n, s in found.std.items() if n.partition(".")[0] == effect
+        }
         fits.append((effect, found.rig.with_effect(effect, entry["parameters"], std=std)))
         logs.append(-found.cost)
     prior = normalised(np.array(logs))
@@ -180,14 +240,18 @@ class Count:
 
 @dataclass(frozen=True)
 class Answers:
-    """What every experiment would tell: its expected outcome, and the likelihoods on the truth by its name."""
+    """What every experiment would tell: its expected outcome, and the likelihoods on the truth by
+    its name.
+    """
 
     prior: Array
     outcomes: list[Outcome]
     gains: dict[str, Array]
 
     def count(self, order: list[Outcome] | None) -> Count:
-        """Experiments until it is decided, in an order; ``None`` chooses by information each time."""
+        """Experiments until it is decided, in an order; ``None`` chooses by information each
+        time.
+        """
         p, left, used, spent = np.log(np.maximum(self.prior, 1e-300)), list(self.outcomes), 0, 0.0
         while normalised(p).max() <= DECIDED and left:
             chosen = first_of(left, normalised(p)) if order is None else order[used]
@@ -241,7 +305,10 @@ def main() -> None:
     nominal = pamrs.rigs.shoulder()
     experiments = library(nominal, SETTINGS.next_experiment)
     print(f"library: {', '.join(e.name for e in experiments)}")
-    print("truth and its size            first          after it        proposed first    recordings to p > 0.95: proposed, random")
+    print(
+        "truth and its size            first          after it        proposed first    recordings "
+        "to p > 0.95: proposed, random"
+    )
     chosen = [int(a) for a in sys.argv[1:]] or range(len(QUESTIONS))
     for index in chosen:
         run(QUESTIONS[index], nominal, experiments, SEED + index)

@@ -1,4 +1,6 @@
-"""Command line of the trial: ``python -m trial write``, ``make``, ``score``, ``report``, ``blocks`` and ``selfcheck``."""
+"""Command line of the trial: ``python -m trial write``, ``make``, ``score``, ``report``, ``blocks``
+and ``selfcheck``.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,10 @@ from .strength import LABELS, MEASURES
 from .summary import markdown, target_table
 from .targets import targets
 
-_MEASURE = "what the multiple of the noise is of: all that the effect moves, or what a refit of the baseline leaves of it"
+_MEASURE = (
+    "what the multiple of the noise is of: all that the effect moves, or what a refit of the "
+    "baseline leaves of it"
+)
 
 
 #: adds a command: its name, and what it is for as ``help``
@@ -42,7 +47,9 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _add_write(add: Add) -> None:
-    whole = add("write", help="write the cases, keys and manifest of a plan; goes on where it was stopped")
+    whole = add(
+        "write", help="write the cases, keys and manifest of a plan; goes on where it was stopped"
+    )
     whole.add_argument("folder", type=Path, help="gets cases/, keys/ and manifest.json")
     whole.add_argument("--plan", choices=PLANS, default="full")
     whole.add_argument("--cases", type=int, help="how many (default: the whole plan)")
@@ -83,13 +90,20 @@ def _add_make(add: Add) -> None:
         help=f"{', '.join((*KINDS, WRONG))}, random, or a pair a+b; may be repeated",
     )
     make.add_argument(
-        "--seed", type=int, required=True, help="seed of the first case; the following cases count up"
+        "--seed",
+        type=int,
+        required=True,
+        help="seed of the first case; the following cases count up",
     )
     make.add_argument("--repeat", type=int, default=1, help="cases per kind (default 1)")
     make.add_argument("--first", type=int, default=1, help="number of the first case (default 1)")
-    make.add_argument("--strength", type=float, default=1.0, help="size of the effects; 1 is moderate")
     make.add_argument(
-        "--wanted", choices=tuple(LABELS), help="scale each effect to this multiple of the noise instead"
+        "--strength", type=float, default=1.0, help="size of the effects; 1 is moderate"
+    )
+    make.add_argument(
+        "--wanted",
+        choices=tuple(LABELS),
+        help="scale each effect to this multiple of the noise instead",
     )
     make.add_argument(
         "--parameter",
@@ -106,7 +120,9 @@ def _add_make(add: Add) -> None:
     )
     make.add_argument("--measure", choices=MEASURES, default="reach", help=_MEASURE)
     make.add_argument("--recordings", type=int, default=5, help="1 to 5 (default 5)")
-    make.add_argument("--duration", type=float, default=40.0, help="seconds per recording (default 40)")
+    make.add_argument(
+        "--duration", type=float, default=40.0, help="seconds per recording (default 40)"
+    )
     make.add_argument("--rig", type=Path, help="nominal rig file (default: the shoulder)")
     make.set_defaults(run=_make)
 
@@ -185,7 +201,9 @@ def _add_report(add: Add) -> None:
         type=Path,
         help="results of `pamrs prove` and of the baselines (default: FOLDER/results)",
     )
-    page.add_argument("--out", type=Path, required=True, help="folder for the page and the pictures")
+    page.add_argument(
+        "--out", type=Path, required=True, help="folder for the page and the pictures"
+    )
     page.add_argument(
         "--command",
         dest="words",

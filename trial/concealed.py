@@ -1,4 +1,6 @@
-"""Write concealed cases: nominal rig, recordings of a plant that differs from it, and the key elsewhere."""
+"""Write concealed cases: nominal rig, recordings of a plant that differs from it, and the key
+elsewhere.
+"""
 
 from __future__ import annotations
 
@@ -32,10 +34,11 @@ _NO_EFFECT = ("none", "parameters", WRONG)
 class Spec:
     """What a case is made from.
 
-    `kind` is "none", "parameters", "wrong_parameter", an effect id, or ids joined by "+". With `wanted` (one label of
-    :data:`trial.strength.LABELS` per effect) the effects are scaled to that reach, else by `strength`. `measure`
-    is what the multiple of the noise is of: "reach", or "left", what a refit of the baseline leaves of it. `wrong`
-    lists the parameters that are far off, dotted name and tolerances with their sign, of the kind "wrong_parameter".
+    `kind` is "none", "parameters", "wrong_parameter", an effect id, or ids joined by "+". With
+    `wanted` (one label of :data:`trial.strength.LABELS` per effect) the effects are scaled to that
+    reach, else by `strength`. `measure` is what the multiple of the noise is of: "reach", or
+    "left", what a refit of the baseline leaves of it. `wrong` lists the parameters that are far
+    off, dotted name and tolerances with their sign, of the kind "wrong_parameter".
     """
 
     name: str
@@ -82,17 +85,23 @@ def write(path: Path, text: str) -> None:
 
 
 def _csv(record: Record) -> str:
-    lines = ["time [s],valve_command [V],supply_pressure [bar],muscle_pressure [bar],joint_angle [deg]"]
+    lines = [
+        "time [s],valve_command [V],supply_pressure [bar],muscle_pressure [bar],joint_angle [deg]"
+    ]
     lines += [
         f"{t:.3f},{u:.4f},{ps / 1e5:.5f},{p / 1e5:.5f},{math.degrees(a):.3f}"
-        for t, u, (p, ps, a) in zip(record.time.tolist(), record.command.tolist(), record.logged.tolist(), strict=True)
+        for t, u, (p, ps, a) in zip(
+            record.time.tolist(), record.command.tolist(), record.logged.tolist(), strict=True
+        )
     ]
     return "\n".join(lines) + "\n"
 
 
 def _case_toml(recordings: Sequence[tuple[str, str]]) -> str:
     blocks = ['schema = "pamrs.case/1"\nrig = "rig.toml"\n']
-    blocks += [f'[[recording]]\nfile = "{name}.csv"\nrole = "{role}"\n' for name, role in recordings]
+    blocks += [
+        f'[[recording]]\nfile = "{name}.csv"\nrole = "{role}"\n' for name, role in recordings
+    ]
     return "\n".join(blocks)
 
 
@@ -128,29 +137,44 @@ class _Bench:
             self.supply.append(par.supply_pressure + float(own.uniform(-1.0, 1.0)) * supply_tol)
             self.prepared.append(prepare(nominal, name, spec.duration, own))
 
-    def measure(self, effects: Effects, known: dict[int, Measured] | None = None, fit_only: bool = False) -> dict[int, Measured]:
+    def measure(
+        self, effects: Effects, known: dict[int, Measured] | None = None, fit_only: bool = False
+    ) -> dict[int, Measured]:
         """Record and reach of the recordings by number; those in `known` are kept."""
         plant = Plant(self.par, effects)
         found = dict(known or {})
         for i, (made, supply) in enumerate(zip(self.prepared, self.supply, strict=True)):
             if i in found or (fit_only and i not in self.fit):
                 continue
-            record = run(plant, *made, supply, self.noise, np.random.default_rng([self.spec.seed, i, 78]), i)
-            found[i] = (record, record.clean - follow(self.bare, record, i) if effects.items or self.moves else np.zeros((1, 3)))
+            record = run(
+                plant, *made, supply, self.noise, np.random.default_rng([self.spec.seed, i, 78]), i
+            )
+            found[i] = (
+                record,
+                record.clean - follow(self.bare, record, i)
+                if effects.items or self.moves
+                else np.zeros((1, 3)),
+            )
         return found
 
     def most_moved(self, measured: dict[int, Measured]) -> tuple[str, float]:
         """Channel that moves most in a recording to fit, and its reach."""
-        tops = [max(reach(measured[i][1], self.noise).items(), key=lambda item: item[1]) for i in self.fit]
+        tops = [
+            max(reach(measured[i][1], self.noise).items(), key=lambda item: item[1])
+            for i in self.fit
+        ]
         return max(tops, key=lambda item: item[1])
 
     def left(self, measured: dict[int, Measured]) -> float:
-        """Reach that is left of the recordings to fit when the baseline is refitted within its tolerances.
+        """Reach that is left of the recordings to fit when the baseline is refitted within its
+        tolerances.
 
         The sensitivities are those of the recordings of the first call.
         """
         if self._remainder is None:
-            self._remainder = Remainder(self.true, self.tolerance, [(measured[i][0], i) for i in self.fit], self.noise)
+            self._remainder = Remainder(
+                self.true, self.tolerance, [(measured[i][0], i) for i in self.fit], self.noise
+            )
         found = self._remainder.of([measured[i][1] for i in self.fit])
         return max(max(reach(moved, self.noise).values()) for moved in found)
 
@@ -199,7 +223,9 @@ def _noise(rng: np.random.Generator) -> Noise:
 
 @dataclass(frozen=True)
 class _Chosen:
-    """The effects of a case, the reach of each alone where it was aimed at, and the recordings of the last one alone."""
+    """The effects of a case, the reach of each alone where it was aimed at, and the recordings of
+    the last one alone.
+    """
 
     effects: Effects
     alone: dict[str, float]
@@ -209,7 +235,9 @@ class _Chosen:
 def _choose(spec: Spec, ids: Sequence[str], bench: _Bench, rng: np.random.Generator) -> _Chosen:
     """Draw the effects and scale them to what is wanted."""
     start = float(np.median(bench.supply))
-    setting = Setting(len(spec.recordings), spec.duration, start, bench.par.payload, bench.par.coulomb)
+    setting = Setting(
+        len(spec.recordings), spec.duration, start, bench.par.payload, bench.par.coulomb
+    )
     alone: dict[str, float] = {}
     known: dict[int, Measured] = {}
     chosen = []
@@ -282,28 +310,41 @@ def generate(spec: Spec, rig: Path) -> Case:
     if wrong:
         key["wrong_parameters"] = _wrong_entries(model, true, wrong)
     files = {f"{name}.csv": _csv(measured[i][0]) for i, (name, _) in enumerate(spec.recordings)}
-    files = {"rig.toml": rig.read_text(encoding="utf-8"), **files, "case.toml": _case_toml(spec.recordings)}
+    files = {
+        "rig.toml": rig.read_text(encoding="utf-8"),
+        **files,
+        "case.toml": _case_toml(spec.recordings),
+    }
     return Case(spec.name, json.dumps(key, indent=1) + "\n", files)
 
 
 def _wrong_entries(
     model: dict[str, Any], true: dict[str, Any], wrong: dict[str, float]
 ) -> dict[str, dict[str, float]]:
-    """The parameters that are far off: what the rig file says, what is true, and by how many tolerances."""
+    """The parameters that are far off: what the rig file says, what is true, and by how many
+    tolerances.
+    """
     nominal, value = _values(model, wrong), _values(true, wrong)
-    return {k: {"nominal": nominal[k], "value": value[k], "tolerances": z} for k, z in wrong.items()}
+    return {
+        k: {"nominal": nominal[k], "value": value[k], "tolerances": z} for k, z in wrong.items()
+    }
 
 
 def _check_wrong(wrong: Sequence[tuple[str, float]], rig: Path) -> None:
     """Refuse parameters without a tolerance, and values that are not positive."""
     model, tolerance = read_rig(rig)
-    allowed = [n for n in tolerance if not n.startswith("sensors.") and n != "supply.initial_pressure"]
+    allowed = [
+        n for n in tolerance if not n.startswith("sensors.") and n != "supply.initial_pressure"
+    ]
     for name, z in wrong:
         if name not in allowed:
             raise ValueError(f"unknown parameter {name!r}; known: {', '.join(allowed)}")
         least = -_values(model, [name])[name] / tolerance[name]
         if not (math.isfinite(z) and z > least):
-            raise ValueError(f"{name}: {z:g} tolerances off is not allowed, more than {least:.3g} are (the value stays positive)")
+            raise ValueError(
+                f"{name}: {z:g} tolerances off is not allowed, more than {least:.3g} are (the "
+                "value stays positive)"
+            )
 
 
 def make_case(
@@ -327,9 +368,11 @@ def make_case(
     Parameters
     ----------
     out, keys : Path
-        Folder of the cases and folder of the keys (must differ, and the keys must not lie inside the cases).
+        Folder of the cases and folder of the keys (must differ, and the keys must not lie inside
+        the cases).
     kind : str
-        One of :data:`trial.effects.KINDS`, "wrong_parameter", "random", or effects joined by "+" for a pair.
+        One of :data:`trial.effects.KINDS`, "wrong_parameter", "random", or effects joined by "+"
+        for a pair.
     seed : int
         Everything is determined by the seed, the kind and the other arguments.
     name : str
@@ -337,7 +380,8 @@ def make_case(
     strength : float
         Size of the effect; 1 is moderate.
     wanted : str, optional
-        "weak", "medium", "strong" or "heavy": scale every effect until it reaches that multiple of the noise.
+        "weak", "medium", "strong" or "heavy": scale every effect until it reaches that multiple of
+        the noise.
     measure : str
         "reach", or "left": the multiple is of what a refit of the baseline leaves.
     recordings : int
@@ -359,8 +403,8 @@ def make_case(
     Raises
     ------
     ValueError
-        Unknown kind, bad duration or number of recordings, a wrong parameter that cannot be, or keys inside the folder of
-        the cases.
+        Unknown kind, bad duration or number of recordings, a wrong parameter that cannot be, or
+        keys inside the folder of the cases.
     """
     out, keys = Path(out), Path(keys)
     if keys.resolve().is_relative_to((out / name).resolve()):
@@ -377,8 +421,13 @@ def make_case(
     if kind == "random":
         kind = str(np.random.default_rng([seed, 5]).choice(KINDS))
     parts = kind.split("+")
-    if any(p not in (*KINDS, WRONG) for p in parts) or (len(parts) > 1 and set(_NO_EFFECT) & set(parts)):
-        raise ValueError(f"unknown kind {kind!r}; known: {', '.join((*KINDS, WRONG))}, random, and effects joined by '+'")
+    if any(p not in (*KINDS, WRONG) for p in parts) or (
+        len(parts) > 1 and set(_NO_EFFECT) & set(parts)
+    ):
+        raise ValueError(
+            f"unknown kind {kind!r}; known: {', '.join((*KINDS, WRONG))}, random, and effects "
+            "joined by '+'"
+        )
     if (kind == WRONG) != bool(wrong):
         raise ValueError(f"wrong parameters and the kind {WRONG!r} go together")
     rig = (rig or default_rig()).resolve()
@@ -394,7 +443,9 @@ def make_case(
 
 
 def store(case: Case, out: Path) -> None:
-    """Write the files of a case below `out`; its list of recordings comes last and says that it is complete."""
+    """Write the files of a case below `out`; its list of recordings comes last and says that it is
+    complete.
+    """
     for file, content in case.files.items():
         write(out / case.name / file, content)
 

@@ -35,7 +35,8 @@ def select(count: int) -> list[tuple[str, str]]:
 
 @dataclass(frozen=True)
 class Excitation:
-    """Reference angle [rad], masks of samples with the valve at its believed null and wide open to vent, dither [V].
+    """Reference angle [rad], masks of samples with the valve at its believed null and wide open to
+    vent, dither [V].
 
     All of shape (n,). With `open_loop` the commands are found on the nominal plant and replayed.
     """
@@ -60,7 +61,9 @@ def _ramps(time: Array, points: list[tuple[float, float]], smooth: bool) -> Arra
 
 @dataclass(frozen=True)
 class _Course:
-    """Reference angle [deg], and masks and dither as :class:`Excitation` has them; None where there are none."""
+    """Reference angle [deg], and masks and dither as :class:`Excitation` has them; None where there
+    are none.
+    """
 
     angle: Array
     sealed: NDArray[np.bool_] | None = None
@@ -200,7 +203,9 @@ def build(name: str, duration: float, sample_time: float, rng: np.random.Generat
         Unknown name.
     """
     if name not in _COURSES:
-        raise ValueError(f"unknown excitation {name!r}; known: {', '.join(r[0] for r in RECORDINGS)}")
+        raise ValueError(
+            f"unknown excitation {name!r}; known: {', '.join(r[0] for r in RECORDINGS)}"
+        )
     n = round(duration / sample_time)
     course = _COURSES[name](_Clock(sample_time * np.arange(n), duration, sample_time), rng)
     return Excitation(
@@ -213,7 +218,8 @@ def build(name: str, duration: float, sample_time: float, rng: np.random.Generat
 
 
 class Controller:
-    """PID on the angle with feedforward from the nominal model over an inner pressure loop, 12-bit output.
+    """PID on the angle with feedforward from the nominal model over an inner pressure loop, 12-bit
+    output.
 
     Parameters
     ----------
@@ -247,8 +253,12 @@ class Controller:
         """Nearest DAC level [V] within 0 to 10 V."""
         return round(min(max(command, 0.0), 10.0) / DAC_STEP) * DAC_STEP
 
-    def __call__(self, reference: float, angle: float, pressure: float, dither: float, sealed: bool) -> float:
-        """Command [V] from the reference and measured angle [rad] and the measured gauge pressure [Pa]."""
+    def __call__(
+        self, reference: float, angle: float, pressure: float, dither: float, sealed: bool
+    ) -> float:
+        """Command [V] from the reference and measured angle [rad] and the measured gauge pressure
+        [Pa].
+        """
         if self.last is not None:
             self.rate += self.smooth * ((angle - self.last) / self.step - self.rate)
         self.last = angle

@@ -1,7 +1,9 @@
-"""The independent plant: tank, valve, muscles, joint and arm under an adaptive Dormand-Prince 5(4) pair.
+"""The independent plant: tank, valve, muscles, joint and arm under an adaptive Dormand-Prince 5(4)
+pair.
 
-The inner loop uses plain floats: one right-hand side, see :mod:`.rates`, costs a few
-microseconds. Effects enter at the ports of :class:`.effects.Effect`; without any, none of them costs more than a test.
+The inner loop uses plain floats: one right-hand side, see :mod:`.rates`, costs a few microseconds.
+Effects enter at the ports of :class:`.effects.Effect`; without any, none of them costs more than a
+test.
 """
 
 from __future__ import annotations
@@ -24,7 +26,9 @@ Ports = list[Callable[..., Any]]
 
 @dataclass(frozen=True)
 class Parameters:
-    """All numbers of the plant without effects; SI units, angles in rad, pressures in Pa (gauge if noted)."""
+    """All numbers of the plant without effects; SI units, angles in rad, pressures in Pa (gauge if
+    noted).
+    """
 
     ambient: float
     temperature: float
@@ -60,8 +64,8 @@ class Parameters:
 class Plant:
     """Plant with a set of effects.
 
-    The state is ``[p, p_supply, angle, rate, ...]`` in absolute Pa, rad and rad/s, followed by the time [s] when an
-    effect needs it and by the states of the effects.
+    The state is ``[p, p_supply, angle, rate, ...]`` in absolute Pa, rad and rad/s, followed by the
+    time [s] when an effect needs it and by the states of the effects.
 
     Parameters
     ----------
@@ -80,7 +84,9 @@ class Plant:
         self.par = parameters
         # an effect of no size would still cost time, and a share of zero divide by it
         self.effects = Effects(*(e for e in effects or () if e.active()))
-        self.tables = JointTables(parameters.muscle, parameters.joint, parameters.count, parameters.modulus_scale)
+        self.tables = JointTables(
+            parameters.muscle, parameters.joint, parameters.count, parameters.modulus_scale
+        )
         self.scale = [1.0e5, 1.0e6, 1.0, 1.0]
         self.i_clock = -1
         if any(e.needs_clock for e in self.effects):
@@ -122,7 +128,9 @@ class Plant:
                 return effect, first
         return None, -1
 
-    def initial(self, pressure: float, supply: float, angle: float, rate: float = 0.0, clock: float = 0.0) -> State:
+    def initial(
+        self, pressure: float, supply: float, angle: float, rate: float = 0.0, clock: float = 0.0
+    ) -> State:
         """State at absolute pressures [Pa] and a time [s] with every memory at rest."""
         par = self.par
         y = [pressure, supply, angle, rate]
@@ -160,7 +168,9 @@ class Plant:
         return min(max((command - self.par.null_voltage) / self.par.half_range, -1.0), 1.0)
 
     def valve(self) -> Callable[[float, float, float, float], tuple[float, float]]:
-        """Flows into and out of the muscles [kg/s] from opening, tank and muscle pressure and gas temperature."""
+        """Flows into and out of the muscles [kg/s] from opening, tank and muscle pressure and gas
+        temperature.
+        """
         par, area, orifice = self.par, self.area, orifice_of(self.par)
         ambient, t0 = par.ambient, par.temperature
         jet = math.sqrt(2.0 / (par.gas_constant * t0))
@@ -184,7 +194,13 @@ class Plant:
                 m_out = c * orifice(p, ambient)
                 if line is not None or exhaust is not None:
                     m_out = settle(
-                        lambda m: c * orifice(p if line is None else line(-m, p), ambient if exhaust is None else exhaust(m)),
+                        lambda m: (
+                            c
+                            * orifice(
+                                p if line is None else line(-m, p),
+                                ambient if exhaust is None else exhaust(m),
+                            )
+                        ),
                         m_out,
                     )
             if gap is not None:
@@ -199,7 +215,9 @@ class Plant:
         """Time derivative of the state at a signed valve opening (before its lag)."""
         return self._rhs(list(state), opening)
 
-    def advance(self, y: State, opening: float, span: float, step: float, rtol: float = 1.0e-8) -> tuple[State, float]:
+    def advance(
+        self, y: State, opening: float, span: float, step: float, rtol: float = 1.0e-8
+    ) -> tuple[State, float]:
         """Integrate over `span` [s] at a constant opening.
 
         Returns
@@ -236,7 +254,10 @@ class Plant:
             k5 = f([y[i] + c1 * k1[i] + c2 * k2[i] + c3 * k3[i] + c4 * k4[i] for i in n], opening)
             c1, c2, c3 = h * 9017.0 / 3168.0, -h * 355.0 / 33.0, h * 46732.0 / 5247.0
             c4, c5 = h * 49.0 / 176.0, -h * 5103.0 / 18656.0
-            k6 = f([y[i] + c1 * k1[i] + c2 * k2[i] + c3 * k3[i] + c4 * k4[i] + c5 * k5[i] for i in n], opening)
+            k6 = f(
+                [y[i] + c1 * k1[i] + c2 * k2[i] + c3 * k3[i] + c4 * k4[i] + c5 * k5[i] for i in n],
+                opening,
+            )
             c1, c3, c4 = h * 35.0 / 384.0, h * 500.0 / 1113.0, h * 125.0 / 192.0
             c5, c6 = -h * 2187.0 / 6784.0, h * 11.0 / 84.0
             new = [y[i] + c1 * k1[i] + c3 * k3[i] + c4 * k4[i] + c5 * k5[i] + c6 * k6[i] for i in n]
@@ -245,7 +266,9 @@ class Plant:
             c5, c6, c7 = -h * 17253.0 / 339200.0, h * 22.0 / 525.0, -h / 40.0
             worst = 0.0
             for i in n:
-                err = abs(c1 * k1[i] + c3 * k3[i] + c4 * k4[i] + c5 * k5[i] + c6 * k6[i] + c7 * k7[i])
+                err = abs(
+                    c1 * k1[i] + c3 * k3[i] + c4 * k4[i] + c5 * k5[i] + c6 * k6[i] + c7 * k7[i]
+                )
                 err /= rtol * (scale[i] + abs(new[i]))
                 if not err <= worst:
                     worst = err
@@ -264,14 +287,19 @@ class Plant:
                     raise ArithmeticError(f"step below 1 ns at state {y!r}")
 
     def classical(self, y: State, opening: float, span: float) -> State:
-        """One classical Runge-Kutta step over `span` [s]: quicker than :meth:`advance`, without error control."""
+        """One classical Runge-Kutta step over `span` [s]: quicker than :meth:`advance`, without
+        error control.
+        """
         f, half = self._rhs, 0.5 * span
         k1 = f(y, opening)
         k2 = f([a + half * b for a, b in zip(y, k1, strict=False)], opening)
         k3 = f([a + half * b for a, b in zip(y, k2, strict=False)], opening)
         k4 = f([a + span * b for a, b in zip(y, k3, strict=False)], opening)
         sixth = span / 6.0
-        return [a + sixth * (b + 2.0 * (c + d) + e) for a, b, c, d, e in zip(y, k1, k2, k3, k4, strict=False)]
+        return [
+            a + sixth * (b + 2.0 * (c + d) + e)
+            for a, b, c, d, e in zip(y, k1, k2, k3, k4, strict=False)
+        ]
 
     def tick(self, y: State) -> State:
         """State after what effects do once per sample (relays, largest values, play)."""

@@ -1,7 +1,8 @@
-"""The right-hand side of the plant: where the joint is, the gas, the muscles' torque and the motion.
+"""The right-hand side of the plant: where the joint is, the gas, the muscles' torque and the
+motion.
 
-Each is a function made once for a plant, with everything bound that does not change: one right-hand side costs a few
-microseconds. Effects enter at the ports of :class:`.effects.Effect`.
+Each is a function made once for a plant, with everything bound that does not change: one right-hand
+side costs a few microseconds. Effects enter at the ports of :class:`.effects.Effect`.
 """
 
 from __future__ import annotations
@@ -15,7 +16,8 @@ from .effects import HeatTransfer
 if TYPE_CHECKING:
     from .plant import Plant, State
 
-#: coefficients of one cell of the joint's tables: gas torque, elastic torque, volume, contraction, wall area
+#: coefficients of one cell of the joint's tables: gas torque, elastic torque, volume, contraction,
+#: wall area
 Cubic = tuple[float, ...]
 Cell = tuple[Cubic, Cubic, Cubic, Cubic, Cubic]
 Place = tuple[Cell, float, float]
@@ -23,7 +25,12 @@ Place = tuple[Cell, float, float]
 
 def rates_of(plant: Plant) -> Callable[[State, float], State]:
     """Time derivative of the state at a signed opening of the valve."""
-    place, gas, muscles, motion = place_of(plant), gas_of(plant), muscles_of(plant), motion_of(plant)
+    place, gas, muscles, motion = (
+        place_of(plant),
+        gas_of(plant),
+        muscles_of(plant),
+        motion_of(plant),
+    )
     spool, follows = plant.port("spool"), plant.ports("follow")
     ambient, clock, width = plant.par.ambient, plant.i_clock, plant.size
 
@@ -45,7 +52,9 @@ def rates_of(plant: Plant) -> Callable[[State, float], State]:
 
 
 def place_of(plant: Plant) -> Callable[[float, float], Place]:
-    """Cell of an angle [rad] at a gauge pressure [Pa], distance from its knot [rad], factor on the moment arm."""
+    """Cell of an angle [rad] at a gauge pressure [Pa], distance from its knot [rad], factor on the
+    moment arm.
+    """
     tables, gear = plant.tables, plant.port("gear", False)
     cells: list[Cell] = [(c[0:4], c[4:8], c[8:12], c[12:16], c[16:20]) for c in tables.cells]
     start, step, last = tables.start, tables.step, len(cells) - 1
@@ -65,7 +74,9 @@ def place_of(plant: Plant) -> Callable[[float, float], Place]:
 
 
 def gas_of(plant: Plant) -> Callable[[State, float, Place, State], None]:
-    """Rates of the pressures of muscles and tank [Pa/s], and of the temperature where heat flows."""
+    """Rates of the pressures of muscles and tank [Pa/s], and of the temperature where heat
+    flows.
+    """
     par = plant.par
     t0, rt0 = par.temperature, par.gas_constant * par.temperature
     dead, vt = par.dead_volume, par.supply_volume
@@ -104,7 +115,8 @@ def warming_of(
 ) -> Callable[[float, float, tuple[float, float], float, float, float], tuple[float, float]]:
     """Rates of temperature [K/s] and pressure [Pa/s] by the energy balance of the gas.
 
-    From its pressure, temperature, flows into and out of it, volume with its rate, and the area of the wall.
+    From its pressure, temperature, flows into and out of it, volume with its rate, and the area of
+    the wall.
     """
     par = plant.par
     ambient, t0, gas, g = par.ambient, par.temperature, par.gas_constant, par.kappa
@@ -119,10 +131,16 @@ def warming_of(
         wall: float,
     ) -> tuple[float, float]:
         m_in, m_out = flows
-        h = heat.coefficient * sqrt(p * temperature / (ambient * t0)) * (1.0 + heat.jet * m_in / 1.0e-3)
+        h = (
+            heat.coefficient
+            * sqrt(p * temperature / (ambient * t0))
+            * (1.0 + heat.jet * m_in / 1.0e-3)
+        )
         mass = p * volume / (gas * temperature)
         warm = ((g * t0 - temperature) * m_in - (g - 1.0) * temperature * m_out) / mass
-        warm += (g - 1.0) * (h * wall * (t0 - temperature) / (mass * gas) - temperature * v_rate / volume)
+        warm += (g - 1.0) * (
+            h * wall * (t0 - temperature) / (mass * gas) - temperature * v_rate / volume
+        )
         balance = gas * ((m_in - m_out) * temperature + mass * warm) / volume - p * v_rate / volume
         return warm, balance
 

@@ -15,30 +15,42 @@ from .effects import LISTED, TYPES
 SCHEMA = "pamrs.diagnosis/1"
 VERDICTS = ("none", "parameters", "effects", "unlisted")
 HEALTHY = ("none", "parameters")
-#: sum over the channels of what a refit leaves above the noise, in units of it, below which there is no gap to close
+#: sum over the channels of what a refit leaves above the noise, in units of it, below which there
+#: is no gap to close
 LEAST_ROOM = 0.05
 #: block of the rig in which an effect of a block of the plant acts; transducers go by their channel
 _ACTS = {
-    "supply": "supply", "valve": "chamber", "line": "chamber", "chamber": "chamber", "muscle": "arm", "joint": "arm", "arm": "arm",
-    "encoder_gear_lash": "arm", "encoder_eccentricity": "arm", "pressure_lag": "chamber", "pressure_zero_drift": "chamber",
-}  # fmt: skip
+    ("supply"): ("supply"),
+    ("valve"): ("chamber"),
+    ("line"): ("chamber"),
+    ("chamber"): ("chamber"),
+    ("muscle"): ("arm"),
+    ("joint"): ("arm"),
+    ("arm"): ("arm"),
+    ("encoder_gear_lash"): ("arm"),
+    ("encoder_eccentricity"): ("arm"),
+    ("pressure_lag"): ("chamber"),
+    ("pressure_zero_drift"): ("chamber"),
+}
 
 
 @dataclass(frozen=True)
 class Row:
-    """One scored case; `probability`, `gap`, `utility` and `seconds` are None when the result lacks them.
+    """One scored case; `probability`, `gap`, `utility` and `seconds` are None when the result lacks
+    them.
 
-    `wanted` is the strength ("weak", "medium", "strong", "pair" or ""), `first` what was named first, `claim` the
-    largest stated probability and whether its hypothesis is the truth.
+    `wanted` is the strength ("weak", "medium", "strong", "pair" or ""), `first` what was named
+    first, `claim` the largest stated probability and whether its hypothesis is the truth.
 
-    `labels` are the strengths of all `ids`, `listed` those of `ids` that can be named, `name_probability` the probability
-    that they are among what is missing. `rest_said` tells, of a listed effect beside one of no catalogue, whether the
-    result says that a block where the latter acts keeps a mismatch; `unexplained` are the blocks it says so of. `wrong`
-    are the parameters that are far off, with their tolerances, `wrong_named` those that the result names,
-    `interval_holds` whether the stated intervals hold the true values (None where they are not named). `false_name`: on
-    a case without an effect, an effect or `unlisted` was claimed, or a parameter called wrong on a null.
-    `held_out` is the largest error on held-out recordings after the diagnosis, in units of the noise, and `said` all
-    that was said.
+    `labels` are the strengths of all `ids`, `listed` those of `ids` that can be named,
+    `name_probability` the probability that they are among what is missing. `rest_said` tells, of a
+    listed effect beside one of no catalogue, whether the result says that a block where the latter
+    acts keeps a mismatch; `unexplained` are the blocks it says so of. `wrong` are the parameters
+    that are far off, with their tolerances, `wrong_named` those that the result names,
+    `interval_holds` whether the stated intervals hold the true values (None where they are not
+    named). `false_name`: on a case without an effect, an effect or `unlisted` was claimed, or a
+    parameter called wrong on a null. `held_out` is the largest error on held-out recordings after
+    the diagnosis, in units of the noise, and `said` all that was said.
     """
 
     case: str
@@ -87,7 +99,9 @@ class Row:
 
     @property
     def visible(self) -> float:
-        """Reach that a refit of the baseline leaves, or the plain reach when the key does not tell."""
+        """Reach that a refit of the baseline leaves, or the plain reach when the key does not
+        tell.
+        """
         return self.reach if self.left is None else self.left
 
 
@@ -101,7 +115,17 @@ class Scores:
 
     def text(self) -> str:
         """Table and totals as plain text."""
-        head = ("case", "truth", "verdict", "named", "p(truth)", "outcome", "gap", "reach", "seconds")
+        head = (
+            "case",
+            "truth",
+            "verdict",
+            "named",
+            "p(truth)",
+            "outcome",
+            "gap",
+            "reach",
+            "seconds",
+        )
         body = [
             (
                 r.case,
@@ -117,7 +141,10 @@ class Scores:
             for r in self.rows
         ]
         width = [max(len(line[i]) for line in [head, *body]) for i in range(len(head))]
-        lines = ["  ".join(cell.ljust(w) for cell, w in zip(line, width, strict=True)).rstrip() for line in [head, *body]]
+        lines = [
+            "  ".join(cell.ljust(w) for cell, w in zip(line, width, strict=True)).rstrip()
+            for line in [head, *body]
+        ]
         lines.append("")
         wide = max(len(k) for k in self.totals)
         lines += [f"{k.ljust(wide)}  {_show(v, 3)}" for k, v in self.totals.items()]
@@ -138,16 +165,20 @@ def _number(value: Any) -> float | None:
 def utility(truth: set[str], answers: Sequence[set[str]], components: int) -> float:
     """Mean ambiguity-group utility over the answers.
 
-    For each answer ``m = 1 - n(N+1)/(f(n+1)) - n'(N'+1)/(f(n'+1))`` with n the missed effects, N the
-    components that the answer calls healthy, n' the effects named wrongly, N' the effects named, f the number
-    of components.
+    For each answer ``m = 1 - n(N+1)/(f(n+1)) - n'(N'+1)/(f(n'+1))`` with n the missed effects, N
+    the components that the answer calls healthy, n' the effects named wrongly, N' the effects
+    named, f the number of components.
     """
     marks = []
     for answer in answers:
         missed, extra = len(truth - answer), len(answer - truth)
         sick = len(answer)
         well = components - sick
-        marks.append(1.0 - missed * (well + 1) / (components * (missed + 1)) - extra * (sick + 1) / (components * (extra + 1)))
+        marks.append(
+            1.0
+            - missed * (well + 1) / (components * (missed + 1))
+            - extra * (sick + 1) / (components * (extra + 1))
+        )
     return mean(marks)
 
 
@@ -158,7 +189,9 @@ def _result(folder: Path, case: str) -> dict[str, Any] | None:
             if not isinstance(data, dict) or data.get("schema") != SCHEMA:
                 raise ValueError(f"{path}: schema must be {SCHEMA!r}")
             if data.get("verdict") not in VERDICTS:
-                raise ValueError(f"{path}: verdict {data.get('verdict')!r} is not one of {', '.join(VERDICTS)}")
+                raise ValueError(
+                    f"{path}: verdict {data.get('verdict')!r} is not one of {', '.join(VERDICTS)}"
+                )
             return data
     return None
 
@@ -176,7 +209,9 @@ def _parameters(names: Iterable[str]) -> set[str]:
 
 
 def _parts(name: str, parameters: bool) -> frozenset[str]:
-    """What a hypothesis claims, empty where it is healthy; names of parameters count only on demand."""
+    """What a hypothesis claims, empty where it is healthy; names of parameters count only on
+    demand.
+    """
     parts = frozenset(name.replace(",", "+").split("+")) - set(HEALTHY)
     return parts if parameters else parts - _parameters(parts)
 
@@ -195,7 +230,9 @@ def _numbers(table: dict[str, Any]) -> dict[str, float]:
 
 
 def _among(result: dict[str, Any], names: Sequence[str]) -> float:
-    """Probability that all these names are among what is missing, each by the block that knows most of it."""
+    """Probability that all these names are among what is missing, each by the block that knows most
+    of it.
+    """
 
     def within(told: dict[str, Any], name: str) -> float:
         chances = _numbers(told.get("probabilities", {})).items()
@@ -211,7 +248,8 @@ def _block_of(effect: str) -> str:
 
 
 def _claim(truth: set[str], probabilities: dict[str, float]) -> tuple[float, bool] | None:
-    """Largest stated probability and whether it is on the truth; "none" and "parameters" count as one.
+    """Largest stated probability and whether it is on the truth; "none" and "parameters" count as
+    one.
 
     A wrong parameter counts as healthy, unless the truth is one: then the names must equal it.
     """
@@ -230,7 +268,8 @@ def _claim(truth: set[str], probabilities: dict[str, float]) -> tuple[float, boo
 def gap_of(result: dict[str, Any]) -> float | None:
     """Share of the gap to the noise that the diagnosis closed on held-out recordings.
 
-    What named nothing closed nothing: 0, unless its table of errors shows that there was no gap, which gives None.
+    What named nothing closed nothing: 0, unless its table of errors shows that there was no gap,
+    which gives None.
     """
     fit = result.get("fit", {})
     gap = _number(fit.get("gap_closed"))
@@ -244,7 +283,9 @@ def gap_of(result: dict[str, Any]) -> float | None:
 
 
 def _held_out(result: dict[str, Any]) -> float | None:
-    """Largest error after the diagnosis on held-out recordings, in units of the noise of its channel."""
+    """Largest error after the diagnosis on held-out recordings, in units of the noise of its
+    channel.
+    """
     table = (result.get("fit", {}).get("held_out") or {}).values()
     pairs = [(_number(e.get("after")), _number(e.get("noise"))) for e in table]
     return max((a / s for a, s in pairs if a is not None and s), default=None)
@@ -262,8 +303,12 @@ def _holds(true: dict[str, Any], told: Sequence[dict[str, Any]]) -> bool | None:
     return all(found) if found else None
 
 
-def _said(result: dict[str, Any], named: Sequence[str], wrong: Sequence[str], unexplained: Sequence[str]) -> str:
-    """Verdict, names, wrong parameters, what stays unexplained and the sets that cannot be told apart, in one line."""
+def _said(
+    result: dict[str, Any], named: Sequence[str], wrong: Sequence[str], unexplained: Sequence[str]
+) -> str:
+    """Verdict, names, wrong parameters, what stays unexplained and the sets that cannot be told
+    apart, in one line.
+    """
     verdict = str(result["verdict"])
     text = f"effects {', '.join(named)}" if verdict == "effects" else verdict
     if wrong:
@@ -278,8 +323,9 @@ def _said(result: dict[str, Any], named: Sequence[str], wrong: Sequence[str], un
 class _Truth:
     """What a key conceals, and what of it a diagnosis can name.
 
-    `known` are the names that count as such: the catalogue, and what this diagnosis gave a probability. `listed` are
-    the effects that can be named, `parts` what is to be claimed: effects, "unlisted", parameters that are `far` off.
+    `known` are the names that count as such: the catalogue, and what this diagnosis gave a
+    probability. `listed` are the effects that can be named, `parts` what is to be claimed: effects,
+    "unlisted", parameters that are `far` off.
     """
 
     case: str
@@ -296,7 +342,9 @@ class _Truth:
         return 0 < len(self.listed) < len(self.ids)
 
 
-def _truth(key: dict[str, Any], probabilities: dict[str, float], catalogue: Sequence[str]) -> _Truth:
+def _truth(
+    key: dict[str, Any], probabilities: dict[str, float], catalogue: Sequence[str]
+) -> _Truth:
     ids = [str(i) for i in key["effects"]]
     known = {*catalogue, *(i for i in ids if i in probabilities)}
     far: dict[str, Any] = key.get("wrong_parameters", {})
@@ -307,8 +355,10 @@ def _truth(key: dict[str, Any], probabilities: dict[str, float], catalogue: Sequ
 
 @dataclass(frozen=True)
 class _Told:
-    """What a result claims: its verdict, the effects best first, those of them that are judged, the parameters that
-    it calls wrong, the blocks that keep a mismatch, and the sets that it cannot tell apart."""
+    """What a result claims: its verdict, the effects best first, those of them that are judged, the
+    parameters that it calls wrong, the blocks that keep a mismatch, and the sets that it cannot
+    tell apart.
+    """
 
     verdict: str
     named: list[str]
@@ -329,7 +379,9 @@ def _told(result: dict[str, Any], truth: _Truth) -> _Told:
     named = [str(e["id"]) for e in result.get("effects", [])]
     judged = max(1, len(truth.listed) if truth.mixed else len(truth.parts))
     # what a name leaves is no claim of its own
-    left = [e for e in result.get("unexplained") or [] if e.get("verdict", "unlisted") == "unlisted"]
+    left = [
+        e for e in result.get("unexplained") or [] if e.get("verdict", "unlisted") == "unlisted"
+    ]
     groups = result.get("ambiguity", [])
     return _Told(
         verdict,
@@ -370,7 +422,8 @@ def _chance(truth: _Truth, result: dict[str, Any], probabilities: dict[str, floa
         return _among(result, truth.listed)
     pooled = _pooled(probabilities, bool(truth.far))
     if not truth.ids:
-        # "none" and "parameters" say that no physics is missing, and which of them is a matter of degree
+        # "none" and "parameters" say that no physics is missing, and which of them is a matter of
+        # degree
         return pooled.get(frozenset(truth.parts), 0.0)
     if len(truth.parts) == 1:
         return pooled.get(frozenset(truth.parts))
@@ -430,9 +483,9 @@ def _missing(key: dict[str, Any], truth: _Truth) -> Row:
 def score_case(key: dict[str, Any], result: dict[str, Any] | None, catalogue: Sequence[str]) -> Row:
     """Score one case; a missing result is wrong.
 
-    An effect that is not in the catalogue has the truth "unlisted", unless the diagnosis gives that very id a
-    probability. Of a listed effect beside such a one, the listed one must be named first; what is said of the rest is
-    scored apart.
+    An effect that is not in the catalogue has the truth "unlisted", unless the diagnosis gives that
+    very id a probability. Of a listed effect beside such a one, the listed one must be named first;
+    what is said of the rest is scored apart.
     """
     probabilities = _numbers((result or {}).get("probabilities", {}))
     truth = _truth(key, probabilities, catalogue)
@@ -482,7 +535,9 @@ def _median(values: Sequence[float | None]) -> float | None:
     return median(kept) if kept else None
 
 
-def score(keys: Path, results: Path, catalogue: Sequence[str] = LISTED, first: int | None = None) -> Scores:
+def score(
+    keys: Path, results: Path, catalogue: Sequence[str] = LISTED, first: int | None = None
+) -> Scores:
     """Score every key in a folder, or the first so many by name.
 
     Parameters
@@ -517,8 +572,12 @@ def score(keys: Path, results: Path, catalogue: Sequence[str] = LISTED, first: i
     seen = [r for r in listed if r.visible >= 3.0]
     shares = {
         "false alarms (null and parameter cases)": _count(r.detected for r in healthy),
-        "detected (moves a channel by 3x noise)": _count(r.detected for r in sick if r.reach >= 3.0),
-        "detected (3x noise left after a refit)": _count(r.detected for r in sick if r.visible >= 3.0),
+        "detected (moves a channel by 3x noise)": _count(
+            r.detected for r in sick if r.reach >= 3.0
+        ),
+        "detected (3x noise left after a refit)": _count(
+            r.detected for r in sick if r.visible >= 3.0
+        ),
         "right name first (catalogue effects)": _count(r.outcome == "right" for r in listed),
         "right name first (3x noise left)": _count(r.outcome == "right" for r in seen),
         "name or ambiguity set holds the truth": _count(r.contains for r in listed),
@@ -526,12 +585,18 @@ def score(keys: Path, results: Path, catalogue: Sequence[str] = LISTED, first: i
         "unlisted recognised": _count(r.outcome == "right" for r in unlisted),
     }
     if mixed:
-        shares["right name first (beside an effect of no catalogue)"] = _count(r.outcome == "right" for r in mixed)
-        shares["unexplained rest is said"] = _count(r.rest_said for r in mixed if r.rest_said is not None)
+        shares["right name first (beside an effect of no catalogue)"] = _count(
+            r.outcome == "right" for r in mixed
+        )
+        shares["unexplained rest is said"] = _count(
+            r.rest_said for r in mixed if r.rest_said is not None
+        )
     if far:
         shares["wrong parameter named"] = _count(r.outcome == "right" for r in far)
         shares["wrong parameter named or in an ambiguity set"] = _count(r.contains for r in far)
-        shares["stated interval holds the wrong parameter"] = _count(r.interval_holds for r in far if r.interval_holds is not None)
+        shares["stated interval holds the wrong parameter"] = _count(
+            r.interval_holds for r in far if r.interval_holds is not None
+        )
         shares["false names (no effect concealed)"] = _count(r.false_name for r in (*healthy, *far))
     utilities = [r.utility if r.utility is not None else 0.0 for r in rows]
     totals: dict[str, float | int | None] = {

@@ -27,7 +27,9 @@ def test_evaluations_of_the_bounded_least_squares() -> None:
     boxes = {"wide": 10.0, "its end outside the box": 0.7}
     for name, wall in boxes.items():
         bounds = (np.full(2, -10.0), np.full(2, wall))
-        counts[f"valley, {name}"] = levenberg_marquardt(rosenbrock, np.array([-1.2, 1.0]), bounds, 200, DiagnosisSettings().fit, 0.0)[2]
+        counts[f"valley, {name}"] = levenberg_marquardt(
+            rosenbrock, np.array([-1.2, 1.0]), bounds, 200, DiagnosisSettings().fit, 0.0
+        )[2]
     compare("least_squares", counts)
 
 

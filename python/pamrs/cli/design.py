@@ -14,7 +14,13 @@ import typer
 from pamrs.cli._shared import check_writable, exact, named_muscle, write
 
 if TYPE_CHECKING:
-    from pamrs.design import JointDesign, JointProblem, MethodComparison, ParetoFront, PressureSearch
+    from pamrs.design import (
+        JointDesign,
+        JointProblem,
+        MethodComparison,
+        ParetoFront,
+        PressureSearch,
+    )
 
 __all__ = ["design_app"]
 
@@ -31,37 +37,67 @@ def _root() -> None:
 
 @design_app.command("joint")
 def _joint(
-    muscle: Annotated[str, typer.Option(help="A muscle of the library, or a rig file (TOML) with one.")],
+    muscle: Annotated[
+        str, typer.Option(help="A muscle of the library, or a rig file (TOML) with one.")
+    ],
     count: Annotated[int, typer.Option(help="Muscles in parallel.")],
     torque: Annotated[str, typer.Option(help='Wanted over the whole range, like "788 ft lbf".')],
-    min_angle: Annotated[str, typer.Option(help='Like "15 deg"; the muscles are at rest length there.')],
+    min_angle: Annotated[
+        str, typer.Option(help='Like "15 deg"; the muscles are at rest length there.')
+    ],
     max_angle: Annotated[str, typer.Option(help='Like "120 deg".')],
     pressure: Annotated[str, typer.Option(help='Gauge pressure, like "190 psi".')],
-    method: Annotated[str, typer.Option(help="ga (as published), de (differential evolution) or cma (CMA-ES).")] = "ga",
+    method: Annotated[
+        str, typer.Option(help="ga (as published), de (differential evolution) or cma (CMA-ES).")
+    ] = "ga",
     bounds: Annotated[
-        list[str] | None, typer.Option(help='LENGTH=LOW:HIGH, like "lu=10:60 mm"; LENGTH is lu, ru, ll or rl; may be repeated.')
+        list[str] | None,
+        typer.Option(
+            help='LENGTH=LOW:HIGH, like "lu=10:60 mm"; LENGTH is lu, ru, ll or rl; may be repeated.'
+        ),
     ] = None,
     max_stroke: Annotated[str, typer.Option(help="Largest stroke over the rest length.")] = "15 %",
-    evaluations: Annotated[int, typer.Option(help="Designs tried in a search; 1820 are 100 generations as published.")] = 1820,
-    mutation: Annotated[float, typer.Option(help="Chance of the genetic algorithm that a child gets one length at random.")] = 0.2,
+    evaluations: Annotated[
+        int, typer.Option(help="Designs tried in a search; 1820 are 100 generations as published.")
+    ] = 1820,
+    mutation: Annotated[
+        float,
+        typer.Option(
+            help="Chance of the genetic algorithm that a child gets one length at random."
+        ),
+    ] = 0.2,
     minimise_pressure: Annotated[
-        bool, typer.Option("--minimise-pressure", help="Repeat at other pressures for the least that does; also by direct search.")
+        bool,
+        typer.Option(
+            "--minimise-pressure",
+            help="Repeat at other pressures for the least that does; also by direct search.",
+        ),
     ] = False,
-    compare: Annotated[bool, typer.Option("--compare", help="Also run all methods with ten seeds each.")] = False,
-    pareto: Annotated[bool, typer.Option("--pareto", help="Also find pressure against size.")] = False,
+    compare: Annotated[
+        bool, typer.Option("--compare", help="Also run all methods with ten seeds each.")
+    ] = False,
+    pareto: Annotated[
+        bool, typer.Option("--pareto", help="Also find pressure against size.")
+    ] = False,
     seed: Annotated[int, typer.Option(help="The same seed gives the same result.")] = 0,
     png: Annotated[Path | None, typer.Option(help="Write the picture.")] = None,
     json: Annotated[Path | None, typer.Option(help=f"Write the result (schema {SCHEMA}).")] = None,
-    rig_joint: Annotated[Path | None, typer.Option(help="Write the block [joint] of a rig file.")] = None,
+    rig_joint: Annotated[
+        Path | None, typer.Option(help="Write the block [joint] of a rig file.")
+    ] = None,
 ) -> None:
-    """Find the four lengths of a tendon joint that give a torque over a range of angles (dissertation 3.5)."""
+    """Find the four lengths of a tendon joint that give a torque over a range of angles
+    (dissertation 3.5).
+    """
     check_writable(png, json, rig_joint)
     if method not in _METHODS:
         raise typer.BadParameter(f"--method = {method!r} is not allowed: {', '.join(_METHODS)}")
     from pamrs.units import bar_and_psi
 
     draw = None if png is None else _picture()
-    problem = _problem(muscle, count, torque, (min_angle, max_angle), pressure, bounds or [], max_stroke)
+    problem = _problem(
+        muscle, count, torque, (min_angle, max_angle), pressure, bounds or [], max_stroke
+    )
     search = _Search(method, evaluations, mutation, seed)
     found = _found(problem, search, pressures=minimise_pressure, compare=compare, pareto=pareto)
     title = f"{count} {muscle}, {torque} from {min_angle} to {max_angle}"
@@ -102,8 +138,12 @@ class _Found:
     front: ParetoFront | None = None
 
 
-def _found(problem: JointProblem, search: _Search, *, pressures: bool, compare: bool, pareto: bool) -> _Found:
-    """The design, at the least pressure where that is asked for, with the comparison and the front."""
+def _found(
+    problem: JointProblem, search: _Search, *, pressures: bool, compare: bool, pareto: bool
+) -> _Found:
+    """The design, at the least pressure where that is asked for, with the comparison and the
+    front.
+    """
     from pamrs.design import Genetic, compare_methods, pareto_front
 
     found = _least_pressure(problem, search) if pressures else _design(problem, search)
@@ -111,7 +151,9 @@ def _found(problem: JointProblem, search: _Search, *, pressures: bool, compare: 
     if compare:
         settings = Genetic(mutation=search.mutation, tolerance=None)
         with _bar("runs") as progress:
-            comparison = compare_methods(problem, evaluations=search.evaluations, genetic=settings, progress=progress)
+            comparison = compare_methods(
+                problem, evaluations=search.evaluations, genetic=settings, progress=progress
+            )
         found = replace(found, comparison=comparison)
     if pareto:
         with _bar("generations") as progress:
@@ -151,7 +193,13 @@ def _options(search: _Search) -> dict[str, Any]:
 
 
 def _problem(
-    muscle: str, count: int, torque: str, angles: tuple[str, str], pressure: str, bounds: Sequence[str], max_stroke: str
+    muscle: str,
+    count: int,
+    torque: str,
+    angles: tuple[str, str],
+    pressure: str,
+    bounds: Sequence[str],
+    max_stroke: str,
 ) -> JointProblem:
     from pamrs.design import JointProblem
 
@@ -168,7 +216,9 @@ def _problem(
 
 
 def _bounds(given: Sequence[str]) -> dict[str, tuple[float, float]]:
-    """``lu=10:60 mm`` and so on; the unit of the second number serves for the first where that has none."""
+    """``lu=10:60 mm`` and so on; the unit of the second number serves for the first where that has
+    none.
+    """
     from pamrs.design import LENGTHS, SYMBOLS
     from pamrs.errors import ParameterError
 
@@ -179,11 +229,18 @@ def _bounds(given: Sequence[str]) -> dict[str, tuple[float, float]]:
         low, colon, high = rest.partition(":")
         key = names.get(name.strip())
         if not equals or not colon or key is None or key in found:
-            reason = "given twice" if key in found else "LENGTH=LOW:HIGH is needed, like 'lu=10:60 mm', with lu, ru, ll or rl"
+            reason = (
+                "given twice"
+                if key in found
+                else "LENGTH=LOW:HIGH is needed, like 'lu=10:60 mm', with lu, ru, ll or rl"
+            )
             raise ParameterError(f"--bounds = {text!r} is not allowed: {reason}")
         unit = high.strip().lstrip("+-0123456789.eE").strip()
         bare = not low.strip().lstrip("+-0123456789.eE").strip()
-        found[key] = (exact("bounds", f"{low} {unit}" if bare else low, "length"), exact("bounds", high, "length"))
+        found[key] = (
+            exact("bounds", f"{low} {unit}" if bare else low, "length"),
+            exact("bounds", high, "length"),
+        )
     return found
 
 
@@ -225,7 +282,12 @@ def _bar(what: str) -> Iterator[Callable[[int, int], None] | None]:
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+    )
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
         task = progress.add_task(what, total=None)
         yield lambda done, total: progress.update(task, completed=done, total=total)
@@ -239,7 +301,10 @@ def _strict_line(design: JointDesign | None) -> str:
         return "strict, direct search: no design was found that any pressure makes good enough"
     assert design.search is not None
     found = f"{bar_and_psi(design.problem.pressure)} gives the torque at every angle"
-    return f"strict, direct search: {found} ({design.search.method}, {design.search.evaluations} evaluations)"
+    return (
+        f"strict, direct search: {found} ({design.search.method}, {design.search.evaluations} "
+        "evaluations)"
+    )
 
 
 def _front_table(front: ParetoFront) -> str:
@@ -255,7 +320,11 @@ def _front_table(front: ParetoFront) -> str:
         f"{'mm':>9}{'bar':>9}" + "".join(f"{s:>9}" for s in SYMBOLS),
     ]
     for index in np.unique(np.linspace(0, len(front.size) - 1, 12).round().astype(int)).tolist():
-        numbers = [1e3 * front.size[index], front.pressure[index] / 1e5, *(1e3 * front.lengths[index])]
+        numbers = [
+            1e3 * front.size[index],
+            front.pressure[index] / 1e5,
+            *(1e3 * front.lengths[index]),
+        ]
         lines.append("".join(f"{number:>9.2f}" for number in numbers))
     return "\n".join(lines)
 

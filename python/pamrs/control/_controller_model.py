@@ -1,4 +1,6 @@
-"""Linear models of sampled controllers about an operating point, by differences of one update over its state and its measurements."""
+"""Linear models of sampled controllers about an operating point, by differences of one update over
+its state and its measurements.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,11 @@ __all__ = ["LinearController", "heard", "linear_controller"]
 Array = NDArray[np.float64]
 
 #: Half width of the differences in what is measured [SI].
-_WIDTHS: Final[dict[str, float]] = {"joint_angle": 1e-5, "joint_rate": 1e-5, "muscle_pressure": 10.0}
+_WIDTHS: Final[dict[str, float]] = {
+    "joint_angle": 1e-5,
+    "joint_rate": 1e-5,
+    "muscle_pressure": 10.0,
+}
 #: By how much of the slope the slopes of both sides may differ.
 _KINK: Final = 0.01
 SIDES: Final = ("", "up", "down", "mean")
@@ -26,7 +32,8 @@ SIDES: Final = ("", "up", "down", "mean")
 
 @dataclass(frozen=True)
 class LinearController:
-    """``x+ = A x + B y, u = C x + D y`` from one sample to the next, about an operating point; y are :attr:`inputs`.
+    """``x+ = A x + B y, u = C x + D y`` from one sample to the next, about an operating point; y
+    are :attr:`inputs`.
 
     Attributes
     ----------
@@ -59,9 +66,10 @@ def linear_controller(
 ) -> LinearController:
     """Any controller with a state of floats about an operating point, by differences of one update.
 
-    Exact for a controller that is linear inside its limits (PID, cascade). What does not reach the command (a clock), or is never
-    moved by a measurement (an integral without a gain), is left out. A law with a corner at the point (a dead band's edge, a limit, a
-    switching line) has two slopes there and no linear model: it is refused unless a side is chosen.
+    Exact for a controller that is linear inside its limits (PID, cascade). What does not reach the
+    command (a clock), or is never moved by a measurement (an integral without a gain), is left out.
+    A law with a corner at the point (a dead band's edge, a limit, a switching line) has two slopes
+    there and no linear model: it is refused unless a side is chosen.
 
     Parameters
     ----------
@@ -72,41 +80,55 @@ def linear_controller(
     angle : float, optional
         Another reference [rad].
     state : mapping, optional
-        The controller's state at the operating point, for one whose integrals have to hold the arm up (a cascade, whose outer integral
-        is the pressure): ``controller.state`` after a closed loop that has come to rest there. By default that of a controller which
-        has seen the point three times.
+        The controller's state at the operating point, for one whose integrals have to hold the arm
+        up (a cascade, whose outer integral is the pressure): ``controller.state`` after a closed
+        loop that has come to rest there. By default that of a controller which has seen the point
+        three times.
     side : {"", "up", "down", "mean"}
-        Of what is measured or remembered, where the slopes towards larger and smaller values differ by more than one percent: which
-        of them, or the mean of both. By default such a controller is refused.
+        Of what is measured or remembered, where the slopes towards larger and smaller values differ
+        by more than one percent: which of them, or the mean of both. By default such a controller
+        is refused.
 
     Returns
     -------
     LinearController
-        From ``joint_angle``, ``joint_rate`` and ``muscle_pressure``, those of them that are in ``point``.
+        From ``joint_angle``, ``joint_rate`` and ``muscle_pressure``, those of them that are in
+        ``point``.
 
     Raises
     ------
     ParameterError
-        If the side is unknown, the controller answers what is not a finite number, has a corner at the point, or no measurement reaches
-        its command: it is at a limit.
+        If the side is unknown, the controller answers what is not a finite number, has a corner at
+        the point, or no measurement reaches its command: it is at a limit.
     """
     if side not in SIDES:
-        raise ParameterError(f"side = {side!r} is not allowed: one of {', '.join(map(repr, SIDES))}")
-    inputs = tuple(name for name in ("joint_angle", "joint_rate", "muscle_pressure") if name in point)
+        raise ParameterError(
+            f"side = {side!r} is not allowed: one of {', '.join(map(repr, SIDES))}"
+        )
+    inputs = tuple(
+        name for name in ("joint_angle", "joint_rate", "muscle_pressure") if name in point
+    )
     reference = Reference(point["joint_angle"] if angle is None else angle)
-    update = _Update(controller, dict(point), reference, _settled(controller, point, reference, state))
+    update = _Update(
+        controller, dict(point), reference, _settled(controller, point, reference, state)
+    )
     slopes, middle = _slopes(update, inputs, side)
     controller.reset()
     command = float(middle[-1])
     n = len(update.paths)
     whole = np.array([slope for slope, _ in slopes]).T
     if not (np.isfinite(whole).all() and math.isfinite(command)):
-        raise ParameterError("the controller's command is not finite at the operating point: no linear model is there")
+        raise ParameterError(
+            "the controller's command is not finite at the operating point: no linear model is "
+            "there"
+        )
     if not whole[n].any() or not whole[:, n:].any():
         raise ParameterError(
-            f"the controller answers {command:g} whatever it measures: it is at a limit; give the state in which it holds the arm here"
+            f"the controller answers {command:g} whatever it measures: it is at a limit; give the "
+            "state in which it holds the arm here"
         )
-    # an integral with a gain of zero is heard, but nothing moves it; it would count as a motion that never dies out
+    # an integral with a gain of zero is heard, but nothing moves it; it would count as a motion
+    # that never dies out
     moved = heard(whole[:n, :n].T, np.abs(whole[:n, n:]).sum(axis=1))
     kept = sorted(set(heard(whole[:n, :n], whole[n, :n])) & set(moved))
     if side == "":
@@ -122,7 +144,9 @@ def _settled(
     reference: Reference,
     state: Mapping[str, Any] | None,
 ) -> Mapping[str, Any]:
-    """The controller's state at the operating point: the one given, or after three updates there."""
+    """The controller's state at the operating point: the one given, or after three updates
+    there.
+    """
     controller.reset()
     if state is None:
         for k in range(3):  # filters and differences have seen something
@@ -167,8 +191,12 @@ class _Update:
         return np.array([*(_at(after, path) for path in self.paths), command])
 
 
-def _slopes(update: _Update, inputs: tuple[str, ...], side: str) -> tuple[list[tuple[Array, Array]], Array]:
-    """Slopes over every float of the state and every input, and what is answered at the point itself."""
+def _slopes(
+    update: _Update, inputs: tuple[str, ...], side: str
+) -> tuple[list[tuple[Array, Array]], Array]:
+    """Slopes over every float of the state and every input, and what is answered at the point
+    itself.
+    """
     start, point = update.start, update.point
     middle = update(start, point)
     slopes = []
@@ -183,8 +211,12 @@ def _slopes(update: _Update, inputs: tuple[str, ...], side: str) -> tuple[list[t
     return slopes, middle
 
 
-def _refuse_corners(update: _Update, inputs: tuple[str, ...], steps: list[Array], kept: list[int]) -> None:
-    """Name the first slope that differs between its sides, of the states that are kept or of the command."""
+def _refuse_corners(
+    update: _Update, inputs: tuple[str, ...], steps: list[Array], kept: list[int]
+) -> None:
+    """Name the first slope that differs between its sides, of the states that are kept or of the
+    command.
+    """
     n = len(update.paths)
     names = [".".join(map(str, path)) for path in update.paths]
     places = [*kept, n]
@@ -194,18 +226,25 @@ def _refuse_corners(update: _Update, inputs: tuple[str, ...], steps: list[Array]
             what = "its command" if k == n else names[k]
             raise ParameterError(
                 f"the controller has a corner at the operating point: the slopes of {what} over "
-                f"{name} differ by {step[k]:.3g} between its sides; choose a side (up, down, mean), "
-                "or another point"
+                f"{name} differ by {step[k]:.3g} between its sides; choose a side (up, down, "
+                "mean), or another point"
             )
 
 
 def _slope(up: Array, middle: Array, down: Array, width: float, side: str) -> tuple[Array, Array]:
-    """Slope of what is answered, and by how much it differs between both sides; zero where that is next to nothing."""
+    """Slope of what is answered, and by how much it differs between both sides; zero where that is
+    next to nothing.
+    """
     above, below = (up - middle) / width, (middle - down) / width
     # the last digits of what is differenced are no corner
-    slack = _KINK * np.maximum(np.abs(above), np.abs(below)) + 1e-11 * np.maximum(1.0, np.abs(middle)) / width
+    slack = (
+        _KINK * np.maximum(np.abs(above), np.abs(below))
+        + 1e-11 * np.maximum(1.0, np.abs(middle)) / width
+    )
     apart = np.abs(above - below)
-    return {"up": above, "down": below}.get(side, 0.5 * (above + below)), np.where(apart > slack, apart, 0.0)
+    return {"up": above, "down": below}.get(side, 0.5 * (above + below)), np.where(
+        apart > slack, apart, 0.0
+    )
 
 
 def heard(a: Array, c: Array) -> list[int]:
@@ -247,4 +286,7 @@ def _changed(state: Any, path: Path, change: float) -> Any:
         copied = state.copy()
         copied[path[0]] += change
         return copied
-    return {key: _changed(value, path[1:], change) if key == path[0] else value for key, value in state.items()}
+    return {
+        key: _changed(value, path[1:], change) if key == path[0] else value
+        for key, value in state.items()
+    }

@@ -71,10 +71,16 @@ class Where(Entry):
         Recording to which the intervals belong.
     """
 
-    block: str | None = field(default=None, metadata=told("block of the chain that carries the excess residual"))
+    block: str | None = field(
+        default=None, metadata=told("block of the chain that carries the excess residual")
+    )
     channel: str | None = field(default=None, metadata=told("channel that tells"))
-    intervals: list[list[float]] = field(default_factory=list, metadata=told("start and stop in s", kind="pairs"))
-    conditions: list[Condition] = field(default_factory=list, metadata=told("operating conditions that carry the excess"))
+    intervals: list[list[float]] = field(
+        default_factory=list, metadata=told("start and stop in s", kind="pairs")
+    )
+    conditions: list[Condition] = field(
+        default_factory=list, metadata=told("operating conditions that carry the excess")
+    )
     text: str = ""
     recording: str | None = field(default=None, metadata=told(json=False, optional=True))
 
@@ -100,7 +106,9 @@ class EffectParameterFound(Entry):
     value: float
     std: float | None
     unit: str
-    interval: list[float] | None = field(default=None, metadata=told("95 % interval", optional=True, kind="pair"))
+    interval: list[float] | None = field(
+        default=None, metadata=told("95 % interval", optional=True, kind="pair")
+    )
     identifiable: bool | None = field(default=None, metadata=told(optional=True))
 
 
@@ -230,14 +238,14 @@ class BlockVerdict(Entry):
 
 @dataclass(frozen=True, eq=False)
 class Unexplained(Entry):
-    """A block that keeps a mismatch.
+    """A block with a mismatch that stays unexplained.
 
     Attributes
     ----------
     block, channel, unit : str
         The block, the channel that it predicts, and its SI unit.
     noises, size : float
-        How much, in units of the noise and in the unit of the channel.
+        How large it is, in units of the noise and in the unit of the channel.
     verdict : str
         Of its group of blocks.
     """
@@ -321,7 +329,8 @@ class WrongParameter(Entry):
     probability: float = field(metadata=told(kind="probability"))
     held_out: dict[str, StageError] = field(
         metadata=told(
-            "root mean square error of each channel it acts on: nominal model, refitted inside the tolerances, with the other value"
+            "root mean square error of each channel it acts on: nominal model, refitted inside the "
+            "tolerances, with the other value"
         )
     )
 
@@ -368,6 +377,7 @@ class FitErrors(Entry):
     gap_closed: float | None = field(
         default=None,
         metadata=told(
-            "(refit - after)/(refit - noise), held-out data, channels pooled in units of their noise; 1 is down to the noise"
+            "(refit - after)/(refit - noise), held-out data, channels pooled in units of their "
+            "noise; 1 is down to the noise"
         ),
     )

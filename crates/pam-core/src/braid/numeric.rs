@@ -126,8 +126,9 @@ pub fn brent(
     None
 }
 
-/// Step from the second of three points towards the root by inverse quadratic interpolation, by the secant where the
-/// first is the third; `None` where it leaves the bracket or does not halve the last step but one.
+/// Step from the second of three points towards the root by inverse quadratic interpolation, by the
+/// secant where the first is the third; `None` where it leaves the bracket or does not halve the
+/// last step but one.
 #[inline]
 fn interpolated([a, b, c]: [f64; 3], [fa, fb, fc]: [f64; 3], width: f64, last: f64) -> Option<f64> {
     let middle = 0.5 * (c - b);
@@ -146,7 +147,8 @@ fn interpolated([a, b, c]: [f64; 3], [fa, fb, fc]: [f64; 3], width: f64, last: f
     (2.0 * p < (3.0 * middle * q - (width * q).abs()).min((last * q).abs())).then(|| p / q)
 }
 
-/// The least value of a function on `[0, 1]`: the best of `steps` equal steps, then golden-section search about it.
+/// The least value of a function on `[0, 1]`: the best of `steps` equal steps, then golden-section
+/// search about it.
 pub fn minimum(f: impl Fn(f64) -> f64, steps: u32) -> Root {
     const GOLDEN: f64 = 0.618_033_988_749_894_8;
     const NARROWED: u32 = 80;

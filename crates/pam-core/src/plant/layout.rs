@@ -8,13 +8,20 @@ use crate::effects::Role;
 /// Number of sums that are kept beside the states: see [`BALANCE`].
 pub const BALANCE_COUNT: usize = 6;
 
-/// Channels of the sums over a simulation, in their order: mass out of the supplies and into the ambient, what
-/// regulators relieve included [kg]; energy `R T m` and exergy `R T ln(p/p_a) m` of what the supplies gave, work of
-/// the muscles, positive work at the joints [J].
-pub const BALANCE: [&str; BALANCE_COUNT] =
-    ["mass_supplied", "mass_vented", "energy_supplied", "exergy_supplied", "muscle_work", "joint_work"];
+/// Channels of the sums over a simulation, in their order: mass out of the supplies and into the
+/// ambient, what regulators relieve included [kg]; energy `R T m` and exergy `R T ln(p/p_a) m` of
+/// what the supplies gave, work of the muscles, positive work at the joints [J].
+pub const BALANCE: [&str; BALANCE_COUNT] = [
+    "mass_supplied",
+    "mass_vented",
+    "energy_supplied",
+    "exergy_supplied",
+    "muscle_work",
+    "joint_work",
+];
 
-/// Places of the states: supplies' pressures, gases' pressures, gases' masses, coordinates, their rates, what effects need.
+/// Places of the states: supplies' pressures, gases' pressures, gases' masses, coordinates, their
+/// rates, what effects need.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Layout {
     /// Supplies.
@@ -265,7 +272,12 @@ fn channels(spec: &RigSpec, wiring: &Wiring, joints: &[String]) -> Vec<(String, 
 }
 
 /// States that an initial value can be given for, with the place of each.
-fn initial(spec: &RigSpec, wiring: &Wiring, layout: &Layout, joints: &[String]) -> Vec<(String, usize)> {
+fn initial(
+    spec: &RigSpec,
+    wiring: &Wiring,
+    layout: &Layout,
+    joints: &[String],
+) -> Vec<(String, usize)> {
     let mut found = Vec::new();
     let mut add = |kind: &str, name: &str, place| found.push((dotted(kind, name), place));
     for (k, supply) in spec.supplies.iter().enumerate() {

@@ -83,7 +83,10 @@ class EvidenceSettings(SettingsGroup):
         0.5,
         unit="1",
         least=0.0,
-        reason="excess variance over that of the noise from which recordings are asked how much an effect leaves",
+        reason=(
+            "excess variance over that of the noise from which recordings are tested for how much "
+            "an effect leaves"
+        ),
         origin="docs/decisions/0014",
     )
     telling_share: float = setting(
@@ -98,7 +101,8 @@ class EvidenceSettings(SettingsGroup):
         0.04,
         unit="1",
         least=0.0,
-        reason="share of a mismatch that the difference between an equation of the catalogue and the truth may leave",
+        reason="share of a mismatch that the difference between an equation of the catalogue and "
+        "the truth may leave",
         origin="docs/decisions/0014",
     )
     form_share_alike: float = setting(
@@ -112,7 +116,8 @@ class EvidenceSettings(SettingsGroup):
         0.15,
         unit="1",
         least=0.0,
-        reason="standard deviation of what a right effect of another form leaves of a mismatch's variance",
+        reason="standard deviation of what a right effect of another form leaves of a mismatch's "
+        "variance",
         origin="docs/decisions/0022",
     )
     noise_error: float = setting(
@@ -141,7 +146,8 @@ class EvidenceSettings(SettingsGroup):
         0.02,
         unit="1",
         least=0.0,
-        reason="share of the pressure below which a drift that no other recording confirms may be the bench's own",
+        reason="share of the pressure below which a drift that no other recording confirms may be "
+        "the bench's own",
         origin="docs/decisions/0014: the aluminium control of the chambers has one",
     )
     drift_probability: float = setting(
@@ -164,7 +170,8 @@ class EvidenceSettings(SettingsGroup):
         0.1,
         unit="1",
         least=0.0,
-        reason="part of an effect's size over a recording below which what would tell it from another effect is zero",
+        reason="part of an effect's size over a recording below which what would tell it from "
+        "another effect is zero",
         origin="judgement",
     )
     same_stds: float = setting(
@@ -192,7 +199,8 @@ class EvidenceSettings(SettingsGroup):
         0.35,
         unit="1",
         least=0.0,
-        reason="relative scatter of an effect's size between recordings beyond which it is not that effect",
+        reason="relative scatter of an effect's size between recordings beyond which it is not "
+        "that effect",
         origin="judgement",
     )
     scatter_width: float = setting(
@@ -265,7 +273,8 @@ class VerdictSettings(SettingsGroup):
         unit="1",
         least=0.0,
         most=1.0,
-        reason="probability above which a name is given even where unlisted is more probable than each set of names that has it",
+        reason="probability above which a name is given even where unlisted is more probable than "
+        "each set of names that has it",
         origin="docs/decisions/0024",
     )
     listed: float = setting(
@@ -283,7 +292,9 @@ class VerdictSettings(SettingsGroup):
         reason="probability from which a hypothesis of one group is put beside those of others",
         origin="judgement",
     )
-    most_sets: int = setting(8, unit="count", least=1, reason="sets that a case lists", origin="judgement")
+    most_sets: int = setting(
+        8, unit="count", least=1, reason="sets that a case lists", origin="judgement"
+    )
     quiet_likely: float = setting(
         0.96,
         unit="1",
@@ -331,14 +342,16 @@ class VerdictSettings(SettingsGroup):
         unit="1",
         least=0.0,
         most=1.0,
-        reason="factor of the probability of effects on a joint beside geometry that the rig file marks unknown",
+        reason="factor of the probability of effects on a joint beside geometry that the rig file "
+        "marks unknown",
         origin="docs/decisions/0012",
     )
     least_gap: float = setting(
         0.05,
         unit="noises",
         least=0.0,
-        reason="gap between refit and noise, over all channels, below which nothing is said of how much of it closes",
+        reason="gap between refit and noise, over all channels, below which nothing is said of "
+        "how much of it closes",
         origin="judgement",
     )
 
