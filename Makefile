@@ -15,6 +15,8 @@ CASE_KIND := $(if $(KIND),--kind $(KIND))
 LOCKED := $(if $(CI),--locked)
 RUST_SOURCES := $(shell find crates -name '*.rs' -path '*/src/*' 2>/dev/null) \
                 $(shell find crates -name Cargo.toml 2>/dev/null) Cargo.toml $(wildcard Cargo.lock)
+# Two checks are made at once: cargo takes its own processors, not make's.
+CARGO := env -u MAKEFLAGS -u MFLAGS cargo
 # One by one, since cargo fmt does not see modules that a macro declares.
 RUSTFMT := find crates -name '*.rs' -print0 | xargs -0 rustfmt --edition 2021
 PYTHON_SOURCES := python tests trial demo benchmarks fingerprints
@@ -59,7 +61,7 @@ $(VENV)/.flags: $(VENV)/.created FORCE
 	@printf '%s\n' '$(RUSTFLAGS)' | cmp -s - $@ || printf '%s\n' '$(RUSTFLAGS)' > $@
 
 $(VENV)/.built: $(VENV)/.installed $(VENV)/.flags pyproject.toml $(RUST_SOURCES)
-	PATH="$(CURDIR)/$(BIN):$$PATH" VIRTUAL_ENV="$(CURDIR)/$(VENV)" \
+	env -u MAKEFLAGS -u MFLAGS PATH="$(CURDIR)/$(BIN):$$PATH" VIRTUAL_ENV="$(CURDIR)/$(VENV)" \
 	    $(BIN)/maturin develop --release --quiet $(LOCKED)
 	@touch $@
 
@@ -93,7 +95,7 @@ lint: lint-rust lint-python  ## formatting, clippy, ruff, mypy, the stub against
 
 lint-rust: $(VENV)/.created
 	$(RUSTFMT) --check
-	cargo clippy --quiet --workspace --all-targets $(LOCKED) -- -D warnings
+	$(CARGO) clippy --quiet --workspace --all-targets $(LOCKED) -- -D warnings
 
 lint-python: build
 	$(BIN)/ruff check --quiet $(PYTHON_SOURCES)
@@ -102,8 +104,8 @@ lint-python: build
 	$(BIN)/python -m mypy.stubtest pamrs._core
 
 test-rust:  ## the core's tests, documentation examples included
-	cargo test --quiet --workspace --exclude pam-py $(LOCKED) --lib --tests
-	cargo test --quiet -p pam-core $(LOCKED) --doc
+	$(CARGO) test --quiet --workspace --exclude pam-py $(LOCKED) --lib --tests
+	$(CARGO) test --quiet -p pam-core $(LOCKED) --doc
 
 test-python: build  ## pytest without what is marked slow (WORKERS=2 to choose)
 	$(PYTEST) -m "not slow"
@@ -113,11 +115,11 @@ test-python-all: build
 
 snapshots: build  ## write the files of the work done anew, where it has changed on purpose
 	PAMRS_SNAPSHOTS=write $(BIN)/python -m pytest -q tests/work
-	PAMRS_SNAPSHOTS=write cargo test --quiet -p pam-core $(LOCKED) --test work
+	PAMRS_SNAPSHOTS=write $(CARGO) test --quiet -p pam-core $(LOCKED) --test work
 
 deny:  ## licences, sources and duplicates of the crates (needs cargo-deny)
 	@command -v cargo-deny > /dev/null || { echo "cargo-deny is not installed; it is with: cargo install --locked cargo-deny"; exit 1; }
-	cargo deny --locked check bans licenses sources
+	$(CARGO) deny --locked check bans licenses sources
 
 format:  ## rewrite the sources in the house's layout
 	$(RUSTFMT)
@@ -125,7 +127,7 @@ format:  ## rewrite the sources in the house's layout
 	$(BIN)/ruff format $(PYTHON_SOURCES)
 
 bench: build  ## this package and its reference side by side
-	cargo bench --quiet --package pam-core $(LOCKED)
+	$(CARGO) bench --quiet --package pam-core $(LOCKED)
 	$(BIN)/python -m benchmarks.bench
 
 convergence: build  ## order, stability and error of every packaged rig
