@@ -12,9 +12,9 @@ from scipy.stats import chi2
 
 from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.fit import Key, Problem, residuals
-from pamrs.diagnosis.noise import Floor, bins_of, floors
+from pamrs.diagnosis.noise import NoiseLevel, bins_of, noise_levels
 from pamrs.diagnosis.prepare import Block, Prepared, Residual, available_blocks, binned, prepare
-from pamrs.diagnosis.search import coloured, refitted
+from pamrs.diagnosis.search import refitted, with_autocorrelation
 from pamrs.recordings import load_case
 from pamrs.rig import Rig
 from pamrs.simulation import core_rig
@@ -40,7 +40,7 @@ class Stretch:
     prepared : Prepared
         The recording.
     noise : float
-        Floor of a sample, in the channel's unit: its own noise and that of the drives.
+        Noise level of a sample, in the channel's unit: its own noise and that of the drives.
     y : (m,) array
         Residual over `noise`, means over :data:`STEP`.
     u : (m, k) array
@@ -116,7 +116,7 @@ class Sheet:
 def _refitted(inner: Problem, nominal: Rig) -> tuple[Rig, dict[str, float]]:
     """Baseline inside its tolerances, as the diagnosis refits it."""
     first = refitted(inner, nominal, dict.fromkeys((b.name for b in inner.blocks), 1.0))
-    best, _ = coloured(inner, nominal, first)
+    best, _ = with_autocorrelation(inner, nominal, first)
     return best.rig, best.moved
 
 
@@ -136,14 +136,14 @@ def _signals(prepared: Prepared, rig: Rig) -> dict[str, Array]:
 
 
 def _stretch(
-    r: Residual, floor: Floor, prepared: Prepared, signals: dict[str, Array], scales: dict[str, tuple[float, float]]
+    r: Residual, noise_level: NoiseLevel, prepared: Prepared, signals: dict[str, Array], scales: dict[str, tuple[float, float]]
 ) -> Stretch:
     width = max(1, round(STEP / prepared.dt))
-    y, _ = binned(r.value / floor.sample, r.rows, width)
+    y, _ = binned(r.value / noise_level.sample, r.rows, width)
     every = np.ones(prepared.n, dtype=bool)
     u = np.column_stack([(binned(v, every, width)[0] - scales[n][0]) / scales[n][1] for n, v in signals.items()])
     pieces = [(-(-a // width), min(b // width, y.size)) for a, b, _ in r.starts]
-    return Stretch(r, prepared, floor.sample, y, u, [(a, b) for a, b in pieces if b - a >= 16], width * prepared.dt)
+    return Stretch(r, prepared, noise_level.sample, y, u, [(a, b) for a, b in pieces if b - a >= 16], width * prepared.dt)
 
 
 def sheet(folder: str | os.PathLike[str]) -> Sheet:
@@ -177,34 +177,38 @@ def sheet(folder: str | os.PathLike[str]) -> Sheet:
         model, distances = _refitted(inner, rig)
         for name, value in distances.items():
             moved[name] = max(value, moved.get(name, 0.0), key=abs)
-        floor = floors(inner, core.respecified(model.to_json())) | (floors(outer, core.respecified(model.to_json())) if held else {})
+        noise_level = noise_levels(inner, core.respecified(model.to_json()))
+        if held:
+            noise_level |= noise_levels(outer, core.respecified(model.to_json()))
         found = residuals(inner, model)
         outside = residuals(outer, model) if held else found
 
-        def lay(block: Block, prepared: Prepared, left: dict[Key, Residual], floor: dict[Key, Floor] = floor) -> Stretch:
+        def lay(
+            block: Block, prepared: Prepared, left: dict[Key, Residual], noise_level: dict[Key, NoiseLevel] = noise_level
+        ) -> Stretch:
             key = (block.name, prepared.recording.name)
-            return _stretch(left[key], floor[key], prepared, tables[prepared.recording.name], scales)
+            return _stretch(left[key], noise_level[key], prepared, tables[prepared.recording.name], scales)
 
         for block in members:
             stretches = [lay(block, p, found) for p in fitted]
             columns.append(Column(block, names, stretches, [lay(block, p, outside) for p in held] if held else stretches))
-            chances.append(_chance(block, fitted, found, floor))
+            chances.append(_chance(block, fitted, found, noise_level))
     return Sheet(case.name, columns, min(1.0, min(chances) * len(chances)), moved)
 
 
-def _chance(block: Block, recordings: list[Prepared], found: dict[Key, Residual], floor: dict[Key, Floor]) -> float:
-    """Chi-square of the means over 0.1 s against their floor, each counted as independent: the textbook's test of a fit."""
+def _chance(block: Block, recordings: list[Prepared], found: dict[Key, Residual], noise_level: dict[Key, NoiseLevel]) -> float:
+    """Chi-square of the means over 0.1 s against their noise level, each counted as independent: the textbook's test of a fit."""
     total, count = 0.0, 0
     for prepared in recordings:
         key = (block.name, prepared.recording.name)
         means, counts = binned(found[key].value, found[key].rows, bins_of(prepared))
-        total += float(((means[counts > 0] / floor[key].binned) ** 2).sum())
+        total += float(((means[counts > 0] / noise_level[key].binned) ** 2).sum())
         count += int((counts > 0).sum())
     return float(chi2.sf(total, max(1, count)))
 
 
 def errors(column: Column, corrections: list[Array] | None = None) -> tuple[float, float]:
-    """Root mean square of a block's held-out residual, and its floor, in the channel's unit."""
+    """Root mean square of a block's held-out residual, and its noise level, in the channel's unit."""
     squares, floors_, weights = [], [], []
     for i, stretch in enumerate(column.outer):
         r = stretch.residual

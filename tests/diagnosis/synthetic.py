@@ -8,7 +8,6 @@ import numpy as np
 
 from pamrs.diagnosis.result import Diagnosis, Trace
 from pamrs.findings import (
-    Asked,
     BlockResidual,
     ChannelError,
     Condition,
@@ -18,6 +17,7 @@ from pamrs.findings import (
     FitErrors,
     NextExperiment,
     ParameterFound,
+    Tested,
     Where,
 )
 
@@ -139,9 +139,9 @@ def diagnosis(**changes: Any) -> Diagnosis:
         "warnings": ["frozen joint_angle in step_up, 3.1 to 3.4 s: masked"],
         "seconds": 31.4,
         "text": "After each fill the gas cools and the pressure sags.\n\nA leak goes on; this stops.",
-        "asked": [
-            {"id": "heat_transfer", "blocks": ["chamber"], "promised": 0.96, "left": 0.003},
-            {"id": "valve_hysteresis", "blocks": ["chamber"], "promised": 0.011, "left": None},
+        "tested": [
+            {"id": "heat_transfer", "blocks": ["chamber"], "predicted_gain": 0.96, "left": 0.003},
+            {"id": "valve_hysteresis", "blocks": ["chamber"], "predicted_gain": 0.011, "left": None},
         ],
         "rig": ModelText(),
         "traces": [
@@ -189,7 +189,7 @@ def entries(content: dict[str, Any]) -> dict[str, Any]:
         "parameters": each(ParameterFound, content["parameters"]),
         "fit": FitErrors(**errors, gap_closed=content["fit"].get("gap_closed")),
         "next_experiment": NextExperiment(**content["next_experiment"]),
-        "asked": [Asked(**asked) for asked in content["asked"]],
+        "tested": [Tested(**row) for row in content["tested"]],
         "residuals": each(BlockResidual, content["residuals"]),
         "condition_map": None if shown is None else ConditionMap(**shown),
     }

@@ -10,7 +10,7 @@ from pamrs import _core
 from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.explain import describe_closure
 from pamrs.diagnosis.fit import Fit, Key, Problem, fit, fits, residuals
-from pamrs.diagnosis.noise import Floor, excess, floors, inflation
+from pamrs.diagnosis.noise import NoiseLevel, excess, inflation, noise_levels
 from pamrs.diagnosis.prepare import Block, available_blocks, prepare
 from pamrs.diagnosis.search import find_closure
 from pamrs.effects import CATALOGUE, EFFECTS, MEMORY_OF, TERMS
@@ -62,8 +62,8 @@ class Case:
         white = dict.fromkeys(names, 1.0)
         first = fit(self.problem, NOMINAL, (), {}, white)
         width = SETTINGS.noise.fit_bin_time
-        self.colour = {b.name: inflation(b, self.problem.recordings, first.residuals, width) for b in self.blocks}
-        self.baseline = fit(self.problem, NOMINAL, (), {}, self.colour, warm=first)
+        self.autocorrelation = {b.name: inflation(b, self.problem.recordings, first.residuals, width) for b in self.blocks}
+        self.baseline = fit(self.problem, NOMINAL, (), {}, self.autocorrelation, warm=first)
         self.evaluations = 0
 
     def found(self, monkeypatch: pytest.MonkeyPatch, blocks: list[Block]) -> Fit | None:
@@ -73,14 +73,14 @@ class Case:
 
         monkeypatch.setattr("pamrs.diagnosis.search._closure.residuals", counted)
         monkeypatch.setattr("pamrs.diagnosis.fit._fitting.residuals", counted)
-        return find_closure(self.problem, NOMINAL, self.baseline, self.colour, blocks, lambda _: None)
+        return find_closure(self.problem, NOMINAL, self.baseline, self.autocorrelation, blocks, lambda _: None)
 
     def gap_closed(self, model: Fit, block: str) -> float:
         """Share of the excess beyond noise that a model removes on the held-out recording."""
-        floor: dict[Key, Floor] = floors(self.held, self.held.core.respecified(model.rig.to_json()))
+        noise_level: dict[Key, NoiseLevel] = noise_levels(self.held, self.held.core.respecified(model.rig.to_json()))
         own = next(b for b in self.blocks if b.name == block)
         found = [residuals(self.held, m.rig) for m in (self.baseline, model)]
-        ratios = [excess(own, self.held.recordings, r, floor, SETTINGS.noise).ratio - 1.0 for r in found]
+        ratios = [excess(own, self.held.recordings, r, noise_level, SETTINGS.noise).ratio - 1.0 for r in found]
         return 1.0 - float(np.sqrt(max(0.0, ratios[1]) / ratios[0]))
 
 
@@ -136,8 +136,9 @@ def test_a_hidden_flow_is_modelled(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("names", [("arm",), ("supply", "chamber")])
 def test_a_null_keeps_no_excess_and_next_to_no_terms(names: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:
     case = Case(NOMINAL, names)
-    floor = floors(case.problem, case.problem.core.respecified(case.baseline.rig.to_json()))
-    assert all(excess(b, case.problem.recordings, case.baseline.residuals, floor, SETTINGS.noise).ratio < 1.2 for b in case.blocks)
+    noise_level = noise_levels(case.problem, case.problem.core.respecified(case.baseline.rig.to_json()))
+    found = [excess(b, case.problem.recordings, case.baseline.residuals, noise_level, SETTINGS.noise) for b in case.blocks]
+    assert all(kept.ratio < 1.2 for kept in found)
     # a form that is asked for all the same mends what the smoothing of the drives does at reversals: hundredths of the arm's torque
     found = case.found(monkeypatch, case.blocks)
     assert found is None or set(found.effects) == {"closure_torque"}
@@ -148,12 +149,12 @@ def test_a_null_keeps_no_excess_and_next_to_no_terms(names: tuple[str, ...], mon
 def test_what_does_not_fit_together_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     case = Case(NOMINAL, ("arm",))
     with pytest.raises(DiagnosisError, match="blocks"):
-        find_closure(case.problem, NOMINAL, case.baseline, case.colour, [], lambda _: None)
+        find_closure(case.problem, NOMINAL, case.baseline, case.autocorrelation, [], lambda _: None)
     with pytest.raises(DiagnosisError, match="closure_torque"):
         describe_closure(case.baseline, case.problem, case.baseline)
     prepared = case.problem.recordings[0]
     given = ("arm", prepared.commands, DT, DT, [0], prepared.signals, prepared.n)
-    with pytest.raises(RigError, match="closure_torque"):
+    with pytest.raises(RigError, match="no sum of terms"):
         core_rig(NOMINAL).closure_terms(*given)
     terms = _core.Rig(NOMINAL.with_effect("closure_torque").to_json()).closure_terms(*given)
     assert terms.shape == (ROWS, len(TERMS["closure_torque"]))

@@ -77,7 +77,7 @@ def test_a_recording_without_the_event_has_no_slope_in_it() -> None:
 
 
 @pytest.mark.slow
-def test_a_push_is_found_beside_a_lasting_effect() -> None:
+def test_a_push_is_found_beside_a_persistent_effect() -> None:
     plant = pamrs.rigs.shoulder().with_effect("muscle_hysteresis", {"friction_pressure": 1e-4, "presliding": 0.003})
     records = recordings("external_torque", {"torque": 5.0, "duration": 0.8}, plant=plant)
     found = pamrs.diagnose(pamrs.Case("both", pamrs.rigs.shoulder(), records, Path()))

@@ -37,7 +37,7 @@ def speeds(pool):
     return propose(rig, hypotheses, experiments=[pool["nested_triangles"], pool["slow_triangle"]])
 
 
-def test_information_lies_between_nothing_and_the_doubt() -> None:
+def test_information_lies_between_nothing_and_the_uncertainty() -> None:
     p = [0.5, 0.3, 0.2]
     rng = np.random.default_rng(1)
     assert information(p, np.zeros((3, 3))) == pytest.approx(0.0, abs=1e-12)
@@ -54,11 +54,11 @@ def test_information_lies_between_nothing_and_the_doubt() -> None:
 
 
 def test_speed_separates_creep_from_hysteresis(speeds) -> None:
-    doubt = entropy([0.5, 0.4])
-    assert 0.3 * doubt < speeds["expected_information_bits"] <= doubt
+    uncertainty = entropy([0.5, 0.4])
+    assert 0.3 * uncertainty < speeds["expected_information_bits"] <= uncertainty
     ranking = {entry["name"]: entry["bits"] for entry in speeds["ranking"]}
     assert ranking["nested_triangles"] >= ranking["slow_triangle"] - 0.02
-    assert all(0.0 <= bits <= doubt for bits in ranking.values())
+    assert all(0.0 <= bits <= uncertainty for bits in ranking.values())
     assert speeds["excitation"]["kind"] == speeds["ranking"][0]["name"]
     assert "creep" in speeds["text"]
     assert "bar" in speeds["text"]

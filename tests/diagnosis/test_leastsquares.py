@@ -1,4 +1,4 @@
-"""The bounded least squares of the diagnosis, against SciPy's and by its promises."""
+"""The bounded least squares of the diagnosis, against SciPy's and by its predicted gains."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis import DiagnosisSettings, _doubted, _unsettled
+from pamrs.diagnosis import DiagnosisSettings, _capped, _unsettled
 from pamrs.diagnosis.evidence import Group
 from pamrs.diagnosis.prepare import available_blocks
 from pamrs.recordings import Recording
@@ -120,10 +120,10 @@ def test_no_confident_name_beside_unknown_geometry(rig: pamrs.Rig, bare: pamrs.R
     assert _unsettled(pamrs.load_rig(tmp_path / "rig.toml")) == ["transmission.flexor.radius"]
     arm = available_blocks(bare, tuple(recorded(rig, 1, "fit", pressures_only=True, n=40).channels), SETTINGS.prepare)[0]
     group = Group([arm], {}, {}, [], {"muscle_hysteresis": 0.9, "muscle_creep": 0.05, "unlisted": 0.05}, arm, {}, [arm])
-    doubted = _doubted(group).probabilities
-    assert doubted["muscle_hysteresis"] < 0.5
-    assert sum(doubted.values()) == pytest.approx(1.0)
-    assert doubted["unlisted"] > 0.5
+    capped = _capped(group, SETTINGS.verdict.unknown_geometry_probability).probabilities
+    assert capped["muscle_hysteresis"] < 0.5
+    assert sum(capped.values()) == pytest.approx(1.0)
+    assert capped["unlisted"] > 0.5
 
 
 def test_swapped_muscles_are_seen(rig: pamrs.Rig, bare: pamrs.Rig) -> None:

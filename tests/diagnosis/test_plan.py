@@ -40,7 +40,7 @@ def test_a_sealed_chamber_is_planned_quickly(capsys: pytest.CaptureFixture[str],
     assert verdicts.keys() | set(written["not_asked"]) == set(CATALOGUE)
     page = capsys.readouterr().out
     assert "leak_muscle" in page
-    assert "Not asked of this rig" in page
+    assert "Not tested with this rig" in page
 
 
 def test_unknown_names_are_errors_that_name_them() -> None:

@@ -154,4 +154,4 @@ def test_sentences_have_units_of_the_field() -> None:
     wrong = WrongParameter("chamber.dead_volume", "chamber", 1.5e-4, 2.25e-5, 3.6e-4, 5e-6, [3.5e-4, 3.7e-4], "m3", 9.3, 0.98, {})
     assert sentence_of(wrong) == "chamber dead volume is 360.0 +- 5.0 cm3, not 150 +- 22"
     kept = Unexplained("arm", "joint_angle", "rad", 15.2, 0.007, "unlisted")
-    assert kept_sentence(kept) == "the arm keeps 15 times its noise (0.40 deg) that no listed effect explains"
+    assert kept_sentence(kept) == "the residual of the arm is 15 times the noise level (0.40 deg), and no listed effect explains it"

@@ -91,9 +91,9 @@ def test_a_name_in_the_chamber_stands_beside_an_arm_without_one() -> None:
     kept = found.unexplained[0]
     assert (kept["block"], kept["unit"], kept["verdict"]) == ("arm", "rad", "unlisted")
     assert 1e-3 < kept["size"] < 1e-2
-    assert "the arm keeps" in found.headline
-    assert found.headline.index("dead zone") < found.headline.index("the arm keeps")
-    assert "the arm keeps" in found.summary().replace("\n", " ").replace("  ", " ")
+    assert "the residual of the arm" in found.headline
+    assert found.headline.index("dead zone") < found.headline.index("the residual of the arm")
+    assert "the residual of the arm" in found.summary().replace("\n", " ").replace("  ", " ")
 
 
 def test_pairs_of_one_mistake_are_suspected_with_either_at_its_wall() -> None:
@@ -149,7 +149,7 @@ def test_a_zero_that_two_groups_share_is_named_once() -> None:
     assert found.parameters["sensors.pressure_zero"]["value"] == wrong["value"] == found.rig.parameter("sensors.pressure_zero").value
 
 
-def test_every_parameter_at_its_wall_is_freed_whatever_pairs_promise(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_parameter_at_its_wall_is_freed_whatever_the_gain_of_pairs(monkeypatch: pytest.MonkeyPatch) -> None:
     pairs = [
         ("arm.payload", "arm.first_moment"),
         ("arm.inertia", "arm.first_moment"),
@@ -157,7 +157,7 @@ def test_every_parameter_at_its_wall_is_freed_whatever_pairs_promise(monkeypatch
     ]
     gains = dict.fromkeys(pairs, 1e6) | {("muscle.modulus_scale",): 50.0, ("arm.viscous",): 3.0}
     monkeypatch.setattr(wrong_parameters, "suspected", lambda *_: list(gains))
-    monkeypatch.setattr(wrong_parameters, "_promised", lambda *_: gains)
+    monkeypatch.setattr(wrong_parameters, "_predicted_gain", lambda *_: gains)
     asked: list[tuple[str, ...]] = []
 
     class Trial:
@@ -167,5 +167,5 @@ def test_every_parameter_at_its_wall_is_freed_whatever_pairs_promise(monkeypatch
             asked.append(names)
 
     assert wrong_parameters.freed(Trial(), None, None, lambda text: None) == []  # type: ignore[arg-type]
-    # two pairs at the most, the one parameter that promises something beyond a file that is wrong by chance, and not the other
+    # two pairs at the most, the one parameter with a predicted gain beyond a file that is wrong by chance, and not the other
     assert asked == [*pairs[:2], ("muscle.modulus_scale",)]

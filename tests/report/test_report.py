@@ -76,7 +76,7 @@ def test_page_tells_the_story(page: str) -> None:
         "310 to 490 kPa",
         "9.00 to 11.20 s",
         "How to read this page",
-        "The 2 effects that were asked",
+        "The 2 effects that were tested",
         "under 1 %",
         "not fitted",
     ):

@@ -10,15 +10,16 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis import fitting
-from pamrs.diagnosis.blocks import available_blocks
-from pamrs.diagnosis.hypotheses import refitted
-from pamrs.diagnosis.signals import prepare
+from pamrs.diagnosis import DiagnosisSettings
+from pamrs.diagnosis.fit import Problem, _fitting, fit
+from pamrs.diagnosis.prepare import available_blocks, prepare
+from pamrs.diagnosis.search import refitted
 from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
 from tests.work.snapshot import compare
 
 TOLERANCE = 0.1
+SETTINGS = DiagnosisSettings()
 NOISE = {"supply_pressure": 400.0, "muscle_pressure": 400.0, "joint_angle": 3e-4}
 
 
@@ -28,7 +29,7 @@ class Work:
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.predicted: list[tuple[int, int]] = []
         self.evaluated: list[int] = []
-        predict, solve = fitting.residual, fitting.levenberg_marquardt
+        predict, solve = _fitting.residual, _fitting.levenberg_marquardt
 
         def residual(block: Any, core: Any, prepared: Any, parameters: list[str]) -> Any:
             self.predicted.append((prepared.n, len(parameters)))
@@ -39,8 +40,8 @@ class Work:
             self.evaluated.append(found[2])
             return found
 
-        monkeypatch.setattr(fitting, "residual", residual)
-        monkeypatch.setattr(fitting, "levenberg_marquardt", least_squares)
+        monkeypatch.setattr(_fitting, "residual", residual)
+        monkeypatch.setattr(_fitting, "levenberg_marquardt", least_squares)
 
     def of(self, name: str, job: Callable[[], object]) -> dict[str, int]:
         """Counts of a job by what they count."""
@@ -82,17 +83,17 @@ def hold(conductance: float) -> pamrs.Case:
 def test_work_of_the_refit_and_of_an_effect_of_a_shoulder(monkeypatch: pytest.MonkeyPatch) -> None:
     rig = pamrs.rigs.shoulder()
     truth = rig.with_effect("muscle_hysteresis").with_parameters({"chamber.dead_volume": 1.7e-4})
-    recordings = [prepare(recorded(truth, seed), rig) for seed in (1, 2)]
-    blocks = available_blocks(rig, (*NOISE, "valve_command"))
+    recordings = [prepare(recorded(truth, seed), rig, SETTINGS) for seed in (1, 2)]
+    blocks = available_blocks(rig, (*NOISE, "valve_command"), SETTINGS.prepare)
     work, counts = Work(monkeypatch), {}
     for kind in ("supply", "chamber", "arm"):
         chosen = [block for block in blocks if block.kind == kind]
-        problem, white = fitting.Problem(chosen, recordings, core_rig(rig)), {block.name: 1.0 for block in chosen}
+        problem, white = Problem(chosen, recordings, core_rig(rig), SETTINGS), {block.name: 1.0 for block in chosen}
         counts |= work.of(f"refit of the {kind}", lambda p=problem, w=white: refitted(p, rig, w))
     starts = {"muscle_hysteresis.friction_pressure": 1e-5, "muscle_hysteresis.friction_constant": 1.0}
     counts |= work.of(
         "hysteresis of the arm",
-        lambda: fitting.fit(problem, rig, ("muscle_hysteresis",), starts, white, evaluations=30),
+        lambda: fit(problem, rig, ("muscle_hysteresis",), starts, white, evaluations=30),
     )
     compare("shoulder", counts, tolerance=TOLERANCE)
 

@@ -61,9 +61,7 @@ def _joint(
     from pamrs.units import bar_and_psi
 
     draw = None if png is None else _picture()
-    problem = _problem(
-        muscle, count, torque, (min_angle, max_angle), pressure, bounds or [], max_stroke
-    )
+    problem = _problem(muscle, count, torque, (min_angle, max_angle), pressure, bounds or [], max_stroke)
     search = _Search(method, evaluations, mutation, seed)
     found = _found(problem, search, pressures=minimise_pressure, compare=compare, pareto=pareto)
     title = f"{count} {muscle}, {torque} from {min_angle} to {max_angle}"
@@ -72,9 +70,7 @@ def _joint(
         contents[json] = _json(title, found)
     if png is not None and draw is not None:
         caption = f"{title}: {bar_and_psi(found.design.problem.pressure)}"
-        contents[png] = draw(
-            found.design, caption, comparison=found.comparison, front=found.front
-        )
+        contents[png] = draw(found.design, caption, comparison=found.comparison, front=found.front)
     if rig_joint is not None:
         contents[rig_joint] = found.design.to_toml()
     typer.echo(title)
@@ -106,9 +102,7 @@ class _Found:
     front: ParetoFront | None = None
 
 
-def _found(
-    problem: JointProblem, search: _Search, *, pressures: bool, compare: bool, pareto: bool
-) -> _Found:
+def _found(problem: JointProblem, search: _Search, *, pressures: bool, compare: bool, pareto: bool) -> _Found:
     """The design, at the least pressure where that is asked for, with the comparison and the front."""
     from pamrs.design import Genetic, compare_methods, pareto_front
 
@@ -117,9 +111,7 @@ def _found(
     if compare:
         settings = Genetic(mutation=search.mutation, tolerance=None)
         with _bar("runs") as progress:
-            comparison = compare_methods(
-                problem, evaluations=search.evaluations, genetic=settings, progress=progress
-            )
+            comparison = compare_methods(problem, evaluations=search.evaluations, genetic=settings, progress=progress)
         found = replace(found, comparison=comparison)
     if pareto:
         with _bar("generations") as progress:

@@ -90,9 +90,7 @@ def _muscle(
     outputs = _Outputs(report=report, rig=rig, json=json, png=png)
     check_writable(report, rig, json, png)
     if per_level and rig is not None:
-        raise typer.BadParameter(
-            "a rig needs moduli linear in pressure: leave out --per-level or --rig"
-        )
+        raise typer.BadParameter("a rig needs moduli linear in pressure: leave out --per-level or --rig")
     sizes = _stated(rest_length, rest_diameter, braid_angle, wall_thickness)
     inputs = _inputs(data, muscle, sizes, where or [], clipped)
     shape, notes = _shape(inputs, model, geometry, levels, free, prior, noise)
@@ -112,8 +110,7 @@ def _muscle(
     write(contents)
     if rig is not None and inputs.rig is None:
         typer.echo(
-            f"{rig} is the muscle on a load frame: simulate it with a length, "
-            "or give it [joint] and [arm]",
+            f"{rig} is the muscle on a load frame: simulate it with a length, or give it [joint] and [arm]",
             err=True,
         )
 
@@ -272,9 +269,7 @@ def _shape(
     return shape, notes
 
 
-def _inputs(
-    data: Path, muscle: str | None, sizes: Mapping[str, str], where: Sequence[str], clipped: str | None
-) -> _Inputs:
+def _inputs(data: Path, muscle: str | None, sizes: Mapping[str, str], where: Sequence[str], clipped: str | None) -> _Inputs:
     """From a description, or from a table and the options."""
     from pamrs.errors import ParameterError
 

@@ -101,14 +101,10 @@ def linear_controller(
     n = len(update.paths)
     whole = np.array([slope for slope, _ in slopes]).T
     if not (np.isfinite(whole).all() and math.isfinite(command)):
-        raise ParameterError(
-            "the controller's command is not finite at the operating point: "
-            "no linear model is there"
-        )
+        raise ParameterError("the controller's command is not finite at the operating point: no linear model is there")
     if not whole[n].any() or not whole[:, n:].any():
         raise ParameterError(
-            f"the controller answers {command:g} whatever it measures: it is at a limit; "
-            "give the state in which it holds the arm here"
+            f"the controller answers {command:g} whatever it measures: it is at a limit; give the state in which it holds the arm here"
         )
     # an integral with a gain of zero is heard, but nothing moves it; it would count as a motion that never dies out
     moved = heard(whole[:n, :n].T, np.abs(whole[:n, n:]).sum(axis=1))
@@ -171,9 +167,7 @@ class _Update:
         return np.array([*(_at(after, path) for path in self.paths), command])
 
 
-def _slopes(
-    update: _Update, inputs: tuple[str, ...], side: str
-) -> tuple[list[tuple[Array, Array]], Array]:
+def _slopes(update: _Update, inputs: tuple[str, ...], side: str) -> tuple[list[tuple[Array, Array]], Array]:
     """Slopes over every float of the state and every input, and what is answered at the point itself."""
     start, point = update.start, update.point
     middle = update(start, point)
@@ -189,9 +183,7 @@ def _slopes(
     return slopes, middle
 
 
-def _refuse_corners(
-    update: _Update, inputs: tuple[str, ...], steps: list[Array], kept: list[int]
-) -> None:
+def _refuse_corners(update: _Update, inputs: tuple[str, ...], steps: list[Array], kept: list[int]) -> None:
     """Name the first slope that differs between its sides, of the states that are kept or of the command."""
     n = len(update.paths)
     names = [".".join(map(str, path)) for path in update.paths]

@@ -89,7 +89,7 @@ class Feedforward(SampledController):
         Parameters
         ----------
         rig : Rig
-            The nominal rig, with the payload that the controller believes in.
+            The nominal rig, with the payload that the controller assumes.
         km : float or ndarray, shape (n,)
             [1/s].
         **others

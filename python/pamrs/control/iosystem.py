@@ -1,7 +1,7 @@
 """A rig as a ``control.NonlinearIOSystem``: in discrete time, one step of it being one sample of the simulator.
 
 The core has no state derivative to give, and a derivative would lose what happens between steps (hard stops, remembered hysteresis, the
-books of air and energy). So the system is discrete, its state is the simulator's, its update is restore and step, and
+balances of mass and energy). So the system is discrete, its state is the simulator's, its update is restore and step, and
 ``control.input_output_response`` gives what :func:`pamrs.simulate` gives, to the last bit.
 """
 
@@ -48,7 +48,7 @@ def iosystem(
     -------
     control.NonlinearIOSystem
         Inputs and outputs have the names of the channels, of a named block ``joint_angle_elbow``, as python-control allows no dot.
-        Its states are ``x[0] ...``: the physical ones first (absolute pressures), then memories and books; :func:`initial_state` makes
+        Its states are ``x[0] ...``: the physical ones first (absolute pressures), then memories and balances; :func:`initial_state` makes
         them from initial values by name.
 
     Raises

@@ -275,9 +275,7 @@ def search_gains(
     return GainSearch(gains, float(values[best]), by, points, values, nu, omega, method, seed)
 
 
-def _check_search(
-    method: str, evaluations: int, population: int, seed: int, scale: tuple[float, float] | None
-) -> None:
+def _check_search(method: str, evaluations: int, population: int, seed: int, scale: tuple[float, float] | None) -> None:
     """Refuse the arguments of a search that cannot be.
 
     Raises
@@ -288,19 +286,14 @@ def _check_search(
     if method not in METHODS:
         raise ParameterError(f"method = {method!r} is not allowed: one of {', '.join(METHODS)}")
     if not 4 <= population <= evaluations:
-        raise ParameterError(
-            f"population = {population} is not allowed: from 4 to evaluations = {evaluations} "
-            "is needed"
-        )
+        raise ParameterError(f"population = {population} is not allowed: from 4 to evaluations = {evaluations} is needed")
     if scale is None and evaluations < 2 * population:
         raise ParameterError(
             f"evaluations = {evaluations} is not allowed: without a scale two populations = "
             f"{2 * population} are needed, as the first finds it"
         )
     if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed < 2**32:
-        raise ParameterError(
-            f"seed = {seed!r} is not allowed: a whole number from 0 to 2**32 - 1 is needed"
-        )
+        raise ParameterError(f"seed = {seed!r} is not allowed: a whole number from 0 to 2**32 - 1 is needed")
     if scale is not None and not all(math.isfinite(s) and s > 0.0 for s in scale):
         raise ParameterError(f"scale = {scale} is not allowed: two numbers above zero are needed")
 
@@ -352,10 +345,7 @@ def _first_scale(loops: _Loops, points: Array) -> tuple[float, float]:
     nu, omega = loops.run(points)
     ok = np.isfinite(nu) & np.isfinite(omega)
     if not ok.any():
-        raise ParameterError(
-            "every run of the first population failed: there is nothing to compare; "
-            "narrow the bounds"
-        )
+        raise ParameterError("every run of the first population failed: there is nothing to compare; narrow the bounds")
     return float(nu[ok].min()), float(omega[ok].min())
 
 

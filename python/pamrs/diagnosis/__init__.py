@@ -22,7 +22,7 @@ from pamrs.channels import dotted
 from pamrs.diagnosis.evidence import Group
 from pamrs.diagnosis.explain import assemble
 from pamrs.diagnosis.fit import Problem
-from pamrs.diagnosis.noise import floors
+from pamrs.diagnosis.noise import noise_levels
 from pamrs.diagnosis.prepare import Block, Prepared, available_blocks, check_plausible, check_sense, prepare
 from pamrs.diagnosis.result import Diagnosis
 from pamrs.diagnosis.search import examine
@@ -48,8 +48,8 @@ def _unsettled(rig: Rig) -> list[str]:
     return [name for name in unknown if name.partition(".")[0] in moving]
 
 
-def _doubted(group: Group, factor: float) -> Group:
-    """A group of joints whose names are believed less, the rest going to ``unlisted``."""
+def _capped(group: Group, factor: float) -> Group:
+    """A group of joints whose names have a smaller probability, the rest going to ``unlisted``."""
     if group.mismatch is None or group.mismatch.kind != "arm":
         return group
     kept = {k: p if k in ("", "unlisted") else factor * p for k, p in group.probabilities.items()}
@@ -79,14 +79,14 @@ def _drowned(problem: Problem, rig: Rig) -> dict[str, str]:
     regulated = [b for b in problem.blocks if b.kind == "supply" and b.name.partition(".")[2] in drooping]
     recordings = problem.recordings
     found = {}
-    floor = floors(replace(problem, blocks=regulated), problem.core) if regulated else {}
+    noise_level = noise_levels(replace(problem, blocks=regulated), problem.core) if regulated else {}
     for block in regulated:
-        gains = [(floor[block.name, p.recording.name].sample / p.noise[block.channel]) ** 2 - 1.0 for p in recordings]
-        pull = math.sqrt(sum(max(0.0, gain) * p.n for gain, p in zip(gains, recordings, strict=True)))
-        if pull > most:
+        gains = [(noise_level[block.name, p.recording.name].sample / p.noise[block.channel]) ** 2 - 1.0 for p in recordings]
+        shift = math.sqrt(sum(max(0.0, gain) * p.n for gain, p in zip(gains, recordings, strict=True)))
+        if shift > most:
             found[block.name] = (
                 f"block {block.name} was left out: only the difference of two measured pressures tells the regulator's flow, and their "
-                f"noise would move its droop by {pull:.2g} standard deviations; at most {most:g} is allowed (a flow meter would "
+                f"noise would move its droop by {shift:.2g} standard deviations; at most {most:g} is allowed (a flow meter would "
                 "settle it)"
             )
     return found
@@ -153,21 +153,19 @@ def diagnose(
     blocks = inner.blocks
     gas, motion = [b for b in blocks if b.kind != "arm"], [b for b in blocks if b.kind == "arm"]
     with _in_range(case.name):
-        groups = [
-            group for members in (gas, motion) if members for group in examine(inner, outer, case.rig, members, say)
-        ]
+        groups = [group for members in (gas, motion) if members for group in examine(inner, outer, case.rig, members, say)]
         unsettled = _unsettled(case.rig) if motion else []
         factor = chosen.verdict.unknown_geometry_probability
         if unsettled:
-            groups = [_doubted(group, factor) for group in groups]
+            groups = [_capped(group, factor) for group in groups]
         say("putting the answer together")
         diagnosis = assemble(case, inner, outer, groups)
     warnings = [*diagnosis.warnings, *left_out]
     if unsettled:
         what = "length" if case.rig.model["load"] else "angle"
         warnings.append(
-            f"{', '.join(unsettled)}: marked unknown, and no fit moves them; a wrong one bends the {what} as an effect would, so that "
-            f"no effect of muscles and what they move is believed by more than {100 * factor:.0f} %"
+            f"{', '.join(unsettled)}: marked unknown, and no fit moves them; a wrong one bends the {what} as an effect would, so "
+            f"the probability of an effect of muscles and what they move is capped at {100 * factor:.0f} %"
         )
     if not math.isfinite(sum(diagnosis.probabilities.values())):
         raise DiagnosisError("the probabilities are not finite: please report this case")

@@ -86,9 +86,10 @@ class Diagnosis(Findings):
     tried : list of Tried
         Every set of effects that was fitted: ``blocks``, ``effects``, what it leaves of each block's variance in units of the noise's
         (``fitted``, ``held_out``), ``gap_closed``, its ``values``.
-    asked : list of Asked
-        Every lasting effect that acts where the mismatch is: ``id``, ``blocks``, ``promised``, the share of the mismatch that its
-        signature could take before any fit, and ``left``, the share that it leaves fitted alone (None where it promised too little).
+    tested : list of Tested
+        Every persistent effect that acts where the mismatch is: ``id``, ``blocks``, ``predicted_gain``, the share of
+        the mismatch that its signature could take before any fit, and ``left``, the share that it leaves fitted alone
+        (None where the predicted gain is too small).
     settings : DiagnosisSettings
         The numbers that the verdict rests on.
 

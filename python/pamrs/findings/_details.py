@@ -12,12 +12,12 @@ import numpy.typing as npt
 from pamrs.findings._entry import Entry, told
 
 __all__ = [
-    "Asked",
     "BlockResidual",
     "ConditionMap",
     "Curves",
     "NextExperiment",
     "RankedExperiment",
+    "Tested",
     "Tried",
 ]
 
@@ -181,7 +181,7 @@ class Tried(Entry):
     suspects : list of str
         Blocks that kept an excess.
     gain : float
-        Gain in chi-square that the screen promised.
+        Gain in chi-square that the screen predicted.
     """
 
     blocks: list[str]
@@ -199,7 +199,7 @@ class Tried(Entry):
 
 
 @dataclass(frozen=True, eq=False)
-class Asked(Entry):
+class Tested(Entry):
     """A persistent effect that acts where the mismatch is.
 
     Attributes
@@ -208,13 +208,13 @@ class Asked(Entry):
         Its id.
     blocks : list of str
         Where.
-    promised : float
+    predicted_gain : float
         Share of the mismatch that its signature could take before any fit.
     left : float or None
-        Share that it leaves fitted alone; None where it promised too little.
+        Share that it leaves fitted alone; None where the predicted gain is too small.
     """
 
     id: str
     blocks: list[str]
-    promised: float
+    predicted_gain: float
     left: float | None

@@ -71,16 +71,10 @@ class Where(Entry):
         Recording to which the intervals belong.
     """
 
-    block: str | None = field(
-        default=None, metadata=told("block of the chain that carries the excess residual")
-    )
+    block: str | None = field(default=None, metadata=told("block of the chain that carries the excess residual"))
     channel: str | None = field(default=None, metadata=told("channel that tells"))
-    intervals: list[list[float]] = field(
-        default_factory=list, metadata=told("start and stop in s", kind="pairs")
-    )
-    conditions: list[Condition] = field(
-        default_factory=list, metadata=told("operating conditions that carry the excess")
-    )
+    intervals: list[list[float]] = field(default_factory=list, metadata=told("start and stop in s", kind="pairs"))
+    conditions: list[Condition] = field(default_factory=list, metadata=told("operating conditions that carry the excess"))
     text: str = ""
     recording: str | None = field(default=None, metadata=told(json=False, optional=True))
 
@@ -106,9 +100,7 @@ class EffectParameterFound(Entry):
     value: float
     std: float | None
     unit: str
-    interval: list[float] | None = field(
-        default=None, metadata=told("95 % interval", optional=True, kind="pair")
-    )
+    interval: list[float] | None = field(default=None, metadata=told("95 % interval", optional=True, kind="pair"))
     identifiable: bool | None = field(default=None, metadata=told(optional=True))
 
 
@@ -287,9 +279,7 @@ class ChannelError(Entry):
 
     noise: float = field(metadata=told("standard deviation of the sensor noise"))
     before: float = field(metadata=told("root mean square error of the nominal model"))
-    refit: float = field(
-        metadata=told("root mean square error after refitting parameters only")
-    )
+    refit: float = field(metadata=told("root mean square error after refitting parameters only"))
     after: float = field(metadata=told("root mean square error with the effect"))
 
 
@@ -331,8 +321,7 @@ class WrongParameter(Entry):
     probability: float = field(metadata=told(kind="probability"))
     held_out: dict[str, StageError] = field(
         metadata=told(
-            "root mean square error of each channel it acts on: nominal model, refitted inside "
-            "the tolerances, with the other value"
+            "root mean square error of each channel it acts on: nominal model, refitted inside the tolerances, with the other value"
         )
     )
 
@@ -379,7 +368,6 @@ class FitErrors(Entry):
     gap_closed: float | None = field(
         default=None,
         metadata=told(
-            "(refit - after)/(refit - noise), held-out data, channels pooled in units of their "
-            "noise; 1 is down to the noise"
+            "(refit - after)/(refit - noise), held-out data, channels pooled in units of their noise; 1 is down to the noise"
         ),
     )

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["Entry", "told", "to_plain"]
+__all__ = ["Entry", "to_plain", "told"]
 
 
 def told(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from pamrs.findings._details import Asked, BlockResidual, ConditionMap, NextExperiment, Tried
+from pamrs.findings._details import BlockResidual, ConditionMap, NextExperiment, Tested, Tried
 from pamrs.findings._entries import VERDICTS, BlockVerdict, EffectFound, FitErrors, ParameterFound, Unexplained, Where, WrongParameter
 from pamrs.findings._entry import told
 from pamrs.findings._trace import ModelFile, Trace
@@ -63,7 +63,7 @@ class Findings:
         Seconds of each stage, optional.
     tried : list of Tried
         Every set of effects that was fitted.
-    asked : list of Asked
+    tested : list of Tested
         Every persistent effect that acts where the mismatch is.
 
     Raises
@@ -75,21 +75,15 @@ class Findings:
     case: str = field(metadata=told(json=False))
     verdict: str = field(metadata=told(enum=VERDICTS))
     where: Where = field(default_factory=Where)
-    effects: list[EffectFound] = field(
-        default_factory=list, metadata=told("the named physics, most probable first")
-    )
+    effects: list[EffectFound] = field(default_factory=list, metadata=told("the named physics, most probable first"))
     ambiguity: list[list[str]] = field(
         default_factory=list,
         metadata=told("sets of effects that the data cannot separate; empty when settled"),
     )
-    probabilities: dict[str, float] = field(
-        default_factory=dict, metadata=told("over all hypotheses", kind="probability")
-    )
+    probabilities: dict[str, float] = field(default_factory=dict, metadata=told("over all hypotheses", kind="probability"))
     blocks: list[BlockVerdict] = field(
         default_factory=list,
-        metadata=told(
-            "the verdict of each group of blocks that is judged by itself", required=False
-        ),
+        metadata=told("the verdict of each group of blocks that is judged by itself", required=False),
     )
     unexplained: list[Unexplained] = field(
         default_factory=list,
@@ -111,7 +105,7 @@ class Findings:
     condition_map: ConditionMap | None = field(default=None, metadata=told(json=False))
     timings: dict[str, float] = field(default_factory=dict, metadata=told(json=False))
     tried: list[Tried] = field(default_factory=list, metadata=told(json=False))
-    asked: list[Asked] = field(default_factory=list, metadata=told(json=False))
+    tested: list[Tested] = field(default_factory=list, metadata=told(json=False))
 
     def __post_init__(self) -> None:
         if self.verdict not in VERDICTS:

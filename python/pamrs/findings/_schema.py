@@ -132,9 +132,7 @@ def _or_null(schema: dict[str, Any], *, optional: bool) -> dict[str, Any]:
     return {"oneOf": [{"type": "null"}, schema]}
 
 
-def _tuple(
-    inner: tuple[Any, ...], meta: Mapping[str, Any], definitions: dict[str, Any]
-) -> dict[str, Any]:
+def _tuple(inner: tuple[Any, ...], meta: Mapping[str, Any], definitions: dict[str, Any]) -> dict[str, Any]:
     """A tuple of any length, or of some length of one type."""
     items = {"type": "array", "items": _of(inner[0], meta, definitions)}
     if inner[-1] is Ellipsis:

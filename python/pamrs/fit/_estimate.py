@@ -326,9 +326,7 @@ def _search(problem: Problem, design: Design, rows: Mask, start: Estimate | None
     found = None
     settled = problem.noise is not None
     for _ in range(_SIGMA_ROUNDS):
-        found = least_squares(
-            space.residuals, z, jac=space.jacobian, args=(sigma,), x_scale=1.0, xtol=1e-12
-        )
+        found = least_squares(space.residuals, z, jac=space.jacobian, args=(sigma,), x_scale=1.0, xtol=1e-12)
         z = np.asarray(found.x)
         if problem.noise is not None:
             break

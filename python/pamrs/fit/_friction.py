@@ -290,8 +290,7 @@ def fit_friction(
     names = {"friction_coefficient": "1", "friction_pressure_slope": "1/Pa"}
     return FrictionFit(
         params={
-            name: LawParameter(name, float(line.values[k]), float(line.stderr[k]), unit)
-            for k, (name, unit) in enumerate(names.items())
+            name: LawParameter(name, float(line.values[k]), float(line.stderr[k]), unit) for k, (name, unit) in enumerate(names.items())
         },
         floor=floor,
         presliding=distance,
@@ -330,9 +329,7 @@ def _map(
         raise ParameterError(f"{', '.join(missing)}: needed when no ForceMap is given")
     rest = 1.0 if rest_length is None else rest_length
     length = rest * (1.0 - np.asarray(contraction, dtype=np.float64))
-    return ForceMap.from_arrays(
-        length, pressure, force, rest_length=rest, direction=direction, check_duplicates=False
-    )
+    return ForceMap.from_arrays(length, pressure, force, rest_length=rest, direction=direction, check_duplicates=False)
 
 
 def _loops(data: ForceMap) -> tuple[list[FrictionLevel], list[str]]:
@@ -345,10 +342,7 @@ def _loops(data: ForceMap) -> tuple[list[FrictionLevel], list[str]]:
     """
     gas, e, pull, level, way = data.used_rows()
     if not np.any(way != 0):
-        raise RecordingError(
-            f"{data.label}: no row has a direction of motion; "
-            "friction needs both branches of the loop"
-        )
+        raise RecordingError(f"{data.label}: no row has a direction of motion; friction needs both branches of the loop")
     issues = list(data.issues)
     unknown = int(np.sum(way == 0))
     if unknown:
@@ -358,9 +352,7 @@ def _loops(data: ForceMap) -> tuple[list[FrictionLevel], list[str]]:
     for index, nominal in enumerate(data.levels.tolist()):
         rows, title = level == index, f"{nominal / 1e3:.0f} kPa"
         if float(np.abs(pull[rows]).max()) < least:
-            issues.append(
-                f"{title}: forces below {100 * WEAK:g} % of the map's largest: no coefficient"
-            )
+            issues.append(f"{title}: forces below {100 * WEAK:g} % of the map's largest: no coefficient")
             continue
         found = _loop(float(np.median(gas[rows])), e[rows], pull[rows], way[rows])
         if isinstance(found, str):
@@ -370,10 +362,7 @@ def _loops(data: ForceMap) -> tuple[list[FrictionLevel], list[str]]:
     if not levels:
         raise RecordingError(f"{data.label}: no pressure gives a coefficient ({'; '.join(issues)})")
     if len(levels) < 2:
-        raise RecordingError(
-            f"{data.label}: one pressure only ({levels[0].pressure / 1e3:.0f} kPa): "
-            "the slope c1 is not determinable"
-        )
+        raise RecordingError(f"{data.label}: one pressure only ({levels[0].pressure / 1e3:.0f} kPa): the slope c1 is not determinable")
     return levels, issues
 
 
@@ -382,8 +371,7 @@ def _doubts(levels: list[FrictionLevel], above: Mask, floor: float) -> list[str]
     found: list[str] = []
     if above.sum() == 1:
         found.append(
-            f"one pressure only stands above the floor of {floor:g}: "
-            "the slope c1 is hardly determined by it and its neighbour"
+            f"one pressure only stands above the floor of {floor:g}: the slope c1 is hardly determined by it and its neighbour"
         )
     pooled, spread = _pooled(levels)
     if pooled < -_SURE * spread:
@@ -392,10 +380,7 @@ def _doubts(levels: list[FrictionLevel], above: Mask, floor: float) -> list[str]
             f"+- {spread:.1g}): are the directions exchanged?"
         )
     if not above.any():
-        found.append(
-            f"no coefficient stands above the floor of {floor:g}: "
-            "the law is its floor at every pressure"
-        )
+        found.append(f"no coefficient stands above the floor of {floor:g}: the law is its floor at every pressure")
     return found
 
 

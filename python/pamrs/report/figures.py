@@ -230,7 +230,7 @@ def traces_svg(diagnosis: Findings, traces: Sequence[Trace], prefix: str) -> str
     Parameters
     ----------
     diagnosis : Findings
-        For noise floors and marked intervals.
+        For noise levels and marked intervals.
     traces : sequence of Trace
         Channels of one recording, at least one.
     prefix : str
@@ -320,7 +320,7 @@ def _separating(curves: Curves) -> Figure:
 
 
 def _block_rows(diagnosis: Findings) -> list[tuple[str, float, bool]]:
-    """Name, residual in units of the noise floor, whether located; in the order of the chain."""
+    """Name, residual in units of the noise level, whether located; in the order of the chain."""
     rows = []
     for name, entry in diagnosis.residuals.items():
         if is_number(entry.rms) and is_number(entry.noise) and entry.noise > 0:
@@ -335,7 +335,7 @@ def _draw_blocks(axes: Axes, rows: Sequence[tuple[str, float, bool]], least_rows
     colours = [COLOURS["before"] if r[2] else COLOURS["quiet"] for r in rows]
     axes.barh(position, size - left, left=left, color=colours, height=0.62)
     axes.axvline(1.0, color="#1f1f1f", lw=1.1, ls=(0, (3, 2)))
-    axes.text(1.0, -0.62, " noise floor", va="bottom", ha="left", color="#374151", fontsize="small")
+    axes.text(1.0, -0.62, " noise level", va="bottom", ha="left", color="#374151", fontsize="small")
     axes.set_xscale("log")
     axes.set_xlim(left, max(3.0, float(size.max()) * 1.9))
     for y, value in zip(position.tolist(), size.tolist(), strict=True):
@@ -345,11 +345,11 @@ def _draw_blocks(axes: Axes, rows: Sequence[tuple[str, float, bool]], least_rows
     axes.xaxis.set_major_formatter(lambda v, _: format_number(v, 1))
     axes.xaxis.set_minor_formatter("")
     axes.grid(axis="y", visible=False)
-    axes.set_xlabel("residual of the refitted baseline / noise floor")
+    axes.set_xlabel("residual of the refitted baseline / noise level")
 
 
 def blocks_svg(diagnosis: Findings, prefix: str = "blocks") -> str | None:
-    """Bar chart of each block's residual against its noise floor; None when there are no blocks."""
+    """Bar chart of each block's residual against its noise level; None when there are no blocks."""
     rows = _block_rows(diagnosis)
     if not rows:
         return None

@@ -131,15 +131,15 @@ def _wrong(diagnosis: Findings) -> list[dict[str, Any]]:
     return rows
 
 
-def _asked(diagnosis: Findings) -> list[dict[str, str]]:
-    """Effects that were asked, in percent of the mismatch."""
+def _tested(diagnosis: Findings) -> list[dict[str, str]]:
+    """Effects that were tested, in percent of the mismatch."""
 
     def percent(share: float | None) -> str:
         return "not fitted" if share is None else "all" if share >= 1.0 else f"{100 * share:.0f} %" if share > 0.005 else "under 1 %"
 
     return [
-        {"name": words.label(a.id), "blocks": ", ".join(a.blocks), "promised": percent(a.promised), "left": percent(a.left)}
-        for a in diagnosis.asked
+        {"name": words.label(a.id), "blocks": ", ".join(a.blocks), "predicted_gain": percent(a.predicted_gain), "left": percent(a.left)}
+        for a in diagnosis.tested
     ]
 
 
@@ -331,7 +331,7 @@ def render(diagnosis: Findings) -> str:
         wrong=_wrong(diagnosis),
         kept=[words.kept_sentence(u) for u in diagnosis.unexplained],
         ambiguity=[words.set_label(list(s)) for s in diagnosis.ambiguity],
-        asked=_asked(diagnosis),
+        tested=_tested(diagnosis),
         experiment=diagnosis.next_experiment.text,
         excitation=_excitation(diagnosis),
         bits=words.format_number(bits, 2) if words.is_number(bits) else "",

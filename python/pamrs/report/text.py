@@ -187,12 +187,12 @@ def sentence_of(wrong: WrongParameter) -> str:
 
 
 def kept_sentence(kept: Unexplained) -> str:
-    """What a block keeps: ``the arm keeps 15 times its noise (0.4 deg) that no listed effect explains``."""
+    """What is left in a block: ``the residual of the arm is 15 times the noise level (0.4 deg), and no listed effect explains it``."""
     unit, factor = display_unit(kept.unit, abs(kept.size))
     size = format_number(kept.size * factor, 2, unicode=False)
-    why = "no listed effect explains" if kept.verdict == "unlisted" else "what is named does not explain"
+    why = "no listed effect explains it" if kept.verdict == "unlisted" else "what is named does not explain it"
     times = format_number(kept.noises, 2, unicode=False)
-    return f"the {_spoken(kept.block)} keeps {times} times its noise ({size} {unit}) that {why}".replace("°", "deg")
+    return f"the residual of the {_spoken(kept.block)} is {times} times the noise level ({size} {unit}), and {why}".replace("°", "deg")
 
 
 def _spoken(name: str) -> str:
@@ -291,9 +291,9 @@ def _unnamed(diagnosis: Findings) -> str:
     doubtful = [s for s in diagnosis.ambiguity if s not in (["none"], ["parameters"])]
     rivals = " or ".join(_answer(s) for s in doubtful)
     if diagnosis.verdict == "none" and doubtful:
-        return f"The model explains these recordings down to their noise, but they cannot rule out {rivals}{place}"
+        return f"The model explains these recordings down to the noise level, but they cannot rule out {rivals}{place}"
     if diagnosis.verdict == "none":
-        return "Nothing is missing: the model explains these recordings down to their noise"
+        return "Nothing is missing: the model explains these recordings down to the noise level"
     if diagnosis.verdict == "parameters" and doubtful:
         return f"Parameter values may explain the difference; these recordings cannot rule out {rivals}{place}"
     if diagnosis.verdict == "parameters":

@@ -242,9 +242,7 @@ def _torque_at_rest(group: _Group) -> None:
     )
 
 
-def _range_of_torque(
-    group: _Group, ranges: dict[str, Array], own: dict[float, Array]
-) -> None:
+def _range_of_torque(group: _Group, ranges: dict[str, Array], own: dict[float, Array]) -> None:
     """Rotations between which there are 200 ft lbf: as we have the torque, as printed, and read otherwise."""
     rest, end = elbow.rest_angle(), math.radians(_RANGE)
     at_end = {law: float(elbow.elbow_torque(end, law=law)) / FOOT_POUND for law in elbow.LAWS}

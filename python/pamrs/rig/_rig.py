@@ -308,7 +308,7 @@ class Rig:
         return self
 
     def _with_entry(self, entry: dict[str, Any], std: dict[str, dict[str, float]]) -> Rig:
-        """This rig with one effect more, as an entry of its model."""
+        """The same rig with one effect more, as an entry of its model."""
         model = {**self._model, "effects": [*self._model["effects"], entry]}
         found = Rig(self.name, model, self._tolerances, {**self._effect_std, **std}, self.source)
         origin, before = self.__dict__.get("_origin", (self, {}))
@@ -405,6 +405,7 @@ class Rig:
         -------
         Rig
         """
+
         def stays(entry: Mapping[str, Any]) -> bool:
             if effect is None:
                 return False

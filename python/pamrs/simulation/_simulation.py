@@ -159,7 +159,7 @@ class Simulation(Mapping[str, Array]):
     def balance(self) -> Balance:
         """Mass, energy and work from the first to the last row."""
         channels = self._channels
-        gain = {name: float(channels[name][-1] - channels[name][0]) for name in _BOOKS}
+        gain = {name: float(channels[name][-1] - channels[name][0]) for name in _BALANCES}
         masses = [m for channel in ("air_mass", "line_mass") for m in self.under(channel).values()]
         return Balance(
             supplied=gain["mass_supplied"],
@@ -443,4 +443,4 @@ def default_step(sample_time: float, longest: float = 1e-3) -> float:
 MOST_NUMBERS = 250_000_000
 _TELLING_TORQUE = 1.0  # N m
 #: Channels of the core that are sums since the start.
-_BOOKS = ("mass_supplied", "mass_vented", "energy_supplied", "exergy_supplied", "muscle_work", "joint_work")
+_BALANCES = ("mass_supplied", "mass_vented", "energy_supplied", "exergy_supplied", "muscle_work", "joint_work")

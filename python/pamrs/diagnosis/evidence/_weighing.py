@@ -16,11 +16,11 @@ from pamrs.diagnosis.settings import DiagnosisSettings, EvidenceSettings
 from pamrs.effects import EFFECTS, SameData, find_parameter
 
 __all__ = [
-    "believed",
-    "doubt",
+    "capped",
     "explains",
-    "most_believed",
+    "penalty",
     "price",
+    "probability_cap",
     "same_recordings",
     "share_left",
     "stands",
@@ -47,8 +47,8 @@ def visited(problem: Problem) -> Ranges:
     return found
 
 
-def most_believed(fitted: Problem, mismatch: Block, left: float, *, same: bool) -> float:
-    """How far any name is believed at most, which is less where the proof is weak.
+def probability_cap(fitted: Problem, mismatch: Block, left: float, *, same: bool) -> float:
+    """Largest probability that any name can get, which is less where the proof is weak.
 
     A slow drift of less than two percent of the pressure, with no held-out recording, may as well be the bench's own loss,
     creep of a wall or the transducer's drift. ``same`` says that nothing is held out, ``left`` what the refit leaves of the channel.
@@ -70,9 +70,9 @@ def share_left(candidate: Candidate, baseline: Candidate, suspects: list[Block],
     found = _excesses(candidate, baseline, suspects)
     most = max(before for before, _ in found)
     telling = settings.telling_excess
-    asked = min(telling, settings.telling_share * most)
-    shares = [after / before for before, after in found if before > asked]
-    shares += [(after - telling) / max(most, telling) for before, after in found if before <= asked and after > telling]
+    threshold = min(telling, settings.telling_share * most)
+    shares = [after / before for before, after in found if before > threshold]
+    shares += [(after - telling) / max(most, telling) for before, after in found if before <= threshold and after > telling]
     return max(shares, default=1.0)
 
 
@@ -106,9 +106,9 @@ def weigh(
     Between sets: the logarithm of what each leaves of the mismatch, fitted and held out, on a nominal number of independent looks;
     what the form of an equation may leave (``form_share`` of the settings) is granted to all of them, so that no second effect is
     asked for to mend the form of the first; among sets of as many effects less is granted (``form_share_alike``). What is left of a
-    faint mismatch counts by what noise could leave of it. Each parameter and each further effect has its price, and so have a clock
-    that does not drift and values that an effect hardly has (:func:`unlikely`). Against ``unlisted``: the share of the mismatch that
-    the set explains where it explains least, and whether its size is the same in all recordings; sets that are not believed
+    mismatch near the noise counts by what noise could leave of it. Each parameter and each further effect has
+    its price, and so have a clock that does not drift and values that an effect hardly has (:func:`unlikely`). Against ``unlisted``: the share of the mismatch that
+    the set explains where it explains least, and whether its size is the same in all recordings; improbable sets
     themselves say nothing against one that is. The constants are those under which the stated probabilities came true in a trial
     with other seeds than the published one (docs/decisions/0014).
 
@@ -219,7 +219,7 @@ def _trusted(
     odds = (math.log((1.0 - left) / left) - even) / settings.softness
     if explains(candidate, baseline, suspects, settings):
         odds = max(odds, settings.log_odds_noise_left)
-    return believed(odds - doubt(candidate, seconds, settings), most)
+    return capped(odds - penalty(candidate, seconds, settings), most)
 
 
 def _pliable(candidate: Candidate) -> bool:
@@ -228,12 +228,12 @@ def _pliable(candidate: Candidate) -> bool:
     return bool(candidate.wrong) or any(not info.leading.same_everywhere for info in free)
 
 
-def believed(odds: float, most: float) -> float:
+def capped(odds: float, most: float) -> float:
     """Probability of logarithmic odds, at most so much."""
     return most / (1.0 + math.exp(-min(60.0, max(-60.0, odds))))
 
 
-def doubt(candidate: Candidate, seconds: float, settings: EvidenceSettings) -> float:
+def penalty(candidate: Candidate, seconds: float, settings: EvidenceSettings) -> float:
     """What a set's values take from the logarithm of its odds: a size that scatters between recordings, a time that was not seen."""
     times = (value for name, value in _effect_values(candidate) if find_parameter(name).time_constant)
     unseen = any(value > settings.unseen_lengths * seconds for value in times)
@@ -308,7 +308,7 @@ def _score(
         for block in suspects:
             excess, left = (max(0.0, e[block.name].ratio - 1.0) for e in (was, now))
             total -= 0.25 * evidence.looks * math.log(1.0 + left + share * excess)
-            # of a faint mismatch the noise says how much may be left, of a strong one the forms
+            # of a mismatch near the noise the noise says how much may be left, of a strong one the forms
             spread = math.hypot(now[block.name].scatter, evidence.form_error * excess, evidence.noise_error)
             total -= min(0.5 * (left / spread) ** 2, evidence.decided) * (0.5 if once else 1.0)
     return total - price(candidate, settings) - evidence.further_price * (len(candidate.names) - 1)

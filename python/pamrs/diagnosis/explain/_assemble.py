@@ -14,10 +14,10 @@ from pamrs.diagnosis.evidence import (
     Candidate,
     Group,
     Judged,
+    autocorrelation_of,
     case_ambiguity,
     case_probabilities,
     case_verdict,
-    colour_of,
     is_parameter,
     judge,
     parts_of,
@@ -31,14 +31,13 @@ from pamrs.diagnosis.explain._closure_words import describe_closure
 from pamrs.diagnosis.explain._conditions import Picture, describe
 from pamrs.diagnosis.fit import CHOSEN, Events, Key, Problem, events_of, fit, residuals
 from pamrs.diagnosis.next_experiment import propose
-from pamrs.diagnosis.noise import Floor
+from pamrs.diagnosis.noise import NoiseLevel
 from pamrs.diagnosis.prepare import Residual
 from pamrs.diagnosis.result import Diagnosis
 from pamrs.diagnosis.settings import DiagnosisSettings, EvidenceSettings
 from pamrs.effects import CATALOGUE, EFFECTS
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError
 from pamrs.findings import (
-    Asked,
     BlockResidual,
     ChannelError,
     EffectFound,
@@ -47,6 +46,7 @@ from pamrs.findings import (
     NextExperiment,
     ParameterFound,
     StageError,
+    Tested,
     Trace,
     Tried,
     WrongParameter,
@@ -75,20 +75,20 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
     ambiguity = case_ambiguity(judged, settings.verdict)
     models = _models(nominal, fitted, judged, verdict)
     judged = models.judged
-    floor = {k: v for g in groups for k, v in g.floor.items()}
+    noise_level = {k: v for g in groups for k, v in g.noise_level.items()}
     fit_found = models.residuals(fitted)
     out_found = fit_found if held is fitted else models.residuals(held)
     located = _located(judged, settings)
     picture = Picture()
     if located is not None:
         block = next(b for b in fitted.blocks if b.name == located)
-        picture = describe(block, fitted.recordings, nominal, fit_found["refit"], fit_found["after"], floor)
-    fit_table = _table(fitted, fit_found, floor)
-    held_table = _table(held, out_found, floor) if held is not fitted else {}
+        picture = describe(block, fitted.recordings, nominal, fit_found["refit"], fit_found["after"], noise_level)
+    fit_table = _table(fitted, fit_found, noise_level)
+    held_table = _table(held, out_found, noise_level) if held is not fitted else {}
     table = held_table or fit_table
     named = any(j.named or j.wrong for j in judged)
     gap = _gap(table, settings.verdict.least_gap) if models.final.effects or any(j.wrong for j in judged) else None
-    blocks = block_entries(judged, fitted, fit_found, held, out_found, floor)
+    blocks = block_entries(judged, fitted, fit_found, held, out_found, noise_level)
     diagnosis = Diagnosis(
         case=case.name,
         verdict=verdict,
@@ -108,14 +108,12 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
         residuals=_block_table(groups),
         condition_map=picture.map,
         tried=_tried(groups),
-        asked=_asked(groups, settings.evidence),
+        tested=_tested(groups, settings.evidence),
         settings=settings,
     )
     missing = [j.group for j in judged if j.verdict == "unlisted"]
     forms = [
-        describe_closure(g.closure.fit, replace(fitted, blocks=g.blocks), g.candidates[0].fit)
-        for g in missing
-        if g.closure is not None
+        describe_closure(g.closure.fit, replace(fitted, blocks=g.blocks), g.candidates[0].fit) for g in missing if g.closure is not None
     ]
     sought = any(g.sought for g in missing)
     return replace(diagnosis, text=words.verdict(diagnosis, case, gap, forms, settings.warnings, sought=sought))
@@ -165,9 +163,7 @@ def _models(nominal: Rig, fitted: Problem, judged: list[Judged], verdict: str) -
     return _Models(judged, starts, chosen, nominal, baseline, _merged(nominal, chosen))
 
 
-def _warnings(
-    case: Case, models: _Models, table: dict[str, ChannelError], settings: DiagnosisSettings, *, same: bool
-) -> list[str]:
+def _warnings(case: Case, models: _Models, table: dict[str, ChannelError], settings: DiagnosisSettings, *, same: bool) -> list[str]:
     """What a reader should know before trusting the rest."""
     named = any(j.named or j.wrong for j in models.judged)
     return [
@@ -212,16 +208,16 @@ def _tried(groups: list[Group]) -> list[Tried]:
     ]
 
 
-def _asked(groups: list[Group], settings: EvidenceSettings) -> list[Asked]:
-    """Every lasting effect that acts where a mismatch is, what it promised and what it leaves alone, the best first."""
+def _tested(groups: list[Group], settings: EvidenceSettings) -> list[Tested]:
+    """Every persistent effect that acts where a mismatch is, its predicted gain and what it leaves alone, the best first."""
     found = []
     for group in groups:
-        for effect, promised in group.promised.items():
+        for effect, predicted_gain in group.predicted_gain.items():
             singles = [c for c in group.candidates if c.effects == (effect,)]
             alone = [share_left(c, group.candidates[0], group.suspects, settings) for c in singles]
             blocks = [b.name for b in group.suspects]
-            found.append(Asked(effect, blocks, min(1.0, max(0.0, promised)), min(alone, default=None)))
-    return sorted(found, key=lambda a: (a.left is None, a.left if a.left is not None else -a.promised))
+            found.append(Tested(effect, blocks, min(1.0, max(0.0, predicted_gain)), min(alone, default=None)))
+    return sorted(found, key=lambda a: (a.left is None, a.left if a.left is not None else -a.predicted_gain))
 
 
 def _next(
@@ -246,9 +242,7 @@ def _next(
     return words.next_experiment(verdict, probabilities, ambiguity, nominal, missing)
 
 
-def _hypotheses(
-    judged: list[Judged], probabilities: dict[str, float], nominal: Rig, least: float
-) -> list[tuple[str, Rig, float]]:
+def _hypotheses(judged: list[Judged], probabilities: dict[str, float], nominal: Rig, least: float) -> list[tuple[str, Rig, float]]:
     """The likely hypotheses that have a model, as fitted; those of an effect with times of its own can predict no other recording."""
     found = []
     for key, p in probabilities.items():
@@ -272,8 +266,8 @@ def _inside(group: Group, wanted: frozenset[str]) -> Candidate:
 def _owners(candidates: list[Candidate]) -> dict[str, int]:
     """The group that tells most of each parameter that several have (sensors' zeros): the one with the least standard deviation.
 
-    What a group leaves without a name is in its colour, and so in its standard deviations. Events are fitted with the values beside
-    them, which stay.
+    What a group leaves without a name is in its autocorrelation, and so in its standard deviations. Events are
+    fitted with the values beside them, which stay.
     """
 
     def spread(k: int, name: str) -> float:
@@ -305,14 +299,14 @@ def _settled(nominal: Rig, problem: Problem, judged: list[Judged], chosen: list[
             effects = candidate.fit.effects
             free, fixed = parts_of(start_of(candidate.fit, effect, settings.least_start) for effect in effects)
             settled = {n: other.values[n] for n, other in common.items()}
-            colour = colour_of(own, candidate.fit)
+            autocorrelation = autocorrelation_of(own, candidate.fit)
             with contextlib.suppress(SimulationError):  # it then stays as it was fitted
                 again = fit(
                     own,
                     nominal,
                     effects,
                     free,
-                    colour,
+                    autocorrelation,
                     fixed=fixed,
                     warm=candidate.fit,
                     share=settings.final_step_share,
@@ -358,14 +352,14 @@ def _located(judged: list[Judged], settings: DiagnosisSettings) -> str | None:
     return None
 
 
-def _table(problem: Problem, found: dict[str, dict[Key, Residual]], floor: dict[Key, Floor]) -> dict[str, ChannelError]:
+def _table(problem: Problem, found: dict[str, dict[Key, Residual]], noise_level: dict[Key, NoiseLevel]) -> dict[str, ChannelError]:
     """Error of every channel at every stage."""
     out = {}
     for block in problem.blocks:
         errors = {}
         noise, weights = [], []
         for prepared in problem.recordings:
-            noise.append(floor[block.name, prepared.recording.name].sample ** 2)
+            noise.append(noise_level[block.name, prepared.recording.name].sample ** 2)
             weights.append(max(1, int(found["refit"][block.name, prepared.recording.name].rows.sum())))
         level = math.sqrt(float(np.average(noise, weights=weights)))
         for stage in ("before", "refit", "after"):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pamrs.channels import unit_of
 from pamrs.diagnosis.evidence import Judged, significant
 from pamrs.diagnosis.fit import Key, Problem
-from pamrs.diagnosis.noise import Floor, excess
+from pamrs.diagnosis.noise import NoiseLevel, excess
 from pamrs.diagnosis.prepare import Block, Residual
 from pamrs.findings import BlockMismatch, BlockVerdict, MismatchSize, MismatchStages, Unexplained
 
@@ -15,7 +15,7 @@ Stages = dict[str, dict[Key, Residual]]
 
 
 def block_entries(
-    judged: list[Judged], fitted: Problem, fit_found: Stages, held: Problem, out_found: Stages, floor: dict[Key, Floor]
+    judged: list[Judged], fitted: Problem, fit_found: Stages, held: Problem, out_found: Stages, noise_level: dict[Key, NoiseLevel]
 ) -> list[BlockVerdict]:
     """One entry for each group of blocks.
 
@@ -27,13 +27,13 @@ def block_entries(
         Recordings that were fitted and held out (the same object when there are no others).
     fit_found, out_found : dict of str to dict
         Their residuals by stage (``before``, ``refit``, ``after``), block and recording.
-    floor : dict
+    noise_level : dict
         Noise by block and recording.
     """
 
     def mismatch(block: Block) -> BlockMismatch:
-        outside = None if held is fitted else _sizes(block, held, out_found, floor)
-        inside = _sizes(block, fitted, fit_found, floor)
+        outside = None if held is fitted else _sizes(block, held, out_found, noise_level)
+        inside = _sizes(block, fitted, fit_found, noise_level)
         return BlockMismatch(block.name, block.channel, unit_of(block.channel), inside, outside)
 
     return [
@@ -50,11 +50,11 @@ def block_entries(
     ]
 
 
-def _sizes(block: Block, problem: Problem, found: Stages, floor: dict[Key, Floor]) -> MismatchStages:
+def _sizes(block: Block, problem: Problem, found: Stages, noise_level: dict[Key, NoiseLevel]) -> MismatchStages:
     """What is more than noise at every stage: in noises, in the channel's unit, and whether noise could be so large."""
     sizes = {}
     for stage, residuals in found.items():
-        told = excess(block, problem.recordings, residuals, floor, problem.settings.noise)
+        told = excess(block, problem.recordings, residuals, noise_level, problem.settings.noise)
         sizes[stage] = MismatchSize(told.systematic, told.systematic * told.noise, significant(told))
     return MismatchStages(**sizes)
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pamrs.channels import channel_of, dotted
 from pamrs.diagnosis.fit import Key
-from pamrs.diagnosis.noise import Floor, bins_of
+from pamrs.diagnosis.noise import NoiseLevel, bins_of
 from pamrs.diagnosis.prepare import Block, Prepared, binned
 from pamrs.findings import Condition, ConditionMap
 from pamrs.rig import Rig
@@ -106,7 +106,7 @@ def describe(
     rig: Rig,
     before: dict[Key, Any],
     after: dict[Key, Any] | None,
-    floor: dict[Key, Floor],
+    noise_level: dict[Key, NoiseLevel],
 ) -> Picture:
     """Shares of the excess by condition, intervals in the worst recording, and the conditions map.
 
@@ -120,8 +120,8 @@ def describe(
         Nominal model, for the valve's null.
     before, after : dict
         Residuals of the refitted baseline and of the final model.
-    floor : dict
-        Noise floors.
+    noise_level : dict
+        Noise levels.
     """
     columns: dict[str, list[Array]] = {}
     scaled, scaled_after, worst, picture = [], [], -1.0, Picture()
@@ -131,8 +131,8 @@ def describe(
         means, counts = binned(before[key].value, before[key].rows, width)
         ok = counts > 0
         # inside a window the residual is an integral: its change says where the cause acts
-        score = means / floor[key].binned
-        cause = score if block.window is None else _change(before[key].value, before[key].rows, width) / floor[key].binned
+        score = means / noise_level[key].binned
+        cause = score if block.window is None else _change(before[key].value, before[key].rows, width) / noise_level[key].binned
         conditions = _conditions(block, prepared, rig, width)
         for name, values in conditions.items():
             columns.setdefault(name, []).append(values[ok])
@@ -140,7 +140,7 @@ def describe(
         if after is not None:
             a = after[key]
             rest = binned(a.value, a.rows, width)[0] if block.window is None else _change(a.value, a.rows, width)
-            scaled_after.append((rest / floor[key].binned)[ok])
+            scaled_after.append((rest / noise_level[key].binned)[ok])
         power = float(np.mean(score[ok] ** 2)) if ok.any() else 0.0
         if power > worst:
             worst = power

@@ -34,55 +34,56 @@ def where(located: str | None, problem: Problem, judged: list[Judged], picture: 
     settings = problem.settings.warnings
     groups = [j.group for j in judged]
     if located is None:
-        text = "No block keeps more than its noise after the refit."
+        text = "After the refit, no block's residual is above the noise level."
         return Where(text=text)
     block = next(b for b in problem.blocks if b.name == located)
     found = next(g.baseline[located] for g in groups if located in g.baseline)
     parts = "" if block.covers == located else f" ({block.covers})"
     text = (
-        f"The mismatch lies in the {located} block{parts}: with its neighbours' measured signals as inputs, the refitted "
-        f"model still misses {block.channel.replace('_', ' ')} by {found.systematic:.2g} times its noise."
+        f"The mismatch lies in the {located} block{parts}. With the measured signals of its neighbours as inputs, "
+        f"the refitted model misses {block.channel.replace('_', ' ')} by {found.systematic:.2g} times the noise level."
     )
     group = next((g for g in groups if g.mismatch is not None and g.mismatch.name == located), None)
     wrong = next((j.wrong for j in judged if block in j.group.blocks), ())
-    faint = group is not None and group.faint
-    mistaken = bool(wrong) and (group is None or faint)
+    below_noise = group is not None and group.below_noise
+    mistaken = bool(wrong) and (group is None or below_noise)
     if mistaken:
         text = (
-            f"Inside its tolerances the {located} block{parts} fits to its noise, but only with parameters at their ends; with another "
-            f"value of {' and '.join(wrong)} they come back."
+            f"The {located} block{parts} fits down to the noise level, but only with parameters at the ends of "
+            f"their tolerances. With another value of {' and '.join(wrong)} they return to their nominal values."
         )
     elif group is not None and group.instead:
         moved = ", ".join(f"{n} by {group.candidates[0].fit.moved[n]:+.1f} tolerances" for n in group.instead)
         text = (
-            f"No block keeps more than its noise, but for that the refit of the {located} block{parts} had to move {moved}, and an "
-            "effect does the same without."
+            f"No block's residual is above the noise level, but the refit of the {located} block{parts} had to move "
+            f"{moved}. An effect explains the same data without that."
         )
-    elif faint:
+    elif below_noise:
         text = (
-            f"No block keeps more than its noise, but the residual of the {located} block{parts} has the signature of an effect in it, "
-            "in held-out recordings too."
+            f"No block's residual is above the noise level, but the residual of the {located} block{parts} "
+            "contains the signature of an effect, in held-out recordings too."
         )
-    elif group is not None and group.probabilities.get("", 0.0) > settings.doubted_probability:
+    elif group is not None and group.probabilities.get("", 0.0) > settings.no_mismatch_probability:
         text = (
-            f"The {located} block{parts} keeps hardly more than its noise ({found.systematic:.2g} times it in "
-            f"{block.channel.replace('_', ' ')}): its floor may as well have been taken too low."
+            f"The residual of the {located} block{parts} is barely above the noise level "
+            f"({found.systematic:.2g} times it in {block.channel.replace('_', ' ')}). "
+            "The noise level may have been estimated too low."
         )
     elif all(g.mismatch is None for g in groups):
         text = (
-            f"Every block fits to its noise, but the {located} block only with a parameter far outside its tolerance "
+            f"Every block fits down to the noise level, but the {located} block only with a parameter far outside its tolerance "
             "(see the warnings)."
         )
-    telling = [] if faint else [c for c in picture.conditions if c.share > settings.telling_condition * c.time][:2]
+    telling = [] if below_noise else [c for c in picture.conditions if c.share > settings.telling_condition * c.time][:2]
     if telling:
         text += " It is largest under: " + "; ".join(c.text for c in telling) + "."
-    if picture.intervals and not faint:
+    if picture.intervals and not below_noise:
         text += f" The intervals are those of recording {picture.recording}."
     return Where(
         block=located,
         channel=block.channel,
-        intervals=[] if faint else picture.intervals,
-        conditions=[] if faint else picture.conditions[:6],
+        intervals=[] if below_noise else picture.intervals,
+        conditions=[] if below_noise else picture.conditions[:6],
         text=text,
         recording=picture.recording,
     )
@@ -101,7 +102,7 @@ def verdict(
     kind = diagnosis.verdict
     missing = [b for b in diagnosis.blocks if b.verdict == "unlisted"]
     if kind == "none":
-        text = "Nothing is missing that these recordings could show: the nominal model predicts every block to its noise."
+        text = "These recordings show no missing physics: the nominal model predicts every block down to the noise level."
         return text + _unsettled(diagnosis)
     if kind == "parameters" and diagnosis.wrong_parameters:
         return _mistaken(diagnosis, case, gap, settings) + _beside(diagnosis, missing, forms, sought=sought)
@@ -109,20 +110,21 @@ def verdict(
         shifted = sorted(diagnosis.parameters.items(), key=lambda kv: -abs(kv[1].moved_sigmas))[:3]
         moved = ", ".join(f"{n} by {p.moved_sigmas:+.1f} tolerances" for n, p in shifted)
         return (
-            "No physics is missing that these recordings could show, but parameters differ from the nominal ones: with values "
-            f"inside their tolerances the model predicts every block to its noise. Moved most: {moved}." + _unsettled(diagnosis)
+            "These recordings show no missing physics, but parameters differ from their nominal values. With values "
+            "inside their tolerances the model predicts every block down to the noise level. "
+            f"Moved most: {moved}." + _unsettled(diagnosis)
         )
     place = diagnosis.where.text
     if kind == "unlisted":
         tried = ", ".join(f"{e.id} ({e.probability:.0%})" for e in diagnosis.effects)
         text = (
-            f"Physics is missing that is not in the catalogue, or no effect of the catalogue explains the data well enough to be "
-            f"named. {place}" + (f" Closest: {tried}." if tried else "")
+            f"Physics is missing. Either it is not in the catalogue, or no effect of the catalogue explains the data well "
+            f"enough to be named. {place}" + (f" Closest: {tried}." if tried else "")
         )
         if not forms and not sought:
-            return text + (" No form of it was looked for: a load has none in the simulator yet." if case.rig.model["load"] else "")
+            return text + (" No form of it was searched for: the simulator has none for a load yet." if case.rig.model["load"] else "")
         if not forms:
-            return text + " No form of it was found that carries over to other recordings: the model stays the refitted one."
+            return text + " No form of it carries over to other recordings, so the model stays the refitted one."
         closes = "" if gap is None else f" With it in the model, {100 * gap:.0f} % of the gap between refitted model and noise closes."
         return text + "\n\nWhat is missing, as a form without a name. " + " ".join(forms) + closes
     names = " and ".join(f"{e.name} ({e.id}, probability {e.probability:.2f})" for e in diagnosis.effects)
@@ -136,8 +138,8 @@ def verdict(
         text += " " + _mistaken(diagnosis, case, None, settings)
     if unknown_volumes(case.rig):
         text += (
-            " The chamber's volume is not known: what the recording fixes is the time constant (and the conductance per volume); "
-            "the conductance itself holds for the placeholder volume of the rig file only."
+            " The chamber's volume is not known. The recording determines the time constant and the conductance per volume; "
+            "the conductance itself holds only for the placeholder volume of the rig file."
         )
     return text + _beside(diagnosis, missing, forms, sought=sought)
 
@@ -183,12 +185,12 @@ def _beside(diagnosis: Findings, missing: list[BlockVerdict], forms: list[str], 
         return text
     kept = [u for u in diagnosis.unexplained if u.verdict == "unlisted"]
     blocks = " and ".join(name for b in missing for name in b.blocks)
-    said = [_capital(kept_sentence(u)) + "." for u in kept] or [f"Something acts in {blocks} that no listed effect explains."]
+    said = [_capital(kept_sentence(u)) + "." for u in kept] or [f"No listed effect explains the residual in {blocks}."]
     text += "\n\nWhat stays open. " + " ".join(said)
     if forms:
-        text += " As a form without a name, which is in the model: " + " ".join(forms)
+        text += " The model contains it as a form without a name: " + " ".join(forms)
     else:
-        text += " No form of it " + ("was found that carries over to other recordings." if sought else "was looked for.")
+        text += " No form of it " + ("carries over to other recordings." if sought else "was searched for.")
     return text
 
 
@@ -200,7 +202,7 @@ def _unsettled(diagnosis: Findings) -> str:
 
 _SCALED = (
     "Repeat the excitation under which the excess is largest at two speeds and at two payloads: what scales with speed, with "
-    "load or with neither tells the class of the missing effect."
+    "load or with neither shows the class of the missing effect."
 )
 _SCALED_EXCITATION: dict[str, Any] = {"kind": "repeat_scaled", "speed_ratio": 10.0, "payloads": 2}
 """What to record of a mismatch without a name."""
@@ -243,7 +245,7 @@ def next_experiment(
     leading = max(probabilities, key=lambda k: probabilities[k])
     if not ambiguity and kind != "unlisted" and missing:
         text, excitation = _SCALED, _SCALED_EXCITATION
-        text = f"The name is settled. For what the {' and '.join(missing)} keeps: {text[:1].lower()}{text[1:]}"
+        text = f"The name is settled. For the rest of the residual in the {' and '.join(missing)}: {text[:1].lower()}{text[1:]}"
         return NextExperiment(text, excitation)
     if not ambiguity and kind != "unlisted":
         text = "The name is settled by these recordings; no further one is needed for it."
@@ -251,10 +253,10 @@ def next_experiment(
     same = same_data(ambiguity)
     if same:
         return NextExperiment(same)
-    doubted = [k for s in ambiguity for k in s if k in EFFECTS and not EFFECTS[k].experiment]
+    untold = [k for s in ambiguity for k in s if k in EFFECTS and not EFFECTS[k].experiment]
     parameters = [k for s in ambiguity for k in s if k == "parameters" or is_parameter(k)]
-    if parameters and doubted:
-        return NextExperiment(_sentence(EFFECTS[doubted[0]].separates))
+    if parameters and untold:
+        return NextExperiment(_sentence(EFFECTS[untold[0]].separates))
     measurable = [k for k in parameters if is_parameter(k)]
     if measurable:
         text = f"Measure {' or '.join(measurable)} by itself (scale, ruler, known volume): these recordings cannot tell which is wrong."
@@ -338,9 +340,7 @@ def worse(table: dict[str, ChannelError], settings: WarningSettings) -> list[str
     return out
 
 
-def reservations(
-    judged: list[Judged], chosen: list[Candidate], table: dict[str, ChannelError], settings: WarningSettings
-) -> list[str]:
+def reservations(judged: list[Judged], chosen: list[Candidate], table: dict[str, ChannelError], settings: WarningSettings) -> list[str]:
     """What a reader should know of a model with a name: what it still misses where it acts, and values that it had to move far."""
     out = []
     for j in judged:
@@ -355,11 +355,14 @@ def reservations(
             why = "its equation is not the whole truth" if j.named else "something acts beside it"
             name = "" if j.ambiguity else "the name stands, "
             out.append(
-                f"with {what} the model still misses {channel.replace('_', ' ')} by {times:.2g} times its noise: {name}{why}, and "
-                "standard deviations hold only as far as that matters little"
+                f"with {what} the model still misses {channel.replace('_', ' ')} by {times:.2g} times the noise level: "
+                f"{name}{why}, and standard deviations hold only as far as that matters little"
             )
     named = [c for c in chosen if any(effect in CATALOGUE for effect in c.effects)]
     far = settings.moved_tolerances
     moved = {n: v for c in named for n, v in c.fit.held_by_prior.items() if abs(v) > far}
-    out += [f"with the effect the fit moves {n} by {v:+.1f} tolerances: it may make up for the effect's form" for n, v in moved.items()]
+    out += [
+        f"with the effect the fit moves {n} by {v:+.1f} tolerances: it may compensate for the effect's form"
+        for n, v in moved.items()
+    ]
     return out

@@ -34,6 +34,8 @@ LOGARITHMIC = frozenset(
     if parameter.neutral != 0.0 and parameter.lower > 0.0
 )
 """Shapes that are positive: fitted by their logarithm."""
+
+
 @dataclass(frozen=True, eq=False)
 class Problem:
     """Blocks and recordings to be explained together.
@@ -357,7 +359,7 @@ def fit(
     starts : dict of str to float
         Dotted effect parameters that are free, with their starts.
     inflation : dict of str to float
-        Variance of each block's binned residual relative to white sample noise (coloured residuals count less).
+        Variance of each block's binned residual relative to white sample noise (autocorrelated residuals count less).
     fixed : dict of str to float, optional
         Effect parameters that are held.
     warm : Fit, optional

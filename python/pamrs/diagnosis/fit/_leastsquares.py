@@ -45,7 +45,7 @@ def levenberg_marquardt(
     evaluations : int
         Limit, the first included.
     settings : FitSettings
-        Gain and share of the sum of squares that a step has to promise, damping.
+        Least predicted gain of a step, the same as a share of the sum of squares, damping.
     share : float, optional
         Another share; 0 where the last few units of chi-square count.
 
@@ -105,7 +105,7 @@ def levenberg_marquardt(
 
 
 def _promise(step: Array, gradient: Array, normal: Array) -> float:
-    """Gain in the sum of squares that a step promises."""
+    """Predicted gain of a step in the sum of squares."""
     return -2.0 * float(gradient @ step) - float(step @ normal @ step)
 
 

@@ -60,7 +60,6 @@ def _scale(effect: str, parameter: str, settings: TransientSettings) -> float:
     return scales.get(_first_of(effect, parameter).role, _tried(EFFECTS[effect].leading))
 
 
-
 def fit_events(effect: str, problem: Problem, nominal: Rig, baseline: Fit, inflation: dict[str, float]) -> Fit | None:
     """Find the events of an effect in every recording and refit the baseline beside them.
 

@@ -1,8 +1,8 @@
 """The next experiment: each one that the rig can do, simulated with every hypothesis that survives, and what it would tell.
 
-Every hypothesis answers to the same commands. Its answer becomes a recording without noise, and every other hypothesis is asked to
+Every hypothesis answers to the same commands. Its answer becomes a recording without noise, and every other hypothesis has to
 explain it through the cut chain, its own parameters and the baseline's free to move inside what is known. What it cannot explain is
-a distance, and the distances of all pairs say how much of the present doubt the experiment takes away.
+a distance, and the distances of all pairs say how much of the present uncertainty the experiment removes.
 """
 
 from __future__ import annotations
@@ -245,8 +245,8 @@ def propose(
     sound = {**usual, **(noise or {})}
     records = [r.recording if isinstance(r, Prepared) else r for r in recordings]
     own = _channels(nominal, records, channels)
-    doubt = entropy([p for _, _, p in chosen])
-    if len(chosen) < 2 or doubt < own_settings.settled_entropy:
+    uncertainty = entropy([p for _, _, p in chosen])
+    if len(chosen) < 2 or uncertainty < own_settings.settled_entropy:
         text = "One hypothesis is left; no experiment can add to that."
         return NextExperiment(text, {}, 0.0)
     pool = _library(nominal, records, own_settings) if experiments is None else list(experiments)
@@ -254,7 +254,7 @@ def propose(
     for sensor in ("", *_missing(nominal, own, usual)):
         for experiment in sorted(pool, key=lambda e: e.effort):
             enough = len(found) >= own_settings.most_shown
-            if enough and max(o.bits for o in found) > doubt - 0.5 * own_settings.resolution:
+            if enough and max(o.bits for o in found) > uncertainty - 0.5 * own_settings.resolution:
                 break  # what is left costs more and cannot tell more
             try:
                 found.append(outcome_of(experiment, chosen, sound, own, settings, sensor))
@@ -268,7 +268,7 @@ def propose(
     best_first = ranked(found, [p for _, _, p in chosen], own_settings.resolution)
     best = best_first[0]
     return NextExperiment(
-        text=_text(best, chosen, doubt, own_settings.hopeless_share),
+        text=_text(best, chosen, uncertainty, own_settings.hopeless_share),
         excitation={**best.experiment.excitation, **({"sensor": best.sensor} if best.sensor else {})},
         expected_information_bits=round(best.bits, 3),
         ranking=[
@@ -331,7 +331,7 @@ def _spoken(label: str) -> str:
     return " with ".join(names)
 
 
-def _text(best: Outcome, hypotheses: Sequence[Hypothesis], doubt: float, hopeless: float) -> str:
+def _text(best: Outcome, hypotheses: Sequence[Hypothesis], uncertainty: float, hopeless: float) -> str:
     said = best.experiment.text[:1].upper() + best.experiment.text[1:]
     if best.sensor:
         said += f", with one more channel: {best.sensor.replace('_', ' ')}"
@@ -341,10 +341,11 @@ def _text(best: Outcome, hypotheses: Sequence[Hypothesis], doubt: float, hopeles
     channel = next(b.channel for b in best.problem.blocks if b.name == key[0]).replace("_", " ")
     said += (
         f". If it is {_spoken(hypotheses[0][0])}, a model with {_spoken(hypotheses[j][0])} then misses the {channel} by "
-        f"{size:.2g} times its noise, whatever its parameters; expected to give {best.bits:.2f} of the {doubt:.2f} bit of doubt."
+        f"{size:.2g} times the noise level, whatever its parameters. The expected information is {best.bits:.2f} of the "
+        f"{uncertainty:.2f} bit of uncertainty."
     )
-    if best.bits < hopeless * doubt:
-        said += " No standard experiment does better with these channels: think of another sensor."
+    if best.bits < hopeless * uncertainty:
+        said += " No standard experiment does better with these channels: consider another sensor."
     return said
 
 

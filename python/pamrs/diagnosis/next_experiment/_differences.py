@@ -1,7 +1,7 @@
 """What a change of the model leaves in the cut chain when everything else that is free has been fitted again.
 
-Residuals are counted in bins of 0.1 s in units of the floor that the noise of the sensors (output and drives) leaves there, and a
-recording as a modest number of independent ones: errors of a model are coloured, and a recording of 6000 samples does not know a
+Residuals are counted in bins of 0.1 s in units of the noise level that the noise of the sensors (output and drives) leaves there, and a
+recording as a modest number of independent ones: errors of a model are autocorrelated, and a recording of 6000 samples does not know a
 difference of a thousandth of its noise. Baseline parameters move inside their tolerances, an effect's own parameters inside what
 is known of them.
 """
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs.diagnosis.fit import Key, Problem, bin_width, free_baseline, residuals
-from pamrs.diagnosis.noise import bins_of, floors
+from pamrs.diagnosis.noise import bins_of, noise_levels
 from pamrs.diagnosis.prepare import Prepared, Residual, available_blocks, binned, prepare
 from pamrs.diagnosis.settings import DiagnosisSettings, NextExperimentSettings
 from pamrs.effects import EFFECTS
@@ -146,7 +146,7 @@ class Left:
     Attributes
     ----------
     rms : dict
-        By block and recording: root mean square of bin means [floors].
+        By block and recording: root mean square of bin means [noise levels].
     rows : dict
         By block and recording: the difference in each bin of the fit [channel's unit].
     total : float
@@ -159,14 +159,14 @@ class Left:
 
     @property
     def largest(self) -> tuple[Key, float]:
-        """Where it is largest, and how large [floors]."""
+        """Where it is largest, and how large [noise levels]."""
         key = max(self.rms, key=lambda k: self.rms[k])
         return key, self.rms[key]
 
 
 def weights_of(problem: Problem, rig: Rig) -> dict[Key, float]:
-    """Floor of a block's bin means over a recording, as a multiple of its white part: what drives' noise adds (>= 1)."""
-    found = floors(problem, core_rig(rig))
+    """Noise level of a block's bin means over a recording, as a multiple of its white part: what drives' noise adds (>= 1)."""
+    found = noise_levels(problem, core_rig(rig))
     out = {}
     for prepared in problem.recordings:
         for block in problem.blocks:
@@ -251,9 +251,9 @@ def _left(problem: Problem, values: Mapping[Key, Array], model: Linear, weights:
             r = model.found[key]
             mean, counts = binned(np.where(r.rows, values[key], 0.0), r.rows, width)
             slope, _ = binned(np.zeros((values[key].size, 0)) if r.jacobian is None else r.jacobian, r.rows, width)
-            floor = weights[key] * prepared.noise[block.channel] / math.sqrt(bins_of(prepared))
+            noise_level = weights[key] * prepared.noise[block.channel] / math.sqrt(bins_of(prepared))
             # what differs is smooth over a bin of 0.1 s: its mean square in fine bins is that in coarse ones
-            scale = math.sqrt(effective / max(1, int((counts > 0).sum()))) / floor
+            scale = math.sqrt(effective / max(1, int((counts > 0).sum()))) / noise_level
             rows.append(mean * scale)
             slopes.append(-slope * spread * scale)
             scales.append(scale)

@@ -235,7 +235,7 @@ class Plan:
             )
         return [
             *lines,
-            *(["", f"Not asked of this rig and these channels: {', '.join(self.not_asked)}"] if self.not_asked else []),
+            *(["", f"Not tested with this rig and these channels: {', '.join(self.not_asked)}"] if self.not_asked else []),
             "",
             "Not told apart: " + ("; ".join(", ".join(g) for g in self.groups) if self.groups else "none of those seen"),
         ]

@@ -274,8 +274,8 @@ def _parts(
         key = (block.name, experiment.name)
         r = base[key]
         slope, counts = binned(np.zeros((r.value.size, 0)) if r.jacobian is None else r.jacobian, r.rows, width)
-        floor = weights[key] * noise[block.channel] / math.sqrt(bins_of(prepared))
-        scale[key] = math.sqrt(effective / max(1, int((counts > 0).sum()))) / floor
+        noise_level = weights[key] * noise[block.channel] / math.sqrt(bins_of(prepared))
+        scale[key] = math.sqrt(effective / max(1, int((counts > 0).sum()))) / noise_level
         slopes[key] = slope * spread * scale[key]
         moved[key] = np.zeros((slope.shape[0], len(starts)))
     for index, start in enumerate(starts):

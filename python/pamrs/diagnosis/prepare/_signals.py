@@ -1,4 +1,4 @@
-"""Recordings made ready for the cut chain: smoothed drive signals, noise floors, windows."""
+"""Recordings made ready for the cut chain: smoothed drive signals, noise levels, windows."""
 
 from __future__ import annotations
 
@@ -165,9 +165,7 @@ def _long_holes(mask: Mask, bridged: int) -> list[tuple[int, int]]:
     return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a > bridged]
 
 
-def _state(
-    values: Array, mask: Mask, noise: float, dt: float, at: int, settings: PrepareSettings
-) -> tuple[float, float] | None:
+def _state(values: Array, mask: Mask, noise: float, dt: float, at: int, settings: PrepareSettings) -> tuple[float, float] | None:
     """Value and slope at a sample by the longest stretch around it, free of long holes, that a cubic fits but for the noise.
 
     From the shortest on, as long as the slope stays within what the shorter one leaves open (Lepski 1991): at the edge of a recording
@@ -231,9 +229,7 @@ def prepare(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Prep
     own = settings.prepare
     length = max(own.least_samples, filter_length(recording.sample_time, own))
     if len(recording) < length:
-        raise DiagnosisError(
-            f"recording {recording.name!r} has {len(recording)} samples; at least {length} are needed for a diagnosis"
-        )
+        raise DiagnosisError(f"recording {recording.name!r} has {len(recording)} samples; at least {length} are needed for a diagnosis")
     core = core_rig(rig)
     _check_commands(recording, rig, core.inputs)
     signals, raw, noise = {}, {}, {}

@@ -135,7 +135,7 @@ class Screen:
 
 
 def best_size(along: float, power: float, start: Start, settings: ScreenSettings) -> tuple[float, float]:
-    """Multiple of a start's size at which its signature gains most, inside what is believed, and that gain in chi-square.
+    """Multiple of a start's size at which its signature gains most, inside its plausible range, and that gain in chi-square.
 
     ``along`` is the product of what is left of the residual with the signature, ``power`` that of the signature with itself.
     """

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.diagnosis.evidence import colour_of
+from pamrs.diagnosis.evidence import autocorrelation_of
 from pamrs.diagnosis.fit import Fit, Problem, fit, residuals, stacked, with_priors
 from pamrs.diagnosis.noise import correlation_time
 from pamrs.diagnosis.prepare import Block
@@ -75,7 +75,7 @@ def find_closure(
     with those that remember); all chosen terms of a closure share one memory time and one memory angle, which the fit then refines.
     A term is taken while the logarithm of the misfit falls by more than its price, counted on independent samples of what is left,
     and while recordings left out are predicted better with it (with one recording only the price decides). The choice is made a
-    second time at the fit, residuals weighted by the colour that they have there, and the best of the fits and the baseline is
+    second time at the fit, residuals weighted by the autocorrelation that they have there, and the best of the fits and the baseline is
     kept. This takes ten to fifteen evaluations of the problem.
 
     Parameters
@@ -115,11 +115,11 @@ def find_closure(
     found = None if chosen is None else _fitted(problem, nominal, baseline, inflation, chosen, say)
     if found is None:
         return None
-    colour = colour_of(problem, found)
-    candidates, columns, warm = _again(problem, baseline, found, colour, blocks, closures)
-    second = _select(_Frame.of(problem, warm, found, colour), candidates, columns, found.values, settings)
-    other = None if second is None else _fitted(problem, nominal, warm, colour, second, say)
-    return _better([baseline, found, *([] if other is None else [other])], problem, colour, len(candidates))
+    autocorrelation = autocorrelation_of(problem, found)
+    candidates, columns, warm = _again(problem, baseline, found, autocorrelation, blocks, closures)
+    second = _select(_Frame.of(problem, warm, found, autocorrelation), candidates, columns, found.values, settings)
+    other = None if second is None else _fitted(problem, nominal, warm, autocorrelation, second, say)
+    return _better([baseline, found, *([] if other is None else [other])], problem, autocorrelation, len(candidates))
 
 
 def _closures(blocks: Sequence[Block]) -> dict[str, str]:
@@ -309,46 +309,77 @@ def _select(
         target = target - q @ (q.T @ target)
         wide = wide - q @ (q.T @ wide)
     crossed = _Crossed.of(frame, rows, unit)
-    left, free = target.copy(), wide.copy()
-    order: list[int] = []
-    locked: dict[str, float | None] = {}
-
-    def take(k: int) -> None:
-        """Add a term, and take what it explains out of everything."""
-        nonlocal left, free
-        order.append(k)
-        if candidates[k].memory:
-            locked.setdefault(candidates[k].memory, candidates[k].shape)
-        direction = free[:, k] / max(float(np.linalg.norm(free[:, k])), 1e-150)
-        left = left - direction * float(direction @ left)
-        free = free - np.outer(direction, direction @ free)
-
+    chosen = _Selection(candidates, target, wide, settings.least_power)
     for k, candidate in enumerate(candidates):
-        if candidate.name in present and usable[k] and float(free[:, k] @ free[:, k]) > settings.least_power:
-            take(k)
-    taken, misfit, proof = len(order), float(left @ left), crossed.left_out(order)
-    samples = frame.independent(left[: rows.size])
+        if candidate.name in present and usable[k] and chosen.power(k) > settings.least_power:
+            chosen.take(k)
+    order = chosen.order
+    taken, misfit, proof = len(order), chosen.misfit, crossed.left_out(order)
+    samples = frame.independent(chosen.left[: rows.size])
     while len(order) < settings.most_terms:
-        power = (free**2).sum(axis=0)
-        open_ = usable & (power > settings.least_power)
-        open_ &= np.array([c.memory not in locked or locked[c.memory] == c.shape for c in candidates])
-        open_[order] = False
-        if not open_.any():
+        telling = chosen.most_telling(usable)
+        if telling is None:
             break
-        take(int(np.argmax(np.where(open_, (free.T @ left) ** 2 / np.where(open_, power, 1.0), -1.0))))
-        now, outside = float(left @ left), crossed.left_out(order)
-        here = frame.independent(left[: rows.size])
-        inner, outer = here * math.log(misfit / max(now, 1e-300)), here * math.log(proof / max(outside, 1e-300))
+        chosen.take(telling)
+        now, outside = chosen.misfit, crossed.left_out(order)
+        here = frame.independent(chosen.left[: rows.size])
+        inner = here * math.log(misfit / max(now, 1e-300))
+        outer = here * math.log(proof / max(outside, 1e-300))
         new = len(order) - taken
         price = new * _price(here, len(candidates))
         if outer > 0.0 and (inner > price or (outer > price and inner > new * math.log(here))):
             taken, misfit, proof, samples = len(order), now, outside, here
     kept = _pruned(target, wide, order[:taken], misfit, samples, _price(samples, len(candidates)))
-    if not kept:
-        return None
-    design = np.concatenate(
-        [np.concatenate([frame.freedom, np.eye(b)]), np.concatenate([unit[:, kept], np.zeros((b, len(kept)))])], axis=1
-    )
+    return _solved(frame, candidates, rows, unit, size, kept) if kept else None
+
+
+class _Selection:
+    """Terms taken one after the other; what each explains is taken out of everything that is left."""
+
+    def __init__(self, candidates: list[_Candidate], target: Array, wide: Array, least_power: float) -> None:
+        self.left, self._free = target.copy(), wide.copy()
+        self.order: list[int] = []
+        self._candidates, self._least_power = candidates, least_power
+        self._shapes: dict[str, float | None] = {}
+
+    @property
+    def misfit(self) -> float:
+        """Sum of squares that is left."""
+        return float(self.left @ self.left)
+
+    def power(self, k: int) -> float:
+        """How much of a term is not yet explained by those taken."""
+        return float(self._free[:, k] @ self._free[:, k])
+
+    def take(self, k: int) -> None:
+        """Add a term."""
+        self.order.append(k)
+        candidate = self._candidates[k]
+        if candidate.memory:
+            self._shapes.setdefault(candidate.memory, candidate.shape)
+        direction = self._free[:, k] / max(float(np.linalg.norm(self._free[:, k])), 1e-150)
+        self.left = self.left - direction * float(direction @ self.left)
+        self._free = self._free - np.outer(direction, direction @ self._free)
+
+    def most_telling(self, usable: NDArray[np.bool_]) -> int | None:
+        """The term that explains most of what is left; memories keep the shape that the first of them has."""
+        shapes = self._shapes
+        power = (self._free**2).sum(axis=0)
+        open_ = usable & (power > self._least_power)
+        open_ &= np.array([c.memory not in shapes or shapes[c.memory] == c.shape for c in self._candidates])
+        open_[self.order] = False
+        if not open_.any():
+            return None
+        explained = (self._free.T @ self.left) ** 2 / np.where(open_, power, 1.0)
+        return int(np.argmax(np.where(open_, explained, -1.0)))
+
+
+def _solved(frame: _Frame, candidates: list[_Candidate], rows: Array, unit: Array, size: Array, kept: list[int]) -> _Choice:
+    """Coefficients of the terms that are kept, the baseline moving freely inside its tolerances."""
+    b = frame.freedom.shape[1]
+    baseline = np.concatenate([frame.freedom, np.eye(b)])
+    terms = np.concatenate([unit[:, kept], np.zeros((b, len(kept)))])
+    design = np.concatenate([baseline, terms], axis=1)
     solution, *_ = np.linalg.lstsq(design, -np.concatenate([rows, frame.moved]), rcond=1e-10)
     values = {candidates[k].name: float(v) / float(size[k]) for k, v in zip(kept, solution[b:], strict=True)}
     shapes = {c.memory: c.shape for c in (candidates[k] for k in kept) if c.memory and c.shape is not None}

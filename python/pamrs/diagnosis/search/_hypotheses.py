@@ -11,21 +11,21 @@ from pamrs.diagnosis.evidence import (
     Group,
     Ranges,
     explains,
-    most_believed,
+    probability_cap,
     same_recordings,
     share_left,
     significant,
     visited,
     weigh,
-    without_colour,
+    without_autocorrelation,
 )
 from pamrs.diagnosis.fit import Fit, Key, Problem, Start, acts_in, fits, residuals
-from pamrs.diagnosis.noise import Excess, excess, floors
+from pamrs.diagnosis.noise import Excess, excess, noise_levels
 from pamrs.diagnosis.prepare import Block, Residual
 from pamrs.diagnosis.screen import Screen, by_effect, inclusion, left_out, screen, stand_of
-from pamrs.diagnosis.search._baseline import coloured, refitted, thorough
+from pamrs.diagnosis.search._baseline import refitted, thorough, with_autocorrelation
+from pamrs.diagnosis.search._below_noise import below_noise
 from pamrs.diagnosis.search._closure import find_closure
-from pamrs.diagnosis.search._faint import faint
 from pamrs.diagnosis.search._wrong_parameters import beside_quiet, freed
 from pamrs.effects import CATALOGUE, EFFECTS, EffectInfo, SameData
 from pamrs.errors import SimulationError
@@ -83,8 +83,8 @@ class _Refit:
         Recordings, model, noise levels, and the blocks that keep an excess.
     first : Fit
         The refit with white noise.
-    colour : dict of str to float
-        Weights of the colour that it leaves.
+    autocorrelation : dict of str to float
+        Weights of the autocorrelation that it leaves.
     was : dict of str to Excess
         What the nominal model leaves of the recordings to fit, by block.
     start : Candidate
@@ -95,7 +95,7 @@ class _Refit:
 
     trial: Attempts
     first: Fit
-    colour: dict[str, float]
+    autocorrelation: dict[str, float]
     was: dict[str, Excess]
     start: Candidate
     apart: list[Block]
@@ -104,31 +104,31 @@ class _Refit:
         """The blocks as a group, with hypotheses and their probabilities."""
         trial = self.trial
         blocks, kept = trial.inner.blocks, candidates[0].fitted
-        return Group(blocks, self.was, kept, candidates, probabilities, mismatch, trial.floor, trial.suspects)
+        return Group(blocks, self.was, kept, candidates, probabilities, mismatch, trial.noise_level, trial.suspects)
 
 
 def _refit(inner: Problem, outer: Problem, nominal: Rig, *, same: bool) -> _Refit:
     """Fit parameters inside their tolerances, and see what each block keeps."""
     blocks, settings = inner.blocks, inner.settings
     before = residuals(inner, nominal)
-    first = refitted(inner, nominal, without_colour(blocks))
-    floor = floors(inner, core_rig(first.rig, inner.core))
+    first = refitted(inner, nominal, without_autocorrelation(blocks))
+    noise_level = noise_levels(inner, core_rig(first.rig, inner.core))
     if not same:
-        floor |= floors(outer, core_rig(first.rig, outer.core))
-    baseline, colour = coloured(inner, nominal, first)
+        noise_level |= noise_levels(outer, core_rig(first.rig, outer.core))
+    baseline, autocorrelation = with_autocorrelation(inner, nominal, first)
 
     def kept(problem: Problem, found: dict[Key, Residual]) -> dict[str, Excess]:
-        return {b.name: excess(b, problem.recordings, found, floor, settings.noise) for b in blocks}
+        return {b.name: excess(b, problem.recordings, found, noise_level, settings.noise) for b in blocks}
 
     was, now = kept(inner, before), kept(inner, baseline.residuals)
-    outside = left_out(inner, baseline, colour) if same else residuals(outer, baseline.rig)
+    outside = left_out(inner, baseline, autocorrelation) if same else residuals(outer, baseline.rig)
     out = kept(outer, outside)
     # what parameters could not be told from the fitted recordings shows in the others alone, and is no mismatch
     least, hint = settings.search.held_out_ratio, settings.search.fitted_hint
     apart = [b for b in blocks if significant(out[b.name], least) and now[b.name].ratio > hint and not same]
     suspects = [b for b in blocks if significant(now[b.name]) or b in apart]
-    trial = Attempts(inner, outer, nominal, floor, out, suspects)
-    return _Refit(trial, first, colour, was, Candidate((), baseline, out, now, 0.0), apart)
+    trial = Attempts(inner, outer, nominal, noise_level, out, suspects)
+    return _Refit(trial, first, autocorrelation, was, Candidate((), baseline, out, now, 0.0), apart)
 
 
 def _healthy(refit: _Refit, common: Candidate) -> Group:
@@ -136,10 +136,7 @@ def _healthy(refit: _Refit, common: Candidate) -> Group:
     trial = refit.trial
     # what the nominal model leaves in the held-out ones is what the parameters are moved for
     quiet = residuals(trial.outer, trial.nominal)
-    ever = {
-        b.name: max(refit.was[b.name], trial.excess(b, trial.outer, quiet), key=lambda e: e.ratio)
-        for b in trial.inner.blocks
-    }
+    ever = {b.name: max(refit.was[b.name], trial.excess(b, trial.outer, quiet), key=lambda e: e.ratio) for b in trial.inner.blocks}
     return replace(refit.group([common], {"": 1.0}, None), nominal=ever, suspects=[])
 
 
@@ -154,7 +151,7 @@ def _quiet(refit: _Refit, say: Say, tell: Say) -> Group:
     blocks = refit.trial.inner.blocks
     persistent = [e for e in _acting(refit.trial, blocks) if not EFFECTS[e].transient]
     trial = replace(refit.trial, suspects=blocks)
-    return beside_quiet(trial, faint(trial, nothing, persistent, say) or nothing, tell)
+    return beside_quiet(trial, below_noise(trial, nothing, persistent, say) or nothing, tell)
 
 
 def _explained(refit: _Refit, say: Say, tell: Say) -> list[Group]:
@@ -162,7 +159,7 @@ def _explained(refit: _Refit, say: Say, tell: Say) -> list[Group]:
     trial, start = refit.trial, refit.start
     suspects, now, settings = trial.suspects, start.fitted, trial.settings
     mismatch = max(suspects, key=lambda b: trial.out[b.name].ratio + now[b.name].ratio)
-    tell(f"{mismatch.name} keeps {now[mismatch.name].systematic:.2g} noise units after the refit")
+    tell(f"after the refit the residual of {mismatch.name} is {now[mismatch.name].systematic:.2g} noise units")
     marginal = _marginal(refit)
     acting = _acting(trial, suspects)
     # events of free times would always mend a noise level that was estimated too low
@@ -172,7 +169,7 @@ def _explained(refit: _Refit, say: Say, tell: Say) -> list[Group]:
     sealed = trial.nominal.model["valve"] is None
     screened = screen(trial.inner, start.fit, persistent, trial.white, sealed=sealed)
     terms = _Terms(
-        most_believed(trial.inner, mismatch, now[mismatch.name].rms, same=trial.same),
+        probability_cap(trial.inner, mismatch, now[mismatch.name].rms, same=trial.same),
         max(p.n * p.dt for p in trial.inner.recordings),
         visited(trial.inner),
     )
@@ -184,7 +181,7 @@ def _explained(refit: _Refit, say: Say, tell: Say) -> list[Group]:
     group = replace(
         refit.group(candidates, weighed, mismatch),
         inclusion=inclusion(screened, settings.search.least_gain, settings.search.partner_share, settings),
-        promised=_promised(screened, now[mismatch.name], settings.search.marginal_excess),
+        predicted_gain=_predicted_gain(screened, now[mismatch.name], settings.search.marginal_excess),
     )
     parts = _apart(group, trial, terms) if weighed["unlisted"] > settings.search.split_from else []
     return parts or [_with_form(group, refit, say, tell)]
@@ -229,13 +226,13 @@ def _hypotheses(
     least = trial.settings.search.transient_from
     if transient and all(share_left(c, start, trial.suspects, evidence) > least for c in (*singles, *mistaken)):
         tell(f"looking for what happens at times of its own ({', '.join(transient)})")
-        singles += [c for e in transient if (c := trial.eventful(e, start)) is not None]
+        singles += [c for e in transient if (c := trial.transient(e, start)) is not None]
     if any(_settles(c, trial, start) for c in (*singles, *mistaken)):
         return [start, *singles, *mistaken]
     pairs = _pairs(trial, screened, start, singles, tell)
     for effect, beside in _beside(trial, screened, start, singles, transient):
         tell(f"looking for {effect} beside {beside.effects[0]}")
-        found = trial.eventful(effect, beside)
+        found = trial.transient(effect, beside)
         pairs += [] if found is None else [found]
     return [start, *singles, *pairs, *mistaken]
 
@@ -252,9 +249,7 @@ def _settles(candidate: Candidate, trial: Attempts, start: Candidate) -> bool:
     return little and not _untouched(candidate, start, trial)
 
 
-def _weighed(
-    trial: Attempts, candidates: list[Candidate], terms: _Terms, tell: Say
-) -> tuple[list[Candidate], dict[str, float]]:
+def _weighed(trial: Attempts, candidates: list[Candidate], terms: _Terms, tell: Say) -> tuple[list[Candidate], dict[str, float]]:
     """Hypotheses with their probabilities, those that are close fitted to the end first."""
     start, settings = candidates[0], trial.settings
 
@@ -271,7 +266,7 @@ def _weighed(
     return candidates, found
 
 
-def _promised(screened: Screen, kept: Excess, least: float) -> dict[str, float]:
+def _predicted_gain(screened: Screen, kept: Excess, least: float) -> dict[str, float]:
     """Share of the mismatch that each effect could take by its signature alone."""
     # of the chi-square that is left noise has its part
     missing = screened.stand.power_left * (1.0 - 1.0 / max(kept.ratio, 1.0 + least))
@@ -288,7 +283,7 @@ def _with_form(group: Group, refit: _Refit, say: Say, tell: Say) -> Group:
         tell("no form of what is missing is looked for, since that of a load is not in the simulator")
         return group
     group = replace(group, sought=True)
-    closed = find_closure(trial.inner, trial.nominal, start.fit, refit.colour, suspects, say)
+    closed = find_closure(trial.inner, trial.nominal, start.fit, refit.autocorrelation, suspects, say)
     if closed is None:
         return group
     try:
@@ -335,7 +330,7 @@ def _apart(group: Group, trial: Attempts, terms: _Terms) -> list[Group]:
             probabilities=probabilities,
             mismatch=max(suspects, key=lambda b: start.held_out[b.name].ratio + start.fitted[b.name].ratio),
             suspects=suspects,
-            promised={e: p for e, p in group.promised.items() if any(acts_in(e, b) for b in suspects)},
+            predicted_gain={e: p for e, p in group.predicted_gain.items() if any(acts_in(e, b) for b in suspects)},
         )
 
     parts = [part([b], [b], own[b.name]) for b in named]
@@ -445,9 +440,9 @@ def _as_twin(trial: Attempts, start: Candidate, single: Candidate, twin: EffectI
 def _beside(
     trial: Attempts, screened: Screen, start: Candidate, singles: list[Candidate], happening: list[str]
 ) -> list[tuple[str, Candidate]]:
-    """Effects with times of their own, each with a lasting one that it may have happened beside.
+    """Effects with times of their own, each with a persistent one that it may have happened beside.
 
-    That is the lasting effect that leaves least, if it leaves much; and, of those that were fitted, the one whose signature
+    That is the persistent effect that leaves least, if it leaves much; and, of those that were fitted, the one whose signature
     is in what the events leave.
     """
     settings, evidence = trial.settings.search, trial.settings.evidence
@@ -485,13 +480,11 @@ def _untouched(candidate: Candidate, start: Candidate, trial: Attempts) -> list[
     ]
 
 
-def _pairs(
-    trial: Attempts, screened: Screen, start: Candidate, singles: list[Candidate], tell: Say
-) -> list[Candidate]:
+def _pairs(trial: Attempts, screened: Screen, start: Candidate, singles: list[Candidate], tell: Say) -> list[Candidate]:
     """For the best singles that leave something: the effects that would take most of it, fitted together with them."""
     settings = trial.settings.search
-    lasting = [c for c in singles if c.fit.events is None]
-    ranked = sorted(lasting, key=lambda c: sum(c.held_out[b.name].ratio for b in trial.suspects))[: settings.most_paired]
+    persistent = [c for c in singles if c.fit.events is None]
+    ranked = sorted(persistent, key=lambda c: sum(c.held_out[b.name].ratio for b in trial.suspects))[: settings.most_paired]
     white = trial.white
     mismatch = float(screened.stand.rows @ screened.stand.rows)
     tried: set[frozenset[str]] = set()

@@ -63,15 +63,15 @@ def _kind(name: str) -> str:
 
 
 def freed(trial: Attempts, baseline: Fit, first: Fit, say: Callable[[str], None]) -> list[Candidate]:
-    """The suspected parameters, each freed and fitted, and the pairs that promise most by the linear model.
+    """The suspected parameters, each freed and fitted, and the pairs of the largest gain predicted by the linear model.
 
-    Where the mismatch is large its colour leaves little weight to the recordings, so that the priors hold what a fit with
+    Where the mismatch is large its autocorrelation leaves little weight to the recordings, so that the priors hold what a fit with
     white noise moved to its wall: parameters at their wall in either fit are suspects.
 
     Parameters
     ----------
     trial : Attempts
-        Recordings, model, floors.
+        Recordings, model, noise levels.
     baseline : Fit
         The refitted baseline, with sensitivities.
     first : Fit
@@ -81,9 +81,9 @@ def freed(trial: Attempts, baseline: Fit, first: Fit, say: Callable[[str], None]
     """
     settings, walls = trial.settings.wrong_parameters, trial.settings.fit.most_tolerances
     suspects = [names for found in (baseline, first) for names in suspected(found, trial.inner.blocks, settings)]
-    gains = _promised(trial.inner, trial.nominal, baseline, list(dict.fromkeys(suspects)), trial.white)
-    ranked = sorted((n for n, gain in gains.items() if gain > settings.least_promise), key=lambda n: -gains[n])
-    # the linear model says little of what is far away: each parameter at its wall is fitted, whatever it promises beside others
+    gains = _predicted_gain(trial.inner, trial.nominal, baseline, list(dict.fromkeys(suspects)), trial.white)
+    ranked = sorted((n for n, gain in gains.items() if gain > settings.least_predicted_gain), key=lambda n: -gains[n])
+    # the linear model says little of what is far away: each parameter at its wall is fitted, whatever its predicted gain beside others
     least = settings.pair_share * max(gains.values(), default=0.0)
     pairs = [names for names in ranked if len(names) > 1 and gains[names] > least][: settings.most_pairs]
     found = []
@@ -95,7 +95,7 @@ def freed(trial: Attempts, baseline: Fit, first: Fit, say: Callable[[str], None]
     return found
 
 
-def _promised(
+def _predicted_gain(
     problem: Problem, nominal: Rig, baseline: Fit, suspects: list[tuple[str, ...]], inflation: dict[str, float]
 ) -> dict[tuple[str, ...], float]:
     """Gain in chi-square, priors included, that freeing parameters brings by the sensitivities at the baseline."""
@@ -124,7 +124,7 @@ def _promised(
 
         limits = (np.maximum(low, -wall), np.minimum(high, wall))
         _, (values, _, _), _ = levenberg_marquardt(
-            evaluate, begin, limits, settings.promise_evaluations, settings, 0.0
+            evaluate, begin, limits, settings.predicted_gain_evaluations, settings, 0.0
         )
         return float(values @ values)
 
@@ -136,21 +136,21 @@ def beside_quiet(trial: Attempts, quiet: Group, say: Callable[[str], None]) -> G
     """A group whose baseline leaves only noise, but needs a parameter at its wall for it: which one the file is wrong about.
 
     Each parameter at its wall is freed. What speaks for it is what misfit and priors lose together, weighed against the odds of a file
-    that is so wrong, beside faint effects that the group found, by what they lose.
+    that is so wrong, beside effects below the noise that the group found, by what they lose.
     """
     start = quiet.candidates[0]
     found = freed(trial, start.fit, start.fit, say)
     shown = [c for c in found if not any(significant(e) for e in c.fitted.values()) and _carries_over(c, start)]
     if not shown:
         return quiet
-    colour = trial.colour(start.fit)
-    before = with_priors(trial.inner, start.fit, colour)
+    autocorrelation = trial.autocorrelation(start.fit)
+    before = with_priors(trial.inner, start.fit, autocorrelation)
     effects = [c for c in quiet.candidates if c.effects and quiet.probabilities.get(c.key, 0.0) > 0.0]
     # a file that is further outside its tolerances is rarer, but less and less so
     settings, walls = trial.settings.wrong_parameters, trial.settings.fit.most_tolerances
     against = {c: settings.file_log_odds * len(c.wrong) + c.outside(walls) for c in shown}
     against |= dict.fromkeys(effects, settings.effect_log_odds)
-    scores = {c: 0.5 * (before - with_priors(trial.inner, c.fit, colour)) - odds for c, odds in against.items()}
+    scores = {c: 0.5 * (before - with_priors(trial.inner, c.fit, autocorrelation)) - odds for c, odds in against.items()}
     top = max(0.0, *scores.values())
     weights = {c: math.exp(max(-60.0, score - top)) for c, score in scores.items()}
     total = math.exp(-top) + sum(weights.values())

@@ -20,15 +20,15 @@ from pamrs.diagnosis.settings._models import (
     ScreenSettings,
     TransientSettings,
 )
-from pamrs.diagnosis.settings._search import FaintSettings, SearchSettings, WrongParameterSettings
+from pamrs.diagnosis.settings._search import BelowNoiseSettings, SearchSettings, WrongParameterSettings
 from pamrs.diagnosis.settings._setting import SettingsGroup
 from pamrs.errors import ParameterError
 
 __all__ = [
+    "BelowNoiseSettings",
     "ClosureSettings",
     "DiagnosisSettings",
     "EvidenceSettings",
-    "FaintSettings",
     "FitSettings",
     "NextExperimentSettings",
     "NoiseSettings",
@@ -67,7 +67,7 @@ class DiagnosisSettings:
         Scores of effects before any fit.
     search : SearchSettings
         Hypotheses that are fitted.
-    faint : FaintSettings
+    below_noise : BelowNoiseSettings
         Effects below the noise.
     wrong_parameters : WrongParameterSettings
         Values of the rig file that are wrong.
@@ -106,7 +106,7 @@ class DiagnosisSettings:
     transients: TransientSettings = field(default_factory=TransientSettings)
     screen: ScreenSettings = field(default_factory=ScreenSettings)
     search: SearchSettings = field(default_factory=SearchSettings)
-    faint: FaintSettings = field(default_factory=FaintSettings)
+    below_noise: BelowNoiseSettings = field(default_factory=BelowNoiseSettings)
     wrong_parameters: WrongParameterSettings = field(default_factory=WrongParameterSettings)
     evidence: EvidenceSettings = field(default_factory=EvidenceSettings)
     closures: ClosureSettings = field(default_factory=ClosureSettings)
@@ -120,15 +120,10 @@ class DiagnosisSettings:
         for name, group in _GROUPS.items():
             value = getattr(self, name)
             if not isinstance(value, group):
-                raise ParameterError(
-                    f"DiagnosisSettings.{name} is a {type(value).__name__}; "
-                    f"a {group.__name__} is needed"
-                )
+                raise ParameterError(f"DiagnosisSettings.{name} is a {type(value).__name__}; a {group.__name__} is needed")
         seed = self.seed
         if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
-            raise ParameterError(
-                f"DiagnosisSettings.seed = {seed!r} is not allowed: a whole number, 0 or more"
-            )
+            raise ParameterError(f"DiagnosisSettings.seed = {seed!r} is not allowed: a whole number, 0 or more")
 
     def to_dict(self) -> dict[str, Any]:
         """The values by group and name, as JSON has them."""
@@ -152,14 +147,9 @@ class DiagnosisSettings:
         given: dict[str, Any] = {}
         for name, value in values.items():
             if name != "seed" and name not in _GROUPS:
-                raise ParameterError(
-                    f"settings has {name!r}, which is not allowed: one of "
-                    f"{', '.join(_GROUPS)}, seed"
-                )
+                raise ParameterError(f"settings has {name!r}, which is not allowed: one of {', '.join(_GROUPS)}, seed")
             if name != "seed" and not isinstance(value, Mapping):
-                raise ParameterError(
-                    f"settings.{name} is a {type(value).__name__}; a table of values is needed"
-                )
+                raise ParameterError(f"settings.{name} is a {type(value).__name__}; a table of values is needed")
             given[name] = value if name == "seed" else _GROUPS[name].from_dict(value)
         return cls(**given)
 
@@ -197,7 +187,7 @@ _GROUPS: dict[str, type[SettingsGroup]] = {
     "transients": TransientSettings,
     "screen": ScreenSettings,
     "search": SearchSettings,
-    "faint": FaintSettings,
+    "below_noise": BelowNoiseSettings,
     "wrong_parameters": WrongParameterSettings,
     "evidence": EvidenceSettings,
     "closures": ClosureSettings,

@@ -41,7 +41,7 @@ class NextExperimentSettings(SettingsGroup):
         0.01,
         unit="bit",
         least=0.0,
-        reason="doubt below which no experiment can add to the answer",
+        reason="uncertainty below which no experiment can add to the answer",
         origin="judgement",
     )
     effective_samples: float = setting(
@@ -73,14 +73,12 @@ class NextExperimentSettings(SettingsGroup):
         reason="what one more sensor costs, as time",
         origin="judgement",
     )
-    most_shown: int = setting(
-        5, unit="count", least=1, reason="experiments in the ranking", origin="judgement"
-    )
+    most_shown: int = setting(5, unit="count", least=1, reason="experiments in the ranking", origin="judgement")
     hopeless_share: float = setting(
         0.1,
         unit="1",
         least=0.0,
-        reason="share of the doubt below which the text asks for another sensor",
+        reason="share of the uncertainty below which the text suggests another sensor",
         origin="judgement",
     )
     pressure_noise: float = setting(
@@ -111,12 +109,8 @@ class NextExperimentSettings(SettingsGroup):
         reason="sample time of an experiment where no recording tells",
         origin="judgement",
     )
-    least_sample_time: float = setting(
-        0.002, unit="s", above=0.0, reason="shortest sample time", origin="judgement"
-    )
-    most_sample_time: float = setting(
-        0.01, unit="s", above=0.0, reason="longest sample time", origin="judgement"
-    )
+    least_sample_time: float = setting(0.002, unit="s", above=0.0, reason="shortest sample time", origin="judgement")
+    most_sample_time: float = setting(0.01, unit="s", above=0.0, reason="longest sample time", origin="judgement")
     sealed_sample_time: float = setting(
         0.1,
         unit="s",
@@ -124,12 +118,8 @@ class NextExperimentSettings(SettingsGroup):
         reason="sample time for a chamber without a valve, which changes slowly",
         origin="judgement",
     )
-    least_sealed_sample_time: float = setting(
-        0.05, unit="s", above=0.0, reason="shortest sample time of it", origin="judgement"
-    )
-    most_sealed_sample_time: float = setting(
-        1.0, unit="s", above=0.0, reason="longest sample time of it", origin="judgement"
-    )
+    least_sealed_sample_time: float = setting(0.05, unit="s", above=0.0, reason="shortest sample time of it", origin="judgement")
+    most_sealed_sample_time: float = setting(1.0, unit="s", above=0.0, reason="longest sample time of it", origin="judgement")
     bandwidth: float = setting(
         15.0,
         unit="rad/s",
@@ -224,18 +214,17 @@ class WarningSettings(SettingsGroup):
         0.01,
         unit="1",
         above=0.0,
-        reason="share of the ambient pressure within which a recording that begins at it may hold "
-        "absolute pressures",
+        reason="share of the ambient pressure within which a recording that begins at it may hold absolute pressures",
         origin="judgement",
     )
     least_pressure: float = setting(
         1e4,
         unit="Pa",
         above=0.0,
-        reason="gauge pressure that a channel never exceeds, from which its unit is doubted",
+        reason="gauge pressure that a channel never exceeds, below which its unit is questioned",
         origin="judgement",
     )
-    doubted_probability: float = setting(
+    no_mismatch_probability: float = setting(
         0.1,
         unit="1",
         least=0.0,

@@ -40,8 +40,7 @@ class PrepareSettings(SettingsGroup):
         2.0,
         unit="1",
         least=0.0,
-        reason="standard deviations of that variance that are allowed beside it for the shortest "
-        "stretch",
+        reason="standard deviations of that variance that are allowed beside it for the shortest stretch",
         origin="docs/decisions/0022",
     )
     start_longer_stds: float = setting(
@@ -106,8 +105,7 @@ class PrepareSettings(SettingsGroup):
         3.0,
         unit="standard deviations",
         above=0.0,
-        reason="how far the noise of two measured pressures may move a regulator's droop before "
-        "its block is left out",
+        reason="how far the noise of two measured pressures may move a regulator's droop before its block is left out",
         origin="judgement",
     )
     arm_window: float = setting(
@@ -119,9 +117,7 @@ class PrepareSettings(SettingsGroup):
         "noise level in slow motion with stiction",
         origin="docs/decisions/0014",
     )
-    supply_window: float = setting(
-        4.0, unit="s", above=0.0, reason="the same for a tank or a regulator", origin="judgement"
-    )
+    supply_window: float = setting(4.0, unit="s", above=0.0, reason="the same for a tank or a regulator", origin="judgement")
     chamber_window: float = setting(
         2.0,
         unit="s",
@@ -133,8 +129,7 @@ class PrepareSettings(SettingsGroup):
         4,
         unit="count",
         least=1,
-        reason="usable samples of a window for each state whose start is projected out; a window "
-        "with fewer is not used",
+        reason="usable samples of a window for each state whose start is projected out; a window with fewer is not used",
         origin="judgement",
     )
     arm_step: float = setting(
@@ -192,9 +187,7 @@ class PlausibilitySettings(SettingsGroup):
         reason="highest measured supply pressure over that of the rig file, at the least",
         origin="judgement",
     )
-    supply_most_share: float = setting(
-        5.0, unit="1", above=0.0, reason="the same at the most", origin="judgement"
-    )
+    supply_most_share: float = setting(5.0, unit="1", above=0.0, reason="the same at the most", origin="judgement")
     order_margin: float = setting(
         0.05,
         unit="1",
@@ -224,12 +217,8 @@ class PlausibilitySettings(SettingsGroup):
         reason="share of its range by which a joint or a load may leave it",
         origin="judgement",
     )
-    least_angle_margin: float = setting(
-        0.1, unit="rad", least=0.0, reason="the same of a joint, at the least", origin="judgement"
-    )
-    least_length_margin: float = setting(
-        0.01, unit="m", least=0.0, reason="the same of a load, at the least", origin="judgement"
-    )
+    least_angle_margin: float = setting(0.1, unit="rad", least=0.0, reason="the same of a joint, at the least", origin="judgement")
+    least_length_margin: float = setting(0.01, unit="m", least=0.0, reason="the same of a load, at the least", origin="judgement")
     range_time_share: float = setting(
         0.2,
         unit="1",
@@ -263,16 +252,14 @@ class PlausibilitySettings(SettingsGroup):
         2e4,
         unit="Pa",
         above=0.0,
-        reason="change of a muscle's pressure during which the tank that feeds it cannot read one "
-        "and the same value",
+        reason="change of a muscle's pressure during which the tank that feeds it cannot read one and the same value",
         origin="judgement",
     )
     frozen_motion_share: float = setting(
         0.1,
         unit="1",
         above=0.0,
-        reason="relative change of the muscles' pressure during which what they move cannot read "
-        "one and the same value",
+        reason="relative change of the muscles' pressure during which what they move cannot read one and the same value",
         origin="judgement",
     )
     opposed_share: float = setting(
@@ -298,9 +285,7 @@ class PlausibilitySettings(SettingsGroup):
         reason="change of a joint's angle up to which the muscles' volume hardly moves their pressure",
         origin="judgement",
     )
-    still_length: float = setting(
-        1e-3, unit="m", above=0.0, reason="the same of a load's length", origin="judgement"
-    )
+    still_length: float = setting(1e-3, unit="m", above=0.0, reason="the same of a load's length", origin="judgement")
     command_span: float = setting(
         2.0,
         unit="half ranges",
@@ -327,14 +312,14 @@ class PlausibilitySettings(SettingsGroup):
         2e4,
         unit="Pa",
         above=0.0,
-        reason="range of a muscle's pressure below which its sense is not asked",
+        reason="range of a muscle's pressure below which its sense is not tested",
         origin="judgement",
     )
     sense_least_noises: float = setting(
         3.0,
         unit="noises",
         above=0.0,
-        reason="standard deviation of an angle below which its unit and sign are not asked",
+        reason="standard deviation of an angle below which its unit and sign are not tested",
         origin="judgement",
     )
     sense_wrong: float = setting(
@@ -365,9 +350,7 @@ class NoiseSettings(SettingsGroup):
         "the noise level: what is missing is slower than that",
         origin="judgement, docs/decisions/0014",
     )
-    least_bin_samples: int = setting(
-        5, unit="count", least=1, reason="fewest samples of such a bin", origin="judgement"
-    )
+    least_bin_samples: int = setting(5, unit="count", least=1, reason="fewest samples of such a bin", origin="judgement")
     fit_bin_time: float = setting(
         0.02,
         unit="s",
@@ -386,8 +369,7 @@ class NoiseSettings(SettingsGroup):
         1.1,
         unit="1",
         least=1.0,
-        reason="factor by which the variance must exceed its noise level before it counts: noise "
-        "levels are estimates",
+        reason="factor by which the variance must exceed its noise level before it counts: noise levels are estimates",
         origin="docs/decisions/0022, 55 healthy cases",
     )
     chance: float = setting(
@@ -402,8 +384,7 @@ class NoiseSettings(SettingsGroup):
         2.5,
         unit="1",
         least=1.0,
-        reason="variance over that of the noise which is a mismatch however much the noise level "
-        "scatters",
+        reason="variance over that of the noise which is a mismatch however much the noise level scatters",
         origin="docs/decisions/0022",
     )
     most_log_limit: float = setting(

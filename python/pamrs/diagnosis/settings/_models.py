@@ -17,8 +17,7 @@ class FitSettings(SettingsGroup):
         3.0,
         unit="tolerances",
         above=0.0,
-        reason="how far a baseline parameter may move: farther out it would stand for missing "
-        "physics, or for a wrong rig file",
+        reason="how far a baseline parameter may move: farther out it would stand for missing physics, or for a wrong rig file",
         origin="docs/decisions/0014: with six, an inertia far out hid a mounting that gives way",
     )
     freed_multiple: float = setting(
@@ -61,14 +60,14 @@ class FitSettings(SettingsGroup):
         0.2,
         unit="chi-square",
         least=0.0,
-        reason="gain that a step has to promise, or the fit ends: noise makes as much",
+        reason="least predicted gain of a step, or the fit ends: noise makes as much",
         origin="judgement, docs/decisions/0014",
     )
     step_share: float = setting(
         2e-3,
         unit="1",
         least=0.0,
-        reason="share of the sum of squares that a step has to promise in a first fit",
+        reason="least predicted gain of a step in a first fit, as a share of the sum of squares",
         origin="docs/decisions/0014",
     )
     final_step_share: float = setting(
@@ -78,20 +77,15 @@ class FitSettings(SettingsGroup):
         reason="the same in a fit that goes to its end",
         origin="docs/decisions/0022: a fit that stopped early looked like missing physics",
     )
-    evaluations: int = setting(
-        12, unit="count", least=1, reason="evaluations of a fit at the most", origin="judgement"
-    )
+    evaluations: int = setting(12, unit="count", least=1, reason="evaluations of a fit at the most", origin="judgement")
     baseline_evaluations: int = setting(
         30,
         unit="count",
         least=1,
-        reason="the same of a fit of baseline parameters alone: what it leaves undone looks like "
-        "missing physics",
+        reason="the same of a fit of baseline parameters alone: what it leaves undone looks like missing physics",
         origin="docs/decisions/0022",
     )
-    effect_evaluations: int = setting(
-        8, unit="count", least=1, reason="the same of a first fit of effects", origin="judgement"
-    )
+    effect_evaluations: int = setting(8, unit="count", least=1, reason="the same of a first fit of effects", origin="judgement")
     sealed_evaluations: int = setting(
         30,
         unit="count",
@@ -106,11 +100,11 @@ class FitSettings(SettingsGroup):
         reason="the same for the last stretch of a fit",
         origin="docs/decisions/0022",
     )
-    promise_evaluations: int = setting(
+    predicted_gain_evaluations: int = setting(
         50,
         unit="count",
         least=1,
-        reason="the same of the linear model that tells what freeing a parameter promises",
+        reason="the same of the linear model that predicts the gain of freeing a parameter",
         origin="judgement: to its end",
     )
     first_damping: float = setting(
@@ -131,8 +125,7 @@ class FitSettings(SettingsGroup):
         0.1,
         unit="tolerances",
         least=0.0,
-        reason="difference of two groups about one sensor's zero from which the group that knows "
-        "it less well is fitted again",
+        reason="difference of two groups about one sensor's zero from which the group that knows it less well is fitted again",
         origin="docs/decisions/0022",
     )
     known_share: float = setting(
@@ -164,12 +157,8 @@ class FitSettings(SettingsGroup):
 class TransientSettings(SettingsGroup):
     """How effects with times of their own are looked for in each recording."""
 
-    spacing: float = setting(
-        0.5, unit="s", above=0.0, reason="distance of the times that are tried", origin="judgement"
-    )
-    first_time: float = setting(
-        0.25, unit="s", least=0.0, reason="first time that is tried", origin="judgement"
-    )
+    spacing: float = setting(0.5, unit="s", above=0.0, reason="distance of the times that are tried", origin="judgement")
+    first_time: float = setting(0.25, unit="s", least=0.0, reason="first time that is tried", origin="judgement")
     last_time: float = setting(
         0.5,
         unit="s",
@@ -184,9 +173,7 @@ class TransientSettings(SettingsGroup):
         reason="time before an event from which its signature counts",
         origin="judgement: the smoothing of the drives reaches back",
     )
-    least_distance: float = setting(
-        1.0, unit="s", above=0.0, reason="least time between two events", origin="judgement"
-    )
+    least_distance: float = setting(1.0, unit="s", above=0.0, reason="least time between two events", origin="judgement")
     least_gain: float = setting(
         25.0,
         unit="chi-square",
@@ -202,27 +189,13 @@ class TransientSettings(SettingsGroup):
         reason="share of what the recording's residual is from which an event counts",
         origin="judgement; docs/decisions/0020",
     )
-    time_scale: float = setting(
-        0.2, unit="s", above=0.0, reason="scale of an event's time in a fit", origin="judgement"
-    )
-    duration_scale: float = setting(
-        0.4, unit="s", above=0.0, reason="scale of its duration", origin="judgement"
-    )
-    rise_scale: float = setting(
-        0.2, unit="s", above=0.0, reason="scale of the time of its edges", origin="judgement"
-    )
-    least_duration: float = setting(
-        0.05, unit="s", above=0.0, reason="shortest duration of an event", origin="judgement"
-    )
-    most_duration: float = setting(
-        5.0, unit="s", above=0.0, reason="longest duration of an event", origin="judgement"
-    )
-    least_rise: float = setting(
-        0.02, unit="s", above=0.0, reason="shortest edge of an event", origin="judgement: a blow"
-    )
-    most_rise: float = setting(
-        2.0, unit="s", above=0.0, reason="longest edge of an event", origin="judgement: a hand"
-    )
+    time_scale: float = setting(0.2, unit="s", above=0.0, reason="scale of an event's time in a fit", origin="judgement")
+    duration_scale: float = setting(0.4, unit="s", above=0.0, reason="scale of its duration", origin="judgement")
+    rise_scale: float = setting(0.2, unit="s", above=0.0, reason="scale of the time of its edges", origin="judgement")
+    least_duration: float = setting(0.05, unit="s", above=0.0, reason="shortest duration of an event", origin="judgement")
+    most_duration: float = setting(5.0, unit="s", above=0.0, reason="longest duration of an event", origin="judgement")
+    least_rise: float = setting(0.02, unit="s", above=0.0, reason="shortest edge of an event", origin="judgement: a blow")
+    most_rise: float = setting(2.0, unit="s", above=0.0, reason="longest edge of an event", origin="judgement: a hand")
     most_size: float = setting(
         1e3,
         unit="SI",
@@ -268,8 +241,7 @@ class ScreenSettings(SettingsGroup):
         0.002,
         unit="typical sizes",
         above=0.0,
-        reason="smallest size from which a fit starts: a compressor's delivery may be 500 times "
-        "smaller than typical",
+        reason="smallest size from which a fit starts: a compressor's delivery may be 500 times smaller than typical",
         origin="docs/decisions/0020",
     )
     repeat_below: float = setting(
@@ -283,7 +255,7 @@ class ScreenSettings(SettingsGroup):
         3,
         unit="count",
         least=1,
-        reason="signatures of one start at the most, each at the size that the last one asked for",
+        reason="signatures of one start at the most, each at the size that the last one suggested",
         origin="judgement",
     )
     invisible: float = setting(
@@ -313,8 +285,7 @@ class ScreenSettings(SettingsGroup):
         unit="1",
         least=0.0,
         most=1.0,
-        reason="quantiles of a channel at which a place of contact is tried; one that is met from "
-        "above at the others",
+        reason="quantiles of a channel at which a place of contact is tried; one that is met from above at the others",
         origin="judgement",
     )
     opening_shares: tuple[float, ...] = setting(
@@ -356,16 +327,14 @@ class ClosureSettings(SettingsGroup):
         0.8,
         unit="1",
         least=0.0,
-        reason="share of the mismatch that it may leave, held-out recordings included: what does "
-        "not carry over is no form of anything",
+        reason="share of the mismatch that it may leave, held-out recordings included: what does not carry over is no form of anything",
         origin="judgement",
     )
     most_misfit_share: float = setting(
         0.75,
         unit="1",
         above=0.0,
-        reason="share of the misfit that it may leave: with less gain it mends what the smoothing "
-        "of the drives does",
+        reason="share of the misfit that it may leave: with less gain it mends what the smoothing of the drives does",
         origin="judgement",
     )
     most_terms: int = setting(
@@ -379,8 +348,7 @@ class ClosureSettings(SettingsGroup):
         1e-6,
         unit="1",
         above=0.0,
-        reason="share of a term's effect on the residuals that must be left beside the baseline "
-        "and the terms before it",
+        reason="share of a term's effect on the residuals that must be left beside the baseline and the terms before it",
         origin="judgement: rounding",
     )
     evaluations: int = setting(
@@ -395,13 +363,10 @@ class ClosureSettings(SettingsGroup):
         unit="1",
         above=0.0,
         most=1.0,
-        reason="share of the linear estimate from which the fit is tried where the whole of it "
-        "gains nothing",
+        reason="share of the linear estimate from which the fit is tried where the whole of it gains nothing",
         origin="judgement",
     )
-    shrunk_evaluations: int = setting(
-        3, unit="count", least=1, reason="evaluations of that fit at the most", origin="judgement"
-    )
+    shrunk_evaluations: int = setting(3, unit="count", least=1, reason="evaluations of that fit at the most", origin="judgement")
     spoken_share: float = setting(
         0.05,
         unit="1",

@@ -80,9 +80,7 @@ class SettingsGroup:
         known = [f.name for f in dataclasses.fields(cls)]
         for name in values:
             if name not in known:
-                raise ParameterError(
-                    f"settings: {_title(cls)} has no {name!r}; it has {', '.join(known)}"
-                )
+                raise ParameterError(f"settings: {_title(cls)} has no {name!r}; it has {', '.join(known)}")
         return cls(**values)
 
 
@@ -102,9 +100,7 @@ def _checked(group: SettingsGroup, field: dataclasses.Field[Any], value: Any) ->
         given = value
         value = _tuple(value)
         if not value or not all(_alike(part, default[0]) for part in value):
-            raise ParameterError(
-                f"{name} = {given!r} is not allowed: like {list(default)!r}, one entry at least"
-            )
+            raise ParameterError(f"{name} = {given!r} is not allowed: like {list(default)!r}, one entry at least")
         return tuple(_within(name, field, part) for part in value)
     return _within(name, field, value)
 
@@ -117,11 +113,7 @@ def _tuple(value: Any) -> Any:
 def _alike(value: Any, pattern: Any) -> bool:
     """Whether an entry has the form of the default's entries."""
     if isinstance(pattern, tuple):
-        return (
-            isinstance(value, tuple)
-            and len(value) == len(pattern)
-            and all(_alike(part, pattern[0]) for part in value)
-        )
+        return isinstance(value, tuple) and len(value) == len(pattern) and all(_alike(part, pattern[0]) for part in value)
     return isinstance(value, str) if isinstance(pattern, str) else _number(value)
 
 

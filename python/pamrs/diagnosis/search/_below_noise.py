@@ -8,36 +8,36 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pamrs.diagnosis.evidence import Attempts, Candidate, Group, believed, doubt, price, stands, unlikely, visited
+from pamrs.diagnosis.evidence import Attempts, Candidate, Group, capped, penalty, price, stands, unlikely, visited
 from pamrs.diagnosis.fit import Fit, Key, Problem, Start, acts_in, fit, residuals, stacked
 from pamrs.diagnosis.prepare import Residual
 from pamrs.diagnosis.screen import Screen, by_effect, inclusion, screen
 from pamrs.errors import SimulationError
 
-__all__ = ["faint"]
+__all__ = ["below_noise"]
 
 
 @dataclass(frozen=True)
 class Begun:
-    """Where the fit of a faint effect begins.
+    """Where the fit of an effect below the noise begins.
 
     Attributes
     ----------
     start : Start
         The effect.
     back : dict of str to float
-        Parameters that it stands in for, put back to their nominal values; empty where the residual speaks for the effect.
+        Parameters that it is confounded with, put back to their nominal values; empty where the residual speaks for the effect.
     """
 
     start: Start
     back: dict[str, float]
 
 
-def faint(trial: Attempts, quiet: Group, acting: list[str], say: Callable[[str], None]) -> Group | None:
+def below_noise(trial: Attempts, quiet: Group, acting: list[str], say: Callable[[str], None]) -> Group | None:
     """An effect that shows although the refitted baseline leaves no more than noise; None where there is none.
 
     The variance of a residual tells nothing of what is much smaller than the noise, a score test along a known signature does. Noise
-    that came in with the drives is coloured and counts by its correlation time. Held-out recordings have to agree.
+    that came in with the drives is autocorrelated and counts by its correlation time. Held-out recordings have to agree.
 
     Where an effect and a parameter do the same (a lost activation pressure and the zero of the transducer), nothing is left at all;
     what speaks for the effect is how far the parameter had to leave its nominal value, and the two stay a set.
@@ -55,16 +55,16 @@ def faint(trial: Attempts, quiet: Group, acting: list[str], say: Callable[[str],
     """
     if trial.same:
         return None
-    start, settings = quiet.candidates[0], trial.settings.faint
-    colour = trial.colour(start.fit)
-    screened = screen(trial.inner, start.fit, acting, colour, sealed=trial.nominal.model["valve"] is None)
+    start, settings = quiet.candidates[0], trial.settings.below_noise
+    autocorrelation = trial.autocorrelation(start.fit)
+    screened = screen(trial.inner, start.fit, acting, autocorrelation, sealed=trial.nominal.model["valve"] is None)
     best = {effect: scores[0] for effect, scores in by_effect(screened.scores()).items()}
     gains = {effect: score.gain for effect, score in best.items()}
     least = max(settings.least_gain, settings.rival_share * max(gains.values(), default=0.0))
     chosen = [e for e in sorted(gains, key=lambda e: -gains[e]) if gains[e] > least][: settings.most_fitted]
     starts = {e: Begun(best[e].start.scaled(best[e].size), {}) for e in chosen}
-    starts = starts or _instead(screened, start.fit, trial, colour)
-    against = _finest(trial, start.fit, starts, colour) if starts else None
+    starts = starts or _instead(screened, start.fit, trial, autocorrelation)
+    against = _finest(trial, start.fit, starts, autocorrelation) if starts else None
     if against is None:
         return None
     found = _Found({}, {})
@@ -73,7 +73,7 @@ def faint(trial: Attempts, quiet: Group, acting: list[str], say: Callable[[str],
         why = ", ".join(f"{n} moved far where {effect} does the same" for n in begun.back)
         say(f"{names}: no more than noise, " + (why or f"with a signature of {effect} in it (chi-square {gains[effect]:.3g})"))
         values = against.fit.values | begun.back
-        tried = trial.fitted([begun.start], replace(against.fit, values=values), colour, share=0.0)
+        tried = trial.fitted([begun.start], replace(against.fit, values=values), autocorrelation, share=0.0)
         if tried is not None:
             _weigh(found, replace(tried, gain=gains.get(effect, 0.0)), begun, against, trial)
     if not found.shown and not found.eased:
@@ -90,14 +90,14 @@ class _Finest:
     ----------
     fit : Fit
         On the recordings to fit.
-    colour : dict of str to float
-        Weights of the noise's colour.
+    autocorrelation : dict of str to float
+        Weights of the noise's autocorrelation.
     inside, outside : float
         Chi-square on the recordings to fit and on those held out.
     """
 
     fit: Fit
-    colour: dict[str, float]
+    autocorrelation: dict[str, float]
     inside: float
     outside: float
 
@@ -110,24 +110,24 @@ class _Found:
     eased: dict[Candidate, float]
 
 
-def _finest(trial: Attempts, start: Fit, starts: dict[str, Begun], colour: dict[str, float]) -> _Finest | None:
+def _finest(trial: Attempts, start: Fit, starts: dict[str, Begun], autocorrelation: dict[str, float]) -> _Finest | None:
     """The baseline to the last unit of chi-square and from wherever an effect begins: what it still has to gain would count for one."""
     begins = [start, *(replace(start, values=start.values | b.back) for b in starts.values() if b.back)]
     try:
-        fits = [fit(trial.inner, trial.nominal, (), {}, colour, warm=begin, share=0.0) for begin in begins]
+        fits = [fit(trial.inner, trial.nominal, (), {}, autocorrelation, warm=begin, share=0.0) for begin in begins]
         finest = min(fits, key=lambda f: f.cost)
-        outside = _chi_square(trial.outer, residuals(trial.outer, finest.rig), colour)
+        outside = _chi_square(trial.outer, residuals(trial.outer, finest.rig), autocorrelation)
     except SimulationError:
         return None
-    return _Finest(finest, colour, _chi_square(trial.inner, finest.residuals, colour), outside)
+    return _Finest(finest, autocorrelation, _chi_square(trial.inner, finest.residuals, autocorrelation), outside)
 
 
 def _weigh(found: _Found, tried: Candidate, begun: Begun, against: _Finest, trial: Attempts) -> None:
     """Put a fitted effect among those that are found, if chi-square or priors and held-out recordings speak for it."""
-    settings, colour = trial.settings.faint, against.colour
+    settings, autocorrelation = trial.settings.below_noise, against.autocorrelation
     seconds = max(p.n * p.dt for p in trial.inner.recordings)
-    within = against.inside - _chi_square(trial.inner, tried.fit.residuals, colour)
-    over = against.outside - _chi_square(trial.outer, residuals(trial.outer, tried.fit.rig), colour)
+    within = against.inside - _chi_square(trial.inner, tried.fit.residuals, autocorrelation)
+    over = against.outside - _chi_square(trial.outer, residuals(trial.outer, tried.fit.rig), autocorrelation)
     relief = against.fit.strain - tried.fit.strain
     gain = within + relief
     evidence = trial.settings.evidence
@@ -145,19 +145,18 @@ def _weigh(found: _Found, tried: Candidate, begun: Begun, against: _Finest, tria
 
 def _group(found: _Found, quiet: Group, starts: dict[str, Begun], trial: Attempts) -> Group:
     """The quiet group with what was found in it, and its probabilities."""
-    settings, shown = trial.settings.faint, bool(found.shown)
+    settings, shown = trial.settings.below_noise, bool(found.shown)
     seconds = max(p.n * p.dt for p in trial.inner.recordings)
     odds = found.shown or found.eased
     top = max(odds, key=lambda c: odds[c])
-    # against noise what is faint stands alone, against parameters that may be off what eases them has a rival
+    # against noise such an effect stands alone, against parameters that may be off what eases them has a rival
     weights = {
-        c: math.exp(max(-30.0, score - (odds[top] if shown else 0.0))) / (1 if shown else len(odds))
-        for c, score in odds.items()
+        c: math.exp(max(-30.0, score - (odds[top] if shown else 0.0))) / (1 if shown else len(odds)) for c, score in odds.items()
     }
     total = sum(weights.values()) + (0.0 if shown else 1.0)
     most = settings.most_probability
     probabilities = {
-        c.effects[0]: w / total * believed(settings.log_odds - doubt(c, seconds, trial.settings.evidence), most)
+        c.effects[0]: w / total * capped(settings.log_odds - penalty(c, seconds, trial.settings.evidence), most)
         for c, w in weights.items()
     }
     if not shown:
@@ -171,15 +170,15 @@ def _group(found: _Found, quiet: Group, starts: dict[str, Begun], trial: Attempt
         probabilities=probabilities,
         mismatch=mismatch,
         suspects=[mismatch],
-        faint=True,
+        below_noise=True,
         instead=() if shown else tuple(starts[top.effects[0]].back),
     )
 
 
-def _instead(screened: Screen, found: Fit, trial: Attempts, colour: dict[str, float]) -> dict[str, Begun]:
+def _instead(screened: Screen, found: Fit, trial: Attempts, autocorrelation: dict[str, float]) -> dict[str, Begun]:
     """Effects that do what a parameter was moved far for."""
-    settings = trial.settings.faint
-    _, jacobian = stacked(trial.inner, found.residuals, colour)
+    settings = trial.settings.below_noise
+    _, jacobian = stacked(trial.inner, found.residuals, autocorrelation)
     best: dict[str, tuple[float, Begun]] = {}
     for name, moved in found.moved.items():
         if abs(moved) < settings.moved_tolerances or jacobian is None:
@@ -199,11 +198,11 @@ def _instead(screened: Screen, found: Fit, trial: Attempts, colour: dict[str, fl
 
 
 def _gone_back(begun: Begun, before: Fit, after: Fit, share: float) -> bool:
-    """Whether the parameters that an effect stands in for are where they were expected, once it is there."""
+    """Whether the parameters that an effect is confounded with are where they were expected, once it is there."""
     return bool(begun.back) and all(abs(after.moved[n]) < share * abs(before.moved[n]) for n in begun.back)
 
 
-def _chi_square(problem: Problem, found: dict[Key, Residual], colour: dict[str, float]) -> float:
-    """Sum of squares of a problem's bin means in units of their coloured noise."""
-    rows, _ = stacked(problem, found, colour)
+def _chi_square(problem: Problem, found: dict[Key, Residual], autocorrelation: dict[str, float]) -> float:
+    """Sum of squares of a problem's bin means in units of their autocorrelated noise."""
+    rows, _ = stacked(problem, found, autocorrelation)
     return float(rows @ rows)

@@ -11,7 +11,7 @@ import pamrs
 from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.evidence import Candidate, significant, weigh
 from pamrs.diagnosis.fit import Fit, Problem, residuals
-from pamrs.diagnosis.noise import Excess, excess, floors
+from pamrs.diagnosis.noise import Excess, excess, noise_levels
 from pamrs.diagnosis.prepare import Prepared, available_blocks, begun, noise_level, prepare
 from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
@@ -74,10 +74,10 @@ def test_noise_stays_inside_its_limit_and_the_scatter_is_that_of_the_noise() -> 
     core = core_rig(RIG)
     blocks = available_blocks(RIG, tuple(NOISE), SETTINGS.prepare)
     problem = Problem(blocks, [recorded(seed) for seed in range(12)], core, SETTINGS)
-    floor, found = floors(problem, core), residuals(problem, RIG)
+    noise_level, found = noise_levels(problem, core), residuals(problem, RIG)
     for block in blocks:
-        each = [excess(block, [p], found, floor, SETTINGS.noise) for p in problem.recordings]
-        together = excess(block, problem.recordings, found, floor, SETTINGS.noise)
+        each = [excess(block, [p], found, noise_level, SETTINGS.noise) for p in problem.recordings]
+        together = excess(block, problem.recordings, found, noise_level, SETTINGS.noise)
         assert not significant(together)
         assert 0.8 < together.ratio < 1.2
         assert sum(significant(e) for e in each) <= 1
@@ -87,13 +87,13 @@ def test_noise_stays_inside_its_limit_and_the_scatter_is_that_of_the_noise() -> 
 
 
 def named(effects: tuple[str, ...], ratio: float, values: dict[str, float], scatter: float = 0.05) -> Candidate:
-    """A set of effects that leaves so many times the floor."""
+    """A set of effects that leaves so many times the noise level."""
     left = {"arm": Excess(ratio, 0.0, 0.5, 1.0, 1.0, min(2.5, 1.1 * np.exp(2.6 * scatter)), scatter)}
     fit = Fit(effects, RIG, values, {}, np.zeros((0, 0)), 0.0, {}, {}, 1, {}, None)
     return Candidate(effects, fit, left, left, 0.0)
 
 
-def test_of_a_faint_mismatch_the_noise_says_how_much_may_be_left() -> None:
+def test_of_a_mismatch_near_the_noise_the_noise_says_how_much_may_be_left() -> None:
     blocks = [b for b in available_blocks(RIG, tuple(NOISE), SETTINGS.prepare) if b.name == "arm"]
     start, right, wrong = named((), 1.4, {}), named(("leak_muscle",), 1.0, {}), named(("supply_leak",), 1.25, {})
     odds = weigh([start, right, wrong], blocks, 0.985, 30.0, SETTINGS)

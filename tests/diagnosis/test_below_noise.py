@@ -37,7 +37,7 @@ def shoulder_case(truth: pamrs.Rig, fitted: int = 2, speed: float = 1.0) -> pamr
         mask = {channel: np.ones(time.size, dtype=bool) for channel in channels}
         role = "held_out" if number == fitted else "fit"
         found.append(Recording(f"run_{number}", role, time, 0.005, channels, mask, [], dict.fromkeys(channels, "")))
-    return pamrs.Case("faint", pamrs.rigs.shoulder(), found, Path())
+    return pamrs.Case("below_noise", pamrs.rigs.shoulder(), found, Path())
 
 
 def test_an_effect_below_the_noise_is_named() -> None:
@@ -51,14 +51,14 @@ def test_an_effect_below_the_noise_is_named() -> None:
 
 
 @pytest.mark.slow
-def test_faint_rivals_that_look_alike_stay_a_set() -> None:
+def test_rivals_below_the_noise_that_look_alike_stay_a_set() -> None:
     found = pamrs.diagnose(shoulder_case(pamrs.rigs.shoulder().with_effect("input_path_lag", {"delay": 1.2e-3, "time_constant": 0.0})))
     assert found.verdict == "effects"
     assert ["input_path_lag"] in found.ambiguity
     assert max(found.probabilities.values()) < 0.6
 
 
-def test_noise_alone_has_no_faint_effect() -> None:
+def test_noise_alone_has_no_effect_below_it() -> None:
     found = pamrs.diagnose(shoulder_case(pamrs.rigs.shoulder()))
     assert found.verdict in ("none", "parameters")
     assert found.effects == []
@@ -146,7 +146,7 @@ def test_a_clock_that_does_not_drift_gives_way_to_a_lag() -> None:
     assert weighed(lag, drifting)["clock_skew"] > 0.5
 
 
-def test_creep_slower_than_any_recording_is_not_believed() -> None:
+def test_creep_slower_than_any_recording_gets_a_penalty() -> None:
     seen = candidate(("muscle_creep",), 1.0, **{"muscle_creep.stiffness": 1e3, "muscle_creep.time_constant": 8.0})
     unseen = candidate(("muscle_creep",), 1.0, **{"muscle_creep.stiffness": 1e3, "muscle_creep.time_constant": 300.0})
     assert weighed(seen)["muscle_creep"] > 0.95
@@ -162,7 +162,7 @@ def test_held_out_recordings_that_hardly_show_a_mismatch_do_not_veto_its_effect(
         swing = uneven(("payload_swing",), fitted, held, **{"payload_swing.swinging_share": 0.04})
         return weighed(swing, start=uneven((), 14.8, 0.35))["payload_swing"]
 
-    assert named(0.0, 0.65) > 0.9  # noise of a floor
+    assert named(0.0, 0.65) > 0.9  # scatter of a noise level
     assert named(0.0, 20.0) < 0.1  # a mismatch of its own making
     assert named(13.0, 0.1) < 0.1  # it explains nothing
 
