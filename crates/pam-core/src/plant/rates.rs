@@ -8,7 +8,7 @@
 use super::body::Body;
 use super::layout::{Channel, Layout, BALANCE_COUNT};
 use super::memory::Memory;
-use super::ports::Acting;
+use super::ports::{Acting, Ports};
 use super::units::{LineUnit, Path, SupplyUnit, Wiring};
 use super::{Rig, Values};
 use crate::blocks::chamber::Polytropic;
@@ -108,6 +108,20 @@ pub(super) struct Altered {
     pub motion: bool,
 }
 
+impl Altered {
+    /// As the effects are plugged into the ports of a rig.
+    fn at(ports: &Ports) -> Self {
+        Self {
+            supplies: ports.on_supplies(),
+            passages: ports.passage.iter().any(Option::is_some),
+            flows: !ports.flows.is_empty(),
+            balances: ports.on_balance(),
+            muscles: ports.muscles.iter().any(|muscle| muscle.some),
+            motion: ports.on_motion(),
+        }
+    }
+}
+
 /// What the equations need to write down on the way.
 #[derive(Debug, Clone)]
 pub struct Scratch<S> {
@@ -188,14 +202,7 @@ impl<'a, S: Number> Plant<'a, S> {
             lines,
             scales: wiring.groups.iter().map(|group| values[group.scale]).collect(),
             body: Body::new(&wiring.body, &wiring.coordinates, &values)?,
-            altered: Altered {
-                supplies: wiring.ports.on_supplies(),
-                passages: wiring.ports.passage.iter().any(Option::is_some),
-                flows: !wiring.ports.flows.is_empty(),
-                balances: wiring.ports.on_balance(),
-                muscles: wiring.ports.muscles.iter().any(|muscle| muscle.some),
-                motion: wiring.ports.on_motion(),
-            },
+            altered: Altered::at(&wiring.ports),
             wiring,
             effects: (wiring.ports.effects.iter())
                 .map(|effect| {
