@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs import _core
 from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.prepare import available_blocks, noise_level, prepare
 from pamrs.diagnosis.result import schema
@@ -37,10 +36,7 @@ def sealed_case(conductance: float, *, laminar: float = 0.0, noise: float = 150.
     return pamrs.Case("hold", rig, [recording], ROOT)
 
 
-def test_catalogue_matches_the_core() -> None:
-    core = {effect: (block, dict(parameters)) for effect, block, parameters in _core.effects()}
-    table = {e.id: (e.block, {p.name: p.unit for p in e.parameters}) for e in EFFECTS.values()}
-    assert table == core
+def test_every_parameter_of_the_catalogue_is_one_that_a_fit_can_move() -> None:
     for effect in EFFECTS.values():
         assert set(effect.dotted()) <= set(core_rig(pamrs.rigs.shoulder().with_effect(effect.id)).parameter_names)
 

@@ -120,7 +120,7 @@ def test_no_confident_name_beside_unknown_geometry(rig: pamrs.Rig, bare: pamrs.R
     assert _unsettled(pamrs.load_rig(tmp_path / "rig.toml")) == ["transmission.flexor.radius"]
     arm = available_blocks(bare, tuple(recorded(rig, 1, "fit", pressures_only=True, n=40).channels), SETTINGS.prepare)[0]
     group = Group([arm], {}, {}, [], {"muscle_hysteresis": 0.9, "muscle_creep": 0.05, "unlisted": 0.05}, arm, {}, [arm])
-    doubted = _doubted(group).probabilities
+    doubted = _doubted(group, SETTINGS.verdict.unknown_geometry_probability).probabilities
     assert doubted["muscle_hysteresis"] < 0.5
     assert sum(doubted.values()) == pytest.approx(1.0)
     assert doubted["unlisted"] > 0.5

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis import fitting
-from pamrs.diagnosis.blocks import available_blocks
-from pamrs.diagnosis.hypotheses import refitted
-from pamrs.diagnosis.signals import prepare
+from pamrs.diagnosis import DiagnosisSettings
+from pamrs.diagnosis.fit import _fitting as fitting
+from pamrs.diagnosis.prepare import available_blocks, prepare
+from pamrs.diagnosis.search import refitted
 from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
 from tests.work.snapshot import compare
@@ -82,12 +82,14 @@ def hold(conductance: float) -> pamrs.Case:
 def test_work_of_the_refit_and_of_an_effect_of_a_shoulder(monkeypatch: pytest.MonkeyPatch) -> None:
     rig = pamrs.rigs.shoulder()
     truth = rig.with_effect("muscle_hysteresis").with_parameters({"chamber.dead_volume": 1.7e-4})
-    recordings = [prepare(recorded(truth, seed), rig) for seed in (1, 2)]
-    blocks = available_blocks(rig, (*NOISE, "valve_command"))
+    settings = DiagnosisSettings()
+    recordings = [prepare(recorded(truth, seed), rig, settings) for seed in (1, 2)]
+    blocks = available_blocks(rig, (*NOISE, "valve_command"), settings.prepare)
     work, counts = Work(monkeypatch), {}
     for kind in ("supply", "chamber", "arm"):
         chosen = [block for block in blocks if block.kind == kind]
-        problem, white = fitting.Problem(chosen, recordings, core_rig(rig)), {block.name: 1.0 for block in chosen}
+        problem = fitting.Problem(chosen, recordings, core_rig(rig), settings)
+        white = {block.name: 1.0 for block in chosen}
         counts |= work.of(f"refit of the {kind}", lambda p=problem, w=white: refitted(p, rig, w))
     starts = {"muscle_hysteresis.friction_pressure": 1e-5, "muscle_hysteresis.friction_constant": 1.0}
     counts |= work.of(

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import scipy.optimize
 from numpy.typing import NDArray
-
 from pamrs.diagnosis.leastsquares import levenberg_marquardt
+
 from pamrs.fit import fit_muscle
 from tests.fit.cases import TOLERANCE, measure, muscle
 from tests.work.snapshot import compare
