@@ -17,6 +17,7 @@ from pamrs.diagnosis.fit import Problem, fit, residuals
 from pamrs.diagnosis.next_experiment import library
 from pamrs.diagnosis.prepare import available_blocks, prepare
 from pamrs.errors import DiagnosisError
+from pamrs.findings import ChannelError
 from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
 
@@ -116,16 +117,17 @@ def test_pressures_that_begin_at_one_atmosphere_are_asked_about() -> None:
         pamrs.Case("c", rig, [replace(gauge, channels=gauge.channels | {"muscle_pressure": pressure + zero})], Path())
         for zero in (0.0, 101325.0)
     ]
-    assert words.absolute(cases[0]) == []
-    (told,) = words.absolute(cases[1])
+    assert words.absolute(cases[0], SETTINGS.warnings) == []
+    (told,) = words.absolute(cases[1], SETTINGS.warnings)
     assert "absolute pressures" in told
 
 
 def test_a_channel_that_a_new_model_spoils_is_told() -> None:
     table = {
-        "muscle_pressure": {"noise": 400.0, "before": 7500.0, "refit": 26900.0, "after": 8910.0},
-        "joint_angle": {"noise": 1e-3, "before": 1e-2, "refit": 5e-3, "after": 1e-3},
+        "muscle_pressure": ChannelError(noise=400.0, before=7500.0, refit=26900.0, after=8910.0),
+        "joint_angle": ChannelError(noise=1e-3, before=1e-2, refit=5e-3, after=1e-3),
     }
-    (told,) = words.worse(table | {"muscle_pressure": table["muscle_pressure"] | {"after": 9100.0}})
+    spoiled = replace(table["muscle_pressure"], after=9100.0)
+    (told,) = words.worse(table | {"muscle_pressure": spoiled}, SETTINGS.warnings)
     assert "muscle pressure by 9.10 kPa, the nominal one by 7.50 kPa" in told
-    assert words.worse({"joint_angle": table["joint_angle"]}) == []
+    assert words.worse({"joint_angle": table["joint_angle"]}, SETTINGS.warnings) == []

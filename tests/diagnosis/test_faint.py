@@ -14,7 +14,6 @@ from pamrs.diagnosis.evidence import Candidate, weigh
 from pamrs.diagnosis.fit import Fit
 from pamrs.diagnosis.noise import Excess
 from pamrs.diagnosis.prepare import available_blocks
-from pamrs.diagnosis.search import _hypotheses as hypotheses
 from pamrs.recordings import Recording
 
 SETTINGS = DiagnosisSettings()
@@ -100,7 +99,7 @@ def test_a_payload_on_a_cord_is_named_with_its_length() -> None:
 def candidate(effects: tuple[str, ...], left: float, **values: float) -> Candidate:
     """A made-up set that leaves an excess of a block, fitted and held out."""
     fit = Fit(effects, pamrs.rigs.shoulder(), values, {}, np.zeros((0, 0)), 0.0, {})
-    ratio = {"chamber": Excess(1.0 + left, 0.0, 0.0, 1.0, 1.0)}
+    ratio = {"chamber": Excess(1.0 + left, 0.0, 0.0, 1.0, 1.0, 1.1)}
     return Candidate(effects, fit, ratio, ratio, 0.0)
 
 
@@ -112,9 +111,7 @@ def weighed(*sets: Candidate, start: Candidate | None = None) -> dict[str, float
 
 
 def test_a_set_that_explains_nothing_says_nothing_against_one_that_does() -> None:
-    right = candidate(
-        ("leak_muscle",), 0.0, **{"leak_muscle.conductance": 1e-12, "leak_muscle.laminar_share": 0.5, "leak_muscle.x": 1.0}
-    )
+    right = candidate(("leak_muscle",), 0.0, **{"leak_muscle.conductance": 1e-12, "leak_muscle.laminar_share": 0.5})
     wrong = candidate(("pressure_lag",), 9.0, **{"pressure_lag.time_constant": 1e-3})
     alone, both = weighed(right), weighed(right, wrong)
     assert alone["leak_muscle"] > 0.98
@@ -155,7 +152,7 @@ def test_creep_slower_than_any_recording_is_not_believed() -> None:
 
 def test_held_out_recordings_that_hardly_show_a_mismatch_do_not_veto_its_effect() -> None:
     def uneven(effects: tuple[str, ...], fitted: float, held: float, **values: float) -> Candidate:
-        ratio = {left: {"chamber": Excess(1.0 + left, 0.0, 0.0, 1.0, 1.0)} for left in (fitted, held)}
+        ratio = {left: {"chamber": Excess(1.0 + left, 0.0, 0.0, 1.0, 1.0, 1.1)} for left in (fitted, held)}
         return replace(candidate(effects, fitted, **values), fitted=ratio[fitted], held_out=ratio[held])
 
     def named(fitted: float, held: float) -> float:
@@ -177,16 +174,15 @@ def test_a_tube_is_named_with_the_place_of_the_transducer() -> None:
     assert abs(told["conductance"]["value"] / 5e-8 - 1.0) < 0.15
 
 
-def test_a_parameter_that_only_held_out_recordings_show_is_a_parameter(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(hypotheses, "HINT", 0.0)
-    monkeypatch.setattr(hypotheses, "HELD_RATIO", 1.3)
+def test_a_parameter_that_only_held_out_recordings_show_is_a_parameter() -> None:
+    sharp = SETTINGS.with_values({"search.fitted_hint": 0.0, "search.held_out_ratio": 1.3})
     said: list[str] = []
     nominal = pamrs.rigs.shoulder()
     known = nominal.parameter("arm.viscous")
     truth = nominal.with_parameters({"arm.viscous": known.value + 2.0 * known.tol})
     slow, fast = shoulder_case(truth, speed=0.02), shoulder_case(truth, speed=2.0)
     case = pamrs.Case("unseen", nominal, [*slow.recordings[:2], fast.recordings[2]], Path())
-    found = pamrs.diagnose(case, progress=said.append)
+    found = pamrs.diagnose(case, settings=sharp, progress=said.append)
     assert "arm: one baseline leaves noise in all recordings" in said
     assert found.verdict == "parameters"
     assert abs(found.parameters["arm.viscous"]["moved_sigmas"] - 2.0) < 0.2

@@ -10,7 +10,7 @@ import pytest
 import pamrs
 from pamrs.cli import main
 from pamrs.diagnosis import DiagnosisSettings
-from pamrs.diagnosis.next_experiment import _plan as plan
+from pamrs.diagnosis.next_experiment import _planning as planning
 from pamrs.diagnosis.next_experiment import library, pressure_range
 from pamrs.effects import CATALOGUE, EFFECTS
 
@@ -68,17 +68,17 @@ def test_a_case_or_a_plan(words: list[str]) -> None:
 def few():
     """Plans of the shoulder from one experiment in the place of all, computed once, so that the tests are quick."""
     pool = library(pamrs.rigs.shoulder(), SETTINGS.next_experiment, sample_time=0.01, only=["slow_triangle"])
-    made = plan._parts
+    made = planning._parts
     kept: dict[str, Any] = {}
 
-    def once(rig, blocks, experiment, starts, noise):
+    def once(rig, blocks, experiment, *more):
         if experiment.name not in kept:
-            kept[experiment.name] = made(rig, blocks, experiment, starts, noise)
+            kept[experiment.name] = made(rig, blocks, experiment, *more)
         return kept[experiment.name]
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(plan, "library", lambda rig: pool)
-        patch.setattr(plan, "_parts", once)
+        patch.setattr(planning, "library", lambda rig, settings: pool)
+        patch.setattr(planning, "_parts", once)
         yield lambda *channels: pamrs.plan_diagnosis(pamrs.rigs.shoulder(), channels, experiments=["slow_triangle"])
 
 
@@ -124,9 +124,9 @@ def test_without_the_supply_the_arm_alone_is_left(few) -> None:
 def test_holds_on_both_sides_separate_a_leak_from_centre_leakage(monkeypatch: pytest.MonkeyPatch) -> None:
     rig = pamrs.rigs.shoulder()
     (both,) = pool = library(rig, SETTINGS.next_experiment, sample_time=0.01, only=["holds_both_sides"])
-    monkeypatch.setattr(plan, "library", lambda rig: pool)
+    monkeypatch.setattr(planning, "library", lambda rig, settings: pool)
     leaks = {name: EFFECTS[name] for name in ("leak_muscle", "valve_centre_leakage")}
-    monkeypatch.setattr(plan, "CATALOGUE", leaks)
+    monkeypatch.setattr(planning, "CATALOGUE", leaks)
     quiet = {"muscle_pressure": 20.0, "supply_pressure": 20.0, "joint_angle": 1e-4}
     found = pamrs.plan_diagnosis(rig, ALL, experiments=["holds_both_sides"], noise=quiet)
     assert found.separable("leak_muscle", "valve_centre_leakage")

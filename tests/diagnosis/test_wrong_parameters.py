@@ -162,6 +162,7 @@ def test_every_parameter_at_its_wall_is_freed_whatever_pairs_promise(monkeypatch
 
     class Trial:
         inner, nominal, white = Problem([], [], core_rig(pamrs.rigs.shoulder()), SETTINGS), pamrs.rigs.shoulder(), {}
+        settings = SETTINGS
 
         def freed(self, names: tuple[str, ...], baseline: object) -> None:
             asked.append(names)

@@ -24,7 +24,7 @@ class SearchSettings(SettingsGroup):
     fitted_hint: float = setting(
         1.15,
         unit="1",
-        least=1.0,
+        least=0.0,
         reason="variance over that of the noise that the fitted recordings must have for that",
         origin="docs/decisions/0020",
     )
