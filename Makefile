@@ -16,7 +16,7 @@ LOCKED := $(if $(CI),--locked)
 RUST_SOURCES := $(shell find crates -name '*.rs' -path '*/src/*' 2>/dev/null) \
                 $(shell find crates -name Cargo.toml 2>/dev/null) Cargo.toml $(wildcard Cargo.lock)
 # One by one, since cargo fmt does not see modules that a macro declares.
-RUSTFMT := rustfmt --edition 2021 $(shell find crates -name '*.rs')
+RUSTFMT := find crates -name '*.rs' -print0 | xargs -0 rustfmt --edition 2021
 PYTHON_SOURCES := python tests trial demo benchmarks fingerprints
 # Processes that pytest takes; a file of tests stays in one, so that what its tests share is computed once.
 WORKERS ?= $(shell nproc 2>/dev/null || echo 2)

@@ -1,10 +1,12 @@
 """Order of the integrator, its error at the usual step, and how far it can be driven by stiff rigs.
 
-``python -m benchmarks.convergence OUT`` writes ``convergence.md`` and ``convergence.png`` to a folder (``make convergence``: to docs).
+``python -m benchmarks.convergence OUT`` writes ``convergence.md`` and ``convergence.png`` to a
+folder (``make convergence``: to docs).
 
-The order is that of a smooth run: in motion from the start, no joint that turns back, no flow that becomes choked, no stop. The error
-at the usual step is that of a working run, which fills, vents, turns back and chokes, against a step 64 times finer. Rigs with a small
-volume between valve and muscle are compared with the independent reference, which integrates them implicitly and adaptively.
+The order is that of a smooth run: in motion from the start, no joint that turns back, no flow that
+becomes choked, no stop. The error at the usual step is that of a working run, which fills, vents,
+turns back and chokes, against a step 64 times finer. Rigs with a small volume between valve and
+muscle are compared with the independent reference, which integrates them implicitly and adaptively.
 """
 
 from __future__ import annotations
@@ -27,14 +29,23 @@ from tests.runs import FRICTIONLESS, RUNS, Run, misses
 
 USUAL = 1e-3
 HALVINGS = 6
-#: Fraction of a range below which an error is that of rounding, for channels whose magnitude is at most so many ranges.
+#: Fraction of a range below which an error is that of rounding, for channels whose magnitude is at
+#: most so many ranges.
 ROUNDING, RANGES = 1e-12, 50.0
 COMMAND = "make convergence"
 DEGREE = math.pi / 180.0
 GROUPS = {
     "pressures": ("muscle_pressure", "supply_pressure", "line_pressure"),
     "motion": ("joint_angle", "joint_rate", "length", "length_rate"),
-    "masses, works": ("air_mass", "line_mass", "mass_supplied", "mass_vented", "energy_supplied", "muscle_work", "joint_work"),
+    "masses, works": (
+        "air_mass",
+        "line_mass",
+        "mass_supplied",
+        "mass_vented",
+        "energy_supplied",
+        "muscle_work",
+        "joint_work",
+    ),
 }
 
 
@@ -47,9 +58,19 @@ def bench(rows: int) -> Run:
     return Run("bench", 0.005, rows, {"muscle_pressure": 2e5}, {"length": length})
 
 
-def steady(rig: str, rows: int, initial: dict[str, float], changes: dict[str, float] | None = None, **volts: float) -> Run:
-    """A run under constant commands; `volts` by the names of the valves, ``valve`` for one without a name."""
-    names = {name: "valve_command" if name == "valve" else f"valve_command.{name}" for name in volts}
+def steady(
+    rig: str,
+    rows: int,
+    initial: dict[str, float],
+    changes: dict[str, float] | None = None,
+    **volts: float,
+) -> Run:
+    """A run under constant commands; `volts` by the names of the valves, ``valve`` for one without
+    a name.
+    """
+    names = {
+        name: "valve_command" if name == "valve" else f"valve_command.{name}" for name in volts
+    }
     commands = {names[name]: np.full(rows, value) for name, value in volts.items()}
     return Run(rig, RUNS[rig].sample_time, rows, initial, commands, changes or {})
 
@@ -61,7 +82,9 @@ SMOOTH: dict[str, Run] = {
     "shoulder": steady("shoulder", 41, {**MOVING, "muscle_pressure": 2.6e5}, valve=6.0),
     "elbow": steady("elbow", 41, {**MOVING, "muscle_pressure": 5.5e5}, valve=6.0),
     "antagonistic_joint": steady("antagonistic_joint", 21, BENT, flexor=8.0, extensor=3.0),
-    "antagonistic_joint without friction": steady("antagonistic_joint", 21, BENT, FRICTIONLESS, flexor=8.0, extensor=3.0),
+    "antagonistic_joint without friction": steady(
+        "antagonistic_joint", 21, BENT, FRICTIONLESS, flexor=8.0, extensor=3.0
+    ),
     "recruitment": steady(
         "recruitment",
         41,
@@ -87,7 +110,12 @@ SMOOTH: dict[str, Run] = {
         elbow=6.0,
         wrist=5.1,
     ),
-    "hanging_mass": steady("hanging_mass", 21, {"length": 0.25, "length_rate": -0.02, "muscle_pressure": 2.4e5}, valve=6.0),
+    "hanging_mass": steady(
+        "hanging_mass",
+        21,
+        {"length": 0.25, "length_rate": -0.02, "muscle_pressure": 2.4e5},
+        valve=6.0,
+    ),
     "regulated_joint": Run(
         "regulated_joint",
         0.005,
@@ -108,7 +136,9 @@ WORKING: dict[str, Run] = {
     "regulated_joint, outlet from 0 bar": replace(
         RUNS["regulated_joint"],
         initial={"joint_angle": 45.0 * DEGREE, "muscle_pressure": 2e5, "supply_pressure": 0.0},
-        commands={"supply_command": 3e5 + 5e4 * np.sin(0.05 * np.arange(RUNS["regulated_joint"].rows))},
+        commands={
+            "supply_command": 3e5 + 5e4 * np.sin(0.05 * np.arange(RUNS["regulated_joint"].rows))
+        },
     ),
 }
 
@@ -117,19 +147,34 @@ def behind(line: str) -> Run:
     """The shoulder with a line between valve and chamber, filled and vented."""
     rig = parse_rig(f"{pamrs.rigs.shoulder().to_toml_text()}\n[line]\n{line}\n")
     command = 5.0 + 1.5 * np.sin(0.1 + 0.2 * np.arange(61))
-    return Run(rig, 0.005, 61, {"joint_angle": 40.0 * DEGREE, "muscle_pressure": 2.6e5}, {"valve_command": command})
+    return Run(
+        rig,
+        0.005,
+        61,
+        {"joint_angle": 40.0 * DEGREE, "muscle_pressure": 2.6e5},
+        {"valve_command": command},
+    )
 
 
 def stiff() -> dict[str, Run]:
-    """The shoulder with ever smaller volumes behind its valve: half a tube and what is given, or what is given before an orifice."""
+    """The shoulder with ever smaller volumes behind its valve: half a tube and what is given, or
+    what is given before an orifice.
+    """
     found = {}
     for length in (2.0, 1.0, 0.3):
-        tube = f'length = {{ value = {length}, unit = "m" }}\ndiameter = {{ value = 4.0, unit = "mm" }}'
+        tube = (
+            f'length = {{ value = {length}, unit = "m" }}\n'
+            'diameter = { value = 4.0, unit = "mm" }'
+        )
         for volume in (10.0, 1.0, 0.1):
-            found[f"{length:g} m of tube, {volume:g} cm3"] = behind(f'{tube}\ninlet_volume = {{ value = {volume}, unit = "cm3" }}')
+            found[f"{length:g} m of tube, {volume:g} cm3"] = behind(
+                f'{tube}\ninlet_volume = {{ value = {volume}, unit = "cm3" }}'
+            )
     for volume in (10.0, 1.0, 0.1):
         nozzle = 'kind = "orifice"\ndischarge_area = { value = 6.0, unit = "mm2" }'
-        found[f"orifice of 6 mm2, {volume:g} cm3"] = behind(f'{nozzle}\ninlet_volume = {{ value = {volume}, unit = "cm3" }}')
+        found[f"orifice of 6 mm2, {volume:g} cm3"] = behind(
+            f'{nozzle}\ninlet_volume = {{ value = {volume}, unit = "cm3" }}'
+        )
     return found
 
 
@@ -138,7 +183,9 @@ def stiff() -> dict[str, Run]:
 
 @dataclass(frozen=True)
 class Curve:
-    """Steps [s] that were really taken, and the largest error of any channel in fractions of its range at each."""
+    """Steps [s] that were really taken, and the largest error of any channel in fractions of its
+    range at each.
+    """
 
     steps: list[float]
     errors: list[float]
@@ -169,14 +216,23 @@ def curve_of(run: Run) -> Curve:
     longest = run.sample_time / parts(run, run.sample_time)
     steps = [longest / 2**k for k in range(HALVINGS)]
     fine = run.core(steps[-1] / 8.0)
-    kept = [name for name, v in fine.items() if name not in ("time", "joint_work") and np.abs(v).max() < RANGES * np.ptp(v)]
+    kept = [
+        name
+        for name, v in fine.items()
+        if name not in ("time", "joint_work") and np.abs(v).max() < RANGES * np.ptp(v)
+    ]
     every = [errors_of(run.core(step), fine) for step in steps]
     return Curve(steps, [max(errors[name] for name in kept) for errors in every])
 
 
 def grouped(errors: dict[str, float]) -> list[float]:
-    """The largest error of each group of channels; not a number where the rig has none of a group."""
-    of = [[miss for name, miss in errors.items() if name.partition(".")[0] in channels] for channels in GROUPS.values()]
+    """The largest error of each group of channels; not a number where the rig has none of a
+    group.
+    """
+    of = [
+        [miss for name, miss in errors.items() if name.partition(".")[0] in channels]
+        for channels in GROUPS.values()
+    ]
     return [max(members) if members else math.nan for members in of]
 
 
@@ -202,7 +258,10 @@ def usual(run: Run) -> float:
 def cells(run: Run) -> list[str]:
     """Stable step, parts of the usual one."""
     stable = core_rig(run.plant).stable_step
-    return ["any" if math.isinf(stable) else f"{1e3 * stable:.3g}", f"{parts(run, usual(run)) * usual(run) / run.sample_time:.0f}"]
+    return [
+        "any" if math.isinf(stable) else f"{1e3 * stable:.3g}",
+        f"{parts(run, usual(run)) * usual(run) / run.sample_time:.0f}",
+    ]
 
 
 def number(error: float) -> str:
@@ -219,27 +278,38 @@ def table(head: list[str], rows: list[list[str]]) -> list[str]:
 TEXT = f"""\
 # Convergence
 
-Made by `{COMMAND}` (`python -m benchmarks.convergence docs`). Errors are the largest of any row, in fractions of the channel's range.
+Made by `{COMMAND}` (`python -m benchmarks.convergence docs`). Errors are the largest of any row, \
+in fractions of the channel's range.
 
-The core takes fourth-order Runge-Kutta steps of fixed length: 1 ms at most where nothing else is said, each divided into equal parts
-where the rig is stiffer. The order is measured over halved steps of a smooth run: in motion from the start, no joint that turns back,
-no flow that becomes choked, no stop. The errors at 1 ms are those of a working run that fills, vents, turns back and chokes, against
+The core takes fourth-order Runge-Kutta steps of fixed length: 1 ms at most where nothing else is \
+said, each divided into equal parts
+where the rig is stiffer. The order is measured over halved steps of a smooth run: in motion from \
+the start, no joint that turns back,
+no flow that becomes choked, no stop. The errors at 1 ms are those of a working run that fills, \
+vents, turns back and chokes, against
 a step 64 times finer.
 
 {{packaged}}
 
 Where the order is less, something is not smooth:
 
-- A muscle's friction: its elements stick or slip from one step to the next (the antagonists as they come).
-- Coulomb friction where a joint turns back: it changes its direction over `coulomb_speed`, which light links pass in less than 1 ms.
+- A muscle's friction: its elements stick or slip from one step to the next (the antagonists as \
+they come).
+- Coulomb friction where a joint turns back: it changes its direction over `coulomb_speed`, which \
+light links pass in less than 1 ms.
   All of the two-joint arm's error comes from there; without it 4e-8 is left.
 - The positive work at the joints, which has a kink there: order two.
-- A flow that turns round: next to equal pressures, above a ratio of 0.999, its law is linear, and a fast pressure passes both kinks in
-  one step. That is the largest error of the table, in the air that a regulator relieves while its outlet rises from 0 bar.
+- A flow that turns round: next to equal pressures, above a ratio of 0.999, its law is linear, and \
+a fast pressure passes both kinks in
+  one step. That is the largest error of the table, in the air that a regulator relieves while its \
+outlet rises from 0 bar.
 
-Small volumes behind the shoulder's valve, at the same 1 ms. The errors are those against the independent reference
-(`tests/reference`: other code, implicit and adaptive, tolerance 1e-10), so that they speak for the equations too. The smallest volume
-is stable, but at a price: the explicit steps follow a rate that has died away long before anything happens.
+Small volumes behind the shoulder's valve, at the same 1 ms. The errors are those against the \
+independent reference
+(`tests/reference`: other code, implicit and adaptive, tolerance 1e-10), so that they speak for \
+the equations too. The smallest volume
+is stable, but at a price: the explicit steps follow a rate that has died away long before \
+anything happens.
 
 {{stiff}}
 
@@ -255,10 +325,18 @@ def draw(smooth: dict[str, Curve], small: dict[str, Curve], path: Path) -> None:
     figure = Figure(figsize=(11.0, 6.4), dpi=110, layout="constrained")
     left, right = figure.subplots(1, 2)
     lines(left, smooth, guide=(1e-6, 1.0, (0.06, 20.0)))
-    left.set(title="smooth runs of the packaged rigs", ylabel="error against a far finer step, fraction of a range", ylim=(1e-14, 1e-3))
+    left.set(
+        title="smooth runs of the packaged rigs",
+        ylabel="error against a far finer step, fraction of a range",
+        ylim=(1e-14, 1e-3),
+    )
     lines(right, small, guide=(1e-5, 0.1, (0.012, 0.2)))
     right.axhspan(0.0, 1e-9, color="0.93", zorder=0, label="what the reference leaves open")
-    right.set(title="shoulder behind a small volume", ylabel="error against the reference, fraction of a range", ylim=(1e-11, 1e-4))
+    right.set(
+        title="shoulder behind a small volume",
+        ylabel="error against the reference, fraction of a range",
+        ylim=(1e-11, 1e-4),
+    )
     for axes in (left, right):
         axes.grid(which="major", color="0.88", lw=0.6)
         axes.set_xlabel("step [ms]")
@@ -266,22 +344,45 @@ def draw(smooth: dict[str, Curve], small: dict[str, Curve], path: Path) -> None:
     figure.savefig(path)
 
 
-def lines(axes: Axes, curves: dict[str, Curve], guide: tuple[float, float, tuple[float, float]]) -> None:
-    """One line for each curve, and a slope of four through an error at a step [ms], from one step to another."""
+def lines(
+    axes: Axes, curves: dict[str, Curve], guide: tuple[float, float, tuple[float, float]]
+) -> None:
+    """One line for each curve, and a slope of four through an error at a step [ms], from one step
+    to another.
+    """
     marks = "osD^v<>Ph*pX"
     for k, (name, curve) in enumerate(curves.items()):
-        style = {"marker": marks[k % len(marks)], "ms": 4.5, "lw": 1.2, "ls": "-" if k < 10 else "--", "label": name}
+        style = {
+            "marker": marks[k % len(marks)],
+            "ms": 4.5,
+            "lw": 1.2,
+            "ls": "-" if k < 10 else "--",
+            "label": name,
+        }
         color = mpl.colormaps["tab10"](k % 10)
-        axes.loglog(1e3 * np.array(curve.steps), np.maximum(curve.errors, 1e-16), color=color, **style)
+        axes.loglog(
+            1e3 * np.array(curve.steps), np.maximum(curve.errors, 1e-16), color=color, **style
+        )
     error, step, ends = guide
-    axes.loglog(ends, error * (np.array(ends) / step) ** 4, color="0.75", lw=6.0, zorder=0, label="slope of 4")
+    axes.loglog(
+        ends,
+        error * (np.array(ends) / step) ** 4,
+        color="0.75",
+        lw=6.0,
+        zorder=0,
+        label="slope of 4",
+    )
 
 
 # ------------------------------------------------------------------ everything
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="Order, error and cost of the integrator on every packaged rig and on stiff ones.")
+    parser = argparse.ArgumentParser(
+        description=(
+            "Order, error and cost of the integrator on every packaged rig and on stiff ones."
+        )
+    )
     parser.add_argument("out", type=Path, help="folder for convergence.md and convergence.png")
     out = parser.parse_args().out
     out.mkdir(parents=True, exist_ok=True)
@@ -293,7 +394,9 @@ def main() -> None:
             smooth[name] = curve_of(SMOOTH[name])
             order = f"{smooth[name].order:.2f}"
         rows.append([name, *cells(run), order, *map(number, errors), f"{1e3 * cost(run):.2g}"])
-    packaged = table(["rig", "stable step [ms]", "parts of 1 ms", "order", *GROUPS, "ms per simulated s"], rows)
+    packaged = table(
+        ["rig", "stable step [ms]", "parts of 1 ms", "order", *GROUPS, "ms per simulated s"], rows
+    )
     small, rows = {}, []
     for name, run in stiff().items():
         want = run.reference(1e-10, "Radau")
@@ -302,10 +405,23 @@ def main() -> None:
         errors = [misses(run.core(step), want) for step in steps]
         rows.append([name, *cells(run), *map(number, grouped(errors[0])), f"{1e3 * cost(run):.2g}"])
         small[name] = Curve(steps, [max(each.values()) for each in errors])
-    volumes = table(["between valve and chamber", "stable step [ms]", "parts of 1 ms", *GROUPS, "ms per simulated s"], rows)
+    volumes = table(
+        [
+            "between valve and chamber",
+            "stable step [ms]",
+            "parts of 1 ms",
+            *GROUPS,
+            "ms per simulated s",
+        ],
+        rows,
+    )
     text = TEXT.format(packaged="\n".join(packaged), stiff="\n".join(volumes))
     (out / "convergence.md").write_text(text, encoding="utf-8")
-    draw(smooth, {name: curve for k, (name, curve) in enumerate(small.items()) if k % 3 != 1}, out / "convergence.png")
+    draw(
+        smooth,
+        {name: curve for k, (name, curve) in enumerate(small.items()) if k % 3 != 1},
+        out / "convergence.png",
+    )
     print(text)
 
 

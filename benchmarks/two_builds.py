@@ -1,8 +1,9 @@
 """Every number of one build against those of another, bit for bit.
 
-``python -m benchmarks.two_builds write OUT.npz`` simulates every packaged rig, bare and with each effect that it can
-have, and predicts each of its blocks with all sensitivities. Run it once with each build on ``PYTHONPATH``, then
-``python -m benchmarks.two_builds compare ONE.npz OTHER.npz`` lists what differs and ends with 1 where anything does.
+``python -m benchmarks.two_builds write OUT.npz`` simulates every packaged rig, bare and with each
+effect that it can have, and predicts each of its blocks with all sensitivities. Run it once with
+each build on ``PYTHONPATH``, then ``python -m benchmarks.two_builds compare ONE.npz OTHER.npz``
+lists what differs and ends with 1 where anything does.
 """
 
 from __future__ import annotations
@@ -23,7 +24,9 @@ WINDOW = 60
 
 
 def rigs() -> Iterator[tuple[str, pamrs.Rig]]:
-    """Every packaged rig, bare, with each effect by itself at two sets of values, and with all of them."""
+    """Every packaged rig, bare, with each effect by itself at two sets of values, and with all of
+    them.
+    """
     try:
         from pamrs.effects import EFFECTS
     except ImportError:  # builds before that package
@@ -70,14 +73,21 @@ def driven(rig: pamrs.Rig, core: _core.Rig) -> dict[str, np.ndarray]:
 
 def blocks(core: _core.Rig) -> Iterator[tuple[str, str]]:
     """Name and output channel of each block that can be predicted."""
-    kinds = {"supply_pressure": "supply", "muscle_pressure": "chamber", "joint_angle": "arm", "length": "load"}
+    kinds = {
+        "supply_pressure": "supply",
+        "muscle_pressure": "chamber",
+        "joint_angle": "arm",
+        "length": "load",
+    }
     for channel in core.channels:
         kind, _, name = channel.partition(".")
         if kind in kinds:
             yield kinds[kind] + (f".{name}" if name else ""), channel
 
 
-def numbers(label: str, rig: pamrs.Rig, measured: dict[str, np.ndarray]) -> Iterator[tuple[str, np.ndarray]]:
+def numbers(
+    label: str, rig: pamrs.Rig, measured: dict[str, np.ndarray]
+) -> Iterator[tuple[str, np.ndarray]]:
     """Every channel of a simulation, and predictions with sensitivities, by name."""
     try:
         core = _core.Rig(rig.to_json())
@@ -98,14 +108,24 @@ def numbers(label: str, rig: pamrs.Rig, measured: dict[str, np.ndarray]) -> Iter
         known = {
             name: (values, np.gradient(values, SAMPLE))
             for name, values in measured.items()
-            if name.partition(".")[0] in ("supply_pressure", "muscle_pressure", "joint_angle", "length")
+            if name.partition(".")[0]
+            in ("supply_pressure", "muscle_pressure", "joint_angle", "length")
         }
         starts = list(range(0, SAMPLES, WINDOW))
         for block, channel in blocks(core):
             if channel not in known:
                 continue
             try:
-                value, slopes = core.predict(block, commands, SAMPLE, step, starts, list(core.parameter_names), known, SAMPLES)
+                value, slopes = core.predict(
+                    block,
+                    commands,
+                    SAMPLE,
+                    step,
+                    starts,
+                    list(core.parameter_names),
+                    known,
+                    SAMPLES,
+                )
             except pamrs.PamrsError as error:
                 yield f"{label}|{block} refused: {error}", np.zeros(0)
                 continue
@@ -126,8 +146,15 @@ def write(path: Path) -> None:
         if label.partition("+")[2] in ("", "all"):
             print(f"{len(found):6d} arrays  {label}", file=sys.stderr)
     with path.open("wb") as file:
-        np.savez(file, **{f"a{k}": values for k, values in enumerate(found.values())}, names=np.array(list(found)))
-    print(f"{path}: {len(found)} arrays, {sum(values.size for values in found.values())} numbers, core {_core.__file__}")
+        np.savez(
+            file,
+            **{f"a{k}": values for k, values in enumerate(found.values())},
+            names=np.array(list(found)),
+        )
+    print(
+        f"{path}: {len(found)} arrays, {sum(values.size for values in found.values())} numbers, "
+        f"core {_core.__file__}"
+    )
 
 
 def compare(one: Path, other: Path) -> int:
@@ -146,17 +173,26 @@ def compare(one: Path, other: Path) -> int:
         x, y = a[name], b[name]
         if x.shape != y.shape or not np.array_equal(x, y, equal_nan=True):
             differ += 1
-            apart = float(np.nanmax(np.abs(x - y) / (np.abs(x) + 1e-300))) if x.shape == y.shape else float("inf")
+            apart = (
+                float(np.nanmax(np.abs(x - y) / (np.abs(x) + 1e-300)))
+                if x.shape == y.shape
+                else float("inf")
+            )
             print(f"differs: {name}: shapes {x.shape}, {y.shape}, relative {apart:.2e}")
     same = len(a.keys() & b.keys()) - differ
     total = sum(a[name].size for name in a.keys() & b.keys())
-    print(f"{same} arrays are the same bit for bit, {differ} differ, {len(lost) + len(new)} are in one only; {total} numbers")
+    print(
+        f"{same} arrays are the same bit for bit, {differ} differ, {len(lost) + len(new)} are in "
+        f"one only; {total} numbers"
+    )
     return differ + len(lost) + len(new)
 
 
 def main() -> int:
     """The command line."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     verbs = parser.add_subparsers(dest="verb", required=True)
     verbs.add_parser("write").add_argument("out", type=Path)
     both = verbs.add_parser("compare")

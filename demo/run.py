@@ -1,7 +1,8 @@
 """Conceal an effect in recordings of a simulated shoulder, diagnose them, open the key.
 
-The plant that makes the recordings shares no code with the package, and the diagnosis runs in a process
-of its own that is given the case folder and nothing else. The key's fingerprint is printed first.
+The plant that makes the recordings shares no code with the package, and the diagnosis runs in a
+process of its own that is given the case folder and nothing else. The key's fingerprint is printed
+first.
 """
 
 import argparse
@@ -32,9 +33,15 @@ def score(key: dict[str, Any], result: dict[str, Any]) -> tuple[str, str, bool]:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--kind", help=f"what to conceal; by default one of {', '.join(KINDS)} by chance")
-    parser.add_argument("--seed", type=int, help="number that fixes the case; by default a fresh one")
-    parser.add_argument("--out", type=Path, default=Path("out/demo"), help="folder for everything written")
+    parser.add_argument(
+        "--kind", help=f"what to conceal; by default one of {', '.join(KINDS)} by chance"
+    )
+    parser.add_argument(
+        "--seed", type=int, help="number that fixes the case; by default a fresh one"
+    )
+    parser.add_argument(
+        "--out", type=Path, default=Path("out/demo"), help="folder for everything written"
+    )
     options = parser.parse_args()
     seed = secrets.randbelow(10**6) if options.seed is None else options.seed
     kind = options.kind or secrets.choice(KINDS)
@@ -44,7 +51,9 @@ def main() -> int:
         shutil.rmtree(stale, ignore_errors=True)
     out.mkdir(parents=True, exist_ok=True)
 
-    print("1  An independent plant writes recordings with something concealed in them ...", flush=True)
+    print(
+        "1  An independent plant writes recordings with something concealed in them ...", flush=True
+    )
     make = [sys.executable, "-m", "trial", "make", "--kind", kind, "--seed", str(seed)]
     folders = ["--out", str(folder.parent), "--keys-dir", str(key_path.parent)]
     made = subprocess.run([*make, *folders], cwd=ROOT, stdout=subprocess.DEVNULL, check=False)
@@ -66,7 +75,10 @@ def main() -> int:
     key = json.loads(key_path.read_text(encoding="utf-8"))
     result = json.loads(answer.read_text(encoding="utf-8"))
     truth, verdict, right = score(key, result)
-    print(f"\n3  The key is opened.\n   concealed: {truth}\n   verdict:   {verdict}   ({seconds:.0f} s)")
+    print(
+        f"\n3  The key is opened.\n   concealed: {truth}\n"
+        f"   verdict:   {verdict}   ({seconds:.0f} s)"
+    )
     print("   The verdict is right." if right else "   The verdict is NOT the truth this time.")
     again = f"make demo KIND={kind} SEED={seed}"
     print(f"\nThe same case again: {again}\nWritten:")

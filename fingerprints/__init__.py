@@ -1,1 +1,3 @@
-"""Pages and pictures of the catalogue of effects: ``python -m fingerprints docs/effects`` (``make effects``)."""
+"""Pages and pictures of the catalogue of effects: ``python -m fingerprints docs/effects``
+(``make effects``).
+"""

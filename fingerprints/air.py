@@ -4,7 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from fingerprints.sheet import BAR, QUIET, WITH, WITHOUT, Array, Sheet, angle, clock, flow, hold, label, pressure, supply
+from fingerprints.sheet import (
+    BAR,
+    QUIET,
+    WITH,
+    WITHOUT,
+    Array,
+    Sheet,
+    angle,
+    clock,
+    flow,
+    hold,
+    label,
+    pressure,
+    supply,
+)
 from pamrs import simulate
 
 __all__ = [
@@ -21,7 +35,11 @@ __all__ = [
 ]
 
 #: The arm between two stops, so that the muscle's volume does not change.
-LOCKED = {"joint.max_angle": np.radians(15.05), "joint.stop_stiffness": 1e6, "joint.stop_damping": 3e3}
+LOCKED = {
+    "joint.max_angle": np.radians(15.05),
+    "joint.stop_stiffness": 1e6,
+    "joint.stop_damping": 3e3,
+}
 NAMES = ("without", "with the effect")
 
 
@@ -32,15 +50,23 @@ def supply_leak(sheet: Sheet) -> None:
     idle = slice(400, -10)
     for start, style in ((13.8e5, "-"), (5e5, "--")):
         command = hold(time, (0.0, 5.0), (10.0, 5.5), (10.5, 5.0))
-        runs = sheet.run(LOCKED, valve_command=command, sample_time=0.05, initial={"supply_pressure": start})
+        runs = sheet.run(
+            LOCKED, valve_command=command, sample_time=0.05, initial={"supply_pressure": start}
+        )
         for run, colour, words in zip(runs, (WITHOUT, WITH), NAMES, strict=True):
             width, given = (2.2 if colour == WITHOUT else 1.3), words if style == "-" else None
             axes["s"].plot(time, supply(run), style, lw=width, color=colour, label=given)
             axes["p"].plot(time, pressure(run), style, lw=width, color=colour, label=given)
             rate = -BAR * np.gradient(supply(run), 0.05)
-            axes["x"].plot((supply(run) + 1.01325)[idle], rate[idle], "o", ms=4, color=colour, label=given)
+            axes["x"].plot(
+                (supply(run) + 1.01325)[idle], rate[idle], "o", ms=4, color=colour, label=given
+            )
     axes["x"].plot(
-        [0.0, 15.0], [0.0, 15.0 * rate[idle][0] / (supply(runs[1]) + 1.01325)[idle][0]], ":", color=QUIET, label="through zero"
+        [0.0, 15.0],
+        [0.0, 15.0 * rate[idle][0] / (supply(runs[1]) + 1.01325)[idle][0]],
+        ":",
+        color=QUIET,
+        label="through zero",
     )
     label(
         axes["s"],
@@ -49,23 +75,43 @@ def supply_leak(sheet: Sheet) -> None:
         legend="center left",
     )
     label(axes["p"], "muscle: as modelled", y="muscle [bar]", legend="upper left")
-    label(axes["x"], "valve shut: in proportion to absolute pressure", "supply, absolute [bar]", "rate of fall [Pa/s]", "upper left")
+    label(
+        axes["x"],
+        "valve shut: in proportion to absolute pressure",
+        "supply, absolute [bar]",
+        "rate of fall [Pa/s]",
+        "upper left",
+    )
 
 
 def compressor(sheet: Sheet) -> None:
     """Fills and vents in a row, then idle."""
     time, busy = clock(110.0, 0.05), 76.0
-    command = np.where(time > busy, 5.0, np.where(time % 2.0 < 0.5, 5.8, np.where(time % 2.0 > 1.0, 3.0, 5.0)))
-    runs = sheet.run(LOCKED, valve_command=command, sample_time=0.05, initial={"supply_pressure": 13e5})
+    command = np.where(
+        time > busy, 5.0, np.where(time % 2.0 < 0.5, 5.8, np.where(time % 2.0 > 1.0, 3.0, 5.0))
+    )
+    runs = sheet.run(
+        LOCKED, valve_command=command, sample_time=0.05, initial={"supply_pressure": 13e5}
+    )
     axes = sheet.axes("s;p", height_ratios=[2, 1], sharex=True)
     sheet.both(axes["s"], runs, supply)
     values = sheet.rigs[1].effects[0]["parameters"]
     for name, words in (("cut_out_pressure", "stops"), ("cut_in_pressure", "starts")):
         axes["s"].axhline(values[name] / BAR, color=QUIET, ls=":", lw=1.2)
         axes["s"].text(0.0, values[name] / BAR, words, ha="left", va="bottom", color=QUIET)
-    label(axes["s"], "supply: rises evenly from one pressure to the other, again and again", "", "supply [bar]", "lower left")
+    label(
+        axes["s"],
+        "supply: rises evenly from one pressure to the other, again and again",
+        "",
+        "supply [bar]",
+        "lower left",
+    )
     sheet.both(axes["p"], runs, pressure)
-    label(axes["p"], f"muscle: uses the air up to {busy:g} s; the compressor goes on to its stop without", y="muscle [bar]")
+    label(
+        axes["p"],
+        f"muscle: uses the air up to {busy:g} s; the compressor goes on to its stop without",
+        y="muscle [bar]",
+    )
 
 
 def dead_band(sheet: Sheet) -> None:
@@ -87,7 +133,12 @@ def dead_band(sheet: Sheet) -> None:
     for run, colour, words in zip(runs, (WITHOUT, WITH), NAMES, strict=True):
         axes["x"].plot(time, command / BAR - supply(run), color=colour, lw=1.3, label=words)
     axes["x"].set_ylim(-0.5, 0.5)
-    label(axes["x"], "error: stays where it enters the band", y="set - outlet [bar]", legend="upper right")
+    label(
+        axes["x"],
+        "error: stays where it enters the band",
+        y="set - outlet [bar]",
+        legend="upper right",
+    )
 
 
 def _triangle(time: Array, period: float, low: float, high: float) -> Array:
@@ -99,16 +150,32 @@ def _triangle(time: Array, period: float, low: float, high: float) -> Array:
 def dead_zone(sheet: Sheet) -> None:
     """Slow ramps of the command through the null, both ways."""
     time = clock(4.0, 0.005)
-    runs = sheet.run(LOCKED, valve_command=_triangle(time + 0.5, 2.0, 4.4, 5.3), sample_time=0.005, initial={"muscle_pressure": 3e5})
+    runs = sheet.run(
+        LOCKED,
+        valve_command=_triangle(time + 0.5, 2.0, 4.4, 5.3),
+        sample_time=0.005,
+        initial={"muscle_pressure": 3e5},
+    )
     axes = sheet.axes("ux;px", width_ratios=[1, 1.1])
     axes["u"].plot(time, runs[0]["valve_command"], color=QUIET)
     label(axes["u"], "command: ramps through the null", y="valve [V]")
     sheet.both(axes["p"], runs, pressure)
-    label(axes["p"], "muscle: stands at each change of direction", y="muscle [bar]", legend="lower left")
+    label(
+        axes["p"],
+        "muscle: stands at each change of direction",
+        y="muscle [bar]",
+        legend="lower left",
+    )
     sheet.both(axes["x"], runs, flow, lambda run: run["valve_command"], part=slice(2, -2))
     half = 5.0 * sheet.rigs[1].effects[0]["parameters"]["half_width"]
     axes["x"].axvspan(5.0 - half, 5.0 + half, color="#dfe3e8", lw=0, label="dead zone")
-    label(axes["x"], "flow against command: none in the dead zone", "valve [V]", "air into the muscle [g/s]", "upper left")
+    label(
+        axes["x"],
+        "flow against command: none in the dead zone",
+        "valve [V]",
+        "air into the muscle [g/s]",
+        "upper left",
+    )
 
 
 def play(sheet: Sheet) -> None:
@@ -120,7 +187,9 @@ def play(sheet: Sheet) -> None:
             row = period / 600.0
             time = clock(3.0 * period, row)
             command = _triangle(time, period, low, high)
-            runs = sheet.run(LOCKED, valve_command=command, sample_time=row, initial={"muscle_pressure": 3e5})
+            runs = sheet.run(
+                LOCKED, valve_command=command, sample_time=row, initial={"muscle_pressure": 3e5}
+            )
             part = slice(750, 1350)
             of = {"part": part, "ls": style}
             sheet.both(axes[letter], runs, flow, lambda run: run["valve_command"], **of)
@@ -136,16 +205,25 @@ def centre_leakage(sheet: Sheet) -> None:
     axes = sheet.axes("px;sx", width_ratios=[1.25, 1])
     for start, style in ((1e5, "-"), (5.8e5, "--")):
         first = {"muscle_pressure": start, "supply_pressure": 6e5}
-        runs = sheet.run(LOCKED, valve_command=np.full(time.size, 5.0), sample_time=0.1, initial=first)
+        runs = sheet.run(
+            LOCKED, valve_command=np.full(time.size, 5.0), sample_time=0.1, initial=first
+        )
         words = "from below" if style == "-" else "from above"
         for run, colour, which in zip(runs, (WITHOUT, WITH), ("without", "with"), strict=True):
             axes["p"].plot(time, pressure(run), style, color=colour, label=f"{which}, {words}")
             axes["s"].plot(time, supply(run), style, color=colour)
-            axes["x"].plot(pressure(run)[5:], 100.0 * np.gradient(pressure(run), 0.1)[5:], style, color=colour)
+            axes["x"].plot(
+                pressure(run)[5:], 100.0 * np.gradient(pressure(run), 0.1)[5:], style, color=colour
+            )
     label(axes["p"], "muscle: to one and the same value", y="muscle [bar]", legend="center right")
     label(axes["s"], "supply: air is used up all the time", y="supply [bar]")
     axes["x"].axhline(0.0, color=QUIET, lw=0.8)
-    label(axes["x"], "at the null: up from below, down from above", "muscle [bar]", "rate of the muscle's pressure [kPa/s]")
+    label(
+        axes["x"],
+        "at the null: up from below, down from above",
+        "muscle [bar]",
+        "rate of the muscle's pressure [kPa/s]",
+    )
 
 
 def input_lag(sheet: Sheet) -> None:
@@ -153,17 +231,27 @@ def input_lag(sheet: Sheet) -> None:
     axes = sheet.axes("up;xx", height_ratios=[1, 1.2])
     time = clock(0.5, 0.0005)
     command = hold(time, (0.0, 5.0), (0.05, 6.2), (0.15, 5.0), (0.25, 5.3), (0.35, 5.0), (0.4, 3.8))
-    runs = sheet.run(LOCKED, valve_command=command, sample_time=0.0005, initial={"muscle_pressure": 3e5})
+    runs = sheet.run(
+        LOCKED, valve_command=command, sample_time=0.0005, initial={"muscle_pressure": 3e5}
+    )
     axes["u"].plot(time, command, color=QUIET)
     label(axes["u"], "command", y="valve [V]")
     sheet.both(axes["p"], runs, flow)
-    label(axes["p"], "flow: late at every edge", y="air into the muscle [g/s]", legend="upper right")
-    for at, style, words in ((0.05, "-", "large fill"), (0.25, "--", "small fill"), (0.4, ":", "vent")):
+    label(
+        axes["p"], "flow: late at every edge", y="air into the muscle [g/s]", legend="upper right"
+    )
+    for at, style, words in (
+        (0.05, "-", "large fill"),
+        (0.25, "--", "small fill"),
+        (0.4, ":", "vent"),
+    ):
         part = slice(round((at - 0.01) / 0.0005), round((at + 0.06) / 0.0005))
         for run, colour, which in zip(runs, (WITHOUT, WITH), ("without", "with"), strict=True):
             edge = flow(run)[part]
             size = flow(run)[round((at + 0.08) / 0.0005)]
-            axes["x"].plot(1e3 * (time[part] - at), edge / size, style, color=colour, label=f"{which}, {words}")
+            axes["x"].plot(
+                1e3 * (time[part] - at), edge / size, style, color=colour, label=f"{which}, {words}"
+            )
     label(
         axes["x"],
         "each edge in parts of its size: all late by the same",
@@ -179,7 +267,12 @@ def restriction(sheet: Sheet) -> None:
     time = clock(0.6, 0.002)
     for letter, start, volts in (("p", 0.5e5, (10.0, 7.0, 6.0)), ("v", 6e5, (0.0, 3.0, 4.0))):
         for volt in volts:
-            runs = sheet.run(LOCKED, valve_command=np.full(time.size, volt), sample_time=0.002, initial={"muscle_pressure": start})
+            runs = sheet.run(
+                LOCKED,
+                valve_command=np.full(time.size, volt),
+                sample_time=0.002,
+                initial={"muscle_pressure": start},
+            )
             sheet.both(axes[letter], runs, pressure)
             axes[letter].text(0.61, pressure(runs[0])[-1], f"{volt:g} V", color=QUIET, va="center")
         axes[letter].set_xlim(-0.02, 0.68)
@@ -189,45 +282,85 @@ def restriction(sheet: Sheet) -> None:
     label(axes["v"], "venting at three openings", y="muscle [bar]", legend="lower left")
     every = np.linspace(0.0, 10.0, 81)
     for rig, colour, words in zip(sheet.rigs, (WITHOUT, WITH), NAMES, strict=True):
-        maps = [simulate(rig, np.full(2, volt), sample_time=1e-4, initial={"muscle_pressure": 4e5}) for volt in every]
+        maps = [
+            simulate(rig, np.full(2, volt), sample_time=1e-4, initial={"muscle_pressure": 4e5})
+            for volt in every
+        ]
         axes["x"].plot(every, [flow(run)[0] for run in maps], color=colour, label=words)
-    label(axes["x"], "flow at 4 bar: short at large openings, both ways", "valve [V]", "air into the muscle [g/s]", "upper left")
+    label(
+        axes["x"],
+        "flow at 4 bar: short at large openings, both ways",
+        "valve [V]",
+        "air into the muscle [g/s]",
+        "upper left",
+    )
 
 
 def muscle_leak(sheet: Sheet) -> None:
     """Fill, shut, hold, at three levels."""
     time = clock(100.0, 0.05)
-    command = hold(time, (0.0, 5.07), (4.0, 5.0), (33.0, 5.05), (37.0, 5.0), (66.0, 5.05), (70.0, 5.0))
+    command = hold(
+        time, (0.0, 5.07), (4.0, 5.0), (33.0, 5.05), (37.0, 5.0), (66.0, 5.05), (70.0, 5.0)
+    )
     runs = sheet.run(valve_command=command, sample_time=0.05)
     axes = sheet.axes("px;ax", width_ratios=[1.25, 1])
     sheet.both(axes["p"], runs, pressure)
-    label(axes["p"], "muscle: falls with the valve shut, without end", y="muscle [bar]", legend="upper left")
+    label(
+        axes["p"],
+        "muscle: falls with the valve shut, without end",
+        y="muscle [bar]",
+        legend="upper left",
+    )
     sheet.both(axes["a"], runs, angle)
     label(axes["a"], "joint: sinks with it", y="angle [deg]")
     for first, last in ((6.0, 32.0), (39.0, 65.0), (72.0, 99.0)):
         part = slice(round(first / 0.05), round(last / 0.05))
         for run, colour in zip(runs, (WITHOUT, WITH), strict=True):
-            axes["x"].plot(pressure(run)[part] + 1.01325, -1e3 * flow(run)[part], ".", ms=3, color=colour)
+            axes["x"].plot(
+                pressure(run)[part] + 1.01325, -1e3 * flow(run)[part], ".", ms=3, color=colour
+            )
     end = (pressure(runs[1])[-40] + 1.01325, -1e3 * flow(runs[1])[-40])
     axes["x"].plot([0.0, end[0]], [0.0, end[1]], ":", color=QUIET, label="through zero")
-    label(axes["x"], "valve shut: loss in proportion to absolute pressure", "muscle, absolute [bar]", "air lost [mg/s]", "upper left")
+    label(
+        axes["x"],
+        "valve shut: loss in proportion to absolute pressure",
+        "muscle, absolute [bar]",
+        "air lost [mg/s]",
+        "upper left",
+    )
 
 
 def heat(sheet: Sheet) -> None:
     """A fast fill and a fast vent, each with the valve shut after it; small ones and large ones."""
     time = clock(24.0)
     command = hold(
-        time, (0.0, 5.0), (1.0, 10.0), (1.15, 5.0), (7.0, 0.0), (7.25, 5.0), (13.0, 10.0), (13.05, 5.0), (19.0, 0.0), (19.08, 5.0)
+        time,
+        (0.0, 5.0),
+        (1.0, 10.0),
+        (1.15, 5.0),
+        (7.0, 0.0),
+        (7.25, 5.0),
+        (13.0, 10.0),
+        (13.05, 5.0),
+        (19.0, 0.0),
+        (19.08, 5.0),
     )
     runs = sheet.run(LOCKED, valve_command=command)
     axes = sheet.axes("pp;fv")
     sheet.both(axes["p"], runs, pressure)
-    label(axes["p"], "muscle: large and small, fast fills and vents, the valve shut in between", y="muscle [bar]", legend="upper right")
+    label(
+        axes["p"],
+        "muscle: large and small, fast fills and vents, the valve shut in between",
+        y="muscle [bar]",
+        legend="upper right",
+    )
     for letter, at, words in (
         ("f", 1.15, "after the large fill: falls, then stays"),
         ("v", 7.25, "after the large vent: rises, then stays"),
     ):
         part = slice(round((at + 0.02) / 0.01), round((at + 5.0) / 0.01))
         for run, colour in zip(runs, (WITHOUT, WITH), strict=True):
-            axes[letter].plot(time[part] - at, (pressure(run) - pressure(run)[part][-1])[part], color=colour)
+            axes[letter].plot(
+                time[part] - at, (pressure(run) - pressure(run)[part][-1])[part], color=colour
+            )
         label(axes[letter], words, "time since the valve shut [s]", "muscle, less its end [bar]")

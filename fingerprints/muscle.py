@@ -6,7 +6,20 @@ from typing import Any
 
 import numpy as np
 
-from fingerprints.sheet import BAR, QUIET, WITH, WITHOUT, Array, Sheet, angle, clock, hold, label, pressure, through
+from fingerprints.sheet import (
+    BAR,
+    QUIET,
+    WITH,
+    WITHOUT,
+    Array,
+    Sheet,
+    angle,
+    clock,
+    hold,
+    label,
+    pressure,
+    through,
+)
 from pamrs import Simulation, rigs, simulate
 
 __all__ = ["activation", "creep", "crowding", "damping", "hysteresis", "softening"]
@@ -20,7 +33,9 @@ def zigzag(time: Array, *levels: float, over: float) -> Array:
     return through(time, *((k * over, level) for k, level in enumerate(levels)))
 
 
-def bench(sheet: Sheet, contraction: Array, gauge: float, sample_time: float) -> tuple[Simulation, Simulation]:
+def bench(
+    sheet: Sheet, contraction: Array, gauge: float, sample_time: float
+) -> tuple[Simulation, Simulation]:
     """The muscle on the load frame at a held pressure [Pa], its contraction prescribed."""
     effect = sheet.rigs[1].effects[0]
     plain = rigs.named("bench")
@@ -45,13 +60,24 @@ def percent(run: Simulation) -> Array:
 
 
 def hysteresis(sheet: Sheet) -> None:
-    """Slow triangles of the pressure with a small one inside; the muscle alone, at two pressures and two speeds."""
+    """Slow triangles of the pressure with a small one inside; the muscle alone, at two pressures
+    and two speeds.
+    """
     axes = sheet.axes("xf", width_ratios=[1, 1])
     over = 20.0
     time = clock(8 * over, 0.05)
-    runs = sheet.run(supply_command=BAR * zigzag(time, 0.0, 3.2, 0.8, 2.2, 1.5, 2.2, 0.8, 3.2, 0.8, over=over), sample_time=0.05)
+    runs = sheet.run(
+        supply_command=BAR * zigzag(time, 0.0, 3.2, 0.8, 2.2, 1.5, 2.2, 0.8, 3.2, 0.8, over=over),
+        sample_time=0.05,
+    )
     sheet.both(axes["x"], runs, angle, pressure, part=slice(round(over / 0.05), None))
-    label(axes["x"], "joint, slow triangles: loops, a small one inside", "muscle [bar]", "angle [deg]", "upper left")
+    label(
+        axes["x"],
+        "joint, slow triangles: loops, a small one inside",
+        "muscle [bar]",
+        "angle [deg]",
+        "upper left",
+    )
     for gauge, place in ((2e5, 0.035), (4e5, 0.035)):
         for period, style in ((20.0, "-"), (2.0, "--")):
             time = clock(2.0 * period, period / 1000.0)
@@ -60,12 +86,24 @@ def hysteresis(sheet: Sheet) -> None:
             words = "" if style == "-" else ", ten times as fast"
             for run, colour, name in zip(pair, (WITHOUT, WITH), NAMES, strict=True):
                 given = f"{name}{words}" if gauge == 2e5 else None
-                wide: dict[str, Any] = {} if style == "-" else {"lw": 5.0, "alpha": 0.35, "zorder": 1.5}
-                axes["f"].plot(percent(run)[1000:], pull(run)[1000:], color=colour, label=given, **wide)
+                wide: dict[str, Any] = (
+                    {} if style == "-" else {"lw": 5.0, "alpha": 0.35, "zorder": 1.5}
+                )
+                axes["f"].plot(
+                    percent(run)[1000:], pull(run)[1000:], color=colour, label=given, **wide
+                )
         axes["f"].text(
-            100 * place, float(np.interp(place, np.sort(wave), pull(pair[0])[np.argsort(wave)])) + 60.0, f"{gauge / BAR:g} bar"
+            100 * place,
+            float(np.interp(place, np.sort(wave), pull(pair[0])[np.argsort(wave)])) + 60.0,
+            f"{gauge / BAR:g} bar",
         )
-    label(axes["f"], "one muscle on a frame: wider with pressure, not with speed", "contraction [%]", "pull [N]", "upper right")
+    label(
+        axes["f"],
+        "one muscle on a frame: wider with pressure, not with speed",
+        "contraction [%]",
+        "pull [N]",
+        "upper right",
+    )
 
 
 def creep(sheet: Sheet) -> None:
@@ -73,7 +111,9 @@ def creep(sheet: Sheet) -> None:
     time = clock(80.0, 0.02)
     command = BAR * hold(time, (0.0, 1.0), (5.0, 2.4), (30.0, 1.0), (55.0, 2.4), (57.0, 2.1))
     runs = sheet.run(
-        supply_command=command, sample_time=0.02, initial={"supply_pressure": 1e5, "muscle_pressure": 1e5, "joint_angle": 0.45}
+        supply_command=command,
+        sample_time=0.02,
+        initial={"supply_pressure": 1e5, "muscle_pressure": 1e5, "joint_angle": 0.45},
     )
     axes = sheet.axes("p;a;d", sharex=True, height_ratios=[0.8, 1, 1])
     sheet.both(axes["p"], runs, pressure)
@@ -103,7 +143,13 @@ def damping(sheet: Sheet) -> None:
             pair = bench(sheet, wave, gauge, period / 1000.0)
             if gauge > 2e5:
                 for run, colour, name in zip(pair, (WITHOUT, WITH), NAMES, strict=True):
-                    axes["f"].plot(percent(run)[1000:], pull(run)[1000:], style, color=colour, label=f"{name}, {1.0 / period:g} Hz")
+                    axes["f"].plot(
+                        percent(run)[1000:],
+                        pull(run)[1000:],
+                        style,
+                        color=colour,
+                        label=f"{name}, {1.0 / period:g} Hz",
+                    )
         extra = (pull(pair[1]) - pull(pair[0]))[1000:]
         axes["d"].plot(
             1e3 * np.gradient(REST * (1.0 - wave), time)[1000:],
@@ -112,7 +158,13 @@ def damping(sheet: Sheet) -> None:
             color=WITH,
             label=f"{gauge / BAR:g} bar",
         )
-    label(axes["f"], "one muscle at 4 bar: the loop grows with speed", "contraction [%]", "pull [N]", "upper right")
+    label(
+        axes["f"],
+        "one muscle at 4 bar: the loop grows with speed",
+        "contraction [%]",
+        "pull [N]",
+        "upper right",
+    )
     axes["d"].axhline(0.0, color=QUIET, lw=0.8)
     label(
         axes["d"],
@@ -123,11 +175,25 @@ def damping(sheet: Sheet) -> None:
     )
     for letter, bar, start in (("l", 1.5, 60.0), ("h", 3.0, 70.0)):
         time = clock(4.0, 0.005)
-        first = {"supply_pressure": bar * BAR, "muscle_pressure": bar * BAR, "joint_angle": np.radians(start)}
-        runs = sheet.run({"arm.coulomb": 0.2}, supply_command=np.full(time.size, bar * BAR), sample_time=0.005, initial=first)
+        first = {
+            "supply_pressure": bar * BAR,
+            "muscle_pressure": bar * BAR,
+            "joint_angle": np.radians(start),
+        }
+        runs = sheet.run(
+            {"arm.coulomb": 0.2},
+            supply_command=np.full(time.size, bar * BAR),
+            sample_time=0.005,
+            initial=first,
+        )
         for run, colour, name in zip(runs, (WITHOUT, WITH), NAMES, strict=True):
             axes[letter].plot(time, angle(run) - angle(run)[-1], color=colour, label=name)
-        label(axes[letter], f"let go at {bar:g} bar", y="angle, less its end [deg]", legend="upper right")
+        label(
+            axes[letter],
+            f"let go at {bar:g} bar",
+            y="angle, less its end [deg]",
+            legend="upper right",
+        )
 
 
 def activation(sheet: Sheet) -> None:
@@ -135,7 +201,11 @@ def activation(sheet: Sheet) -> None:
     time = clock(60.0, 0.05)
     axes = sheet.axes("xd", width_ratios=[1.2, 1])
     for payload, style, words in ((9.07, "-", "payload 9 kg"), (0.0, "--", "no payload")):
-        runs = sheet.run({"arm.payload": payload}, supply_command=BAR * through(time, (0.0, 0.0), (60.0, 3.2)), sample_time=0.05)
+        runs = sheet.run(
+            {"arm.payload": payload},
+            supply_command=BAR * through(time, (0.0, 0.0), (60.0, 3.2)),
+            sample_time=0.05,
+        )
         for run, colour, name in zip(runs, (WITHOUT, WITH), NAMES, strict=True):
             axes["x"].plot(pressure(run), angle(run), style, color=colour, label=f"{name}, {words}")
         grid = np.linspace(18.0, min(118.0, angle(runs[1]).max()), 100)
@@ -143,10 +213,22 @@ def activation(sheet: Sheet) -> None:
         axes["d"].plot(grid, shift[1] - shift[0], style, color=WITH, label=words)
     threshold = sheet.rigs[1].effects[0]["parameters"]["threshold"] / BAR
     axes["x"].axvspan(0.0, threshold, color="#dfe3e8", lw=0)
-    label(axes["x"], "joint: no motion up to the threshold, then shifted", "muscle [bar]", "angle [deg]", "upper left")
+    label(
+        axes["x"],
+        "joint: no motion up to the threshold, then shifted",
+        "muscle [bar]",
+        "angle [deg]",
+        "upper left",
+    )
     axes["d"].axhline(threshold, color=QUIET, ls=":", label="threshold")
     axes["d"].set_ylim(0.0, 1.5 * threshold)
-    label(axes["d"], "more pressure for the same angle: the same everywhere", "angle [deg]", "with less without [bar]", "lower right")
+    label(
+        axes["d"],
+        "more pressure for the same angle: the same everywhere",
+        "angle [deg]",
+        "with less without [bar]",
+        "lower right",
+    )
 
 
 def softening(sheet: Sheet) -> None:
@@ -154,21 +236,47 @@ def softening(sheet: Sheet) -> None:
     over = 15.0
     time = clock(8 * over, 0.05)
     levels = (0.0, 2.0, 0.0, 2.0, 0.0, 3.0, 0.0, 3.0, 0.0)
-    runs = sheet.run({"arm.coulomb": 0.0}, supply_command=BAR * zigzag(time, *levels, over=over), sample_time=0.05)
+    runs = sheet.run(
+        {"arm.coulomb": 0.0},
+        supply_command=BAR * zigzag(time, *levels, over=over),
+        sample_time=0.05,
+    )
     axes = sheet.axes("px;ax", width_ratios=[1, 1.2])
     sheet.both(axes["p"], runs, pressure)
     label(axes["p"], "muscle: twice low, twice high", y="muscle [bar]")
     sheet.both(axes["a"], runs, angle)
     label(axes["a"], "joint", y="angle [deg]", legend="upper left")
-    strokes = [slice(round(2 * k * over / 0.05) + 10, round((2 * k + 1) * over / 0.05) - 10) for k in range(4)]
+    strokes = [
+        slice(round(2 * k * over / 0.05) + 10, round((2 * k + 1) * over / 0.05) - 10)
+        for k in range(4)
+    ]
     axes["x"].plot(
-        pressure(runs[0])[strokes[3]], angle(runs[0])[strokes[3]], color=WITHOUT, lw=5.0, alpha=0.4, label="without, every stroke"
+        pressure(runs[0])[strokes[3]],
+        angle(runs[0])[strokes[3]],
+        color=WITHOUT,
+        lw=5.0,
+        alpha=0.4,
+        label="without, every stroke",
     )
     styles = ((":", 1.8, 1.0), ("--", 1.8, 1.0), ("-", 5.0, 0.35), ("-", 1.8, 1.0))
     for k, (part, (style, width, alpha)) in enumerate(zip(strokes, styles, strict=True)):
         words = f"with, stroke {k + 1}, to {levels[2 * k + 1]:g} bar"
-        axes["x"].plot(pressure(runs[1])[part], angle(runs[1])[part], style, color=WITH, lw=width, alpha=alpha, label=words)
-    label(axes["x"], "strokes upward: as modelled where it never was, stronger later", "muscle [bar]", "angle [deg]", "upper left")
+        axes["x"].plot(
+            pressure(runs[1])[part],
+            angle(runs[1])[part],
+            style,
+            color=WITH,
+            lw=width,
+            alpha=alpha,
+            label=words,
+        )
+    label(
+        axes["x"],
+        "strokes upward: as modelled where it never was, stronger later",
+        "muscle [bar]",
+        "angle [deg]",
+        "upper left",
+    )
 
 
 def crowding(sheet: Sheet) -> None:
@@ -179,8 +287,16 @@ def crowding(sheet: Sheet) -> None:
     for gauge, style in ((1e5, ":"), (3e5, "--"), (5e5, "-")):
         pair = bench(sheet, wave, gauge, 0.02)
         for run, colour, name in zip(pair, (WITHOUT, WITH), NAMES, strict=True):
-            axes["f"].plot(percent(run), pull(run), style, color=colour, label=f"{name}, {gauge / BAR:g} bar")
-        axes["d"].plot(percent(pair[0]), pull(pair[1]) - pull(pair[0]), style, color=WITH, label=f"{gauge / BAR:g} bar")
+            axes["f"].plot(
+                percent(run), pull(run), style, color=colour, label=f"{name}, {gauge / BAR:g} bar"
+            )
+        axes["d"].plot(
+            percent(pair[0]),
+            pull(pair[1]) - pull(pair[0]),
+            style,
+            color=WITH,
+            label=f"{gauge / BAR:g} bar",
+        )
     label(axes["f"], "one muscle on a frame", "contraction [%]", "pull [N]", "upper right")
     label(
         axes["d"],
@@ -193,4 +309,10 @@ def crowding(sheet: Sheet) -> None:
     runs = sheet.run(supply_command=BAR * zigzag(time, 0.0, 4.5, 0.0, over=40.0), sample_time=0.05)
     sheet.both(axes["x"], runs, angle, pressure)
     axes["x"].set(xlim=(2.0, 4.6), ylim=(50.0, 122.0))
-    label(axes["x"], "joint: falls short the same way up and down", "muscle [bar]", "angle [deg]", "upper left")
+    label(
+        axes["x"],
+        "joint: falls short the same way up and down",
+        "muscle [bar]",
+        "angle [deg]",
+        "upper left",
+    )

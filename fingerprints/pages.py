@@ -13,9 +13,12 @@ COMMAND = "make effects"
 INDEX = f"""\
 # The physics that a model can leave out
 
-Made by `{COMMAND}` from the table of the package (`pamrs.effects`); `pamrs effects` prints it, `pamrs effects ID` one entry.
-Every page has the equation, the parameters, what is confused with the effect and what separates the two, the lines of a rig file, and
-the fingerprint as the simulator draws it: the same experiment without the effect (orange) and with it (blue).
+Made by `{COMMAND}` from the table of the package (`pamrs.effects`); `pamrs effects` prints it, \
+`pamrs effects ID` one entry.
+Every page has the equation, the parameters, what is confused with the effect and what separates \
+the two, the lines of a rig file, and
+the fingerprint as the simulator draws it: the same experiment without the effect (orange) and \
+with it (blue).
 """
 
 PAGE = """\
@@ -31,7 +34,8 @@ Made by `{command}`. Block: {block}. Acts on {where}. [All effects](README.md)
 
 ![{look}]({id}.png)
 
-*{look}.* On the packaged rig `{rig}`: {experiment}. Orange without the effect, blue with it{values}.
+*{look}.* On the packaged rig `{rig}`: {experiment}. Orange without the effect, blue with \
+it{values}.
 
 ## Confusable with
 
@@ -65,8 +69,21 @@ def index() -> str:
     """The list of all effects by block."""
     lines = [INDEX]
     for block, infos in catalogue().items():
-        rows = [[f"[`{i.id}`]({i.id}.md)", i.name, i.fingerprint, ", ".join(linked(rival) for rival in i.rivals)] for i in infos]
-        lines += [f"## {block}", "", *table(["id", "effect", "fingerprint", "confusable with"], rows), ""]
+        rows = [
+            [
+                f"[`{i.id}`]({i.id}.md)",
+                i.name,
+                i.fingerprint,
+                ", ".join(linked(rival) for rival in i.rivals),
+            ]
+            for i in infos
+        ]
+        lines += [
+            f"## {block}",
+            "",
+            *table(["id", "effect", "fingerprint", "confusable with"], rows),
+            "",
+        ]
     return "\n".join(lines)
 
 
@@ -74,7 +91,10 @@ def page(info: EffectInfo) -> str:
     """The page of one effect."""
     shown = EXPERIMENTS[info.id]
     units = {parameter.name: parameter.unit for parameter in info.parameters}
-    values = [f"`{name}` {value:g} {units[name]}".removesuffix(" 1") for name, value in shown.values.items()]
+    values = [
+        f"`{name}` {value:g} {units[name]}".removesuffix(" 1")
+        for name, value in shown.values.items()
+    ]
     rows = [
         [
             f"`{p.name}`",
@@ -82,7 +102,9 @@ def page(info: EffectInfo) -> str:
             f"{p.default:g}",
             f"{p.lower:g} to {p.upper:g}",
             "" if p.neutral is None else f"{p.neutral:g}",
-            p.meaning if p.expected is None else "{}; expected {:g} to {:g}".format(p.meaning, *p.expected),
+            p.meaning
+            if p.expected is None
+            else "{}; expected {:g} to {:g}".format(p.meaning, *p.expected),
         ]
         for p in info.parameters
     ]
@@ -98,9 +120,14 @@ def page(info: EffectInfo) -> str:
         rig=shown.rig,
         experiment=shown.words,
         values=f" ({', '.join(values)})" if values else "",
-        rivals="\n".join(f"- {linked(rival)}{f': {EFFECTS[rival].name}' if rival in EFFECTS else ''}" for rival in info.rivals),
+        rivals="\n".join(
+            f"- {linked(rival)}{f': {EFFECTS[rival].name}' if rival in EFFECTS else ''}"
+            for rival in info.rivals
+        ),
         separates=info.separates,
-        parameters="\n".join(table(["parameter", "unit", "usual", "bounds", "off at", "meaning"], rows)),
+        parameters="\n".join(
+            table(["parameter", "unit", "usual", "bounds", "off at", "meaning"], rows)
+        ),
         snippet=snippet(info.id),
         given="{" + ", ".join(f'"{p.name}": {p.default:g}' for p in info.parameters) + "}",
         reference=info.reference,
@@ -114,5 +141,9 @@ def linked(rival: str) -> str:
 
 def table(head: list[str], rows: list[list[str]]) -> list[str]:
     """A table of Markdown."""
-    lines = [head, ["---"] * len(head), *([cell.replace("|", r"\|") for cell in row] for row in rows)]
+    lines = [
+        head,
+        ["---"] * len(head),
+        *([cell.replace("|", r"\|") for cell in row] for row in rows),
+    ]
     return [f"| {' | '.join(line)} |" for line in lines]

@@ -139,23 +139,42 @@ class Sheet:
         self.experiment = experiment
         self.rigs = (plain, plain.with_effect(experiment.effect, experiment.values))
         self.figure = Figure(figsize=SIZE, dpi=DPI, layout="constrained")
-        self.figure.suptitle(f"{experiment.effect}: {experiment.look}", x=0.012, ha="left", fontsize=11.5, fontweight="bold")
+        self.figure.suptitle(
+            f"{experiment.effect}: {experiment.look}",
+            x=0.012,
+            ha="left",
+            fontsize=11.5,
+            fontweight="bold",
+        )
 
     def axes(self, mosaic: str, **options: Any) -> dict[str, Axes]:
         """Axes by the letters of a mosaic, ``"px;ax"``."""
         found: dict[str, Axes] = self.figure.subplot_mosaic(mosaic, **options)
         return found
 
-    def run(self, changes: Mapping[str, float] | None = None, **drive: Any) -> tuple[pamrs.Simulation, pamrs.Simulation]:
+    def run(
+        self, changes: Mapping[str, float] | None = None, **drive: Any
+    ) -> tuple[pamrs.Simulation, pamrs.Simulation]:
         """Simulations without and with the effect, of a rig with some parameters changed."""
-        without, with_ = (pamrs.simulate(rig.with_parameters(changes or {}), **{"sample_time": 0.01, **drive}) for rig in self.rigs)
+        without, with_ = (
+            pamrs.simulate(rig.with_parameters(changes or {}), **{"sample_time": 0.01, **drive})
+            for rig in self.rigs
+        )
         return without, with_
 
     @staticmethod
-    def both(axes: Axes, runs: tuple[pamrs.Simulation, pamrs.Simulation], y: Of, x: Of = time_of, **style: Any) -> None:
+    def both(
+        axes: Axes,
+        runs: tuple[pamrs.Simulation, pamrs.Simulation],
+        y: Of,
+        x: Of = time_of,
+        **style: Any,
+    ) -> None:
         """The curve without the effect and the one with it on top."""
         part = style.pop("part", slice(None))
-        for run, colour, words, width in zip(runs, (WITHOUT, WITH), ("without", "with the effect"), (2.2, 1.3), strict=True):
+        for run, colour, words, width in zip(
+            runs, (WITHOUT, WITH), ("without", "with the effect"), (2.2, 1.3), strict=True
+        ):
             kept = {"label": words, "lw": width, **style}
             axes.plot(x(run)[part], y(run)[part], color=colour, **kept)
 
@@ -164,7 +183,14 @@ def label(axes: Axes, title: str, x: str = "time [s]", y: str = "", legend: str 
     """Title and labels; a legend where a place is given."""
     axes.set(title=title, xlabel=x, ylabel=y)
     if legend:
-        axes.legend(loc=legend, frameon=True, framealpha=0.85, edgecolor="none", fontsize=8.5, handlelength=1.6)
+        axes.legend(
+            loc=legend,
+            frameon=True,
+            framealpha=0.85,
+            edgecolor="none",
+            fontsize=8.5,
+            handlelength=1.6,
+        )
 
 
 def picture(experiment: Experiment) -> bytes:
@@ -176,6 +202,8 @@ def picture(experiment: Experiment) -> bytes:
         sheet.figure.savefig(stream, format="png", metadata={"Software": None})
     small = io.BytesIO()
     with Image.open(stream) as image:
-        flat = image.convert("RGB").quantize(PALETTE, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+        flat = image.convert("RGB").quantize(
+            PALETTE, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE
+        )
         flat.save(small, format="png", optimize=True)
     return small.getvalue()

@@ -15,7 +15,10 @@ EXPERIMENTS: Final[dict[str, Experiment]] = {
         Experiment(
             "supply_leak",
             "shoulder",
-            "the valve shut for two minutes but for one short fill, from a full and from a half empty tank (the arm held)",
+            (
+                "the valve shut for two minutes but for one short fill, from a full and from a "
+                "half empty tank (the arm held)"
+            ),
             "the supply falls all the time, in proportion to its pressure",
             air.supply_leak,
             {"conductance": 6e-11},
@@ -45,7 +48,10 @@ EXPERIMENTS: Final[dict[str, Experiment]] = {
         Experiment(
             "valve_hysteresis",
             "shoulder",
-            "triangles of the command at two speeds, through the null and on one side of it (the arm held)",
+            (
+                "triangles of the command at two speeds, through the null and on one side of it "
+                "(the arm held)"
+            ),
             "rising and falling commands give two lines, at any speed, also away from the null",
             air.play,
             {"half_width": 0.01},
@@ -53,7 +59,10 @@ EXPERIMENTS: Final[dict[str, Experiment]] = {
         Experiment(
             "valve_centre_leakage",
             "shoulder",
-            "the valve at its null for 200 s, from a low and from a high pressure, the tank at 6 bar (the arm held)",
+            (
+                "the valve at its null for 200 s, from a low and from a high pressure, the tank at "
+                "6 bar (the arm held)"
+            ),
             "from below and from above to one pressure, and the tank loses air",
             air.centre_leakage,
             {"conductance": 1e-10},
@@ -84,14 +93,20 @@ EXPERIMENTS: Final[dict[str, Experiment]] = {
         Experiment(
             "heat_transfer",
             "shoulder",
-            "fast fills and vents, large and small, the valve shut for five seconds after each (the arm held)",
+            (
+                "fast fills and vents, large and small, the valve shut for five seconds after each "
+                "(the arm held)"
+            ),
             "after a fast fill the pressure falls and stays, after a fast vent it rises and stays",
             air.heat,
         ),
         Experiment(
             "muscle_hysteresis",
             "regulated_joint",
-            "slow triangles of the pressure, a small one inside; on the rig `bench` a sine of length at two pressures and two speeds",
+            (
+                "slow triangles of the pressure, a small one inside; on the rig `bench` a sine of "
+                "length at two pressures and two speeds"
+            ),
             "a loop that grows with pressure, not with speed, and turns over a distance",
             muscle.hysteresis,
             {"friction_constant": 10.0, "friction_pressure": 1e-4, "presliding": 2e-3},
@@ -107,7 +122,10 @@ EXPERIMENTS: Final[dict[str, Experiment]] = {
         Experiment(
             "muscle_rate_damping",
             "regulated_joint",
-            "the arm let go at two pressures; on the rig `bench` a sine of length at two pressures and two speeds",
+            (
+                "the arm let go at two pressures; on the rig `bench` a sine of length at two "
+                "pressures and two speeds"
+            ),
             "a loop that grows with speed, decay that is faster at higher pressure",
             muscle.damping,
             {"damping_constant": 300.0, "damping_pressure": 2e-3, "lengthening_share": 0.4},
@@ -131,7 +149,10 @@ EXPERIMENTS: Final[dict[str, Experiment]] = {
         Experiment(
             "pam_crowding_contact",
             "regulated_joint",
-            "a slow triangle of the pressure; on the rig `bench` the whole stroke at three pressures",
+            (
+                "a slow triangle of the pressure; on the rig `bench` the whole stroke at three "
+                "pressures"
+            ),
             "beyond one contraction the pull falls short, more at higher pressure",
             muscle.crowding,
             {"contact_area": 3e-3, "onset_contraction": 0.1},
@@ -170,7 +191,10 @@ EXPERIMENTS: Final[dict[str, Experiment]] = {
         Experiment(
             "external_torque",
             "regulated_joint",
-            "the same steps of pressure twice; a push of 1.5 s in the second hold (no Coulomb friction)",
+            (
+                "the same steps of pressure twice; a push of 1.5 s in the second hold (no Coulomb "
+                "friction)"
+            ),
             "a torque that comes and goes by itself, and not again with the command",
             motion.push,
             {"torque": -8.0, "time": 21.0, "duration": 1.5},

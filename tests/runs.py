@@ -1,4 +1,5 @@
-"""One smooth run of each packaged rig: what drives it, from where, and how core and reference carry it out.
+"""One smooth run of each packaged rig: what drives it, from where, and how core and reference carry
+it out.
 
 The joints stay off their stops.  Commands are held over each sample; both sides restart there.
 """
@@ -39,8 +40,8 @@ class Run:
     initial : dict of str to float
         Gauge pressures (Pa), angles (rad), rates (rad/s), lengths (m).
     commands : dict of str to ndarray, shape (rows,)
-        By channel: ``valve_command.flexor`` (V), ``supply_command`` (Pa, gauge), ``length`` (m) of a load frame, which the
-        reference does not have.
+        By channel: ``valve_command.flexor`` (V), ``supply_command`` (Pa, gauge), ``length`` (m) of
+        a load frame, which the reference does not have.
     changes : dict of str to float
         Parameters of the rig that are others than in the package, by dotted name, SI.
     """
@@ -71,7 +72,9 @@ class Run:
 
     @property
     def keywords(self) -> dict[str, Any]:
-        """What drives it, as keywords of `pamrs.simulate` (and without ``duration`` those of `Simulator.run`)."""
+        """What drives it, as keywords of `pamrs.simulate` (and without ``duration`` those of
+        `Simulator.run`).
+        """
         signals: dict[str, Any] = {}
         for name, values in self.commands.items():
             channel, _, block = name.partition(".")
@@ -83,28 +86,53 @@ class Run:
 
     def core(self, step: float | None = None) -> pamrs.Simulation:
         """Simulate with pamrs at a step (s)."""
-        return pamrs.simulate(self.plant, sample_time=self.sample_time, step=step, initial=self.initial, **self.keywords)
+        return pamrs.simulate(
+            self.plant,
+            sample_time=self.sample_time,
+            step=step,
+            initial=self.initial,
+            **self.keywords,
+        )
 
-    def reference(self, rtol: float = 1e-12, method: Literal["DOP853", "Radau"] = "DOP853") -> dict[str, Array]:
+    def reference(
+        self, rtol: float = 1e-12, method: Literal["DOP853", "Radau"] = "DOP853"
+    ) -> dict[str, Array]:
         """Integrate with the reference; channels by the core's names, supplies' masses left out."""
         rows = None if self.commands else self.rows
-        found = network.simulate(self.model, self.commands, self.sample_time, self.initial, rtol, rows=rows, method=method)
+        found = network.simulate(
+            self.model,
+            self.commands,
+            self.sample_time,
+            self.initial,
+            rtol,
+            rows=rows,
+            method=method,
+        )
         named = {}
         for name, values in found.items():
             channel, dot, block = name.partition(".")
             named[CALLED.get(channel, channel) + dot + block] = values
-        return {name: values for name, values in named.items() if not name.startswith("supply_air_mass") and name != "time"}
+        return {
+            name: values
+            for name, values in named.items()
+            if not name.startswith("supply_air_mass") and name != "time"
+        }
 
     def lasting(self, rows: int) -> Run:
         """The same with fewer rows."""
-        return replace(self, rows=rows, commands={name: values[:rows] for name, values in self.commands.items()})
+        return replace(
+            self,
+            rows=rows,
+            commands={name: values[:rows] for name, values in self.commands.items()},
+        )
 
 
 def misses(got: Mapping[str, Array], want: Mapping[str, Array]) -> dict[str, float]:
-    """Largest error of every channel of `want` as a fraction of its range; where it stays, of its magnitude (1 at least).
+    """Largest error of every channel of `want` as a fraction of its range; where it stays, of its
+    magnitude (1 at least).
 
-    The positive work at the joints is held to the range of the muscles' whole work where that is larger: of a load that sinks, the
-    positive part is nothing but the moment before it turns.
+    The positive work at the joints is held to the range of the muscles' whole work where that is
+    larger: of a load that sinks, the positive part is nothing but the moment before it turns.
     """
     found = {}
     for name, values in want.items():
@@ -117,20 +145,29 @@ def misses(got: Mapping[str, Array], want: Mapping[str, Array]) -> dict[str, flo
     return found
 
 
-def _about(mean: float, swing: float, frequency: float, phase: float, sample_time: float, rows: int) -> Array:
+def _about(
+    mean: float, swing: float, frequency: float, phase: float, sample_time: float, rows: int
+) -> Array:
     """A sine about a mean, one value per row."""
     return mean + swing * np.sin(2.0 * np.pi * frequency * sample_time * np.arange(rows) + phase)
 
 
-def _valves(names: tuple[str, ...], swing: float, frequency: float, phases: tuple[float, ...], rows: int) -> dict[str, Array]:
+def _valves(
+    names: tuple[str, ...], swing: float, frequency: float, phases: tuple[float, ...], rows: int
+) -> dict[str, Array]:
     """A sine about 5 V for every valve, at rows of 5 ms."""
     words = [f"valve_command.{name}" if name else "valve_command" for name in names]
-    return {word: _about(5.0, swing, frequency, phase, 0.005, rows) for word, phase in zip(words, phases, strict=True)}
+    return {
+        word: _about(5.0, swing, frequency, phase, 0.005, rows)
+        for word, phase in zip(words, phases, strict=True)
+    }
 
 
 #: The reference has no force that depends on the direction of motion.
 FRICTIONLESS = {
-    f"muscle.{side}.friction_{key}": 0.0 for side in ("flexor", "extensor") for key in ("coefficient", "pressure_slope", "floor")
+    f"muscle.{side}.friction_{key}": 0.0
+    for side in ("flexor", "extensor")
+    for key in ("coefficient", "pressure_slope", "floor")
 }
 
 _DEGREE = math.pi / 180.0

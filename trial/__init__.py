@@ -1,6 +1,7 @@
 """Independent plant, concealed cases and scoring for the blinded trial.
 
-Nothing here imports the package under test. The public entry points are :func:`make_case` and :func:`score`.
+Nothing here imports the package under test. The public entry points are :func:`make_case` and
+:func:`score`.
 """
 
 from .concealed import make_case

@@ -1,4 +1,6 @@
-"""Command line of the trial: ``python -m trial write``, ``make``, ``score``, ``report``, ``blocks`` and ``selfcheck``."""
+"""Command line of the trial: ``python -m trial write``, ``make``, ``score``, ``report``, ``blocks``
+and ``selfcheck``.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +8,7 @@ import argparse
 import hashlib
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 from .blocks import blocks_page
@@ -20,48 +23,152 @@ from .strength import LABELS, MEASURES
 from .summary import markdown, target_table
 from .targets import targets
 
-_MEASURE = "what the multiple of the noise is of: all that the effect moves, or what a refit of the baseline leaves of it"
+_MEASURE = (
+    "what the multiple of the noise is of: all that the effect moves, or what a refit of the "
+    "baseline leaves of it"
+)
+
+
+#: adds a command: its name, and what it is for as ``help``
+Add = Callable[..., argparse.ArgumentParser]
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="python -m trial", description="Blinded trial of the diagnosis on concealed data.")
-    sub = parser.add_subparsers(dest="command", required=True)
-    whole = sub.add_parser("write", help="write the cases, keys and manifest of a plan; goes on where it was stopped")
+    parser = argparse.ArgumentParser(
+        prog="python -m trial", description="Blinded trial of the diagnosis on concealed data."
+    )
+    commands = parser.add_subparsers(dest="command", required=True)
+    for add in (_add_write, _add_make, _add_score, _add_report, _add_blocks, _add_selfcheck):
+        add(commands.add_parser)
+    return parser
+
+
+# ---------------------------------------------------------------------- write, make
+
+
+def _add_write(add: Add) -> None:
+    whole = add(
+        "write", help="write the cases, keys and manifest of a plan; goes on where it was stopped"
+    )
     whole.add_argument("folder", type=Path, help="gets cases/, keys/ and manifest.json")
     whole.add_argument("--plan", choices=PLANS, default="full")
     whole.add_argument("--cases", type=int, help="how many (default: the whole plan)")
     whole.add_argument("--seed", type=int, required=True)
-    whole.add_argument("--duration", type=float, help="seconds per recording (default: 30 to 40; plan small 12)")
+    whole.add_argument(
+        "--duration", type=float, help="seconds per recording (default: 30 to 40; plan small 12)"
+    )
     whole.add_argument("--jobs", type=int, default=1, help="processes (default 1)")
     whole.add_argument("--measure", choices=MEASURES, default="reach", help=_MEASURE)
     whole.add_argument("--rig", type=Path, help="nominal rig file (default: the shoulder)")
-    make = sub.add_parser("make", help="write concealed cases and their keys")
+    whole.set_defaults(run=_write)
+
+
+def _write(args: argparse.Namespace) -> None:
+    if (args.cases is not None and args.cases < 1) or args.jobs < 1:
+        raise ValueError("--cases and --jobs must be at least 1")
+
+    def told(name: str, done: int, total: int) -> None:
+        print(f"{name} written, {done} of {total}", file=sys.stderr, flush=True)
+
+    wanted = specs(args.plan, args.seed, args.cases, args.duration, args.measure, args.rig)
+    manifest = write_plan(args.folder, wanted, jobs=args.jobs, rig=args.rig, progress=told)
+    print(f"sha256 of the manifest: {hashlib.sha256(manifest.read_bytes()).hexdigest()}")
+
+
+def _add_make(add: Add) -> None:
+    make = add("make", help="write concealed cases and their keys")
     make.add_argument("--out", type=Path, required=True, help="folder for the cases")
-    make.add_argument("--keys-dir", type=Path, help="folder for the answer keys (default: OUT with '_keys' appended)")
+    make.add_argument(
+        "--keys-dir",
+        type=Path,
+        help="folder for the answer keys (default: OUT with '_keys' appended)",
+    )
     make.add_argument(
         "--kind",
         action="append",
         required=True,
         help=f"{', '.join((*KINDS, WRONG))}, random, or a pair a+b; may be repeated",
     )
-    make.add_argument("--seed", type=int, required=True, help="seed of the first case; the following cases count up")
+    make.add_argument(
+        "--seed",
+        type=int,
+        required=True,
+        help="seed of the first case; the following cases count up",
+    )
     make.add_argument("--repeat", type=int, default=1, help="cases per kind (default 1)")
     make.add_argument("--first", type=int, default=1, help="number of the first case (default 1)")
-    make.add_argument("--strength", type=float, default=1.0, help="size of the effects; 1 is moderate")
-    make.add_argument("--wanted", choices=tuple(LABELS), help="scale each effect to this multiple of the noise instead")
     make.add_argument(
-        "--parameter", action="append", default=[], help=f"of the kind {WRONG}: a parameter as SECTION.NAME; may be repeated"
+        "--strength", type=float, default=1.0, help="size of the effects; 1 is moderate"
     )
     make.add_argument(
-        "--tolerances", action="append", type=float, default=[], help="by how many tolerances it is off; once per parameter"
+        "--wanted",
+        choices=tuple(LABELS),
+        help="scale each effect to this multiple of the noise instead",
+    )
+    make.add_argument(
+        "--parameter",
+        action="append",
+        default=[],
+        help=f"of the kind {WRONG}: a parameter as SECTION.NAME; may be repeated",
+    )
+    make.add_argument(
+        "--tolerances",
+        action="append",
+        type=float,
+        default=[],
+        help="by how many tolerances it is off; once per parameter",
     )
     make.add_argument("--measure", choices=MEASURES, default="reach", help=_MEASURE)
     make.add_argument("--recordings", type=int, default=5, help="1 to 5 (default 5)")
-    make.add_argument("--duration", type=float, default=40.0, help="seconds per recording (default 40)")
+    make.add_argument(
+        "--duration", type=float, default=40.0, help="seconds per recording (default 40)"
+    )
     make.add_argument("--rig", type=Path, help="nominal rig file (default: the shoulder)")
-    mark = sub.add_parser("score", help="score results against the keys")
+    make.set_defaults(run=_make)
+
+
+def _make(args: argparse.Namespace) -> None:
+    keys = args.keys_dir or args.out.with_name(args.out.name + "_keys")
+    if len(args.parameter) != len(args.tolerances):
+        raise ValueError("give --tolerances once for every --parameter")
+    wrong = tuple(zip(args.parameter, args.tolerances, strict=True))
+    if wrong and WRONG not in args.kind:
+        raise ValueError(f"--parameter is for --kind {WRONG}")
+    kinds = [k for k in args.kind for _ in range(args.repeat)]
+    for i, kind in enumerate(kinds):
+        start = time.perf_counter()
+        name = f"case_{args.first + i:03d}"
+
+        def publish(digest: str, case: str = name) -> None:
+            print(f"{case} key sha256 {digest}", flush=True)
+
+        make_case(
+            args.out,
+            keys,
+            kind,
+            seed=args.seed + i,
+            name=name,
+            strength=args.strength,
+            wanted=args.wanted,
+            measure=args.measure,
+            recordings=args.recordings,
+            duration=args.duration,
+            rig=args.rig,
+            publish=publish,
+            wrong=wrong if kind == WRONG else (),
+        )
+        print(f"{name} written in {time.perf_counter() - start:.1f} s", file=sys.stderr, flush=True)
+
+
+# ---------------------------------------------------------------- score, report, blocks
+
+
+def _add_score(add: Add) -> None:
+    mark = add("score", help="score results against the keys")
     mark.add_argument("--keys", type=Path, required=True)
-    mark.add_argument("--results", type=Path, required=True, help="folder with case_xxx/out.json or case_xxx.json")
+    mark.add_argument(
+        "--results", type=Path, required=True, help="folder with case_xxx/out.json or case_xxx.json"
+    )
     mark.add_argument(
         "--catalogue",
         default=",".join(LISTED),
@@ -69,77 +176,96 @@ def _parser() -> argparse.ArgumentParser:
     )
     mark.add_argument("--markdown", type=Path, help="write the tables here")
     mark.add_argument("--figure", type=Path, help="draw the figure here (needs matplotlib)")
-    page = sub.add_parser("report", help="score a whole trial and write its page, trial.md, with pictures (needs matplotlib)")
+    mark.set_defaults(run=_score)
+
+
+def _score(args: argparse.Namespace) -> None:
+    catalogue = tuple(c for c in args.catalogue.split(",") if c)
+    scores = score(args.keys, args.results, catalogue)
+    print(scores.text())
+    print(f"\n{target_table(targets(scores, catalogue))}")
+    if args.markdown is not None:
+        write(args.markdown, markdown(scores, catalogue))
+    if args.figure is not None:
+        figure(scores, args.figure)
+
+
+def _add_report(add: Add) -> None:
+    page = add(
+        "report",
+        help="score a whole trial and write its page, trial.md, with pictures (needs matplotlib)",
+    )
     page.add_argument("folder", type=Path, help="the trial: cases/, keys/ and manifest.json")
-    page.add_argument("--results", type=Path, help="results of `pamrs prove` and of the baselines (default: FOLDER/results)")
-    page.add_argument("--out", type=Path, required=True, help="folder for the page and the pictures")
-    page.add_argument("--command", dest="words", default="python -m trial report", help="what makes the page, as it says")
-    apart = sub.add_parser("blocks", help="score a trial of plan blocks and write its page, blocks.md")
+    page.add_argument(
+        "--results",
+        type=Path,
+        help="results of `pamrs prove` and of the baselines (default: FOLDER/results)",
+    )
+    page.add_argument(
+        "--out", type=Path, required=True, help="folder for the page and the pictures"
+    )
+    page.add_argument(
+        "--command",
+        dest="words",
+        default="python -m trial report",
+        help="what makes the page, as it says",
+    )
+    page.set_defaults(run=_report)
+
+
+def _report(args: argparse.Namespace) -> None:
+    results = args.results or args.folder / "results"
+    print(f"written: {report(args.folder, results, args.out, args.words)}")
+
+
+def _add_blocks(add: Add) -> None:
+    apart = add("blocks", help="score a trial of plan blocks and write its page, blocks.md")
     apart.add_argument("folder", type=Path, help="the trial: cases/, keys/ and manifest.json")
-    apart.add_argument("--results", type=Path, help="results of `pamrs prove` (default: FOLDER/results)")
+    apart.add_argument(
+        "--results", type=Path, help="results of `pamrs prove` (default: FOLDER/results)"
+    )
     apart.add_argument("--out", type=Path, required=True, help="folder for the page")
-    apart.add_argument("--command", dest="words", default="python -m trial blocks", help="what makes the page, as it says")
-    apart.add_argument("--first", type=int, help="only the first so many cases, where a run was ended before the last")
-    check = sub.add_parser("selfcheck", help="compare the plant with finer steps and with another integrator")
-    check.add_argument("--golden", type=Path, help="folder with golden vectors of the plant without effects")
-    return parser
+    apart.add_argument(
+        "--command",
+        dest="words",
+        default="python -m trial blocks",
+        help="what makes the page, as it says",
+    )
+    apart.add_argument(
+        "--first",
+        type=int,
+        help="only the first so many cases, where a run was ended before the last",
+    )
+    apart.set_defaults(run=_blocks)
+
+
+def _blocks(args: argparse.Namespace) -> None:
+    if args.first is not None and args.first < 1:
+        raise ValueError(f"--first {args.first} is not allowed: at least 1")
+    results = args.results or args.folder / "results"
+    print(f"written: {blocks_page(args.folder, results, args.out, args.words, first=args.first)}")
+
+
+# ------------------------------------------------------------------------- selfcheck
+
+
+def _add_selfcheck(add: Add) -> None:
+    check = add("selfcheck", help="compare the plant with finer steps and with another integrator")
+    check.add_argument(
+        "--golden", type=Path, help="folder with golden vectors of the plant without effects"
+    )
+    check.set_defaults(run=_selfcheck)
+
+
+def _selfcheck(args: argparse.Namespace) -> None:
+    print(selfcheck(args.golden))
 
 
 def main(argv: list[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
     args = _parser().parse_args(argv)
     try:
-        if args.command == "write":
-            if (args.cases is not None and args.cases < 1) or args.jobs < 1:
-                raise ValueError("--cases and --jobs must be at least 1")
-
-            def told(name: str, done: int, total: int) -> None:
-                print(f"{name} written, {done} of {total}", file=sys.stderr, flush=True)
-
-            wanted = specs(args.plan, args.seed, args.cases, args.duration, args.measure, args.rig)
-            manifest = write_plan(args.folder, wanted, jobs=args.jobs, rig=args.rig, progress=told)
-            print(f"sha256 of the manifest: {hashlib.sha256(manifest.read_bytes()).hexdigest()}")
-        elif args.command == "make":
-            keys = args.keys_dir or args.out.with_name(args.out.name + "_keys")
-            if len(args.parameter) != len(args.tolerances):
-                raise ValueError("give --tolerances once for every --parameter")
-            wrong = tuple(zip(args.parameter, args.tolerances, strict=True))
-            if wrong and WRONG not in args.kind:
-                raise ValueError(f"--parameter is for --kind {WRONG}")
-            kinds = [k for k in args.kind for _ in range(args.repeat)]
-            for i, kind in enumerate(kinds):
-                start = time.perf_counter()
-                name = f"case_{args.first + i:03d}"
-
-                def publish(digest: str, case: str = name) -> None:
-                    print(f"{case} key sha256 {digest}", flush=True)
-
-                make_case(
-                    args.out, keys, kind, seed=args.seed + i, name=name, strength=args.strength, wanted=args.wanted,
-                    measure=args.measure,
-                    recordings=args.recordings, duration=args.duration, rig=args.rig, publish=publish,
-                    wrong=wrong if kind == WRONG else (),
-                )  # fmt: skip
-                print(f"{name} written in {time.perf_counter() - start:.1f} s", file=sys.stderr, flush=True)
-        elif args.command == "score":
-            catalogue = tuple(c for c in args.catalogue.split(",") if c)
-            scores = score(args.keys, args.results, catalogue)
-            print(scores.text())
-            print(f"\n{target_table(targets(scores, catalogue))}")
-            if args.markdown is not None:
-                write(args.markdown, markdown(scores, catalogue))
-            if args.figure is not None:
-                figure(scores, args.figure)
-        elif args.command == "report":
-            results = args.results or args.folder / "results"
-            print(f"written: {report(args.folder, results, args.out, args.words)}")
-        elif args.command == "blocks":
-            if args.first is not None and args.first < 1:
-                raise ValueError(f"--first {args.first} is not allowed: at least 1")
-            page_of = blocks_page(args.folder, args.results or args.folder / "results", args.out, args.words, first=args.first)
-            print(f"written: {page_of}")
-        else:
-            print(selfcheck(args.golden))
+        args.run(args)
     except (ValueError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 2

@@ -1,4 +1,6 @@
-"""The page of a trial of plan `blocks`: naming beside an effect of no catalogue, and parameters that are far off."""
+"""The page of a trial of plan `blocks`: naming beside an effect of no catalogue, and parameters
+that are far off.
+"""
 
 from __future__ import annotations
 
@@ -51,9 +53,14 @@ def _both(told: Iterable[bool]) -> str:
 
 
 def _naming(rows: Sequence[Row], labels: Sequence[str]) -> str:
-    """Right names by strength and by what stands beside; the difference to the same effects alone."""
+    """Right names by strength and by what stands beside; the difference to the same effects
+    alone.
+    """
     body = []
-    for name, chosen in [*((f"{label}, {LABELS[label]:g} noises", [label]) for label in labels), ("all", list(labels))]:
+    for name, chosen in [
+        *((f"{label}, {LABELS[label]:g} noises", [label]) for label in labels),
+        ("all", list(labels)),
+    ]:
         kept = [r for r in rows if r.labels and r.labels[0] in chosen]
         groups = {words: [r for r in kept if beside(r) == words] for words in BESIDE.values()}
         alone = groups["alone"]
@@ -63,12 +70,35 @@ def _naming(rows: Sequence[Row], labels: Sequence[str]) -> str:
                 points = f"{100.0 * (_hits(group) / len(group) - _hits(alone) / len(alone)):+.1f}"
                 # the same effect of the same case, alone and not
                 before = {(r.seed, r.ids[0]): r.outcome == "right" for r in alone}
-                pairs = [(before[r.seed, r.ids[0]], r.outcome == "right") for r in group if (r.seed, r.ids[0]) in before]
-                changed = f"{sum(a and not b for a, b in pairs)}, {sum(b and not a for a, b in pairs)}"
+                pairs = [
+                    (before[r.seed, r.ids[0]], r.outcome == "right")
+                    for r in group
+                    if (r.seed, r.ids[0]) in before
+                ]
+                changed = (
+                    f"{sum(a and not b for a, b in pairs)}, {sum(b and not a for a, b in pairs)}"
+                )
             chance = _mean(r.name_probability for r in group)
             contains = _share(r.contains for r in group)
-            body.append((name, words, _both(r.outcome == "right" for r in group), points, changed, contains, chance))
-    head = ("strength", "", "right name first (95 % interval)", "difference, points", "lost, gained", "name or set holds it")
+            body.append(
+                (
+                    name,
+                    words,
+                    _both(r.outcome == "right" for r in group),
+                    points,
+                    changed,
+                    contains,
+                    chance,
+                )
+            )
+    head = (
+        "strength",
+        "",
+        "right name first (95 % interval)",
+        "difference, points",
+        "lost, gained",
+        "name or set holds it",
+    )
     return table((*head, "mean probability on the name"), body)
 
 
@@ -76,11 +106,21 @@ def _by(rows: Sequence[Row], heading: str, key: Callable[[Row], str]) -> str:
     """Right names and mean probability by any property and by what stands beside."""
     body = []
     for name in sorted({key(r) for r in rows}):
-        groups = [[r for r in rows if key(r) == name and beside(r) == words] for words in BESIDE.values()]
+        groups = [
+            [r for r in rows if key(r) == name and beside(r) == words] for words in BESIDE.values()
+        ]
         body.append(
             (
                 name,
-                *(f"{_share(r.outcome == 'right' for r in g)}; {_mean(r.name_probability for r in g)}" if g else "-" for g in groups),
+                *(
+                    (
+                        f"{_share(r.outcome == 'right' for r in g)}; "
+                        f"{_mean(r.name_probability for r in g)}"
+                    )
+                    if g
+                    else "-"
+                    for g in groups
+                ),
             )
         )
     return table((heading, *BESIDE.values()), body)
@@ -94,7 +134,9 @@ def _rest(rows: Sequence[Row]) -> str:
         there = [r.rest_said for r in group if r.rest_said is not None]
         none = [bool(r.unexplained) for r in group if not r.mixed]
         body.append((words, _both(there), _both(none)))
-    return table(("", "unexplained rest is said, in the right block", "said where there is none"), body)
+    return table(
+        ("", "unexplained rest is said, in the right block", "said where there is none"), body
+    )
 
 
 def _far(rows: Sequence[Row]) -> str:
@@ -124,7 +166,10 @@ def _far(rows: Sequence[Row]) -> str:
     for way, sign in (("upwards", 1.0), ("downwards", -1.0)):
         for low, high in SIZES:
             size = f"{low:g} to {high:g} tolerances"
-            line(f"{way}, {size}", [r for r in rows if sign * r.wrong[0][1] > 0.0 and size_of(r.wrong[0][1]) == size])
+            line(
+                f"{way}, {size}",
+                [r for r in rows if sign * r.wrong[0][1] > 0.0 and size_of(r.wrong[0][1]) == size],
+            )
         line(way, [r for r in rows if sign * r.wrong[0][1] > 0.0])
     line("all", rows)
     head = (
@@ -134,7 +179,10 @@ def _far(rows: Sequence[Row]) -> str:
         "another parameter named",
         "an effect, unlisted or a rest claimed",
     )
-    return table((*head, "95 % interval holds the value", "held out, error / noise", "mean probability"), body)
+    return table(
+        (*head, "95 % interval holds the value", "held out, error / noise", "mean probability"),
+        body,
+    )
 
 
 def _false(rows: Sequence[Row]) -> str:
@@ -149,8 +197,22 @@ def _false(rows: Sequence[Row]) -> str:
         claimed = [r.detected for r in group]
         left = [bool(r.unexplained) and not r.detected for r in group]
         called = [bool(r.wrong_named) for r in group if not r.wrong]
-        body.append((name, str(len(group)), _share(claimed), _share(left), _share(called), _both(r.false_name for r in group)))
-    head = ("truth", "cases", "an effect or unlisted is the verdict", "only a rest called unexplained")
+        body.append(
+            (
+                name,
+                str(len(group)),
+                _share(claimed),
+                _share(left),
+                _share(called),
+                _both(r.false_name for r in group),
+            )
+        )
+    head = (
+        "truth",
+        "cases",
+        "an effect or unlisted is the verdict",
+        "only a rest called unexplained",
+    )
     return table((*head, "a parameter called wrong on a null", "false names (95 % interval)"), body)
 
 
@@ -160,7 +222,9 @@ def _truth(row: Row) -> str:
     if not row.ids:
         return row.truth
     labels = row.labels or ("",) * len(row.ids)
-    return " beside ".join(f"{name} ({label})" if label else name for name, label in zip(row.ids, labels, strict=True))
+    return " beside ".join(
+        f"{name} ({label})" if label else name for name, label in zip(row.ids, labels, strict=True)
+    )
 
 
 def tables(scores: Scores) -> str:
@@ -170,12 +234,19 @@ def tables(scores: Scores) -> str:
     labels = [label for label in LABELS if any(r.labels[:1] == (label,) for r in gas)]
     far = [r for r in rows if r.wrong]
     poor = [r for r in rows if r.outcome != "right" or r.false_name]
-    listing = [(r.case, _truth(r), r.said, r.outcome + (", false name" if r.false_name else "")) for r in poor]
+    listing = [
+        (r.case, _truth(r), r.said, r.outcome + (", false name" if r.false_name else ""))
+        for r in poor
+    ]
     parts = [
-        "## Naming an effect of the gas blocks, alone and beside an effect of no catalogue in the arm\n",
-        "The three cases of a group have the same effect of the gas blocks, the same baseline and the same noise. Strengths are "
-        "multiples of the noise, measured as the keys tell. Right: verdict `effects` and the name of the gas effect first; what is "
-        "said of the rest is counted apart. Lost, gained: groups named right alone only, and beside the other only.\n",
+        (
+            "## Naming an effect of the gas blocks, alone and beside an effect of no catalogue in "
+            "the arm\n"
+        ),
+        "The three cases of a group have the same effect of the gas blocks, the same baseline and "
+        "the same noise. Strengths are multiples of the noise, measured as the keys tell. Right: "
+        "verdict `effects` and the name of the gas effect first; what is said of the rest is "
+        "counted apart. Lost, gained: groups named right alone only, and beside the other only.\n",
         _naming(gas, labels),
         "\nRight name first, of so many; mean probability on the name.\n",
         _by(gas, "effect", lambda r: r.ids[0]),
@@ -184,9 +255,10 @@ def tables(scores: Scores) -> str:
         "\n## The unexplained rest\n",
         _rest(gas),
         "\n## Parameters far outside their tolerance\n",
-        "Named: verdict `parameters` and exactly the right names. The error on held-out recordings is that of the worst channel "
-        "after the diagnosis, in units of its noise (median over the cases). Viscous friction has no room downwards and is put "
-        "upwards instead; dead volume goes down by less than 5 tolerances only.\n",
+        "Named: verdict `parameters` and exactly the right names. The error on held-out recordings "
+        "is that of the worst channel after the diagnosis, in units of its noise (median over the "
+        "cases). Viscous friction has no room downwards and is put upwards instead; dead volume "
+        "goes down by less than 5 tolerances only.\n",
         _far(far) if far else "No such case.",
         "\n## False names where no effect is concealed\n",
         _false(rows),
@@ -197,7 +269,12 @@ def tables(scores: Scores) -> str:
 
 
 def blocks_page(
-    folder: Path, results: Path, out: Path, command: str, catalogue: Sequence[str] = LISTED, first: int | None = None
+    folder: Path,
+    results: Path,
+    out: Path,
+    command: str,
+    catalogue: Sequence[str] = LISTED,
+    first: int | None = None,
 ) -> Path:
     """Score a trial of plan `blocks` and write its page ``blocks.md``.
 
@@ -214,7 +291,8 @@ def blocks_page(
     catalogue : sequence of str
         As in :func:`trial.score.score`.
     first : int, optional
-        Only the first so many cases, where a run was ended before the last: they stand in random order, so that these are a fair share.
+        Only the first so many cases, where a run was ended before the last: they stand in random
+        order, so that these are a fair share.
 
     Returns
     -------
@@ -229,8 +307,14 @@ def blocks_page(
     digest, count = checked(folder)
     run = run_of(results, digest)
     scores = score(folder / "keys", results, catalogue, first)
-    head = ["# Blocks judged apart, and parameters far outside their tolerance\n", *about(folder, digest, count, run, command)]
+    head = [
+        "# Blocks judged apart, and parameters far outside their tolerance\n",
+        *about(folder, digest, count, run, command),
+    ]
     if first is not None and first < count:
-        head.append(f"**Scored are the first {first} of the {count} cases**, which stand in random order: the run was ended there.\n")
+        head.append(
+            f"**Scored are the first {first} of the {count} cases**, which stand in random order: "
+            "the run was ended there.\n"
+        )
     write(out / "blocks.md", "\n".join([*head, tables(scores)]))
     return out / "blocks.md"

@@ -1,4 +1,6 @@
-"""Write concealed cases: nominal rig, recordings of a plant that differs from it, and the key elsewhere."""
+"""Write concealed cases: nominal rig, recordings of a plant that differs from it, and the key
+elsewhere.
+"""
 
 from __future__ import annotations
 
@@ -32,10 +34,11 @@ _NO_EFFECT = ("none", "parameters", WRONG)
 class Spec:
     """What a case is made from.
 
-    `kind` is "none", "parameters", "wrong_parameter", an effect id, or ids joined by "+". With `wanted` (one label of
-    :data:`trial.strength.LABELS` per effect) the effects are scaled to that reach, else by `strength`. `measure`
-    is what the multiple of the noise is of: "reach", or "left", what a refit of the baseline leaves of it. `wrong`
-    lists the parameters that are far off, dotted name and tolerances with their sign, of the kind "wrong_parameter".
+    `kind` is "none", "parameters", "wrong_parameter", an effect id, or ids joined by "+". With
+    `wanted` (one label of :data:`trial.strength.LABELS` per effect) the effects are scaled to that
+    reach, else by `strength`. `measure` is what the multiple of the noise is of: "reach", or
+    "left", what a refit of the baseline leaves of it. `wrong` lists the parameters that are far
+    off, dotted name and tolerances with their sign, of the kind "wrong_parameter".
     """
 
     name: str
@@ -82,17 +85,23 @@ def write(path: Path, text: str) -> None:
 
 
 def _csv(record: Record) -> str:
-    lines = ["time [s],valve_command [V],supply_pressure [bar],muscle_pressure [bar],joint_angle [deg]"]
+    lines = [
+        "time [s],valve_command [V],supply_pressure [bar],muscle_pressure [bar],joint_angle [deg]"
+    ]
     lines += [
         f"{t:.3f},{u:.4f},{ps / 1e5:.5f},{p / 1e5:.5f},{math.degrees(a):.3f}"
-        for t, u, (p, ps, a) in zip(record.time.tolist(), record.command.tolist(), record.logged.tolist(), strict=True)
+        for t, u, (p, ps, a) in zip(
+            record.time.tolist(), record.command.tolist(), record.logged.tolist(), strict=True
+        )
     ]
     return "\n".join(lines) + "\n"
 
 
 def _case_toml(recordings: Sequence[tuple[str, str]]) -> str:
     blocks = ['schema = "pamrs.case/1"\nrig = "rig.toml"\n']
-    blocks += [f'[[recording]]\nfile = "{name}.csv"\nrole = "{role}"\n' for name, role in recordings]
+    blocks += [
+        f'[[recording]]\nfile = "{name}.csv"\nrole = "{role}"\n' for name, role in recordings
+    ]
     return "\n".join(blocks)
 
 
@@ -128,29 +137,44 @@ class _Bench:
             self.supply.append(par.supply_pressure + float(own.uniform(-1.0, 1.0)) * supply_tol)
             self.prepared.append(prepare(nominal, name, spec.duration, own))
 
-    def measure(self, effects: Effects, known: dict[int, Measured] | None = None, fit_only: bool = False) -> dict[int, Measured]:
+    def measure(
+        self, effects: Effects, known: dict[int, Measured] | None = None, fit_only: bool = False
+    ) -> dict[int, Measured]:
         """Record and reach of the recordings by number; those in `known` are kept."""
         plant = Plant(self.par, effects)
         found = dict(known or {})
         for i, (made, supply) in enumerate(zip(self.prepared, self.supply, strict=True)):
             if i in found or (fit_only and i not in self.fit):
                 continue
-            record = run(plant, *made, supply, self.noise, np.random.default_rng([self.spec.seed, i, 78]), i)
-            found[i] = (record, record.clean - follow(self.bare, record, i) if effects.items or self.moves else np.zeros((1, 3)))
+            record = run(
+                plant, *made, supply, self.noise, np.random.default_rng([self.spec.seed, i, 78]), i
+            )
+            found[i] = (
+                record,
+                record.clean - follow(self.bare, record, i)
+                if effects.items or self.moves
+                else np.zeros((1, 3)),
+            )
         return found
 
     def most_moved(self, measured: dict[int, Measured]) -> tuple[str, float]:
         """Channel that moves most in a recording to fit, and its reach."""
-        tops = [max(reach(measured[i][1], self.noise).items(), key=lambda item: item[1]) for i in self.fit]
+        tops = [
+            max(reach(measured[i][1], self.noise).items(), key=lambda item: item[1])
+            for i in self.fit
+        ]
         return max(tops, key=lambda item: item[1])
 
     def left(self, measured: dict[int, Measured]) -> float:
-        """Reach that is left of the recordings to fit when the baseline is refitted within its tolerances.
+        """Reach that is left of the recordings to fit when the baseline is refitted within its
+        tolerances.
 
         The sensitivities are those of the recordings of the first call.
         """
         if self._remainder is None:
-            self._remainder = Remainder(self.true, self.tolerance, [(measured[i][0], i) for i in self.fit], self.noise)
+            self._remainder = Remainder(
+                self.true, self.tolerance, [(measured[i][0], i) for i in self.fit], self.noise
+            )
         found = self._remainder.of([measured[i][1] for i in self.fit])
         return max(max(reach(moved, self.noise).values()) for moved in found)
 
@@ -187,22 +211,33 @@ def _verdict(kind: str, ids: Sequence[str]) -> str:
     return "effects" if any(i in LISTED for i in ids) else "unlisted"
 
 
-def generate(spec: Spec, rig: Path) -> Case:
-    """Make one case in memory; the same arguments give the same bytes."""
-    model, tolerance = read_rig(rig)
-    rng = np.random.default_rng([spec.seed, 20140517])
-    wrong = dict(spec.wrong)
-    true, moved = draw_parameters(spec.kind, model, tolerance, rng, wrong)
-    ids = [p for p in spec.kind.split("+") if p not in _NO_EFFECT]
-    noise = Noise(
+def _noise(rng: np.random.Generator) -> Noise:
+    """Noise and steps of the transducers of one case."""
+    return Noise(
         pressure=float(rng.uniform(300.0, 600.0)),
         pressure_step=float(rng.choice([42.0, 84.0])),
         angle=math.radians(float(rng.uniform(0.01, 0.02))),
         angle_step=ANGLE_STEP,
     )
-    bench = _Bench(spec, true, tolerance, _nominal(rig), noise, _put(true, _values(model, wrong)) if wrong else None)
+
+
+@dataclass(frozen=True)
+class _Chosen:
+    """The effects of a case, the reach of each alone where it was aimed at, and the recordings of
+    the last one alone.
+    """
+
+    effects: Effects
+    alone: dict[str, float]
+    known: dict[int, Measured]
+
+
+def _choose(spec: Spec, ids: Sequence[str], bench: _Bench, rng: np.random.Generator) -> _Chosen:
+    """Draw the effects and scale them to what is wanted."""
     start = float(np.median(bench.supply))
-    setting = Setting(len(spec.recordings), spec.duration, start, bench.par.payload, bench.par.coulomb)
+    setting = Setting(
+        len(spec.recordings), spec.duration, start, bench.par.payload, bench.par.coulomb
+    )
     alone: dict[str, float] = {}
     known: dict[int, Measured] = {}
     chosen = []
@@ -218,55 +253,98 @@ def generate(spec: Spec, rig: Path) -> Case:
                     break
             effect = effect.scaled(factor)
         chosen.append(effect)
-    effects = Effects(*chosen)
-    measured = bench.measure(effects, known if len(ids) == 1 else None)
+    return _Chosen(Effects(*chosen), alone, known)
+
+
+def _reached(bench: _Bench, measured: dict[int, Measured], concealed: bool) -> dict[str, Any]:
+    """What the key says of how far the channels move; nothing moves where nothing is concealed."""
     channel, size, left = None, 0.0, 0.0
-    if ids or wrong:
+    if concealed:
         channel, size = bench.most_moved(measured)
         left = bench.left(measured)
-    runs: dict[str, Any] = {}
-    for i, (name, role) in enumerate(spec.recordings):
-        runs[name] = {"role": role, "initial_supply_pressure": bench.supply[i], "reach": reach(measured[i][1], noise)}
+    return {"reach": size, "reach_channel": channel, "reach_left": left}
+
+
+def generate(spec: Spec, rig: Path) -> Case:
+    """Make one case in memory; the same arguments give the same bytes."""
+    model, tolerance = read_rig(rig)
+    rng = np.random.default_rng([spec.seed, 20140517])
+    wrong = dict(spec.wrong)
+    true, moved = draw_parameters(spec.kind, model, tolerance, rng, wrong)
+    ids = [p for p in spec.kind.split("+") if p not in _NO_EFFECT]
+    noise = _noise(rng)
+    believed = _put(true, _values(model, wrong)) if wrong else None
+    bench = _Bench(spec, true, tolerance, _nominal(rig), noise, believed)
+    chosen = _choose(spec, ids, bench, rng)
+    measured = bench.measure(chosen.effects, chosen.known if len(ids) == 1 else None)
+    reached = _reached(bench, measured, bool(ids or wrong))
     key: dict[str, Any] = {
         "schema": "pamrs.trial-key/1",
         "case": spec.name,
         "kind": spec.kind,
         "verdict": _verdict(spec.kind, ids),
         "effects": ids,
-        "blocks": {e.id: e.block for e in effects},
-        "effect_parameters": effects.to_dict(),
+        "blocks": {e.id: e.block for e in chosen.effects},
+        "effect_parameters": chosen.effects.to_dict(),
         "strength": spec.strength,
         "wanted": dict(zip(ids, spec.wanted, strict=False)),
         "measure": spec.measure,
         "duration": spec.duration,
-        "reach": size,
-        "reach_channel": channel,
-        "reach_alone": alone,
-        "reach_left": left,
+        "reach": reached["reach"],
+        "reach_channel": reached["reach_channel"],
+        "reach_alone": chosen.alone,
+        "reach_left": reached["reach_left"],
         "parameters": _values(true, moved),
         "moved_tolerances": moved,
         "noise": asdict(noise),
-        "recordings": runs,
+        "recordings": {
+            name: {
+                "role": role,
+                "initial_supply_pressure": bench.supply[i],
+                "reach": reach(measured[i][1], noise),
+            }
+            for i, (name, role) in enumerate(spec.recordings)
+        },
         "seed": spec.seed,
     }
     if wrong:
-        nominal, value = _values(model, wrong), _values(true, wrong)
-        key["wrong_parameters"] = {k: {"nominal": nominal[k], "value": value[k], "tolerances": z} for k, z in wrong.items()}
+        key["wrong_parameters"] = _wrong_entries(model, true, wrong)
     files = {f"{name}.csv": _csv(measured[i][0]) for i, (name, _) in enumerate(spec.recordings)}
-    files = {"rig.toml": rig.read_text(encoding="utf-8"), **files, "case.toml": _case_toml(spec.recordings)}
+    files = {
+        "rig.toml": rig.read_text(encoding="utf-8"),
+        **files,
+        "case.toml": _case_toml(spec.recordings),
+    }
     return Case(spec.name, json.dumps(key, indent=1) + "\n", files)
+
+
+def _wrong_entries(
+    model: dict[str, Any], true: dict[str, Any], wrong: dict[str, float]
+) -> dict[str, dict[str, float]]:
+    """The parameters that are far off: what the rig file says, what is true, and by how many
+    tolerances.
+    """
+    nominal, value = _values(model, wrong), _values(true, wrong)
+    return {
+        k: {"nominal": nominal[k], "value": value[k], "tolerances": z} for k, z in wrong.items()
+    }
 
 
 def _check_wrong(wrong: Sequence[tuple[str, float]], rig: Path) -> None:
     """Refuse parameters without a tolerance, and values that are not positive."""
     model, tolerance = read_rig(rig)
-    allowed = [n for n in tolerance if not n.startswith("sensors.") and n != "supply.initial_pressure"]
+    allowed = [
+        n for n in tolerance if not n.startswith("sensors.") and n != "supply.initial_pressure"
+    ]
     for name, z in wrong:
         if name not in allowed:
             raise ValueError(f"unknown parameter {name!r}; known: {', '.join(allowed)}")
         least = -_values(model, [name])[name] / tolerance[name]
         if not (math.isfinite(z) and z > least):
-            raise ValueError(f"{name}: {z:g} tolerances off is not allowed, more than {least:.3g} are (the value stays positive)")
+            raise ValueError(
+                f"{name}: {z:g} tolerances off is not allowed, more than {least:.3g} are (the "
+                "value stays positive)"
+            )
 
 
 def make_case(
@@ -290,9 +368,11 @@ def make_case(
     Parameters
     ----------
     out, keys : Path
-        Folder of the cases and folder of the keys (must differ, and the keys must not lie inside the cases).
+        Folder of the cases and folder of the keys (must differ, and the keys must not lie inside
+        the cases).
     kind : str
-        One of :data:`trial.effects.KINDS`, "wrong_parameter", "random", or effects joined by "+" for a pair.
+        One of :data:`trial.effects.KINDS`, "wrong_parameter", "random", or effects joined by "+"
+        for a pair.
     seed : int
         Everything is determined by the seed, the kind and the other arguments.
     name : str
@@ -300,7 +380,8 @@ def make_case(
     strength : float
         Size of the effect; 1 is moderate.
     wanted : str, optional
-        "weak", "medium", "strong" or "heavy": scale every effect until it reaches that multiple of the noise.
+        "weak", "medium", "strong" or "heavy": scale every effect until it reaches that multiple of
+        the noise.
     measure : str
         "reach", or "left": the multiple is of what a refit of the baseline leaves.
     recordings : int
@@ -322,8 +403,8 @@ def make_case(
     Raises
     ------
     ValueError
-        Unknown kind, bad duration or number of recordings, a wrong parameter that cannot be, or keys inside the folder of
-        the cases.
+        Unknown kind, bad duration or number of recordings, a wrong parameter that cannot be, or
+        keys inside the folder of the cases.
     """
     out, keys = Path(out), Path(keys)
     if keys.resolve().is_relative_to((out / name).resolve()):
@@ -340,8 +421,13 @@ def make_case(
     if kind == "random":
         kind = str(np.random.default_rng([seed, 5]).choice(KINDS))
     parts = kind.split("+")
-    if any(p not in (*KINDS, WRONG) for p in parts) or (len(parts) > 1 and set(_NO_EFFECT) & set(parts)):
-        raise ValueError(f"unknown kind {kind!r}; known: {', '.join((*KINDS, WRONG))}, random, and effects joined by '+'")
+    if any(p not in (*KINDS, WRONG) for p in parts) or (
+        len(parts) > 1 and set(_NO_EFFECT) & set(parts)
+    ):
+        raise ValueError(
+            f"unknown kind {kind!r}; known: {', '.join((*KINDS, WRONG))}, random, and effects "
+            "joined by '+'"
+        )
     if (kind == WRONG) != bool(wrong):
         raise ValueError(f"wrong parameters and the kind {WRONG!r} go together")
     rig = (rig or default_rig()).resolve()
@@ -357,7 +443,9 @@ def make_case(
 
 
 def store(case: Case, out: Path) -> None:
-    """Write the files of a case below `out`; its list of recordings comes last and says that it is complete."""
+    """Write the files of a case below `out`; its list of recordings comes last and says that it is
+    complete.
+    """
     for file, content in case.files.items():
         write(out / case.name / file, content)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,7 +35,8 @@ def select(count: int) -> list[tuple[str, str]]:
 
 @dataclass(frozen=True)
 class Excitation:
-    """Reference angle [rad], masks of samples with the valve at its believed null and wide open to vent, dither [V].
+    """Reference angle [rad], masks of samples with the valve at its believed null and wide open to
+    vent, dither [V].
 
     All of shape (n,). With `open_loop` the commands are found on the nominal plant and replayed.
     """
@@ -57,6 +59,132 @@ def _ramps(time: Array, points: list[tuple[float, float]], smooth: bool) -> Arra
     return np.asarray(v[i] + (v[i + 1] - v[i]) * 0.5 * (1.0 - np.cos(np.pi * s)))
 
 
+@dataclass(frozen=True)
+class _Course:
+    """Reference angle [deg], and masks and dither as :class:`Excitation` has them; None where there
+    are none.
+    """
+
+    angle: Array
+    sealed: NDArray[np.bool_] | None = None
+    dither: Array | None = None
+    vent: NDArray[np.bool_] | None = None
+
+
+@dataclass(frozen=True)
+class _Clock:
+    """Times of the samples [s], shape (n,), and how long they and one of them take [s]."""
+
+    time: Array
+    duration: float
+    sample_time: float
+
+
+def _lift_hold(clock: _Clock, rng: np.random.Generator) -> _Course:
+    """Lifts to random levels with holds, now and then back down."""
+    points = [(0.0, 16.0)]
+    while points[-1][0] < clock.duration:
+        t, level = points[-1]
+        goal = float(rng.uniform(30.0, 85.0))
+        if abs(goal - level) < 15.0:
+            goal = level + math.copysign(20.0, goal - level)
+        move, hold = float(rng.uniform(3.0, 6.0)), float(rng.uniform(3.0, 5.0))
+        points += [(t + move, goal), (t + move + hold, goal)]
+        if rng.random() < 0.4:
+            points += [(points[-1][0] + move, 18.0), (points[-1][0] + move + 1.5, 18.0)]
+    return _Course(_ramps(clock.time, points, smooth=True))
+
+
+def _multisine(clock: _Clock, rng: np.random.Generator) -> _Course:
+    """Nine sines about a level, faded in, with a dither on the command."""
+    time = clock.time
+    base = np.geomspace(0.08, 2.2, 9) * rng.uniform(0.9, 1.1, 9)
+    size = 1.0 / np.sqrt(1.0 + (base / 0.5) ** 2)
+    phase = rng.uniform(0.0, 2.0 * np.pi, (9, 1))
+    wave = (size[:, None] * np.sin(2.0 * np.pi * base[:, None] * time + phase)).sum(axis=0)
+    wave *= 26.0 / np.abs(wave).max()
+    fade = np.clip(time / 3.0, 0.0, 1.0)
+    angle = 16.0 + fade * (float(rng.uniform(48.0, 58.0)) - 16.0 + wave)
+    every = max(1, round(0.06 / clock.sample_time))
+    n = len(time)
+    dither = np.repeat(rng.choice([-0.15, 0.15], n // every + 1), every)[:n]
+    return _Course(angle, dither=dither)
+
+
+def _sealed_holds(clock: _Clock, rng: np.random.Generator) -> _Course:
+    """Moves to random levels; the valve is held closed at each."""
+    time = clock.time
+    angle, sealed = np.full(len(time), 16.0), np.zeros(len(time), dtype=bool)
+    t, level = 0.0, 16.0
+    while t < clock.duration:
+        goal = float(rng.uniform(30.0, 95.0))
+        if abs(goal - level) < 12.0:
+            goal = level + math.copysign(18.0, 60.0 - level)
+        move, hold = float(rng.uniform(1.5, 3.5)), float(rng.uniform(5.0, 8.0))
+        settle = move + float(rng.uniform(0.3, 1.0))
+        part = (time >= t) & (time < t + settle + hold)
+        points = [(0.0, level), (move, goal), (settle + hold + 1.0, goal)]
+        angle[part] = _ramps(time[part] - t, points, smooth=True)
+        sealed |= (time >= t + settle) & (time < t + settle + hold)
+        t, level = t + settle + hold, goal
+    return _Course(angle, sealed=sealed)
+
+
+def _angle_steps(clock: _Clock, rng: np.random.Generator) -> _Course:
+    """Quick steps to random levels."""
+    points = [(0.0, 16.0)]
+    while points[-1][0] < clock.duration:
+        t, level = points[-1]
+        goal = float(rng.uniform(20.0, 95.0))
+        hold = float(rng.uniform(1.5, 4.0))
+        move = max(0.25, abs(goal - level) / 120.0)
+        points += [(t + move, goal), (t + move + hold, goal)]
+    return _Course(_ramps(clock.time, points, smooth=False))
+
+
+def _slow_triangle(clock: _Clock, rng: np.random.Generator) -> _Course:
+    """Slowly up and down, with a small loop on the way down."""
+    points = [(0.0, 16.0)]
+    top = float(rng.uniform(75.0, 95.0))
+    points.append((float(rng.uniform(0.4, 0.5)) * clock.duration, top))
+    middle = float(rng.uniform(55.0, 65.0))
+    points.append((points[-1][0] + (top - middle) / 4.0, middle))
+    inner = middle + float(rng.uniform(8.0, 14.0))
+    points.append((points[-1][0] + (inner - middle) / 4.0, inner))
+    points.append((max(clock.duration, points[-1][0] + 5.0), 18.0))
+    return _Course(_ramps(clock.time, points, smooth=False))
+
+
+def _open_cycles(clock: _Clock, rng: np.random.Generator) -> _Course:
+    """Fills in one or two moves with sealed pauses, then vents.
+
+    Every cycle starts afresh, so that errors do not pile up.
+    """
+    time = clock.time
+    sealed, vent = np.zeros(len(time), dtype=bool), np.zeros(len(time), dtype=bool)
+    points = [(0.0, 16.0)]
+    while points[-1][0] < clock.duration:
+        t = points[-1][0]
+        for level in rng.uniform(30.0, 80.0, int(rng.integers(1, 3))).tolist():
+            move, hold = float(rng.uniform(0.8, 2.5)), float(rng.uniform(1.0, 2.5))
+            points += [(t + move, level), (t + move + hold, level)]
+            sealed |= (time >= t + move + 0.4) & (time < t + move + hold)
+            t += move + hold
+        points += [(t + 0.1, 15.5), (t + 2.2, 15.5)]
+        vent |= (time >= t) & (time < t + 2.2)
+    return _Course(_ramps(time, points, smooth=True), sealed=sealed, vent=vent)
+
+
+_COURSES: dict[str, Callable[[_Clock, np.random.Generator], _Course]] = {
+    "lift_hold": _lift_hold,
+    "multisine": _multisine,
+    "sealed_holds": _sealed_holds,
+    "angle_steps": _angle_steps,
+    "slow_triangle": _slow_triangle,
+    "open_cycles": _open_cycles,
+}
+
+
 def build(name: str, duration: float, sample_time: float, rng: np.random.Generator) -> Excitation:
     """Build one excitation.
 
@@ -74,81 +202,24 @@ def build(name: str, duration: float, sample_time: float, rng: np.random.Generat
     ValueError
         Unknown name.
     """
+    if name not in _COURSES:
+        raise ValueError(
+            f"unknown excitation {name!r}; known: {', '.join(r[0] for r in RECORDINGS)}"
+        )
     n = round(duration / sample_time)
-    time = sample_time * np.arange(n)
-    sealed = np.zeros(n, dtype=bool)
-    vent = np.zeros(n, dtype=bool)
-    dither = np.zeros(n)
-    points = [(0.0, 16.0)]
-    if name == "lift_hold":
-        while points[-1][0] < duration:
-            t, level = points[-1]
-            goal = float(rng.uniform(30.0, 85.0))
-            if abs(goal - level) < 15.0:
-                goal = level + math.copysign(20.0, goal - level)
-            move, hold = float(rng.uniform(3.0, 6.0)), float(rng.uniform(3.0, 5.0))
-            points += [(t + move, goal), (t + move + hold, goal)]
-            if rng.random() < 0.4:
-                points += [(points[-1][0] + move, 18.0), (points[-1][0] + move + 1.5, 18.0)]
-        angle = _ramps(time, points, smooth=True)
-    elif name == "multisine":
-        base = np.geomspace(0.08, 2.2, 9) * rng.uniform(0.9, 1.1, 9)
-        size = 1.0 / np.sqrt(1.0 + (base / 0.5) ** 2)
-        wave = (size[:, None] * np.sin(2.0 * np.pi * base[:, None] * time + rng.uniform(0.0, 2.0 * np.pi, (9, 1)))).sum(axis=0)
-        wave *= 26.0 / np.abs(wave).max()
-        fade = np.clip(time / 3.0, 0.0, 1.0)
-        angle = 16.0 + fade * (float(rng.uniform(48.0, 58.0)) - 16.0 + wave)
-        every = max(1, round(0.06 / sample_time))
-        dither = np.repeat(rng.choice([-0.15, 0.15], n // every + 1), every)[:n]
-    elif name == "sealed_holds":
-        angle = np.full(n, 16.0)
-        t, level = 0.0, 16.0
-        while t < duration:
-            goal = float(rng.uniform(30.0, 95.0))
-            if abs(goal - level) < 12.0:
-                goal = level + math.copysign(18.0, 60.0 - level)
-            move, hold = float(rng.uniform(1.5, 3.5)), float(rng.uniform(5.0, 8.0))
-            settle = move + float(rng.uniform(0.3, 1.0))
-            part = (time >= t) & (time < t + settle + hold)
-            angle[part] = _ramps(time[part] - t, [(0.0, level), (move, goal), (settle + hold + 1.0, goal)], smooth=True)
-            sealed |= (time >= t + settle) & (time < t + settle + hold)
-            t, level = t + settle + hold, goal
-    elif name == "angle_steps":
-        while points[-1][0] < duration:
-            t, level = points[-1]
-            goal = float(rng.uniform(20.0, 95.0))
-            hold = float(rng.uniform(1.5, 4.0))
-            move = max(0.25, abs(goal - level) / 120.0)
-            points += [(t + move, goal), (t + move + hold, goal)]
-        angle = _ramps(time, points, smooth=False)
-    elif name == "slow_triangle":
-        top = float(rng.uniform(75.0, 95.0))
-        points.append((float(rng.uniform(0.4, 0.5)) * duration, top))
-        middle = float(rng.uniform(55.0, 65.0))
-        points.append((points[-1][0] + (top - middle) / 4.0, middle))
-        inner = middle + float(rng.uniform(8.0, 14.0))
-        points.append((points[-1][0] + (inner - middle) / 4.0, inner))
-        points.append((max(duration, points[-1][0] + 5.0), 18.0))
-        angle = _ramps(time, points, smooth=False)
-    elif name == "open_cycles":
-        # fill in one or two moves with sealed pauses, then vent: every cycle starts afresh, so that errors do not pile up
-        while points[-1][0] < duration:
-            t = points[-1][0]
-            for level in rng.uniform(30.0, 80.0, int(rng.integers(1, 3))).tolist():
-                move, hold = float(rng.uniform(0.8, 2.5)), float(rng.uniform(1.0, 2.5))
-                points += [(t + move, level), (t + move + hold, level)]
-                sealed |= (time >= t + move + 0.4) & (time < t + move + hold)
-                t += move + hold
-            points += [(t + 0.1, 15.5), (t + 2.2, 15.5)]
-            vent |= (time >= t) & (time < t + 2.2)
-        angle = _ramps(time, points, smooth=True)
-    else:
-        raise ValueError(f"unknown excitation {name!r}; known: {', '.join(r[0] for r in RECORDINGS)}")
-    return Excitation(np.radians(np.clip(angle, 15.5, 105.0)), sealed, dither, vent, name == "open_cycles")
+    course = _COURSES[name](_Clock(sample_time * np.arange(n), duration, sample_time), rng)
+    return Excitation(
+        np.radians(np.clip(course.angle, 15.5, 105.0)),
+        np.zeros(n, dtype=bool) if course.sealed is None else course.sealed,
+        np.zeros(n) if course.dither is None else course.dither,
+        np.zeros(n, dtype=bool) if course.vent is None else course.vent,
+        name == "open_cycles",
+    )
 
 
 class Controller:
-    """PID on the angle with feedforward from the nominal model over an inner pressure loop, 12-bit output.
+    """PID on the angle with feedforward from the nominal model over an inner pressure loop, 12-bit
+    output.
 
     Parameters
     ----------
@@ -182,8 +253,12 @@ class Controller:
         """Nearest DAC level [V] within 0 to 10 V."""
         return round(min(max(command, 0.0), 10.0) / DAC_STEP) * DAC_STEP
 
-    def __call__(self, reference: float, angle: float, pressure: float, dither: float, sealed: bool) -> float:
-        """Command [V] from the reference and measured angle [rad] and the measured gauge pressure [Pa]."""
+    def __call__(
+        self, reference: float, angle: float, pressure: float, dither: float, sealed: bool
+    ) -> float:
+        """Command [V] from the reference and measured angle [rad] and the measured gauge pressure
+        [Pa].
+        """
         if self.last is not None:
             self.rate += self.smooth * ((angle - self.last) / self.step - self.rate)
         self.last = angle

@@ -25,7 +25,9 @@ def area_of(par: Parameters) -> Callable[[float], float]:
 
 
 def orifice_of(par: Parameters) -> Callable[[float, float], float]:
-    """Upstream pressure times the flow function of an ideal nozzle, signed; linear above a pressure ratio of 0.999."""
+    """Upstream pressure times the flow function of an ideal nozzle, signed; linear above a pressure
+    ratio of 0.999.
+    """
     g = par.kappa
     choke = (2.0 / (g + 1.0)) ** (g / (g - 1.0))
     choked: float = (2.0 / (g + 1.0)) ** (1.0 / (g - 1.0)) * math.sqrt(g / (g + 1.0))
@@ -48,7 +50,9 @@ def orifice_of(par: Parameters) -> Callable[[float, float], float]:
 
 
 def settle(flow: Callable[[float], float], free: float) -> float:
-    """Flow m with ``flow(m) = m`` when `flow` falls with m and ``free = flow(0)``, by the Illinois rule."""
+    """Flow m with ``flow(m) = m`` when `flow` falls with m and ``free = flow(0)``, by the Illinois
+    rule.
+    """
     if free == 0.0:
         return 0.0
     a, fa = 0.0, free

@@ -21,8 +21,8 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(40)
 class Shape:
     """Shape of one muscle at one length (SI units).
 
-    `radius` and `thickness` belong to the middle section, `volume` is the air volume; `taut` tells that the
-    neck floor holds.
+    `radius` and `thickness` belong to the middle section, `volume` is the air volume; `taut` tells
+    that the neck floor holds.
     """
 
     length: float
@@ -38,8 +38,8 @@ class Muscle:
     Parameters
     ----------
     spec : dict
-        Keys rest_length, rest_diameter, braid_angle [rad], wall_thickness, modulus_slope, modulus_offset, k0,
-        contraction_slope, extension_slope, neck_floor.
+        Keys rest_length, rest_diameter, braid_angle [rad], wall_thickness, modulus_slope,
+        modulus_offset, k0, contraction_slope, extension_slope, neck_floor.
     """
 
     def __init__(self, spec: dict[str, Any]) -> None:
@@ -49,7 +49,9 @@ class Muscle:
         self.wall = float(spec["wall_thickness"])
         self.fibre = self.rest_length / math.sin(angle)
         self.turns = self.rest_length / (2.0 * math.pi * self.rest_radius * math.tan(angle))
-        self.rubber = math.pi * (self.rest_radius**2 - (self.rest_radius - self.wall) ** 2) * self.rest_length
+        self.rubber = (
+            math.pi * (self.rest_radius**2 - (self.rest_radius - self.wall) ** 2) * self.rest_length
+        )
         self.slope = [float(v) for v in spec["modulus_slope"]]
         self.offset = [float(v) for v in spec["modulus_offset"]]
         self.k0 = float(spec["k0"])
@@ -57,7 +59,9 @@ class Muscle:
         self.k_ext = float(spec["extension_slope"])
         self.neck = float(spec["neck_floor"])
 
-    def _ends(self, contraction: float, radius: float) -> tuple[float, float, float, float, float, float]:
+    def _ends(
+        self, contraction: float, radius: float
+    ) -> tuple[float, float, float, float, float, float]:
         k = self.k0 - (self.k_con if contraction >= 0.0 else self.k_ext) * contraction
         q = k / math.sqrt(k * k + 3.0)
         a = (radius - self.rest_radius) / (1.0 - q)
@@ -68,19 +72,28 @@ class Muscle:
         """Fibre length [m] that the radius [m] would need, less the true one."""
         length = self.rest_length * (1.0 - contraction)
         a, b, c, reach, last, _ = self._ends(contraction, radius)
-        middle = (length - 2.0 * reach) / length * math.hypot(length, 2.0 * math.pi * radius * self.turns)
+        middle = (
+            (length - 2.0 * reach)
+            / length
+            * math.hypot(length, 2.0 * math.pi * radius * self.turns)
+        )
         if a == 0.0:
             return middle - self.fibre
         w = 2.0 * math.pi * self.turns * reach / (length * last)
         v = 0.5 * last * (_NODES + 1.0)
-        speed = np.sqrt(((a * np.cos(v) + c) * w) ** 2 + (a * np.sin(v)) ** 2 + (b * np.cos(v)) ** 2)
+        speed = np.sqrt(
+            ((a * np.cos(v) + c) * w) ** 2 + (a * np.sin(v)) ** 2 + (b * np.cos(v)) ** 2
+        )
         return middle + last * float(_WEIGHTS @ speed) - self.fibre
 
     def shape(self, contraction: float) -> Shape:
         """Solve the shape at a contraction ratio (positive when shorter than at rest)."""
         length = self.rest_length * (1.0 - contraction)
         if not 0.55 * self.fibre < length < self.fibre:
-            raise ValueError(f"contraction ratio {contraction!r} leaves the range of the braid (length {length:.4f} m)")
+            raise ValueError(
+                f"contraction ratio {contraction!r} leaves the range of the braid (length "
+                f"{length:.4f} m)"
+            )
         taut = False
         rest = self.rest_radius
         if contraction == 0.0:
@@ -94,7 +107,15 @@ class Muscle:
                 far = rest + i * step
                 if sign * self.fibre_excess(contraction, far) <= 0.0:
                     lo, hi = min(near, far), max(near, far)
-                    radius = float(brentq(lambda r: self.fibre_excess(contraction, r), lo, hi, xtol=1e-16, rtol=1e-14))
+                    radius = float(
+                        brentq(
+                            lambda r: self.fibre_excess(contraction, r),
+                            lo,
+                            hi,
+                            xtol=1e-16,
+                            rtol=1e-14,
+                        )
+                    )
                     break
                 near = far
             else:
@@ -103,10 +124,14 @@ class Muscle:
                 taut = True
         a, b, c, reach, last, _ = self._ends(contraction, radius)
         cylinder = length - 2.0 * reach
-        first = cylinder * radius + 2.0 * b * (c * math.sin(last) + a * (0.5 * last + 0.25 * math.sin(2.0 * last)))
+        first = cylinder * radius + 2.0 * b * (
+            c * math.sin(last) + a * (0.5 * last + 0.25 * math.sin(2.0 * last))
+        )
         sin_l = math.sin(last)
         second = cylinder * radius**2 + 2.0 * b * (
-            c * c * sin_l + 2.0 * a * c * (0.5 * last + 0.25 * math.sin(2.0 * last)) + a * a * (sin_l - sin_l**3 / 3.0)
+            c * c * sin_l
+            + 2.0 * a * c * (0.5 * last + 0.25 * math.sin(2.0 * last))
+            + a * a * (sin_l - sin_l**3 / 3.0)
         )
         wall = (first - math.sqrt(first * first - length * self.rubber / math.pi)) / length
         volume = math.pi * (second - 2.0 * wall * first + wall * wall * length)
@@ -126,7 +151,9 @@ class Muscle:
 
 
 class Tendon:
-    """Tendon joint: contraction [m] and moment arm [m/rad] as functions of the joint angle [rad]."""
+    """Tendon joint: contraction [m] and moment arm [m/rad] as functions of the joint angle
+    [rad].
+    """
 
     def __init__(self, spec: dict[str, Any]) -> None:
         self.axial = float(spec["upper_axial"])
@@ -153,7 +180,9 @@ class Tendon:
 
 @lru_cache(maxsize=4)
 def _rows(muscle: str, tendon: str, count: int) -> tuple[Array, Array]:
-    """Knots [rad] and exact quantities of the joint, see :meth:`JointTables.exact`; the arguments are JSON."""
+    """Knots [rad] and exact quantities of the joint, see :meth:`JointTables.exact`; the arguments
+    are JSON.
+    """
     spec, joint = json.loads(muscle), json.loads(tendon)
     shapes, pull = Muscle(spec), Tendon(joint)
     knots = float(joint["rest_angle"]) + math.radians(STEP) * np.arange(-BELOW, ABOVE + 1)
@@ -167,8 +196,9 @@ STEP, BELOW, ABOVE = 0.1, 80, 1160
 class JointTables:
     """Everything the plant needs as cubic pieces over the joint angle.
 
-    Rows of `cells`: coefficients of one cell, for the gas torque per pressure [m3], the elastic torque [N m], the
-    air volume of all muscles [m3], the contraction [m] and the wall area [m2]; each cubic highest power first.
+    Rows of `cells`: coefficients of one cell, for the gas torque per pressure [m3], the elastic
+    torque [N m], the air volume of all muscles [m3], the contraction [m] and the wall area [m2];
+    each cubic highest power first.
 
     Parameters
     ----------
@@ -180,25 +210,33 @@ class JointTables:
         Multiplies every modulus.
     """
 
-    def __init__(self, muscle: dict[str, Any], joint: dict[str, float], count: int, modulus_scale: float) -> None:
-        knots, exact = _rows(json.dumps(muscle, sort_keys=True), json.dumps(joint, sort_keys=True), count)
+    def __init__(
+        self, muscle: dict[str, Any], joint: dict[str, float], count: int, modulus_scale: float
+    ) -> None:
+        knots, exact = _rows(
+            json.dumps(muscle, sort_keys=True), json.dumps(joint, sort_keys=True), count
+        )
         self.step = math.radians(STEP)
         self.knots = knots
         self.start = float(knots[0])
-        rows = np.column_stack([exact[:, 0] + modulus_scale * exact[:, 1], modulus_scale * exact[:, 2], exact[:, 3:]])
+        rows = np.column_stack(
+            [exact[:, 0] + modulus_scale * exact[:, 1], modulus_scale * exact[:, 2], exact[:, 3:]]
+        )
         cells: list[tuple[float, ...]] = []
         for lo, hi, kind in ((0, BELOW, PchipInterpolator), (BELOW, BELOW + ABOVE, CubicSpline)):
             pieces = kind(knots[lo : hi + 1], rows[lo : hi + 1])
             # c has shape (4, cells, quantities)
-            cells.extend(tuple(c) for c in np.transpose(pieces.c, (1, 2, 0)).reshape(hi - lo, -1).tolist())
+            cells.extend(
+                tuple(c) for c in np.transpose(pieces.c, (1, 2, 0)).reshape(hi - lo, -1).tolist()
+            )
         self.cells = cells
 
     @staticmethod
     def exact(muscle: Muscle, tendon: Tendon, count: int, angle: float) -> Array:
         """Quantities at one angle [rad] without interpolation.
 
-        Gas torque per pressure without and per modulus scale, elastic torque per modulus scale, air volume,
-        contraction, wall area.
+        Gas torque per pressure without and per modulus scale, elastic torque per modulus scale, air
+        volume, contraction, wall area.
         """
         contraction = tendon.contraction(angle)
         shape = muscle.shape(contraction / muscle.rest_length)
@@ -206,7 +244,9 @@ class JointTables:
         first, second = muscle.force_terms(shape, 1.0)
         arm = count * tendon.arm(angle)
         wall = count * 2.0 * math.pi * (shape.radius - shape.thickness) * shape.length
-        return np.array([gas * arm, (first - gas) * arm, second * arm, count * shape.volume, contraction, wall])
+        return np.array(
+            [gas * arm, (first - gas) * arm, second * arm, count * shape.volume, contraction, wall]
+        )
 
     def cell(self, angle: float) -> tuple[tuple[float, ...], float]:
         """Coefficients of the cell of an angle [rad] and the distance from its knot [rad]."""
@@ -226,8 +266,16 @@ class JointTables:
     def pull(self, angle: float, gauge: float) -> tuple[float, float, float]:
         """Force of all muscles [N], its slope over contraction [N/m] and the moment arm [m/rad]."""
         k, s = self.cell(angle)
-        torque = gauge * (((k[0] * s + k[1]) * s + k[2]) * s + k[3]) + ((k[4] * s + k[5]) * s + k[6]) * s + k[7]
-        slope = gauge * ((3.0 * k[0] * s + 2.0 * k[1]) * s + k[2]) + (3.0 * k[4] * s + 2.0 * k[5]) * s + k[6]
+        torque = (
+            gauge * (((k[0] * s + k[1]) * s + k[2]) * s + k[3])
+            + ((k[4] * s + k[5]) * s + k[6]) * s
+            + k[7]
+        )
+        slope = (
+            gauge * ((3.0 * k[0] * s + 2.0 * k[1]) * s + k[2])
+            + (3.0 * k[4] * s + 2.0 * k[5]) * s
+            + k[6]
+        )
         arm = (3.0 * k[12] * s + 2.0 * k[13]) * s + k[14]
         force = torque / arm
         return force, (slope - force * (6.0 * k[12] * s + 2.0 * k[13])) / (arm * arm), arm

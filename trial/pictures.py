@@ -40,7 +40,9 @@ def draw_strength(axes: Any, rows: Sequence[Row]) -> None:
         for low, high in zip(_EDGES, _EDGES[1:], strict=False):
             inside = [r for r in effects if low <= r.visible < high]
             if inside:
-                hits = sum(r.detected if word == "detected" else r.outcome == "right" for r in inside)
+                hits = sum(
+                    r.detected if word == "detected" else r.outcome == "right" for r in inside
+                )
                 bottom, top = wilson(hits, len(inside))
                 at.append(sum(r.visible for r in inside) / len(inside))
                 share.append(hits / len(inside))
@@ -48,18 +50,33 @@ def draw_strength(axes: Any, rows: Sequence[Row]) -> None:
                 above.append(max(top - share[-1], 0.0))
         nudge = 0.985 if word == "detected" else 1.015
         axes.errorbar(
-            [a * nudge for a in at], share, yerr=(below, above), marker=marker, color=colour, capsize=3, label=word, linewidth=1.4
-        )  # fmt: skip
+            [a * nudge for a in at],
+            share,
+            yerr=(below, above),
+            marker=marker,
+            color=colour,
+            capsize=3,
+            label=word,
+            linewidth=1.4,
+        )
     false = [r.detected for r in rows if r.healthy]
     if false:
         word = f"false alarms ({sum(false)} of {len(false)})"
         axes.axhline(sum(false) / len(false), color=_GREY, linestyle=":", linewidth=1.2, label=word)
     axes.set_xscale("log")
-    ticks = [t for t in (0.5, 1, 1.5, 2, 3, 5, 10, 20, 50) if not effects or t <= 1.3 * max(r.visible for r in effects)]
+    ticks = [
+        t
+        for t in (0.5, 1, 1.5, 2, 3, 5, 10, 20, 50)
+        if not effects or t <= 1.3 * max(r.visible for r in effects)
+    ]
     axes.set_xticks(ticks, [f"{t:g}" for t in ticks])
     axes.minorticks_off()
     axes.axvline(SEEN, color=_GREY, linewidth=0.8)
-    axes.set(xlabel="effect left after a refit / noise of the channel", ylabel="share of cases", ylim=(-0.03, 1.03))
+    axes.set(
+        xlabel="effect left after a refit / noise of the channel",
+        ylabel="share of cases",
+        ylim=(-0.03, 1.03),
+    )
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, frameon=False, fontsize=9)
     _plain(axes)
 
@@ -71,10 +88,30 @@ def draw_calibration(axes: Any, rows: Sequence[Row]) -> None:
     for _, _, stated, hits, cases in bins:
         bottom, top = wilson(hits, cases)
         true = hits / cases
-        axes.errorbar([stated], [true], yerr=([max(true - bottom, 0.0)], [max(top - true, 0.0)]), marker="o", color=_BLUE, capsize=3)
-        axes.annotate(str(cases), (stated, bottom), textcoords="offset points", xytext=(0, -12), fontsize=8, ha="center", color="0.3")
+        axes.errorbar(
+            [stated],
+            [true],
+            yerr=([max(true - bottom, 0.0)], [max(top - true, 0.0)]),
+            marker="o",
+            color=_BLUE,
+            capsize=3,
+        )
+        axes.annotate(
+            str(cases),
+            (stated, bottom),
+            textcoords="offset points",
+            xytext=(0, -12),
+            fontsize=8,
+            ha="center",
+            color="0.3",
+        )
     least = min((b[2] for b in bins), default=0.5)
-    axes.set(xlabel="stated probability of the leading hypothesis", ylabel="share true", xlim=(least - 0.05, 1.01), ylim=(-0.08, 1.05))
+    axes.set(
+        xlabel="stated probability of the leading hypothesis",
+        ylabel="share true",
+        xlim=(least - 0.05, 1.01),
+        ylim=(-0.08, 1.05),
+    )
     if brier is not None:
         axes.set_title(f"numbers: cases; Brier score {brier:.3f}", fontsize=10)
     _plain(axes)
@@ -88,9 +125,16 @@ def draw_confusion(axes: Any, rows: Sequence[Row]) -> None:
     def order(name: str) -> tuple[bool, str]:
         return (name in last, f"{last.index(name)}" if name in last else name)
 
-    unlisted = {r.ids[0] for r in rows if len(r.ids) == 1 and r.ids[0] in matrix and not any(c[r.ids[0]] for c in matrix.values())}
+    unlisted = {
+        r.ids[0]
+        for r in rows
+        if len(r.ids) == 1 and r.ids[0] in matrix and not any(c[r.ids[0]] for c in matrix.values())
+    }
     truths = sorted(matrix, key=lambda t: (t in last, t in unlisted, order(t)))
-    names = sorted({n for c in matrix.values() for n in c} | {t for t in truths if t not in unlisted}, key=order)
+    names = sorted(
+        {n for c in matrix.values() for n in c} | {t for t in truths if t not in unlisted},
+        key=order,
+    )
     cells = [[matrix[t][n] / matrix[t].total() for n in names] for t in truths]
     if cells:
         axes.imshow(cells, cmap="Blues", vmin=0.0, vmax=1.2, aspect="auto")
@@ -98,8 +142,18 @@ def draw_confusion(axes: Any, rows: Sequence[Row]) -> None:
         for j, name in enumerate(names):
             if matrix[truth][name]:
                 dark = cells[i][j] > 0.6
-                axes.text(j, i, str(matrix[truth][name]), ha="center", va="center", fontsize=8, color="white" if dark else "black")
-    axes.set_xticks(range(len(names)), names, rotation=60, ha="right", rotation_mode="anchor", fontsize=8.5)
+                axes.text(
+                    j,
+                    i,
+                    str(matrix[truth][name]),
+                    ha="center",
+                    va="center",
+                    fontsize=8,
+                    color="white" if dark else "black",
+                )
+    axes.set_xticks(
+        range(len(names)), names, rotation=60, ha="right", rotation_mode="anchor", fontsize=8.5
+    )
     axes.set_yticks(range(len(truths)), truths, fontsize=8.5)
     axes.set_xticks([x - 0.5 for x in range(1, len(names))], minor=True)
     axes.set_yticks([y - 0.5 for y in range(1, len(truths))], minor=True)
@@ -112,19 +166,37 @@ def draw_gaps(axes: Any, rows: Sequence[Row]) -> None:
     """Median gap closed on held-out recordings, by effect and strength."""
     found = gaps(rows)
     names = sorted(found, key=lambda n: (n == "pair", n), reverse=True)
-    styles = dict(zip((*STRENGTHS, "pair"), ((_GREY, "v"), (_ORANGE, "s"), (_BLUE, "o"), (_GREEN, "D")), strict=True))
+    styles = dict(
+        zip(
+            (*STRENGTHS, "pair"),
+            ((_GREY, "v"), (_ORANGE, "s"), (_BLUE, "o"), (_GREEN, "D")),
+            strict=True,
+        )
+    )
     for label, (colour, marker) in styles.items():
         places = [(i, found[n][label]) for i, n in enumerate(names) if label in found[n]]
         for i, values in places:
             axes.scatter(values, [i] * len(values), s=14, color=colour, alpha=0.45, linewidths=0)
         if places:
             at = [median(values) for _, values in places]
-            axes.scatter(at, [i for i, _ in places], s=42, color=colour, marker=marker, label=f"{label} (median)", zorder=3)
+            axes.scatter(
+                at,
+                [i for i, _ in places],
+                s=42,
+                color=colour,
+                marker=marker,
+                label=f"{label} (median)",
+                zorder=3,
+            )
     axes.axvline(0.9, color=_GREY, linewidth=0.8)
     axes.set_yticks(range(len(names)), names, fontsize=8.5)
-    axes.set(xlabel="share of the gap to the noise closed on held-out recordings", xlim=(-0.03, 1.03))
+    axes.set(
+        xlabel="share of the gap to the noise closed on held-out recordings", xlim=(-0.03, 1.03)
+    )
     if names:
-        axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=4, frameon=False, fontsize=9)
+        axes.legend(
+            loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=4, frameon=False, fontsize=9
+        )
     _plain(axes)
     axes.grid(axis="x", color="0.9", linewidth=0.7)
 
@@ -140,7 +212,14 @@ def draw_baselines(axes: Any, rows: Sequence[Compared]) -> None:
         values = [middle[method] for _, middle, _ in told]
         axes.bar(at, values, width=0.18, color=shades[m], label=word)
         for x, value in zip(at, values, strict=True):
-            axes.annotate(f"{value:.2f}", (x, value), textcoords="offset points", xytext=(0, 2), ha="center", fontsize=7.5)
+            axes.annotate(
+                f"{value:.2f}",
+                (x, value),
+                textcoords="offset points",
+                xytext=(0, 2),
+                ha="center",
+                fontsize=7.5,
+            )
     axes.set_xticks(range(len(told)), [f"{k}\n{n} cases" for k, _, n in told], fontsize=9)
     axes.set(ylabel="median share of the gap closed", ylim=(0.0, 1.08))
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=4, frameon=False, fontsize=9)
@@ -148,7 +227,9 @@ def draw_baselines(axes: Any, rows: Sequence[Compared]) -> None:
 
 
 def pictures(scores: Scores, compared: Sequence[Compared], folder: Path) -> list[Path]:
-    """Write strength, calibration, confusion, gap and, where there are baselines, baselines as PNG; returns the files."""
+    """Write strength, calibration, confusion, gap and, where there are baselines, baselines as PNG;
+    returns the files.
+    """
     rows = scores.rows
     effects = max(8, len(confusion(rows)))
     plan: list[tuple[str, float, float, Any, Any]] = [
@@ -175,7 +256,9 @@ def figure(scores: Scores, path: Path) -> None:
     The file type follows the suffix.
     """
     page = _page(11.0, 6.0 + 0.22 * max(8, len(confusion(scores.rows))))
-    grid = page.add_gridspec(2, 2, height_ratios=(1.0, 0.4 + 0.06 * max(8, len(confusion(scores.rows)))))
+    grid = page.add_gridspec(
+        2, 2, height_ratios=(1.0, 0.4 + 0.06 * max(8, len(confusion(scores.rows))))
+    )
     draw_strength(page.add_subplot(grid[0, 0]), scores.rows)
     draw_calibration(page.add_subplot(grid[0, 1]), scores.rows)
     draw_confusion(page.add_subplot(grid[1, :]), scores.rows)

@@ -39,13 +39,23 @@ _SMALL: tuple[tuple[str, tuple[str, ...]], ...] = (
 )
 #: plan `blocks`: effects of the gas blocks, and effects of no catalogue that act in the arm
 GAS = (
-    "supply_leak", "compressor_cut_in", "valve_dead_zone", "valve_hysteresis", "valve_centre_leakage", "input_path_lag",
+    "supply_leak", "compressor_cut_in", "valve_dead_zone", "valve_hysteresis",
+    "valve_centre_leakage", "input_path_lag",
     "tube_flow_restriction", "leak_muscle", "heat_transfer",
 )  # fmt: skip
-ARM = ("tendon_compliance", "muscle_buckling", "encoder_gear_lash", "hose_torque", "moment_arm_error", "encoder_eccentricity")
-#: plan `blocks`: parameters that are put far off, by how many tolerances, and the least share of the nominal value
+ARM = (
+    "tendon_compliance",
+    "muscle_buckling",
+    "encoder_gear_lash",
+    "hose_torque",
+    "moment_arm_error",
+    "encoder_eccentricity",
+)
+#: plan `blocks`: parameters that are put far off, by how many tolerances, and the least share of
+#: the nominal value
 PARAMETERS = (
-    "supply.volume", "valve.discharge_area_max", "chamber.dead_volume", "muscle.modulus_scale", "arm.inertia",
+    "supply.volume", "valve.discharge_area_max", "chamber.dead_volume", "muscle.modulus_scale",
+    "arm.inertia",
     "arm.first_moment", "arm.payload", "arm.viscous",
 )  # fmt: skip
 SIZES = ((4.0, 6.0), (7.0, 10.0), (11.0, 15.0))
@@ -62,11 +72,17 @@ class Planned:
     group: int = 0
 
 
-def _far(name: str, way: float, size: tuple[float, float], rig: Path, rng: np.random.Generator) -> float:
-    """Tolerances, with their sign, by which a parameter is off; upwards where no four of them fit downwards."""
+def _far(
+    name: str, way: float, size: tuple[float, float], rig: Path, rng: np.random.Generator
+) -> float:
+    """Tolerances, with their sign, by which a parameter is off; upwards where no four of them fit
+    downwards.
+    """
     model, tolerance = read_rig(rig)
     section, key = name.split(".")
-    most = (1.0 - LEAST_SHARE) * model[section][key] / tolerance[name] if way < 0.0 else SIZES[-1][1]
+    most = (
+        (1.0 - LEAST_SHARE) * model[section][key] / tolerance[name] if way < 0.0 else SIZES[-1][1]
+    )
     if most < SIZES[0][0]:
         way, most = 1.0, SIZES[-1][1]
     low, high = size if size[0] < most else SIZES[0]
@@ -76,21 +92,32 @@ def _far(name: str, way: float, size: tuple[float, float], rig: Path, rng: np.ra
 def blocks(rng: np.random.Generator, rig: Path | None = None) -> list[Planned]:
     """Cases of plan `blocks`, in no particular order.
 
-    Every effect of the gas blocks at medium and strong, alone and beside an effect of no catalogue in the arm at strong
-    and at heavy: 54 cases in groups of three, which share the seed and so the baseline, the noise and the first effect.
-    Eight parameters far off, upwards and downwards, of three sizes: 48. Six nulls and six with parameters only.
+    Every effect of the gas blocks at medium and strong, alone and beside an effect of no catalogue
+    in the arm at strong and at heavy: 54 cases in groups of three, which share the seed and so the
+    baseline, the noise and the first effect. Eight parameters far off, upwards and downwards, of
+    three sizes: 48. Six nulls and six with parameters only.
     """
     rig = rig or default_rig()
     missing = [name for name in PARAMETERS if name not in read_rig(rig)[1]]
     if missing:
-        raise ValueError(f"{rig}: plan 'blocks' needs a tolerance of {', '.join(PARAMETERS)}; missing: {', '.join(missing)}")
+        raise ValueError(
+            f"{rig}: plan 'blocks' needs a tolerance of {', '.join(PARAMETERS)}; missing: "
+            f"{', '.join(missing)}"
+        )
     found: list[Planned] = []
     turn = [str(v) for v in rng.permutation(ARM)]
     for i, (name, label) in enumerate((n, s) for n in GAS for s in ("medium", "strong")):
         found.append(Planned(name, (label,), group=i + 1))
-        found.extend(Planned(f"{name}+{turn[i % len(turn)]}", (label, much), group=i + 1) for much in ("strong", "heavy"))
+        found.extend(
+            Planned(f"{name}+{turn[i % len(turn)]}", (label, much), group=i + 1)
+            for much in ("strong", "heavy")
+        )
     for name in PARAMETERS:
-        found.extend(Planned(WRONG, wrong=((name, _far(name, way, size, rig, rng)),)) for way in (1.0, -1.0) for size in SIZES)
+        found.extend(
+            Planned(WRONG, wrong=((name, _far(name, way, size, rig, rng)),))
+            for way in (1.0, -1.0)
+            for size in SIZES
+        )
     return [*found, *(Planned(kind) for kind in ("none", "parameters") for _ in range(6))]
 
 
@@ -105,8 +132,8 @@ def _pair(rng: np.random.Generator) -> tuple[str, str]:
 def kinds(plan: str, rng: np.random.Generator) -> list[tuple[str, tuple[str, ...]]]:
     """Kinds and wanted strengths of plan `full` or `small`, in no particular order.
 
-    `full`: 30 nulls, 30 with parameters only, every listed effect three times at each strength, 30 pairs, every
-    unlisted effect at medium and twice at strong. `small`: twelve cases.
+    `full`: 30 nulls, 30 with parameters only, every listed effect three times at each strength, 30
+    pairs, every unlisted effect at medium and twice at strong. `small`: twelve cases.
 
     Raises
     ------
@@ -129,7 +156,9 @@ def kinds(plan: str, rng: np.random.Generator) -> list[tuple[str, tuple[str, ...
 
 
 def _recordings(rng: np.random.Generator) -> tuple[tuple[str, str], ...]:
-    """Three or four recordings to fit, one of them in open loop, and one or two held out of another excitation."""
+    """Three or four recordings to fit, one of them in open loop, and one or two held out of another
+    excitation.
+    """
     fit = ["multisine", "sealed_holds", "open_cycles"]
     if rng.random() < 0.3:
         fit.append("lift_hold")
@@ -154,8 +183,8 @@ def specs(
     plan : str
         One of :data:`PLANS`.
     seed : int
-        Settles everything. Each case (or group of cases) has its own seed, so that it comes out the same whatever is made
-        with it.
+        Settles everything. Each case (or group of cases) has its own seed, so that it comes out the
+        same whatever is made with it.
     cases : int, optional
         How many; above the size of the plan it is repeated with other seeds.
     duration : float, optional
@@ -173,13 +202,26 @@ def specs(
         for i in rng.permutation(len(wanted)).tolist():
             one = wanted[i]
             number = len(found) + 1
-            own = np.random.default_rng([seed, turn, one.group, 816] if one.group else [seed, number, 815])
+            own = np.random.default_rng(
+                [seed, turn, one.group, 816] if one.group else [seed, number, 815]
+            )
             chosen = _recordings(own)
             length = 12.0 if plan == "small" else float(own.integers(30, 41))
             length = length if duration is None else duration
             seed_of_case = int(own.integers(2**31))
             name = f"case_{number:04d}"
-            found.append(Spec(name, one.kind, seed_of_case, chosen, length, one.labels, measure=measure, wrong=one.wrong))
+            found.append(
+                Spec(
+                    name,
+                    one.kind,
+                    seed_of_case,
+                    chosen,
+                    length,
+                    one.labels,
+                    measure=measure,
+                    wrong=one.wrong,
+                )
+            )
         turn += 1
     return found[:cases]
 
@@ -187,18 +229,29 @@ def specs(
 def _complete(folder: Path, spec: Spec, digests: dict[str, str]) -> bool:
     """Whether a case, its key and its digest are there and belong together."""
     key = folder / "keys" / f"{spec.name}.json"
-    files = [folder / "cases" / spec.name / f for f in ("case.toml", "rig.toml", *(f"{n}.csv" for n, _ in spec.recordings))]
+    files = [
+        folder / "cases" / spec.name / f
+        for f in ("case.toml", "rig.toml", *(f"{n}.csv" for n, _ in spec.recordings))
+    ]
     if spec.name not in digests or not key.is_file() or not all(f.is_file() for f in files):
         return False
     content = key.read_bytes()
     if hashlib.sha256(content).hexdigest() != digests[spec.name]:
         return False
     told: dict[str, Any] = json.loads(content)
-    same = all(told.get(name) == getattr(spec, name) for name in ("kind", "seed", "duration", "measure", "strength"))
+    same = all(
+        told.get(name) == getattr(spec, name)
+        for name in ("kind", "seed", "duration", "measure", "strength")
+    )
     wrong = {name: entry["tolerances"] for name, entry in told.get("wrong_parameters", {}).items()}
     roles = {name: entry["role"] for name, entry in told.get("recordings", {}).items()}
     wanted = tuple(told.get("wanted", {}).values())
-    return same and wanted == spec.wanted and wrong == dict(spec.wrong) and roles == dict(spec.recordings)
+    return (
+        same
+        and wanted == spec.wanted
+        and wrong == dict(spec.wrong)
+        and roles == dict(spec.recordings)
+    )
 
 
 def _work(task: tuple[Spec, Path]) -> Case:
@@ -213,10 +266,11 @@ def write_plan(
     rig: Path | None = None,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> Path:
-    """Write the cases of a plan below ``folder/cases``, their keys below ``folder/keys``, and the manifest.
+    """Write the cases of a plan below ``folder/cases``, their keys below ``folder/keys``, and the
+    manifest.
 
-    The digest of a key is in the manifest before any file of its case exists. A case that is there complete is not
-    made again.
+    The digest of a key is in the manifest before any file of its case exists. A case that is there
+    complete is not made again.
 
     Parameters
     ----------

@@ -1,7 +1,9 @@
-"""The independent plant: tank, valve, muscles, joint and arm under an adaptive Dormand-Prince 5(4) pair.
+"""The independent plant: tank, valve, muscles, joint and arm under an adaptive Dormand-Prince 5(4)
+pair.
 
-The inner loop uses plain floats: one right-hand side costs two microseconds, 40 s a quarter of a second.
-Effects enter at the ports of :class:`.effects.Effect`; without any, none of them costs more than a test.
+The inner loop uses plain floats: one right-hand side, see :mod:`.rates`, costs a few microseconds.
+Effects enter at the ports of :class:`.effects.Effect`; without any, none of them costs more than a
+test.
 """
 
 from __future__ import annotations
@@ -16,6 +18,7 @@ from scipy.optimize import brentq
 from .effects import Effects, Env, HeatTransfer, Start
 from .flows import area_of, orifice_of, settle
 from .geometry import JointTables
+from .rates import rates_of
 
 State = list[float]
 Ports = list[Callable[..., Any]]
@@ -23,7 +26,9 @@ Ports = list[Callable[..., Any]]
 
 @dataclass(frozen=True)
 class Parameters:
-    """All numbers of the plant without effects; SI units, angles in rad, pressures in Pa (gauge if noted)."""
+    """All numbers of the plant without effects; SI units, angles in rad, pressures in Pa (gauge if
+    noted).
+    """
 
     ambient: float
     temperature: float
@@ -59,8 +64,8 @@ class Parameters:
 class Plant:
     """Plant with a set of effects.
 
-    The state is ``[p, p_supply, angle, rate, ...]`` in absolute Pa, rad and rad/s, followed by the time [s] when an
-    effect needs it and by the states of the effects.
+    The state is ``[p, p_supply, angle, rate, ...]`` in absolute Pa, rad and rad/s, followed by the
+    time [s] when an effect needs it and by the states of the effects.
 
     Parameters
     ----------
@@ -79,7 +84,9 @@ class Plant:
         self.par = parameters
         # an effect of no size would still cost time, and a share of zero divide by it
         self.effects = Effects(*(e for e in effects or () if e.active()))
-        self.tables = JointTables(parameters.muscle, parameters.joint, parameters.count, parameters.modulus_scale)
+        self.tables = JointTables(
+            parameters.muscle, parameters.joint, parameters.count, parameters.modulus_scale
+        )
         self.scale = [1.0e5, 1.0e6, 1.0, 1.0]
         self.i_clock = -1
         if any(e.needs_clock for e in self.effects):
@@ -91,14 +98,14 @@ class Plant:
             self.scale += effect.sizes()
         self.size = len(self.scale)
         self.env = Env(parameters, self.tables, self.i_clock)
-        self.ticks = self._ports("tick")
-        self._reads = self._ports("read")
+        self.ticks = self.ports("tick")
+        self._reads = self.ports("read")
         self.area = area_of(parameters)
-        self._line = self._port("line", False)
-        self._flows = self._valve()
-        self._rhs = self._build()
+        self._line = self.port("line", False)
+        self._flows = self.valve()
+        self._rhs = rates_of(self)
 
-    def _ports(self, name: str, own: bool = True) -> Ports:
+    def ports(self, name: str, own: bool = True) -> Ports:
         """Functions of all effects at one port."""
         found = (
             getattr(e, name)(self.env, first) if own else getattr(e, name)(self.env)
@@ -106,14 +113,24 @@ class Plant:
         )
         return [f for f in found if f is not None]
 
-    def _port(self, name: str, own: bool = True) -> Any:
+    def port(self, name: str, own: bool = True) -> Any:
         """The function at a port that takes one effect; None when there is none."""
-        found = self._ports(name, own)
+        found = self.ports(name, own)
         if len(found) > 1:
             raise ValueError(f"two effects at the port {name!r}")
         return found[0] if found else None
 
-    def initial(self, pressure: float, supply: float, angle: float, rate: float = 0.0, clock: float = 0.0) -> State:
+    @property
+    def heat(self) -> tuple[HeatTransfer | None, int]:
+        """The exchange of heat with the wall, if there is one, and the index of its temperature."""
+        for effect, first in zip(self.effects, self.slots, strict=True):
+            if isinstance(effect, HeatTransfer):
+                return effect, first
+        return None, -1
+
+    def initial(
+        self, pressure: float, supply: float, angle: float, rate: float = 0.0, clock: float = 0.0
+    ) -> State:
         """State at absolute pressures [Pa] and a time [s] with every memory at rest."""
         par = self.par
         y = [pressure, supply, angle, rate]
@@ -150,13 +167,15 @@ class Plant:
         """Command [V] as a part of half the stroke, -1..1."""
         return min(max((command - self.par.null_voltage) / self.par.half_range, -1.0), 1.0)
 
-    def _valve(self) -> Callable[[float, float, float, float], tuple[float, float]]:
-        """Flows into and out of the muscles [kg/s] from opening, tank and muscle pressure and gas temperature."""
+    def valve(self) -> Callable[[float, float, float, float], tuple[float, float]]:
+        """Flows into and out of the muscles [kg/s] from opening, tank and muscle pressure and gas
+        temperature.
+        """
         par, area, orifice = self.par, self.area, orifice_of(self.par)
         ambient, t0 = par.ambient, par.temperature
         jet = math.sqrt(2.0 / (par.gas_constant * t0))
-        line, exhaust, gap = self._port("line", False), self._port("exhaust", False), self._port("gap")
-        heat = next((e for e in self.effects if isinstance(e, HeatTransfer)), None)
+        line, exhaust, gap = self.port("line", False), self.port("exhaust", False), self.port("gap")
+        heat, _ = self.heat
         share = heat.share if heat is not None else 0.0
         sqrt = math.sqrt
         last = [math.nan, 0.0]  # opening and its conductance: constant over most steps
@@ -175,7 +194,13 @@ class Plant:
                 m_out = c * orifice(p, ambient)
                 if line is not None or exhaust is not None:
                     m_out = settle(
-                        lambda m: c * orifice(p if line is None else line(-m, p), ambient if exhaust is None else exhaust(m)),
+                        lambda m: (
+                            c
+                            * orifice(
+                                p if line is None else line(-m, p),
+                                ambient if exhaust is None else exhaust(m),
+                            )
+                        ),
                         m_out,
                     )
             if gap is not None:
@@ -186,115 +211,13 @@ class Plant:
 
         return flows
 
-    def _build(self) -> Callable[[State, float], State]:
-        par, tab = self.par, self.tables
-        cells, start, step, last = tab.cells, tab.start, tab.step, len(tab.cells) - 1
-        ambient, t0, gas, g = par.ambient, par.temperature, par.gas_constant, par.kappa
-        rt0 = gas * t0
-        dead, vt = par.dead_volume, par.supply_volume
-        a_in, a_out, a_vol = par.alpha_in, par.alpha_out, par.alpha
-        rest_inertia = par.inertia + par.payload * par.length**2
-        rest_weight = (par.first_moment + par.payload * par.length) * par.gravity
-        reach, pull = par.length**2, par.length * par.gravity
-        viscous, coulomb, speed = par.viscous, par.coulomb, par.coulomb_speed
-        low, high = par.joint["min_angle"], par.joint["max_angle"]
-        ks, ds = par.joint["stop_stiffness"], par.joint["stop_damping"]
-        clock, width = self.i_clock, self.size
-        tanks, leaks = self._ports("tank"), self._ports("leak", False)
-        spool, gear, lost = self._port("spool"), self._port("gear", False), self._port("lost_pressure", False)
-        elastics, forces, torques = self._ports("elastic"), self._ports("force"), self._ports("torque")
-        load, motion, follows = self._port("load", False), self._port("motion"), self._ports("follow")
-        heat, i_heat = None, -1
-        for effect, first in zip(self.effects, self.slots, strict=True):
-            if isinstance(effect, HeatTransfer):
-                heat, i_heat = effect, first
-        flows = self._valve()
-        muscular = bool(elastics or forces)
-        tanh, sin, sqrt = math.tanh, math.sin, math.sqrt
-
-        def rhs(y: State, x: float) -> State:
-            p, ps, angle, rate = y[0], y[1], y[2], y[3]
-            pg = p - ambient
-            d = [0.0] * width
-            if clock >= 0:
-                d[clock] = 1.0
-            # gear: angle at which the muscles are looked up
-            seen, ratio = angle, 1.0
-            if gear is not None:
-                seen, ratio = gear(angle, pg)
-            i = int((seen - start) / step)
-            if i < 0:
-                i = 0
-            elif i > last:
-                i = last
-            s = seen - start - i * step
-            k0, k1, k2, k3, k4, k5, k6, k7, k8, k9, k10, k11, k12, k13, k14, k15, k16, k17, k18, k19 = cells[i]
-            push = pg if lost is None else pg - lost(pg)
-            springy = ((k4 * s + k5) * s + k6) * s + k7
-            torque = push * (((k0 * s + k1) * s + k2) * s + k3) + springy
-            volume = ((k8 * s + k9) * s + k10) * s + k11 + dead
-            v_rate = ((3.0 * k8 * s + 2.0 * k9) * s + k10) * ratio * rate
-            if spool is not None:
-                x = spool(x, y, d)
-            temperature = t0 if heat is None else y[i_heat]
-            m_in, m_out = flows(x, ps, p, temperature)
-            for leak in leaks:
-                m_out += leak(p, temperature)
-            d[1] = -rt0 / vt * m_in
-            for tank in tanks:
-                d[1] += tank(ps, m_in, y, d)
-            change = (rt0 * (a_in * m_in - a_out * m_out) - a_vol * p * v_rate) / volume
-            if heat is not None:
-                wall = ((k16 * s + k17) * s + k18) * s + k19
-                h = heat.coefficient * sqrt(p * temperature / (ambient * t0)) * (1.0 + heat.jet * m_in / 1.0e-3)
-                mass = p * volume / (gas * temperature)
-                warm = ((g * t0 - temperature) * m_in - (g - 1.0) * temperature * m_out) / mass
-                warm += (g - 1.0) * (h * wall * (t0 - temperature) / (mass * gas) - temperature * v_rate / volume)
-                d[i_heat] = warm
-                balance = gas * ((m_in - m_out) * temperature + mass * warm) / volume - p * v_rate / volume
-                change += heat.share * (balance - change)
-            d[0] = change
-            if muscular:
-                arm = (3.0 * k12 * s + 2.0 * k13) * s + k14
-                short = ((k12 * s + k13) * s + k14) * s + k15
-                for elastic in elastics:
-                    torque += elastic(short, springy, y)
-                for force in forces:
-                    torque -= arm * force(pg, short, arm * ratio * rate, y, d)
-            torque *= ratio
-            stop = 0.0
-            if angle < low:
-                stop = ks * (low - angle) - ds * rate
-                if stop < 0.0:
-                    stop = 0.0
-            elif angle > high:
-                stop = ks * (high - angle) - ds * rate
-                if stop > 0.0:
-                    stop = 0.0
-            torque += stop - viscous * rate - coulomb * tanh(rate / speed)
-            for more in torques:
-                torque += more(angle, rate, pg, y, d)
-            inertia, weight = rest_inertia, rest_weight
-            if load is not None:
-                mass = load(y[clock])
-                inertia += mass * reach
-                weight += mass * pull
-            d[2] = rate
-            if motion is None:
-                d[3] = (torque - weight * sin(angle)) / inertia
-            else:
-                d[3] = motion(torque, angle, rate, inertia, weight, y, d)
-            for follow in follows:
-                follow(p, y, d)
-            return d
-
-        return rhs
-
     def derivative(self, state: Sequence[float], opening: float) -> State:
         """Time derivative of the state at a signed valve opening (before its lag)."""
         return self._rhs(list(state), opening)
 
-    def advance(self, y: State, opening: float, span: float, step: float, rtol: float = 1.0e-8) -> tuple[State, float]:
+    def advance(
+        self, y: State, opening: float, span: float, step: float, rtol: float = 1.0e-8
+    ) -> tuple[State, float]:
         """Integrate over `span` [s] at a constant opening.
 
         Returns
@@ -331,7 +254,10 @@ class Plant:
             k5 = f([y[i] + c1 * k1[i] + c2 * k2[i] + c3 * k3[i] + c4 * k4[i] for i in n], opening)
             c1, c2, c3 = h * 9017.0 / 3168.0, -h * 355.0 / 33.0, h * 46732.0 / 5247.0
             c4, c5 = h * 49.0 / 176.0, -h * 5103.0 / 18656.0
-            k6 = f([y[i] + c1 * k1[i] + c2 * k2[i] + c3 * k3[i] + c4 * k4[i] + c5 * k5[i] for i in n], opening)
+            k6 = f(
+                [y[i] + c1 * k1[i] + c2 * k2[i] + c3 * k3[i] + c4 * k4[i] + c5 * k5[i] for i in n],
+                opening,
+            )
             c1, c3, c4 = h * 35.0 / 384.0, h * 500.0 / 1113.0, h * 125.0 / 192.0
             c5, c6 = -h * 2187.0 / 6784.0, h * 11.0 / 84.0
             new = [y[i] + c1 * k1[i] + c3 * k3[i] + c4 * k4[i] + c5 * k5[i] + c6 * k6[i] for i in n]
@@ -340,7 +266,9 @@ class Plant:
             c5, c6, c7 = -h * 17253.0 / 339200.0, h * 22.0 / 525.0, -h / 40.0
             worst = 0.0
             for i in n:
-                err = abs(c1 * k1[i] + c3 * k3[i] + c4 * k4[i] + c5 * k5[i] + c6 * k6[i] + c7 * k7[i])
+                err = abs(
+                    c1 * k1[i] + c3 * k3[i] + c4 * k4[i] + c5 * k5[i] + c6 * k6[i] + c7 * k7[i]
+                )
                 err /= rtol * (scale[i] + abs(new[i]))
                 if not err <= worst:
                     worst = err
@@ -359,14 +287,19 @@ class Plant:
                     raise ArithmeticError(f"step below 1 ns at state {y!r}")
 
     def classical(self, y: State, opening: float, span: float) -> State:
-        """One classical Runge-Kutta step over `span` [s]: quicker than :meth:`advance`, without error control."""
+        """One classical Runge-Kutta step over `span` [s]: quicker than :meth:`advance`, without
+        error control.
+        """
         f, half = self._rhs, 0.5 * span
         k1 = f(y, opening)
         k2 = f([a + half * b for a, b in zip(y, k1, strict=False)], opening)
         k3 = f([a + half * b for a, b in zip(y, k2, strict=False)], opening)
         k4 = f([a + span * b for a, b in zip(y, k3, strict=False)], opening)
         sixth = span / 6.0
-        return [a + sixth * (b + 2.0 * (c + d) + e) for a, b, c, d, e in zip(y, k1, k2, k3, k4, strict=False)]
+        return [
+            a + sixth * (b + 2.0 * (c + d) + e)
+            for a, b, c, d, e in zip(y, k1, k2, k3, k4, strict=False)
+        ]
 
     def tick(self, y: State) -> State:
         """State after what effects do once per sample (relays, largest values, play)."""

@@ -30,9 +30,14 @@ class Noise:
     angle_step: float
 
     def floor(self) -> Array:
-        """Standard deviation of noise and quantisation per channel, in the order of :data:`CHANNELS`."""
+        """Standard deviation of noise and quantisation per channel, in the order of
+        :data:`CHANNELS`.
+        """
         lsb = math.sqrt(12.0)
-        p, a = math.hypot(self.pressure, self.pressure_step / lsb), math.hypot(self.angle, self.angle_step / lsb)
+        p, a = (
+            math.hypot(self.pressure, self.pressure_step / lsb),
+            math.hypot(self.angle, self.angle_step / lsb),
+        )
         return np.array([p, p, a])
 
 
@@ -40,8 +45,9 @@ class Noise:
 class Record:
     """One recording of n samples.
 
-    Command (n,) [V]; `logged` (n, 3) with noise and `clean` (n, 3) without, in the order of :data:`CHANNELS`, gauge
-    Pa and rad; the true states at the samples, and the pressure of the tank at the start [gauge Pa].
+    Command (n,) [V]; `logged` (n, 3) with noise and `clean` (n, 3) without, in the order of
+    :data:`CHANNELS`, gauge Pa and rad; the true states at the samples, and the pressure of the tank
+    at the start [gauge Pa].
     """
 
     time: Array
@@ -88,7 +94,9 @@ def open_loop(nominal: Plant, shape: Excitation, control: Controller) -> Array:
     return command
 
 
-def prepare(nominal: Plant, name: str, duration: float, rng: np.random.Generator) -> tuple[Excitation, Controller, Array | None]:
+def prepare(
+    nominal: Plant, name: str, duration: float, rng: np.random.Generator
+) -> tuple[Excitation, Controller, Array | None]:
     """Excitation, controller and, for an open-loop recording, its commands."""
     shape = build(name, duration, SAMPLE_TIME, rng)
     control = Controller(nominal, SAMPLE_TIME, rng)
@@ -127,7 +135,11 @@ def run(
     white = rng.standard_normal((n, 3)) * [noise.pressure, noise.pressure, noise.angle]
     grid = np.array([noise.pressure_step, noise.pressure_step, noise.angle_step])
     noisy, steps = white.tolist(), grid.tolist()
-    reference, dither, sealed = shape.reference.tolist(), shape.dither.tolist(), shape.sealed.tolist()
+    reference, dither, sealed = (
+        shape.reference.tolist(),
+        shape.dither.tolist(),
+        shape.sealed.tolist(),
+    )
     sent: list[float] = []
     clean: list[tuple[float, float, float]] = []
     states: list[State] = []
@@ -161,18 +173,27 @@ def _late(plant: Plant, time: Array, clean: Array) -> Array:
         if warp is not None:
             shift = np.array([warp(float(t)) for t in time])
             clean = np.column_stack(
-                [PchipInterpolator(time, clean[:, j])(np.clip(time - shift[:, j], time[0], time[-1])) for j in range(3)]
+                [
+                    PchipInterpolator(time, clean[:, j])(
+                        np.clip(time - shift[:, j], time[0], time[-1])
+                    )
+                    for j in range(3)
+                ]
             )
     return clean
 
 
 def follow(
-    bare: Plant, record: Record, index: int = 0, shift: tuple[float, float] = (0.0, 0.0), window: float = 2.0
-) -> Array:  # fmt: skip
+    bare: Plant,
+    record: Record,
+    index: int = 0,
+    shift: tuple[float, float] = (0.0, 0.0),
+    window: float = 2.0,
+) -> Array:
     """Noise-free readings (n, 3) of a plant that gets the commands of a recording of another one.
 
-    Its muscle pressure, angle and rate start from the true state every `window` [s], the tank runs through.
-    One classical Runge-Kutta step per sample: its error is some thousandths of the noise.
+    Its muscle pressure, angle and rate start from the true state every `window` [s], the tank runs
+    through. One classical Runge-Kutta step per sample: its error is some thousandths of the noise.
 
     Parameters
     ----------
@@ -197,7 +218,9 @@ def follow(
     for i, state in enumerate(record.states):
         if i % every == 0:
             supply = y[1] if y else state[1]
-            y = bare.initial(state[0] + shift[0], supply, state[2] + shift[1], state[3], begin + i * SAMPLE_TIME)
+            y = bare.initial(
+                state[0] + shift[0], supply, state[2] + shift[1], state[3], begin + i * SAMPLE_TIME
+            )
         y = bare.tick(y)
         found.append(bare.reading(y, opening))
         for opening, span in path.spans(command[i], begin + i * SAMPLE_TIME):

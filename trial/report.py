@@ -1,4 +1,6 @@
-"""The page of a trial: targets against measurements, tables, pictures, and the commands that make it."""
+"""The page of a trial: targets against measurements, tables, pictures, and the commands that make
+it.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,10 @@ from .sidebyside import compared, side_by_side
 from .summary import markdown
 
 _CAPTIONS = {
-    "strength": "Detection and naming against what the effect leaves after a refit, with Wilson intervals of 95 %",
+    ("strength"): (
+        "Detection and naming against what the effect leaves after a refit, with Wilson intervals "
+        "of 95 %"
+    ),
     "calibration": "How often the leading hypothesis was true, against its stated probability",
     "confusion": "What was named first for what; pairs are left out",
     "gap": "Gap closed on held-out recordings by effect and strength: every case, and the median",
@@ -50,10 +55,15 @@ def checked(folder: Path) -> tuple[str, int]:
     told = json.loads(content)
     if told.get("schema") != MANIFEST_SCHEMA:
         raise ValueError(f"{folder / MANIFEST}: schema must be {MANIFEST_SCHEMA!r}")
-    found = {p.stem: hashlib.sha256(p.read_bytes()).hexdigest() for p in (folder / "keys").glob("*.json")}
+    found = {
+        p.stem: hashlib.sha256(p.read_bytes()).hexdigest() for p in (folder / "keys").glob("*.json")
+    }
     for name, digest in told["keys"].items():
         if found.get(name) != digest:
-            raise ValueError(f"{folder / 'keys' / name}.json: {'missing' if name not in found else 'not the key that was published'}")
+            raise ValueError(
+                f"{folder / 'keys' / name}.json: "
+                f"{'missing' if name not in found else 'not the key that was published'}"
+            )
     if more := sorted(set(found) - set(told["keys"])):
         raise ValueError(f"{folder / 'keys'}: not in the manifest: {', '.join(more[:3])}")
     return hashlib.sha256(content).hexdigest(), len(found)
@@ -71,15 +81,18 @@ def run_of(results: Path, digest: str) -> dict[str, Any]:
 
 
 def about(folder: Path, digest: str, count: int, run: dict[str, Any], command: str) -> list[str]:
-    """How a trial was made: its cases, the digest of its manifest, the code and the machine, and the command."""
+    """How a trial was made: its cases, the digest of its manifest, the code and the machine, and
+    the command.
+    """
     entries = run.get("cases", {}).values()
     codes = sorted({str(e["code"])[:12] for e in entries if "code" in e})
     errors = sum("error" in e for e in entries)
     machine = run.get("machine", {})
     recordings = len(list((folder / "cases").glob("*/*.csv")))
     lines = [
-        f"{count} cases with {recordings} recordings by the independent plant of [trial](../../trial/README.md). Every key has the "
-        "SHA-256 that was published before its case was written; each case was diagnosed in a process of its own that was given that "
+        f"{count} cases with {recordings} recordings by the independent plant of "
+        "[trial](../../trial/README.md). Every key has the SHA-256 that was published before its "
+        "case was written; each case was diagnosed in a process of its own that was given that "
         "case's folder only; then the keys were opened.\n",
         f"- SHA-256 of the manifest: `{digest}`",
     ]
@@ -87,15 +100,23 @@ def about(folder: Path, digest: str, count: int, run: dict[str, Any], command: s
         ended = f"; {errors} of the cases could not be diagnosed" if errors else ""
         lines.append(f"- pamrs {run.get('version')}, code `{'`, `'.join(codes) or '-'}`{ended}")
         processor = machine.get("processor") or "unknown processor"
-        lines.append(f"- {processor}, {machine.get('cores')} cores, {run.get('jobs')} cases at a time; Python {machine.get('python')}")
+        lines.append(
+            f"- {processor}, {machine.get('cores')} cores, {run.get('jobs')} cases at a time; "
+            f"Python {machine.get('python')}"
+        )
         spent = sum(float(e.get("cpu_seconds", 0.0)) for e in entries)
         lines.append(f"- {spent / 3600.0:.1f} h of processor time for the diagnoses")
         if len(codes) > 1:
-            lines.append("- **The results were made by different code: run `pamrs prove --fresh` before they are quoted.**")
+            lines.append(
+                "- **The results were made by different code: run `pamrs prove --fresh` before "
+                "they are quoted.**"
+            )
     return [*lines, f"\nMade by\n\n```\n{command}\n```\n"]
 
 
-def report(folder: Path, results: Path, out: Path, command: str, catalogue: Sequence[str] = LISTED) -> Path:
+def report(
+    folder: Path, results: Path, out: Path, command: str, catalogue: Sequence[str] = LISTED
+) -> Path:
     """Score a trial and write its page ``trial.md`` with its pictures.
 
     Parameters
@@ -127,12 +148,28 @@ def report(folder: Path, results: Path, out: Path, command: str, catalogue: Sequ
     others = compared(folder / "keys", results, catalogue)
     drawn = pictures(scores, others, out)
     images = {p.stem: f"![{_CAPTIONS[p.stem]}]({p.name})\n\n*{_CAPTIONS[p.stem]}.*" for p in drawn}
-    text = "\n".join(["# Blinded trial\n", *about(folder, digest, count, run, command), markdown(scores, catalogue)])
-    closes = {"## Measures": "strength", "## What was named first": "gap", "## Calibration of the leading": "confusion"}
+    text = "\n".join(
+        [
+            "# Blinded trial\n",
+            *about(folder, digest, count, run, command),
+            markdown(scores, catalogue),
+        ]
+    )
+    closes = {
+        "## Measures": "strength",
+        "## What was named first": "gap",
+        "## Calibration of the leading": "confusion",
+    }
     for heading, name in closes.items():
-        text = text.replace(heading, f"{images[name]}\n\n{heading}", 1)  # a picture closes the part before it
+        text = text.replace(
+            heading, f"{images[name]}\n\n{heading}", 1
+        )  # a picture closes the part before it
     parts = [text, images["calibration"], "\n## Other methods on the same cases\n"]
-    parts.append(side_by_side(others) if others else "The baselines were not run (`python -m benchmarks.baselines`).")
+    parts.append(
+        side_by_side(others)
+        if others
+        else "The baselines were not run (`python -m benchmarks.baselines`)."
+    )
     if "baselines" in images:
         parts.append("\n" + images["baselines"])
     write(out / "trial.md", "\n".join(parts) + "\n")

@@ -57,14 +57,20 @@ def read_rig(path: Path) -> tuple[dict[str, Any], dict[str, float]]:
                 continue
             model[section][key] = _si(entry)
             if isinstance(entry, dict) and "tol" in entry:
-                tolerance[f"{section}.{key}"] = _UNIT.get(entry.get("unit", ""), 1.0) * float(entry["tol"])
+                tolerance[f"{section}.{key}"] = _UNIT.get(entry.get("unit", ""), 1.0) * float(
+                    entry["tol"]
+                )
     return model, tolerance
 
 
 def to_parameters(model: dict[str, Any]) -> Parameters:
     """Plant parameters of a nested SI model as returned by :func:`read_rig`."""
     gas, valve, arm, chamber = model["gas"], model["valve"], model["arm"], model["chamber"]
-    muscle = {k: v for k, v in model["muscle"].items() if k not in ("model", "count", "modulus_scale", "end_ratio")}
+    muscle = {
+        k: v
+        for k, v in model["muscle"].items()
+        if k not in ("model", "count", "modulus_scale", "end_ratio")
+    }
     muscle.update(model["muscle"]["end_ratio"])
     return Parameters(
         ambient=gas["ambient_pressure"],
@@ -108,8 +114,8 @@ def draw_parameters(
 ) -> tuple[dict[str, Any], dict[str, float]]:
     """Draw the true baseline.
 
-    Every parameter lies within one tolerance (normal, truncated); `parameters` moves one or two of them by 1.5 to
-    2.5 tolerances instead. Those in `wrong` lie as many tolerances off as it says.
+    Every parameter lies within one tolerance (normal, truncated); `parameters` moves one or two of
+    them by 1.5 to 2.5 tolerances instead. Those in `wrong` lie as many tolerances off as it says.
 
     Returns
     -------
@@ -127,7 +133,11 @@ def draw_parameters(
             z = float(rng.standard_normal())
         moved[name] = z
     if kind == "parameters":
-        loud = [k for k in names if not k.startswith("sensors.") and k not in ("supply.volume", "arm.coulomb")]
+        loud = [
+            k
+            for k in names
+            if not k.startswith("sensors.") and k not in ("supply.volume", "arm.coulomb")
+        ]
         for name in rng.choice(loud, int(rng.integers(1, 3)), replace=False):
             moved[str(name)] = float(rng.choice([-1.0, 1.0]) * rng.uniform(1.5, 2.5))
     moved.update(wrong or {})

@@ -15,30 +15,42 @@ from .effects import LISTED, TYPES
 SCHEMA = "pamrs.diagnosis/1"
 VERDICTS = ("none", "parameters", "effects", "unlisted")
 HEALTHY = ("none", "parameters")
-#: sum over the channels of what a refit leaves above the noise, in units of it, below which there is no gap to close
+#: sum over the channels of what a refit leaves above the noise, in units of it, below which there
+#: is no gap to close
 LEAST_ROOM = 0.05
 #: block of the rig in which an effect of a block of the plant acts; transducers go by their channel
 _ACTS = {
-    "supply": "supply", "valve": "chamber", "line": "chamber", "chamber": "chamber", "muscle": "arm", "joint": "arm", "arm": "arm",
-    "encoder_gear_lash": "arm", "encoder_eccentricity": "arm", "pressure_lag": "chamber", "pressure_zero_drift": "chamber",
-}  # fmt: skip
+    ("supply"): ("supply"),
+    ("valve"): ("chamber"),
+    ("line"): ("chamber"),
+    ("chamber"): ("chamber"),
+    ("muscle"): ("arm"),
+    ("joint"): ("arm"),
+    ("arm"): ("arm"),
+    ("encoder_gear_lash"): ("arm"),
+    ("encoder_eccentricity"): ("arm"),
+    ("pressure_lag"): ("chamber"),
+    ("pressure_zero_drift"): ("chamber"),
+}
 
 
 @dataclass(frozen=True)
 class Row:
-    """One scored case; `probability`, `gap`, `utility` and `seconds` are None when the result lacks them.
+    """One scored case; `probability`, `gap`, `utility` and `seconds` are None when the result lacks
+    them.
 
-    `wanted` is the strength ("weak", "medium", "strong", "pair" or ""), `first` what was named first, `claim` the
-    largest stated probability and whether its hypothesis is the truth.
+    `wanted` is the strength ("weak", "medium", "strong", "pair" or ""), `first` what was named
+    first, `claim` the largest stated probability and whether its hypothesis is the truth.
 
-    `labels` are the strengths of all `ids`, `listed` those of `ids` that can be named, `name_probability` the probability
-    that they are among what is missing. `rest_said` tells, of a listed effect beside one of no catalogue, whether the
-    result says that a block where the latter acts keeps a mismatch; `unexplained` are the blocks it says so of. `wrong`
-    are the parameters that are far off, with their tolerances, `wrong_named` those that the result names,
-    `interval_holds` whether the stated intervals hold the true values (None where they are not named). `false_name`: on
-    a case without an effect, an effect or `unlisted` was claimed, or a parameter called wrong on a null.
-    `held_out` is the largest error on held-out recordings after the diagnosis, in units of the noise, and `said` all
-    that was said.
+    `labels` are the strengths of all `ids`, `listed` those of `ids` that can be named,
+    `name_probability` the probability that they are among what is missing. `rest_said` tells, of a
+    listed effect beside one of no catalogue, whether the result says that a block where the latter
+    acts keeps a mismatch; `unexplained` are the blocks it says so of. `wrong` are the parameters
+    that are far off, with their tolerances, `wrong_named` those that the result names,
+    `interval_holds` whether the stated intervals hold the true values (None where they are not
+    named). `false_name`: on a case without an effect, an effect or `unlisted` was claimed, or a
+    parameter called wrong on a null. `held_out` is the largest error on held-out recordings after
+    the diagnosis, in units of the noise, and `said` all that was said.
     """
 
     case: str
@@ -87,7 +99,9 @@ class Row:
 
     @property
     def visible(self) -> float:
-        """Reach that a refit of the baseline leaves, or the plain reach when the key does not tell."""
+        """Reach that a refit of the baseline leaves, or the plain reach when the key does not
+        tell.
+        """
         return self.reach if self.left is None else self.left
 
 
@@ -101,7 +115,17 @@ class Scores:
 
     def text(self) -> str:
         """Table and totals as plain text."""
-        head = ("case", "truth", "verdict", "named", "p(truth)", "outcome", "gap", "reach", "seconds")
+        head = (
+            "case",
+            "truth",
+            "verdict",
+            "named",
+            "p(truth)",
+            "outcome",
+            "gap",
+            "reach",
+            "seconds",
+        )
         body = [
             (
                 r.case,
@@ -117,7 +141,10 @@ class Scores:
             for r in self.rows
         ]
         width = [max(len(line[i]) for line in [head, *body]) for i in range(len(head))]
-        lines = ["  ".join(cell.ljust(w) for cell, w in zip(line, width, strict=True)).rstrip() for line in [head, *body]]
+        lines = [
+            "  ".join(cell.ljust(w) for cell, w in zip(line, width, strict=True)).rstrip()
+            for line in [head, *body]
+        ]
         lines.append("")
         wide = max(len(k) for k in self.totals)
         lines += [f"{k.ljust(wide)}  {_show(v, 3)}" for k, v in self.totals.items()]
@@ -138,16 +165,20 @@ def _number(value: Any) -> float | None:
 def utility(truth: set[str], answers: Sequence[set[str]], components: int) -> float:
     """Mean ambiguity-group utility over the answers.
 
-    For each answer ``m = 1 - n(N+1)/(f(n+1)) - n'(N'+1)/(f(n'+1))`` with n the missed effects, N the
-    components that the answer calls healthy, n' the effects named wrongly, N' the effects named, f the number
-    of components.
+    For each answer ``m = 1 - n(N+1)/(f(n+1)) - n'(N'+1)/(f(n'+1))`` with n the missed effects, N
+    the components that the answer calls healthy, n' the effects named wrongly, N' the effects
+    named, f the number of components.
     """
     marks = []
     for answer in answers:
         missed, extra = len(truth - answer), len(answer - truth)
         sick = len(answer)
         well = components - sick
-        marks.append(1.0 - missed * (well + 1) / (components * (missed + 1)) - extra * (sick + 1) / (components * (extra + 1)))
+        marks.append(
+            1.0
+            - missed * (well + 1) / (components * (missed + 1))
+            - extra * (sick + 1) / (components * (extra + 1))
+        )
     return mean(marks)
 
 
@@ -158,7 +189,9 @@ def _result(folder: Path, case: str) -> dict[str, Any] | None:
             if not isinstance(data, dict) or data.get("schema") != SCHEMA:
                 raise ValueError(f"{path}: schema must be {SCHEMA!r}")
             if data.get("verdict") not in VERDICTS:
-                raise ValueError(f"{path}: verdict {data.get('verdict')!r} is not one of {', '.join(VERDICTS)}")
+                raise ValueError(
+                    f"{path}: verdict {data.get('verdict')!r} is not one of {', '.join(VERDICTS)}"
+                )
             return data
     return None
 
@@ -176,7 +209,9 @@ def _parameters(names: Iterable[str]) -> set[str]:
 
 
 def _parts(name: str, parameters: bool) -> frozenset[str]:
-    """What a hypothesis claims, empty where it is healthy; names of parameters count only on demand."""
+    """What a hypothesis claims, empty where it is healthy; names of parameters count only on
+    demand.
+    """
     parts = frozenset(name.replace(",", "+").split("+")) - set(HEALTHY)
     return parts if parameters else parts - _parameters(parts)
 
@@ -195,7 +230,9 @@ def _numbers(table: dict[str, Any]) -> dict[str, float]:
 
 
 def _among(result: dict[str, Any], names: Sequence[str]) -> float:
-    """Probability that all these names are among what is missing, each by the block that knows most of it."""
+    """Probability that all these names are among what is missing, each by the block that knows most
+    of it.
+    """
 
     def within(told: dict[str, Any], name: str) -> float:
         chances = _numbers(told.get("probabilities", {})).items()
@@ -211,7 +248,8 @@ def _block_of(effect: str) -> str:
 
 
 def _claim(truth: set[str], probabilities: dict[str, float]) -> tuple[float, bool] | None:
-    """Largest stated probability and whether it is on the truth; "none" and "parameters" count as one.
+    """Largest stated probability and whether it is on the truth; "none" and "parameters" count as
+    one.
 
     A wrong parameter counts as healthy, unless the truth is one: then the names must equal it.
     """
@@ -230,7 +268,8 @@ def _claim(truth: set[str], probabilities: dict[str, float]) -> tuple[float, boo
 def gap_of(result: dict[str, Any]) -> float | None:
     """Share of the gap to the noise that the diagnosis closed on held-out recordings.
 
-    What named nothing closed nothing: 0, unless its table of errors shows that there was no gap, which gives None.
+    What named nothing closed nothing: 0, unless its table of errors shows that there was no gap,
+    which gives None.
     """
     fit = result.get("fit", {})
     gap = _number(fit.get("gap_closed"))
@@ -244,7 +283,9 @@ def gap_of(result: dict[str, Any]) -> float | None:
 
 
 def _held_out(result: dict[str, Any]) -> float | None:
-    """Largest error after the diagnosis on held-out recordings, in units of the noise of its channel."""
+    """Largest error after the diagnosis on held-out recordings, in units of the noise of its
+    channel.
+    """
     table = (result.get("fit", {}).get("held_out") or {}).values()
     pairs = [(_number(e.get("after")), _number(e.get("noise"))) for e in table]
     return max((a / s for a, s in pairs if a is not None and s), default=None)
@@ -262,8 +303,12 @@ def _holds(true: dict[str, Any], told: Sequence[dict[str, Any]]) -> bool | None:
     return all(found) if found else None
 
 
-def _said(result: dict[str, Any], named: Sequence[str], wrong: Sequence[str], unexplained: Sequence[str]) -> str:
-    """Verdict, names, wrong parameters, what stays unexplained and the sets that cannot be told apart, in one line."""
+def _said(
+    result: dict[str, Any], named: Sequence[str], wrong: Sequence[str], unexplained: Sequence[str]
+) -> str:
+    """Verdict, names, wrong parameters, what stays unexplained and the sets that cannot be told
+    apart, in one line.
+    """
     verdict = str(result["verdict"])
     text = f"effects {', '.join(named)}" if verdict == "effects" else verdict
     if wrong:
@@ -274,111 +319,209 @@ def _said(result: dict[str, Any], named: Sequence[str], wrong: Sequence[str], un
     return text + (f"; not told apart: {' or '.join(sets)}" if len(sets) > 1 else "")
 
 
-def score_case(key: dict[str, Any], result: dict[str, Any] | None, catalogue: Sequence[str]) -> Row:
-    """Score one case; a missing result is wrong.
+@dataclass(frozen=True)
+class _Truth:
+    """What a key conceals, and what of it a diagnosis can name.
 
-    An effect that is not in the catalogue has the truth "unlisted", unless the diagnosis gives that very id a
-    probability. Of a listed effect beside such a one, the listed one must be named first; what is said of the rest is
-    scored apart.
+    `known` are the names that count as such: the catalogue, and what this diagnosis gave a
+    probability. `listed` are the effects that can be named, `parts` what is to be claimed: effects,
+    "unlisted", parameters that are `far` off.
     """
-    case, kind, ids = str(key["case"]), str(key["kind"]), [str(i) for i in key["effects"]]
-    reach = float(key.get("reach", 0.0))
-    labels = list(key.get("wanted", {}).values())
-    wanted = "pair" if len(ids) > 1 else str(labels[0]) if labels else ""
-    left = _number(key.get("reach_left"))
-    far: dict[str, Any] = key.get("wrong_parameters", {})
-    wrong = tuple((str(k), float(e["tolerances"])) for k, e in far.items())
-    probabilities = _numbers((result or {}).get("probabilities", {}))
+
+    case: str
+    kind: str
+    ids: list[str]
+    known: set[str]
+    listed: tuple[str, ...]
+    far: dict[str, Any]
+    parts: set[str]
+
+    @property
+    def mixed(self) -> bool:
+        """Whether an effect that can be named stands beside one that cannot."""
+        return 0 < len(self.listed) < len(self.ids)
+
+
+def _truth(
+    key: dict[str, Any], probabilities: dict[str, float], catalogue: Sequence[str]
+) -> _Truth:
+    ids = [str(i) for i in key["effects"]]
     known = {*catalogue, *(i for i in ids if i in probabilities)}
+    far: dict[str, Any] = key.get("wrong_parameters", {})
+    parts = {i if i in known else "unlisted" for i in ids} | set(far)
     listed = tuple(i for i in ids if i in known)
-    mixed = 0 < len(listed) < len(ids)
-    common: dict[str, Any] = {
-        "ids": tuple(ids),
-        "wanted": wanted,
-        "left": left,
-        "labels": tuple(map(str, labels)),
-        "listed": listed,
-        "wrong": wrong,
-        "seed": int(key.get("seed", 0)),
-    }
-    if result is None:
-        gap, missed = 0.0 if ids else None, False if mixed else None
-        return Row(case, kind, "missing", "-", None, "wrong", gap, reach, None, False, None, **common, rest_said=missed)
+    return _Truth(str(key["case"]), str(key["kind"]), ids, known, listed, far, parts)
+
+
+@dataclass(frozen=True)
+class _Told:
+    """What a result claims: its verdict, the effects best first, those of them that are judged, the
+    parameters that it calls wrong, the blocks that keep a mismatch, and the sets that it cannot
+    tell apart.
+    """
+
+    verdict: str
+    named: list[str]
+    top: list[str]
+    wrong: tuple[str, ...]
+    unexplained: tuple[str, ...]
+    sets: list[set[str]]
+
+    @property
+    def plain(self) -> str:
+        """Verdict, or the wrong parameters where it names them."""
+        return "+".join(self.wrong) if self.verdict == "parameters" and self.wrong else self.verdict
+
+
+def _told(result: dict[str, Any], truth: _Truth) -> _Told:
     verdict = str(result["verdict"])
     # effects, best first: a single name is judged, a pair must be named whole
     named = [str(e["id"]) for e in result.get("effects", [])]
-    truth = {i if i in known else "unlisted" for i in ids} | set(far)
-    top = named[: max(1, len(listed) if mixed else len(truth))] if verdict == "effects" else []
-    told_wrong = list(result.get("wrong_parameters") or [])
-    wrong_named = tuple(str(e["name"]) for e in told_wrong)
+    judged = max(1, len(truth.listed) if truth.mixed else len(truth.parts))
     # what a name leaves is no claim of its own
-    unexplained = tuple(str(e["block"]) for e in result.get("unexplained") or [] if e.get("verdict", "unlisted") == "unlisted")
-    rest = {"unlisted"} if unexplained else set[str]()
-    answer = _answer(verdict, named)
-    sets = [{part for i in group for part in str(i).split("+")} for group in result.get("ambiguity", [])]
-    if far:
-        right = verdict == "parameters" and set(wrong_named) == truth
-        contains = right or truth in sets
-        outcome = "right" if right else ("ambiguous" if contains or verdict in HEALTHY else "wrong")
-    elif mixed:
-        right = verdict == "effects" and set(top) == set(listed)
-        contains = right or any(s - {"unlisted"} == set(listed) for s in sets)
-        outcome = "right" if right else ("ambiguous" if contains else "wrong")
-    elif not ids:
-        right = verdict == kind
-        # "parameters" and "none" both say that no physics is missing
-        harmless = verdict in ("none", "parameters")
-        contains = harmless or any(s <= {"none", "parameters"} for s in sets)
-        outcome = "right" if right else ("ambiguous" if harmless or contains else "wrong")
-    else:
-        right = _answer(verdict, top) == truth if verdict == "effects" else answer == truth
-        contains = right or truth in sets
-        outcome = "right" if right else ("ambiguous" if contains else "wrong")
-    chance: float | None
-    pooled = _pooled(probabilities, bool(far))
-    if mixed:
-        chance = _among(result, listed)
-    elif not ids:
-        # "none" and "parameters" say that no physics is missing, and which of them is a matter of degree
-        chance = pooled.get(frozenset(truth), 0.0)
-    elif len(truth) == 1:
-        chance = pooled.get(frozenset(truth))
-    else:
-        joint = [probabilities.get(sep.join(order)) for sep in ("+", ",") for order in (ids, ids[::-1])]
-        chance = next((p for p in joint if p is not None), min((probabilities.get(i, 0.0) for i in truth), default=0.0))
-    gap = gap_of(result)
-    # wrong parameters are healthy, unless the truth is one
-    groups = sets if sets else [answer | (set(wrong_named) if far else set())]
-    groups = [s - {"none", "parameters"} | (set() if ids and len(listed) == len(ids) else rest) for s in groups]
-    groups = groups if far else [s - _parameters(s) for s in groups]
-    components = len({*known, "unlisted", *named, *truth, *(wrong_named if far else ())})
-    mark = utility(truth, groups, components)
-    plain = "+".join(wrong_named) if verdict == "parameters" and wrong_named else verdict
-    label = "+".join(top) if verdict == "effects" else plain
-    claimed = verdict in ("effects", "unlisted") or bool(rest)
-    return Row(
-        case,
-        kind,
+    left = [
+        e for e in result.get("unexplained") or [] if e.get("verdict", "unlisted") == "unlisted"
+    ]
+    groups = result.get("ambiguity", [])
+    return _Told(
         verdict,
-        label,
-        chance if chance is not None else 0.0,
-        outcome,
-        gap,
-        reach,
-        mark,
-        contains,
-        _number(result.get("seconds")),
-        **common,
-        first=(named[0] if named else "effects") if verdict == "effects" else plain,
-        claim=_claim(truth, probabilities),
-        name_probability=_among(result, listed) if listed else None,
-        rest_said=any(b.startswith(_block_of(i)) for b in unexplained for i in ids if i not in known) if mixed else None,
-        unexplained=unexplained,
-        wrong_named=wrong_named,
-        interval_holds=_holds(far, told_wrong),
-        false_name=not ids and (claimed or bool(wrong_named and not far)),
+        named,
+        named[:judged] if verdict == "effects" else [],
+        tuple(str(e["name"]) for e in result.get("wrong_parameters") or []),
+        tuple(str(e["block"]) for e in left),
+        [{part for i in group for part in str(i).split("+")} for group in groups],
+    )
+
+
+def _outcome(truth: _Truth, told: _Told) -> tuple[str, bool]:
+    """Right, ambiguous or wrong, and whether the answer or a set holds the truth."""
+    verdict, parts, sets = told.verdict, truth.parts, told.sets
+    near = False
+    if truth.far:
+        right = verdict == "parameters" and set(told.wrong) == parts
+        contains = right or parts in sets
+        near = verdict in HEALTHY
+    elif truth.mixed:
+        listed = set(truth.listed)
+        right = verdict == "effects" and set(told.top) == listed
+        contains = right or any(s - {"unlisted"} == listed for s in sets)
+    elif not truth.ids:
+        right = verdict == truth.kind
+        # "parameters" and "none" both say that no physics is missing
+        contains = verdict in HEALTHY or any(s <= set(HEALTHY) for s in sets)
+    else:
+        claim = told.top if verdict == "effects" else told.named
+        right = _answer(verdict, claim) == parts
+        contains = right or parts in sets
+    return "right" if right else "ambiguous" if near or contains else "wrong", contains
+
+
+def _chance(truth: _Truth, result: dict[str, Any], probabilities: dict[str, float]) -> float | None:
+    """Stated probability of the truth; None where it is not stated."""
+    if truth.mixed:
+        return _among(result, truth.listed)
+    pooled = _pooled(probabilities, bool(truth.far))
+    if not truth.ids:
+        # "none" and "parameters" say that no physics is missing, and which of them is a matter of
+        # degree
+        return pooled.get(frozenset(truth.parts), 0.0)
+    if len(truth.parts) == 1:
+        return pooled.get(frozenset(truth.parts))
+    ids = truth.ids
+    joint = [probabilities.get(sep.join(order)) for sep in ("+", ",") for order in (ids, ids[::-1])]
+    each = min((probabilities.get(i, 0.0) for i in truth.parts), default=0.0)
+    return next((p for p in joint if p is not None), each)
+
+
+def _utility(truth: _Truth, told: _Told) -> float:
+    """Utility of the sets that a result cannot tell apart, or of its answer."""
+    far = bool(truth.far)
+    answer = _answer(told.verdict, told.named)
+    # wrong parameters are healthy, unless the truth is one
+    groups = told.sets if told.sets else [answer | (set(told.wrong) if far else set())]
+    whole = bool(truth.ids) and len(truth.listed) == len(truth.ids)
+    rest = {"unlisted"} if told.unexplained and not whole else set[str]()
+    groups = [s - set(HEALTHY) | rest for s in groups]
+    groups = groups if far else [s - _parameters(s) for s in groups]
+    names = {*truth.known, "unlisted", *told.named, *truth.parts, *(told.wrong if far else ())}
+    return utility(truth.parts, groups, len(names))
+
+
+def _of_key(key: dict[str, Any], truth: _Truth) -> dict[str, Any]:
+    """What the row of a case has from its key, with or without a result."""
+    labels = list(key.get("wanted", {}).values())
+    return {
+        "reach": float(key.get("reach", 0.0)),
+        "ids": tuple(truth.ids),
+        "wanted": "pair" if len(truth.ids) > 1 else str(labels[0]) if labels else "",
+        "left": _number(key.get("reach_left")),
+        "labels": tuple(map(str, labels)),
+        "listed": truth.listed,
+        "wrong": tuple((str(k), float(e["tolerances"])) for k, e in truth.far.items()),
+        "seed": int(key.get("seed", 0)),
+    }
+
+
+def _missing(key: dict[str, Any], truth: _Truth) -> Row:
+    """The row of a case without a result."""
+    return Row(
+        case=truth.case,
+        truth=truth.kind,
+        verdict="missing",
+        named="-",
+        probability=None,
+        outcome="wrong",
+        gap=0.0 if truth.ids else None,
+        utility=None,
+        contains=False,
+        seconds=None,
+        rest_said=False if truth.mixed else None,
+        **_of_key(key, truth),
+    )
+
+
+def score_case(key: dict[str, Any], result: dict[str, Any] | None, catalogue: Sequence[str]) -> Row:
+    """Score one case; a missing result is wrong.
+
+    An effect that is not in the catalogue has the truth "unlisted", unless the diagnosis gives that
+    very id a probability. Of a listed effect beside such a one, the listed one must be named first;
+    what is said of the rest is scored apart.
+    """
+    probabilities = _numbers((result or {}).get("probabilities", {}))
+    truth = _truth(key, probabilities, catalogue)
+    if result is None:
+        return _missing(key, truth)
+    told = _told(result, truth)
+    outcome, contains = _outcome(truth, told)
+    chance = _chance(truth, result, probabilities)
+    effects = told.verdict == "effects"
+    claimed = told.verdict in ("effects", "unlisted") or bool(told.unexplained)
+    rest_said = None
+    if truth.mixed:
+        hidden = [_block_of(i) for i in truth.ids if i not in truth.known]
+        rest_said = any(b.startswith(block) for b in told.unexplained for block in hidden)
+    return Row(
+        case=truth.case,
+        truth=truth.kind,
+        verdict=told.verdict,
+        named="+".join(told.top) if effects else told.plain,
+        probability=chance if chance is not None else 0.0,
+        outcome=outcome,
+        gap=gap_of(result),
+        utility=_utility(truth, told),
+        contains=contains,
+        seconds=_number(result.get("seconds")),
+        **_of_key(key, truth),
+        first=(told.named[0] if told.named else "effects") if effects else told.plain,
+        claim=_claim(truth.parts, probabilities),
+        name_probability=_among(result, truth.listed) if truth.listed else None,
+        rest_said=rest_said,
+        unexplained=told.unexplained,
+        wrong_named=told.wrong,
+        interval_holds=_holds(truth.far, list(result.get("wrong_parameters") or [])),
+        false_name=not truth.ids and (claimed or bool(told.wrong and not truth.far)),
         held_out=_held_out(result),
-        said=_said(result, named, wrong_named, unexplained),
+        said=_said(result, told.named, told.wrong, told.unexplained),
     )
 
 
@@ -392,7 +535,9 @@ def _median(values: Sequence[float | None]) -> float | None:
     return median(kept) if kept else None
 
 
-def score(keys: Path, results: Path, catalogue: Sequence[str] = LISTED, first: int | None = None) -> Scores:
+def score(
+    keys: Path, results: Path, catalogue: Sequence[str] = LISTED, first: int | None = None
+) -> Scores:
     """Score every key in a folder, or the first so many by name.
 
     Parameters
@@ -427,8 +572,12 @@ def score(keys: Path, results: Path, catalogue: Sequence[str] = LISTED, first: i
     seen = [r for r in listed if r.visible >= 3.0]
     shares = {
         "false alarms (null and parameter cases)": _count(r.detected for r in healthy),
-        "detected (moves a channel by 3x noise)": _count(r.detected for r in sick if r.reach >= 3.0),
-        "detected (3x noise left after a refit)": _count(r.detected for r in sick if r.visible >= 3.0),
+        "detected (moves a channel by 3x noise)": _count(
+            r.detected for r in sick if r.reach >= 3.0
+        ),
+        "detected (3x noise left after a refit)": _count(
+            r.detected for r in sick if r.visible >= 3.0
+        ),
         "right name first (catalogue effects)": _count(r.outcome == "right" for r in listed),
         "right name first (3x noise left)": _count(r.outcome == "right" for r in seen),
         "name or ambiguity set holds the truth": _count(r.contains for r in listed),
@@ -436,12 +585,18 @@ def score(keys: Path, results: Path, catalogue: Sequence[str] = LISTED, first: i
         "unlisted recognised": _count(r.outcome == "right" for r in unlisted),
     }
     if mixed:
-        shares["right name first (beside an effect of no catalogue)"] = _count(r.outcome == "right" for r in mixed)
-        shares["unexplained rest is said"] = _count(r.rest_said for r in mixed if r.rest_said is not None)
+        shares["right name first (beside an effect of no catalogue)"] = _count(
+            r.outcome == "right" for r in mixed
+        )
+        shares["unexplained rest is said"] = _count(
+            r.rest_said for r in mixed if r.rest_said is not None
+        )
     if far:
         shares["wrong parameter named"] = _count(r.outcome == "right" for r in far)
         shares["wrong parameter named or in an ambiguity set"] = _count(r.contains for r in far)
-        shares["stated interval holds the wrong parameter"] = _count(r.interval_holds for r in far if r.interval_holds is not None)
+        shares["stated interval holds the wrong parameter"] = _count(
+            r.interval_holds for r in far if r.interval_holds is not None
+        )
         shares["false names (no effect concealed)"] = _count(r.false_name for r in (*healthy, *far))
     utilities = [r.utility if r.utility is not None else 0.0 for r in rows]
     totals: dict[str, float | int | None] = {

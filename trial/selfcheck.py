@@ -25,7 +25,9 @@ def against_golden(plant: Plant, path: Path) -> dict[str, float]:
     step = 1.0e-3
     found = [y[:4]]
     for i in range(len(data) - 1):
-        y, step = plant.advance(y, plant.normalised(float(data[i, 1])), float(data[i + 1, 0] - data[i, 0]), step)
+        y, step = plant.advance(
+            y, plant.normalised(float(data[i, 1])), float(data[i + 1, 0] - data[i, 0]), step
+        )
         found.append(y[:4])
     error = np.abs(np.array(found) - data[:, 2:6]).max(axis=0) / np.ptp(data[:, 2:6], axis=0)
     names = ("muscle_pressure", "supply_pressure", "joint_angle", "joint_rate")
@@ -33,7 +35,9 @@ def against_golden(plant: Plant, path: Path) -> dict[str, float]:
 
 
 def against_fine(plant: Plant, seconds: float = 10.0) -> float:
-    """Largest difference of pressures and angle over their range from a run with a tolerance of 1e-12."""
+    """Largest difference of pressures and angle over their range from a run with a tolerance of
+    1e-12.
+    """
     found = []
     for rtol in (1.0e-8, 1.0e-12):
         y, step, rows = plant.rest(13.8e5 + plant.par.ambient), 1.0e-3, []
@@ -65,7 +69,10 @@ def against_lsoda(plant: Plant, seconds: float = 3.0) -> float:
             "max_step": 2e-3,
         }
         other = solve_ivp(slope, (0.0, 0.1), other, **kwargs).y[:, -1].tolist()
-        worst = max(worst, *(abs(a - b) / (abs(b) + s) for a, b, s in zip(y, other, plant.scale, strict=True)))
+        worst = max(
+            worst,
+            *(abs(a - b) / (abs(b) + s) for a, b, s in zip(y, other, plant.scale, strict=True)),
+        )
     return worst
 
 
@@ -75,7 +82,8 @@ def selfcheck(golden: Path | None = None) -> str:
     Parameters
     ----------
     golden : Path, optional
-        Folder with golden vectors of the plant without effects (CSV: time, command, absolute pressures, angle, rate).
+        Folder with golden vectors of the plant without effects (CSV: time, command, absolute
+        pressures, angle, rate).
 
     Raises
     ------
@@ -88,7 +96,11 @@ def selfcheck(golden: Path | None = None) -> str:
     bad: list[str] = []
     for path in sorted(golden.glob("shoulder_*.csv")) if golden else ():
         errors = against_golden(plant, path)
-        lines.append(f"golden {path.stem}: " + ", ".join(f"{k} {v:.1e}" for k, v in errors.items()) + " of range")
+        lines.append(
+            f"golden {path.stem}: "
+            + ", ".join(f"{k} {v:.1e}" for k, v in errors.items())
+            + " of range"
+        )
         # a strike on the stiff stop amplifies every rounding
         if not max(errors.values()) < (1.0e-5 if "choked" in path.stem else 1.0e-7):
             bad.append(lines[-1])

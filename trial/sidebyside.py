@@ -1,4 +1,6 @@
-"""The diagnosis beside what other methods made of the same cases (``python -m benchmarks.baselines``)."""
+"""The diagnosis beside what other methods made of the same cases
+(``python -m benchmarks.baselines``).
+"""
 
 from __future__ import annotations
 
@@ -27,7 +29,9 @@ CLASSES = (
 
 @dataclass(frozen=True)
 class Compared:
-    """One case by every method: the gap that each closed (None: there was none), and whether a refit alone raised an alarm."""
+    """One case by every method: the gap that each closed (None: there was none), and whether a
+    refit alone raised an alarm.
+    """
 
     row: Row
     kind: str
@@ -77,7 +81,9 @@ def compared(keys: Path, results: Path, catalogue: Sequence[str] = LISTED) -> li
 
 
 def medians(rows: Iterable[Compared]) -> tuple[dict[str, float], int]:
-    """Median gap closed by method, over the cases in which every method has one, and their number."""
+    """Median gap closed by method, over the cases in which every method has one, and their
+    number.
+    """
     whole = [{m: g for m, g in c.gaps.items() if g is not None} for c in rows]
     whole = [g for g in whole if len(g) == len(METHODS)]
     return ({m: median([g[m] for g in whole]) for m in METHODS} if whole else {}), len(whole)
@@ -94,14 +100,19 @@ def _share(rows: Iterable[Compared], hit: Callable[[Compared], bool | None]) -> 
 def side_by_side(rows: Sequence[Compared]) -> str:
     """Markdown: the gap closed by class and strength, and what each method detects and names."""
     lines = [
-        "Median share of the gap to the noise closed on held-out recordings; a case whose refit leaves no gap is left out.\n",
+        (
+            "Median share of the gap to the noise closed on held-out recordings; a case whose "
+            "refit leaves no gap is left out.\n"
+        ),
         "| class | cases | " + " | ".join(METHODS.values()) + " |",
         "|---|---|" + "---|" * len(METHODS),
     ]
     for name in (*CLASSES, "all"):
         middle, count = medians(c for c in rows if c.row.ids and name in ("all", c.kind))
         if count:
-            lines.append(f"| {name} | {count} | " + " | ".join(f"{middle[m]:.2f}" for m in METHODS) + " |")
+            lines.append(
+                f"| {name} | {count} | " + " | ".join(f"{middle[m]:.2f}" for m in METHODS) + " |"
+            )
     healthy = [c for c in rows if c.row.healthy]
     seen = [c for c in rows if c.row.ids and c.row.visible >= SEEN]
     listed = [c for c in seen if not c.kind.startswith("unlisted")]
@@ -109,8 +120,9 @@ def side_by_side(rows: Sequence[Compared]) -> str:
     refit = (_share(healthy, lambda c: c.alarm), _share(seen, lambda c: c.alarm))
     mine = (_share(healthy, lambda c: c.row.detected), _share(seen, lambda c: c.row.detected))
     lines += [
-        "\nThe refit raises an alarm by chi-square (1 %, its residual's means over 0.1 s against the diagnosis' own noise floor). "
-        "SINDy and the Gaussian process predict; they neither test nor name a cause.\n",
+        "\nThe refit raises an alarm by chi-square (1 %, its residual's means over 0.1 s against "
+        "the diagnosis' own noise floor). SINDy and the Gaussian process predict; they neither "
+        "test nor name a cause.\n",
         "| | refit, chi-square | SINDy | Gaussian process | pamrs |",
         "|---|---|---|---|---|",
         f"| false alarms | {refit[0]} | - | - | {mine[0]} |",

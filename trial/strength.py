@@ -1,4 +1,6 @@
-"""Find the size of an effect that moves its most affected channel by a wanted multiple of the noise."""
+"""Find the size of an effect that moves its most affected channel by a wanted multiple of the
+noise.
+"""
 
 from __future__ import annotations
 
@@ -7,21 +9,44 @@ from collections.abc import Callable
 from typing import TypeVar
 
 T = TypeVar("T")
-#: multiples of the noise; medium lies a little above 3, so that every medium case counts as detectable
+#: multiples of the noise; medium lies a little above 3, so that every medium case counts as
+#: detectable
 STRENGTHS = {"weak": 1.5, "medium": 3.3, "strong": 10.0}
 #: every label that can be wanted; "heavy" is what stands beside an effect in plan `blocks`
 LABELS = {**STRENGTHS, "heavy": 20.0}
 #: factor on the drawn size with which the search for medium starts; it only saves time
 FIRST = {
-    "supply_leak": 0.5, "compressor_cut_in": 0.2, "valve_dead_zone": 0.01, "valve_hysteresis": 0.15,
-    "valve_centre_leakage": 0.45, "input_path_lag": 0.17, "tube_flow_restriction": 0.5, "leak_muscle": 0.2,
-    "heat_transfer": 0.03, "muscle_hysteresis": 0.055, "muscle_creep": 0.28, "muscle_rate_damping": 0.21,
-    "activation_pressure": 0.033, "mullins_softening": 0.08, "pam_crowding_contact": 4.0,
-    "joint_coulomb_stribeck": 0.26, "joint_end_stop": 0.07, "payload_swing": 0.75, "payload_change": 1.8,
-    "base_flexibility": 0.45, "pressure_lag": 0.7, "tendon_compliance": 0.012, "valve_null_drift": 0.24,
-    "muscle_buckling": 0.53, "encoder_gear_lash": 0.83, "hose_torque": 0.46, "supply_gas_cooling": 4.6,
-    "exhaust_back_pressure": 0.05, "moment_arm_error": 1.3, "pressure_zero_drift": 1.5,
-}  # fmt: skip
+    "supply_leak": 0.5,
+    "compressor_cut_in": 0.2,
+    "valve_dead_zone": 0.01,
+    "valve_hysteresis": 0.15,
+    ("valve_centre_leakage"): 0.45,
+    ("input_path_lag"): 0.17,
+    ("tube_flow_restriction"): 0.5,
+    ("leak_muscle"): 0.2,
+    ("heat_transfer"): 0.03,
+    ("muscle_hysteresis"): 0.055,
+    ("muscle_creep"): 0.28,
+    ("muscle_rate_damping"): 0.21,
+    "activation_pressure": 0.033,
+    "mullins_softening": 0.08,
+    "pam_crowding_contact": 4.0,
+    ("joint_coulomb_stribeck"): 0.26,
+    ("joint_end_stop"): 0.07,
+    ("payload_swing"): 0.75,
+    ("payload_change"): 1.8,
+    ("base_flexibility"): 0.45,
+    ("pressure_lag"): 0.7,
+    ("tendon_compliance"): 0.012,
+    ("valve_null_drift"): 0.24,
+    ("muscle_buckling"): 0.53,
+    ("encoder_gear_lash"): 0.83,
+    ("hose_torque"): 0.46,
+    ("supply_gas_cooling"): 4.6,
+    "exhaust_back_pressure": 0.05,
+    "moment_arm_error": 1.3,
+    "pressure_zero_drift": 1.5,
+}
 MEASURES = ("reach", "left")
 
 
@@ -63,7 +88,9 @@ def aim(
     factor = min(start, most)
     for attempt in range(tries):
         found, result = simulate(factor)
-        if best is None or abs(math.log(max(found, 1e-9) / target)) < abs(math.log(max(best[1], 1e-9) / target)):
+        if best is None or abs(math.log(max(found, 1e-9) / target)) < abs(
+            math.log(max(best[1], 1e-9) / target)
+        ):
             best = (factor, found, result)
         if abs(found / target - 1.0) <= tolerance or (found < target and factor >= most):
             break

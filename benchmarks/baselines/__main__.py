@@ -1,7 +1,9 @@
-"""``python -m benchmarks.baselines FOLDER --results DIR --jobs N``: the baselines on the cases of a trial, resumable.
+"""``python -m benchmarks.baselines FOLDER --results DIR --jobs N``: the baselines on the cases of a
+trial, resumable.
 
-Writes ``DIR/baselines/NAME.json`` for each case. The keys are opened after the last case only, where there are some, for the table
-of the gap closed by every method, that of ``pamrs prove`` beside them.
+Writes ``DIR/baselines/NAME.json`` for each case. The keys are opened after the last case only,
+where there are some, for the table of the gap closed by every method, that of ``pamrs prove``
+beside them.
 """
 
 from __future__ import annotations
@@ -17,13 +19,23 @@ from trial.sidebyside import compared, side_by_side
 
 
 def main(words: list[str] | None = None) -> int:
-    """Run the command line; 0 when every case has a result, 3 when some failed, 2 when the input is wrong."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.baselines", description=(__doc__ or "").splitlines()[0])
+    """Run the command line; 0 when every case has a result, 3 when some failed, 2 when the input is
+    wrong.
+    """
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.baselines", description=(__doc__ or "").splitlines()[0]
+    )
     parser.add_argument("folder", type=Path, help="the trial: cases/, and keys/ for the table")
-    parser.add_argument("--results", type=Path, help="results of `pamrs prove`; gets baselines/ (default: FOLDER/results)")
+    parser.add_argument(
+        "--results",
+        type=Path,
+        help="results of `pamrs prove`; gets baselines/ (default: FOLDER/results)",
+    )
     parser.add_argument("--jobs", type=int, default=1, help="processes (default 1)")
     parser.add_argument("--limit", type=int, help="only the first so many cases")
-    parser.add_argument("--markdown", type=Path, help="write the table here, not to standard output only")
+    parser.add_argument(
+        "--markdown", type=Path, help="write the table here, not to standard output only"
+    )
     args = parser.parse_args(words)
     for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
         os.environ[name] = "1"  # before the workers start; they inherit it
@@ -34,7 +46,12 @@ def main(words: list[str] | None = None) -> int:
             raise ValueError(f"--jobs = {args.jobs}, --limit = {args.limit}: at least 1 is needed")
         cases = cases_of(args.folder)[0][: args.limit]
         results = args.results or args.folder / "results"
-        failed = run(cases, results / "baselines", args.jobs, lambda text: print(text, file=sys.stderr, flush=True))
+        failed = run(
+            cases,
+            results / "baselines",
+            args.jobs,
+            lambda text: print(text, file=sys.stderr, flush=True),
+        )
         if (args.folder / "keys").is_dir():
             text = side_by_side(compared(args.folder / "keys", results))
             print(text)

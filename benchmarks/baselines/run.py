@@ -30,8 +30,8 @@ def examined(folder: Path) -> dict[str, Any]:
     Returns
     -------
     dict
-        Schema ``pamrs.baselines/1``: by channel the held-out errors [SI], the gap closed by method, whether refitting
-        alone raises an alarm.
+        Schema ``pamrs.baselines/1``: by channel the held-out errors [SI], the gap closed by method,
+        whether refitting alone raises an alarm.
     """
     from benchmarks.baselines import gaussian, sindy
 
@@ -72,7 +72,11 @@ def valid(path: Path, case: Path) -> bool:
         told = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return False
-    return isinstance(told, dict) and told.get("schema") == SCHEMA and told.get("case_sha256") == case_digest(case)
+    return (
+        isinstance(told, dict)
+        and told.get("schema") == SCHEMA
+        and told.get("case_sha256") == case_digest(case)
+    )
 
 
 def _work(folder: Path, out: Path) -> str | None:
@@ -92,7 +96,10 @@ def run(cases: list[Path], out: Path, jobs: int, say: Callable[[str], None]) -> 
         say(f"{done} of {len(cases)} results are there")
     start = done
     with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn")) as pool:
-        tasks = {pool.submit(_work, c.resolve(), (out / f"{c.name}.json").resolve()): c.name for c in waiting}
+        tasks = {
+            pool.submit(_work, c.resolve(), (out / f"{c.name}.json").resolve()): c.name
+            for c in waiting
+        }
         try:
             for task in as_completed(tasks):
                 try:
@@ -103,7 +110,10 @@ def run(cases: list[Path], out: Path, jobs: int, say: Callable[[str], None]) -> 
                     failed[tasks[task]] = error
                 done += 1
                 left = (time.perf_counter() - began) / (done - start) * (len(cases) - done)
-                say(f"[{done}/{len(cases)}] {tasks[task]}: {'error: ' + error if error else 'done'}; about {left / 60:.0f} min left")
+                say(
+                    f"[{done}/{len(cases)}] {tasks[task]}: "
+                    f"{'error: ' + error if error else 'done'}; about {left / 60:.0f} min left"
+                )
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise

@@ -1,4 +1,6 @@
-"""A case as the baselines see it: residuals of the refitted cut chain, measured signals, the gap to the noise."""
+"""A case as the baselines see it: residuals of the refitted cut chain, measured signals, the gap to
+the noise.
+"""
 
 from __future__ import annotations
 
@@ -12,9 +14,9 @@ from scipy.stats import chi2
 
 from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.fit import Key, Problem, residuals
-from pamrs.diagnosis.noise import Floor, bins_of, floors
+from pamrs.diagnosis.noise import NoiseLevel, bins_of, noise_levels
 from pamrs.diagnosis.prepare import Block, Prepared, Residual, available_blocks, binned, prepare
-from pamrs.diagnosis.search import coloured, refitted
+from pamrs.diagnosis.search import refitted, with_autocorrelation
 from pamrs.recordings import load_case
 from pamrs.rig import Rig
 from pamrs.simulation import core_rig
@@ -24,7 +26,8 @@ Array = NDArray[np.float64]
 STEP = 0.02
 """Sample time of what the baselines learn from: means over this long [s]."""
 LEAST_ROOM = 0.05
-"""Sum over the channels of what is above the noise, in units of it, below which there is no gap to close (as in the diagnosis)."""
+"""Sum over the channels of what is above the noise, in units of it, below which there is no gap to
+close (as in the diagnosis)."""
 ALPHA = 0.01
 """False alarms that a test of chi-square allows."""
 
@@ -40,7 +43,7 @@ class Stretch:
     prepared : Prepared
         The recording.
     noise : float
-        Floor of a sample, in the channel's unit: its own noise and that of the drives.
+        Noise level of a sample, in the channel's unit: its own noise and that of the drives.
     y : (m,) array
         Residual over `noise`, means over :data:`STEP`.
     u : (m, k) array
@@ -60,11 +63,17 @@ class Stretch:
     dt: float
 
     def corrected(self, correction: Array) -> Array:
-        """Residual at every sample with a correction (m,) taken off, freed of the windows' starts like the diagnosis' own."""
+        """Residual at every sample with a correction (m,) taken off, freed of the windows' starts
+        like the diagnosis' own.
+        """
         r = self.residual
         width = round(self.dt / self.prepared.dt)
         centres = (np.arange(correction.size) + 0.5) * width - 0.5
-        value = np.where(r.rows, r.value - self.noise * np.interp(np.arange(r.value.size), centres, correction), 0.0)
+        value = np.where(
+            r.rows,
+            r.value - self.noise * np.interp(np.arange(r.value.size), centres, correction),
+            0.0,
+        )
         for a, b, q in r.starts:
             value[a:b] -= q @ (q.T @ value[a:b])
         return np.where(r.rows, value, 0.0)
@@ -78,7 +87,9 @@ class Stretch:
 
 @dataclass(frozen=True, eq=False)
 class Column:
-    """One block: its stretches to learn from and those held out (the same when nothing is held out)."""
+    """One block: its stretches to learn from and those held out (the same when nothing is held
+    out).
+    """
 
     block: Block
     names: tuple[str, ...]
@@ -97,7 +108,8 @@ class Sheet:
     columns : list of Column
         Its blocks.
     p_value : float
-        Chance of the refitted misfit from noise alone, the least over the blocks times their number.
+        Chance of the refitted misfit from noise alone, the least over the blocks times their
+        number.
     moved : dict of str to float
         Distance of each parameter from its nominal value, in tolerances.
     """
@@ -116,14 +128,20 @@ class Sheet:
 def _refitted(inner: Problem, nominal: Rig) -> tuple[Rig, dict[str, float]]:
     """Baseline inside its tolerances, as the diagnosis refits it."""
     first = refitted(inner, nominal, dict.fromkeys((b.name for b in inner.blocks), 1.0))
-    best, _ = coloured(inner, nominal, first)
+    best, _ = with_autocorrelation(inner, nominal, first)
     return best.rig, best.moved
 
 
 def _signals(prepared: Prepared, rig: Rig) -> dict[str, Array]:
-    """Measured signals and their rates at every sample, SI; the opening of the valve by its command."""
+    """Measured signals and their rates at every sample, SI; the opening of the valve by its
+    command.
+    """
     out: dict[str, Array] = {}
-    for channel, short in (("muscle_pressure", "p"), ("joint_angle", "q"), ("supply_pressure", "ps")):
+    for channel, short in (
+        ("muscle_pressure", "p"),
+        ("joint_angle", "q"),
+        ("supply_pressure", "ps"),
+    ):
         if channel in prepared.signals:
             value, slope = prepared.signals[channel]
             out[short] = value
@@ -136,14 +154,28 @@ def _signals(prepared: Prepared, rig: Rig) -> dict[str, Array]:
 
 
 def _stretch(
-    r: Residual, floor: Floor, prepared: Prepared, signals: dict[str, Array], scales: dict[str, tuple[float, float]]
+    r: Residual,
+    noise_level: NoiseLevel,
+    prepared: Prepared,
+    signals: dict[str, Array],
+    scales: dict[str, tuple[float, float]],
 ) -> Stretch:
     width = max(1, round(STEP / prepared.dt))
-    y, _ = binned(r.value / floor.sample, r.rows, width)
+    y, _ = binned(r.value / noise_level.sample, r.rows, width)
     every = np.ones(prepared.n, dtype=bool)
-    u = np.column_stack([(binned(v, every, width)[0] - scales[n][0]) / scales[n][1] for n, v in signals.items()])
+    u = np.column_stack(
+        [(binned(v, every, width)[0] - scales[n][0]) / scales[n][1] for n, v in signals.items()]
+    )
     pieces = [(-(-a // width), min(b // width, y.size)) for a, b, _ in r.starts]
-    return Stretch(r, prepared, floor.sample, y, u, [(a, b) for a, b in pieces if b - a >= 16], width * prepared.dt)
+    return Stretch(
+        r,
+        prepared,
+        noise_level.sample,
+        y,
+        u,
+        [(a, b) for a, b in pieces if b - a >= 16],
+        width * prepared.dt,
+    )
 
 
 def sheet(folder: str | os.PathLike[str]) -> Sheet:
@@ -168,7 +200,10 @@ def sheet(folder: str | os.PathLike[str]) -> Sheet:
     names = tuple(tables[fitted[0].recording.name])
     every = {n: np.concatenate([tables[p.recording.name][n] for p in fitted]) for n in names}
     # the opening has a zero that means something, and so have rates
-    scales = {n: (0.0 if n[0] in "dx" else float(v.mean()), float(v.std()) or 1.0) for n, v in every.items()}
+    scales = {
+        n: (0.0 if n[0] in "dx" else float(v.mean()), float(v.std()) or 1.0)
+        for n, v in every.items()
+    }
     for members in ([b for b in blocks if b.name != "arm"], [b for b in blocks if b.name == "arm"]):
         if not members:
             continue
@@ -177,34 +212,59 @@ def sheet(folder: str | os.PathLike[str]) -> Sheet:
         model, distances = _refitted(inner, rig)
         for name, value in distances.items():
             moved[name] = max(value, moved.get(name, 0.0), key=abs)
-        floor = floors(inner, core.respecified(model.to_json())) | (floors(outer, core.respecified(model.to_json())) if held else {})
+        noise_level = noise_levels(inner, core.respecified(model.to_json()))
+        if held:
+            noise_level |= noise_levels(outer, core.respecified(model.to_json()))
         found = residuals(inner, model)
         outside = residuals(outer, model) if held else found
 
-        def lay(block: Block, prepared: Prepared, left: dict[Key, Residual], floor: dict[Key, Floor] = floor) -> Stretch:
+        def lay(
+            block: Block,
+            prepared: Prepared,
+            left: dict[Key, Residual],
+            noise_level: dict[Key, NoiseLevel] = noise_level,
+        ) -> Stretch:
             key = (block.name, prepared.recording.name)
-            return _stretch(left[key], floor[key], prepared, tables[prepared.recording.name], scales)
+            return _stretch(
+                left[key], noise_level[key], prepared, tables[prepared.recording.name], scales
+            )
 
         for block in members:
             stretches = [lay(block, p, found) for p in fitted]
-            columns.append(Column(block, names, stretches, [lay(block, p, outside) for p in held] if held else stretches))
-            chances.append(_chance(block, fitted, found, floor))
+            columns.append(
+                Column(
+                    block,
+                    names,
+                    stretches,
+                    [lay(block, p, outside) for p in held] if held else stretches,
+                )
+            )
+            chances.append(_chance(block, fitted, found, noise_level))
     return Sheet(case.name, columns, min(1.0, min(chances) * len(chances)), moved)
 
 
-def _chance(block: Block, recordings: list[Prepared], found: dict[Key, Residual], floor: dict[Key, Floor]) -> float:
-    """Chi-square of the means over 0.1 s against their floor, each counted as independent: the textbook's test of a fit."""
+def _chance(
+    block: Block,
+    recordings: list[Prepared],
+    found: dict[Key, Residual],
+    noise_level: dict[Key, NoiseLevel],
+) -> float:
+    """Chi-square of the means over 0.1 s against their noise level, each counted as independent:
+    the textbook's test of a fit.
+    """
     total, count = 0.0, 0
     for prepared in recordings:
         key = (block.name, prepared.recording.name)
         means, counts = binned(found[key].value, found[key].rows, bins_of(prepared))
-        total += float(((means[counts > 0] / floor[key].binned) ** 2).sum())
+        total += float(((means[counts > 0] / noise_level[key].binned) ** 2).sum())
         count += int((counts > 0).sum())
     return float(chi2.sf(total, max(1, count)))
 
 
 def errors(column: Column, corrections: list[Array] | None = None) -> tuple[float, float]:
-    """Root mean square of a block's held-out residual, and its floor, in the channel's unit."""
+    """Root mean square of a block's held-out residual, and its noise level, in the channel's
+    unit.
+    """
     squares, floors_, weights = [], [], []
     for i, stretch in enumerate(column.outer):
         r = stretch.residual
@@ -212,11 +272,14 @@ def errors(column: Column, corrections: list[Array] | None = None) -> tuple[floa
         squares.append(float(np.mean(value[r.rows] ** 2)) if r.rows.any() else 0.0)
         floors_.append(stretch.noise**2)
         weights.append(max(1, int(r.rows.sum())))
-    return math.sqrt(float(np.average(squares, weights=weights))), math.sqrt(float(np.average(floors_, weights=weights)))
+    return math.sqrt(float(np.average(squares, weights=weights))), math.sqrt(
+        float(np.average(floors_, weights=weights))
+    )
 
 
 def gap_closed(table: dict[str, dict[str, float]], method: str) -> float | None:
-    """(refit - after)/(refit - noise), pooled over channels in units of their noise; None without a gap.
+    """(refit - after)/(refit - noise), pooled over channels in units of their noise; None without a
+    gap.
 
     Parameters
     ----------

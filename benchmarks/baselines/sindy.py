@@ -1,12 +1,15 @@
-"""SINDy on the residual: a sparse equation of motion for it in measured signals, with its own memory.
+"""SINDy on the residual: a sparse equation of motion for it in measured signals, with its own
+memory.
 
-Brunton, Proctor & Kutz (2016), with pysindy's sequentially thresholded least squares. For a residual r in units of its noise and
-measured signals u, the candidates of r itself (order 0), of dr/dt (1) or of the rate of dr/dt (2) are 1, u, |u|, sign u, u|u|, all
-products of two signals, and r (and dr/dt) times 1 and u. Size of the library, order and threshold are chosen by leaving out one
-recording to fit at a time; "no correction" takes part in that choice. Rates and candidates are averaged over 0.2 s before they are
-compared (the weak form with a box as test function, after Schaeffer & McCalla 2017), or noise would drown the rates. The equation is
-integrated over the diagnosis' windows, from the smoothed residual at the start of each; where its memory would grow by itself, it is
-held at neither growing nor decaying.
+Brunton, Proctor & Kutz (2016), with pysindy's sequentially thresholded least squares. For a
+residual r in units of its noise and measured signals u, the candidates of r itself (order 0), of
+dr/dt (1) or of the rate of dr/dt (2) are 1, u, |u|, sign u, u|u|, all products of two signals, and
+r (and dr/dt) times 1 and u. Size of the library, order and threshold are chosen by leaving out one
+recording to fit at a time; "no correction" takes part in that choice. Rates and candidates are
+averaged over 0.2 s before they are compared (the weak form with a box as test function, after
+Schaeffer & McCalla 2017), or noise would drown the rates. The equation is integrated over the
+diagnosis' windows, from the smoothed residual at the start of each; where its memory would grow by
+itself, it is held at neither growing nor decaying.
 """
 
 from __future__ import annotations
@@ -36,7 +39,9 @@ BEYOND = 3.0
 
 
 def library(u: Array, names: tuple[str, ...], size: str) -> tuple[Array, list[str]]:
-    """Candidate terms of the measured signals, (m, n), and what they are called; `size` is one of :data:`LIBRARIES`."""
+    """Candidate terms of the measured signals, (m, n), and what they are called; `size` is one of
+    :data:`LIBRARIES`.
+    """
     terms = [np.ones(len(u))]
     called = ["1"]
     for i, name in enumerate(names):
@@ -83,20 +88,28 @@ class Equation:
     limit: float
 
     def text(self, called: list[str], names: tuple[str, ...]) -> str:
-        """The terms that are left, as one line; signals in units of their scatter, the residual in units of its noise."""
+        """The terms that are left, as one line; signals in units of their scatter, the residual in
+        units of its noise.
+        """
         parts = [f"{c:+.3g} {t}" for c, t in zip(self.a, called, strict=True) if c]
         for state, row in zip(("r", "dr"), self.memory, strict=False):
             parts += [f"{c:+.3g} {state} {t}" for c, t in zip(row, ("", *names), strict=False) if c]
-        return ("r = ", "dr/dt = ", "d2r/dt2 = ")[self.order] + (" ".join(p.strip() for p in parts) or "0")
+        return ("r = ", "dr/dt = ", "d2r/dt2 = ")[self.order] + (
+            " ".join(p.strip() for p in parts) or "0"
+        )
 
     def run(self, stretch: Stretch, terms: Array) -> Array:
-        """Integrate over the windows of a stretch by the trapezoidal rule; (m,) in units of the noise."""
+        """Integrate over the windows of a stretch by the trapezoidal rule; (m,) in units of the
+        noise.
+        """
         out = np.zeros(len(stretch.y))
         drive = terms @ self.a
         if self.order == 0:
             return np.clip(drive, -self.limit, self.limit)
         width = self.memory.shape[1] - 1
-        feedback = np.minimum(np.column_stack([np.ones(len(stretch.u)), stretch.u[:, :width]]) @ self.memory.T, 0.0)
+        feedback = np.minimum(
+            np.column_stack([np.ones(len(stretch.u)), stretch.u[:, :width]]) @ self.memory.T, 0.0
+        )
         h = 0.5 * stretch.dt
         for a, b in stretch.pieces:
             x = _states(stretch.y[a:b], stretch.dt, self.order)[0][0]
@@ -104,7 +117,11 @@ class Equation:
                 out[a:b] = _first(float(x[0]), drive[a:b], feedback[a:b, 0], h)
             else:
                 out[a:b] = _second((float(x[0]), float(x[1])), drive[a:b], feedback[a:b], h)
-        return np.clip(np.nan_to_num(out, nan=self.limit, posinf=self.limit, neginf=-self.limit), -self.limit, self.limit)
+        return np.clip(
+            np.nan_to_num(out, nan=self.limit, posinf=self.limit, neginf=-self.limit),
+            -self.limit,
+            self.limit,
+        )
 
 
 def _first(x: float, drive: Array, rate: Array, h: float) -> list[float]:
@@ -148,7 +165,11 @@ def _rows(stretches: list[Stretch], terms: list[Array], order: int) -> tuple[Arr
     candidates, rates = [], []
     for stretch, table in zip(stretches, terms, strict=True):
         # products of memory and signals belong to the full library
-        ones = np.column_stack([np.ones(len(stretch.u)), stretch.u]) if _full(table, stretch.u) else np.ones((len(stretch.u), 1))
+        ones = (
+            np.column_stack([np.ones(len(stretch.u)), stretch.u])
+            if _full(table, stretch.u)
+            else np.ones((len(stretch.u), 1))
+        )
         for a, b in stretch.pieces:
             state, rate = _states(stretch.y[a:b], stretch.dt, order)
             memory = [ones[a:b] * state[:, [s]] for s in range(order)]
@@ -157,7 +178,9 @@ def _rows(stretches: list[Stretch], terms: list[Array], order: int) -> tuple[Arr
     return np.concatenate(candidates), np.concatenate(rates)
 
 
-def learnt(stretches: list[Stretch], terms: list[Array], order: int, threshold: float) -> Equation | None:
+def learnt(
+    stretches: list[Stretch], terms: list[Array], order: int, threshold: float
+) -> Equation | None:
     """Fit an equation; None where nothing can be learnt."""
     if not any(s.pieces for s in stretches):
         return None
@@ -169,21 +192,32 @@ def learnt(stretches: list[Stretch], terms: list[Array], order: int, threshold: 
         return None
     scaled = candidates[:, kept] / width[kept]
     model = pysindy.SINDy(
-        optimizer=pysindy.STLSQ(threshold=threshold, alpha=RIDGE * len(scaled), max_iter=20), feature_library=pysindy.IdentityLibrary()
+        optimizer=pysindy.STLSQ(threshold=threshold, alpha=RIDGE * len(scaled), max_iter=20),
+        feature_library=pysindy.IdentityLibrary(),
     )
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # "sparsity parameter is too big": nothing is left, which is an answer
-        model.fit(scaled, t=stretches[0].dt, x_dot=np.repeat(rates[:, None] / size, scaled.shape[1], axis=1)[:, :1])
+        warnings.simplefilter(
+            "ignore"
+        )  # "sparsity parameter is too big": nothing is left, which is an answer
+        model.fit(
+            scaled,
+            t=stretches[0].dt,
+            x_dot=np.repeat(rates[:, None] / size, scaled.shape[1], axis=1)[:, :1],
+        )
     found = np.zeros(width.size)
     found[kept] = np.asarray(model.coefficients())[0] * size / width[kept]
     n = terms[0].shape[1]
     limit = BEYOND * max(float(np.abs(s.y).max()) for s in stretches)
-    return Equation(order, found[:n], found[n:].reshape(order, -1) if order else np.zeros((0, 1)), limit)
+    return Equation(
+        order, found[:n], found[n:].reshape(order, -1) if order else np.zeros((0, 1)), limit
+    )
 
 
 def correct(column: Column) -> tuple[list[Array], str]:
     """Corrections for the held-out stretches of a block, and the equation that gave them."""
-    tables = {size: [library(s.u, column.names, size)[0] for s in column.inner] for size in LIBRARIES}
+    tables = {
+        size: [library(s.u, column.names, size)[0] for s in column.inner] for size in LIBRARIES
+    }
     before = [s.error() for s in column.inner]
     best: tuple[str, int, float] | None = None
     least = 1.0
@@ -192,8 +226,14 @@ def correct(column: Column) -> tuple[list[Array], str]:
             terms, total = tables[size], 0.0
             for left, stretch in enumerate(column.inner):
                 rest = [i for i in range(len(terms)) if i != left]
-                equation = learnt([column.inner[i] for i in rest], [terms[i] for i in rest], order, threshold)
-                change = np.zeros(len(stretch.y)) if equation is None else equation.run(stretch, terms[left])
+                equation = learnt(
+                    [column.inner[i] for i in rest], [terms[i] for i in rest], order, threshold
+                )
+                change = (
+                    np.zeros(len(stretch.y))
+                    if equation is None
+                    else equation.run(stretch, terms[left])
+                )
                 total += stretch.error(change) / max(before[left], 1e-9) / len(terms)
             if total < least:
                 best, least = (size, order, threshold), total
@@ -201,4 +241,6 @@ def correct(column: Column) -> tuple[list[Array], str]:
     if best is None or equation is None or not (equation.a.any() or equation.memory.any()):
         return [np.zeros(len(s.y)) for s in column.outer], "no correction"
     called = library(column.outer[0].u, column.names, best[0])[1]
-    return [equation.run(s, library(s.u, column.names, best[0])[0]) for s in column.outer], equation.text(called, column.names)
+    return [
+        equation.run(s, library(s.u, column.names, best[0])[0]) for s in column.outer
+    ], equation.text(called, column.names)

@@ -1,4 +1,5 @@
-"""Every force model on both Festo maps: all pressures, each pressure from the others, three pressures for all the rest.
+"""Every force model on both Festo maps: all pressures, each pressure from the others, three
+pressures for all the rest.
 
     python cases/festo_dmsp/compare.py out/festo_dmsp
 
@@ -15,13 +16,21 @@ from typing import Any
 import numpy as np
 
 from pamrs.errors import PamrsError
-from pamrs.fit import FitError, MeasuredMuscle, ModelComparison, compare_models, fit_muscle, load_measured_muscle
+from pamrs.fit import (
+    FitError,
+    MeasuredMuscle,
+    ModelComparison,
+    compare_models,
+    fit_muscle,
+    load_measured_muscle,
+)
 from pamrs.fit.report import render_png
 
 HERE = Path(__file__).parent
 PUBLISHED = {"DMSP-20-300": 4.4, "DMSP-10-250": 2.35}
 FREE = ("braid_angle", "rest_length")
-#: The shares of the highest pressure at which the dissertation characterised its muscle (20, 60 and 120 psi).
+#: The shares of the highest pressure at which the dissertation characterised its muscle (20, 60 and
+#: 120 psi).
 SHARES = (1 / 6, 1 / 2, 1.0)
 TRIPLES = 100
 
@@ -32,7 +41,9 @@ def three(levels: np.ndarray) -> list[int]:
 
 
 def wide_triples(levels: np.ndarray) -> list[list[int]]:
-    """Sets of three a person might measure: the highest, one in the middle, one below; at most :data:`TRIPLES`, drawn with seed 0."""
+    """Sets of three a person might measure: the highest, one in the middle, one below; at most
+    :data:`TRIPLES`, drawn with seed 0.
+    """
     top = len(levels) - 1
     share = levels / levels[-1]
     middle, low = np.flatnonzero((share > 0.45) & (share < 0.85)), np.flatnonzero(share < 0.45)
@@ -49,14 +60,23 @@ def percent(value: float | None) -> str:
 def table(comparison: ModelComparison) -> str:
     """Largest and rms errors of every model as Markdown."""
     lines = [
-        "| model | order | unknowns | all pressures | each from the others | three pressures, the others |",
+        (
+            "| model | order | unknowns | all pressures | each from the others | three pressures, "
+            "the others |"
+        ),
         "|---|---|---|---|---|---|",
     ]
     for row in comparison.rows:
         if row["rank"] is None:
-            lines.append(f"| {row['model']} | {row['order'] or ''} | {row['nvarys']} | not determined | | |")
+            lines.append(
+                f"| {row['model']} | {row['order'] or ''} | {row['nvarys']} | not determined | | |"
+            )
             continue
-        pairs = [(row["max"], row["rms"]), (row["lopo_max"], row["lopo_rms"]), (row["subset_max"], row["subset_rms"])]
+        pairs = [
+            (row["max"], row["rms"]),
+            (row["lopo_max"], row["lopo_rms"]),
+            (row["subset_max"], row["subset_rms"]),
+        ]
         cells = " | ".join(f"{percent(worst)} ({percent(rms)})" for worst, rms in pairs)
         star = " *" if row["recommended"] else ""
         lines.append(f"| {row['model']}{star} | {row['order'] or ''} | {row['nvarys']} | {cells} |")
@@ -64,9 +84,14 @@ def table(comparison: ModelComparison) -> str:
 
 
 def other_choices(measured: MeasuredMuscle, published: float, settings: dict[str, Any]) -> str:
-    """How much the choice of the three pressures, and the width of the moduli's prior, matter: largest held-out errors."""
+    """How much the choice of the three pressures, and the width of the moduli's prior, matter:
+    largest held-out errors.
+    """
     lines = [
-        "| model | order | prior | median | nine in ten below | worst | choices below the published error |",
+        (
+            "| model | order | prior | median | nine in ten below | worst | choices below the "
+            "published error |"
+        ),
         "|---|---|---|---|---|---|---|",
     ]
     choices = wide_triples(measured.data.levels)
@@ -78,28 +103,62 @@ def other_choices(measured: MeasuredMuscle, published: float, settings: dict[str
         ("robinson", 4, 1 / 3),
         ("robinson", 4, 3),
     ):
-        known = {key: value * (width if key.startswith("modulus") else 1) for key, value in settings["tolerance"].items()}
+        known = {
+            key: value * (width if key.startswith("modulus") else 1)
+            for key, value in settings["tolerance"].items()
+        }
         errors = []
         for levels in choices:
             fit = fit_muscle(
-                measured.data, measured.muscle, model=model, order=order, levels=levels, **{**settings, "tolerance": known}
+                measured.data,
+                measured.muscle,
+                model=model,
+                order=order,
+                levels=levels,
+                **{**settings, "tolerance": known},
             )
             errors.append(100 * (fit.errors_of("held_out") or (0.0, 0.0))[1])
         found = np.array(errors)
-        numbers = " | ".join(f"{value:.2f}" for value in (np.median(found), np.percentile(found, 90), found.max()))
-        lines.append(f"| {model} | {order} | x {width:.2g} | {numbers} | {int((found < published).sum())} of {len(choices)} |")
+        numbers = " | ".join(
+            f"{value:.2f}" for value in (np.median(found), np.percentile(found, 90), found.max())
+        )
+        lines.append(
+            f"| {model} | {order} | x {width:.2g} | {numbers} | {int((found < published).sum())} "
+            f"of {len(choices)} |"
+        )
     return "\n".join(lines)
 
 
 def what_is_told(measured: MeasuredMuscle, levels: list[int], settings: dict[str, Any]) -> str:
-    """What the stated noise and the moduli's prior do to fits on the three levels: largest error on the others."""
+    """What the stated noise and the moduli's prior do to fits on the three levels: largest error on
+    the others.
+    """
     lines = ["| model | order | nothing | noise | noise and prior |", "|---|---|---|---|---|"]
-    sizes = {key: value for key, value in settings["tolerance"].items() if not key.startswith("modulus")}
-    for model, order in (("kothera", 2), ("robinson", 2), ("ferraresi", 2), ("robinson", 3), ("robinson", 4)):
+    sizes = {
+        key: value for key, value in settings["tolerance"].items() if not key.startswith("modulus")
+    }
+    for model, order in (
+        ("kothera", 2),
+        ("robinson", 2),
+        ("ferraresi", 2),
+        ("robinson", 3),
+        ("robinson", 4),
+    ):
         cells = []
-        for told in ({"tolerance": sizes}, {"tolerance": sizes, "noise": settings["noise"]}, settings):
+        for told in (
+            {"tolerance": sizes},
+            {"tolerance": sizes, "noise": settings["noise"]},
+            settings,
+        ):
             try:
-                fit = fit_muscle(measured.data, measured.muscle, model=model, order=order, levels=levels, **{"free": FREE, **told})
+                fit = fit_muscle(
+                    measured.data,
+                    measured.muscle,
+                    model=model,
+                    order=order,
+                    levels=levels,
+                    **{"free": FREE, **told},
+                )
                 cells.append(percent((fit.errors_of("held_out") or (0.0, 0.0))[1]))
             except FitError:
                 cells.append("not determined")
@@ -114,10 +173,18 @@ def one_map(name: str, out: Path) -> None:
     chosen = three(data.levels)
     pressures = ", ".join(f"{data.levels[i] / 1e3:g}" for i in chosen)
     largest = float(data.force[data.used].max())
-    print(f"\n## {name}\n\n{int(data.used.sum())} points, largest force {largest:.1f} N; published: within {published} %.")
-    print(f"Three pressures: {pressures} kPa. Largest error (rms in brackets), percent of the largest force.\n")
+    print(
+        f"\n## {name}\n\n{int(data.used.sum())} points, largest force {largest:.1f} N; published: "
+        f"within {published} %."
+    )
+    print(
+        f"Three pressures: {pressures} kPa. Largest error (rms in brackets), percent of the "
+        "largest force.\n"
+    )
     print(f"comparing the models on {name} ...", file=sys.stderr)
-    sizes = {key: value for key, value in measured.tolerance.items() if not key.startswith("modulus")}
+    sizes = {
+        key: value for key, value in measured.tolerance.items() if not key.startswith("modulus")
+    }
     nominal = compare_models(data, measured.muscle, levels=chosen)
     print(f"Geometry as stated, nothing known of the moduli:\n\n{table(nominal)}\n")
     settings: dict[str, Any] = {
@@ -125,13 +192,24 @@ def one_map(name: str, out: Path) -> None:
         "tolerance": {**sizes, "c10": 1e7, "c01": 1e7, "bladder_modulus": 1e7},
         "noise": measured.noise,
     }
-    settings["tolerance"] |= {key: measured.tolerance[key] for key in ("modulus_slope", "modulus_offset")}
+    settings["tolerance"] |= {
+        key: measured.tolerance[key] for key in ("modulus_slope", "modulus_offset")
+    }
     fitted = compare_models(data, measured.muscle, levels=chosen, **settings)
-    print(f"Braid angle and rest length fitted within their tolerances, moduli with their wide prior:\n\n{table(fitted)}\n")
+    print(
+        "Braid angle and rest length fitted within their tolerances, moduli with their wide "
+        f"prior:\n\n{table(fitted)}\n"
+    )
     print(f"trying other sets of three on {name} ...", file=sys.stderr)
-    settings["tolerance"] = {k: v for k, v in settings["tolerance"].items() if k in measured.tolerance}
-    print(f"The same three pressures, with less said:\n\n{what_is_told(measured, chosen, settings)}\n")
-    print("Other choices of three (highest, one in the middle, one low), largest error on the rest:\n")
+    settings["tolerance"] = {
+        k: v for k, v in settings["tolerance"].items() if k in measured.tolerance
+    }
+    print(
+        f"The same three pressures, with less said:\n\n{what_is_told(measured, chosen, settings)}\n"
+    )
+    print(
+        "Other choices of three (highest, one in the middle, one low), largest error on the rest:\n"
+    )
     print(other_choices(measured, published, settings))
     fit = fit_muscle(data, measured.muscle, model="robinson", order=4, levels=chosen, **settings)
     picture = out / f"{name}.png"

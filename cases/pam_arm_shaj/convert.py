@@ -3,8 +3,9 @@
     python cases/pam_arm_shaj/convert.py out/pam_arm_shaj [--unit-bar 3] [--rate 100]
     pamrs diagnose out/pam_arm_shaj
 
-The data stay where they are; the folder gets a table for each episode, the rig file and a ``case.toml``. The unit of the
-pressures and the sample rate are not documented: both are arguments, and what the diagnosis says under others is part of the answer.
+The data stay where they are; the folder gets a table for each episode, the rig file and a
+``case.toml``. The unit of the pressures and the sample rate are not documented: both are arguments,
+and what the diagnosis says under others is part of the answer.
 """
 
 from __future__ import annotations
@@ -20,7 +21,8 @@ from numpy.typing import NDArray
 HERE = Path(__file__).parent
 DATA = HERE.parents[1] / "../shared/recordings/pam_arm_shaj/data/PAMData/Data2"
 JOINT, PLUS, MINUS = 0, 0, 1
-"""Joint and the muscles that turn it up and down (by regression, SOURCE.md): columns of ``ob`` from 0 and from 8."""
+"""Joint and the muscles that turn it up and down (by regression, SOURCE.md): columns of ``ob`` from
+0 and from 8."""
 RESET = 5
 """Rows left out at both ends of an episode: artefacts of the reset."""
 EPISODES, HELD_OUT = 12, 4
@@ -52,32 +54,53 @@ def convert(folder: Path, *, unit_bar: float, rate: float, data: Path = DATA) ->
         Names of the episodes, the held-out ones last.
     """
     found = {path.name: episode(path) for path in sorted(data.iterdir()) if path.is_file()}
-    chosen = sorted(found, key=lambda name: -float(np.std(found[name][:, 0])) * len(found[name]))[:EPISODES]
+    chosen = sorted(found, key=lambda name: -float(np.std(found[name][:, 0])) * len(found[name]))[
+        :EPISODES
+    ]
     folder.mkdir(parents=True, exist_ok=True)
     held = set(chosen[2 :: EPISODES // HELD_OUT])
     entries = []
     for name in sorted(chosen, key=lambda name: (name in held, name)):
         angle, plus, minus = found[name].T
-        table = np.column_stack([np.arange(len(angle)) / rate, unit_bar * plus, unit_bar * minus, angle])
-        heading = "time [s],muscle_pressure.plus [bar],muscle_pressure.minus [bar],joint_angle.base [rad]"
-        np.savetxt(folder / f"{name}.csv", table, delimiter=",", header=heading, comments="", fmt="%.9g")
-        entries.append(f'[[recording]]\nfile = "{name}.csv"\nrole = "{"held_out" if name in held else "fit"}"\n')
+        table = np.column_stack(
+            [np.arange(len(angle)) / rate, unit_bar * plus, unit_bar * minus, angle]
+        )
+        heading = (
+            "time [s],muscle_pressure.plus [bar],muscle_pressure.minus [bar],joint_angle.base [rad]"
+        )
+        np.savetxt(
+            folder / f"{name}.csv", table, delimiter=",", header=heading, comments="", fmt="%.9g"
+        )
+        entries.append(
+            f'[[recording]]\nfile = "{name}.csv"\n'
+            f'role = "{"held_out" if name in held else "fit"}"\n'
+        )
     shutil.copy(HERE / "rig.toml", folder / "rig.toml")
-    head = f'schema = "pamrs.case/1"\nname = "pam_arm_joint_0"\ndescription = "assumed: 1 = {unit_bar:g} bar, {rate:g} Hz"\n\n'
+    head = (
+        'schema = "pamrs.case/1"\nname = "pam_arm_joint_0"\n'
+        f'description = "assumed: 1 = {unit_bar:g} bar, {rate:g} Hz"\n\n'
+    )
     (folder / "case.toml").write_text(head + "\n".join(entries), encoding="utf-8")
     return [path.stem for path in sorted(folder.glob("*.csv"))]
 
 
 def main() -> None:
     """Read the arguments and write the case."""
-    parser = argparse.ArgumentParser(description="Episodes of pam_arm_shaj as a case of one antagonistic joint.")
+    parser = argparse.ArgumentParser(
+        description="Episodes of pam_arm_shaj as a case of one antagonistic joint."
+    )
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--unit-bar", type=float, default=3.0, help="gauge pressure of the scaled value 1 [bar]")
+    parser.add_argument(
+        "--unit-bar", type=float, default=3.0, help="gauge pressure of the scaled value 1 [bar]"
+    )
     parser.add_argument("--rate", type=float, default=100.0, help="samples per second")
     parser.add_argument("--data", type=Path, default=DATA)
     args = parser.parse_args()
     if not args.data.is_dir():
-        print(f"the recordings are not there: {args.data.resolve()}; the README says where they come from")
+        print(
+            f"the recordings are not there: {args.data.resolve()}; the README says where they come "
+            "from"
+        )
         return
     names = convert(args.folder, unit_bar=args.unit_bar, rate=args.rate, data=args.data)
     print(f"{len(names)} episodes written to {args.folder}; next: pamrs diagnose {args.folder}")

@@ -1,4 +1,5 @@
-"""Friction of four real cylinders: fitted on three pressures, predicted at the others; see the README beside.
+"""Friction of four real cylinders: fitted on three pressures, predicted at the others; see the
+README beside.
 
     python cases/zillen_cylinders/friction.py out/zillen_cylinders
 
@@ -17,7 +18,10 @@ from pamrs.fit.cylinder.friction import CylinderFriction, HeldOut, fit_cylinder_
 from pamrs.fit.cylinder.record import FrictionRecord, load_friction_folder
 from pamrs.fit.cylinder.report import held_out_lines
 
-DATA = Path(__file__).parents[2] / "../shared/recordings/pneumatic_cylinders_zillen/results_pneumatic-actuator/data/friction"
+DATA = (
+    Path(__file__).parents[2]
+    / "../shared/recordings/pneumatic_cylinders_zillen/results_pneumatic-actuator/data/friction"
+)
 FIT_ON = {7: (1e5, 4e5, 7e5), 4: (1e5, 3e5, 7e5), 3: (1e5, 3e5)}  # [Pa], by the number of runs
 LAWS = ("linear", "constant", "proportional", "quadratic")
 SLOW_LOGGER = 0.013  # s: the even pressures of Circle were logged at 60 Hz, in another session
@@ -37,9 +41,15 @@ def cell(fit: CylinderFriction, name: str, factor: float = 1.0) -> str:
 
 
 def groups(cylinders: dict[str, list[FrictionRecord]]) -> dict[str, list[FrictionRecord]]:
-    """The cylinders; on their own the runs of Circle from one session, and those of X-ring257 below its jump."""
+    """The cylinders; on their own the runs of Circle from one session, and those of X-ring257 below
+    its jump.
+    """
     fast = [run for run in cylinders["Circle"] if np.median(np.diff(run.time)) < SLOW_LOGGER]
-    return {**cylinders, "Circle, 100 Hz runs": fast, "X-ring257 to 5 bar": cylinders["X-ring257"][:3]}
+    return {
+        **cylinders,
+        "Circle, 100 Hz runs": fast,
+        "X-ring257 to 5 bar": cylinders["X-ring257"][:3],
+    }
 
 
 def left_out(records: list[FrictionRecord], law: str) -> list[HeldOut]:
@@ -53,40 +63,70 @@ def left_out(records: list[FrictionRecord], law: str) -> list[HeldOut]:
 def main(folder: Path) -> None:
     """Fit, predict, print and draw."""
     if not DATA.is_dir():
-        print(f"the recordings are not there: {DATA.resolve()}; the README says where they come from")
+        print(
+            f"the recordings are not there: {DATA.resolve()}; the README says where they come from"
+        )
         return
     found = load_friction_folder(DATA)
-    fits, report = [], [f"{gone} equals {kept} byte for byte: left out" for gone, kept in found.duplicates]
-    print("| cylinder | fitted on [bar] | f0 [N] | f1 [N/bar] | breakaway ratio | held out: error [N] (%) |")
+    fits, report = (
+        [],
+        [f"{gone} equals {kept} byte for byte: left out" for gone, kept in found.duplicates],
+    )
+    print(
+        "| cylinder | fitted on [bar] | f0 [N] | f1 [N/bar] | breakaway ratio | held out: error "
+        "[N] (%) |"
+    )
     print("|---|---|---|---|---|---|")
     crossed = []
     for name, records in groups(found.cylinders).items():
         fit = fit_cylinder_friction(records, fit_on=FIT_ON[len(records)])
         on = ", ".join(f"{p / 1e5:.0f}" for p in fit.pressures)
         errors = "; ".join(
-            f"{x.level.pressure / 1e5:.0f} bar: {x.error:+.2f} ({100 * x.relative_error:+.0f} %)" for x in fit.held_out()
+            f"{x.level.pressure / 1e5:.0f} bar: {x.error:+.2f} ({100 * x.relative_error:+.0f} %)"
+            for x in fit.held_out()
         )
-        print(f"| {name} | {on} | {cell(fit, 'f0')} | {cell(fit, 'f1', 1e5)} | {cell(fit, 'breakaway_ratio')} | {errors} |")
+        print(
+            f"| {name} | {on} | {cell(fit, 'f0')} | {cell(fit, 'f1', 1e5)} | "
+            f"{cell(fit, 'breakaway_ratio')} | {errors} |"
+        )
         left = {law: left_out(records, law) for law in LAWS}
         whole = fit_cylinder_friction(records)
         numbers = " | ".join(f"{rms(left[law]):.0f}" if left[law] else "too few" for law in LAWS)
         area = f"{cell(whole, 'area', 1e6)} | {cell(whole, 'force_zero')}"
         crossed.append(
-            f"| {name} | {cell(whole, 'f0')} | {cell(whole, 'f1', 1e5)} | {cell(whole, 'breakaway_ratio')} | {area} | {numbers} |"
+            f"| {name} | {cell(whole, 'f0')} | {cell(whole, 'f1', 1e5)} | "
+            f"{cell(whole, 'breakaway_ratio')} | {area} | {numbers} |"
         )
-        report += ["", fit.fit_report(), "  each pressure from all the others:", *held_out_lines(left["linear"])]
+        report += [
+            "",
+            fit.fit_report(),
+            "  each pressure from all the others:",
+            *held_out_lines(left["linear"]),
+        ]
         if name in found.cylinders:
             fits.append(fit)
-    print("\n| cylinder, all runs | f0 [N] | f1 [N/bar] | breakaway ratio | area [mm2] | force zero [N] | " + " | ".join(LAWS) + " |")
+    print(
+        (
+            "\n| cylinder, all runs | f0 [N] | f1 [N/bar] | breakaway ratio | area [mm2] | force "
+            "zero [N] | "
+        )
+        + " | ".join(LAWS)
+        + " |"
+    )
     print("|---|---|---|---|---|---|" + "---|" * len(LAWS))
     print("\n".join(crossed))
     print("\n| cylinder | depends on pressure (range) | " + " | ".join(COMPARED) + " |")
     print("|---|---|" + "---|" * len(COMPARED))
     for name, records in groups(found.cylinders).items():
         compared = compare_friction_laws(records, name=name)
-        shares = " | ".join(f"{compared.probabilities[law]:.3f} ({compared.held_out[law]:+.1f})" for law in COMPARED)
+        shares = " | ".join(
+            f"{compared.probabilities[law]:.3f} ({compared.held_out[law]:+.1f})" for law in COMPARED
+        )
         low, high = compared.range
-        print(f"| {name} | {compared.pressure:.3f} ({low:.2f} to {high:.2f}){', named' if compared.settled else ''} | {shares} |")
+        print(
+            f"| {name} | {compared.pressure:.3f} ({low:.2f} to "
+            f"{high:.2f}){', named' if compared.settled else ''} | {shares} |"
+        )
         report += ["", compared.statement()]
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "report.txt").write_text("\n".join(report) + "\n", encoding="utf-8")

@@ -1,4 +1,5 @@
-"""pamrs: simulate pneumatic artificial muscles and arms, and find the physics that a simulation leaves out.
+"""pamrs: simulate pneumatic artificial muscles and arms, and find the physics that a simulation
+leaves out.
 
 Names are loaded when they are first used, so that importing the package costs next to nothing.
 """
@@ -71,7 +72,9 @@ __all__ = [
     "sizing",
 ]
 
-_MODULES: Final = {name: f"pamrs.{name}" for name in ("fit", "library", "rigs")} | {"sizing": "pamrs.design.sizing"}
+_MODULES: Final = {name: f"pamrs.{name}" for name in ("fit", "library", "rigs")} | {
+    "sizing": "pamrs.design.sizing"
+}
 _HOMES: Final[dict[str, str]] = {
     "Batch": "pamrs.simulation",
     "BatchRun": "pamrs.simulation",

@@ -1,7 +1,7 @@
 """Modules that stood directly in ``pamrs`` and are parts of its packages now.
 
-The old paths go on working for a while: ``from pamrs.recording import Recording`` gives the class of
-``pamrs.recordings`` and a :class:`DeprecationWarning` that names the new path.
+The old paths go on working for a while: ``from pamrs.recording import Recording`` gives the class
+of ``pamrs.recordings`` and a :class:`DeprecationWarning` that names the new path.
 """
 
 from __future__ import annotations

@@ -14,13 +14,19 @@ os.umask(_UMASK)
 
 
 def write_atomically(path: str | os.PathLike[str], content: str | bytes) -> Path:
-    """Write `content` to a temporary file beside `path`, then rename: readers never see half a file."""
+    """Write `content` to a temporary file beside `path`, then rename: readers never see half a
+    file.
+    """
     target = Path(os.path.realpath(path))  # through a symbolic link, not over it
     data = content.encode("utf-8") if isinstance(content, str) else content
-    if target.exists() and not target.is_file():  # a pipe or a terminal: nothing there to keep whole
+    if (
+        target.exists() and not target.is_file()
+    ):  # a pipe or a terminal: nothing there to keep whole
         Path(path).write_bytes(data)
         return Path(path)
-    handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.", suffix=".tmp")
+    handle, temporary = tempfile.mkstemp(
+        dir=target.parent, prefix=f".{target.name}.", suffix=".tmp"
+    )
     try:
         with os.fdopen(handle, "wb") as stream:
             stream.write(data)

@@ -6,8 +6,8 @@ from typing import Final
 
 __all__ = ["UNITS", "channel_of", "dotted", "unit_of"]
 
-#: SI unit of each channel, recorded or simulated; pressures gauge. Where a rig has several blocks of a kind, the name of the
-#: block stands behind a dot: ``muscle_pressure.flexor``.
+#: SI unit of each channel, recorded or simulated; pressures gauge. Where a rig has several blocks
+#: of a kind, the name of the block stands behind a dot: ``muscle_pressure.flexor``.
 UNITS: Final[dict[str, str]] = {
     "time": "s",
     "valve_command": "V",

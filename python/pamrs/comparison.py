@@ -1,4 +1,6 @@
-"""Published statements beside what this package gives: value, deviation, and agree / differs / cannot tell."""
+"""Published statements beside what this package gives: value, deviation, and agree / differs /
+cannot tell.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,17 @@ from typing import Any, Final
 
 from pamrs.errors import ParameterError
 
-__all__ = ["RELATIONS", "VERDICTS", "Comparison", "Told", "judge", "markdown", "table", "to_csv", "verdicts"]
+__all__ = [
+    "RELATIONS",
+    "VERDICTS",
+    "Comparison",
+    "Told",
+    "judge",
+    "markdown",
+    "table",
+    "to_csv",
+    "verdicts",
+]
 
 #: How ours must stand to the published value.
 RELATIONS: Final = ("equals", "above", "below")
@@ -28,7 +40,8 @@ class Comparison:
     Attributes
     ----------
     group, fact, where, unit, note : str
-        What the statement is about (a muscle, an experiment), the statement, its place in the source, unit of the numbers, remark.
+        What the statement is about (a muscle, an experiment), the statement, its place in the
+        source, unit of the numbers, remark.
     published, ours, deviation : float
         In ``unit``; the deviation is ours less published. Not a number where there is none.
     relative : float or None
@@ -68,7 +81,9 @@ class Comparison:
 
     @property
     def gap(self) -> str:
-        """The deviation as people read it: a share where the numbers should be equal, else a difference."""
+        """The deviation as people read it: a share where the numbers should be equal, else a
+        difference.
+        """
         if self.relative is not None and self.relation == "equals" and math.isfinite(self.relative):
             return f"{100.0 * self.relative:+.1f} %"
         return _number(self.deviation, sign=True)
@@ -146,10 +161,13 @@ def judge(
     Raises
     ------
     ParameterError
-        If the relation is unknown, the tolerance is not a number from zero on, or there is no source.
+        If the relation is unknown, the tolerance is not a number from zero on, or there is no
+        source.
     """
     if relation not in RELATIONS:
-        raise ParameterError(f"relation = {relation!r} is not allowed: one of {', '.join(RELATIONS)}")
+        raise ParameterError(
+            f"relation = {relation!r} is not allowed: one of {', '.join(RELATIONS)}"
+        )
     if not tolerance >= 0.0:
         raise ParameterError(f"tolerance = {tolerance} is not allowed: a number from 0 on")
     if not where.strip():
@@ -178,7 +196,13 @@ def judge(
     )
 
 
-def table(rows: Iterable[Comparison], *, notes: bool = True, titles: bool = True, headings: Mapping[str, str] | None = None) -> str:
+def table(
+    rows: Iterable[Comparison],
+    *,
+    notes: bool = True,
+    titles: bool = True,
+    headings: Mapping[str, str] | None = None,
+) -> str:
     """The comparison as text, one line per statement.
 
     Parameters
@@ -198,20 +222,30 @@ def table(rows: Iterable[Comparison], *, notes: bool = True, titles: bool = True
     """
     rows = list(rows)
     width = max([52, *(len(row.fact) for row in rows)])
-    lines = [f"{'fact':<{width}} {'published':>10} {'ours':>10} {'unit':<7} {'deviation':>9}  verdict"]
+    lines = [
+        f"{'fact':<{width}} {'published':>10} {'ours':>10} {'unit':<7} {'deviation':>9}  verdict"
+    ]
     group = ""
     for row in rows:
         if titles and row.group != group:
             group = row.group
             lines += ["", (headings or {}).get(group, group)]
-        line = f"{row.fact:<{width}} {_published(row):>10} {_number(row.ours):>10} {row.unit:<7} {row.gap:>9}  {_verdict(row)}"
+        line = (
+            f"{row.fact:<{width}} {_published(row):>10} {_number(row.ours):>10} {row.unit:<7} "
+            f"{row.gap:>9}  {_verdict(row)}"
+        )
         lines.append(line.rstrip())
         if notes:
             lines.append(f"    {row.where}{': ' + row.note if row.note else ''}")
     return "\n".join(lines)
 
 
-def markdown(rows: Iterable[Comparison], *, headings: Mapping[str, str] | None = None, below: Mapping[str, str] | None = None) -> str:
+def markdown(
+    rows: Iterable[Comparison],
+    *,
+    headings: Mapping[str, str] | None = None,
+    below: Mapping[str, str] | None = None,
+) -> str:
     """The comparison as Markdown: a table for each group, its remarks as a list below.
 
     Parameters
@@ -246,7 +280,16 @@ def markdown(rows: Iterable[Comparison], *, headings: Mapping[str, str] | None =
                 mark = f" [{number}]"
                 remarks.append(f"- [{number}] {row.fact}: {row.note}")
             verdict = f"**{_verdict(row)}**" if row.verdict == "differs" else _verdict(row)
-            cells = (row.fact, row.where, _published(row), _number(row.ours), row.unit, row.gap, row.criterion, verdict + mark)
+            cells = (
+                row.fact,
+                row.where,
+                _published(row),
+                _number(row.ours),
+                row.unit,
+                row.gap,
+                row.criterion,
+                verdict + mark,
+            )
             lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
         lines += ["", *remarks, *([""] if remarks else [])]
         if below and group in below:
@@ -279,7 +322,10 @@ def verdicts(rows: Sequence[Comparison]) -> str:
     found = {verdict: sum(row.verdict == verdict for row in rows) for verdict in VERDICTS}
     used = sum(row.verdict == "agree" and row.used for row in rows)
     note = f" ({used} used to identify)" if used else ""
-    return f"{found['agree']} agree{note}, {found['differs']} differ, {found['cannot tell']} cannot tell"
+    return (
+        f"{found['agree']} agree{note}, {found['differs']} differ, {found['cannot tell']} cannot "
+        "tell"
+    )
 
 
 def _published(row: Comparison) -> str:

@@ -26,7 +26,9 @@ class CaseError(PamrsError, ValueError):
 
 
 class SimulationError(PamrsError, ArithmeticError):
-    """An integration left the range in which the model holds; the message gives the time and the state."""
+    """An integration left the range in which the model holds; the message gives the time and the
+    state.
+    """
 
 
 class DiagnosisError(PamrsError, ValueError):

@@ -1,9 +1,9 @@
 """Units: from what people write in files to SI.
 
 A unit is written as products and quotients of known symbols, with exponents as plain digits:
-``"kg m2"``, ``"N m s/rad"``, ``"m3/(s Pa)"``, ``"l/(s bar)"``. Symbols are case sensitive. The angle and
-the volt count as dimensions of their own, so that a pressure given in degrees is an error and not a
-number; inside a compound unit (``N m/rad``) the angle may be left out.
+``"kg m2"``, ``"N m s/rad"``, ``"m3/(s Pa)"``, ``"l/(s bar)"``. Symbols are case sensitive. The
+angle and the volt count as dimensions of their own, so that a pressure given in degrees is an error
+and not a number; inside a compound unit (``N m/rad``) the angle may be left out.
 """
 
 from __future__ import annotations
@@ -61,20 +61,64 @@ _INCH: Final = 0.0254
 _G: Final = 9.80665
 
 _SYMBOLS: Final[dict[str, tuple[float, _Vector]]] = {
-    "1": (1.0, _NONE), "-": (1.0, _NONE), "%": (0.01, _NONE), "s": (1.0, _S), "ms": (1e-3, _S),
-    "us": (1e-6, _S), "µs": (1e-6, _S), "ns": (1e-9, _S), "min": (60.0, _S), "h": (3600.0, _S),
-    "Hz": (1.0, _HZ), "kHz": (1e3, _HZ), "m": (1.0, _M), "cm": (1e-2, _M), "mm": (1e-3, _M),
-    "um": (1e-6, _M), "in": (_INCH, _M), "ft": (12 * _INCH, _M), "l": (1e-3, _M3), "L": (1e-3, _M3),
-    "ml": (1e-6, _M3), "mL": (1e-6, _M3), "cl": (1e-5, _M3), "gal": (3.785411784e-3, _M3), "kg": (1.0, _KG),
-    "g": (1e-3, _KG), "lb": (_POUND, _KG), "oz": (_POUND / 16, _KG), "Pa": (1.0, _PA), "hPa": (1e2, _PA),
-    "kPa": (1e3, _PA), "MPa": (1e6, _PA), "bar": (1e5, _PA), "barg": (1e5, _PA), "mbar": (1e2, _PA),
-    "atm": (101325.0, _PA), "psi": (_POUND * _G / _INCH**2, _PA), "psig": (_POUND * _G / _INCH**2, _PA),
-    "rad": (1.0, _RAD), "mrad": (1e-3, _RAD), "deg": (math.pi / 180, _RAD), "°": (math.pi / 180, _RAD),
-    "rev": (2 * math.pi, _RAD), "rpm": (2 * math.pi / 60, (0, 0, -1, 0, 0, 1)), "N": (1.0, _N),
-    "kN": (1e3, _N), "mN": (1e-3, _N), "lbf": (_POUND * _G, _N), "kgf": (_G, _N), "Nm": (1.0, _J),
-    "J": (1.0, _J), "kJ": (1e3, _J), "W": (1.0, _W), "kW": (1e3, _W), "V": (1.0, _V), "mV": (1e-3, _V),
+    "1": (1.0, _NONE),
+    "-": (1.0, _NONE),
+    "%": (0.01, _NONE),
+    "s": (1.0, _S),
+    "ms": (1e-3, _S),
+    "us": (1e-6, _S),
+    "µs": (1e-6, _S),
+    "ns": (1e-9, _S),
+    "min": (60.0, _S),
+    "h": (3600.0, _S),
+    "Hz": (1.0, _HZ),
+    "kHz": (1e3, _HZ),
+    "m": (1.0, _M),
+    "cm": (1e-2, _M),
+    "mm": (1e-3, _M),
+    "um": (1e-6, _M),
+    "in": (_INCH, _M),
+    "ft": (12 * _INCH, _M),
+    "l": (1e-3, _M3),
+    "L": (1e-3, _M3),
+    ("ml"): (1e-6, _M3),
+    ("mL"): (1e-6, _M3),
+    ("cl"): (1e-5, _M3),
+    ("gal"): (3.785411784e-3, _M3),
+    ("kg"): (1.0, _KG),
+    ("g"): (1e-3, _KG),
+    ("lb"): (_POUND, _KG),
+    ("oz"): (_POUND / 16, _KG),
+    ("Pa"): (1.0, _PA),
+    ("hPa"): (1e2, _PA),
+    "kPa": (1e3, _PA),
+    "MPa": (1e6, _PA),
+    "bar": (1e5, _PA),
+    "barg": (1e5, _PA),
+    "mbar": (1e2, _PA),
+    ("atm"): (101325.0, _PA),
+    ("psi"): (_POUND * _G / _INCH**2, _PA),
+    ("psig"): (_POUND * _G / _INCH**2, _PA),
+    ("rad"): (1.0, _RAD),
+    ("mrad"): (1e-3, _RAD),
+    ("deg"): (math.pi / 180, _RAD),
+    ("°"): (math.pi / 180, _RAD),
+    "rev": (2 * math.pi, _RAD),
+    "rpm": (2 * math.pi / 60, (0, 0, -1, 0, 0, 1)),
+    "N": (1.0, _N),
+    "kN": (1e3, _N),
+    "mN": (1e-3, _N),
+    "lbf": (_POUND * _G, _N),
+    "kgf": (_G, _N),
+    "Nm": (1.0, _J),
+    ("J"): (1.0, _J),
+    ("kJ"): (1e3, _J),
+    ("W"): (1.0, _W),
+    ("kW"): (1e3, _W),
+    ("V"): (1.0, _V),
+    ("mV"): (1e-3, _V),
     "K": (1.0, _K),
-}  # fmt: skip
+}
 
 # units with an offset stand alone, never inside a product
 _OFFSETS: Final[dict[str, tuple[float, float]]] = {
@@ -121,7 +165,10 @@ def _product(text: str, whole: str) -> tuple[float, list[int]]:
 
 def _unknown(whole: str, factor: str) -> str:
     if whole in _ABSOLUTE:
-        return f"unit {whole!r}: pressures are gauge pressures here (subtract the ambient pressure first)"
+        return (
+            f"unit {whole!r}: pressures are gauge pressures here (subtract the ambient pressure "
+            "first)"
+        )
     near = difflib.get_close_matches(factor, _known_names(), n=1, cutoff=0.5)
     if not near:
         near = [name for name in _known_names() if name.lower() == factor.lower()][:1]
@@ -155,8 +202,12 @@ def parse_unit(unit: str) -> Unit:
     if text in _OFFSETS:
         scale, offset = _OFFSETS[text]
         return Unit(scale, offset, _K)
-    top, *below = re.sub(r"/\s*\(([^()/]*)\)\s*$", lambda m: "/" + "/".join(m[1].split()), text).split("/")
-    if any(mark in part for part in (top, *below) for mark in "()") or not all(map(str.strip, (top, *below))):
+    top, *below = re.sub(
+        r"/\s*\(([^()/]*)\)\s*$", lambda m: "/" + "/".join(m[1].split()), text
+    ).split("/")
+    if any(mark in part for part in (top, *below) for mark in "()") or not all(
+        map(str.strip, (top, *below))
+    ):
         raise ParameterError(_unknown(text, text))
     scale, dimension = _product(top, text)
     for part in below:
@@ -190,7 +241,9 @@ def _checked(unit: str, dimension: str) -> Unit:
     si_unit = DIMENSIONS.get(dimension, dimension)
     parsed = parse_unit(unit)
     if not same_dimension(unit, si_unit):
-        raise ParameterError(f"unit {unit!r} has the wrong dimension; a unit like {si_unit!r} is needed")
+        raise ParameterError(
+            f"unit {unit!r} has the wrong dimension; a unit like {si_unit!r} is needed"
+        )
     return parsed
 
 

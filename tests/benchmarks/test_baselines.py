@@ -28,10 +28,16 @@ def hold(folder, conductance, *starts):
     (folder / "rig.toml").write_text(rig.to_toml_text())
     text = 'schema = "pamrs.case/1"\nrig = "rig.toml"\n'
     for i, start in enumerate(starts):
-        run = pamrs.simulate(truth, duration=60.0, sample_time=0.1, step=0.01, initial={"muscle_pressure": start})
-        pressure = run["muscle_pressure"] + np.random.default_rng(i).normal(0.0, 150.0, run.time.size)
+        run = pamrs.simulate(
+            truth, duration=60.0, sample_time=0.1, step=0.01, initial={"muscle_pressure": start}
+        )
+        pressure = run["muscle_pressure"] + np.random.default_rng(i).normal(
+            0.0, 150.0, run.time.size
+        )
         rows = [f"{t:.1f},{p:.2f}" for t, p in zip(run.time, pressure, strict=True)]
-        (folder / f"hold_{i}.csv").write_text("\n".join(["time [s],muscle_pressure [Pa]", *rows]) + "\n")
+        (folder / f"hold_{i}.csv").write_text(
+            "\n".join(["time [s],muscle_pressure [Pa]", *rows]) + "\n"
+        )
         role = "held_out" if i == len(starts) - 1 else "fit"
         text += f'\n[[recording]]\nfile = "hold_{i}.csv"\nrole = "{role}"\n'
     (folder / "case.toml").write_text(text)
@@ -61,7 +67,10 @@ def test_a_leak_and_a_tight_chamber(tmp_path, capsys):
 
 
 def test_the_gap_is_pooled_like_that_of_the_diagnosis():
-    table = {"a": {"noise": 1.0, "refit": 3.0, "gp": 2.0}, "b": {"noise": 2.0, "refit": 2.0, "gp": 2.0}}
+    table = {
+        "a": {"noise": 1.0, "refit": 3.0, "gp": 2.0},
+        "b": {"noise": 2.0, "refit": 2.0, "gp": 2.0},
+    }
     assert gap_closed(table, "gp") == pytest.approx(0.5)
     assert gap_closed({"a": {"noise": 1.0, "refit": 1.04, "gp": 1.0}}, "gp") is None
     assert gap_closed({"a": {"noise": 1.0, "refit": 3.0, "gp": 9.0}}, "gp") == 0.0
@@ -93,7 +102,9 @@ def test_the_features_of_a_whole_arm_have_the_valves_opening():
     channels = {"valve_command": command, **{n: run[n] for n in names}}
     mask = {n: np.ones(command.size, dtype=bool) for n in channels}
     units = dict.fromkeys(channels, "")
-    prepared = prepare(Recording("r", "fit", run.time, 0.005, channels, mask, [], units), rig, SETTINGS)
+    prepared = prepare(
+        Recording("r", "fit", run.time, 0.005, channels, mask, [], units), rig, SETTINGS
+    )
     found = _signals(prepared, rig)
     assert set(found) == {"p", "dp", "q", "dq", "ps", "x"}
     assert np.allclose(found["x"], (command - 5.0) / rig.model["valve"]["half_range"])

@@ -71,7 +71,9 @@ def test_rig_check_lists_parameters(capsys):
 
 def test_rig_check_names_the_file_and_the_key(capsys, tmp_path):
     broken = tmp_path / "broken.toml"
-    broken.write_text(RIG.read_text(encoding="utf-8").replace("dead_volume", "dead_volum"), encoding="utf-8")
+    broken.write_text(
+        RIG.read_text(encoding="utf-8").replace("dead_volume", "dead_volum"), encoding="utf-8"
+    )
     code, out, err = run(capsys, "rig", "check", broken)
     assert code == 2
     assert out == ""
@@ -95,7 +97,9 @@ def test_missing_file(capsys, tmp_path, command):
 
 
 def test_output_folder_is_checked_before_the_work(capsys, tmp_path):
-    code, _, err = run(capsys, "diagnose", tmp_path, "--report", tmp_path / "absent" / "report.html")
+    code, _, err = run(
+        capsys, "diagnose", tmp_path, "--report", tmp_path / "absent" / "report.html"
+    )
     assert code == 2
     assert_one_clean_line(err, "absent", "does not exist")
 
@@ -104,7 +108,9 @@ def test_simulate_writes_units_and_values(capsys, tmp_path):
     time = np.arange(0.0, 0.5, 0.005)
     volts = 5.0 + 2.0 * (time > 0.1)
     rows = "\n".join(f"{t:.3f},{v:.1f},13.8,1.0,20.0" for t, v in zip(time, volts, strict=True))
-    header = "time [s],valve_command [V],supply_pressure [bar],muscle_pressure [bar],joint_angle [deg]"
+    header = (
+        "time [s],valve_command [V],supply_pressure [bar],muscle_pressure [bar],joint_angle [deg]"
+    )
     source, target = tmp_path / "in.csv", tmp_path / "out.csv"
     source.write_text(f"{header}\n{rows}\n", encoding="utf-8")
     code, out, err = run(capsys, "simulate", RIG, "--input", source, "--output", target)
@@ -114,7 +120,10 @@ def test_simulate_writes_units_and_values(capsys, tmp_path):
     assert lines[0].startswith("time [s],")
     assert "muscle_pressure [Pa]" in lines[0]
     assert len(lines) == len(time) + 1
-    pressure = [float(line.split(",")[lines[0].split(",").index("muscle_pressure [Pa]")]) for line in lines[1:]]
+    pressure = [
+        float(line.split(",")[lines[0].split(",").index("muscle_pressure [Pa]")])
+        for line in lines[1:]
+    ]
     assert np.all(np.isfinite(pressure))
     assert pressure[-1] > pressure[0]
 
@@ -158,7 +167,11 @@ def test_diagnose_writes_what_it_is_asked_for(capsys, tmp_path, monkeypatch):
 
 
 def test_runs_as_a_module():
-    done = subprocess.run([sys.executable, "-m", "pamrs", "rig", "check", "absent.toml"], capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-m", "pamrs", "rig", "check", "absent.toml"],
+        capture_output=True,
+        text=True,
+    )
     assert done.returncode == 2
     assert_one_clean_line(done.stderr, "absent.toml")
 
@@ -166,7 +179,8 @@ def test_runs_as_a_module():
 def test_help_loads_nothing_heavy():
     code = (
         "import sys; from pamrs.cli import main; main(['--help']);"
-        "sys.exit(','.join(m for m in ('scipy', 'pandas', 'matplotlib', 'jinja2') if m in sys.modules) or 0)"
+        "sys.exit(','.join(m for m in ('scipy', 'pandas', 'matplotlib', 'jinja2') if m in "
+        "sys.modules) or 0)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
@@ -197,25 +211,45 @@ def test_rig_check_takes_the_name_of_a_packaged_rig(capsys):
 
 def test_simulate_draws_channels_and_motion(capsys, tmp_path):
     run_ = pamrs.simulate(pamrs.rigs.shoulder(), np.full(41, 6.0), sample_time=0.01)
-    lines = ["time [s],valve_command [V],muscle_pressure [Pa],supply_pressure [Pa],joint_angle [rad]"]
+    lines = [
+        "time [s],valve_command [V],muscle_pressure [Pa],supply_pressure [Pa],joint_angle [rad]"
+    ]
     columns = ("time", "valve_command", "muscle_pressure", "supply_pressure", "joint_angle")
     lines += [",".join(f"{run_[name][row]:.9g}" for name in columns) for row in range(41)]
     table = tmp_path / "input.csv"
     table.write_text("\n".join(lines) + "\n", encoding="utf-8")
     plot, motion = tmp_path / "run.png", tmp_path / "run.gif"
-    code, _, err = run(capsys, "simulate", "shoulder", "--input", table, "--plot", plot, "--animation", motion, "--speed", "2")
+    code, _, err = run(
+        capsys,
+        "simulate",
+        "shoulder",
+        "--input",
+        table,
+        "--plot",
+        plot,
+        "--animation",
+        motion,
+        "--speed",
+        "2",
+    )
     assert code == 0, err
     assert plot.read_bytes().startswith(b"\x89PNG")
     assert motion.read_bytes().startswith(b"GIF89a")
     code, _, err = run(capsys, "simulate", "shoulder", "--input", table)
     assert code == 2
     assert "nothing would be written" in err
-    code, _, err = run(capsys, "simulate", "shoulder", "--input", table, "--animation", motion, "--speed", "0")
+    code, _, err = run(
+        capsys, "simulate", "shoulder", "--input", table, "--animation", motion, "--speed", "0"
+    )
     assert code == 2
     assert "speed = 0.0 is not allowed" in err
 
 
 def test_a_chamber_has_no_motion(tmp_path):
-    still = pamrs.simulate(pamrs.rigs.sealed_chamber(), sample_time=0.1, duration=1.0, initial={"muscle_pressure": 5e5})
-    with pytest.raises(pamrs.ParameterError, match="'sealed_chamber' has no arm and no load to draw"):
+    still = pamrs.simulate(
+        pamrs.rigs.sealed_chamber(), sample_time=0.1, duration=1.0, initial={"muscle_pressure": 5e5}
+    )
+    with pytest.raises(
+        pamrs.ParameterError, match="'sealed_chamber' has no arm and no load to draw"
+    ):
         still.animate(tmp_path / "x.gif")

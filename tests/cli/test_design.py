@@ -24,7 +24,10 @@ ARGUMENTS = {
 
 
 def words(*more, **changes):
-    given = {**ARGUMENTS, **{f"--{name.replace('_', '-')}": value for name, value in changes.items()}}
+    given = {
+        **ARGUMENTS,
+        **{f"--{name.replace('_', '-')}": value for name, value in changes.items()},
+    }
     return ["design", "joint", *(word for pair in given.items() for word in pair), *map(str, more)]
 
 
@@ -36,7 +39,13 @@ def run(capsys, arguments):
 
 def test_a_design_is_printed_and_repeats_by_its_seed(capsys):
     low = run(capsys, words("--method", "de", pressure="183 psi"))[1]
-    assert re.search(r"met within 0\.1 % of the work wanted; least torque [\d.]+ % below the wanted one at [\d.]+ deg", low)
+    assert re.search(
+        (
+            r"met within 0\.1 % of the work wanted; least torque [\d.]+ % below the wanted one at "
+            r"[\d.]+ deg"
+        ),
+        low,
+    )
     assert "the requirement is met" not in low
     code, out, err = run(capsys, words("--method", "de"))
     assert (code, err) == (0, "")
@@ -51,7 +60,12 @@ def test_a_design_is_printed_and_repeats_by_its_seed(capsys):
 def test_files_hold_the_design(capsys, tmp_path, method):
     data, picture, block = (tmp_path / name for name in ("a.json", "a.png", "a.toml"))
     outputs = ["--json", data, "--png", picture, "--rig-joint", block]
-    code, out, err = run(capsys, words("--method", method, "--bounds", "lu=10:60 mm", "--bounds", "rl=0 in:0.5 in", *outputs))
+    code, out, err = run(
+        capsys,
+        words(
+            "--method", method, "--bounds", "lu=10:60 mm", "--bounds", "rl=0 in:0.5 in", *outputs
+        ),
+    )
     assert code == 0
     assert sorted(err.splitlines()) == sorted(f"written: {path}" for path in (data, picture, block))
     document = json.loads(data.read_text())
@@ -66,7 +80,9 @@ def test_files_hold_the_design(capsys, tmp_path, method):
     assert design["torque"] == pytest.approx(torque.tolist())
     assert picture.read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
     text = rigs.shoulder().to_toml_text()
-    rig = parse_rig(re.sub(r"\[joint\].*?(?=\n\[)", lambda _: block.read_text(), text, count=1, flags=re.DOTALL))
+    rig = parse_rig(
+        re.sub(r"\[joint\].*?(?=\n\[)", lambda _: block.read_text(), text, count=1, flags=re.DOTALL)
+    )
     assert rig.model["joint"]["upper_axial"] == pytest.approx(design["lengths"]["upper_axial"])
     assert rig.model["joint"]["max_angle"] == pytest.approx(math.radians(120))
 
@@ -75,10 +91,25 @@ def test_minimum_pressure_comparison_and_front(capsys, tmp_path, monkeypatch):
     from pamrs import design
 
     front = design.pareto_front
-    monkeypatch.setattr(design, "pareto_front", lambda problem, **kw: front(problem, population=20, generations=10, **kw))
+    monkeypatch.setattr(
+        design,
+        "pareto_front",
+        lambda problem, **kw: front(problem, population=20, generations=10, **kw),
+    )
     data, picture = tmp_path / "a.json", tmp_path / "a.png"
     outputs = ["--json", data, "--png", picture]
-    code, out, _ = run(capsys, words("--method", "de", "--minimise-pressure", "--compare", "--pareto", *outputs, evaluations="100"))
+    code, out, _ = run(
+        capsys,
+        words(
+            "--method",
+            "de",
+            "--minimise-pressure",
+            "--compare",
+            "--pareto",
+            *outputs,
+            evaluations="100",
+        ),
+    )
     assert code == 0
     document = json.loads(data.read_text())
     lowest = document["minimum_pressure"]
@@ -98,7 +129,9 @@ def test_minimum_pressure_comparison_and_front(capsys, tmp_path, monkeypatch):
 
 
 def test_a_requirement_that_cannot_be_met_is_a_result(capsys):
-    code, out, _ = run(capsys, words("--minimise-pressure", "--method", "de", torque="500 kN m", evaluations="60"))
+    code, out, _ = run(
+        capsys, words("--minimise-pressure", "--method", "de", torque="500 kN m", evaluations="60")
+    )
     assert code == 0
     assert "THE REQUIREMENT IS NOT MET" in out
     assert "NO PRESSURE UP TO" in out
@@ -151,7 +184,11 @@ def test_wrong_input_is_named(capsys, changes, more, part):
 )
 def test_a_missing_package_is_named(capsys, tmp_path, monkeypatch, package, more, extra):
     monkeypatch.chdir(tmp_path)
-    for name in [name for name in sys.modules if name.startswith((package, "pamrs.design._genetic", "pamrs.design.figures"))]:
+    for name in [
+        name
+        for name in sys.modules
+        if name.startswith((package, "pamrs.design._genetic", "pamrs.design.figures"))
+    ]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, package, None)
     code, out, err = run(capsys, words(*more, evaluations="20"))

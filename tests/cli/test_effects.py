@@ -34,7 +34,15 @@ def test_an_effect_is_shown_in_full(capsys, effect):
     code, out, err = run(capsys, "effects", effect)
     assert (code, err) == (0, "")
     info, words = EFFECTS[effect], " ".join(out.split())
-    for part in (info.name, info.block, info.equation, info.fingerprint, info.separates, info.reference, *info.rivals):
+    for part in (
+        info.name,
+        info.block,
+        info.equation,
+        info.fingerprint,
+        info.separates,
+        info.reference,
+        *info.rivals,
+    ):
         assert " ".join(part.split()) in words
     for parameter in info.parameters:
         assert f"{parameter.name} " in out
@@ -50,7 +58,9 @@ def test_its_snippet_switches_it_on_with_the_usual_values(effect):
 
 
 def test_a_snippet_takes_values():
-    assert 'conductance   = { value = 2e-11, unit = "m3/(s Pa)" }' in text.snippet("leak_muscle", {"conductance": 2e-11})
+    assert 'conductance   = { value = 2e-11, unit = "m3/(s Pa)" }' in text.snippet(
+        "leak_muscle", {"conductance": 2e-11}
+    )
 
 
 @pytest.mark.parametrize(

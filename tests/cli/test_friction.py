@@ -38,7 +38,12 @@ def rows(count, noise):
     rng = np.random.default_rng(3)
     e, way = cycle(count)
     loops = [
-        [REST * (1 - e) * 1e3, 0 * e + p / 1e3, muscle.force(p, e, direction=way) + noise * rng.normal(size=e.size), way]
+        [
+            REST * (1 - e) * 1e3,
+            0 * e + p / 1e3,
+            muscle.force(p, e, direction=way) + noise * rng.normal(size=e.size),
+            way,
+        ]
         for p in LEVELS
     ]
     return np.concatenate([np.column_stack(loop) for loop in loops])
@@ -47,7 +52,14 @@ def rows(count, noise):
 @pytest.fixture(scope="module")
 def table(tmp_path_factory):
     path = tmp_path_factory.mktemp("loops") / "loops.csv"
-    np.savetxt(path, rows(40, 2.0), delimiter=",", header="length [mm],pressure [kPa],force [N],direction", comments="", fmt="%.10g")
+    np.savetxt(
+        path,
+        rows(40, 2.0),
+        delimiter=",",
+        header="length [mm],pressure [kPa],force [N],direction",
+        comments="",
+        fmt="%.10g",
+    )
     return path
 
 
@@ -78,7 +90,9 @@ def test_the_coefficients_come_back_with_the_loops(capsys, table):
 
 def test_it_prints_and_writes_what_the_function_gives(capsys, table, tmp_path):
     result, picture = tmp_path / "out.json", tmp_path / "out.png"
-    code, out, err = run(capsys, table, *OPTIONS, "--floor", 0.0, "--json", result, "--png", picture)
+    code, out, err = run(
+        capsys, table, *OPTIONS, "--floor", 0.0, "--json", result, "--png", picture
+    )
     assert code == 0
     fit = fit_friction(load_force_map(table, rest_length=REST), floor=0.0)
     assert out == f"loops: {fit.fit_report()}\n"
@@ -86,7 +100,9 @@ def test_it_prints_and_writes_what_the_function_gives(capsys, table, tmp_path):
     assert document["schema"] == "pamrs.friction_fit/1"
     assert document["rows"] == 400
     assert document["fit"] == fit.to_dict()
-    assert [item["value"] for item in document["fit"]["parameters"]] == [p.value for p in fit.params.values()]
+    assert [item["value"] for item in document["fit"]["parameters"]] == [
+        p.value for p in fit.params.values()
+    ]
     assert document["fit"]["levels"][0]["rows"] == 80
     assert f"pamrs fit friction {table} --rest-length '276 mm' --floor 0.0" in document["command"]
     head = picture.read_bytes()[:24]
@@ -99,7 +115,11 @@ def test_it_prints_and_writes_what_the_function_gives(capsys, table, tmp_path):
 def test_what_is_not_determinable_is_null(capsys, table, tmp_path):
     text = table.read_text(encoding="utf-8").splitlines()
     two = tmp_path / "two.csv"
-    two.write_text("\n".join([text[0], *(line for line in text[1:] if line.split(",")[1] in ("200", "400"))]) + "\n", encoding="utf-8")
+    two.write_text(
+        "\n".join([text[0], *(line for line in text[1:] if line.split(",")[1] in ("200", "400"))])
+        + "\n",
+        encoding="utf-8",
+    )
     code, out, _ = run(capsys, two, *OPTIONS, "--json", tmp_path / "two.json")
     assert code == 0
     assert "its significance cannot be tested" in out
@@ -113,7 +133,14 @@ def test_a_recording_of_a_bench_is_read(capsys, tmp_path):
     measured = rows(300, 1.0)
     path = tmp_path / "bench.csv"
     columns = np.column_stack([0.1 * np.arange(len(measured)), measured[:, :3]])
-    np.savetxt(path, columns, delimiter=",", header="time [s],length [mm],pressure [kPa],force [N]", comments="", fmt="%.10g")
+    np.savetxt(
+        path,
+        columns,
+        delimiter=",",
+        header="time [s],length [mm],pressure [kPa],force [N]",
+        comments="",
+        fmt="%.10g",
+    )
     code, out, _ = run(capsys, path, *OPTIONS)
     assert code == 0
     assert printed(out, "c0")[0] == pytest.approx(C0, rel=0.03)
@@ -124,14 +151,29 @@ def test_a_recording_of_a_bench_is_read(capsys, tmp_path):
 def test_the_muscle_may_be_named_or_given_in_full(capsys, table):
     alone = run(capsys, table, *OPTIONS)[1]
     assert run(capsys, table, "--muscle", "pam_a_1in")[1] == alone
-    sizes = ["--rest-diameter", "25.4 mm", "--braid-angle", "73.5 deg", "--wall-thickness", "3.175 mm"]
+    sizes = [
+        "--rest-diameter",
+        "25.4 mm",
+        "--braid-angle",
+        "73.5 deg",
+        "--wall-thickness",
+        "3.175 mm",
+    ]
     assert run(capsys, table, *OPTIONS, *sizes)[1] == alone
 
 
 def test_a_description_brings_its_muscle(capsys, table):
-    sizes = {"rest_length": (276, "mm"), "rest_diameter": (25.4, "mm"), "braid_angle": (73.5, "deg"), "wall_thickness": (3.175, "mm")}
+    sizes = {
+        "rest_length": (276, "mm"),
+        "rest_diameter": (25.4, "mm"),
+        "braid_angle": (73.5, "deg"),
+        "wall_thickness": (3.175, "mm"),
+    }
     text = 'schema = "pamrs.force_map/1"\nname = "loops"\nfile = "loops.csv"\n[muscle]\n'
-    text += "".join(f'{name} = {{ value = {value}, unit = "{unit}" }}\n' for name, (value, unit) in sizes.items())
+    text += "".join(
+        f'{name} = {{ value = {value}, unit = "{unit}" }}\n'
+        for name, (value, unit) in sizes.items()
+    )
     path = table.with_name("loops.toml")
     path.write_text(text, encoding="utf-8")
     assert run(capsys, path)[1] == run(capsys, table, *OPTIONS)[1]
@@ -152,13 +194,18 @@ def test_a_description_brings_its_muscle(capsys, table):
         ([*OPTIONS, "--floor", "1.5"], ["floor = 1.5 is not allowed"]),
         ([*OPTIONS, "--floor", "nan"], ["floor = nan is not allowed"]),
         ([*OPTIONS, "--where", "direction"], ["--where = 'direction' is not allowed"]),
-        ([*OPTIONS, "--where", "direction=1"], ["no pressure gives a coefficient", "0 rows while contracting"]),
+        (
+            [*OPTIONS, "--where", "direction=1"],
+            ["no pressure gives a coefficient", "0 rows while contracting"],
+        ),
         ([*OPTIONS, "--clipped", "0"], ["--clipped = '0' is not allowed"]),
         ([*OPTIONS, "--colour", "red"], ["--colour"]),
     ],
 )
 def test_wrong_input_is_one_line_and_writes_nothing(capsys, table, tmp_path, words, parts):
-    code, out, err = run(capsys, table, *words, "--json", tmp_path / "x.json", "--png", tmp_path / "x.png")
+    code, out, err = run(
+        capsys, table, *words, "--json", tmp_path / "x.json", "--png", tmp_path / "x.png"
+    )
     line = err.splitlines()[-1]
     assert (code, out) == (2, "")
     assert line.startswith("pamrs: error: ")

@@ -49,7 +49,11 @@ def test_library_lists_every_muscle_with_its_pressure_and_mass(capsys):
         assert words[0] == name
         assert float(words[1]) == pytest.approx(item.max_pressure / 1e5, rel=1e-4)
         assert words[2] == "bar"
-        assert words[3] == "unknown" if item.mass is None else float(words[3]) == pytest.approx(item.mass, rel=1e-4)
+        assert (
+            words[3] == "unknown"
+            if item.mass is None
+            else float(words[3]) == pytest.approx(item.mass, rel=1e-4)
+        )
         assert item.title in out
 
 
@@ -60,9 +64,15 @@ def test_a_muscle_is_shown_with_the_origin_of_each_number(capsys, name):
     assert code == 0
     for key, origin in item.origins.items():
         assert origin in " ".join(line_of(out, f"{key} "))
-    assert float(line_of(out, "rest_length")[1]) == pytest.approx(1e3 * item.parameters["rest_length"], rel=1e-4)
-    assert float(line_of(out, "braid_angle")[1]) == pytest.approx(np.degrees(item.parameters["braid_angle"]), rel=1e-4)
-    assert float(line_of(out, "modulus_offset")[1].rstrip(",")) == pytest.approx(item.parameters["modulus_offset"][0] / 1e6, rel=1e-4)
+    assert float(line_of(out, "rest_length")[1]) == pytest.approx(
+        1e3 * item.parameters["rest_length"], rel=1e-4
+    )
+    assert float(line_of(out, "braid_angle")[1]) == pytest.approx(
+        np.degrees(item.parameters["braid_angle"]), rel=1e-4
+    )
+    assert float(line_of(out, "modulus_offset")[1].rstrip(",")) == pytest.approx(
+        item.parameters["modulus_offset"][0] / 1e6, rel=1e-4
+    )
     rows = compare(name)
     for row in rows:
         assert f"{row.fact} " in out
@@ -71,7 +81,10 @@ def test_a_muscle_is_shown_with_the_origin_of_each_number(capsys, name):
 
 
 def test_friction_is_shown_per_megapascal(capsys):
-    assert line_of(run(capsys, "library", "ch2_075in")[1], "friction_pressure_slope")[1:3] == ["-0.145", "1/MPa"]
+    assert line_of(run(capsys, "library", "ch2_075in")[1], "friction_pressure_slope")[1:3] == [
+        "-0.145",
+        "1/MPa",
+    ]
 
 
 @pytest.mark.parametrize("name", library.names())
@@ -84,7 +97,9 @@ def test_the_rig_of_a_muscle_has_that_muscle(capsys, tmp_path, name):
     rig = load_rig(path)
     assert rig.name == name
     assert rig.muscle.parameters == library.entry(name).muscle.parameters
-    assert rig.parameter("chamber.dead_volume").value == pytest.approx(0.1 * float(rig.muscle.air_volume(0.0)))
+    assert rig.parameter("chamber.dead_volume").value == pytest.approx(
+        0.1 * float(rig.muscle.air_volume(0.0))
+    )
 
 
 def test_facts_are_what_the_module_prints(capsys):
@@ -118,10 +133,14 @@ def test_wrong_words_to_library_write_nothing(capsys, tmp_path, monkeypatch, wor
 
 def test_size_prints_and_writes_what_the_function_gives(capsys, tmp_path):
     path = tmp_path / "size.json"
-    code, out, err = run(capsys, "size", *POINTS, *PAIR, "--core", "40 mm", "--dead-volume", "20 ml", "--json", path)
+    code, out, err = run(
+        capsys, "size", *POINTS, *PAIR, "--core", "40 mm", "--dead-volume", "20 ml", "--json", path
+    )
     assert code == 0
     assert err == f"written: {path}\n"
-    expected = size(PAIR, Requirement([(0.0, 18e3), (0.03, 7e3)]), filling=Filling(dead_volume=20e-6), core=0.04)
+    expected = size(
+        PAIR, Requirement([(0.0, 18e3), (0.03, 7e3)]), filling=Filling(dead_volume=20e-6), core=0.04
+    )
     assert expected.table() in out
     assert line_of(out, "count")[1:] == ["6", "1", "*"]
     assert "required: 0 mm:18 kN, 30 mm:7 kN" in out
@@ -166,7 +185,9 @@ def test_a_rig_file_is_a_candidate_at_a_pressure(capsys, tmp_path):
     code, out, _ = run(capsys, "size", *POINTS, path, "pam_a_1in", "--pressure", "11 bar")
     assert code == 0
     assert line_of(out, "blocked force")[3] == line_of(out, "blocked force")[4]
-    assert_refused(capsys, ["size", *POINTS, path], [f"MUSCLE = '{path}' is a rig file", "give --pressure"])
+    assert_refused(
+        capsys, ["size", *POINTS, path], [f"MUSCLE = '{path}' is a rig file", "give --pressure"]
+    )
 
 
 def test_a_pressure_beyond_the_tests_is_said(capsys):
@@ -179,7 +200,10 @@ def test_what_is_not_feasible_is_printed_with_its_reason(capsys, tmp_path):
     path = tmp_path / "size.json"
     code, out, _ = run(capsys, "size", "--point", "30 cm:9 N", "elbow_0625in", "--json", path)
     assert code == 0
-    assert "elbow_0625in: not feasible: it would contract by 1.517, beyond the braid's limit 0.392" in out
+    assert (
+        "elbow_0625in: not feasible: it would contract by 1.517, beyond the braid's limit 0.392"
+        in out
+    )
     assert "count" not in out
     assert json.loads(path.read_text(encoding="utf-8"))["rows"] == []
     code, out, _ = run(capsys, "size", *POINTS, *PAIR, "--max-count", 3)
@@ -195,11 +219,20 @@ def test_what_is_not_feasible_is_printed_with_its_reason(capsys, tmp_path):
         (["--point", "18"], ["--point = '18' is not allowed", "POSITION:FORCE"]),
         (["--point", "0:4 kN"], ["--point = '0' is not allowed", "unit like 'm'"]),
         (["--point", "0 mm:4 bar"], ["--point = '4 bar'", "wrong dimension"]),
-        (["--point", "3 mm:4 kN", "--point", "3 %:2 kN"], ["3 mm:4 kN, 3 %:2 kN", "all contractions"]),
-        (["--point", "3 mm:4 kN", "--point", "2 mm:5 kN"], ["3 mm:4 kN, 2 mm:5 kN", "positions must increase"]),
+        (
+            ["--point", "3 mm:4 kN", "--point", "3 %:2 kN"],
+            ["3 mm:4 kN, 3 %:2 kN", "all contractions"],
+        ),
+        (
+            ["--point", "3 mm:4 kN", "--point", "2 mm:5 kN"],
+            ["3 mm:4 kN, 2 mm:5 kN", "positions must increase"],
+        ),
         (["--point", "3 mm:4 +- 1 kN"], ["--point = '4 +- 1 kN'", "standard deviation"]),
         (["--point", "-3 mm:4 kN"], ["-3 mm:4 kN", "none below zero"]),
-        ([*POINTS, "no_such"], ["MUSCLE = 'no_such' is neither a file nor in the library", "elbow_0625in"]),
+        (
+            [*POINTS, "no_such"],
+            ["MUSCLE = 'no_such' is neither a file nor in the library", "elbow_0625in"],
+        ),
         ([*POINTS, "no_such.toml", "--pressure", "5 bar"], ["no_such.toml: cannot be read"]),
         ([*POINTS, "pam_a_1in", "pam_a_1in"], ["'pam_a_1in' is used twice"]),
         ([*POINTS, "--valve", "3"], ["--valve = '3' is not allowed"]),
@@ -220,4 +253,6 @@ def test_wrong_words_to_size_write_nothing(capsys, tmp_path, monkeypatch, words,
 
 
 def test_size_needs_the_folder_of_its_output(capsys):
-    assert_refused(capsys, ["size", *POINTS, "--json", "no_folder/x.json"], ["folder no_folder does not exist"])
+    assert_refused(
+        capsys, ["size", *POINTS, "--json", "no_folder/x.json"], ["folder no_folder does not exist"]
+    )

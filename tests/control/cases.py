@@ -36,14 +36,24 @@ PERIOD = 0.005
 # name -> a function of a factor on its gains (a float or an array)
 CONTROLLERS = {
     "pid": lambda x: PID(2.0 * x, 1.5, 0.1, period=PERIOD),
-    "pid back-calculation": lambda x: PID(1.0 * x, 0.3, 0.05, anti_windup="back_calculation", period=PERIOD, angle_filter=0.01),
+    "pid back-calculation": lambda x: PID(
+        1.0 * x, 0.3, 0.05, anti_windup="back_calculation", period=PERIOD, angle_filter=0.01
+    ),
     "pid measured rate": lambda x: PID(2.0, 1.5, 0.2 * x, period=PERIOD, measured_rate=True),
     "fuzzy": lambda x: Fuzzy(1.0 * x, 0.5, 0.5, period=PERIOD, output_filter=0.02),
-    "fuzzy quoted": lambda x: Fuzzy(1.0, 0.5 * x, 0.5 * x, table="quoted", period=PERIOD, output_filter=0.02),
+    "fuzzy quoted": lambda x: Fuzzy(
+        1.0, 0.5 * x, 0.5 * x, table="quoted", period=PERIOD, output_filter=0.02
+    ),
     "feedforward": lambda x: Feedforward(FULL, AIR, 1.0 * x, period=PERIOD),
-    "feedforward friction": lambda x: Feedforward(FULL.scaled(x), AIR, 5.0, friction=True, pressure_filter=0.01, period=PERIOD),
-    "feedforward + pid": lambda x: Parallel(Feedforward(FULL, AIR, 1.0, period=PERIOD), PID(x, 0.3, period=PERIOD)),
-    "feedforward + fuzzy": lambda x: Parallel(Feedforward(FULL, AIR, 2.0 * x, period=PERIOD), Fuzzy(0.8, 0.5, 0.5, period=PERIOD)),
+    "feedforward friction": lambda x: Feedforward(
+        FULL.scaled(x), AIR, 5.0, friction=True, pressure_filter=0.01, period=PERIOD
+    ),
+    "feedforward + pid": lambda x: Parallel(
+        Feedforward(FULL, AIR, 1.0, period=PERIOD), PID(x, 0.3, period=PERIOD)
+    ),
+    "feedforward + fuzzy": lambda x: Parallel(
+        Feedforward(FULL, AIR, 2.0 * x, period=PERIOD), Fuzzy(0.8, 0.5, 0.5, period=PERIOD)
+    ),
     "feedforward + cascade": lambda x: Parallel(
         Feedforward(FULL, AIR, 0.5, period=PERIOD), cascaded_pid(1.38e6, kp=6e5 * x, period=PERIOD)
     ),
@@ -51,15 +61,29 @@ CONTROLLERS = {
     "cascaded pi": lambda x: cascaded_pid(1.38e6, kp=1e5 * x, ki=1e5, kd=0.0, period=PERIOD),
     "pressure loop": lambda x: PressureLoop(2e-4 * x, 2e-4, period=PERIOD),
     "sliding": lambda x: Cascade(Sliding(SIMPLIFIED, slope=5.0 * x, period=PERIOD)),
-    "sliding signum": lambda x: Cascade(Sliding(FULL, boundary_layer=0.0, switching=2e4 * x, period=PERIOD)),
+    "sliding signum": lambda x: Cascade(
+        Sliding(FULL, boundary_layer=0.0, switching=2e4 * x, period=PERIOD)
+    ),
     "sliding estimates": lambda x: Cascade(Sliding(SIMPLIFIED.scaled(x), period=PERIOD)),
-    "adaptive": lambda x: Cascade(AdaptiveSliding(SIMPLIFIED, (1.0, 5.0, 300.0 * x), period=PERIOD)),
-    "adaptive free": lambda x: Cascade(AdaptiveSliding(SIMPLIFIED, (x, x, x), bounds=None, hold_at_limit=False, period=PERIOD)),
-    "adaptive published": lambda x: Cascade(AdaptiveSliding.published(SIMPLIFIED, 1, slope=4.0 * x, period=PERIOD)),
+    "adaptive": lambda x: Cascade(
+        AdaptiveSliding(SIMPLIFIED, (1.0, 5.0, 300.0 * x), period=PERIOD)
+    ),
+    "adaptive free": lambda x: Cascade(
+        AdaptiveSliding(SIMPLIFIED, (x, x, x), bounds=None, hold_at_limit=False, period=PERIOD)
+    ),
+    "adaptive published": lambda x: Cascade(
+        AdaptiveSliding.published(SIMPLIFIED, 1, slope=4.0 * x, period=PERIOD)
+    ),
     "neural zero": lambda x: Cascade(Neural(SIMPLIFIED, slope=3.0 * x, period=PERIOD)),
-    "neural model": lambda x: Cascade(Neural(FULL, start="model", gains=(300.0, 2e4, 3e5 * x), period=PERIOD)),
-    "neural gaylord": lambda x: Cascade(Neural(GAYLORD, start="model", bounds=None, switching=4e5 * x, period=PERIOD)),
-    "hysteresis sliding": lambda x: HysteresisCompensation(Cascade(Sliding(FULL, slope=5.0 * x, period=PERIOD)), DIAGNOSED),
+    "neural model": lambda x: Cascade(
+        Neural(FULL, start="model", gains=(300.0, 2e4, 3e5 * x), period=PERIOD)
+    ),
+    "neural gaylord": lambda x: Cascade(
+        Neural(GAYLORD, start="model", bounds=None, switching=4e5 * x, period=PERIOD)
+    ),
+    "hysteresis sliding": lambda x: HysteresisCompensation(
+        Cascade(Sliding(FULL, slope=5.0 * x, period=PERIOD)), DIAGNOSED
+    ),
     "hysteresis feedforward": lambda x: HysteresisCompensation(
         Feedforward(FULL, AIR, 5.0 * x, period=PERIOD), DIAGNOSED, source="measured"
     ),
@@ -73,9 +97,17 @@ def smooth(time):
     if time < rise:
         w = math.pi / rise
         half = 0.5 * (high - low)
-        return Reference(low + half * (1.0 - math.cos(w * time)), half * w * math.sin(w * time), half * w * w * math.cos(w * time))
+        return Reference(
+            low + half * (1.0 - math.cos(w * time)),
+            half * w * math.sin(w * time),
+            half * w * w * math.cos(w * time),
+        )
     a, w, since = math.radians(10.0), 1.2, time - rise
-    return Reference(high - a * (1.0 - math.cos(w * since)), -a * w * math.sin(w * since), -a * w * w * math.cos(w * since))
+    return Reference(
+        high - a * (1.0 - math.cos(w * since)),
+        -a * w * math.sin(w * since),
+        -a * w * w * math.cos(w * since),
+    )
 
 
 def samples(count, seed=0, shape=()):
@@ -94,4 +126,6 @@ def samples(count, seed=0, shape=()):
 
 def singles(measurement, row=None):
     """One plant of a batch of measurements, as floats."""
-    return {name: float(value if row is None else value[row]) for name, value in measurement.items()}
+    return {
+        name: float(value if row is None else value[row]) for name, value in measurement.items()
+    }

@@ -1,4 +1,6 @@
-"""A small PID for the tests of everything around controllers; gains may be arrays, one for each plant of a batch."""
+"""A small PID for the tests of everything around controllers; gains may be arrays, one for each
+plant of a batch.
+"""
 
 import numpy as np
 
@@ -6,7 +8,9 @@ from pamrs.control import Controller
 
 
 class SmallPid(Controller):
-    """``null + kp e + ki int e - kd rate``, limited to 0..10 V, integration stopped while limited."""
+    """``null + kp e + ki int e - kd rate``, limited to 0..10 V, integration stopped while
+    limited.
+    """
 
     def __init__(self, kp=2.0, ki=1.0, kd=0.5, period=0.005, null=5.0):
         self.kp, self.ki, self.kd, self.period, self.null = kp, ki, kd, period, null
@@ -17,10 +21,17 @@ class SmallPid(Controller):
 
     def update(self, time, measurement, reference):
         error = reference.angle - measurement["joint_angle"]
-        wanted = self.null + self.kp * error + self.integral + self.kd * (reference.rate - measurement["joint_rate"])
+        wanted = (
+            self.null
+            + self.kp * error
+            + self.integral
+            + self.kd * (reference.rate - measurement["joint_rate"])
+        )
         if isinstance(wanted, np.ndarray):
             command = np.clip(wanted, 0.0, 10.0)
-            self.integral = self.integral + np.where(command == wanted, self.ki * self.period * error, 0.0)
+            self.integral = self.integral + np.where(
+                command == wanted, self.ki * self.period * error, 0.0
+            )
             return command
         command = min(max(wanted, 0.0), 10.0)
         if command == wanted:

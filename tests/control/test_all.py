@@ -11,7 +11,17 @@ import pytest
 import pamrs
 from pamrs.control import PID, Cascade, Feedforward, Parallel, Reference, cascaded_pid
 from pamrs.errors import ParameterError
-from tests.control.cases import AIR, CONTROLLERS, DIAGNOSED, FULL, PERIOD, SHOULDER, samples, singles, smooth
+from tests.control.cases import (
+    AIR,
+    CONTROLLERS,
+    DIAGNOSED,
+    FULL,
+    PERIOD,
+    SHOULDER,
+    samples,
+    singles,
+    smooth,
+)
 
 ALL = pytest.mark.parametrize("name", CONTROLLERS)
 
@@ -27,7 +37,10 @@ def test_a_batch_of_plants_is_its_plants(name):
     for k, sample in enumerate(samples(count, shape=(n,))):
         answer = batch.update(k * PERIOD, sample, aim_of(name, k * PERIOD))
         assert answer.shape == (n,)
-        each = [one.update(k * PERIOD, singles(sample, row), aim_of(name, k * PERIOD)) for row, one in enumerate(single)]
+        each = [
+            one.update(k * PERIOD, singles(sample, row), aim_of(name, k * PERIOD))
+            for row, one in enumerate(single)
+        ]
         assert all(type(value) is float for value in each)
         assert answer == pytest.approx(each, rel=1e-12, abs=1e-12)
 
@@ -48,13 +61,19 @@ def test_a_sweep_of_gains_is_its_gains(name):
 @pytest.mark.parametrize("shape", [(), (2,)])
 def test_a_controller_goes_on_from_a_pickle_and_from_its_state_bit_for_bit(name, shape):
     controller = CONTROLLERS[name](1.0)
-    rows = [singles(sample) if shape == () else sample for sample in samples(300, seed=5, shape=shape)]
+    rows = [
+        singles(sample) if shape == () else sample for sample in samples(300, seed=5, shape=shape)
+    ]
 
     def play(one, numbers):
         return [one.update(k * PERIOD, rows[k], aim_of(name, k * PERIOD)) for k in numbers]
 
     first = play(controller, range(150))
-    kept, state, fresh = pickle.dumps(controller), copy.deepcopy(controller.state), CONTROLLERS[name](1.0)
+    kept, state, fresh = (
+        pickle.dumps(controller),
+        copy.deepcopy(controller.state),
+        CONTROLLERS[name](1.0),
+    )
     rest = play(controller, range(150, 300))
     assert np.array_equal(play(pickle.loads(kept), range(150, 300)), rest)
     fresh.restore(state)
@@ -71,7 +90,14 @@ def test_a_controller_goes_on_from_a_pickle_and_from_its_state_bit_for_bit(name,
         controller.restore({**state, "other": 1.0})
 
 
-VALVE_ONLY = ("pid", "pid back-calculation", "pid measured rate", "fuzzy", "fuzzy quoted", "dead zone")
+VALVE_ONLY = (
+    "pid",
+    "pid back-calculation",
+    "pid measured rate",
+    "fuzzy",
+    "fuzzy quoted",
+    "dead zone",
+)
 NOT_READ = {("pressure loop", "joint_angle"), *((name, "muscle_pressure") for name in VALVE_ONLY)}
 
 
@@ -110,7 +136,12 @@ def test_a_refused_sample_changes_nothing_whatever_refuses_it(name, first):
     # two lengths in one sample, of which the first is good by itself
     wrong += [({**good, "joint_angle": np.zeros(3), "muscle_pressure": np.zeros(4)}, aim)]
     arrays = Reference(aim.angle + np.zeros(3), aim.rate + np.zeros(3), math.nan)
-    wrong += [(good, arrays), (good, (1.0,)), (good, 1.0), ({**good, "joint_angle": np.zeros(4)}, arrays._replace(acceleration=0.0))]
+    wrong += [
+        (good, arrays),
+        (good, (1.0,)),
+        (good, 1.0),
+        ({**good, "joint_angle": np.zeros(4)}, arrays._replace(acceleration=0.0)),
+    ]
     refused = 0
     for measurement, reference in wrong:
         try:
@@ -135,8 +166,14 @@ def test_a_refused_sample_changes_nothing_whatever_refuses_it(name, first):
 @pytest.mark.parametrize("feedback", ["pid", "cascade"])
 def test_a_rate_that_only_the_feedback_needs_is_refused_by_the_whole(feedback):
     inner = PID(2.0, 1.0, 0.1, period=PERIOD, measured_rate=True)
-    parallel = Parallel(Feedforward(FULL, AIR, 1.0, period=PERIOD), inner if feedback == "pid" else cascaded_pid(1e6, period=PERIOD))
-    sample = {**singles(next(samples(1))), **({} if feedback == "pid" else {"joint_angle": math.nan})}
+    parallel = Parallel(
+        Feedforward(FULL, AIR, 1.0, period=PERIOD),
+        inner if feedback == "pid" else cascaded_pid(1e6, period=PERIOD),
+    )
+    sample = {
+        **singles(next(samples(1))),
+        **({} if feedback == "pid" else {"joint_angle": math.nan}),
+    }
     state = parallel.state
     with pytest.raises(ParameterError, match="joint"):
         parallel.update(0.0, {n: v for n, v in sample.items() if n != "joint_rate"}, smooth(0.0))
@@ -177,7 +214,10 @@ def test_what_is_not_a_state_is_refused_and_changes_nothing(name):
     def at(state, path):
         return at(state[path[0]], path[1:]) if path else state
 
-    for one, fresh in ((batch, CONTROLLERS[name](np.ones(3)).state), (single, CONTROLLERS[name](1.0).state)):
+    for one, fresh in (
+        (batch, CONTROLLERS[name](np.ones(3)).state),
+        (single, CONTROLLERS[name](1.0).state),
+    ):
         state = one.state
         for path, _ in leaves(state):
             wrong = ["x", "1.0", [1.0, "a"], np.zeros((2, 3, 4)), np.zeros(5), [[1.0], [1.0, 2.0]]]
@@ -192,7 +232,8 @@ def test_what_is_not_a_state_is_refused_and_changes_nothing(name):
     assert pickle.dumps((batch.state, single.state)) == kept
 
 
-#: Root mean square and largest absolute error [deg] from 6 s on, on a shoulder some per cent off its model: measured, and 15 % more.
+#: Root mean square and largest absolute error [deg] from 6 s on, on a shoulder some per cent off
+#: its model: measured, and 15 % more.
 BOUNDS = {
     "pid": (10.99, 25.94),
     "pid back-calculation": (12.19, 24.82),
@@ -224,7 +265,9 @@ BOUNDS = {
 @pytest.mark.parametrize("name", [name for name in CONTROLLERS if name != "pressure loop"])
 def test_the_loop_on_the_shoulder_stays_bounded(name):
     plant = SHOULDER if "hysteresis" not in name and "dead" not in name else DIAGNOSED
-    plant = plant.with_parameters({"muscle.modulus_scale": 1.04, "arm.payload": 9.3, "arm.coulomb": 2.0})
+    plant = plant.with_parameters(
+        {"muscle.modulus_scale": 1.04, "arm.payload": 9.3, "arm.coulomb": 2.0}
+    )
     controller, simulator = CONTROLLERS[name](1.0), pamrs.Simulator(plant, sample_time=PERIOD)
     run = simulator.control(lambda m: controller.update(m["time"], m, smooth(m["time"])), 16.0)
     time, angle = run["time"], run["joint_angle"]

@@ -1,4 +1,6 @@
-"""Gymnasium environments: clean by its checker, seeded, ends and rewards right; many are the single ones."""
+"""Gymnasium environments: clean by its checker, seeded, ends and rewards right; many are the single
+ones.
+"""
 
 import math
 
@@ -44,10 +46,14 @@ def test_a_step_is_the_simulators():
         seen, reward, terminated, truncated, info = env.step(np.array([opening], dtype=np.float32))
         opening = float(np.clip(np.float32(opening), -1.0, 1.0))
         sample = simulator.step(5.0 + 5.0 * opening)
-        assert seen[:3] == pytest.approx([sample[n] for n in ("joint_angle", "joint_rate", "muscle_pressure")], rel=1e-6)
+        assert seen[:3] == pytest.approx(
+            [sample[n] for n in ("joint_angle", "joint_rate", "muscle_pressure")], rel=1e-6
+        )
         wanted = SHORT(0.02 * (k + 1))
         assert seen[3:] == pytest.approx([wanted.angle, wanted.rate, opening], rel=1e-6)
-        assert reward == pytest.approx(-((wanted.angle - sample["joint_angle"]) ** 2) - 0.5 * (opening - last) ** 2)
+        assert reward == pytest.approx(
+            -((wanted.angle - sample["joint_angle"]) ** 2) - 0.5 * (opening - last) ** 2
+        )
         assert info["valve_command"] == pytest.approx(5.0 + 5.0 * opening)
         assert not terminated
         assert not truncated
@@ -64,7 +70,9 @@ def test_it_is_truncated_at_the_end_and_not_before():
 def test_a_plant_that_leaves_its_model_is_terminated():
     env = gym_module.ShoulderEnv(trajectory=SHORT)
     env.reset()
-    env._simulator.restore(pamrs.Simulator(pamrs.rigs.shoulder(), sample_time=0.02, initial=BREAKING).state)
+    env._simulator.restore(
+        pamrs.Simulator(pamrs.rigs.shoulder(), sample_time=0.02, initial=BREAKING).state
+    )
     seen, reward, terminated, truncated, _ = env.step(np.zeros(1, dtype=np.float32))
     assert env.observation_space.contains(seen)
     assert terminated
@@ -108,7 +116,12 @@ def test_many_arms_are_the_single_ones():
 def test_one_plant_that_ends_truncates_the_others():
     many = gym_module.ShoulderVectorEnv(3, trajectory=SHORT)
     many.reset(seed=1)
-    other = pamrs.Batch(pamrs.rigs.shoulder(), n=3, sample_time=0.02, initial={"joint_angle": 0.5, "joint_rate": [0.0, -500.0, 0.0]})
+    other = pamrs.Batch(
+        pamrs.rigs.shoulder(),
+        n=3,
+        sample_time=0.02,
+        initial={"joint_angle": 0.5, "joint_rate": [0.0, -500.0, 0.0]},
+    )
     many._batch.restore(other.state)
     _, reward, terminated, truncated, _ = many.step(np.zeros((3, 1), dtype=np.float32))
     assert terminated.tolist() == [False, True, False]
@@ -123,7 +136,9 @@ def test_a_seed_may_be_any_whole_number():
 
 
 def test_the_vector_is_made_by_its_name():
-    made = gymnasium.make_vec("pamrs/Shoulder-v0", num_envs=2, vectorization_mode="vector_entry_point")
+    made = gymnasium.make_vec(
+        "pamrs/Shoulder-v0", num_envs=2, vectorization_mode="vector_entry_point"
+    )
     assert isinstance(made.unwrapped, gym_module.ShoulderVectorEnv)
     made.reset(seed=[1, 2])
 

@@ -1,4 +1,6 @@
-"""Compensation of what a diagnosis found: the memory is the core's, the torque the simulator's, and the error falls."""
+"""Compensation of what a diagnosis found: the memory is the core's, the torque the simulator's, and
+the error falls.
+"""
 
 import math
 
@@ -75,7 +77,9 @@ def rms(controller, rig):
     simulator = pamrs.Simulator(rig, sample_time=PERIOD)
     run = simulator.control(lambda m: controller.update(m["time"], m, smooth(m["time"])), 16.0)
     wanted = np.array([smooth(float(t)).angle for t in run["time"]])
-    return float(np.degrees(np.sqrt(np.mean((run["joint_angle"] - wanted)[run["time"] > 5.0] ** 2))))
+    return float(
+        np.degrees(np.sqrt(np.mean((run["joint_angle"] - wanted)[run["time"] > 5.0] ** 2)))
+    )
 
 
 @pytest.mark.parametrize("source", ["desired", "measured"])
@@ -89,11 +93,19 @@ def test_compensation_halves_the_error_at_least(source):
 
 
 def test_an_effect_of_no_strength_changes_nothing():
-    nothing = SHOULDER.with_effect("muscle_hysteresis", {"friction_constant": 0.0, "friction_pressure": 0.0, "presliding": 1e-3})
-    plain, known = (wrap(Cascade(Sliding(FULL, period=PERIOD))) for wrap in (lambda c: c, lambda c: HysteresisCompensation(c, nothing)))
+    nothing = SHOULDER.with_effect(
+        "muscle_hysteresis",
+        {"friction_constant": 0.0, "friction_pressure": 0.0, "presliding": 1e-3},
+    )
+    plain, known = (
+        wrap(Cascade(Sliding(FULL, period=PERIOD)))
+        for wrap in (lambda c: c, lambda c: HysteresisCompensation(c, nothing))
+    )
     for k in range(200):
         sample = {"joint_angle": 0.3 + 0.001 * k, "muscle_pressure": 1e5 + 1e3 * k}
-        assert plain.update(k * PERIOD, sample, smooth(k * PERIOD)) == known.update(k * PERIOD, sample, smooth(k * PERIOD))
+        assert plain.update(k * PERIOD, sample, smooth(k * PERIOD)) == known.update(
+            k * PERIOD, sample, smooth(k * PERIOD)
+        )
 
 
 def test_the_dead_zone_is_jumped():

@@ -13,7 +13,9 @@ control = pytest.importorskip("control")
 @pytest.mark.parametrize("effect", [None, "muscle_hysteresis"])
 def test_its_response_is_the_simulation(effect):
     rig = pamrs.rigs.shoulder() if effect is None else pamrs.rigs.shoulder().with_effect(effect)
-    system = iosystem(rig, sample_time=0.005, outputs=["joint_angle", "muscle_pressure", "air_mass"])
+    system = iosystem(
+        rig, sample_time=0.005, outputs=["joint_angle", "muscle_pressure", "air_mass"]
+    )
     assert isinstance(system, control.NonlinearIOSystem)
     assert system.dt == 0.005
     assert system.input_labels == ["valve_command"]
@@ -35,13 +37,20 @@ def test_named_inputs_and_a_loop_in_python_control():
     # a proportional loop around the shoulder by control.interconnect, and by hand
     plant = iosystem(pamrs.rigs.shoulder(), sample_time=0.01, outputs=["joint_angle"], name="plant")
     gain = control.NonlinearIOSystem(
-        None, lambda t, x, u, p: 5.0 + 3.0 * (0.6 - u[0]), inputs=["joint_angle"], outputs=["valve_command"], dt=0.01, name="law"
+        None,
+        lambda t, x, u, p: 5.0 + 3.0 * (0.6 - u[0]),
+        inputs=["joint_angle"],
+        outputs=["valve_command"],
+        dt=0.01,
+        name="law",
     )
     loop = control.interconnect([plant, gain], inputs=[], outputs=["joint_angle"])
     time = np.arange(101) * 0.01
     state = initial_state(pamrs.rigs.shoulder(), sample_time=0.01)
     response = control.input_output_response(loop, time, np.zeros((0, time.size)), state)
-    alone = pamrs.Simulator(pamrs.rigs.shoulder(), sample_time=0.01).control(lambda s: 5.0 + 3.0 * (0.6 - s["joint_angle"]), 1.0)
+    alone = pamrs.Simulator(pamrs.rigs.shoulder(), sample_time=0.01).control(
+        lambda s: 5.0 + 3.0 * (0.6 - s["joint_angle"]), 1.0
+    )
     assert np.ravel(response.outputs) == pytest.approx(alone["joint_angle"], abs=1e-12)
 
 
@@ -50,7 +59,10 @@ def test_named_inputs_and_a_loop_in_python_control():
     [
         (lambda: iosystem(pamrs.rigs.shoulder(), sample_time=0.0), "sample_time"),
         (lambda: iosystem(pamrs.rigs.shoulder(), sample_time=0.01, outputs=["angle"]), "outputs"),
-        (lambda: iosystem(pamrs.rigs.shoulder().with_effect("clock_skew"), sample_time=0.01), "clock_skew"),
+        (
+            lambda: iosystem(pamrs.rigs.shoulder().with_effect("clock_skew"), sample_time=0.01),
+            "clock_skew",
+        ),
     ],
 )
 def test_bad_input_is_named(call, word):

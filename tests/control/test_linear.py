@@ -1,4 +1,6 @@
-"""Linear models against central differences of what the core simulates, rig by rig and effect by effect."""
+"""Linear models against central differences of what the core simulates, rig by rig and effect by
+effect.
+"""
 
 import math
 
@@ -26,9 +28,17 @@ WIDTHS = {
     "closure_flow": 1e-4,
     "closure_supply": 1e-4,
 }
-#: Where the typical values show little: sums of terms are zero without coefficients, and a delay is none.
+#: Where the typical values show little: sums of terms are zero without coefficients, and a delay is
+#: none.
 GIVEN = {
-    "closure_torque": {"creep": 5.0, "pressure_memory": 0.5, "slip": 3.0, "pressure_rate": -0.3, "sign": -0.4, "memory_time": 0.1},
+    "closure_torque": {
+        "creep": 5.0,
+        "pressure_memory": 0.5,
+        "slip": 3.0,
+        "pressure_rate": -0.3,
+        "sign": -0.4,
+        "memory_time": 0.1,
+    },
     "closure_flow": {
         "pressure_memory": -2e-4,
         "opening_memory": 1e-4,
@@ -44,7 +54,8 @@ GIVEN = {
     "heat_transfer": {"share": 0.6, "initial_temperature_rise": 5.0},
     "tube_flow_restriction": {"tap": 1.0},
 }
-#: Chambers that do not hold the joint: where they are at ambient pressure, a muscle may have a corner.
+#: Chambers that do not hold the joint: where they are at ambient pressure, a muscle may have a
+#: corner.
 PRESSED = {
     "antagonistic_joint": {"muscle_pressure.extensor": 2e5},
     "recruitment": {"muscle_pressure.pair_2": 1e5, "muscle_pressure.pair_3": 0.8e5},
@@ -53,7 +64,9 @@ SMOOTH = ["", *(name for name, info in EFFECTS.items() if info.kink is None)]
 
 
 def settled(name):
-    """A packaged rig with where its joints rest: what :func:`equilibrium` and :func:`linearise` take."""
+    """A packaged rig with where its joints rest: what :func:`equilibrium` and :func:`linearise`
+    take.
+    """
     rig = pamrs.rigs.named(name)
     joints = rig.tables("joint")
     joint, chamber = next(iter(joints)), next(iter(rig.tables("chamber")))
@@ -73,13 +86,17 @@ def settle(rig, given):
 
 
 class Differences:
-    """Sampled matrices of a rig's simulation about a start, by central differences of one short sample."""
+    """Sampled matrices of a rig's simulation about a start, by central differences of one short
+    sample.
+    """
 
     def __init__(self, rig, start, side):
         self.simulator = pamrs.Simulator(rig, sample_time=SAMPLE, step=STEP, initial=start)
         self.map = core_rig(rig).state_map()
         self.at = self.simulator.state
-        self.places = {name: k for k, (name, role) in enumerate(self.map) if not role.startswith("effect_")}
+        self.places = {
+            name: k for k, (name, role) in enumerate(self.map) if not role.startswith("effect_")
+        }
         self.at[self._of("effect_begun")] = 1.0
         self.null = {name: table["null_voltage"] for name, table in rig.tables("valve").items()}
         self.sides = {"mean": (1.0, -1.0), "fill": (1.0, 0.0), "vent": (0.0, -1.0)}[side]
@@ -95,11 +112,17 @@ class Differences:
         if effect != name:
             name = f"chamber{block}"
         roles = ("pressure", "position", "rate", "free_mass", "effect_moves", "effect_opens")
-        return next((k, role) for k, (found, role) in enumerate(self.map) if found == name and role in roles)
+        return next(
+            (k, role) for k, (found, role) in enumerate(self.map) if found == name and role in roles
+        )
 
     def width(self, name):
         place, role = self.place(name)
-        return 3e-5 * self.at[place] if role == "free_mass" else WIDTHS.get(name.partition(".")[0], 1e-5)
+        return (
+            3e-5 * self.at[place]
+            if role == "free_mass"
+            else WIDTHS.get(name.partition(".")[0], 1e-5)
+        )
 
     def after(self, state, **changed):
         self.simulator.restore(state)
@@ -115,7 +138,9 @@ class Differences:
             state[rate] += 1e-3
             changes.append(self.after(state) - rest)
         moved = np.array(changes)
-        return dict(zip(angles, np.linalg.solve(moved[:, angles], moved[:, self.follow]), strict=True))
+        return dict(
+            zip(angles, np.linalg.solve(moved[:, angles], moved[:, self.follow]), strict=True)
+        )
 
     def sampled(self, states, inputs):
         """State and input matrix of a sample."""
@@ -133,8 +158,13 @@ class Differences:
             columns.append((ends[0] - ends[1])[places] / ((sides[0] - sides[1]) * self.width(name)))
         for name in inputs:
             valve = name.partition(".")[2]
-            ends = [self.after(self.at, **{valve: self.null[valve] + side * COMMAND}) for side in self.sides]
-            columns.append((ends[0] - ends[1])[places] / ((self.sides[0] - self.sides[1]) * COMMAND))
+            ends = [
+                self.after(self.at, **{valve: self.null[valve] + side * COMMAND})
+                for side in self.sides
+            ]
+            columns.append(
+                (ends[0] - ends[1])[places] / ((self.sides[0] - self.sides[1]) * COMMAND)
+            )
         whole = np.array(columns).T
         return whole[:, : len(states)], whole[:, len(states) :]
 
@@ -148,7 +178,9 @@ class Differences:
                 state[self.place(name)[0]] += side * self.width(name)
                 self.simulator.restore(state)
                 samples.append(self.simulator.observe())
-            columns.append([(samples[0][out] - samples[1][out]) / (2.0 * self.width(name)) for out in outputs])
+            columns.append(
+                [(samples[0][out] - samples[1][out]) / (2.0 * self.width(name)) for out in outputs]
+            )
         return np.array(columns).T
 
 
@@ -158,11 +190,19 @@ def agrees(rig, given, *, side="mean", held=("supply_pressure",), friction="rest
     rig = resting(without_dry_friction(rig) if friction == "moving" else rig)
     by = Differences(rig, equilibrium(rig, **given), side)
     widths = np.array([by.width(name) for name in model.states])
-    # a chamber that loses air does not rest meanwhile, and one that gets some gets all of it as it gets the most
-    error = 1e-4 if any("leak" in effect["id"] or effect["id"] == "closure_flow" for effect in rig.effects) else 5e-6
+    # a chamber that loses air does not rest meanwhile, and one that gets some gets all of it as it
+    # gets the most
+    error = (
+        1e-4
+        if any("leak" in effect["id"] or effect["id"] == "closure_flow" for effect in rig.effects)
+        else 5e-6
+    )
     found = by.sampled(model.states, model.inputs)
     # in half widths, so that every entry is seen beside what its row does
-    scales = 1.0 / widths[:, None] * widths, np.repeat(COMMAND / widths[:, None], len(model.inputs), axis=1)
+    scales = (
+        1.0 / widths[:, None] * widths,
+        np.repeat(COMMAND / widths[:, None], len(model.inputs), axis=1),
+    )
     for expected, matrix, scale in zip(found, model.sampled(SAMPLE), scales, strict=True):
         difference = np.abs(matrix - expected) * scale
         assert difference.max() < error * np.abs(expected * scale).max(), (model.states, difference)
@@ -170,7 +210,11 @@ def agrees(rig, given, *, side="mean", held=("supply_pressure",), friction="rest
     return model
 
 
-RIGS = [name for name in pamrs.rigs.names() if pamrs.rigs.named(name).tables("joint") and pamrs.rigs.named(name).tables("valve")]
+RIGS = [
+    name
+    for name in pamrs.rigs.names()
+    if pamrs.rigs.named(name).tables("joint") and pamrs.rigs.named(name).tables("valve")
+]
 
 
 @pytest.fixture(scope="module", params=RIGS)
@@ -187,7 +231,15 @@ def test_the_derivatives_are_those_of_the_simulation(point, effect):
 
 @pytest.mark.parametrize("side", ["fill", "vent"])
 @pytest.mark.parametrize(
-    "effect", ["", "input_path_lag", "valve_centre_leakage", "tube_flow_restriction", "closure_flow", "closure_supply"]
+    "effect",
+    [
+        "",
+        "input_path_lag",
+        "valve_centre_leakage",
+        "tube_flow_restriction",
+        "closure_flow",
+        "closure_supply",
+    ],
 )
 def test_a_side_of_a_valve_is_the_slope_on_that_side(side, effect):
     rig, given = settled("antagonistic_joint")
@@ -216,8 +268,13 @@ def test_a_wide_hose_behind_a_shut_valve_changes_no_slope(conductance):
 def test_a_muscle_without_pressure_has_the_mean_of_two_slopes():
     rig, given = settled("recruitment")
     given = {**given, "initial": {}}
-    bare, model = linearise(rig, **given), linearise(rig.with_effect("activation_pressure"), **given)
-    rate, pressure = (bare.states.index(name) for name in ("joint_rate.shoulder", "muscle_pressure.pair_2"))
+    bare, model = (
+        linearise(rig, **given),
+        linearise(rig.with_effect("activation_pressure"), **given),
+    )
+    rate, pressure = (
+        bare.states.index(name) for name in ("joint_rate.shoulder", "muscle_pressure.pair_2")
+    )
     assert model.a[rate, pressure] == pytest.approx(0.5 * bare.a[rate, pressure], rel=1e-6)
 
 
@@ -269,7 +326,9 @@ def test_the_core_counts_a_load_by_its_length():
     length = rig.tables("muscle")[""]["rest_length"]
     by_length = (force(length=length) - force(length=length - 1e-6)) / 1e-6
     assert a[2].tolist() == [0.0, 0.0, 0.0, 1.0]
-    assert a[3, 1] == pytest.approx(-(force(muscle_pressure=10.0) - force(muscle_pressure=-10.0)) / 20.0 / mass, rel=1e-6)
+    assert a[3, 1] == pytest.approx(
+        -(force(muscle_pressure=10.0) - force(muscle_pressure=-10.0)) / 20.0 / mass, rel=1e-6
+    )
     assert a[3, 2] == pytest.approx(-by_length / mass, rel=1e-2)
     assert b[0, 0] < 0.0 < b[1, 0]
     assert c.tolist() == np.eye(4).tolist()

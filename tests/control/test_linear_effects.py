@@ -1,4 +1,6 @@
-"""Linear models of rigs with effects, sensors that are off, several joints, dry friction; and of controllers with corners."""
+"""Linear models of rigs with effects, sensors that are off, several joints, dry friction; and of
+controllers with corners.
+"""
 
 import math
 
@@ -41,7 +43,9 @@ def rig():
 
 
 def moves_alike(rig, model, start, moved, *, low=2e-3):
-    """The core and its linear model, both from the operating point under commands; channels as the sensors read them."""
+    """The core and its linear model, both from the operating point under commands; channels as the
+    sensors read them.
+    """
     time = np.arange(301) * 1e-3
     null = dict.fromkeys(model.inputs, 5.0)
     commands = {name: null[name] + moved(time, k) for k, name in enumerate(model.inputs)}
@@ -84,7 +88,9 @@ def test_a_lag_is_one_and_leaves_the_rest_as_it_is(rig):
     # T y' = p - y
     assert lagged.a[3] == pytest.approx([200.0, 0.0, 0.0, -200.0], rel=1e-12, abs=0.0)
     assert lagged.b[0] == pytest.approx(bare.b[0], rel=1e-12)
-    assert lagged.c[lagged.outputs.index("muscle_pressure")] == pytest.approx([0.0, 0.0, 0.0, 1.0], abs=0.0)
+    assert lagged.c[lagged.outputs.index("muscle_pressure")] == pytest.approx(
+        [0.0, 0.0, 0.0, 1.0], abs=0.0
+    )
     late = linearise(rig.with_effect("input_path_lag", {"time_constant": 0.02}), ANGLE)
     assert late.states[3:] == ("input_path_lag.lag",)
     assert late.a[3] == pytest.approx([0.0, 0.0, 0.0, -50.0], rel=1e-12, abs=0.0)
@@ -99,13 +105,19 @@ def test_a_lag_is_one_and_leaves_the_rest_as_it_is(rig):
 
 @pytest.mark.parametrize("side", ["fill", "vent"])
 def test_behind_a_lag_a_valve_still_has_sides(rig, side):
-    late = linearise(rig.with_effect("input_path_lag", {"time_constant": 0.02, "delay": 0.01}), ANGLE, side=side)
+    late = linearise(
+        rig.with_effect("input_path_lag", {"time_constant": 0.02, "delay": 0.01}), ANGLE, side=side
+    )
     # at low frequency the way to the flow is that of the valve alone
     steady = np.linalg.solve(late.a[3:, 3:], -late.b[3:, 0])
-    assert (late.a[0, 3:] @ steady) == pytest.approx(linearise(rig, ANGLE, side=side).b[0, 0], rel=1e-9)
+    assert (late.a[0, 3:] @ steady) == pytest.approx(
+        linearise(rig, ANGLE, side=side).b[0, 0], rel=1e-9
+    )
 
 
-@pytest.mark.parametrize("effect", ["valve_dead_zone", "valve_hysteresis", "mullins_softening", "clock_skew"])
+@pytest.mark.parametrize(
+    "effect", ["valve_dead_zone", "valve_hysteresis", "mullins_softening", "clock_skew"]
+)
 def test_what_has_no_linear_model_is_refused_by_name(rig, effect):
     with pytest.raises(ParameterError, match=f"{effect}.*no linear model"):
         linearise(rig.with_effect(effect), ANGLE)
@@ -144,7 +156,9 @@ def test_every_effect_is_known_and_all_together_too(rig):
             every = every.with_effect(effect)
     model = linearise(every, ANGLE)
     assert np.linalg.eigvals(model.a).real.max() < 1.0
-    assert {"payload_swing.rate", "base_flexibility.angle", "muscle_creep", "pressure_lag"} < set(model.states)
+    assert {"payload_swing.rate", "base_flexibility.angle", "muscle_creep", "pressure_lag"} < set(
+        model.states
+    )
 
 
 def test_a_command_that_moves_nothing_is_refused(rig):
@@ -188,7 +202,8 @@ def test_dry_friction_at_rest_and_in_motion_have_regions_of_their_own(rig):
 
     axes = {"kp": [0.3, 0.44, 0.5, 7.5, 8.5]}
     regions = {
-        friction: stable_region(rig, made, axes, payloads=[9.07], angle=ANGLE, friction=friction) for friction in ("rest", "moving")
+        friction: stable_region(rig, made, axes, payloads=[9.07], angle=ANGLE, friction=friction)
+        for friction in ("rest", "moving")
     }
     assert regions["rest"].stable[0].tolist() == [True, True, True, True, False]
     assert regions["moving"].stable[0].tolist() == [True, True, False, False, False]
@@ -196,10 +211,16 @@ def test_dry_friction_at_rest_and_in_motion_have_regions_of_their_own(rig):
     moving = linearise(rig, ANGLE, friction="moving")
     bare = linearise(rig.with_parameters({"arm.coulomb": 0.0}), ANGLE)
     assert moving.a == pytest.approx(bare.a, rel=1e-12, abs=1e-12)
-    # between both bounds the arm forgets a small push, and swings for good after a large one; below both it forgets any
+    # between both bounds the arm forgets a small push, and swings for good after a large one; below
+    # both it forgets any
     start = equilibrium(rig, ANGLE)
     for kp, push, swings in ((7.0, 0.1, False), (7.0, 0.3, True), (0.4, 0.3, False)):
-        run = closed_loop(rig, made(kp), step(ANGLE, ANGLE, duration=12.0), initial={**start, "joint_angle": ANGLE + push})
+        run = closed_loop(
+            rig,
+            made(kp),
+            step(ANGLE, ANGLE, duration=12.0),
+            initial={**start, "joint_angle": ANGLE + push},
+        )
         late = np.ptp(run.angle[run.time > 9.0])
         assert (late > 1.0) == swings, (kp, push, late)
         assert (late < 0.1) != swings, (kp, push, late)
@@ -217,7 +238,10 @@ def test_a_corner_of_a_controller_is_refused_or_a_side_is_chosen(rig):
     point = linearise(rig, ANGLE).point
     with pytest.raises(ParameterError, match=r"corner.*command over joint_angle"):
         linear_controller(DeadBand(kp=2.0), point, ANGLE + 0.01)
-    slopes = {side: linear_controller(DeadBand(kp=2.0), point, ANGLE + 0.01 + 1e-12, side=side).d[0, 0] for side in ("down", "mean")}
+    slopes = {
+        side: linear_controller(DeadBand(kp=2.0), point, ANGLE + 0.01 + 1e-12, side=side).d[0, 0]
+        for side in ("down", "mean")
+    }
     assert slopes["down"] == pytest.approx(-2.0, rel=1e-4)
     assert slopes["mean"] == pytest.approx(-1.0, rel=1e-4)
     assert linear_controller(DeadBand(kp=2.0), point, ANGLE + 0.02).d[0, 0] == pytest.approx(-2.0)
@@ -232,7 +256,12 @@ def test_a_corner_of_a_controller_is_refused_or_a_side_is_chosen(rig):
     ("call", "word"),
     [
         (lambda rig: linearise(rig, ANGLE, friction="none"), "friction"),
-        (lambda rig: stable_region(rig, SmallPid, {"kp": [1.0]}, payloads=[1.0], angle=ANGLE, friction=""), "friction"),
+        (
+            lambda rig: stable_region(
+                rig, SmallPid, {"kp": [1.0]}, payloads=[1.0], angle=ANGLE, friction=""
+            ),
+            "friction",
+        ),
         (lambda rig: linear_controller(PID(1.0), {"joint_angle": 0.5}, side="left"), "side"),
     ],
 )
@@ -244,7 +273,10 @@ def test_bad_input_is_named(rig, call, word):
 def test_a_loop_is_judged_with_its_lag(rig):
     law = linear_controller(PID(7.5, period=0.005), linearise(rig, ANGLE).point)
     late = rig.with_effect("input_path_lag", {"time_constant": 0.02})
-    radii = [max(spectral_radius(linearise(plant, ANGLE, side=side), law) for side in ("fill", "vent")) for plant in (rig, late)]
+    radii = [
+        max(spectral_radius(linearise(plant, ANGLE, side=side), law) for side in ("fill", "vent"))
+        for plant in (rig, late)
+    ]
     assert radii[0] < 1.0 < radii[1]
 
 
@@ -257,7 +289,9 @@ def test_effects_at_one_of_several_blocks_are_named_after_it():
         ("pressure_lag", {"time_constant": 0.02}, "flexor"),
     ):
         rig = rig.with_effect(effect, values, at=at)
-    start = equilibrium(rig, 0.7, joint="elbow", chamber="flexor", initial={"muscle_pressure.extensor": 2e5})
+    start = equilibrium(
+        rig, 0.7, joint="elbow", chamber="flexor", initial={"muscle_pressure.extensor": 2e5}
+    )
     model = linearise(rig, 0.7, joint="elbow", chamber="flexor", initial=start, side="fill")
     assert model.states[-4:] == (
         "closure_flow.pressure.flexor",

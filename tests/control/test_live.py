@@ -1,4 +1,6 @@
-"""A live loop: what it does at jitter, dropouts, overruns, lost sensors, Ctrl-C and failures; the safe command comes last, always."""
+"""A live loop: what it does at jitter, dropouts, overruns, lost sensors, Ctrl-C and failures; the
+safe command comes last, always.
+"""
 
 import math
 import os
@@ -11,7 +13,15 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.control import PID, Cascade, DeadZoneCompensation, HysteresisCompensation, Parallel, closed_loop, sweep
+from pamrs.control import (
+    PID,
+    Cascade,
+    DeadZoneCompensation,
+    HysteresisCompensation,
+    Parallel,
+    closed_loop,
+    sweep,
+)
 from pamrs.control.live import LiveError, SystemClock, run_live
 from pamrs.control.simulated_device import FAULTS, SimulatedDevice, VirtualClock
 from pamrs.control.trajectories import degrees, lift_hold_return
@@ -30,7 +40,9 @@ def rig():
 def live(rig, controller=None, clock=None, device=None, **options):
     clock = clock or VirtualClock()
     device = SimulatedDevice(rig, clock, **(device or {}))
-    return run_live(device, controller or SmallPid(period=0.01), LIFT, clock=clock, **options), device
+    return run_live(
+        device, controller or SmallPid(period=0.01), LIFT, clock=clock, **options
+    ), device
 
 
 def test_on_time_it_is_the_simulated_loop(rig):
@@ -58,7 +70,11 @@ def test_jitter_is_measured_and_borne(rig):
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_missed_reading_holds_the_command_and_the_controller_keeps_its_time(rig, fault):
     run, device = live(
-        rig, PID(2.0, 1.0, period=0.01), device={"dropouts": 0.15, "faults": (fault,), "seed": 4}, stamp="time", most_missed=9
+        rig,
+        PID(2.0, 1.0, period=0.01),
+        device={"dropouts": 0.15, "faults": (fault,), "seed": 4},
+        stamp="time",
+        most_missed=9,
     )
     gone = np.isnan(run.channels["joint_angle"])
     assert run.reason == "finished"
@@ -85,10 +101,23 @@ def test_a_stale_reading_is_seen_by_its_time_or_a_counter(rig):
     for stamp, change, seen in (
         (None, dict, True),
         (None, lambda m: {n: v for n, v in m.items() if n != "time"}, False),
-        ("frame", lambda m: {**{n: v for n, v in m.items() if n != "time"}, "frame": round(1e3 * m["time"])}, True),
+        (
+            "frame",
+            lambda m: {
+                **{n: v for n, v in m.items() if n != "time"},
+                "frame": round(1e3 * m["time"]),
+            },
+            True,
+        ),
     ):
         clock = VirtualClock()
-        run = run_live(Altered(rig, clock, change, **stale), SmallPid(period=0.01), LIFT, clock=clock, stamp=stamp)
+        run = run_live(
+            Altered(rig, clock, change, **stale),
+            SmallPid(period=0.01),
+            LIFT,
+            clock=clock,
+            stamp=stamp,
+        )
         assert (50 < run.missed < 150) == seen
         assert seen or run.missed == 0
 
@@ -99,17 +128,27 @@ def test_what_cannot_be_is_no_reading(rig):
 
     clock = VirtualClock()
     device = Altered(rig, clock, change)
-    run = run_live(device, SmallPid(period=0.01), LIFT, clock=clock, plausible={"joint_angle": (0.0, 2.2)})
+    run = run_live(
+        device, SmallPid(period=0.01), LIFT, clock=clock, plausible={"joint_angle": (0.0, 2.2)}
+    )
     assert run.missed == 2
     assert (np.flatnonzero(np.isnan(run.channels["joint_angle"])) == [101, 102]).all()
     clock = VirtualClock()
-    run = run_live(SimulatedDevice(rig, clock), SmallPid(period=0.01), LIFT, clock=clock, plausible={"elbow": (0.0, 1.0)})
+    run = run_live(
+        SimulatedDevice(rig, clock),
+        SmallPid(period=0.01),
+        LIFT,
+        clock=clock,
+        plausible={"elbow": (0.0, 1.0)},
+    )
     assert (run.reason, run.missed) == ("lost_sensor", 6)
 
 
 @pytest.mark.parametrize("safe", [5.0, 0.0])
 def test_a_lost_sensor_is_a_safe_stop(rig, safe):
-    run, device = live(rig, device={"lost_from": 2.0, "seed": 1}, stamp="time", most_missed=3, safe=safe)
+    run, device = live(
+        rig, device={"lost_from": 2.0, "seed": 1}, stamp="time", most_missed=3, safe=safe
+    )
     assert run.reason == "lost_sensor"
     assert run.missed == 4
     when, command = device.written[-1]
@@ -165,7 +204,11 @@ def test_a_reading_that_hung_is_not_acted_on(rig):
         assert np.isnan(run.channels["joint_angle"][100])
         after = [pair for pair in device.written if pair[0] > 0.9951]
         # the first command after it is of a new reading, or the safe one
-        assert after[0] == ((pytest.approx(1.025), after[0][1]) if reason == "finished" else (pytest.approx(2.0), 0.0))
+        assert after[0] == (
+            (pytest.approx(1.025), after[0][1])
+            if reason == "finished"
+            else (pytest.approx(2.0), 0.0)
+        )
 
 
 def test_an_answer_that_took_too_long_is_not_written(rig):
@@ -280,7 +323,9 @@ run_live(Device(), PID(2.0, period=0.01), step(0.3, 1.0, duration=30.0), safe=0.
 @pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP"])
 def test_a_signal_that_ends_the_program_leaves_the_safe_command(name):
     number = getattr(signal, name)
-    with subprocess.Popen([sys.executable, "-c", TERMINATED], stdout=subprocess.PIPE, text=True) as child:
+    with subprocess.Popen(
+        [sys.executable, "-c", TERMINATED], stdout=subprocess.PIPE, text=True
+    ) as child:
         first = [child.stdout.readline() for _ in range(5)]
         child.send_signal(number)
         rest = child.stdout.read().split()
@@ -314,7 +359,10 @@ def test_signals_are_the_programs_own_again_and_never_interrupt_the_safe_command
     old = signal.signal(signal.SIGTERM, signal.SIG_IGN)
     try:
         clock = VirtualClock()
-        assert run_live(Signalled(rig, clock), SmallPid(period=0.01), LIFT, clock=clock).reason == "finished"
+        assert (
+            run_live(Signalled(rig, clock), SmallPid(period=0.01), LIFT, clock=clock).reason
+            == "finished"
+        )
     finally:
         signal.signal(signal.SIGTERM, old)
 
@@ -345,10 +393,17 @@ def test_a_pressure_is_no_valve_command(rig):
     assert closed_loop(rig, Cascade(sliding), LIFT, 0.1).command.max() <= 10.0
     # nor is a valve command a pressure, which 5 of 10 V would hardly be
     for name in ("pid", "sliding"):
-        with pytest.raises(ParameterError, match="outer is a .* with answers = 'valve', which is not allowed: 'pressure' is needed"):
+        with pytest.raises(
+            ParameterError,
+            match=(
+                "outer is a .* with answers = 'valve', which is not allowed: 'pressure' is needed"
+            ),
+        ):
             Cascade(CONTROLLERS[name](1.0))
     # with an actuation that knows what to do with it it is allowed
-    run = closed_loop(rig, sliding, LIFT, 0.1, actuation=lambda pressure: {"valve_command": 5.0 + 1e-7 * pressure})
+    run = closed_loop(
+        rig, sliding, LIFT, 0.1, actuation=lambda pressure: {"valve_command": 5.0 + 1e-7 * pressure}
+    )
     assert run.command.max() > 10.0
 
 
@@ -398,7 +453,9 @@ def test_bad_input_is_named(rig, change, word):
     clock = VirtualClock()
     options = {"controller": SmallPid(period=0.01), **change}
     with pytest.raises(ParameterError, match=word):
-        run_live(SimulatedDevice(rig, clock), options.pop("controller"), LIFT, clock=clock, **options)
+        run_live(
+            SimulatedDevice(rig, clock), options.pop("controller"), LIFT, clock=clock, **options
+        )
     with pytest.raises(ParameterError, match="2 valves"):
         SimulatedDevice(pamrs.rigs.named("antagonistic_joint"), clock)
     for wrong in ({"dropouts": 2.0}, {"faults": ("smoke",)}):
@@ -412,7 +469,11 @@ def test_a_channel_that_goes_is_a_missed_reading(rig):
     class Loses(SimulatedDevice):
         def read(self):
             reading = super().read()
-            return {"muscle_pressure": reading["muscle_pressure"]} if self.clock.now() > 0.5 else reading
+            return (
+                {"muscle_pressure": reading["muscle_pressure"]}
+                if self.clock.now() > 0.5
+                else reading
+            )
 
     clock = VirtualClock()
     run = run_live(Loses(rig, clock), SmallPid(period=0.01), LIFT, clock=clock)

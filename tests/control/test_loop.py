@@ -77,7 +77,11 @@ def test_a_restarted_loop_is_the_whole_one(rig):
 def test_a_restarted_loop_with_noise_and_delay_is_the_whole_one(rig):
     sensors = Sensors(noise={"joint_angle": 2e-3}, delay=0.02, seed=4)
     whole = closed_loop(rig, SmallPid(), LIFT, 3.0, sample_time=0.005, sensors=sensors)
-    simulator, controller, reader = pamrs.Simulator(rig, sample_time=0.005), SmallPid(), sensors.started(0.005)
+    simulator, controller, reader = (
+        pamrs.Simulator(rig, sample_time=0.005),
+        SmallPid(),
+        sensors.started(0.005),
+    )
     first = closed_loop(simulator, controller, LIFT, 1.5, sensors=reader)
     kept = copy.deepcopy(reader.state)
     state = simulator.state
@@ -90,7 +94,12 @@ def test_a_restarted_loop_with_noise_and_delay_is_the_whole_one(rig):
     other.restore(kept)
     again = closed_loop(simulator, controller, LIFT, 1.5, start=1.5, reset=False, sensors=other)
     assert (again.command == second.command).all()
-    for wrong in ({}, {"late": 3, "random": kept["random"]}, {**kept, "random": {}}, {**kept, "late": kept["late"] * 3}):
+    for wrong in (
+        {},
+        {"late": 3, "random": kept["random"]},
+        {**kept, "random": {}},
+        {**kept, "late": kept["late"] * 3},
+    ):
         with pytest.raises(ParameterError, match="state"):
             other.restore(wrong)
     with pytest.raises(ParameterError, match="period"):
@@ -105,7 +114,9 @@ def closed_loop_state(rig, sensors):
 
 
 def test_sensors_delay_round_and_are_noisy_as_said(rig):
-    sensors = Sensors(noise={"joint_angle": 2e-3}, resolution={"muscle_pressure": 5e3}, delay=0.02, seed=4)
+    sensors = Sensors(
+        noise={"joint_angle": 2e-3}, resolution={"muscle_pressure": 5e3}, delay=0.02, seed=4
+    )
     controller = Listening()
     run = closed_loop(rig, controller, LIFT, 2.0, sample_time=0.005, sensors=sensors)
     told = np.array([h[1]["joint_angle"] for h in controller.heard])
@@ -119,7 +130,14 @@ def test_sensors_delay_round_and_are_noisy_as_said(rig):
     assert pressure / 5e3 == pytest.approx(np.round(pressure / 5e3))
     again = closed_loop(rig, Listening(), LIFT, 2.0, sample_time=0.005, sensors=sensors)
     assert (again.command == run.command).all()
-    other = closed_loop(rig, Listening(), LIFT, 2.0, sample_time=0.005, sensors=Sensors(noise={"joint_angle": 2e-3}, seed=5))
+    other = closed_loop(
+        rig,
+        Listening(),
+        LIFT,
+        2.0,
+        sample_time=0.005,
+        sensors=Sensors(noise={"joint_angle": 2e-3}, seed=5),
+    )
     assert (other.command != run.command).any()
 
 
@@ -147,7 +165,12 @@ def test_a_regulator_and_named_blocks_are_driven_by_name():
     named = {name: 5.5 if k == 0 else 4.5 for k, name in enumerate(inputs)}
 
     def split_up(command):
-        return {"valve_command": {name.partition(".")[2]: command if k == 0 else 10.0 - command for k, name in enumerate(inputs)}}
+        return {
+            "valve_command": {
+                name.partition(".")[2]: command if k == 0 else 10.0 - command
+                for k, name in enumerate(inputs)
+            }
+        }
 
     measured = {"joint_angle": "joint_angle.elbow"}
     run = closed_loop(rig, Still(), step(0.0, 0.1), 0.5, actuation=split_up, measured=measured)
@@ -157,7 +180,15 @@ def test_a_regulator_and_named_blocks_are_driven_by_name():
     assert np.ptp(run.angle) > 0.01
     # a sweep names them as well
     many = sweep(
-        rig, Still(), step(0.0, 0.1), 0.5, n=2, actuation=split_up, measured=measured, channels=["joint_angle.elbow"], sample_time=0.001
+        rig,
+        Still(),
+        step(0.0, 0.1),
+        0.5,
+        n=2,
+        actuation=split_up,
+        measured=measured,
+        channels=["joint_angle.elbow"],
+        sample_time=0.001,
     )
     assert (many.run["joint_angle.elbow"][0] == run.angle).all()
     assert many.largest[1] == pytest.approx(np.abs(run.error[::5]).max())
@@ -168,7 +199,14 @@ def test_a_regulator_and_named_blocks_are_driven_by_name():
 def test_a_table_has_a_column_for_everything(rig):
     pytest.importorskip("pandas")
     run = closed_loop(rig, SmallPid(), LIFT, 0.5, channels=["muscle_pressure"])
-    assert list(run.to_pandas().columns) == ["reference", "reference_rate", "command", "joint_angle", "joint_rate", "muscle_pressure"]
+    assert list(run.to_pandas().columns) == [
+        "reference",
+        "reference_rate",
+        "command",
+        "joint_angle",
+        "joint_rate",
+        "muscle_pressure",
+    ]
 
 
 @pytest.mark.parametrize(

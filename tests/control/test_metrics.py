@@ -14,7 +14,9 @@ def second_order(zeta, w, time):
     """Step response of ``w^2 / (s^2 + 2 zeta w s + w^2)`` and its rate."""
     d = w * math.sqrt(1 - zeta**2)
     decay = np.exp(-zeta * w * time)
-    return 1 - decay * (np.cos(d * time) + zeta * w / d * np.sin(d * time)), decay * w * w / d * np.sin(d * time)
+    return 1 - decay * (
+        np.cos(d * time) + zeta * w / d * np.sin(d * time)
+    ), decay * w * w / d * np.sin(d * time)
 
 
 def test_curvature_of_a_circle_is_one_over_its_radius():
@@ -23,9 +25,14 @@ def test_curvature_of_a_circle_is_one_over_its_radius():
     angle = np.sqrt(radius**2 - time**2)
     inner = slice(5, -5)
     assert m.curvature(time, angle)[inner] == pytest.approx(1 / radius, rel=1e-5)
-    assert m.curvature(time, angle, rate=-time / angle)[inner] == pytest.approx(1 / radius, rel=1e-5)
-    # the integral over time of a circle's curvature is the change of the slope's sine: here time / radius
-    assert m.total_curvature(time, angle, rate=-time / angle) == pytest.approx(2.4 / radius, rel=1e-12)
+    assert m.curvature(time, angle, rate=-time / angle)[inner] == pytest.approx(
+        1 / radius, rel=1e-5
+    )
+    # the integral over time of a circle's curvature is the change of the slope's sine: here time /
+    # radius
+    assert m.total_curvature(time, angle, rate=-time / angle) == pytest.approx(
+        2.4 / radius, rel=1e-12
+    )
     assert m.total_curvature(time, angle) == pytest.approx(2.4 / radius, rel=1e-3)
     assert trapezoid(m.curvature(time, angle), time) == pytest.approx(2.4 / radius, rel=1e-3)
 
@@ -33,13 +40,19 @@ def test_curvature_of_a_circle_is_one_over_its_radius():
 def test_curvature_depends_on_the_unit_and_does_not_cancel():
     time = np.linspace(0.0, 2 * math.pi, 20001)
     angle, rate = 0.5 * np.sin(time), 0.5 * np.cos(time)
-    # the sine of the slope goes from v/sqrt(1+v^2) to its negative and back: four times its largest value
+    # the sine of the slope goes from v/sqrt(1+v^2) to its negative and back: four times its largest
+    # value
     for unit, scale in (("rad", 1.0), ("deg", 180 / math.pi)):
         v = 0.5 * scale
-        assert m.total_curvature(time, angle, rate=rate, unit=unit) == pytest.approx(4 * v / math.sqrt(1 + v * v), rel=1e-9)
+        assert m.total_curvature(time, angle, rate=rate, unit=unit) == pytest.approx(
+            4 * v / math.sqrt(1 + v * v), rel=1e-9
+        )
     # a moving arm's wiggle counts less in degrees: same wiggle at rest and on a ramp of 10 deg/s
     wiggle, ramp = 1e-3 * np.sin(20 * time), math.radians(10) * time
-    ratio = {u: m.total_curvature(time, ramp + wiggle, unit=u) / m.total_curvature(time, wiggle, unit=u) for u in ("rad", "deg")}
+    ratio = {
+        u: m.total_curvature(time, ramp + wiggle, unit=u) / m.total_curvature(time, wiggle, unit=u)
+        for u in ("rad", "deg")
+    }
     assert ratio["rad"] > 0.9
     assert ratio["deg"] < 0.02
 
@@ -49,7 +62,9 @@ def test_squared_error_rms_and_lag_of_known_signals():
     reference = 0.1 * time
     late = 0.1 * (time - 0.75)
     assert m.squared_error(time, reference, late) == pytest.approx(10 * 0.075**2)
-    assert m.squared_error(time, reference, late, unit="deg") == pytest.approx(10 * math.degrees(0.075) ** 2)
+    assert m.squared_error(time, reference, late, unit="deg") == pytest.approx(
+        10 * math.degrees(0.075) ** 2
+    )
     assert m.rms(time, reference, late) == pytest.approx(0.075)
     assert m.lag(time, reference, late) == pytest.approx(0.75)
     assert m.steady_error(time, reference, late) == pytest.approx(0.075)
@@ -71,7 +86,11 @@ def test_step_of_a_damped_second_order(zeta, w):
     from scipy.optimize import brentq
 
     def first(level):
-        return brentq(lambda t: float(second_order(zeta, w, t)[0]) - level, 0.0, math.pi / w / math.sqrt(1 - zeta**2))
+        return brentq(
+            lambda t: float(second_order(zeta, w, t)[0]) - level,
+            0.0,
+            math.pi / w / math.sqrt(1 - zeta**2),
+        )
 
     assert m.rise_time(time, angle, 0.3, 0.8) == pytest.approx(first(0.9) - first(0.1), rel=1e-5)
     settled = m.settling_time(time, angle, 0.3, 0.8)
@@ -79,11 +98,15 @@ def test_step_of_a_damped_second_order(zeta, w):
     later = time > settled + 1e-6
     assert (np.abs(y[later] - 1) <= 0.02).all()
     # omega of the step: the rate rises and falls once per half wave, so its extremes are enough
-    assert m.total_curvature(time, angle, rate=0.5 * rate) == pytest.approx(total_variation(zeta, w), rel=1e-4)
+    assert m.total_curvature(time, angle, rate=0.5 * rate) == pytest.approx(
+        total_variation(zeta, w), rel=1e-4
+    )
 
 
 def total_variation(zeta, w):
-    """Sum of the changes of ``v / sqrt(1 + v^2)`` between the extremes of the rate, which are where tan(d t) = d / (zeta w)."""
+    """Sum of the changes of ``v / sqrt(1 + v^2)`` between the extremes of the rate, which are where
+    tan(d t) = d / (zeta w).
+    """
     d = w * math.sqrt(1 - zeta**2)
     when = (math.atan2(d, zeta * w) + math.pi * np.arange(60)) / d
     extremes = np.concatenate([[0.0], 0.5 * second_order(zeta, w, when)[1]])
@@ -112,9 +135,13 @@ def test_a_batch_is_its_runs():
             assert isinstance(getattr(one, name), float)
             assert getattr(together, name)[k] == pytest.approx(getattr(one, name), rel=1e-12)
         for part, values in one.phases.items():
-            assert {n: together.phases[part][n][k] for n in values} == pytest.approx(values, rel=1e-12)
+            assert {n: together.phases[part][n][k] for n in values} == pytest.approx(
+                values, rel=1e-12
+            )
         for f in (m.rise_time, m.overshoot, m.settling_time):
-            assert f(time, angle, 0.0, 1.0)[k] == pytest.approx(f(time, angle[k], 0.0, 1.0), rel=1e-12)
+            assert f(time, angle, 0.0, 1.0)[k] == pytest.approx(
+                f(time, angle[k], 0.0, 1.0), rel=1e-12
+            )
     # squared errors of the parts add up to that of the whole
     whole = together.phases["first"]["rms"] ** 2 * 1.0 + together.phases["later"]["rms"] ** 2 * 11.0
     assert whole == pytest.approx(together.squared_error)

@@ -1,4 +1,6 @@
-"""What a model-based controller knows of a rig: inverses are inverses, and the simplified torque is near the full one."""
+"""What a model-based controller knows of a rig: inverses are inverses, and the simplified torque is
+near the full one.
+"""
 
 import math
 
@@ -35,7 +37,9 @@ def test_torque_is_a_line_in_the_pressure(name):
     angle = np.radians([20.0, 45.0, 80.0, 110.0])
     c1, c2 = torque_line(rig, angle)
     for pressure in (0.0, 2e5, 1.3e6):
-        assert c1 * pressure + c2 == pytest.approx(rig_torque(rig, pressure, angle), rel=1e-10, abs=1e-9)
+        assert c1 * pressure + c2 == pytest.approx(
+            rig_torque(rig, pressure, angle), rel=1e-10, abs=1e-9
+        )
 
 
 @pytest.mark.parametrize("name", ["shoulder", "elbow"])
@@ -50,28 +54,44 @@ def test_inverse_force_is_the_inverse_of_the_rig_s_torque(name):
 
 
 def test_desired_pressure_holds_the_simulated_arm_where_it_should_be():
-    """Inverse dynamics and inverse force against the simulator: at P_d without motion the net torque is zero."""
+    """Inverse dynamics and inverse force against the simulator: at P_d without motion the net
+    torque is zero.
+    """
     rig = SHOULDER.with_parameters({"arm.coulomb": 0.0})
     controller = Feedforward.from_rig(rig, 1.0)
     for degrees in (30.0, 60.0, 90.0):
         pressure = controller.desired_pressure(Reference(math.radians(degrees)))
         simulator = pamrs.Simulator(
-            rig, sample_time=1e-3, initial={"joint_angle": math.radians(degrees), "muscle_pressure": float(pressure)}
+            rig,
+            sample_time=1e-3,
+            initial={"joint_angle": math.radians(degrees), "muscle_pressure": float(pressure)},
         )
         sample = simulator.observe()
         arm = rig.model["arm"]
         weight = (arm["first_moment"] + arm["payload"] * arm["length"]) * arm["gravity"]
-        assert sample["joint_torque"] == pytest.approx(weight * math.sin(math.radians(degrees)), rel=1e-6)
+        assert sample["joint_torque"] == pytest.approx(
+            weight * math.sin(math.radians(degrees)), rel=1e-6
+        )
 
 
 def test_orifice_inverse_against_the_core():
     gas = SHOULDER.model["gas"]
-    values = (gas["ambient_pressure"], gas["temperature"], gas["gas_constant"], gas["heat_capacity_ratio"])
+    values = (
+        gas["ambient_pressure"],
+        gas["temperature"],
+        gas["gas_constant"],
+        gas["heat_capacity_ratio"],
+    )
     core, inverse = _core.Gas(*values), OrificeInverse(*values)
     upstream, area = 7.3e5, 3.1e-6
-    ratios = np.concatenate([np.linspace(0.05, 0.99, 97), [inverse.critical, 0.998, 0.999, 0.9995, 0.99999]])
+    ratios = np.concatenate(
+        [np.linspace(0.05, 0.99, 97), [inverse.critical, 0.998, 0.999, 0.9995, 0.99999]]
+    )
     flow = core.mass_flow(area, upstream, upstream * ratios)
-    found = [inverse.area(float(m), upstream, float(upstream * r)) for m, r in zip(flow, ratios, strict=True)]
+    found = [
+        inverse.area(float(m), upstream, float(upstream * r))
+        for m, r in zip(flow, ratios, strict=True)
+    ]
     assert found == pytest.approx([area] * ratios.size, rel=1e-9)
     assert inverse.area(flow, upstream, upstream * ratios).tolist() == found
     assert inverse.flow(1e5, 2e5) == 0.0
@@ -91,20 +111,30 @@ def test_area_table_backwards():
 @pytest.mark.parametrize("rate", [2e5, -1e5, 3e4])
 def test_the_valve_command_makes_the_wanted_pressure_rate_in_the_simulator(rate):
     start = {"joint_angle": math.radians(60.0), "muscle_pressure": 4e5, "joint_rate": 0.3}
-    simulator = pamrs.Simulator(SHOULDER, sample_time=1e-6, initial=start)  # the arm hardly moves in it
+    simulator = pamrs.Simulator(
+        SHOULDER, sample_time=1e-6, initial=start
+    )  # the arm hardly moves in it
     sample = simulator.observe()
     air = AirModel(SHOULDER)
     volts = air.null + air.command(
-        rate, sample["muscle_pressure"], sample["supply_pressure"], sample["joint_angle"], sample["joint_rate"]
+        rate,
+        sample["muscle_pressure"],
+        sample["supply_pressure"],
+        sample["joint_angle"],
+        sample["joint_rate"],
     )
     after = simulator.step(volts)
-    assert (after["muscle_pressure"] - sample["muscle_pressure"]) / 1e-6 == pytest.approx(rate, rel=1e-3)
+    assert (after["muscle_pressure"] - sample["muscle_pressure"]) / 1e-6 == pytest.approx(
+        rate, rel=1e-3
+    )
 
 
 def test_no_air_where_the_supply_is_below_the_muscle():
     air = AirModel(SHOULDER)
     assert air.command(1e5, 5e5, 4e5, 1.0, 0.0) == 0.0
-    assert air.command(np.array([1e5, 1e5, -1e5]), 5e5, np.array([4e5, 9e5, 4e5]), 1.0, 0.0)[0] == 0.0
+    assert (
+        air.command(np.array([1e5, 1e5, -1e5]), 5e5, np.array([4e5, 9e5, 4e5]), 1.0, 0.0)[0] == 0.0
+    )
     assert air.command(0.0, 5e5, 4e5, 1.0, 0.0) == 0.0
 
 
@@ -119,7 +149,9 @@ def test_simplified_torque_is_the_least_squares_fit_with_its_residual():
     torque = np.array([rig_torque(SHOULDER, p, angle) for p in pressure])
 
     def residual(k):
-        return (np.outer(pressure / 1e6, np.polyval(k[:4], angle)) + np.polyval(k[4:], angle) - torque).ravel()
+        return (
+            np.outer(pressure / 1e6, np.polyval(k[:4], angle)) + np.polyval(k[4:], angle) - torque
+        ).ravel()
 
     k = np.array(fit.coefficients) * np.repeat([1e6, 1.0], 4)
     assert np.sqrt(np.mean(residual(k) ** 2)) == pytest.approx(fit.rms, rel=1e-9)
@@ -135,7 +167,13 @@ def test_gaylord_estimate():
     muscle = SHOULDER.muscle
     angle = math.radians(60.0)
     length = 0.276 - 0.7 * 0.0254 * math.radians(45.0)
-    by_hand = 6 * (3 * length**2 - muscle.fibre_length**2) / (4 * math.pi * muscle.turns**2) * 0.7 * 0.0254
+    by_hand = (
+        6
+        * (3 * length**2 - muscle.fibre_length**2)
+        / (4 * math.pi * muscle.turns**2)
+        * 0.7
+        * 0.0254
+    )
     assert guess.at(angle)[0] == pytest.approx(by_hand, rel=1e-6)
     assert guess.at(angle)[1] == 0.0
     # as printed, 5 in long and with B = 11.23 in, the muscle would push

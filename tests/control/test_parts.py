@@ -47,25 +47,38 @@ def test_filtered_derivative_of_a_ramp_is_exact():
     tau, period, slope = 0.05, 0.002, -3.0
     derivative = FilteredDerivative(tau, period)
     answers = [derivative.update(slope * k * period) for k in range(200)]
-    assert answers == pytest.approx([-slope * math.expm1(-k * period / tau) for k in range(200)], abs=1e-11)
+    assert answers == pytest.approx(
+        [-slope * math.expm1(-k * period / tau) for k in range(200)], abs=1e-11
+    )
 
 
 @pytest.mark.parametrize("mode", ["clamping", "back_calculation", "none"])
 def test_anti_windup(mode):
-    law = PIDLaw(2.0, 4.0, 0.0, period=0.01, limits=(-1.0, 1.0), anti_windup=mode, tracking_time=0.05)
+    law = PIDLaw(
+        2.0, 4.0, 0.0, period=0.01, limits=(-1.0, 1.0), anti_windup=mode, tracking_time=0.05
+    )
     for _ in range(1000):
         assert law.update(3.0) == 1.0
     after = [law.update(-0.1) for _ in range(1000)]
     left = next((k for k, value in enumerate(after) if value < 1.0), None)
     if mode == "none":
-        # 4 * 3 * 10 s of windup are taken back by 0.4 per second: still at the limit after ten seconds
+        # 4 * 3 * 10 s of windup are taken back by 0.4 per second: still at the limit after ten
+        # seconds
         assert left is None
     else:
         assert left == 0
 
 
 def test_back_calculation_drives_the_integral_to_what_the_limit_allows():
-    law = PIDLaw(2.0, 4.0, 0.0, period=0.001, limits=(-1.0, 1.0), anti_windup="back_calculation", tracking_time=0.1)
+    law = PIDLaw(
+        2.0,
+        4.0,
+        0.0,
+        period=0.001,
+        limits=(-1.0, 1.0),
+        anti_windup="back_calculation",
+        tracking_time=0.1,
+    )
     for _ in range(5000):
         law.update(1.0)
     # ki e = excess/Tt in balance: 2 + I - 1 = 0.4

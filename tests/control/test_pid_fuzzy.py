@@ -39,7 +39,9 @@ def test_pid_against_scipy():
     e, de = rng.normal(size=300), rng.normal(size=300)
     # kp + ki T z^-1/(1 - z^-1)
     expected = lfilter([kp, -kp + ki * period], [1.0, -1.0], e) + kd * de
-    assert [law.update(float(a), float(b)) for a, b in zip(e, de, strict=True)] == pytest.approx(expected, abs=1e-10)
+    assert [law.update(float(a), float(b)) for a, b in zip(e, de, strict=True)] == pytest.approx(
+        expected, abs=1e-10
+    )
 
 
 def test_pid_by_hand_with_filtered_derivative():
@@ -52,7 +54,9 @@ def test_pid_by_hand_with_filtered_derivative():
 
 def test_pid_reads_the_rate_where_it_is_told_to():
     controller = PID(0.0, 0.0, 1.0, output_filter=0.0, rate_filter=0.0, measured_rate=True)
-    assert controller.update(0.0, {"joint_angle": 0.3, "joint_rate": 0.7}, Reference(0.3, 0.2)) == pytest.approx(4.5)
+    assert controller.update(
+        0.0, {"joint_angle": 0.3, "joint_rate": 0.7}, Reference(0.3, 0.2)
+    ) == pytest.approx(4.5)
     with pytest.raises(ParameterError, match="joint_rate"):
         controller.update(1e-3, {"joint_angle": 0.3}, Reference(0.3))
 
@@ -61,18 +65,26 @@ def test_units_of_the_gains():
     sample, aim = {"joint_angle": 0.3}, Reference(0.31, 0.0)
     degrees = PID(1.0, unit="deg", output_filter=0.0).update(0.0, sample, aim)
     assert degrees == pytest.approx(5.0 + math.degrees(0.01))
-    assert PID(math.degrees(1.0), output_filter=0.0).update(0.0, sample, aim) == pytest.approx(degrees)
+    assert PID(math.degrees(1.0), output_filter=0.0).update(0.0, sample, aim) == pytest.approx(
+        degrees
+    )
     fuzzy = Fuzzy(math.degrees(0.4), math.degrees(0.3), 0.7, unit="deg", output_filter=0.0)
-    assert fuzzy.update(0.0, sample, aim) == pytest.approx(Fuzzy(0.4, 0.3, 0.7, output_filter=0.0).update(0.0, sample, aim))
+    assert fuzzy.update(0.0, sample, aim) == pytest.approx(
+        Fuzzy(0.4, 0.3, 0.7, output_filter=0.0).update(0.0, sample, aim)
+    )
     with pytest.raises(ParameterError, match="unit"):
         PID(1.0, unit="grad")
 
 
-@pytest.mark.parametrize("make", [lambda **k: PID(1e4, **k), lambda **k: Fuzzy(1e-3, 1.0, 20.0, **k)])
+@pytest.mark.parametrize(
+    "make", [lambda **k: PID(1e4, **k), lambda **k: Fuzzy(1e-3, 1.0, 20.0, **k)]
+)
 def test_volts_stay_within_the_valve_s_range(make):
     for aim, limit in ((2.0, 10.0), (-2.0, 0.0)):
         controller = make(output_filter=0.01)
-        answers = [controller.update(k * 1e-3, {"joint_angle": 0.0}, Reference(aim)) for k in range(200)]
+        answers = [
+            controller.update(k * 1e-3, {"joint_angle": 0.0}, Reference(aim)) for k in range(200)
+        ]
         assert min(answers) >= 0.0
         assert max(answers) <= 10.0
         assert answers[-1] == pytest.approx(limit, abs=1e-6)
@@ -108,7 +120,9 @@ def test_rule_table():
 
 
 def test_the_rule_that_the_text_quotes():
-    """Error "negative small" and rate "positive small" is quoted as "positive small": not so in the standard table."""
+    """Error "negative small" and rate "positive small" is quoted as "positive small": not so in the
+    standard table.
+    """
     error, rate = FUZZY_SETS.index("NS"), FUZZY_SETS.index("PS")
     assert FUZZY_SETS[round(3 * fuzzy_rules("quoted")[error, rate]) + 3] == "PS"
     assert FUZZY_SETS[round(3 * fuzzy_rules("anti_diagonal")[error, rate]) + 3] == "ZE"
@@ -132,9 +146,12 @@ def test_surface_at_the_centres_is_the_table_and_by_hand_between():
         for i, x in enumerate(centres):
             for j, y in enumerate(centres):
                 assert surface(x, y, table) == pytest.approx(rules[i, j], abs=1e-12)
-    # x = 1/12: ZE 3/4, PS 1/4; y = 1/6: ZE 1/2, PS 1/2; premises 1/2, 1/2, 1/4, 1/4 for ZE, PS, PS, PM
+    # x = 1/12: ZE 3/4, PS 1/4; y = 1/6: ZE 1/2, PS 1/2; premises 1/2, 1/2, 1/4, 1/4 for ZE, PS, PS,
+    # PM
     area = {m: m - m * m / 2 for m in (0.5, 0.25)}
-    expected = (area[0.5] * 1 / 3 + area[0.25] * 1 / 3 + area[0.25] * 2 / 3) / (2 * area[0.5] + 2 * area[0.25])
+    expected = (area[0.5] * 1 / 3 + area[0.25] * 1 / 3 + area[0.25] * 2 / 3) / (
+        2 * area[0.5] + 2 * area[0.25]
+    )
     assert surface(1 / 12, 1 / 6) == pytest.approx(expected, abs=1e-12)
 
 
@@ -207,8 +224,14 @@ def test_lengths_of_a_batch_must_agree():
 
 def test_gains_can_be_read_and_not_changed():
     for made, names in (
-        (PID(1.0, 2.0, 3.0), {"kp": 1.0, "ki": 2.0, "kd": 3.0, "null": 5.0, "limits": (0.0, 10.0), "unit": "rad"}),
-        (Fuzzy(0.4, 0.3, 0.7), {"g1": 0.4, "g2": 0.3, "h": 0.7, "null": 5.0, "limits": (0.0, 10.0), "unit": "rad"}),
+        (
+            PID(1.0, 2.0, 3.0),
+            {"kp": 1.0, "ki": 2.0, "kd": 3.0, "null": 5.0, "limits": (0.0, 10.0), "unit": "rad"},
+        ),
+        (
+            Fuzzy(0.4, 0.3, 0.7),
+            {"g1": 0.4, "g2": 0.3, "h": 0.7, "null": 5.0, "limits": (0.0, 10.0), "unit": "rad"},
+        ),
         (PressureLoop(1.0, 2.0), {"kp": 1.0, "ki": 2.0, "null": 5.0}),
         (Feedforward(FULL, AIR, 0.7), {"km": 0.7, "null": 5.0}),
         (Sliding(FULL), {"slope": 5.0, "switching": 2e4, "boundary_layer": 0.2}),

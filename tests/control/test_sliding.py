@@ -1,4 +1,6 @@
-"""The sliding family on the plant of its own laws, (5.4) with the pressure as input: s s' < 0, Lyapunov functions, bounded weights."""
+"""The sliding family on the plant of its own laws, (5.4) with the pressure as input: s s' < 0,
+Lyapunov functions, bounded weights.
+"""
 
 import math
 
@@ -16,7 +18,11 @@ STEP = 1e-3
 
 def aim(time):
     a, w = math.radians(20.0), 1.3
-    return Reference(math.radians(60.0) + a * math.sin(w * time), a * w * math.cos(w * time), -a * w * w * math.sin(w * time))
+    return Reference(
+        math.radians(60.0) + a * math.sin(w * time),
+        a * w * math.cos(w * time),
+        -a * w * w * math.sin(w * time),
+    )
 
 
 def acceleration(pressure, angle, rate, arm=SIMPLIFIED):
@@ -26,7 +32,9 @@ def acceleration(pressure, angle, rate, arm=SIMPLIFIED):
 
 
 def run(controller, duration, *, arm=SIMPLIFIED, start=(0.87, 0.0), each=None):
-    """The plant with the pressure held over a sample, integrated by scipy; rows of time, angle, rate, s, pressure."""
+    """The plant with the pressure held over a sample, integrated by scipy; rows of time, angle,
+    rate, s, pressure.
+    """
     from scipy.integrate import solve_ivp
 
     rows, state = [], np.array(start)
@@ -34,18 +42,32 @@ def run(controller, duration, *, arm=SIMPLIFIED, start=(0.87, 0.0), each=None):
         t = k * STEP
         ref = aim(t)
         s = state[1] - (ref.rate - LAMBDA * (state[0] - ref.angle))
-        pressure = controller.update(t, {"joint_angle": float(state[0]), "joint_rate": float(state[1])}, ref)
+        pressure = controller.update(
+            t, {"joint_angle": float(state[0]), "joint_rate": float(state[1])}, ref
+        )
         if each is not None:
             each(s, ref, state, pressure)
         rows.append((t, *state, s, pressure))
         state = solve_ivp(
-            lambda _, x, p=pressure: [x[1], acceleration(p, x[0], x[1], arm)], (0.0, STEP), state, rtol=1e-8, atol=1e-10
+            lambda _, x, p=pressure: [x[1], acceleration(p, x[0], x[1], arm)],
+            (0.0, STEP),
+            state,
+            rtol=1e-8,
+            atol=1e-10,
         ).y[:, -1]
     return np.array(rows)
 
 
 def sharp(kind, *arguments, **others):
-    return kind(*arguments, slope=LAMBDA, switching=KD, measured_rate=True, rate_filter=0.0, period=STEP, **others)
+    return kind(
+        *arguments,
+        slope=LAMBDA,
+        switching=KD,
+        measured_rate=True,
+        rate_filter=0.0,
+        period=STEP,
+        **others,
+    )
 
 
 @pytest.mark.parametrize("s0", [-1.5, -0.2, 0.3, 2.0])
@@ -59,7 +81,10 @@ def test_s_falls_outside_the_boundary_layer(s0, degrees):
     )
     if pressure == 0.0:  # a muscle cannot push: only so much of the law is left
         assert s0 > 0.0
-        assert s0 * (acceleration(0.0, angle, rate) - (ref.acceleration - LAMBDA * (rate - ref.rate))) < 0.0
+        assert (
+            s0 * (acceleration(0.0, angle, rate) - (ref.acceleration - LAMBDA * (rate - ref.rate)))
+            < 0.0
+        )
         return
     change = acceleration(pressure, angle, rate) - (ref.acceleration - LAMBDA * (rate - ref.rate))
     c1, _ = SIMPLIFIED.torque.at(angle)
@@ -84,7 +109,13 @@ def test_sliding_reaches_the_surface_and_stays(layer):
 
 def test_wrong_estimates_are_covered_by_a_large_enough_switching_term():
     controller = Sliding(
-        SIMPLIFIED.scaled(0.7), slope=LAMBDA, switching=1.2e5, boundary_layer=0.0, measured_rate=True, rate_filter=0.0, period=STEP
+        SIMPLIFIED.scaled(0.7),
+        slope=LAMBDA,
+        switching=1.2e5,
+        boundary_layer=0.0,
+        measured_rate=True,
+        rate_filter=0.0,
+        period=STEP,
     )
     rows = run(controller, 2.0)
     assert np.abs(rows[-500:, 3]).max() < 0.05
@@ -92,15 +123,23 @@ def test_wrong_estimates_are_covered_by_a_large_enough_switching_term():
 
 def test_adaptive_law_by_hand():
     gains = (2.0, 3.0, 400.0)
-    controller = sharp(AdaptiveSliding, SIMPLIFIED, gains, boundary_layer=0.0, bounds=None, hold_at_limit=False)
+    controller = sharp(
+        AdaptiveSliding, SIMPLIFIED, gains, boundary_layer=0.0, bounds=None, hold_at_limit=False
+    )
     angle, rate, ref = 1.0, 0.4, Reference(1.05, 0.2, 0.5)
     wanted = ref.rate - LAMBDA * (angle - ref.angle)
     s, second = rate - wanted, ref.acceleration - LAMBDA * (rate - ref.rate)
     controller.update(0.0, {"joint_angle": angle, "joint_rate": rate}, ref)
     a = controller.estimates
-    assert a["inertia"] == pytest.approx(SIMPLIFIED.inertia - gains[0] * second * s * STEP, rel=1e-12)
-    assert a["viscous"] == pytest.approx(SIMPLIFIED.viscous - gains[1] * wanted * s * STEP, rel=1e-12)
-    assert a["weight"] == pytest.approx(SIMPLIFIED.weight - gains[2] * math.sin(angle) * s * STEP, rel=1e-12)
+    assert a["inertia"] == pytest.approx(
+        SIMPLIFIED.inertia - gains[0] * second * s * STEP, rel=1e-12
+    )
+    assert a["viscous"] == pytest.approx(
+        SIMPLIFIED.viscous - gains[1] * wanted * s * STEP, rel=1e-12
+    )
+    assert a["weight"] == pytest.approx(
+        SIMPLIFIED.weight - gains[2] * math.sin(angle) * s * STEP, rel=1e-12
+    )
 
 
 @pytest.mark.parametrize("factor", [0.6, 1.6])
@@ -109,12 +148,21 @@ def test_the_lyapunov_function_of_the_adaptive_law_does_not_grow(factor, bounds)
     gains = (1.0, 5.0, 300.0)
     true = np.array([SIMPLIFIED.inertia, SIMPLIFIED.viscous, SIMPLIFIED.weight])
     arm = SIMPLIFIED.scaled(factor)
-    controller = sharp(AdaptiveSliding, arm, gains, boundary_layer=0.02, deadband=0.02, bounds=bounds)
+    controller = sharp(
+        AdaptiveSliding, arm, gains, boundary_layer=0.02, deadband=0.02, bounds=bounds
+    )
     values = []
 
     def lyapunov(s, ref, state, pressure):
         values.append(
-            (s, 0.5 * true[0] * s * s + 0.5 * float(np.sum((np.array(list(controller.estimates.values())) - true) ** 2 / gains)))
+            (
+                s,
+                0.5 * true[0] * s * s
+                + 0.5
+                * float(
+                    np.sum((np.array(list(controller.estimates.values())) - true) ** 2 / gains)
+                ),
+            )
         )
 
     rows = run(controller, 6.0, each=lyapunov)
@@ -129,16 +177,38 @@ def test_the_lyapunov_function_of_the_adaptive_law_does_not_grow(factor, bounds)
 
 
 def test_deadband_is_two_sided_and_stops_the_adaptation():
-    assert [dead(x, 0.02) for x in (-0.03, -0.02, 0.0, 0.01, 0.021)] == [-0.03, 0.0, 0.0, 0.0, 0.021]
+    assert [dead(x, 0.02) for x in (-0.03, -0.02, 0.0, 0.01, 0.021)] == [
+        -0.03,
+        0.0,
+        0.0,
+        0.0,
+        0.021,
+    ]
     assert dead(np.array([-0.03, 0.01, 0.03]), 0.02).tolist() == [-0.03, 0.0, 0.03]
     for kind, names in ((AdaptiveSliding, ("estimates",)), (Neural, ("weights",))):
-        controller = kind(SIMPLIFIED, slope=LAMBDA, measured_rate=True, rate_filter=0.0, period=STEP)
+        controller = kind(
+            SIMPLIFIED, slope=LAMBDA, measured_rate=True, rate_filter=0.0, period=STEP
+        )
         before = {key: np.array(value) for key, value in getattr(controller, names[0]).items()}
         for k in range(50):
-            controller.update(k * STEP, {"joint_angle": 1.0, "joint_rate": 0.99 * controller.deadband * (-1) ** k}, Reference(1.0))
-        assert all(np.array_equal(before[key], value) for key, value in getattr(controller, names[0]).items())
-        controller.update(50 * STEP, {"joint_angle": 1.0, "joint_rate": -1.01 * controller.deadband}, Reference(1.0))
-        assert any(not np.array_equal(before[key], value) for key, value in getattr(controller, names[0]).items())
+            controller.update(
+                k * STEP,
+                {"joint_angle": 1.0, "joint_rate": 0.99 * controller.deadband * (-1) ** k},
+                Reference(1.0),
+            )
+        assert all(
+            np.array_equal(before[key], value)
+            for key, value in getattr(controller, names[0]).items()
+        )
+        controller.update(
+            50 * STEP,
+            {"joint_angle": 1.0, "joint_rate": -1.01 * controller.deadband},
+            Reference(1.0),
+        )
+        assert any(
+            not np.array_equal(before[key], value)
+            for key, value in getattr(controller, names[0]).items()
+        )
 
 
 @pytest.mark.parametrize("shape", [(), (3,)])
@@ -155,10 +225,16 @@ def test_weights_are_bounded_whatever_happens(shape, sense):
             controller.update(k * STEP, sample, reference)
     for (low, high), value in zip(adaptive.bounds, adaptive.estimates.values(), strict=True):
         assert np.all((np.asarray(value) >= low) & (np.asarray(value) <= high))
-    assert any(np.all(np.isin(value, pair)) for pair, value in zip(adaptive.bounds, adaptive.estimates.values(), strict=True))
+    assert any(
+        np.all(np.isin(value, pair))
+        for pair, value in zip(adaptive.bounds, adaptive.estimates.values(), strict=True)
+    )
     for bound, weights in zip(neural.bounds, neural.weights.values(), strict=True):
         assert np.abs(weights).max() == bound
-    assert all(np.abs(w).max() > bound for bound, w in zip(neural.bounds, free.weights.values(), strict=True))
+    assert all(
+        np.abs(w).max() > bound
+        for bound, w in zip(neural.bounds, free.weights.values(), strict=True)
+    )
 
 
 def test_adaptation_stands_still_at_a_limit_of_the_pressure():
@@ -166,7 +242,12 @@ def test_adaptation_stands_still_at_a_limit_of_the_pressure():
     free = sharp(AdaptiveSliding, SIMPLIFIED, hold_at_limit=False)
     for k in range(100):  # far below the aim and asked for more than there is
         for controller in (held, free):
-            assert controller.update(k * STEP, {"joint_angle": 0.5, "joint_rate": 0.0}, Reference(2.0, 0.0, 400.0)) == 1.38e6
+            assert (
+                controller.update(
+                    k * STEP, {"joint_angle": 0.5, "joint_rate": 0.0}, Reference(2.0, 0.0, 400.0)
+                )
+                == 1.38e6
+            )
     assert held.estimates["weight"] == SIMPLIFIED.weight
     assert free.estimates["weight"] > SIMPLIFIED.weight
 
@@ -187,13 +268,22 @@ def test_the_basis_is_a_partition_of_unity():
 
 
 def test_the_start_from_the_model_is_the_sliding_law():
-    """At the nodes the networks that start from a model give what sliding control gives (5.17)-(5.19)."""
+    """At the nodes the networks that start from a model give what sliding control gives
+    (5.17)-(5.19).
+    """
     for arm in (SIMPLIFIED, FULL, GAYLORD):
-        neural = sharp(Neural, arm, start="model", boundary_layer=0.2, nodes=10, gains=(0.0, 0.0, 0.0))
+        neural = sharp(
+            Neural, arm, start="model", boundary_layer=0.2, nodes=10, gains=(0.0, 0.0, 0.0)
+        )
         sliding = sharp(Sliding, arm, boundary_layer=0.2)
         for k, angle in enumerate(neural.angles[2:8].tolist()):
-            sample, ref = {"joint_angle": angle, "joint_rate": 0.2}, Reference(angle + 0.02, 0.1, 0.2)
-            assert neural.update(k * STEP, sample, ref) == pytest.approx(sliding.update(k * STEP, sample, ref), rel=1e-6)
+            sample, ref = (
+                {"joint_angle": angle, "joint_rate": 0.2},
+                Reference(angle + 0.02, 0.1, 0.2),
+            )
+            assert neural.update(k * STEP, sample, ref) == pytest.approx(
+                sliding.update(k * STEP, sample, ref), rel=1e-6
+            )
 
 
 def test_networks_learn_from_zero_on_their_plant():
@@ -207,7 +297,9 @@ def test_networks_learn_from_zero_on_their_plant():
     # the static network has learnt what holds the arm where it has been
     angle = math.radians(60.0)
     holds = arm.pressure(arm.weight * math.sin(angle), angle)
-    assert float(controller.basis(angle) @ controller.weights["G"]) == pytest.approx(holds, rel=0.35)
+    assert float(controller.basis(angle) @ controller.weights["G"]) == pytest.approx(
+        holds, rel=0.35
+    )
 
 
 @pytest.mark.parametrize("shape", [(), (2,)])

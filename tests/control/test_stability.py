@@ -1,4 +1,6 @@
-"""Linear models and stability: closed forms, and the nonlinear simulation on both sides of the boundary."""
+"""Linear models and stability: closed forms, and the nonlinear simulation on both sides of the
+boundary.
+"""
 
 import math
 
@@ -7,7 +9,13 @@ import pytest
 
 import pamrs
 from pamrs.control import PID, cascaded_pid, closed_loop
-from pamrs.control.linear import LinearController, LinearModel, equilibrium, linear_controller, linearise
+from pamrs.control.linear import (
+    LinearController,
+    LinearModel,
+    equilibrium,
+    linear_controller,
+    linearise,
+)
 from pamrs.control.stability import loop_matrix, margins, spectral_radius, stable_region
 from pamrs.control.trajectories import step
 from pamrs.errors import ParameterError
@@ -32,7 +40,11 @@ def test_equilibrium_stands_still(rig):
     run = pamrs.simulate(rig, np.full(1001, 5.0), sample_time=0.001, initial=start)
     assert np.ptp(run["joint_angle"]) < 1e-6
     table, _ = arm(rig)
-    weight = (table["first_moment"] + table["payload"] * table["length"]) * table["gravity"] * math.sin(ANGLE)
+    weight = (
+        (table["first_moment"] + table["payload"] * table["length"])
+        * table["gravity"]
+        * math.sin(ANGLE)
+    )
     assert run["joint_torque"][0] == pytest.approx(weight, rel=1e-8)
 
 
@@ -42,7 +54,9 @@ def test_the_linear_rig_has_the_equations_coefficients(rig):
     table, inertia = arm(rig)
     p, th, w = range(3)
     # friction: viscous, and Coulomb's slope at rest
-    assert model.a[w, w] == pytest.approx(-(table["viscous"] + table["coulomb"] / table["coulomb_speed"]) / inertia, rel=1e-12)
+    assert model.a[w, w] == pytest.approx(
+        -(table["viscous"] + table["coulomb"] / table["coulomb_speed"]) / inertia, rel=1e-12
+    )
     assert model.a[th] == pytest.approx([0.0, 0.0, 1.0], abs=0.0)
     # torque over pressure and angle, from the channels of held states
     point = equilibrium(rig, ANGLE)
@@ -53,15 +67,22 @@ def test_the_linear_rig_has_the_equations_coefficients(rig):
 
     by_pressure = (torque(muscle_pressure=50.0) - torque(muscle_pressure=-50.0)) / 100.0
     by_angle = (torque(joint_angle=1e-5) - torque(joint_angle=-1e-5)) / 2e-5
-    weight = (table["first_moment"] + table["payload"] * table["length"]) * table["gravity"] * math.cos(ANGLE)
+    weight = (
+        (table["first_moment"] + table["payload"] * table["length"])
+        * table["gravity"]
+        * math.cos(ANGLE)
+    )
     assert model.a[w, p] == pytest.approx(by_pressure / inertia, rel=1e-6)
     assert model.a[w, th] == pytest.approx((by_angle - weight) / inertia, rel=1e-5)
-    # filling is faster than venting: the mass flow goes with the upstream pressure, both choked or nearly
+    # filling is faster than venting: the mass flow goes with the upstream pressure, both choked or
+    # nearly
     fill, vent = (linearise(rig, ANGLE, side=side).b[p, 0] for side in ("fill", "vent"))
     assert fill > 2 * vent > 0.0
     assert model.b[p, 0] == pytest.approx(0.5 * (fill + vent), rel=1e-12)
     gas, valve, chamber = (rig.tables(b)[""] for b in ("gas", "valve", "chamber"))
-    area = valve["discharge_area_max"] * 0.2 / (0.25 * valve["half_range"])  # the table's first slope
+    area = (
+        valve["discharge_area_max"] * 0.2 / (0.25 * valve["half_range"])
+    )  # the table's first slope
     r, t = gas["gas_constant"], gas["temperature"]
     choked = math.sqrt(1.4 / (r * t)) * (2 / 2.4) ** (2.4 / 0.8)
     flow = area * choked * (13.8e5 + 101325.0)
@@ -96,12 +117,16 @@ def test_python_control_gets_the_names(rig):
 
 def integrator(gain):
     one = np.ones((1, 1))
-    return LinearModel(0.0 * one, gain * one, one, ("joint_angle",), ("valve_command",), ("joint_angle",))
+    return LinearModel(
+        0.0 * one, gain * one, one, ("joint_angle",), ("valve_command",), ("joint_angle",)
+    )
 
 
 def proportional(gain, period):
     none = np.zeros((0, 0))
-    return LinearController(none, np.zeros((0, 1)), np.zeros((1, 0)), np.array([[-gain]]), ("joint_angle",), period)
+    return LinearController(
+        none, np.zeros((0, 1)), np.zeros((1, 0)), np.array([[-gain]]), ("joint_angle",), period
+    )
 
 
 @pytest.mark.parametrize("gain", [0.5, 3.0, 19.9, 20.1])
@@ -169,7 +194,11 @@ def test_delay_margin_is_where_delay_makes_it_unstable():
     pytest.importorskip("control")
     model, law = integrator(1.0), proportional(3.0, 0.01)
     spare = margins(model, law).delay
-    assert spectral_radius(model, law, delay=0.98 * spare) < 1.0 < spectral_radius(model, law, delay=1.02 * spare)
+    assert (
+        spectral_radius(model, law, delay=0.98 * spare)
+        < 1.0
+        < spectral_radius(model, law, delay=1.02 * spare)
+    )
 
 
 def test_a_controller_made_linear_answers_as_itself(rig):
@@ -187,7 +216,9 @@ def test_a_controller_made_linear_answers_as_itself(rig):
     for k in range(3, 60):
         moved = rng.normal(0.0, 1e-2)
         y = np.array([moved if name == "joint_angle" else 0.0 for name in linear.inputs])
-        answer = controller.update(0.01 * k, {**point, "joint_angle": point["joint_angle"] + moved}, reference)
+        answer = controller.update(
+            0.01 * k, {**point, "joint_angle": point["joint_angle"] + moved}, reference
+        )
         assert answer - 5.0 == pytest.approx((linear.c @ x + linear.d @ y)[0], abs=1e-7)
         x = linear.a @ x + linear.b @ y
 
@@ -204,12 +235,15 @@ def test_a_cascade_is_made_linear_where_it_holds_the_arm(rig):
     models = [linearise(rig, ANGLE, side=side) for side in ("fill", "vent")]
     assert all(spectral_radius(model, linear) < 1.0 for model in models)
     # the inner loop alone is proportional at high frequency: volts per pascal, low-passed
-    pressure = linear.d[0, 2] + sum((linear.c @ np.linalg.matrix_power(linear.a, k) @ linear.b)[0, 2] for k in range(8))
+    pressure = linear.d[0, 2] + sum(
+        (linear.c @ np.linalg.matrix_power(linear.a, k) @ linear.b)[0, 2] for k in range(8)
+    )
     assert pressure == pytest.approx(-2e-4 * (1 + 8 * 0.005), rel=0.05)
 
 
 def test_both_sides_of_the_boundary_are_what_the_arm_does(rig):
-    # proportional control of a sampled arm: the boundary in the gain, then the arm itself a little inside and outside
+    # proportional control of a sampled arm: the boundary in the gain, then the arm itself a little
+    # inside and outside
     def made(kp):
         return SmallPid(kp=kp, ki=0.0, kd=0.1, period=0.01)
 
@@ -228,14 +262,23 @@ def test_both_sides_of_the_boundary_are_what_the_arm_does(rig):
     start["joint_angle"] += 1e-5
     for kp, grows in ((inside, False), (outside, True)):
         run = closed_loop(loaded, made(kp), step(ANGLE, ANGLE, duration=4.0), initial=start)
-        early, late = (np.abs(run.error[(run.time >= a) & (run.time < a + 0.5)]).max() for a in (0.0, 3.0))
+        early, late = (
+            np.abs(run.error[(run.time >= a) & (run.time < a + 0.5)]).max() for a in (0.0, 3.0)
+        )
         assert (late > 3 * early) == grows, (kp, early, late)
         assert (late < 0.5 * early) != grows, (kp, early, late)
 
 
 def test_region_of_stable_gains_over_payload(rig):
     axes = {"kp": [0.5, 2.0, 60.0, 400.0], "kd": [0.0, 0.1]}
-    region = stable_region(rig, lambda kp, kd: SmallPid(kp, 0.0, kd, period=0.01), axes, payloads=[2.0, 15.0], angle=ANGLE, delay=0.01)
+    region = stable_region(
+        rig,
+        lambda kp, kd: SmallPid(kp, 0.0, kd, period=0.01),
+        axes,
+        payloads=[2.0, 15.0],
+        angle=ANGLE,
+        delay=0.01,
+    )
     assert region.radius.shape == (2, 4, 2)
     assert region.stable[:, 0].all()
     assert not region.stable[:, 3].any()
@@ -243,7 +286,10 @@ def test_region_of_stable_gains_over_payload(rig):
     assert (region.growth < 0).tolist() == region.stable.tolist()
     one = linear_controller(SmallPid(2.0, 0.0, 0.1, period=0.01), linearise(rig, ANGLE).point)
     loaded = rig.with_parameters({"arm.payload": 15.0})
-    both = [spectral_radius(linearise(loaded, ANGLE, side=side), one, delay=0.01) for side in ("fill", "vent")]
+    both = [
+        spectral_radius(linearise(loaded, ANGLE, side=side), one, delay=0.01)
+        for side in ("fill", "vent")
+    ]
     assert region.radius[1, 1, 1] == pytest.approx(max(both))
 
 
@@ -259,7 +305,12 @@ def test_region_of_stable_gains_over_payload(rig):
         (lambda rig: linearise(rig, ANGLE).sampled(0.0), "period"),
         (lambda rig: loop_matrix(integrator(1.0), proportional(1.0, 0.1), delay=-1.0), "delay"),
         (lambda rig: stable_region(rig, SmallPid, {"kp": []}, payloads=[1.0], angle=ANGLE), "kp"),
-        (lambda rig: stable_region(rig, SmallPid, {"kp": [1.0]}, payloads=[1.0], angle=ANGLE, sides=("up",)), "sides"),
+        (
+            lambda rig: stable_region(
+                rig, SmallPid, {"kp": [1.0]}, payloads=[1.0], angle=ANGLE, sides=("up",)
+            ),
+            "sides",
+        ),
     ],
 )
 def test_bad_input_is_named(rig, call, word):

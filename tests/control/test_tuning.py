@@ -1,4 +1,6 @@
-"""Sweeps are their single runs; grids and searches find the same optimum; perturbed plants are what they say."""
+"""Sweeps are their single runs; grids and searches find the same optimum; perturbed plants are what
+they say.
+"""
 
 import math
 
@@ -31,11 +33,25 @@ def test_a_sweep_is_its_single_runs(rig, unit):
     rigs = [rig.with_parameters({"arm.payload": m}) for m in (5.0, 9.0, 12.0, 5.0)]
     sensors = Sensors(noise={"joint_angle": 1e-4}, delay=0.01, seed=3)
     all_of_them = sweep(
-        rigs, SmallPid(kp, ki, period=0.005), LIFT, 3.0, sample_time=0.005, sensors=sensors, channels=["joint_angle"], unit=unit
+        rigs,
+        SmallPid(kp, ki, period=0.005),
+        LIFT,
+        3.0,
+        sample_time=0.005,
+        sensors=sensors,
+        channels=["joint_angle"],
+        unit=unit,
     )
     assert not all_of_them.failed.any()
     for k in range(4):
-        one = closed_loop(rigs[k], SmallPid(kp[k], ki[k], period=0.005), LIFT, 3.0, sample_time=0.005, sensors=sensors)
+        one = closed_loop(
+            rigs[k],
+            SmallPid(kp[k], ki[k], period=0.005),
+            LIFT,
+            3.0,
+            sample_time=0.005,
+            sensors=sensors,
+        )
         assert (all_of_them.run["joint_angle"][k] == one.angle).all()
         single = one.metrics(unit=unit)
         assert all_of_them.squared_error[k] == pytest.approx(single.squared_error, rel=1e-12)
@@ -50,7 +66,9 @@ def test_a_map_is_a_sweep_of_every_combination(rig):
     found = gain_map(rig, pid, axes, LIFT, payloads=[2.0, 9.0], **FAST)
     assert found.j.shape == (2, 3, 2)
     for p, mass in enumerate((2.0, 9.0)):
-        run = closed_loop(rig.with_parameters({"arm.payload": mass}), pid(2.0, 1.0), LIFT, 3.0, sample_time=0.01).metrics()
+        run = closed_loop(
+            rig.with_parameters({"arm.payload": mass}), pid(2.0, 1.0), LIFT, 3.0, sample_time=0.01
+        ).metrics()
         assert found.squared_error[p, 2, 1] == pytest.approx(run.squared_error, rel=1e-12)
         assert found.curvature[p, 2, 1] == pytest.approx(run.curvature, rel=1e-12)
     # J of the best is one only if it is best in both; each payload is a set of its own
@@ -62,7 +80,11 @@ def test_a_map_is_a_sweep_of_every_combination(rig):
         assert found.j[p] == pytest.approx(j)
         assert row["j"] == pytest.approx(j.min())
         assert found.scale[p] == pytest.approx([nu.min(), omega.min()])
-    assert found.best("rms")[0]["rms"] == found.rms[0].min() == pytest.approx(math.sqrt(found.squared_error[0].min() / 3.0))
+    assert (
+        found.best("rms")[0]["rms"]
+        == found.rms[0].min()
+        == pytest.approx(math.sqrt(found.squared_error[0].min() / 3.0))
+    )
     assert found.best("squared_error")[0]["squared_error"] == found.squared_error[0].min()
 
 
@@ -70,17 +92,26 @@ def test_a_map_is_a_sweep_of_every_combination(rig):
 def test_a_search_is_at_least_as_good_as_the_grid_and_seeded(rig, method):
     pytest.importorskip({"cma": "cma", "optuna": "optuna"}[method])
     bounds = {"kp": (0.2, 4.0), "ki": (0.0, 3.0)}
-    grid = gain_map(rig, pid, {name: np.linspace(*box, 6) for name, box in bounds.items()}, LIFT, **FAST)
+    grid = gain_map(
+        rig, pid, {name: np.linspace(*box, 6) for name, box in bounds.items()}, LIFT, **FAST
+    )
     scale = tuple(grid.scale[0])
     state = np.random.get_state()[1].copy()  # noqa: NPY002
-    found = [search_gains(rig, pid, bounds, LIFT, method=method, evaluations=64, seed=5, scale=scale, **FAST) for _ in range(2)]
+    found = [
+        search_gains(
+            rig, pid, bounds, LIFT, method=method, evaluations=64, seed=5, scale=scale, **FAST
+        )
+        for _ in range(2)
+    ]
     assert (np.random.get_state()[1] == state).all()  # noqa: NPY002
     assert found[0].tried.shape == (64, 2)
     assert (found[0].tried == found[1].tried).all()
     assert found[0].j == found[1].j == found[0].values.min()
     assert found[0].j < 1.02 * grid.j.min()
     run = closed_loop(rig, pid(**found[0].gains), LIFT, 3.0, sample_time=0.01).metrics()
-    assert found[0].j == pytest.approx(0.25 * run.squared_error / scale[0] + 0.75 * run.curvature / scale[1])
+    assert found[0].j == pytest.approx(
+        0.25 * run.squared_error / scale[0] + 0.75 * run.curvature / scale[1]
+    )
 
 
 @pytest.mark.parametrize("method", ["cma", "optuna"])
@@ -94,7 +125,10 @@ def test_a_search_is_never_worse_than_its_start(rig, method, scaled):
     start = {name: best[name] for name in ("ki", "kp")}  # in any order
     more = {"evaluations": 8, "scale": tuple(grid.scale[0])} if scaled else {"evaluations": 16}
     alone, found = (
-        search_gains(rig, pid, bounds, LIFT, method=method, population=8, seed=4, start=s, **more, **FAST) for s in (None, start)
+        search_gains(
+            rig, pid, bounds, LIFT, method=method, population=8, seed=4, start=s, **more, **FAST
+        )
+        for s in (None, start)
     )
     first = 0 if scaled else 8
     assert found.tried.shape == alone.tried.shape
@@ -110,32 +144,61 @@ def test_a_search_is_never_worse_than_its_start(rig, method, scaled):
 def test_a_start_may_be_on_its_bounds(rig):
     pytest.importorskip("cma")
     start = {"kp": 4.0, "ki": 0.0}
-    found = search_gains(rig, pid, {"kp": (0.2, 4.0), "ki": (0.0, 3.0)}, LIFT, evaluations=16, population=8, start=start, **FAST)
+    found = search_gains(
+        rig,
+        pid,
+        {"kp": (0.2, 4.0), "ki": (0.0, 3.0)},
+        LIFT,
+        evaluations=16,
+        population=8,
+        start=start,
+        **FAST,
+    )
     assert found.tried[8].tolist() == [4.0, 0.0]
 
 
 def test_a_search_without_a_scale_takes_that_of_its_first_population(rig):
     pytest.importorskip("cma")
-    found = search_gains(rig, pid, {"kp": (0.2, 4.0), "ki": (0.0, 3.0)}, LIFT, evaluations=24, population=8, seed=1, **FAST)
+    found = search_gains(
+        rig,
+        pid,
+        {"kp": (0.2, 4.0), "ki": (0.0, 3.0)},
+        LIFT,
+        evaluations=24,
+        population=8,
+        seed=1,
+        **FAST,
+    )
     assert found.scale == pytest.approx((found.squared_error[:8].min(), found.curvature[:8].min()))
     assert found.values.size == 24
 
 
 def test_a_controller_for_another_model_controls_the_perturbed_plant(rig):
     plant = perturbed(rig, seed=2)
-    same, other = (gain_map(r, pid, {"kp": [2.0], "ki": [1.0]}, LIFT, **FAST).squared_error[0, 0, 0] for r in (rig, plant))
+    same, other = (
+        gain_map(r, pid, {"kp": [2.0], "ki": [1.0]}, LIFT, **FAST).squared_error[0, 0, 0]
+        for r in (rig, plant)
+    )
     assert same != other
     assert other == pytest.approx(same, rel=0.3)
 
 
 def test_perturbed_is_off_by_what_it_says(rig):
     plant = perturbed(rig, force=1.06, friction=0.9, inertia=1.04)
-    for name, factor in (("arm.viscous", 0.9), ("arm.coulomb", 0.9), ("arm.inertia", 1.04), ("arm.payload", 1.0)):
+    for name, factor in (
+        ("arm.viscous", 0.9),
+        ("arm.coulomb", 0.9),
+        ("arm.inertia", 1.04),
+        ("arm.payload", 1.0),
+    ):
         assert plant.parameter(name).value == pytest.approx(factor * rig.parameter(name).value)
     # at rest length the pressure's part of the force goes with the cross-section
     pull = [float(r.muscle.force(8e5, 0.0) - r.muscle.force(0.0, 0.0)) for r in (rig, plant)]
     assert pull[1] / pull[0] == pytest.approx(1.06, rel=0.02)
-    factors = {n: perturbed(rig, seed=7).parameter(n).value / rig.parameter(n).value for n in ("arm.viscous", "arm.inertia")}
+    factors = {
+        n: perturbed(rig, seed=7).parameter(n).value / rig.parameter(n).value
+        for n in ("arm.viscous", "arm.inertia")
+    }
     assert all(0.025 <= abs(f - 1.0) <= 0.05 for f in factors.values())
     assert perturbed(rig, seed=7).model == perturbed(rig, seed=7).model
     assert perturbed(rig, seed=7).model != perturbed(rig, seed=8).model
@@ -155,14 +218,29 @@ def test_perturbed_is_off_by_what_it_says(rig):
         (lambda r: search_gains(r, pid, {"kp": (1.0, 1.0)}, LIFT), "kp"),
         (lambda r: search_gains(r, pid, {"kp": (1.0, 2.0)}, LIFT, method="ga"), "method"),
         (lambda r: search_gains(r, pid, {"kp": (1.0, 2.0)}, LIFT, evaluations=8), "population"),
-        (lambda r: search_gains(r, pid, {"kp": (1.0, 2.0)}, LIFT, evaluations=30, population=16), "evaluations"),
+        (
+            lambda r: search_gains(r, pid, {"kp": (1.0, 2.0)}, LIFT, evaluations=30, population=16),
+            "evaluations",
+        ),
         (lambda r: search_gains(r, pid, {"kp": (1.0, 2.0)}, LIFT, seed=-1), "seed"),
         (lambda r: search_gains(r, pid, {"kp": (1.0, 2.0)}, LIFT, scale=(0.0, 1.0)), "scale"),
         (lambda r: search_gains(r, pid, {"kp": (1.0, math.nan)}, LIFT), "kp"),
-        (lambda r: search_gains(r, pid, {"kp": (1.0, 2.0)}, LIFT, start={"kp": 2.5}), "start of kp = 2.5 .* 1.0 to 2.0"),
-        (lambda r: search_gains(r, pid, {"kp": (1.0, 2.0)}, LIFT, start={"kp": math.nan}), "start of kp = nan"),
-        (lambda r: search_gains(r, pid, {"kp": (1.0, 2.0)}, LIFT, start={"kp": "a"}), "start of kp = 'a'"),
-        (lambda r: search_gains(r, pid, {"kp": (1.0, 2.0)}, LIFT, start={"ki": 1.0}), "start = .*: one value each of kp"),
+        (
+            lambda r: search_gains(r, pid, {"kp": (1.0, 2.0)}, LIFT, start={"kp": 2.5}),
+            "start of kp = 2.5 .* 1.0 to 2.0",
+        ),
+        (
+            lambda r: search_gains(r, pid, {"kp": (1.0, 2.0)}, LIFT, start={"kp": math.nan}),
+            "start of kp = nan",
+        ),
+        (
+            lambda r: search_gains(r, pid, {"kp": (1.0, 2.0)}, LIFT, start={"kp": "a"}),
+            "start of kp = 'a'",
+        ),
+        (
+            lambda r: search_gains(r, pid, {"kp": (1.0, 2.0)}, LIFT, start={"ki": 1.0}),
+            "start = .*: one value each of kp",
+        ),
     ],
 )
 def test_bad_input_is_named(rig, call, word):

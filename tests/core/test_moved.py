@@ -28,10 +28,14 @@ def test_every_moved_module_is_tested():
     assert set(NAMES) == set(PACKAGES)
 
 
-@pytest.mark.parametrize(("module", "name"), [(module, name) for module, names in NAMES.items() for name in names])
+@pytest.mark.parametrize(
+    ("module", "name"), [(module, name) for module, names in NAMES.items() for name in names]
+)
 def test_a_name_is_found_by_its_old_path_with_a_warning(module, name):
     old = importlib.import_module(f"pamrs.{module}")
-    with pytest.warns(DeprecationWarning, match=rf"pamrs\.{module}\.{name} is {PACKAGES[module]}\.{name} now"):
+    with pytest.warns(
+        DeprecationWarning, match=rf"pamrs\.{module}\.{name} is {PACKAGES[module]}\.{name} now"
+    ):
         found = getattr(old, name)
     assert found is getattr(importlib.import_module(PACKAGES[module]), name)
 
@@ -39,7 +43,10 @@ def test_a_name_is_found_by_its_old_path_with_a_warning(module, name):
 def test_the_warning_is_about_the_line_that_imports():
     code = "import warnings\nwarnings.simplefilter('always')\nfrom pamrs.replay import replay\n"
     done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
-    assert "<string>:3: DeprecationWarning: pamrs.replay.replay is pamrs.simulation.replay now" in done.stderr
+    assert (
+        "<string>:3: DeprecationWarning: pamrs.replay.replay is pamrs.simulation.replay now"
+        in done.stderr
+    )
 
 
 def test_what_was_never_there_is_not_there_now():

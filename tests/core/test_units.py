@@ -46,7 +46,9 @@ def test_known_conversions(value: float, unit: str, dimension: str, expected: fl
 @given(st.floats(-1e6, 1e6), st.sampled_from([row[1:3] for row in KNOWN]))
 def test_back_and_forth(value: float, pair: tuple[str, str]) -> None:
     unit, dimension = pair
-    assert from_si(to_si(value, unit, dimension), unit, dimension) == pytest.approx(value, rel=1e-12, abs=1e-9)
+    assert from_si(to_si(value, unit, dimension), unit, dimension) == pytest.approx(
+        value, rel=1e-12, abs=1e-9
+    )
 
 
 def test_a_difference_of_temperatures_has_no_offset() -> None:
@@ -62,7 +64,14 @@ def test_si_units_stand_as_they_are(unit: str) -> None:
 
 @pytest.mark.parametrize(
     ("unit", "dimension"),
-    [("V", "pressure"), ("bar", "angle"), ("1", "angle"), ("deg", "1"), ("kg m", "inertia"), ("s", "length")],
+    [
+        ("V", "pressure"),
+        ("bar", "angle"),
+        ("1", "angle"),
+        ("deg", "1"),
+        ("kg m", "inertia"),
+        ("s", "length"),
+    ],
 )
 def test_wrong_dimension_names_both(unit: str, dimension: str) -> None:
     with pytest.raises(ParameterError) as caught:
@@ -71,7 +80,9 @@ def test_wrong_dimension_names_both(unit: str, dimension: str) -> None:
     assert repr(DIMENSIONS.get(dimension, dimension)) in str(caught.value)
 
 
-@pytest.mark.parametrize("unit", ["Bar", "pascal", "m//s", "m/", "(m)", "2", "m3/(s", "kg-m2", "[bar]", "bar bar bara"])
+@pytest.mark.parametrize(
+    "unit", ["Bar", "pascal", "m//s", "m/", "(m)", "2", "m3/(s", "kg-m2", "[bar]", "bar bar bara"]
+)
 def test_unknown_units_are_named(unit: str) -> None:
     with pytest.raises(ParameterError) as caught:
         parse_unit(unit)

@@ -64,19 +64,27 @@ def test_objective_is_the_slow_integral(torque, lengths):
     joint = Joint(rest_angle=task.min_angle, **dict(zip(LENGTHS, lengths, strict=True)))
 
     def gap(angle, sign):
-        return max(sign * (float(joint.torque(task.muscle, task.pressure, angle, count=6)) - torque), 0.0)
+        return max(
+            sign * (float(joint.torque(task.muscle, task.pressure, angle, count=6)) - torque), 0.0
+        )
 
-    below, above = (quad(gap, task.min_angle, task.max_angle, (sign,), limit=400)[0] for sign in (-1.0, 1.0))
+    below, above = (
+        quad(gap, task.min_angle, task.max_angle, (sign,), limit=400)[0] for sign in (-1.0, 1.0)
+    )
     scores = task.evaluate(lengths)
     assert scores.area_below[0] == pytest.approx(below, abs=2e-5 * task.required_area)
     assert scores.area_above[0] == pytest.approx(above, abs=2e-5 * task.required_area)
     stroke = joint.shortening(task.angles).max()
     penalty = 0.0 if stroke <= 0.15 * 0.276 else 1e4
-    assert scores.fitness[0] == pytest.approx(below + 0.01 * above + penalty, abs=1e-4 * task.required_area)
+    assert scores.fitness[0] == pytest.approx(
+        below + 0.01 * above + penalty, abs=1e-4 * task.required_area
+    )
 
 
 def test_areas_are_cut_where_the_line_crosses():
-    below, above = _areas(np.array([0.0, 1.0, 3.0]), np.array([[-1.0, 3.0, 3.0], [1.0, -1.0, 0.0], [0.0, 0.0, 0.0]]))
+    below, above = _areas(
+        np.array([0.0, 1.0, 3.0]), np.array([[-1.0, 3.0, 3.0], [1.0, -1.0, 0.0], [0.0, 0.0, 0.0]])
+    )
     assert below == pytest.approx([0.125, 0.25 + 1.0, 0.0])
     assert above == pytest.approx([1.125 + 6.0, 0.25, 0.0])
 
@@ -94,7 +102,10 @@ def test_the_penalty_begins_at_the_largest_stroke():
     task = problem()
     stroke = problem().joint(GOOD).shortening(task.max_angle)
     contraction = float(stroke) / 0.276
-    inside, outside = (task.replace(max_contraction=contraction * factor).evaluate(GOOD) for factor in (1.0001, 0.9999))
+    inside, outside = (
+        task.replace(max_contraction=contraction * factor).evaluate(GOOD)
+        for factor in (1.0001, 0.9999)
+    )
     assert inside.available[0]
     assert inside.max_angle[0] == pytest.approx(task.max_angle)
     assert not outside.available[0]
@@ -117,9 +128,17 @@ def test_designs_out_of_reach_are_penalised_and_finite():
     short = np.array([0.001, 0.02, 0.02, 0.08])
     with pytest.raises(ParameterError, match="folded"):
         task.joint(short)
-    designs = np.array([short, [0.0127, 0.0635, 0.0127, 0.0], [0.5, 0.5, 0.5, 0.5], [0.05, 0.0, 0.05, 0.05]])
+    designs = np.array(
+        [short, [0.0127, 0.0635, 0.0127, 0.0], [0.5, 0.5, 0.5, 0.5], [0.05, 0.0, 0.05, 0.05]]
+    )
     scores = task.evaluate(designs)
-    for values in (scores.fitness, scores.area_below, scores.area_above, scores.torque, scores.max_angle):
+    for values in (
+        scores.fitness,
+        scores.area_below,
+        scores.area_above,
+        scores.torque,
+        scores.max_angle,
+    ):
         assert np.all(np.isfinite(values))
     assert np.all(scores.fitness >= 1e4)
     assert not np.any(scores.available)
@@ -127,7 +146,9 @@ def test_designs_out_of_reach_are_penalised_and_finite():
     assert np.all(np.isfinite(task.size(designs)))
     folding = {"upper_axial": (0.001, 0.003), "lower_offset": (0.04, 0.09)}
     assert not JointDesign.of(task, short).met()
-    assert np.isfinite(optimise(task.replace(bounds=folding), "random", evaluations=60).scores.fitness[0])
+    assert np.isfinite(
+        optimise(task.replace(bounds=folding), "random", evaluations=60).scores.fitness[0]
+    )
 
 
 def test_a_muscle_that_cannot_pull_is_slack():
@@ -141,7 +162,9 @@ def test_a_muscle_that_cannot_pull_is_slack():
 def test_needed_pressure_is_where_the_torque_just_suffices():
     task = problem()
     needed = float(task.needed_pressure(GOOD)[0])
-    assert task.replace(pressure=needed).evaluate(GOOD).torque.min() == pytest.approx(task.torque, rel=1e-9)
+    assert task.replace(pressure=needed).evaluate(GOOD).torque.min() == pytest.approx(
+        task.torque, rel=1e-9
+    )
     assert JointDesign.of(task.replace(pressure=1.001 * needed), GOOD).met(1e-9)
     assert JointDesign.of(task, TABLE).needed_pressure is None  # beyond 15 % of stroke
 
@@ -156,12 +179,18 @@ def test_met_within_a_tolerance_is_not_called_met():
     assert short == pytest.approx(1.0 - torque.min() / task.torque)
     assert angle == task.angles[int(np.argmin(torque))]
     words = (
-        f"met within 0.1 % of the work wanted; least torque {100 * short:.2g} % below the wanted one at {math.degrees(angle):.4g} deg"
+        f"met within 0.1 % of the work wanted; least torque {100 * short:.2g} % below the wanted "
+        f"one at {math.degrees(angle):.4g} deg"
     )
     assert words in low.summary()
     assert "the requirement is met" not in low.summary()
     found = low.to_dict()
-    assert [found[name] for name in ("met", "area_tolerance", "shortfall", "shortfall_angle")] == [True, 1e-3, short, angle]
+    assert [found[name] for name in ("met", "area_tolerance", "shortfall", "shortfall_angle")] == [
+        True,
+        1e-3,
+        short,
+        angle,
+    ]
     enough = JointDesign.of(task.replace(pressure=needed), GOOD)
     assert enough.shortfall[0] == 0.0
     assert "the requirement is met" in enough.summary()
@@ -169,7 +198,9 @@ def test_met_within_a_tolerance_is_not_called_met():
 
 def test_a_design_keeps_its_tolerance():
     task = problem(pressure=0.99 * float(problem().needed_pressure(GOOD)[0]))
-    strict, loose = (JointDesign(task, np.array(GOOD), area_tolerance=value) for value in (0.0, 0.05))
+    strict, loose = (
+        JointDesign(task, np.array(GOOD), area_tolerance=value) for value in (0.0, 0.05)
+    )
     assert (strict.met(), loose.met(), strict.met(0.05)) == (False, True, True)
     assert (strict.to_dict()["met"], loose.to_dict()["met"]) == (False, True)
     assert "THE REQUIREMENT IS NOT MET" in strict.summary()
@@ -191,7 +222,8 @@ def test_no_joint_gets_more_work_out_of_a_stroke_than_the_muscle_gives():
     scores = low.evaluate(designs)
     assert work < low.required_area
     assert scores.area_below[scores.available].min() >= low.required_area - work - 1e-3
-    # a joint whose arm fits the muscle at every angle needs just this: the work of the muscle is the work wanted
+    # a joint whose arm fits the muscle at every angle needs just this: the work of the muscle is
+    # the work wanted
     force = 6 * task.muscle.force(task.least_possible_pressure(), stroke / 0.276)
     assert np.trapezoid(force, stroke) == pytest.approx(task.required_area, rel=1e-6)
 
@@ -225,7 +257,9 @@ def test_impossible_problems_are_named(changes, word):
         problem(**changes)
 
 
-@pytest.mark.parametrize("designs", [[0.1, 0.2], [[math.nan, 0.1, 0.1, 0.1]], [-0.1, 0.1, 0.1, 0.1]])
+@pytest.mark.parametrize(
+    "designs", [[0.1, 0.2], [[math.nan, 0.1, 0.1, 0.1]], [-0.1, 0.1, 0.1, 0.1]]
+)
 def test_impossible_designs_are_named(designs):
     with pytest.raises(ParameterError):
         problem().evaluate(designs)
@@ -282,7 +316,11 @@ def test_the_published_numbers_of_designs():
 def single_cut(point, first, second):
     """Whether a point is the head of one and the tail of the other."""
     pairs = ((first, second), (second, first))
-    return any(np.array_equal(point, np.concatenate([a[:cut], b[cut:]])) for a, b in pairs for cut in range(1, len(point)))
+    return any(
+        np.array_equal(point, np.concatenate([a[:cut], b[cut:]]))
+        for a, b in pairs
+        for cut in range(1, len(point))
+    )
 
 
 @pytest.mark.parametrize("order", [1.0, -1.0])
@@ -294,7 +332,9 @@ def test_every_child_comes_from_the_two_best_of_elites_and_children(order):
         done = sum(map(len, batches))
         return order * np.arange(done - len(points), done, dtype=float)
 
-    settings = Genetic(mutation=0.0, tolerance=None, bits=1)  # one digit a coordinate: cuts can be seen
+    settings = Genetic(
+        mutation=0.0, tolerance=None, bits=1
+    )  # one digit a coordinate: cuts can be seen
     search(by_order, np.zeros(24), np.ones(24), evaluations=20 + 18 * 8, genetic=settings)
     for before, batch in zip(batches[:-1], batches[1:], strict=True):
         elites = batches[0][:2] if order > 0.0 else before[-2:]
@@ -324,11 +364,20 @@ def test_every_method_makes_exactly_the_evaluations_it_may(method, evaluations):
         calls.append(len(points))
         return ball(points)
 
-    found = search(counted, np.zeros(4), np.ones(4), method=method, evaluations=evaluations, genetic=Genetic(tolerance=None))
+    found = search(
+        counted,
+        np.zeros(4),
+        np.ones(4),
+        method=method,
+        evaluations=evaluations,
+        genetic=Genetic(tolerance=None),
+    )
     assert sum(calls) == found.evaluations == found.history.evaluations[-1] == evaluations
 
 
-@pytest.mark.parametrize(("method", "within"), [("ga", 0.05), ("de", 1e-4), ("cma", 1e-6), ("random", 0.1)])
+@pytest.mark.parametrize(
+    ("method", "within"), [("ga", 0.05), ("de", 1e-4), ("cma", 1e-6), ("random", 0.1)]
+)
 def test_searches_find_a_known_optimum(method, within):
     found = run(method, 1, genetic=Genetic(tolerance=None))
     assert found.value == pytest.approx(1.0, abs=within)
@@ -344,7 +393,11 @@ def test_the_genetic_algorithm_stops_when_it_has_converged():
 
 @pytest.mark.parametrize(
     ("options", "word"),
-    [({"method": "newton"}, "method"), ({"evaluations": 19}, "evaluations"), ({"seed": -1}, "seed")],
+    [
+        ({"method": "newton"}, "method"),
+        ({"evaluations": 19}, "evaluations"),
+        ({"seed": -1}, "seed"),
+    ],
 )
 def test_impossible_searches_are_named(options, word):
     with pytest.raises(ParameterError, match=word):
@@ -352,7 +405,15 @@ def test_impossible_searches_are_named(options, word):
 
 
 @pytest.mark.parametrize(
-    "options", [{"elites": 1}, {"population": 2}, {"bits": 0}, {"mutation": 1.5}, {"stall": 0}, {"tolerance": -1.0}]
+    "options",
+    [
+        {"elites": 1},
+        {"population": 2},
+        {"bits": 0},
+        {"mutation": 1.5},
+        {"stall": 0},
+        {"tolerance": -1.0},
+    ],
 )
 def test_impossible_settings_are_named(options):
     with pytest.raises(ParameterError, match=next(iter(options))):
@@ -362,7 +423,9 @@ def test_impossible_settings_are_named(options):
 def test_a_joint_with_one_free_length_is_found_by_every_method():
     fixed = {name: (value, value) for name, value in zip(LENGTHS, GOOD, strict=True)}
     task = problem(torque=900.0, points=36, bounds={**fixed, "lower_axial": (0.015, 0.045)})
-    grid = np.array([[GOOD[0], GOOD[1], value, GOOD[3]] for value in np.linspace(0.015, 0.045, 3001)])
+    grid = np.array(
+        [[GOOD[0], GOOD[1], value, GOOD[3]] for value in np.linspace(0.015, 0.045, 3001)]
+    )
     fitness = task.evaluate(grid).fitness
     best = grid[int(np.argmin(fitness)), 2]
     for method, within in (("ga", 5e-4), ("de", 2e-5), ("cma", 2e-5)):
@@ -372,9 +435,17 @@ def test_a_joint_with_one_free_length_is_found_by_every_method():
 
 
 def test_a_long_tendon_on_a_constant_force_is_a_pulley():
-    # muscle ends far away, force nearly constant over a short range: torque = F (arm), arm is about the lower link's lever
-    task = problem(min_angle=math.radians(80.0), max_angle=math.radians(84.0), torque=400.0, points=11)
-    far = {"upper_axial": (2.0, 2.0), "upper_offset": (0.0, 0.0), "lower_offset": (0.0, 0.0), "lower_axial": (0.001, 0.05)}
+    # muscle ends far away, force nearly constant over a short range: torque = F (arm), arm is about
+    # the lower link's lever
+    task = problem(
+        min_angle=math.radians(80.0), max_angle=math.radians(84.0), torque=400.0, points=11
+    )
+    far = {
+        "upper_axial": (2.0, 2.0),
+        "upper_offset": (0.0, 0.0),
+        "lower_offset": (0.0, 0.0),
+        "lower_axial": (0.001, 0.05),
+    }
     task = task.replace(bounds=far)
     found = optimise(task, "de", evaluations=300)
     lever = task.torque / (6.0 * float(task.muscle.force(task.pressure, 0.0)))
@@ -415,7 +486,9 @@ def test_the_outer_loop_brackets_the_smallest_pressure():
 
 def test_the_tolerance_of_the_outer_loop_is_kept_and_its_bound_holds():
     task = problem(points=22)
-    found = minimum_pressure(task, "de", tries=1, evaluations=400, tolerance=2e4, area_tolerance=0.2)
+    found = minimum_pressure(
+        task, "de", tries=1, evaluations=400, tolerance=2e4, area_tolerance=0.2
+    )
     assert found.design.area_tolerance == found.to_dict()["area_tolerance"] == 0.2
     assert found.design.met()
     assert found.design.to_dict()["met"]
@@ -430,7 +503,10 @@ def test_the_tolerance_of_the_outer_loop_is_kept_and_its_bound_holds():
 
 def test_more_torque_needs_more_pressure():
     options = {"tries": 1, "evaluations": 400, "tolerance": 2e4}
-    pressures = [minimum_pressure(problem(points=22, torque=t), "de", **options).pressure for t in (600.0, 900.0, 1200.0)]
+    pressures = [
+        minimum_pressure(problem(points=22, torque=t), "de", **options).pressure
+        for t in (600.0, 900.0, 1200.0)
+    ]
     assert pressures[0] < pressures[1] < pressures[2]
     bounds = [problem(torque=t).least_possible_pressure() for t in (600.0, 900.0, 1200.0)]
     assert all(low < high for low, high in zip(bounds, pressures, strict=True))
@@ -459,7 +535,8 @@ def test_bounds_that_cannot_reach_the_range_give_a_result_too():
 
 
 @pytest.mark.parametrize(
-    ("options", "word"), [({"tolerance": 0.0}, "tolerance"), ({"tries": 0}, "tries"), ({"highest": -1.0}, "highest")]
+    ("options", "word"),
+    [({"tolerance": 0.0}, "tolerance"), ({"tries": 0}, "tries"), ({"highest": -1.0}, "highest")],
 )
 def test_impossible_outer_loops_are_named(options, word):
     with pytest.raises(ParameterError, match=word):
@@ -489,7 +566,9 @@ def test_no_design_of_the_front_beats_another_and_none_is_far_from_the_best():
 def test_size_holds_both_ends_of_the_tendon():
     task = problem()
     stroke = task.joint(GOOD).shortening(task.angles).max()
-    assert task.size(GOOD)[0] == pytest.approx(max(math.hypot(GOOD[0] + stroke, GOOD[1]), math.hypot(GOOD[2], GOOD[3])))
+    assert task.size(GOOD)[0] == pytest.approx(
+        max(math.hypot(GOOD[0] + stroke, GOOD[1]), math.hypot(GOOD[2], GOOD[3]))
+    )
 
 
 # ------------------------------------------------------------- published, package
@@ -504,7 +583,11 @@ def test_published_joints_beside_ours():
     assert shoulder["least torque of Table 3.5"].ours == pytest.approx(350.0, abs=2.0)
     assert shoulder["the same, braid's force alone, 75.4 deg (ch. 5: N 0.9)"].verdict == "agree"
     assert "against itself" in shoulder["torque at 13 bar and 90 deg"].note
-    assert {row.verdict for row in (*shoulder.values(), *elbow.values())} == {"agree", "differs", "cannot tell"}
+    assert {row.verdict for row in (*shoulder.values(), *elbow.values())} == {
+        "agree",
+        "differs",
+        "cannot tell",
+    }
 
 
 def test_a_design_round_trips_as_a_joint():
@@ -518,7 +601,9 @@ def test_a_design_round_trips_as_a_joint():
 def test_friction_plays_no_part():
     muscle = library.ch2_075in()
     assert muscle.parameters["friction_coefficient"] > 0.0
-    plain = muscle.replace(friction_coefficient=0.0, friction_pressure_slope=0.0, friction_floor=0.0)
+    plain = muscle.replace(
+        friction_coefficient=0.0, friction_pressure_slope=0.0, friction_floor=0.0
+    )
     values = [problem(muscle=item, points=22).evaluate(GOOD).fitness[0] for item in (muscle, plain)]
     assert values[0] == values[1]
     assert isinstance(plain, Muscle)
@@ -526,6 +611,11 @@ def test_friction_plays_no_part():
 
 def test_the_package_is_light():
     heavy = ("deap", "cma", "scipy", "matplotlib")
-    code = f"import sys, pamrs.design, pamrs.cli.design; print([name for name in {heavy} if name in sys.modules])"
-    shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    code = (
+        f"import sys, pamrs.design, pamrs.cli.design; print([name for name in {heavy} if name in "
+        "sys.modules])"
+    )
+    shown = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    ).stdout
     assert shown.strip() == "[]"

@@ -17,7 +17,11 @@ from pamrs.rig import Joint, Rig
 PSI, LB = 6894.757293168361, 0.45359237
 FULL = 150.0 * PSI
 #: (2.36), the friction hysteresis of the 0.75-in muscle
-HYSTERESIS = {"friction_coefficient": 0.16, "friction_pressure_slope": -0.145e-6, "friction_floor": 0.01}
+HYSTERESIS = {
+    "friction_coefficient": 0.16,
+    "friction_pressure_slope": -0.145e-6,
+    "friction_floor": 0.01,
+}
 
 
 def changed(rig, **blocks):
@@ -34,10 +38,16 @@ def elbow():
 
 
 def rest_angle(rig, pressure, *, start=None, seconds=40.0):
-    """Angle of rest by brute force: pressure raised slowly (or, from a given angle, on at once), arm damped until nothing moves."""
+    """Angle of rest by brute force: pressure raised slowly (or, from a given angle, on at once),
+    arm damped until nothing moves.
+    """
     fed = changed(rig, supply=None, valve=None, arm={"viscous": 150.0})
     time = np.arange(0.0, seconds, 0.02)
-    given = np.full(time.size, pressure) if start is not None else pressure * np.minimum(time / (0.5 * seconds), 1.0)
+    given = (
+        np.full(time.size, pressure)
+        if start is not None
+        else pressure * np.minimum(time / (0.5 * seconds), 1.0)
+    )
     initial = {} if start is None else {"joint_angle": start}
     result = pamrs.simulate(fed, pressure=given, sample_time=0.02, initial=initial)
     assert abs(float(result["joint_rate"][-1])) < 1e-5, "it has not come to rest"
@@ -51,7 +61,9 @@ def test_torques_are_those_of_joint_and_gravity(elbow):
     result = lift(elbow, pressure=FULL, points=50)
     model = elbow.model
     joint = Joint.from_model(model["joint"])
-    np.testing.assert_allclose(result.torque, joint.torque(elbow.muscle, FULL, result.angle, count=6), rtol=1e-12)
+    np.testing.assert_allclose(
+        result.torque, joint.torque(elbow.muscle, FULL, result.angle, count=6), rtol=1e-12
+    )
     np.testing.assert_array_equal(result.torque, result.torque_holding)  # no hysteresis in the rig
     moment = model["arm"]["first_moment"] + 100.0 * LB * 0.508
     np.testing.assert_allclose(result.gravity, moment * 9.80665 * np.sin(result.angle), rtol=1e-12)
@@ -73,7 +85,9 @@ def test_the_angle_reached_is_where_the_torques_meet(elbow):
 def test_capacity_is_the_payload_that_reaches_an_angle(elbow):
     light = lift(elbow, pressure=FULL, points=200)
     for row in (20, 100, 190):
-        again = lift(elbow.with_parameters({"arm.payload": float(light.capacity[row])}), pressure=FULL)
+        again = lift(
+            elbow.with_parameters({"arm.payload": float(light.capacity[row])}), pressure=FULL
+        )
         assert again.reached == pytest.approx(float(light.angle[row]), abs=1e-9)
 
 
@@ -81,13 +95,22 @@ def test_capacity_is_the_payload_that_reaches_an_angle(elbow):
 def test_payload_limit_is_just_lifted(elbow, degrees):
     to = elbow.model["joint"]["max_angle"] if degrees == 120.0 else math.radians(degrees)
     limit = lift(elbow, pressure=FULL, to=to).payload_limit
-    verdicts = [lift(elbow.with_parameters({"arm.payload": f * limit}), pressure=FULL, to=to).can_lift for f in (0.9999, 1.0001)]
+    verdicts = [
+        lift(elbow.with_parameters({"arm.payload": f * limit}), pressure=FULL, to=to).can_lift
+        for f in (0.9999, 1.0001)
+    ]
     assert verdicts == [True, False]
 
 
 def test_the_limit_inside_the_range_is_found_between_the_points(elbow):
     # a cam whose lever is shortest in the middle of the range
-    level = {"kind": "polynomial", "coefficients": [0.03, -0.03, 0.0167], "rest_angle": 0.3, "min_angle": 0.3, "max_angle": 1.9}
+    level = {
+        "kind": "polynomial",
+        "coefficients": [0.03, -0.03, 0.0167],
+        "rest_angle": 0.3,
+        "min_angle": 0.3,
+        "max_angle": 1.9,
+    }
     kept = {name: elbow.model["joint"][name] for name in ("stop_stiffness", "stop_damping")}
     model = elbow.model
     model["joint"] = {**kept, **level}
@@ -109,11 +132,19 @@ def test_the_limit_inside_the_range_is_found_between_the_points(elbow):
 
 
 def test_friction_narrows_what_is_lifted_and_widens_what_is_held(elbow):
-    plain, rough = lift(elbow, pressure=FULL), lift(changed(elbow, arm={"coulomb": 15.0}), pressure=FULL)
+    plain, rough = (
+        lift(elbow, pressure=FULL),
+        lift(changed(elbow, arm={"coulomb": 15.0}), pressure=FULL),
+    )
     assert rough.reached < plain.reached < plain.held < rough.held
     hysteretic = lift(changed(elbow, muscle=HYSTERESIS), pressure=4e5)
-    np.testing.assert_allclose((hysteretic.torque_holding / hysteretic.torque)[:300], 1.102 / 0.898, rtol=1e-9)
-    effect = elbow.with_effect("muscle_hysteresis", {"friction_constant": 10.0, "friction_pressure": 2e-5, "presliding": 1e-3})
+    np.testing.assert_allclose(
+        (hysteretic.torque_holding / hysteretic.torque)[:300], 1.102 / 0.898, rtol=1e-9
+    )
+    effect = elbow.with_effect(
+        "muscle_hysteresis",
+        {"friction_constant": 10.0, "friction_pressure": 2e-5, "presliding": 1e-3},
+    )
     change = lift(effect, pressure=4e5).torque - lift(elbow, pressure=4e5).torque
     arm = Joint.from_model(elbow.model["joint"]).moment_arm(plain.angle)
     np.testing.assert_allclose(change, -6 * (10.0 + 8.0) * arm, rtol=1e-8, atol=1e-9)
@@ -141,7 +172,10 @@ def test_without_gravity_any_payload_is_lifted(elbow):
 # ------------------------------------------------------------------ by brute force
 
 
-@pytest.mark.parametrize(("pounds", "psi"), [(100.0, 150.0), (100.0, 60.0), (135.0, 150.0), (380.0, 150.0), (500.0, 150.0)])
+@pytest.mark.parametrize(
+    ("pounds", "psi"),
+    [(100.0, 150.0), (100.0, 60.0), (135.0, 150.0), (380.0, 150.0), (500.0, 150.0)],
+)
 def test_simulation_comes_to_rest_at_the_angle_reached(elbow, pounds, psi):
     rig = changed(elbow, arm={"coulomb": 0.0, "payload": pounds * LB})
     result = lift(rig, pressure=psi * PSI)
@@ -160,8 +194,12 @@ def test_simulation_with_hysteresis_rests_between_lifted_and_held(elbow):
     rig = changed(elbow, arm={"coulomb": 0.0}, muscle=HYSTERESIS)
     result = lift(rig, pressure=6e5)
     assert math.degrees(result.held - result.reached) > 4.0
-    assert rest_angle(rig, 6e5) == pytest.approx(result.reached, abs=2e-4)  # lifted slowly: the shortening branch
-    assert rest_angle(rig, 6e5, start=1.9) == pytest.approx(result.held, abs=2e-4)  # sunk from above: the other branch
+    assert rest_angle(rig, 6e5) == pytest.approx(
+        result.reached, abs=2e-4
+    )  # lifted slowly: the shortening branch
+    assert rest_angle(rig, 6e5, start=1.9) == pytest.approx(
+        result.held, abs=2e-4
+    )  # sunk from above: the other branch
 
 
 def test_simulation_with_coulomb_friction_rests_between_lifted_and_held(elbow):
@@ -180,10 +218,14 @@ def test_bad_arguments(elbow):
     for pressure in (math.nan, math.inf, -1.0):
         with pytest.raises(ParameterError, match=f"pressure = {pressure}"):
             lift(elbow, pressure=pressure)
-    with pytest.raises(ParameterError, match=r"pressure is missing: the rig 'elbow' has no \[supply\]"):
+    with pytest.raises(
+        ParameterError, match=r"pressure is missing: the rig 'elbow' has no \[supply\]"
+    ):
         lift(changed(elbow, supply=None, valve=None))
     for to in (0.1, 3.0, math.nan):
-        with pytest.raises(ParameterError, match=r"to = .* rad .* at most joint.max_angle = 120.0 deg"):
+        with pytest.raises(
+            ParameterError, match=r"to = .* rad .* at most joint.max_angle = 120.0 deg"
+        ):
             lift(elbow, to=to)
     with pytest.raises(ParameterError, match="points = 2"):
         lift(elbow, points=2)
@@ -210,7 +252,17 @@ def run(capsys, *words):
 
 def test_command_prints_and_writes(capsys, tmp_path):
     data, picture = tmp_path / "a.json", tmp_path / "a.png"
-    words = ("elbow", "--pressure", "150 psi", "--payload", "380 lb", "--json", data, "--png", picture)
+    words = (
+        "elbow",
+        "--pressure",
+        "150 psi",
+        "--payload",
+        "380 lb",
+        "--json",
+        data,
+        "--png",
+        picture,
+    )
     code, out, err = run(capsys, *words)
     assert code == 0
     assert out.startswith("elbow: cannot lift 172.4 kg beyond 22.")
@@ -245,7 +297,11 @@ def test_command_refuses_what_it_cannot_use(capsys, words, message):
 
 
 def test_missing_plot_package_is_named(capsys, tmp_path, monkeypatch):
-    for name in [name for name in sys.modules if name.startswith(("matplotlib", "pamrs.design._lifting_figure", "pamrs.report.fig"))]:
+    for name in [
+        name
+        for name in sys.modules
+        if name.startswith(("matplotlib", "pamrs.design._lifting_figure", "pamrs.report.fig"))
+    ]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     code, _, err = run(capsys, "elbow", "--png", tmp_path / "a.png")

@@ -22,7 +22,9 @@ def test_count_is_the_smallest_that_meets_every_point():
     requirement = Requirement([(0.0, 9e3), (0.02, 8e3), (0.05, 4e3)])
     for row in size(PAIR, requirement).rows:
         item = library.entry(row["name"])
-        one = item.muscle.force(item.max_pressure, requirement.contraction(item.parameters["rest_length"]))
+        one = item.muscle.force(
+            item.max_pressure, requirement.contraction(item.parameters["rest_length"])
+        )
         forces = requirement.array[:, 1]
         assert np.all(row["count"] * one >= forces * (1 - 1e-12))
         assert np.any((row["count"] - 1) * one < forces)
@@ -31,7 +33,9 @@ def test_count_is_the_smallest_that_meets_every_point():
 
 
 def test_count_never_falls_with_the_force_wanted():
-    counts = [size(PAIR, Requirement([(0.0, f), (0.03, f / 2)])).rows for f in np.linspace(1e3, 60e3, 25)]
+    counts = [
+        size(PAIR, Requirement([(0.0, f), (0.03, f / 2)])).rows for f in np.linspace(1e3, 60e3, 25)
+    ]
     for k in range(2):
         assert np.all(np.diff([rows[k]["count"] for rows in counts]) >= 0)
     assert counts[-1][0]["count"] > counts[0][0]["count"]
@@ -39,16 +43,23 @@ def test_count_never_falls_with_the_force_wanted():
 
 def test_count_never_rises_with_pressure():
     counts = [
-        size([Candidate.from_library("elbow_0625in", pressure=p)], Requirement([(0.0, 9e3), (0.03, 4e3)])).rows[0]["count"]
+        size(
+            [Candidate.from_library("elbow_0625in", pressure=p)],
+            Requirement([(0.0, 9e3), (0.03, 4e3)]),
+        ).rows[0]["count"]
         for p in np.linspace(5e5, 12e5, 8)
     ]
     assert np.all(np.diff(counts) <= 0)
 
 
 def test_figures_scale_with_the_count():
-    one, six = (size([Candidate.from_library("elbow_0625in", count=n)], Requirement([(0.01, 1e3)])).rows[0] for n in (1, 6))
+    one, six = (
+        size([Candidate.from_library("elbow_0625in", count=n)], Requirement([(0.01, 1e3)])).rows[0]
+        for n in (1, 6)
+    )
     keys = (
-        "mass", "air_volume_rest", "air_volume_end", "air_volume_full", "air_mass_per_stroke", "energy_per_stroke",
+        "mass", "air_volume_rest", "air_volume_end", "air_volume_full", "air_mass_per_stroke",
+        "energy_per_stroke",
         "fill_time_rest", "fill_time_full", "blocked_force", "force_margin",
     )  # fmt: skip
     for key in keys:
@@ -58,20 +69,28 @@ def test_figures_scale_with_the_count():
 
 
 def test_air_volume_is_the_muscles_own():
-    row = size([Candidate.from_library("elbow_0625in", count=3)], Requirement([(0.02, 1e3)])).rows[0]
+    row = size([Candidate.from_library("elbow_0625in", count=3)], Requirement([(0.02, 1e3)])).rows[
+        0
+    ]
     muscle = library.elbow_0625in()
     assert row["air_volume_rest"] == pytest.approx(3 * float(muscle.air_volume(0.0)))
-    assert row["air_volume_end"] == pytest.approx(3 * float(muscle.air_volume(0.02 / muscle.parameters["rest_length"])))
+    assert row["air_volume_end"] == pytest.approx(
+        3 * float(muscle.air_volume(0.02 / muscle.parameters["rest_length"]))
+    )
     assert row["air_volume_full"] == pytest.approx(3 * float(muscle.air_volume(0.37)), rel=1e-4)
     absolute = row["pressure"] + 101325.0
-    assert row["energy_per_stroke"] == pytest.approx(absolute * row["air_volume_end"] - 101325.0 * row["air_volume_rest"])
+    assert row["energy_per_stroke"] == pytest.approx(
+        absolute * row["air_volume_end"] - 101325.0 * row["air_volume_rest"]
+    )
     assert row["air_mass_per_stroke"] == pytest.approx(row["energy_per_stroke"] / (287.05 * 293.15))
 
 
 def test_contraction_requirement_equals_the_stroke_requirement():
     length = library.elbow_0625in().parameters["rest_length"]
     by_stroke = size(["elbow_0625in"], Requirement([(0.1 * length, 5e3)])).row("elbow_0625in")
-    by_contraction = size(["elbow_0625in"], Requirement([(0.1, 5e3)], position="contraction")).row("elbow_0625in")
+    by_contraction = size(["elbow_0625in"], Requirement([(0.1, 5e3)], position="contraction")).row(
+        "elbow_0625in"
+    )
     assert by_stroke.pop("name") == by_contraction.pop("name")
     assert by_stroke == pytest.approx(by_contraction, rel=1e-9)
 
@@ -80,10 +99,18 @@ def test_contraction_requirement_equals_the_stroke_requirement():
     ("candidate", "requirement", "reason"),
     [
         ("elbow_0625in", Requirement([(0.09, 100.0)]), "beyond the braid's limit"),
-        ("elbow_0625in", Requirement([(0.385, 100.0)], position="contraction"), "no number is enough"),
+        (
+            "elbow_0625in",
+            Requirement([(0.385, 100.0)], position="contraction"),
+            "no number is enough",
+        ),
         ("elbow_0625in", Requirement([(0.0, 1e7)]), "at most 100 are considered"),
         (Candidate.from_library("elbow_0625in", count=2), ONE_POINT, "5 are needed, 2 are given"),
-        (Candidate.from_library("elbow_0625in", pressure=14e5), ONE_POINT, "not below the supply's"),
+        (
+            Candidate.from_library("elbow_0625in", pressure=14e5),
+            ONE_POINT,
+            "not below the supply's",
+        ),
     ],
 )
 def test_infeasible_is_told_with_its_reason(candidate, requirement, reason):
@@ -131,7 +158,9 @@ def test_packing():
 def test_fill_time_against_the_reference_orifice():
     filling = Filling(area=5e-6, supply_pressure=10e5)
     pressures = np.linspace(101325.0, 101325.0 + 9.9e5, 20001)
-    flow = np.array([orifice_flow(5e-6, 10e5 + 101325.0, float(p), 293.15, 287.05) for p in pressures])
+    flow = np.array(
+        [orifice_flow(5e-6, 10e5 + 101325.0, float(p), 293.15, 287.05) for p in pressures]
+    )
     slowness = 1.0 / flow
     area = float(np.sum(0.5 * (slowness[1:] + slowness[:-1]) * np.diff(pressures)))
     assert filling.time(2e-3, 9.9e5) == pytest.approx(2e-3 / (287.05 * 293.15) * area, rel=1e-5)
@@ -141,7 +170,9 @@ def test_fill_time_laws():
     filling = Filling()
     assert filling.time(2e-3, 6e5) == pytest.approx(2.0 * filling.time(1e-3, 6e5), rel=1e-12)
     assert filling.time(1e-3, 6e5) < filling.time(1e-3, 9e5) < filling.time(1e-3, 13.79e5)
-    assert Filling(dead_volume=1e-3).time(1e-3, 6e5) == pytest.approx(filling.time(2e-3, 6e5), rel=1e-12)
+    assert Filling(dead_volume=1e-3).time(1e-3, 6e5) == pytest.approx(
+        filling.time(2e-3, 6e5), rel=1e-12
+    )
     # choked: dp/dt is constant
     choked = filling.time(1e-3, 4e5) / filling.time(1e-3, 2e5)
     assert choked == pytest.approx(2.0, rel=1e-10)
@@ -151,7 +182,9 @@ def test_sonic_conductance_gives_the_choked_flow():
     conductance = 2e-8
     filling = Filling.from_sonic_conductance(conductance, supply_pressure=12e5)
     flow = conductance * 1.185 * (12e5 + 101325.0)  # kg/m3 of the standard's reference air
-    assert orifice_flow(filling.area, 12e5 + 101325.0, 101325.0, 293.15, 287.05) == pytest.approx(flow, rel=1e-9)
+    assert orifice_flow(filling.area, 12e5 + 101325.0, 101325.0, 293.15, 287.05) == pytest.approx(
+        flow, rel=1e-9
+    )
 
 
 @pytest.mark.parametrize(
@@ -188,7 +221,9 @@ def test_bad_input_is_named(call, message):
 
 
 def test_a_muscle_whose_geometry_has_no_solution_is_infeasible():
-    wide = Muscle(rest_length=0.12, rest_diameter=0.05, braid_angle=math.radians(75.0), wall_thickness=0.002)
+    wide = Muscle(
+        rest_length=0.12, rest_diameter=0.05, braid_angle=math.radians(75.0), wall_thickness=0.002
+    )
     result = size([Candidate("wide", wide, 5e5), "elbow_0625in"], Requirement([(0.0, 1e3)]))
     assert "at which the geometry has a solution" in result.infeasible["wide"]
     assert [row["name"] for row in result.rows] == ["elbow_0625in"]
@@ -201,4 +236,8 @@ def test_a_pressure_in_bar_is_asked_about():
 
 def test_a_pressure_that_is_no_number_is_named():
     with pytest.raises(ParameterError, match="pressure = 'x' is not allowed"):
-        Candidate("x", Muscle(rest_length=0.2, rest_diameter=0.02, braid_angle=1.2, wall_thickness=0.001), "x")
+        Candidate(
+            "x",
+            Muscle(rest_length=0.2, rest_diameter=0.02, braid_angle=1.2, wall_thickness=0.001),
+            "x",
+        )

@@ -8,7 +8,6 @@ import numpy as np
 
 from pamrs.diagnosis.result import Diagnosis, Trace
 from pamrs.findings import (
-    Asked,
     BlockResidual,
     ChannelError,
     Condition,
@@ -18,6 +17,7 @@ from pamrs.findings import (
     FitErrors,
     NextExperiment,
     ParameterFound,
+    Tested,
     Where,
 )
 
@@ -27,10 +27,21 @@ class ModelText:
         return 'name = "sealed <chamber>"\n\n[[effects]]\nid = "heat_transfer"\n'
 
 
-def trace(recording: str, role: str, channel: str, unit: str, scale: float, *, n: int = 6000, seed: int = 1) -> Trace:
+def trace(
+    recording: str,
+    role: str,
+    channel: str,
+    unit: str,
+    scale: float,
+    *,
+    n: int = 6000,
+    seed: int = 1,
+) -> Trace:
     rng = np.random.default_rng(seed)
     time = np.arange(n) * 0.005
-    truth = scale * (1.0 + 0.4 * np.sin(0.7 * time) * np.exp(-time / 40) + 0.1 * np.sign(np.sin(0.35 * time)))
+    truth = scale * (
+        1.0 + 0.4 * np.sin(0.7 * time) * np.exp(-time / 40) + 0.1 * np.sign(np.sin(0.35 * time))
+    )
     missing = scale * 0.08 * np.exp(-(time % 9.0) / 2.5)
     measured = truth + scale * 0.004 * rng.standard_normal(n)
     measured[1000:1100] = np.nan
@@ -48,7 +59,12 @@ def trace(recording: str, role: str, channel: str, unit: str, scale: float, *, n
 
 
 def fit_entry(scale: float) -> dict[str, float]:
-    return {"noise": 0.004 * scale, "before": 0.045 * scale, "refit": 0.024 * scale, "after": 0.0042 * scale}
+    return {
+        "noise": 0.004 * scale,
+        "before": 0.045 * scale,
+        "refit": 0.024 * scale,
+        "after": 0.0042 * scale,
+    }
 
 
 def diagnosis(**changes: Any) -> Diagnosis:
@@ -65,7 +81,13 @@ def diagnosis(**changes: Any) -> Diagnosis:
             "recording": "sine_sweep",
             "intervals": [[0.0, 2.4], [9.0, 11.2], [18.0, 20.3]],
             "conditions": [
-                Condition("filled", 0.81, 0.2, 3.1, "the pressure has just risen: 81 % of the excess lies within 2.5 s of a fill"),
+                Condition(
+                    "filled",
+                    0.81,
+                    0.2,
+                    3.1,
+                    "the pressure has just risen: 81 % of the excess lies within 2.5 s of a fill",
+                ),
                 Condition("muscle pressure", 0.6, 0.3, 2.0, "muscle pressure 310 to 490 kPa"),
             ],
             "text": "The excess is in the chamber: after each fill the pressure sags by 8 kPa.",
@@ -138,16 +160,28 @@ def diagnosis(**changes: Any) -> Diagnosis:
         },
         "warnings": ["frozen joint_angle in step_up, 3.1 to 3.4 s: masked"],
         "seconds": 31.4,
-        "text": "After each fill the gas cools and the pressure sags.\n\nA leak goes on; this stops.",
-        "asked": [
-            {"id": "heat_transfer", "blocks": ["chamber"], "promised": 0.96, "left": 0.003},
-            {"id": "valve_hysteresis", "blocks": ["chamber"], "promised": 0.011, "left": None},
+        ("text"): (
+            "After each fill the gas cools and the pressure sags.\n\nA leak goes on; this stops."
+        ),
+        "tested": [
+            {"id": "heat_transfer", "blocks": ["chamber"], "predicted_gain": 0.96, "left": 0.003},
+            {
+                "id": "valve_hysteresis",
+                "blocks": ["chamber"],
+                "predicted_gain": 0.011,
+                "left": None,
+            },
         ],
         "rig": ModelText(),
         "traces": [
             trace(name, role, channel, unit, scale, seed=i)
-            for i, (name, role) in enumerate([("step_up", "fit"), ("sine_sweep", "held_out"), ("random", "held_out")])
-            for channel, unit, scale in (("joint_angle", "rad", 0.6), ("muscle_pressure", "Pa", 3e5))
+            for i, (name, role) in enumerate(
+                [("step_up", "fit"), ("sine_sweep", "held_out"), ("random", "held_out")]
+            )
+            for channel, unit, scale in (
+                ("joint_angle", "rad", 0.6),
+                ("muscle_pressure", "Pa", 3e5),
+            )
         ],
         "residuals": {
             name: {
@@ -180,8 +214,12 @@ def entries(content: dict[str, Any]) -> dict[str, Any]:
     def each(cls: Any, values: dict[str, Any]) -> dict[str, Any]:
         return {name: cls(**value) for name, value in values.items()}
 
-    effects = [e | {"parameters": each(EffectParameterFound, e["parameters"])} for e in content["effects"]]
-    errors = {part: each(ChannelError, content["fit"].get(part, {})) for part in ("channels", "held_out")}
+    effects = [
+        e | {"parameters": each(EffectParameterFound, e["parameters"])} for e in content["effects"]
+    ]
+    errors = {
+        part: each(ChannelError, content["fit"].get(part, {})) for part in ("channels", "held_out")
+    }
     shown = content["condition_map"]
     return {
         "where": Where(**content["where"]),
@@ -189,7 +227,7 @@ def entries(content: dict[str, Any]) -> dict[str, Any]:
         "parameters": each(ParameterFound, content["parameters"]),
         "fit": FitErrors(**errors, gap_closed=content["fit"].get("gap_closed")),
         "next_experiment": NextExperiment(**content["next_experiment"]),
-        "asked": [Asked(**asked) for asked in content["asked"]],
+        "tested": [Tested(**row) for row in content["tested"]],
         "residuals": each(BlockResidual, content["residuals"]),
         "condition_map": None if shown is None else ConditionMap(**shown),
     }
@@ -242,5 +280,14 @@ def nothing() -> Diagnosis:
         traces=[same],
         text="",
         rig=None,
-        fit={"channels": {"muscle_pressure": {"noise": 1.0, "before": 1.0, "refit": float("nan"), "after": float("nan")}}},
+        fit={
+            "channels": {
+                "muscle_pressure": {
+                    "noise": 1.0,
+                    "before": 1.0,
+                    "refit": float("nan"),
+                    "after": float("nan"),
+                }
+            }
+        },
     )

@@ -22,7 +22,14 @@ RIG = pamrs.rigs.shoulder()
 CHANNELS = ("supply_pressure", "muscle_pressure", "valve_command", "joint_angle")
 BLOCKS = [b for b in available_blocks(RIG, CHANNELS, SETTINGS.prepare) if b.kind != "arm"]
 TERMS = _Terms(0.985, 30.0, {})
-TRIAL = Attempts(Problem(BLOCKS, [], core_rig(RIG), SETTINGS), Problem(BLOCKS, [], core_rig(RIG), SETTINGS), RIG, {}, {}, BLOCKS)
+TRIAL = Attempts(
+    Problem(BLOCKS, [], core_rig(RIG), SETTINGS),
+    Problem(BLOCKS, [], core_rig(RIG), SETTINGS),
+    RIG,
+    {},
+    {},
+    BLOCKS,
+)
 
 
 def candidate(key: str, supply: float, chamber: float, **values: float) -> Candidate:
@@ -32,9 +39,20 @@ def candidate(key: str, supply: float, chamber: float, **values: float) -> Candi
     model = RIG
     for effect in effects:
         model = model.with_effect(effect)
-    fit = Fit(effects, model, values, dict.fromkeys(values, 1e-12), np.zeros((0, 0)), 0.0, {}, dict.fromkeys(wrong, 8.0), freed=wrong)
+    fit = Fit(
+        effects,
+        model,
+        values,
+        dict.fromkeys(values, 1e-12),
+        np.zeros((0, 0)),
+        0.0,
+        {},
+        dict.fromkeys(wrong, 8.0),
+        freed=wrong,
+    )
     left = {
-        name: Excess(1.0 + ratio, ratio**0.5, 0.0, 1.0, 1.0, 1.1, 0.02) for name, ratio in (("supply", supply), ("chamber", chamber))
+        name: Excess(1.0 + ratio, ratio**0.5, 0.0, 1.0, 1.0, 1.1, 0.02)
+        for name, ratio in (("supply", supply), ("chamber", chamber))
     }
     return Candidate(effects, fit, left, left, 0.0, wrong=wrong)
 
@@ -43,7 +61,9 @@ def group(*found: Candidate) -> Group:
     start = candidate("", 2.5, 64.0)
     probabilities = weigh([start, *found], BLOCKS, 0.985, 30.0, SETTINGS)
     chamber = next(b for b in BLOCKS if b.name == "chamber")
-    return Group(BLOCKS, start.fitted, start.fitted, [start, *found], probabilities, chamber, {}, BLOCKS)
+    return Group(
+        BLOCKS, start.fitted, start.fitted, [start, *found], probabilities, chamber, {}, BLOCKS
+    )
 
 
 def leak(supply: float, chamber: float) -> Candidate:
@@ -51,12 +71,21 @@ def leak(supply: float, chamber: float) -> Candidate:
 
 
 def test_a_leak_of_the_tank_is_named_beside_a_chamber_without_a_name() -> None:
-    whole = group(leak(0.02, 64.0), candidate("valve_hysteresis", 2.4, 58.0, **{"valve_hysteresis.half_width": 0.01}))
+    whole = group(
+        leak(0.02, 64.0),
+        candidate("valve_hysteresis", 2.4, 58.0, **{"valve_hysteresis.half_width": 0.01}),
+    )
     assert whole.probabilities["unlisted"] > 0.95
     tank, chamber = _apart(whole, TRIAL, TERMS)
-    assert ([b.name for b in tank.blocks], [b.name for b in chamber.blocks]) == (["supply"], ["chamber"])
+    assert ([b.name for b in tank.blocks], [b.name for b in chamber.blocks]) == (
+        ["supply"],
+        ["chamber"],
+    )
     judged = judge([tank, chamber], SETTINGS)
-    assert [(j.verdict, j.named) for j in judged] == [("effects", ("supply_leak",)), ("unlisted", ())]
+    assert [(j.verdict, j.named) for j in judged] == [
+        ("effects", ("supply_leak",)),
+        ("unlisted", ()),
+    ]
     assert case_verdict(judged) == "effects"
     # one fit for both, so that the model has the tank's parameters beside the leak
     assert chamber.candidates[0].fit is tank.candidates[1].fit
@@ -64,7 +93,9 @@ def test_a_leak_of_the_tank_is_named_beside_a_chamber_without_a_name() -> None:
 
 def test_a_valve_that_explains_the_tank_alone_is_no_name() -> None:
     # it acts in both blocks, and leaves one of them as it was
-    whole = group(candidate("valve_hysteresis", 0.02, 60.0, **{"valve_hysteresis.half_width": 0.01}))
+    whole = group(
+        candidate("valve_hysteresis", 0.02, 60.0, **{"valve_hysteresis.half_width": 0.01})
+    )
     assert _apart(whole, TRIAL, TERMS) == []
 
 
@@ -81,5 +112,8 @@ def test_each_block_may_have_a_name_of_its_own(monkeypatch: pytest.MonkeyPatch) 
     parts = _apart(group(volume, heat), TRIAL, TERMS)
     assert asked == [["heat_transfer", "supply.volume"]]
     judged = judge(parts, SETTINGS)
-    assert {name for j in judged for name in (*j.named, *j.wrong)} == {"supply.volume", "heat_transfer"}
+    assert {name for j in judged for name in (*j.named, *j.wrong)} == {
+        "supply.volume",
+        "heat_transfer",
+    }
     assert sorted(b.name for p in parts for b in p.blocks) == ["chamber", "supply"]

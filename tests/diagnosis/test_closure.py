@@ -1,4 +1,6 @@
-"""Closures: a mismatch without a name is modelled, predicts recordings that were held out, and nothing is made of nothing."""
+"""Closures: a mismatch without a name is modelled, predicts recordings that were held out, and
+nothing is made of nothing.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,7 @@ from pamrs import _core
 from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.explain import describe_closure
 from pamrs.diagnosis.fit import Fit, Key, Problem, fit, fits, residuals
-from pamrs.diagnosis.noise import Floor, excess, floors, inflation
+from pamrs.diagnosis.noise import NoiseLevel, excess, inflation, noise_levels
 from pamrs.diagnosis.prepare import Block, available_blocks, prepare
 from pamrs.diagnosis.search import find_closure
 from pamrs.effects import CATALOGUE, EFFECTS, MEMORY_OF, TERMS
@@ -22,7 +24,12 @@ SETTINGS = DiagnosisSettings()
 CLOSURES = [effect for effect in EFFECTS.values() if not effect.catalogue]
 
 DT, ROWS = 0.005, 1600
-NOISE = {"valve_command": 0.0, "supply_pressure": 400.0, "muscle_pressure": 400.0, "joint_angle": 3e-4}
+NOISE = {
+    "valve_command": 0.0,
+    "supply_pressure": 400.0,
+    "muscle_pressure": 400.0,
+    "joint_angle": 3e-4,
+}
 NOMINAL = pamrs.rigs.shoulder()
 
 
@@ -38,22 +45,33 @@ def command(kind: str) -> np.ndarray:
 
 
 def recorded(truth: pamrs.Rig, kind: str, seed: int) -> Recording:
-    run = pamrs.simulate(truth, command(kind), sample_time=DT, initial={"muscle_pressure": 2e5, "joint_angle": 0.9})
+    run = pamrs.simulate(
+        truth, command(kind), sample_time=DT, initial={"muscle_pressure": 2e5, "joint_angle": 0.9}
+    )
     rng = np.random.default_rng(seed)
-    channels = {name: run[name] + rng.normal(0.0, 1.0, ROWS) * level for name, level in NOISE.items()}
+    channels = {
+        name: run[name] + rng.normal(0.0, 1.0, ROWS) * level for name, level in NOISE.items()
+    }
     mask = {name: np.ones(ROWS, dtype=bool) for name in channels}
     return Recording(kind, "fit", run.time, DT, channels, mask, [], dict.fromkeys(channels, "SI"))
 
 
 class Case:
-    """Three recordings of a truth with the nominal model fitted to them, and one of another excitation."""
+    """Three recordings of a truth with the nominal model fitted to them, and one of another
+    excitation.
+    """
 
     def __init__(self, truth: pamrs.Rig, names: tuple[str, ...]) -> None:
-        self.blocks: list[Block] = [b for b in available_blocks(NOMINAL, tuple(NOISE), SETTINGS.prepare) if b.name in names]
+        self.blocks: list[Block] = [
+            b for b in available_blocks(NOMINAL, tuple(NOISE), SETTINGS.prepare) if b.name in names
+        ]
         self.problem, self.held = (
             Problem(
                 self.blocks,
-                [prepare(recorded(truth, kind, seed), NOMINAL, SETTINGS) for seed, kind in enumerate(kinds)],
+                [
+                    prepare(recorded(truth, kind, seed), NOMINAL, SETTINGS)
+                    for seed, kind in enumerate(kinds)
+                ],
                 core_rig(NOMINAL),
                 SETTINGS,
             )
@@ -62,8 +80,11 @@ class Case:
         white = dict.fromkeys(names, 1.0)
         first = fit(self.problem, NOMINAL, (), {}, white)
         width = SETTINGS.noise.fit_bin_time
-        self.colour = {b.name: inflation(b, self.problem.recordings, first.residuals, width) for b in self.blocks}
-        self.baseline = fit(self.problem, NOMINAL, (), {}, self.colour, warm=first)
+        self.autocorrelation = {
+            b.name: inflation(b, self.problem.recordings, first.residuals, width)
+            for b in self.blocks
+        }
+        self.baseline = fit(self.problem, NOMINAL, (), {}, self.autocorrelation, warm=first)
         self.evaluations = 0
 
     def found(self, monkeypatch: pytest.MonkeyPatch, blocks: list[Block]) -> Fit | None:
@@ -73,14 +94,21 @@ class Case:
 
         monkeypatch.setattr("pamrs.diagnosis.search._closure.residuals", counted)
         monkeypatch.setattr("pamrs.diagnosis.fit._fitting.residuals", counted)
-        return find_closure(self.problem, NOMINAL, self.baseline, self.colour, blocks, lambda _: None)
+        return find_closure(
+            self.problem, NOMINAL, self.baseline, self.autocorrelation, blocks, lambda _: None
+        )
 
     def gap_closed(self, model: Fit, block: str) -> float:
         """Share of the excess beyond noise that a model removes on the held-out recording."""
-        floor: dict[Key, Floor] = floors(self.held, self.held.core.respecified(model.rig.to_json()))
+        noise_level: dict[Key, NoiseLevel] = noise_levels(
+            self.held, self.held.core.respecified(model.rig.to_json())
+        )
         own = next(b for b in self.blocks if b.name == block)
         found = [residuals(self.held, m.rig) for m in (self.baseline, model)]
-        ratios = [excess(own, self.held.recordings, r, floor, SETTINGS.noise).ratio - 1.0 for r in found]
+        ratios = [
+            excess(own, self.held.recordings, r, noise_level, SETTINGS.noise).ratio - 1.0
+            for r in found
+        ]
         return 1.0 - float(np.sqrt(max(0.0, ratios[1]) / ratios[0]))
 
 
@@ -91,18 +119,31 @@ def test_closures_are_no_names_and_their_dictionaries_are_those_of_the_core() ->
         coefficients = [p.name for p in closure.parameters if p.neutral == 0.0]
         assert coefficients == [term.name for term in TERMS[closure.id]]
         kinds = {term.kind for term in TERMS[closure.id]}
-        assert {p.name for p in closure.parameters if p.neutral is None} == {MEMORY_OF[k] for k in kinds & set(MEMORY_OF)}
+        assert {p.name for p in closure.parameters if p.neutral is None} == {
+            MEMORY_OF[k] for k in kinds & set(MEMORY_OF)
+        }
         assert kinds <= {"static", "even", "odd", *MEMORY_OF}
         assert fits(NOMINAL, closure.id)
 
 
-def test_a_hidden_torque_is_modelled_and_predicts_what_was_held_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    case = Case(NOMINAL.with_effect("closure_torque", {"pressure_creep": -4.0, "sine_4": 2.5, "memory_time": 0.7}), ("arm",))
+def test_a_hidden_torque_is_modelled_and_predicts_what_was_held_out(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    case = Case(
+        NOMINAL.with_effect(
+            "closure_torque", {"pressure_creep": -4.0, "sine_4": 2.5, "memory_time": 0.7}
+        ),
+        ("arm",),
+    )
     found = case.found(monkeypatch, case.blocks)
     assert found is not None
     assert case.evaluations <= 18
     assert found.values["closure_torque.sine_4"] == pytest.approx(2.5, rel=0.1)
-    assert 2 <= sum(name.startswith("closure_torque.") for name in found.values) <= SETTINGS.closures.most_terms + 2
+    assert (
+        2
+        <= sum(name.startswith("closure_torque.") for name in found.values)
+        <= SETTINGS.closures.most_terms + 2
+    )
     assert case.gap_closed(found, "arm") > 0.85
     text = describe_closure(found, case.problem, case.baseline)
     assert "a torque is missing" in text
@@ -130,30 +171,44 @@ def test_a_hidden_flow_is_modelled(monkeypatch: pytest.MonkeyPatch) -> None:
     assert found is not None
     assert found.values["closure_flow.pressure"] < 0.0
     assert case.gap_closed(found, "chamber") > 0.85
-    assert "a flow into the chamber is missing" in describe_closure(found, case.problem, case.baseline)
+    assert "a flow into the chamber is missing" in describe_closure(
+        found, case.problem, case.baseline
+    )
 
 
 @pytest.mark.parametrize("names", [("arm",), ("supply", "chamber")])
-def test_a_null_keeps_no_excess_and_next_to_no_terms(names: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_null_keeps_no_excess_and_next_to_no_terms(
+    names: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
     case = Case(NOMINAL, names)
-    floor = floors(case.problem, case.problem.core.respecified(case.baseline.rig.to_json()))
-    assert all(excess(b, case.problem.recordings, case.baseline.residuals, floor, SETTINGS.noise).ratio < 1.2 for b in case.blocks)
-    # a form that is asked for all the same mends what the smoothing of the drives does at reversals: hundredths of the arm's torque
+    noise_level = noise_levels(
+        case.problem, case.problem.core.respecified(case.baseline.rig.to_json())
+    )
+    found = [
+        excess(b, case.problem.recordings, case.baseline.residuals, noise_level, SETTINGS.noise)
+        for b in case.blocks
+    ]
+    assert all(kept.ratio < 1.2 for kept in found)
+    # a form that is asked for all the same mends what the smoothing of the drives does at
+    # reversals: hundredths of the arm's torque
     found = case.found(monkeypatch, case.blocks)
     assert found is None or set(found.effects) == {"closure_torque"}
-    assert found is None or sum(abs(v) for n, v in found.values.items() if n.startswith("closure_torque.")) < 0.25
+    assert (
+        found is None
+        or sum(abs(v) for n, v in found.values.items() if n.startswith("closure_torque.")) < 0.25
+    )
     assert case.evaluations <= 18
 
 
 def test_what_does_not_fit_together_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     case = Case(NOMINAL, ("arm",))
     with pytest.raises(DiagnosisError, match="blocks"):
-        find_closure(case.problem, NOMINAL, case.baseline, case.colour, [], lambda _: None)
+        find_closure(case.problem, NOMINAL, case.baseline, case.autocorrelation, [], lambda _: None)
     with pytest.raises(DiagnosisError, match="closure_torque"):
         describe_closure(case.baseline, case.problem, case.baseline)
     prepared = case.problem.recordings[0]
     given = ("arm", prepared.commands, DT, DT, [0], prepared.signals, prepared.n)
-    with pytest.raises(RigError, match="closure_torque"):
+    with pytest.raises(RigError, match="no sum of terms"):
         core_rig(NOMINAL).closure_terms(*given)
     terms = _core.Rig(NOMINAL.with_effect("closure_torque").to_json()).closure_terms(*given)
     assert terms.shape == (ROWS, len(TERMS["closure_torque"]))

@@ -1,4 +1,6 @@
-"""Diagnosis: known answers are recovered, nothing is found where nothing is, bad data are refused in words."""
+"""Diagnosis: known answers are recovered, nothing is found where nothing is, bad data are refused
+in words.
+"""
 
 from __future__ import annotations
 
@@ -24,21 +26,40 @@ CHAMBERS = ROOT / "cases" / "zillen_chambers"
 DATA = ROOT / ".." / "shared" / "recordings" / "pneumatic_cylinders_zillen"
 
 
-def sealed_case(conductance: float, *, laminar: float = 0.0, noise: float = 150.0, seed: int = 1) -> pamrs.Case:
+def sealed_case(
+    conductance: float, *, laminar: float = 0.0, noise: float = 150.0, seed: int = 1
+) -> pamrs.Case:
     """A hold of a known chamber, 120 s at 10 Hz, with sensor noise."""
     rig = pamrs.rigs.sealed_chamber()
-    truth = rig.with_effect("leak_muscle", {"conductance": conductance, "laminar_share": laminar}) if conductance else rig
-    run = pamrs.simulate(truth, duration=120.0, sample_time=0.1, step=0.01, initial={"muscle_pressure": 7e5})
+    truth = (
+        rig.with_effect("leak_muscle", {"conductance": conductance, "laminar_share": laminar})
+        if conductance
+        else rig
+    )
+    run = pamrs.simulate(
+        truth, duration=120.0, sample_time=0.1, step=0.01, initial={"muscle_pressure": 7e5}
+    )
     rng = np.random.default_rng(seed)
     pressure = run["muscle_pressure"] + rng.normal(0.0, noise, run.time.size)
     mask = {"muscle_pressure": np.ones(run.time.size, dtype=bool)}
-    recording = Recording("hold", "fit", run.time, 0.1, {"muscle_pressure": pressure}, mask, [], {"muscle_pressure": "Pa"})
+    recording = Recording(
+        "hold",
+        "fit",
+        run.time,
+        0.1,
+        {"muscle_pressure": pressure},
+        mask,
+        [],
+        {"muscle_pressure": "Pa"},
+    )
     return pamrs.Case("hold", rig, [recording], ROOT)
 
 
 def test_every_parameter_of_the_catalogue_is_one_that_a_fit_can_move() -> None:
     for effect in EFFECTS.values():
-        assert set(effect.dotted()) <= set(core_rig(pamrs.rigs.shoulder().with_effect(effect.id)).parameter_names)
+        assert set(effect.dotted()) <= set(
+            core_rig(pamrs.rigs.shoulder().with_effect(effect.id)).parameter_names
+        )
 
 
 @pytest.mark.parametrize("laminar", [0.0, 1.0])
@@ -75,13 +96,17 @@ def test_a_diagnosis_repeats_exactly() -> None:
 def test_noise_level_is_recovered(level: float) -> None:
     rng = np.random.default_rng(0)
     slow = 500.0 * np.sin(np.arange(4000) * 0.01)
-    estimate = noise_level(slow + rng.normal(0.0, level, 4000), np.ones(4000, dtype=bool), seed=SETTINGS.seed)
+    estimate = noise_level(
+        slow + rng.normal(0.0, level, 4000), np.ones(4000, dtype=bool), seed=SETTINGS.seed
+    )
     assert estimate == pytest.approx(level, rel=0.08)
 
 
 def test_quantised_rest_has_the_noise_of_its_lattice() -> None:
     values = np.where(np.arange(400) % 50 == 0, 42.0, 0.0)
-    assert noise_level(values, np.ones(400, dtype=bool), seed=SETTINGS.seed) == pytest.approx(42.0 / np.sqrt(12.0))
+    assert noise_level(values, np.ones(400, dtype=bool), seed=SETTINGS.seed) == pytest.approx(
+        42.0 / np.sqrt(12.0)
+    )
 
 
 def test_too_few_samples_are_refused_in_words() -> None:
@@ -120,9 +145,16 @@ def shoulder_recording(n: int = 2000) -> Recording:
     rig = pamrs.rigs.shoulder()
     time = 0.005 * np.arange(n)
     command = 5.0 + 0.3 * np.sin(time) + 0.1 * np.sin(5 * time)
-    run = pamrs.simulate(rig, command, sample_time=0.005, initial={"muscle_pressure": 2e5, "joint_angle": 0.9})
+    run = pamrs.simulate(
+        rig, command, sample_time=0.005, initial={"muscle_pressure": 2e5, "joint_angle": 0.9}
+    )
     rng = np.random.default_rng(5)
-    noise = {"valve_command": 0.0, "supply_pressure": 400.0, "muscle_pressure": 400.0, "joint_angle": 3e-4}
+    noise = {
+        "valve_command": 0.0,
+        "supply_pressure": 400.0,
+        "muscle_pressure": 400.0,
+        "joint_angle": 3e-4,
+    }
     channels = {name: run[name] + rng.normal(0.0, 1.0, n) * level for name, level in noise.items()}
     mask = {name: np.ones(n, dtype=bool) for name in channels}
     return Recording("run", "fit", time, 0.005, channels, mask, [], dict.fromkeys(channels, "SI"))
@@ -134,12 +166,17 @@ def test_a_hole_in_a_drive_costs_only_itself() -> None:
     recording.mask["valve_command"][900:930] = False
     prepared = prepare(recording, pamrs.rigs.shoulder(), SETTINGS)
     lost = {}
-    for block in available_blocks(pamrs.rigs.shoulder(), tuple(recording.channels), SETTINGS.prepare):
-        rows = prepared.usable(block.channel, block.drives, prepared.starts(block.window, block.drives))
+    for block in available_blocks(
+        pamrs.rigs.shoulder(), tuple(recording.channels), SETTINGS.prepare
+    ):
+        rows = prepared.usable(
+            block.channel, block.drives, prepared.starts(block.window, block.drives)
+        )
         lost[block.name] = int((~rows).sum())
         if "valve_command" in block.drives:
             assert not rows[900:930].any()
-    # the arm is driven by the pressure: the hole and the smoothing's reach on both sides, and no more
+    # the arm is driven by the pressure: the hole and the smoothing's reach on both sides, and no
+    # more
     assert lost["arm"] <= 20 + 2 * 6 + 1
 
 
@@ -161,12 +198,22 @@ def test_mostly_missing_data_are_refused_in_words() -> None:
 def _share(name: str, recording: Recording) -> float:
     rig = pamrs.rigs.shoulder()
     prepared = prepare(recording, rig, SETTINGS)
-    block = next(b for b in available_blocks(rig, tuple(recording.channels), SETTINGS.prepare) if b.name == name)
-    return float(prepared.usable(block.channel, block.drives, prepared.starts(block.window, block.drives)).mean())
+    block = next(
+        b
+        for b in available_blocks(rig, tuple(recording.channels), SETTINGS.prepare)
+        if b.name == name
+    )
+    return float(
+        prepared.usable(
+            block.channel, block.drives, prepared.starts(block.window, block.drives)
+        ).mean()
+    )
 
 
 @pytest.mark.skipif(not DATA.exists(), reason="the recordings of ../shared are absent")
-@pytest.mark.parametrize(("name", "leaks"), [("Ultimaker_015", True), ("Ultimaker_020", True), ("Aluminium", False)])
+@pytest.mark.parametrize(
+    ("name", "leaks"), [("Ultimaker_015", True), ("Ultimaker_020", True), ("Aluminium", False)]
+)
 def test_printed_chambers(name: str, leaks: bool) -> None:
     found = pamrs.diagnose(CHAMBERS / name)
     leak = found.probabilities.get("leak_muscle", 0.0)
@@ -178,7 +225,9 @@ def test_printed_chambers(name: str, leaks: bool) -> None:
     else:
         # a drift of half a percent is not called a leak with confidence
         assert leak < 0.9
-        slow = next(e for e in found.effects if e["id"] == "leak_muscle")["parameters"]["time_constant"]["value"]
+        slow = next(e for e in found.effects if e["id"] == "leak_muscle")["parameters"][
+            "time_constant"
+        ]["value"]
         assert slow > 1e4
 
 
@@ -186,7 +235,9 @@ def test_printed_chambers(name: str, leaks: bool) -> None:
 def test_small_blinded_trial(kind: str, tmp_path: Path) -> None:
     from trial import make_case
 
-    made = make_case(tmp_path / "cases", tmp_path / "keys", kind, seed=2014, recordings=4, duration=12.0)
+    made = make_case(
+        tmp_path / "cases", tmp_path / "keys", kind, seed=2014, recordings=4, duration=12.0
+    )
     assert made is not None
     (folder,) = sorted((tmp_path / "cases").glob("case_*"))
     found = pamrs.diagnose(folder)

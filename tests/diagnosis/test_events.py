@@ -20,13 +20,19 @@ TIMES = {"lift": 4.3, "lower": 7.1, "again": 5.6}
 ROLES = {"lift": "fit", "lower": "fit", "again": "held_out"}
 
 
-def recordings(effect: str, make: dict[str, float], duration: float = 12.0, *, plant: pamrs.Rig | None = None) -> list[Recording]:
+def recordings(
+    effect: str, make: dict[str, float], duration: float = 12.0, *, plant: pamrs.Rig | None = None
+) -> list[Recording]:
     """Recordings of a shoulder with an event each, with the noise of transducers."""
     found = []
     for number, (name, when) in enumerate(TIMES.items()):
         rng = np.random.default_rng([2014, number])
         time = np.arange(0.0, duration, 0.005)
-        command = 5.0 + (0.35 + 0.1 * number) * np.sin(2 * np.pi * 0.15 * time) + 0.25 * np.sin(2 * np.pi * 0.4 * time + number)
+        command = (
+            5.0
+            + (0.35 + 0.1 * number) * np.sin(2 * np.pi * 0.15 * time)
+            + 0.25 * np.sin(2 * np.pi * 0.4 * time + number)
+        )
         rig = (plant or pamrs.rigs.shoulder()).with_effect(effect, make | {"time": when})
         run = pamrs.simulate(rig, valve_command=command, sample_time=0.005)
         channels = {
@@ -36,7 +42,11 @@ def recordings(effect: str, make: dict[str, float], duration: float = 12.0, *, p
             "joint_angle": run["joint_angle"] + rng.normal(0.0, 3e-4, time.size),
         }
         mask = {channel: np.ones(time.size, dtype=bool) for channel in channels}
-        found.append(Recording(name, ROLES[name], time, 0.005, channels, mask, [], dict.fromkeys(channels, "")))
+        found.append(
+            Recording(
+                name, ROLES[name], time, 0.005, channels, mask, [], dict.fromkeys(channels, "")
+            )
+        )
     return found
 
 
@@ -48,7 +58,9 @@ def recordings(effect: str, make: dict[str, float], duration: float = 12.0, *, p
     ],
 )
 def test_an_event_is_named_with_its_times(effect: str, make: dict[str, float]) -> None:
-    found = pamrs.diagnose(pamrs.Case("events", pamrs.rigs.shoulder(), recordings(effect, make), Path()))
+    found = pamrs.diagnose(
+        pamrs.Case("events", pamrs.rigs.shoulder(), recordings(effect, make), Path())
+    )
     assert found.verdict == "effects"
     assert found.effects[0]["id"] == effect
     assert found.probabilities[effect] > 0.8
@@ -63,8 +75,15 @@ def test_an_event_is_named_with_its_times(effect: str, make: dict[str, float]) -
 
 def test_a_recording_without_the_event_has_no_slope_in_it() -> None:
     rig = pamrs.rigs.shoulder()
-    prepared = [prepare(r, rig, SETTINGS) for r in recordings("payload_change", {"mass_change": 0.4}, 4.0)[:2]]
-    blocks = [b for b in available_blocks(rig, tuple(prepared[0].recording.channels), SETTINGS.prepare) if b.name == "arm"]
+    prepared = [
+        prepare(r, rig, SETTINGS)
+        for r in recordings("payload_change", {"mass_change": 0.4}, 4.0)[:2]
+    ]
+    blocks = [
+        b
+        for b in available_blocks(rig, tuple(prepared[0].recording.channels), SETTINGS.prepare)
+        if b.name == "arm"
+    ]
     happened = Events("payload_change", {"lift": {"mass_change": 0.4, "time": 2.0}})
     names = ["arm.payload", "payload_change.mass_change"]
     found = residuals(Problem(blocks, prepared, core_rig(rig), SETTINGS), rig, names, happened)
@@ -77,12 +96,16 @@ def test_a_recording_without_the_event_has_no_slope_in_it() -> None:
 
 
 @pytest.mark.slow
-def test_a_push_is_found_beside_a_lasting_effect() -> None:
-    plant = pamrs.rigs.shoulder().with_effect("muscle_hysteresis", {"friction_pressure": 1e-4, "presliding": 0.003})
+def test_a_push_is_found_beside_a_persistent_effect() -> None:
+    plant = pamrs.rigs.shoulder().with_effect(
+        "muscle_hysteresis", {"friction_pressure": 1e-4, "presliding": 0.003}
+    )
     records = recordings("external_torque", {"torque": 5.0, "duration": 0.8}, plant=plant)
     found = pamrs.diagnose(pamrs.Case("both", pamrs.rigs.shoulder(), records, Path()))
     assert found.probabilities["external_torque+muscle_hysteresis"] > 0.5
     (push,) = [e for e in found.effects if e["id"] == "external_torque"]
-    largest = {e["recording"]: e["time"] for e in sorted(push["events"], key=lambda e: abs(e["torque"]))}
+    largest = {
+        e["recording"]: e["time"] for e in sorted(push["events"], key=lambda e: abs(e["torque"]))
+    }
     assert all(abs(largest[name] - when) < 0.3 for name, when in TIMES.items())
     assert found.rig.effects[0]["id"] == "muscle_hysteresis"

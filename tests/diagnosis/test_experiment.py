@@ -11,7 +11,15 @@ import pytest
 
 import pamrs
 from pamrs.diagnosis import DiagnosisSettings
-from pamrs.diagnosis.next_experiment import MEASURABLE, entropy, information, library, propose, taken, usual_noise
+from pamrs.diagnosis.next_experiment import (
+    MEASURABLE,
+    entropy,
+    information,
+    library,
+    propose,
+    taken,
+    usual_noise,
+)
 from pamrs.diagnosis.result import schema
 from tests.diagnosis import synthetic
 
@@ -23,7 +31,12 @@ NOISE = usual_noise(SETTINGS.next_experiment)
 def pool():
     """The experiments of the shoulder."""
     names = ("null_ramp", "nested_triangles", "slow_triangle")
-    return {e.name: e for e in library(pamrs.rigs.shoulder(), SETTINGS.next_experiment, sample_time=0.01, only=names)}
+    return {
+        e.name: e
+        for e in library(
+            pamrs.rigs.shoulder(), SETTINGS.next_experiment, sample_time=0.01, only=names
+        )
+    }
 
 
 @pytest.fixture(scope="module")
@@ -31,13 +44,23 @@ def speeds(pool):
     """Creep or hysteresis, at two speeds and with holds."""
     rig = pamrs.rigs.shoulder()
     hypotheses = [
-        ("muscle_hysteresis", rig.with_effect("muscle_hysteresis", {"friction_constant": 0.5, "friction_pressure": 5e-6}), 0.5),
-        ("muscle_creep", rig.with_effect("muscle_creep", {"stiffness": 60.0, "time_constant": 3.0}), 0.4),
+        (
+            "muscle_hysteresis",
+            rig.with_effect(
+                "muscle_hysteresis", {"friction_constant": 0.5, "friction_pressure": 5e-6}
+            ),
+            0.5,
+        ),
+        (
+            "muscle_creep",
+            rig.with_effect("muscle_creep", {"stiffness": 60.0, "time_constant": 3.0}),
+            0.4,
+        ),
     ]
     return propose(rig, hypotheses, experiments=[pool["nested_triangles"], pool["slow_triangle"]])
 
 
-def test_information_lies_between_nothing_and_the_doubt() -> None:
+def test_information_lies_between_nothing_and_the_uncertainty() -> None:
     p = [0.5, 0.3, 0.2]
     rng = np.random.default_rng(1)
     assert information(p, np.zeros((3, 3))) == pytest.approx(0.0, abs=1e-12)
@@ -54,11 +77,11 @@ def test_information_lies_between_nothing_and_the_doubt() -> None:
 
 
 def test_speed_separates_creep_from_hysteresis(speeds) -> None:
-    doubt = entropy([0.5, 0.4])
-    assert 0.3 * doubt < speeds["expected_information_bits"] <= doubt
+    uncertainty = entropy([0.5, 0.4])
+    assert 0.3 * uncertainty < speeds["expected_information_bits"] <= uncertainty
     ranking = {entry["name"]: entry["bits"] for entry in speeds["ranking"]}
     assert ranking["nested_triangles"] >= ranking["slow_triangle"] - 0.02
-    assert all(0.0 <= bits <= doubt for bits in ranking.values())
+    assert all(0.0 <= bits <= uncertainty for bits in ranking.values())
     assert speeds["excitation"]["kind"] == speeds["ranking"][0]["name"]
     assert "creep" in speeds["text"]
     assert "bar" in speeds["text"]
@@ -102,10 +125,14 @@ def test_recordings_say_the_channels_the_clock_and_the_pressure() -> None:
     leak = rig.with_effect("leak_muscle", {"conductance": 1e-13})
     run = pamrs.simulate(rig, duration=60.0, sample_time=0.2, initial={"muscle_pressure": 4e5})
     prepared = taken(run, rig, "hold", NOISE, SETTINGS)
-    found = propose(rig, [("none", rig, 0.6), ("leak_muscle", leak, 0.4)], {"muscle_pressure": 50.0}, [prepared])
+    found = propose(
+        rig, [("none", rig, 0.6), ("leak_muscle", leak, 0.4)], {"muscle_pressure": 50.0}, [prepared]
+    )
     assert max(found["excitation"]["levels_bar"]) <= 4.21
     assert found["curves"]["time"][1] == pytest.approx(0.2)
-    assert math.isclose(found["curves"]["values"]["none"][0], found["curves"]["values"]["leak_muscle"][0])
+    assert math.isclose(
+        found["curves"]["values"]["none"][0], found["curves"]["values"]["leak_muscle"][0]
+    )
 
 
 def test_a_missing_sensor_is_proposed(pool) -> None:
@@ -122,7 +149,9 @@ def test_a_missing_sensor_is_proposed(pool) -> None:
 
 def test_one_hypothesis_needs_no_experiment() -> None:
     rig = pamrs.rigs.sealed_chamber()
-    found = propose(rig, [("none", rig, 0.999), ("leak_muscle", rig.with_effect("leak_muscle"), 0.0)])
+    found = propose(
+        rig, [("none", rig, 0.999), ("leak_muscle", rig.with_effect("leak_muscle"), 0.0)]
+    )
     assert found["expected_information_bits"] == 0.0
     assert found.curves is None
     assert found["curves"] is None
@@ -135,4 +164,8 @@ def test_impossible_arguments_are_named() -> None:
     with pytest.raises(pamrs.ParameterError, match="'none' is 1.5"):
         propose(rig, [("none", rig, 1.5)])
     with pytest.raises(pamrs.ParameterError, match="'angle'.*muscle_pressure"):
-        propose(rig, [("none", rig, 0.5), ("leak_muscle", rig.with_effect("leak_muscle"), 0.5)], channels=("angle",))
+        propose(
+            rig,
+            [("none", rig, 0.5), ("leak_muscle", rig.with_effect("leak_muscle"), 0.5)],
+            channels=("angle",),
+        )

@@ -1,4 +1,6 @@
-"""Hostile recordings of a plant in which nothing is missing: refused in words, or judged without a confident name."""
+"""Hostile recordings of a plant in which nothing is missing: refused in words, or judged without a
+confident name.
+"""
 
 from __future__ import annotations
 
@@ -35,13 +37,19 @@ def sound(n: int = 1600, *, seed: int = 5) -> Table:
     rig = pamrs.rigs.shoulder()
     time = 0.005 * np.arange(n)
     command = 5.0 + 0.45 * np.sin(1.6 * time) + 0.25 * np.sin(4.1 * time)
-    run = pamrs.simulate(rig, command, sample_time=0.005, initial={"muscle_pressure": 2e5, "joint_angle": 0.9})
+    run = pamrs.simulate(
+        rig, command, sample_time=0.005, initial={"muscle_pressure": 2e5, "joint_angle": 0.9}
+    )
     rng = np.random.default_rng(seed)
     noise = {"supply_pressure": 400.0, "muscle_pressure": 400.0, "joint_angle": 3e-4}
-    return {"time": time, "valve_command": command} | {c: run[c] + rng.normal(0.0, s, n) for c, s in noise.items()}
+    return {"time": time, "valve_command": command} | {
+        c: run[c] + rng.normal(0.0, s, n) for c, s in noise.items()
+    }
 
 
-def loaded(folder: Path, table: Table, units: dict[str, str] | None = None, name: str = "run") -> pamrs.Case:
+def loaded(
+    folder: Path, table: Table, units: dict[str, str] | None = None, name: str = "run"
+) -> pamrs.Case:
     """The table as a case, by way of a file."""
     headings = HEADINGS | (units or {})
     rows = zip(*(table[c].tolist() for c in table), strict=True)
@@ -55,7 +63,9 @@ def loaded(folder: Path, table: Table, units: dict[str, str] | None = None, name
 def holes(t: Table) -> Table:
     """Nearly a third of the samples of every channel missing, each on its own."""
     rng = np.random.default_rng(1)
-    return {c: v if c == "time" else np.where(rng.random(v.size) < 0.3, np.nan, v) for c, v in t.items()}
+    return {
+        c: v if c == "time" else np.where(rng.random(v.size) < 0.3, np.nan, v) for c, v in t.items()
+    }
 
 
 def rows_gone(t: Table) -> Table:
@@ -91,9 +101,13 @@ def plain() -> Table:
 
 
 @pytest.mark.parametrize("damage", [holes, rows_gone, steps, saturated, frozen_while])
-def test_what_is_judged_gets_no_confident_name(damage: Callable[[Table], Table], plain: Table, tmp_path: Path) -> None:
+def test_what_is_judged_gets_no_confident_name(
+    damage: Callable[[Table], Table], plain: Table, tmp_path: Path
+) -> None:
     found = pamrs.diagnose(loaded(tmp_path, damage(plain)))
-    named = [e["id"] for e in found.effects if found.verdict == "effects" and e["probability"] >= 0.5]
+    named = [
+        e["id"] for e in found.effects if found.verdict == "effects" and e["probability"] >= 0.5
+    ]
     assert not named, found.text
     assert found.warnings
 
@@ -109,24 +123,88 @@ def put(channel: str, change: Callable[[Array], Array]) -> Callable[[Table], Tab
 
 
 REFUSED = {
-    "bar under Pa": (put("muscle_pressure", lambda p: p / 1e5), {}, "muscle_pressure never exceeds .* bar"),
-    "Pa under bar": (lambda t: t, {"muscle_pressure": "bar"}, "muscle_pressure.*not possible.*unit"),
-    "kPa under bar": (put("muscle_pressure", lambda p: p / 1e3), {"muscle_pressure": "bar"}, "muscle_pressure reaches .* kPa"),
-    "psi under bar": (put("supply_pressure", lambda p: p / 6894.76), {"supply_pressure": "bar"}, "supply_pressure reaches .* psi"),
-    "rad under deg": (lambda t: t, {"joint_angle": "deg"}, "joint_angle .*(deg or rad|rad under a heading in deg)"),
-    "deg under rad": (put("joint_angle", np.degrees), {}, "joint_angle.*(deg or rad|right column and unit)"),
-    "angle the other way": (put("joint_angle", lambda q: 2.7 - q), {}, "joint_angle .* opposite to the model"),
-    "supply and muscle": (swap("supply_pressure", "muscle_pressure"), {}, "muscle_pressure is above supply_pressure for .* swapped"),
+    "bar under Pa": (
+        put("muscle_pressure", lambda p: p / 1e5),
+        {},
+        "muscle_pressure never exceeds .* bar",
+    ),
+    "Pa under bar": (
+        lambda t: t,
+        {"muscle_pressure": "bar"},
+        "muscle_pressure.*not possible.*unit",
+    ),
+    "kPa under bar": (
+        put("muscle_pressure", lambda p: p / 1e3),
+        {"muscle_pressure": "bar"},
+        "muscle_pressure reaches .* kPa",
+    ),
+    "psi under bar": (
+        put("supply_pressure", lambda p: p / 6894.76),
+        {"supply_pressure": "bar"},
+        "supply_pressure reaches .* psi",
+    ),
+    "rad under deg": (
+        lambda t: t,
+        {"joint_angle": "deg"},
+        "joint_angle .*(deg or rad|rad under a heading in deg)",
+    ),
+    "deg under rad": (
+        put("joint_angle", np.degrees),
+        {},
+        "joint_angle.*(deg or rad|right column and unit)",
+    ),
+    "angle the other way": (
+        put("joint_angle", lambda q: 2.7 - q),
+        {},
+        "joint_angle .* opposite to the model",
+    ),
+    "supply and muscle": (
+        swap("supply_pressure", "muscle_pressure"),
+        {},
+        "muscle_pressure is above supply_pressure for .* swapped",
+    ),
     "pressure and angle": (swap("muscle_pressure", "joint_angle"), {}, "joint_angle.*not possible"),
     "supply and angle": (swap("supply_pressure", "joint_angle"), {}, "joint_angle.*not possible"),
-    "valve the other way": (put("valve_command", lambda u: 10.0 - u), {}, "change of muscle_pressure goes against valve_command"),
-    "command in mV under V": (put("valve_command", lambda u: 100.0 * u), {}, "valve_command is beyond twice its valve's range"),
-    "frozen supply": (put("supply_pressure", lambda p: np.full_like(p, p[0])), {}, "supply_pressure has the one value .* frozen"),
-    "frozen muscle": (put("muscle_pressure", lambda p: np.full_like(p, p[0])), {}, "only 0 of .* samples of muscle_pressure"),
-    "frozen angle": (put("joint_angle", lambda q: np.full_like(q, q[0])), {}, "joint_angle has the one value .* encoder"),
-    "pressure all NaN": (put("muscle_pressure", lambda p: np.full_like(p, np.nan)), {}, "only 0 of .* samples of muscle_pressure"),
-    "command all NaN": (put("valve_command", lambda u: np.full_like(u, np.nan)), {}, "no usable sample of valve_command"),
-    "everything NaN": (lambda t: {c: v if c == "time" else np.full_like(v, np.nan) for c, v in t.items()}, {}, "only 0 of"),
+    "valve the other way": (
+        put("valve_command", lambda u: 10.0 - u),
+        {},
+        "change of muscle_pressure goes against valve_command",
+    ),
+    "command in mV under V": (
+        put("valve_command", lambda u: 100.0 * u),
+        {},
+        "valve_command is beyond twice its valve's range",
+    ),
+    "frozen supply": (
+        put("supply_pressure", lambda p: np.full_like(p, p[0])),
+        {},
+        "supply_pressure has the one value .* frozen",
+    ),
+    "frozen muscle": (
+        put("muscle_pressure", lambda p: np.full_like(p, p[0])),
+        {},
+        "only 0 of .* samples of muscle_pressure",
+    ),
+    "frozen angle": (
+        put("joint_angle", lambda q: np.full_like(q, q[0])),
+        {},
+        "joint_angle has the one value .* encoder",
+    ),
+    "pressure all NaN": (
+        put("muscle_pressure", lambda p: np.full_like(p, np.nan)),
+        {},
+        "only 0 of .* samples of muscle_pressure",
+    ),
+    "command all NaN": (
+        put("valve_command", lambda u: np.full_like(u, np.nan)),
+        {},
+        "no usable sample of valve_command",
+    ),
+    "everything NaN": (
+        lambda t: {c: v if c == "time" else np.full_like(v, np.nan) for c, v in t.items()},
+        {},
+        "only 0 of",
+    ),
     "no time": (put("time", lambda t: np.full_like(t, np.nan)), {}, "'time' has no value at all"),
     "time backwards": (put("time", lambda t: t[::-1].copy()), {}, "'time' runs backwards"),
     "time standing still": (put("time", np.zeros_like), {}, "at different times"),
@@ -146,24 +224,37 @@ def test_what_cannot_be_is_refused_in_words(name: str, plain: Table, tmp_path: P
 def test_sound_recordings_are_plausible(plain: Table, tmp_path: Path) -> None:
     case = loaded(tmp_path, plain)
     assert implausible(case.recordings[0], case.rig, SETTINGS.plausibility) == []
-    resting = {c: v[:400] for c, v in plain.items()} | {"muscle_pressure": np.zeros(400), "joint_angle": np.full(400, 0.2618)}
-    assert implausible(loaded(tmp_path, resting).recordings[0], case.rig, SETTINGS.plausibility) == []
+    resting = {c: v[:400] for c, v in plain.items()} | {
+        "muscle_pressure": np.zeros(400),
+        "joint_angle": np.full(400, 0.2618),
+    }
+    assert (
+        implausible(loaded(tmp_path, resting).recordings[0], case.rig, SETTINGS.plausibility) == []
+    )
 
 
 def test_every_finding_is_told_at_once(plain: Table, tmp_path: Path) -> None:
     table = put("joint_angle", lambda q: 20 * q)(swap("supply_pressure", "muscle_pressure")(plain))
     with pytest.raises(pamrs.DiagnosisError) as told:
         pamrs.diagnose(loaded(tmp_path, table))
-    assert all(word in str(told.value) for word in ("'run'", "joint_angle", "muscle_pressure", "allowed"))
+    assert all(
+        word in str(told.value) for word in ("'run'", "joint_angle", "muscle_pressure", "allowed")
+    )
 
 
 def test_an_arm_whose_swing_moves_the_pressure_is_not_refused() -> None:
     # a limit cycle: most of the pressure's change is the volume's, against the valve
     name, payload = "the rig", lift.PAYLOADS[1]
     truth = lift.plant(lift.VARIANTS[name], payload, seed=None)
-    model = lift.believed(lift.VARIANTS[name]).with_parameters({"arm.payload": payload})
+    model = lift.assumed(lift.VARIANTS[name]).with_parameters({"arm.payload": payload})
     record = recorded(truth, model, trajectories.compound(), "fit", 0, 25.0)
     assert np.ptp(record.channels["joint_angle"]) > 1.0
     assert implausible(record, model, SETTINGS.plausibility) == []
-    turned = replace(record, channels=record.channels | {"valve_command": 10.0 - record.channels["valve_command"]})
-    assert any("goes against valve_command" in text for text in implausible(turned, model, SETTINGS.plausibility))
+    turned = replace(
+        record,
+        channels=record.channels | {"valve_command": 10.0 - record.channels["valve_command"]},
+    )
+    assert any(
+        "goes against valve_command" in text
+        for text in implausible(turned, model, SETTINGS.plausibility)
+    )

@@ -1,4 +1,4 @@
-"""The bounded least squares of the diagnosis, against SciPy's and by its promises."""
+"""The bounded least squares of the diagnosis, against SciPy's and by its predicted gains."""
 
 from __future__ import annotations
 
@@ -29,7 +29,9 @@ def decay(x: Array, time: Array, data: Array) -> tuple[Array, Array, str]:
 
 
 def test_the_end_of_a_valley_is_found() -> None:
-    x, (rows, _, _), spent = levenberg_marquardt(rosenbrock, np.array([-1.2, 1.0]), WIDE, 60, SETTINGS.fit)
+    x, (rows, _, _), spent = levenberg_marquardt(
+        rosenbrock, np.array([-1.2, 1.0]), WIDE, 60, SETTINGS.fit
+    )
     # a step stops being worth it at a gain of 0.2 in chi-square, or of the two thousandth part
     assert float(rows @ rows) < 1.0
     assert np.allclose(x, 1.0, atol=2e-3)
@@ -41,10 +43,18 @@ def test_the_same_end_as_scipy_in_a_box(seed: int) -> None:
     rng = np.random.default_rng(seed)
     time = np.linspace(0.0, 3.0, 200)
     data = 2.0 * np.exp(-1.5 * time) + 0.01 * rng.standard_normal(200)
-    low, high = np.array([0.0, 0.1]), np.array([1.8, 5.0])  # the best amplitude lies beyond the wall
-    x, best, _ = levenberg_marquardt(lambda x: decay(x, time, data), np.array([0.5, 0.5]), (low, high), 40, SETTINGS.fit)
+    low, high = (
+        np.array([0.0, 0.1]),
+        np.array([1.8, 5.0]),
+    )  # the best amplitude lies beyond the wall
+    x, best, _ = levenberg_marquardt(
+        lambda x: decay(x, time, data), np.array([0.5, 0.5]), (low, high), 40, SETTINGS.fit
+    )
     theirs = least_squares(
-        lambda x: decay(x, time, data)[0], np.array([0.5, 0.5]), jac=lambda x: decay(x, time, data)[1], bounds=(low, high)
+        lambda x: decay(x, time, data)[0],
+        np.array([0.5, 0.5]),
+        jac=lambda x: decay(x, time, data)[1],
+        bounds=(low, high),
     )
     assert best[2] == "told"
     assert 0.5 * float(best[0] @ best[0]) <= theirs.cost * (1.0 + 2e-3) + 0.2
@@ -61,7 +71,9 @@ def test_a_point_that_cannot_be_simulated_is_taken_back() -> None:
             raise SimulationError("beyond the model's range")
         return 10.0 * np.arctan(2.0 * (x - 1.0)), np.diag(20.0 / (1.0 + 4.0 * (x - 1.0) ** 2)), None
 
-    x, _, _ = levenberg_marquardt(evaluate, np.array([-1.0]), (np.array([-5.0]), np.array([5.0])), 30, SETTINGS.fit)
+    x, _, _ = levenberg_marquardt(
+        evaluate, np.array([-1.0]), (np.array([-5.0]), np.array([5.0])), 30, SETTINGS.fit
+    )
     assert max(visited) > 1.5, "the first step overshoots: the case is empty otherwise"
     assert abs(float(x[0]) - 1.0) < 0.02
 
@@ -71,7 +83,9 @@ def test_a_start_that_cannot_be_simulated_is_an_error() -> None:
         raise SimulationError("no such plant")
 
     with pytest.raises(SimulationError, match="no such plant"):
-        levenberg_marquardt(evaluate, np.zeros(1), (np.array([-1.0]), np.array([1.0])), 5, SETTINGS.fit)
+        levenberg_marquardt(
+            evaluate, np.zeros(1), (np.array([-1.0]), np.array([1.0])), 5, SETTINGS.fit
+        )
 
 
 def test_noise_is_not_worth_an_evaluation() -> None:
@@ -79,14 +93,19 @@ def test_noise_is_not_worth_an_evaluation() -> None:
     rows += 0.02 - rows.mean()  # a gain of 0.4 in a chi-square of 1000
     jacobian = np.ones((1000, 1))
     found = levenberg_marquardt(
-        lambda x: (rows + jacobian[:, 0] * x[0], jacobian, None), np.zeros(1), (WIDE[0][:1], WIDE[1][:1]), 9, SETTINGS.fit
+        lambda x: (rows + jacobian[:, 0] * x[0], jacobian, None),
+        np.zeros(1),
+        (WIDE[0][:1], WIDE[1][:1]),
+        9,
+        SETTINGS.fit,
     )
     spent = found[2]
     assert spent == 1
 
 
 def test_a_step_that_walls_bend_uphill_is_shortened() -> None:
-    # the long way to the minimum leaves the box through both parameters, and the corner where it leaves lies uphill
+    # the long way to the minimum leaves the box through both parameters, and the corner where it
+    # leaves lies uphill
     normal = np.array([[1.0, 0.999], [0.999, 1.0]])
     root = np.linalg.cholesky(normal).T
     aim = np.array([50.0, -45.0])

@@ -1,4 +1,6 @@
-"""Where no recording is held out, each is predicted by the others: as a fit to the others would, without one."""
+"""Where no recording is held out, each is predicted by the others: as a fit to the others would,
+without one.
+"""
 
 from __future__ import annotations
 
@@ -24,10 +26,16 @@ CHANNEL = {"muscle_pressure": "Pa"}
 def hold(name: str, conductance: float, seconds: float = 60.0, seed: int = 0) -> Recording:
     """A sealed hold at 10 Hz with 150 Pa of noise."""
     truth = RIG.with_effect("leak_muscle", {"conductance": conductance})
-    run = pamrs.simulate(truth, duration=seconds, sample_time=0.1, step=0.01, initial={"muscle_pressure": 7e5})
-    pressure = run["muscle_pressure"] + np.random.default_rng(seed).normal(0.0, 150.0, run.time.size)
+    run = pamrs.simulate(
+        truth, duration=seconds, sample_time=0.1, step=0.01, initial={"muscle_pressure": 7e5}
+    )
+    pressure = run["muscle_pressure"] + np.random.default_rng(seed).normal(
+        0.0, 150.0, run.time.size
+    )
     mask = {"muscle_pressure": np.ones(run.time.size, dtype=bool)}
-    return Recording(name, "fit", run.time, 0.1, {"muscle_pressure": pressure}, mask, [], dict(CHANNEL))
+    return Recording(
+        name, "fit", run.time, 0.1, {"muscle_pressure": pressure}, mask, [], dict(CHANNEL)
+    )
 
 
 def problem(*recordings: Recording) -> Problem:
@@ -39,7 +47,16 @@ def leaking(given: Problem) -> Fit:
     """The leak fitted to every recording of a problem."""
     start = {"leak_muscle.conductance": 1e-11}
     white = {b.name: 1.0 for b in given.blocks}
-    return fit(given, RIG, ("leak_muscle",), start, white, fixed={"leak_muscle.laminar_share": 0.0}, evaluations=30, share=0.0)
+    return fit(
+        given,
+        RIG,
+        ("leak_muscle",),
+        start,
+        white,
+        fixed={"leak_muscle.laminar_share": 0.0},
+        evaluations=30,
+        share=0.0,
+    )
 
 
 def rms(found: object, key: tuple[str, str]) -> float:
@@ -48,11 +65,18 @@ def rms(found: object, key: tuple[str, str]) -> float:
 
 def test_one_step_is_what_a_fit_to_the_others_predicts() -> None:
     names = ("one", "two", "three")
-    everything = problem(*(hold(n, c, seed=k) for k, (n, c) in enumerate(zip(names, (2e-11, 2.2e-11, 2.6e-11), strict=True))))
+    everything = problem(
+        *(
+            hold(n, c, seed=k)
+            for k, (n, c) in enumerate(zip(names, (2e-11, 2.2e-11, 2.6e-11), strict=True))
+        )
+    )
     found = leaking(everything)
     away = left_out(everything, found, {b.name: 1.0 for b in everything.blocks})
     for k, name in enumerate(names):
-        others = replace(everything, recordings=[p for i, p in enumerate(everything.recordings) if i != k])
+        others = replace(
+            everything, recordings=[p for i, p in enumerate(everything.recordings) if i != k]
+        )
         alone = replace(everything, recordings=[everything.recordings[k]])
         refitted = residuals(alone, leaking(others).rig)
         key = (everything.blocks[0].name, name)
@@ -75,11 +99,20 @@ def test_what_one_recording_alone_tells_is_taken_from_it() -> None:
 
 
 def test_recordings_without_roles_name_a_leak_that_is_in_all_of_them() -> None:
-    case = pamrs.Case("holds", RIG, [hold("one", 3e-11, 120.0), hold("two", 3e-11, 120.0, seed=1)], Path())
+    case = pamrs.Case(
+        "holds", RIG, [hold("one", 3e-11, 120.0), hold("two", 3e-11, 120.0, seed=1)], Path()
+    )
     found = pamrs.diagnose(case)
     assert found.effects[0]["id"] == "leak_muscle"
     assert any("how the other recordings predict each" in w for w in found.warnings)
-    one, two = (next(t for t in found.tried if t["effects"] == e)["held_out"]["chamber"] for e in ([], ["leak_muscle"]))
+    one, two = (
+        next(t for t in found.tried if t["effects"] == e)["held_out"]["chamber"]
+        for e in ([], ["leak_muscle"])
+    )
     assert one > 20.0 * two
-    differ = pamrs.diagnose(pamrs.Case("holds", RIG, [hold("one", 1e-11, 120.0), hold("two", 9e-11, 120.0, seed=1)], Path()))
+    differ = pamrs.diagnose(
+        pamrs.Case(
+            "holds", RIG, [hold("one", 1e-11, 120.0), hold("two", 9e-11, 120.0, seed=1)], Path()
+        )
+    )
     assert differ.probabilities["unlisted"] > max(0.3, 10.0 * found.probabilities["unlisted"])

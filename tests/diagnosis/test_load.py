@@ -1,4 +1,6 @@
-"""A muscle that lifts a hanging mass is diagnosed as an arm is: its length is the channel, its load the block."""
+"""A muscle that lifts a hanging mass is diagnosed as an arm is: its length is the channel, its load
+the block.
+"""
 
 from __future__ import annotations
 
@@ -45,15 +47,29 @@ def recording(rig: pamrs.Rig, name: str, role: str, seed: int, seconds: float = 
 
 def case(rig: pamrs.Rig) -> pamrs.Case:
     roles = {"slow": "fit", "fast": "fit", "steps": "held_out"}
-    return pamrs.Case("lift", RIG, [recording(rig, n, r, k) for k, (n, r) in enumerate(roles.items())], Path())
+    return pamrs.Case(
+        "lift", RIG, [recording(rig, n, r, k) for k, (n, r) in enumerate(roles.items())], Path()
+    )
 
 
 def test_the_load_is_a_block_and_its_sensitivities_are_those_of_differences() -> None:
     blocks = {b.name: b for b in available_blocks(RIG, tuple(NOISE), SETTINGS.prepare)}
     assert blocks["load"].kind == "arm"
     assert "length" in blocks["chamber"].drives
-    problem = Problem([blocks["load"]], [prepare(recording(RIG, "slow", "fit", 0, 6.0), RIG, SETTINGS)], core_rig(RIG), SETTINGS)
-    names = ["load.mass", "load.viscous", "load.coulomb", "muscle.modulus_scale", "sensors.pressure_zero", "sensors.length_zero"]
+    problem = Problem(
+        [blocks["load"]],
+        [prepare(recording(RIG, "slow", "fit", 0, 6.0), RIG, SETTINGS)],
+        core_rig(RIG),
+        SETTINGS,
+    )
+    names = [
+        "load.mass",
+        "load.viscous",
+        "load.coulomb",
+        "muscle.modulus_scale",
+        "sensors.pressure_zero",
+        "sensors.length_zero",
+    ]
     found = residuals(problem, RIG, names)["load", "slow"]
     assert float(np.sqrt(np.mean(found.value**2))) < 2.0 * found.noise
     prepared, known = problem.recordings[0], RIG.parameters
@@ -62,7 +78,9 @@ def test_the_load_is_a_block_and_its_sensitivities_are_those_of_differences() ->
     for k, name in enumerate(names):
         step = 1e-3 * known[name].tol
         up, down = (
-            core_rig(RIG.with_parameters({name: known[name].value + s * step})).predict(*given, [], prepared.signals, prepared.n)[0]
+            core_rig(RIG.with_parameters({name: known[name].value + s * step})).predict(
+                *given, [], prepared.signals, prepared.n
+            )[0]
             for s in (1.0, -1.0)
         )
         slope = (up - down) / (2.0 * step)
@@ -79,7 +97,9 @@ def test_the_load_is_a_block_and_its_sensitivities_are_those_of_differences() ->
 def test_a_true_model_of_a_load_misses_nothing(true: dict[str, float]) -> None:
     found = pamrs.diagnose(case(RIG.with_parameters(true)))
     assert found.verdict in ("none", "parameters")
-    if "muscle.rest_length" in true:  # what is read as a longer muscle is the zero of its length, near enough
+    if (
+        "muscle.rest_length" in true
+    ):  # what is read as a longer muscle is the zero of its length, near enough
         assert found.parameters["sensors.length_zero"]["value"] == pytest.approx(1e-3, abs=2e-4)
 
 
@@ -89,7 +109,9 @@ def test_the_zero_of_the_length_is_what_is_read_beside_the_true_one() -> None:
     assert other["length"] - one["length"] == pytest.approx(0.002)
     assert other["muscle_pressure"] == pytest.approx(one["muscle_pressure"])
     text = pamrs.rigs.sealed_chamber().to_toml_text() + 'length_zero = { value = 1, unit = "mm" }\n'
-    with pytest.raises(pamrs.RigError, match=r'length_zero is not allowed: a \[load\] with kind = "mass"'):
+    with pytest.raises(
+        pamrs.RigError, match=r'length_zero is not allowed: a \[load\] with kind = "mass"'
+    ):
         parse_rig(text)
 
 
@@ -102,15 +124,22 @@ def test_a_length_that_cannot_be_is_refused() -> None:
     assert told(lambda x: x) == ""
     assert "length has the one value" in told(lambda x: np.full_like(x, 0.25))
     assert "length is outside its load's range" in told(lambda x: 1e-3 * x)
-    assert "length moves with" in told(lambda x: 0.24 + 100.0 * (x - x.mean()) * np.sign(np.sin(1e4 * np.arange(x.size))))
+    assert "length moves with" in told(
+        lambda x: 0.24 + 100.0 * (x - x.mean()) * np.sign(np.sin(1e4 * np.arange(x.size)))
+    )
     slow = replace(recording(RIG, "slow", "fit", 0, 4.0), sample_time=0.4)
     assert "too slow for a load" in "; ".join(implausible(slow, RIG, SETTINGS.plausibility))
 
 
 def test_a_load_behind_a_valve_that_was_not_recorded_is_driven_by_its_pressure() -> None:
     whole = recording(RIG, "slow", "fit", 0, 4.0)
-    bare = replace(whole, channels={n: v for n, v in whole.channels.items() if n in ("muscle_pressure", "length")})
-    assert [b.name for b in available_blocks(RIG, tuple(bare.channels), SETTINGS.prepare)] == ["load"]
+    bare = replace(
+        whole,
+        channels={n: v for n, v in whole.channels.items() if n in ("muscle_pressure", "length")},
+    )
+    assert [b.name for b in available_blocks(RIG, tuple(bare.channels), SETTINGS.prepare)] == [
+        "load"
+    ]
     assert prepare(bare, RIG, SETTINGS).n == whole.time.size
 
 
@@ -118,9 +147,16 @@ def test_a_mass_that_changes_is_looked_for_and_found() -> None:
     assert RIG.muscle is not None
     assert fits(RIG, "payload_change")
     assert not fits(pamrs.rigs.bench(RIG.muscle), "payload_change")
-    changed = RIG.with_effect("payload_change", {"mass_change": -2.0, "time": 7.0})  # of which 4 s are not recorded
+    changed = RIG.with_effect(
+        "payload_change", {"mass_change": -2.0, "time": 7.0}
+    )  # of which 4 s are not recorded
     load = [b for b in available_blocks(RIG, tuple(NOISE), SETTINGS.prepare) if b.name == "load"]
-    problem = Problem(load, [prepare(recording(changed, "slow", "fit", 0, 6.0), RIG, SETTINGS)], core_rig(RIG), SETTINGS)
+    problem = Problem(
+        load,
+        [prepare(recording(changed, "slow", "fit", 0, 6.0), RIG, SETTINGS)],
+        core_rig(RIG),
+        SETTINGS,
+    )
     found = look_for_events("payload_change", problem, RIG, residuals(problem, RIG), {"load": 1.0})
     assert found is not None
     (values,) = found.values.values()
@@ -132,7 +168,9 @@ def test_the_next_experiment_with_a_load_is_simulated() -> None:
     assert [e.name for e in experiments] == ["staircase", "other_payload"]
     assert experiments[1].changes == {"load.mass": pytest.approx(20.0)}
     creeping = RIG.with_effect("muscle_creep")
-    told = propose(RIG, [("none", RIG, 0.5), ("muscle_creep", creeping, 0.5)], experiments=experiments[:1])
+    told = propose(
+        RIG, [("none", RIG, 0.5), ("muscle_creep", creeping, 0.5)], experiments=experiments[:1]
+    )
     assert told["expected_information_bits"] > 0.3
     assert told["curves"] is not None
 
@@ -140,7 +178,12 @@ def test_the_next_experiment_with_a_load_is_simulated() -> None:
 @pytest.mark.slow
 def test_an_effect_on_a_load_is_named() -> None:
     found = pamrs.diagnose(
-        case(RIG.with_effect("muscle_hysteresis", {"friction_constant": 4.0, "friction_pressure": 4e-5, "presliding": 2e-3}))
+        case(
+            RIG.with_effect(
+                "muscle_hysteresis",
+                {"friction_constant": 4.0, "friction_pressure": 4e-5, "presliding": 2e-3},
+            )
+        )
     )
     assert found.effects[0]["id"] == "muscle_hysteresis"
     assert found.effects[0]["probability"] > 0.8
@@ -152,10 +195,18 @@ def test_an_effect_on_a_load_is_named() -> None:
 def test_a_frame_holds_the_length_and_has_no_block_of_its_own() -> None:
     assert RIG.muscle is not None
     bench = pamrs.rigs.bench(RIG.muscle)
-    assert not [b for b in available_blocks(bench, ("muscle_pressure", "length"), SETTINGS.prepare) if b.name == "load"]
-    signals = {n: (np.full(64, v), np.zeros(64)) for n, v in (("muscle_pressure", 2e5), ("length", 0.25))}
+    assert not [
+        b
+        for b in available_blocks(bench, ("muscle_pressure", "length"), SETTINGS.prepare)
+        if b.name == "load"
+    ]
+    signals = {
+        n: (np.full(64, v), np.zeros(64)) for n, v in (("muscle_pressure", 2e5), ("length", 0.25))
+    }
     with pytest.raises((SimulationError, ValueError), match="frame"):
         core_rig(bench).predict("load", {}, DT, DT, [0], [], signals, 64)
-    still = Recording("held", "fit", DT * np.arange(64), DT, {n: v for n, (v, _) in signals.items()}, {}, [], {})
+    still = Recording(
+        "held", "fit", DT * np.arange(64), DT, {n: v for n, (v, _) in signals.items()}, {}, [], {}
+    )
     with pytest.raises(DiagnosisError, match="a frame holds the length"):
         pamrs.diagnose(pamrs.Case("held", bench, [still], Path()))

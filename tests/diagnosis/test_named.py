@@ -1,4 +1,6 @@
-"""Diagnosis of rigs with named blocks: each tank, chamber and joint its own block, and a joint driven by pressures alone."""
+"""Diagnosis of rigs with named blocks: each tank, chamber and joint its own block, and a joint
+driven by pressures alone.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +10,7 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis import DiagnosisSettings, _doubted, _unsettled
+from pamrs.diagnosis import DiagnosisSettings, _capped, _unsettled
 from pamrs.diagnosis.evidence import Group
 from pamrs.diagnosis.prepare import available_blocks
 from pamrs.recordings import Recording
@@ -20,7 +22,9 @@ RIGS = ROOT / "python" / "pamrs" / "rigs"
 NOISE = {"supply_pressure": 400.0, "muscle_pressure": 400.0, "joint_angle": 3e-4}
 
 
-def recorded(rig: pamrs.Rig, seed: int, role: str, *, pressures_only: bool = False, n: int = 1600) -> Recording:
+def recorded(
+    rig: pamrs.Rig, seed: int, role: str, *, pressures_only: bool = False, n: int = 1600
+) -> Recording:
     """The antagonistic joint, both valves moved, 8 s at 200 Hz."""
     rng = np.random.default_rng(seed)
     time, phase = 0.005 * np.arange(n), rng.uniform(0.0, 6.0, 3)
@@ -29,15 +33,23 @@ def recorded(rig: pamrs.Rig, seed: int, role: str, *, pressures_only: bool = Fal
     run = pamrs.simulate(rig, {"flexor": flexor, "extensor": extensor}, sample_time=0.005)
     kinds = ("muscle_pressure", "joint_angle") if pressures_only else (*NOISE, "valve_command")
     names = [name for name in run if name.partition(".")[0] in kinds]
-    channels = {name: run[name] + rng.normal(0.0, 1.0, n) * NOISE.get(name.partition(".")[0], 0.0) for name in names}
+    channels = {
+        name: run[name] + rng.normal(0.0, 1.0, n) * NOISE.get(name.partition(".")[0], 0.0)
+        for name in names
+    }
     mask = {name: np.ones(n, dtype=bool) for name in names}
-    return Recording(f"{role}_{seed}", role, run.time, 0.005, channels, mask, [], dict.fromkeys(names, "SI"))
+    return Recording(
+        f"{role}_{seed}", role, run.time, 0.005, channels, mask, [], dict.fromkeys(names, "SI")
+    )
 
 
-def case(truth: pamrs.Rig, nominal: pamrs.Rig, *, pressures_only: bool = False, n: int = 1600) -> pamrs.Case:
+def case(
+    truth: pamrs.Rig, nominal: pamrs.Rig, *, pressures_only: bool = False, n: int = 1600
+) -> pamrs.Case:
     """Two recordings to fit and one held out."""
     recordings = [
-        recorded(truth, seed, role, pressures_only=pressures_only, n=n) for seed, role in ((1, "fit"), (2, "fit"), (3, "held_out"))
+        recorded(truth, seed, role, pressures_only=pressures_only, n=n)
+        for seed, role in ((1, "fit"), (2, "fit"), (3, "held_out"))
     ]
     return pamrs.Case("antagonist", nominal, recordings, ROOT)
 
@@ -58,46 +70,87 @@ def bare(tmp_path_factory: pytest.TempPathFactory) -> pamrs.Rig:
 
 
 def test_every_block_has_its_own_drives_and_parameters(rig: pamrs.Rig) -> None:
-    blocks = {b.name: b for b in available_blocks(rig, tuple(recorded(rig, 1, "fit", n=40).channels), SETTINGS.prepare)}
+    blocks = {
+        b.name: b
+        for b in available_blocks(
+            rig, tuple(recorded(rig, 1, "fit", n=40).channels), SETTINGS.prepare
+        )
+    }
     assert list(blocks) == ["supply", "chamber.flexor", "chamber.extensor", "arm.elbow"]
     assert [b.kind for b in blocks.values()] == ["supply", "chamber", "chamber", "arm"]
     flexor = blocks["chamber.flexor"]
     assert flexor.channel == "muscle_pressure.flexor"
     assert flexor.drives == ("supply_pressure", "valve_command.flexor", "joint_angle.elbow")
-    assert {"valve.flexor.null_voltage", "chamber.flexor.dead_volume", "sensors.flexor.pressure_zero"} <= flexor.parameters
+    assert {
+        "valve.flexor.null_voltage",
+        "chamber.flexor.dead_volume",
+        "sensors.flexor.pressure_zero",
+    } <= flexor.parameters
     assert not any("extensor" in name for name in flexor.parameters)
     assert {"muscle_pressure.flexor", "valve_command.extensor"} <= set(blocks["supply"].drives)
-    assert {"muscle.flexor.modulus_scale", "muscle.extensor.modulus_scale", "sensors.elbow.angle_zero"} <= blocks[
-        "arm.elbow"
-    ].parameters
+    assert {
+        "muscle.flexor.modulus_scale",
+        "muscle.extensor.modulus_scale",
+        "sensors.elbow.angle_zero",
+    } <= blocks["arm.elbow"].parameters
 
 
 @pytest.mark.parametrize(
     ("name", "channels", "expected"),
     [
-        ("shoulder", ("supply_pressure", "muscle_pressure", "valve_command", "joint_angle"), ["supply", "chamber", "arm"]),
+        (
+            "shoulder",
+            ("supply_pressure", "muscle_pressure", "valve_command", "joint_angle"),
+            ["supply", "chamber", "arm"],
+        ),
         ("shoulder", ("muscle_pressure", "joint_angle"), ["arm"]),
         ("shoulder", ("muscle_pressure", "valve_command", "joint_angle"), ["arm"]),
         ("sealed_chamber", ("muscle_pressure",), ["chamber"]),
-        ("tube", ("muscle_pressure.left", "muscle_pressure.right"), ["chamber.left", "chamber.right"]),
-        ("regulated_joint", ("supply_command", "supply_pressure", "muscle_pressure", "joint_angle"), ["supply", "chamber", "arm"]),
-        ("regulated_joint", ("supply_pressure", "muscle_pressure", "joint_angle"), ["chamber", "arm"]),
+        (
+            "tube",
+            ("muscle_pressure.left", "muscle_pressure.right"),
+            ["chamber.left", "chamber.right"],
+        ),
+        (
+            "regulated_joint",
+            ("supply_command", "supply_pressure", "muscle_pressure", "joint_angle"),
+            ["supply", "chamber", "arm"],
+        ),
+        (
+            "regulated_joint",
+            ("supply_pressure", "muscle_pressure", "joint_angle"),
+            ["chamber", "arm"],
+        ),
         (
             "two_joint_arm",
-            ("muscle_pressure.elbow", "muscle_pressure.wrist", "joint_angle.elbow", "joint_angle.wrist", "valve_command.elbow"),
+            (
+                "muscle_pressure.elbow",
+                "muscle_pressure.wrist",
+                "joint_angle.elbow",
+                "joint_angle.wrist",
+                "valve_command.elbow",
+            ),
             ["chamber.elbow", "arm.elbow", "arm.wrist"],
         ),
     ],
 )
-def test_the_channels_decide_what_can_be_told_apart(name: str, channels: tuple[str, ...], expected: list[str]) -> None:
-    assert [b.name for b in available_blocks(pamrs.load_rig(RIGS / f"{name}.toml"), channels, SETTINGS.prepare)] == expected
+def test_the_channels_decide_what_can_be_told_apart(
+    name: str, channels: tuple[str, ...], expected: list[str]
+) -> None:
+    assert [
+        b.name
+        for b in available_blocks(pamrs.load_rig(RIGS / f"{name}.toml"), channels, SETTINGS.prepare)
+    ] == expected
 
 
 def test_a_nominal_antagonist_has_nothing_missing(rig: pamrs.Rig) -> None:
     found = pamrs.diagnose(case(rig, rig))
     assert found.verdict in ("none", "parameters")
     assert set(found.residuals) == {"supply", "chamber.flexor", "chamber.extensor", "arm.elbow"}
-    assert [b["blocks"] for b in found.blocks] == [["supply", "chamber.flexor", "chamber.extensor"], ["arm.elbow"]]
+    assert [b["blocks"] for b in found.blocks] == [
+        ["supply", "chamber.flexor", "chamber.extensor"],
+        ["arm.elbow"],
+    ]
     assert "chamber.flexor.dead_volume" in found.parameters
 
 
@@ -110,26 +163,43 @@ def test_pressures_alone_tell_the_friction_of_the_muscles(rig: pamrs.Rig, bare: 
     assert found.effects[0]["id"] == "muscle_hysteresis"
 
 
-def test_no_confident_name_beside_unknown_geometry(rig: pamrs.Rig, bare: pamrs.Rig, tmp_path: Path) -> None:
+def test_no_confident_name_beside_unknown_geometry(
+    rig: pamrs.Rig, bare: pamrs.Rig, tmp_path: Path
+) -> None:
     text = bare.to_toml_text()
     line = next(x for x in text.splitlines() if x.startswith("radius"))
     (tmp_path / "rig.toml").write_text(
-        text.replace(line, line.split(", tol")[0].rstrip(" }") + ", unknown = true }", 1), encoding="utf-8"
+        text.replace(line, line.split(", tol")[0].rstrip(" }") + ", unknown = true }", 1),
+        encoding="utf-8",
     )
     assert _unsettled(bare) == []
     assert _unsettled(pamrs.load_rig(tmp_path / "rig.toml")) == ["transmission.flexor.radius"]
-    arm = available_blocks(bare, tuple(recorded(rig, 1, "fit", pressures_only=True, n=40).channels), SETTINGS.prepare)[0]
-    group = Group([arm], {}, {}, [], {"muscle_hysteresis": 0.9, "muscle_creep": 0.05, "unlisted": 0.05}, arm, {}, [arm])
-    doubted = _doubted(group, SETTINGS.verdict.unknown_geometry_probability).probabilities
-    assert doubted["muscle_hysteresis"] < 0.5
-    assert sum(doubted.values()) == pytest.approx(1.0)
-    assert doubted["unlisted"] > 0.5
+    arm = available_blocks(
+        bare, tuple(recorded(rig, 1, "fit", pressures_only=True, n=40).channels), SETTINGS.prepare
+    )[0]
+    group = Group(
+        [arm],
+        {},
+        {},
+        [],
+        {"muscle_hysteresis": 0.9, "muscle_creep": 0.05, "unlisted": 0.05},
+        arm,
+        {},
+        [arm],
+    )
+    capped = _capped(group, SETTINGS.verdict.unknown_geometry_probability).probabilities
+    assert capped["muscle_hysteresis"] < 0.5
+    assert sum(capped.values()) == pytest.approx(1.0)
+    assert capped["unlisted"] > 0.5
 
 
 def test_swapped_muscles_are_seen(rig: pamrs.Rig, bare: pamrs.Rig) -> None:
     recording = recorded(rig, 1, "fit", pressures_only=True)
     one, two = "muscle_pressure.flexor", "muscle_pressure.extensor"
-    recording.channels[one], recording.channels[two] = recording.channels[two], recording.channels[one]
+    recording.channels[one], recording.channels[two] = (
+        recording.channels[two],
+        recording.channels[one],
+    )
     with pytest.raises(pamrs.DiagnosisError, match=r"in each other's place"):
         pamrs.diagnose(pamrs.Case("swapped", bare, [recording], ROOT))
 

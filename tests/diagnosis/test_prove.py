@@ -1,4 +1,6 @@
-"""``pamrs prove``: processes that see one case each, resuming, errors that stay lines, what run.json says."""
+"""``pamrs prove``: processes that see one case each, resuming, errors that stay lines, what
+run.json says.
+"""
 
 import hashlib
 import json
@@ -24,9 +26,11 @@ if name == "broken":
 if name == "killed":
     os.kill(os.getpid(), 9)
 verdict = "effects" if name.startswith("leak") else "none"
-seen = {"arguments": sys.argv[1:], "threads": os.environ["OPENBLAS_NUM_THREADS"], "pid": os.getpid()}
+seen = {"arguments": sys.argv[1:], "threads": os.environ["OPENBLAS_NUM_THREADS"], "pid": \
+os.getpid()}
 with open(out, "w") as file:
-    json.dump({"schema": "pamrs.diagnosis/1", "verdict": verdict, "seconds": 1.5, "seen": seen}, file)
+    json.dump({"schema": "pamrs.diagnosis/1", "verdict": verdict, "seconds": 1.5, "seen": seen}, \
+file)
 print(json.dumps({"cpu_seconds": 2.5}))
 """
 
@@ -52,13 +56,20 @@ def sealed(folder, conductance, seed):
     """A hold of a known chamber, 60 s at 10 Hz, as a case on disk."""
     rig = pamrs.rigs.sealed_chamber()
     truth = rig.with_effect("leak_muscle", {"conductance": conductance}) if conductance else rig
-    run = pamrs.simulate(truth, duration=60.0, sample_time=0.1, step=0.01, initial={"muscle_pressure": 7e5})
-    pressure = run["muscle_pressure"] + np.random.default_rng(seed).normal(0.0, 150.0, run.time.size)
+    run = pamrs.simulate(
+        truth, duration=60.0, sample_time=0.1, step=0.01, initial={"muscle_pressure": 7e5}
+    )
+    pressure = run["muscle_pressure"] + np.random.default_rng(seed).normal(
+        0.0, 150.0, run.time.size
+    )
     folder.mkdir(parents=True)
     (folder / "rig.toml").write_text(rig.to_toml_text())
     rows = [f"{t:.1f},{p:.2f}" for t, p in zip(run.time, pressure, strict=True)]
     (folder / "hold.csv").write_text("\n".join(["time [s],muscle_pressure [Pa]", *rows]) + "\n")
-    (folder / "case.toml").write_text('schema = "pamrs.case/1"\nrig = "rig.toml"\n\n[[recording]]\nfile = "hold.csv"\nrole = "fit"\n')
+    (folder / "case.toml").write_text(
+        'schema = "pamrs.case/1"\nrig = "rig.toml"\n\n[[recording]]\nfile = "hold.csv"\n'
+        'role = "fit"\n'
+    )
 
 
 def test_every_case_has_a_process_that_is_given_that_case_alone(tmp_path, fake):
@@ -70,7 +81,10 @@ def test_every_case_has_a_process_that_is_given_that_case_alone(tmp_path, fake):
     seen = [valid_result(home / "results" / name / "out.json")["seen"] for name in proof.cases]
     assert len({s["pid"] for s in seen}) == 3
     for name, told in zip(proof.cases, seen, strict=True):
-        assert told["arguments"] == [str(home / "cases" / name), str(home / "results" / name / "out.json")]
+        assert told["arguments"] == [
+            str(home / "cases" / name),
+            str(home / "results" / name / "out.json"),
+        ]
         assert told["threads"] == "1"
     assert len(lines) == 3
     assert "left" in lines[0]
@@ -83,10 +97,17 @@ def test_run_json_says_with_what_and_how_long(tmp_path, fake):
     told = json.loads((home / "results" / "run.json").read_text())
     assert told["schema"] == "pamrs.prove/1"
     assert told["version"] == pamrs.__version__
-    assert told["manifest_sha256"] == hashlib.sha256((home / "manifest.json").read_bytes()).hexdigest()
+    assert (
+        told["manifest_sha256"] == hashlib.sha256((home / "manifest.json").read_bytes()).hexdigest()
+    )
     assert told["machine"]["cores"] >= 1
     entry = told["cases"]["leak_a"]
-    assert (entry["verdict"], entry["seconds"], entry["cpu_seconds"], entry["code"]) == ("effects", 1.5, 2.5, code_digest())
+    assert (entry["verdict"], entry["seconds"], entry["cpu_seconds"], entry["code"]) == (
+        "effects",
+        1.5,
+        2.5,
+        code_digest(),
+    )
 
 
 def test_a_run_goes_on_where_it_was(tmp_path, fake):
@@ -94,7 +115,9 @@ def test_a_run_goes_on_where_it_was(tmp_path, fake):
     prove(home, command=fake, limit=1)
     first = (home / "results" / "leak_a" / "out.json").read_bytes()
     (home / "results" / "leak_b").mkdir()
-    (home / "results" / "leak_b" / "out.json").write_text('{"schema": "pamrs.diagnosis/1", "verd')  # half a file
+    (home / "results" / "leak_b" / "out.json").write_text(
+        '{"schema": "pamrs.diagnosis/1", "verd'
+    )  # half a file
     proof = prove(home, command=fake)
     assert proof.kept == 1
     assert len(proof.cases) == 3
@@ -126,7 +149,10 @@ def test_results_of_other_code_are_pointed_out(tmp_path, fake):
 def test_a_case_that_fails_is_a_line_and_is_tried_again(tmp_path, fake):
     home = make(tmp_path / "trial", "broken", "killed", "leak_a")
     proof = prove(home, command=fake, jobs=2)
-    assert proof.failed == {"broken": "CaseError: the valve is upside down", "killed": "the worker was killed by signal 9"}
+    assert proof.failed == {
+        "broken": "CaseError: the valve is upside down",
+        "killed": "the worker was killed by signal 9",
+    }
     assert proof.verdicts["error"] == 2
     assert "error" in proof.table()
     assert prove(home, command=fake).kept == 1
@@ -137,7 +163,8 @@ def test_interrupted_workers_are_ended(tmp_path):
     script = tmp_path / "worker.py"
     script.write_text(
         "import os, sys, time\nfile = os.path.dirname(os.path.dirname(sys.argv[2])) + '/pid'\n"
-        "if sys.argv[1].endswith('b'):\n    open(file, 'w').write(str(os.getpid()))\n    time.sleep(60)\n"
+        "if sys.argv[1].endswith('b'):\n    open(file, 'w').write(str(os.getpid()))\n"
+        "    time.sleep(60)\n"
         "while not os.path.exists(file) or not open(file).read():\n    time.sleep(0.02)\n"
     )
 
@@ -156,7 +183,9 @@ def test_a_case_that_takes_too_long_is_given_up(tmp_path):
     assert proof.failed == {"a": "given up after 0 s"}
 
 
-@pytest.mark.parametrize(("listed", "words"), [(["a"], "does not list b"), (["a", "b", "c"], "not there: c")])
+@pytest.mark.parametrize(
+    ("listed", "words"), [(["a"], "does not list b"), (["a", "b", "c"], "not there: c")]
+)
 def test_the_manifest_lists_the_cases(tmp_path, listed, words):
     home = make(tmp_path / "trial", "a", "b")
     (home / "manifest.json").write_text(json.dumps({"keys": dict.fromkeys(listed, "")}))
@@ -181,14 +210,24 @@ def test_what_is_refused(tmp_path):
 def test_two_real_cases_from_the_command_line(tmp_path, capsys):
     for name, conductance in (("one", 3e-11), ("two", 0.0)):
         sealed(tmp_path / "trial" / name, conductance, 1)
-    assert cli.main(["prove", str(tmp_path / "trial"), "--results", str(tmp_path / "out"), "--jobs", "2"]) == 0
+    assert (
+        cli.main(
+            ["prove", str(tmp_path / "trial"), "--results", str(tmp_path / "out"), "--jobs", "2"]
+        )
+        == 0
+    )
     told = capsys.readouterr()
     assert "effects" in told.out
     assert "[2/2]" in told.err
-    verdicts = [valid_result(tmp_path / "out" / name / "out.json")["verdict"] for name in ("one", "two")]
+    verdicts = [
+        valid_result(tmp_path / "out" / name / "out.json")["verdict"] for name in ("one", "two")
+    ]
     assert verdicts == ["effects", "none"]
     (tmp_path / "trial" / "two" / "hold.csv").unlink()
-    assert cli.main(["prove", str(tmp_path / "trial"), "--results", str(tmp_path / "out"), "--fresh"]) == 3
+    assert (
+        cli.main(["prove", str(tmp_path / "trial"), "--results", str(tmp_path / "out"), "--fresh"])
+        == 3
+    )
     assert "two: CaseError" in capsys.readouterr().out
 
 

@@ -15,15 +15,31 @@ Array = NDArray[np.float64]
 ROWS = 6000
 
 
-def screened(rows: Array, signatures: dict[str, Array], jacobian: Array | None = None, moved: float = 0.0) -> Screen:
-    """A screen of made-up signatures, each of an effect of one positive size, beside parameters with priors."""
+def screened(
+    rows: Array, signatures: dict[str, Array], jacobian: Array | None = None, moved: float = 0.0
+) -> Screen:
+    """A screen of made-up signatures, each of an effect of one positive size, beside parameters
+    with priors.
+    """
     slopes = np.zeros((rows.size, 0)) if jacobian is None else jacobian
     count = slopes.shape[1]
     normal = slopes.T @ slopes + np.eye(count)
     left = rows - slopes @ np.linalg.solve(normal, slopes.T @ rows + moved)
-    stand = Stand(rows, left, slopes, np.full(count, moved), np.ones(count), slopes @ np.linalg.cholesky(np.linalg.inv(normal)))
+    stand = Stand(
+        rows,
+        left,
+        slopes,
+        np.full(count, moved),
+        np.ones(count),
+        slopes @ np.linalg.cholesky(np.linalg.inv(normal)),
+    )
     return Screen(
-        stand, [(e, Start(e, {f"{e}.size": 1.0}, {}, (f"{e}.size",), False), s) for e, s in signatures.items()], SETTINGS.screen
+        stand,
+        [
+            (e, Start(e, {f"{e}.size": 1.0}, {}, (f"{e}.size",), False), s)
+            for e, s in signatures.items()
+        ],
+        SETTINGS.screen,
     )
 
 
@@ -46,13 +62,20 @@ def test_a_second_effect_is_taken_beside_the_first() -> None:
     rows = np.random.default_rng(6).normal(size=ROWS) - 0.5 * first - 0.3 * second
     both = inclusion(screened(rows, {"first": first, "second": second}), 12.0, 0.01, SETTINGS)
     assert min(both.values()) == 1.0
-    assert inclusion(screened(rows, {"first": first, "second": second}), 12.0, 1.0, SETTINGS) == {"first": 1.0}
+    assert inclusion(screened(rows, {"first": first, "second": second}), 12.0, 1.0, SETTINGS) == {
+        "first": 1.0
+    }
 
 
 def test_twins_share_the_resamples() -> None:
     common, own, other = waves(3)
     rows = np.random.default_rng(7).normal(size=ROWS) - 0.5 * common
-    found = inclusion(screened(rows, {"one": common + 0.02 * own, "twin": common + 0.02 * other}), 12.0, 1.0, SETTINGS)
+    found = inclusion(
+        screened(rows, {"one": common + 0.02 * own, "twin": common + 0.02 * other}),
+        12.0,
+        1.0,
+        SETTINGS,
+    )
     assert 0.02 < found["one"] < 0.98
     assert abs(found["one"] + found["twin"] - 1.0) < 1e-9
 
@@ -60,10 +83,13 @@ def test_twins_share_the_resamples() -> None:
 def test_what_a_parameter_does_is_no_effect_unless_it_is_held() -> None:
     signal, _ = waves(2)
     noise = np.random.default_rng(8).normal(size=ROWS)
-    # a parameter with little prior information has taken the signal up: the residual is noise, the pull of its prior is nothing
+    # a parameter with little prior information has taken the signal up: the residual is noise, the
+    # pull of its prior is nothing
     taken = screened(noise, {"effect": signal}, 50.0 * signal[:, None])
     assert inclusion(taken, 12.0, 1.0, SETTINGS).get("effect", 0.0) < 0.05
-    assert inclusion(screened(noise - signal, {"effect": signal}, 1e-3 * signal[:, None]), 12.0, 1.0, SETTINGS) == {"effect": 1.0}
+    assert inclusion(
+        screened(noise - signal, {"effect": signal}, 1e-3 * signal[:, None]), 12.0, 1.0, SETTINGS
+    ) == {"effect": 1.0}
 
 
 def test_nothing_to_choose_from_is_nothing() -> None:

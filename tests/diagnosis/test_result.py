@@ -31,7 +31,11 @@ def test_json_follows_schema(make, tmp_path: Path) -> None:
 
 def test_schema_is_closed() -> None:
     content = synthetic.diagnosis().to_dict()
-    for change in ({"extra": 1}, {"verdict": "perhaps"}, {"where": {**content["where"], "extra": 1}}):
+    for change in (
+        {"extra": 1},
+        {"verdict": "perhaps"},
+        {"where": {**content["where"], "extra": 1}},
+    ):
         with pytest.raises(jsonschema.ValidationError):
             jsonschema.validate({**content, **change}, schema())
 
@@ -58,7 +62,13 @@ def test_entries_have_attributes_and_keys() -> None:
         chosen.value = 2.0  # type: ignore[misc]
     with pytest.raises(dataclasses.FrozenInstanceError):
         found.verdict = "none"  # type: ignore[misc]
-    assert Where() == {"block": None, "channel": None, "intervals": [], "conditions": [], "text": ""}
+    assert Where() == {
+        "block": None,
+        "channel": None,
+        "intervals": [],
+        "conditions": [],
+        "text": "",
+    }
 
 
 def test_not_finite_becomes_null() -> None:
@@ -74,7 +84,9 @@ def test_numpy_values_become_json() -> None:
         "intervals": np.array([[0.0, 1.0]]).tolist(),
         "conditions": [Condition("time", float(np.float32(0.5)), 0.25, 1.0, "late")],
     }
-    content = json.loads(synthetic.diagnosis(where=where, probabilities={"none": np.float64(0.25)}).to_json())
+    content = json.loads(
+        synthetic.diagnosis(where=where, probabilities={"none": np.float64(0.25)}).to_json()
+    )
     told = {"name": "time", "share": 0.5, "time": 0.25, "mean": 1.0, "text": "late"}
     assert content["where"]["conditions"] == [told]
     assert content["probabilities"] == {"none": 0.25}
@@ -103,7 +115,9 @@ def test_summary_names_the_effect() -> None:
 def test_headlines() -> None:
     assert "chamber" in synthetic.diagnosis().headline
     assert synthetic.nothing().headline.startswith("Nothing is missing")
-    assert "discharge area" in synthetic.diagnosis(verdict="parameters", effects=[], where={}).headline
+    assert (
+        "discharge area" in synthetic.diagnosis(verdict="parameters", effects=[], where={}).headline
+    )
     assert "outside the catalogue" in synthetic.diagnosis(verdict="unlisted", effects=[]).headline
     rivals = synthetic.diagnosis(ambiguity=[["leak_muscle"], ["leak_muscle", "heat_transfer"]])
     assert "cannot tell muscle leak from muscle leak + heat transfer" in rivals.headline

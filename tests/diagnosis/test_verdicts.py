@@ -8,7 +8,15 @@ from hypothesis import strategies as st
 
 import pamrs
 from pamrs.diagnosis import DiagnosisSettings
-from pamrs.diagnosis.evidence import Candidate, Group, Judged, case_ambiguity, case_probabilities, case_verdict, judge
+from pamrs.diagnosis.evidence import (
+    Candidate,
+    Group,
+    Judged,
+    case_ambiguity,
+    case_probabilities,
+    case_verdict,
+    judge,
+)
 from pamrs.diagnosis.fit import Fit
 from pamrs.diagnosis.noise import Excess
 from pamrs.diagnosis.prepare import Block, available_blocks
@@ -31,14 +39,27 @@ def candidate(key: str, moved: dict[str, float] | None = None) -> Candidate:
     return Candidate(effects, none, {}, {}, 0.0, wrong=wrong)
 
 
-def group(name: str, probabilities: dict[str, float], *, moved: dict[str, float] | None = None, shifted: bool = False) -> Group:
+def group(
+    name: str,
+    probabilities: dict[str, float],
+    *,
+    moved: dict[str, float] | None = None,
+    shifted: bool = False,
+) -> Group:
     """A group of one block with given probabilities."""
     block: Block = BLOCKS[name]
     keys = [key for key in probabilities if key not in ("", "unlisted")]
     size = Excess(4.0 if shifted else 1.0, 1.0, 0.0, 1.0, 1.0, 1.1)
     mismatch = None if set(probabilities) == {""} else block
     return Group(
-        [block], {name: size}, {name: size}, [candidate("", moved), *(candidate(k) for k in keys)], probabilities, mismatch, {}, []
+        [block],
+        {name: size},
+        {name: size},
+        [candidate("", moved), *(candidate(k) for k in keys)],
+        probabilities,
+        mismatch,
+        {},
+        [],
     )
 
 
@@ -50,12 +71,15 @@ def said(*groups: Group) -> tuple[list[Judged], str]:
 def test_one_block_without_a_name_takes_nothing_from_a_name_in_another() -> None:
     alone = judge([group("chamber", {"valve_dead_zone": 0.98, "unlisted": 0.02})], SETTINGS)
     judged, verdict = said(
-        group("chamber", {"valve_dead_zone": 0.98, "unlisted": 0.02}), group("arm", {"muscle_creep": 0.01, "unlisted": 0.99})
+        group("chamber", {"valve_dead_zone": 0.98, "unlisted": 0.02}),
+        group("arm", {"muscle_creep": 0.01, "unlisted": 0.99}),
     )
     assert verdict == "effects"
     assert [j.verdict for j in judged] == ["effects", "unlisted"]
     assert judged[0].named == ("valve_dead_zone",)
-    assert judged[0].probability("valve_dead_zone") == pytest.approx(alone[0].probability("valve_dead_zone"))
+    assert judged[0].probability("valve_dead_zone") == pytest.approx(
+        alone[0].probability("valve_dead_zone")
+    )
     found = case_probabilities(judged, SETTINGS.verdict)
     assert max(found, key=lambda key: found[key]) == "valve_dead_zone"
     assert found["unlisted"] < 0.03
@@ -64,7 +88,9 @@ def test_one_block_without_a_name_takes_nothing_from_a_name_in_another() -> None
 
 def test_a_second_effect_in_another_block_lowers_nothing() -> None:
     gas = {"leak_muscle": 0.92, "heat_transfer": 0.05, "unlisted": 0.03}
-    judged, _ = said(group("chamber", gas), group("arm", {"muscle_hysteresis": 0.92, "unlisted": 0.08}))
+    judged, _ = said(
+        group("chamber", gas), group("arm", {"muscle_hysteresis": 0.92, "unlisted": 0.08})
+    )
     assert judged[0].probabilities["leak_muscle"] == pytest.approx(0.92)
     # each is settled, although the two together are less so
     assert case_ambiguity(judged, SETTINGS.verdict) == []
@@ -82,62 +108,107 @@ def test_an_effect_of_two_groups_is_judged_once() -> None:
 
 def test_open_sets_stand_beside_what_is_settled() -> None:
     gas = {"leak_muscle": 0.6, "chamber.dead_volume": 0.4}
-    judged, verdict = said(group("chamber", gas), group("arm", {"muscle_creep": 0.98, "unlisted": 0.02}))
+    judged, verdict = said(
+        group("chamber", gas), group("arm", {"muscle_creep": 0.98, "unlisted": 0.02})
+    )
     assert verdict == "effects"
-    assert case_ambiguity(judged, SETTINGS.verdict) == [["leak_muscle", "muscle_creep"], ["chamber.dead_volume", "muscle_creep"]]
+    assert case_ambiguity(judged, SETTINGS.verdict) == [
+        ["leak_muscle", "muscle_creep"],
+        ["chamber.dead_volume", "muscle_creep"],
+    ]
     judged, _ = said(group("chamber", gas), group("arm", {"unlisted": 0.98, "muscle_creep": 0.02}))
     assert case_ambiguity(judged, SETTINGS.verdict) == [["leak_muscle"], ["chamber.dead_volume"]]
 
 
 def test_a_wrong_parameter_is_the_verdict_parameters() -> None:
-    judged, verdict = said(group("chamber", {"chamber.dead_volume": 0.97, "unlisted": 0.03}), group("arm", {"": 1.0}))
+    judged, verdict = said(
+        group("chamber", {"chamber.dead_volume": 0.97, "unlisted": 0.03}), group("arm", {"": 1.0})
+    )
     assert verdict == "parameters"
     assert judged[0].wrong == ("chamber.dead_volume",)
     assert case_probabilities(judged, SETTINGS.verdict)["chamber.dead_volume"] > 0.9
     # and stays it where another block keeps something without a name; an effect comes first
-    assert said(group("chamber", {"chamber.dead_volume": 1.0}), group("arm", {"unlisted": 1.0}))[1] == "parameters"
-    assert said(group("chamber", {"chamber.dead_volume": 1.0}), group("arm", {"muscle_creep": 1.0}))[1] == "effects"
+    assert (
+        said(group("chamber", {"chamber.dead_volume": 1.0}), group("arm", {"unlisted": 1.0}))[1]
+        == "parameters"
+    )
+    assert (
+        said(group("chamber", {"chamber.dead_volume": 1.0}), group("arm", {"muscle_creep": 1.0}))[1]
+        == "effects"
+    )
 
 
 def test_a_name_that_is_more_probable_than_not_is_given() -> None:
-    (one,) = judge([group("arm", {"muscle_creep": 0.35, "muscle_creep+payload_swing": 0.25, "unlisted": 0.4})], SETTINGS)
+    (one,) = judge(
+        [group("arm", {"muscle_creep": 0.35, "muscle_creep+payload_swing": 0.25, "unlisted": 0.4})],
+        SETTINGS,
+    )
     assert (one.verdict, one.named) == ("effects", ("muscle_creep",))
     assert one.ambiguity == [["unlisted"], ["muscle_creep"], ["muscle_creep", "payload_swing"]]
-    (two,) = judge([group("arm", {"muscle_creep": 0.45, "muscle_hysteresis": 0.4, "unlisted": 0.15})], SETTINGS)
+    (two,) = judge(
+        [group("arm", {"muscle_creep": 0.45, "muscle_hysteresis": 0.4, "unlisted": 0.15})], SETTINGS
+    )
     assert (two.verdict, two.named) == ("effects", ("muscle_creep",))
-    (none,) = judge([group("arm", {"muscle_creep": 0.35, "muscle_hysteresis": 0.25, "unlisted": 0.4})], SETTINGS)
+    (none,) = judge(
+        [group("arm", {"muscle_creep": 0.35, "muscle_hysteresis": 0.25, "unlisted": 0.4})], SETTINGS
+    )
     assert none.verdict == "unlisted"
 
 
 def test_healthy_groups() -> None:
     assert said(group("chamber", {"": 1.0}), group("arm", {"": 1.0}))[1] == "none"
-    assert said(group("chamber", {"": 1.0}, shifted=True), group("arm", {"": 1.0}))[1] == "parameters"
-    judged, verdict = said(group("chamber", {"": 1.0}, moved={"chamber.alpha": 3.0}), group("arm", {"": 1.0}))
+    assert (
+        said(group("chamber", {"": 1.0}, shifted=True), group("arm", {"": 1.0}))[1] == "parameters"
+    )
+    judged, verdict = said(
+        group("chamber", {"": 1.0}, moved={"chamber.alpha": 3.0}), group("arm", {"": 1.0})
+    )
     assert verdict == "parameters"
     # a parameter at its wall, and nobody knows why
     assert judged[0].ambiguity == [["parameters"], ["unlisted"]]
-    judged, _ = said(group("chamber", {"": 1.0}, moved={"chamber.alpha": 3.0}), group("arm", {"": 1.0}, moved={"arm.payload": 3.0}))
+    judged, _ = said(
+        group("chamber", {"": 1.0}, moved={"chamber.alpha": 3.0}),
+        group("arm", {"": 1.0}, moved={"arm.payload": 3.0}),
+    )
     assert case_ambiguity(judged, SETTINGS.verdict) == [["parameters"], ["unlisted"]]
     # what is open in a block keeps that it may have no name
-    judged, _ = said(group("chamber", {"valve_dead_zone": 1.0}), group("arm", {"muscle_creep": 0.5, "unlisted": 0.5}))
-    assert sorted(case_ambiguity(judged, SETTINGS.verdict)) == [["muscle_creep", "valve_dead_zone"], ["valve_dead_zone", "unlisted"]]
+    judged, _ = said(
+        group("chamber", {"valve_dead_zone": 1.0}),
+        group("arm", {"muscle_creep": 0.5, "unlisted": 0.5}),
+    )
+    assert sorted(case_ambiguity(judged, SETTINGS.verdict)) == [
+        ["muscle_creep", "valve_dead_zone"],
+        ["valve_dead_zone", "unlisted"],
+    ]
 
 
 @settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(
     gas=st.dictionaries(
-        st.sampled_from(["leak_muscle", "pressure_lag", "chamber.dead_volume", "unlisted"]), st.floats(0.01, 1.0), min_size=1
+        st.sampled_from(["leak_muscle", "pressure_lag", "chamber.dead_volume", "unlisted"]),
+        st.floats(0.01, 1.0),
+        min_size=1,
     ),
-    arm=st.dictionaries(st.sampled_from(["muscle_creep", "pressure_lag", "arm.payload", "unlisted"]), st.floats(0.01, 1.0), min_size=1),
+    arm=st.dictionaries(
+        st.sampled_from(["muscle_creep", "pressure_lag", "arm.payload", "unlisted"]),
+        st.floats(0.01, 1.0),
+        min_size=1,
+    ),
 )
-def test_probabilities_add_to_one_and_verdicts_follow_them(gas: dict[str, float], arm: dict[str, float]) -> None:
+def test_probabilities_add_to_one_and_verdicts_follow_them(
+    gas: dict[str, float], arm: dict[str, float]
+) -> None:
     found = [{k: v / sum(p.values()) for k, v in p.items()} for p in (gas, arm)]
     judged = judge([group("chamber", found[0]), group("arm", found[1])], SETTINGS)
     for j in judged:
         assert sum(j.probabilities.values()) == pytest.approx(1.0)
         assert bool(j.named or j.wrong) == (j.verdict in ("effects", "parameters"))
         best = max(j.probabilities.values())
-        assert j.ambiguity == [] if best >= 0.9 else all(j.probabilities[k] >= 0.05 for k in ("+".join(s) for s in j.ambiguity))
+        assert (
+            j.ambiguity == []
+            if best >= 0.9
+            else all(j.probabilities[k] >= 0.05 for k in ("+".join(s) for s in j.ambiguity))
+        )
     sets = case_ambiguity(judged, SETTINGS.verdict)
     assert len({tuple(s) for s in sets}) == len(sets)
     assert not sets or any(j.ambiguity for j in judged)
@@ -151,7 +222,22 @@ def test_probabilities_add_to_one_and_verdicts_follow_them(gas: dict[str, float]
 
 
 def test_sentences_have_units_of_the_field() -> None:
-    wrong = WrongParameter("chamber.dead_volume", "chamber", 1.5e-4, 2.25e-5, 3.6e-4, 5e-6, [3.5e-4, 3.7e-4], "m3", 9.3, 0.98, {})
+    wrong = WrongParameter(
+        "chamber.dead_volume",
+        "chamber",
+        1.5e-4,
+        2.25e-5,
+        3.6e-4,
+        5e-6,
+        [3.5e-4, 3.7e-4],
+        "m3",
+        9.3,
+        0.98,
+        {},
+    )
     assert sentence_of(wrong) == "chamber dead volume is 360.0 +- 5.0 cm3, not 150 +- 22"
     kept = Unexplained("arm", "joint_angle", "rad", 15.2, 0.007, "unlisted")
-    assert kept_sentence(kept) == "the arm keeps 15 times its noise (0.40 deg) that no listed effect explains"
+    assert kept_sentence(kept) == (
+        "the residual of the arm is 15 times the noise level (0.40 deg), and no listed effect "
+        "explains it"
+    )

@@ -1,4 +1,6 @@
-"""The committed pages of the catalogue are what the table generates now, and every effect has a picture."""
+"""The committed pages of the catalogue are what the table generates now, and every effect has a
+picture.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,10 @@ def test_every_effect_has_an_experiment_in_the_order_of_the_catalogue():
 
 def test_there_are_pages_and_pictures_of_the_catalogue_and_no_others():
     names = {path.name for path in DOCS.iterdir()}
-    assert names == {"README.md", *(f"{effect}.{suffix}" for effect in IDS for suffix in ("md", "png"))}
+    assert names == {
+        "README.md",
+        *(f"{effect}.{suffix}" for effect in IDS for suffix in ("md", "png")),
+    }
 
 
 @pytest.mark.parametrize("name", pages())

@@ -1,4 +1,6 @@
-"""Effects through Python: rig files, simulation, restart, places and what is refused; their laws are tested in the core."""
+"""Effects through Python: rig files, simulation, restart, places and what is refused; their laws
+are tested in the core.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +24,10 @@ def regulated() -> pamrs.Rig:
     text = pamrs.rigs.shoulder().to_toml_text()
     head, _, rest = text.partition("[supply]")
     _, _, rest = rest.partition("\n\n")
-    supply = 'kind = "regulator"\ninitial_pressure = { value = 6e5, unit = "Pa" }\ntime_constant = { value = 0.1, unit = "s" }\n'
+    supply = (
+        'kind = "regulator"\ninitial_pressure = { value = 6e5, unit = "Pa" }\n'
+        'time_constant = { value = 0.1, unit = "s" }\n'
+    )
     return parse_rig(f"{head}[supply]\n{supply}\n{rest}")
 
 
@@ -80,19 +85,29 @@ def test_all_at_once_run_and_restart() -> None:
     first.run(COMMAND[:17])
     second = pamrs.Simulator(rig, sample_time=0.01, initial=START)
     second.restore(first.state)
-    np.testing.assert_array_equal(second.run(COMMAND[17:])["joint_angle"], expected["joint_angle"][17:])
+    np.testing.assert_array_equal(
+        second.run(COMMAND[17:])["joint_angle"], expected["joint_angle"][17:]
+    )
 
 
 def test_the_table_can_be_read_by_a_fit() -> None:
     for effect in EFFECTS.values():
-        assert 1 <= len({p.name.rstrip("_23") for p in effect.parameters}) <= (5 if effect.catalogue else 24)
-        assert all((effect.name, effect.equation, effect.fingerprint, effect.separates, effect.reference))
+        assert (
+            1
+            <= len({p.name.rstrip("_23") for p in effect.parameters})
+            <= (5 if effect.catalogue else 24)
+        )
+        assert all(
+            (effect.name, effect.equation, effect.fingerprint, effect.separates, effect.reference)
+        )
         for parameter in effect.parameters:
             assert parameter.lower <= parameter.default <= parameter.upper
             assert parameter.starts
             assert list(parameter.starts) == sorted(parameter.starts)
             assert all(parameter.lower <= start <= parameter.upper for start in parameter.starts)
-            assert parameter.neutral is None or parameter.lower <= parameter.neutral <= parameter.upper
+            assert (
+                parameter.neutral is None or parameter.lower <= parameter.neutral <= parameter.upper
+            )
             assert parse_unit(parameter.unit).scale == 1.0
             assert parameter.meaning
 
@@ -127,7 +142,9 @@ def test_the_diagnosis_knows_where_an_effect_acts_and_where_to_begin(effect: str
             assert all(value != 0.0 for name, value in start.free.items() if name in start.sizes)
             half = start.scaled(0.5)
             assert all(
-                half.free[name] == pytest.approx(start.free[name] * (2.0**0.5 if name in restricting else 0.5)) for name in start.sizes
+                half.free[name]
+                == pytest.approx(start.free[name] * (2.0**0.5 if name in restricting else 0.5))
+                for name in start.sizes
             )
 
 
@@ -141,7 +158,10 @@ def test_unknown_places_and_parameters_are_named() -> None:
         rig.with_effect("valve_dead_zone", at="left")
     with pytest.raises(ParameterError, match="whole rig"):
         rig.with_effect("base_flexibility", at="left")
-    entry = '\n[[effects]]\nid = "muscle_creep"\nparameters = { stiffnes = { value = 1.0, unit = "N/m" } }\n'
+    entry = (
+        '\n[[effects]]\nid = "muscle_creep"\n'
+        'parameters = { stiffnes = { value = 1.0, unit = "N/m" } }\n'
+    )
     with pytest.raises(RigError, match="stiffnes"):
         parse_rig(rig.to_toml_text() + entry)
     entry = '\n[[effects]]\nid = "clock_skew"\nat = "left"\n'
@@ -151,7 +171,12 @@ def test_unknown_places_and_parameters_are_named() -> None:
 
 def test_an_effect_on_what_is_not_there_is_refused() -> None:
     sealed = pamrs.rigs.sealed_chamber()
-    for effect, word in (("valve_dead_zone", "valve"), ("muscle_creep", "muscle"), ("payload_swing", "arm"), ("supply_leak", "supply")):
+    for effect, word in (
+        ("valve_dead_zone", "valve"),
+        ("muscle_creep", "muscle"),
+        ("payload_swing", "arm"),
+        ("supply_leak", "supply"),
+    ):
         with pytest.raises(RigError, match=word):
             pamrs.simulate(sealed.with_effect(effect), duration=1.0, sample_time=0.1)
 
@@ -163,7 +188,9 @@ def test_a_lagging_sensor_is_inverted_where_it_drives() -> None:
     np.testing.assert_array_equal(lagging["joint_angle"], truth["joint_angle"])
     behind = lagging["muscle_pressure"] + 0.02 * np.gradient(lagging["muscle_pressure"], 0.01)
     inner = slice(3, -3)
-    assert np.abs(behind - truth["muscle_pressure"])[inner].max() < 0.2 * np.ptp(truth["muscle_pressure"])
+    assert np.abs(behind - truth["muscle_pressure"])[inner].max() < 0.2 * np.ptp(
+        truth["muscle_pressure"]
+    )
     assert np.abs(lagging["muscle_pressure"] - truth["muscle_pressure"]).max() > 1e3
 
 
@@ -178,9 +205,13 @@ def test_a_transducer_at_the_valve_reads_what_the_air_leaves_in_the_tube() -> No
         )
     )
     assert not np.allclose(bare["joint_angle"], muscle["joint_angle"], rtol=1e-6)
-    assert np.array_equal(muscle["joint_angle"], valve["joint_angle"]), "the transducer moves nothing"
+    assert np.array_equal(muscle["joint_angle"], valve["joint_angle"]), (
+        "the transducer moves nothing"
+    )
     lead = valve["muscle_pressure"] - muscle["muscle_pressure"]
-    before = np.concatenate([[5.0], COMMAND[:-1]])[: lead.size]  # a sample is read under the command before it
+    before = np.concatenate([[5.0], COMMAND[:-1]])[
+        : lead.size
+    ]  # a sample is read under the command before it
     assert np.all(lead[before > 5.0] >= 0.0)
     assert np.all(lead[before < 5.0] <= 0.0)
     assert np.all(lead[before == 5.0] == 0.0), "shut: the muscle's own"

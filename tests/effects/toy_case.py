@@ -1,8 +1,8 @@
 """The package with one effect more: run by test_toy.py, with a package whose core has it.
 
 ``python toy_case.py FOLDER`` simulates `toy_joint_spring` in both forms, lets the trial conceal its
-own form of it in a case below FOLDER, diagnoses that case, writes the report beside it and prints what
-was found as one line of JSON.
+own form of it in a case below FOLDER, diagnoses that case, writes the report beside it and prints
+what was found as one line of JSON.
 """
 
 from __future__ import annotations

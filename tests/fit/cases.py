@@ -8,10 +8,20 @@ from pamrs import Muscle
 from pamrs.fit import ForceMap
 
 REST = 0.2
-SHAPE = {"rest_length": REST, "rest_diameter": 0.02, "braid_angle": math.radians(70.0), "wall_thickness": 0.0018}
+SHAPE = {
+    "rest_length": REST,
+    "rest_diameter": 0.02,
+    "braid_angle": math.radians(70.0),
+    "wall_thickness": 0.0018,
+}
 PRESSURES = np.array([1e5, 2e5, 3.5e5, 5e5, 6.5e5, 8e5])
 CONTRACTIONS = np.linspace(-0.01, 0.26, 11)
-TOLERANCE = {"rest_diameter": 0.001, "braid_angle": math.radians(1.0), "rest_length": 0.002, "wall_thickness": 2e-4}
+TOLERANCE = {
+    "rest_diameter": 0.001,
+    "braid_angle": math.radians(1.0),
+    "rest_length": 0.002,
+    "wall_thickness": 2e-4,
+}
 SLOPES, OFFSETS = [2.5, -1.2, 0.6, 0.3], [9e5, -2.1e5, 4e4, 2.5e4]
 
 
@@ -26,13 +36,24 @@ def muscle(model="kothera", order=2, **changes):
     return Muscle(**{**SHAPE, "model": model, **own, **changes})
 
 
-def measure(of, *, pressures=PRESSURES, contractions=CONTRACTIONS, noise=0.0, seed=0, direction=None, rest=REST):
+def measure(
+    of,
+    *,
+    pressures=PRESSURES,
+    contractions=CONTRACTIONS,
+    noise=0.0,
+    seed=0,
+    direction=None,
+    rest=REST,
+):
     """A force map of a muscle, with Gaussian noise [N]."""
     p, e = (grid.ravel() for grid in np.meshgrid(pressures, contractions, indexing="ij"))
     force = of.force(p, e) if direction is None else of.force(p, e, direction=direction)
     force = force + noise * np.random.default_rng(seed).standard_normal(len(p))
     ways = None if direction is None else np.full(len(p), direction)
-    return ForceMap.from_arrays(of.parameters["rest_length"] * (1.0 - e), p, force, rest_length=rest, direction=ways)
+    return ForceMap.from_arrays(
+        of.parameters["rest_length"] * (1.0 - e), p, force, rest_length=rest, direction=ways
+    )
 
 
 def truth(of, fit):

@@ -1,4 +1,6 @@
-"""Models side by side: the right one wins, the penalty is honest, what cannot be ranked is named."""
+"""Models side by side: the right one wins, the penalty is honest, what cannot be ranked is
+named.
+"""
 
 import json
 
@@ -45,14 +47,18 @@ def test_orders_that_the_data_do_not_determine_are_listed_and_not_ranked():
     assert missing["rms"] is None
     assert "2 different lengths, but order 3" in missing["reason"]
     assert "not ranked: 2 different lengths" in comparison.to_text()
-    with pytest.raises(FitError, match="determine none of the candidates: kothera: one pressure level only"):
+    with pytest.raises(
+        FitError, match="determine none of the candidates: kothera: one pressure level only"
+    ):
         compare_models(measure(real, pressures=[3e5]), real, models=["kothera"])
 
 
 def test_the_column_for_a_few_levels_is_a_fit_of_these():
     real = muscle("robinson", 2)
     data = measure(real, noise=3.0)
-    comparison = compare_models(data, real, models=["robinson", "gaylord"], orders=[2], levels=[0, 2, 5])
+    comparison = compare_models(
+        data, real, models=["robinson", "gaylord"], orders=[2], levels=[0, 2, 5]
+    )
     rms, worst = fit_muscle(data, real, levels=[0, 2, 5]).errors_of("held_out")
     found = row(comparison, "robinson", 2)
     assert (found["subset_rms"], found["subset_max"]) == (rms, worst)
@@ -61,7 +67,9 @@ def test_the_column_for_a_few_levels_is_a_fit_of_these():
 
 
 def test_a_few_levels_that_are_too_few_are_named():
-    comparison = compare_models(measure(muscle(), noise=1.0), muscle(), models=["kothera"], orders=[1], levels=[3])
+    comparison = compare_models(
+        measure(muscle(), noise=1.0), muscle(), models=["kothera"], orders=[1], levels=[3]
+    )
     assert "one pressure level only" in comparison.rows[0]["subset_reason"]
     with pytest.raises(ParameterError, match="none is left to predict"):
         compare_models(measure(muscle()), muscle(), models=["gaylord"], levels=range(6))
@@ -72,7 +80,12 @@ def test_geometry_is_freed_where_it_has_an_effect():
     names = ["braid_angle", "wall_thickness", "k0"]
     tolerance = {**TOLERANCE, "k0": 0.1}
     comparison = compare_models(
-        data, muscle("robinson", 1), models=["gaylord", "kothera", "robinson"], orders=[1], free=names, tolerance=tolerance
+        data,
+        muscle("robinson", 1),
+        models=["gaylord", "kothera", "robinson"],
+        orders=[1],
+        free=names,
+        tolerance=tolerance,
     )
     assert row(comparison, "gaylord")["free"] == ["braid_angle"]
     assert row(comparison, "kothera", 1)["free"] == ["braid_angle", "wall_thickness"]
@@ -81,7 +94,9 @@ def test_geometry_is_freed_where_it_has_an_effect():
 
 
 def test_rows_are_plain():
-    comparison = compare_models(measure(muscle(), noise=1.0), muscle(), orders=[2, 1], levels=[0, 3, 5])
+    comparison = compare_models(
+        measure(muscle(), noise=1.0), muscle(), orders=[2, 1], levels=[0, 3, 5]
+    )
     assert json.loads(json.dumps(comparison.to_dicts(), allow_nan=False)) == comparison.rows
     assert comparison.to_text().count("\n") == len(comparison.rows) + 6
     assert "best" in repr(comparison)
@@ -89,7 +104,12 @@ def test_rows_are_plain():
 
 def loops(seed):
     """A muscle of 300 mm with loops of +- 4 % whose directions nobody noted, and 1 % noise."""
-    sizes = {"rest_length": 0.3, "rest_diameter": 0.023, "braid_angle": np.radians(64.0), "wall_thickness": 0.0015}
+    sizes = {
+        "rest_length": 0.3,
+        "rest_diameter": 0.023,
+        "braid_angle": np.radians(64.0),
+        "wall_thickness": 0.0015,
+    }
     real = Muscle(**sizes, modulus_slope=[1.2, -0.3], modulus_offset=[5e5, -0.8e5])
     grid = np.meshgrid(np.linspace(1e5, 6e5, 6), np.linspace(0.0, 0.2, 8), [-1, 1], indexing="ij")
     p, e, way = (values.ravel() for values in grid)
@@ -101,10 +121,18 @@ def loops(seed):
 @pytest.mark.parametrize("seed", range(8))
 def test_hysteresis_does_not_recommend_a_model_that_is_plainly_worse(seed):
     data, nominal, way = loops(seed)
-    told = ForceMap.from_arrays(data.length, data.pressure, data.force, rest_length=0.3, direction=way)
-    for comparison in (compare_models(data, nominal), compare_models(told, fit_friction(told).to_muscle(nominal))):
+    told = ForceMap.from_arrays(
+        data.length, data.pressure, data.force, rest_length=0.3, direction=way
+    )
+    for comparison in (
+        compare_models(data, nominal),
+        compare_models(told, fit_friction(told).to_muscle(nominal)),
+    ):
         assert comparison.recommended.model in ("kothera", "robinson")
-        assert row(comparison, "elbow_linear")["lopo_excess"] > row(comparison, "elbow_linear")["lopo_excess_stderr"]
+        assert (
+            row(comparison, "elbow_linear")["lopo_excess"]
+            > row(comparison, "elbow_linear")["lopo_excess_stderr"]
+        )
 
 
 def test_the_recommendation_compares_level_by_level():
@@ -120,7 +148,9 @@ def test_the_recommendation_compares_level_by_level():
     for found in comparison.rows:
         apart = squares(comparison.fits[found["model"], found["order"]]) - squares(comparison.best)
         mean, stderr = np.mean(apart), np.std(apart, ddof=1) / np.sqrt(6)
-        assert (found["lopo_excess"], found["lopo_excess_stderr"]) == pytest.approx((mean, stderr), abs=1e-15)
+        assert (found["lopo_excess"], found["lopo_excess_stderr"]) == pytest.approx(
+            (mean, stderr), abs=1e-15
+        )
         if mean <= stderr:
             eligible.append(found)
     assert [found["recommended"] for found in comparison.rows].count(True) == 1
@@ -129,7 +159,11 @@ def test_the_recommendation_compares_level_by_level():
 
 @pytest.mark.parametrize(
     ("settings", "message"),
-    [({"models": ["hill"]}, "models"), ({"models": []}, "models"), ({"models": ["kothera"], "orders": []}, "orders")],
+    [
+        ({"models": ["hill"]}, "models"),
+        ({"models": []}, "models"),
+        ({"models": ["kothera"], "orders": []}, "orders"),
+    ],
 )
 def test_arguments_that_are_not_allowed_are_named(settings, message):
     with pytest.raises(ParameterError, match=message):
@@ -144,7 +178,9 @@ def test_independent_noise_counts_every_point_and_model_error_does_not():
     smooth = ForceMap.from_arrays(data.length, data.pressure, data.force + wave, rest_length=REST)
     size = effective_size(fit_muscle(smooth, muscle()))
     assert 12 <= size < 0.2 * 360
-    turned = np.where(data.level % 2 == 0, wave, -wave)  # smooth along each level, opposite in the next
+    turned = np.where(
+        data.level % 2 == 0, wave, -wave
+    )  # smooth along each level, opposite in the next
     along = ForceMap.from_arrays(data.length, data.pressure, data.force + turned, rest_length=REST)
     assert effective_size(fit_muscle(along, muscle())) < 0.5 * 360
 
@@ -152,7 +188,9 @@ def test_independent_noise_counts_every_point_and_model_error_does_not():
 def test_loops_without_a_friction_law_are_said_to_favour_the_model_with_two_branches():
     real = muscle(friction_coefficient=0.05)
     maps = [measure(real, direction=way, noise=1.0) for way in (-1.0, 1.0)]
-    columns = [np.concatenate([getattr(m, name) for m in maps]) for name in ("length", "pressure", "force")]
+    columns = [
+        np.concatenate([getattr(m, name) for m in maps]) for name in ("length", "pressure", "force")
+    ]
     way = np.repeat([-1.0, 1.0], len(maps[0]))
     data = ForceMap.from_arrays(*columns, rest_length=REST, direction=way)
     found = compare_models(data, muscle(), models=["kothera", "elbow_linear"], orders=[2])

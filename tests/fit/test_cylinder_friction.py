@@ -1,4 +1,6 @@
-"""Friction of cylinders: strokes, breakaway and law from synthetic runs whose friction is known, and the real set."""
+"""Friction of cylinders: strokes, breakaway and law from synthetic runs whose friction is known,
+and the real set.
+"""
 
 import warnings
 from pathlib import Path
@@ -29,8 +31,22 @@ PRESSURES = (1e5, 2e5, 4e5, 5e5, 7e5)
 STEP, STROKE = 0.01, 0.036
 
 
-def run(pressure, *, seed=0, scatter=0.02, between=0.0, cycles=5, breakaway=RATIO, name=None, tilt=0.0, speeds=(0.02, 0.03), sign=1):
-    """A run with friction F0 + F1 p: at rest, then to and fro; the regulator lags by 4 kPa to each side."""
+def run(
+    pressure,
+    *,
+    seed=0,
+    scatter=0.02,
+    between=0.0,
+    cycles=5,
+    breakaway=RATIO,
+    name=None,
+    tilt=0.0,
+    speeds=(0.02, 0.03),
+    sign=1,
+):
+    """A run with friction F0 + F1 p: at rest, then to and fro; the regulator lags by 4 kPa to each
+    side.
+    """
     rng = np.random.default_rng(seed + int(pressure / 1e4))
     friction = (F0 + F1 * pressure) * (1.0 + between * rng.standard_normal())
     position, force, gas = [np.zeros(15)], [np.zeros(15)], [np.zeros(15)]
@@ -40,7 +56,12 @@ def run(pressure, *, seed=0, scatter=0.02, between=0.0, cycles=5, breakaway=RATI
             x = np.arange(0.0, STROKE, speed * STEP)
             x = x if way > 0 else STROKE - x
             position.append(x)
-            force.append(way * factor * friction * np.clip(np.abs(x - x[0]) / 4e-4, 0.0, 1.0) ** (0.5 if len(force) > 1 else 0.0))
+            force.append(
+                way
+                * factor
+                * friction
+                * np.clip(np.abs(x - x[0]) / 4e-4, 0.0, 1.0) ** (0.5 if len(force) > 1 else 0.0)
+            )
             gas.append(np.full(len(x), way * 4e3))
     position, force, gas = (np.concatenate(part) for part in (position, force, gas))
     force[16:19] = friction * np.array([0.7, 1.0, 0.9]) * breakaway
@@ -50,7 +71,9 @@ def run(pressure, *, seed=0, scatter=0.02, between=0.0, cycles=5, breakaway=RATI
     time = STEP * np.arange(len(force))
     label = name or f"run_{pressure / 1e5:.0f}bar"
     position = position + 2e-6 * rng.standard_normal(len(position))
-    return FrictionRecord.from_arrays(time, sign * position, gas, force + noise, name=label, cylinder="made")
+    return FrictionRecord.from_arrays(
+        time, sign * position, gas, force + noise, name=label, cylinder="made"
+    )
 
 
 def runs(**options):
@@ -104,7 +127,9 @@ def test_known_friction_and_breakaway_are_recovered():
 
 def test_signed_prediction_over_velocity():
     fit = fit_cylinder_friction(runs())
-    assert np.allclose(fit.predict(2e5, [-0.1, 0.0, 0.1]), fit.predict(2e5) * np.array([-1.0, 0.0, 1.0]))
+    assert np.allclose(
+        fit.predict(2e5, [-0.1, 0.0, 0.1]), fit.predict(2e5) * np.array([-1.0, 0.0, 1.0])
+    )
     with pytest.raises(ParameterError, match="pressure: a value is not finite"):
         fit.predict([1e5, np.nan])
 
@@ -116,8 +141,13 @@ def test_standard_errors_tell_the_truth():
         fit = fit_cylinder_friction(records, area=AREA)
         slope = fit.params["f1"]
         slopes.append((slope.value - F1) / slope.stderr)
-        held_out += [item.error / item.stderr for item in fit.leave_one_pressure_out() if not item.extrapolated]
-    # a scatter that only the levels show, two or three of them to spare: Student's tails, so medians and wide limits
+        held_out += [
+            item.error / item.stderr
+            for item in fit.leave_one_pressure_out()
+            if not item.extrapolated
+        ]
+    # a scatter that only the levels show, two or three of them to spare: Student's tails, so
+    # medians and wide limits
     assert 0.7 < float(np.std(slopes)) < 1.6
     assert 0.5 < float(np.median(np.abs(held_out))) < 1.1
 
@@ -141,7 +171,9 @@ def test_a_held_out_run_does_not_touch_the_fit():
     spoilt = [*records[:1], run(2e5, seed=4, between=0.5), *records[2:]]
     options = {"fit_on": (1e5, 4e5, 7e5)}
     one, other = (fit_cylinder_friction(found, **options) for found in (records, spoilt))
-    assert {k: v.value for k, v in one.params.items()} == {k: v.value for k, v in other.params.items()}
+    assert {k: v.value for k, v in one.params.items()} == {
+        k: v.value for k, v in other.params.items()
+    }
     assert one.held_out()[0].level.friction != other.held_out()[0].level.friction
 
 
@@ -192,7 +224,10 @@ def test_speed_and_pressure_are_told_apart_only_if_they_vary_apart():
     together = [run(p, speeds=(0.02 + 2e-8 * p, 0.03)) for p in PRESSURES]
     with pytest.raises(RecordingError, match="speed and pressure have a correlation of 1.00"):
         fit_cylinder_friction(together, law="linear_speed")
-    apart = [run(p, speeds=(v, v)) for p, v in zip(PRESSURES, (0.02, 0.04, 0.03, 0.02, 0.03), strict=True)]
+    apart = [
+        run(p, speeds=(v, v))
+        for p, v in zip(PRESSURES, (0.02, 0.04, 0.03, 0.02, 0.03), strict=True)
+    ]
     fit = fit_cylinder_friction(apart, law="linear_speed")
     assert abs(fit.params["fv"].value) < 3.0 * fit.params["fv"].stderr
     with pytest.raises(ParameterError, match="velocity is needed"):
@@ -200,8 +235,17 @@ def test_speed_and_pressure_are_told_apart_only_if_they_vary_apart():
 
 
 def test_report_says_what_the_runs_do_not_tell():
-    text = fit_cylinder_friction([run(p, speeds=(0.02 + 2e-8 * p, 0.03)) for p in PRESSURES], fit_on=(1e5, 7e5)).fit_report()
-    for words in ("the law cannot be tested", "not separable from the area", "f1 = ", "N/bar", "predicted 4.00 bar", "breakaway"):
+    text = fit_cylinder_friction(
+        [run(p, speeds=(0.02 + 2e-8 * p, 0.03)) for p in PRESSURES], fit_on=(1e5, 7e5)
+    ).fit_report()
+    for words in (
+        "the law cannot be tested",
+        "not separable from the area",
+        "f1 = ",
+        "N/bar",
+        "predicted 4.00 bar",
+        "breakaway",
+    ):
         assert words in text
 
 
@@ -224,17 +268,32 @@ def test_rows_that_cannot_be_used_are_flagged():
     force[100:103] = np.nan
     time[200] = time[199]
     record = FrictionRecord.from_arrays(time, whole.position, whole.pressure, force)
-    assert [record.reason[i] for i in (100, 102, 200)] == ["not a number", "not a number", "time does not advance"]
+    assert [record.reason[i] for i in (100, 102, 200)] == [
+        "not a number",
+        "not a number",
+        "time does not advance",
+    ]
     assert "3 rows of" in " ".join(record.issues)
-    assert pair_strokes(record).friction(AREA).mean() == pytest.approx(pair_strokes(whole).friction(AREA).mean(), rel=1e-3)
+    assert pair_strokes(record).friction(AREA).mean() == pytest.approx(
+        pair_strokes(whole).friction(AREA).mean(), rel=1e-3
+    )
 
 
 @pytest.mark.parametrize(
     ("spoil", "message"),
     [
-        (lambda r: (r.time, r.position * 1e3, r.pressure, r.force), r"position = .* m is outside -5 to 5 m; right unit\?"),
-        (lambda r: (r.time, r.position, r.pressure * 1e3, r.force), r"pressure = .* Pa is outside .*; right unit\?"),
-        (lambda r: (r.time[:10], r.position[:10], r.pressure[:10], r.force[:10]), "10 usable rows of 10; 20 at least"),
+        (
+            lambda r: (r.time, r.position * 1e3, r.pressure, r.force),
+            r"position = .* m is outside -5 to 5 m; right unit\?",
+        ),
+        (
+            lambda r: (r.time, r.position, r.pressure * 1e3, r.force),
+            r"pressure = .* Pa is outside .*; right unit\?",
+        ),
+        (
+            lambda r: (r.time[:10], r.position[:10], r.pressure[:10], r.force[:10]),
+            "10 usable rows of 10; 20 at least",
+        ),
         (lambda r: (r.time[1:], r.position, r.pressure, r.force), "the same number is needed"),
     ],
 )
@@ -245,10 +304,14 @@ def test_impossible_columns_are_named(spoil, message):
 
 def test_motion_without_reversal_or_with_too_few_strokes():
     whole = run(3e5)
-    one_way = FrictionRecord.from_arrays(*(values[:150] for values in (whole.time, whole.position, whole.pressure, whole.force)))
+    one_way = FrictionRecord.from_arrays(
+        *(values[:150] for values in (whole.time, whole.position, whole.pressure, whole.force))
+    )
     with pytest.raises(RecordingError, match="the motion never reverses"):
         find_strokes(one_way)
-    still = FrictionRecord.from_arrays(whole.time, np.zeros(len(whole)), whole.pressure, whole.force)
+    still = FrictionRecord.from_arrays(
+        whole.time, np.zeros(len(whole)), whole.pressure, whole.force
+    )
     with pytest.raises(RecordingError, match="the position does not change"):
         find_strokes(still)
     with pytest.raises(RecordingError, match="2 complete pairs of strokes; 3 at least"):
@@ -258,9 +321,18 @@ def test_motion_without_reversal_or_with_too_few_strokes():
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"fit_on": (1e5,)}, r"1 pressure \(100 kPa\): the slope f1 of friction over pressure is not determinable"),
-        ({"fit_on": (1e5, 7e5), "law": "quadratic"}, r"2 pressures .* the 3 coefficients of the law 'quadratic' are not determinable"),
-        ({"fit_on": (1e5,), "law": "constant"}, "the piston area is not determinable from one pressure; give area"),
+        (
+            {"fit_on": (1e5,)},
+            r"1 pressure \(100 kPa\): the slope f1 of friction over pressure is not determinable",
+        ),
+        (
+            {"fit_on": (1e5, 7e5), "law": "quadratic"},
+            r"2 pressures .* the 3 coefficients of the law 'quadratic' are not determinable",
+        ),
+        (
+            {"fit_on": (1e5,), "law": "constant"},
+            "the piston area is not determinable from one pressure; give area",
+        ),
         ({"area": 1e-1}, r"friction comes out as .* N with area = 0.1 m2"),
     ],
 )
@@ -272,7 +344,10 @@ def test_what_the_runs_do_not_determine_is_named(options, message):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"fit_on": (3e5,)}, "fit_on: no run at 300 kPa; there are runs at 100, 200, 400, 500, 700 kPa"),
+        (
+            {"fit_on": (3e5,)},
+            "fit_on: no run at 300 kPa; there are runs at 100, 200, 400, 500, 700 kPa",
+        ),
         ({"law": "cubic"}, "law = 'cubic' is not allowed: constant"),
         ({"area": -1.0}, "area = -1.0 m2 is not allowed"),
         ({"margin": 0.6}, "margin = 0.6 is not allowed: 0 to 0.45"),
@@ -293,7 +368,13 @@ def test_a_single_pressure_with_its_area_gives_a_constant():
 
 def write(path, record):
     table = np.column_stack(
-        [record.time * 1e3, *[np.zeros(len(record))] * 3, record.position * 1e3, record.pressure / 1e5, record.force]
+        [
+            record.time * 1e3,
+            *[np.zeros(len(record))] * 3,
+            record.position * 1e3,
+            record.pressure / 1e5,
+            record.force,
+        ]
     )
     np.savetxt(path, table, fmt="%.6f", delimiter="\t")
 
@@ -318,7 +399,10 @@ def test_files_that_cannot_be_read(tmp_path):
     with pytest.raises(RecordingError, match="columns lists 2 names, but there are 7 columns"):
         load_friction_record(tmp_path / "A_1bar.csv", columns=("time [ms]", "force [N]"))
     with pytest.raises(RecordingError, match="columns names no position"):
-        load_friction_record(tmp_path / "A_1bar.csv", columns=("time [ms]", "", "", "", "", "pressure [bar]", "force [N]"))
+        load_friction_record(
+            tmp_path / "A_1bar.csv",
+            columns=("time [ms]", "", "", "", "", "pressure [bar]", "force [N]"),
+        )
 
 
 # -------------------------------------------------------------------------- real set
@@ -341,7 +425,14 @@ def test_real_cylinders():
     assert ring.area == pytest.approx(np.pi / 4 * 0.0257**2, rel=0.01)
     # the X-ring is linear up to 5 bar, and then it is not: the law must say so
     sealed = found.cylinders["X-ring257"]
-    assert abs(fit_cylinder_friction(sealed, fit_on=(1e5, 3e5), area=ring.area).held_out()[0].relative_error) < 0.05
+    assert (
+        abs(
+            fit_cylinder_friction(sealed, fit_on=(1e5, 3e5), area=ring.area)
+            .held_out()[0]
+            .relative_error
+        )
+        < 0.05
+    )
     whole = fit_cylinder_friction(sealed)
     assert whole.between > 1.0
     assert whole.redchi > 10.0
@@ -355,7 +446,9 @@ def test_real_cylinders():
 
 def test_pressure_is_named_where_speed_does_not_go_with_it():
     speeds = [(0.02, 0.03), (0.03, 0.045), (0.018, 0.026), (0.028, 0.04), (0.022, 0.03)]
-    records = [run(p, scatter=0.01, between=0.01, speeds=s) for p, s in zip(PRESSURES, speeds, strict=True)]
+    records = [
+        run(p, scatter=0.01, between=0.01, speeds=s) for p, s in zip(PRESSURES, speeds, strict=True)
+    ]
     found = compare_friction_laws(records, name="made")
     assert found.settled
     assert found.pressure > 0.98
@@ -365,7 +458,9 @@ def test_pressure_is_named_where_speed_does_not_go_with_it():
 
 
 def test_pressure_is_not_named_where_speed_falls_with_it():
-    records = [run(p, scatter=0.01, speeds=(0.04 - 8e-8 * p, 0.05 - 1e-7 * p)) for p in (2e5, 3e5, 4e5)]
+    records = [
+        run(p, scatter=0.01, speeds=(0.04 - 8e-8 * p, 0.05 - 1e-7 * p)) for p in (2e5, 3e5, 4e5)
+    ]
     found = compare_friction_laws(records)
     assert not found.settled
     assert found.probabilities["stribeck"] > 0.03

@@ -1,4 +1,6 @@
-"""Force maps: parsing, units, every flag with its count, levels, descriptions, recordings of a bench."""
+"""Force maps: parsing, units, every flag with its count, levels, descriptions, recordings of a
+bench.
+"""
 
 import re
 from pathlib import Path
@@ -11,8 +13,13 @@ from pamrs.errors import ParameterError, RecordingError
 from pamrs.fit import ForceMap, load_force_map, load_measured_muscle
 
 CASE = Path(__file__).parents[2] / "cases" / "festo_dmsp"
-TABLE = CASE.parents[2] / "shared/recordings/festo_dmsp_martens_boblan/martens_boblan_2017_force_maps.csv"
-needs_festo = pytest.mark.skipif(not TABLE.exists(), reason="the Festo maps are not beside the project")
+TABLE = (
+    CASE.parents[2]
+    / "shared/recordings/festo_dmsp_martens_boblan/martens_boblan_2017_force_maps.csv"
+)
+needs_festo = pytest.mark.skipif(
+    not TABLE.exists(), reason="the Festo maps are not beside the project"
+)
 
 REST = 0.3
 LENGTHS = np.tile([0.30, 0.28, 0.26, 0.24], 3)
@@ -52,7 +59,9 @@ def write(tmp_path, text, name="map.csv"):
 
 def csv_text(heading, scale=(1.0, 1.0, 1.0)):
     rows = np.column_stack([LENGTHS * scale[0], PRESSURES * scale[1], FORCES * scale[2]])
-    return heading + "\n" + "\n".join(",".join(f"{value:.9g}" for value in row) for row in rows) + "\n"
+    return (
+        heading + "\n" + "\n".join(",".join(f"{value:.9g}" for value in row) for row in rows) + "\n"
+    )
 
 
 # ------------------------------------------------------------------------ arrays
@@ -82,7 +91,11 @@ def test_clean_map_uses_every_row():
         ({"length": changed(LENGTHS, 3, np.inf)}, "not a number", "no number"),
         ({"pressure": changed(PRESSURES, 3, -2e4)}, "negative pressure", "negative gauge pressure"),
         ({"pressure": changed(PRESSURES, 3, 9e8)}, "pressure out of range", "beyond 5 MPa"),
-        ({"length": changed(LENGTHS, 3, 280.0)}, "length out of range", "no muscle of this rest length"),
+        (
+            {"length": changed(LENGTHS, 3, 280.0)},
+            "length out of range",
+            "no muscle of this rest length",
+        ),
         ({"force": changed(FORCES, 3, 0.0), "clipped": 0.0}, "clipped", "1 row of 12 is clipped"),
         ({"faulty": np.arange(12) == 3}, "sensor fault", "masked by the check"),
         (
@@ -109,7 +122,9 @@ def test_each_bad_row_is_flagged_with_its_reason(columns, reason, words):
 
 
 def test_repeats_of_a_resting_bench_are_no_duplicates():
-    assert made(np.full(9, 0.28), np.full(9, 2e5), np.full(9, 100.0), check_duplicates=False).used.all()
+    assert made(
+        np.full(9, 0.28), np.full(9, 2e5), np.full(9, 100.0), check_duplicates=False
+    ).used.all()
 
 
 def test_exact_zeros_that_nobody_explains_are_used_and_reported():
@@ -159,7 +174,13 @@ def test_columns_of_different_lengths():
 
 
 def test_too_few_rows_says_what_became_of_the_others():
-    with pytest.raises(RecordingError, match="1 usable row, two at least.*11 rows of 12 are clipped.*indices 0, 1, 2, 3, 4 and 6 more"):
+    with pytest.raises(
+        RecordingError,
+        match=(
+            "1 usable row, two at least.*11 rows of 12 are clipped.*indices 0, 1, 2, 3, 4 and 6 "
+            "more"
+        ),
+    ):
         made(force=np.append(np.zeros(11), 5.0), clipped=0.0)
 
 
@@ -200,7 +221,9 @@ def test_select_leaves_out_the_other_levels():
 
 def test_levels_by_pressure():
     assert made().level_indices([4.01e5, 1e5, 1e5]) == [0, 2]
-    with pytest.raises(ParameterError, match="no measurement at 300 kPa; there are levels at 100, 200, 400 kPa"):
+    with pytest.raises(
+        ParameterError, match="no measurement at 300 kPa; there are levels at 100, 200, 400 kPa"
+    ):
         made().level_indices([3e5])
 
 
@@ -234,9 +257,24 @@ def test_a_level_without_a_row_left_vanishes():
     [
         ({"force": FORCES * 1e3}, {"force": "N"}, "forces are too large (in mN, read as N?)"),
         ({"force": FORCES * 9.81}, {"force": "kgf"}, "forces are too large (in N, read as kgf?)"),
-        ({"force": FORCES / 1e3}, {}, "forces are too small (in kN, read as N or in N, read as mN?)"),
-        ({"pressure": PRESSURES / 14.5}, {"pressure": "psi"}, "pressures are too small (in bar, read as psi?)"),
-        ({"force": FORCES * 30.0}, {}, "forces are too large, or the pressures are too small, or the muscle's sizes are too small"),
+        (
+            {"force": FORCES / 1e3},
+            {},
+            "forces are too small (in kN, read as N or in N, read as mN?)",
+        ),
+        (
+            {"pressure": PRESSURES / 14.5},
+            {"pressure": "psi"},
+            "pressures are too small (in bar, read as psi?)",
+        ),
+        (
+            {"force": FORCES * 30.0},
+            {},
+            (
+                "forces are too large, or the pressures are too small, or the muscle's sizes are "
+                "too small"
+            ),
+        ),
     ],
 )
 def test_forces_that_gas_cannot_make(columns, units, words):
@@ -279,7 +317,10 @@ def test_contraction_in_place_of_length(tmp_path):
 
 
 def test_direction_in_words_or_numbers(tmp_path):
-    text = "length_m,pressure_bar,force_N,direction\n.3,1,90,contracting\n.28,1,60,lengthening\n.26,1,30,\n.25,1,20,-1\n"
+    text = (
+        "length_m,pressure_bar,force_N,direction\n.3,1,90,contracting\n.28,1,60,lengthening\n"
+        ".26,1,30,\n.25,1,20,-1\n"
+    )
     data = load_force_map(write(tmp_path, text), rest_length=REST)
     np.testing.assert_array_equal(data.direction, [-1, 1, 0, -1])
     with pytest.raises(RecordingError, match="row 2: 'sideways' is not allowed"):
@@ -306,7 +347,10 @@ def test_a_bare_table_needs_the_rest_length(tmp_path):
         load_force_map(write(tmp_path, csv_text("length_m,pressure_Pa,force_N")))
 
 
-SEVERAL = "specimen,spot,length_m,pressure_bar,force_N\nA,1,.3,1,90\nB,1,.3,1,95\nB,2,.28,1,0\nB,3,.26,2,130\nB,4,.27,2,oops\n"
+SEVERAL = (
+    "specimen,spot,length_m,pressure_bar,force_N\nA,1,.3,1,90\nB,1,.3,1,95\nB,2,.28,1,0\n"
+    "B,3,.26,2,130\nB,4,.27,2,oops\n"
+)
 
 
 def test_rows_of_one_specimen(tmp_path):
@@ -315,7 +359,9 @@ def test_rows_of_one_specimen(tmp_path):
     np.testing.assert_array_equal(data.force[data.used], [95.0, 130.0])
     assert len(data) == 4
     assert sorted(set(data.reason)) == ["", "clipped", "not a number"]
-    assert any("1 row of the file is not specimen = B and belongs" in issue for issue in data.issues)
+    assert any(
+        "1 row of the file is not specimen = B and belongs" in issue for issue in data.issues
+    )
     assert any("columns not used: spot" in issue for issue in data.issues)
     with pytest.raises(RecordingError, match="no row has specimen = 'C'; there are: A, B"):
         load_force_map(path, rest_length=REST, where={"specimen": "C"})
@@ -324,7 +370,9 @@ def test_rows_of_one_specimen(tmp_path):
 
 
 def test_two_specimens_are_not_mixed(tmp_path):
-    with pytest.raises(RecordingError, match=r"column 'specimen' has 2 values \(A, B\): choose one"):
+    with pytest.raises(
+        RecordingError, match=r"column 'specimen' has 2 values \(A, B\): choose one"
+    ):
         load_force_map(write(tmp_path, SEVERAL), rest_length=REST)
 
 
@@ -338,24 +386,43 @@ def test_a_cell_that_is_no_number_is_named(tmp_path):
 
 @pytest.mark.parametrize("name", ["map.csv", "map.txt", "map.tsv"])
 @pytest.mark.parametrize(
-    ("delimiter", "decimal"), [(";", ","), (";", "."), ("\t", ","), ("\t", "."), (",", "."), ("|", ","), (" ", ","), (" ", ".")]
+    ("delimiter", "decimal"),
+    [
+        (";", ","),
+        (";", "."),
+        ("\t", ","),
+        ("\t", "."),
+        (",", "."),
+        ("|", ","),
+        (" ", ","),
+        (" ", "."),
+    ],
 )
 def test_delimiter_and_decimal_mark_are_found(tmp_path, name, delimiter, decimal):
-    text = csv_text("length_mm,pressure_bar,force_N", (1e3, 1e-5, 1.0)).replace(",", delimiter).replace(".", decimal)
+    text = (
+        csv_text("length_mm,pressure_bar,force_N", (1e3, 1e-5, 1.0))
+        .replace(",", delimiter)
+        .replace(".", decimal)
+    )
     data = load_force_map(write(tmp_path, text, name), rest_length=REST)
     np.testing.assert_allclose(data.length, LENGTHS)
     np.testing.assert_allclose(data.force, FORCES, rtol=1e-6)
 
 
 def test_quoted_cells_may_have_decimal_commas(tmp_path):
-    text = '"length [mm]","pressure [bar]","force [N]"\n"300,5","1,0","12,3"\n"290,5","1,0","8,5"\n"280,0","1,0","4,25"\n'
+    text = (
+        '"length [mm]","pressure [bar]","force [N]"\n"300,5","1,0","12,3"\n"290,5","1,0","8,5"\n'
+        '"280,0","1,0","4,25"\n'
+    )
     data = load_force_map(write(tmp_path, text), rest_length=REST)
     np.testing.assert_allclose(data.force, [12.3, 8.5, 4.25])
 
 
 def test_descriptions_find_delimiter_and_decimal_mark(described):
     table = described.with_name("map.csv")
-    table.write_text(table.read_text(encoding="utf-8").replace(",", ";").replace("95", "95,5"), encoding="utf-8")
+    table.write_text(
+        table.read_text(encoding="utf-8").replace(",", ";").replace("95", "95,5"), encoding="utf-8"
+    )
     assert load_measured_muscle(described).data.force[0] == 95.5
 
 
@@ -366,10 +433,22 @@ def test_descriptions_find_delimiter_and_decimal_mark(described):
             "length [mm],pressure [bar],force [N]\n300,5,1,0,12,3\n290,5,1,0,8,5\n",
             "3 cells, row 2 has 6.*both part.*delimiter and decimal",
         ),
-        ("bench 7\nlength [mm];pressure [bar];force [N]\n300;1;12\n", "'bench 7', is not parted.*delimiter and decimal"),
-        ("length_mm;pressure_bar;force_N\n300,5;1.5;12\n290;1;8\n", "'300,5' and '1.5': which mark.*decimal"),
-        ("length_mm;pressure_Pa;force_N\n300;100,000;12\n290;100,000;8\n", "decimals or thousands.*decimal = ','"),
-        ("length_mm;pressure_Pa;force_N\n300;1.000,5;12\n290;1.000,5;8\n", "'1.000,5' has a mark between thousands"),
+        (
+            "bench 7\nlength [mm];pressure [bar];force [N]\n300;1;12\n",
+            "'bench 7', is not parted.*delimiter and decimal",
+        ),
+        (
+            "length_mm;pressure_bar;force_N\n300,5;1.5;12\n290;1;8\n",
+            "'300,5' and '1.5': which mark.*decimal",
+        ),
+        (
+            "length_mm;pressure_Pa;force_N\n300;100,000;12\n290;100,000;8\n",
+            "decimals or thousands.*decimal = ','",
+        ),
+        (
+            "length_mm;pressure_Pa;force_N\n300;1.000,5;12\n290;1.000,5;8\n",
+            "'1.000,5' has a mark between thousands",
+        ),
     ],
 )
 def test_tables_that_cannot_be_told_apart_ask_for_delimiter_and_decimal(tmp_path, text, match):
@@ -386,34 +465,62 @@ def test_a_given_decimal_mark_settles_thousands(tmp_path):
 @pytest.mark.parametrize(("option", "value"), [("delimiter", "tab"), ("decimal", ";")])
 def test_impossible_marks(tmp_path, option, value):
     with pytest.raises(RecordingError, match=f"{option} = '{value}' is not allowed"):
-        load_force_map(write(tmp_path, csv_text("length_m,pressure_Pa,force_N")), rest_length=REST, **{option: value})
+        load_force_map(
+            write(tmp_path, csv_text("length_m,pressure_Pa,force_N")),
+            rest_length=REST,
+            **{option: value},
+        )
 
 
-@pytest.mark.parametrize("heading", ["L [mm],p [bar],F [N]", "L\u00e4nge [mm],Druck [bar],Kraft [N]"])
+@pytest.mark.parametrize(
+    "heading", ["L [mm],p [bar],F [N]", "L\u00e4nge [mm],Druck [bar],Kraft [N]"]
+)
 def test_unknown_headings_say_how_to_map_them(tmp_path, heading):
     path = write(tmp_path, csv_text(heading, (1e3, 1e-5, 1.0)))
     long, gas, pull = heading.split(",")
     with pytest.raises(RecordingError) as error:
         load_force_map(path, rest_length=REST)
-    proposed = f'columns = {{ "{long}" = "length [mm]", "{gas}" = "pressure [bar]", "{pull}" = "force [N]" }} in a .toml'
+    proposed = (
+        f'columns = {{ "{long}" = "length [mm]", "{gas}" = "pressure [bar]", "{pull}" = "force '
+        '[N]" } in a .toml'
+    )
     assert proposed in str(error.value)
     assert f"there are: {long}, {gas}, {pull}. Rename" in str(error.value)
-    mapped = load_force_map(path, rest_length=REST, columns={long: "length [mm]", gas: "pressure [bar]", pull: "force [N]"})
+    mapped = load_force_map(
+        path,
+        rest_length=REST,
+        columns={long: "length [mm]", gas: "pressure [bar]", pull: "force [N]"},
+    )
     np.testing.assert_allclose(mapped.force, FORCES, rtol=1e-6)
 
 
 def test_headings_without_units_are_mapped_by_hand(tmp_path):
-    with pytest.raises(RecordingError, match=r'columns = \{ "\.\.\." = "length \[m\]", .* "\.\.\." = "force \[N\]" \}'):
+    with pytest.raises(
+        RecordingError,
+        match=r'columns = \{ "\.\.\." = "length \[m\]", .* "\.\.\." = "force \[N\]" \}',
+    ):
         load_force_map(write(tmp_path, csv_text("L,p,F")), rest_length=REST)
 
 
 @pytest.mark.parametrize(
     ("heading", "rest", "words"),
     [
-        ("length [mm]", 3.0, "Either rest_length is 10 times too large, or the length column is in cm, read as mm"),
-        ("length [cm]", REST, "Either rest_length is 10 times too small, or the length column is in mm, read as cm"),
+        (
+            "length [mm]",
+            3.0,
+            "Either rest_length is 10 times too large, or the length column is in cm, read as mm",
+        ),
+        (
+            "length [cm]",
+            REST,
+            "Either rest_length is 10 times too small, or the length column is in mm, read as cm",
+        ),
         ("length [in]", REST, "25.4 times too small, or the length column is in mm, read as in"),
-        ("length [mm]", 4.5, "They differ by a factor of 15: check rest_length and the length column"),
+        (
+            "length [mm]",
+            4.5,
+            "They differ by a factor of 15: check rest_length and the length column",
+        ),
     ],
 )
 def test_wrong_lengths_name_the_rest_length_too(tmp_path, heading, rest, words):
@@ -426,25 +533,44 @@ def test_wrong_lengths_name_the_rest_length_too(tmp_path, heading, rest, words):
 def test_bar_under_a_heading_in_psi_does_not_blame_the_forces_alone(tmp_path):
     path = write(tmp_path, csv_text("length [mm],pressure [psi],force [N]", (1e3, 1e-5, 1.0)))
     with pytest.raises(
-        RecordingError, match=r"forces are too large( \(.*\))?, or the pressures are too small \(in bar, read as psi\?\)"
+        RecordingError,
+        match=(
+            r"forces are too large( \(.*\))?, or the pressures are too small \(in bar, read as "
+            r"psi\?\)"
+        ),
     ):
         load_force_map(path, rest_length=REST).checked_against(fake_muscle())
 
 
 def test_where_on_a_measured_column_keeps_it(tmp_path):
-    path = write(tmp_path, csv_text("length [mm],pressure [bar],force [N]", (1e3, 1e-5, 1.0)).replace(",1,", ",1.000,"))
+    path = write(
+        tmp_path,
+        csv_text("length [mm],pressure [bar],force [N]", (1e3, 1e-5, 1.0)).replace(
+            ",1,", ",1.000,"
+        ),
+    )
     for value in ("1.000", "1", 1.0):
         data = load_force_map(path, rest_length=REST, where={"pressure [bar]": value})
         np.testing.assert_allclose(data.pressure, np.full(4, 1e5))
         np.testing.assert_allclose(data.force, FORCES[:4], rtol=1e-6)
-    with pytest.raises(RecordingError, match=r"where names the column 'pressure', but .*; did you mean 'pressure \[bar\]'\?"):
+    with pytest.raises(
+        RecordingError,
+        match=r"where names the column 'pressure', but .*; did you mean 'pressure \[bar\]'\?",
+    ):
         load_force_map(path, rest_length=REST, where={"pressure": "1"})
-    with pytest.raises(RecordingError, match=r"columns names 'Force', but .*; did you mean 'force \[N\]'\?"):
+    with pytest.raises(
+        RecordingError, match=r"columns names 'Force', but .*; did you mean 'force \[N\]'\?"
+    ):
         load_force_map(path, rest_length=REST, columns={"Force": "force [N]"})
 
 
 def test_where_compares_numbers_with_decimal_commas(tmp_path):
-    path = write(tmp_path, csv_text("length [mm],pressure [bar],force [N]", (1e3, 1.5e-5, 1.0)).replace(",", ";").replace(".", ","))
+    path = write(
+        tmp_path,
+        csv_text("length [mm],pressure [bar],force [N]", (1e3, 1.5e-5, 1.0))
+        .replace(",", ";")
+        .replace(".", ","),
+    )
     for value in ("1.5", "1,50"):
         assert len(load_force_map(path, rest_length=REST, where={"pressure [bar]": value})) == 4
 
@@ -458,16 +584,25 @@ def test_rows_not_used_are_named_as_in_the_file(tmp_path):
     data = load_force_map(write(tmp_path, "\n".join(lines)), rest_length=REST, clipped=0.0)
     assert data.issues == [
         "1 row of 12 has no number for length, pressure or force: not used (row 4)",
-        "6 rows of 12 are clipped: the true force lies beyond the end of the scale: not used (rows 8, 9, 10, 11, 12 and 1 more)",
+        (
+            "6 rows of 12 are clipped: the true force lies beyond the end of the scale: not used "
+            "(rows 8, 9, 10, 11, 12 and 1 more)"
+        ),
     ]
     with pytest.raises(RecordingError, match=r"3 rows of 4 are clipped.*\(rows 11, 12, 13\)"):
-        load_force_map(tmp_path / "map.csv", rest_length=REST, where={"pressure [bar]": 4}, clipped=0.0)
+        load_force_map(
+            tmp_path / "map.csv", rest_length=REST, where={"pressure [bar]": 4}, clipped=0.0
+        )
 
 
 @pytest.mark.parametrize(("scale", "found"), [(1.0, True), (100.0, False)])
 def test_fractions_under_a_heading_in_percent_are_asked_about(tmp_path, scale, found):
-    rows = "".join(f"{e * scale},{p},{100 * p * (0.3 - e)}\n" for e in (0.0, 0.1, 0.21) for p in (1, 2, 3))
-    data = load_force_map(write(tmp_path, "contraction [%],pressure [bar],force [N]\n" + rows), rest_length=REST)
+    rows = "".join(
+        f"{e * scale},{p},{100 * p * (0.3 - e)}\n" for e in (0.0, 0.1, 0.21) for p in (1, 2, 3)
+    )
+    data = load_force_map(
+        write(tmp_path, "contraction [%],pressure [bar],force [N]\n" + rows), rest_length=REST
+    )
     note = "contractions span only 0.21 %: are they fractions? write contraction [1]"
     assert (note in data.issues) == found
 
@@ -478,17 +613,31 @@ def test_contractions_near_five_percent_are_no_fractions(tmp_path):
 
 
 def grid(activation, ambient=0.0, stiffness=2e3, noise=0.0, lengths=(0.30, 0.29, 0.27, 0.25)):
-    """Gauge data of a muscle whose bladder lifts at ``activation``, with ``ambient`` added to the pressures."""
-    pressure, length = (column.ravel() for column in np.meshgrid(np.arange(1e5, 6.1e5, 1e5), lengths, indexing="ij"))
+    """Gauge data of a muscle whose bladder lifts at ``activation``, with ``ambient`` added to the
+    pressures.
+    """
+    pressure, length = (
+        column.ravel() for column in np.meshgrid(np.arange(1e5, 6.1e5, 1e5), lengths, indexing="ij")
+    )
     force = (pressure - activation) * 3e-3 * (length / REST - 0.7) - stiffness * (1 - length / REST)
-    return length, pressure + ambient, force + noise * np.random.default_rng(3).normal(size=force.size)
+    return (
+        length,
+        pressure + ambient,
+        force + noise * np.random.default_rng(3).normal(size=force.size),
+    )
 
 
 @pytest.mark.parametrize("noise", [0.0, 2.0])
 def test_absolute_pressures_are_asked_about(noise):
     issues = made(*grid(0.0, 101.3e3, noise=noise)).issues
     assert len(issues) == 1
-    assert re.match(r"forces vanish near (9\d|10\d)(\.\d)? kPa .*are the pressures absolute\? gauge pressures are needed", issues[0])
+    assert re.match(
+        (
+            r"forces vanish near (9\d|10\d)(\.\d)? kPa .*are the pressures absolute\? gauge "
+            r"pressures are needed"
+        ),
+        issues[0],
+    )
 
 
 @pytest.mark.parametrize(
@@ -500,9 +649,20 @@ def test_absolute_pressures_are_asked_about(noise):
         grid(7e4, stiffness=5e3, lengths=(0.299, 0.28, 0.26)),
         grid(0.0, stiffness=1e4, lengths=(0.28, 0.26)),
         [column[:12] for column in grid(0.0, 101.3e3)],
-        [np.append(column, value) for column, value in zip(grid(1e5), (0.30, 5e4, 1.0), strict=True)],
+        [
+            np.append(column, value)
+            for column, value in zip(grid(1e5), (0.30, 5e4, 1.0), strict=True)
+        ],
     ],
-    ids=["gauge", "activation", "noise", "stiff", "no long length", "three levels", "pressure below ambient"],
+    ids=[
+        "gauge",
+        "activation",
+        "noise",
+        "stiff",
+        "no long length",
+        "three levels",
+        "pressure below ambient",
+    ],
 )
 def test_gauge_pressures_are_not_asked_about(columns):
     assert not any("absolute" in issue for issue in made(*columns).issues)
@@ -518,15 +678,22 @@ def test_recording_of_a_bench_knows_its_direction(tmp_path, noise):
     held = np.repeat([1e5, 2e5, 3e5], 1000) + noise * generator.normal(size=time.size)
     length = 0.27 - 0.03 * np.cos(2 * np.pi * time / 5) + 2e-5 * generator.normal(size=time.size)
     way = np.sign(np.sin(2 * np.pi * time / 5))
-    force = held * 3e-3 * (length / REST - 0.7) * (1 + 0.05 * way) + generator.normal(size=time.size)
-    rows = "\n".join(",".join(f"{v:.7g}" for v in row) for row in np.column_stack([time, length * 1e3, held / 1e5, force]))
+    force = held * 3e-3 * (length / REST - 0.7) * (1 + 0.05 * way) + generator.normal(
+        size=time.size
+    )
+    rows = "\n".join(
+        ",".join(f"{v:.7g}" for v in row)
+        for row in np.column_stack([time, length * 1e3, held / 1e5, force])
+    )
     path = write(tmp_path, "time [s],length [mm],pressure [bar],force [N]\n" + rows)
     data = load_force_map(path, rest_length=REST)
     assert data.used.mean() > 0.99
     np.testing.assert_allclose(data.levels, [1e5, 2e5, 3e5], rtol=0.01)
     assert np.mean(data.direction == way) > 0.9
     assert np.mean(data.direction == -way) < 0.005
-    path.write_text(path.read_text(encoding="utf-8").replace(",", ";").replace(".", ","), encoding="utf-8")
+    path.write_text(
+        path.read_text(encoding="utf-8").replace(",", ";").replace(".", ","), encoding="utf-8"
+    )
     np.testing.assert_array_equal(load_force_map(path, rest_length=REST).force, data.force)
 
 
@@ -535,8 +702,19 @@ def test_recording_of_a_bench_knows_its_direction(tmp_path, noise):
 
 @pytest.fixture
 def described(tmp_path):
-    write(tmp_path, SEVERAL.replace("length_m", "L").replace("pressure_bar", "p").replace("force_N", "F").replace("oops", "80"))
-    text = (tmp_path / "map.csv").read_text(encoding="utf-8").replace(",.", ",0.").replace("0.3,", "300,")
+    write(
+        tmp_path,
+        SEVERAL.replace("length_m", "L")
+        .replace("pressure_bar", "p")
+        .replace("force_N", "F")
+        .replace("oops", "80"),
+    )
+    text = (
+        (tmp_path / "map.csv")
+        .read_text(encoding="utf-8")
+        .replace(",.", ",0.")
+        .replace("0.3,", "300,")
+    )
     for metres, millimetres in (("0.28", "280"), ("0.26", "260"), ("0.27", "270")):
         text = text.replace(metres, millimetres)
     write(tmp_path, text)
@@ -578,7 +756,10 @@ def test_description_problems_are_named(described, old, new, match):
 
 
 @needs_festo
-@pytest.mark.parametrize(("name", "used", "clipped", "levels"), [("DMSP-20-300", 60, 66, 20), ("DMSP-10-250", 40, 45, 16)])
+@pytest.mark.parametrize(
+    ("name", "used", "clipped", "levels"),
+    [("DMSP-20-300", 60, 66, 20), ("DMSP-10-250", 40, 45, 16)],
+)
 def test_festo_maps_leave_the_clipped_zeros_out(name, used, clipped, levels):
     measured = load_measured_muscle(CASE / f"{name}.toml")
     assert measured.data.used.sum() == used
@@ -593,5 +774,7 @@ def test_festo_maps_leave_the_clipped_zeros_out(name, used, clipped, levels):
 
 
 def test_a_description_takes_no_arguments_beside_it(described):
-    with pytest.raises(ParameterError, match=r"rest_length cannot be given: .* describes its table itself"):
+    with pytest.raises(
+        ParameterError, match=r"rest_length cannot be given: .* describes its table itself"
+    ):
         load_force_map(described, rest_length=0.3)

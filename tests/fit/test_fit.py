@@ -10,7 +10,17 @@ from pamrs import rigs
 from pamrs.errors import ParameterError
 from pamrs.fit import FitError, ForceMap, fit_muscle
 from pamrs.rig import Rig
-from tests.fit.cases import CONTRACTIONS, OFFSETS, PRESSURES, REST, SLOPES, TOLERANCE, measure, muscle, truth
+from tests.fit.cases import (
+    CONTRACTIONS,
+    OFFSETS,
+    PRESSURES,
+    REST,
+    SLOPES,
+    TOLERANCE,
+    measure,
+    muscle,
+    truth,
+)
 
 # ------------------------------------------------------------------------ recovery
 
@@ -32,7 +42,9 @@ def test_slopes_and_offsets_come_back_to_rounding(model, order):
     assert fit.order == order
     assert list(fit.params) == [f"{letter}{k}" for letter in "mb" for k in range(1, order + 1)]
     np.testing.assert_allclose(fit.x, truth(real, fit), rtol=1e-13 * fit.condition_number * 100)
-    np.testing.assert_allclose(fit.muscle.force(4e5, CONTRACTIONS), real.force(4e5, CONTRACTIONS), rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(
+        fit.muscle.force(4e5, CONTRACTIONS), real.force(4e5, CONTRACTIONS), rtol=1e-9, atol=1e-9
+    )
     assert fit.rsquared == pytest.approx(1.0, abs=1e-12)
 
 
@@ -61,7 +73,9 @@ def test_plain_standard_errors_cover_as_they_should():
     inside = []
     for seed in range(120):
         fit = fit_muscle(measure(real, noise=4.0, seed=seed), real, errors="plain")
-        inside.append(np.abs(fit.x - truth(real, fit)) < [item.stderr for item in fit.params.values()])
+        inside.append(
+            np.abs(fit.x - truth(real, fit)) < [item.stderr for item in fit.params.values()]
+        )
     share = np.mean(inside)
     assert 0.62 < share < 0.74  # 0.683 for a normal distribution
 
@@ -72,9 +86,15 @@ def test_standard_errors_by_level_see_errors_that_a_level_shares():
     found, plain, level = [], [], []
     for seed in range(60):
         data = measure(real, pressures=pressures, noise=1.0, seed=seed)
-        stiffer = 0.1 * np.random.default_rng(1000 + seed).standard_normal(15)[data.level]  # rubber that creeps between levels
-        elastic = real.force(data.pressure, data.contraction) - real.replace(modulus_scale=0.0).force(data.pressure, data.contraction)
-        crept = ForceMap.from_arrays(data.length, data.pressure, data.force + stiffer * elastic, rest_length=REST)
+        stiffer = (
+            0.1 * np.random.default_rng(1000 + seed).standard_normal(15)[data.level]
+        )  # rubber that creeps between levels
+        elastic = real.force(data.pressure, data.contraction) - real.replace(
+            modulus_scale=0.0
+        ).force(data.pressure, data.contraction)
+        crept = ForceMap.from_arrays(
+            data.length, data.pressure, data.force + stiffer * elastic, rest_length=REST
+        )
         fit = fit_muscle(crept, real)
         assert fit.errors == "level"
         found.append(fit.x)
@@ -90,7 +110,10 @@ def test_level_errors_are_the_jackknife_of_explicit_refits():
     data = measure(real, noise=4.0, seed=5)
     fit = fit_muscle(data, real)
     count = len(data.levels)
-    parts = [fit_muscle(data, real, levels=[i for i in range(count) if i != gone]).x - fit.x for gone in range(count)]
+    parts = [
+        fit_muscle(data, real, levels=[i for i in range(count) if i != gone]).x - fit.x
+        for gone in range(count)
+    ]
     expected = (1.0 - 1.0 / count) * np.array(parts).T @ np.array(parts)
     np.testing.assert_allclose(fit.covar, expected, rtol=1e-7)
 
@@ -105,24 +128,41 @@ def test_per_level_moduli_lie_on_the_line_when_the_truth_is_a_line():
     levels, values, stderr = fit.moduli()
     np.testing.assert_allclose(values, np.outer(levels, SLOPES[:2]) + OFFSETS[:2], rtol=1e-8)
     assert stderr.shape == values.shape
-    np.testing.assert_allclose(fit.predict(2.7e5, [0.05, 0.2]), real.force(2.7e5, [0.05, 0.2]), rtol=1e-9)
-    np.testing.assert_allclose(fit.muscle_at(2.7e5).force(2.7e5, 0.1), real.force(2.7e5, 0.1), rtol=1e-9)
+    np.testing.assert_allclose(
+        fit.predict(2.7e5, [0.05, 0.2]), real.force(2.7e5, [0.05, 0.2]), rtol=1e-9
+    )
+    np.testing.assert_allclose(
+        fit.muscle_at(2.7e5).force(2.7e5, 0.1), real.force(2.7e5, 0.1), rtol=1e-9
+    )
     assert list(fit.params)[:3] == ["E1_100kPa", "E2_100kPa", "E1_200kPa"]
 
 
 def test_names_tell_the_pressure_of_each_level_apart():
     real = muscle(order=1)
-    p, e = (grid.ravel() for grid in np.meshgrid([2e5, 2.0004e5, 343.75e3], CONTRACTIONS, indexing="ij"))
-    data = ForceMap.from_arrays(REST * (1.0 - e), p, real.force(p, e), rest_length=REST, level_tolerance=10.0)
-    assert list(fit_muscle(data, real, moduli="per_level").params) == ["E1_200kPa", "E1_200.04kPa", "E1_343.75kPa"]
-    assert list(fit_muscle(data, real, moduli="per_level", levels=[0, 2]).params) == ["E1_200kPa", "E1_343.8kPa"]
+    p, e = (
+        grid.ravel() for grid in np.meshgrid([2e5, 2.0004e5, 343.75e3], CONTRACTIONS, indexing="ij")
+    )
+    data = ForceMap.from_arrays(
+        REST * (1.0 - e), p, real.force(p, e), rest_length=REST, level_tolerance=10.0
+    )
+    assert list(fit_muscle(data, real, moduli="per_level").params) == [
+        "E1_200kPa",
+        "E1_200.04kPa",
+        "E1_343.75kPa",
+    ]
+    assert list(fit_muscle(data, real, moduli="per_level", levels=[0, 2]).params) == [
+        "E1_200kPa",
+        "E1_343.8kPa",
+    ]
 
 
 def test_moduli_of_a_linear_fit_have_the_error_of_the_line():
     real = muscle(order=1)
     fit = fit_muscle(measure(real, noise=3.0), real)
     levels, values, stderr = fit.moduli()
-    np.testing.assert_allclose(values[:, 0], fit.params["m1"].value * levels + fit.params["b1"].value, rtol=1e-12)
+    np.testing.assert_allclose(
+        values[:, 0], fit.params["m1"].value * levels + fit.params["b1"].value, rtol=1e-12
+    )
     for level, spread in zip(levels, stderr[:, 0], strict=True):
         gradient = np.array([level, 1.0])
         assert spread == pytest.approx(math.sqrt(gradient @ fit.covar @ gradient))
@@ -141,7 +181,9 @@ def test_per_level_does_not_go_beyond_its_levels():
 def test_a_level_has_its_own_moduli_whatever_the_other_levels_say():
     real = muscle()
     nominal = np.repeat(PRESSURES, len(CONTRACTIONS))
-    pressure = nominal + np.random.default_rng(0).uniform(-1e3, 1e3, len(nominal))  # a regulator holds no level exactly
+    pressure = nominal + np.random.default_rng(0).uniform(
+        -1e3, 1e3, len(nominal)
+    )  # a regulator holds no level exactly
     contraction = np.tile(CONTRACTIONS, len(PRESSURES))
     force = real.force(pressure, contraction)
 
@@ -187,7 +229,9 @@ def test_error_by_pressure_is_2_37():
     errors = fit.error_by_pressure()
     for k, pressure in enumerate(PRESSURES):
         rows = data.pressure == pressure
-        share = (data.force[rows] - fit.predict(data.pressure[rows], data.contraction[rows])) / data.force[rows].max()
+        share = (
+            data.force[rows] - fit.predict(data.pressure[rows], data.contraction[rows])
+        ) / data.force[rows].max()
         assert errors.rms[k] == pytest.approx(math.sqrt(np.mean(share**2)))
         assert errors.max[k] == pytest.approx(np.abs(share).max())
     assert fit.errors_of("held_out") is None
@@ -219,15 +263,24 @@ def test_a_level_that_does_not_pull_is_no_scale_and_no_obstacle(force):
         assert cross.by_pressure.weak.tolist() == ([0.0] if levels is None else [])
         assert math.isfinite(cross.rms)
         assert json.loads(json.dumps(fit.to_dict(), allow_nan=False))["weak_levels"] == [0.0]
-    assert fit_muscle(data, muscle(), weights="level", levels=[1, 2, 3, 4, 5, 6]).errors_of("held_out")[0] < 1.0
-    with pytest.raises(FitError, match=r"weights = 'level' .* at 0 kPa \(.* N\): leave these levels out"):
+    assert (
+        fit_muscle(data, muscle(), weights="level", levels=[1, 2, 3, 4, 5, 6]).errors_of(
+            "held_out"
+        )[0]
+        < 1.0
+    )
+    with pytest.raises(
+        FitError, match=r"weights = 'level' .* at 0 kPa \(.* N\): leave these levels out"
+    ):
         fit_muscle(data, muscle(), weights="level")
 
 
 def test_weights_by_level_minimise_2_37():
     real = muscle(order=3)
     data = measure(real, noise=8.0, seed=2)
-    plain, level = (fit_muscle(data, real, order=2, weights=weights) for weights in ("force", "level"))
+    plain, level = (
+        fit_muscle(data, real, order=2, weights=weights) for weights in ("force", "level")
+    )
 
     def total(fit):
         return np.sum(fit.error_by_pressure().rms ** 2)
@@ -266,8 +319,12 @@ def test_leaving_out_needs_levels_to_spare():
     data = measure(muscle(), pressures=[2e5, 6e5])
     with pytest.raises(FitError, match="^without 200 kPa the other levels do not determine"):
         fit_muscle(data, muscle()).leave_one_pressure_out()
-    with pytest.raises(FitError, match="two pressure levels at least are needed to predict one from the others"):
-        fit_muscle(measure(muscle(), pressures=[2e5]), muscle(), moduli="per_level").leave_one_pressure_out()
+    with pytest.raises(
+        FitError, match="two pressure levels at least are needed to predict one from the others"
+    ):
+        fit_muscle(
+            measure(muscle(), pressures=[2e5]), muscle(), moduli="per_level"
+        ).leave_one_pressure_out()
 
 
 # -------------------------------------------------------------------- direction
@@ -280,7 +337,12 @@ def test_friction_of_the_muscle_goes_with_the_direction():
         fit = fit_muscle(data, real)
         np.testing.assert_allclose(fit.x, truth(real, fit), rtol=1e-8)
         np.testing.assert_allclose(fit.best_fit, data.force, rtol=1e-9, atol=1e-6)
-        np.testing.assert_allclose(fit.predict(data.pressure, data.contraction, direction=way), data.force, rtol=1e-9, atol=1e-6)
+        np.testing.assert_allclose(
+            fit.predict(data.pressure, data.contraction, direction=way),
+            data.force,
+            rtol=1e-9,
+            atol=1e-6,
+        )
         assert fit.score() == pytest.approx(1.0)
         assert fit_muscle(data, real, direction=None).max_error > 1e-3
 
@@ -298,8 +360,12 @@ def test_elbow_model_has_a_branch_for_lengthening():
         rest_length=REST,
         direction=np.append(up.direction, unknown.direction),
     )
-    assert fit_muscle(both, real).max_error < 1e-9  # unknown directions are on the contraction branch
-    assert fit_muscle(up, real, direction=None).params["bladder_modulus"].value != pytest.approx(8e5, rel=1e-3)
+    assert (
+        fit_muscle(both, real).max_error < 1e-9
+    )  # unknown directions are on the contraction branch
+    assert fit_muscle(up, real, direction=None).params["bladder_modulus"].value != pytest.approx(
+        8e5, rel=1e-3
+    )
 
 
 # -------------------------------------------------------------------- prediction
@@ -315,7 +381,10 @@ def test_prediction_says_where_it_extrapolates():
 def test_predicted_spread_is_that_of_repeated_fits():
     real = muscle()
     at_p, at_e = np.array([2e5, 4e5, 8e5]), np.array([0.0, 0.15, 0.25])
-    fits = [fit_muscle(measure(real, noise=5.0, seed=seed), real, errors="plain", noise=5.0) for seed in range(150)]
+    fits = [
+        fit_muscle(measure(real, noise=5.0, seed=seed), real, errors="plain", noise=5.0)
+        for seed in range(150)
+    ]
     spread = np.std([fit.predict(at_p, at_e) for fit in fits], axis=0)
     np.testing.assert_allclose(fits[0].predict_std(at_p, at_e), spread, rtol=0.2)
     both = fits[0].predict_std(at_p, at_e, new_point=True)
@@ -323,17 +392,29 @@ def test_predicted_spread_is_that_of_repeated_fits():
 
 
 def test_predicted_spread_includes_the_geometry():
-    fit = fit_muscle(measure(muscle(order=1), noise=2.0), muscle(order=1), free=["braid_angle"], tolerance=TOLERANCE)
+    fit = fit_muscle(
+        measure(muscle(order=1), noise=2.0),
+        muscle(order=1),
+        free=["braid_angle"],
+        tolerance=TOLERANCE,
+    )
     best = fit.muscle
     given = best.parameters
     sides = []
     for sign in (1.0, -1.0):
-        slope, offset = given["modulus_slope"][0] + sign * 1e-3, given["modulus_offset"][0] + sign * 10.0
+        slope, offset = (
+            given["modulus_slope"][0] + sign * 1e-3,
+            given["modulus_offset"][0] + sign * 10.0,
+        )
         angle = given["braid_angle"] + sign * 1e-5
         changes = {"modulus_slope": [slope]}, {"modulus_offset": [offset]}, {"braid_angle": angle}
-        sides.append(np.array([float(best.replace(**change).force(4e5, 0.1)) for change in changes]))
+        sides.append(
+            np.array([float(best.replace(**change).force(4e5, 0.1)) for change in changes])
+        )
     gradient = (sides[0] - sides[1]) / (2.0 * np.array([1e-3, 10.0, 1e-5]))
-    assert fit.predict_std(4e5, 0.1) == pytest.approx(math.sqrt(gradient @ fit.covar @ gradient), rel=1e-5)
+    assert fit.predict_std(4e5, 0.1) == pytest.approx(
+        math.sqrt(gradient @ fit.covar @ gradient), rel=1e-5
+    )
 
 
 def test_prediction_refuses_what_is_not_possible():
@@ -371,7 +452,12 @@ def test_fit_becomes_a_rig():
 def test_fit_becomes_a_bench_with_tolerances(tmp_path):
     from pamrs import load_rig
 
-    fit = fit_muscle(measure(muscle("robinson"), noise=2.0), muscle("robinson"), free=["braid_angle"], tolerance=TOLERANCE)
+    fit = fit_muscle(
+        measure(muscle("robinson"), noise=2.0),
+        muscle("robinson"),
+        free=["braid_angle"],
+        tolerance=TOLERANCE,
+    )
     rig = load_rig(fit.to_rig().to_toml(tmp_path / "bench.toml"))
     assert rig.parameter("muscle.braid_angle").value == fit.params["braid_angle"].value
     assert rig.parameter("muscle.braid_angle").tol == fit.params["braid_angle"].stderr
@@ -379,9 +465,23 @@ def test_fit_becomes_a_bench_with_tolerances(tmp_path):
 
 
 def test_report_and_dictionary_hold_the_numbers():
-    fit = fit_muscle(measure(muscle(), noise=3.0), muscle(), levels=[0, 1, 4, 5], free=["braid_angle"], tolerance=TOLERANCE)
+    fit = fit_muscle(
+        measure(muscle(), noise=3.0),
+        muscle(),
+        levels=[0, 1, 4, 5],
+        free=["braid_angle"],
+        tolerance=TOLERANCE,
+    )
     text = fit.fit_report()
-    for word in ("kothera, order 2", "m1", "braid_angle", "nominal 1.2217", "not fitted", "levels not fitted", "independent"):
+    for word in (
+        "kothera, order 2",
+        "m1",
+        "braid_angle",
+        "nominal 1.2217",
+        "not fitted",
+        "levels not fitted",
+        "independent",
+    ):
         assert word in text
     plain = json.loads(json.dumps(fit.to_dict(), allow_nan=False))
     assert [item["name"] for item in plain["parameters"]] == fit.var_names
@@ -396,13 +496,19 @@ def test_the_report_says_what_its_numbers_are_of():
     data = measure(muscle(), noise=3.0)
     fit = fit_muscle(data, muscle())
     text = fit.fit_report()
-    assert f"chi2 {fit.chisqr:.4g} N2, residual rms {math.sqrt(fit.chisqr / fit.ndata):.4g} N\n" in text
+    assert (
+        f"chi2 {fit.chisqr:.4g} N2, residual rms {math.sqrt(fit.chisqr / fit.ndata):.4g} N\n"
+        in text
+    )
     assert "reduced" not in text
     assert "with all 66 points as independent: AIC" in text
     assert "of the map's largest force: rms" in text
     assert "force error of each level, of the largest force of that level:" in text
     known = fit_muscle(data, muscle(), noise=3.0)
-    assert f"reduced chi2 {known.chisqr / 9.0 / known.nfree:.4g} with the stated noise of 3 N" in known.fit_report()
+    assert (
+        f"reduced chi2 {known.chisqr / 9.0 / known.nfree:.4g} with the stated noise of 3 N"
+        in known.fit_report()
+    )
     level = fit_muscle(data, muscle(), weights="level", noise=0.01)
     assert "N2" not in level.fit_report()
     assert "with the stated noise of 1 % of the level's largest force" in level.fit_report()
@@ -412,12 +518,17 @@ def test_results_show_themselves_in_one_line():
     fit = fit_muscle(measure(muscle(), noise=3.0), muscle())
     cross = fit.leave_one_pressure_out()
     assert repr(cross) == (
-        f"CrossValidation(6 levels, each from the others: rms {100 * cross.rms:.2f} %, max {100 * cross.max:.2f} % "
-        "of the map's largest force)"
+        f"CrossValidation(6 levels, each from the others: rms {100 * cross.rms:.2f} %, max "
+        f"{100 * cross.max:.2f} % of the map's largest force)"
     )
     worst = 100 * fit.error_by_pressure().rms.max()
-    assert repr(fit.error_by_pressure()) == f"PressureErrors(6 levels, rms at most {worst:.2f} % of the level's largest force)"
-    assert "6 levels, 1 left out, rms" in repr(fit_muscle(with_level_at_zero(0.5), muscle()).error_by_pressure())
+    assert (
+        repr(fit.error_by_pressure())
+        == f"PressureErrors(6 levels, rms at most {worst:.2f} % of the level's largest force)"
+    )
+    assert "6 levels, 1 left out, rms" in repr(
+        fit_muscle(with_level_at_zero(0.5), muscle()).error_by_pressure()
+    )
 
 
 def test_a_rig_keeps_the_tolerances_of_what_the_fit_did_not_change():
@@ -425,8 +536,14 @@ def test_a_rig_keeps_the_tolerances_of_what_the_fit_did_not_change():
     real = shoulder.muscle
     e, p = (grid.ravel() for grid in np.meshgrid(np.linspace(0.0, 0.25, 9), PRESSURES))
     data = ForceMap.from_arrays(0.276 * (1.0 - e), p, real.force(p, e), rest_length=0.276)
-    nominal = real.replace(friction_coefficient=0.5 * real.parameters["friction_coefficient"] + 0.01)
-    told = Rig(shoulder.name, shoulder.model, {"muscle.braid_angle": 0.02, "muscle.friction_coefficient": 0.03})
+    nominal = real.replace(
+        friction_coefficient=0.5 * real.parameters["friction_coefficient"] + 0.01
+    )
+    told = Rig(
+        shoulder.name,
+        shoulder.model,
+        {"muscle.braid_angle": 0.02, "muscle.friction_coefficient": 0.03},
+    )
     rig = fit_muscle(data, nominal, order=2).to_rig(told)
     assert rig.parameter("muscle.braid_angle").tol == 0.02
     assert rig.parameter("muscle.friction_coefficient").tol == 0.0

@@ -27,10 +27,16 @@ def muscle(**friction):
 RUBBED = {"friction_coefficient": C0, "friction_pressure_slope": C1, "friction_floor": FLOOR}
 
 
-def loops(levels=LEVELS, *, friction=RUBBED, noise=0.0, count=60, cycles=2, presliding=None, seed=0):
-    """Pressure, contraction, force and direction of slow loops; with a presliding distance, of four slip elements."""
+def loops(
+    levels=LEVELS, *, friction=RUBBED, noise=0.0, count=60, cycles=2, presliding=None, seed=0
+):
+    """Pressure, contraction, force and direction of slow loops; with a presliding distance, of four
+    slip elements.
+    """
     rng = np.random.default_rng(seed)
-    e = np.tile(np.concatenate([np.linspace(0.01, 0.30, count), np.linspace(0.30, 0.01, count)]), cycles)
+    e = np.tile(
+        np.concatenate([np.linspace(0.01, 0.30, count), np.linspace(0.30, 0.01, count)]), cycles
+    )
     way = np.tile(np.repeat([-1, 1], count), cycles)
     acting = way.astype(float)
     if presliding is not None:
@@ -41,7 +47,9 @@ def loops(levels=LEVELS, *, friction=RUBBED, noise=0.0, count=60, cycles=2, pres
             acting.append(elements.mean())
             last = here
     body = muscle(**friction)
-    force = [body.force(p, e, direction=acting) + noise * rng.standard_normal(len(e)) for p in levels]
+    force = [
+        body.force(p, e, direction=acting) + noise * rng.standard_normal(len(e)) for p in levels
+    ]
     tiled = [np.tile(values, len(levels)) for values in (e, way)]
     return {
         "pressure": np.repeat(levels, len(e)),
@@ -63,7 +71,10 @@ def test_exact_loops_give_the_coefficients_back():
 
 
 def test_it_shows_itself_in_one_line():
-    assert repr(fit_friction(**loops())) == "FrictionFit(c_F = max(0.16 - 0.145/MPa P, 0.01), 6 levels)"
+    assert (
+        repr(fit_friction(**loops()))
+        == "FrictionFit(c_F = max(0.16 - 0.145/MPa P, 0.01), 6 levels)"
+    )
 
 
 def test_a_pressure_at_which_nothing_pulls_gives_no_coefficient():
@@ -80,7 +91,12 @@ def test_standard_errors_tell_the_truth():
     scores = []
     for seed in range(24):
         fit = fit_friction(**loops(noise=10.0, seed=seed))
-        scores.append([(fit.params[k].value - t) / fit.params[k].stderr for k, t in zip(fit.params, (C0, C1), strict=True)])
+        scores.append(
+            [
+                (fit.params[k].value - t) / fit.params[k].stderr
+                for k, t in zip(fit.params, (C0, C1), strict=True)
+            ]
+        )
     spread = np.std(scores, axis=0)
     assert np.all((spread > 0.5) & (spread < 1.6))
     assert np.all(np.abs(np.mean(scores, axis=0)) < 0.7)
@@ -97,7 +113,9 @@ def test_levels_on_the_floor_do_not_bend_the_line():
 def test_friction_that_does_not_depend_on_pressure():
     fit = fit_friction(**loops(friction={"friction_coefficient": 0.08}, noise=5.0))
     assert not fit.slope_significant
-    assert fit.params["friction_coefficient"].value == pytest.approx(0.08, abs=3 * fit.params["friction_coefficient"].stderr)
+    assert fit.params["friction_coefficient"].value == pytest.approx(
+        0.08, abs=3 * fit.params["friction_coefficient"].stderr
+    )
     assert "not significant" in fit.fit_report()
 
 
@@ -136,7 +154,12 @@ def test_force_map_with_rows_of_unknown_direction():
     force = made["force"].copy()
     force[20] = np.nan
     data = ForceMap.from_arrays(
-        REST * (1.0 - made["contraction"]), made["pressure"], force, rest_length=REST, direction=way, check_duplicates=False
+        REST * (1.0 - made["contraction"]),
+        made["pressure"],
+        force,
+        rest_length=REST,
+        direction=way,
+        check_duplicates=False,
     )
     fit = fit_friction(data)
     assert fit.params["friction_coefficient"].value == pytest.approx(C0, rel=2e-3)
@@ -155,7 +178,9 @@ def test_a_pressure_with_one_branch_is_named_and_the_others_count():
 
 def test_what_the_loops_do_not_determine_is_named():
     made = loops()
-    with pytest.raises(RecordingError, match=r"one pressure only \(100 kPa\): the slope c1 is not determinable"):
+    with pytest.raises(
+        RecordingError, match=r"one pressure only \(100 kPa\): the slope c1 is not determinable"
+    ):
         fit_friction(**loops(LEVELS[:1]))
     with pytest.raises(RecordingError, match="no row has a direction of motion"):
         fit_friction(**{**made, "direction": np.zeros(len(made["force"]))})

@@ -41,7 +41,13 @@ def test_a_parameter_that_the_data_say_nothing_of_keeps_its_prior():
     assert item.value == pytest.approx(6.105, abs=1e-6)
     assert item.stderr == pytest.approx(0.5, rel=1e-6)
     assert any("extension_slope: the data say nothing" in note for note in fit.warnings)
-    with pytest.raises(FitError, match="extension_slope has no effect on any fitted point; give a tolerance for extension_slope"):
+    with pytest.raises(
+        FitError,
+        match=(
+            "extension_slope has no effect on any fitted point; give a tolerance for "
+            "extension_slope"
+        ),
+    ):
         fit_muscle(data, real, free=["extension_slope"])
 
 
@@ -49,7 +55,9 @@ def test_prior_and_data_are_weighed_by_the_scatter():
     real = muscle(braid_angle=math.radians(71.0))
     data = measure(real, noise=1.0)
     moved = [
-        fit_muscle(data, muscle(), free=["braid_angle"], tolerance=TOLERANCE, noise=noise).params["braid_angle"].value
+        fit_muscle(data, muscle(), free=["braid_angle"], tolerance=TOLERANCE, noise=noise)
+        .params["braid_angle"]
+        .value
         for noise in (0.1, 10.0, 1e5)
     ]
     away = np.degrees(moved) - 70.0
@@ -62,8 +70,12 @@ def test_fitted_geometry_costs_degrees_of_freedom():
     real = muscle(order=1)
     noise = []
     for seed in range(100):
-        data = measure(real, pressures=[2e5, 7e5], contractions=[0.0, 0.1, 0.2], noise=1.0, seed=seed)
-        noise.append(fit_muscle(data, real, free=["braid_angle"], tolerance={"braid_angle": math.inf}).noise)
+        data = measure(
+            real, pressures=[2e5, 7e5], contractions=[0.0, 0.1, 0.2], noise=1.0, seed=seed
+        )
+        noise.append(
+            fit_muscle(data, real, free=["braid_angle"], tolerance={"braid_angle": math.inf}).noise
+        )
     assert np.mean(np.square(noise)) == pytest.approx(1.0, abs=0.13)  # 6 points, 3 unknowns
 
 
@@ -75,7 +87,9 @@ def test_leaving_out_refits_the_geometry():
     own = data.level == 3
     other = fit_muscle(data, muscle(order=1), levels=[0, 1, 2, 4, 5], **settings)
     np.testing.assert_allclose(
-        cross.residual[own], data.force[own] - other.predict(data.pressure[own], length=data.length[own]), atol=0.02
+        cross.residual[own],
+        data.force[own] - other.predict(data.pressure[own], length=data.length[own]),
+        atol=0.02,
     )
 
 
@@ -84,7 +98,10 @@ def test_level_errors_with_geometry_follow_the_refits():
     data = measure(real, noise=2.0)
     fit = fit_muscle(data, muscle(order=1), free=["braid_angle"])
     others = [[k for k in range(6) if k != gone] for gone in range(6)]
-    parts = [fit_muscle(data, muscle(order=1), free=["braid_angle"], levels=kept).x - fit.x for kept in others]
+    parts = [
+        fit_muscle(data, muscle(order=1), free=["braid_angle"], levels=kept).x - fit.x
+        for kept in others
+    ]
     expected = np.sqrt(5.0 / 6.0 * np.sum(np.square(parts), axis=0))
     np.testing.assert_allclose(np.sqrt(np.diag(fit.covar)), expected, rtol=0.05)
 
@@ -92,7 +109,9 @@ def test_level_errors_with_geometry_follow_the_refits():
 def test_geometry_that_cannot_reach_the_lengths_is_named():
     data = measure(muscle(), contractions=np.linspace(0.0, 0.3, 8))
     flat = muscle(braid_angle=math.radians(50.0), wall_thickness=1e-4)
-    with pytest.raises(FitError, match=r"geometry cannot reach: the braid allows .* braid_angle = 50 deg"):
+    with pytest.raises(
+        FitError, match=r"geometry cannot reach: the braid allows .* braid_angle = 50 deg"
+    ):
         fit_muscle(data, flat, order=1)
 
 
@@ -100,7 +119,12 @@ def test_search_stays_where_the_braid_reaches():
     real = muscle(braid_angle=math.radians(66.0))
     lengths = np.linspace(0.0, 0.32, 9)
     data = measure(real, contractions=lengths, noise=1.0)
-    fit = fit_muscle(data, muscle(braid_angle=math.radians(65.0)), free=["braid_angle"], tolerance={"braid_angle": 0.1})
+    fit = fit_muscle(
+        data,
+        muscle(braid_angle=math.radians(65.0)),
+        free=["braid_angle"],
+        tolerance={"braid_angle": 0.1},
+    )
     low, high = fit.muscle.contraction_limits
     assert low < 0.0
     assert high > 0.32

@@ -16,7 +16,16 @@ from pamrs.rig import Muscle
 
 REST = 0.3
 LEVELS = [1e5, 2e5, 3e5, 4e5, 5e5, 6e5]
-SIZES = ["--rest-length", "300 mm", "--rest-diameter", "20 mm", "--braid-angle", "65 +- 3 deg", "--wall-thickness", "2 mm"]
+SIZES = [
+    "--rest-length",
+    "300 mm",
+    "--rest-diameter",
+    "20 mm",
+    "--braid-angle",
+    "65 +- 3 deg",
+    "--wall-thickness",
+    "2 mm",
+]
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +47,9 @@ def data(muscle):
     e, p = (grid.ravel() for grid in np.meshgrid(np.linspace(0.01, 0.19, 7), LEVELS))
     force = muscle.force(p, e) + np.random.default_rng(5).normal(scale=1.0, size=e.size)
     force[[3, 17]] = np.nan
-    return ForceMap.from_arrays(REST * (1 - e), p, force, rest_length=REST, name="bench 7", source="bench.csv")
+    return ForceMap.from_arrays(
+        REST * (1 - e), p, force, rest_length=REST, name="bench 7", source="bench.csv"
+    )
 
 
 @pytest.fixture(scope="module")
@@ -110,7 +121,13 @@ def test_page_compares_models(data, muscle, fit):
 
 
 @pytest.mark.parametrize(
-    "options", [{"model": "gaylord"}, {"model": "mooney_rivlin"}, {"moduli": "per_level"}, {"free": ["braid_angle"]}]
+    "options",
+    [
+        {"model": "gaylord"},
+        {"model": "mooney_rivlin"},
+        {"moduli": "per_level"},
+        {"free": ["braid_angle"]},
+    ],
 )
 def test_every_kind_of_fit_has_a_page(data, muscle, options):
     page = pages.render_html(fit_muscle(data, muscle, **options))
@@ -120,12 +137,16 @@ def test_every_kind_of_fit_has_a_page(data, muscle, options):
 def test_one_pressure_alone_has_a_page(data, muscle):
     one = fit_muscle(data, muscle, moduli="per_level", levels=[3])
     words = words_of(pages.render_html(one))
-    assert "Leaving one pressure out is not possible: two pressure levels at least are needed" in words
+    assert (
+        "Leaving one pressure out is not possible: two pressure levels at least are needed" in words
+    )
 
 
 def test_text_from_files_is_escaped(muscle):
     e, p = (grid.ravel() for grid in np.meshgrid(np.linspace(0.01, 0.19, 5), LEVELS))
-    evil = ForceMap.from_arrays(REST * (1 - e), p, muscle.force(p, e), rest_length=REST, name="<b>x</b>")
+    evil = ForceMap.from_arrays(
+        REST * (1 - e), p, muscle.force(p, e), rest_length=REST, name="<b>x</b>"
+    )
     page = pages.render_html(fit_muscle(evil, muscle), command="<script>")
     assert "<b>x</b>" not in page
     assert "<script>" not in page
@@ -133,8 +154,12 @@ def test_text_from_files_is_escaped(muscle):
 
 def test_directions_draw_both_branches(muscle):
     rubbing = muscle.replace(friction_coefficient=0.05)
-    e, p, d = (grid.ravel() for grid in np.meshgrid(np.linspace(0.01, 0.19, 5), LEVELS, [-1.0, 1.0]))
-    loop = ForceMap.from_arrays(REST * (1 - e), p, rubbing.force(p, e, direction=d), rest_length=REST, direction=d)
+    e, p, d = (
+        grid.ravel() for grid in np.meshgrid(np.linspace(0.01, 0.19, 5), LEVELS, [-1.0, 1.0])
+    )
+    loop = ForceMap.from_arrays(
+        REST * (1 - e), p, rubbing.force(p, e, direction=d), rest_length=REST, direction=d
+    )
     page = pages.render_html(fit_muscle(loop, rubbing))
     assert "model, contracting" in page
     assert "model, lengthening" in page
@@ -145,7 +170,11 @@ def test_png_has_the_promised_size(fit, tmp_path):
     head = path.read_bytes()[:24]
     assert head[:8] == b"\x89PNG\r\n\x1a\n"
     assert (int.from_bytes(head[16:20], "big"), int.from_bytes(head[20:24], "big")) == (1600, 1000)
-    assert pages.write_report(fit, tmp_path / "fit.html").read_text(encoding="utf-8").startswith("<!DOCTYPE")
+    assert (
+        pages.write_report(fit, tmp_path / "fit.html")
+        .read_text(encoding="utf-8")
+        .startswith("<!DOCTYPE")
+    )
 
 
 # ------------------------------------------------------------------------- words
@@ -154,14 +183,22 @@ def test_png_has_the_promised_size(fit, tmp_path):
 @pytest.mark.parametrize("package", ["jinja2", "matplotlib"])
 def test_a_missing_package_of_the_page_is_named(fit, monkeypatch, package):
     monkeypatch.setitem(sys.modules, package, None)
-    with pytest.raises(ImportError, match=rf"the report needs {package}, which is not installed: pip install pamrs\[report\]"):
+    with pytest.raises(
+        ImportError,
+        match=rf"the report needs {package}, which is not installed: pip install pamrs\[report\]",
+    ):
         pages.render_html(fit)
 
 
-@pytest.mark.parametrize("draw", [pages.render_png, lambda fit: pages.render_friction_png(fit, fit.data)])
+@pytest.mark.parametrize(
+    "draw", [pages.render_png, lambda fit: pages.render_friction_png(fit, fit.data)]
+)
 def test_a_missing_package_of_the_pictures_is_named(fit, monkeypatch, draw):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
-    with pytest.raises(ImportError, match=r"the report needs matplotlib, which is not installed: pip install pamrs\[report\]"):
+    with pytest.raises(
+        ImportError,
+        match=r"the report needs matplotlib, which is not installed: pip install pamrs\[report\]",
+    ):
         draw(fit)
 
 
@@ -192,8 +229,19 @@ def run(capsys, *words):
 
 def test_command_writes_everything(capsys, table, tmp_path):
     files = {name: tmp_path / f"out.{name}" for name in ("html", "json", "toml", "png")}
-    outputs = ["--report", files["html"], "--json", files["json"], "--rig", files["toml"], "--png", files["png"]]
-    code, out, err = run(capsys, table, *SIZES, "--model", "kothera", "--order", 2, "--free", "braid-angle", *outputs)
+    outputs = [
+        "--report",
+        files["html"],
+        "--json",
+        files["json"],
+        "--rig",
+        files["toml"],
+        "--png",
+        files["png"],
+    ]
+    code, out, err = run(
+        capsys, table, *SIZES, "--model", "kothera", "--order", 2, "--free", "braid-angle", *outputs
+    )
     assert code == 0
     assert "kothera, order 2" in out
     assert "leave one pressure out: rms" in out
@@ -211,15 +259,36 @@ def test_command_writes_everything(capsys, table, tmp_path):
     page = files["html"].read_text(encoding="utf-8")
     assert "pamrs fit muscle" in words_of(page)
     assert "--free braid-angle" in words_of(page)
-    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(path.name for path in files.values())
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(
+        path.name for path in files.values()
+    )
 
 
 def test_command_predicts_left_out_pressures_and_compares(capsys, table):
-    code, out, _ = run(capsys, table, *SIZES, "--model", "kothera", "--order", 1, "--levels", "100kPa,3 bar,0.6MPa", "--compare")
+    code, out, _ = run(
+        capsys,
+        table,
+        *SIZES,
+        "--model",
+        "kothera",
+        "--order",
+        1,
+        "--levels",
+        "100kPa,3 bar,0.6MPa",
+        "--compare",
+    )
     assert code == 0
     assert "levels not fitted" in out
     assert "subset: fitted to 100, 300, 600 kPa" in out
-    for model in ("gaylord", "chou_hannaford", "mooney_rivlin", "ferraresi", "kothera", "robinson", "elbow_linear"):
+    for model in (
+        "gaylord",
+        "chou_hannaford",
+        "mooney_rivlin",
+        "ferraresi",
+        "kothera",
+        "robinson",
+        "elbow_linear",
+    ):
         assert model in out
 
 
@@ -239,9 +308,16 @@ def test_command_per_level(capsys, table):
 
 def write(path, data):
     """A table of a map."""
-    columns = [data.length, data.pressure, data.force, *([data.direction] if np.any(data.direction) else [])]
+    columns = [
+        data.length,
+        data.pressure,
+        data.force,
+        *([data.direction] if np.any(data.direction) else []),
+    ]
     heading = "length [m],pressure [Pa],force [N]" + (",direction" if len(columns) > 3 else "")
-    np.savetxt(path, np.column_stack(columns), delimiter=",", header=heading, comments="", fmt="%.10g")
+    np.savetxt(
+        path, np.column_stack(columns), delimiter=",", header=heading, comments="", fmt="%.10g"
+    )
     return path
 
 
@@ -249,25 +325,36 @@ def write(path, data):
 def loops(muscle, tmp_path_factory):
     """A table of loops with c_F = 0.06 - 0.04/MPa P and noise of 1 N."""
     rubbing = muscle.replace(friction_coefficient=0.06, friction_pressure_slope=-4e-8)
-    e, p, d = (grid.ravel() for grid in np.meshgrid(np.linspace(0.01, 0.19, 8), LEVELS, [-1.0, 1.0]))
+    e, p, d = (
+        grid.ravel() for grid in np.meshgrid(np.linspace(0.01, 0.19, 8), LEVELS, [-1.0, 1.0])
+    )
     force = rubbing.force(p, e, direction=d) + np.random.default_rng(2).normal(size=e.size)
     path = tmp_path_factory.mktemp("loops") / "loops.csv"
-    return write(path, ForceMap.from_arrays(REST * (1 - e), p, force, rest_length=REST, direction=d))
+    return write(
+        path, ForceMap.from_arrays(REST * (1 - e), p, force, rest_length=REST, direction=d)
+    )
 
 
-def test_friction_is_fitted_before_the_moduli_and_goes_into_the_rig(capsys, loops, muscle, tmp_path):
+def test_friction_is_fitted_before_the_moduli_and_goes_into_the_rig(
+    capsys, loops, muscle, tmp_path
+):
     rig, result = tmp_path / "rig.toml", tmp_path / "fit.json"
     options = [*SIZES, "--model", "kothera", "--order", 2]
     code, out, err = run(capsys, loops, *options, "--rig", rig, "--json", result, "--compare")
     assert code == 0
     c0, c1 = (
-        float(text) for text in re.search(r"friction, fitted to the loops before .* c0 = (\S+) \+- .* c1 = (\S+) \+-", out).groups()
+        float(text)
+        for text in re.search(
+            r"friction, fitted to the loops before .* c0 = (\S+) \+- .* c1 = (\S+) \+-", out
+        ).groups()
     )
     assert (c0, c1) == (pytest.approx(0.06, abs=0.005), pytest.approx(-0.04, abs=0.01))
     given = load_rig(rig).muscle.parameters
     assert given["friction_coefficient"] == pytest.approx(c0, rel=1e-3)
     assert given["friction_pressure_slope"] == pytest.approx(1e-6 * c1, rel=1e-3)
-    np.testing.assert_allclose(load_rig(rig).muscle.force(4e5, [0.05, 0.15]), muscle.force(4e5, [0.05, 0.15]), rtol=0.01)
+    np.testing.assert_allclose(
+        load_rig(rig).muscle.force(4e5, [0.05, 0.15]), muscle.force(4e5, [0.05, 0.15]), rtol=0.01
+    )
     document = json.loads(result.read_text(encoding="utf-8"))
     assert document["friction"]["parameters"][0]["value"] == given["friction_coefficient"]
     assert document["fit"]["rms_error"] < 0.01
@@ -275,14 +362,35 @@ def test_friction_is_fitted_before_the_moduli_and_goes_into_the_rig(capsys, loop
     assert f"{rig} is the muscle on a load frame: simulate it with a length" in err
     code, out, _ = run(capsys, loops, *options, "--muscle", rig)  # that muscle has friction
     assert "friction as the muscle has it: c_F = max(c0 + c1 P, 0.01), c0 = 0.0" in out
-    code, out, _ = run(capsys, loops, *options, "--muscle", rig, "--friction", "fit", "--levels", "100kPa,300kPa,600kPa")
+    code, out, _ = run(
+        capsys,
+        loops,
+        *options,
+        "--muscle",
+        rig,
+        "--friction",
+        "fit",
+        "--levels",
+        "100kPa,300kPa,600kPa",
+    )
     assert "friction, fitted to the loops" in out
 
 
-@pytest.mark.parametrize(("choice", "model"), [("none", "kothera"), ("muscle", "kothera"), (None, "elbow_linear")])
+@pytest.mark.parametrize(
+    ("choice", "model"), [("none", "kothera"), ("muscle", "kothera"), (None, "elbow_linear")]
+)
 def test_friction_may_stay_out(capsys, loops, tmp_path, choice, model):
     result = tmp_path / "fit.json"
-    code, out, _ = run(capsys, loops, *SIZES, "--model", model, "--json", result, *([] if choice is None else ["--friction", choice]))
+    code, out, _ = run(
+        capsys,
+        loops,
+        *SIZES,
+        "--model",
+        model,
+        "--json",
+        result,
+        *([] if choice is None else ["--friction", choice]),
+    )
     assert code == 0
     assert "fitted to the loops" not in out
     assert json.loads(result.read_text(encoding="utf-8"))["friction"] is None
@@ -306,9 +414,14 @@ def test_friction_that_cannot_be_fitted_is_said_or_refused(capsys, loops, tmp_pa
 
 
 def test_loops_without_friction_get_none(capsys, muscle, tmp_path):
-    e, p, d = (grid.ravel() for grid in np.meshgrid(np.linspace(0.01, 0.19, 8), LEVELS, [-1.0, 1.0]))
+    e, p, d = (
+        grid.ravel() for grid in np.meshgrid(np.linspace(0.01, 0.19, 8), LEVELS, [-1.0, 1.0])
+    )
     force = muscle.force(p, e) + 1e-3 * np.random.default_rng(2).normal(size=e.size)
-    path = write(tmp_path / "still.csv", ForceMap.from_arrays(REST * (1 - e), p, force, rest_length=REST, direction=d))
+    path = write(
+        tmp_path / "still.csv",
+        ForceMap.from_arrays(REST * (1 - e), p, force, rest_length=REST, direction=d),
+    )
     code, out, _ = run(capsys, path, *SIZES, "--model", "kothera", "--order", 2)
     assert code == 0
     assert "friction: none, no pressure's c_F stands above 0.01" in out
@@ -319,8 +432,13 @@ def test_the_fitted_muscle_goes_into_the_rig_that_it_is_of(capsys, tmp_path):
     source = shoulder.to_toml(tmp_path / "shoulder.toml")
     real = shoulder.muscle
     e, p = (grid.ravel() for grid in np.meshgrid(np.linspace(0.0, 0.25, 9), LEVELS))
-    stiffer = real.replace(modulus_offset=[1.1 * value for value in real.parameters["modulus_offset"]])
-    path = write(tmp_path / "map.csv", ForceMap.from_arrays(0.276 * (1 - e), p, stiffer.force(p, e), rest_length=0.276))
+    stiffer = real.replace(
+        modulus_offset=[1.1 * value for value in real.parameters["modulus_offset"]]
+    )
+    path = write(
+        tmp_path / "map.csv",
+        ForceMap.from_arrays(0.276 * (1 - e), p, stiffer.force(p, e), rest_length=0.276),
+    )
     code, _, err = run(capsys, path, "--muscle", source, "--rig", tmp_path / "fitted.toml")
     assert code == 0
     assert "cannot be simulated" not in err
@@ -345,20 +463,31 @@ def test_a_tolerance_of_what_is_not_free_is_named(capsys, table, tmp_path):
 
 
 def test_what_cannot_be_left_out_is_said_once(capsys, table):
-    _, out, _ = run(capsys, table, *SIZES, "--model", "kothera", "--order", 2, "--levels", "100kPa,600kPa")
-    assert "leave one pressure out: not possible, without 100 kPa the other levels do not determine the fit" in out
+    _, out, _ = run(
+        capsys, table, *SIZES, "--model", "kothera", "--order", 2, "--levels", "100kPa,600kPa"
+    )
+    assert (
+        "leave one pressure out: not possible, without 100 kPa the other levels do not "
+        "determine the fit"
+    ) in out
     assert out.count("leave one pressure out") == 1
     assert "leave-one-pressure-out" not in out
 
 
 def test_a_level_at_rest_has_a_page_and_pictures(capsys, data, tmp_path):
     e = np.linspace(0.01, 0.19, 7)
-    columns = [np.append(data.length, REST * (1 - e)), np.append(data.pressure, 0 * e), np.append(data.force, -0.5 * np.cos(9 * e))]
+    columns = [
+        np.append(data.length, REST * (1 - e)),
+        np.append(data.pressure, 0 * e),
+        np.append(data.force, -0.5 * np.cos(9 * e)),
+    ]
     path = write(tmp_path / "rest.csv", ForceMap.from_arrays(*columns, rest_length=REST))
     for levels in ([], ["--levels", "100kPa,300kPa,600kPa"]):
         files = [tmp_path / name for name in ("x.html", "x.png", "x.json")]
         outputs = ["--report", files[0], "--png", files[1], "--json", files[2]]
-        code, out, _ = run(capsys, path, *SIZES, "--model", "kothera", "--order", 2, "--compare", *outputs, *levels)
+        code, out, _ = run(
+            capsys, path, *SIZES, "--model", "kothera", "--order", 2, "--compare", *outputs, *levels
+        )
         assert code == 0
         assert "0 kPa: not in this table" in out
         words = words_of(files[0].read_text(encoding="utf-8"))
@@ -402,7 +531,20 @@ def test_wrong_input_is_one_line(capsys, table, tmp_path, words, parts):
 
 
 def test_nothing_is_written_when_the_fit_fails(capsys, table, tmp_path):
-    assert run(capsys, table, *SIZES, "--order", 2, "--levels", "100kPa", "--report", tmp_path / "x.html")[0] == 2
+    assert (
+        run(
+            capsys,
+            table,
+            *SIZES,
+            "--order",
+            2,
+            "--levels",
+            "100kPa",
+            "--report",
+            tmp_path / "x.html",
+        )[0]
+        == 2
+    )
     assert list(tmp_path.iterdir()) == []
 
 
@@ -414,8 +556,16 @@ def test_a_missing_table_is_named(capsys):
 
 def test_a_description_needs_no_geometry(capsys, table):
     text = 'schema = "pamrs.force_map/1"\nfile = "bench.csv"\n[muscle]\nmodel = "kothera"\n'
-    sizes = {"rest_length": (300, "mm"), "rest_diameter": (20, "mm"), "braid_angle": (65, "deg"), "wall_thickness": (2, "mm")}
-    text += "".join(f'{name} = {{ value = {value}, unit = "{unit}" }}\n' for name, (value, unit) in sizes.items())
+    sizes = {
+        "rest_length": (300, "mm"),
+        "rest_diameter": (20, "mm"),
+        "braid_angle": (65, "deg"),
+        "wall_thickness": (2, "mm"),
+    }
+    text += "".join(
+        f'{name} = {{ value = {value}, unit = "{unit}" }}\n'
+        for name, (value, unit) in sizes.items()
+    )
     path = table.with_name("bench.toml")
     path.write_text(text, encoding="utf-8")
     code, out, _ = run(capsys, path, "--order", 2)
@@ -427,7 +577,9 @@ def test_a_description_needs_no_geometry(capsys, table):
 
 
 def test_zeros_that_nobody_explains_are_named(capsys, data, tmp_path):
-    rows = np.column_stack([data.length, data.pressure, np.where(data.level == 0, 0.0, data.force)])[data.used]
+    rows = np.column_stack(
+        [data.length, data.pressure, np.where(data.level == 0, 0.0, data.force)]
+    )[data.used]
     path = tmp_path / "zeros.csv"
     np.savetxt(path, rows, delimiter=",", header="length_m,pressure_Pa,force_N", comments="")
     code, _, err = run(capsys, path, *SIZES, "--order", 2, "--levels", "100kPa")
@@ -448,11 +600,15 @@ CASE = Path(__file__).parents[2] / "cases" / "festo_dmsp"
 
 
 @pytest.mark.skipif(
-    not (CASE.parents[2] / "shared/recordings/festo_dmsp_martens_boblan").is_dir(), reason="the Festo maps are not beside the project"
+    not (CASE.parents[2] / "shared/recordings/festo_dmsp_martens_boblan").is_dir(),
+    reason="the Festo maps are not beside the project",
 )
 @pytest.mark.parametrize(
     ("name", "levels", "published"),
-    [("DMSP-20-300", "110kPa,343.75kPa,675kPa", 0.044), ("DMSP-10-250", "132.5kPa,335kPa,650kPa", 0.0235)],
+    [
+        ("DMSP-20-300", "110kPa,343.75kPa,675kPa", 0.044),
+        ("DMSP-10-250", "132.5kPa,335kPa,650kPa", 0.0235),
+    ],
 )
 def test_festo_maps_are_met_better_than_published(capsys, tmp_path, name, levels, published):
     options = ["--model", "robinson", "--order", 4, "--free", "braid_angle,rest_length"]
@@ -462,5 +618,7 @@ def test_festo_maps_are_met_better_than_published(capsys, tmp_path, name, levels
     assert document["fit"]["max_error"] < published / 2
     assert document["leave_one_pressure_out"]["max"] < published / 2
     # A sixth, half and all of the highest pressure, as the dissertation chose its three.
-    assert run(capsys, CASE / f"{name}.toml", *options, "--levels", levels, "--json", result)[0] == 0
+    assert (
+        run(capsys, CASE / f"{name}.toml", *options, "--levels", levels, "--json", result)[0] == 0
+    )
     assert json.loads(result.read_text(encoding="utf-8"))["fit"]["held_out_max_error"] < published

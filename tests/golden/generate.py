@@ -106,7 +106,9 @@ NETWORKS = ("antagonistic_joint", "two_joint_arm", "tube", "hanging_mass")
 
 
 def networks() -> None:
-    """Write ``network_NAME.csv`` of each rig: the smooth run of ``tests/runs.py`` by the reference."""
+    """Write ``network_NAME.csv`` of each rig: the smooth run of ``tests/runs.py`` by the
+    reference.
+    """
     from tests.runs import RUNS
 
     for name in NETWORKS:

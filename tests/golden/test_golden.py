@@ -1,4 +1,6 @@
-"""pamrs against golden vectors: the project's own and, when present, the shared set beside the project."""
+"""pamrs against golden vectors: the project's own and, when present, the shared set beside the
+project.
+"""
 
 from __future__ import annotations
 
@@ -62,7 +64,12 @@ def read_muscles(path: Path) -> dict[str, dict[str, NDArray[np.float64]]]:
         rows = list(csv.DictReader(file))
     names = list(dict.fromkeys(row["muscle"] for row in rows))
     columns = [key for key in rows[0] if key != "muscle"]
-    return {name: {c: np.array([float(row[c]) for row in rows if row["muscle"] == name]) for c in columns} for name in names}
+    return {
+        name: {
+            c: np.array([float(row[c]) for row in rows if row["muscle"] == name]) for c in columns
+        }
+        for name in names
+    }
 
 
 @pytest.mark.parametrize("folder", [OWN, SHARED], ids=["own", "shared"])
@@ -82,7 +89,9 @@ def test_muscle_static(folder: Path) -> None:
         for column, values in got.items():
             # A force is a difference of larger terms: near zero it is held to the blocked force.
             floor = 1e-9 * np.abs(want[column][e == 0.0][0]) if column.startswith("force") else 0.0
-            np.testing.assert_allclose(values, want[column], rtol=1e-9, atol=floor, err_msg=f"{name} {column}")
+            np.testing.assert_allclose(
+                values, want[column], rtol=1e-9, atol=floor, err_msg=f"{name} {column}"
+            )
 
 
 def trajectory_misses(path: Path) -> dict[str, float]:
@@ -133,7 +142,9 @@ def test_shoulder_trajectory(folder: Path, name: str, tolerance: float) -> None:
 
 @pytest.mark.parametrize("name", NETWORKS)
 def test_networks(name: str) -> None:
-    """Rigs of several blocks at a step of 0.1 ms: every channel of the reference, sums of mass and energy included."""
+    """Rigs of several blocks at a step of 0.1 ms: every channel of the reference, sums of mass and
+    energy included.
+    """
     path = OWN / f"network_{name}.csv"
     header = path.read_text(encoding="utf-8").partition("\n")[0].split(",")
     data = dict(zip(header, np.genfromtxt(path, delimiter=",", skip_header=1).T, strict=True))

@@ -51,7 +51,9 @@ def test_stored_numbers_are_the_derived_ones(name):
     item, again = library.entry(name), derive(library.entry(name))
     for key, value in again.parameters.items():
         scale = np.max(np.abs(value))
-        np.testing.assert_allclose(item.parameters[key], value, rtol=0.0, atol=6e-6 * scale)  # six digits are stored
+        np.testing.assert_allclose(
+            item.parameters[key], value, rtol=0.0, atol=6e-6 * scale
+        )  # six digits are stored
     assert again.rank == len(again.conditions) < again.unknowns
 
 
@@ -79,7 +81,11 @@ def test_verdicts(rows):
 
 @pytest.mark.parametrize(
     ("name", "psi", "force"),
-    [("elbow_0625in", 150.0, 820.0), ("large_2in", 90.0, 4280.0), ("large_2in_effective", 90.0, 4280.0)],
+    [
+        ("elbow_0625in", 150.0, 820.0),
+        ("large_2in", 90.0, 4280.0),
+        ("large_2in_effective", 90.0, 4280.0),
+    ],
 )
 def test_blocked_force_row_against_reference_geometry(name, psi, force, rows):
     item = library.entry(name)
@@ -87,8 +93,12 @@ def test_blocked_force_row_against_reference_geometry(name, psi, force, rows):
     reference = GeometryReference(*(item.parameters[key] for key in keys))
     length, turns = reference.rest_length, reference.turns
     # at rest: pressure on the Gaylord area, plus the wall's two terms
-    area = (3.0 * length**2 - reference.fibre_length**2) / (4.0 * math.pi * turns**2) + reference.rubber_volume / length
-    area -= reference.wall_thickness * length**2 / (2.0 * math.pi * reference.rest_radius * turns**2)
+    area = (3.0 * length**2 - reference.fibre_length**2) / (
+        4.0 * math.pi * turns**2
+    ) + reference.rubber_volume / length
+    area -= (
+        reference.wall_thickness * length**2 / (2.0 * math.pi * reference.rest_radius * turns**2)
+    )
     row = next(r for r in rows if r.group == name and r.fact.startswith("blocked force at"))
     assert row.published == pytest.approx(force)
     assert row.ours == pytest.approx(area * psi * PSI / POUND_FORCE, rel=1e-9)
@@ -144,7 +154,9 @@ def test_free_contraction_grows_with_pressure_and_activation_inverts_it():
     free = [free_contraction(muscle, p) for p in (0.5e5, 0.7e5, 2e5, 8e5)]
     assert np.all(np.diff(free) > 0.0)
     for e in (0.005, 0.01, 0.05):
-        assert free_contraction(muscle, activation_pressure(muscle, e)) == pytest.approx(e, rel=1e-6)
+        assert free_contraction(muscle, activation_pressure(muscle, e)) == pytest.approx(
+            e, rel=1e-6
+        )
 
 
 def test_gent_relation():
@@ -155,20 +167,28 @@ def test_gent_relation():
 
 
 def test_least_norm_moves_only_along_the_facts():
-    matrix, prior, spread = np.array([[1.0, 2.0, 0.0]]), np.array([1.0, 1.0, 5.0]), np.array([1.0, 0.5, 3.0])
+    matrix, prior, spread = (
+        np.array([[1.0, 2.0, 0.0]]),
+        np.array([1.0, 1.0, 5.0]),
+        np.array([1.0, 0.5, 3.0]),
+    )
     x, rank = least_norm(matrix, np.array([5.0]), prior, spread)
     np.testing.assert_allclose(x, [2.0, 1.5, 5.0], rtol=1e-12)
     assert rank == 1
 
 
 def test_bisect():
-    assert root_between(lambda x: x**3 - 2.0, 0.0, 2.0) == pytest.approx(2.0 ** (1.0 / 3.0), rel=1e-15)
+    assert root_between(lambda x: x**3 - 2.0, 0.0, 2.0) == pytest.approx(
+        2.0 ** (1.0 / 3.0), rel=1e-15
+    )
     assert root_between(lambda x: x + 1.0, 0.0, 1.0) is None
 
 
 def test_design_comparison():
     effective = {row.fact: row for row in compare_design("large_2in_effective")}
-    assert [fact for fact, row in effective.items() if row.verdict == "differs"] == ["muscles needed for 200 ft lbf, elbow_0625in"]
+    assert [fact for fact, row in effective.items() if row.verdict == "differs"] == [
+        "muscles needed for 200 ft lbf, elbow_0625in"
+    ]
     # with the published blocked force six would do
     assert math.ceil(6.145 * 711.2 / 820.0) == 6
     assert effective["mass, six / two"].ours == pytest.approx(6 * 0.17 / (2 * 2.2), rel=1e-12)
@@ -206,8 +226,15 @@ def test_bad_names_and_files():
         ("a = = 1", "not valid TOML"),
         ('schema = "other"\n', "schema"),
         (head + "[muscle]\n", "'properties' is missing"),
-        (head + '[muscle]\nrest_length = { value = 1, unit = "m" }\n[properties]\n', "no origin is given for rest_length"),
-        (head + '[muscle]\nrest_length = { value = 1, unit = "mx", origin = "o" }\n[properties]\n', "unknown unit"),
+        (
+            head + '[muscle]\nrest_length = { value = 1, unit = "m" }\n[properties]\n',
+            "no origin is given for rest_length",
+        ),
+        (
+            head
+            + '[muscle]\nrest_length = { value = 1, unit = "mx", origin = "o" }\n[properties]\n',
+            "unknown unit",
+        ),
     ):
         with pytest.raises(ParameterError, match=message):
             read_entry(text, source="x.toml")
@@ -215,12 +242,17 @@ def test_bad_names_and_files():
 
 def test_import_is_light():
     heavy = "{'scipy', 'matplotlib', 'pandas', 'jinja2', 'typer'}"
-    code = f"import sys, pamrs.library, pamrs.design.sizing; assert not {heavy} & set(sys.modules), sorted({heavy} & set(sys.modules))"
+    code = (
+        f"import sys, pamrs.library, pamrs.design.sizing; assert not {heavy} & set(sys.modules), "
+        f"sorted({heavy} & set(sys.modules))"
+    )
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
 def test_module_prints_identification_and_facts():
-    done = subprocess.run([sys.executable, "-m", "pamrs.library"], check=True, capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-m", "pamrs.library"], check=True, capture_output=True, text=True
+    )
     assert "they determine 3 of 4 combinations" in done.stdout
     assert "cannot tell" in done.stdout
     assert "Six against two" in done.stdout

@@ -65,7 +65,9 @@ def test_every_part_has_its_place():
 
 def test_no_package_imports_one_beside_or_above_it():
     height = {name: index for index, layer in enumerate(LAYERS) for name in layer}
-    against = {(a, b) for a, b in edges() if part(a) != part(b) and height[part(b)] >= height[part(a)]}
+    against = {
+        (a, b) for a, b in edges() if part(a) != part(b) and height[part(b)] >= height[part(a)]
+    }
     assert not against, "imports that go upward"
 
 
@@ -86,7 +88,9 @@ def test_no_modules_import_each_other():
     signature; that import never runs. Between packages these imports count, see above.
     """
     needs: dict[str, set[str]] = {}
-    strict = {(a, b) for a, b in edges() if {part(a), part(b)} <= {"diagnosis", "findings", "report"}}
+    strict = {
+        (a, b) for a, b in edges() if {part(a), part(b)} <= {"diagnosis", "findings", "report"}
+    }
     for importer, imported in edges(annotations=False) | strict:
         needs.setdefault(importer, set()).add(imported)
     try:
@@ -100,7 +104,10 @@ def test_only_the_core_and_the_version_come_from_the_root():
     for importer in sorted(graph().find_modules_that_directly_import("pamrs")):
         for details in graph().get_import_details(importer=importer, imported="pamrs"):
             line = details["line_contents"]
-            names = {name.split(" as ")[0].strip() for name in line.partition(" import ")[2].strip("()").split(",")}
+            names = {
+                name.split(" as ")[0].strip()
+                for name in line.partition(" import ")[2].strip("()").split(",")
+            }
             others = {name for name in names - FROM_ROOT if f"pamrs.{name}" not in modules}
             assert not others, f"{importer}: {line}"
 
@@ -115,7 +122,12 @@ def test_only_its_command_imports_the_reproduction_and_only_when_it_runs():
     outside = {a for a, b in edges() if part(b) == "reproduce" and part(a) != "reproduce"}
     assert outside == {"pamrs.cli.reproduce"}
     tree = ast.parse((ROOT / "python/pamrs/cli/reproduce.py").read_text(encoding="utf-8"))
-    assert not [name for statement in tree.body for name in imported(statement) if name.startswith("pamrs.reproduce")]
+    assert not [
+        name
+        for statement in tree.body
+        for name in imported(statement)
+        if name.startswith("pamrs.reproduce")
+    ]
 
 
 def imported(node: ast.AST) -> list[str]:
@@ -130,12 +142,18 @@ def imported(node: ast.AST) -> list[str]:
 def owner(module: str) -> str | None:
     """The package in which a private module or package may be imported; None for a public one."""
     words = module.split(".")
-    private = [index for index, word in enumerate(words) if word.startswith("_") and not word.startswith("__")]
+    private = [
+        index
+        for index, word in enumerate(words)
+        if word.startswith("_") and not word.startswith("__")
+    ]
     return ".".join(words[: private[0]]) if private else None
 
 
 def test_private_modules_are_imported_in_their_package_alone():
-    strange = [(a, b) for a, b in edges() if (home := owner(b)) and not f"{a}.".startswith(f"{home}.")]
+    strange = [
+        (a, b) for a, b in edges() if (home := owner(b)) and not f"{a}.".startswith(f"{home}.")
+    ]
     assert not strange
 
 
@@ -143,7 +161,11 @@ def test_private_modules_are_imported_in_their_package_alone():
 def test_scripts_import_no_private_part_of_a_package(folder):
     """The private modules directly in pamrs are for all parts of this project."""
     for path in sorted((ROOT / folder).rglob("*.py")):
-        names = [name for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) for name in imported(node)]
+        names = [
+            name
+            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+            for name in imported(node)
+        ]
         mine = [name for name in names if name.startswith("pamrs.")]
         assert not [name for name in mine if owner(name) not in (None, "pamrs")], path
 
@@ -152,5 +174,9 @@ def test_trial_does_not_know_the_package():
     files = sorted((ROOT / "trial").rglob("*.py"))
     assert files
     for path in files:
-        names = [name for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) for name in imported(node)]
+        names = [
+            name
+            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+            for name in imported(node)
+        ]
         assert not [name for name in names if name.split(".")[0] == "pamrs"], path

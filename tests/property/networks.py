@@ -1,4 +1,6 @@
-"""Hypothesis strategies: small rigs of several blocks as tables in SI units, and runs that drive them."""
+"""Hypothesis strategies: small rigs of several blocks as tables in SI units, and runs that drive
+them.
+"""
 
 from __future__ import annotations
 
@@ -32,7 +34,9 @@ def rig_of(blocks: Mapping[str, Mapping[str, Any]]) -> pamrs.Rig:
             if key is None or key.kind in ("choice", "count") or key.path:
                 lines.append(f"{'.'.join(key.where) if key else word} = {json.dumps(value)}")
             else:
-                lines.append(f"{word} = {{ value = {json.dumps(value)}, unit = {json.dumps(key.unit)} }}")
+                lines.append(
+                    f"{word} = {{ value = {json.dumps(value)}, unit = {json.dumps(key.unit)} }}"
+                )
     return parse_rig("\n".join(lines) + "\n")
 
 
@@ -49,7 +53,13 @@ MUSCLE = {
     "modulus_offset": [8e5, -1e5],
 }
 
-TENDON = {"kind": "tendon", "upper_axial": 0.04, "upper_offset": 0.011, "lower_axial": 0.04, "lower_offset": 0.011}
+TENDON = {
+    "kind": "tendon",
+    "upper_axial": 0.04,
+    "upper_offset": 0.011,
+    "lower_axial": 0.04,
+    "lower_offset": 0.011,
+}
 
 #: Stops of a joint (rad): between them a muscle shortens by 2 to 4 cm.
 LOW, HIGH = 0.2, 1.7
@@ -63,7 +73,9 @@ def valve(area: float, **ports: str) -> dict[str, Any]:
 
 @st.composite
 def transmissions(draw: st.DrawFn, side: float = 1.0) -> dict[str, Any]:
-    """How a muscle pulls on a joint between LOW and HIGH; the other side only by pulley or polynomial."""
+    """How a muscle pulls on a joint between LOW and HIGH; the other side only by pulley or
+    polynomial.
+    """
     kind = draw(st.sampled_from(["pulley", "polynomial", *(["tendon"] if side > 0.0 else [])]))
     rest = LOW if side > 0.0 else HIGH
     if kind == "tendon":
@@ -77,21 +89,32 @@ def transmissions(draw: st.DrawFn, side: float = 1.0) -> dict[str, Any]:
 
 @st.composite
 def sources(draw: st.DrawFn) -> tuple[Blocks, str]:
-    """A supply of any kind, with or without a manifold behind it; the port that valves are to be fed from."""
+    """A supply of any kind, with or without a manifold behind it; the port that valves are to be
+    fed from.
+    """
     kind = draw(st.sampled_from(["tank", "constant", "regulator"]))
     own = {
         "tank": {"volume": draw(st.floats(2e-3, 1e-2))},
         "constant": {},
-        "regulator": {"time_constant": draw(st.floats(0.03, 0.2)), "droop": draw(st.floats(0.0, 4e6))},
+        "regulator": {
+            "time_constant": draw(st.floats(0.03, 0.2)),
+            "droop": draw(st.floats(0.0, 4e6)),
+        },
     }[kind]
     pressure = draw(st.floats(6e5, 8e5))
     blocks: Blocks = {"supply": {"kind": kind, "initial_pressure": pressure, **own}}
     if not draw(st.booleans()):
         return blocks, "supply"
     way = draw(st.sampled_from(["tube", "orifice"]))
-    shape = {"tube": {"length": draw(st.floats(0.5, 2.0)), "diameter": 6e-3}, "orifice": {"discharge_area": 4e-6}}[way]
+    shape = {
+        "tube": {"length": draw(st.floats(0.5, 2.0)), "diameter": 6e-3},
+        "orifice": {"discharge_area": 4e-6},
+    }[way]
     blocks["line.main"] = {"kind": way, "from": "supply", "to": "chamber.manifold", **shape}
-    blocks["chamber.manifold"] = {"dead_volume": draw(st.floats(2e-4, 5e-4)), "initial_pressure": pressure - 5e4}
+    blocks["chamber.manifold"] = {
+        "dead_volume": draw(st.floats(2e-4, 5e-4)),
+        "initial_pressure": pressure - 5e4,
+    }
     return blocks, "chamber.manifold"
 
 
@@ -101,13 +124,21 @@ def pulls(draw: st.DrawFn, name: str, joint: str, feed: str, friction: bool) -> 
     alphas = {key: draw(st.floats(1.0, 1.4)) for key in ("alpha_in", "alpha_out", "alpha")}
     blocks: Blocks = {
         f"valve.{name}": valve(draw(st.floats(0.5e-6, 3e-6)), **{"from": feed}),
-        f"chamber.{name}": {"dead_volume": draw(st.floats(2e-5, 1e-4)), "initial_pressure": draw(st.floats(1.5e5, 3e5)), **alphas},
+        f"chamber.{name}": {
+            "dead_volume": draw(st.floats(2e-5, 1e-4)),
+            "initial_pressure": draw(st.floats(1.5e5, 3e5)),
+            **alphas,
+        },
         f"muscle.{name}": {"joint": joint, **MUSCLE, "count": draw(st.integers(1, 2))},
     }
     if friction:
         blocks[f"muscle.{name}"] |= {"friction_coefficient": 0.1, "friction_presliding": 5e-4}
     if draw(st.booleans()):
-        tube = {"length": draw(st.floats(0.3, 1.5)), "diameter": 4e-3, "inlet_volume": draw(st.floats(0.0, 5e-6))}
+        tube = {
+            "length": draw(st.floats(0.3, 1.5)),
+            "diameter": 4e-3,
+            "inlet_volume": draw(st.floats(0.0, 5e-6)),
+        }
         blocks[f"line.{name}"] = {"kind": "tube", "to": f"chamber.{name}", **tube}
     return blocks
 
@@ -136,22 +167,38 @@ def links(draw: st.DrawFn, on: str, rubbing: float) -> dict[str, Any]:
 
 
 @st.composite
-def bodies(draw: st.DrawFn, feed: str, kinds: tuple[str, ...], rubbing: float, friction: bool) -> Blocks:
+def bodies(
+    draw: st.DrawFn, feed: str, kinds: tuple[str, ...], rubbing: float, friction: bool
+) -> Blocks:
     """What muscles move, and the muscles."""
     kind = draw(st.sampled_from(kinds))
     blocks: Blocks = {}
     if kind == "hanging":
         blocks |= draw(pulls("lift", "load", feed, friction))
-        mass = {"mass": draw(st.floats(30.0, 60.0)), "viscous": rubbing * draw(st.floats(50.0, 300.0))}
+        mass = {
+            "mass": draw(st.floats(30.0, 60.0)),
+            "viscous": rubbing * draw(st.floats(50.0, 300.0)),
+        }
         blocks["load"] = {"kind": "mass", **mass, "min_length": 0.15, "max_length": 0.203}
     elif kind == "antagonists":
         for name, side in (("flexor", 1.0), ("extensor", -1.0)):
             blocks |= draw(pulls(name, "joint.elbow", feed, friction))
             blocks[f"transmission.{name}"] = draw(transmissions(side))
         blocks["joint.elbow"] = joint()
-        arm = {"inertia": draw(st.floats(0.02, 0.08)), "first_moment": draw(st.floats(0.0, 0.2)), "length": 0.3}
-        arm |= {"payload": draw(st.floats(0.0, 1.0)), "viscous": rubbing * draw(st.floats(0.1, 0.5))}
-        blocks["arm"] = {**arm, "coulomb": rubbing * draw(st.floats(0.0, 0.1)), "coulomb_speed": 0.1}
+        arm = {
+            "inertia": draw(st.floats(0.02, 0.08)),
+            "first_moment": draw(st.floats(0.0, 0.2)),
+            "length": 0.3,
+        }
+        arm |= {
+            "payload": draw(st.floats(0.0, 1.0)),
+            "viscous": rubbing * draw(st.floats(0.1, 0.5)),
+        }
+        blocks["arm"] = {
+            **arm,
+            "coulomb": rubbing * draw(st.floats(0.0, 0.1)),
+            "coulomb_speed": 0.1,
+        }
     else:
         for name, on in (("elbow", "base"), ("wrist", "link.elbow")):
             blocks |= draw(pulls(name, f"joint.{name}", feed, friction))
@@ -169,10 +216,18 @@ def commands(draw: st.DrawFn, blocks: Blocks, rows: int) -> dict[str, np.ndarray
     for label in blocks:
         kind, _, name = label.partition(".")
         if kind == "valve":
-            swing, frequency, phase = draw(st.floats(0.3, 2.0)), draw(st.floats(1.0, 4.0)), draw(st.floats(0.0, math.tau))
-            found[f"valve_command.{name}"] = 5.0 + swing * np.sin(math.tau * frequency * time + phase)
+            swing, frequency, phase = (
+                draw(st.floats(0.3, 2.0)),
+                draw(st.floats(1.0, 4.0)),
+                draw(st.floats(0.0, math.tau)),
+            )
+            found[f"valve_command.{name}"] = 5.0 + swing * np.sin(
+                math.tau * frequency * time + phase
+            )
     if blocks["supply"]["kind"] == "regulator":
-        found["supply_command"] = blocks["supply"]["initial_pressure"] + draw(st.floats(0.0, 5e5)) * time
+        found["supply_command"] = (
+            blocks["supply"]["initial_pressure"] + draw(st.floats(0.0, 5e5)) * time
+        )
     return found
 
 
@@ -183,9 +238,15 @@ def starts(draw: st.DrawFn, blocks: Blocks) -> dict[str, float]:
     for label in blocks:
         kind, _, name = label.partition(".")
         if kind == "joint":
-            found |= {f"joint_angle.{name}": draw(st.floats(0.6, 1.1)), f"joint_rate.{name}": draw(st.floats(-0.5, 0.5))}
+            found |= {
+                f"joint_angle.{name}": draw(st.floats(0.6, 1.1)),
+                f"joint_rate.{name}": draw(st.floats(-0.5, 0.5)),
+            }
         elif kind == "load":
-            found |= {"length": draw(st.floats(0.175, 0.19)), "length_rate": draw(st.floats(-0.05, 0.05))}
+            found |= {
+                "length": draw(st.floats(0.175, 0.19)),
+                "length_rate": draw(st.floats(-0.05, 0.05)),
+            }
     return found
 
 
@@ -199,12 +260,22 @@ def networks(
 ) -> tuple[Blocks, Run]:
     """A small rig as tables, and a run of it that fills, vents and moves.
 
-    `rubbing` multiplies the friction of what is moved; `friction` gives the muscles one that depends on their direction.
+    `rubbing` multiplies the friction of what is moved; `friction` gives the muscles one that
+    depends on their direction.
     """
     blocks, feed = draw(sources())
     blocks = {"gas": dict(GAS), **blocks, **draw(bodies(feed, kinds, rubbing, friction))}
     if draw(st.booleans()):
-        chamber = next(label for label in blocks if label.startswith("chamber.") and label != "chamber.manifold")
-        blocks["line.leak"] = {"kind": "orifice", "from": chamber, "to": "ambient", "discharge_area": draw(st.floats(1e-9, 2e-8))}
+        chamber = next(
+            label
+            for label in blocks
+            if label.startswith("chamber.") and label != "chamber.manifold"
+        )
+        blocks["line.leak"] = {
+            "kind": "orifice",
+            "from": chamber,
+            "to": "ambient",
+            "discharge_area": draw(st.floats(1e-9, 2e-8)),
+        }
     run = Run(rig_of(blocks), SAMPLE_TIME, rows, draw(starts(blocks)), draw(commands(blocks, rows)))
     return blocks, run

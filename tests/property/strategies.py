@@ -12,7 +12,15 @@ from hypothesis import strategies as st
 import pamrs
 from tests.reference import GeometryReference, MuscleReference
 
-MODELS = ("gaylord", "chou_hannaford", "mooney_rivlin", "ferraresi", "kothera", "robinson", "elbow_linear")
+MODELS = (
+    "gaylord",
+    "chou_hannaford",
+    "mooney_rivlin",
+    "ferraresi",
+    "kothera",
+    "robinson",
+    "elbow_linear",
+)
 GEOMETRIES = ("cylinder", "elliptic", "elliptic_published")
 
 
@@ -38,7 +46,9 @@ def muscle_arguments(draw: st.DrawFn, geometry: str | None = None) -> dict[str, 
 
 @st.composite
 def model_arguments(draw: st.DrawFn, model: str, geometry: str | None = None) -> dict[str, Any]:
-    """Keyword arguments of a muscle of one force model: its own constants, friction, no parameter of another model."""
+    """Keyword arguments of a muscle of one force model: its own constants, friction, no parameter
+    of another model.
+    """
     arguments = draw(muscle_arguments(geometry or draw(st.sampled_from(GEOMETRIES))))
     if model not in ("ferraresi", "kothera", "robinson"):
         del arguments["modulus_slope"], arguments["modulus_offset"]
@@ -56,9 +66,15 @@ def model_arguments(draw: st.DrawFn, model: str, geometry: str | None = None) ->
 
 
 def reference_of(arguments: dict[str, Any]) -> MuscleReference:
-    """Build a muscle of the reference from the arguments of a muscle of pamrs; the geometry must be among them."""
+    """Build a muscle of the reference from the arguments of a muscle of pamrs; the geometry must be
+    among them.
+    """
     shape = {f.name: arguments[f.name] for f in fields(GeometryReference) if f.name in arguments}
-    own = {f.name: arguments[f.name] for f in fields(MuscleReference) if f.name in arguments and f.name != "geometry"}
+    own = {
+        f.name: arguments[f.name]
+        for f in fields(MuscleReference)
+        if f.name in arguments and f.name != "geometry"
+    }
     return MuscleReference(GeometryReference(**shape, kind=arguments["geometry"]), **own)
 
 
@@ -68,13 +84,17 @@ def both(arguments: dict[str, Any]) -> tuple[pamrs.Muscle, MuscleReference]:
 
 
 def stroke(model: MuscleReference) -> np.ndarray:
-    """Contraction ratios from far extension (where the braid is taut) almost to the shortest muscle."""
+    """Contraction ratios from far extension (where the braid is taut) almost to the shortest
+    muscle.
+    """
     low, high = model.geometry.min_contraction, model.geometry.max_contraction
     return np.array([0.9 * low, 0.35 * low, 0.04 * low, 0.0, 0.003, 0.07, 0.2, 0.95 * high])
 
 
 def contractions(model: MuscleReference, n: int = 5) -> np.ndarray:
-    """A few contraction ratios over the stroke that every valid muscle has, mostly in contraction."""
+    """A few contraction ratios over the stroke that every valid muscle has, mostly in
+    contraction.
+    """
     low = 0.4 * model.geometry.min_contraction if model.geometry.kind == "elliptic" else 0.0
     high = min(0.3, 0.95 * model.geometry.max_contraction)
     return np.concatenate([[low, 0.0], np.linspace(0.02, high, n - 2)])

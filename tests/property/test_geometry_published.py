@@ -1,4 +1,6 @@
-"""The three geometries against the independent reference, their limits, and the reference against closed forms."""
+"""The three geometries against the independent reference, their limits, and the reference against
+closed forms.
+"""
 
 from __future__ import annotations
 
@@ -28,9 +30,17 @@ def solved(muscle: pamrs.Muscle, e: float) -> Shape:
 
 
 def tube_volume(shape: Shape, geometry: GeometryReference, e: float, inset: float) -> float:
-    """Volume of the body whose surface lies `inset` below the outer profile of a shape, by quadrature, m^3."""
+    """Volume of the body whose surface lies `inset` below the outer profile of a shape, by
+    quadrature, m^3.
+    """
     end = 0.0 if geometry.kind == "cylinder" else geometry.end_ellipse(e, shape.radius)[3]
-    ends, _ = quad(lambda z: (geometry.profile(z, e, shape.radius) - inset) ** 2, 0.0, end, epsabs=0.0, epsrel=1e-12)
+    ends, _ = quad(
+        lambda z: (geometry.profile(z, e, shape.radius) - inset) ** 2,
+        0.0,
+        end,
+        epsabs=0.0,
+        epsrel=1e-12,
+    )
     return math.pi * (2.0 * ends + (shape.length - 2.0 * end) * (shape.radius - inset) ** 2)
 
 
@@ -41,16 +51,23 @@ def test_shape_equals_the_reference(kind: str, data: st.DataObject) -> None:
     muscle, reference = both(data.draw(muscle_arguments(kind)))
     geometry, e = reference.geometry, stroke(reference)
     shapes = [geometry.solve(float(x)) for x in e]
-    # Where no radius fits the printed minimum is flat: it fixes the radius to about half the digits.
+    # Where no radius fits the printed minimum is flat: it fixes the radius to about half the
+    # digits.
     flat = np.zeros(e.size, dtype=bool)
     if kind == "elliptic_published":
-        flat = np.array([not geometry.fits(float(x), shape.radius) for x, shape in zip(e, shapes, strict=True)])
+        flat = np.array(
+            [not geometry.fits(float(x), shape.radius) for x, shape in zip(e, shapes, strict=True)]
+        )
     for rtol, rows in ((1e-9, ~flat), (1e-6, flat)):
         for name in ("radius", "thickness", "air_volume"):
             want = np.array([getattr(shape, name) for shape in shapes])
-            np.testing.assert_allclose(getattr(muscle, name)(e)[rows], want[rows], rtol=rtol, err_msg=name)
+            np.testing.assert_allclose(
+                getattr(muscle, name)(e)[rows], want[rows], rtol=rtol, err_msg=name
+            )
         hoop = np.array([reference.strains(shape)[1] for shape in shapes])
-        np.testing.assert_allclose(muscle.circumferential_strain(e)[rows], hoop[rows], rtol=rtol, atol=10.0 * rtol)
+        np.testing.assert_allclose(
+            muscle.circumferential_strain(e)[rows], hoop[rows], rtol=rtol, atol=10.0 * rtol
+        )
     np.testing.assert_array_equal(muscle.braid_taut(e), [shape.braid_taut for shape in shapes])
     assert muscle.fibre_length == pytest.approx(geometry.fibre_length, rel=1e-13)
     assert muscle.turns == pytest.approx(geometry.turns, rel=1e-13)
@@ -71,7 +88,9 @@ def test_rubber_and_air_fill_the_profile(kind: str, data: st.DataObject) -> None
         inside = tube_volume(shape, geometry, float(e), shape.thickness)
         assert inside == pytest.approx(shape.air_volume, rel=1e-10)
         outside = tube_volume(shape, geometry, float(e), 0.0)
-        assert outside - inside == pytest.approx(geometry.rubber_volume, rel=1e-10, abs=1e-13 * outside)
+        assert outside - inside == pytest.approx(
+            geometry.rubber_volume, rel=1e-10, abs=1e-13 * outside
+        )
 
 
 @FEW
@@ -82,13 +101,16 @@ def test_solved_radius_fits_the_fibre(arguments: dict[str, Any]) -> None:
         estimate = geometry.fibre_estimate(float(e), float(muscle.radius(e)))
         if bool(muscle.braid_taut(e)):
             assert e < 0.0
-            assert float(muscle.radius(e)) == pytest.approx(geometry.radius_floor(float(e)), rel=1e-12)
+            assert float(muscle.radius(e)) == pytest.approx(
+                geometry.radius_floor(float(e)), rel=1e-12
+            )
             assert estimate > geometry.fibre_length
         else:
             assert estimate == pytest.approx(geometry.fibre_length, rel=1e-12)
 
 
-#: A muscle whose least miss is at the floor itself: a search that stops just short of it must still say taut.
+#: A muscle whose least miss is at the floor itself: a search that stops just short of it must still
+#: say taut.
 AT_THE_FLOOR = {
     "rest_length": 0.1,
     "rest_diameter": 0.004,
@@ -108,9 +130,14 @@ def test_published_radius_misses_the_fibre_least(arguments: dict[str, Any]) -> N
     for e in stroke(reference_of(arguments))[[0, 1, 2, 4, 5, 6, 7]]:
         radius = float(muscle.radius(e))
         last = geometry.rest_radius + 1.6 * (geometry.cylinder_radius(e) - geometry.rest_radius)
-        low, high = sorted((geometry.rest_radius, geometry.radius_floor(float(e)) if e < 0.0 else last))
+        low, high = sorted(
+            (geometry.rest_radius, geometry.radius_floor(float(e)) if e < 0.0 else last)
+        )
         assert low * (1.0 - 1e-12) <= radius <= high * (1.0 + 1e-12)
-        misses = [abs(geometry.fibre_estimate(float(e), x) - geometry.fibre_length) for x in np.linspace(low, high, 60)]
+        misses = [
+            abs(geometry.fibre_estimate(float(e), x) - geometry.fibre_length)
+            for x in np.linspace(low, high, 60)
+        ]
         own = abs(geometry.fibre_estimate(float(e), radius) - geometry.fibre_length)
         assert own <= min(misses) + 1e-12 * geometry.fibre_length
         assert bool(muscle.braid_taut(e)) == (e < 0.0 and radius < low * (1.0 + 1e-9))
@@ -118,8 +145,12 @@ def test_published_radius_misses_the_fibre_least(arguments: dict[str, Any]) -> N
 
 @MORE
 @given(muscle_arguments("elliptic"), st.floats(0.01, 0.2), st.floats(0.3, 0.33))
-def test_published_radius_crosses_the_solved_one_at_the_sphere(arguments: dict[str, Any], tall: float, flat: float) -> None:
-    """Polar and parametric angle agree at rest and on a spherical end (k = 1); a tall end is followed too far."""
+def test_published_radius_crosses_the_solved_one_at_the_sphere(
+    arguments: dict[str, Any], tall: float, flat: float
+) -> None:
+    """Polar and parametric angle agree at rest and on a spherical end (k = 1); a tall end is
+    followed too far.
+    """
     muscle = pamrs.Muscle(**arguments)
     published = muscle.replace(geometry="elliptic_published")
     for same in (0.0, (1.64 - 1.0) / 2.405):
@@ -131,7 +162,9 @@ def test_published_radius_crosses_the_solved_one_at_the_sphere(arguments: dict[s
 @MORE
 @given(muscle_arguments("cylinder"), st.floats(0.0, 1.0))
 def test_cylinder_in_extension_stops_at_its_floor(arguments: dict[str, Any], share: float) -> None:
-    """The radius of the braid's cylinder, but never less than the bladder or 0.8 of the resting radius."""
+    """The radius of the braid's cylinder, but never less than the bladder or 0.8 of the resting
+    radius.
+    """
     muscle = pamrs.Muscle(**arguments)
     low, _ = muscle.contraction_limits
     e = share * low * (1.0 - 1e-9)
@@ -147,13 +180,20 @@ def test_cylinder_in_extension_stops_at_its_floor(arguments: dict[str, Any], sha
 @pytest.mark.parametrize("kind", GEOMETRIES)
 def test_a_thick_bladder_fills_the_braid(kind: str) -> None:
     """With a wall of half the radius the bladder, not the measured 0.8 R0, sets the floor."""
-    arguments = {"rest_length": 0.3, "rest_diameter": 0.02, "braid_angle": 1.25, "wall_thickness": 0.005, "geometry": kind}
+    arguments = {
+        "rest_length": 0.3,
+        "rest_diameter": 0.02,
+        "braid_angle": 1.25,
+        "wall_thickness": 0.005,
+        "geometry": kind,
+    }
     muscle = pamrs.Muscle(**arguments, modulus_slope=[0.0], modulus_offset=[1e6])
     geometry = reference_of(arguments).geometry
     e = 0.9 * geometry.min_contraction
     assert geometry.radius_floor(e) > 0.8 * geometry.rest_radius
     assert float(muscle.radius(e)) == pytest.approx(geometry.solve(e).radius, rel=1e-9)
-    # A full cylinder has no bore: its thickness is a difference under a root, good to half the digits.
+    # A full cylinder has no bore: its thickness is a difference under a root, good to half the
+    # digits.
     assert float(muscle.thickness(e)) == pytest.approx(geometry.solve(e).thickness, rel=1e-6)
     assert np.isfinite(float(muscle.force(2e5, e)))
 
@@ -177,7 +217,8 @@ def test_slender_muscle_is_a_cylinder(arguments: dict[str, Any], e: float) -> No
     np.testing.assert_allclose(gaps[1] / gaps[2], 4.0, rtol=0.1)
 
 
-# --- The reference against closed forms (pamrs plays no part) ----------------------------------------------------
+# --- The reference against closed forms (pamrs plays no
+# part) ----------------------------------------------------
 
 
 @MORE
@@ -189,7 +230,11 @@ def test_reference_gas_areas_are_the_closed_forms(arguments: dict[str, Any], kin
         shape = geometry.solve(float(e))
         length, radius, turns = shape.length, shape.radius, geometry.turns
         gaylord = (3.0 * length**2 - geometry.fibre_length**2) / (4.0 * math.pi * turns**2)
-        thick = 2.0 * math.pi * radius * wall - math.pi * wall**2 - length**2 * wall / (2.0 * math.pi * turns**2 * radius)
+        thick = (
+            2.0 * math.pi * radius * wall
+            - math.pi * wall**2
+            - length**2 * wall / (2.0 * math.pi * turns**2 * radius)
+        )
         scale = length**2 / turns**2
         got = replace(reference, model="gaylord").gas_area(float(e))
         assert got == pytest.approx(gaylord, rel=0.0, abs=1e-13 * scale)
@@ -200,8 +245,12 @@ def test_reference_gas_areas_are_the_closed_forms(arguments: dict[str, Any], kin
 @MORE
 @given(muscle_arguments(), st.sampled_from(GEOMETRIES))
 def test_reference_rubber_follows_principal_stresses(arguments: dict[str, Any], kind: str) -> None:
-    """dW/dL = s1 / L - s2 L / (2 pi N R)^2 with the plane stresses s_i = 2 (l_i^2 - l_3^2) (C10 + C01 l_j^2)."""
-    reference: MuscleReference = replace(reference_of({**arguments, "geometry": kind}), model="mooney_rivlin")
+    """dW/dL = s1 / L - s2 L / (2 pi N R)^2 with the plane stresses s_i = 2 (l_i^2 - l_3^2) (C10 +
+    C01 l_j^2).
+    """
+    reference: MuscleReference = replace(
+        reference_of({**arguments, "geometry": kind}), model="mooney_rivlin"
+    )
     geometry = reference.geometry
     for e in stroke(reference):
         shape = geometry.solve(float(e))
@@ -212,5 +261,11 @@ def test_reference_rubber_follows_principal_stresses(arguments: dict[str, Any], 
             hoop = 2.0 * (two**2 - thin) * (c10 + c01 * one**2)
             turn = shape.length / (2.0 * math.pi * geometry.turns * shape.radius) ** 2
             want = geometry.rubber_volume * (axial / shape.length - hoop * turn)
-            scale = geometry.rubber_volume / shape.length * (1.0 + abs(axial) + abs(hoop) * turn * shape.length)
-            assert reference.elastic_basis(float(e))[column] == pytest.approx(want, rel=0.0, abs=1e-13 * scale)
+            scale = (
+                geometry.rubber_volume
+                / shape.length
+                * (1.0 + abs(axial) + abs(hoop) * turn * shape.length)
+            )
+            assert reference.elastic_basis(float(e))[column] == pytest.approx(
+                want, rel=0.0, abs=1e-13 * scale
+            )

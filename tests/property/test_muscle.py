@@ -74,7 +74,9 @@ def test_force_grows_with_pressure_where_the_gas_pulls(arguments: dict[str, Any]
 @FEW
 @given(muscle_arguments(geometry="cylinder"), st.floats(0.03, 0.3))
 def test_cylinder_does_virtual_work(arguments: dict[str, Any], e: float) -> None:
-    """Gas force of a cylinder: -dV/dL of the outer volume, plus the bladder term of the thickness."""
+    """Gas force of a cylinder: -dV/dL of the outer volume, plus the bladder term of the
+    thickness.
+    """
     arguments = {**arguments, "modulus_slope": [0.0], "modulus_offset": [0.0]}
     muscle, model = both(arguments)
     assume(e < 0.95 * model.geometry.max_contraction)
@@ -96,7 +98,9 @@ def test_rubber_keeps_its_volume(arguments: dict[str, Any]) -> None:
     muscle, model = both({**arguments, "geometry": "cylinder"})
     e = contractions(model)
     outer = math.pi * muscle.radius(e) ** 2 * arguments["rest_length"] * (1.0 - e)
-    np.testing.assert_allclose(outer - muscle.air_volume(e), model.geometry.rubber_volume, rtol=1e-8)
+    np.testing.assert_allclose(
+        outer - muscle.air_volume(e), model.geometry.rubber_volume, rtol=1e-8
+    )
 
 
 @FEW
@@ -106,10 +110,14 @@ def test_rest_shape(arguments: dict[str, Any]) -> None:
     bore = 0.5 * arguments["rest_diameter"] - arguments["wall_thickness"]
     assert float(muscle.radius(0.0)) == pytest.approx(0.5 * arguments["rest_diameter"], rel=1e-12)
     assert float(muscle.thickness(0.0)) == pytest.approx(arguments["wall_thickness"], rel=1e-12)
-    assert float(muscle.air_volume(0.0)) == pytest.approx(math.pi * bore**2 * arguments["rest_length"], rel=1e-12)
+    assert float(muscle.air_volume(0.0)) == pytest.approx(
+        math.pi * bore**2 * arguments["rest_length"], rel=1e-12
+    )
     # At rest there is no strain, so no elastic force either.
     assert float(muscle.force(0.0, 0.0)) == pytest.approx(0.0, abs=1e-6)
-    assert float(muscle.force(3e5, 0.0)) == pytest.approx(3e5 * model.coefficients(0.0)[0], rel=1e-9)
+    assert float(muscle.force(3e5, 0.0)) == pytest.approx(
+        3e5 * model.coefficients(0.0)[0], rel=1e-9
+    )
 
 
 @pytest.mark.parametrize("e", [1e-300, 1e-17, -1e-17, 1e-15, -1e-15, 1e-12, -1e-12])

@@ -1,4 +1,6 @@
-"""Every force model against the independent reference, and the laws that tie the models together."""
+"""Every force model against the independent reference, and the laws that tie the models
+together.
+"""
 
 from __future__ import annotations
 
@@ -13,13 +15,27 @@ from numpy.polynomial import Chebyshev
 from numpy.polynomial.legendre import leggauss
 
 import pamrs
-from tests.property.strategies import GEOMETRIES, MODELS, both, model_arguments, reference_of, stroke
+from tests.property.strategies import (
+    GEOMETRIES,
+    MODELS,
+    both,
+    model_arguments,
+    reference_of,
+    stroke,
+)
 
 FEW = settings(max_examples=10, deadline=None, derandomize=True)
 ANY_MODEL = st.sampled_from(MODELS).flatmap(model_arguments)
 
 #: Moduli, friction and everything else that only some models know.
-CONSTANTS = ("modulus_slope", "modulus_offset", "c10", "c01", "bladder_modulus", "extension_factors")
+CONSTANTS = (
+    "modulus_slope",
+    "modulus_offset",
+    "c10",
+    "c01",
+    "bladder_modulus",
+    "extension_factors",
+)
 
 
 def as_model(arguments: dict[str, Any], model: str, **changes: Any) -> pamrs.Muscle:
@@ -29,12 +45,15 @@ def as_model(arguments: dict[str, Any], model: str, **changes: Any) -> pamrs.Mus
 
 
 def close(got: Any, want: Any, share: float, scale: Any = None) -> None:
-    """Compare forces with a tolerance that is a share of the largest wanted force (or of `scale`)."""
+    """Compare forces with a tolerance that is a share of the largest wanted force (or of
+    `scale`).
+    """
     size = max(float(np.max(np.abs(want if scale is None else scale))), 1e-6)
     np.testing.assert_allclose(got, want, rtol=0.0, atol=share * size)
 
 
-# --- Against the reference ---------------------------------------------------------------------------------------
+# --- Against the
+# reference ---------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("geometry", GEOMETRIES)
@@ -44,14 +63,27 @@ def close(got: Any, want: Any, share: float, scale: Any = None) -> None:
 def test_force_equals_the_reference(model: str, geometry: str, data: st.DataObject) -> None:
     arguments = data.draw(model_arguments(model, geometry))
     pressures = np.array(data.draw(st.lists(st.floats(-0.9e5, 12e5), min_size=2, max_size=3)))
-    directions = (None, *data.draw(st.lists(st.floats(-1.0, 1.0), min_size=1, max_size=2)), -1.0, 1.0)
+    directions = (
+        None,
+        *data.draw(st.lists(st.floats(-1.0, 1.0), min_size=1, max_size=2)),
+        -1.0,
+        1.0,
+    )
     muscle, reference = both(arguments)
     e = stroke(reference)
     if geometry == "elliptic_published":
-        # Where no radius fits, the least miss fixes R to half the digits only; test_geometry_published has it.
-        e = e[[reference.geometry.fits(float(x), reference.geometry.solve_radius(float(x))[0]) for x in e]]
+        # Where no radius fits, the least miss fixes R to half the digits only;
+        # test_geometry_published has it.
+        e = e[
+            [
+                reference.geometry.fits(float(x), reference.geometry.solve_radius(float(x))[0])
+                for x in e
+            ]
+        ]
     area = np.array([reference.gas_area(float(x)) for x in e])
-    np.testing.assert_allclose(muscle.gas_area(e), area, rtol=1e-9, atol=1e-10 * np.max(np.abs(area)))
+    np.testing.assert_allclose(
+        muscle.gas_area(e), area, rtol=1e-9, atol=1e-10 * np.max(np.abs(area))
+    )
     basis = np.array([reference.elastic_basis(float(x)) for x in e])
     assert muscle.elastic_basis(e).shape == basis.shape
     unit = reference.geometry.rubber_volume / reference.geometry.rest_length
@@ -60,20 +92,32 @@ def test_force_equals_the_reference(model: str, geometry: str, data: st.DataObje
         want = np.column_stack([reference.force(pressures, float(x), direction) for x in e])
         got = muscle.force(pressures[:, None], e[None, :], direction=direction)
         scale = max(float(np.max(np.abs(want))), 1.0)
-        np.testing.assert_allclose(got, want, rtol=1e-9, atol=1e-10 * scale, err_msg=f"direction {direction}")
+        np.testing.assert_allclose(
+            got, want, rtol=1e-9, atol=1e-10 * scale, err_msg=f"direction {direction}"
+        )
 
 
 @pytest.mark.parametrize("model", MODELS)
 def test_each_model_has_its_own_geometry(model: str) -> None:
-    shape = {"rest_length": 0.3, "rest_diameter": 0.025, "braid_angle": 1.28, "wall_thickness": 0.002}
-    moduli = {"modulus_slope": [1.0], "modulus_offset": [1e6]} if model in ("ferraresi", "kothera", "robinson") else {}
+    shape = {
+        "rest_length": 0.3,
+        "rest_diameter": 0.025,
+        "braid_angle": 1.28,
+        "wall_thickness": 0.002,
+    }
+    moduli = (
+        {"modulus_slope": [1.0], "modulus_offset": [1e6]}
+        if model in ("ferraresi", "kothera", "robinson")
+        else {}
+    )
     muscle = pamrs.Muscle(**shape, **moduli, model=model)
     assert muscle.model == model
     assert muscle.geometry == ("elliptic" if model == "robinson" else "cylinder")
     assert float(muscle.radius(0.2)) == float(muscle.replace(geometry=muscle.geometry).radius(0.2))
 
 
-# --- One muscle, whatever its model ------------------------------------------------------------------------------
+# --- One muscle, whatever its
+# model ------------------------------------------------------------------------------
 
 
 @FEW
@@ -94,7 +138,9 @@ def test_force_is_the_sum_of_its_parts(arguments: dict[str, Any], pressure: floa
 
 @FEW
 @given(ANY_MODEL, st.floats(0.0, 10e5), st.floats(1e3, 2e5))
-def test_more_pressure_pulls_more_where_the_gas_pulls(arguments: dict[str, Any], low: float, rise: float) -> None:
+def test_more_pressure_pulls_more_where_the_gas_pulls(
+    arguments: dict[str, Any], low: float, rise: float
+) -> None:
     if "modulus_slope" in arguments:
         arguments = {**arguments, "modulus_slope": [0.0] * len(arguments["modulus_offset"])}
     muscle = pamrs.Muscle(**arguments)
@@ -112,7 +158,9 @@ def test_replace_changes_only_what_it_is_told(arguments: dict[str, Any]) -> None
     longer = muscle.replace(rest_length=1.01 * arguments["rest_length"])
     again = pamrs.Muscle(**{**arguments, "rest_length": 1.01 * arguments["rest_length"]})
     assert longer.parameters == again.parameters
-    assert float(longer.force(3e5, 0.1, direction=-1.0)) == float(again.force(3e5, 0.1, direction=-1.0))
+    assert float(longer.force(3e5, 0.1, direction=-1.0)) == float(
+        again.force(3e5, 0.1, direction=-1.0)
+    )
     assert muscle.parameters["rest_length"] == arguments["rest_length"]
 
 
@@ -125,10 +173,13 @@ def test_compiled_table_holds_every_model(model: str, geometry: str) -> None:
     blocked = abs(float(muscle.force(5e5, 0.0)))
     for direction in (None, -1.0, 0.3, 1.0):
         exact = muscle.force(5e5, e, direction=direction)
-        np.testing.assert_allclose(muscle.force_table(5e5, e, direction=direction), exact, rtol=0.0, atol=1e-6 * blocked)
+        np.testing.assert_allclose(
+            muscle.force_table(5e5, e, direction=direction), exact, rtol=0.0, atol=1e-6 * blocked
+        )
 
 
-# --- Virtual work and stored energy ------------------------------------------------------------------------------
+# --- Virtual work and stored
+# energy ------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("model", "thick"), [("gaylord", 0.0), ("chou_hannaford", 1.0)])
@@ -147,13 +198,17 @@ def test_gas_does_virtual_work(model: str, thick: float, data: st.DataObject) ->
     half = 0.02 * e
     slope = Chebyshev.interpolate(volume, 10, domain=[e - half, e + half]).deriv()(e) / rest
     scale = volume(np.array([e]))[0] / rest
-    assert float(muscle.force(4e5, e)) == pytest.approx(4e5 * slope, rel=1e-8, abs=4e5 * 1e-9 * scale)
+    assert float(muscle.force(4e5, e)) == pytest.approx(
+        4e5 * slope, rel=1e-8, abs=4e5 * 1e-9 * scale
+    )
 
 
 @FEW
 @given(model_arguments("mooney_rivlin", "cylinder"))
 def test_rubber_stores_the_work_done_on_it(arguments: dict[str, Any]) -> None:
-    """Over a stroke the work against the pulling force, the integral of F dL, is the rise of the energy."""
+    """Over a stroke the work against the pulling force, the integral of F dL, is the rise of the
+    energy.
+    """
     muscle = pamrs.Muscle(**arguments)
     rest, high = arguments["rest_length"], 0.95 * reference_of(arguments).geometry.max_contraction
 
@@ -179,21 +234,32 @@ def test_rubber_stores_the_work_done_on_it(arguments: dict[str, Any]) -> None:
 @given(model_arguments("mooney_rivlin"))
 def test_rubber_at_rest_does_not_pull(arguments: dict[str, Any]) -> None:
     muscle = pamrs.Muscle(**arguments)
-    scale = muscle.bladder_volume / arguments["rest_length"] * (abs(arguments["c10"]) + abs(arguments["c01"]))
+    scale = (
+        muscle.bladder_volume
+        / arguments["rest_length"]
+        * (abs(arguments["c10"]) + abs(arguments["c01"]))
+    )
     assert abs(float(muscle.force(0.0, 0.0))) <= 1e-11 * scale + 1e-12
 
 
-# --- The models fall into each other -----------------------------------------------------------------------------
+# --- The models fall into each
+# other -----------------------------------------------------------------------------
 
 
 @FEW
 @given(model_arguments("gaylord"), st.floats(1e5, 10e5))
-def test_models_without_wall_and_elasticity_are_gaylord(arguments: dict[str, Any], pressure: float) -> None:
+def test_models_without_wall_and_elasticity_are_gaylord(
+    arguments: dict[str, Any], pressure: float
+) -> None:
     none = {"modulus_slope": [0.0], "modulus_offset": [0.0]}
     e = stroke(reference_of(arguments))
     want = as_model(arguments, "gaylord").force(pressure, e)
-    np.testing.assert_allclose(as_model(arguments, "ferraresi", **none).force(pressure, e), want, rtol=1e-12)
-    np.testing.assert_allclose(as_model(arguments, "mooney_rivlin", c10=0.0, c01=0.0).force(pressure, e), want, rtol=1e-12)
+    np.testing.assert_allclose(
+        as_model(arguments, "ferraresi", **none).force(pressure, e), want, rtol=1e-12
+    )
+    np.testing.assert_allclose(
+        as_model(arguments, "mooney_rivlin", c10=0.0, c01=0.0).force(pressure, e), want, rtol=1e-12
+    )
     thin = {**arguments, "wall_thickness": 0.5e-6 * arguments["rest_diameter"]}
     for muscle in (
         as_model(thin, "chou_hannaford"),
@@ -209,7 +275,9 @@ def test_models_without_wall_and_elasticity_are_gaylord(arguments: dict[str, Any
 
 @FEW
 @given(model_arguments("kothera"), st.floats(-0.9e5, 10e5), st.floats(-1.0, 1.0))
-def test_robinson_is_kothera_on_the_same_geometry(arguments: dict[str, Any], pressure: float, direction: float) -> None:
+def test_robinson_is_kothera_on_the_same_geometry(
+    arguments: dict[str, Any], pressure: float, direction: float
+) -> None:
     e = stroke(reference_of(arguments))
     robinson = pamrs.Muscle(**{**arguments, "model": "robinson"})
     want = pamrs.Muscle(**arguments).force(pressure, e, direction=direction)
@@ -218,10 +286,14 @@ def test_robinson_is_kothera_on_the_same_geometry(arguments: dict[str, Any], pre
 
 @FEW
 @given(model_arguments("elbow_linear", "cylinder"), st.floats(0.0, 10e5))
-def test_elbow_on_a_cylinder_is_kothera_of_first_order(arguments: dict[str, Any], pressure: float) -> None:
+def test_elbow_on_a_cylinder_is_kothera_of_first_order(
+    arguments: dict[str, Any], pressure: float
+) -> None:
     """An incompressible tube has t L (R - t/2) constant, so t L - t0 L0 = -t L eps_c exactly."""
     e = stroke(reference_of(arguments))
-    kothera = as_model(arguments, "kothera", modulus_slope=[0.0], modulus_offset=[arguments["bladder_modulus"]])
+    kothera = as_model(
+        arguments, "kothera", modulus_slope=[0.0], modulus_offset=[arguments["bladder_modulus"]]
+    )
     close(pamrs.Muscle(**arguments).force(pressure, e), kothera.force(pressure, e), 1e-10)
 
 
@@ -240,7 +312,9 @@ def test_elbow_nears_kothera_with_the_strain(arguments: dict[str, Any]) -> None:
 
 @FEW
 @given(model_arguments("elbow_linear"), st.floats(0.0, 10e5), st.floats(-1.0, 1.0))
-def test_elbow_with_unit_factors_has_one_branch(arguments: dict[str, Any], pressure: float, direction: float) -> None:
+def test_elbow_with_unit_factors_has_one_branch(
+    arguments: dict[str, Any], pressure: float, direction: float
+) -> None:
     arguments = {**arguments, "extension_factors": (1.0, 1.0, 1.0)}
     smooth = {"friction_coefficient": 0.0, "friction_pressure_slope": 0.0, "friction_floor": 0.0}
     e = stroke(reference_of(arguments))
@@ -250,8 +324,15 @@ def test_elbow_with_unit_factors_has_one_branch(arguments: dict[str, Any], press
 
 @FEW
 @given(model_arguments("elbow_linear"), st.floats(1e5, 10e5))
-def test_elbow_factors_scale_the_wall_and_leave_gaylord(arguments: dict[str, Any], pressure: float) -> None:
-    arguments = {**arguments, "friction_coefficient": 0.0, "friction_pressure_slope": 0.0, "friction_floor": 0.0}
+def test_elbow_factors_scale_the_wall_and_leave_gaylord(
+    arguments: dict[str, Any], pressure: float
+) -> None:
+    arguments = {
+        **arguments,
+        "friction_coefficient": 0.0,
+        "friction_pressure_slope": 0.0,
+        "friction_floor": 0.0,
+    }
     e = stroke(reference_of(arguments))
     bare = pamrs.Muscle(**{**arguments, "extension_factors": (0.0, 0.0, 0.0)})
     gaylord = as_model(arguments, "gaylord")
@@ -261,22 +342,34 @@ def test_elbow_factors_scale_the_wall_and_leave_gaylord(arguments: dict[str, Any
     close(bare.force(pressure, e, direction=0.0), half, 1e-12)
 
 
-# --- Friction ----------------------------------------------------------------------------------------------------
+# ---
+# Friction -----------------------------------------------------------------------------------------
 
 
 @FEW
 @given(ANY_MODEL, st.floats(-0.9e5, 12e5), st.floats(-1.0, 1.0))
-def test_no_friction_no_hysteresis(arguments: dict[str, Any], pressure: float, direction: float) -> None:
+def test_no_friction_no_hysteresis(
+    arguments: dict[str, Any], pressure: float, direction: float
+) -> None:
     assume(arguments["model"] != "elbow_linear")
-    arguments = {**arguments, "friction_coefficient": 0.0, "friction_pressure_slope": 0.0, "friction_floor": 0.0}
+    arguments = {
+        **arguments,
+        "friction_coefficient": 0.0,
+        "friction_pressure_slope": 0.0,
+        "friction_floor": 0.0,
+    }
     e = stroke(reference_of(arguments))
     muscle = pamrs.Muscle(**arguments)
-    np.testing.assert_array_equal(muscle.force(pressure, e, direction=direction), muscle.force(pressure, e))
+    np.testing.assert_array_equal(
+        muscle.force(pressure, e, direction=direction), muscle.force(pressure, e)
+    )
 
 
 @FEW
 @given(ANY_MODEL, st.floats(0.0, 12e5))
-def test_lengthening_pulls_more_than_contracting(arguments: dict[str, Any], pressure: float) -> None:
+def test_lengthening_pulls_more_than_contracting(
+    arguments: dict[str, Any], pressure: float
+) -> None:
     if arguments["model"] == "elbow_linear":
         arguments = {**arguments, "extension_factors": (1.0, 1.0, 1.0)}
     arguments = {**arguments, "friction_floor": 0.01}
@@ -292,9 +385,15 @@ def test_lengthening_pulls_more_than_contracting(arguments: dict[str, Any], pres
 
 @FEW
 @given(ANY_MODEL, st.floats(0.0, 15e5), st.sampled_from([-1.0, 1.0]))
-def test_friction_falls_with_pressure_to_its_floor(arguments: dict[str, Any], pressure: float, direction: float) -> None:
+def test_friction_falls_with_pressure_to_its_floor(
+    arguments: dict[str, Any], pressure: float, direction: float
+) -> None:
     """c_F = 0.16 - 0.145 P (MPa), at least 0.01 (2.36)."""
-    law = {"friction_coefficient": 0.16, "friction_pressure_slope": -0.145e-6, "friction_floor": 0.01}
+    law = {
+        "friction_coefficient": 0.16,
+        "friction_pressure_slope": -0.145e-6,
+        "friction_floor": 0.01,
+    }
     if arguments["model"] == "elbow_linear":
         law["extension_factors"] = (1.0, 1.0, 1.0)  # type: ignore[assignment]
     muscle = pamrs.Muscle(**{**arguments, **law})
@@ -302,16 +401,24 @@ def test_friction_falls_with_pressure_to_its_floor(arguments: dict[str, Any], pr
     assume(abs(float(base)) > 1.0)
     share = float((muscle.force(pressure, 0.1, direction=direction) - base) / np.abs(base))
     coefficient = 0.16 - 0.145 * pressure / 1e6
-    assert share == pytest.approx(direction * (coefficient if coefficient > 0.01 else 0.01), abs=1e-10)
+    assert share == pytest.approx(
+        direction * (coefficient if coefficient > 0.01 else 0.01), abs=1e-10
+    )
 
 
-# --- Refused by name ---------------------------------------------------------------------------------------------
+# --- Refused by
+# name ---------------------------------------------------------------------------------------------
 
 
 def made(**changes: Any) -> pamrs.Muscle:
     """A one-inch muscle with moduli that its model knows."""
     model = changes.get("model", "robinson")
-    arguments: dict[str, Any] = {"rest_length": 0.276, "rest_diameter": 0.0254, "braid_angle": 1.283, "wall_thickness": 0.003}
+    arguments: dict[str, Any] = {
+        "rest_length": 0.276,
+        "rest_diameter": 0.0254,
+        "braid_angle": 1.283,
+        "wall_thickness": 0.003,
+    }
     if model in ("ferraresi", "kothera", "robinson"):
         arguments |= {"modulus_slope": [3.0, -0.35], "modulus_offset": [1.15e6, -0.15e6]}
     if model == "mooney_rivlin":
@@ -388,7 +495,12 @@ def test_impossible_state_is_refused_by_name(
 @pytest.mark.parametrize("e", [math.nan, 0.6, -0.06])
 def test_impossible_contraction_is_refused_by_every_method(e: float) -> None:
     muscle = made()
-    methods = (muscle.gas_area, muscle.elastic_basis, muscle.circumferential_strain, muscle.braid_taut)
+    methods = (
+        muscle.gas_area,
+        muscle.elastic_basis,
+        muscle.circumferential_strain,
+        muscle.braid_taut,
+    )
     for method in methods:
         with pytest.raises(pamrs.ParameterError, match="contraction|length"):
             method(np.array([0.1, e]))

@@ -18,9 +18,17 @@ from tests.runs import RUNS, Run, misses
 
 AMBIENT = 101325.0
 RT = 287.05 * 293.15
-#: Of a channel's range. The force of a stop jumps inside a step, which a fixed step meets with an error of first order.
+#: Of a channel's range. The force of a stop jumps inside a step, which a fixed step meets with an
+#: error of first order.
 SMOOTH, STOPPED = 1e-6, 1e-4
-BOOKS = ("mass_supplied", "mass_vented", "energy_supplied", "exergy_supplied", "muscle_work", "joint_work")
+BOOKS = (
+    "mass_supplied",
+    "mass_vented",
+    "energy_supplied",
+    "exergy_supplied",
+    "muscle_work",
+    "joint_work",
+)
 
 
 def beyond(found: dict[str, float], bound: float) -> dict[str, float]:
@@ -44,14 +52,25 @@ def test_packaged_rigs(name: str) -> None:
     want, got = run.reference(), run.core(2e-5)
     assert not stops(got)
     assert set(BOOKS) < set(want)
-    moved = [channel for channel in want if channel.partition(".")[0] in ("joint_angle", "length", "muscle_pressure")]
+    moved = [
+        channel
+        for channel in want
+        if channel.partition(".")[0] in ("joint_angle", "length", "muscle_pressure")
+    ]
     if name != "sealed_chamber":
         assert all(np.ptp(want[channel]) > 0.03 * np.abs(want[channel]).max() for channel in moved)
     assert not beyond(misses(got, want), SMOOTH)
 
 
-def falling(rig: str, rows: int, changes: dict[str, float] | None = None, **starts: tuple[float | None, float | None]) -> Run:
-    """A run of a packaged rig whose valves hardly vent; `starts` are angle or length and pressure of blocks by their names."""
+def falling(
+    rig: str,
+    rows: int,
+    changes: dict[str, float] | None = None,
+    **starts: tuple[float | None, float | None],
+) -> Run:
+    """A run of a packaged rig whose valves hardly vent; `starts` are angle or length and pressure
+    of blocks by their names.
+    """
     usual = RUNS[rig]
     initial = {}
     for block, (position, pressure) in starts.items():
@@ -59,7 +78,14 @@ def falling(rig: str, rows: int, changes: dict[str, float] | None = None, **star
             initial["length" if block == "load" else f"joint_angle.{block}"] = position
         if pressure is not None:
             initial["muscle_pressure" if block == "load" else f"muscle_pressure.{block}"] = pressure
-    return Run(rig, 0.005, rows, initial, {name: np.full(rows, 4.9) for name in usual.commands}, {**usual.changes, **(changes or {})})
+    return Run(
+        rig,
+        0.005,
+        rows,
+        initial,
+        {name: np.full(rows, 4.9) for name in usual.commands},
+        {**usual.changes, **(changes or {})},
+    )
 
 
 @pytest.mark.parametrize(
@@ -79,12 +105,17 @@ def test_what_falls_on_a_stop(run: Run, block: str) -> None:
     assert not beyond(misses(got, run.reference(1e-10)), STOPPED)
 
 
-# A failing example is not shrunk: the reference is too slow for the hundreds of runs that would take.
+# A failing example is not shrunk: the reference is too slow for the hundreds of runs that would
+# take.
 @settings(
     max_examples=40,
     deadline=None,
     phases=[Phase.explicit, Phase.reuse, Phase.generate],
-    suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.filter_too_much],
+    suppress_health_check=[
+        HealthCheck.too_slow,
+        HealthCheck.data_too_large,
+        HealthCheck.filter_too_much,
+    ],
 )
 @given(networks())
 def test_networks(drawn: tuple[Blocks, Run]) -> None:
@@ -99,7 +130,9 @@ def test_a_small_volume_before_a_tube(inlet: float) -> None:
     """The shoulder's valve at the end of a tube: stiff, so that the reference is implicit."""
     rig = with_tube(inlet_volume=inlet)
     start = {"joint_angle": 0.7, "muscle_pressure": 2.6e5}
-    run = Run(rig, 0.005, 41, start, {"valve_command": 5.0 + 1.5 * np.sin(0.1 + 0.2 * np.arange(41))})
+    run = Run(
+        rig, 0.005, 41, start, {"valve_command": 5.0 + 1.5 * np.sin(0.1 + 0.2 * np.arange(41))}
+    )
     want = run.reference(1e-10, "Radau")
     assert not beyond(misses(run.core(1e-6), want), SMOOTH)
     assert not beyond(misses(run.core(), want), 1e-3)  # 1 ms, which is divided
@@ -107,9 +140,16 @@ def test_a_small_volume_before_a_tube(inlet: float) -> None:
 
 def with_tube(**changes: float) -> pamrs.Rig:
     """The shoulder with 1 m of 4 mm tube between valve and chamber."""
-    line = {"length": "1.0", "diameter": "0.004", "inlet_volume": "0.0", **{name: repr(value) for name, value in changes.items()}}
+    line = {
+        "length": "1.0",
+        "diameter": "0.004",
+        "inlet_volume": "0.0",
+        **{name: repr(value) for name, value in changes.items()},
+    }
     units = {"length": "m", "diameter": "m", "inlet_volume": "m3"}
-    table = "\n".join(f'{name} = {{ value = {value}, unit = "{units[name]}" }}' for name, value in line.items())
+    table = "\n".join(
+        f'{name} = {{ value = {value}, unit = "{units[name]}" }}' for name, value in line.items()
+    )
     return pamrs.rig.parse_rig(f"{pamrs.rigs.shoulder().to_toml_text()}\n[line]\n{table}\n")
 
 
@@ -122,21 +162,43 @@ def with_tube(**changes: float) -> pamrs.Rig:
     ids=["back into the supply", "in from the ambient", "filling", "venting"],
 )
 def test_air_through_a_valve_in_both_directions(command: float, pressure: float) -> None:
-    """P' = R T/V (alpha_in m_in - alpha_out m_out): what goes out of a chamber is its outflow, whatever the valve is for."""
-    run = Run(one_chamber({"valve": valve(1e-6)}), 0.01, 41, {"muscle_pressure": pressure}, {"valve_command": np.full(41, command)})
+    """P' = R T/V (alpha_in m_in - alpha_out m_out): what goes out of a chamber is its outflow,
+    whatever the valve is for.
+    """
+    run = Run(
+        one_chamber({"valve": valve(1e-6)}),
+        0.01,
+        41,
+        {"muscle_pressure": pressure},
+        {"valve_command": np.full(41, command)},
+    )
     assert not beyond(misses(run.core(1e-4), run.reference()), SMOOTH)
 
 
 @pytest.mark.parametrize("pressure", [-5e4, 6e5])
 def test_air_through_a_line_in_both_directions(pressure: float) -> None:
-    run = Run(one_chamber({"line": {"kind": "orifice", "discharge_area": 1e-6}}), 0.01, 41, {"muscle_pressure": pressure})
+    run = Run(
+        one_chamber({"line": {"kind": "orifice", "discharge_area": 1e-6}}),
+        0.01,
+        41,
+        {"muscle_pressure": pressure},
+    )
     assert not beyond(misses(run.core(1e-4), run.reference()), SMOOTH)
 
 
 def one_chamber(way: Blocks) -> pamrs.Rig:
-    """A rigid chamber with different exponents for each direction, on a tank of 2 bar by a valve or a line."""
+    """A rigid chamber with different exponents for each direction, on a tank of 2 bar by a valve or
+    a line.
+    """
     chamber = {"dead_volume": 1e-4, "alpha_in": 1.4, "alpha_out": 1.0, "alpha": 1.2}
-    return rig_of({"gas": GAS, "supply": {"kind": "tank", "volume": 2e-3, "initial_pressure": 2e5}, **way, "chamber": chamber})
+    return rig_of(
+        {
+            "gas": GAS,
+            "supply": {"kind": "tank", "volume": 2e-3, "initial_pressure": 2e5},
+            **way,
+            "chamber": chamber,
+        }
+    )
 
 
 # ------------------------------------------------------------------ the bench, by its own laws
@@ -152,21 +214,29 @@ def bench_muscle(length: np.ndarray, pressure: np.ndarray) -> tuple[np.ndarray, 
     muscle = muscle_of(BENCH.model["muscle"])
     ratio = 1.0 - length / muscle.geometry.rest_length
     force = [float(muscle.force(p, e)) for p, e in zip(pressure, ratio, strict=True)]
-    return np.array(force), DEAD + np.array([muscle.geometry.solve(float(e)).air_volume for e in ratio])
+    return np.array(force), DEAD + np.array(
+        [muscle.geometry.solve(float(e)).air_volume for e in ratio]
+    )
 
 
 def over_samples(power: Callable[[int, float], float]) -> np.ndarray:
     """Integral of `power(sample, share of it)` from the start to each row."""
     nodes, weights = leggauss(6)
     each = [
-        0.5 * float(np.diff(TIME)[k] * sum(w * power(k, 0.5 * (x + 1.0)) for x, w in zip(nodes, weights, strict=True)))
+        0.5
+        * float(
+            np.diff(TIME)[k]
+            * sum(w * power(k, 0.5 * (x + 1.0)) for x, w in zip(nodes, weights, strict=True))
+        )
         for k in range(TIME.size - 1)
     ]
     return np.concatenate([[0.0], np.cumsum(each)])
 
 
 def bench_work(pressure: Callable[[int, float], float]) -> dict[str, np.ndarray]:
-    """Work of the bench's muscle and the positive part of it, while straight lines lead from length to length."""
+    """Work of the bench's muscle and the positive part of it, while straight lines lead from length
+    to length.
+    """
     rate = np.diff(LENGTH) / np.diff(TIME)
 
     def power(k: int, share: float) -> float:
@@ -174,12 +244,17 @@ def bench_work(pressure: Callable[[int, float], float]) -> dict[str, np.ndarray]
         force, _ = bench_muscle(np.array([length]), np.array([pressure(k, share)]))
         return float(-force[0] * rate[k])
 
-    return {"muscle_work": over_samples(power), "joint_work": over_samples(lambda k, share: max(power(k, share), 0.0))}
+    return {
+        "muscle_work": over_samples(power),
+        "joint_work": over_samples(lambda k, share: max(power(k, share), 0.0)),
+    }
 
 
 def test_a_shut_muscle_on_the_bench_is_a_gas_spring() -> None:
     """P V^alpha stays, with the force and the work that go with it."""
-    got = pamrs.simulate(BENCH, length=LENGTH, sample_time=0.02, step=1e-4, initial={"muscle_pressure": 2e5})
+    got = pamrs.simulate(
+        BENCH, length=LENGTH, sample_time=0.02, step=1e-4, initial={"muscle_pressure": 2e5}
+    )
     muscle = muscle_of(BENCH.model["muscle"])
 
     def volume(length: float) -> float:
@@ -192,14 +267,25 @@ def test_a_shut_muscle_on_the_bench_is_a_gas_spring() -> None:
     force, volumes = bench_muscle(LENGTH, gauge)
     work = bench_work(lambda k, share: pressure(LENGTH[k] + share * (LENGTH[k + 1] - LENGTH[k])))
     mass = np.full(TIME.size, (2e5 + AMBIENT) * volumes[0] / RT)
-    want = {"muscle_pressure": gauge, "muscle_force": force, "air_volume": volumes, "air_mass": mass, "length": LENGTH, **work}
-    still = dict.fromkeys(("mass_supplied", "mass_vented", "energy_supplied", "exergy_supplied"), np.zeros(TIME.size))
+    want = {
+        "muscle_pressure": gauge,
+        "muscle_force": force,
+        "air_volume": volumes,
+        "air_mass": mass,
+        "length": LENGTH,
+        **work,
+    }
+    still = dict.fromkeys(
+        ("mass_supplied", "mass_vented", "energy_supplied", "exergy_supplied"), np.zeros(TIME.size)
+    )
     assert float(np.ptp(gauge)) > 2e4
     assert not beyond(misses(got, want | still), SMOOTH)
 
 
 def test_a_held_pressure_on_the_bench_takes_and_gives_air() -> None:
-    """Gas at the room's temperature: m = P V/(R T), and what it lacks is supplied, what is too much is vented."""
+    """Gas at the room's temperature: m = P V/(R T), and what it lacks is supplied, what is too much
+    is vented.
+    """
     gauge = 2e5 + 5e4 * np.sin(7.0 * TIME)
     got = pamrs.simulate(BENCH, length=LENGTH, pressure=gauge, sample_time=0.02, step=1e-4)
     force, volumes = bench_muscle(LENGTH, gauge)
@@ -214,7 +300,12 @@ def test_a_held_pressure_on_the_bench_takes_and_gives_air() -> None:
         "exergy_supplied": RT * ratio * np.maximum(more, 0.0),
     }
     want = {name: np.concatenate([[0.0], np.cumsum(values)]) for name, values in sums.items()}
-    want |= {"muscle_pressure": gauge, "muscle_force": force, "air_volume": volumes, "air_mass": mass}
+    want |= {
+        "muscle_pressure": gauge,
+        "muscle_force": force,
+        "air_volume": volumes,
+        "air_mass": mass,
+    }
     want |= bench_work(lambda k, share: float(gauge[k] + share * (gauge[k + 1] - gauge[k])))
     assert not beyond(misses(got, want), SMOOTH)
     assert math.isclose(got.balance.residual, 0.0, abs_tol=1e-12 * mass[0])

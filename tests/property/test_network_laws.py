@@ -1,4 +1,6 @@
-"""Laws that every rig keeps, on random small ones: mass, energy, power, one result by every way of running, events."""
+"""Laws that every rig keeps, on random small ones: mass, energy, power, one result by every way of
+running, events.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,16 @@ from scipy.interpolate import CubicSpline
 
 import pamrs
 from pamrs.simulation import core_rig
-from tests.property.networks import HIGH, LOW, MUSCLE, TENDON, Blocks, networks, rig_of, transmissions
+from tests.property.networks import (
+    HIGH,
+    LOW,
+    MUSCLE,
+    TENDON,
+    Blocks,
+    networks,
+    rig_of,
+    transmissions,
+)
 from tests.reference.planar import Link, PlanarArm
 from tests.runs import Run
 
@@ -29,8 +40,13 @@ SOME = settings(max_examples=80, deadline=None, suppress_health_check=list(Healt
 
 def finer(run: Run, parts: int) -> Run:
     """The same commands, held over the same times, with more rows."""
-    held = {name: np.append(np.repeat(values[:-1], parts), values[-1]) for name, values in run.commands.items()}
-    return replace(run, sample_time=run.sample_time / parts, rows=parts * (run.rows - 1) + 1, commands=held)
+    held = {
+        name: np.append(np.repeat(values[:-1], parts), values[-1])
+        for name, values in run.commands.items()
+    }
+    return replace(
+        run, sample_time=run.sample_time / parts, rows=parts * (run.rows - 1) + 1, commands=held
+    )
 
 
 def touches(run: pamrs.Simulation) -> bool:
@@ -46,13 +62,22 @@ def touches(run: pamrs.Simulation) -> bool:
 def test_mass_in_is_mass_stored_and_vented(drawn: tuple[Blocks, Run]) -> None:
     blocks, run = drawn
     got = run.core()
-    books, held = got.balance, sum(float(mass[0]) for word in ("air_mass", "line_mass") for mass in got.under(word).values())
+    books, held = (
+        got.balance,
+        sum(
+            float(mass[0])
+            for word in ("air_mass", "line_mass")
+            for mass in got.under(word).values()
+        ),
+    )
     assert abs(books.residual) <= 1e-9 * (abs(books.supplied) + abs(books.vented) + held)
     source = blocks["supply"]
     if source["kind"] == "tank":
         lost = -np.diff(got["supply_pressure"]) * source["volume"] / RT
         rounding = 1e-15 * (source["initial_pressure"] + 101325.0) * source["volume"] / RT
-        np.testing.assert_allclose(np.diff(got["mass_supplied"]), lost, rtol=1e-9, atol=100.0 * rounding)
+        np.testing.assert_allclose(
+            np.diff(got["mass_supplied"]), lost, rtol=1e-9, atol=100.0 * rounding
+        )
         assert books.energy == pytest.approx(RT * books.supplied, rel=1e-12, abs=1e-15)
 
 
@@ -67,7 +92,9 @@ def joint_of(model: dict[str, Any]) -> pamrs.Joint:
 @SOME
 @given(networks(rows=11))
 def test_muscles_and_joints_have_the_same_power(drawn: tuple[Blocks, Run]) -> None:
-    """At every row tau = sum of F dd/dtheta; and the book of the muscles' work is the integral of all tau dtheta/dt."""
+    """At every row tau = sum of F dd/dtheta; and the book of the muscles' work is the integral of
+    all tau dtheta/dt.
+    """
     blocks, run = drawn
     run = finer(run, 50)
     got = run.core()
@@ -83,31 +110,51 @@ def test_muscles_and_joints_have_the_same_power(drawn: tuple[Blocks, Run]) -> No
             if table["joint"] == label:
                 joint = joint_of(run.plant.tables("transmission")[muscle])
                 torque += got[f"muscle_force.{muscle}"] * joint.moment_arm(angle)
-        np.testing.assert_allclose(got[f"joint_torque.{name}"], torque, rtol=1e-12, atol=1e-12 * float(np.abs(torque).max()))
+        np.testing.assert_allclose(
+            got[f"joint_torque.{name}"],
+            torque,
+            rtol=1e-12,
+            atol=1e-12 * float(np.abs(torque).max()),
+        )
         power += torque * got[f"joint_rate.{name}"]
-    each = [CubicSpline(run.time[k : k + 51], power[k : k + 51]).integrate(run.time[k], run.time[k + 50]) for k in range(0, 500, 50)]
+    each = [
+        CubicSpline(run.time[k : k + 51], power[k : k + 51]).integrate(
+            run.time[k], run.time[k + 50]
+        )
+        for k in range(0, 500, 50)
+    ]
     assume(not touches(got))  # the force of a stop makes kinks between the rows
     whole = float(np.abs(each).sum())
     # the spline's own error is near 1e-7 where a command jumps
-    np.testing.assert_allclose(got["muscle_work"][50::50], np.cumsum(each), rtol=0.0, atol=1e-6 * whole)
+    np.testing.assert_allclose(
+        got["muscle_work"][50::50], np.cumsum(each), rtol=0.0, atol=1e-6 * whole
+    )
 
 
 @SOME
 @given(transmissions(), st.floats(1e4, 6e5), st.integers(1, 6), st.data())
-def test_a_joint_alone_loses_no_power(model: dict[str, Any], pressure: float, count: int, data: st.DataObject) -> None:
-    """tau = n F dd/dtheta with the slope of the shortening itself, for every kind but `published`."""
+def test_a_joint_alone_loses_no_power(
+    model: dict[str, Any], pressure: float, count: int, data: st.DataObject
+) -> None:
+    """tau = n F dd/dtheta with the slope of the shortening itself, for every kind but
+    `published`.
+    """
     angle, h = data.draw(st.floats(LOW + 0.01, HIGH - 0.01)), 1e-3
     joint, muscle = joint_of(model), pamrs.Muscle(**MUSCLE)
     d = joint.shortening(angle + h * np.array([-2.0, -1.0, 1.0, 2.0]))
     slope = float(d[0] - 8.0 * d[1] + 8.0 * d[2] - d[3]) / (12.0 * h)
     assert float(joint.moment_arm(angle)) == pytest.approx(slope, rel=1e-7, abs=1e-10)
-    force = count * float(muscle.force(pressure, float(joint.shortening(angle)) / MUSCLE["rest_length"]))
+    force = count * float(
+        muscle.force(pressure, float(joint.shortening(angle)) / MUSCLE["rest_length"])
+    )
     torque = float(joint.torque(muscle, pressure, angle, count=count))
     assert torque == pytest.approx(force * float(joint.moment_arm(angle)), rel=1e-13)
 
 
 def test_the_published_torque_loses_power() -> None:
-    """What is printed in (3.6)-(3.8) is the exception, and the books show it: the joint gets less than the muscle gives."""
+    """What is printed in (3.6)-(3.8) is the exception, and the books show it: the joint gets less
+    than the muscle gives.
+    """
     arm = {"inertia": 0.05, "length": 0.3, "payload": 1.0, "viscous": 0.3}
     stops = {"min_angle": LOW, "max_angle": HIGH}
     works = {}
@@ -122,7 +169,9 @@ def test_the_published_torque_loses_power() -> None:
         run = Run(rig_of(blocks), 2e-4, 501, {"joint_angle": 0.9})
         got = run.core()
         assert not touches(got)
-        torque_work = CubicSpline(run.time, got["joint_torque"] * got["joint_rate"]).integrate(0.0, run.time[-1])
+        torque_work = CubicSpline(run.time, got["joint_torque"] * got["joint_rate"]).integrate(
+            0.0, run.time[-1]
+        )
         works[kind] = float(torque_work) / float(got["muscle_work"][-1])
     assert works["tendon"] == pytest.approx(1.0, abs=1e-8)
     assert works["published"] < 0.98
@@ -139,13 +188,22 @@ def mechanical_energy(blocks: Blocks, run: Run, got: pamrs.Simulation) -> Array:
     if "link.elbow" in blocks:
         arm = PlanarArm([Link.from_model(link) for link in run.model["arm"]["links"]])
         angles, rates = (
-            np.column_stack([got[f"{word}.{name}"] for name in ("elbow", "wrist")]) for word in ("joint_angle", "joint_rate")
+            np.column_stack([got[f"{word}.{name}"] for name in ("elbow", "wrist")])
+            for word in ("joint_angle", "joint_rate")
         )
-        return np.array([arm.kinetic_energy(q, v) + arm.potential_energy(q) for q, v in zip(angles, rates, strict=True)])
+        return np.array(
+            [
+                arm.kinetic_energy(q, v) + arm.potential_energy(q)
+                for q, v in zip(angles, rates, strict=True)
+            ]
+        )
     arm_of = blocks["arm"]
     inertia = arm_of["inertia"] + arm_of["payload"] * arm_of["length"] ** 2
     moment = arm_of["first_moment"] + arm_of["payload"] * arm_of["length"]
-    return np.asarray(0.5 * inertia * got["joint_rate.elbow"] ** 2 - moment * GRAVITY * np.cos(got["joint_angle.elbow"]))
+    return np.asarray(
+        0.5 * inertia * got["joint_rate.elbow"] ** 2
+        - moment * GRAVITY * np.cos(got["joint_angle.elbow"])
+    )
 
 
 @SOME
@@ -171,12 +229,17 @@ def same(one: Any, other: Any, names: Any) -> None:
 
 def answers(run: Run, k: int) -> dict[str, Any]:
     """The commands of one sample as keywords of `Simulator.step`."""
-    return {word: {name: float(values[k]) for name, values in signals.items()} for word, signals in run.keywords.items()}
+    return {
+        word: {name: float(values[k]) for name, values in signals.items()}
+        for word, signals in run.keywords.items()
+    }
 
 
 @SOME
 @given(networks(rows=31, friction=True), st.integers(1, 29))
-def test_a_run_is_the_same_in_one_go_sample_by_sample_and_from_the_middle(drawn: tuple[Blocks, Run], cut: int) -> None:
+def test_a_run_is_the_same_in_one_go_sample_by_sample_and_from_the_middle(
+    drawn: tuple[Blocks, Run], cut: int
+) -> None:
     run = drawn[1]
     whole = run.core()
     simulated = [name for name in whole if name != "time" and name not in run.commands]
@@ -186,25 +249,41 @@ def test_a_run_is_the_same_in_one_go_sample_by_sample_and_from_the_middle(drawn:
     assert fresh.events == whole.events
 
     half = pamrs.Simulator(run.plant, sample_time=run.sample_time, initial=run.initial)
-    before = half.run(**{word: {n: v[:cut] for n, v in signals.items()} for word, signals in run.keywords.items()})
-    rest = {word: {n: v[cut:-1] for n, v in signals.items()} for word, signals in run.keywords.items()}
+    before = half.run(
+        **{word: {n: v[:cut] for n, v in signals.items()} for word, signals in run.keywords.items()}
+    )
+    rest = {
+        word: {n: v[cut:-1] for n, v in signals.items()} for word, signals in run.keywords.items()
+    }
     again = pamrs.Simulator(run.plant, sample_time=run.sample_time)
     again.restore(half.state)
     for other in (pickle.loads(pickle.dumps(half)), again):
         happened = len(other.events)
         after = other.run(**rest)
-        same({name: np.concatenate([whole[name][:1], before[name], after[name]]) for name in simulated}, whole, simulated)
+        same(
+            {
+                name: np.concatenate([whole[name][:1], before[name], after[name]])
+                for name in simulated
+            },
+            whole,
+            simulated,
+        )
         assert half.events + other.events[happened:] == whole.events
 
 
 @SOME
 @given(networks(rows=31), st.randoms(use_true_random=False))
-def test_the_order_of_the_blocks_in_the_file_is_of_no_account(drawn: tuple[Blocks, Run], random: Any) -> None:
+def test_the_order_of_the_blocks_in_the_file_is_of_no_account(
+    drawn: tuple[Blocks, Run], random: Any
+) -> None:
     """Up to rounding: flows out of one supply are added in another order."""
     blocks, run = drawn
     labels = list(blocks)
     random.shuffle(labels)
-    one, other = run.core(), replace(run, rig=rig_of({label: blocks[label] for label in labels})).core()
+    one, other = (
+        run.core(),
+        replace(run, rig=rig_of({label: blocks[label] for label in labels})).core(),
+    )
     assume(not touches(one))
     assert set(one) == set(other)
     for name in one:
@@ -215,7 +294,9 @@ def test_the_order_of_the_blocks_in_the_file_is_of_no_account(drawn: tuple[Block
 @SOME
 @given(networks(rows=31), st.integers(1, 7))
 def test_a_controller_is_held_for_its_period(drawn: tuple[Blocks, Run], every: int) -> None:
-    """Feedback of the first pressure; what was answered, held, and run again without a controller is the same bit for bit."""
+    """Feedback of the first pressure; what was answered, held, and run again without a controller
+    is the same bit for bit.
+    """
     run = drawn[1]
     simulator = pamrs.Simulator(run.plant, sample_time=run.sample_time, initial=run.initial)
     pressure = next(name for name in simulator.observe() if name.startswith("muscle_pressure"))
@@ -225,10 +306,16 @@ def test_a_controller_is_held_for_its_period(drawn: tuple[Blocks, Run], every: i
         asked.append(sample["time"])
         shift = 1e-5 * (sample[pressure] - 2.5e5)
         usual = answers(run, round(sample["time"] / run.sample_time))
-        return usual | {"valve_command": {name: volts - shift for name, volts in usual["valve_command"].items()}}
+        return usual | {
+            "valve_command": {name: volts - shift for name, volts in usual["valve_command"].items()}
+        }
 
-    closed = simulator.control(update, (run.rows - 1) * run.sample_time, period=every * run.sample_time)
-    np.testing.assert_allclose(asked, run.sample_time * np.arange(0, run.rows - 1, every), rtol=0.0, atol=1e-12)
+    closed = simulator.control(
+        update, (run.rows - 1) * run.sample_time, period=every * run.sample_time
+    )
+    np.testing.assert_allclose(
+        asked, run.sample_time * np.arange(0, run.rows - 1, every), rtol=0.0, atol=1e-12
+    )
     held = {name: closed[name] for name in run.commands}
     for name, values in held.items():
         for k in range(0, run.rows - 1, every):
@@ -247,26 +334,40 @@ def test_events_rise_in_time_and_stops_agree_with_the_angles(drawn: tuple[Blocks
     blocks, run = drawn
     run = finer(run, 5)
     got = run.core()
-    step = run.sample_time / np.ceil(run.sample_time / min(1e-3, core_rig(run.plant).stable_step) - 1e-9)
+    step = run.sample_time / np.ceil(
+        run.sample_time / min(1e-3, core_rig(run.plant).stable_step) - 1e-9
+    )
     times = np.array([event.time for event in got.events])
     assert bool(np.all(np.diff(times) >= -step * (1.0 + 1e-9)))
     assert bool(np.all((times >= 0.0) & (times <= run.time[-1] + 1e-12)))
     for block, (values, low, high) in stopped(blocks, got).items():
         for side, beyond in (("min", values < low), ("max", values > high)):
-            events = [event for event in got.events if event.block == block and event.kind.startswith(f"{side}_stop")]
+            events = [
+                event
+                for event in got.events
+                if event.block == block and event.kind.startswith(f"{side}_stop")
+            ]
             words = [event.kind.rsplit("_", 1)[1] for event in events]
             assert words == (["reached", "left"] * len(words))[: len(words)]
             now = np.zeros(run.rows, dtype=bool)
             for event, word in zip(events, words, strict=True):
                 now[run.time >= event.time] = word == "reached"
-            near = np.array([any(abs(t - event.time) <= step for event in events) for t in run.time])
+            near = np.array(
+                [any(abs(t - event.time) <= step for event in events) for t in run.time]
+            )
             np.testing.assert_array_equal(now[~near], beyond[~near], err_msg=f"{block} {side}")
 
 
 def stopped(blocks: Blocks, got: pamrs.Simulation) -> dict[str, tuple[Array, float, float]]:
-    """What can meet a stop, with its limits in the sense in which the core counts: shortening for a load."""
+    """What can meet a stop, with its limits in the sense in which the core counts: shortening for a
+    load.
+    """
     found = {
-        label: (got[f"joint_angle.{label.partition('.')[2]}"], table["min_angle"], table["max_angle"])
+        label: (
+            got[f"joint_angle.{label.partition('.')[2]}"],
+            table["min_angle"],
+            table["max_angle"],
+        )
         for label, table in blocks.items()
         if label.startswith("joint.")
     }

@@ -31,10 +31,13 @@ def table(result: Any) -> np.ndarray:
 
 def touches_stop(plant: Plant, angle: np.ndarray) -> bool:
     """Whether a trajectory comes within 1 mrad of an end stop."""
-    return bool(angle.min() < plant.joint.min_angle + 1e-3 or angle.max() > plant.joint.max_angle - 1e-3)
+    return bool(
+        angle.min() < plant.joint.min_angle + 1e-3 or angle.max() > plant.joint.max_angle - 1e-3
+    )
 
 
-# A failing example is not shrunk: the reference is too slow for the hundreds of runs that would take.
+# A failing example is not shrunk: the reference is too slow for the hundreds of runs that would
+# take.
 @settings(FEW, max_examples=25, phases=[Phase.explicit, Phase.reuse, Phase.generate])
 @given(
     rig_overrides(),
@@ -43,10 +46,19 @@ def touches_stop(plant: Plant, angle: np.ndarray) -> bool:
     st.floats(math.radians(35.0), math.radians(80.0)),
     st.floats(-0.5, 0.5),
 )
-def test_matches_reference(overrides: dict[str, float], command: list[float], pressure: float, angle: float, rate: float) -> None:
-    initial = {"muscle_pressure": pressure, "supply_pressure": 12e5, "joint_angle": angle, "joint_rate": rate}
+def test_matches_reference(
+    overrides: dict[str, float], command: list[float], pressure: float, angle: float, rate: float
+) -> None:
+    initial = {
+        "muscle_pressure": pressure,
+        "supply_pressure": 12e5,
+        "joint_angle": angle,
+        "joint_rate": rate,
+    }
     rig = pamrs.rigs.shoulder().with_parameters(overrides)
-    got = pamrs.simulate(rig, valve_command=command, sample_time=SAMPLE_TIME, step=1e-4, initial=initial)
+    got = pamrs.simulate(
+        rig, valve_command=command, sample_time=SAMPLE_TIME, step=1e-4, initial=initial
+    )
     plant = with_overrides(shoulder(), overrides)
     absolute = {**initial, "muscle_pressure": pressure + AMBIENT, "supply_pressure": 12e5 + AMBIENT}
     want = plant.simulate(command, SAMPLE_TIME, absolute)
@@ -70,16 +82,31 @@ def test_matches_reference(overrides: dict[str, float], command: list[float], pr
             61,
         ),
         ("vents almost to ambient", 4.0, {"muscle_pressure": 40.0, "joint_angle": 0.45}, 21),
-        ("fills from a tank hardly above it", 6.0, {"muscle_pressure": 5e5, "supply_pressure": 5.003e5}, 21),
+        (
+            "fills from a tank hardly above it",
+            6.0,
+            {"muscle_pressure": 5e5, "supply_pressure": 5.003e5},
+            21,
+        ),
     ],
 )
-def test_corners_match_reference(case: str, command: float, changes: dict[str, float], rows: int) -> None:
+def test_corners_match_reference(
+    case: str, command: float, changes: dict[str, float], rows: int
+) -> None:
     initial = {**START, **changes}
     commanded = [command] * rows
-    got = pamrs.simulate(pamrs.rigs.shoulder(), valve_command=commanded, sample_time=SAMPLE_TIME, step=1e-5, initial=initial)
+    got = pamrs.simulate(
+        pamrs.rigs.shoulder(),
+        valve_command=commanded,
+        sample_time=SAMPLE_TIME,
+        step=1e-5,
+        initial=initial,
+    )
     offsets = {name: AMBIENT if name.endswith("pressure") else 0.0 for name in CHANNELS}
     plant = shoulder()
-    want = plant.simulate(commanded, SAMPLE_TIME, {name: initial[name] + offsets[name] for name in CHANNELS})
+    want = plant.simulate(
+        commanded, SAMPLE_TIME, {name: initial[name] + offsets[name] for name in CHANNELS}
+    )
     if "stop" in case:
         assert touches_stop(plant, want.joint_angle)
     for name, scale in CHANNELS.items():
@@ -91,11 +118,18 @@ def test_corners_match_reference(case: str, command: float, changes: dict[str, f
 @given(rig_overrides(), commands(ROWS))
 def test_runs_are_identical_bit_for_bit(overrides: dict[str, float], command: list[float]) -> None:
     rig = pamrs.rigs.shoulder().with_parameters(overrides)
-    runs = [pamrs.simulate(rig, valve_command=command, sample_time=SAMPLE_TIME, step=1e-3, initial=START) for _ in range(2)]
+    runs = [
+        pamrs.simulate(
+            rig, valve_command=command, sample_time=SAMPLE_TIME, step=1e-3, initial=START
+        )
+        for _ in range(2)
+    ]
     np.testing.assert_array_equal(table(runs[0]), table(runs[1]))
     # The future of the command cannot change the past.
     other = [*command[:20], *(9.0 - u / 2.0 for u in command[20:])]
-    changed = pamrs.simulate(rig, valve_command=other, sample_time=SAMPLE_TIME, step=1e-3, initial=START)
+    changed = pamrs.simulate(
+        rig, valve_command=other, sample_time=SAMPLE_TIME, step=1e-3, initial=START
+    )
     np.testing.assert_array_equal(table(runs[0])[:21], table(changed)[:21])
 
 
@@ -103,9 +137,13 @@ def test_runs_are_identical_bit_for_bit(overrides: dict[str, float], command: li
 @given(commands(ROWS), st.integers(5, 50))
 def test_a_run_can_be_resumed(command: list[float], cut: int) -> None:
     rig = pamrs.rigs.shoulder()
-    whole = pamrs.simulate(rig, valve_command=command, sample_time=SAMPLE_TIME, step=5e-4, initial=START)
+    whole = pamrs.simulate(
+        rig, valve_command=command, sample_time=SAMPLE_TIME, step=5e-4, initial=START
+    )
     state = {name: float(whole[name][cut]) for name in CHANNELS}
-    rest = pamrs.simulate(rig, valve_command=command[cut:], sample_time=SAMPLE_TIME, step=5e-4, initial=state)
+    rest = pamrs.simulate(
+        rig, valve_command=command[cut:], sample_time=SAMPLE_TIME, step=5e-4, initial=state
+    )
     miss = np.abs(table(rest) - table(whole)[cut:]) / list(CHANNELS.values())
     assert float(miss.max()) < 1e-9
 
@@ -128,7 +166,9 @@ def test_convergence_is_of_fourth_order() -> None:
 @FEW
 @given(st.floats(5.1, 8.0), st.floats(1e5, 3e5))
 def test_isothermal_filling_keeps_the_gas(u: float, pressure: float) -> None:
-    """With every exponent 1 the products p V of tank and chamber add up to a constant while filling."""
+    """With every exponent 1 the products p V of tank and chamber add up to a constant while
+    filling.
+    """
     exponents = {"chamber.alpha_in": 1.0, "chamber.alpha_out": 1.0, "chamber.alpha": 1.0}
     rig = pamrs.rigs.shoulder().with_parameters(exponents)
     run = pamrs.simulate(
@@ -141,7 +181,9 @@ def test_isothermal_filling_keeps_the_gas(u: float, pressure: float) -> None:
     plant = shoulder()
     d = np.array([plant.joint.contraction(a) for a in run["joint_angle"]])
     volume = 6 * MUSCLE.air_volume(d / 0.276) + plant.chamber.dead_volume
-    gas = (run["muscle_pressure"] + AMBIENT) * volume + (run["supply_pressure"] + AMBIENT) * plant.supply_volume
+    gas = (run["muscle_pressure"] + AMBIENT) * volume + (
+        run["supply_pressure"] + AMBIENT
+    ) * plant.supply_volume
     moved = plant.supply_volume * np.ptp(run["supply_pressure"])
     assert float(np.ptp(gas)) < 1e-6 * moved + 1e-9 * gas[0]
 
@@ -149,7 +191,9 @@ def test_isothermal_filling_keeps_the_gas(u: float, pressure: float) -> None:
 @FEW
 @given(st.floats(1e5, 3.5e5), st.floats(0.7, 1.3))
 def test_muscle_work_becomes_arm_energy(pressure: float, angle: float) -> None:
-    """Without friction, work of the muscles n F dd equals the arm's kinetic and potential energy."""
+    """Without friction, work of the muscles n F dd equals the arm's kinetic and potential
+    energy.
+    """
     free = {"arm.viscous": 0.0, "arm.coulomb": 0.0}
     rig = pamrs.rigs.shoulder().with_parameters(free)
     start = {**START, "muscle_pressure": pressure, "joint_angle": angle}
@@ -186,6 +230,8 @@ def test_more_payload_sags_further() -> None:
     angles = []
     for payload in (5.0, 9.07, 15.0):
         rig = pamrs.rigs.shoulder().with_parameters({"arm.payload": payload})
-        run = pamrs.simulate(rig, valve_command=[5.0] * 41, sample_time=SAMPLE_TIME, step=5e-4, initial=START)
+        run = pamrs.simulate(
+            rig, valve_command=[5.0] * 41, sample_time=SAMPLE_TIME, step=5e-4, initial=START
+        )
         angles.append(float(run["joint_angle"][-1]))
     assert angles == sorted(angles, reverse=True)

@@ -15,7 +15,9 @@ ROOT = Path(__file__).parents[2]
 SHARED = ROOT / ".." / "shared"
 CONCEALED = SHARED / "concealed"
 CHAMBERS = ROOT / "cases" / "zillen_chambers"
-TOML = 'schema = "pamrs.case/1"\nrig = "rig.toml"\n\n[[recording]]\nfile = "run.csv"\nrole = "fit"\n'
+TOML = (
+    'schema = "pamrs.case/1"\nrig = "rig.toml"\n\n[[recording]]\nfile = "run.csv"\nrole = "fit"\n'
+)
 
 
 def folder(path: Path, toml: str = TOML) -> Path:
@@ -50,7 +52,10 @@ def test_case_with_defaults(tmp_path: Path) -> None:
 
 
 def test_roles_names_and_files_outside(tmp_path: Path) -> None:
-    extra = '[[recording]]\nfile = "../elsewhere.csv"\nname = "proof"\nrole = "held_out"\nsample_time = 0.2\n'
+    extra = (
+        '[[recording]]\nfile = "../elsewhere.csv"\nname = "proof"\nrole = "held_out"\n'
+        "sample_time = 0.2\n"
+    )
     home = folder(tmp_path, TOML + extra)
     (tmp_path / "elsewhere.csv").write_bytes((home / "run.csv").read_bytes())
     case = load_case(home)
@@ -75,7 +80,11 @@ BAD = [
     ('role = "fit"', "sample_time = -1.0", ["sample_time = -1.0", "positive"]),
     ('role = "fit"', "name = 3", ["recording[0].name"]),
     ('role = "fit"', 'columns = ["time [s]", "force [V]"]', ["run.csv", "force [V]"]),
-    ('file = "run.csv"', 'file = "absent.csv"', ["recording[0].file = 'absent.csv'", "no file", "copy it"]),
+    (
+        'file = "run.csv"',
+        'file = "absent.csv"',
+        ["recording[0].file = 'absent.csv'", "no file", "copy it"],
+    ),
     ('file = "run.csv"', "file = 7", ["recording[0].file = 7"]),
     ('file = "run.csv"', 'file = "."', ["folder"]),
     ("[[recording]]", "[recording]", ["[[recording]]"]),
@@ -99,7 +108,9 @@ def test_all_problems_at_once(tmp_path: Path) -> None:
     (home / "rig.toml").write_text('schema = "pamrs.rig/1"\n')
     (home / "run.csv").write_text("time [s],pressure [bar]\n0,1\n1,2\n")
     message = refused(home)
-    assert all(words in message for words in ("absent.csv", "[chamber] is missing", "'pressure [bar]'"))
+    assert all(
+        words in message for words in ("absent.csv", "[chamber] is missing", "'pressure [bar]'")
+    )
 
 
 def test_missing_file_tells_where_to_get_it(tmp_path: Path) -> None:

@@ -45,8 +45,13 @@ def lively(seed: int = 3) -> dict[str, Array]:
 
 
 def text(data: dict[str, Array], header: str = HEADER, rows: Any = slice(None)) -> str:
-    table = np.column_stack([data["time"], *(data[name] for name in ("valve_command", *SENSORS))])[rows]
-    lines = [f"{t:.4f},{u:.4f},{supply:.1f},{muscle:.1f},{angle:.4f}" for t, u, supply, muscle, angle in table]
+    table = np.column_stack([data["time"], *(data[name] for name in ("valve_command", *SENSORS))])[
+        rows
+    ]
+    lines = [
+        f"{t:.4f},{u:.4f},{supply:.1f},{muscle:.1f},{angle:.4f}"
+        for t, u, supply, muscle, angle in table
+    ]
     return "\n".join([header, *lines]) + "\n"
 
 
@@ -78,14 +83,20 @@ def test_clean_recording_in_si(tmp_path: Path) -> None:
     assert recording.issues == []
     assert recording.valid().all()
     np.testing.assert_allclose(recording.time, np.arange(N) * DT, rtol=0, atol=1e-12)
-    np.testing.assert_allclose(recording.channels["joint_angle"], np.radians(data["joint_angle"]), atol=2e-6)
-    np.testing.assert_allclose(recording.channels["muscle_pressure"], data["muscle_pressure"], atol=0.1)
+    np.testing.assert_allclose(
+        recording.channels["joint_angle"], np.radians(data["joint_angle"]), atol=2e-6
+    )
+    np.testing.assert_allclose(
+        recording.channels["muscle_pressure"], data["muscle_pressure"], atol=0.1
+    )
     assert recording.units["joint_angle"] == "rad"
     assert recording.duration == pytest.approx((N - 1) * DT)
     assert "run" in repr(recording)
 
 
-@pytest.mark.parametrize(("unit", "scale"), [("bar", 1e5), ("kPa", 1e3), ("psi", 6894.757293168361), ("mbar", 100.0)])
+@pytest.mark.parametrize(
+    ("unit", "scale"), [("bar", 1e5), ("kPa", 1e3), ("psi", 6894.757293168361), ("mbar", 100.0)]
+)
 def test_units_are_converted(tmp_path: Path, unit: str, scale: float) -> None:
     rows = "\n".join(f"{i * 10},{0.1 * i}" for i in range(30))
     recording = load(tmp_path, f"time [ms],muscle_pressure [{unit}]\n{rows}\n")
@@ -103,7 +114,9 @@ def test_time_starts_at_zero(tmp_path: Path) -> None:
 
 
 def test_gzip_bom_quotes_and_crlf(tmp_path: Path) -> None:
-    content = '\ufeff"time [s]","muscle_pressure [bar]"\r\n' + "".join(f"{0.1 * i},{i % 7}\r\n" for i in range(40))
+    content = '\ufeff"time [s]","muscle_pressure [bar]"\r\n' + "".join(
+        f"{0.1 * i},{i % 7}\r\n" for i in range(40)
+    )
     file = tmp_path / "run.csv.gz"
     file.write_bytes(gzip.compress(content.encode()))
     recording = load_recording(file)
@@ -128,7 +141,9 @@ def test_columns_without_header_thousands_and_semicolons(tmp_path: Path) -> None
 
 
 def test_decimal_comma_and_renamed_columns(tmp_path: Path) -> None:
-    content = "t;p;junk\n" + "".join(f"{i / 10:.1f};{i / 5:.1f};x\n".replace(".", ",") for i in range(30))
+    content = "t;p;junk\n" + "".join(
+        f"{i / 10:.1f};{i / 5:.1f};x\n".replace(".", ",") for i in range(30)
+    )
     names = {"t": "time [s]", "p": "muscle_pressure [bar]", "junk": ""}
     recording = load(tmp_path, content, columns=names, delimiter=";", decimal=",")
     assert recording.channels["muscle_pressure"][5] == pytest.approx(1e5)
@@ -142,7 +157,9 @@ def test_rows_without_a_clock(tmp_path: Path) -> None:
 
 def test_blank_separated(tmp_path: Path) -> None:
     content = "".join(f"  {i * 10}   {i % 5}.5 \n" for i in range(50))
-    recording = load(tmp_path, content, columns=["time [ms]", "force [N]"], header=False, delimiter=" ")
+    recording = load(
+        tmp_path, content, columns=["time [ms]", "force [N]"], header=False, delimiter=" "
+    )
     assert recording.channels["force"][1] == 1.5
 
 
@@ -183,7 +200,11 @@ BAD = [
     ("time [s],muscle_pressure\n" + ROWS, {}, ["'muscle_pressure'", "no unit", "[Pa]"]),
     ("time [s],muscle_pressure []\n" + ROWS, {}, ["muscle_pressure []", "no unit"]),
     ("time,muscle_pressure [bar]\n" + ROWS, {}, ["'time'", "no unit"]),
-    ("time [s],muscle_pressure [V]\n" + ROWS, {}, ["muscle_pressure [V]", "wrong dimension", "'Pa'"]),
+    (
+        "time [s],muscle_pressure [V]\n" + ROWS,
+        {},
+        ["muscle_pressure [V]", "wrong dimension", "'Pa'"],
+    ),
     ("time [s],muscle_pressure [Bar]\n" + ROWS, {}, ["muscle_pressure [Bar]", "'bar'"]),
     ("time [s],joint_angle [bar]\n" + ROWS, {}, ["joint_angle [bar]", "'rad'"]),
     ("time [s],muscle_presure [bar]\n" + ROWS, {}, ["'muscle_presure [bar]'", "'muscle_pressure'"]),
@@ -197,7 +218,11 @@ BAD = [
     ("time [s];force [N]\n0;1\n1;2\n", {}, ["time [s];force [N]"]),
     ("time [s],force [N]\n" + "0,1,2\n" * 9, {}, ["2 cells", "row 2"]),
     ("time [s],force [N]\n" + ROWS, {"columns": ["time [s]"]}, ["1 headings", "2 columns"]),
-    ("time [s],force [N]\n" + ROWS, {"columns": {"torque": "force [N]"}}, ["'torque'", "force [N]"]),
+    (
+        "time [s],force [N]\n" + ROWS,
+        {"columns": {"torque": "force [N]"}},
+        ["'torque'", "force [N]"],
+    ),
     ("time [s],force [N]\n" + ROWS, {"columns": "force [N]"}, ["columns"]),
     (ROWS, {"header": False}, ["columns must list"]),
     ("time [s],force [N]\n" + ROWS, {"role": "test"}, ["'test'", "'held_out'"]),
@@ -209,7 +234,9 @@ BAD = [
 
 
 @pytest.mark.parametrize(("content", "options", "wanted"), BAD)
-def test_mistakes_name_file_and_column(tmp_path: Path, content: str, options: dict[str, Any], wanted: list[str]) -> None:
+def test_mistakes_name_file_and_column(
+    tmp_path: Path, content: str, options: dict[str, Any], wanted: list[str]
+) -> None:
     message = refused(tmp_path, content, **options)
     for words in wanted:
         assert words in message, message
@@ -450,7 +477,9 @@ def test_constant_channels_are_told(tmp_path: Path) -> None:
 
 
 def test_ordinary_rest_is_no_fault() -> None:
-    """An encoder against its stop, a dry joint in mid-travel, a vented muscle cut off at zero, ideal data."""
+    """An encoder against its stop, a dry joint in mid-travel, a vented muscle cut off at zero,
+    ideal data.
+    """
     data = lively()
     time = data["time"]
     ideal = np.round(1e5 * np.clip(np.sin(time), 0.0, 1.0), 1)
@@ -485,7 +514,11 @@ def test_sealed_recordings_are_sound(case: Path) -> None:
 def test_every_canonical_channel_is_read(tmp_path: Path) -> None:
     header = ",".join(f"{name} [{channel.unit}]" for name, channel in CHANNELS.items())
     values = {"V": "5", "Pa": "30{}", "K": "300"}
-    cells = [values.get(channel.unit, "0.5") for name, channel in CHANNELS.items() if name != "time"]
-    rows = "\n".join(f"{i}," + ",".join(cell.format(i * 7 % 11) for cell in cells) for i in range(9))
+    cells = [
+        values.get(channel.unit, "0.5") for name, channel in CHANNELS.items() if name != "time"
+    ]
+    rows = "\n".join(
+        f"{i}," + ",".join(cell.format(i * 7 % 11) for cell in cells) for i in range(9)
+    )
     recording = load(tmp_path, f"{header}\n{rows}\n")
     assert ["time", *recording.channels] == list(CHANNELS)

@@ -1,14 +1,25 @@
-"""Independent reference model: NumPy and SciPy only, written from the equations, sharing no code with pamrs.
+"""Independent reference model: NumPy and SciPy only, written from the equations, sharing no code
+with pamrs.
 
-It is slow and plain on purpose: roots by ``brentq``, integrals by ``quad``, trajectories by an adaptive
-eighth-order method.  ``geometry`` and ``muscle`` describe one muscle, ``gas`` the orifice and the valve,
-``plant`` the whole one-link arm and the sealed rigid chamber.
+It is slow and plain on purpose: roots by ``brentq``, integrals by ``quad``, trajectories by an
+adaptive eighth-order method. ``geometry`` and ``muscle`` describe one muscle, ``gas`` the orifice
+and the valve, ``plant`` the whole one-link arm and the sealed rigid chamber.
 """
 
 from .gas import Valve, orifice_flow
 from .geometry import GeometryReference, Shape
 from .muscle import MuscleReference
-from .plant import Arm, Chamber, Gas, Joint, Plant, Trajectory, sealed_chamber, shoulder, with_overrides
+from .plant import (
+    Arm,
+    Chamber,
+    Gas,
+    Joint,
+    Plant,
+    Trajectory,
+    sealed_chamber,
+    shoulder,
+    with_overrides,
+)
 
 __all__ = [
     "Arm",

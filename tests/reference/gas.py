@@ -17,11 +17,15 @@ def critical_ratio(gamma: float = 1.4) -> float:
 
 
 def flow_function(ratio: float, gamma: float = 1.4) -> float:
-    """Dimensionless flow psi at pressure ratio `ratio` = downstream / upstream (absolute), in 0..1."""
+    """Dimensionless flow psi at pressure ratio `ratio` = downstream / upstream (absolute), in
+    0..1.
+    """
     if ratio > LAMINAR_RATIO:
         return flow_function(LAMINAR_RATIO, gamma) * (1.0 - ratio) / (1.0 - LAMINAR_RATIO)
     if ratio <= critical_ratio(gamma):
-        return float((2.0 / (gamma + 1.0)) ** (1.0 / (gamma - 1.0)) * math.sqrt(gamma / (gamma + 1.0)))
+        return float(
+            (2.0 / (gamma + 1.0)) ** (1.0 / (gamma - 1.0)) * math.sqrt(gamma / (gamma + 1.0))
+        )
     inside = ratio ** (2.0 / gamma) - ratio ** ((gamma + 1.0) / gamma)
     return math.sqrt(gamma / (gamma - 1.0) * inside)
 

@@ -1,8 +1,9 @@
 """Geometry of one braided muscle: exact solve by bracketing and adaptive quadrature.
 
-``elliptic_published`` keeps the choices printed in Robinson (2014) for comparison: the braid on an end is followed
-over the parametric angles 0 to pi/3 (2.27), and |B - B_est(R)| is minimised (2.30) where ``elliptic`` solves for its
-zero.  The sum of squared increments printed as (2.28) is not a length: the arc-length integral stands for it.
+``elliptic_published`` keeps the choices printed in Robinson (2014) for comparison: the braid on an
+end is followed over the parametric angles 0 to pi/3 (2.27), and |B - B_est(R)| is minimised (2.30)
+where ``elliptic`` solves for its zero. The sum of squared increments printed as (2.28) is not a
+length: the arc-length integral stands for it.
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ from scipy.optimize import brentq, minimize_scalar
 #: Shortest admissible length as a fraction of the braid fibre length.
 SHORTEST_OF_FIBRE = 0.58
 
-#: The printed minimisation looks from R0 this many times as far as the radius of the cylinder (contraction).
+#: The printed minimisation looks from R0 this many times as far as the radius of the cylinder
+#: (contraction).
 PUBLISHED_REACH = 1.6
 
 
@@ -106,7 +108,9 @@ class GeometryReference:
         """Fibre length B_est that a middle radius implies, m."""
         length = self.rest_length * (1.0 - e)
         a, b, c, end = self.end_ellipse(e, radius)
-        straight = (length - 2.0 * end) / length * math.hypot(length, 2.0 * math.pi * radius * self.turns)
+        straight = (
+            (length - 2.0 * end) / length * math.hypot(length, 2.0 * math.pi * radius * self.turns)
+        )
         if a == 0.0:
             return straight
         published = self.kind == "elliptic_published"
@@ -127,12 +131,18 @@ class GeometryReference:
     def radius_floor(self, e: float) -> float:
         """Least outer radius in extension, m."""
         length = self.rest_length * (1.0 - e)
-        return max(math.sqrt(self.rubber_volume / (math.pi * length)), self.neck_floor * self.rest_radius)
+        return max(
+            math.sqrt(self.rubber_volume / (math.pi * length)), self.neck_floor * self.rest_radius
+        )
 
     def cylinder_radius(self, e: float) -> float:
-        """Radius of a cylinder that the braid covers, m; zero where the muscle is as long as its fibre."""
+        """Radius of a cylinder that the braid covers, m; zero where the muscle is as long as its
+        fibre.
+        """
         fibre, length = self.fibre_length, self.rest_length * (1.0 - e)
-        return math.sqrt(max((fibre - length) * (fibre + length), 0.0)) / (2.0 * math.pi * self.turns)
+        return math.sqrt(max((fibre - length) * (fibre + length), 0.0)) / (
+            2.0 * math.pi * self.turns
+        )
 
     def solve_radius(self, e: float) -> tuple[float, bool]:
         """Return the outer radius of the middle part and whether the braid is taut."""
@@ -168,24 +178,39 @@ class GeometryReference:
         raise ValueError(f"no radius fits the fibre at contraction ratio {e}")
 
     def _closest_radius(self, e: float) -> tuple[float, bool]:
-        """Radius of least |B - B_est|: the zero nearest to R0, else the least miss on a fine grid, refined.
+        """Radius of least |B - B_est|: the zero nearest to R0, else the least miss on a fine grid,
+        refined.
 
-        Without a zero the least miss may lie between R0 and the floor; only at the floor does the braid count as taut.
+        Without a zero the least miss may lie between R0 and the floor; only at the floor does the
+        braid count as taut.
         """
         r0 = self.rest_radius
-        last = r0 + PUBLISHED_REACH * (self.cylinder_radius(e) - r0) if e > 0.0 else self.radius_floor(e)
+        last = (
+            r0 + PUBLISHED_REACH * (self.cylinder_radius(e) - r0)
+            if e > 0.0
+            else self.radius_floor(e)
+        )
 
         def miss(radius: float) -> float:
             return self.fibre_estimate(e, radius) - self.fibre_length
 
         grid = np.linspace(r0, last, 65)
         misses = [miss(float(radius)) for radius in grid]
-        for near, far, miss_near, miss_far in zip(grid[:-1], grid[1:], misses[:-1], misses[1:], strict=True):
+        for near, far, miss_near, miss_far in zip(
+            grid[:-1], grid[1:], misses[:-1], misses[1:], strict=True
+        ):
             if miss_near * miss_far <= 0.0:
                 return float(brentq(miss, near, far, xtol=1e-18, rtol=8.9e-16)), False
         least = int(np.argmin(np.abs(misses)))
-        bounds = sorted((float(grid[max(least - 1, 0)]), float(grid[min(least + 1, grid.size - 1)])))
-        found = minimize_scalar(lambda radius: abs(miss(radius)), bounds=bounds, method="bounded", options={"xatol": 1e-12})
+        bounds = sorted(
+            (float(grid[max(least - 1, 0)]), float(grid[min(least + 1, grid.size - 1)]))
+        )
+        found = minimize_scalar(
+            lambda radius: abs(miss(radius)),
+            bounds=bounds,
+            method="bounded",
+            options={"xatol": 1e-12},
+        )
         inside = abs(found.x - grid[least]) > 1e-9 * r0 and found.fun < abs(misses[least])
         best = float(found.x if inside else grid[least])
         return best, e < 0.0 and best == last
@@ -223,14 +248,18 @@ class GeometryReference:
         return Shape(length, radius, thickness, math.pi * over_length(thickness, 2), taut)
 
     def air_volume_slope(self, e: float, step: float = 1e-3) -> float:
-        """dV/de by a sixth-order central difference; `e` must be 3 `step` away from any kink, m^3."""
+        """dV/de by a sixth-order central difference; `e` must be 3 `step` away from any kink,
+        m^3.
+        """
         weights = np.array([-1.0, 9.0, -45.0, 45.0, -9.0, 1.0]) / 60.0
         points = (-3.0, -2.0, -1.0, 1.0, 2.0, 3.0)
         values = np.array([self.solve(e + n * step).air_volume for n in points])
         return float(weights @ values / step)
 
     def taut_contraction(self) -> float:
-        """Contraction ratio (negative) below which the braid is taut; no tautness gives the lower limit."""
+        """Contraction ratio (negative) below which the braid is taut; no tautness gives the lower
+        limit.
+        """
         low = self.min_contraction if self.kind == "cylinder" else min(-0.05, self.min_contraction)
         grid = np.linspace(0.0, low, 201)
         taut = [self.solve_radius(float(e))[1] for e in grid]

@@ -1,8 +1,8 @@
 """Force of one muscle for every force model, written so that it does not repeat closed forms.
 
-Gas forces are -dV/dL and the Mooney-Rivlin force is VB dW/dL (F dL = VB dW - P dV, F pulling; (3.21) prints a minus),
-both differentiated numerically by a complex step (Squire and Trapp 1998), which loses no digits.  The membrane terms
-are the force balance as stated.
+Gas forces are -dV/dL and the Mooney-Rivlin force is VB dW/dL (F dL = VB dW - P dV, F pulling;
+(3.21) prints a minus), both differentiated numerically by a complex step (Squire and Trapp 1998),
+which loses no digits. The membrane terms are the force balance as stated.
 """
 
 from __future__ import annotations
@@ -39,13 +39,15 @@ class MuscleReference:
     count : int
         Number of equal muscles in parallel; forces and volumes below are of one.
     model : str
-        Force model: gaylord, chou_hannaford, mooney_rivlin, ferraresi, kothera, robinson or elbow_linear.
+        Force model: gaylord, chou_hannaford, mooney_rivlin, ferraresi, kothera, robinson or
+        elbow_linear.
     c10, c01 : float
         Constants of the Mooney-Rivlin energy, Pa.
     bladder_modulus : float
         E_R of ``elbow_linear``, Pa.
     extension_factors : (float, float, float)
-        Factors on the wall pressure, axial and hoop terms of ``elbow_linear`` while lengthening (4.7).
+        Factors on the wall pressure, axial and hoop terms of ``elbow_linear`` while lengthening
+        (4.7).
     friction_coefficient, friction_pressure_slope, friction_floor : float
         c_F = max(coefficient + slope P, floor) of the hysteresis (2.36).
     """
@@ -65,7 +67,9 @@ class MuscleReference:
     friction_floor: float = 0.0
 
     def strains(self, shape: Shape) -> tuple[float, float]:
-        """Axial and circumferential bladder strain; the latter of the mid wall unless the wall is constant."""
+        """Axial and circumferential bladder strain; the latter of the mid wall unless the wall is
+        constant.
+        """
         geo = self.geometry
         axial = shape.length / geo.rest_length - 1.0
         if self.model == "ferraresi":
@@ -77,17 +81,27 @@ class MuscleReference:
         """Force of an axial and a hoop stress in the wall, the hoop stress through the braid, N."""
         geo = self.geometry
         wall = geo.wall_thickness if self.model == "ferraresi" else shape.thickness
-        return axial * geo.rubber_volume / shape.length - hoop * self.hoop_area(shape, wall * shape.length)
+        return axial * geo.rubber_volume / shape.length - hoop * self.hoop_area(
+            shape, wall * shape.length
+        )
 
     def hoop_area(self, shape: Shape, section: float) -> float:
         """Axial force per unit of hoop stress acting on a wall section (m^2) of the muscle, m^2."""
         return section * shape.length / (2.0 * math.pi * shape.radius * self.geometry.turns**2)
 
-    def along_braid(self, quantity: Callable[[complex, complex], complex], shape: Shape, radius: float) -> float:
-        """-d/dL of quantity(L, R), R following the braid from `radius`: (2 pi N R)^2 + L^2 stays."""
+    def along_braid(
+        self, quantity: Callable[[complex, complex], complex], shape: Shape, radius: float
+    ) -> float:
+        """-d/dL of quantity(L, R), R following the braid from `radius`: (2 pi N R)^2 + L^2
+        stays.
+        """
         step = 1e-20 * shape.length
         length = complex(shape.length, step)
-        turned = (shape.length - length) * (shape.length + length) / (2.0 * math.pi * self.geometry.turns) ** 2
+        turned = (
+            (shape.length - length)
+            * (shape.length + length)
+            / (2.0 * math.pi * self.geometry.turns) ** 2
+        )
         return -quantity(length, np.sqrt(radius**2 + turned)).imag / step
 
     def gas_area(self, e: float) -> float:
@@ -118,7 +132,9 @@ class MuscleReference:
         """FL and FT of (4.5) and (4.6) per unit of E_R, m^2."""
         geo, shape = self.geometry, self.geometry.solve(e)
         stretched = shape.thickness * shape.length - geo.wall_thickness * geo.rest_length
-        return geo.rubber_volume * (1.0 / geo.rest_length - 1.0 / shape.length), self.hoop_area(shape, stretched)
+        return geo.rubber_volume * (1.0 / geo.rest_length - 1.0 / shape.length), self.hoop_area(
+            shape, stretched
+        )
 
     def moduli(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Slope and offset of the modulus in front of every column of `elastic_basis`."""
@@ -141,19 +157,27 @@ class MuscleReference:
             return np.array([self.membrane(shape, axial**k, hoop**k) for k in orders])
         if self.model == "mooney_rivlin":
             units = ((1.0, 0.0), (0.0, 1.0))
-            slopes = [self.along_braid(lambda x, y, u=u: self.energy(*u, x, y), shape, shape.radius) for u in units]
+            slopes = [
+                self.along_braid(lambda x, y, u=u: self.energy(*u, x, y), shape, shape.radius)
+                for u in units
+            ]
             return -np.array(slopes)
         return np.array([sum(self.elbow_parts(e))]) if self.model == "elbow_linear" else np.zeros(0)
 
     def coefficients(self, e: float) -> tuple[float, float, float]:
-        """a_gas, a_elastic (m^2) and b_elastic (N): F = P a_gas + scale (P a_elastic + b_elastic)."""
+        """a_gas, a_elastic (m^2) and b_elastic (N): F = P a_gas + scale (P a_elastic +
+        b_elastic).
+        """
         basis, (slopes, offsets) = self.elastic_basis(e), self.moduli()
         return self.gas_area(e), float(basis @ slopes), float(basis @ offsets)
 
-    def force(self, pressure: ArrayLike, e: float, direction: float | None = None) -> NDArray[np.float64]:
+    def force(
+        self, pressure: ArrayLike, e: float, direction: float | None = None
+    ) -> NDArray[np.float64]:
         """Force at gauge `pressure` (Pa, any shape) and one contraction ratio, N.
 
-        `direction` is -1 while contracting and +1 while lengthening; None leaves the hysteresis out.
+        `direction` is -1 while contracting and +1 while lengthening; None leaves the hysteresis
+        out.
         """
         a_gas, a_elastic, b_elastic = self.coefficients(e)
         p = np.asarray(pressure, dtype=float)
@@ -163,7 +187,9 @@ class MuscleReference:
         if self.model == "elbow_linear":
             share = 0.5 * (1.0 + direction)
             force = (1.0 - share) * force + share * self._lengthening(p, e)
-        friction = np.maximum(self.friction_coefficient + self.friction_pressure_slope * p, self.friction_floor)
+        friction = np.maximum(
+            self.friction_coefficient + self.friction_pressure_slope * p, self.friction_floor
+        )
         return force + direction * friction * np.abs(force)
 
     def _lengthening(self, p: NDArray[np.float64], e: float) -> NDArray[np.float64]:
@@ -177,15 +203,20 @@ class MuscleReference:
     def tabulate(self, e_min: float, e_max: float, degree: int = 28) -> MuscleTable:
         """Chebyshev table on [e_min, e_max].
 
-        One seam is at e = 0, where the end ellipse has a kink; the others shorten the pieces near it,
-        because the continued branch has a singularity a little way into extension.
+        One seam is at e = 0, where the end ellipse has a kink; the others shorten the pieces near
+        it, because the continued branch has a singularity a little way into extension.
         """
         edges = [e_min, *(seam for seam in (0.0, 0.03, 0.12) if e_min < seam < e_max), e_max]
         pieces = []
         for low, high in zip(edges[:-1], edges[1:], strict=True):
             nodes = np.cos(np.pi * (np.arange(degree + 1) + 0.5) / (degree + 1))
             points = 0.5 * (low + high) + 0.5 * (high - low) * nodes
-            rows = np.array([(*self.coefficients(float(x)), self.geometry.solve(float(x)).air_volume) for x in points])
+            rows = np.array(
+                [
+                    (*self.coefficients(float(x)), self.geometry.solve(float(x)).air_volume)
+                    for x in points
+                ]
+            )
             fits = [Chebyshev.fit(points, rows[:, j], degree, domain=[low, high]) for j in range(4)]
             pieces.append((low, high, fits, fits[3].deriv()))
         return MuscleTable(self.modulus_scale, pieces)
@@ -194,12 +225,16 @@ class MuscleReference:
 class MuscleTable:
     """Force, volume and volume slope of one muscle from Chebyshev series (for the integrator)."""
 
-    def __init__(self, scale: float, pieces: list[tuple[float, float, list[Chebyshev], Chebyshev]]) -> None:
+    def __init__(
+        self, scale: float, pieces: list[tuple[float, float, list[Chebyshev], Chebyshev]]
+    ) -> None:
         self.scale = scale
         self.pieces = pieces
 
     def __call__(self, e: float, pressure: float) -> tuple[float, float, float]:
-        """Force (N), air volume (m^3) and dV/de (m^3) at contraction ratio `e`, gauge `pressure` (Pa)."""
+        """Force (N), air volume (m^3) and dV/de (m^3) at contraction ratio `e`, gauge `pressure`
+        (Pa).
+        """
         for low, high, fits, slope in self.pieces:
             if low <= e <= high:
                 a_gas, a_elastic, b_elastic, volume = (_clenshaw(f, e) for f in fits)

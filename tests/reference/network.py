@@ -1,12 +1,14 @@
-"""Rigs of several supplies, valves, lines, chambers, muscles and joints, from the description that the core takes.
+"""Rigs of several supplies, valves, lines, chambers, muscles and joints, from the description that
+the core takes.
 
-A rig is a graph: gas nodes (supplies, chambers, inlets of lines, ambient) joined by flows, and coordinates (joint
-angles, or the shortening on a linear load) on which muscles pull.  Pressures inside are absolute, channels are gauge.
-Every book (masses, energies, works) is a further state of the integrator, not a sum over samples; the positive work at
-the joints, with a kink at every reversal, is read off the signed work of each.
+A rig is a graph: gas nodes (supplies, chambers, inlets of lines, ambient) joined by flows, and
+coordinates (joint angles, or the shortening on a linear load) on which muscles pull. Pressures
+inside are absolute, channels are gauge. Every book (masses, energies, works) is a further state of
+the integrator, not a sum over samples; the positive work at the joints, with a kink at every
+reversal, is read off the signed work of each.
 
-Flows run down the pressure in either direction, through a valve too.  What the reference has no equation for (effects,
-sensor errors, hysteresis, load frames) is refused.
+Flows run down the pressure in either direction, through a valve too. What the reference has no
+equation for (effects, sensor errors, hysteresis, load frames) is refused.
 """
 
 from __future__ import annotations
@@ -33,10 +35,18 @@ Array = NDArray[np.float64]
 #: Density (kg/m^3) and temperature (K) of the reference air of ISO 6358.
 STANDARD_DENSITY, STANDARD_TEMPERATURE = 1.185, 293.15
 
-#: What the muscle tables reach beyond the stops: angle (rad), or shortening on a load (of the rest length).
+#: What the muscle tables reach beyond the stops: angle (rad), or shortening on a load (of the rest
+#: length).
 STOP_DEPTH, LOAD_DEPTH = 0.05, 0.03
 
-BOOKS = ("mass_supplied", "mass_vented", "energy_supplied", "exergy_supplied", "muscle_work", "joint_work")
+BOOKS = (
+    "mass_supplied",
+    "mass_vented",
+    "energy_supplied",
+    "exergy_supplied",
+    "muscle_work",
+    "joint_work",
+)
 SUPPLIES = ("tank", "constant", "regulator")
 
 
@@ -67,7 +77,12 @@ class Orifice:
         """Mass flow from the first to the second, kg/s."""
         gas = self.gas
         flow = orifice_flow(
-            self.area, max(first, second), min(first, second), gas.temperature, gas.gas_constant, gas.heat_capacity_ratio
+            self.area,
+            max(first, second),
+            min(first, second),
+            gas.temperature,
+            gas.gas_constant,
+            gas.heat_capacity_ratio,
         )
         return flow if first > second else -flow
 
@@ -105,7 +120,12 @@ class Tube:
     def __call__(self, first: float, second: float) -> float:
         """Mass flow from the first to the second, kg/s."""
         high, low = max(first, second), min(first, second)
-        choked = self.conductance * STANDARD_DENSITY * high * math.sqrt(STANDARD_TEMPERATURE / self.gas.temperature)
+        choked = (
+            self.conductance
+            * STANDARD_DENSITY
+            * high
+            * math.sqrt(STANDARD_TEMPERATURE / self.gas.temperature)
+        )
         return math.copysign(choked * self.flow_function(low / high), first - second)
 
 
@@ -124,7 +144,8 @@ class Transmission(Protocol):
 class Polynomial:
     """Shortening as a power series of the angle from rest, without a constant term.
 
-    A pulley is its first order; on a linear load the coordinate is the shortening itself, a pulley of radius one.
+    A pulley is its first order; on a linear load the coordinate is the shortening itself, a pulley
+    of radius one.
     """
 
     coefficients: Sequence[float]
@@ -136,7 +157,9 @@ class Polynomial:
 
     def moment_arm(self, angle: float) -> float:
         """Slope of the shortening, m/rad."""
-        return sum(k * c * (angle - self.rest_angle) ** (k - 1) for k, c in enumerate(self.coefficients, 1))
+        return sum(
+            k * c * (angle - self.rest_angle) ** (k - 1) for k, c in enumerate(self.coefficients, 1)
+        )
 
 
 def transmission(model: Mapping[str, Any]) -> Transmission:
@@ -172,7 +195,9 @@ def tabulate(muscle: MuscleReference, low: float, high: float, degree: int = 20)
     while todo:
         a, b = todo.pop()
         points = 0.5 * (a + b) + 0.5 * (b - a) * nodes
-        rows = np.array([(*muscle.coefficients(float(x)), geometry.solve(float(x)).air_volume) for x in points])
+        rows = np.array(
+            [(*muscle.coefficients(float(x)), geometry.solve(float(x)).air_volume) for x in points]
+        )
         fits = [Chebyshev.fit(points, rows[:, j], degree, domain=[a, b]) for j in range(4)]
         tails = [np.abs(fit.coef[-2:]).max() / max(np.abs(fit.coef).max(), 1e-300) for fit in fits]
         if max(tails) > 1e-11 and b - a > 1e-3:
@@ -185,11 +210,17 @@ def tabulate(muscle: MuscleReference, low: float, high: float, degree: int = 20)
 def muscle_of(model: Mapping[str, Any]) -> MuscleReference:
     """Muscle of a rig description; one whose force depends on its direction is refused."""
     shape = {key.name: model[key.name] for key in fields(GeometryReference) if key.name in model}
-    own = {key.name: model[key.name] for key in fields(MuscleReference) if key.name in model and key.name != "geometry"}
+    own = {
+        key.name: model[key.name]
+        for key in fields(MuscleReference)
+        if key.name in model and key.name != "geometry"
+    }
     own = {key: tuple(value) if isinstance(value, list) else value for key, value in own.items()}
     muscle = MuscleReference(GeometryReference(**shape, kind=model["geometry"]), **own)
     friction = (muscle.friction_coefficient, muscle.friction_pressure_slope, muscle.friction_floor)
-    two_branches = muscle.model == "elbow_linear" and any(factor != 1.0 for factor in muscle.extension_factors)
+    two_branches = muscle.model == "elbow_linear" and any(
+        factor != 1.0 for factor in muscle.extension_factors
+    )
     if any(friction) or two_branches:
         raise ValueError("the reference has no muscle whose force depends on its direction")
     return muscle
@@ -211,7 +242,9 @@ class Pull:
 
 @dataclass(frozen=True)
 class Node:
-    """Gas of one pressure; `volume` is what does not belong to muscles, `start` its initial absolute pressure."""
+    """Gas of one pressure; `volume` is what does not belong to muscles, `start` its initial
+    absolute pressure.
+    """
 
     kind: str
     name: str
@@ -267,7 +300,9 @@ def _planar(model: Mapping[str, Any], joints: Sequence[Coordinate]) -> Body:
 
 def _mass(load: Mapping[str, Any]) -> Body:
     def accelerate(_: Sequence[float], v: Sequence[float], f: Sequence[float]) -> list[float]:
-        friction = load["viscous"] * v[0] + load["coulomb"] * math.tanh(v[0] / load["coulomb_speed"])
+        friction = load["viscous"] * v[0] + load["coulomb"] * math.tanh(
+            v[0] / load["coulomb_speed"]
+        )
         return [(f[0] - friction) / load["mass"] - load["gravity"]]
 
     return accelerate
@@ -315,25 +350,47 @@ class Network:
         for line in model["lines"]:
             own = _port("line", line["name"])
             if line["from"] and line.get("inlet_volume", 0.0):
-                raise ValueError(f"{own}: the reference has an inlet volume only where valves feed the line")
+                raise ValueError(
+                    f"{own}: the reference has an inlet volume only where valves feed the line"
+                )
             if line["kind"] == "tube":
                 tubes[own] = Tube(line["length"], line["diameter"], gas)
                 for end in (line["from"] or own, line["to"]):
                     halves[end] = halves.get(end, 0.0) + tubes[own].half_volume
         for supply in model["supplies"]:
-            numbers = {key: supply[key] for key in ("volume", "time_constant", "droop") if supply.get(key) is not None}
+            numbers = {
+                key: supply[key]
+                for key in ("volume", "time_constant", "droop")
+                if supply.get(key) is not None
+            }
             start = ambient + supply["initial_pressure"]
-            self._add(_port("supply", supply["name"]), Node(supply["kind"], supply["name"], start=start, **numbers))
+            self._add(
+                _port("supply", supply["name"]),
+                Node(supply["kind"], supply["name"], start=start, **numbers),
+            )
         for chamber in model["chambers"]:
             own = _port("chamber", chamber["name"])
             alphas = {key: chamber[key] for key in ("alpha_in", "alpha_out", "alpha")}
             volume = chamber["dead_volume"] + halves.get(own, 0.0)
-            self._add(own, Node("chamber", chamber["name"], volume, ambient + chamber["initial_pressure"], **alphas))
+            self._add(
+                own,
+                Node(
+                    "chamber",
+                    chamber["name"],
+                    volume,
+                    ambient + chamber["initial_pressure"],
+                    **alphas,
+                ),
+            )
         for line in model["lines"]:
             if not line["from"]:
                 own = _port("line", line["name"])
-                self._add(own, Node("inlet", line["name"], line["inlet_volume"] + halves.get(own, 0.0)))
-        self.inlet_ends = {_port("line", line["name"]): line["to"] for line in model["lines"] if not line["from"]}
+                self._add(
+                    own, Node("inlet", line["name"], line["inlet_volume"] + halves.get(own, 0.0))
+                )
+        self.inlet_ends = {
+            _port("line", line["name"]): line["to"] for line in model["lines"] if not line["from"]
+        }
         self._add("ambient", Node("ambient", "", start=ambient))
         for line in model["lines"]:
             own = _port("line", line["name"])
@@ -341,16 +398,24 @@ class Network:
             self.pipes.append((flow, self.index[line["from"] or own], self.index[line["to"]]))
         for part in model["valves"]:
             valve = Valve(**{key.name: part[key.name] for key in fields(Valve)})
-            self.valves.append((valve, part["name"], self.index[part["from"]], self.index[part["to"]]))
+            self.valves.append(
+                (valve, part["name"], self.index[part["from"]], self.index[part["to"]])
+            )
 
     def _build_body(self, model: Mapping[str, Any]) -> tuple[list[Coordinate], Body]:
         arm, load = model["arm"], model["load"]
         if load is not None:
             if load["kind"] != "mass":
                 raise ValueError(f"the reference has no load {load['kind']!r}")
-            self.rest_length = next(part["muscle"]["rest_length"] for part in model["muscles"] if part["joint"] == "load")
+            self.rest_length = next(
+                part["muscle"]["rest_length"]
+                for part in model["muscles"]
+                if part["joint"] == "load"
+            )
             low, high = self.rest_length - load["max_length"], self.rest_length - load["min_length"]
-            return [Coordinate("", 0.0, low, high, load["stop_stiffness"], load["stop_damping"])], _mass(load)
+            return [
+                Coordinate("", 0.0, low, high, load["stop_stiffness"], load["stop_damping"])
+            ], _mass(load)
         keys = ("name", "rest_angle", "min_angle", "max_angle", "stop_stiffness", "stop_damping")
         joints = [Coordinate(*(joint[key] for key in keys)) for joint in model["joints"]]
         if arm is None:
@@ -364,8 +429,13 @@ class Network:
         if part["joint"] == "load":
             number, depth = 0, LOAD_DEPTH * rest
         else:
-            number = [_port("joint", joint["name"]) for joint in model["joints"]].index(part["joint"])
-            means, depth = transmission(part["transmission"] or model["joints"][number]["transmission"]), STOP_DEPTH
+            number = [_port("joint", joint["name"]) for joint in model["joints"]].index(
+                part["joint"]
+            )
+            means, depth = (
+                transmission(part["transmission"] or model["joints"][number]["transmission"]),
+                STOP_DEPTH,
+            )
         at = self.coordinates[number]
         shortening = list(_possible(means, np.linspace(at.low - depth, at.high + depth, 201)))
         low = max(min(shortening) / rest - 1e-3, (1.0 - 1e-4) * muscle.geometry.min_contraction)
@@ -375,10 +445,16 @@ class Network:
     # ---------------------------------------------------------------- states
 
     def start(self, initial: Mapping[str, float]) -> Array:
-        """State at the first sample, from gauge pressures; what `initial` leaves out is as described, at rest."""
+        """State at the first sample, from gauge pressures; what `initial` leaves out is as
+        described, at rest.
+        """
         left = dict(initial)
         ambient = self.gas.ambient_pressure
-        words = {"chamber": "muscle_pressure", "inlet": "line_pressure", **dict.fromkeys(SUPPLIES, "supply_pressure")}
+        words = {
+            "chamber": "muscle_pressure",
+            "inlet": "line_pressure",
+            **dict.fromkeys(SUPPLIES, "supply_pressure"),
+        }
         pressure = [node.start for node in self.nodes]
         for i, node in enumerate(self.nodes):
             channel = suffix(words.get(node.kind, ""), node.name)
@@ -401,18 +477,34 @@ class Network:
             raise ValueError(f"initial values of nothing in this rig: {', '.join(left)}")
         volume = self.volumes(position)
         mass = [p * v / self.rt for p, v in zip(pressure, volume, strict=True)]
-        return np.array([*pressure[:-1], *position, *rate, *mass[:-1], *(0.0 for _ in BOOKS[:-1]), *(0.0 for _ in position)])
+        return np.array(
+            [
+                *pressure[:-1],
+                *position,
+                *rate,
+                *mass[:-1],
+                *(0.0 for _ in BOOKS[:-1]),
+                *(0.0 for _ in position),
+            ]
+        )
 
     def volumes(self, position: Sequence[float]) -> list[float]:
-        """Volume of every node with the muscles that belong to it, m^3 (zero where it does not matter)."""
+        """Volume of every node with the muscles that belong to it, m^3 (zero where it does not
+        matter).
+        """
         volume = [node.volume for node in self.nodes]
         for pull in self.pulls:
-            e = pull.transmission.contraction(position[pull.coordinate]) / pull.muscle.geometry.rest_length
+            e = (
+                pull.transmission.contraction(position[pull.coordinate])
+                / pull.muscle.geometry.rest_length
+            )
             volume[pull.chamber] += pull.muscle.count * pull.table(e, 0.0)[1]
         return volume
 
     def split(self, state: Array) -> tuple[Array, ...]:
-        """Pressures (absolute), positions, rates, masses and books of states (..., m), the last of these the work at each joint."""
+        """Pressures (absolute), positions, rates, masses and books of states (..., m), the last of
+        these the work at each joint.
+        """
         n, c = len(self.nodes) - 1, len(self.coordinates)
         parts = np.split(state, np.cumsum([n, c, c, n]), axis=-1)
         return tuple(parts)
@@ -420,9 +512,18 @@ class Network:
     def tolerances(self, state: Array, rtol: float) -> Array:
         """Absolute tolerances of a state."""
         pressure, position, rate, mass, books = self.split(state)
-        air = max(self.gas.ambient_pressure * sum(self.volumes(position.tolist())[:-1]) / self.rt, 1e-9)
+        air = max(
+            self.gas.ambient_pressure * sum(self.volumes(position.tolist())[:-1]) / self.rt, 1e-9
+        )
         works = [air, air, *(air * self.rt,) * (books.size - 2)]
-        return rtol * np.array([*(1e5,) * pressure.size, *(1.0,) * (position.size + rate.size), *(air,) * mass.size, *works])
+        return rtol * np.array(
+            [
+                *(1e5,) * pressure.size,
+                *(1.0,) * (position.size + rate.size),
+                *(air,) * mass.size,
+                *works,
+            ]
+        )
 
     # ---------------------------------------------------------------- equations
 
@@ -437,8 +538,12 @@ class Network:
                 ways.append((Orifice(-area, self.gas), target, self.index["ambient"]))
         return ways
 
-    def derivative(self, state: Array, ways: Iterable[tuple[Flow, int, int]], set_pressure: Sequence[float]) -> list[float]:
-        """Time derivative of a state, with the open ways and the absolute set pressure of every node (regulators')."""
+    def derivative(
+        self, state: Array, ways: Iterable[tuple[Flow, int, int]], set_pressure: Sequence[float]
+    ) -> list[float]:
+        """Time derivative of a state, with the open ways and the absolute set pressure of every
+        node (regulators').
+        """
         gas, count, size = self.gas, len(self.nodes), len(self.coordinates)
         values = state.tolist()
         pressure = [*values[: count - 1], gas.ambient_pressure]
@@ -477,11 +582,18 @@ class Network:
             if node.kind == "constant":
                 pressure_rate.append(0.0)
             elif node.kind == "regulator":
-                pressure_rate.append((set_pressure[i] - node.droop * net_out - pressure[i]) / node.time_constant)
+                pressure_rate.append(
+                    (set_pressure[i] - node.droop * net_out - pressure[i]) / node.time_constant
+                )
             else:  # a tank is isothermal: its coefficients are one
                 moved = self.rt * (node.alpha_in * inflow[i] - node.alpha_out * outflow[i])
-                pressure_rate.append((moved - node.alpha * pressure[i] * volume_rate[i]) / volume[i])
-        stopped = [f + c.stop(q, v) for f, c, q, v in zip(force, self.coordinates, position, rate, strict=True)]
+                pressure_rate.append(
+                    (moved - node.alpha * pressure[i] * volume_rate[i]) / volume[i]
+                )
+        stopped = [
+            f + c.stop(q, v)
+            for f, c, q, v in zip(force, self.coordinates, position, rate, strict=True)
+        ]
         return [
             *pressure_rate,
             *rate,
@@ -492,10 +604,15 @@ class Network:
         ]  # fmt: skip
 
     def channels(self, states: Array) -> dict[str, Array]:
-        """Channels of states (n, m): gauge pressures, positions, rates and books but the positive work at the joints."""
+        """Channels of states (n, m): gauge pressures, positions, rates and books but the positive
+        work at the joints.
+        """
         pressure, position, rate, mass, books = self.split(states)
         ambient = self.gas.ambient_pressure
-        words = {"chamber": ("muscle_pressure", "air_mass"), "inlet": ("line_pressure", "line_air_mass")}
+        words = {
+            "chamber": ("muscle_pressure", "air_mass"),
+            "inlet": ("line_pressure", "line_air_mass"),
+        }
         out: dict[str, Array] = {}
         for i, node in enumerate(self.nodes[:-1]):
             of_pressure, of_mass = words.get(node.kind, ("supply_pressure", "supply_air_mass"))
@@ -520,8 +637,12 @@ def _possible(means: Transmission, positions: Iterable[float]) -> Iterable[float
             continue
 
 
-def _rhs(_: float, state: Array, rate: Callable[[Array], list[float]], left: list[str]) -> list[float]:
-    """Derivative; not a number where a trial step has left the model, so that the integrator shortens it."""
+def _rhs(
+    _: float, state: Array, rate: Callable[[Array], list[float]], left: list[str]
+) -> list[float]:
+    """Derivative; not a number where a trial step has left the model, so that the integrator
+    shortens it.
+    """
     try:
         return rate(state)
     except ValueError as error:
@@ -546,13 +667,14 @@ def simulate(
     model : mapping
         The description that the core takes.
     commands : mapping of str to array_like (n,)
-        ``valve_command[.name]`` (V) of every valve, ``supply_command[.name]`` (Pa, gauge) of any regulator;
-        entry k is held from sample k to sample k + 1.
+        ``valve_command[.name]`` (V) of every valve, ``supply_command[.name]`` (Pa, gauge) of any
+        regulator; entry k is held from sample k to sample k + 1.
     sample_time : float
         Seconds between samples.
     initial : mapping, optional
-        ``muscle_pressure``, ``supply_pressure``, ``line_pressure`` (Pa, gauge), ``joint_angle``, ``joint_rate``
-        (rad, rad/s), ``length``, ``length_rate`` (m, m/s), each with ``.name`` for a named block.
+        ``muscle_pressure``, ``supply_pressure``, ``line_pressure`` (Pa, gauge), ``joint_angle``,
+        ``joint_rate`` (rad, rad/s), ``length``, ``length_rate`` (m, m/s), each with ``.name`` for a
+        named block.
     rtol : float
         Relative tolerance of the integrator.
     rows : int, optional
@@ -568,9 +690,16 @@ def simulate(
     rig = Network(model)
     held = {name: np.asarray(values, dtype=float) for name, values in commands.items()}
     takes = {suffix("valve_command", name) for _, name, _, _ in rig.valves}
-    regulators = {i: suffix("supply_command", node.name) for i, node in enumerate(rig.nodes) if node.kind == "regulator"}
+    regulators = {
+        i: suffix("supply_command", node.name)
+        for i, node in enumerate(rig.nodes)
+        if node.kind == "regulator"
+    }
     if not takes <= set(held) <= takes | set(regulators.values()):
-        raise ValueError(f"commands are {sorted(held)}; the rig takes {sorted(takes)} and may take {sorted(regulators.values())}")
+        raise ValueError(
+            f"commands are {sorted(held)}; the rig takes {sorted(takes)} and may take "
+            f"{sorted(regulators.values())}"
+        )
     sizes = {values.size for values in held.values()} | ({rows} if rows is not None else set())
     if len(sizes) != 1:
         raise ValueError(f"numbers of samples: {sorted(sizes)}; one is needed")
@@ -592,9 +721,17 @@ def simulate(
         settings = {"rtol": rtol, "atol": atol, "first_step": first, "dense_output": True}
         solution = solve_ivp(slope, (0.0, sample_time), states[k], method=method, **settings)
         if not solution.success:
-            raise RuntimeError(f"integration failed in sample {k}: {'; '.join([solution.message, *left])}")
+            raise RuntimeError(
+                f"integration failed in sample {k}: {'; '.join([solution.message, *left])}"
+            )
         states[k + 1] = solution.y[:, -1]
-        work = rig.split(solution.sol(np.linspace(0.0, sample_time, 1001)).T)[-1][:, len(BOOKS) - 1 :]
+        work = rig.split(solution.sol(np.linspace(0.0, sample_time, 1001)).T)[-1][
+            :, len(BOOKS) - 1 :
+        ]
         positive[k + 1] = positive[k] + np.maximum(np.diff(work, axis=0), 0.0).sum()
         first = min(float(np.diff(solution.t).max()), sample_time)
-    return {"time": sample_time * np.arange(n, dtype=np.float64), **rig.channels(states), BOOKS[-1]: positive}
+    return {
+        "time": sample_time * np.arange(n, dtype=np.float64),
+        **rig.channels(states),
+        BOOKS[-1]: positive,
+    }

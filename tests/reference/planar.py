@@ -1,8 +1,8 @@
 """Planar arm of N revolute links by recursive Newton-Euler, in the plane of gravity.
 
-The first angle counts from the gravity vector, each further one from the link before.  Only forces and moments of the
-single bodies enter; the mass matrix is the response to unit accelerations, column by column, so no closed form of it
-is written down anywhere.
+The first angle counts from the gravity vector, each further one from the link before. Only forces
+and moments of the single bodies enter; the mass matrix is the response to unit accelerations,
+column by column, so no closed form of it is written down anywhere.
 """
 
 from __future__ import annotations
@@ -47,9 +47,15 @@ class PlanarArm:
     gravity: float = 9.80665
 
     def inverse_dynamics(
-        self, angle: Sequence[float], rate: Sequence[float], acceleration: Sequence[float], gravity: float | None = None
+        self,
+        angle: Sequence[float],
+        rate: Sequence[float],
+        acceleration: Sequence[float],
+        gravity: float | None = None,
     ) -> list[float]:
-        """Joint torques (N m) that make the motion, friction left out; `gravity` in place of the arm's own."""
+        """Joint torques (N m) that make the motion, friction left out; `gravity` in place of the
+        arm's own.
+        """
         phi = omega = alpha = 0.0
         # The base rises with g instead of every body falling.
         ax, ay = 0.0, self.gravity if gravity is None else gravity
@@ -57,16 +63,23 @@ class PlanarArm:
         for link, q, v, a in zip(self.links, angle, rate, acceleration, strict=True):
             phi, omega, alpha = phi + q, omega + v, alpha + a
             ux, uy = math.sin(phi), -math.cos(phi)
-            # A point at distance s from the joint has the acceleration of the joint plus s (alpha n - omega^2 u), n = (-uy, ux).
+            # A point at distance s from the joint has the acceleration of the joint plus s (alpha
+            # n - omega^2 u), n = (-uy, ux).
             bx, by = -alpha * uy - omega**2 * ux, alpha * ux - omega**2 * uy
             centre = link.mass * (ax + link.centre * bx), link.mass * (ay + link.centre * by)
             ax, ay = ax + link.length * bx, ay + link.length * by
-            moved.append((link, ux, uy, centre, (link.payload * ax, link.payload * ay), link.inertia * alpha))
+            moved.append(
+                (link, ux, uy, centre, (link.payload * ax, link.payload * ay), link.inertia * alpha)
+            )
         torques = []
         fx = fy = moment = 0.0
         for link, ux, uy, centre, tip, spin in reversed(moved):
             fx, fy = fx + tip[0], fy + tip[1]
-            moment += spin + link.centre * (ux * centre[1] - uy * centre[0]) + link.length * (ux * fy - uy * fx)
+            moment += (
+                spin
+                + link.centre * (ux * centre[1] - uy * centre[0])
+                + link.length * (ux * fy - uy * fx)
+            )
             fx, fy = fx + centre[0], fy + centre[1]
             torques.append(moment)
         return torques[::-1]
@@ -81,10 +94,17 @@ class PlanarArm:
         """C(q, q') q' + G(q), N m."""
         return self.inverse_dynamics(angle, rate, [0.0] * len(self.links))
 
-    def acceleration(self, angle: Sequence[float], rate: Sequence[float], torque: Sequence[float]) -> list[float]:
-        """Angular accelerations, rad/s^2, under the sums of joint torques `torque`; friction is the arm's own."""
+    def acceleration(
+        self, angle: Sequence[float], rate: Sequence[float], torque: Sequence[float]
+    ) -> list[float]:
+        """Angular accelerations, rad/s^2, under the sums of joint torques `torque`; friction is the
+        arm's own.
+        """
         bias = self.bias(angle, rate)
-        net = [t - b - link.friction(v) for t, b, link, v in zip(torque, bias, self.links, rate, strict=True)]
+        net = [
+            t - b - link.friction(v)
+            for t, b, link, v in zip(torque, bias, self.links, rate, strict=True)
+        ]
         found: list[float] = np.linalg.solve(self.mass_matrix(angle), net).tolist()
         return found
 
@@ -97,7 +117,9 @@ class PlanarArm:
         for link, x, y, w in zip(self.links, np.cos(phi), np.sin(phi), omega, strict=True):
             cx, cy = vx + link.centre * x * w, vy + link.centre * y * w
             vx, vy = vx + link.length * x * w, vy + link.length * y * w
-            total += 0.5 * (link.mass * (cx**2 + cy**2) + link.payload * (vx**2 + vy**2) + link.inertia * w**2)
+            total += 0.5 * (
+                link.mass * (cx**2 + cy**2) + link.payload * (vx**2 + vy**2) + link.inertia * w**2
+            )
         return total
 
     def potential_energy(self, angle: ArrayLike) -> Any:

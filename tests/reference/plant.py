@@ -65,7 +65,9 @@ class Joint:
     def contraction(self, angle: float) -> float:
         """Muscle contraction d, m."""
         x, y = self._lower_point(angle)
-        return x + math.sqrt(self.tendon_length**2 - (self.upper_offset - y) ** 2) - self.upper_axial
+        return (
+            x + math.sqrt(self.tendon_length**2 - (self.upper_offset - y) ** 2) - self.upper_axial
+        )
 
     def moment_arm(self, angle: float) -> float:
         """dd/dangle, m."""
@@ -76,9 +78,13 @@ class Joint:
     def stop_torque(self, angle: float, rate: float) -> float:
         """Torque of the end stops, N m; a stop pushes, it never pulls."""
         if angle < self.min_angle:
-            return max(self.stop_stiffness * (self.min_angle - angle) - self.stop_damping * rate, 0.0)
+            return max(
+                self.stop_stiffness * (self.min_angle - angle) - self.stop_damping * rate, 0.0
+            )
         if angle > self.max_angle:
-            return -max(self.stop_stiffness * (angle - self.max_angle) + self.stop_damping * rate, 0.0)
+            return -max(
+                self.stop_stiffness * (angle - self.max_angle) + self.stop_damping * rate, 0.0
+            )
         return 0.0
 
 
@@ -131,8 +137,13 @@ class Plant:
         """Muscle table over the stroke of the joint, with a margin for the depth of the stops."""
         joint, rest = self.joint, self.muscle.geometry.rest_length
         low = joint.contraction(joint.min_angle) / rest
-        high = max(joint.contraction(a) for a in np.linspace(joint.min_angle, joint.max_angle, 201)) / rest
-        return self.muscle.tabulate(low - 0.004, min(high + 0.01, self.muscle.geometry.max_contraction))
+        high = (
+            max(joint.contraction(a) for a in np.linspace(joint.min_angle, joint.max_angle, 201))
+            / rest
+        )
+        return self.muscle.tabulate(
+            low - 0.004, min(high + 0.01, self.muscle.geometry.max_contraction)
+        )
 
     def torque(self, muscle_pressure: float, angle: float) -> float:
         """Torque of all muscles at an absolute pressure, N m."""
@@ -141,11 +152,15 @@ class Plant:
         return self.muscle.count * force * self.joint.moment_arm(angle)
 
     def derivative(self, state: NDArray[np.float64], command: float) -> list[float]:
-        """Time derivative of (muscle pressure, supply pressure, angle, rate); pressures absolute."""
+        """Time derivative of (muscle pressure, supply pressure, angle, rate); pressures
+        absolute.
+        """
         pressure, supply, angle, rate = state.tolist()
         gas, rest, n = self.gas, self.muscle.geometry.rest_length, self.muscle.count
         moment_arm = self.joint.moment_arm(angle)
-        force, volume_one, slope = self.table(self.joint.contraction(angle) / rest, pressure - gas.ambient_pressure)
+        force, volume_one, slope = self.table(
+            self.joint.contraction(angle) / rest, pressure - gas.ambient_pressure
+        )
         volume = n * volume_one + self.chamber.dead_volume
         volume_rate = n * slope * moment_arm * rate / rest
         area = self.valve.area(command)
@@ -158,7 +173,8 @@ class Plant:
         rt = gas.gas_constant * gas.temperature
         chamber = self.chamber
         pressure_rate = (
-            rt * (chamber.alpha_in * inflow - chamber.alpha_out * outflow) - chamber.alpha * pressure * volume_rate
+            rt * (chamber.alpha_in * inflow - chamber.alpha_out * outflow)
+            - chamber.alpha * pressure * volume_rate
         ) / volume
         torque = n * force * moment_arm + self.joint.stop_torque(angle, rate)
         return [
@@ -208,13 +224,17 @@ class Plant:
             if not solution.success:
                 raise RuntimeError(f"integration failed in sample {k}: {solution.message}")
             states[k + 1] = solution.y[:, -1]
-        return Trajectory(sample_time * np.arange(command.size, dtype=np.float64), command, *states.T.copy())
+        return Trajectory(
+            sample_time * np.arange(command.size, dtype=np.float64), command, *states.T.copy()
+        )
 
 
 def shoulder() -> Plant:
     """Return the nominal shoulder rig: six one-inch latex muscles and a 15 L tank."""
     geometry = GeometryReference(0.276, 0.0254, math.radians(73.5), 0.003175)
-    return Plant(MuscleReference(geometry, [3.0, -0.35, 0.0, 0.0], [1.15e6, -0.15e6, 0.0, 0.0], 1.0, 6))
+    return Plant(
+        MuscleReference(geometry, [3.0, -0.35, 0.0, 0.0], [1.15e6, -0.15e6, 0.0, 0.0], 1.0, 6)
+    )
 
 
 def with_overrides(plant: Plant, overrides: Mapping[str, float]) -> Plant:

@@ -41,14 +41,24 @@ def test_page_is_self_contained(make, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("verdict", "ambiguity", "words"),
     [
-        ("effects", [["activation_pressure"], ["parameters"]], "cannot tell activation pressure from parameter values"),
-        ("parameters", [["parameters"], ["activation_pressure"]], "cannot rule out activation pressure"),
+        (
+            "effects",
+            [["activation_pressure"], ["parameters"]],
+            "cannot tell activation pressure from parameter values",
+        ),
+        (
+            "parameters",
+            [["parameters"], ["activation_pressure"]],
+            "cannot rule out activation pressure",
+        ),
         ("none", [["none"], ["unlisted"]], "cannot rule out an effect outside the catalogue"),
         ("parameters", [], "No physics is missing"),
         ("none", [], "Nothing is missing"),
     ],
 )
-def test_a_set_with_parameters_in_it_is_no_missing_physics_yet(verdict: str, ambiguity: list[list[str]], words: str) -> None:
+def test_a_set_with_parameters_in_it_is_no_missing_physics_yet(
+    verdict: str, ambiguity: list[list[str]], words: str
+) -> None:
     assert words in replace(synthetic.diagnosis(), verdict=verdict, ambiguity=ambiguity).headline
 
 
@@ -76,7 +86,7 @@ def test_page_tells_the_story(page: str) -> None:
         "310 to 490 kPa",
         "9.00 to 11.20 s",
         "How to read this page",
-        "The 2 effects that were asked",
+        "The 2 effects that were tested",
         "under 1 %",
         "not fitted",
     ):
@@ -86,7 +96,9 @@ def test_page_tells_the_story(page: str) -> None:
 
 def test_ambiguity_is_shown_only_when_open(page: str) -> None:
     assert "cannot separate" not in page
-    html = render_html(synthetic.diagnosis(ambiguity=[["leak_muscle"], ["leak_muscle", "heat_transfer"]]))
+    html = render_html(
+        synthetic.diagnosis(ambiguity=[["leak_muscle"], ["leak_muscle", "heat_transfer"]])
+    )
     assert "cannot separate" in html
     assert "<li>muscle leak + heat transfer</li>" in html
 
@@ -106,7 +118,11 @@ def test_figure_is_a_png(make, tmp_path: Path) -> None:
 
 
 def test_figure_without_traces(tmp_path: Path) -> None:
-    assert synthetic.diagnosis(traces=[], probabilities={}, residuals={}, condition_map=None).figure(tmp_path / "f.png").exists()
+    assert (
+        synthetic.diagnosis(traces=[], probabilities={}, residuals={}, condition_map=None)
+        .figure(tmp_path / "f.png")
+        .exists()
+    )
 
 
 def test_decimation_keeps_extremes_and_gaps() -> None:
@@ -122,13 +138,26 @@ def test_decimation_keeps_extremes_and_gaps() -> None:
 
 
 def test_map_of_wrong_shape_is_refused() -> None:
-    bad = {"x_label": "", "y_label": "", "x_edges": [0, 1, 2], "y_edges": [0, 1], "z": [[1.0, 2.0, 3.0]]}
+    bad = {
+        "x_label": "",
+        "y_label": "",
+        "x_edges": [0, 1, 2],
+        "y_edges": [0, 1],
+        "z": [[1.0, 2.0, 3.0]],
+    }
     with pytest.raises(ValueError, match="shape"):
         figures.map_svg(synthetic.diagnosis(condition_map=bad))
 
 
 def test_empty_map_is_left_out() -> None:
-    empty = {"x_label": "", "y_label": "", "x_edges": [0, 1, 2], "y_edges": [0, 1], "z": [[np.nan, np.nan]], "z_after": None}
+    empty = {
+        "x_label": "",
+        "y_label": "",
+        "x_edges": [0, 1, 2],
+        "y_edges": [0, 1],
+        "z": [[np.nan, np.nan]],
+        "z_after": None,
+    }
     assert figures.map_svg(synthetic.diagnosis(condition_map=empty)) is None
 
 

@@ -24,7 +24,9 @@ PATH = lift.trajectory()
 
 
 def made(late=0.3, swing=0.0, rest=0.0, above=0.0):
-    """Four payloads that follow the reference late, swing, settle ``rest`` deg off and pass the hold by ``above`` deg."""
+    """Four payloads that follow the reference late, swing, settle ``rest`` deg off and pass the
+    hold by ``above`` deg.
+    """
     wanted = np.asarray(PATH(TIME).angle)
     angle = np.asarray(PATH(np.maximum(TIME - late, 0.0)).angle)
     angle = angle + np.radians(swing) * np.sin(8.0 * TIME) + np.radians(rest) * (TIME > 20.0)
@@ -68,8 +70,18 @@ def test_overshoot_swing_and_delay_are_read_off_the_angle():
         ("FF+PID", {}, {"above": 5.0}, "FF+PID: largest overshoot of the hold"),
         ("FF+fuzzy", {}, {"swing": 5.0}, "FF+fuzzy: swing in the last 2 s of the hold"),
         ("PID", {"rest": -5.0}, {}, "PID, 34 kg: overshoot below the rest position"),
-        ("FF+fuzzy, kM 0.5", {"rest": 3.0}, {"rest": 0.1}, "FF+fuzzy, kM 0.5, 45 kg: error 5 s after the return"),
-        ("FF+PID, PID's gains", {"late": 0.1}, {"late": 0.6}, "11 kg: error with feedforward, worst stage over PID alone"),
+        (
+            "FF+fuzzy, kM 0.5",
+            {"rest": 3.0},
+            {"rest": 0.1},
+            "FF+fuzzy, kM 0.5, 45 kg: error 5 s after the return",
+        ),
+        (
+            "FF+PID, PID's gains",
+            {"late": 0.1},
+            {"late": 0.6},
+            "11 kg: error with feedforward, worst stage over PID alone",
+        ),
         ("FF+PID, PID's gains", {}, {"swing": 4.0}, "11 kg: omega, FF+PID over PID"),
     ],
 )
@@ -96,7 +108,10 @@ def test_a_lift_of_a_batch_is_the_one_alone():
     assert not np.array_equal(together[names[0]]["PID"].angle[1], alone.angle[0])
     # and the one of a closed loop that knows of no batch
     rig = lift.plant(VARIANTS[names[1]], payloads[1])
-    start = {"joint_angle": float(alone.angle[0, 0]), "muscle_pressure": float(alone.pressure[0, 0])}
+    start = {
+        "joint_angle": float(alone.angle[0, 0]),
+        "muscle_pressure": float(alone.pressure[0, 0]),
+    }
     controller = PID(1.4, 2.5, period=lift.PERIOD, anti_windup="none")
     single = closed_loop(rig, controller, PATH, sample_time=lift.PERIOD, step=1e-3, initial=start)
     np.testing.assert_allclose(alone.angle[0], single.angle[::2], atol=1e-9)
@@ -104,7 +119,7 @@ def test_a_lift_of_a_batch_is_the_one_alone():
 
 def test_a_plant_hides_its_effects_and_shares_its_valve():
     variant = VARIANTS["damping 6000 N s/m, valve 4.2 mm2"]
-    rig, model = lift.plant(variant, 20.0), lift.believed(variant)
+    rig, model = lift.plant(variant, 20.0), lift.assumed(variant)
     assert [effect["id"] for effect in rig.effects] == ["muscle_rate_damping"]
     assert model.effects == []
     for one in (rig, model):
@@ -141,9 +156,14 @@ def test_a_map_has_the_metrics_of_its_loops_in_both_units():
 
 def test_records_for_the_diagnosis_have_what_is_measured():
     name = chapter4.DAMPED
-    truth, model = lift.plant(VARIANTS[name], PAYLOADS[1], seed=None), lift.believed().with_parameters({"arm.payload": PAYLOADS[1]})
+    truth, model = (
+        lift.plant(VARIANTS[name], PAYLOADS[1], seed=None),
+        lift.assumed().with_parameters({"arm.payload": PAYLOADS[1]}),
+    )
     one, again = (lift_diagnosis.recorded(truth, model, PATH, "fit", 3, 1.0) for _ in range(2))
-    assert {"valve_command", "supply_pressure", "muscle_pressure", "joint_angle"} <= set(one.channels)
+    assert {"valve_command", "supply_pressure", "muscle_pressure", "joint_angle"} <= set(
+        one.channels
+    )
     np.testing.assert_array_equal(one.channels["joint_angle"], again.channels["joint_angle"])
     # the effect is in the plant alone: nothing else of it differs
     assert truth.without_effect("muscle_rate_damping").model == model.model
@@ -151,15 +171,24 @@ def test_records_for_the_diagnosis_have_what_is_measured():
 
 def test_page_has_every_plant_and_no_picture_is_missing():
     text = (DOCS / "chapter4.md").read_text(encoding="utf-8")
-    command = "pamrs reproduce ch4 --output docs/reproduction/chapter4 --page docs/reproduction/chapter4.md"
+    command = (
+        "pamrs reproduce ch4 --output docs/reproduction/chapter4 --page "
+        "docs/reproduction/chapter4.md"
+    )
     assert f"`{command}`" in text.splitlines()[2]
     links = re.findall(r"\]\(([^)]+\.png)\)", text)
     assert len(links) == 9
     assert all((DOCS / link).is_file() for link in links)
-    stored = list(csv.DictReader(io.StringIO((DOCS / "chapter4" / "facts.csv").read_text(encoding="utf-8"))))
+    stored = list(
+        csv.DictReader(io.StringIO((DOCS / "chapter4" / "facts.csv").read_text(encoding="utf-8")))
+    )
     groups = {row["group"] for row in stored}
     assert groups == set(chapter4.GROUPS.values())
     tried = [row for row in stored if row["group"] == chapter4.GROUPS["effects"]]
     assert [row["fact"] for row in tried] == list(VARIANTS)
-    agreeing = [row for row in stored if row["group"] == chapter4.GROUPS["rig"] and row["verdict"] == "agree"]
+    agreeing = [
+        row
+        for row in stored
+        if row["group"] == chapter4.GROUPS["rig"] and row["verdict"] == "agree"
+    ]
     assert int(float(tried[0]["ours"])) == len(agreeing)

@@ -1,4 +1,6 @@
-"""Chapter 5 beside ours: what the experiments vary, how they are read, and that the short plan fills the whole page."""
+"""Chapter 5 beside ours: what the experiments vary, how they are read, and that the short plan
+fills the whole page.
+"""
 
 import csv
 import math
@@ -16,7 +18,16 @@ from pamrs.reproduce import _chapter5 as chapter5
 from pamrs.reproduce import _tracking as tracking
 from pamrs.reproduce._chapter5_comparison import orders
 from pamrs.reproduce._chapter5_statements import GROUPS
-from pamrs.reproduce._tracking import KINDS, PERIOD, Track, arm_model, controller, follow, plant, waves
+from pamrs.reproduce._tracking import (
+    KINDS,
+    PERIOD,
+    Track,
+    arm_model,
+    controller,
+    follow,
+    plant,
+    waves,
+)
 from pamrs.reproduce._tracking_runs import EFFECTS, MIDDLE, SHORT, STARTS, WRONG, Plan
 
 DOCS = Path(__file__).parents[2] / "docs" / "reproduction"
@@ -30,7 +41,17 @@ def track(error, *, pressure=0.0):
     wanted = np.radians(50.0 + 10.0 * np.sin(0.7 * time))
     angle = (wanted - np.radians(error))[None]
     rate = np.gradient(angle, time, axis=1)
-    return Track(time, wanted, angle, rate, np.array([False]), {}, np.array([]), {}, np.full_like(angle, pressure))
+    return Track(
+        time,
+        wanted,
+        angle,
+        rate,
+        np.array([False]),
+        {},
+        np.array([]),
+        {},
+        np.full_like(angle, pressure),
+    )
 
 
 # ------------------------------------------------------------------ reading a track
@@ -111,13 +132,18 @@ def test_one_plant_has_one_row_of_what_it_learnt(kind):
     assert all(values.shape[0] == 1 for values in first.learnt.values())
     assert bool(first.learnt) == (kind in ("adaptive sliding", "neural"))
     again = follow(kind, [plant(25.0)], arm_model([25.0]), waves(0.1), learnt=first.learnt)
-    assert {name: values.shape for name, values in again.learnt.items()} == {name: v.shape for name, v in first.learnt.items()}
+    assert {name: values.shape for name, values in again.learnt.items()} == {
+        name: v.shape for name, v in first.learnt.items()
+    }
 
 
 def test_what_was_learnt_needs_a_row_for_each_plant():
     weights = follow("neural", [plant(25.0)], arm_model([25.0]), waves(0.1)).learnt
     one = {name: values[0] for name, values in weights.items()}
-    with pytest.raises(ParameterError, match=r"learnt\['H'\] has the shape \(22,\); one row for each of 1 plants is needed"):
+    with pytest.raises(
+        ParameterError,
+        match=r"learnt\['H'\] has the shape \(22,\); one row for each of 1 plants is needed",
+    ):
         follow("neural", [plant(25.0)], arm_model([25.0]), waves(0.1), learnt=one)
     with pytest.raises(ParameterError, match="one row for each of 2 plants"):
         follow("neural", [plant(25.0)] * 2, arm_model([25.0] * 2), waves(0.1), learnt=weights)
@@ -151,7 +177,9 @@ def test_what_is_known_beforehand_comes_out(rows):
     assert by["largest frequency"].verdict == "agree"
     assert by["largest frequency"].ours == pytest.approx(1.55 / (2.0 * math.pi))
     # the unit of Table 5.2 cannot be recovered, and no verdict may rest on a guess
-    assert {row.verdict for row in rows if "Trial" in row.fact and "over early" in row.fact} == {"cannot tell"}
+    assert {row.verdict for row in rows if "Trial" in row.fact and "over early" in row.fact} == {
+        "cannot tell"
+    }
     run = TINY.estimates()
     exact, small, large = run.rms().reshape(-1, len(WRONG)).T
     assert np.all(exact < small)
@@ -191,12 +219,23 @@ def test_page_in_the_documentation_is_of_the_full_plan(rows):
     stored = {(row["group"], row["fact"]): row for row in csv.DictReader(lines)}
     assert {group for group, _ in stored} == set(GROUPS.values())
     known = {row.fact: row for row in rows}
-    for fact in ("inertia with 50 lb over that without", "largest frequency", "simplified torque (5.1) against the full model"):
-        assert float(stored[GROUPS["rig"], fact]["ours"]) == pytest.approx(known[fact].ours, rel=1e-4)
+    for fact in (
+        "inertia with 50 lb over that without",
+        "largest frequency",
+        "simplified torque (5.1) against the full model",
+    ):
+        assert float(stored[GROUPS["rig"], fact]["ours"]) == pytest.approx(
+            known[fact].ours, rel=1e-4
+        )
     effects = {fact for group, fact in stored if group == GROUPS["effects"]}
-    assert {f"orders of 5.5 that hold, {name}" for name in (*EFFECTS, "nothing left out")} == effects
+    assert {
+        f"orders of 5.5 that hold, {name}" for name in (*EFFECTS, "nothing left out")
+    } == effects
     text = (DOCS / "chapter5.md").read_text(encoding="utf-8")
-    assert "`pamrs reproduce ch5 --output docs/reproduction/chapter5 --page docs/reproduction/chapter5.md`" in text.splitlines()[2]
+    assert (
+        "`pamrs reproduce ch5 --output docs/reproduction/chapter5 --page "
+        "docs/reproduction/chapter5.md`"
+    ) in text.splitlines()[2]
     links = re.findall(r"\]\(([^)]+\.png)\)", text)
     assert len(links) == 10
     assert all((DOCS / link).is_file() for link in links)

@@ -1,4 +1,6 @@
-"""The dissertation beside pamrs: how a statement is judged, the experiments of chapter 3, and the command."""
+"""The dissertation beside pamrs: how a statement is judged, the experiments of chapter 3, and the
+command.
+"""
 
 import csv
 import io
@@ -23,7 +25,8 @@ from pamrs.rig import Joint
 
 DOCS = Path(__file__).parents[2] / "docs" / "reproduction"
 AXIAL, OFFSET, TENDON = 1.56 * 0.0254, 0.42 * 0.0254, 3.04 * 0.0254
-#: Statements of the chapter's experiments with which ours do not agree; one that changes sides must be noticed.
+#: Statements of the chapter's experiments with which ours do not agree; one that changes sides must
+#: be noticed.
 DIFFER = {
     "torque where the range begins, at rest length",
     "last rotation with 200 ft lbf",
@@ -77,12 +80,16 @@ def test_verdict(published, ours, options, verdict):
 def test_a_fact_needs_a_source_and_a_criterion():
     with pytest.raises(ParameterError, match="where is empty: the fact 'fact'"):
         judge("group", "fact", " ", 1.0, 1.0)
-    with pytest.raises(ParameterError, match="relation = 'near' is not allowed: one of equals, above, below"):
+    with pytest.raises(
+        ParameterError, match="relation = 'near' is not allowed: one of equals, above, below"
+    ):
         judge("group", "fact", "3.2", 1.0, 1.0, relation="near")
     for tolerance in (-1.0, math.nan):
         with pytest.raises(ParameterError, match=f"tolerance = {tolerance}"):
             judge("group", "fact", "3.2", 1.0, 1.0, tolerance=tolerance)
-    assert judge("group", "fact", "3.2", 10.0, 9.0, "in", tolerance=0.5).criterion == "within 0.5 in"
+    assert (
+        judge("group", "fact", "3.2", 10.0, 9.0, "in", tolerance=0.5).criterion == "within 0.5 in"
+    )
     assert judge("group", "fact", "3.2", 10.0, 9.0, relation="below").criterion == "below"
 
 
@@ -111,14 +118,26 @@ def test_text_markdown_and_csv_have_every_fact():
     parsed = list(csv.DictReader(io.StringIO(to_csv(made))))
     assert [row["fact"] for row in parsed] == ["a | b", "c", "d"]
     assert parsed[0]["relative"] == "-0.1"
-    assert (parsed[1]["used"], parsed[2]["ours"], parsed[2]["verdict"]) == ("yes", "", "cannot tell")
+    assert (parsed[1]["used"], parsed[2]["ours"], parsed[2]["verdict"]) == (
+        "yes",
+        "",
+        "cannot tell",
+    )
     assert verdicts(made) == "1 agree (1 used to identify), 1 differ, 1 cannot tell"
 
 
 def test_page_shows_command_numbers_and_pictures_from_where_it_stands():
     row = judge("group", "fact", "3.2", 1.0, 1.0)
     pictures = [Picture("one", "group", "What it shows", b"")]
-    section = Section("Title", [row], {}, ["In short."], [("a.b", "1 m", "the reason")], pictures, [("nu", "error squared", "rad2 s")])
+    section = Section(
+        "Title",
+        [row],
+        {},
+        ["In short."],
+        [("a.b", "1 m", "the reason")],
+        pictures,
+        [("nu", "error squared", "rad2 s")],
+    )
     text = page([section], "pamrs reproduce x", "pictures/here")
     assert text.splitlines()[2].startswith("Made by `pamrs reproduce x`")
     assert "![What it shows](pictures/here/one.png)" in text
@@ -132,15 +151,32 @@ def test_page_shows_command_numbers_and_pictures_from_where_it_stands():
 def test_page_in_the_documentation_explains_the_symbols_that_it_uses(name):
     text = (DOCS / f"{name.replace('ch', 'chapter')}.md").read_text(encoding="utf-8")
     table = [f"| {' | '.join(row)} |" for row in symbols(name)]
-    assert "\n".join(["### Symbols and abbreviations", "", "| symbol | meaning | unit |", "|---|---|---|", *table, "", "### "]) in text
+    assert (
+        "\n".join(
+            [
+                "### Symbols and abbreviations",
+                "",
+                "| symbol | meaning | unit |",
+                "|---|---|---|",
+                *table,
+                "",
+                "### ",
+            ]
+        )
+        in text
+    )
     rest = text.replace("\n".join(table), "")
     for symbol in (word.strip() for row in symbols(name) for word in row[0].split(",")):
-        assert re.search(rf"\b{re.escape(symbol.removeprefix('effects such as ').strip('`'))}\b", rest), symbol
+        assert re.search(
+            rf"\b{re.escape(symbol.removeprefix('effects such as ').strip('`'))}\b", rest
+        ), symbol
     assert [line for line in page([], "x").splitlines()[4:] if line not in text] == []
 
 
 def test_symbols_of_no_chapter_are_refused():
-    with pytest.raises(ParameterError, match="chapter = 'ch9' is not allowed: one of ch3, ch4, ch5"):
+    with pytest.raises(
+        ParameterError, match="chapter = 'ch9' is not allowed: one of ch3, ch4, ch5"
+    ):
         symbols("ch9")
 
 
@@ -148,10 +184,14 @@ def test_symbols_of_no_chapter_are_refused():
 
 
 def geometry(rotation):
-    """(3.1)-(3.8) as printed, from the tendon's end: contraction, torque per pull as printed and with power conserved."""
+    """(3.1)-(3.8) as printed, from the tendon's end: contraction, torque per pull as printed and
+    with power conserved.
+    """
     angle = elbow.rest_angle() + rotation
     reach = math.hypot(AXIAL, OFFSET)
-    between = math.pi - angle - math.atan2(OFFSET, AXIAL)  # the lower end's direction from the upper link
+    between = (
+        math.pi - angle - math.atan2(OFFSET, AXIAL)
+    )  # the lower end's direction from the upper link
     x, y = reach * np.cos(between), reach * np.sin(between)
     upper = x + np.sqrt(TENDON**2 - (OFFSET - y) ** 2)  # the upper end's place along its link
     ao = np.hypot(upper, OFFSET)
@@ -166,7 +206,9 @@ def test_rig_has_the_librarys_muscle_and_the_printed_tendon():
     assert rig.muscle.replace(count=1).parameters == library.entry("elbow_0625in").muscle.parameters
     assert rig.model["muscle"]["count"] == 6
     contraction, _, _ = geometry(0.0)
-    assert contraction == pytest.approx(0.0, abs=1e-8)  # the rest angle is that of a tendon of 3.04 in
+    assert contraction == pytest.approx(
+        0.0, abs=1e-8
+    )  # the rest angle is that of a tendon of 3.04 in
     arm = rig.model["arm"]
     mass = 7.0 * 20.0 / 33.0
     assert arm["first_moment"] == pytest.approx(mass * 0.508 / 2.0, rel=1e-3)
@@ -177,9 +219,13 @@ def test_rig_has_the_librarys_muscle_and_the_printed_tendon():
 def test_torque_laws_are_the_printed_equations_and_power():
     rotation = np.radians(np.linspace(0.0, 110.0, 56))
     contraction, printed, conserving = geometry(rotation)
-    force = 6.0 * rigs.named("elbow").muscle.force(150.0 * elbow.PSI, contraction / (7.785 * 0.0254))
+    force = 6.0 * rigs.named("elbow").muscle.force(
+        150.0 * elbow.PSI, contraction / (7.785 * 0.0254)
+    )
     # the file has the rest angle to 1e-5 deg
-    np.testing.assert_allclose(elbow.elbow_torque(rotation, law="printed"), force * printed, rtol=1e-5)
+    np.testing.assert_allclose(
+        elbow.elbow_torque(rotation, law="printed"), force * printed, rtol=1e-5
+    )
     np.testing.assert_allclose(elbow.elbow_torque(rotation), force * conserving, rtol=1e-5)
     fine = np.linspace(0.1, 1.8, 20001)
     travel = geometry(fine)[0]
@@ -190,7 +236,9 @@ def test_torque_laws_are_the_printed_equations_and_power():
 
 def test_range_is_where_the_torque_is_enough():
     first, last = elbow.torque_range(elbow.elbow_torque, 200.0 * elbow.FOOT_POUND)
-    np.testing.assert_allclose(elbow.elbow_torque([first, last]) / elbow.FOOT_POUND, 200.0, rtol=1e-9)
+    np.testing.assert_allclose(
+        elbow.elbow_torque([first, last]) / elbow.FOOT_POUND, 200.0, rtol=1e-9
+    )
     assert np.all(elbow.elbow_torque(np.linspace(first, last, 99)[1:-1]) > 200.0 * elbow.FOOT_POUND)
     assert np.isnan(elbow.torque_range(elbow.elbow_torque, 1e4)).all()
     assert elbow.torque_range(lambda x: np.ones_like(x), 0.5, last=1.0) == (0.0, 1.0)
@@ -199,33 +247,48 @@ def test_range_is_where_the_torque_is_enough():
 @pytest.mark.parametrize("share", [0.0, 0.3, 1.0])
 def test_muscle_of_chapter_3_has_gaylords_blocked_force_and_the_free_contraction(share):
     muscle = elbow.mooney_rivlin(share)
-    assert float(muscle.force(150.0 * elbow.PSI, 0.0)) / 4.4482216152605 == pytest.approx(879.8, abs=0.1)
+    assert float(muscle.force(150.0 * elbow.PSI, 0.0)) / 4.4482216152605 == pytest.approx(
+        879.8, abs=0.1
+    )
     assert abs(float(muscle.force(150.0 * elbow.PSI, 0.37))) < 1e-6
-    assert muscle.parameters["c01"] == pytest.approx(share * (muscle.parameters["c01"] + muscle.parameters["c10"]))
+    assert muscle.parameters["c01"] == pytest.approx(
+        share * (muscle.parameters["c01"] + muscle.parameters["c10"])
+    )
     with pytest.raises(ParameterError, match="share = 1.5"):
         elbow.mooney_rivlin(1.5)
 
 
 def test_steeper_braid_has_force_and_diameter_of_table_3_2():
     muscle = elbow.steeper_braid()
-    assert float(muscle.force(150.0 * elbow.PSI, 0.0)) / 4.4482216152605 == pytest.approx(820.0, rel=0.02)
+    assert float(muscle.force(150.0 * elbow.PSI, 0.0)) / 4.4482216152605 == pytest.approx(
+        820.0, rel=0.02
+    )
     assert abs(float(muscle.force(150.0 * elbow.PSI, 0.37))) < 1e-6
-    assert 2.0 * float(muscle.replace(geometry="cylinder").radius(0.37)) / 0.0254 == pytest.approx(1.75, rel=0.01)
+    assert 2.0 * float(muscle.replace(geometry="cylinder").radius(0.37)) / 0.0254 == pytest.approx(
+        1.75, rel=0.01
+    )
 
 
 def test_payload_torque():
-    assert float(elbow.payload_torque(100.0, math.pi / 2)) / elbow.FOOT_POUND == pytest.approx(100.0 * 20.0 / 12.0, rel=1e-12)
-    assert float(elbow.payload_torque(380.0, math.pi / 6, 0.1778)) / elbow.FOOT_POUND == pytest.approx(
-        0.5 * 380.0 * 7.0 / 12.0, rel=1e-12
+    assert float(elbow.payload_torque(100.0, math.pi / 2)) / elbow.FOOT_POUND == pytest.approx(
+        100.0 * 20.0 / 12.0, rel=1e-12
     )
+    assert float(
+        elbow.payload_torque(380.0, math.pi / 6, 0.1778)
+    ) / elbow.FOOT_POUND == pytest.approx(0.5 * 380.0 * 7.0 / 12.0, rel=1e-12)
 
 
 def test_static_curve_balances_and_has_the_slope_of_its_points():
     curve = elbow.static_curve(135.0, law="printed")
     arm = rigs.named("elbow").model["arm"]
     weight = elbow.payload_torque(135.0, elbow.rest_angle() + curve.rotation)
-    weight = weight + arm["first_moment"] * arm["gravity"] * np.sin(elbow.rest_angle() + curve.rotation)
-    torque = [float(elbow.elbow_torque(r, law="printed", psi=p)) for r, p in zip(curve.rotation, curve.psi, strict=True)]
+    weight = weight + arm["first_moment"] * arm["gravity"] * np.sin(
+        elbow.rest_angle() + curve.rotation
+    )
+    torque = [
+        float(elbow.elbow_torque(r, law="printed", psi=p))
+        for r, p in zip(curve.rotation, curve.psi, strict=True)
+    ]
     np.testing.assert_allclose(torque, weight, rtol=1e-9)
     assert curve.psi[-1] == pytest.approx(150.0, rel=1e-9)
     between = np.diff(curve.rotation) / np.diff(curve.psi)
@@ -236,15 +299,21 @@ def test_static_curve_balances_and_has_the_slope_of_its_points():
 def test_slow_simulation_follows_the_static_curve():
     curve = elbow.static_curve(135.0)
     slow = elbow.triangle(frequency=0.005)
-    rising, falling = elbow.at_same_pressure(slow, slow["joint_angle"] - elbow.rest_angle(), curve.psi[20:-5])
-    np.testing.assert_allclose(0.5 * (rising + falling), curve.rotation[20:-5], atol=math.radians(1.0))
+    rising, falling = elbow.at_same_pressure(
+        slow, slow["joint_angle"] - elbow.rest_angle(), curve.psi[20:-5]
+    )
+    np.testing.assert_allclose(
+        0.5 * (rising + falling), curve.rotation[20:-5], atol=math.radians(1.0)
+    )
 
 
 def test_hysteresis_turns_the_loop_the_published_way():
     loops = {}
     for hysteresis in (False, True):
         result = elbow.triangle(hysteresis=hysteresis)
-        rising, falling = elbow.at_same_pressure(result, result["joint_angle"], np.linspace(45.0, 140.0, 20))
+        rising, falling = elbow.at_same_pressure(
+            result, result["joint_angle"], np.linspace(45.0, 140.0, 20)
+        )
         loops[hysteresis] = float(np.degrees(falling - rising).mean())
     assert 0.0 < loops[False] < 2.0 < loops[True]
 
@@ -254,7 +323,9 @@ def test_step_and_the_valve_that_gives_a_peak():
     result, rotation = ours.simulation, ours.simulation["joint_angle"] - elbow.rest_angle()
     assert ours.area == pytest.approx(8.4e-6)
     assert ours.peak == result["joint_rate"].max()
-    assert float(np.interp(ours.arrival, result.time, rotation)) == pytest.approx(math.radians(90.0), abs=1e-6)
+    assert float(np.interp(ours.arrival, result.time, rotation)) == pytest.approx(
+        math.radians(90.0), abs=1e-6
+    )
     assert rotation[result.time < ours.arrival].max() < math.radians(90.0)
     assert ours.mean == pytest.approx(math.radians(90.0) / ours.arrival)
     area = elbow.valve_for_peak(math.radians(200.0))
@@ -279,7 +350,9 @@ def test_ramp_is_cut_off_at_what_was_reached():
 
 
 def test_bad_arguments():
-    with pytest.raises(ParameterError, match="law = 'other' is not allowed: one of conserving, printed"):
+    with pytest.raises(
+        ParameterError, match="law = 'other' is not allowed: one of conserving, printed"
+    ):
         elbow.arm_rig(law="other")
     with pytest.raises(ParameterError, match="arm.payload"):
         elbow.arm_rig(pounds=-1.0)
@@ -291,17 +364,39 @@ def test_bad_arguments():
 def test_every_fact_has_a_source_in_the_chapter(rows):
     for row in rows:
         assert re.search(r"\b3\.\d|Table 3", row.where), row
-        assert row.unit or row.relation != "equals" or row.tolerance or row.published == int(row.published)
+        assert (
+            row.unit
+            or row.relation != "equals"
+            or row.tolerance
+            or row.published == int(row.published)
+        )
     assert len({(row.group, row.fact) for row in rows}) == len(rows)
     places = " ".join(row.where for row in rows)
-    for place in ("Table 3.1", "Table 3.2", "Table 3.3", "3.2.2", "3.2.3", "3.2.4", "3.2.5", "3.3.2", "3.4", "3.5", "3.6", "Fig. 3.16"):
+    for place in (
+        "Table 3.1",
+        "Table 3.2",
+        "Table 3.3",
+        "3.2.2",
+        "3.2.3",
+        "3.2.4",
+        "3.2.5",
+        "3.3.2",
+        "3.4",
+        "3.5",
+        "3.6",
+        "Fig. 3.16",
+    ):
         assert place in places
 
 
 def test_verdicts_of_the_chapter(rows):
     own = [row for row in rows if row.group in chapter3.GROUPS.values()]
     assert {row.fact for row in own if row.verdict == "differs"} == DIFFER
-    assert all(row.note for row in own if row.verdict == "differs" and row.fact != "rotation at the largest torque")
+    assert all(
+        row.note
+        for row in own
+        if row.verdict == "differs" and row.fact != "rotation at the largest torque"
+    )
     assert all(row.note for row in rows if row.verdict == "cannot tell")
     assert [row.fact for row in own if row.used] == ["peak rate, valve area chosen for it"]
     assert {row.verdict for row in rows} == {"agree", "differs", "cannot tell"}
@@ -309,18 +404,38 @@ def test_verdicts_of_the_chapter(rows):
 
 def test_the_printed_torque_law_is_what_fits_and_the_table_says_so(rows):
     by = {row.fact: row for row in rows if row.group in chapter3.GROUPS.values()}
-    for fact in ("last rotation with 200 ft lbf", "largest torque", "rotation at the largest torque"):
+    for fact in (
+        "last rotation with 200 ft lbf",
+        "largest torque",
+        "rotation at the largest torque",
+    ):
         plain, printed = by[fact], by[f"{fact}, torque as printed in (3.6)-(3.8)"]
         assert abs(printed.relative) < chapter3.SHARE < abs(plain.relative)
     text = " ".join(chapter3.in_short(rows))
-    assert f"{by['last rotation with 200 ft lbf, torque as printed in (3.6)-(3.8)'].ours:.1f} deg (published 78)" in text
+    assert (
+        f"{by['last rotation with 200 ft lbf, torque as printed in (3.6)-(3.8)'].ours:.1f} deg "
+        "(published 78)"
+    ) in text
 
 
 def test_every_number_chosen_is_the_rigs_and_says_from_where():
     rig = rigs.named("elbow")
-    assert [name for name, _, reason in chapter3.chosen() if name not in rig.parameters or len(reason) < 10] == []
+    assert [
+        name
+        for name, _, reason in chapter3.chosen()
+        if name not in rig.parameters or len(reason) < 10
+    ] == []
     lines = (Path(rigs.__file__).parent / "elbow.toml").read_text(encoding="utf-8").splitlines()
-    for name in ("discharge_area_max", "dead_volume", "inertia", "first_moment", "viscous", "coulomb", "max_angle", "volume"):
+    for name in (
+        "discharge_area_max",
+        "dead_volume",
+        "inertia",
+        "first_moment",
+        "viscous",
+        "coulomb",
+        "max_angle",
+        "volume",
+    ):
         line = next(line for line in lines if line.startswith(f"{name} "))
         assert "#" in line, f"{name} has no origin"
 
@@ -330,9 +445,14 @@ def test_page_in_the_documentation_is_what_the_command_makes(rows):
     for row in rows:
         there = stored[row.group, row.fact]
         assert there["verdict"] == row.verdict
-        assert float(there["ours"] or "nan") == pytest.approx(row.ours, rel=1e-4, abs=1e-6, nan_ok=True)
+        assert float(there["ours"] or "nan") == pytest.approx(
+            row.ours, rel=1e-4, abs=1e-6, nan_ok=True
+        )
     text = (DOCS / "chapter3.md").read_text(encoding="utf-8")
-    command = "pamrs reproduce ch3 --output docs/reproduction/chapter3 --page docs/reproduction/chapter3.md"
+    command = (
+        "pamrs reproduce ch3 --output docs/reproduction/chapter3 --page "
+        "docs/reproduction/chapter3.md"
+    )
     assert f"`{command}`" in text.splitlines()[2]
     links = re.findall(r"\]\(([^)]+\.png)\)", text)
     assert len(links) >= 8
@@ -382,7 +502,11 @@ def test_command_refuses_chapters_that_there_are_not(capsys, tmp_path):
 
 
 def test_missing_plot_package_is_named(capsys, tmp_path, monkeypatch):
-    for name in [name for name in sys.modules if name.startswith(("matplotlib", "pamrs.reproduce._chapter3_fig", "pamrs.report.fig"))]:
+    for name in [
+        name
+        for name in sys.modules
+        if name.startswith(("matplotlib", "pamrs.reproduce._chapter3_fig", "pamrs.report.fig"))
+    ]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     code, out, err = run(capsys, "ch3", "--output", tmp_path, "--no-search")

@@ -1,4 +1,6 @@
-"""Rigs of several groups and joints: blocks with names, the rigs of the package, and what the core gets of them."""
+"""Rigs of several groups and joints: blocks with names, the rigs of the package, and what the core
+gets of them.
+"""
 
 from __future__ import annotations
 
@@ -52,7 +54,9 @@ def test_packaged_rigs_read_back_to_the_last_bit(name: str, tmp_path: Path) -> N
     assert same(rig, load_rig(rig.to_toml(tmp_path / "again.toml")))
     assert same(rig, parse_rig(parse_rig(rig.to_toml_text()).to_toml_text()))
     assert same(rig, pickle.loads(pickle.dumps(rig)))
-    assert same(rig, rig.with_parameters({name: given.value for name, given in rig.parameters.items()}))
+    assert same(
+        rig, rig.with_parameters({name: given.value for name, given in rig.parameters.items()})
+    )
     renamed = parse_rig(rigs.template(name, "mine"))
     assert renamed.name == "mine"
     assert renamed.parameters == rig.parameters
@@ -62,7 +66,13 @@ def test_packaged_rigs_read_back_to_the_last_bit(name: str, tmp_path: Path) -> N
 def test_pickling_leaves_out_what_is_made_again() -> None:
     rig = rigs.named("antagonistic_joint")
     assert rig.ports("valve")["flexor"]["to"] == "chamber.flexor"
-    assert set(pickle.loads(pickle.dumps(rig)).__dict__) == {"name", "_model", "_tolerances", "_effect_std", "source"}
+    assert set(pickle.loads(pickle.dumps(rig)).__dict__) == {
+        "name",
+        "_model",
+        "_tolerances",
+        "_effect_std",
+        "source",
+    }
 
 
 def test_muscles_of_the_packaged_rigs_are_those_of_the_library() -> None:
@@ -77,7 +87,9 @@ def test_muscles_of_the_packaged_rigs_are_those_of_the_library() -> None:
         found, wanted = rigs.named(rig).muscle_of(name).parameters, muscle.parameters
         for key, value in wanted.items():
             if key != "count":
-                assert found[key] == (pytest.approx(value) if not isinstance(value, str) else value), (rig, key)
+                assert found[key] == (
+                    pytest.approx(value) if not isinstance(value, str) else value
+                ), (rig, key)
 
 
 def test_packaged_joints_stay_within_what_their_muscles_can_do() -> None:
@@ -92,7 +104,10 @@ def test_packaged_joints_stay_within_what_their_muscles_can_do() -> None:
             geometry = pamrs.Joint.from_model(transmissions.get(muscle, joint))
             model = rig.muscle_of(muscle)
             least, most = model.contraction_range
-            contraction = geometry.shortening([low, 0.5 * (low + high), high]) / model.parameters["rest_length"]
+            contraction = (
+                geometry.shortening([low, 0.5 * (low + high), high])
+                / model.parameters["rest_length"]
+            )
             assert least <= contraction.min() <= contraction.max() <= most, (name, muscle)
 
 
@@ -130,7 +145,9 @@ def test_tables_of_blocks_with_and_without_names() -> None:
     assert rig.tables("transmission")["extensor"]["radius"] == -0.02
     rig.tables("valve")["flexor"]["half_range"] = 0.0
     assert rig.tables("valve")["flexor"]["half_range"] == 5.0
-    with pytest.raises(ParameterError, match="block = 'valves' is not allowed: one of gas, supply, valve"):
+    with pytest.raises(
+        ParameterError, match="block = 'valves' is not allowed: one of gas, supply, valve"
+    ):
         rig.tables("valves")
     with pytest.raises(ParameterError, match="block = 'tank'"):
         rig.ports("tank")
@@ -160,12 +177,21 @@ def test_parameters_of_named_blocks() -> None:
     assert "supply.initial_pressure" in rig.parameters
     assert "supply.volume" not in rig.parameters
     assert "arm.inertia" not in rig.parameters
-    other = rig.with_parameters({"muscle.wrist.count": 4, "arm.gravity": 1.6, "link.hand.payload": 0.0})
+    other = rig.with_parameters(
+        {"muscle.wrist.count": 4, "arm.gravity": 1.6, "link.hand.payload": 0.0}
+    )
     assert other.tables("muscle")["wrist"]["count"] == 4
     assert other.tables("muscle")["elbow"]["count"] == 6
     assert other.parameters["link.hand.payload"].tol == rig.parameters["link.hand.payload"].tol
     assert other.ports("link") == rig.ports("link")
-    for name in ("valve.discharge_area_max", "valve.hand.half_range", "valve.elbow.from", "valve.elbow", "supply.volume", "ports.x"):
+    for name in (
+        "valve.discharge_area_max",
+        "valve.hand.half_range",
+        "valve.elbow.from",
+        "valve.elbow",
+        "supply.volume",
+        "ports.x",
+    ):
         with pytest.raises(ParameterError, match="has no parameter"):
             rig.with_parameters({name: 1.0})
     with pytest.raises(ParameterError, match=r"link\.hand\.payload = -1 kg"):
@@ -173,7 +199,9 @@ def test_parameters_of_named_blocks() -> None:
 
 
 def test_unknown_and_tolerance_of_named_blocks_survive() -> None:
-    text = stand("chamber.a", "chamber.b").replace('unit = "cm3" }', 'unit = "cm3", unknown = true }', 1)
+    text = stand("chamber.a", "chamber.b").replace(
+        'unit = "cm3" }', 'unit = "cm3", unknown = true }', 1
+    )
     rig = parse_rig(text.replace('unit = "cm3" }', 'unit = "cm3", tol = 0.5 }', 1))
     assert not rig.parameters["chamber.a.dead_volume"].known
     assert rig.parameters["chamber.b.dead_volume"].tol == pytest.approx(5e-7)
@@ -185,9 +213,14 @@ def test_the_muscle_of_a_rig_with_one_and_with_several() -> None:
     assert one.muscle is not None
     assert one.muscle.parameters == one.muscle_of("left").parameters
     pair = rigs.named("antagonistic_joint")
-    with pytest.raises(ParameterError, match=r"has the muscles flexor, extensor: take one by Rig\.muscle_of\(name\)"):
+    with pytest.raises(
+        ParameterError,
+        match=r"has the muscles flexor, extensor: take one by Rig\.muscle_of\(name\)",
+    ):
         _ = pair.muscle
-    with pytest.raises(ParameterError, match=r"name = '' .*|has no such muscle; it has: 'flexor', 'extensor'"):
+    with pytest.raises(
+        ParameterError, match=r"name = '' .*|has no such muscle; it has: 'flexor', 'extensor'"
+    ):
         pair.muscle_of()
     assert pair.muscle_of("flexor").parameters["friction_coefficient"] == 0.16
     with pytest.raises(ParameterError, match="it has: none"):
@@ -199,20 +232,51 @@ def test_the_muscle_of_a_rig_with_one_and_with_several() -> None:
 
 def test_json_of_the_shoulder() -> None:
     model = rigs.shoulder().model
-    joint = {key: model["joint"][key] for key in ("upper_axial", "upper_offset", "lower_axial", "lower_offset", "rest_angle")}
-    stops = {key: model["joint"][key] for key in ("min_angle", "max_angle", "stop_stiffness", "stop_damping")}
+    joint = {
+        key: model["joint"][key]
+        for key in ("upper_axial", "upper_offset", "lower_axial", "lower_offset", "rest_angle")
+    }
+    stops = {
+        key: model["joint"][key]
+        for key in ("min_angle", "max_angle", "stop_stiffness", "stop_damping")
+    }
     assert core(rigs.shoulder()) == {
         "name": "shoulder",
-        "gas": {"ambient_pressure": 101325.0, "temperature": 293.15, "gas_constant": 287.05, "heat_capacity_ratio": 1.4},
+        "gas": {
+            "ambient_pressure": 101325.0,
+            "temperature": 293.15,
+            "gas_constant": 287.05,
+            "heat_capacity_ratio": 1.4,
+        },
         "supplies": [{"name": "", "kind": "tank", "volume": 0.015, "initial_pressure": 13.8e5}],
         "valves": [{"name": "", "from": "supply", "to": "chamber", **model["valve"]}],
         "lines": [],
         "chambers": [
-            {"name": "", "dead_volume": 1.5e-4, "initial_pressure": 0.0, "alpha_in": 1.4, "alpha_out": 1.0, "alpha": 1.2},
+            {
+                "name": "",
+                "dead_volume": 1.5e-4,
+                "initial_pressure": 0.0,
+                "alpha_in": 1.4,
+                "alpha_out": 1.0,
+                "alpha": 1.2,
+            },
         ],
-        "muscles": [{"name": "", "chamber": "chamber", "joint": "joint", "transmission": None, "muscle": model["muscle"]}],
+        "muscles": [
+            {
+                "name": "",
+                "chamber": "chamber",
+                "joint": "joint",
+                "transmission": None,
+                "muscle": model["muscle"],
+            }
+        ],
         "joints": [
-            {"name": "", "transmission": {"kind": "tendon", **joint}, "rest_angle": joint["rest_angle"], **stops},
+            {
+                "name": "",
+                "transmission": {"kind": "tendon", **joint},
+                "rest_angle": joint["rest_angle"],
+                **stops,
+            },
         ],
         "arm": {
             "kind": "one_link",
@@ -241,12 +305,23 @@ def test_json_of_an_antagonistic_pair() -> None:
         "opening": [0.0, 0.25, 0.5, 0.75, 1.0],
         "fraction": [0.0, 0.2, 0.5, 0.8, 1.0],
     }
-    air = {"dead_volume": pytest.approx(6e-6), "initial_pressure": 2e5, "alpha_in": 1.4, "alpha_out": 1.0, "alpha": 1.2}
+    air = {
+        "dead_volume": pytest.approx(6e-6),
+        "initial_pressure": 2e5,
+        "alpha_in": 1.4,
+        "alpha_out": 1.0,
+        "alpha": 1.2,
+    }
     quarter = pytest.approx(math.pi / 2)
     arm = rig.model["arm"]
     assert core(rig) == {
         "name": "antagonistic_joint",
-        "gas": {"ambient_pressure": 101325.0, "temperature": 293.15, "gas_constant": 287.05, "heat_capacity_ratio": 1.4},
+        "gas": {
+            "ambient_pressure": 101325.0,
+            "temperature": 293.15,
+            "gas_constant": 287.05,
+            "heat_capacity_ratio": 1.4,
+        },
         "supplies": [{"name": "", "kind": "tank", "volume": 0.005, "initial_pressure": 6e5}],
         "valves": [
             {"name": "flexor", "from": "supply", "to": "chamber.flexor", **valve},
@@ -283,7 +358,10 @@ def test_json_of_an_antagonistic_pair() -> None:
         ],
         "arm": {"kind": "one_link", **{key: arm[key] for key in arm if key != "kind"}, "links": []},
         "load": None,
-        "sensors": [{"name": name, "pressure_zero": 0.0, "angle_zero": 0.0} for name in ("flexor", "extensor", "elbow")],
+        "sensors": [
+            {"name": name, "pressure_zero": 0.0, "angle_zero": 0.0}
+            for name in ("flexor", "extensor", "elbow")
+        ],
         "effects": [],
     }
     assert list(core(rig)["muscles"][0]["muscle"]) == list(rigs.shoulder().model["muscle"])
@@ -300,11 +378,19 @@ def test_json_of_lines_regulators_and_links() -> None:
     assert nozzle["arm"] is None
     fed = core(rigs.named("regulated_joint"))
     assert fed["supplies"] == [
-        {"name": "", "kind": "regulator", "initial_pressure": 0.0, "time_constant": 0.1, "droop": pytest.approx(3e6)},
+        {
+            "name": "",
+            "kind": "regulator",
+            "initial_pressure": 0.0,
+            "time_constant": 0.1,
+            "droop": pytest.approx(3e6),
+        },
     ]
     assert (fed["lines"][0]["from"], fed["lines"][0]["to"]) == ("supply", "chamber")
     arm = rigs.named("two_joint_arm")
-    assert core(arm)["supplies"] == [{"name": "", "kind": "constant", "initial_pressure": pytest.approx(8.3e5)}]
+    assert core(arm)["supplies"] == [
+        {"name": "", "kind": "constant", "initial_pressure": pytest.approx(8.3e5)}
+    ]
     links = arm.tables("link")
     assert core(arm)["arm"] == {
         "kind": "planar",
@@ -317,15 +403,27 @@ def test_json_of_lines_regulators_and_links() -> None:
     keys = ["length", "mass", "centre", "inertia", "payload", "viscous", "coulomb", "coulomb_speed"]
     assert list(links["hand"]) == keys
     load = core(rigs.named("bench"))["load"]
-    assert load == {"kind": "frame", "min_length": pytest.approx(0.17), "max_length": pytest.approx(0.285)}
+    assert load == {
+        "kind": "frame",
+        "min_length": pytest.approx(0.17),
+        "max_length": pytest.approx(0.285),
+    }
     assert core(rigs.named("bench"))["muscles"][0]["joint"] == "load"
 
 
 def test_json_of_a_line_that_valves_feed() -> None:
-    rig = parse_rig(stand("supply", "valve.a", "valve.b", "line.a", "line.b", "chamber.a", "chamber.b"))
+    rig = parse_rig(
+        stand("supply", "valve.a", "valve.b", "line.a", "line.b", "chamber.a", "chamber.b")
+    )
     found = core(rig)
-    assert [(valve["from"], valve["to"]) for valve in found["valves"]] == [("supply", "line.a"), ("supply", "line.b")]
-    assert [(line["from"], line["to"]) for line in found["lines"]] == [("", "chamber.a"), ("", "chamber.b")]
+    assert [(valve["from"], valve["to"]) for valve in found["valves"]] == [
+        ("supply", "line.a"),
+        ("supply", "line.b"),
+    ]
+    assert [(line["from"], line["to"]) for line in found["lines"]] == [
+        ("", "chamber.a"),
+        ("", "chamber.b"),
+    ]
     assert rig.wiring[0] == "air: supply -> valve.a -> line.a -> chamber.a -> ambient"
 
 
@@ -342,17 +440,33 @@ def test_sensors_belong_to_the_chamber_and_the_joint_of_their_name() -> None:
         "elbow": {"angle_zero": 0.0},
     }
     assert "sensors.flexor.angle_zero" not in pair.parameters
-    moved = pair.with_parameters({"sensors.elbow.angle_zero": 0.01, "sensors.flexor.pressure_zero": 500.0})
+    moved = pair.with_parameters(
+        {"sensors.elbow.angle_zero": 0.01, "sensors.flexor.pressure_zero": 500.0}
+    )
     assert core(moved)["sensors"] == [
         {"name": "flexor", "pressure_zero": 500.0, "angle_zero": 0.0},
         {"name": "extensor", "pressure_zero": 0.0, "angle_zero": 0.0},
         {"name": "elbow", "pressure_zero": 0.0, "angle_zero": 0.01},
     ]
-    text = stand("chamber.flexor", "sensors.flexor", sensors_flexor='angle_zero = { value = 1, unit = "deg" }')
+    text = stand(
+        "chamber.flexor",
+        "sensors.flexor",
+        sensors_flexor='angle_zero = { value = 1, unit = "deg" }',
+    )
     assert "sensors.flexor.angle_zero is not allowed: the rig has no joint.flexor" in refused(text)
-    common = parse_rig(stand("chamber.a", "chamber.b", "sensors", sensors='pressure_zero = { value = 1, unit = "kPa" }'))
+    common = parse_rig(
+        stand(
+            "chamber.a",
+            "chamber.b",
+            "sensors",
+            sensors='pressure_zero = { value = 1, unit = "kPa" }',
+        )
+    )
     assert core(common)["sensors"] == [{"name": "", "pressure_zero": 1000.0, "angle_zero": 0.0}]
-    assert parse_rig(stand("chamber.a", "chamber.b")).model["sensors"] == {"pressure_zero": 0.0, "angle_zero": 0.0}
+    assert parse_rig(stand("chamber.a", "chamber.b")).model["sensors"] == {
+        "pressure_zero": 0.0,
+        "angle_zero": 0.0,
+    }
 
 
 # ------------------------------------------------------------------------------- effects
@@ -360,9 +474,14 @@ def test_sensors_belong_to_the_chamber_and_the_joint_of_their_name() -> None:
 
 def test_an_effect_on_one_block() -> None:
     pair = rigs.named("antagonistic_joint")
-    rig = pair.with_effect("leak_muscle", {"conductance": 1e-11}, std={"conductance": 1e-12}, at="chamber.extensor")
+    rig = pair.with_effect(
+        "leak_muscle", {"conductance": 1e-11}, std={"conductance": 1e-12}, at="chamber.extensor"
+    )
     rig = rig.with_effect("muscle_hysteresis")
-    assert [(entry["id"], entry.get("at")) for entry in rig.effects] == [("leak_muscle", "extensor"), ("muscle_hysteresis", None)]
+    assert [(entry["id"], entry.get("at")) for entry in rig.effects] == [
+        ("leak_muscle", "extensor"),
+        ("muscle_hysteresis", None),
+    ]
     assert [entry["at"] for entry in core(rig)["effects"]] == ["extensor", ""]
     assert same(rig, parse_rig(rig.to_toml_text()))
     assert same(rig, pickle.loads(pickle.dumps(rig)))
@@ -372,8 +491,12 @@ def test_an_effect_on_one_block() -> None:
     assert same(other, parse_rig(other.to_toml_text()))
     assert other.without_effect("leak_muscle", at="flexor").effects == rig.effects
     assert [entry.get("at") for entry in other.with_effect("leak_muscle").effects] == [None, None]
-    assert rig.without_effect("leak_muscle").effects == pair.with_effect("muscle_hysteresis").effects
-    with pytest.raises(ParameterError, match="leak_muscle: at = 'flexr' names no chamber; did you mean 'flexor'"):
+    assert (
+        rig.without_effect("leak_muscle").effects == pair.with_effect("muscle_hysteresis").effects
+    )
+    with pytest.raises(
+        ParameterError, match="leak_muscle: at = 'flexr' names no chamber; did you mean 'flexor'"
+    ):
         pair.with_effect("leak_muscle", at="flexr")
     with pytest.raises(ParameterError, match="there are: flexor, extensor"):
         pair.with_effect("muscle_hysteresis", at="elbow")
@@ -385,12 +508,18 @@ def test_effects_in_a_file_name_their_block() -> None:
     leak = '[[effects]]\nid = "leak_muscle"\n'
     assert parse_rig(text + leak + 'at = "a"\n').effects[0]["at"] == "a"
     assert parse_rig(text + leak + 'at = "chamber.b"\n').effects[0]["at"] == "b"
-    assert "leak_muscle: at = 'c' names no chamber; there are: a, b" in refused(text + leak + 'at = "c"\n')
-    assert "effects[0].at = 3 is not allowed: the name of a chamber" in refused(text + leak + "at = 3\n")
+    assert "leak_muscle: at = 'c' names no chamber; there are: a, b" in refused(
+        text + leak + 'at = "c"\n'
+    )
+    assert "effects[0].at = 3 is not allowed: the name of a chamber" in refused(
+        text + leak + "at = 3\n"
+    )
     both = parse_rig(text + leak + 'at = "a"\n' + leak + 'at = "b"\n')
     assert [entry["at"] for entry in both.effects] == ["a", "b"]
     for other in ('at = "a"\n', ""):
-        assert "effects[1].id = 'leak_muscle' is there twice" in refused(text + leak + 'at = "a"\n' + leak + other)
+        assert "effects[1].id = 'leak_muscle' is there twice" in refused(
+            text + leak + 'at = "a"\n' + leak + other
+        )
     assert "effects[0].form = 'wide' is not allowed" in refused(text + leak + 'form = "wide"\n')
     assert "there is none with a name" in refused(stand("chamber") + leak + 'at = "a"\n')
 
@@ -399,7 +528,10 @@ def test_effects_in_a_file_name_their_block() -> None:
 
 
 def test_the_wiring_in_words() -> None:
-    assert rigs.shoulder().wiring == ["air: supply -> valve -> chamber -> ambient", "pull: chamber -> muscle -> joint -> arm"]
+    assert rigs.shoulder().wiring == [
+        "air: supply -> valve -> chamber -> ambient",
+        "pull: chamber -> muscle -> joint -> arm",
+    ]
     assert rigs.named("antagonistic_joint").wiring == [
         "air: supply -> valve.flexor -> chamber.flexor -> ambient",
         "air: supply -> valve.extensor -> chamber.extensor -> ambient",
@@ -413,19 +545,33 @@ def test_the_wiring_in_words() -> None:
     ]
     assert rigs.named("tube").wiring == ["air: chamber.left -> line -> chamber.right"]
     assert rigs.named("blow_down_tank").wiring == ["air: chamber -> line -> ambient"]
-    assert rigs.named("bench").wiring == ["air: chamber, shut off", "pull: chamber -> muscle -> load"]
+    assert rigs.named("bench").wiring == [
+        "air: chamber, shut off",
+        "pull: chamber -> muscle -> load",
+    ]
 
 
-def test_rig_check_says_what_is_connected(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    monkeypatch.setattr("pamrs.simulation.core_rig", lambda rig: None)  # what the core says has tests of its own
+def test_rig_check_says_what_is_connected(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(
+        "pamrs.simulation.core_rig", lambda rig: None
+    )  # what the core says has tests of its own
     assert cli.main(["rig", "check", "antagonistic_joint"]) == 0
     out = capsys.readouterr().out.splitlines()
-    assert out[: len(rigs.named("antagonistic_joint").wiring)] == rigs.named("antagonistic_joint").wiring
-    assert any(line.split()[:3] == ["valve.flexor.discharge_area_max", "1.2e-06", "±"] for line in out)
+    assert (
+        out[: len(rigs.named("antagonistic_joint").wiring)]
+        == rigs.named("antagonistic_joint").wiring
+    )
+    assert any(
+        line.split()[:3] == ["valve.flexor.discharge_area_max", "1.2e-06", "±"] for line in out
+    )
     assert out[-1].endswith("is valid, 70 parameters, 0 effects")
 
 
-def test_help_and_template_know_every_rig_and_key(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_help_and_template_know_every_rig_and_key(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("COLUMNS", "300")
         assert cli.main(["rig", "new", "--help"]) == 0
@@ -439,6 +585,12 @@ def test_help_and_template_know_every_rig_and_key(capsys: pytest.CaptureFixture[
         assert f"# [{block}]" in text
         assert all(key.where[-1] in text for key in keys)
         assert all(f"#   {port.name} " in text for port in PORTS.get(block, ()))
-    for words in ("[valve.NAME]", "valve.flexor.half_range", "[transmission.flexor]", '"ambient"', "that it acts on; default every"):
+    for words in (
+        "[valve.NAME]",
+        "valve.flexor.half_range",
+        "[transmission.flexor]",
+        '"ambient"',
+        "that it acts on; default every",
+    ):
         assert words in text
     assert all(line.startswith("#") for line in text.splitlines())

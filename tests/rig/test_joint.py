@@ -30,8 +30,12 @@ ANGLES = np.radians(np.linspace(16.0, 119.0, 12))
 
 def test_the_tendon_is_that_of_the_reference() -> None:
     joint, peer = pamrs.Joint(**TENDON), shoulder().joint
-    np.testing.assert_allclose(joint.shortening(ANGLES), [peer.contraction(float(a)) for a in ANGLES], rtol=1e-12)
-    np.testing.assert_allclose(joint.moment_arm(ANGLES), [peer.moment_arm(float(a)) for a in ANGLES], rtol=1e-12)
+    np.testing.assert_allclose(
+        joint.shortening(ANGLES), [peer.contraction(float(a)) for a in ANGLES], rtol=1e-12
+    )
+    np.testing.assert_allclose(
+        joint.moment_arm(ANGLES), [peer.moment_arm(float(a)) for a in ANGLES], rtol=1e-12
+    )
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -110,6 +114,11 @@ def test_every_kind_can_be_chosen_in_a_rig_file(kind: str) -> None:
 
 
 def test_the_keys_of_another_kind_are_refused() -> None:
-    text = rig_with("pulley").replace('kind = "pulley"', 'kind = "pulley"\nupper_axial = { value = 0.02, unit = "m" }')
-    with pytest.raises(pamrs.RigError, match=r"joint\.upper_axial is not allowed with 'pulley': only with tendon, published"):
+    text = rig_with("pulley").replace(
+        'kind = "pulley"', 'kind = "pulley"\nupper_axial = { value = 0.02, unit = "m" }'
+    )
+    with pytest.raises(
+        pamrs.RigError,
+        match=r"joint\.upper_axial is not allowed with 'pulley': only with tendon, published",
+    ):
         parse_rig(text)

@@ -38,7 +38,9 @@ def rig_text(model: str, *, geometry: str | None = None, extra: str = "") -> str
             lines += extra.splitlines()
         elif name == "geometry":
             lines += [f'geometry = "{geometry}"'] if geometry else []
-        elif not (name in ("modulus_slope", "modulus_offset") and name not in ELASTIC_PARAMETERS[model]):
+        elif not (
+            name in ("modulus_slope", "modulus_offset") and name not in ELASTIC_PARAMETERS[model]
+        ):
             lines.append(line)
     return "\n".join(lines)
 
@@ -55,7 +57,9 @@ def test_every_model_can_be_chosen_in_a_rig_file(model: str, geometry: str | Non
     assert muscle.geometry == (geometry or ("elliptic" if model == "robinson" else "cylinder"))
     want = shoulder_muscle().replace(model=model, geometry=geometry, **ELASTIC.get(model, {}))
     assert muscle.parameters == {**want.parameters, "count": 6}
-    np.testing.assert_array_equal(muscle.force(3e5, [0.0, 0.1, 0.2]), want.force(3e5, [0.0, 0.1, 0.2]))
+    np.testing.assert_array_equal(
+        muscle.force(3e5, [0.0, 0.1, 0.2]), want.force(3e5, [0.0, 0.1, 0.2])
+    )
     assert ("muscle.c10" in rig.parameters) == (model == "mooney_rivlin")
 
 
@@ -68,8 +72,15 @@ def test_every_model_moves_the_arm(model: str) -> None:
 
 
 def test_friction_is_read_with_its_units() -> None:
-    friction = 'friction = { coefficient = 0.16, pressure_slope = { value = -0.145, unit = "1/MPa" }, floor = 0.01 }'
-    text = rig_text("robinson").replace("friction =", "#", 1).replace('model = "robinson"', f'model = "robinson"\n{friction}')
+    friction = (
+        'friction = { coefficient = 0.16, pressure_slope = { value = -0.145, unit = "1/MPa" }, '
+        "floor = 0.01 }"
+    )
+    text = (
+        rig_text("robinson")
+        .replace("friction =", "#", 1)
+        .replace('model = "robinson"', f'model = "robinson"\n{friction}')
+    )
     muscle = parse_rig(text).muscle
     assert muscle is not None
     up, plain, down = (muscle.force(4e5, 0.1, direction=d) for d in (-1.0, None, 1.0))
@@ -79,9 +90,21 @@ def test_friction_is_read_with_its_units() -> None:
 @pytest.mark.parametrize(
     ("model", "extra", "words"),
     [
-        ("gaylord", 'c10 = { value = 1e5, unit = "Pa" }', ["muscle.c10", "'gaylord'", "mooney_rivlin"]),
-        ("robinson", 'bladder_modulus = { value = 1, unit = "MPa" }', ["muscle.bladder_modulus", "elbow_linear"]),
-        ("elbow_linear", 'extension_factors = { value = [1, 1], unit = "1" }', ["extension_factors has 2", "three"]),
+        (
+            "gaylord",
+            'c10 = { value = 1e5, unit = "Pa" }',
+            ["muscle.c10", "'gaylord'", "mooney_rivlin"],
+        ),
+        (
+            "robinson",
+            'bladder_modulus = { value = 1, unit = "MPa" }',
+            ["muscle.bladder_modulus", "elbow_linear"],
+        ),
+        (
+            "elbow_linear",
+            'extension_factors = { value = [1, 1], unit = "1" }',
+            ["extension_factors has 2", "three"],
+        ),
         ("kothera", 'geometry = "sphere"', ["muscle.geometry = 'sphere'", "'elliptic_published'"]),
     ],
 )
@@ -109,11 +132,16 @@ def test_replacing_the_model_keeps_what_both_have() -> None:
 def test_braid_constants_are_the_published_ones() -> None:
     inch = 0.0254
     muscle = shoulder_muscle().replace(
-        rest_length=7.785 * inch, rest_diameter=0.625 * inch, braid_angle=math.radians(72.5), wall_thickness=inch / 16
+        rest_length=7.785 * inch,
+        rest_diameter=0.625 * inch,
+        braid_angle=math.radians(72.5),
+        wall_thickness=inch / 16,
     )
     assert muscle.turns == pytest.approx(1.25, abs=0.005)
     assert muscle.fibre_length / inch == pytest.approx(8.16, abs=0.005)
-    assert muscle.bladder_volume == pytest.approx(math.pi * (0.625 - 1 / 16) / 16 * 7.785 * inch**3, rel=1e-12)
+    assert muscle.bladder_volume == pytest.approx(
+        math.pi * (0.625 - 1 / 16) / 16 * 7.785 * inch**3, rel=1e-12
+    )
     low, high = muscle.contraction_limits
     assert (1 - low) * 7.785 == pytest.approx(8.163, abs=1e-3)
     assert (1 - high) == pytest.approx(0.58 * (1 - low))
@@ -121,7 +149,13 @@ def test_braid_constants_are_the_published_ones() -> None:
 
 def test_braid_taut_only_in_extension() -> None:
     muscle = shoulder_muscle()
-    assert muscle.braid_taut([-0.03, -0.02, -0.005, 0.0, 0.2]).tolist() == [True, True, False, False, False]
+    assert muscle.braid_taut([-0.03, -0.02, -0.005, 0.0, 0.2]).tolist() == [
+        True,
+        True,
+        False,
+        False,
+        False,
+    ]
     assert muscle.radius(-0.03) == pytest.approx(0.8 * 0.0127)
 
 
@@ -135,7 +169,9 @@ def test_muscles_and_joints_can_be_pickled() -> None:
     muscle = shoulder_muscle().replace(friction_coefficient=0.1)
     again = pickle.loads(pickle.dumps(muscle))
     assert again.parameters == muscle.parameters
-    np.testing.assert_array_equal(again.force(3e5, [0.1], direction=1.0), muscle.force(3e5, [0.1], direction=1.0))
+    np.testing.assert_array_equal(
+        again.force(3e5, [0.1], direction=1.0), muscle.force(3e5, [0.1], direction=1.0)
+    )
     joint = pamrs.Joint(kind="pulley", radius=0.03, rest_angle=0.2)
     assert pickle.loads(pickle.dumps(joint)).parameters == joint.parameters
     rig = pamrs.rigs.shoulder()

@@ -37,7 +37,11 @@ def changed(old: str, new: str) -> str:
 
 
 def same(one: Rig, other: Rig) -> bool:
-    return one.model == other.model and one.parameters == other.parameters and one.effect_std == other.effect_std
+    return (
+        one.model == other.model
+        and one.parameters == other.parameters
+        and one.effect_std == other.effect_std
+    )
 
 
 # ------------------------------------------------------------------------ reading
@@ -46,7 +50,9 @@ def same(one: Rig, other: Rig) -> bool:
 def test_shoulder_in_si() -> None:
     rig = pamrs.rigs.shoulder()
     assert rig.name == "shoulder"
-    assert rig.blocks == tuple(block for block in BLOCKS if block not in ("line", "transmission", "link", "load"))
+    assert rig.blocks == tuple(
+        block for block in BLOCKS if block not in ("line", "transmission", "link", "load")
+    )
     braid = rig.parameter("muscle.braid_angle")
     assert braid.value == pytest.approx(math.radians(73.5))
     assert (braid.unit, braid.tol, braid.known) == ("rad", 0.0, True)
@@ -63,13 +69,17 @@ def test_shoulder_in_si() -> None:
 def test_sealed_chamber_has_no_more_than_a_chamber() -> None:
     rig = pamrs.rigs.sealed_chamber()
     assert rig.blocks == ("gas", "chamber", "sensors")
-    assert all(rig.model[name] is None for name in ("supply", "valve", "muscle", "joint", "arm", "load"))
+    assert all(
+        rig.model[name] is None for name in ("supply", "valve", "muscle", "joint", "arm", "load")
+    )
     assert rig.muscle is None
     assert rig.parameters["chamber.dead_volume"].known
 
 
 def test_gas_and_chamber_are_enough() -> None:
-    text = 'schema="pamrs.rig/1"\n[gas]\n[chamber]\ndead_volume={value=100,unit="cm3",unknown=true}\n'
+    text = (
+        'schema="pamrs.rig/1"\n[gas]\n[chamber]\ndead_volume={value=100,unit="cm3",unknown=true}\n'
+    )
     rig = parse_rig(text)
     volume = rig.parameters["chamber.dead_volume"]
     assert volume.value == pytest.approx(1e-4)
@@ -80,8 +90,12 @@ def test_gas_and_chamber_are_enough() -> None:
 
 
 def test_units_of_any_kind_give_the_same_rig() -> None:
-    text = changed('value = 0.015,  unit = "m3",  tol = 3.0e-4', 'value = 15, unit = "l", tol = 0.3')
-    text = text.replace('value = 73.5,     unit = "deg"', f'value = {math.radians(73.5)!r}, unit = "rad"')
+    text = changed(
+        'value = 0.015,  unit = "m3",  tol = 3.0e-4', 'value = 15, unit = "l", tol = 0.3'
+    )
+    text = text.replace(
+        'value = 73.5,     unit = "deg"', f'value = {math.radians(73.5)!r}, unit = "rad"'
+    )
     rig = parse_rig(text)
     assert rig.parameters["supply.volume"].value == pytest.approx(0.015, rel=1e-15)
     assert rig.parameters["supply.volume"].tol == pytest.approx(3e-4)
@@ -136,21 +150,37 @@ BAD = [
     ("[3.0, -0.35, 0.0, 0.0]", "[3.0]", ["muscle.modulus_slope has 1", "muscle.modulus_offset 4"]),
     ("[3.0, -0.35, 0.0, 0.0]", "[3.0, nan, 0.0, 0.0]", ["muscle.modulus_slope[1] = nan"]),
     ("[3.0, -0.35, 0.0, 0.0]", "[]", ["muscle.modulus_slope", "a list of numbers"]),
-    ("opening = [0.0, 0.25, 0.5,", "opening = [0.0, 0.5, 0.25,", ["valve.area_fraction.opening", "rise"]),
+    (
+        "opening = [0.0, 0.25, 0.5,",
+        "opening = [0.0, 0.5, 0.25,",
+        ["valve.area_fraction.opening", "rise"],
+    ),
     (
         "fraction = [0.0, 0.2, 0.5,",
         "fraction = [0.0, 0.2,",
         ["valve.area_fraction", "5 values and fraction 4"],
     ),
-    ("fraction = [0.0, 0.2, 0.5,", "fraction = [0.0, 0.6, 0.5,", ["valve.area_fraction.fraction", "fall"]),
+    (
+        "fraction = [0.0, 0.2, 0.5,",
+        "fraction = [0.0, 0.6, 0.5,",
+        ["valve.area_fraction.fraction", "fall"],
+    ),
     ("k0 = 1.64", "k1 = 1.64", ["'muscle.end_ratio.k1'", "k0, contraction_slope"]),
     ("value = 120.0,", "value = 10.0,", ["joint.max_angle", "joint.min_angle"]),
-    ('schema = "pamrs.rig/1"', 'schema = "pamrs.rig/2"', ["schema = 'pamrs.rig/2'", "'pamrs.rig/1'"]),
+    (
+        'schema = "pamrs.rig/1"',
+        'schema = "pamrs.rig/2"',
+        ["schema = 'pamrs.rig/2'", "'pamrs.rig/1'"],
+    ),
     ('name = "shoulder"', "name = 7", ["name = 7"]),
     ("[sensors]", "[sensor]", ["unknown key 'sensor'", "'sensors'"]),
     ("[supply]", "[[supply]]", ["supply", "a table"]),
     ("[arm]", "[[arm", ["not valid TOML"]),
-    ("[sensors]", '[[effects]]\nid = "gremlins"\n[sensors]', ["effects[0].id = 'gremlins'", "leak_muscle"]),
+    (
+        "[sensors]",
+        '[[effects]]\nid = "gremlins"\n[sensors]',
+        ["effects[0].id = 'gremlins'", "leak_muscle"],
+    ),
 ]
 
 
@@ -199,13 +229,20 @@ def test_unreadable_files(tmp_path: Path) -> None:
 
 JSON_LIKE = st.recursive(
     st.one_of(st.booleans(), st.integers(-9, 9), st.floats(), st.text(max_size=5)),
-    lambda inner: st.one_of(st.lists(inner, max_size=3), st.dictionaries(st.sampled_from(["value", "unit", "x"]), inner)),
+    lambda inner: st.one_of(
+        st.lists(inner, max_size=3), st.dictionaries(st.sampled_from(["value", "unit", "x"]), inner)
+    ),
     max_leaves=5,
 )
 
 
 @settings(max_examples=150)
-@given(st.sampled_from(list(BLOCKS)), st.text("abcdef_", min_size=1, max_size=9), JSON_LIKE, st.booleans())
+@given(
+    st.sampled_from(list(BLOCKS)),
+    st.text("abcdef_", min_size=1, max_size=9),
+    JSON_LIKE,
+    st.booleans(),
+)
 def test_nothing_but_a_rig_error(block: str, key: str, value: Any, known: bool) -> None:
     from pamrs.rig import Reader
 
@@ -232,14 +269,21 @@ def test_with_parameters_leaves_the_old_rig_alone() -> None:
 
 @pytest.mark.parametrize(
     ("name", "value"),
-    [("arm.payload", -1.0), ("arm.payload", math.nan), ("muscle.count", 2.5), ("chamber.dead_volume", 0.0)],
+    [
+        ("arm.payload", -1.0),
+        ("arm.payload", math.nan),
+        ("muscle.count", 2.5),
+        ("chamber.dead_volume", 0.0),
+    ],
 )
 def test_impossible_values_are_refused(name: str, value: float) -> None:
     with pytest.raises(ParameterError, match=name):
         pamrs.rigs.shoulder().with_parameters({name: value})
 
 
-@pytest.mark.parametrize("name", ["arm.mass", "payload", "valve.opening", "muscle.model", "", "wings.span"])
+@pytest.mark.parametrize(
+    "name", ["arm.mass", "payload", "valve.opening", "muscle.model", "", "wings.span"]
+)
 def test_unknown_names_are_refused(name: str) -> None:
     with pytest.raises(ParameterError, match="has no parameter"):
         pamrs.rigs.shoulder().with_parameters({name: 1.0})
@@ -255,7 +299,9 @@ def test_parameters_of_absent_blocks_are_not_there() -> None:
 @pytest.mark.parametrize("effect", sorted(EFFECTS))
 def test_effects_round_trip(effect: str) -> None:
     first = EFFECTS[effect].parameters[0]
-    rig = pamrs.rigs.shoulder().with_effect(effect, {first.name: first.upper}, std={first.name: 0.1 * first.upper})
+    rig = pamrs.rigs.shoulder().with_effect(
+        effect, {first.name: first.upper}, std={first.name: 0.1 * first.upper}
+    )
     assert rig.effects[0]["id"] == effect
     assert rig.effects[0]["parameters"][first.name] == first.upper
     again = parse_rig(rig.to_toml_text())
@@ -268,7 +314,9 @@ def test_effects_round_trip(effect: str) -> None:
 def test_an_effect_replaces_its_like() -> None:
     rig = pamrs.rigs.shoulder().with_effect("leak_muscle", {"conductance": 1e-9})
     rig = rig.with_effect("leak_muscle", {"conductance": 2e-9})
-    assert rig.effects == [{"id": "leak_muscle", "parameters": {"conductance": 2e-9, "laminar_share": 0.0}}]
+    assert rig.effects == [
+        {"id": "leak_muscle", "parameters": {"conductance": 2e-9, "laminar_share": 0.0}}
+    ]
     assert pamrs.rigs.shoulder().effects == []
 
 

@@ -33,11 +33,18 @@ def signals(rig: pamrs.Rig, n: int, sample: int) -> dict[str, Any]:
     for name in core_rig(rig).inputs:
         channel, _, block = name.partition(".")
         shift = 0.7 * len(given.get(channel, ()))
-        values = commands(n, sample + int(20 * shift)) if channel == "valve_command" else 3e5 + 2e4 * commands(n, sample)
+        values = (
+            commands(n, sample + int(20 * shift))
+            if channel == "valve_command"
+            else 3e5 + 2e4 * commands(n, sample)
+        )
         given.setdefault(channel, {})[block] = values
     for load in rig.tables("load").values():
         if load["kind"] == "frame":
-            middle, half = 0.5 * (load["max_length"] + load["min_length"]), 0.2 * (load["max_length"] - load["min_length"])
+            middle, half = (
+                0.5 * (load["max_length"] + load["min_length"]),
+                0.2 * (load["max_length"] - load["min_length"]),
+            )
             given["length"] = middle + half * np.sin(0.1 * sample + np.arange(n))
             given["pressure"] = 2e5 + 1e4 * np.arange(n) + 1e3 * sample
     return given
@@ -45,7 +52,9 @@ def signals(rig: pamrs.Rig, n: int, sample: int) -> dict[str, Any]:
 
 def row_of(given: dict[str, Any], row: int) -> dict[str, Any]:
     one = {
-        name: {b: float(v[row]) for b, v in values.items()} if isinstance(values, dict) else float(values[row])
+        name: {b: float(v[row]) for b, v in values.items()}
+        if isinstance(values, dict)
+        else float(values[row])
         for name, values in given.items()
     }
     return one
@@ -134,7 +143,10 @@ def test_a_sweep_over_payloads_is_the_rigs_one_by_one() -> None:
 def test_a_regulator_without_a_command_keeps_its_own_pressure() -> None:
     base = pamrs.rigs.named("regulated_joint")
     rigs = [base.with_parameters({"supply.initial_pressure": pressure}) for pressure in (2e5, 3e5)]
-    batch, ones = pamrs.Batch(rigs, sample_time=DT), [pamrs.Simulator(rig, sample_time=DT) for rig in rigs]
+    batch, ones = (
+        pamrs.Batch(rigs, sample_time=DT),
+        [pamrs.Simulator(rig, sample_time=DT) for rig in rigs],
+    )
     for _ in range(20):
         seen, alone = batch.step(), [one.step() for one in ones]
     for channel, values in seen.items():
@@ -148,7 +160,10 @@ def failing() -> pamrs.Batch:
 
 
 def test_a_row_that_fails_says_why_and_the_others_go_on() -> None:
-    batch, alone = failing(), pamrs.Simulator(pamrs.rigs.shoulder(), sample_time=0.001, initial={"joint_rate": -500.0})
+    batch, alone = (
+        failing(),
+        pamrs.Simulator(pamrs.rigs.shoulder(), sample_time=0.001, initial={"joint_rate": -500.0}),
+    )
     healthy = shoulders(3, sample_time=0.001)
     good, message = alone.observe(), ""
     for k in range(20):
@@ -221,7 +236,13 @@ def test_a_closed_loop_is_that_of_each_simulator() -> None:
         np.testing.assert_array_equal(alone.time, run.time)
         for channel in run:
             np.testing.assert_array_equal(run[channel][row], alone[channel], err_msg=channel)
-    few = shoulders(3).control(Loop(gains, rates), 0.2, period=0.004, channels=("joint_angle", "valve_command"), record_every=7)
+    few = shoulders(3).control(
+        Loop(gains, rates),
+        0.2,
+        period=0.004,
+        channels=("joint_angle", "valve_command"),
+        record_every=7,
+    )
     assert set(few) == {"joint_angle", "valve_command"}
     np.testing.assert_array_equal(few.time, run.time[::7])
     for channel in few:
@@ -235,14 +256,18 @@ def test_a_loop_goes_on_where_the_last_one_ended() -> None:
     run = whole.control(Loop(np.array([1.0, 2.0]), 0.5), 0.1, period=0.004)
     loop = Loop(np.array([1.0, 2.0]), 0.5)
     one, two = parts.control(loop, 0.04, period=0.004), parts.control(loop, 0.06, period=0.004)
-    np.testing.assert_array_equal(np.hstack([one["joint_angle"], two["joint_angle"][:, 1:]]), run["joint_angle"])
+    np.testing.assert_array_equal(
+        np.hstack([one["joint_angle"], two["joint_angle"][:, 1:]]), run["joint_angle"]
+    )
     np.testing.assert_allclose(two.time, run.time[20:], atol=1e-12)
 
 
 def test_an_answer_that_is_not_finite_ends_its_row_alone() -> None:
     def update(sample: dict[str, Any]) -> dict[str, Any]:
         late = sample["time"] > 0.0099
-        return {"valve_command": np.array([5.5, np.nan if late else 5.5, 5.5, -np.inf if late else 5.5])}
+        return {
+            "valve_command": np.array([5.5, np.nan if late else 5.5, 5.5, -np.inf if late else 5.5])
+        }
 
     run = shoulders(4).control(update, 0.04)
     assert run.failed.tolist() == [False, True, False, True]
@@ -261,7 +286,9 @@ def test_names_of_several_valves_and_keywords_are_answers() -> None:
     rig = pamrs.rigs.named("antagonistic_joint")
     answer = {"flexor": np.array([5.5, 6.0]), "extensor": 4.8}
     one = pamrs.Batch(rig, n=2, sample_time=DT).control(lambda sample: answer, 0.02)
-    two = pamrs.Batch(rig, n=2, sample_time=DT).control(lambda sample: {"valve_command": answer}, 0.02)
+    two = pamrs.Batch(rig, n=2, sample_time=DT).control(
+        lambda sample: {"valve_command": answer}, 0.02
+    )
     np.testing.assert_array_equal(one["joint_angle.elbow"], two["joint_angle.elbow"])
     np.testing.assert_array_equal(one["valve_command.extensor"], np.full((2, 11), 4.8))
 
@@ -272,7 +299,9 @@ def test_bad_input_is_named_and_leaves_the_batch_alone() -> None:
     before = batch.state
     with pytest.raises(pamrs.ParameterError, match=r"valve_command\[1\] = NaN"):
         batch.step([5.0, np.nan, 5.0])
-    with pytest.raises(pamrs.ParameterError, match=r"valve_command has the shape \(2,\); \(3,\) is needed"):
+    with pytest.raises(
+        pamrs.ParameterError, match=r"valve_command has the shape \(2,\); \(3,\) is needed"
+    ):
         batch.step([5.0, 5.0])
     with pytest.raises(pamrs.ParameterError, match="valve_command is missing"):
         batch.step()
@@ -280,7 +309,13 @@ def test_bad_input_is_named_and_leaves_the_batch_alone() -> None:
         batch.step(["a", "b", "c"])
     with pytest.raises(pamrs.ParameterError, match="supply_command is given"):
         batch.step(5.0, supply_command=1e5)
-    for name, value in (("period", 0.003), ("duration", -1.0), ("duration", np.nan), ("record_every", 0), ("channels", ["angle"])):
+    for name, value in (
+        ("period", 0.003),
+        ("duration", -1.0),
+        ("duration", np.nan),
+        ("record_every", 0),
+        ("channels", ["angle"]),
+    ):
         with pytest.raises(pamrs.ParameterError, match=f"{name} (= |has )"):
             batch.control(lambda sample: 5.0, **{"duration": 0.1, name: value})
     with pytest.raises(pamrs.ParameterError, match="update is a float"):
@@ -290,7 +325,17 @@ def test_bad_input_is_named_and_leaves_the_batch_alone() -> None:
     for state, message in (
         ({**before, "rows": before["rows"][:2]}, "state has 2 values"),
         ({**before, "rows": [*before["rows"][:2], before["rows"][2][:-1]]}, "row 2: state"),
-        ({**before, "rows": [before["rows"][0], np.full_like(before["rows"][1], np.nan), before["rows"][2]]}, r"row 1: state\[0\]"),
+        (
+            {
+                **before,
+                "rows": [
+                    before["rows"][0],
+                    np.full_like(before["rows"][1], np.nan),
+                    before["rows"][2],
+                ],
+            },
+            r"row 1: state\[0\]",
+        ),
         ({**before, "samples": 7}, "row 0: state.samples = 1"),
         ({**before, "samples": -1}, "state.samples = -1"),
         ({**before, "status": (None,)}, "status has 1 values"),
@@ -315,8 +360,14 @@ def test_bad_input_is_named_and_leaves_the_batch_alone() -> None:
         ({"threads": 0}, "threads = 0"),
         ({"sample_time": 0.0}, "sample_time = 0"),
         ({"step": 0.0003}, "step = 0.0003"),
-        ({"initial": {"muscle_pressure": [1e5, 2e5]}}, "initial muscle_pressure is for 2 plants, n for 3"),
-        ({"initial": {"muscle_pressure": [1e5, np.inf, 2e5]}}, r"initial muscle_pressure\[1\] = inf"),
+        (
+            {"initial": {"muscle_pressure": [1e5, 2e5]}},
+            "initial muscle_pressure is for 2 plants, n for 3",
+        ),
+        (
+            {"initial": {"muscle_pressure": [1e5, np.inf, 2e5]}},
+            r"initial muscle_pressure\[1\] = inf",
+        ),
         ({"initial": {"muscle_pressure": [[1e5, 1e5, 2e5]]}}, "shape"),
         ({"initial": {"pressure": 1e5}}, "unknown entry 'pressure'"),
         ({"initial": {"joint_angle": [0.5, 40.0, 0.5]}}, "row 1: initial.joint_angle = 40"),
@@ -334,7 +385,9 @@ def test_only_rigs_make_a_batch() -> None:
 
 
 def script(code: str) -> list[str]:
-    done = subprocess.run([sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True, timeout=60)
+    done = subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True, timeout=60
+    )
     assert done.returncode == 0, done.stderr
     return done.stdout.split()
 
@@ -350,11 +403,14 @@ def test_ctrl_c_ends_a_long_advance_at_a_sample() -> None:
             os.kill(os.getpid(), signal.SIGINT)
         threading.Thread(target=press).start()
         try:
-            batch.control(lambda sample: 5.5, 1e4, period=1e4, channels=["joint_angle"], record_every=10_000_000)
+            batch.control(lambda sample: 5.5, 1e4, period=1e4, channels=["joint_angle"], \
+record_every=10_000_000)
         except KeyboardInterrupt:
             again = pamrs.Batch(pamrs.rigs.shoulder(), n=40, sample_time=0.001)
-            again.control(lambda sample: 5.5, batch.time, channels=["joint_angle"], period=batch.time)
-            print(batch.time > 0.0, all((a == b).all() for a, b in zip(batch.state["rows"], again.state["rows"])))
+            again.control(lambda sample: 5.5, batch.time, channels=["joint_angle"], \
+period=batch.time)
+            print(batch.time > 0.0, all((a == b).all() for a, b in zip(batch.state["rows"], \
+again.state["rows"])))
     """)
     assert said == ["True", "True"]
 
@@ -392,7 +448,10 @@ def test_a_controller_cannot_change_what_is_recorded():
 
 def test_a_reset_is_a_new_batch_and_keeps_its_threads():
     rigs = [pamrs.rigs.shoulder().with_parameters({"arm.payload": m}) for m in (2.0, 9.0)]
-    used, new = (pamrs.Batch(rigs, sample_time=0.005, initial={"joint_angle": [0.4, 0.6]}, threads=2) for _ in range(2))
+    used, new = (
+        pamrs.Batch(rigs, sample_time=0.005, initial={"joint_angle": [0.4, 0.6]}, threads=2)
+        for _ in range(2)
+    )
     core = used._core
     for _ in range(50):
         used.step([9.0, 6.0])

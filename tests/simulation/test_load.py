@@ -47,7 +47,9 @@ def test_a_bench_measures_the_force_of_its_muscle_in_both_directions() -> None:
     np.testing.assert_allclose(run["muscle_pressure"], 4e5, rtol=1e-12)
     e = 1.0 - length / 0.276
     for rows, way in ((slice(20, 201), -1.0), (slice(221, 401), 1.0)):
-        np.testing.assert_allclose(run["muscle_force"][rows], muscle().force(4e5, e[rows], direction=way), rtol=1e-8)
+        np.testing.assert_allclose(
+            run["muscle_force"][rows], muscle().force(4e5, e[rows], direction=way), rtol=1e-8
+        )
 
 
 def test_a_shut_chamber_on_the_frame_follows_its_volume() -> None:
@@ -62,7 +64,9 @@ def test_a_shut_chamber_on_the_frame_follows_its_volume() -> None:
 def test_a_mass_hangs_where_the_muscle_carries_it() -> None:
     rig = parse_rig(MASS)
     assert parse_rig(rig.to_toml_text()).model == rig.model
-    run = pamrs.simulate(rig, sample_time=0.01, duration=20.0, initial={"muscle_pressure": 4e5, "length": 0.25})
+    run = pamrs.simulate(
+        rig, sample_time=0.01, duration=20.0, initial={"muscle_pressure": 4e5, "length": 0.25}
+    )
     assert run["length"][0] == pytest.approx(0.25)
     assert run["muscle_force"][-1] == pytest.approx(40.0 * 9.80665, rel=1e-4)
     assert abs(run["length_rate"][-1]) < 1e-5
@@ -81,7 +85,9 @@ def test_steps_on_the_frame_are_the_run() -> None:
     rig = pamrs.rigs.bench(muscle())
     length = np.linspace(0.276, 0.25, 30)
     whole = pamrs.simulate(rig, sample_time=0.01, length=length, pressure=np.full(30, 2e5))
-    one = pamrs.Simulator(rig, sample_time=0.01, initial={"muscle_pressure": 2e5, "length": float(length[0])})
+    one = pamrs.Simulator(
+        rig, sample_time=0.01, initial={"muscle_pressure": 2e5, "length": float(length[0])}
+    )
     for row in range(1, 30):
         sample = one.step(length=float(length[row]), pressure=2e5)
         assert sample["muscle_force"] == whole["muscle_force"][row]
@@ -94,7 +100,9 @@ def test_a_fitted_muscle_goes_onto_the_bench_and_back() -> None:
     rig = parse_rig(fit_muscle(data, real, order=2).to_rig().to_toml_text())
     length = np.linspace(0.276, 0.21, 50)
     run = pamrs.simulate(rig, sample_time=0.01, length=length, pressure=np.full(50, 3e5))
-    np.testing.assert_allclose(run["muscle_force"], real.force(3e5, 1.0 - length / 0.276), rtol=1e-7)
+    np.testing.assert_allclose(
+        run["muscle_force"], real.force(3e5, 1.0 - length / 0.276), rtol=1e-7
+    )
 
 
 @pytest.mark.parametrize(
@@ -105,10 +113,19 @@ def test_a_fitted_muscle_goes_onto_the_bench_and_back() -> None:
         ({"length": [0.27, np.nan]}, r"length\[1\] = nan"),
         ({"length": [0.27, 0.5]}, r"length\[1\] = 0\.5 is not allowed"),
         ({"length": [0.27, 0.26], "pressure": [1e5]}, r"pressure has the shape \(1,\); \(2,\)"),
-        ({"length": [0.27, 0.26], "duration": 1.0}, r"duration = 1\.0 is not allowed together with a signal that sets it"),
+        (
+            {"length": [0.27, 0.26], "duration": 1.0},
+            r"duration = 1\.0 is not allowed together with a signal that sets it",
+        ),
         ({"length": [0.5, 0.26]}, r"length\[0\] = 0\.5"),
-        ({"length": [0.27, 0.26], "initial": {"length": 0.25}}, r"initial length = 0\.25 does not go with length\[0\]"),
-        ({"length": [0.27], "initial": {"joint_angle": 0.1}}, r"has 'joint_angle', but the rig .* no \[joint\]"),
+        (
+            {"length": [0.27, 0.26], "initial": {"length": 0.25}},
+            r"initial length = 0\.25 does not go with length\[0\]",
+        ),
+        (
+            {"length": [0.27], "initial": {"joint_angle": 0.1}},
+            r"has 'joint_angle', but the rig .* no \[joint\]",
+        ),
     ],
 )
 def test_what_a_frame_cannot_do_is_named(arguments: dict[str, object], message: str) -> None:
@@ -127,7 +144,11 @@ def test_only_a_frame_takes_a_length_and_no_valve_a_pressure() -> None:
     ("old", "new", "message"),
     [
         ("value = 280", "value = 170", r"load\.max_length = 0\.17 m is not allowed"),
-        ("[load]\nmass", '[load]\nkind = "frame"\nmass', r"load\.mass is not allowed with 'frame': only with mass"),
+        (
+            "[load]\nmass",
+            '[load]\nkind = "frame"\nmass',
+            r"load\.mass is not allowed with 'frame': only with mass",
+        ),
         ("value = 40, ", "value = 0, ", r"load\.mass = 0 kg"),
         ("[muscle]", "[sensor]", r"needs the block \[muscle\]|sensor"),
     ],
@@ -138,17 +159,29 @@ def test_loads_that_cannot_be_are_named(old: str, new: str, message: str) -> Non
 
 
 def test_a_load_and_a_joint_exclude_each_other() -> None:
-    load = '[load]\nkind = "frame"\nmin_length = { value = 200, unit = "mm" }\nmax_length = { value = 270, unit = "mm" }\n'
+    load = (
+        '[load]\nkind = "frame"\nmin_length = { value = 200, unit = "mm" }\n'
+        'max_length = { value = 270, unit = "mm" }\n'
+    )
     with pytest.raises(pamrs.RigError, match=r"\[load\] does not go with \[joint\] and \[arm\]"):
         parse_rig(pamrs.rigs.shoulder().to_toml_text() + load)
 
 
 def test_a_load_without_its_length_is_refused_with_what_to_measure(tmp_path: Path) -> None:
     (tmp_path / "rig.toml").write_text(MASS, encoding="utf-8")
-    run = pamrs.simulate(parse_rig(MASS), sample_time=0.01, duration=2.0, initial={"muscle_pressure": 4e5, "length": 0.25})
-    rows = "\n".join(f"{t:.3f},{p:.3f}" for t, p in zip(run.time, run["muscle_pressure"], strict=True))
+    run = pamrs.simulate(
+        parse_rig(MASS),
+        sample_time=0.01,
+        duration=2.0,
+        initial={"muscle_pressure": 4e5, "length": 0.25},
+    )
+    rows = "\n".join(
+        f"{t:.3f},{p:.3f}" for t, p in zip(run.time, run["muscle_pressure"], strict=True)
+    )
     (tmp_path / "run.csv").write_text(f"time [s],muscle_pressure [Pa]\n{rows}\n", encoding="utf-8")
-    case = 'schema = "pamrs.case/1"\nrig = "rig.toml"\n[[recording]]\nfile = "run.csv"\nrole = "fit"\n'
+    case = (
+        'schema = "pamrs.case/1"\nrig = "rig.toml"\n[[recording]]\nfile = "run.csv"\nrole = "fit"\n'
+    )
     (tmp_path / "case.toml").write_text(case, encoding="utf-8")
     with pytest.raises(pamrs.DiagnosisError, match=r"measure muscle_pressure, length$"):
         pamrs.diagnose(tmp_path)
@@ -166,13 +199,19 @@ def test_air_of_a_regulator_that_is_then_shut_is_at_room_temperature() -> None:
 
 @pytest.mark.parametrize("mass", [0.01, 0.05, 0.2, 5.0])
 def test_a_light_mass_is_stable_on_its_stops(mass: float) -> None:
-    rig = parse_rig(MASS.replace("value = 40,", f"value = {mass},").replace("value = 180", "value = 240"))
+    rig = parse_rig(
+        MASS.replace("value = 40,", f"value = {mass},").replace("value = 180", "value = 240")
+    )
     start = {"muscle_pressure": 4e5, "length": 0.26}
     run = pamrs.simulate(rig, sample_time=0.005, duration=0.5, initial=start)
-    fine = pamrs.simulate(rig, sample_time=0.005, step=1e-6 if mass < 0.1 else 1e-5, duration=0.5, initial=start)
+    fine = pamrs.simulate(
+        rig, sample_time=0.005, step=1e-6 if mass < 0.1 else 1e-5, duration=0.5, initial=start
+    )
     assert abs(run["length_rate"][-1]) < 1e-3
     np.testing.assert_allclose(run["length"][-1], fine["length"][-1], atol=1e-6)
-    coarse = pamrs.simulate(rig, sample_time=0.005, step=0.005, duration=0.5, initial=start)  # divided until it is stable
+    coarse = pamrs.simulate(
+        rig, sample_time=0.005, step=0.005, duration=0.5, initial=start
+    )  # divided until it is stable
     np.testing.assert_allclose(coarse["length"][-1], fine["length"][-1], atol=1e-6)
 
 

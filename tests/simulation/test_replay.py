@@ -16,7 +16,10 @@ from pamrs.simulation import differences, replay
 
 def write(path: Path, run: pamrs.Simulation, *names: str) -> Path:
     rows = ["time [s]," + ",".join(f"{name} [{unit_of(name)}]" for name in names)]
-    rows += [",".join(f"{v:.12g}" for v in row) for row in zip(run.time, *(run[name] for name in names), strict=True)]
+    rows += [
+        ",".join(f"{v:.12g}" for v in row)
+        for row in zip(run.time, *(run[name] for name in names), strict=True)
+    ]
     path.write_text("\n".join(rows) + "\n", encoding="utf-8")
     return path
 
@@ -28,12 +31,22 @@ def wave(rows: int, phase: float = 0.0) -> np.ndarray:
 def test_a_recording_of_named_blocks_is_replayed(tmp_path: Path) -> None:
     rig = pamrs.rigs.named("two_joint_arm")
     run = pamrs.simulate(
-        rig, {"elbow": wave(300) + 0.4, "wrist": wave(300, 1.0)}, sample_time=0.01, initial={"muscle_pressure.elbow": 2e5}
+        rig,
+        {"elbow": wave(300) + 0.4, "wrist": wave(300, 1.0)},
+        sample_time=0.01,
+        initial={"muscle_pressure.elbow": 2e5},
     )
-    names = [n for n in run if n.partition(".")[0] in ("valve_command", "supply_pressure", "muscle_pressure", "joint_angle")]
+    names = [
+        n
+        for n in run
+        if n.partition(".")[0]
+        in ("valve_command", "supply_pressure", "muscle_pressure", "joint_angle")
+    ]
     recording = pamrs.load_recording(write(tmp_path / "run.csv", run, *names))
     again = replay(rig, recording)
-    np.testing.assert_allclose(again["joint_angle.wrist"], run["joint_angle.wrist"], atol=1e-4)  # rests on its stop at the start
+    np.testing.assert_allclose(
+        again["joint_angle.wrist"], run["joint_angle.wrist"], atol=1e-4
+    )  # rests on its stop at the start
     found = differences(again, recording)
     assert set(found) == {n for n in names if not n.startswith("valve_command")}
     assert found["joint_angle.elbow"] < 1e-4
@@ -44,7 +57,9 @@ def test_a_recording_of_named_blocks_is_replayed(tmp_path: Path) -> None:
 def test_what_a_replay_needs_is_named(tmp_path: Path) -> None:
     rig = pamrs.rigs.named("two_joint_arm")
     run = pamrs.simulate(rig, {"elbow": 6.0, "wrist": 5.0}, sample_time=0.01, duration=1.0)
-    recording = pamrs.load_recording(write(tmp_path / "run.csv", run, "valve_command.elbow", "joint_angle.elbow"))
+    recording = pamrs.load_recording(
+        write(tmp_path / "run.csv", run, "valve_command.elbow", "joint_angle.elbow")
+    )
     with pytest.raises(pamrs.RecordingError, match=r"no usable valve_command\.wrist"):
         replay(rig, recording)
 
@@ -56,7 +71,9 @@ def test_pressures_move_a_joint_that_nothing_feeds(tmp_path: Path) -> None:
     pressure = 2e5 + 1e5 * np.sin(0.02 * np.arange(200))
     run = pamrs.simulate(rig, sample_time=0.01, pressure=pressure)
     np.testing.assert_allclose(run["muscle_pressure"], pressure, atol=1e-6)
-    recording = pamrs.load_recording(write(tmp_path / "run.csv", run, "muscle_pressure", "joint_angle"))
+    recording = pamrs.load_recording(
+        write(tmp_path / "run.csv", run, "muscle_pressure", "joint_angle")
+    )
     again = replay(rig, recording)
     np.testing.assert_allclose(again["joint_angle"], run["joint_angle"], atol=1e-7)
     assert set(differences(again, recording)) == {"joint_angle"}
@@ -64,8 +81,28 @@ def test_pressures_move_a_joint_that_nothing_feeds(tmp_path: Path) -> None:
 
 def test_steps_on_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "run.csv"
-    words = ["simulate", "two_joint_arm", "--hold", "valve_command.elbow = 6 V, 5 V @ 0.5 s", "--hold", "valve_command.wrist = 5000 mV"]
-    assert cli.main([*words, "--initial", "muscle_pressure.wrist = 1 bar", "--duration", "1 s", "--output", str(out)]) == 0
+    words = [
+        "simulate",
+        "two_joint_arm",
+        "--hold",
+        "valve_command.elbow = 6 V, 5 V @ 0.5 s",
+        "--hold",
+        "valve_command.wrist = 5000 mV",
+    ]
+    assert (
+        cli.main(
+            [
+                *words,
+                "--initial",
+                "muscle_pressure.wrist = 1 bar",
+                "--duration",
+                "1 s",
+                "--output",
+                str(out),
+            ]
+        )
+        == 0
+    )
     said = capsys.readouterr().out
     assert "muscle_pressure.wrist: from" in said
     assert "g supplied" in said
@@ -81,8 +118,14 @@ def test_steps_on_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--hold", "valve_command = 6 V"], "the rig has no valve of that name; it has: elbow, wrist"),
-        (["--hold", "valve_command.elbow = 6 bar", "--hold", "valve_command.wrist = 5 V"], "--hold"),
+        (
+            ["--hold", "valve_command = 6 V"],
+            "the rig has no valve of that name; it has: elbow, wrist",
+        ),
+        (
+            ["--hold", "valve_command.elbow = 6 bar", "--hold", "valve_command.wrist = 5 V"],
+            "--hold",
+        ),
         (["--hold", "torque = 6 V"], "a signal like"),
         (["--hold", "valve_command.elbow = 6 V, 7 V"], "needs its time"),
         (["--hold", "valve_command.elbow = 6 V"], "valve_command.wrist is missing"),
@@ -90,7 +133,9 @@ def test_steps_on_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture
         (["--duration", "-1 s"], "--duration"),
     ],
 )
-def test_wrong_steps_are_named(words: list[str], message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_wrong_steps_are_named(
+    words: list[str], message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert cli.main(["simulate", "two_joint_arm", *words, "--output", str(tmp_path / "x.csv")]) == 2
     err = capsys.readouterr().err
     assert message in err.splitlines()[-1]
@@ -119,8 +164,16 @@ def test_a_case_of_named_blocks_that_lacks_a_command_is_refused_by_its_name(tmp_
     rig = pamrs.rigs.named("antagonistic_joint")
     rig.to_toml(tmp_path / "rig.toml")
     run = pamrs.simulate(rig, {"flexor": wave(300), "extensor": 10.0 - wave(300)}, sample_time=0.01)
-    write(tmp_path / "run.csv", run, "valve_command.flexor", "muscle_pressure.flexor", "joint_angle.elbow")
-    case = 'schema = "pamrs.case/1"\nrig = "rig.toml"\n[[recording]]\nfile = "run.csv"\nrole = "fit"\n'
+    write(
+        tmp_path / "run.csv",
+        run,
+        "valve_command.flexor",
+        "muscle_pressure.flexor",
+        "joint_angle.elbow",
+    )
+    case = (
+        'schema = "pamrs.case/1"\nrig = "rig.toml"\n[[recording]]\nfile = "run.csv"\nrole = "fit"\n'
+    )
     (tmp_path / "case.toml").write_text(case, encoding="utf-8")
     with pytest.raises(pamrs.DiagnosisError, match=r"no channel valve_command\.extensor"):
         pamrs.diagnose(tmp_path)

@@ -53,12 +53,18 @@ def test_command_holds_until_the_next_row() -> None:
     np.testing.assert_array_equal(late["muscle_pressure"][:6], steady["muscle_pressure"][:6])
     assert late["muscle_pressure"][6] > steady["muscle_pressure"][6] + 100.0
     # The last command has no row after it.
-    np.testing.assert_array_equal(run([6.0] * 10 + [9.0])["muscle_pressure"], run([6.0] * 11)["muscle_pressure"])
+    np.testing.assert_array_equal(
+        run([6.0] * 10 + [9.0])["muscle_pressure"], run([6.0] * 11)["muscle_pressure"]
+    )
 
 
 def test_valve_fills_vents_and_closes() -> None:
     filled, vented, closed = run([7.0] * 11), run([3.0] * 11), run([5.0] * 11)
-    assert filled["muscle_pressure"][-1] > closed["muscle_pressure"][-1] > vented["muscle_pressure"][-1]
+    assert (
+        filled["muscle_pressure"][-1]
+        > closed["muscle_pressure"][-1]
+        > vented["muscle_pressure"][-1]
+    )
     assert filled["supply_pressure"][-1] < 13.8e5
     for result in (vented, closed):
         assert float(np.ptp(result["supply_pressure"])) == 0.0
@@ -94,7 +100,9 @@ def test_with_parameters_leaves_the_original_alone() -> None:
 
 def test_leak_empties_a_sealed_chamber() -> None:
     rig = pamrs.rigs.sealed_chamber().with_effect("leak_muscle", {"conductance": 1e-11})
-    result = pamrs.simulate(rig, duration=5.0, sample_time=0.1, step=0.01, initial={"muscle_pressure": 7e5})
+    result = pamrs.simulate(
+        rig, duration=5.0, sample_time=0.1, step=0.01, initial={"muscle_pressure": 7e5}
+    )
     assert result.time.shape == result["muscle_pressure"].shape
     assert np.all(np.diff(result["muscle_pressure"]) < 0.0)
     assert float(result["muscle_pressure"].min()) >= 0.0

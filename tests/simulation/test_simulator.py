@@ -1,4 +1,6 @@
-"""The simulator that goes on sample by sample: the same run, restarts bit for bit, copies, Ctrl-C."""
+"""The simulator that goes on sample by sample: the same run, restarts bit for bit, copies,
+Ctrl-C.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,11 @@ COMMAND = 5.0 + 1.2 * np.sin(np.arange(300) * 0.05)
 def rig() -> pamrs.Rig:
     """The shoulder with everything on that has a memory."""
     friction = {"friction_constant": 2.0, "friction_pressure": 2e-5, "presliding": 1e-3}
-    return pamrs.rigs.shoulder().with_effect("muscle_hysteresis", friction).with_effect("heat_transfer")
+    return (
+        pamrs.rigs.shoulder()
+        .with_effect("muscle_hysteresis", friction)
+        .with_effect("heat_transfer")
+    )
 
 
 def simulator(**changes: float) -> pamrs.Simulator:
@@ -60,7 +66,9 @@ def test_reset_begins_again_with_other_values() -> None:
 
 
 def test_a_rig_without_a_valve_needs_no_command() -> None:
-    chamber = pamrs.Simulator(pamrs.rigs.sealed_chamber(), sample_time=0.1, initial={"muscle_pressure": 5e5})
+    chamber = pamrs.Simulator(
+        pamrs.rigs.sealed_chamber(), sample_time=0.1, initial={"muscle_pressure": 5e5}
+    )
     assert chamber.step()["muscle_pressure"] == pytest.approx(5e5)
 
 
@@ -88,7 +96,8 @@ def test_bad_input_is_named_and_leaves_the_state_alone() -> None:
 def test_ctrl_c_ends_a_long_run() -> None:
     code = """
         import os, signal, threading, time, numpy as np, pamrs
-        signal.signal(signal.SIGINT, signal.default_int_handler)  # a job in the background begins with it ignored
+        signal.signal(signal.SIGINT, signal.default_int_handler)  # a job in the background begins \
+with it ignored
         rig = pamrs.rigs.shoulder()
         pamrs.simulate(rig, np.full(2, 5.0), sample_time=0.005)
         def press():
@@ -101,15 +110,32 @@ def test_ctrl_c_ends_a_long_run() -> None:
         except KeyboardInterrupt:
             print(time.perf_counter())
     """
-    done = subprocess.run([sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True, timeout=60)
+    done = subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True, timeout=60
+    )
     assert done.returncode == 0, done.stderr
     pressed, ended = (float(line) for line in done.stdout.split())
     assert ended > pressed
 
 
 def test_a_loop_is_the_run_of_its_commands_whatever_kind_of_number_they_are() -> None:
-    one, kinds = simulator(), [float, np.float64, lambda u: np.array([u]), lambda u: {"": u}, lambda u: {"valve_command": u}]
-    run = one.control(lambda sample: kinds[round(sample["time"] / 0.01) % 5](COMMAND[round(sample["time"] / 0.005)]), 0.5, period=0.01)
+    one, kinds = (
+        simulator(),
+        [
+            float,
+            np.float64,
+            lambda u: np.array([u]),
+            lambda u: {"": u},
+            lambda u: {"valve_command": u},
+        ],
+    )
+    run = one.control(
+        lambda sample: kinds[round(sample["time"] / 0.01) % 5](
+            COMMAND[round(sample["time"] / 0.005)]
+        ),
+        0.5,
+        period=0.01,
+    )
     held = np.repeat(COMMAND[:100:2], 2)
     np.testing.assert_array_equal(run["valve_command"], [*held, held[-1]])
     again = simulator()
@@ -133,7 +159,9 @@ def test_a_loop_is_the_run_of_its_commands_whatever_kind_of_number_they_are() ->
         ("five", "numbers are needed"),
     ],
 )
-def test_an_answer_that_cannot_be_is_named_and_stops_the_loop_at_its_sample(answer: object, message: str) -> None:
+def test_an_answer_that_cannot_be_is_named_and_stops_the_loop_at_its_sample(
+    answer: object, message: str
+) -> None:
     one, usual = simulator(), simulator()
     with pytest.raises(pamrs.ParameterError, match=message):
         one.control(lambda sample: answer if sample["time"] > 0.0099 else 5.5, 0.05)
@@ -156,7 +184,9 @@ def test_a_reset_that_fails_leaves_the_simulator_alone() -> None:
 @pytest.mark.parametrize(("duration", "speed"), [(0.5, 1.0), (1.3, 1.0), (3.0, 2.5)])
 def test_an_animation_lasts_as_long_as_it_says(tmp_path, duration: float, speed: float) -> None:
     image = pytest.importorskip("PIL.Image")
-    run = pamrs.simulate(pamrs.rigs.shoulder(), np.full(int(duration * 50) + 1, 5.2), sample_time=0.02)
+    run = pamrs.simulate(
+        pamrs.rigs.shoulder(), np.full(int(duration * 50) + 1, 5.2), sample_time=0.02
+    )
     lasts = 0.0
     with image.open(run.animate(tmp_path / "arm.gif", speed=speed)) as picture:
         for frame in range(picture.n_frames):

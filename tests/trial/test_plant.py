@@ -80,7 +80,13 @@ def test_effect_moves_its_channel(name, cycle):
         effect = replace(effect, onset=0.008)
     record, far = moved(Effects(effect), cycle)
     assert all(np.isfinite(v) for v in far.values())
-    channel = "supply_pressure" if name in SUPPLY else "muscle_pressure" if name.startswith("pressure") else "joint_angle"
+    channel = (
+        "supply_pressure"
+        if name in SUPPLY
+        else "muscle_pressure"
+        if name.startswith("pressure")
+        else "joint_angle"
+    )
     if name == "clock_skew":
         channel = "muscle_pressure"
     assert far[channel] > 0.5
@@ -89,7 +95,9 @@ def test_effect_moves_its_channel(name, cycle):
     if TYPES[name].block == "sensors" and name != "clock_skew":
         # a transducer changes its own channel and nothing of the plant
         plain, _ = moved(Effects(), cycle)
-        assert np.array(record.states)[:, :4] == pytest.approx(np.array(plain.states)[:, :4], rel=1e-6, abs=1e-6)
+        assert np.array(record.states)[:, :4] == pytest.approx(
+            np.array(plain.states)[:, :4], rel=1e-6, abs=1e-6
+        )
         assert sorted(far.values())[1] < 0.03
     if name in MECHANICAL:
         assert far["supply_pressure"] < 0.05
@@ -99,13 +107,17 @@ def test_names_are_those_of_the_catalogue():
     assert len(LISTED) == 23
     assert len(UNLISTED) >= 6
     assert not set(LISTED) & set(UNLISTED)
-    assert all(TYPES[name].id == name and TYPES[name].graded and TYPES[name].block for name in TYPES)
+    assert all(
+        TYPES[name].id == name and TYPES[name].graded and TYPES[name].block for name in TYPES
+    )
 
 
 def test_integrator_is_accurate():
     assert against_fine(BARE, 4.0) < 1.0e-7
     # states of every kind: gas temperature, friction, spool, swing
-    effects = Effects(*(effect_of(n) for n in ("heat_transfer", "muscle_hysteresis", "payload_swing")))
+    effects = Effects(
+        *(effect_of(n) for n in ("heat_transfer", "muscle_hysteresis", "payload_swing"))
+    )
     assert against_lsoda(Plant(PAR, effects), 1.5) < 1.0e-5
 
 
@@ -113,13 +125,24 @@ def test_swinging_payload_obeys_the_double_pendulum():
     swing = PayloadSwing(share=0.4, length=0.3, drag=0.0, loss=0.0)
     plant = Plant(PAR, Effects(swing))
     angle, rate, phi, spin, torque = 0.7, 0.5, 0.2, -0.8, 12.0
-    inertia, weight = PAR.inertia + PAR.payload * PAR.length**2, (PAR.first_moment + PAR.payload * PAR.length) * PAR.gravity
+    inertia, weight = (
+        PAR.inertia + PAR.payload * PAR.length**2,
+        (PAR.first_moment + PAR.payload * PAR.length) * PAR.gravity,
+    )
     d = [0.0] * plant.size
-    alpha = swing.motion(plant.env, 4)(torque, angle, rate, inertia, weight, [0.0, 0.0, angle, rate, phi, spin], d)
+    alpha = swing.motion(plant.env, 4)(
+        torque, angle, rate, inertia, weight, [0.0, 0.0, angle, rate, phi, spin], d
+    )
     mass, lever = 0.4 * PAR.payload, 0.4 * PAR.payload * PAR.length * 0.3
     c, s = math.cos(angle - phi), math.sin(angle - phi)
-    assert inertia * alpha + lever * (d[5] * c + spin**2 * s) + weight * math.sin(angle) == pytest.approx(torque)
-    hanging = mass * 0.3**2 * d[5] + lever * (alpha * c - rate**2 * s) + mass * PAR.gravity * 0.3 * math.sin(phi)
+    assert inertia * alpha + lever * (d[5] * c + spin**2 * s) + weight * math.sin(
+        angle
+    ) == pytest.approx(torque)
+    hanging = (
+        mass * 0.3**2 * d[5]
+        + lever * (alpha * c - rate**2 * s)
+        + mass * PAR.gravity * 0.3 * math.sin(phi)
+    )
     assert hanging == pytest.approx(0.0, abs=1e-9)
 
 
@@ -128,7 +151,11 @@ def test_full_heat_transfer_conserves_gas():
     y, step = plant.rest(14.0e5), 1.0e-3
 
     def mass(state):
-        return state[0] * (plant.tables.at(state[2])[2] + PAR.dead_volume) / (PAR.gas_constant * state[4])
+        return (
+            state[0]
+            * (plant.tables.at(state[2])[2] + PAR.dead_volume)
+            / (PAR.gas_constant * state[4])
+        )
 
     y, step = plant.advance(y, 0.1, 1.0, step)
     full, hot = mass(y), y[4]
@@ -165,7 +192,9 @@ def test_memory_starts_where_the_arm_is():
         assert len(effect.start(at)) == len(effect.sizes())
 
 
-@pytest.mark.parametrize("law", [lambda f: 7.0 * f, lambda f: 40.0 * f**0.5, lambda f: 12.0 * f / (1.0 + f) + f**2])
+@pytest.mark.parametrize(
+    "law", [lambda f: 7.0 * f, lambda f: 40.0 * f**0.5, lambda f: 12.0 * f / (1.0 + f) + f**2]
+)
 @pytest.mark.parametrize("target", STRENGTHS.values())
 def test_aim_finds_the_size(law, target):
     factor, found, kept = aim(lambda f: (law(f), f), target, 1.0e6)
@@ -184,10 +213,16 @@ RECORDINGS = (("multisine", "fit"), ("open_cycles", "fit"), ("angle_steps", "hel
 
 @pytest.mark.parametrize(
     ("kind", "label", "measure"),
-    [("leak_muscle", "medium", "reach"), ("payload_swing", "strong", "reach"), ("muscle_hysteresis", "weak", "left")],
+    [
+        ("leak_muscle", "medium", "reach"),
+        ("payload_swing", "strong", "reach"),
+        ("muscle_hysteresis", "weak", "left"),
+    ],
 )
 def test_wanted_multiple_is_met(kind, label, measure):
-    key = json.loads(generate(Spec("c", kind, 3, RECORDINGS, 6.0, (label,), measure=measure), default_rig()).key)
+    key = json.loads(
+        generate(Spec("c", kind, 3, RECORDINGS, 6.0, (label,), measure=measure), default_rig()).key
+    )
     found = key["reach" if measure == "reach" else "reach_left"]
     assert found == pytest.approx(STRENGTHS[label], rel=0.3)
     assert key["reach_left"] <= key["reach"] * 1.05
@@ -226,7 +261,9 @@ def test_full_plan():
     assert len(found) >= 300
     assert sum(k == "none" for k, _ in found) == sum(k == "parameters" for k, _ in found) == 30
     for name in LISTED:
-        assert sorted(label for k, (label,) in (f for f in found if f[0] == name)) == sorted([*STRENGTHS] * 3)
+        assert sorted(label for k, (label,) in (f for f in found if f[0] == name)) == sorted(
+            [*STRENGTHS] * 3
+        )
     pairs = [k.split("+") for k, _ in found if "+" in k]
     assert len(pairs) == 30
     assert all(TYPES[a].block != TYPES[b].block for a, b in pairs)
@@ -281,7 +318,9 @@ def test_digest_is_published_before_the_case(two, tmp_path, monkeypatch):
     seen = []
 
     def store(case, out):
-        seen.append(json.loads((tmp_path / "manifest.json").read_text())["keys"][case.name] == case.digest())
+        seen.append(
+            json.loads((tmp_path / "manifest.json").read_text())["keys"][case.name] == case.digest()
+        )
         assert not (out / case.name).exists()
 
     monkeypatch.setattr(plan, "store", store)

@@ -1,4 +1,6 @@
-"""Targets, the other methods beside the diagnosis, and the page of a trial, on results made by hand."""
+"""Targets, the other methods beside the diagnosis, and the page of a trial, on results made by
+hand.
+"""
 
 import hashlib
 import json
@@ -26,10 +28,21 @@ def trial(tmp_path):
         digests[told["case"]] = hashlib.sha256(text.encode()).hexdigest()
         if answer is not None:
             (tmp_path / "results" / f"{told['case']}.json").write_text(json.dumps(answer))
-        gap = {"refit": 0.0, "sindy": 0.3, "gp": 0.2} if told["effects"] else {"refit": None, "sindy": None, "gp": None}
-        other = {"schema": "pamrs.baselines/1", "case": told["case"], "gap_closed": gap, "detected": {"refit": bool(told["effects"])}}
+        gap = (
+            {"refit": 0.0, "sindy": 0.3, "gp": 0.2}
+            if told["effects"]
+            else {"refit": None, "sindy": None, "gp": None}
+        )
+        other = {
+            "schema": "pamrs.baselines/1",
+            "case": told["case"],
+            "gap_closed": gap,
+            "detected": {"refit": bool(told["effects"])},
+        }
         (tmp_path / "results" / "baselines" / f"{told['case']}.json").write_text(json.dumps(other))
-    (tmp_path / "manifest.json").write_text(json.dumps({"schema": "pamrs.trial-manifest/1", "keys": digests}))
+    (tmp_path / "manifest.json").write_text(
+        json.dumps({"schema": "pamrs.trial-manifest/1", "keys": digests})
+    )
     return tmp_path
 
 
@@ -63,7 +76,10 @@ def test_targets_are_those_of_the_proof(trial):
     assert of(found, "median held-out gap closed", "every").measured == pytest.approx(0.9)
     assert of(found, "seconds of a diagnosis").met is True
     text = target_table(found)
-    assert "| false alarms | nulls and parameters only | at most 1 % | 33.3 % | 6.1 % to 79.2 % | 1 of 3 | **missed** |" in text
+    assert (
+        "| false alarms | nulls and parameters only | at most 1 % | 33.3 % | 6.1 % to 79.2 % | "
+        "1 of 3 | **missed** |"
+    ) in text
     assert "| at most 60 s | 10 s |" in text
 
 
@@ -79,7 +95,10 @@ def test_a_target_without_a_case_is_not_met():
 def test_intervals():
     assert median_interval([1.0] * 5) is None
     assert median_interval([float(v) for v in range(6)]) == (0.0, 5.0)
-    assert median_interval([float(v) for v in range(20)]) == (5.0, 14.0)  # ranks 6 and 15 of 20, as tabulated
+    assert median_interval([float(v) for v in range(20)]) == (
+        5.0,
+        14.0,
+    )  # ranks 6 and 15 of 20, as tabulated
     assert mean_interval([1.0, 2.0] * 50) == pytest.approx((1.5 - 0.0985, 1.5 + 0.0985), abs=1e-4)
 
 
@@ -131,6 +150,8 @@ def test_keys_must_be_those_that_were_published(trial, capsys):
 
 
 def test_results_must_be_of_this_trial(trial, capsys):
-    (trial / "results" / "run.json").write_text(json.dumps({"manifest_sha256": "0" * 64, "cases": {}}))
+    (trial / "results" / "run.json").write_text(
+        json.dumps({"manifest_sha256": "0" * 64, "cases": {}})
+    )
     assert main(["report", str(trial), "--out", str(trial / "proof")]) == 2
     assert "another manifest" in capsys.readouterr().err

@@ -27,7 +27,9 @@ def result(verdict, probabilities, effects=(), ambiguity=(), gap=None, seconds=1
     return {
         "schema": "pamrs.diagnosis/1",
         "verdict": verdict,
-        "effects": [{"id": e, "probability": probabilities.get(e, 0.5), "parameters": {}} for e in effects],
+        "effects": [
+            {"id": e, "probability": probabilities.get(e, 0.5), "parameters": {}} for e in effects
+        ],
         "ambiguity": [list(a) for a in ambiguity],
         "probabilities": probabilities,
         "fit": {"gap_closed": gap},
@@ -36,12 +38,24 @@ def result(verdict, probabilities, effects=(), ambiguity=(), gap=None, seconds=1
 
 
 CASES = [
-    (key("c01", kind="none"), result("none", {"none": 0.6, "parameters": 0.38, "leak_muscle": 0.02})),
+    (
+        key("c01", kind="none"),
+        result("none", {"none": 0.6, "parameters": 0.38, "leak_muscle": 0.02}),
+    ),
     (key("c02", kind="parameters"), result("parameters", {"none": 0.1, "parameters": 0.85})),
     # a false alarm
-    (key("c03", kind="none"), result("effects", {"none": 0.3, "leak_muscle": 0.7}, ["leak_muscle"])),
-    (key("c04", ["leak_muscle"], wanted=["weak"], reach=1.5, left=0.4), result("none", {"none": 0.9, "leak_muscle": 0.1}, gap=0.0)),
-    (key("c05", ["leak_muscle"], wanted=["strong"], reach=10.0), result("effects", {"leak_muscle": 0.95}, ["leak_muscle"], gap=0.96)),
+    (
+        key("c03", kind="none"),
+        result("effects", {"none": 0.3, "leak_muscle": 0.7}, ["leak_muscle"]),
+    ),
+    (
+        key("c04", ["leak_muscle"], wanted=["weak"], reach=1.5, left=0.4),
+        result("none", {"none": 0.9, "leak_muscle": 0.1}, gap=0.0),
+    ),
+    (
+        key("c05", ["leak_muscle"], wanted=["strong"], reach=10.0),
+        result("effects", {"leak_muscle": 0.95}, ["leak_muscle"], gap=0.96),
+    ),
     # the wrong name first, the truth in an ambiguity set
     (
         key("c06", ["muscle_creep"], wanted=["medium"], reach=3.3, left=1.0),
@@ -55,10 +69,21 @@ CASES = [
     ),
     (
         key("c07", ["leak_muscle", "muscle_creep"], wanted=["strong", "medium"]),
-        result("effects", {"leak_muscle": 0.9, "muscle_creep": 0.8}, ["muscle_creep", "leak_muscle"], gap=0.92),
+        result(
+            "effects",
+            {"leak_muscle": 0.9, "muscle_creep": 0.8},
+            ["muscle_creep", "leak_muscle"],
+            gap=0.92,
+        ),
     ),
-    (key("c08", ["hose_torque"], wanted=["strong"]), result("unlisted", {"unlisted": 0.8, "payload_swing": 0.2}, gap=0.5)),
-    (key("c09", ["hose_torque"], wanted=["medium"]), result("effects", {"payload_swing": 0.8}, ["payload_swing"], gap=0.4)),
+    (
+        key("c08", ["hose_torque"], wanted=["strong"]),
+        result("unlisted", {"unlisted": 0.8, "payload_swing": 0.2}, gap=0.5),
+    ),
+    (
+        key("c09", ["hose_torque"], wanted=["medium"]),
+        result("effects", {"payload_swing": 0.8}, ["payload_swing"], gap=0.4),
+    ),
     (key("c10", ["leak_muscle"], wanted=["strong"]), None),
 ]
 
@@ -107,7 +132,9 @@ def test_utility_is_that_of_the_diagnosis_competition():
     assert utility(truth, [set()], 20) == pytest.approx(1.0 - 21.0 / (20.0 * 2.0))
     assert utility(set(), [truth], 20) == pytest.approx(1.0 - 2.0 / (20.0 * 2.0))
     # an ambiguity set of two counts half
-    assert utility(truth, [truth, {"muscle_creep"}], 20) == pytest.approx((1.0 + utility(truth, [{"muscle_creep"}], 20)) / 2.0)
+    assert utility(truth, [truth, {"muscle_creep"}], 20) == pytest.approx(
+        (1.0 + utility(truth, [{"muscle_creep"}], 20)) / 2.0
+    )
 
 
 def test_confusion(scored):
@@ -129,7 +156,17 @@ def test_by_strength(scored):
 
 def test_reliability(scored):
     bins, brier = reliability(scored.rows)
-    claims = [(0.98, 1), (0.95, 1), (0.7, 0), (0.9, 0), (0.95, 1), (0.55, 0), (0.9, 1), (0.8, 1), (0.8, 0)]
+    claims = [
+        (0.98, 1),
+        (0.95, 1),
+        (0.7, 0),
+        (0.9, 0),
+        (0.95, 1),
+        (0.55, 0),
+        (0.9, 1),
+        (0.8, 1),
+        (0.8, 0),
+    ]
     assert brier == pytest.approx(sum((p - ok) ** 2 for p, ok in claims) / 9)
     assert sum(n for *_, n in bins) == 9
     by_edge = {(lo, hi): (hits, n) for lo, hi, _, hits, n in bins}
@@ -139,7 +176,8 @@ def test_reliability(scored):
 
 
 @pytest.mark.parametrize(
-    ("hits", "cases", "low", "high"), [(5, 10, 0.2366, 0.7634), (0, 10, 0.0, 0.2775), (10, 10, 0.7225, 1.0), (1, 60, 0.0029, 0.0886)]
+    ("hits", "cases", "low", "high"),
+    [(5, 10, 0.2366, 0.7634), (0, 10, 0.0, 0.2775), (10, 10, 0.7225, 1.0), (1, 60, 0.0029, 0.0886)],
 )
 def test_wilson(hits, cases, low, high):
     assert wilson(hits, cases) == pytest.approx((low, high), abs=1e-4)
@@ -161,7 +199,15 @@ def test_report(scored, tmp_path):
 
 
 def test_command_line(scored, tmp_path, capsys):
-    told = ["score", "--keys", str(tmp_path / "keys"), "--results", str(tmp_path / "results"), "--markdown", str(tmp_path / "t.md")]
+    told = [
+        "score",
+        "--keys",
+        str(tmp_path / "keys"),
+        "--results",
+        str(tmp_path / "results"),
+        "--markdown",
+        str(tmp_path / "t.md"),
+    ]
     assert main(told) == 0
     assert "false alarms" in capsys.readouterr().out
     assert (tmp_path / "t.md").read_text().startswith("## Targets")
@@ -169,6 +215,9 @@ def test_command_line(scored, tmp_path, capsys):
 
 
 def test_names_of_the_catalogue_may_be_set(scored, tmp_path):
-    # with the leak taken out of the catalogue, "unlisted" would be right, unless the result gives it a probability
-    again = score(tmp_path / "keys", tmp_path / "results", tuple(i for i in LISTED if i != "muscle_creep"))
+    # with the leak taken out of the catalogue, "unlisted" would be right, unless the result gives
+    # it a probability
+    again = score(
+        tmp_path / "keys", tmp_path / "results", tuple(i for i in LISTED if i != "muscle_creep")
+    )
     assert again.shares["unlisted recognised"][1] > scored.shares["unlisted recognised"][1]

@@ -11,7 +11,7 @@ import pytest
 
 import pamrs
 from pamrs.diagnosis import DiagnosisSettings
-from pamrs.diagnosis.fit import _fitting as fitting
+from pamrs.diagnosis.fit import Problem, _fitting, fit
 from pamrs.diagnosis.prepare import available_blocks, prepare
 from pamrs.diagnosis.search import refitted
 from pamrs.recordings import Recording
@@ -19,16 +19,19 @@ from pamrs.simulation import core_rig
 from tests.work.snapshot import compare
 
 TOLERANCE = 0.1
+SETTINGS = DiagnosisSettings()
 NOISE = {"supply_pressure": 400.0, "muscle_pressure": 400.0, "joint_angle": 3e-4}
 
 
 class Work:
-    """What is spent: counting stand-ins for the prediction of a block and for the least squares of a fit."""
+    """What is spent: counting stand-ins for the prediction of a block and for the least squares of
+    a fit.
+    """
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.predicted: list[tuple[int, int]] = []
         self.evaluated: list[int] = []
-        predict, solve = fitting.residual, fitting.levenberg_marquardt
+        predict, solve = _fitting.residual, _fitting.levenberg_marquardt
 
         def residual(block: Any, core: Any, prepared: Any, parameters: list[str]) -> Any:
             self.predicted.append((prepared.n, len(parameters)))
@@ -39,8 +42,8 @@ class Work:
             self.evaluated.append(found[2])
             return found
 
-        monkeypatch.setattr(fitting, "residual", residual)
-        monkeypatch.setattr(fitting, "levenberg_marquardt", least_squares)
+        monkeypatch.setattr(_fitting, "residual", residual)
+        monkeypatch.setattr(_fitting, "levenberg_marquardt", least_squares)
 
     def of(self, name: str, job: Callable[[], object]) -> dict[str, int]:
         """Counts of a job by what they count."""
@@ -52,7 +55,9 @@ class Work:
             f"{name}: evaluations of the fits": sum(self.evaluated),
             f"{name}: predictions of a block": len(self.predicted),
             f"{name}: samples predicted": sum(rows for rows, _ in self.predicted),
-            f"{name}: sensitivities of a sample": sum(rows * columns for rows, columns in self.predicted),
+            f"{name}: sensitivities of a sample": sum(
+                rows * columns for rows, columns in self.predicted
+            ),
         }
 
 
@@ -60,12 +65,18 @@ def recorded(rig: pamrs.Rig, seed: int) -> Recording:
     """Eight seconds of a shoulder at 200 Hz, with the noise of transducers."""
     rng = np.random.default_rng(seed)
     time = 0.005 * np.arange(1600)
-    command = 5.0 + 0.5 * np.sin(2 * np.pi * 0.2 * time + seed) + 0.25 * np.sin(2 * np.pi * 0.7 * time)
+    command = (
+        5.0 + 0.5 * np.sin(2 * np.pi * 0.2 * time + seed) + 0.25 * np.sin(2 * np.pi * 0.7 * time)
+    )
     run = pamrs.simulate(rig, valve_command=command, sample_time=0.005)
-    channels = {name: run[name] + sigma * rng.standard_normal(time.size) for name, sigma in NOISE.items()}
+    channels = {
+        name: run[name] + sigma * rng.standard_normal(time.size) for name, sigma in NOISE.items()
+    }
     channels["valve_command"] = command
     mask = {name: np.ones(time.size, dtype=bool) for name in channels}
-    return Recording(f"r{seed}", "fit", time, 0.005, channels, mask, [], dict.fromkeys(channels, ""))
+    return Recording(
+        f"r{seed}", "fit", time, 0.005, channels, mask, [], dict.fromkeys(channels, "")
+    )
 
 
 def hold(conductance: float) -> pamrs.Case:
@@ -75,26 +86,39 @@ def hold(conductance: float) -> pamrs.Case:
     run = pamrs.simulate(truth, duration=60.0, sample_time=0.1, initial={"muscle_pressure": 7e5})
     pressure = run["muscle_pressure"] + np.random.default_rng(1).normal(0.0, 150.0, run.time.size)
     mask = {"muscle_pressure": np.ones(run.time.size, dtype=bool)}
-    recording = Recording("hold", "fit", run.time, 0.1, {"muscle_pressure": pressure}, mask, [], {"muscle_pressure": "Pa"})
+    recording = Recording(
+        "hold",
+        "fit",
+        run.time,
+        0.1,
+        {"muscle_pressure": pressure},
+        mask,
+        [],
+        {"muscle_pressure": "Pa"},
+    )
     return pamrs.Case("hold", rig, [recording], Path())
 
 
 def test_work_of_the_refit_and_of_an_effect_of_a_shoulder(monkeypatch: pytest.MonkeyPatch) -> None:
     rig = pamrs.rigs.shoulder()
     truth = rig.with_effect("muscle_hysteresis").with_parameters({"chamber.dead_volume": 1.7e-4})
-    settings = DiagnosisSettings()
-    recordings = [prepare(recorded(truth, seed), rig, settings) for seed in (1, 2)]
-    blocks = available_blocks(rig, (*NOISE, "valve_command"), settings.prepare)
+    recordings = [prepare(recorded(truth, seed), rig, SETTINGS) for seed in (1, 2)]
+    blocks = available_blocks(rig, (*NOISE, "valve_command"), SETTINGS.prepare)
     work, counts = Work(monkeypatch), {}
     for kind in ("supply", "chamber", "arm"):
         chosen = [block for block in blocks if block.kind == kind]
-        problem = fitting.Problem(chosen, recordings, core_rig(rig), settings)
-        white = {block.name: 1.0 for block in chosen}
+        problem, white = (
+            Problem(chosen, recordings, core_rig(rig), SETTINGS),
+            {block.name: 1.0 for block in chosen},
+        )
         counts |= work.of(f"refit of the {kind}", lambda p=problem, w=white: refitted(p, rig, w))
-    starts = {"muscle_hysteresis.friction_pressure": 1e-5, "muscle_hysteresis.friction_constant": 1.0}
+    starts = {
+        "muscle_hysteresis.friction_pressure": 1e-5,
+        "muscle_hysteresis.friction_constant": 1.0,
+    }
     counts |= work.of(
         "hysteresis of the arm",
-        lambda: fitting.fit(problem, rig, ("muscle_hysteresis",), starts, white, evaluations=30),
+        lambda: fit(problem, rig, ("muscle_hysteresis",), starts, white, evaluations=30),
     )
     compare("shoulder", counts, tolerance=TOLERANCE)
 

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 import scipy.optimize
 from numpy.typing import NDArray
-from pamrs.diagnosis.leastsquares import levenberg_marquardt
 
+from pamrs.diagnosis import DiagnosisSettings
+from pamrs.diagnosis.fit import levenberg_marquardt
 from pamrs.fit import fit_muscle
 from tests.fit.cases import TOLERANCE, measure, muscle
 from tests.work.snapshot import compare
@@ -26,7 +27,9 @@ def test_evaluations_of_the_bounded_least_squares() -> None:
     boxes = {"wide": 10.0, "its end outside the box": 0.7}
     for name, wall in boxes.items():
         bounds = (np.full(2, -10.0), np.full(2, wall))
-        counts[f"valley, {name}"] = levenberg_marquardt(rosenbrock, np.array([-1.2, 1.0]), bounds, 200, 0.0)[2]
+        counts[f"valley, {name}"] = levenberg_marquardt(
+            rosenbrock, np.array([-1.2, 1.0]), bounds, 200, DiagnosisSettings().fit, 0.0
+        )[2]
     compare("least_squares", counts)
 
 

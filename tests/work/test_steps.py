@@ -17,7 +17,9 @@ def test_steps_of_the_packaged_rigs() -> None:
     counts = {}
     for name, run in RUNS.items():
         parts = round(run.sample_time / 1e-3)
-        substeps = _core.Simulator(core_rig(run.plant), run.sample_time, run.sample_time / parts, {}).substeps
+        substeps = _core.Simulator(
+            core_rig(run.plant), run.sample_time, run.sample_time / parts, {}
+        ).substeps
         counts[f"{name}: steps of a sample of {1e3 * run.sample_time:g} ms"] = substeps
         counts[f"{name}: right-hand sides of the run"] = STAGES * substeps * (run.rows - 1)
     compare("steps", counts)

@@ -1,7 +1,7 @@
 """The effects that a case can conceal, with forms that differ from the usual catalogue entries.
 
-One module per block; :mod:`.base` tells how an effect enters the plant. `supply_regulator_deadband` is left out: the
-rig is fed from a tank without a regulator.
+One module per block; :mod:`.base` tells how an effect enters the plant. `supply_regulator_deadband`
+is left out: the rig is fed from a tank without a regulator.
 """
 
 from __future__ import annotations
@@ -18,15 +18,26 @@ from .joint import EndStop, HoseTorque, MomentArm, Stribeck, TendonCompliance
 from .muscle import ActivationPressure, Buckling, Creep, Crowding, Hysteresis, Mullins, RateDamping
 from .sensors import ClockSkew, Eccentricity, GearLash, PressureDrift, PressureLag
 from .supply import Compressor, SupplyCooling, SupplyLeak
-from .valve import CentreLeakage, DeadZone, ExhaustBackPressure, InputLag, NullDrift, TubeRestriction, ValveHysteresis
+from .valve import (
+    CentreLeakage,
+    DeadZone,
+    ExhaustBackPressure,
+    InputLag,
+    NullDrift,
+    TubeRestriction,
+    ValveHysteresis,
+)
 
 _LISTED: tuple[type[Effect], ...] = (
-    SupplyLeak, Compressor, DeadZone, ValveHysteresis, CentreLeakage, InputLag, TubeRestriction, Leak, HeatTransfer,
-    Hysteresis, Creep, RateDamping, ActivationPressure, Mullins, Crowding, Stribeck, EndStop, PayloadSwing,
+    SupplyLeak, Compressor, DeadZone, ValveHysteresis, CentreLeakage, InputLag, TubeRestriction,
+    Leak, HeatTransfer,
+    Hysteresis, Creep, RateDamping, ActivationPressure, Mullins, Crowding, Stribeck, EndStop,
+    PayloadSwing,
     PayloadChange, ExternalTorque, BaseFlexibility, PressureLag, ClockSkew,
 )  # fmt: skip
 _UNLISTED: tuple[type[Effect], ...] = (
-    TendonCompliance, NullDrift, Buckling, GearLash, HoseTorque, SupplyCooling, ExhaustBackPressure, MomentArm,
+    TendonCompliance, NullDrift, Buckling, GearLash, HoseTorque, SupplyCooling, ExhaustBackPressure,
+    MomentArm,
     Eccentricity, PressureDrift,
 )  # fmt: skip
 TYPES: dict[str, type[Effect]] = {t.id: t for t in (*_LISTED, *_UNLISTED)}
@@ -52,7 +63,9 @@ class Effects:
     """
 
     def __init__(self, *effects: Effect) -> None:
-        order = {name: i for i, name in enumerate((*_SHAPERS, *(i for i in TYPES if i not in _SHAPERS)))}
+        order = {
+            name: i for i, name in enumerate((*_SHAPERS, *(i for i in TYPES if i not in _SHAPERS)))
+        }
         self.items = tuple(sorted(effects, key=lambda e: order[e.id]))
         if len({e.id for e in effects}) != len(effects):
             raise ValueError("an effect is given twice")
@@ -65,7 +78,9 @@ class Effects:
         return {e.id: e.to_dict() for e in self.items}
 
 
-def draw(kind: str, strength: float, rng: np.random.Generator, setting: Setting | None = None) -> Effect:
+def draw(
+    kind: str, strength: float, rng: np.random.Generator, setting: Setting | None = None
+) -> Effect:
     """Draw one effect.
 
     Parameters

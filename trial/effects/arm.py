@@ -13,10 +13,11 @@ from .base import RECORDING_PERIOD, Effect, Env, Port, Setting, Start, State, un
 
 @dataclass(frozen=True)
 class PayloadSwing(Effect):
-    """Part of the payload hangs on a rope of `length` [m] and swings, braked by the air: ``-q phi' |phi'|``.
+    """Part of the payload hangs on a rope of `length` [m] and swings, braked by the air:
+    ``-q phi' |phi'|``.
 
-    `share` of the payload, `drag` q [1/rad], `loss` damping ratio of the knot. States: angle from the vertical
-    [rad] and its rate.
+    `share` of the payload, `drag` q [1/rad], `loss` damping ratio of the knot. States: angle from
+    the vertical [rad] and its rate.
     """
 
     id: ClassVar[str] = "payload_swing"
@@ -29,7 +30,12 @@ class PayloadSwing(Effect):
 
     @classmethod
     def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        return cls(uniform(rng, 0.01, 0.02), uniform(rng, 0.12, 0.45), uniform(rng, 0.02, 0.1), uniform(rng, 0.003, 0.02))
+        return cls(
+            uniform(rng, 0.01, 0.02),
+            uniform(rng, 0.12, 0.45),
+            uniform(rng, 0.02, 0.1),
+            uniform(rng, 0.003, 0.02),
+        )
 
     def most(self) -> float:
         return 1.0 / self.share if self.share else 1.0
@@ -47,14 +53,24 @@ class PayloadSwing(Effect):
         sin, cos = math.sin, math.cos
 
         def accelerate(
-            torque: float, angle: float, rate: float, inertia: float, weight: float, y: State, d: State
-        ) -> float:  # fmt: skip
+            torque: float,
+            angle: float,
+            rate: float,
+            inertia: float,
+            weight: float,
+            y: State,
+            d: State,
+        ) -> float:
             phi, spin = y[first], y[second]
             c, s = cos(angle - phi), sin(angle - phi)
             # phi'' = free - (la/rope) c angle'', put into the equation of the arm
-            free = la / rope * s * rate * rate - g / rope * sin(phi) - (drag * abs(spin) + loss) * spin
+            free = (
+                la / rope * s * rate * rate - g / rope * sin(phi) - (drag * abs(spin) + loss) * spin
+            )
             lever = mass * la * rope
-            alpha = (torque - weight * sin(angle) - lever * (c * free + s * spin * spin)) / (inertia - mass * la * la * c * c)
+            alpha = (torque - weight * sin(angle) - lever * (c * free + s * spin * spin)) / (
+                inertia - mass * la * la * c * c
+            )
             d[first] = spin
             d[second] = free - la / rope * c * alpha
             return alpha
@@ -71,8 +87,8 @@ def _ease(s: float) -> float:
 class PayloadChange(Effect):
     """Mass is added or taken during a recording, over a time as with sand or a gripper.
 
-    One entry per event: `time` [s] (recording number times 1000 plus the time in it), `mass` [kg], `span` [s]. Every
-    recording starts with the nominal load.
+    One entry per event: `time` [s] (recording number times 1000 plus the time in it), `mass` [kg],
+    `span` [s]. Every recording starts with the nominal load.
     """
 
     id: ClassVar[str] = "payload_change"
@@ -86,7 +102,9 @@ class PayloadChange(Effect):
     @classmethod
     def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
         n = setting.recordings
-        start = [RECORDING_PERIOD * i + setting.duration * uniform(rng, 0.3, 0.65) for i in range(n)]
+        start = [
+            RECORDING_PERIOD * i + setting.duration * uniform(rng, 0.3, 0.65) for i in range(n)
+        ]
         sign = 1.0 if rng.random() < 0.5 else -1.0
         mass = sign * uniform(rng, 0.025, 0.05)
         return cls(tuple(start), (mass,) * n, (uniform(rng, 0.2, 2.0),) * n)
@@ -96,7 +114,12 @@ class PayloadChange(Effect):
 
     def load(self, env: Env) -> Port:
         events = dict.fromkeys(range(64), (0.0, 0.0, 1.0))
-        events.update({int(t // RECORDING_PERIOD): (t, m, s) for t, m, s in zip(self.time, self.mass, self.span, strict=True)})
+        events.update(
+            {
+                int(t // RECORDING_PERIOD): (t, m, s)
+                for t, m, s in zip(self.time, self.mass, self.span, strict=True)
+            }
+        )
 
         def added(t: float) -> float:
             at, mass, span = events[int(t // RECORDING_PERIOD)]
@@ -107,9 +130,11 @@ class PayloadChange(Effect):
 
 @dataclass(frozen=True)
 class ExternalTorque(Effect):
-    """Pushes on the arm: ``tau sin^2`` over a span, with a tail that dies out, at times that no command knows.
+    """Pushes on the arm: ``tau sin^2`` over a span, with a tail that dies out, at times that no
+    command knows.
 
-    One entry per push: `time` [s] (recording number times 1000 plus the time in it), `size` [N m], `span` [s].
+    One entry per push: `time` [s] (recording number times 1000 plus the time in it), `size` [N m],
+    `span` [s].
     """
 
     id: ClassVar[str] = "external_torque"
@@ -127,7 +152,9 @@ class ExternalTorque(Effect):
             # slots keep the pushes apart
             slots = rng.choice(5, int(rng.integers(2, 4)), replace=False)
             time += [
-                RECORDING_PERIOD * i + setting.duration * (0.08 + 0.17 * float(s) + uniform(rng, 0.0, 0.06)) for s in sorted(slots)
+                RECORDING_PERIOD * i
+                + setting.duration * (0.08 + 0.17 * float(s) + uniform(rng, 0.0, 0.06))
+                for s in sorted(slots)
             ]
         size = tuple(float(rng.choice([-1.0, 1.0])) * uniform(rng, 0.8, 2.0) for _ in time)
         return cls(tuple(time), size, tuple(uniform(rng, 0.4, 2.5) for _ in time))
@@ -152,10 +179,11 @@ class ExternalTorque(Effect):
 
 @dataclass(frozen=True)
 class BaseFlexibility(Effect):
-    """Mounting that yields under the joint torque, stiffer when bent further; the encoder sits on the joint.
+    """Mounting that yields under the joint torque, stiffer when bent further; the encoder sits on
+    the joint.
 
-    ``q'' = -w^2 (q + c tau + r q^3) - 2 z w q'`` with `compliance` c [rad/(N m)], `frequency` w/2pi [Hz], `damping` z,
-    `hardening` r [1/rad2]. States: tilt of the base [rad] and its rate.
+    ``q'' = -w^2 (q + c tau + r q^3) - 2 z w q'`` with `compliance` c [rad/(N m)], `frequency` w/2pi
+    [Hz], `damping` z, `hardening` r [1/rad2]. States: tilt of the base [rad] and its rate.
     """
 
     id: ClassVar[str] = "base_flexibility"
@@ -168,7 +196,12 @@ class BaseFlexibility(Effect):
 
     @classmethod
     def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        return cls(uniform(rng, 1.0e-5, 2.0e-5), uniform(rng, 3.0, 9.0), uniform(rng, 0.01, 0.05), uniform(rng, 0.0, 200.0))
+        return cls(
+            uniform(rng, 1.0e-5, 2.0e-5),
+            uniform(rng, 3.0, 9.0),
+            uniform(rng, 0.01, 0.05),
+            uniform(rng, 0.0, 200.0),
+        )
 
     def start(self, at: Start) -> State:
         return [-self.compliance * at.weight, 0.0]
@@ -181,8 +214,14 @@ class BaseFlexibility(Effect):
         w2, loss, sin = w * w, 2.0 * self.damping * w, math.sin
 
         def accelerate(
-            torque: float, angle: float, rate: float, inertia: float, weight: float, y: State, d: State
-        ) -> float:  # fmt: skip
+            torque: float,
+            angle: float,
+            rate: float,
+            inertia: float,
+            weight: float,
+            y: State,
+            d: State,
+        ) -> float:
             q, turn = y[first], y[second]
             bend = -w2 * (q + c * torque + r * q * q * q) - loss * turn
             d[first] = turn

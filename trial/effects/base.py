@@ -17,7 +17,8 @@ Port = Callable[..., Any] | None
 AIR_CONSTANT = 287.05
 REFERENCE_DENSITY = 1.185
 REFERENCE_TEMPERATURE = 293.15
-#: each recording of a case starts this much later than the one before it [s], so that events can be told by time
+#: each recording of a case starts this much later than the one before it [s], so that events can be
+#: told by time
 RECORDING_PERIOD = 1000.0
 
 
@@ -25,7 +26,8 @@ RECORDING_PERIOD = 1000.0
 class Setting:
     """What a draw may depend on.
 
-    Number and length [s] of the recordings, median start of the tank [gauge Pa], payload [kg], friction [N m].
+    Number and length [s] of the recordings, median start of the tank [gauge Pa], payload [kg],
+    friction [N m].
     """
 
     recordings: int = 5
@@ -46,7 +48,9 @@ class Env:
 
 @dataclass(frozen=True)
 class Start:
-    """Where a recording starts: absolute pressures [Pa], angle [rad], contraction [m], gravity torque [N m]."""
+    """Where a recording starts: absolute pressures [Pa], angle [rad], contraction [m], gravity
+    torque [N m].
+    """
 
     pressure: float
     supply: float
@@ -59,9 +63,9 @@ class Start:
 class Effect:
     """Base of all effects.
 
-    The ports return a function for the right-hand side, or None when the effect does not enter there; `first`
-    is the index of the first own state. `graded` names the fields that carry the size: with all of them at
-    zero the plant is as without the effect.
+    The ports return a function for the right-hand side, or None when the effect does not enter
+    there; `first` is the index of the first own state. `graded` names the fields that carry the
+    size: with all of them at zero the plant is as without the effect.
     """
 
     id: ClassVar[str] = ""
@@ -79,7 +83,9 @@ class Effect:
         new: dict[str, Any] = {}
         for name in self.graded:
             value = getattr(self, name)
-            new[name] = tuple(factor * v for v in value) if isinstance(value, tuple) else factor * value
+            new[name] = (
+                tuple(factor * v for v in value) if isinstance(value, tuple) else factor * value
+            )
         return replace(self, **new)
 
     def most(self) -> float:
@@ -120,7 +126,9 @@ class Effect:
         return None
 
     def gap(self, env: Env, first: int) -> Port:
-        """``f(x, ps, p)``: leakage flows past the spool, tank to muscle and muscle to ambient [kg/s]."""
+        """``f(x, ps, p)``: leakage flows past the spool, tank to muscle and muscle to ambient
+        [kg/s].
+        """
         return None
 
     def line(self, env: Env) -> Port:
@@ -136,7 +144,9 @@ class Effect:
         return None
 
     def gear(self, env: Env) -> Port:
-        """``f(angle, pg)``: angle [rad] at which the muscles are looked up, and the factor on their moment arm."""
+        """``f(angle, pg)``: angle [rad] at which the muscles are looked up, and the factor on their
+        moment arm.
+        """
         return None
 
     def lost_pressure(self, env: Env) -> Port:

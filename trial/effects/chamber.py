@@ -8,16 +8,27 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from .base import AIR_CONSTANT, REFERENCE_DENSITY, REFERENCE_TEMPERATURE, Effect, Env, Port, Setting, Start, State, uniform
+from .base import (
+    AIR_CONSTANT,
+    REFERENCE_DENSITY,
+    REFERENCE_TEMPERATURE,
+    Effect,
+    Env,
+    Port,
+    Setting,
+    Start,
+    State,
+    uniform,
+)
 
 
 @dataclass(frozen=True)
 class Leak(Effect):
     """Leak of the muscles to ambient.
 
-    `form` is "orifice" (ISO 6358 with `ratio` b: ``C rho0 p sqrt(T0/T) psi``), "crack" (the same with an area
-    that grows by `growth` per bar of gauge pressure) or "laminar" (``k (p^2 - pa^2)``); `coefficient` is C
-    [m3/(s Pa)] or k [kg/(s Pa2)].
+    `form` is "orifice" (ISO 6358 with `ratio` b: ``C rho0 p sqrt(T0/T) psi``), "crack" (the same
+    with an area that grows by `growth` per bar of gauge pressure) or "laminar"
+    (``k (p^2 - pa^2)``); `coefficient` is C [m3/(s Pa)] or k [kg/(s Pa2)].
     """
 
     id: ClassVar[str] = "leak_muscle"
@@ -37,13 +48,22 @@ class Leak(Effect):
         if form == "laminar":
             typical = 3.2e5
             return cls(form, conductance * REFERENCE_DENSITY * typical / (typical**2 - 101325.0**2))
-        return cls(form, conductance, uniform(rng, 0.2, 0.45), uniform(rng, 0.1, 0.3) if form == "crack" else 0.0)
+        return cls(
+            form,
+            conductance,
+            uniform(rng, 0.2, 0.45),
+            uniform(rng, 0.1, 0.3) if form == "crack" else 0.0,
+        )
 
     def flow(self, pressure: float, ambient: float, temperature: float) -> float:
-        """Mass flow [kg/s] out of the muscle at an absolute pressure [Pa]; negative when the muscle sucks."""
+        """Mass flow [kg/s] out of the muscle at an absolute pressure [Pa]; negative when the muscle
+        sucks.
+        """
         if self.form == "laminar":
             return self.coefficient * (pressure * pressure - ambient * ambient)
-        up, down, sign = (pressure, ambient, 1.0) if pressure >= ambient else (ambient, pressure, -1.0)
+        up, down, sign = (
+            (pressure, ambient, 1.0) if pressure >= ambient else (ambient, pressure, -1.0)
+        )
         r = down / up
         if r <= self.ratio:
             psi = 1.0
@@ -54,7 +74,14 @@ class Leak(Effect):
             knee = (r - self.ratio) / (1.0 - self.ratio)
             psi = math.sqrt(1.0 - knee * knee)
         area = self.coefficient * (1.0 + self.growth * max(pressure - ambient, 0.0) / 1.0e5)
-        return sign * area * REFERENCE_DENSITY * up * math.sqrt(REFERENCE_TEMPERATURE / temperature) * psi
+        return (
+            sign
+            * area
+            * REFERENCE_DENSITY
+            * up
+            * math.sqrt(REFERENCE_TEMPERATURE / temperature)
+            * psi
+        )
 
     def leak(self, env: Env) -> Port:
         pa, flow = env.par.ambient, self.flow
@@ -65,9 +92,9 @@ class Leak(Effect):
 class HeatTransfer(Effect):
     """Energy balance of the gas with a temperature of its own, in place of the fixed coefficients.
 
-    Wall exchange ``h = h0 sqrt(p T / (pa T0))`` [W/(m2 K)] over the inner wall of the muscles, raised while gas
-    streams in: ``1 + jet m_in / 1 g/s``. `share` is the part of the gas that follows the balance, the rest
-    follows the fixed coefficients. State: gas temperature [K].
+    Wall exchange ``h = h0 sqrt(p T / (pa T0))`` [W/(m2 K)] over the inner wall of the muscles,
+    raised while gas streams in: ``1 + jet m_in / 1 g/s``. `share` is the part of the gas that
+    follows the balance, the rest follows the fixed coefficients. State: gas temperature [K].
     """
 
     id: ClassVar[str] = "heat_transfer"

@@ -13,10 +13,11 @@ from .base import Effect, Env, Port, Setting, Start, State, uniform
 
 @dataclass(frozen=True)
 class Stribeck(Effect):
-    """Break-away friction on top of the baseline: ``f / (1 + (w/w_s)^2)`` against the motion, more one way.
+    """Break-away friction on top of the baseline: ``f / (1 + (w/w_s)^2)`` against the motion, more
+    one way.
 
-    `friction` f [N m], `speed` w_s [rad/s], `turn` [rad/s] over which the sign changes (algebraic sigmoid),
-    `asymmetry` -1..1.
+    `friction` f [N m], `speed` w_s [rad/s], `turn` [rad/s] over which the sign changes (algebraic
+    sigmoid), `asymmetry` -1..1.
     """
 
     id: ClassVar[str] = "joint_coulomb_stribeck"
@@ -29,7 +30,12 @@ class Stribeck(Effect):
 
     @classmethod
     def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        return cls(uniform(rng, 1.0, 2.0), uniform(rng, 0.04, 0.12), uniform(rng, 4.0e-3, 8.0e-3), uniform(rng, -0.2, 0.2))
+        return cls(
+            uniform(rng, 1.0, 2.0),
+            uniform(rng, 0.04, 0.12),
+            uniform(rng, 4.0e-3, 8.0e-3),
+            uniform(rng, -0.2, 0.2),
+        )
 
     def torque(self, env: Env, first: int) -> Port:
         f, ws, turn, skew, sqrt = self.friction, self.speed, self.turn, self.asymmetry, math.sqrt
@@ -46,8 +52,8 @@ class Stribeck(Effect):
 class EndStop(Effect):
     """Rubber bumper inside the range: progressive, with loss in compression.
 
-    ``tau = -k d (1 + (d/d0)^2) (1 + loss rate)``, never pulling; `angle` [rad] where it touches, `stiffness` k
-    [N m/rad], `depth` d0 [rad], `loss` [s/rad].
+    ``tau = -k d (1 + (d/d0)^2) (1 + loss rate)``, never pulling; `angle` [rad] where it touches,
+    `stiffness` k [N m/rad], `depth` d0 [rad], `loss` [s/rad].
     """
 
     id: ClassVar[str] = "joint_end_stop"
@@ -82,10 +88,11 @@ class EndStop(Effect):
 
 @dataclass(frozen=True)
 class HoseTorque(Effect):
-    """Hose laid over the joint: a spring that stiffens with pressure and slips in its clamps (in no catalogue).
+    """Hose laid over the joint: a spring that stiffens with pressure and slips in its clamps (in no
+    catalogue).
 
-    `spring` [N m] amplitude of ``-sin(2 (angle - rest))``, `pressure` [Pa] that doubles it, `slip` [N m] of a
-    Dahl element with the angle `give` [rad].
+    `spring` [N m] amplitude of ``-sin(2 (angle - rest))``, `pressure` [Pa] that doubles it, `slip`
+    [N m] of a Dahl element with the angle `give` [rad].
     """
 
     id: ClassVar[str] = "hose_torque"
@@ -114,7 +121,14 @@ class HoseTorque(Effect):
         return [1.0]
 
     def torque(self, env: Env, first: int) -> Port:
-        spring, slip, rest, pr, give, sin = self.spring, self.slip, self.rest, self.pressure, self.give, math.sin
+        spring, slip, rest, pr, give, sin = (
+            self.spring,
+            self.slip,
+            self.rest,
+            self.pressure,
+            self.give,
+            math.sin,
+        )
 
         def pull(angle: float, rate: float, pg: float, y: State, d: State) -> float:
             z = y[first]
@@ -158,8 +172,8 @@ class TendonCompliance(Effect):
 class MomentArm(Effect):
     """Tendon geometry wrong by more than its tolerance (in no catalogue).
 
-    The muscles see the angle ``a + e sin(n a + phase)``, so force arm and volume stay consistent; `error` e
-    [rad], `order` n.
+    The muscles see the angle ``a + e sin(n a + phase)``, so force arm and volume stay consistent;
+    `error` e [rad], `order` n.
     """
 
     id: ClassVar[str] = "moment_arm_error"
@@ -171,8 +185,15 @@ class MomentArm(Effect):
 
     @classmethod
     def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        return cls(math.radians(uniform(rng, 0.05, 0.1)), uniform(rng, 2.0, 3.5), uniform(rng, 0.0, 2.0 * math.pi))
+        return cls(
+            math.radians(uniform(rng, 0.05, 0.1)),
+            uniform(rng, 2.0, 3.5),
+            uniform(rng, 0.0, 2.0 * math.pi),
+        )
 
     def gear(self, env: Env) -> Port:
         e, n, phase, sin, cos = self.error, self.order, self.phase, math.sin, math.cos
-        return lambda angle, pg: (angle + e * sin(n * angle + phase), 1.0 + e * n * cos(n * angle + phase))
+        return lambda angle, pg: (
+            angle + e * sin(n * angle + phase),
+            1.0 + e * n * cos(n * angle + phase),
+        )

@@ -15,9 +15,9 @@ from .base import Effect, Env, Port, Setting, Start, State, uniform
 class Hysteresis(Effect):
     """Friction of the braid, scaled by ``gauge pressure / reference_pressure``.
 
-    `form` "bouc_wen": one state ``z' = x'/d (1 - |z|^n (beta sgn(x' z) + 1 - beta))``; "dahl_bank": many
-    states ``z_i' = x'/d_i (1 - sgn(x') z_i)``, a smooth Maxwell-slip bank. `friction` [N] and `distance` [m]
-    have one entry per state; x is the contraction.
+    `form` "bouc_wen": one state ``z' = x'/d (1 - |z|^n (beta sgn(x' z) + 1 - beta))``; "dahl_bank":
+    many states ``z_i' = x'/d_i (1 - sgn(x') z_i)``, a smooth Maxwell-slip bank. `friction` [N] and
+    `distance` [m] have one entry per state; x is the contraction.
     """
 
     id: ClassVar[str] = "muscle_hysteresis"
@@ -36,7 +36,14 @@ class Hysteresis(Effect):
         total = 600.0 * uniform(rng, 0.75, 1.3)  # all muscles, at the reference pressure
         if rng.random() < 0.5:
             d = uniform(rng, 0.8e-3, 2.0e-3)
-            return cls("bouc_wen", (total,), (d,), reference, uniform(rng, 1.0, 1.6), uniform(rng, 0.5, 0.7))
+            return cls(
+                "bouc_wen",
+                (total,),
+                (d,),
+                reference,
+                uniform(rng, 1.0, 1.6),
+                uniform(rng, 0.5, 0.7),
+            )
         distances = np.geomspace(0.15e-3, 6.0e-3, 6)
         weights = rng.uniform(0.6, 1.4, 6)
         weights *= total / weights.sum()
@@ -49,8 +56,16 @@ class Hysteresis(Effect):
         return [1.0] * len(self.friction)
 
     def force(self, env: Env, first: int) -> Port:
-        rows = [(first + j, w, 1.0 / d) for j, (w, d) in enumerate(zip(self.friction, self.distance, strict=True))]
-        dahl, n, beta, reference = self.form == "dahl_bank", self.exponent, self.beta, self.reference_pressure
+        rows = [
+            (first + j, w, 1.0 / d)
+            for j, (w, d) in enumerate(zip(self.friction, self.distance, strict=True))
+        ]
+        dahl, n, beta, reference = (
+            self.form == "dahl_bank",
+            self.exponent,
+            self.beta,
+            self.reference_pressure,
+        )
 
         def resist(pg: float, x: float, v: float, y: State, d: State) -> float:
             total, back = 0.0, v < 0.0
@@ -69,10 +84,11 @@ class Hysteresis(Effect):
 
 @dataclass(frozen=True)
 class Creep(Effect):
-    """Stress relaxation over three decades: parallel branches whose stiffness falls with their time constant.
+    """Stress relaxation over three decades: parallel branches whose stiffness falls with their time
+    constant.
 
-    ``F = sum k_i (x - x_i)``, ``x_i' = (x - x_i)/tau_i``, k_i ~ tau_i^-`power`; `stiffness` [N/m] of all muscles
-    and all branches together, time constants [s].
+    ``F = sum k_i (x - x_i)``, ``x_i' = (x - x_i)/tau_i``, k_i ~ tau_i^-`power`; `stiffness` [N/m]
+    of all muscles and all branches together, time constants [s].
     """
 
     id: ClassVar[str] = "muscle_creep"
@@ -86,7 +102,11 @@ class Creep(Effect):
     def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
         quick = uniform(rng, 1.0, 2.5)
         step = uniform(rng, 3.5, 6.0)
-        return cls(uniform(rng, 3.0e3, 5.0e3), uniform(rng, 0.05, 0.3), (quick, quick * step, quick * step**2))
+        return cls(
+            uniform(rng, 3.0e3, 5.0e3),
+            uniform(rng, 0.05, 0.3),
+            (quick, quick * step, quick * step**2),
+        )
 
     def start(self, at: Start) -> State:
         return [at.contraction] * len(self.time_constant)
@@ -114,9 +134,11 @@ class Creep(Effect):
 
 @dataclass(frozen=True)
 class RateDamping(Effect):
-    """Shear-thinning friction of the thread in the rubber: ``F = b (1 + pg/p_r) v_r asinh(v/v_r)``, weaker on extension.
+    """Shear-thinning friction of the thread in the rubber: ``F = b (1 + pg/p_r) v_r asinh(v/v_r)``,
+    weaker on extension.
 
-    `damping` b [N s/m] of all muscles without pressure, `pressure` p_r [Pa], `speed` v_r [m/s], `asymmetry` -1..1.
+    `damping` b [N s/m] of all muscles without pressure, `pressure` p_r [Pa], `speed` v_r [m/s],
+    `asymmetry` -1..1.
     """
 
     id: ClassVar[str] = "muscle_rate_damping"
@@ -129,10 +151,22 @@ class RateDamping(Effect):
 
     @classmethod
     def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        return cls(uniform(rng, 1.5e3, 3.0e3), uniform(rng, 0.5e5, 1.5e5), uniform(rng, 0.01, 0.03), uniform(rng, 0.2, 0.5))
+        return cls(
+            uniform(rng, 1.5e3, 3.0e3),
+            uniform(rng, 0.5e5, 1.5e5),
+            uniform(rng, 0.01, 0.03),
+            uniform(rng, 0.2, 0.5),
+        )
 
     def force(self, env: Env, first: int) -> Port:
-        b, pr, vr, skew, asinh, sqrt = self.damping, self.pressure, self.speed, self.asymmetry, math.asinh, math.sqrt
+        b, pr, vr, skew, asinh, sqrt = (
+            self.damping,
+            self.pressure,
+            self.speed,
+            self.asymmetry,
+            math.asinh,
+            math.sqrt,
+        )
 
         def resist(pg: float, x: float, v: float, y: State, d: State) -> float:
             s = v / vr
@@ -144,7 +178,9 @@ class RateDamping(Effect):
 
 @dataclass(frozen=True)
 class ActivationPressure(Effect):
-    """Pressure spent on laying the bladder against the braid: ``lost = pg p_th / (pg + p_th)``, `threshold` p_th [Pa]."""
+    """Pressure spent on laying the bladder against the braid: ``lost = pg p_th / (pg + p_th)``,
+    `threshold` p_th [Pa].
+    """
 
     id: ClassVar[str] = "activation_pressure"
     block: ClassVar[str] = "muscle"
@@ -164,8 +200,8 @@ class ActivationPressure(Effect):
 class Mullins(Effect):
     """Softening of the bladder below the largest contraction of the past.
 
-    The elastic torque falls by ``damage (1 - exp(-(x_max - x)/w))``; `worked` [m] is the contraction before the
-    recording, `width` w [m]. State: x_max.
+    The elastic torque falls by ``damage (1 - exp(-(x_max - x)/w))``; `worked` [m] is the
+    contraction before the recording, `width` w [m]. State: x_max.
     """
 
     id: ClassVar[str] = "mullins_softening"
@@ -210,9 +246,11 @@ class Mullins(Effect):
 
 @dataclass(frozen=True)
 class Crowding(Effect):
-    """Contact of swelling neighbours: ``F = c pg (x - x_c)^1.5`` against contraction, with a little friction.
+    """Contact of swelling neighbours: ``F = c pg (x - x_c)^1.5`` against contraction, with a little
+    friction.
 
-    `stiffness` c [m2/m^1.5] of all muscles, `onset` x_c [m], `rubbing` share of the force as friction.
+    `stiffness` c [m2/m^1.5] of all muscles, `onset` x_c [m], `rubbing` share of the force as
+    friction.
     """
 
     id: ClassVar[str] = "pam_crowding_contact"
@@ -242,7 +280,8 @@ class Crowding(Effect):
 class Buckling(Effect):
     """Muscles that fold while they carry little pressure push back (in no catalogue).
 
-    ``F = F_b (x/w) exp(1 - x/w) / (1 + (pg/p_b)^2)``, `push` F_b [N], `length` w [m], `pressure` p_b [Pa].
+    ``F = F_b (x/w) exp(1 - x/w) / (1 + (pg/p_b)^2)``, `push` F_b [N], `length` w [m], `pressure`
+    p_b [Pa].
     """
 
     id: ClassVar[str] = "muscle_buckling"
@@ -254,7 +293,9 @@ class Buckling(Effect):
 
     @classmethod
     def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        return cls(uniform(rng, 60.0, 120.0), uniform(rng, 3.0e-3, 8.0e-3), uniform(rng, 0.8e5, 1.6e5))
+        return cls(
+            uniform(rng, 60.0, 120.0), uniform(rng, 3.0e-3, 8.0e-3), uniform(rng, 0.8e5, 1.6e5)
+        )
 
     def force(self, env: Env, first: int) -> Port:
         push, w, pb, exp = self.push, self.length, self.pressure, math.exp

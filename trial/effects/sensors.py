@@ -54,9 +54,11 @@ class PressureLag(Effect):
 
 @dataclass(frozen=True)
 class ClockSkew(Effect):
-    """Channels from a second logger: their clock starts late and runs fast or slow, and is set back now and then.
+    """Channels from a second logger: their clock starts late and runs fast or slow, and is set back
+    now and then.
 
-    `offset` [s], `skew` [s/s]; `channels` "pressures" or "all" (both pressures and the angle against the command).
+    `offset` [s], `skew` [s/s]; `channels` "pressures" or "all" (both pressures and the angle
+    against the command).
     """
 
     id: ClassVar[str] = "clock_skew"
@@ -90,7 +92,9 @@ class ClockSkew(Effect):
 
 @dataclass(frozen=True)
 class GearLash(Effect):
-    """Play in the gear of the angle encoder (in no catalogue); `half_play` [rad]. State: angle of the encoder."""
+    """Play in the gear of the angle encoder (in no catalogue); `half_play` [rad]. State: angle of
+    the encoder.
+    """
 
     id: ClassVar[str] = "encoder_gear_lash"
     block: ClassVar[str] = "sensors"
@@ -121,7 +125,9 @@ class GearLash(Effect):
 
 @dataclass(frozen=True)
 class Eccentricity(Effect):
-    """Encoder disc off centre: the angle reads ``a + A sin(a + phase) + B sin(2 a + phase)`` (in no catalogue); A, B [rad]."""
+    """Encoder disc off centre: the angle reads ``a + A sin(a + phase) + B sin(2 a + phase)`` (in no
+    catalogue); A, B [rad].
+    """
 
     id: ClassVar[str] = "encoder_eccentricity"
     block: ClassVar[str] = "sensors"
@@ -132,16 +138,26 @@ class Eccentricity(Effect):
 
     @classmethod
     def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        return cls(math.radians(uniform(rng, 0.05, 0.08)), math.radians(uniform(rng, 0.01, 0.04)), uniform(rng, 0.0, 2.0 * math.pi))
+        return cls(
+            math.radians(uniform(rng, 0.05, 0.08)),
+            math.radians(uniform(rng, 0.01, 0.04)),
+            uniform(rng, 0.0, 2.0 * math.pi),
+        )
 
     def read(self, env: Env, first: int) -> Port:
         a, b, phase, sin = self.first, self.second, self.phase, math.sin
-        return lambda p, ps, angle, y: (p, ps, angle + a * sin(angle + phase) + b * sin(2.0 * angle + phase))
+        return lambda p, ps, angle, y: (
+            p,
+            ps,
+            angle + a * sin(angle + phase) + b * sin(2.0 * angle + phase),
+        )
 
 
 @dataclass(frozen=True)
 class PressureDrift(Effect):
-    """Zero of the muscle pressure transducer that wanders while it warms up (in no catalogue); `size` [Pa], times in s."""
+    """Zero of the muscle pressure transducer that wanders while it warms up (in no catalogue);
+    `size` [Pa], times in s.
+    """
 
     id: ClassVar[str] = "pressure_zero_drift"
     block: ClassVar[str] = "sensors"
@@ -154,10 +170,17 @@ class PressureDrift(Effect):
     @classmethod
     def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
         sign = 1.0 if rng.random() < 0.5 else -1.0
-        return cls(sign * uniform(rng, 1.2e3, 1.8e3), uniform(rng, 8.0, 20.0), uniform(rng, 15.0, 40.0))
+        return cls(
+            sign * uniform(rng, 1.2e3, 1.8e3), uniform(rng, 8.0, 20.0), uniform(rng, 15.0, 40.0)
+        )
 
     def read(self, env: Env, first: int) -> Port:
-        clock, size, tau, wave = env.clock, self.size, self.time_constant, 2.0 * math.pi / self.period
+        clock, size, tau, wave = (
+            env.clock,
+            self.size,
+            self.time_constant,
+            2.0 * math.pi / self.period,
+        )
 
         def drift(p: float, ps: float, angle: float, y: State) -> tuple[float, float, float]:
             t = y[clock] % RECORDING_PERIOD

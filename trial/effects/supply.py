@@ -13,7 +13,8 @@ from .base import Effect, Env, Port, Setting, Start, State, log_uniform, uniform
 
 @dataclass(frozen=True)
 class SupplyLeak(Effect):
-    """Leak of the tank: laminar, ``k (ps^2 - pa^2)``, or through a slit that opens with pressure, ``k (ps - pa)^n``.
+    """Leak of the tank: laminar, ``k (ps^2 - pa^2)``, or through a slit that opens with pressure,
+    ``k (ps - pa)^n``.
 
     `rate` [kg/s] is the flow at `reference` [Pa absolute].
     """
@@ -49,9 +50,9 @@ class SupplyLeak(Effect):
 class Compressor(Effect):
     """Piston compressor between two tank pressures.
 
-    Delivery [kg/s] falls with the back pressure by the clearance volume (`clearance`), comes up with a time
-    constant `rise` [s] after the start (unloading valve), and pulsates as ``2 sin^2`` with depth `pulsation`
-    at `frequency` [Hz]. `on` and `off` are absolute pressures [Pa].
+    Delivery [kg/s] falls with the back pressure by the clearance volume (`clearance`), comes up
+    with a time constant `rise` [s] after the start (unloading valve), and pulsates as ``2 sin^2``
+    with depth `pulsation` at `frequency` [Hz]. `on` and `off` are absolute pressures [Pa].
     """
 
     id: ClassVar[str] = "compressor_cut_in"
@@ -89,7 +90,12 @@ class Compressor(Effect):
     def tank(self, env: Env, first: int) -> Port:
         pa, clock, second = env.par.ambient, env.clock, first + 1
         gain = env.par.gas_constant * env.par.temperature / env.par.supply_volume * self.delivery
-        wave, depth, spoil, rise = 2.0 * math.pi * self.frequency, self.pulsation, self.clearance, self.rise
+        wave, depth, spoil, rise = (
+            2.0 * math.pi * self.frequency,
+            self.pulsation,
+            self.clearance,
+            self.rise,
+        )
         sin = math.sin
 
         def rate(ps: float, m_in: float, y: State, d: State) -> float:
@@ -117,7 +123,8 @@ class Compressor(Effect):
 class SupplyCooling(Effect):
     """Gas in the tank cools while it expands and warms at the wall (in no catalogue).
 
-    `share` is the part of the temperature change that reaches the pressure; `time_constant` [s] of the wall.
+    `share` is the part of the temperature change that reaches the pressure; `time_constant` [s] of
+    the wall.
     """
 
     id: ClassVar[str] = "supply_gas_cooling"

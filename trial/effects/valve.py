@@ -13,7 +13,9 @@ from .base import RECORDING_PERIOD, Effect, Env, Port, Setting, Start, State, lo
 
 @dataclass(frozen=True)
 class DeadZone(Effect):
-    """Overlap of the spool, normalised widths of both edges; clearance rounds the corner over `rounding` widths."""
+    """Overlap of the spool, normalised widths of both edges; clearance rounds the corner over
+    `rounding` widths.
+    """
 
     id: ClassVar[str] = "valve_dead_zone"
     block: ClassVar[str] = "valve"
@@ -49,8 +51,8 @@ class DeadZone(Effect):
 class ValveHysteresis(Effect):
     """Friction of the spool: it lags the command by up to `half_width` of half the stroke.
 
-    Dahl's law over the path of the command: ``dz = (1 - z sgn(dx)) |dx| / d sgn(dx)``, so the corner of the loop
-    is round, with `d` = `bend` half widths.
+    Dahl's law over the path of the command: ``dz = (1 - z sgn(dx)) |dx| / d sgn(dx)``, so the
+    corner of the loop is round, with `d` = `bend` half widths.
     """
 
     id: ClassVar[str] = "valve_hysteresis"
@@ -85,7 +87,8 @@ class ValveHysteresis(Effect):
 
 @dataclass(frozen=True)
 class CentreLeakage(Effect):
-    """Laminar leakage past the lands of the spool, ``k (pu^2 - pd^2) / (1 + |x| / x_l)``: the gap grows longer.
+    """Laminar leakage past the lands of the spool, ``k (pu^2 - pd^2) / (1 + |x| / x_l)``: the gap
+    grows longer.
 
     `supply_land` and `exhaust_land` are k of the two lands [kg/(s Pa2)], `reach` is x_l.
     """
@@ -114,7 +117,8 @@ class CentreLeakage(Effect):
 
 @dataclass(frozen=True)
 class InputLag(Effect):
-    """Pure delay [s] of the command, then a spool that follows with a time constant `lag` [s], slower for big steps.
+    """Pure delay [s] of the command, then a spool that follows with a time constant `lag` [s],
+    slower for big steps.
 
     ``xs' = (s/lag) tanh((x - xs)/s)`` with `stroke` s, a part of half the full stroke.
     """
@@ -128,7 +132,9 @@ class InputLag(Effect):
 
     @classmethod
     def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        return cls(uniform(rng, 8.0e-3, 14.0e-3), uniform(rng, 6.0e-3, 10.0e-3), uniform(rng, 0.08, 0.3))
+        return cls(
+            uniform(rng, 8.0e-3, 14.0e-3), uniform(rng, 6.0e-3, 10.0e-3), uniform(rng, 0.08, 0.3)
+        )
 
     def most(self) -> float:
         return 0.25 / max(self.pure + self.lag, 1e-9)
@@ -163,8 +169,8 @@ class InputLag(Effect):
 class TubeRestriction(Effect):
     """Hose between the valve manifold, where the transducer sits, and the muscles.
 
-    Isothermal pipe flow with a laminar and a turbulent part: ``pv^2 - p^2 = a m + b m |m|``, with `laminar` a
-    [Pa2 s/kg] and `turbulent` b [Pa2 s2/kg2].
+    Isothermal pipe flow with a laminar and a turbulent part: ``pv^2 - p^2 = a m + b m |m|``, with
+    `laminar` a [Pa2 s/kg] and `turbulent` b [Pa2 s2/kg2].
     """
 
     id: ClassVar[str] = "tube_flow_restriction"
@@ -188,7 +194,9 @@ class TubeRestriction(Effect):
 
 @dataclass(frozen=True)
 class ExhaustBackPressure(Effect):
-    """Silencer behind the exhaust edge: ``pe^2 - pa^2 = b m^2`` with `resistance` b [Pa2 s2/kg2] (in no catalogue)."""
+    """Silencer behind the exhaust edge: ``pe^2 - pa^2 = b m^2`` with `resistance` b [Pa2 s2/kg2]
+    (in no catalogue).
+    """
 
     id: ClassVar[str] = "exhaust_back_pressure"
     block: ClassVar[str] = "valve"
@@ -208,7 +216,8 @@ class ExhaustBackPressure(Effect):
 class NullDrift(Effect):
     """Null voltage that drifts with the temperature of the solenoid (in no catalogue).
 
-    A warm-up with `time_constant` [s] by `warm` of half the stroke, and a slow wave of `wave` with `period` [s].
+    A warm-up with `time_constant` [s] by `warm` of half the stroke, and a slow wave of `wave` with
+    `period` [s].
     """
 
     id: ClassVar[str] = "valve_null_drift"

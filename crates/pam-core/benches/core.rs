@@ -1,5 +1,5 @@
-//! Time of the core's hot paths: one table look-up, one exact solve, one RK4 step of the shoulder, one step with
-//! eight sensitivities.
+//! Time of the core's hot paths: one table look-up, one exact solve, one RK4 step of the shoulder,
+//! one step with eight sensitivities.
 
 use criterion::{criterion_main, Criterion};
 use pam_core::cut_chain::{predict, Block};
@@ -25,22 +25,31 @@ fn core(c: &mut Criterion) {
     let start = Initial::rest(&rig).with(&rig, "muscle_pressure", 1e5);
     let Ok(initial) = start.and_then(|i| i.with(&rig, "joint_angle", 0.52)) else { return };
     if let Some(muscle) = rig.muscle(0) {
-        c.bench_function("muscle table look-up", |b| b.iter(|| muscle.table.eval(black_box(0.123_f64))));
+        c.bench_function("muscle table look-up", |b| {
+            b.iter(|| muscle.table.eval(black_box(0.123_f64)))
+        });
         c.bench_function("muscle exact force", |b| {
             b.iter(|| muscle.exact.force(black_box(4e5), black_box(0.123)))
         });
     }
     let steps = (SAMPLES - 1) * SUBSTEPS;
     c.bench_function(&format!("shoulder, {steps} RK4 steps"), |b| {
-        b.iter(|| simulate(&rig, SAMPLES, &[("valve_command", black_box(&command))], timing, &initial));
+        b.iter(|| {
+            simulate(&rig, SAMPLES, &[("valve_command", black_box(&command))], timing, &initial)
+        });
     });
-    let Ok(run) = simulate(&rig, SAMPLES, &[("valve_command", &command)], timing, &initial) else { return };
+    let Ok(run) = simulate(&rig, SAMPLES, &[("valve_command", &command)], timing, &initial) else {
+        return;
+    };
     let zero = vec![0.0; SAMPLES];
     let channels = ["supply_pressure", "muscle_pressure", "joint_angle"];
     let signals: Vec<_> = (channels.iter())
         .filter_map(|name| Some((*name, Signal { value: run.get(&rig, name)?, slope: &zero })))
         .collect();
-    let Ok(measured) = Measured::new(&rig, SAMPLES, &[("valve_command", &command)], &signals) else { return };
+    let Ok(measured) = Measured::new(&rig, SAMPLES, &[("valve_command", &command)], &signals)
+    else {
+        return;
+    };
     let names = [
         "valve.discharge_area_max",
         "valve.null_voltage",

@@ -28,7 +28,8 @@ pub enum Error {
         /// Where the expectation comes from.
         why: String,
     },
-    /// A parameter has a name for its value that is not known, or does not belong to the model chosen.
+    /// A parameter has a name for its value that is not known, or does not belong to the model
+    /// chosen.
     #[error("{name} = {value} is not allowed: {allowed}")]
     Choice {
         /// Dotted name of the parameter.
@@ -78,7 +79,11 @@ pub fn check_range(name: &str, value: f64, low: f64, high: f64, unit: &str) -> R
 ///
 /// # Errors
 /// [`Error::Choice`] that names the parameter and lists what it may be.
-pub(crate) fn named<T: Copy>(parameter: &str, name: &str, names: &[(&'static str, T)]) -> Result<T> {
+pub(crate) fn named<T: Copy>(
+    parameter: &str,
+    name: &str,
+    names: &[(&'static str, T)],
+) -> Result<T> {
     names.iter().find(|(known, _)| *known == name).map(|(_, value)| *value).ok_or_else(|| {
         let known: Vec<_> = names.iter().map(|(known, _)| format!("\"{known}\"")).collect();
         Error::Choice {

@@ -1,13 +1,14 @@
 //! Pneumatic artificial muscles (McKibben muscles) and the arms they drive.
 //!
 //! The physics of R. M. Robinson's dissertation (University of Maryland, 2014) with its printed
-//! errors corrected: muscle geometry and force, supplies, valves, tubes and gas, joints, arms; fixed-step
-//! integration, and *cut-chain* simulation, in which measured signals drive each block so that a
-//! mismatch with a recording is located in one of them. Every equation is written once, generic over
-//! [`scalar::Scalar`], and is read as plain numbers or as dual numbers for exact sensitivities.
+//! errors corrected: muscle geometry and force, supplies, valves, tubes and gas, joints, arms;
+//! fixed-step integration, and *cut-chain* simulation, in which measured signals drive each block
+//! so that a mismatch with a recording is located in one of them. Every equation is written once,
+//! generic over [`scalar::Scalar`], and is read as plain numbers or as dual numbers for exact
+//! sensitivities.
 //!
-//! SI units, radians; pressures are gauge in force equations and absolute in gas equations. Nothing in
-//! this crate panics on bad input, prints, or knows Python.
+//! SI units, radians; pressures are gauge in force equations and absolute in gas equations. Nothing
+//! in this crate panics on bad input, prints, or knows Python.
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 

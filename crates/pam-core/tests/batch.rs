@@ -1,4 +1,5 @@
-//! Laws of a batch: each row is the plant alone to the last bit, whoever advances it; a row that ends takes none along.
+//! Laws of a batch: each row is the plant alone to the last bit, whoever advances it; a row that
+//! ends takes none along.
 
 use pam_core::simulate::batch::{Batch, Failure};
 use pam_core::simulate::drive::Drive;
@@ -46,9 +47,16 @@ fn bits(states: impl Iterator<Item = Vec<f64>>) -> Vec<Vec<u64>> {
 fn every_row_is_the_plant_alone_whatever_the_threads() {
     let base = rig();
     let rows = 70; // more than one chunk for any number of threads
-    let rigs: Vec<_> = (0..rows)
-        .map(|k| if k % 7 == 3 { with_payload(&base, 1.0 + k as f64 * 0.1) } else { Arc::clone(&base) })
-        .collect();
+    let rigs: Vec<_> =
+        (0..rows)
+            .map(|k| {
+                if k % 7 == 3 {
+                    with_payload(&base, 1.0 + k as f64 * 0.1)
+                } else {
+                    Arc::clone(&base)
+                }
+            })
+            .collect();
     let initial: Vec<_> = rigs
         .iter()
         .enumerate()
@@ -68,7 +76,11 @@ fn every_row_is_the_plant_alone_whatever_the_threads() {
         let mut out = Trajectory::new(&rigs[row], 60);
         let drive = Drive::new(&rigs[row], 60, &[("valve_command", &signal)]).unwrap();
         alone.advance(&rigs[row], TIMING.stable(&rigs[row]), &drive, &mut out).unwrap();
-        assert_eq!(bits(std::iter::once(alone.to_vec())).swap_remove(0), found[0].0[row], "row {row}");
+        assert_eq!(
+            bits(std::iter::once(alone.to_vec())).swap_remove(0),
+            found[0].0[row],
+            "row {row}"
+        );
         for (channel, values) in out.channels.iter().enumerate() {
             let here = found[0].1[channel * rows + row];
             assert_eq!(here.to_bits(), values[59].to_bits(), "row {row}, channel {channel}");
@@ -147,8 +159,10 @@ fn a_bad_command_is_an_error_or_the_end_of_its_row() {
         .is_err());
     assert_eq!((bits(batch.states()), batch.samples()), (before.clone(), 5));
     batch.advance(1, &[("valve_command", &held)], false, &mut quiet).unwrap();
-    let failures: Vec<_> =
-        batch.failures().map(|f| f.map(|f| (f.time, f.message.contains("valve_command[1]")))).collect();
+    let failures: Vec<_> = batch
+        .failures()
+        .map(|f| f.map(|f| (f.time, f.message.contains("valve_command[1]"))))
+        .collect();
     assert_eq!(failures, [None, Some((0.01, true)), None]);
     let after = bits(batch.states());
     assert_eq!(after[1], before[1]);
@@ -158,7 +172,9 @@ fn a_bad_command_is_an_error_or_the_end_of_its_row() {
 #[test]
 fn what_does_not_fit_is_named_with_its_row() {
     let base = rig();
-    let other = Arc::new(Rig::new(RigSpec::from_json(include_str!("data/shoulder.json")).unwrap()).unwrap());
+    let other = Arc::new(
+        Rig::new(RigSpec::from_json(include_str!("data/shoulder.json")).unwrap()).unwrap(),
+    );
     let mut spec = base.spec().clone();
     spec.muscles[0].name = "flexor".into();
     spec.chambers[0].name = "flexor".into();
@@ -166,7 +182,9 @@ fn what_does_not_fit_is_named_with_its_row() {
     assert!(Batch::new(&[], TIMING, &[], 1).is_err());
     assert!(Batch::new(&[Arc::clone(&base)], TIMING, &start(2), 1).is_err());
     if let Ok(renamed) = Rig::new(spec) {
-        let error = Batch::new(&[Arc::clone(&base), Arc::new(renamed)], TIMING, &start(2), 1).err().unwrap();
+        let error = Batch::new(&[Arc::clone(&base), Arc::new(renamed)], TIMING, &start(2), 1)
+            .err()
+            .unwrap();
         assert!(error.to_string().contains("row 1: its channels"), "{error}");
     }
     let mut batch = Batch::new(&[base.clone(), other], TIMING, &start(2), 1).unwrap();
@@ -176,7 +194,11 @@ fn what_does_not_fit_is_named_with_its_row() {
     let mut bad = states.clone();
     bad[1].pop();
     assert!(batch.restore(3, &bad, &none).unwrap_err().to_string().contains("row 1: state"));
-    assert!(batch.restore(4, &states, &none).unwrap_err().to_string().contains("row 0: state.samples = 3"));
+    assert!(batch
+        .restore(4, &states, &none)
+        .unwrap_err()
+        .to_string()
+        .contains("row 0: state.samples = 3"));
     assert!(batch.restore(3, &states[..1], &none).is_err());
     assert_eq!(bits(batch.states()), bits(states.into_iter()));
 }

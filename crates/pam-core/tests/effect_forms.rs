@@ -63,14 +63,19 @@ fn a_leaking_tank_decays_with_its_time_constant() {
     let run = Run::new(rig, 101, 0.1, 10, |_| 0.0, &[]);
     let tau = 0.015 / (1e-9 * 1.185 * RT);
     let expected = (1.38e6 + AMBIENT) * (-10.0 / tau).exp() - AMBIENT;
-    assert!((run.last("supply_pressure") - expected).abs() < 1.0, "{}", run.last("supply_pressure"));
+    assert!(
+        (run.last("supply_pressure") - expected).abs() < 1.0,
+        "{}",
+        run.last("supply_pressure")
+    );
     assert!((run.last("mass_supplied") - run.last("mass_vented")).abs() < 1e-15);
 }
 
 #[test]
 fn a_compressor_runs_between_its_pressures() {
     let leak = effect("supply_leak", &[("conductance", 4e-9)]);
-    let parameters = [("free_air_delivery", 0.02), ("cut_in_pressure", 1.3e6), ("cut_out_pressure", 1.36e6)];
+    let parameters =
+        [("free_air_delivery", 0.02), ("cut_in_pressure", 1.3e6), ("cut_out_pressure", 1.36e6)];
     let rig = with(lone_tank(), vec![leak, effect("compressor_cut_in", &parameters)]);
     let run = Run::new(rig, 4001, 0.01, 2, |_| 0.0, &[]);
     let p = run.get("supply_pressure");
@@ -99,29 +104,57 @@ fn a_regulator_does_not_answer_a_small_step() {
 #[test]
 fn a_valve_is_shut_inside_its_dead_zone_and_follows_its_play() {
     let dead = || vec![effect("valve_dead_zone", &[("half_width", 0.04)])];
-    let still =
-        Run::new(with(rigid_chamber(1e-3), dead()), 50, 0.01, 5, |_| 5.19, &[("muscle_pressure", 2e5)]);
+    let still = Run::new(
+        with(rigid_chamber(1e-3), dead()),
+        50,
+        0.01,
+        5,
+        |_| 5.19,
+        &[("muscle_pressure", 2e5)],
+    );
     assert!(still.get("muscle_pressure").iter().all(|p| (p - 2e5).abs() < 1e-6));
     // Open by 0.5 of the rest: the area of the free valve at that position.
     let rig = with(rigid_chamber(1e-2), dead());
     let moved = Run::new(rig, 5, 0.01, 5, |_| 5.0 + 5.0 * 0.52, &[("muscle_pressure", 2e5)]);
-    let free = Run::new(with(rigid_chamber(1e-2), vec![]), 5, 0.01, 5, |_| 7.5, &[("muscle_pressure", 2e5)]);
+    let free = Run::new(
+        with(rigid_chamber(1e-2), vec![]),
+        5,
+        0.01,
+        5,
+        |_| 7.5,
+        &[("muscle_pressure", 2e5)],
+    );
     assert!((moved.last("muscle_pressure") / free.last("muscle_pressure") - 1.0).abs() < 1e-12);
     let play = vec![effect("valve_hysteresis", &[("half_width", 0.02)])];
     let command = |k: usize| if k < 10 { 5.0 } else { 5.5 };
-    let run = Run::new(with(rigid_chamber(1e-2), play), 20, 0.01, 5, command, &[("muscle_pressure", 2e5)]);
+    let run = Run::new(
+        with(rigid_chamber(1e-2), play),
+        20,
+        0.01,
+        5,
+        command,
+        &[("muscle_pressure", 2e5)],
+    );
     let less = |k: usize| if k < 10 { 5.0 } else { 5.4 };
-    let same = Run::new(with(rigid_chamber(1e-2), vec![]), 20, 0.01, 5, less, &[("muscle_pressure", 2e5)]);
+    let same =
+        Run::new(with(rigid_chamber(1e-2), vec![]), 20, 0.01, 5, less, &[("muscle_pressure", 2e5)]);
     assert!((run.last("muscle_pressure") / same.last("muscle_pressure") - 1.0).abs() < 1e-12);
 }
 
 #[test]
 fn a_lag_in_the_path_costs_its_time() {
-    // Choked filling of a large chamber: what flows is linear in the spool, so that what is missing is its lag.
+    // Choked filling of a large chamber: what flows is linear in the spool, so that what is missing
+    // is its lag.
     let filled = |effects: Vec<EffectSpec>| {
         let command = |k: usize| if k < 10 { 5.0 } else { 5.5 };
-        let run =
-            Run::new(with(rigid_chamber(0.05), effects), 60, 0.01, 10, command, &[("muscle_pressure", 1e5)]);
+        let run = Run::new(
+            with(rigid_chamber(0.05), effects),
+            60,
+            0.01,
+            10,
+            command,
+            &[("muscle_pressure", 1e5)],
+        );
         run.last("muscle_pressure") - 1e5
     };
     let free = filled(vec![]);
@@ -129,11 +162,16 @@ fn a_lag_in_the_path_costs_its_time() {
         let lag = effect("input_path_lag", &[("time_constant", time_constant), ("delay", delay)]);
         let missing = 1.0 - filled(vec![lag]) / free;
         let expected = (time_constant + delay) / 0.49;
-        assert!((missing / expected - 1.0).abs() < 0.01, "{time_constant} {delay}: {missing} {expected}");
+        assert!(
+            (missing / expected - 1.0).abs() < 0.01,
+            "{time_constant} {delay}: {missing} {expected}"
+        );
     }
     let shift = 1.0
-        - filled(vec![effect("clock_skew", &[("offset", 0.0123), ("rate", 0.0), ("angle_share", 1.0)])])
-            / free;
+        - filled(vec![effect(
+            "clock_skew",
+            &[("offset", 0.0123), ("rate", 0.0), ("angle_share", 1.0)],
+        )]) / free;
     assert!((shift * 0.49 - 0.0123).abs() < 1e-4, "{shift}");
 }
 
@@ -144,14 +182,17 @@ fn centre_leakage_settles_where_both_flows_are_equal() {
     let leak = vec![effect("valve_centre_leakage", &[("conductance", 1e-9), ("opening", 0.02)])];
     let from = |pressure: f64| {
         let rig = with(spec.clone(), leak.clone());
-        Run::new(rig, 400, 0.1, 100, |_| 5.0, &[("muscle_pressure", pressure)]).last("muscle_pressure")
+        Run::new(rig, 400, 0.1, 100, |_| 5.0, &[("muscle_pressure", pressure)])
+            .last("muscle_pressure")
     };
     let (up, down) = (from(1e5), from(1.3e6));
     assert!((up - down).abs() < 100.0, "{up} {down}");
     let gas = pam_core::blocks::gas::Gas::new(AMBIENT, 293.15, 287.05, 1.4);
     let p = up + AMBIENT;
-    let (fills, vents) = (gas.mass_flow(1e-9, 1.38e6 + AMBIENT, p), gas.mass_flow(1e-9, p, AMBIENT));
-    // alpha_in is 1.4 here and alpha_out 1: the pressure stands still where the one is less by that.
+    let (fills, vents) =
+        (gas.mass_flow(1e-9, 1.38e6 + AMBIENT, p), gas.mass_flow(1e-9, p, AMBIENT));
+    // alpha_in is 1.4 here and alpha_out 1: the pressure stands still where the one is less by
+    // that.
     assert!((1.4 * fills / vents - 1.0_f64).abs() < 1e-3, "{fills} {vents}");
 }
 
@@ -166,10 +207,12 @@ fn a_narrow_tube_decides_how_fast_a_chamber_fills() {
 
 #[test]
 fn a_transducer_at_the_valve_reads_the_node_of_the_tube() {
-    let tube = |tap: f64| vec![effect("tube_flow_restriction", &[("conductance", 2e-8), ("tap", tap)])];
+    let tube =
+        |tap: f64| vec![effect("tube_flow_restriction", &[("conductance", 2e-8), ("tap", tap)])];
     let command = |k: usize| [5.0, 8.0, 5.0, 2.0, 5.0][k / 10];
     let start = [("muscle_pressure", 2e5)];
-    let at = |tap: f64| Run::new(with(rigid_chamber(2e-3), tube(tap)), 50, 0.01, 10, command, &start);
+    let at =
+        |tap: f64| Run::new(with(rigid_chamber(2e-3), tube(tap)), 50, 0.01, 10, command, &start);
     let (valve, muscle) = (at(1.0), at(0.0));
     for name in ["air_mass", "supply_pressure"] {
         assert_eq!(valve.get(name), muscle.get(name));
@@ -212,9 +255,22 @@ fn a_transducer_at_the_valve_reads_the_node_of_the_tube() {
 fn the_reading_of_a_pressure_lags() {
     let lag = vec![effect("pressure_lag", &[("time_constant", 0.03)])];
     let command = |k: usize| if k < 10 { 5.0 } else { 5.2 };
-    let slow = Run::new(with(rigid_chamber(0.05), lag), 60, 0.01, 10, command, &[("muscle_pressure", 1e5)]);
-    let true_ =
-        Run::new(with(rigid_chamber(0.05), vec![]), 60, 0.01, 10, command, &[("muscle_pressure", 1e5)]);
+    let slow = Run::new(
+        with(rigid_chamber(0.05), lag),
+        60,
+        0.01,
+        10,
+        command,
+        &[("muscle_pressure", 1e5)],
+    );
+    let true_ = Run::new(
+        with(rigid_chamber(0.05), vec![]),
+        60,
+        0.01,
+        10,
+        command,
+        &[("muscle_pressure", 1e5)],
+    );
     let p = true_.get("muscle_pressure");
     // Choked filling is a ramp: the reading is behind by the time constant.
     let expected = p[59] - 0.03 * (p[59] - p[58]) / 0.01;
@@ -251,9 +307,15 @@ fn force_effects_have_their_size() {
         &[("contact_area", 1e-3), ("onset_contraction", 0.02), ("exponent", 1.0), ("rubbing", 0.0)],
     )]);
     assert!((crowded - (plain - 6.0 * 1e-3 * 3e5 * (e - 0.02 - 0.0025))).abs() < 1e-6);
-    assert_eq!(force(vec![effect("muscle_creep", &[("stiffness", 5e3), ("time_constant", 1.0)])]), plain);
     assert_eq!(
-        force(vec![effect("mullins_softening", &[("softening", 0.3), ("contraction_width", 0.03)])]),
+        force(vec![effect("muscle_creep", &[("stiffness", 5e3), ("time_constant", 1.0)])]),
+        plain
+    );
+    assert_eq!(
+        force(vec![effect(
+            "mullins_softening",
+            &[("softening", 0.3), ("contraction_width", 0.03)]
+        )]),
         plain
     );
 }
@@ -263,7 +325,11 @@ fn a_damped_muscle_loses_what_the_speed_times_the_damping_is() {
     let damping = |share: f64| {
         effect(
             "muscle_rate_damping",
-            &[("damping_constant", 200.0), ("damping_pressure", 1e-3), ("lengthening_share", share)],
+            &[
+                ("damping_constant", 200.0),
+                ("damping_pressure", 1e-3),
+                ("lengthening_share", share),
+            ],
         )
     };
     let force = |effects: Vec<EffectSpec>, rate: f64| {
@@ -304,15 +370,19 @@ fn a_change_of_payload_changes_mass_and_weight() {
     for change in [0.0, 3.0, -6.0] {
         let payload = 9.07 + change;
         let expected = -(1.8 + payload * 0.9) * 9.80665 * 1.5_f64.sin() / (0.634 + payload * 0.81);
-        assert!((fall(change) / expected - 1.0).abs() < 2e-3, "{change}: {} {expected}", fall(change));
+        assert!(
+            (fall(change) / expected - 1.0).abs() < 2e-3,
+            "{change}: {} {expected}",
+            fall(change)
+        );
     }
 }
 
 /// A push [N m] at a time for a duration [s], the other two without torque.
 fn one_push(torque: f64, time: f64, duration: f64) -> EffectSpec {
     let own = [("torque", torque), ("time", time), ("duration", duration), ("rise", 0.02)];
-    let others =
-        ["torque_2", "time_2", "duration_2", "torque_3", "time_3", "duration_3"].map(|name| (name, 0.0));
+    let others = ["torque_2", "time_2", "duration_2", "torque_3", "time_3", "duration_3"]
+        .map(|name| (name, 0.0));
     effect("external_torque", &[&own[..], &others[..]].concat())
 }
 
@@ -330,7 +400,13 @@ fn a_push_is_torque_times_duration() {
 fn a_stop_in_the_way_carries_the_arm() {
     let stop = effect(
         "joint_end_stop",
-        &[("stiffness", 2000.0), ("angle", 0.6), ("dissipation", 2.0), ("exponent", 1.0), ("side", -1.0)],
+        &[
+            ("stiffness", 2000.0),
+            ("angle", 0.6),
+            ("dissipation", 2.0),
+            ("exponent", 1.0),
+            ("side", -1.0),
+        ],
     );
     let run = pendulum(vec![stop], 4000, 5e-3, 0.9, 0.0);
     let (angle, torque) = (run.last("joint_angle"), run.last("joint_torque"));
@@ -343,8 +419,9 @@ fn a_stop_in_the_way_carries_the_arm() {
 #[test]
 fn stiction_takes_from_slow_motion_alone() {
     let friction = effect("joint_coulomb_stribeck", &[("stiction", 4.0), ("stribeck_speed", 0.05)]);
-    let slowed =
-        |effects: Vec<EffectSpec>, rate: f64| pendulum(effects, 2, 1e-3, 0.8, rate).last("joint_rate") - rate;
+    let slowed = |effects: Vec<EffectSpec>, rate: f64| {
+        pendulum(effects, 2, 1e-3, 0.8, rate).last("joint_rate") - rate
+    };
     let lost = |rate: f64| {
         (slowed(vec![], rate) - slowed(vec![friction.clone()], rate)) * (0.634 + 9.07 * 0.81) / 1e-3
     };
@@ -407,7 +484,8 @@ fn a_swinging_payload_is_a_second_link_without_mass() {
 
 #[test]
 fn a_base_gives_way_by_its_compliance() {
-    // Released from rest with the base still carrying the weight: it swings back, and the joint opens by both.
+    // Released from rest with the base still carrying the weight: it swings back, and the joint
+    // opens by both.
     let (c, w) = (2e-4, 6.0 * std::f64::consts::TAU);
     let base = [("compliance", c), ("natural_frequency", 6.0), ("damping_ratio", 0.5)];
     let run = pendulum(vec![effect("base_flexibility", &base)], 2, 1e-4, 1.0, 0.0);
@@ -424,7 +502,8 @@ fn a_base_gives_way_by_its_compliance() {
     assert!((last(vec![effect("base_flexibility", &base)]) - last(vec![])).abs() > 1e-4);
 }
 
-/// One muscle in a load frame that shortens it evenly by 10 mm within a tenth of a second, and holds it for 2 s or for good.
+/// One muscle in a load frame that shortens it evenly by 10 mm within a tenth of a second, and
+/// holds it for 2 s or for good.
 fn framed(effects: Vec<EffectSpec>, back: bool) -> Vec<f64> {
     let mut spec = shoulder();
     spec.arm = None;
@@ -462,7 +541,11 @@ fn creep_relaxes_the_force_at_a_held_length() {
 fn softening_is_met_on_the_way_back_only() {
     let soft = effect("mullins_softening", &[("softening", 0.3), ("contraction_width", 0.03)]);
     let (a, b) = (framed(vec![soft], true), framed(vec![], true));
-    assert_eq!(a[..210], b[..210], "a muscle that only contracts is always at its largest contraction");
+    assert_eq!(
+        a[..210],
+        b[..210],
+        "a muscle that only contracts is always at its largest contraction"
+    );
     assert_eq!(a[0], b[0]);
     let (more, pull) = (a[399] - a[0], a[0]);
     assert!(
@@ -489,7 +572,9 @@ fn convergence_is_of_order_four_where_the_effect_is_smooth() {
             Run::new(rig.clone(), 60, 0.01, substeps, command, &start).get("joint_angle").to_vec()
         };
         let reference = run(320);
-        let error = |n: usize| run(n).iter().zip(&reference).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        let error = |n: usize| {
+            run(n).iter().zip(&reference).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+        };
         let order = (error(10) / error(20)).log2();
         assert!((3.4..4.6).contains(&order), "{}: order {order}", typical.id);
     }
@@ -501,14 +586,24 @@ fn fast_effects_shorten_the_step() {
     let free = step(vec![]);
     let lag = step(vec![effect("input_path_lag", &[("time_constant", 1e-4), ("delay", 0.0)])]);
     assert!((lag - 2e-4).abs() < 1e-12, "{lag} {free}");
-    assert_eq!(step(vec![effect("input_path_lag", &[("time_constant", 1e-5), ("delay", 1e-5)])]), free);
-    let stiff = [("stiffness", 1e9), ("angle", 1.0), ("dissipation", 0.0), ("exponent", 1.0), ("side", 1.0)];
+    assert_eq!(
+        step(vec![effect("input_path_lag", &[("time_constant", 1e-5), ("delay", 1e-5)])]),
+        free
+    );
+    let stiff = [
+        ("stiffness", 1e9),
+        ("angle", 1.0),
+        ("dissipation", 0.0),
+        ("exponent", 1.0),
+        ("side", 1.0),
+    ];
     let expected = 2.0 / ((1e9 + 2e4) / (0.634 + 9.07 * 0.81_f64)).sqrt();
     // the muscles are springs beside it, a thousand times softer
     assert!((step(vec![effect("joint_end_stop", &stiff)]) / expected - 1.0).abs() < 1e-3);
     let base = [("compliance", 1e-5), ("natural_frequency", 500.0), ("damping_ratio", 0.1)];
     assert!(step(vec![effect("base_flexibility", &base)]) < 1e-3);
-    // rubbing is a damper of its force over 3 mm/s near rest, at the pressure that may come and not that of the start
+    // rubbing is a damper of its force over 3 mm/s near rest, at the pressure that may come and not
+    // that of the start
     let contact = |rubbing: f64| {
         [("contact_area", 0.3), ("onset_contraction", 0.0), ("exponent", 1.0), ("rubbing", rubbing)]
     };
@@ -531,20 +626,30 @@ fn closure(id: &str, parameters: &[(&str, f64)]) -> EffectSpec {
 
 #[test]
 fn closures_do_what_their_terms_say() {
-    // A flow in proportion to the absolute pressure empties a tank exponentially, and what it takes is booked.
+    // A flow in proportion to the absolute pressure empties a tank exponentially, and what it takes
+    // is booked.
     let flow = closure("closure_supply", &[("pressure", -1e-4)]);
     let run = Run::new(with(lone_tank(), vec![flow]), 101, 0.1, 10, |_| 0.0, &[]);
     let expected = (1.38e6 + AMBIENT) * (-10.0 * 1e-4 / 1e5 * RT / 0.015_f64).exp() - AMBIENT;
-    assert!((run.last("supply_pressure") - expected).abs() < 1.0, "{}", run.last("supply_pressure"));
+    assert!(
+        (run.last("supply_pressure") - expected).abs() < 1.0,
+        "{}",
+        run.last("supply_pressure")
+    );
     assert!((run.last("mass_supplied") - run.last("mass_vented")).abs() < 1e-15);
-    // A constant flow into a rigid chamber with its valve shut: as inflow, and out of it as outflow.
+    // A constant flow into a rigid chamber with its valve shut: as inflow, and out of it as
+    // outflow.
     let rise = |flow: f64| {
         let rig = with(rigid_chamber(1e-3), vec![closure("closure_flow", &[("constant", flow)])]);
-        Run::new(rig, 101, 0.01, 10, |_| 5.0, &[("muscle_pressure", 3e5)]).last("muscle_pressure") - 3e5
+        Run::new(rig, 101, 0.01, 10, |_| 5.0, &[("muscle_pressure", 3e5)]).last("muscle_pressure")
+            - 3e5
     };
     let unit = 1e-6 * RT / 1e-3;
-    assert!((rise(1e-6) / (1.4 * unit) - 1.0).abs() < 1e-9 && (rise(-1e-6) / unit + 1.0).abs() < 1e-9);
-    // A constant torque is a push that lasts, and friction by the way that it went is hysteresis: it outlives the motion.
+    assert!(
+        (rise(1e-6) / (1.4 * unit) - 1.0).abs() < 1e-9 && (rise(-1e-6) / unit + 1.0).abs() < 1e-9
+    );
+    // A constant torque is a push that lasts, and friction by the way that it went is hysteresis:
+    // it outlives the motion.
     let angle = |effects| pendulum(effects, 400, 5e-3, 1.0, 0.0).last("joint_angle");
     let push = one_push(3.0, -10.0, 1e3);
     assert_eq!(angle(vec![closure("closure_torque", &[("constant", 3.0)])]), angle(vec![push]));

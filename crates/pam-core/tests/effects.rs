@@ -1,5 +1,5 @@
-//! Laws of every effect: off it changes nothing, its sensitivities are those of differences, a restart is bit for bit, one block
-//! can be named, and every kind of rig takes it.
+//! Laws of every effect: off it changes nothing, its sensitivities are those of differences, a
+//! restart is bit for bit, one block can be named, and every kind of rig takes it.
 
 mod rigs;
 
@@ -9,7 +9,9 @@ use pam_core::effects::EFFECTS;
 use pam_core::simulate::drive::Drive;
 use pam_core::simulate::{Initial, Progress, Timing, Trajectory};
 use pam_core::{Rig, RigSpec};
-use rigs::{antagonists, effect, effect_at, lone_tank, regulated, shoulder, two_joints, Typical, TYPICAL};
+use rigs::{
+    antagonists, effect, effect_at, lone_tank, regulated, shoulder, two_joints, Typical, TYPICAL,
+};
 
 const DT: f64 = 0.01;
 const TIMING: Timing = Timing { sample_time: DT, substeps: 10 };
@@ -23,7 +25,8 @@ fn spec_for(id: &str) -> RigSpec {
     }
 }
 
-/// A command with edges, and one that goes up and down, for each valve; a set pressure for each regulator.
+/// A command with edges, and one that goes up and down, for each valve; a set pressure for each
+/// regulator.
 fn signals(rig: &Rig, rows: usize) -> Vec<(String, Vec<f64>)> {
     let valve = |k: usize| {
         let t = k as f64 * DT;
@@ -58,7 +61,8 @@ fn borrowed(signals: &[(String, Vec<f64>)]) -> Vec<(&str, &[f64])> {
 
 fn run(rig: &Rig, rows: usize) -> Trajectory {
     let signals = signals(rig, rows);
-    pam_core::simulate::simulate(rig, rows, &borrowed(&signals), TIMING.stable(rig), &initial(rig)).unwrap()
+    pam_core::simulate::simulate(rig, rows, &borrowed(&signals), TIMING.stable(rig), &initial(rig))
+        .unwrap()
 }
 
 fn with(spec: RigSpec, effects: Vec<pam_core::description::EffectSpec>) -> Rig {
@@ -69,8 +73,13 @@ fn with(spec: RigSpec, effects: Vec<pam_core::description::EffectSpec>) -> Rig {
 fn every_effect_is_tested() {
     let others = ["heat_transfer"]; // it replaces an equation and has no neutral value
     for info in EFFECTS.iter().filter(|e| !others.contains(&e.id)) {
-        let typical = TYPICAL.iter().find(|t| t.id == info.id).unwrap_or_else(|| panic!("{}", info.id));
-        assert!(info.parameters().iter().map(|p| p.name).eq(typical.parameters.iter().map(|(n, _)| *n)));
+        let typical =
+            TYPICAL.iter().find(|t| t.id == info.id).unwrap_or_else(|| panic!("{}", info.id));
+        assert!(info
+            .parameters()
+            .iter()
+            .map(|p| p.name)
+            .eq(typical.parameters.iter().map(|(n, _)| *n)));
     }
 }
 
@@ -78,7 +87,8 @@ fn every_effect_is_tested() {
 fn switched_off_it_changes_nothing_bit_for_bit() {
     for typical in TYPICAL {
         for spec in [spec_for(typical.id), antagonists(), two_joints()] {
-            let (plain, off) = (with(spec.clone(), vec![]), with(spec.clone(), vec![typical.off()]));
+            let (plain, off) =
+                (with(spec.clone(), vec![]), with(spec.clone(), vec![typical.off()]));
             let (a, b) = (run(&plain, ROWS), run(&off, ROWS));
             for (k, (name, _)) in plain.names().channels.iter().enumerate() {
                 assert!(a.channels[k] == b.channels[k], "{}: {name} of {}", typical.id, spec.name);
@@ -109,7 +119,9 @@ fn switched_on_it_moves_its_channel() {
 fn rigs_of_several_blocks_take_it_everywhere_or_at_one_of_them() {
     for typical in TYPICAL.iter().filter(|t| t.id != "supply_regulator_deadband") {
         let info = EFFECTS.iter().find(|e| e.id == typical.id).unwrap();
-        for (spec, names) in [(antagonists(), ["flexor", "extensor"]), (two_joints(), ["elbow", "wrist"])] {
+        for (spec, names) in
+            [(antagonists(), ["flexor", "extensor"]), (two_joints(), ["elbow", "wrist"])]
+        {
             let two = match info.at {
                 "joint" => spec.joints.len() == 2,
                 at => ["valve", "chamber", "muscle"].contains(&at),
@@ -123,9 +135,13 @@ fn rigs_of_several_blocks_take_it_everywhere_or_at_one_of_them() {
             };
             let (first, second) = (at(names[0]), at(names[1]));
             assert!(first.channels != second.channels, "{}: the same at either", typical.id);
-            let tip = ["payload_swing", "payload_change"].contains(&typical.id); // alone it acts at the tip
+            // alone it acts at the tip
+            let tip = ["payload_swing", "payload_change"].contains(&typical.id);
             assert_eq!(all.channels == second.channels, tip, "{}", typical.id);
-            let wrong = RigSpec { effects: vec![effect_at(typical.id, "nose", typical.parameters)], ..spec };
+            let wrong = RigSpec {
+                effects: vec![effect_at(typical.id, "nose", typical.parameters)],
+                ..spec
+            };
             assert!(Rig::new(wrong).unwrap_err().to_string().contains("nose"));
         }
     }
@@ -138,15 +154,21 @@ fn one_block_alone_changes() {
         spec.clone(),
         vec![effect_at("leak_muscle", "flexor", &[("conductance", 1e-9), ("laminar_share", 0.0)])],
     );
-    let lag = with(spec.clone(), vec![effect_at("pressure_lag", "flexor", &[("time_constant", 0.02)])]);
+    let lag =
+        with(spec.clone(), vec![effect_at("pressure_lag", "flexor", &[("time_constant", 0.02)])]);
     let plain = with(spec, vec![]);
     let (a, b, c) = (run(&plain, 5), run(&on, 5), run(&lag, 60));
     let get = |rig: &Rig, t: &Trajectory, name: &str| t.get(rig, name).unwrap().to_vec();
     assert!(get(&plain, &a, "muscle_pressure.flexor") != get(&on, &b, "muscle_pressure.flexor"));
     let long = run(&plain, 60);
-    assert_eq!(get(&plain, &long, "muscle_pressure.extensor"), get(&lag, &c, "muscle_pressure.extensor"));
+    assert_eq!(
+        get(&plain, &long, "muscle_pressure.extensor"),
+        get(&lag, &c, "muscle_pressure.extensor")
+    );
     assert_eq!(get(&plain, &long, "joint_angle"), get(&lag, &c, "joint_angle"));
-    assert!(get(&plain, &long, "muscle_pressure.flexor") != get(&lag, &c, "muscle_pressure.flexor"));
+    assert!(
+        get(&plain, &long, "muscle_pressure.flexor") != get(&lag, &c, "muscle_pressure.flexor")
+    );
 }
 
 #[test]
@@ -185,13 +207,20 @@ fn slopes(values: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-fn sensitivities(typical: &Typical, spec: &RigSpec, truth: &Trajectory, block: &str, blind: &[&str]) {
+fn sensitivities(
+    typical: &Typical,
+    spec: &RigSpec,
+    truth: &Trajectory,
+    block: &str,
+    blind: &[&str],
+) {
     let rig = with(spec.clone(), vec![typical.on()]);
     let inputs = signals(&rig, ROWS);
     let channels: Vec<_> = (rig.names().channels.iter())
         .map(|(name, _)| name.as_str())
         .filter(|n| {
-            ["supply_pressure", "muscle_pressure", "joint_angle"].contains(&n.split('.').next().unwrap())
+            ["supply_pressure", "muscle_pressure", "joint_angle"]
+                .contains(&n.split('.').next().unwrap())
         })
         .collect();
     let rates: Vec<_> = channels.iter().map(|n| slopes(truth.get(&rig, n).unwrap())).collect();
@@ -199,11 +228,19 @@ fn sensitivities(typical: &Typical, spec: &RigSpec, truth: &Trajectory, block: &
         .map(|(n, slope)| (*n, Signal { value: truth.get(&rig, n).unwrap(), slope }))
         .collect();
     let measured = Measured::new(&rig, ROWS, &borrowed(&inputs), &measured).unwrap();
-    let names: Vec<_> = typical.parameters.iter().map(|(n, _)| format!("{}.{n}", typical.id)).collect();
+    let names: Vec<_> =
+        typical.parameters.iter().map(|(n, _)| format!("{}.{n}", typical.id)).collect();
     let ids: Vec<_> = names.iter().map(|n| rig.parameters().find(n).unwrap()).collect();
     let predicted = |rig: &Rig, ids: &[_]| {
-        predict(rig, Block::from_name(rig, block).unwrap(), &measured, TIMING.stable(rig), &[0, 40], ids)
-            .unwrap_or_else(|e| panic!("{}: {e}", typical.id))
+        predict(
+            rig,
+            Block::from_name(rig, block).unwrap(),
+            &measured,
+            TIMING.stable(rig),
+            &[0, 40],
+            ids,
+        )
+        .unwrap_or_else(|e| panic!("{}: {e}", typical.id))
     };
     let exact = predicted(&rig, &ids);
     for (column, (name, value)) in typical.parameters.iter().enumerate() {
@@ -217,15 +254,25 @@ fn sensitivities(typical: &Typical, spec: &RigSpec, truth: &Trajectory, block: &
         let (up, down) = (shifted(h), shifted(-h));
         let slope = |k: usize| exact.jacobian[k * exact.columns + column];
         let scale = (0..ROWS).map(|k| slope(k).abs()).fold(0.0, f64::max);
-        assert_eq!(scale > 0.0, !blind.contains(name), "{}.{name} has influence {scale}", typical.id);
+        assert_eq!(
+            scale > 0.0,
+            !blind.contains(name),
+            "{}.{name} has influence {scale}",
+            typical.id
+        );
         for k in 0..ROWS {
             let gap = (slope(k) - (up[k] - down[k]) / (2.0 * h)).abs();
-            assert!(gap <= 2e-3 * scale, "{}.{name} in {block} at row {k}: {gap} of {scale}", typical.id);
+            assert!(
+                gap <= 2e-3 * scale,
+                "{}.{name} in {block} at row {k}: {gap} of {scale}",
+                typical.id
+            );
         }
     }
 }
 
-/// Parameters without an influence: the compressor's cut-out is not reached, a stop's side and a tap are one or the other.
+/// Parameters without an influence: the compressor's cut-out is not reached, a stop's side and a
+/// tap are one or the other.
 fn blind(id: &str) -> &'static [&'static str] {
     match id {
         "compressor_cut_in" => &["cut_out_pressure"],
@@ -267,7 +314,9 @@ const TAPPED: Typical = Typical {
 #[test]
 fn sensitivities_to_a_tube_behind_the_transducer() {
     // Of the supply, the flow is told by the valve alone: no tube changes what it predicts.
-    for (spec, blocks) in [(shoulder(), ["chamber", "arm"]), (two_joints(), ["chamber.elbow", "arm.wrist"])] {
+    for (spec, blocks) in
+        [(shoulder(), ["chamber", "arm"]), (two_joints(), ["chamber.elbow", "arm.wrist"])]
+    {
         let truth = run(&with(spec.clone(), vec![TAPPED.on()]), ROWS);
         for block in blocks {
             sensitivities(&TAPPED, &spec, &truth, block, &["tap"]);
@@ -286,20 +335,25 @@ fn predictions_repeat_what_a_transducer_at_the_valve_reads() {
     let names = ["supply_pressure", "muscle_pressure", "joint_angle"];
     let rates = names.map(|n| slopes(truth.get(&rig, n).unwrap()));
     let gap = |rig: &Rig, block: &str, name: &str, known: &[usize]| {
-        let signal =
-            |k: &usize| (names[*k], Signal { value: truth.get(rig, names[*k]).unwrap(), slope: &rates[*k] });
+        let signal = |k: &usize| {
+            (names[*k], Signal { value: truth.get(rig, names[*k]).unwrap(), slope: &rates[*k] })
+        };
         let signals: Vec<_> = known.iter().map(signal).collect();
         let measured = Measured::new(rig, ROWS, &borrowed(&inputs), &signals).unwrap();
         let block = Block::from_name(rig, block).unwrap();
         let found = predict(rig, block, &measured, TIMING.stable(rig), &[0], &[]).unwrap().value;
         let was = truth.get(rig, name).unwrap();
-        let span =
-            was.iter().copied().fold(f64::MIN, f64::max) - was.iter().copied().fold(f64::MAX, f64::min);
+        let span = was.iter().copied().fold(f64::MIN, f64::max)
+            - was.iter().copied().fold(f64::MAX, f64::min);
         found.iter().zip(was).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / span
     };
     for (block, name) in [("supply", names[0]), ("chamber", names[1]), ("arm", names[2])] {
-        let (with, without) = (gap(&rig, block, name, &[0, 1, 2]), gap(&wrong, block, name, &[0, 1, 2]));
-        assert!(with < 0.05 && (with < 0.02 * without || block != "arm"), "{block}: {with} {without}");
+        let (with, without) =
+            (gap(&rig, block, name, &[0, 1, 2]), gap(&wrong, block, name, &[0, 1, 2]));
+        assert!(
+            with < 0.05 && (with < 0.02 * without || block != "arm"),
+            "{block}: {with} {without}"
+        );
     }
     // what is not known of the valve's other side, is not told of the muscle's
     assert_eq!(gap(&rig, "arm", names[2], &[1, 2]), gap(&wrong, "arm", names[2], &[1, 2]));
@@ -327,23 +381,25 @@ fn sensitivities_hold_on_two_joints() {
 
 #[test]
 fn predictions_repeat_what_was_simulated() {
-    // Measured without noise, cut anywhere, a block predicts what the whole rig did: to the error of the signals' slopes.
+    // Measured without noise, cut anywhere, a block predicts what the whole rig did: to the error
+    // of the signals' slopes.
     for typical in TYPICAL {
         let rig = with(spec_for(typical.id), vec![typical.on()]);
         let truth = run(&rig, ROWS);
         let inputs = signals(&rig, ROWS);
         let names = ["supply_pressure", "muscle_pressure", "joint_angle"];
         let rates = names.map(|n| slopes(truth.get(&rig, n).unwrap()));
-        let signal =
-            |k: usize| (names[k], Signal { value: truth.get(&rig, names[k]).unwrap(), slope: &rates[k] });
+        let signal = |k: usize| {
+            (names[k], Signal { value: truth.get(&rig, names[k]).unwrap(), slope: &rates[k] })
+        };
         let measured = [signal(0), signal(1), signal(2)];
         let measured = Measured::new(&rig, ROWS, &borrowed(&inputs), &measured).unwrap();
         for (block, name) in [("supply", names[0]), ("chamber", names[1]), ("arm", names[2])] {
             let block = Block::from_name(&rig, block).unwrap();
             let found = predict(&rig, block, &measured, TIMING, &[0], &[]).unwrap().value;
             let was = truth.get(&rig, name).unwrap();
-            let span =
-                was.iter().copied().fold(f64::MIN, f64::max) - was.iter().copied().fold(f64::MAX, f64::min);
+            let span = was.iter().copied().fold(f64::MIN, f64::max)
+                - was.iter().copied().fold(f64::MAX, f64::min);
             let gap = found.iter().zip(was).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
             assert!(gap < 0.05 * span, "{}: {name} differs by {gap} of {span}", typical.id);
         }
@@ -368,7 +424,8 @@ fn a_clock_ahead_is_read_from_a_recording() {
         let signal = |k: usize| (names[k], Signal { value: &values[k], slope: &rates[k] });
         let all = [signal(0), signal(1), signal(2)];
         let offset = late as f64 * TIMING.sample_time;
-        let clock = effect_at("clock_skew", "", &[("offset", offset), ("rate", 0.0), ("angle_share", 0.0)]);
+        let clock =
+            effect_at("clock_skew", "", &[("offset", offset), ("rate", 0.0), ("angle_share", 0.0)]);
         let gaps = |rig: &Rig, name: &str, k: usize| {
             let measured = Measured::new(rig, ROWS, &borrowed(&inputs), &all).unwrap();
             let block = Block::from_name(rig, name).unwrap();
@@ -425,7 +482,10 @@ fn impossible_effects_are_refused_by_name() {
         refused(lone_tank(), id, typical.parameters, block);
     }
     let tank = effect_at("supply_regulator_deadband", "", &[("dead_band", 1e4)]);
-    assert!(Rig::new(RigSpec { effects: vec![tank], ..shoulder() }).is_ok(), "no regulator, nothing to do");
+    assert!(
+        Rig::new(RigSpec { effects: vec![tank], ..shoulder() }).is_ok(),
+        "no regulator, nothing to do"
+    );
     let rate = effect_at(
         "base_flexibility",
         "joint",

@@ -1,4 +1,5 @@
-//! Several instances of one effect, each at its own block with its own parameters, and what cannot be together.
+//! Several instances of one effect, each at its own block with its own parameters, and what cannot
+//! be together.
 
 mod rigs;
 
@@ -84,14 +85,16 @@ fn each_has_parameters_of_its_own() {
 fn one_at_a_block_is_found_by_both_names() {
     let at_one = with(antagonists(), vec![leak("flexor", 8e-10)]);
     let everywhere = with(antagonists(), vec![leak("", 8e-10)]);
-    let find = |rig: &Rig, name: &str| rig.parameters().find(name).map(|id| rig.parameters().value(id));
+    let find =
+        |rig: &Rig, name: &str| rig.parameters().find(name).map(|id| rig.parameters().value(id));
     for name in ["leak_muscle.conductance", "leak_muscle.flexor.conductance"] {
         assert_eq!(find(&at_one, name).unwrap(), 8e-10);
     }
     let [one, other] = ["leak_muscle.conductance", "leak_muscle.flexor.conductance"]
         .map(|name| at_one.parameters().find(name).unwrap());
     assert_eq!(one, other);
-    let named = |rig: &Rig| rig.parameters().names().iter().filter(|n| n.starts_with("leak")).count();
+    let named =
+        |rig: &Rig| rig.parameters().names().iter().filter(|n| n.starts_with("leak")).count();
     assert_eq!((named(&at_one), named(&everywhere)), (2, 2), "each is there once");
     assert!(find(&at_one, "leak_muscle.extensor.conductance").is_err());
     assert!(find(&everywhere, "leak_muscle.flexor.conductance").is_err());
@@ -116,7 +119,8 @@ fn predicted(rig: &Rig, truth: &Trajectory, block: &str, names: &[&str]) -> Pred
         .collect();
     let measured = Measured::new(rig, ROWS, &borrowed(&inputs), &measured).unwrap();
     let ids: Vec<_> = names.iter().map(|n| rig.parameters().find(n).unwrap()).collect();
-    predict(rig, Block::from_name(rig, block).unwrap(), &measured, TIMING.stable(rig), &[0], &ids).unwrap()
+    predict(rig, Block::from_name(rig, block).unwrap(), &measured, TIMING.stable(rig), &[0], &ids)
+        .unwrap()
 }
 
 #[test]
@@ -167,7 +171,9 @@ fn one_effect_does_not_act_on_a_block_twice() {
     let change = |at: &str| effect_at("payload_change", at, &[("mass_change", 0.5), ("time", 0.2)]);
     let text = refusal(two_joints(), vec![change(""), change("wrist")]);
     assert!(text.contains("'payload_change' acts on joint.wrist twice"), "{text}");
-    assert!(Rig::new(RigSpec { effects: vec![change(""), change("elbow")], ..two_joints() }).is_ok());
+    assert!(
+        Rig::new(RigSpec { effects: vec![change(""), change("elbow")], ..two_joints() }).is_ok()
+    );
 }
 
 /// Another effect where the sensor's lag acts.
@@ -178,7 +184,8 @@ static READINGS: &[&EffectInfo] = &[&pressure_lag::INFO, &SECOND];
 fn a_port_for_one_effect_takes_one() {
     let lag = |id: &str, at: &str| effect_at(id, at, &[("time_constant", 0.01)]);
     let rig = |effects| Rig::with_effects(RigSpec { effects, ..antagonists() }, READINGS);
-    let text = rig(vec![lag("pressure_lag", ""), lag("second_lag", "flexor")]).unwrap_err().to_string();
+    let text =
+        rig(vec![lag("pressure_lag", ""), lag("second_lag", "flexor")]).unwrap_err().to_string();
     for word in ["'pressure_lag'", "'second_lag'", "cannot both act on chamber.flexor"] {
         assert!(text.contains(word), "{text}");
     }
@@ -186,7 +193,8 @@ fn a_port_for_one_effect_takes_one() {
     // No two effects of the catalogue want such a port.
     let single = [Port::Passage, Port::Balance, Port::Hanging, Port::Mounting, Port::Reading];
     for port in single {
-        let wanting = EFFECTS.iter().filter(|e| e.forms.iter().any(|form| form.ports.contains(&port)));
+        let wanting =
+            EFFECTS.iter().filter(|e| e.forms.iter().any(|form| form.ports.contains(&port)));
         assert!(wanting.count() <= 1, "{port:?}");
     }
 }
@@ -202,7 +210,13 @@ fn an_unknown_form_is_refused_with_those_that_there_are() {
             "{text}"
         );
     }
-    let named = EffectSpec { form: leak_muscle::INFO.forms[0].name.into(), ..leak("flexor", 1e-10) };
-    let (one, other) = (with(antagonists(), vec![named]), with(antagonists(), vec![leak("flexor", 1e-10)]));
-    assert_eq!(run(&one).channels, run(&other).channels, "the first form is the one without a name");
+    let named =
+        EffectSpec { form: leak_muscle::INFO.forms[0].name.into(), ..leak("flexor", 1e-10) };
+    let (one, other) =
+        (with(antagonists(), vec![named]), with(antagonists(), vec![leak("flexor", 1e-10)]));
+    assert_eq!(
+        run(&one).channels,
+        run(&other).channels,
+        "the first form is the one without a name"
+    );
 }

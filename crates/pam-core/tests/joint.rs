@@ -1,4 +1,5 @@
-//! Laws of the joints: the moment arm is the slope of the shortening, so that a joint conserves power.
+//! Laws of the joints: the moment arm is the slope of the shortening, so that a joint conserves
+//! power.
 
 use num_dual::Dual64;
 use pam_core::blocks::joint::tendon::{TendonJoint, Torque};
@@ -16,7 +17,8 @@ fn each(lengths: [f64; 4], radius: f64, coefficients: &[f64]) -> Vec<Joint> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 64, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 64, failure_persistence: None,
+        ..ProptestConfig::default() })]
 
     #[test]
     fn what_the_muscle_gives_the_link_gets(
@@ -53,8 +55,10 @@ proptest! {
 
 #[test]
 fn the_published_torque_loses_the_square_of_the_tendon_angles_cosine() {
-    let (upper_axial, upper_offset, lower_axial, lower_offset) = (0.0254, 0.027_432, 0.027_432, 0.004_826);
-    let joint = TendonJoint::new(upper_axial, upper_offset, lower_axial, lower_offset, 0.2618).unwrap();
+    let (upper_axial, upper_offset, lower_axial, lower_offset) =
+        (0.0254, 0.027_432, 0.027_432, 0.004_826);
+    let joint =
+        TendonJoint::new(upper_axial, upper_offset, lower_axial, lower_offset, 0.2618).unwrap();
     let angle = 1.2_f64;
     let phi = std::f64::consts::PI - angle - lower_offset.atan2(lower_axial);
     let rise = upper_offset - lower_axial.hypot(lower_offset) * phi.sin();

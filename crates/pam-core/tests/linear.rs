@@ -16,7 +16,11 @@ fn linearised(rig: &Rig, side: Side) -> LinearModel {
 }
 
 fn place(model: &LinearModel, name: &str) -> usize {
-    model.states.iter().position(|state| state == name).unwrap_or_else(|| panic!("{:?}", model.states))
+    model
+        .states
+        .iter()
+        .position(|state| state == name)
+        .unwrap_or_else(|| panic!("{:?}", model.states))
 }
 
 /// A row of the state matrix, then of the input matrix.
@@ -32,7 +36,10 @@ fn coefficients_are_those_of_the_equations() {
     let (fill, vent, mean) =
         (linearised(&rig, Side::Fill), linearised(&rig, Side::Vent), linearised(&rig, Side::Mean));
     assert_eq!(mean.states, ["supply_pressure", "muscle_pressure", "joint_angle", "joint_rate"]);
-    assert_eq!((&mean.outputs, mean.inputs.as_slice()), (&mean.states, &["valve_command".to_string()][..]));
+    assert_eq!(
+        (&mean.outputs, mean.inputs.as_slice()),
+        (&mean.states, &["valve_command".to_string()][..])
+    );
     assert_eq!(row(&mean, "joint_angle"), (&[0.0, 0.0, 0.0, 1.0][..], &[0.0][..]));
     let identity: Vec<f64> = (0..16).map(|k| f64::from(u8::from(k % 5 == 0))).collect();
     assert_eq!(mean.c, identity);
@@ -63,10 +70,11 @@ fn what_effects_move_has_a_row_each() {
     for typical in TYPICAL {
         let info = EFFECTS.iter().find(|e| e.id == typical.id).unwrap();
         let states = info.forms[0].states.iter();
-        let names = states.filter(|s| matches!(s.role, Role::Moves | Role::Opens)).map(|s| match s.name {
-            "" => info.id.to_string(),
-            name => format!("{}.{name}", info.id),
-        });
+        let names =
+            states.filter(|s| matches!(s.role, Role::Moves | Role::Opens)).map(|s| match s.name {
+                "" => info.id.to_string(),
+                name => format!("{}.{name}", info.id),
+            });
         let spec = if typical.id == "supply_regulator_deadband" { regulated() } else { shoulder() };
         let rig = Rig::new(RigSpec { effects: vec![typical.on()], ..spec }).unwrap();
         let model = linearised(&rig, Side::Fill);
@@ -90,8 +98,8 @@ fn effects_in_closed_form_have_the_rates_of_their_equations() {
     let slope = |name: &str, by: &str| row(&model, name).0[place(&model, by)];
     assert_eq!(slope("pressure_lag.flexor", "pressure_lag.flexor"), -20.0);
     assert_eq!(slope("pressure_lag.flexor", "muscle_pressure.flexor"), 20.0);
-    let chain =
-        ["lag", "delay_1", "delay_2", "delay_3"].map(|part| format!("input_path_lag.{part}.extensor"));
+    let chain = ["lag", "delay_1", "delay_2", "delay_3"]
+        .map(|part| format!("input_path_lag.{part}.extensor"));
     assert!((row(&model, &chain[0]).1[1] - 50.0 / half_range).abs() < 1e-12);
     assert_eq!(slope(&chain[0], &chain[0]), -50.0);
     for pair in chain.windows(2) {
@@ -103,7 +111,10 @@ fn effects_in_closed_form_have_the_rates_of_their_equations() {
     assert!(slope("muscle_pressure.extensor", &chain[3]) > 0.0);
     let n = model.states.len();
     let reading = &model.c[place(&model, "muscle_pressure.flexor") * n..][..n];
-    assert_eq!(reading.iter().position(|share| *share == 1.0), Some(place(&model, "pressure_lag.flexor")));
+    assert_eq!(
+        reading.iter().position(|share| *share == 1.0),
+        Some(place(&model, "pressure_lag.flexor"))
+    );
 }
 
 #[test]
@@ -113,6 +124,7 @@ fn friction_before_it_slips_is_a_spring_about_the_point() {
     let rough = Rig::new(RigSpec { effects: vec![typical.on()], ..two_joints() }).unwrap();
     let [plain, rough] = [plain, rough].map(|rig| linearised(&rig, Side::Mean));
     assert_eq!(plain.states, rough.states);
-    let spring = |model: &LinearModel| row(model, "joint_rate.elbow").0[place(model, "joint_angle.elbow")];
+    let spring =
+        |model: &LinearModel| row(model, "joint_rate.elbow").0[place(model, "joint_angle.elbow")];
     assert!(spring(&rough) < spring(&plain));
 }

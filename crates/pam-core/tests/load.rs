@@ -1,4 +1,5 @@
-//! Linear loads: a mass hangs where the muscle carries it and keeps its energy, a frame gives the static force.
+//! Linear loads: a mass hangs where the muscle carries it and keeps its energy, a frame gives the
+//! static force.
 
 use pam_core::muscle::{Muscle, MuscleSpec};
 use pam_core::simulate::drive::Drive;
@@ -14,7 +15,8 @@ fn rig(kind: &str, mass: f64, friction: f64) -> Rig {
     spec.muscles[0].muscle.count = 1;
     spec.muscles[0].joint = "load".into();
     let text = format!(
-        r#"{{"kind": "{kind}", "mass": {mass}, "viscous": {friction}, "coulomb_speed": 0.01, "gravity": 9.80665,
+        r#"{{"kind": "{kind}", "mass": {mass}, "viscous": {friction}, "coulomb_speed": 0.01,
+            "gravity": 9.80665,
             "min_length": 0.2, "max_length": 0.28, "stop_stiffness": 1e6, "stop_damping": 1e3}}"#
     );
     spec.load = Some(serde_json::from_str(&text).unwrap());
@@ -29,7 +31,12 @@ impl Run {
     }
 }
 
-fn run(rig: &Rig, initial: Initial, length: Option<&[f64]>, samples: usize) -> pam_core::Result<Run> {
+fn run(
+    rig: &Rig,
+    initial: Initial,
+    length: Option<&[f64]>,
+    samples: usize,
+) -> pam_core::Result<Run> {
     let timing = Timing { sample_time: 0.01, substeps: 20 };
     let mut progress = Progress::start(rig, &initial)?;
     let mut out = Trajectory::new(rig, samples);
@@ -40,14 +47,19 @@ fn run(rig: &Rig, initial: Initial, length: Option<&[f64]>, samples: usize) -> p
 }
 
 fn pressed(rig: &Rig, pressure: f64, shortening: f64) -> pam_core::Result<Initial> {
-    Initial::rest(rig).with(rig, "muscle_pressure", pressure)?.with(rig, "length", 0.276 - shortening)
+    Initial::rest(rig).with(rig, "muscle_pressure", pressure)?.with(
+        rig,
+        "length",
+        0.276 - shortening,
+    )
 }
 
 #[test]
 fn a_mass_comes_to_rest_where_the_muscle_carries_it() {
     let rig = rig("mass", 50.0, 800.0);
     let out = run(&rig, pressed(&rig, 4e5, 0.02).unwrap(), None, 1500).unwrap();
-    let (force, rate) = (out.get("muscle_force").last().unwrap(), out.get("length_rate").last().unwrap());
+    let (force, rate) =
+        (out.get("muscle_force").last().unwrap(), out.get("length_rate").last().unwrap());
     assert!((force - 50.0 * 9.80665).abs() < 0.05, "{force}");
     assert!(rate.abs() < 1e-5, "{rate}");
 }
@@ -57,14 +69,18 @@ fn a_frame_gives_the_static_force_at_its_length() {
     let rig = rig("frame", 0.0, 0.0);
     let length: Vec<f64> = (1..=100).map(|k| 0.276 - 0.0005 * f64::from(k)).collect();
     let out = run(&rig, pressed(&rig, 3e5, 0.0).unwrap(), Some(&length), 100).unwrap();
-    let muscle = Muscle::new(&MuscleSpec { count: 1, ..rig.spec().muscles[0].muscle.clone() }).unwrap();
+    let muscle =
+        Muscle::new(&MuscleSpec { count: 1, ..rig.spec().muscles[0].muscle.clone() }).unwrap();
     for (k, length) in length.iter().enumerate() {
         let e = 1.0 - length / 0.276;
         assert!((out.get("contraction_ratio")[k + 1] - e).abs() < 1e-14);
         let force = muscle.force(out.get("muscle_pressure")[k + 1], e).unwrap();
         assert!((out.get("muscle_force")[k + 1] - force).abs() < 1e-6 * force.abs().max(1.0));
     }
-    assert!(out.get("muscle_pressure").last().unwrap() < &3e5, "the shut chamber grows: its pressure falls");
+    assert!(
+        out.get("muscle_pressure").last().unwrap() < &3e5,
+        "the shut chamber grows: its pressure falls"
+    );
 }
 
 #[test]
@@ -93,7 +109,8 @@ fn loads_that_cannot_be_are_named() {
     for (length, word) in
         [(None, "length is missing"), (Some(vec![0.1]), "length[0]"), (Some(vec![]), "length")]
     {
-        let message = run(&frame, Initial::rest(&frame), length.as_deref(), 1).err().unwrap().to_string();
+        let message =
+            run(&frame, Initial::rest(&frame), length.as_deref(), 1).err().unwrap().to_string();
         assert!(message.contains(word), "{message}");
     }
     let mass = rig("mass", 5.0, 0.0);

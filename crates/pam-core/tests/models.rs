@@ -1,5 +1,5 @@
-//! Every force model on every geometry: table against exact solve, limits in which models become each other, the
-//! published ends, and the branches in a running plant.
+//! Every force model on every geometry: table against exact solve, limits in which models become
+//! each other, the published ends, and the branches in a running plant.
 
 use pam_core::muscle::{CompiledMuscle, ForceModel, Muscle, MuscleSpec};
 use pam_core::simulate::{simulate, Initial, Timing};
@@ -41,7 +41,10 @@ fn tables_agree_with_the_exact_force_in_both_directions() {
                 for direction in [-1.0, 0.3, 1.0] {
                     let want = exact.force_moving(4e5, e, direction).unwrap();
                     let found = compiled.force(4e5, e, Some(direction)).unwrap();
-                    assert!((want - found).abs() < 1e-8 * scale, "{model} {geometry} {e}: {want} {found}");
+                    assert!(
+                        (want - found).abs() < 1e-8 * scale,
+                        "{model} {geometry} {e}: {want} {found}"
+                    );
                 }
             }
         }
@@ -86,7 +89,8 @@ fn models_become_each_other_in_their_limits() {
     }
     // A thin wall and a small strain: linear elasticity, whichever way it is written.
     let mut kothera = spec("kothera", "cylinder");
-    (kothera.modulus_slope, kothera.modulus_offset, kothera.wall_thickness) = (vec![0.0], vec![1e6], 1e-6);
+    (kothera.modulus_slope, kothera.modulus_offset, kothera.wall_thickness) =
+        (vec![0.0], vec![1e6], 1e-6);
     let mut elbow = spec("elbow_linear", "cylinder");
     elbow.wall_thickness = 1e-6;
     let part = |spec: &MuscleSpec, e: f64| muscle(spec).coefficients(e).unwrap().b_elastic;
@@ -115,7 +119,8 @@ fn lift(change: impl Fn(&mut MuscleSpec)) -> Vec<f64> {
     let rig = Rig::new(rig).unwrap();
     let command: Vec<f64> = (0..601).map(|k| 5.0 + 1.2 * (f64::from(k) * 0.02).sin()).collect();
     let timing = Timing { sample_time: 0.005, substeps: 10 };
-    let run = simulate(&rig, 601, &[("valve_command", &command)], timing, &Initial::rest(&rig)).unwrap();
+    let run =
+        simulate(&rig, 601, &[("valve_command", &command)], timing, &Initial::rest(&rig)).unwrap();
     run.get(&rig, "joint_angle").unwrap().to_vec()
 }
 

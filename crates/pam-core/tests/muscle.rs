@@ -28,7 +28,8 @@ fn named(name: &str) -> Option<MuscleSpec> {
 
 #[test]
 fn golden_vectors() {
-    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/golden/muscle_static.csv");
+    let path =
+        PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/golden/muscle_static.csv");
     let Ok(text) = std::fs::read_to_string(&path) else {
         println!("skipped: {} is absent", path.display());
         return;
@@ -62,7 +63,8 @@ fn compiled(spec: &MuscleSpec) -> CompiledMuscle {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 48, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 48, failure_persistence: None,
+        ..ProptestConfig::default() })]
 
     #[test]
     fn shapes_are_possible(
@@ -111,7 +113,8 @@ proptest! {
         let slope = muscle.exact.geometry.solve_dual(e).unwrap().air_volume;
         prop_assert!((point.volume - slope.re).abs() < 2e-9 * slope.re);
         let dual = muscle.table.eval(Dual64::new(e, 1.0));
-        prop_assert!((dual.volume.eps - point.volume_slope).abs() <= 1e-11 * point.volume_slope.abs());
+        prop_assert!((dual.volume.eps - point.volume_slope).abs() <= 1e-11
+            * point.volume_slope.abs());
     }
 
     #[test]

@@ -1,4 +1,5 @@
-//! Laws of rigs of several blocks: what is conserved, what they come to rest at, order, stability, and what is refused.
+//! Laws of rigs of several blocks: what is conserved, what they come to rest at, order, stability,
+//! and what is refused.
 
 use pam_core::description::{ArmSpec, ChamberSpec, LineSpec, LinkSpec, SupplySpec};
 use pam_core::simulate::{simulate, Initial, Progress, Timing, Trajectory};
@@ -54,7 +55,13 @@ fn last(rig: &Rig, run: &Trajectory, name: &str) -> f64 {
     *run.get(rig, name).unwrap().last().unwrap()
 }
 
-fn run(rig: &Rig, rows: usize, signals: &[(&str, &[f64])], sample_time: f64, step: f64) -> Trajectory {
+fn run(
+    rig: &Rig,
+    rows: usize,
+    signals: &[(&str, &[f64])],
+    sample_time: f64,
+    step: f64,
+) -> Trajectory {
     let timing = Timing::new(sample_time, step).unwrap().stable(rig);
     simulate(rig, rows, signals, timing, &Initial::rest(rig)).unwrap()
 }
@@ -83,7 +90,8 @@ fn mass_in_is_mass_stored_and_vented() {
     let out = run(&rig, 400, &pair, 0.005, 1e-3);
     assert!(imbalance(&rig, &out) < 1e-12, "{}", imbalance(&rig, &out));
     assert!(last(&rig, &out, "mass_supplied") > 1e-4 && last(&rig, &out, "mass_vented") > 1e-4);
-    // The tank, whose mass is P V/(R T), lost what was supplied; and E_in is its pressure times its volume.
+    // The tank, whose mass is P V/(R T), lost what was supplied; and E_in is its pressure times its
+    // volume.
     let tank = out.get(&rig, "supply_pressure").unwrap();
     let lost = (tank[0] - tank[399]) * 0.015;
     assert!((lost / last(&rig, &out, "energy_supplied") - 1.0).abs() < 1e-9);
@@ -100,7 +108,8 @@ fn mass_in_is_mass_stored_and_vented() {
 #[test]
 fn a_choked_isothermal_blow_down_is_an_exponential() {
     let (volume, area) = (2e-3, 1e-6);
-    let rig = Rig::new(gas(&[("", volume, 9e5)], vec![orifice("chamber", "ambient", area)])).unwrap();
+    let rig =
+        Rig::new(gas(&[("", volume, 9e5)], vec![orifice("chamber", "ambient", area)])).unwrap();
     let out = run(&rig, 401, &[], 0.05, 1e-3);
     let psi = (2.0_f64 / 2.4).powf(2.5) * (1.4_f64 / 2.4).sqrt();
     let tau = volume / (RT * area * (2.0 / RT).sqrt() * psi);
@@ -122,7 +131,10 @@ fn a_choked_isothermal_blow_down_is_an_exponential() {
 
 #[test]
 fn a_tube_brings_two_chambers_to_one_pressure() {
-    let spec = gas(&[("a", 1e-4, 5e5), ("b", 3e-4, 0.0)], vec![tube("chamber.a", "chamber.b", 2.0, 0.004)]);
+    let spec = gas(
+        &[("a", 1e-4, 5e5), ("b", 3e-4, 0.0)],
+        vec![tube("chamber.a", "chamber.b", 2.0, 0.004)],
+    );
     let rig = Rig::new(spec).unwrap();
     let out = run(&rig, 300, &[], 0.01, 1e-3);
     let half = std::f64::consts::PI * 0.002 * 0.002 * 2.0 / 2.0;
@@ -137,12 +149,22 @@ fn a_tube_brings_two_chambers_to_one_pressure() {
 fn antagonists_at_one_pressure_stay_in_the_middle_and_move_with_a_difference() {
     let rig = Rig::new(antagonists()).unwrap();
     let (five, six) = (vec![5.0; 300], vec![5.4; 300]);
-    let still =
-        run(&rig, 300, &[("valve_command.flexor", &six), ("valve_command.extensor", &six)], 0.01, 1e-3);
+    let still = run(
+        &rig,
+        300,
+        &[("valve_command.flexor", &six), ("valve_command.extensor", &six)],
+        0.01,
+        1e-3,
+    );
     assert!(last(&rig, &still, "joint_angle").abs() < 1e-12);
     assert!(last(&rig, &still, "muscle_pressure.flexor") > 5e5);
-    let bent =
-        run(&rig, 300, &[("valve_command.flexor", &six), ("valve_command.extensor", &five)], 0.01, 1e-3);
+    let bent = run(
+        &rig,
+        300,
+        &[("valve_command.flexor", &six), ("valve_command.extensor", &five)],
+        0.01,
+        1e-3,
+    );
     assert!(last(&rig, &bent, "joint_angle") > 0.3);
     let pull = |run: &Trajectory, name: &str| last(&rig, run, &format!("muscle_force.{name}"));
     let torque = 0.025 * (pull(&bent, "flexor") - pull(&bent, "extensor"));
@@ -158,7 +180,8 @@ fn what_the_muscles_give_the_arm_takes() {
     let inertia = arm.inertia + arm.payload * arm.length * arm.length;
     let rig = Rig::new(spec).unwrap();
     let (a, b) = (vec![5.2; 60], vec![5.0; 60]);
-    let out = run(&rig, 60, &[("valve_command.flexor", &a), ("valve_command.extensor", &b)], 0.005, 2e-4);
+    let out =
+        run(&rig, 60, &[("valve_command.flexor", &a), ("valve_command.extensor", &b)], 0.005, 2e-4);
     assert!(out.events.iter().all(|e| !e.block.starts_with("joint")));
     let rate = last(&rig, &out, "joint_rate");
     let kinetic = 0.5 * inertia * rate * rate;
@@ -173,7 +196,8 @@ fn a_planar_arm_of_one_link_is_the_one_link_arm() {
     let one = Rig::new(shoulder()).unwrap();
     let mut spec = shoulder();
     let arm = spec.arm.clone().unwrap();
-    // mass and centre that give the same first moment and, with their inertia, the same about the joint
+    // mass and centre that give the same first moment and, with their inertia, the same about the
+    // joint
     let (mass, centre) = (4.0, arm.first_moment / 4.0);
     let link = LinkSpec {
         name: String::new(),
@@ -242,7 +266,8 @@ fn small_volumes_are_stable_at_a_millisecond_and_accurate() {
     let fine = run(&rig, 200, &[("valve_command", &u)], 0.005, 2e-6);
     for name in ["line_pressure", "muscle_pressure", "joint_angle"] {
         let (a, b) = (coarse.get(&rig, name).unwrap(), fine.get(&rig, name).unwrap());
-        let range = b.iter().copied().fold(f64::MIN, f64::max) - b.iter().copied().fold(f64::MAX, f64::min);
+        let range =
+            b.iter().copied().fold(f64::MIN, f64::max) - b.iter().copied().fold(f64::MAX, f64::min);
         let worst = a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         assert!(worst < 2e-4 * range, "{name}: {worst} of {range}");
     }
@@ -264,7 +289,8 @@ fn two_joints_converge_with_order_four() {
             let i = i.with(&rig, &format!("muscle_pressure.{n}"), 2e5).unwrap();
             i.with(&rig, &format!("joint_angle.{n}"), 0.6).unwrap()
         });
-        let signals: [(&str, &[f64]); 2] = [("valve_command.elbow", &a), ("valve_command.wrist", &b)];
+        let signals: [(&str, &[f64]); 2] =
+            [("valve_command.elbow", &a), ("valve_command.wrist", &b)];
         simulate(&rig, 26, &signals, timing, &initial)
             .unwrap()
             .get(&rig, "joint_angle.wrist")
@@ -272,7 +298,8 @@ fn two_joints_converge_with_order_four() {
             .to_vec()
     };
     let reference = go(640);
-    let error = |n: usize| go(n).iter().zip(&reference).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    let error =
+        |n: usize| go(n).iter().zip(&reference).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     let order = (error(20) / error(40)).log2();
     assert!((3.5..4.5).contains(&order), "order {order}");
 }
@@ -283,9 +310,14 @@ fn stops_and_choking_are_recorded_with_their_times() {
     let u: Vec<f64> = (0..800).map(|k| if k < 400 { 9.0 } else { 2.0 }).collect();
     let out = run(&rig, 800, &[("valve_command", &u)], 0.005, 1e-3);
     let kinds: Vec<&str> = out.events.iter().map(|e| e.kind.name()).collect();
-    for kind in
-        ["min_stop_left", "max_stop_reached", "max_stop_left", "min_stop_reached", "choked", "unchoked"]
-    {
+    for kind in [
+        "min_stop_left",
+        "max_stop_reached",
+        "max_stop_left",
+        "min_stop_reached",
+        "choked",
+        "unchoked",
+    ] {
         assert!(kinds.contains(&kind), "{kind} in {kinds:?}");
     }
     assert!(out.events.windows(2).all(|w| w[1].time >= w[0].time - 1e-3));
@@ -361,10 +393,12 @@ fn light_bodies_on_stiff_muscles_are_stable_at_a_millisecond() {
         spec.chambers.iter_mut().for_each(|c| c.initial_pressure = 5e5);
         let rig = Rig::new(spec).unwrap();
         let (a, b) = (vec![7.0; 60], vec![6.5; 60]);
-        let signals: [(&str, &[f64]); 2] = [("valve_command.flexor", &a), ("valve_command.extensor", &b)];
+        let signals: [(&str, &[f64]); 2] =
+            [("valve_command.flexor", &a), ("valve_command.extensor", &b)];
         let coarse = run(&rig, 60, &signals, 0.005, 1e-3);
         let fine = run(&rig, 60, &signals, 0.005, 2e-6);
-        let (a, b) = (coarse.get(&rig, "joint_angle").unwrap(), fine.get(&rig, "joint_angle").unwrap());
+        let (a, b) =
+            (coarse.get(&rig, "joint_angle").unwrap(), fine.get(&rig, "joint_angle").unwrap());
         let most = b.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
         let worst = a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         assert!(worst < 0.2 * most, "{inertia}: {worst} of {most}");
@@ -418,7 +452,8 @@ fn air_that_goes_back_through_a_valve_empties_its_chamber() {
     spec.valves = shoulder().valves;
     let (valve, line) = (Rig::new(spec).unwrap(), Rig::new(through_line).unwrap());
     let open = vec![10.0; 40];
-    let (a, b) = (run(&valve, 40, &[("valve_command", &open)], 0.01, 1e-3), run(&line, 40, &[], 0.01, 1e-3));
+    let (a, b) =
+        (run(&valve, 40, &[("valve_command", &open)], 0.01, 1e-3), run(&line, 40, &[], 0.01, 1e-3));
     assert_eq!(a.get(&valve, "muscle_pressure"), b.get(&line, "muscle_pressure"));
     assert!(last(&valve, &a, "mass_supplied") < 0.0 && imbalance(&valve, &a) < 1e-12);
 }

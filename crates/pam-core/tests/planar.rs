@@ -1,4 +1,5 @@
-//! Laws of the planar arm: structure of its equations, energy, the closed forms of one and two links, errors.
+//! Laws of the planar arm: structure of its equations, energy, the closed forms of one and two
+//! links, errors.
 
 use nalgebra::{SMatrix, SVector};
 use num_dual::{Dual64, DualStruct};
@@ -48,7 +49,8 @@ fn unit<const N: usize>(k: usize) -> SVector<f64, N> {
 
 prop_compose! {
     fn numbers()(
-        length in 0.1..0.8_f64, mass in 0.2..8.0_f64, share in -0.2..1.0_f64, inertia in 0.002..0.3_f64,
+        length in 0.1..0.8_f64, mass in 0.2..8.0_f64, share in -0.2..1.0_f64,
+        inertia in 0.002..0.3_f64,
         payload in prop_oneof![Just(0.0), 0.0..10.0_f64],
     ) -> Numbers {
         [length, mass, share, inertia, payload]
@@ -69,6 +71,7 @@ fn motion<const N: usize>(rows: &[[f64; 3]; N]) -> [SVector<f64, N>; 3] {
 }
 
 /// Every law that holds at one instant.
+#[allow(clippy::too_many_lines, reason = "one law after another of the same drawn case")]
 fn check_laws<const N: usize>((numbers, rows): &Case<N>) -> Result<(), TestCaseError> {
     let links = numbers.map(|n| link(&n, [0.7, 1.5]));
     let [q, r, a] = motion(rows);
@@ -79,7 +82,9 @@ fn check_laws<const N: usize>((numbers, rows): &Case<N>) -> Result<(), TestCaseE
 
     // Symmetric and positive definite.
     prop_assert_eq!(h, h.transpose());
-    prop_assert!(nalgebra::Cholesky::new(nalgebra::DMatrix::from_fn(N, N, |i, j| h[(i, j)])).is_some());
+    prop_assert!(
+        nalgebra::Cholesky::new(nalgebra::DMatrix::from_fn(N, N, |i, j| h[(i, j)])).is_some()
+    );
 
     // H' - 2C is skew, and C is that of the Christoffel symbols of H.
     let h_rate = dual.mass_matrix(&moving(&q, &r)).map(|v| v.eps);
@@ -95,7 +100,8 @@ fn check_laws<const N: usize>((numbers, rows): &Case<N>) -> Result<(), TestCaseE
     // Energies: those of H, and those of bodies whose places are differentiated along the motion.
     let kinetic = plain.kinetic_energy(&q, &r);
     prop_assert!(
-        (kinetic - 0.5 * (r.transpose() * h * r)[0]).abs() < 1e-12 * mass * r.norm_squared().max(1.0)
+        (kinetic - 0.5 * (r.transpose() * h * r)[0]).abs()
+            < 1e-12 * mass * r.norm_squared().max(1.0)
     );
     let ends = dual.positions(&moving(&q, &r));
     let (mut base, mut turn) = ([Dual64::new(0.0, 0.0); 2], 0.0);
@@ -112,13 +118,16 @@ fn check_laws<const N: usize>((numbers, rows): &Case<N>) -> Result<(), TestCaseE
         base = end;
     }
     prop_assert!((kinetic - bodies).abs() < 1e-12 * mass * r.norm_squared().max(1.0));
-    prop_assert!((plain.potential_energy(&q) - potential).abs() < 1e-11 * potential.abs().max(100.0));
+    prop_assert!(
+        (plain.potential_energy(&q) - potential).abs() < 1e-11 * potential.abs().max(100.0)
+    );
 
     // G is the slope of the potential energy.
     let g = plain.gravity_torque(&q);
     for k in 0..N {
         prop_assert!(
-            (dual.potential_energy(&moving(&q, &unit(k))).eps - g[k]).abs() < 1e-11 * g.amax().max(100.0)
+            (dual.potential_energy(&moving(&q, &unit(k))).eps - g[k]).abs()
+                < 1e-11 * g.amax().max(100.0)
         );
     }
 
@@ -130,7 +139,8 @@ fn check_laws<const N: usize>((numbers, rows): &Case<N>) -> Result<(), TestCaseE
     let back = plain.acceleration(&q, &r, &torque).unwrap();
     let eigenvalues = nalgebra::DMatrix::from_fn(N, N, |i, j| h[(i, j)]).symmetric_eigenvalues();
     let (low, high) = (eigenvalues.min(), eigenvalues.max());
-    let scale = (high * (1.0 + a.amax() + r.norm_squared()) + torque.amax() + friction.amax()) / low;
+    let scale =
+        (high * (1.0 + a.amax() + r.norm_squared()) + torque.amax() + friction.amax()) / low;
     prop_assert!((back - a).amax() < 1e-14 * scale, "{}", (back - a).amax());
 
     // Power: d/dt energy = tau q' - friction q', and friction never gives.
@@ -140,13 +150,18 @@ fn check_laws<const N: usize>((numbers, rows): &Case<N>) -> Result<(), TestCaseE
     prop_assert!((power - (torque - friction).dot(&r)).abs() < 1e-12 * flow);
     prop_assert!(friction.iter().zip(r.iter()).all(|(f, r)| f * r >= 0.0));
 
-    // Forward and inverse are inverses in values and derivatives: friction, H, C and G all move here.
+    // Forward and inverse are inverses in values and derivatives: friction, H, C and G all move
+    // here.
     let pull = moving(&torque, &unit(0));
     let lifted = dual.acceleration(&place, &rate, &pull).unwrap();
     let slopes = lifted.map(|v| v.eps).amax();
     prop_assert!((lifted.map(|v| v.re()) - back).amax() <= 1e-14 * scale);
     let returned = dual.inverse_dynamics(&place, &rate, &lifted).map(|v| v.eps) - unit::<N>(0);
-    prop_assert!(returned.amax() < 1e-13 * mass * (scale + slopes) * (1.0 + r.amax()), "{}", returned.amax());
+    prop_assert!(
+        returned.amax() < 1e-13 * mass * (scale + slopes) * (1.0 + r.amax()),
+        "{}",
+        returned.amax()
+    );
     Ok(())
 }
 
@@ -156,8 +171,9 @@ fn check_payload<const N: usize>((numbers, rows): &Case<N>) -> Result<(), TestCa
     let rigid = loaded.map(|l| {
         let mass = l.mass + l.payload;
         let centre = (l.mass * l.centre + l.payload * l.length) / mass;
-        let inertia =
-            l.inertia + l.mass * (l.centre - centre).powi(2) + l.payload * (l.length - centre).powi(2);
+        let inertia = l.inertia
+            + l.mass * (l.centre - centre).powi(2)
+            + l.payload * (l.length - centre).powi(2);
         Link { mass, centre, inertia, payload: 0.0, ..l }
     });
     let [q, r, a] = motion(rows);
@@ -168,7 +184,8 @@ fn check_payload<const N: usize>((numbers, rows): &Case<N>) -> Result<(), TestCa
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 128, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 128, failure_persistence: None,
+        ..ProptestConfig::default() })]
 
     #[test]
     fn laws_of_one_link(case in case::<1>()) { check_laws(&case)?; }
@@ -184,7 +201,8 @@ proptest! {
 
     #[test]
     fn one_link_is_the_one_link_arm(
-        numbers in numbers(), angle in -3.0..3.0_f64, rate in -3.0..3.0_f64, torque in -500.0..500.0_f64,
+        numbers in numbers(), angle in -3.0..3.0_f64, rate in -3.0..3.0_f64,
+        torque in -500.0..500.0_f64,
     ) {
         let stops = Stops { min_angle: 0.26, max_angle: 2.0, stiffness: 2e4, damping: 60.0 };
         let l = Link { stops: Some(stops), ..link(&numbers, [3.0, 1.5]) };
@@ -205,7 +223,8 @@ proptest! {
         prop_assert_eq!(planar.mass_matrix(&q)[0], one.total_inertia());
     }
 
-    /// Spong, Hutchinson & Vidyasagar, ch. 7, planar elbow manipulator: the first angle from the horizontal.
+    /// Spong, Hutchinson & Vidyasagar, ch. 7, planar elbow manipulator: the first angle from the
+    /// horizontal.
     #[test]
     fn two_links_are_the_textbooks(case in case::<2>()) {
         let (mut numbers, rows) = case;
@@ -218,7 +237,8 @@ proptest! {
         let l1 = links[0].length;
         let (i1, i2) = (links[0].inertia, links[1].inertia);
         let (q1, q2) = (q[0] - std::f64::consts::FRAC_PI_2, q[1]);
-        let d11 = m1 * lc1.powi(2) + m2 * (l1.powi(2) + lc2.powi(2) + 2.0 * l1 * lc2 * q2.cos()) + i1 + i2;
+        let d11 = m1 * lc1.powi(2) + m2 * (l1.powi(2) + lc2.powi(2) + 2.0 * l1 * lc2 * q2.cos())
+            + i1 + i2;
         let d12 = m2 * (lc2.powi(2) + l1 * lc2 * q2.cos()) + i2;
         let d22 = m2 * lc2.powi(2) + i2;
         let h = -m2 * l1 * lc2 * q2.sin();
@@ -228,7 +248,8 @@ proptest! {
         let tau2 = d12 * a[0] + d22 * a[1] - h * r[0] * r[0] + g2;
         let planar = arm::<f64, 2>(&links);
         let torque = planar.inverse_dynamics(&q, &r, &a);
-        prop_assert!((torque - SVector::<f64, 2>::new(tau1, tau2)).amax() < 1e-12 * torque.amax().max(1e3));
+        prop_assert!((torque - SVector::<f64, 2>::new(tau1, tau2)).amax() < 1e-12
+            * torque.amax().max(1e3));
         let c = planar.coriolis_matrix(&q, &r);
         let book = SMatrix::<f64, 2, 2>::new(h * r[1], h * (r[1] + r[0]), -h * r[0], 0.0);
         prop_assert!((c - book).amax() < 1e-12 * book.amax().max(10.0));
@@ -239,8 +260,12 @@ const CHAIN: [Numbers; 3] =
     [[0.33, 3.0, 0.5, 0.03, 0.0], [0.33, 2.5, 0.45, 0.025, 1.0], [0.18, 1.0, 0.5, 0.004, 4.0]];
 
 /// States after `steps` over 1 s from one start; `M = 2 N`.
-fn fall<const N: usize, const M: usize>(arm: &PlanarArm<f64, N>, steps: u32) -> Vec<SVector<f64, M>> {
-    let mut states = vec![SVector::<f64, M>::from_fn(|i, _| if i < N { 1.2 - 0.3 * i as f64 } else { 0.5 })];
+fn fall<const N: usize, const M: usize>(
+    arm: &PlanarArm<f64, N>,
+    steps: u32,
+) -> Vec<SVector<f64, M>> {
+    let mut states =
+        vec![SVector::<f64, M>::from_fn(|i, _| if i < N { 1.2 - 0.3 * i as f64 } else { 0.5 })];
     let mut method = Rk4::new(M);
     for k in 0..steps as usize {
         let mut next = states[k];
@@ -323,7 +348,9 @@ fn bad_input_is_named() {
         let mut links = good;
         change(&mut links[1]);
         match PlanarArm::new(links, GRAVITY) {
-            Err(Error::Parameter { name, .. }) => assert_eq!(name, format!("arm.links[1].{expected}")),
+            Err(Error::Parameter { name, .. }) => {
+                assert_eq!(name, format!("arm.links[1].{expected}"))
+            }
             other => panic!("{expected}: {other:?}"),
         }
     };
@@ -345,8 +372,11 @@ fn bad_input_is_named() {
 
     let planar = arm::<f64, 3>(&good);
     let (fine, bad) = (SVector::<f64, 3>::repeat(0.4), SVector::<f64, 3>::new(0.4, f64::NAN, 0.4));
-    let cases =
-        [([bad, fine, fine], "angle[1]"), ([fine, bad, fine], "rate[1]"), ([fine, fine, bad], "torque[1]")];
+    let cases = [
+        ([bad, fine, fine], "angle[1]"),
+        ([fine, bad, fine], "rate[1]"),
+        ([fine, fine, bad], "torque[1]"),
+    ];
     for ([q, r, t], expected) in cases {
         match planar.acceleration(&q, &r, &t) {
             Err(Error::Parameter { name, .. }) => assert_eq!(name, expected),
@@ -363,8 +393,10 @@ fn an_arm_without_inertia_is_refused() {
     let zero = SVector::<f64, 2>::zeros();
     for k in 0..200 {
         // In line in any direction: rounding may leave a pivot on either side of zero.
-        let q =
-            SVector::<f64, 2>::new(0.03 * f64::from(k), if k % 2 == 0 { 0.0 } else { std::f64::consts::PI });
+        let q = SVector::<f64, 2>::new(
+            0.03 * f64::from(k),
+            if k % 2 == 0 { 0.0 } else { std::f64::consts::PI },
+        );
         let error = planar.acceleration(&q, &zero, &zero).unwrap_err();
         assert!(error.to_string().contains("pivot 1 of the arm's mass matrix"), "{error}");
     }

@@ -12,7 +12,8 @@ fn spec() -> RigSpec {
 }
 
 fn effect(id: &str, parameters: &[(&str, f64)]) -> EffectSpec {
-    let parameters: BTreeMap<_, _> = parameters.iter().map(|(n, v)| ((*n).to_string(), *v)).collect();
+    let parameters: BTreeMap<_, _> =
+        parameters.iter().map(|(n, v)| ((*n).to_string(), *v)).collect();
     EffectSpec { id: id.into(), form: String::new(), at: String::new(), parameters }
 }
 
@@ -61,6 +62,7 @@ fn slopes(values: &[f64], dt: f64) -> Vec<f64> {
 }
 
 #[test]
+#[allow(clippy::too_many_lines, reason = "a table of the parameters and one check of each")]
 fn sensitivities_agree_with_differences() {
     let mut with_effects = spec();
     with_effects.effects = vec![
@@ -124,7 +126,8 @@ fn sensitivities_agree_with_differences() {
     let u = command(n);
     let signal = |k: usize| (names[k], Signal { value: channel(names[k]), slope: &rates[k] });
     let measured =
-        Measured::new(&base, n, &[("valve_command", &u)], &[signal(0), signal(1), signal(2)]).unwrap();
+        Measured::new(&base, n, &[("valve_command", &u)], &[signal(0), signal(1), signal(2)])
+            .unwrap();
     let timing = Timing { sample_time: dt, substeps: 10 };
     for (spec, block, names) in cases {
         let rig = Rig::new(spec.clone()).unwrap();
@@ -138,7 +141,9 @@ fn sensitivities_agree_with_differences() {
             };
             let (up, down) = (shifted(1.0), shifted(-1.0));
             let span = nudge_size(spec, name, size);
-            let scale = (0..n).map(|k| exact.jacobian[k * exact.columns + column].abs()).fold(0.0, f64::max);
+            let scale = (0..n)
+                .map(|k| exact.jacobian[k * exact.columns + column].abs())
+                .fold(0.0, f64::max);
             assert!(scale > 0.0, "{name} has no influence");
             for k in 0..n {
                 let difference = (up[k] - down[k]) / (2.0 * span);
@@ -198,7 +203,10 @@ fn bad_input_is_a_typed_error() {
     };
     named(run(&[5.0, f64::NAN]), "valve_command[1]");
     named(simulate(&rig, 2, &[], timing, &initial).unwrap_err(), "valve_command is missing");
-    named(initial.clone().with(&rig, "muscle_pressure", -2e5).unwrap_err(), "initial.muscle_pressure");
+    named(
+        initial.clone().with(&rig, "muscle_pressure", -2e5).unwrap_err(),
+        "initial.muscle_pressure",
+    );
     named(initial.clone().with(&rig, "muscle_colour", 1.0).unwrap_err(), "muscle_colour");
     named(Timing::new(0.005, 3e-3).unwrap_err(), "step");
     named(Timing::new(f64::NAN, 1e-3).unwrap_err(), "sample_time");

@@ -1,5 +1,6 @@
-//! A new effect is one file: `toy/toy_spring.rs`, which the core does not know, acts in a rig as those of the catalogue
-//! do. The same file is an entry of the catalogue where the feature `toy` is on (tests/effects/test_toy.py).
+//! A new effect is one file: `toy/toy_spring.rs`, which the core does not know, acts in a rig as
+//! those of the catalogue do. The same file is an entry of the catalogue where the feature `toy` is
+//! on (tests/effects/test_toy.py).
 
 mod rigs;
 #[path = "toy/toy_spring.rs"]
@@ -76,7 +77,8 @@ fn it_moves_the_joint_and_its_neutral_value_changes_nothing() {
             let on = with(spec.clone(), vec![spring(form, "", [40.0, 0.3, 0.1])]);
             let (a, b, c) = (run(&plain), run(&off), run(&on));
             assert_eq!(a.channels, b.channels, "bit for bit");
-            let angles = plain.names().channels.iter().position(|(n, _)| n.starts_with("joint_angle"));
+            let angles =
+                plain.names().channels.iter().position(|(n, _)| n.starts_with("joint_angle"));
             let moved = apart(&a.channels[angles.unwrap()], &c.channels[angles.unwrap()]);
             assert!(moved > 1e-3, "{form} in {}: {moved}", spec.name);
         }
@@ -93,11 +95,14 @@ fn its_forms_are_their_laws() {
     let gained = |form: &str, stiffness: f64| {
         let rig = with(spec.clone(), vec![spring(form, "", [stiffness, 0.3, 1e6])]);
         let start = Initial::rest(&rig).with(&rig, "joint_angle", 1.0).unwrap();
-        let out = simulate(&rig, 2, &[], Timing { sample_time: 1e-3, substeps: 1 }, &start).unwrap();
+        let out =
+            simulate(&rig, 2, &[], Timing { sample_time: 1e-3, substeps: 1 }, &start).unwrap();
         out.get(&rig, "joint_rate").unwrap()[1] * 1e3 / 1e-3
     };
     let depth = 0.7 - 0.5 * 1.0_f64.to_radians();
-    for (form, deflection) in [("linear", depth), ("", depth), ("cubic", depth.powi(3) / SECANT.powi(2))] {
+    for (form, deflection) in
+        [("linear", depth), ("", depth), ("cubic", depth.powi(3) / SECANT.powi(2))]
+    {
         let torque = gained(form, 500.0) - gained(form, 0.0);
         // It begins where it has rested for long.
         let expected = -500.0 * (1.0 - RELAXING) * deflection;
@@ -133,7 +138,10 @@ fn predicted(rig: &Rig, truth: &Trajectory, block: &str, ids: &[ParameterId]) ->
 #[test]
 fn its_sensitivities_are_those_of_differences() {
     let one = |form: &str| vec![spring(form, "", [40.0, 0.3, 0.1])];
-    let two = vec![spring("linear", "elbow", [40.0, 0.3, 0.1]), spring("cubic", "wrist", [9.0, 0.2, 0.2])];
+    let two = vec![
+        spring("linear", "elbow", [40.0, 0.3, 0.1]),
+        spring("cubic", "wrist", [9.0, 0.2, 0.2]),
+    ];
     let rigs = [
         (shoulder(), one("linear"), "arm", "toy_joint_spring"),
         (shoulder(), one("cubic"), "arm", "toy_joint_spring"),
@@ -143,7 +151,10 @@ fn its_sensitivities_are_those_of_differences() {
     for (spec, effects, block, prefix) in rigs {
         let rig = with(spec, effects);
         let truth = run(&rig);
-        let ids = INFO.parameters().iter().map(|p| rig.parameters().find(&format!("{prefix}.{}", p.name)));
+        let ids = INFO
+            .parameters()
+            .iter()
+            .map(|p| rig.parameters().find(&format!("{prefix}.{}", p.name)));
         let ids: Vec<_> = ids.map(Result::unwrap).collect();
         let exact = predicted(&rig, &truth, block, &ids);
         for (column, id) in ids.iter().enumerate() {
@@ -161,7 +172,10 @@ fn its_sensitivities_are_those_of_differences() {
             assert!(scale > 0.0, "{prefix}: parameter {column} of {block} has no influence");
             for k in 0..ROWS {
                 let gap = (slope(k) - (up[k] - down[k]) / (2.0 * step)).abs();
-                assert!(gap <= 2e-3 * scale, "{prefix}: parameter {column}, row {k}: {gap} of {scale}");
+                assert!(
+                    gap <= 2e-3 * scale,
+                    "{prefix}: parameter {column}, row {k}: {gap} of {scale}"
+                );
             }
         }
     }
@@ -189,10 +203,15 @@ fn a_restart_is_bit_for_bit() {
 fn two_of_it_at_two_joints_have_parameters_and_states_of_their_own() {
     let (elbow, wrist) = ([40.0, 0.3, 0.1], [9.0, 0.2, 0.2]);
     let rig = |effects: &[(&str, &str, [f64; 3])]| {
-        with(two_joints(), effects.iter().map(|(form, at, values)| spring(form, at, *values)).collect())
+        with(
+            two_joints(),
+            effects.iter().map(|(form, at, values)| spring(form, at, *values)).collect(),
+        )
     };
     let both = rig(&[("linear", "elbow", elbow), ("cubic", "wrist", wrist)]);
-    for (name, value) in [("elbow.stiffness", 40.0), ("wrist.stiffness", 9.0), ("wrist.time_constant", 0.2)] {
+    for (name, value) in
+        [("elbow.stiffness", 40.0), ("wrist.stiffness", 9.0), ("wrist.time_constant", 0.2)]
+    {
         let id = both.parameters().find(&format!("toy_joint_spring.{name}")).unwrap();
         assert_eq!(both.parameters().value(id), value);
     }
@@ -216,7 +235,10 @@ fn two_of_it_at_two_joints_have_parameters_and_states_of_their_own() {
     assert_eq!(all, angle(&rig(&[("cubic", "wrist", wrist), ("linear", "elbow", elbow)])));
     // One without a name acts at every joint, as two alike do.
     let everywhere = rig(&[("linear", "", elbow)]);
-    assert_eq!(angle(&everywhere), angle(&rig(&[("linear", "elbow", elbow), ("linear", "wrist", elbow)])));
+    assert_eq!(
+        angle(&everywhere),
+        angle(&rig(&[("linear", "elbow", elbow), ("linear", "wrist", elbow)]))
+    );
 }
 
 #[test]
@@ -228,13 +250,20 @@ fn a_stiff_spring_shortens_the_step_and_a_fast_one_too() {
             (rig(form, [0.0, 0.3, 10.0]), rig(form, [1e9, 0.3, 10.0]), rig(form, [0.0, 0.3, 1e-3]));
         assert_eq!((none.stable_step(), none.body_step()), (free.stable_step(), free.body_step()));
         assert!(stiff.stable_step() < 0.5 * free.stable_step(), "{form}: {}", stiff.stable_step());
-        assert!((fast.body_step() / 2e-3 - 1.0).abs() < 1e-12 && fast.body_step() < free.body_step());
-        assert_eq!([&stiff, &fast].map(Rig::gas_step), [free.gas_step(); 2], "the air knows nothing of it");
+        assert!(
+            (fast.body_step() / 2e-3 - 1.0).abs() < 1e-12 && fast.body_step() < free.body_step()
+        );
+        assert_eq!(
+            [&stiff, &fast].map(Rig::gas_step),
+            [free.gas_step(); 2],
+            "the air knows nothing of it"
+        );
         // and the shortened one is stable
         let rig = with(shoulder(), vec![spring(form, "", [2e4, 0.3, 1e-3])]);
         let (fine, rough) = (Timing { substeps: 400, ..TIMING }, TIMING.stable(&rig));
         assert!(rough.substeps < 400, "{}", rough.substeps);
-        let [a, b] = [fine, rough].map(|t| run_at(&rig, t).get(&rig, "joint_angle").unwrap().to_vec());
+        let [a, b] =
+            [fine, rough].map(|t| run_at(&rig, t).get(&rig, "joint_angle").unwrap().to_vec());
         assert!(apart(&a, &b) < 1e-3, "{form}: {}", apart(&a, &b));
     }
 }
@@ -247,14 +276,22 @@ fn what_does_not_fit_is_refused_by_name() {
         assert!(text.contains("toy_joint_spring") && text.contains(word), "{text}");
     };
     let values = [40.0, 0.3, 0.1];
-    refused(vec![spring("quintic", "", values)], "no form \"quintic\"; one of \"linear\", \"cubic\"");
-    refused(vec![spring("", "elbow", values), spring("cubic", "elbow", values)], "joint.elbow twice");
+    refused(
+        vec![spring("quintic", "", values)],
+        "no form \"quintic\"; one of \"linear\", \"cubic\"",
+    );
+    refused(
+        vec![spring("", "elbow", values), spring("cubic", "elbow", values)],
+        "joint.elbow twice",
+    );
     refused(vec![spring("", "", values), spring("", "wrist", values)], "joint.wrist twice");
     refused(vec![spring("", "shoulder", values)], "no joint of that name");
     refused(vec![spring("", "", [-1.0, 0.3, 0.1])], "stiffness = -1");
     let catalogue = Rig::new(RigSpec { effects: vec![spring("", "", values)], ..shoulder() });
     assert_eq!(catalogue.is_err(), cfg!(not(feature = "toy")));
     let leak = effect_at("leak_muscle", "", &[("conductance", 1e-10), ("laminar_share", 0.0)]);
-    let text = Rig::with_effects(RigSpec { effects: vec![leak], ..shoulder() }, TOY).unwrap_err().to_string();
+    let text = Rig::with_effects(RigSpec { effects: vec![leak], ..shoulder() }, TOY)
+        .unwrap_err()
+        .to_string();
     assert!(text.contains("there are: toy_joint_spring"), "{text}");
 }

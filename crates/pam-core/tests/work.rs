@@ -1,5 +1,6 @@
-//! The work done for fixed problems, against the files beside this one: it does not depend on the machine's load, as times
-//! do, and must not grow unnoticed. `make snapshots` writes them anew where it has changed on purpose.
+//! The work done for fixed problems, against the files beside this one: it does not depend on the
+//! machine's load, as times do, and must not grow unnoticed. `make snapshots` writes them anew
+//! where it has changed on purpose.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -42,35 +43,47 @@ fn spec(model: &str, geometry: &str) -> MuscleSpec {
     spec
 }
 
-/// Function evaluations of the root solves over the range of contractions, and the most that one takes.
+/// Function evaluations of the root solves over the range of contractions, and the most that one
+/// takes.
 #[test]
 fn root_solves_of_the_geometry() {
-    let mut table = String::from("# geometry: evaluations of 101 root solves, of the longest one\n");
+    let mut table =
+        String::from("# geometry: evaluations of 101 root solves, of the longest one\n");
     for geometry in GEOMETRIES {
         let muscle = Muscle::new(&spec("robinson", geometry)).unwrap();
         let (low, high) =
             CompiledMuscle::new(muscle.clone()).map(|m| (m.table.e_min, m.table.e_max)).unwrap();
-        let solves = (0..=100).map(|k| (low + (high - low) * f64::from(k) / 100.0).clamp(low, high));
+        let solves =
+            (0..=100).map(|k| (low + (high - low) * f64::from(k) / 100.0).clamp(low, high));
         let spent: Vec<u32> = solves.map(|e| muscle.shape(e).unwrap().iterations).collect();
-        writeln!(table, "{geometry}: {} {}", spent.iter().sum::<u32>(), spent.iter().max().unwrap()).unwrap();
+        writeln!(
+            table,
+            "{geometry}: {} {}",
+            spent.iter().sum::<u32>(),
+            spent.iter().max().unwrap()
+        )
+        .unwrap();
     }
     compare("root_solves.txt", &table);
 }
 
-/// Cells of the table of every force model: as many exact solves as its construction takes, but for a factor.
+/// Cells of the table of every force model: as many exact solves as its construction takes, but for
+/// a factor.
 #[test]
 fn cells_of_the_tables() {
     let mut table = String::from("# force model, geometry: cells of the table\n");
     for (model, _) in ForceModel::NAMES {
         for geometry in GEOMETRIES {
-            let compiled = CompiledMuscle::new(Muscle::new(&spec(model, geometry)).unwrap()).unwrap();
+            let compiled =
+                CompiledMuscle::new(Muscle::new(&spec(model, geometry)).unwrap()).unwrap();
             writeln!(table, "{model} {geometry}: {}", compiled.table.cells()).unwrap();
         }
     }
     compare("table_cells.txt", &table);
 }
 
-/// Steps into which a sample of 100 ms is divided at least, since the rig's fastest rate allows no longer ones.
+/// Steps into which a sample of 100 ms is divided at least, since the rig's fastest rate allows no
+/// longer ones.
 #[test]
 fn steps_of_a_sample() {
     let steps = |spec: RigSpec| SAMPLE.stable(&Rig::new(spec).unwrap()).substeps;

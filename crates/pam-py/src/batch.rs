@@ -98,7 +98,9 @@ impl Batch {
     /// Time and reason of the end of each row that has ended.
     #[getter]
     fn status(&self) -> PyResult<Vec<Ended>> {
-        self.with(|plants| Ok(plants.failures().map(|f| f.map(|f| (f.time, f.message.clone()))).collect()))
+        self.with(|plants| {
+            Ok(plants.failures().map(|f| f.map(|f| (f.time, f.message.clone()))).collect())
+        })
     }
 
     /// Go back, or on, to a state.

@@ -11,7 +11,11 @@ pub fn error(py: Python<'_>, e: &pam_core::Error) -> PyErr {
         pam_core::Error::Model(_) => "RigError",
         _ => "ParameterError",
     };
-    match py.import("pamrs.errors").and_then(|m| m.getattr(class)).and_then(|c| c.call1((e.to_string(),))) {
+    match py
+        .import("pamrs.errors")
+        .and_then(|m| m.getattr(class))
+        .and_then(|c| c.call1((e.to_string(),)))
+    {
         Ok(instance) => PyErr::from_value(instance),
         Err(_) if class == "SimulationError" => PyArithmeticError::new_err(e.to_string()),
         Err(_) => PyValueError::new_err(e.to_string()),

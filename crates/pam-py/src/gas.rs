@@ -31,10 +31,13 @@ impl Gas {
         for (name, value, low, high, unit) in checked {
             check_range(name, value, low, high, unit).map_err(|e| error(py, &e))?;
         }
-        Ok(Self { inner: CoreGas::new(ambient_pressure, temperature, gas_constant, heat_capacity_ratio) })
+        Ok(Self {
+            inner: CoreGas::new(ambient_pressure, temperature, gas_constant, heat_capacity_ratio),
+        })
     }
 
-    /// Mass flow [kg/s] through a discharge area [m2] from an upstream pressure [Pa] to downstream pressures [Pa].
+    /// Mass flow [kg/s] through a discharge area [m2] from an upstream pressure [Pa] to downstream
+    /// pressures [Pa].
     fn mass_flow<'py>(
         &self,
         py: Python<'py>,

@@ -69,8 +69,13 @@ impl Joint {
     }
 
     /// 1 where the joint can have an angle [rad], else 0.
-    fn reaches<'py>(&self, py: Python<'py>, angle: PyReadonlyArray1<'py, f64>) -> Bound<'py, PyArray1<f64>> {
-        let within = |angle: f64| f64::from(u8::from(angle.is_finite() && self.inner.reaches(angle)));
+    fn reaches<'py>(
+        &self,
+        py: Python<'py>,
+        angle: PyReadonlyArray1<'py, f64>,
+    ) -> Bound<'py, PyArray1<f64>> {
+        let within =
+            |angle: f64| f64::from(u8::from(angle.is_finite() && self.inner.reaches(angle)));
         array(py, values(&angle).into_iter().map(within).collect())
     }
 }

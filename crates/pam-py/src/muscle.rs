@@ -9,7 +9,8 @@ use pam_core::muscle::{CompiledMuscle, Muscle as CoreMuscle};
 use pam_core::Result;
 use pyo3::prelude::*;
 
-/// A muscle made from a JSON description (SI, radians); its table is compiled when it is first needed.
+/// A muscle made from a JSON description (SI, radians); its table is compiled when it is first
+/// needed.
 #[pyclass(frozen, module = "pamrs._core")]
 pub struct Muscle {
     inner: CoreMuscle,
@@ -30,7 +31,8 @@ impl Muscle {
         result.map(|v| array(py, v)).map_err(|e| error(py, &e))
     }
 
-    /// One number for each row of pressure, contraction ratio and direction; a missing value is NaN, which no force takes.
+    /// One number for each row of pressure, contraction ratio and direction; a missing value is
+    /// NaN, which no force takes.
     fn rows<'py>(
         py: Python<'py>,
         pressure: &PyReadonlyArray1<'py, f64>,
@@ -40,8 +42,9 @@ impl Muscle {
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let (p, e, d) = (values(pressure), values(contraction), direction.map(values));
         let at = |list: &[f64], k: usize| list.get(k).copied().unwrap_or(f64::NAN);
-        let result: Result<Vec<f64>> =
-            py.detach(|| (0..e.len()).map(|k| f(at(&p, k), e[k], d.as_ref().map(|d| at(d, k)))).collect());
+        let result: Result<Vec<f64>> = py.detach(|| {
+            (0..e.len()).map(|k| f(at(&p, k), e[k], d.as_ref().map(|d| at(d, k)))).collect()
+        });
         result.map(|v| array(py, v)).map_err(|e| error(py, &e))
     }
 
@@ -49,7 +52,8 @@ impl Muscle {
         if let Some(compiled) = self.compiled.get() {
             return Ok(compiled);
         }
-        let made = py.detach(|| CompiledMuscle::new(self.inner.clone())).map_err(|e| error(py, &e))?;
+        let made =
+            py.detach(|| CompiledMuscle::new(self.inner.clone())).map_err(|e| error(py, &e))?;
         Ok(self.compiled.get_or_init(|| made))
     }
 }
@@ -124,13 +128,14 @@ impl Muscle {
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let e = values(&contraction);
         let (inner, shape) = (&self.inner, [e.len(), self.inner.order()]);
-        let rows: Result<Vec<Vec<f64>>> = py.detach(|| e.iter().map(|e| inner.elastic_basis(*e)).collect());
+        let rows: Result<Vec<Vec<f64>>> =
+            py.detach(|| e.iter().map(|e| inner.elastic_basis(*e)).collect());
         let rows = rows.map_err(|e| error(py, &e))?;
         PyArray1::from_vec(py, rows.concat()).reshape(shape)
     }
 
-    /// Force [N] of one muscle, exact solve, at gauge pressures [Pa] and contraction ratios of equal length; with
-    /// directions of motion (-1 to 1) also friction and the lengthening branch.
+    /// Force [N] of one muscle, exact solve, at gauge pressures [Pa] and contraction ratios of
+    /// equal length; with directions of motion (-1 to 1) also friction and the lengthening branch.
     #[pyo3(signature = (pressure, contraction, direction=None))]
     fn force<'py>(
         &self,

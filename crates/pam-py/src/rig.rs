@@ -36,7 +36,8 @@ type Pair<'py> = (PyReadonlyArray1<'py, f64>, PyReadonlyArray1<'py, f64>);
 /// Of states, inputs and outputs.
 type Names = (Vec<String>, Vec<String>, Vec<String>);
 /// A, B and C.
-type Matrices<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>);
+type Matrices<'py> =
+    (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>);
 type Owned = Vec<(String, Vec<f64>)>;
 
 /// Signals by name as the core takes them.
@@ -64,8 +65,10 @@ impl Rig {
         work: impl FnOnce(Block, &Measured<'_>, Timing) -> pam_core::Result<T> + Send,
     ) -> PyResult<T> {
         let commands = owned(commands);
-        let signals: Vec<_> =
-            measured.iter().map(|(name, (value, slope))| (name, values(value), values(slope))).collect();
+        let signals: Vec<_> = measured
+            .iter()
+            .map(|(name, (value, slope))| (name, values(value), values(slope)))
+            .collect();
         let inner = &*self.inner;
         let found = py.detach(|| {
             let signals: Vec<_> = (signals.iter())
@@ -90,19 +93,21 @@ impl Rig {
 
     /// The same rig from another description; compiled muscles are kept where they can be.
     fn respecified(&self, py: Python<'_>, json: &str) -> PyResult<Self> {
-        let made = py.detach(|| RigSpec::from_json(json).and_then(|spec| self.inner.respecified(spec)));
+        let made =
+            py.detach(|| RigSpec::from_json(json).and_then(|spec| self.inner.respecified(spec)));
         Ok(Self { inner: Arc::new(made.map_err(|e| error(py, &e))?) })
     }
 
-    /// The same rig with other values of its parameters, in the order of their names; nothing is wired again.
+    /// The same rig with other values of its parameters, in the order of their names; nothing is
+    /// wired again.
     fn with_values(&self, py: Python<'_>, values: PyReadonlyArray1<'_, f64>) -> PyResult<Self> {
         let values = crate::convert::values(&values);
         let made = py.detach(|| self.inner.with_values(&values));
         Ok(Self { inner: Arc::new(made.map_err(|e| error(py, &e))?) })
     }
 
-    /// The same rig with other values of some parameters by name; None where one of them is not a parameter that can vary, so
-    /// that the rig has to be made again.
+    /// The same rig with other values of some parameters by name; None where one of them is not a
+    /// parameter that can vary, so that the rig has to be made again.
     fn revalued(&self, py: Python<'_>, values: BTreeMap<String, f64>) -> PyResult<Option<Self>> {
         let table = self.inner.parameters();
         let mut all = table.values().to_vec();
@@ -145,7 +150,8 @@ impl Rig {
         self.inner.names().initial.iter().map(|(name, _)| name.clone()).collect()
     }
 
-    /// Dotted names of the scalar parameters that predictions can be differentiated with respect to.
+    /// Dotted names of the scalar parameters that predictions can be differentiated with respect
+    /// to.
     #[getter]
     fn parameter_names(&self) -> Vec<String> {
         self.inner.parameters().names().to_vec()
@@ -157,7 +163,8 @@ impl Rig {
         self.inner.stable_step()
     }
 
-    /// Simulate a number of rows under held signals; channels by name, and what happened on the way.
+    /// Simulate a number of rows under held signals; channels by name, and what happened on the
+    /// way.
     fn simulate<'py>(
         &self,
         py: Python<'py>,
@@ -183,8 +190,9 @@ impl Rig {
         Ok((channels(py, rig, out)?, happened))
     }
 
-    /// Linear model about a start with every valve at its null: names of states, inputs and outputs, then the matrices of
-    /// `x' = A x + B u, y = C x`. `side` is that on which valves open.
+    /// Linear model about a start with every valve at its null: names of states, inputs and
+    /// outputs, then the matrices of `x' = A x + B u, y = C x`. `side` is that on which valves
+    /// open.
     fn linearise<'py>(
         &self,
         py: Python<'py>,
@@ -199,10 +207,14 @@ impl Rig {
         let LinearModel { states, inputs, outputs, a, b, c } = made.map_err(|e| error(py, &e))?;
         let (n, m, p) = (states.len(), inputs.len(), outputs.len());
         let matrix = |values, shape: [usize; 2]| array(py, values).reshape(shape);
-        Ok(((states, inputs, outputs), (matrix(a, [n, n])?, matrix(b, [n, m])?, matrix(c, [p, n])?)))
+        Ok((
+            (states, inputs, outputs),
+            (matrix(a, [n, n])?, matrix(b, [n, m])?, matrix(c, [p, n])?),
+        ))
     }
 
-    /// Predict a block's output from its measured neighbours, with the jacobian (None without parameters).
+    /// Predict a block's output from its measured neighbours, with the jacobian (None without
+    /// parameters).
     #[allow(clippy::too_many_arguments, clippy::type_complexity)]
     fn predict<'py>(
         &self,
@@ -232,12 +244,16 @@ impl Rig {
             },
         )?;
         let rows = p.value.len();
-        let jacobian =
-            if p.columns > 0 { Some(array(py, p.jacobian).reshape([rows, p.columns])?) } else { None };
+        let jacobian = if p.columns > 0 {
+            Some(array(py, p.jacobian).reshape([rows, p.columns])?)
+        } else {
+            None
+        };
         Ok((array(py, p.value), jacobian))
     }
 
-    /// Terms of the closure in a block at each sample of a prediction, one column for each of its coefficients.
+    /// Terms of the closure in a block at each sample of a prediction, one column for each of its
+    /// coefficients.
     #[allow(clippy::too_many_arguments)]
     fn closure_terms<'py>(
         &self,

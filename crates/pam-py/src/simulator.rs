@@ -1,4 +1,5 @@
-//! `_core.Simulator`: a simulation that goes on sample by sample, and the one way both it and `Rig.simulate` run.
+//! `_core.Simulator`: a simulation that goes on sample by sample, and the one way both it and
+//! `Rig.simulate` run.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -47,7 +48,11 @@ pub fn watched(
 }
 
 /// Channels of a trajectory by name.
-pub fn channels<'py>(py: Python<'py>, rig: &pam_core::Rig, t: Trajectory) -> PyResult<Bound<'py, PyDict>> {
+pub fn channels<'py>(
+    py: Python<'py>,
+    rig: &pam_core::Rig,
+    t: Trajectory,
+) -> PyResult<Bound<'py, PyDict>> {
     let out = PyDict::new(py);
     for ((name, _), values) in rig.names().channels.iter().zip(t.channels) {
         out.set_item(name, array(py, values))?;
@@ -100,7 +105,8 @@ impl Simulator {
     fn alone<T>(&self, act: impl FnOnce() -> PyResult<T>) -> PyResult<T> {
         if self.busy.swap(true, Ordering::AcqRel) {
             return Err(PyRuntimeError::new_err(
-                "this Simulator is being advanced by another thread: it belongs to one thread at a time",
+                "this Simulator is being advanced by another thread: it belongs to one thread at a \
+                    time",
             ));
         }
         let done = act();
@@ -155,8 +161,12 @@ impl Simulator {
         let made = Timing::new(sample_time, step)
             .and_then(|t| Ok((t.stable(&rig), Progress::start(&rig, &initial(&rig, &start)?)?)));
         let (timing, progress) = made.map_err(|e| error(py, &e))?;
-        let names =
-            rig.names().channels.iter().map(|(name, _)| PyString::intern(py, name).unbind()).collect();
+        let names = rig
+            .names()
+            .channels
+            .iter()
+            .map(|(name, _)| PyString::intern(py, name).unbind())
+            .collect();
         Ok(Self {
             rig,
             timing,
@@ -167,7 +177,8 @@ impl Simulator {
         })
     }
 
-    /// Hold each command for one sample; the samples after them as channels by name, and what happened on the way.
+    /// Hold each command for one sample; the samples after them as channels by name, and what
+    /// happened on the way.
     fn advance<'py>(
         &self,
         py: Python<'py>,
@@ -175,7 +186,8 @@ impl Simulator {
         signals: Signals<'py>,
     ) -> PyResult<(Bound<'py, PyDict>, Vec<EventRow>)> {
         let signals = owned(&signals);
-        let drive = Drive::new(&self.rig, samples, &borrowed(&signals)).map_err(|e| error(py, &e))?;
+        let drive =
+            Drive::new(&self.rig, samples, &borrowed(&signals)).map_err(|e| error(py, &e))?;
         let mut out = Trajectory::new(&self.rig, samples);
         self.alone(|| {
             let mut progress = self.progress().clone();
@@ -187,8 +199,9 @@ impl Simulator {
         Ok((channels(py, &self.rig, out)?, happened))
     }
 
-    /// Hold one command for some samples: the last of them as numbers by name, and what happened on the way. All of them are
-    /// written to `rows`, one line for each channel, from a column on, where it is given.
+    /// Hold one command for some samples: the last of them as numbers by name, and what happened on
+    /// the way. All of them are written to `rows`, one line for each channel, from a column on,
+    /// where it is given.
     #[pyo3(signature = (samples, signals, rows=None, column=0))]
     fn hold<'py>(
         &self,
@@ -198,10 +211,12 @@ impl Simulator {
         rows: Option<PyReadwriteArray2<'py, f64>>,
         column: usize,
     ) -> PyResult<(Bound<'py, PyDict>, Vec<EventRow>)> {
-        let given =
-            signals.iter().map(|(name, value)| Ok((name.cast_into::<PyString>()?, value.extract::<f64>()?)));
+        let given = signals
+            .iter()
+            .map(|(name, value)| Ok((name.cast_into::<PyString>()?, value.extract::<f64>()?)));
         let given = given.collect::<PyResult<Vec<_>>>()?;
-        let named = given.iter().map(|(name, value)| Ok((name.to_str()?, std::slice::from_ref(value))));
+        let named =
+            given.iter().map(|(name, value)| Ok((name.to_str()?, std::slice::from_ref(value))));
         let named = named.collect::<PyResult<Vec<_>>>()?;
         let drive = Drive::new(&self.rig, 1, &named).map_err(|e| error(py, &e))?;
         self.with_work(py, |run, out| {
@@ -209,8 +224,9 @@ impl Simulator {
                 let mut progress = self.progress().clone();
                 let done = watched(py, |look| {
                     run.with(|run| {
-                        (0..samples)
-                            .try_for_each(|_| progress.advance_in(run, self.timing, &drive, 0..1, out, look))
+                        (0..samples).try_for_each(|_| {
+                            progress.advance_in(run, self.timing, &drive, 0..1, out, look)
+                        })
                     })
                 });
                 *self.progress() = progress;
@@ -232,7 +248,8 @@ impl Simulator {
     fn observe<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         self.with_work(py, |run, out| {
             let progress = self.progress().clone();
-            run.with(|run| progress.observe_in(run, self.timing, out)).map_err(|e| error(py, &e))?;
+            run.with(|run| progress.observe_in(run, self.timing, out))
+                .map_err(|e| error(py, &e))?;
             self.last(py, out)
         })
     }

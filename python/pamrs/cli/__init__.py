@@ -1,9 +1,10 @@
-"""The command line: ``pamrs diagnose``, ``effects``, ``prove``, ``fit``, ``library``, ``lift``, ``simulate``, ``size``, ``rig``, ...
+"""The command line: ``pamrs diagnose``, ``effects``, ``prove``, ``fit``, ``library``, ``lift``,
+``simulate``, ``size``, ``rig``, ...
 
 Results go to standard output, progress and errors to standard error. The exit code is 0 when the
-command did its work (a diagnosis that finds nothing missing included), 2 when the input is wrong,
-3 when ``prove`` has a case without a result.
-Everything heavy is imported inside the command that needs it, so that ``pamrs --help`` answers at once.
+command did its work (a diagnosis that finds nothing missing included), 2 when the input is wrong, 3
+when ``prove`` has a case without a result. Everything heavy is imported inside the command that
+needs it, so that ``pamrs --help`` answers at once.
 """
 
 from __future__ import annotations
@@ -30,7 +31,9 @@ __all__ = ["app", "main"]
 
 app = typer.Typer(
     name="pamrs",
-    help="Simulate pneumatic artificial muscles, and find the physics that a simulation leaves out.",
+    help=(
+        "Simulate pneumatic artificial muscles, and find the physics that a simulation leaves out."
+    ),
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
@@ -58,7 +61,12 @@ def _print_version(wanted: bool) -> None:
 
 @app.callback()
 def _root(
-    version: Annotated[bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")] = False,
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version", callback=_print_version, is_eager=True, help="Print the version."
+        ),
+    ] = False,
 ) -> None:
     """Simulate pneumatic artificial muscles, and find the physics that a simulation leaves out."""
 
@@ -82,7 +90,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        Exit code: 0 done, 1 interrupted, 2 wrong input (one line on standard error says what), 3 a case without a result.
+        Exit code: 0 done, 1 interrupted, 2 wrong input (one line on standard error says what), 3 a
+        case without a result.
 
     Examples
     --------

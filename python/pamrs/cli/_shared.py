@@ -1,4 +1,6 @@
-"""What the commands of ``pamrs`` share: numbers with units, muscles by name, files to write, progress."""
+"""What the commands of ``pamrs`` share: numbers with units, muscles by name, files to write,
+progress.
+"""
 
 from __future__ import annotations
 
@@ -15,12 +17,30 @@ import typer
 if TYPE_CHECKING:
     from pamrs.rig import Muscle, Rig
 
-__all__ = ["GEOMETRY", "QUANTITY", "as_given", "check_writable", "exact", "named_muscle", "progress", "quantity", "rig_named", "write"]
+__all__ = [
+    "GEOMETRY",
+    "QUANTITY",
+    "as_given",
+    "check_writable",
+    "exact",
+    "named_muscle",
+    "progress",
+    "quantity",
+    "rig_named",
+    "write",
+]
 
 _NUMBER = r"[-+]?\d*\.?\d+(?:[eE][-+]?\d+)?"
-QUANTITY = re.compile(rf"^\s*(?P<value>{_NUMBER})\s*(?:(?:\+-|±)\s*(?P<tol>{_NUMBER})\s*)?(?P<unit>\S.*?)?\s*$")
+QUANTITY = re.compile(
+    rf"^\s*(?P<value>{_NUMBER})\s*(?:(?:\+-|±)\s*(?P<tol>{_NUMBER})\s*)?(?P<unit>\S.*?)?\s*$"
+)
 #: Sizes of a muscle that commands take, and their dimension.
-GEOMETRY: Final = {"rest_length": "length", "rest_diameter": "length", "braid_angle": "angle", "wall_thickness": "length"}
+GEOMETRY: Final = {
+    "rest_length": "length",
+    "rest_diameter": "length",
+    "braid_angle": "angle",
+    "wall_thickness": "length",
+}
 
 
 def as_given(name: str, text: str) -> str:
@@ -35,10 +55,17 @@ def quantity(name: str, text: str, dimension: str) -> tuple[float, float | None]
 
     match = QUANTITY.match(text)
     if match is None or match["unit"] is None:
-        raise ParameterError(f"{as_given(name, text)} is not allowed: a number with a unit like {DIMENSIONS[dimension]!r} is needed")
+        raise ParameterError(
+            f"{as_given(name, text)} is not allowed: a number with a unit like "
+            f"{DIMENSIONS[dimension]!r} is needed"
+        )
     try:
         value = to_si(float(match["value"]), match["unit"], dimension)
-        spread = None if match["tol"] is None else to_si(float(match["tol"]), match["unit"], dimension, difference=True)
+        spread = (
+            None
+            if match["tol"] is None
+            else to_si(float(match["tol"]), match["unit"], dimension, difference=True)
+        )
     except ParameterError as error:
         raise ParameterError(f"{as_given(name, text)}: {error}") from None
     return value, spread
@@ -50,11 +77,15 @@ def exact(name: str, text: str, dimension: str) -> float:
 
     value, spread = quantity(name, text, dimension)
     if spread is not None:
-        raise ParameterError(f"{as_given(name, text)} is not allowed: a standard deviation has no use here")
+        raise ParameterError(
+            f"{as_given(name, text)} is not allowed: a standard deviation has no use here"
+        )
     return value
 
 
-def named_muscle(name: str, option: str = "--muscle") -> tuple[Muscle, dict[str, float], Rig | None]:
+def named_muscle(
+    name: str, option: str = "--muscle"
+) -> tuple[Muscle, dict[str, float], Rig | None]:
     """The muscle of a rig file, or of the library, what is known of its geometry, and the rig."""
     from pamrs import library
     from pamrs.errors import ParameterError
@@ -62,12 +93,19 @@ def named_muscle(name: str, option: str = "--muscle") -> tuple[Muscle, dict[str,
 
     if not name.endswith(".toml") and not Path(name).exists():
         if name not in library.names():
-            raise ParameterError(f"{option} = {name!r} is neither a file nor in the library: {', '.join(library.names())}")
+            raise ParameterError(
+                f"{option} = {name!r} is neither a file nor in the library: "
+                f"{', '.join(library.names())}"
+            )
         return library.entry(name).muscle, {}, None
     rig = load_rig(name)
     if rig.muscle is None:
         raise ParameterError(f"{option} = {name!r}: this rig has no block [muscle]")
-    known = {key.partition(".")[2]: p.tol for key, p in rig.parameters.items() if key.startswith("muscle.") and p.tol > 0.0}
+    known = {
+        key.partition(".")[2]: p.tol
+        for key, p in rig.parameters.items()
+        if key.startswith("muscle.") and p.tol > 0.0
+    }
     return rig.muscle, {key: value for key, value in known.items() if key in GEOMETRY}, rig
 
 
@@ -76,7 +114,9 @@ def rig_named(file: Path) -> Rig:
     from pamrs import rigs
     from pamrs.rig import load_rig
 
-    return rigs.named(str(file)) if not file.exists() and str(file) in rigs.names() else load_rig(file)
+    return (
+        rigs.named(str(file)) if not file.exists() and str(file) in rigs.names() else load_rig(file)
+    )
 
 
 def write(contents: Mapping[Path, str | bytes]) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
@@ -13,7 +14,13 @@ import typer
 from pamrs.cli._shared import check_writable, exact, named_muscle, write
 
 if TYPE_CHECKING:
-    from pamrs.design import JointDesign, JointProblem, MethodComparison, ParetoFront, PressureSearch
+    from pamrs.design import (
+        JointDesign,
+        JointProblem,
+        MethodComparison,
+        ParetoFront,
+        PressureSearch,
+    )
 
 __all__ = ["design_app"]
 
@@ -30,85 +37,169 @@ def _root() -> None:
 
 @design_app.command("joint")
 def _joint(
-    muscle: Annotated[str, typer.Option(help="A muscle of the library, or a rig file (TOML) with one.")],
+    muscle: Annotated[
+        str, typer.Option(help="A muscle of the library, or a rig file (TOML) with one.")
+    ],
     count: Annotated[int, typer.Option(help="Muscles in parallel.")],
     torque: Annotated[str, typer.Option(help='Wanted over the whole range, like "788 ft lbf".')],
-    min_angle: Annotated[str, typer.Option(help='Like "15 deg"; the muscles are at rest length there.')],
+    min_angle: Annotated[
+        str, typer.Option(help='Like "15 deg"; the muscles are at rest length there.')
+    ],
     max_angle: Annotated[str, typer.Option(help='Like "120 deg".')],
     pressure: Annotated[str, typer.Option(help='Gauge pressure, like "190 psi".')],
-    method: Annotated[str, typer.Option(help="ga (as published), de (differential evolution) or cma (CMA-ES).")] = "ga",
+    method: Annotated[
+        str, typer.Option(help="ga (as published), de (differential evolution) or cma (CMA-ES).")
+    ] = "ga",
     bounds: Annotated[
-        list[str] | None, typer.Option(help='LENGTH=LOW:HIGH, like "lu=10:60 mm"; LENGTH is lu, ru, ll or rl; may be repeated.')
+        list[str] | None,
+        typer.Option(
+            help='LENGTH=LOW:HIGH, like "lu=10:60 mm"; LENGTH is lu, ru, ll or rl; may be repeated.'
+        ),
     ] = None,
     max_stroke: Annotated[str, typer.Option(help="Largest stroke over the rest length.")] = "15 %",
-    evaluations: Annotated[int, typer.Option(help="Designs tried in a search; 1820 are 100 generations as published.")] = 1820,
-    mutation: Annotated[float, typer.Option(help="Chance of the genetic algorithm that a child gets one length at random.")] = 0.2,
+    evaluations: Annotated[
+        int, typer.Option(help="Designs tried in a search; 1820 are 100 generations as published.")
+    ] = 1820,
+    mutation: Annotated[
+        float,
+        typer.Option(
+            help="Chance of the genetic algorithm that a child gets one length at random."
+        ),
+    ] = 0.2,
     minimise_pressure: Annotated[
-        bool, typer.Option("--minimise-pressure", help="Repeat at other pressures for the least that does; also by direct search.")
+        bool,
+        typer.Option(
+            "--minimise-pressure",
+            help="Repeat at other pressures for the least that does; also by direct search.",
+        ),
     ] = False,
-    compare: Annotated[bool, typer.Option("--compare", help="Also run all methods with ten seeds each.")] = False,
-    pareto: Annotated[bool, typer.Option("--pareto", help="Also find pressure against size.")] = False,
+    compare: Annotated[
+        bool, typer.Option("--compare", help="Also run all methods with ten seeds each.")
+    ] = False,
+    pareto: Annotated[
+        bool, typer.Option("--pareto", help="Also find pressure against size.")
+    ] = False,
     seed: Annotated[int, typer.Option(help="The same seed gives the same result.")] = 0,
     png: Annotated[Path | None, typer.Option(help="Write the picture.")] = None,
     json: Annotated[Path | None, typer.Option(help=f"Write the result (schema {SCHEMA}).")] = None,
-    rig_joint: Annotated[Path | None, typer.Option(help="Write the block [joint] of a rig file.")] = None,
+    rig_joint: Annotated[
+        Path | None, typer.Option(help="Write the block [joint] of a rig file.")
+    ] = None,
 ) -> None:
-    """Find the four lengths of a tendon joint that give a torque over a range of angles (dissertation 3.5)."""
+    """Find the four lengths of a tendon joint that give a torque over a range of angles
+    (dissertation 3.5).
+    """
     check_writable(png, json, rig_joint)
     if method not in _METHODS:
         raise typer.BadParameter(f"--method = {method!r} is not allowed: {', '.join(_METHODS)}")
-    from pamrs.design import Genetic, compare_methods, least_pressure, minimum_pressure, optimise, pareto_front
-    from pamrs.errors import missing_package
     from pamrs.units import bar_and_psi
 
-    if png is not None:
-        try:
-            from pamrs.design.figures import summary_png
-        except ImportError as error:
-            raise missing_package(error, "plot") from None
-    problem = _problem(muscle, count, torque, (min_angle, max_angle), pressure, bounds or [], max_stroke)
-    options: dict[str, Any] = {"evaluations": evaluations, "seed": seed, "genetic": Genetic(mutation=mutation)}
-    lowest = strict = comparison = front = None
-    if minimise_pressure:
-        with _bar("pressures") as progress:
-            lowest = minimum_pressure(problem, method, **options, progress=progress)
-        design = lowest.design
-        with _bar("designs") as progress:
-            strict = least_pressure(problem, seed=seed, progress=progress)
-    else:
-        with _bar("designs") as progress:
-            design = optimise(problem, method, **options, progress=progress)
-    if compare:
-        with _bar("runs") as progress:
-            settings = Genetic(mutation=mutation, tolerance=None)
-            comparison = compare_methods(design.problem, evaluations=evaluations, genetic=settings, progress=progress)
-    if pareto:
-        with _bar("generations") as progress:
-            front = pareto_front(design.problem, seed=seed, progress=progress)
+    draw = None if png is None else _picture()
+    problem = _problem(
+        muscle, count, torque, (min_angle, max_angle), pressure, bounds or [], max_stroke
+    )
+    search = _Search(method, evaluations, mutation, seed)
+    found = _found(problem, search, pressures=minimise_pressure, compare=compare, pareto=pareto)
     title = f"{count} {muscle}, {torque} from {min_angle} to {max_angle}"
     contents: dict[Path, str | bytes] = {}
     if json is not None:
-        contents[json] = _json(title, design, (lowest, strict), comparison, front)
-    if png is not None:
-        contents[png] = summary_png(design, f"{title}: {bar_and_psi(design.problem.pressure)}", comparison=comparison, front=front)
+        contents[json] = _json(title, found)
+    if png is not None and draw is not None:
+        caption = f"{title}: {bar_and_psi(found.design.problem.pressure)}"
+        contents[png] = draw(found.design, caption, comparison=found.comparison, front=found.front)
     if rig_joint is not None:
-        contents[rig_joint] = design.to_toml()
+        contents[rig_joint] = found.design.to_toml()
     typer.echo(title)
-    typer.echo(design.summary())
-    if lowest is not None:
-        typer.echo(f"\n{lowest.summary()}\n{_strict_line(strict)}")
-    if comparison is not None:
-        typer.echo(f"\nJ in joule at {bar_and_psi(design.problem.pressure)}\n{comparison.table()}")
-    if front is not None:
-        typer.echo(f"\n{_front_table(front)}")
+    typer.echo(_summary(found))
     write(contents)
+
+
+# ------------------------------------------------------------------------- search
+
+
+@dataclass(frozen=True)
+class _Search:
+    """How the designs are searched."""
+
+    method: str
+    evaluations: int
+    mutation: float
+    seed: int
+
+
+@dataclass(frozen=True)
+class _Found:
+    """The design, and what else was asked for."""
+
+    design: JointDesign
+    lowest: PressureSearch | None = None
+    strict: JointDesign | None = None
+    comparison: MethodComparison | None = None
+    front: ParetoFront | None = None
+
+
+def _found(
+    problem: JointProblem, search: _Search, *, pressures: bool, compare: bool, pareto: bool
+) -> _Found:
+    """The design, at the least pressure where that is asked for, with the comparison and the
+    front.
+    """
+    from pamrs.design import Genetic, compare_methods, pareto_front
+
+    found = _least_pressure(problem, search) if pressures else _design(problem, search)
+    problem = found.design.problem
+    if compare:
+        settings = Genetic(mutation=search.mutation, tolerance=None)
+        with _bar("runs") as progress:
+            comparison = compare_methods(
+                problem, evaluations=search.evaluations, genetic=settings, progress=progress
+            )
+        found = replace(found, comparison=comparison)
+    if pareto:
+        with _bar("generations") as progress:
+            front = pareto_front(problem, seed=search.seed, progress=progress)
+        found = replace(found, front=front)
+    return found
+
+
+def _design(problem: JointProblem, search: _Search) -> _Found:
+    """The best design at the pressure of the problem."""
+    from pamrs.design import optimise
+
+    with _bar("designs") as progress:
+        return _Found(optimise(problem, search.method, **_options(search), progress=progress))
+
+
+def _least_pressure(problem: JointProblem, search: _Search) -> _Found:
+    """The design that needs the least pressure, by repeated searches and by a direct one."""
+    from pamrs.design import least_pressure, minimum_pressure
+
+    with _bar("pressures") as progress:
+        lowest = minimum_pressure(problem, search.method, **_options(search), progress=progress)
+    with _bar("designs") as progress:
+        strict = least_pressure(problem, seed=search.seed, progress=progress)
+    return _Found(lowest.design, lowest, strict)
+
+
+def _options(search: _Search) -> dict[str, Any]:
+    """What both searches take."""
+    from pamrs.design import Genetic
+
+    genetic = Genetic(mutation=search.mutation)
+    return {"evaluations": search.evaluations, "seed": search.seed, "genetic": genetic}
 
 
 # ------------------------------------------------------------------------- inputs
 
 
 def _problem(
-    muscle: str, count: int, torque: str, angles: tuple[str, str], pressure: str, bounds: Sequence[str], max_stroke: str
+    muscle: str,
+    count: int,
+    torque: str,
+    angles: tuple[str, str],
+    pressure: str,
+    bounds: Sequence[str],
+    max_stroke: str,
 ) -> JointProblem:
     from pamrs.design import JointProblem
 
@@ -125,7 +216,9 @@ def _problem(
 
 
 def _bounds(given: Sequence[str]) -> dict[str, tuple[float, float]]:
-    """``lu=10:60 mm`` and so on; the unit of the second number serves for the first where that has none."""
+    """``lu=10:60 mm`` and so on; the unit of the second number serves for the first where that has
+    none.
+    """
     from pamrs.design import LENGTHS, SYMBOLS
     from pamrs.errors import ParameterError
 
@@ -136,15 +229,48 @@ def _bounds(given: Sequence[str]) -> dict[str, tuple[float, float]]:
         low, colon, high = rest.partition(":")
         key = names.get(name.strip())
         if not equals or not colon or key is None or key in found:
-            reason = "given twice" if key in found else "LENGTH=LOW:HIGH is needed, like 'lu=10:60 mm', with lu, ru, ll or rl"
+            reason = (
+                "given twice"
+                if key in found
+                else "LENGTH=LOW:HIGH is needed, like 'lu=10:60 mm', with lu, ru, ll or rl"
+            )
             raise ParameterError(f"--bounds = {text!r} is not allowed: {reason}")
         unit = high.strip().lstrip("+-0123456789.eE").strip()
         bare = not low.strip().lstrip("+-0123456789.eE").strip()
-        found[key] = (exact("bounds", f"{low} {unit}" if bare else low, "length"), exact("bounds", high, "length"))
+        found[key] = (
+            exact("bounds", f"{low} {unit}" if bare else low, "length"),
+            exact("bounds", high, "length"),
+        )
     return found
 
 
 # ------------------------------------------------------------------------ outputs
+
+
+def _picture() -> Callable[..., bytes]:
+    """What draws a design; its error names the packages that are missing."""
+    from pamrs.errors import missing_package
+
+    try:
+        from pamrs.design.figures import summary_png
+    except ImportError as error:
+        raise missing_package(error, "plot") from None
+    return summary_png
+
+
+def _summary(found: _Found) -> str:
+    """What goes to standard output behind the title."""
+    from pamrs.units import bar_and_psi
+
+    text = found.design.summary()
+    if found.lowest is not None:
+        text += f"\n\n{found.lowest.summary()}\n{_strict_line(found.strict)}"
+    if found.comparison is not None:
+        pressure = bar_and_psi(found.design.problem.pressure)
+        text += f"\n\nJ in joule at {pressure}\n{found.comparison.table()}"
+    if found.front is not None:
+        text += f"\n\n{_front_table(found.front)}"
+    return text
 
 
 @contextmanager
@@ -156,7 +282,12 @@ def _bar(what: str) -> Iterator[Callable[[int, int], None] | None]:
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+    )
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
         task = progress.add_task(what, total=None)
         yield lambda done, total: progress.update(task, completed=done, total=total)
@@ -170,7 +301,10 @@ def _strict_line(design: JointDesign | None) -> str:
         return "strict, direct search: no design was found that any pressure makes good enough"
     assert design.search is not None
     found = f"{bar_and_psi(design.problem.pressure)} gives the torque at every angle"
-    return f"strict, direct search: {found} ({design.search.method}, {design.search.evaluations} evaluations)"
+    return (
+        f"strict, direct search: {found} ({design.search.method}, {design.search.evaluations} "
+        "evaluations)"
+    )
 
 
 def _front_table(front: ParetoFront) -> str:
@@ -186,23 +320,19 @@ def _front_table(front: ParetoFront) -> str:
         f"{'mm':>9}{'bar':>9}" + "".join(f"{s:>9}" for s in SYMBOLS),
     ]
     for index in np.unique(np.linspace(0, len(front.size) - 1, 12).round().astype(int)).tolist():
-        numbers = [1e3 * front.size[index], front.pressure[index] / 1e5, *(1e3 * front.lengths[index])]
+        numbers = [
+            1e3 * front.size[index],
+            front.pressure[index] / 1e5,
+            *(1e3 * front.lengths[index]),
+        ]
         lines.append("".join(f"{number:>9.2f}" for number in numbers))
     return "\n".join(lines)
 
 
-def _json(
-    title: str,
-    design: JointDesign,
-    pressures: tuple[PressureSearch | None, JointDesign | None],
-    comparison: MethodComparison | None,
-    front: ParetoFront | None,
-) -> str:
+def _json(title: str, found: _Found) -> str:
     import json
 
-    lowest, strict = pressures
-
-    problem = design.problem
+    problem = found.design.problem
     document = {
         "schema": SCHEMA,
         "title": title,
@@ -215,10 +345,10 @@ def _json(
             "bounds": {name: list(pair) for name, pair in problem.bounds.items()},
             "max_contraction": problem.max_contraction,
         },
-        "design": design.to_dict(),
-        "minimum_pressure": None if lowest is None else lowest.to_dict(),
-        "least_pressure": None if strict is None else strict.to_dict(),
-        "comparison": None if comparison is None else comparison.rows(),
-        "front": None if front is None else front.to_dict(),
+        "design": found.design.to_dict(),
+        "minimum_pressure": None if found.lowest is None else found.lowest.to_dict(),
+        "least_pressure": None if found.strict is None else found.strict.to_dict(),
+        "comparison": None if found.comparison is None else found.comparison.rows(),
+        "front": None if found.front is None else found.front.to_dict(),
     }
     return json.dumps(document, indent=1, allow_nan=False) + "\n"

@@ -13,19 +13,40 @@ __all__ = ["diagnose_command"]
 
 
 def diagnose_command(
-    case: Annotated[Path | None, typer.Argument(help="Folder with case.toml, rig.toml and the recordings.")] = None,
-    report: Annotated[Path | None, typer.Option(help="Write the report, one HTML file.")] = None,
-    json: Annotated[Path | None, typer.Option(help="Write the result (schema pamrs.diagnosis/1).")] = None,
-    png: Annotated[Path | None, typer.Option(help="Write the summary picture.")] = None,
-    model: Annotated[Path | None, typer.Option(help="Write the rig with the named effect in it.")] = None,
-    plan: Annotated[
-        Path | None, typer.Option(help="Instead of a case: a rig file or a rig of the package; say what a diagnosis could tell.")
+    case: Annotated[
+        Path | None, typer.Argument(help="Folder with case.toml, rig.toml and the recordings.")
     ] = None,
-    channels: Annotated[str | None, typer.Option(help="With --plan: channels at hand, joined by commas; all by default.")] = None,
-    pressure_noise: Annotated[str | None, typer.Option(help="With --plan: sample noise of the pressures, like '200 Pa'.")] = None,
-    angle_noise: Annotated[str | None, typer.Option(help="With --plan: sample noise of the angle, like '0.03 deg'.")] = None,
+    report: Annotated[Path | None, typer.Option(help="Write the report, one HTML file.")] = None,
+    json: Annotated[
+        Path | None, typer.Option(help="Write the result (schema pamrs.diagnosis/1).")
+    ] = None,
+    png: Annotated[Path | None, typer.Option(help="Write the summary picture.")] = None,
+    model: Annotated[
+        Path | None, typer.Option(help="Write the rig with the named effect in it.")
+    ] = None,
+    plan: Annotated[
+        Path | None,
+        typer.Option(
+            help=(
+                "Instead of a case: a rig file or a rig of the package; say what a diagnosis could "
+                "tell."
+            )
+        ),
+    ] = None,
+    channels: Annotated[
+        str | None,
+        typer.Option(help="With --plan: channels at hand, joined by commas; all by default."),
+    ] = None,
+    pressure_noise: Annotated[
+        str | None, typer.Option(help="With --plan: sample noise of the pressures, like '200 Pa'.")
+    ] = None,
+    angle_noise: Annotated[
+        str | None, typer.Option(help="With --plan: sample noise of the angle, like '0.03 deg'.")
+    ] = None,
 ) -> None:
-    """Find the physics that the rig's model leaves out of a case's recordings; with --plan, what could be found at all."""
+    """Find the physics that the rig's model leaves out of a case's recordings; with --plan, what
+    could be found at all.
+    """
     check_writable(report, json, png, model)
     if plan is not None:
         if case is not None:
@@ -35,7 +56,9 @@ def diagnose_command(
         _plan(plan, channels, pressure_noise, angle_noise, json)
         return
     if case is None:
-        raise typer.BadParameter("the argument CASE is missing: a case folder is needed, or a rig by --plan")
+        raise typer.BadParameter(
+            "the argument CASE is missing: a case folder is needed, or a rig by --plan"
+        )
     if not (channels is None and pressure_noise is None and angle_noise is None):
         raise typer.BadParameter("--channels, --pressure-noise and --angle-noise need --plan")
     from pamrs.recordings import load_case
@@ -61,7 +84,13 @@ def diagnose_command(
             typer.echo(f"written: {path}", err=True)
 
 
-def _plan(rig: Path, channels: str | None, pressure_noise: str | None, angle_noise: str | None, json: Path | None) -> None:
+def _plan(
+    rig: Path,
+    channels: str | None,
+    pressure_noise: str | None,
+    angle_noise: str | None,
+    json: Path | None,
+) -> None:
     """What a diagnosis could tell, to standard output and a file."""
     from json import dumps
 
@@ -71,12 +100,19 @@ def _plan(rig: Path, channels: str | None, pressure_noise: str | None, angle_noi
     loaded = rig_named(rig)
     noise: dict[str, float] = {}
     if pressure_noise is not None:
-        noise |= dict.fromkeys(("supply_pressure", "muscle_pressure"), exact("pressure_noise", pressure_noise, "pressure"))
+        noise |= dict.fromkeys(
+            ("supply_pressure", "muscle_pressure"),
+            exact("pressure_noise", pressure_noise, "pressure"),
+        )
     if angle_noise is not None:
         noise["joint_angle"] = exact("angle_noise", angle_noise, "angle")
     core = core_rig(loaded)
     every = [name for name in MEASURABLE if name in {*core.inputs, *core.channels}]
-    given = every if channels is None else [name.strip() for name in channels.split(",") if name.strip()]
+    given = (
+        every
+        if channels is None
+        else [name.strip() for name in channels.split(",") if name.strip()]
+    )
     with progress(f"planning for {loaded.name}"):
         result = plan_diagnosis(loaded, given, noise=noise)
     if json is not None:

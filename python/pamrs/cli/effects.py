@@ -10,9 +10,16 @@ __all__ = ["effects_command"]
 
 
 def effects_command(
-    effect: Annotated[str | None, typer.Argument(metavar="ID", help="An effect of the catalogue; without it, all are listed.")] = None,
+    effect: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="ID", help="An effect of the catalogue; without it, all are listed."
+        ),
+    ] = None,
 ) -> None:
-    """List the physics that a model can leave out, or print one effect: equation, fingerprint, rivals, parameters, rig file."""
+    """List the physics that a model can leave out, or print one effect: equation, fingerprint,
+    rivals, parameters, rig file.
+    """
     from pamrs.effects import text
 
     typer.echo(text.overview() if effect is None else text.description(effect))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import shlex
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
@@ -32,12 +33,21 @@ class FrictionChoice(StrEnum):
     muscle = "muscle"
 
 
-_MuscleName = Annotated[str | None, typer.Option("--muscle", help="Rig file (TOML) with the muscle, or a name of the library.")]
-_RestLength = Annotated[str | None, typer.Option(help='For example "300 mm"; "300 +- 2 mm" with what is known of it.')]
+_MuscleName = Annotated[
+    str | None,
+    typer.Option("--muscle", help="Rig file (TOML) with the muscle, or a name of the library."),
+]
+_RestLength = Annotated[
+    str | None, typer.Option(help='For example "300 mm"; "300 +- 2 mm" with what is known of it.')
+]
 _RestDiameter = Annotated[str | None, typer.Option(help='For example "20 mm" (outside).')]
-_BraidAngle = Annotated[str | None, typer.Option(help='For example "65 +- 3 deg", from the circumference.')]
+_BraidAngle = Annotated[
+    str | None, typer.Option(help='For example "65 +- 3 deg", from the circumference.')
+]
 _WallThickness = Annotated[str | None, typer.Option(help='For example "2 mm".')]
-_Where = Annotated[list[str] | None, typer.Option(help="COLUMN=VALUE: only these rows; may be repeated.")]
+_Where = Annotated[
+    list[str] | None, typer.Option(help="COLUMN=VALUE: only these rows; may be repeated.")
+]
 _Clipped = Annotated[str | None, typer.Option(help='A force that means off the scale, like "0 N".')]
 _Picture = Annotated[Path | None, typer.Option("--png", help="Write the summary picture.")]
 
@@ -52,10 +62,23 @@ def _root() -> None:
 @fit_app.command("muscle")
 def _muscle(
     context: typer.Context,
-    data: Annotated[Path, typer.Argument(help="Force map: a table with units in its headings, or a TOML description.")],
-    model: Annotated[str | None, typer.Option(help="Force model; by default that of the muscle.")] = None,
-    order: Annotated[int | None, typer.Option(help="Order of the stress polynomial, 4 unless the muscle has moduli.")] = None,
-    geometry: Annotated[str | None, typer.Option(help="cylinder, elliptic or elliptic_published; by default the model's own.")] = None,
+    data: Annotated[
+        Path,
+        typer.Argument(
+            help="Force map: a table with units in its headings, or a TOML description."
+        ),
+    ],
+    model: Annotated[
+        str | None, typer.Option(help="Force model; by default that of the muscle.")
+    ] = None,
+    order: Annotated[
+        int | None,
+        typer.Option(help="Order of the stress polynomial, 4 unless the muscle has moduli."),
+    ] = None,
+    geometry: Annotated[
+        str | None,
+        typer.Option(help="cylinder, elliptic or elliptic_published; by default the model's own."),
+    ] = None,
     muscle: _MuscleName = None,
     rest_length: _RestLength = None,
     rest_diameter: _RestDiameter = None,
@@ -63,69 +86,95 @@ def _muscle(
     wall_thickness: _WallThickness = None,
     where: _Where = None,
     clipped: _Clipped = None,
-    free: Annotated[str | None, typer.Option(help="Geometry to fit too: braid_angle,rest_diameter,...")] = None,
-    prior: Annotated[
-        str | None, typer.Option(help='What is known of moduli: "modulus_slope=10, modulus_offset=10 MPa"; needs --noise.')
+    free: Annotated[
+        str | None, typer.Option(help="Geometry to fit too: braid_angle,rest_diameter,...")
     ] = None,
-    noise: Annotated[str | None, typer.Option(help='Standard deviation of the forces: "5 N", or "0.5 %" of the largest.')] = None,
-    levels: Annotated[str | None, typer.Option(help="Fit on these pressures only: 200kPa,400kPa,6bar.")] = None,
-    per_level: Annotated[bool, typer.Option("--per-level", help="Moduli free at each pressure.")] = False,
+    prior: Annotated[
+        str | None,
+        typer.Option(
+            help=(
+                'What is known of moduli: "modulus_slope=10, modulus_offset=10 MPa"; needs --noise.'
+            )
+        ),
+    ] = None,
+    noise: Annotated[
+        str | None,
+        typer.Option(help='Standard deviation of the forces: "5 N", or "0.5 %" of the largest.'),
+    ] = None,
+    levels: Annotated[
+        str | None, typer.Option(help="Fit on these pressures only: 200kPa,400kPa,6bar.")
+    ] = None,
+    per_level: Annotated[
+        bool, typer.Option("--per-level", help="Moduli free at each pressure.")
+    ] = False,
     friction: Annotated[
         FrictionChoice | None,
         typer.Option(
-            help="fit: to the loops, before the moduli; muscle: as the muscle has it; none. By default fit where the rows have both "
-            "directions and the muscle no friction."
+            help=(
+                "fit: to the loops, before the moduli; muscle: as the muscle has it; none. By "
+                "default fit where the rows have both directions and the muscle no friction."
+            )
         ),
     ] = None,
-    compare: Annotated[bool, typer.Option("--compare", help="Fit every model and rank them.")] = False,
+    compare: Annotated[
+        bool, typer.Option("--compare", help="Fit every model and rank them.")
+    ] = False,
     report: Annotated[Path | None, typer.Option(help="Write the report, one HTML file.")] = None,
     rig: Annotated[
-        Path | None, typer.Option(help="Write a rig file with the fitted muscle: that of --muscle, or a new one with the muscle alone.")
+        Path | None,
+        typer.Option(
+            help=(
+                "Write a rig file with the fitted muscle: that of --muscle, or a new one with the "
+                "muscle alone."
+            )
+        ),
     ] = None,
     json: Annotated[Path | None, typer.Option(help=f"Write the result (schema {SCHEMA}).")] = None,
     png: _Picture = None,
 ) -> None:
     """Fit a muscle's force model to measured forces over length and pressure."""
-    outputs = (report, rig, json, png)
-    check_writable(*outputs)
+    outputs = _Outputs(report=report, rig=rig, json=json, png=png)
+    check_writable(report, rig, json, png)
     if per_level and rig is not None:
-        raise typer.BadParameter("a rig needs moduli linear in pressure: leave out --per-level or --rig")
-    sizes = {"rest_length": rest_length, "rest_diameter": rest_diameter, "braid_angle": braid_angle, "wall_thickness": wall_thickness}
-    map_, start, tolerance, stated, base = _inputs(
-        data, muscle, {k: v for k, v in sizes.items() if v is not None}, where or [], clipped
-    )
-    pressures = None if levels is None else [quantity("levels", text, "pressure")[0] for text in levels.split(",")]
-    names = [] if free is None else [name.strip().replace("-", "_") for name in free.split(",") if name.strip()]
-    from pamrs.rig.muscle_models import ELASTIC_PARAMETERS
-
-    elastic = ELASTIC_PARAMETERS.get(model or start.model, ())  # a description may know of coefficients that another model has
-    tolerance = {name: value for name, value in tolerance.items() if name in GEOMETRY or name in elastic}
-    known = {name: value for name, value in tolerance.items() if math.isfinite(value)} | _prior(prior)
-    scatter = stated if noise is None else _noise(noise, map_)
-    idle = [name for name in known if name in GEOMETRY and name not in names]
-    notes = [f"tolerance of {', '.join(idle)} is not used: not free (--free {','.join([*names, *idle])})"] if idle else []
+        raise typer.BadParameter(
+            "a rig needs moduli linear in pressure: leave out --per-level or --rig"
+        )
+    sizes = _stated(rest_length, rest_diameter, braid_angle, wall_thickness)
+    inputs = _inputs(data, muscle, sizes, where or [], clipped)
+    shape, notes = _shape(inputs, model, geometry, levels, free, prior, noise)
     from pamrs.fit import FitError, fit_muscle
 
-    shape: dict[str, Any] = {"geometry": geometry, "free": names, "tolerance": known, "levels": pressures, "noise": scatter}
+    map_, moduli = inputs.data, "per_level" if per_level else "linear"
     with progress(f"fitting {map_.label}"):
         try:
-            start, rubbing, words = _rubbing(map_, start, friction, model, pressures)
-            fit = fit_muscle(map_, start, model=model, order=order, moduli="per_level" if per_level else "linear", **shape)
+            start, rubbing, words = _rubbing(map_, inputs.muscle, friction, model, shape["levels"])
+            fit = fit_muscle(map_, start, model=model, order=order, moduli=moduli, **shape)
             comparison = _comparison(map_, start, fit.order, shape) if compare else None
-            contents = _contents(fit, comparison, rubbing, _command(context), base, report=report, rig=rig, json=json, png=png)
+            contents = _contents(fit, comparison, rubbing, _command(context), inputs.rig, outputs)
             summary = _summary(fit, comparison, words, notes)
         except FitError as error:
             raise FitError("; ".join([str(error), *map_.notes])) from error
     typer.echo(summary, nl=False)
     write(contents)
-    if rig is not None and base is None:
-        typer.echo(f"{rig} is the muscle on a load frame: simulate it with a length, or give it [joint] and [arm]", err=True)
+    if rig is not None and inputs.rig is None:
+        typer.echo(
+            (
+                f"{rig} is the muscle on a load frame: simulate it with a length, or give it "
+                "[joint] and [arm]"
+            ),
+            err=True,
+        )
 
 
 @fit_app.command("friction")
 def _friction(
     context: typer.Context,
-    data: Annotated[Path, typer.Argument(help="Force map with a column direction, recording of a bench, or a TOML description.")],
+    data: Annotated[
+        Path,
+        typer.Argument(
+            help="Force map with a column direction, recording of a bench, or a TOML description."
+        ),
+    ],
     muscle: _MuscleName = None,
     rest_length: _RestLength = None,
     rest_diameter: _RestDiameter = None,
@@ -134,13 +183,17 @@ def _friction(
     where: _Where = None,
     clipped: _Clipped = None,
     floor: Annotated[float, typer.Option(help="The least that c_F becomes.")] = 0.01,
-    json: Annotated[Path | None, typer.Option(help=f"Write the result (schema {FRICTION_SCHEMA}).")] = None,
+    json: Annotated[
+        Path | None, typer.Option(help=f"Write the result (schema {FRICTION_SCHEMA}).")
+    ] = None,
     png: _Picture = None,
 ) -> None:
-    """Fit the friction c_F = max(c0 + c1 P, floor) of a muscle to its hysteresis loops; of its geometry, the rest length is enough."""
+    """Fit the friction c_F = max(c0 + c1 P, floor) of a muscle to its hysteresis loops; of its
+    geometry, the rest length is enough.
+    """
     check_writable(json, png)
-    sizes = {"rest_length": rest_length, "rest_diameter": rest_diameter, "braid_angle": braid_angle, "wall_thickness": wall_thickness}
-    map_ = _loops(data, muscle, {k: v for k, v in sizes.items() if v is not None}, where or [], clipped)
+    sizes = _stated(rest_length, rest_diameter, braid_angle, wall_thickness)
+    map_ = _loops(data, muscle, sizes, where or [], clipped)
     from pamrs.fit import fit_friction
 
     contents: dict[Path, str | bytes] = {}
@@ -157,12 +210,17 @@ def _friction(
 
 
 def _rubbing(
-    data: ForceMap, muscle: Muscle, choice: FrictionChoice | None, model: str | None, pressures: Sequence[float] | None
+    data: ForceMap,
+    muscle: Muscle,
+    choice: FrictionChoice | None,
+    model: str | None,
+    pressures: Sequence[float] | None,
 ) -> tuple[Muscle, FrictionFit | None, str]:
-    """The muscle with the friction asked for, the fit of that to the loops where there is one, and what to say of it.
+    """The muscle with the friction asked for, the fit of that to the loops where there is one, and
+    what to say of it.
 
-    Unasked, friction is fitted where the rows have both directions and the muscle has none; not for the elbow's model, which has
-    a branch of its own for lengthening.
+    Unasked, friction is fitted where the rows have both directions and the muscle has none; not for
+    the elbow's model, which has a branch of its own for lengthening.
     """
     import numpy as np
 
@@ -176,7 +234,11 @@ def _rubbing(
         return muscle.replace(**bare), None, ""
     way = data.direction[data.used]
     loops = bool(np.any(way < 0) and np.any(way > 0))
-    alone = loops and not any(given[name] for name in bare) and (model or muscle.model) != "elbow_linear"
+    alone = (
+        loops
+        and not any(given[name] for name in bare)
+        and (model or muscle.model) != "elbow_linear"
+    )
     if choice is FrictionChoice.muscle or (choice is None and not alone):
         law = friction_words(muscle) if loops else ""
         return muscle, None, f"friction as the muscle has it: {law}" if law else ""
@@ -190,14 +252,32 @@ def _rubbing(
     if choice is None and not found.ndata:
         return muscle, None, f"friction: none, no pressure's c_F stands above {found.floor:g}"
     if choice is None and not found.told:
-        return muscle, None, "friction: none, the loops do not tell it from their scatter (--friction fit takes it all the same)"
+        return (
+            muscle,
+            None,
+            (
+                "friction: none, the loops do not tell it from their scatter (--friction fit takes "
+                "it all the same)"
+            ),
+        )
     c0, c1 = found.params["friction_coefficient"], found.params["friction_pressure_slope"]
-    line = f"c0 = {c0.value:.4g} +- {c0.stderr:.2g}, c1 = {1e6 * c1.value:.4g} +- {1e6 * c1.stderr:.2g} 1/MPa"
-    return found.to_muscle(muscle), found, f"friction, fitted to the loops before the moduli: {line}"
+    line = (
+        f"c0 = {c0.value:.4g} +- {c0.stderr:.2g}, c1 = {1e6 * c1.value:.4g} +- "
+        f"{1e6 * c1.stderr:.2g} 1/MPa"
+    )
+    return (
+        found.to_muscle(muscle),
+        found,
+        f"friction, fitted to the loops before the moduli: {line}",
+    )
 
 
-def _comparison(data: ForceMap, muscle: Muscle, order: int | None, shape: dict[str, Any]) -> ModelComparison:
-    """Every model, in the orders 1 to 4 and that of the fit, and in the geometry asked for where the muscle's own model is meant."""
+def _comparison(
+    data: ForceMap, muscle: Muscle, order: int | None, shape: dict[str, Any]
+) -> ModelComparison:
+    """Every model, in the orders 1 to 4 and that of the fit, and in the geometry asked for where
+    the muscle's own model is meant.
+    """
     from pamrs.fit import compare_models
 
     settings = {key: value for key, value in shape.items() if key != "geometry"}
@@ -209,10 +289,81 @@ def _comparison(data: ForceMap, muscle: Muscle, order: int | None, shape: dict[s
 # ------------------------------------------------------------------------- inputs
 
 
+@dataclass(frozen=True)
+class _Inputs:
+    """A force map, the muscle it is of, and what is known of both.
+
+    The tolerances are standard deviations of the muscle's parameters in SI, the noise is that of
+    the forces [N], and the rig is the one that the muscle is a part of.
+    """
+
+    data: ForceMap
+    muscle: Muscle
+    tolerance: dict[str, float]
+    noise: float | None = None
+    rig: Rig | None = None
+
+
+def _stated(
+    rest_length: str | None,
+    rest_diameter: str | None,
+    braid_angle: str | None,
+    wall_thickness: str | None,
+) -> dict[str, str]:
+    """The sizes that were given, by their name in :data:`GEOMETRY`."""
+    sizes = {
+        "rest_length": rest_length,
+        "rest_diameter": rest_diameter,
+        "braid_angle": braid_angle,
+        "wall_thickness": wall_thickness,
+    }
+    return {name: text for name, text in sizes.items() if text is not None}
+
+
+def _shape(
+    inputs: _Inputs,
+    model: str | None,
+    geometry: str | None,
+    levels: str | None,
+    free: str | None,
+    prior: str | None,
+    noise: str | None,
+) -> tuple[dict[str, Any], list[str]]:
+    """What a fit and a comparison both take, and notes on what is not used."""
+    from pamrs.rig.muscle_models import ELASTIC_PARAMETERS
+
+    pressures = None
+    if levels is not None:
+        pressures = [quantity("levels", text, "pressure")[0] for text in levels.split(",")]
+    names = [name.strip().replace("-", "_") for name in (free or "").split(",") if name.strip()]
+    # a description may know of coefficients that another model has
+    own = {*GEOMETRY, *ELASTIC_PARAMETERS.get(model or inputs.muscle.model, ())}
+    stated = inputs.tolerance.items()
+    known = {name: value for name, value in stated if name in own and math.isfinite(value)}
+    known |= _prior(prior)
+    idle = [name for name in known if name in GEOMETRY and name not in names]
+    notes = []
+    if idle:
+        both = ",".join([*names, *idle])
+        notes = [f"tolerance of {', '.join(idle)} is not used: not free (--free {both})"]
+    shape = {
+        "geometry": geometry,
+        "free": names,
+        "tolerance": known,
+        "levels": pressures,
+        "noise": inputs.noise if noise is None else _noise(noise, inputs.data),
+    }
+    return shape, notes
+
+
 def _inputs(
-    data: Path, muscle: str | None, sizes: Mapping[str, str], where: Sequence[str], clipped: str | None
-) -> tuple[ForceMap, Muscle, dict[str, float], float | None, Rig | None]:
-    """Map, muscle, tolerances, noise, and the rig of the muscle if it is of one; from a description or from a table and the options."""
+    data: Path,
+    muscle: str | None,
+    sizes: Mapping[str, str],
+    where: Sequence[str],
+    clipped: str | None,
+) -> _Inputs:
+    """From a description, or from a table and the options."""
     from pamrs.errors import ParameterError
 
     if data.suffix.lower() == ".toml":
@@ -220,14 +371,17 @@ def _inputs(
         given += [f"--{name.replace('_', '-')}" for name in sizes] + (["--where"] if where else [])
         given += ["--clipped"] if clipped is not None else []
         if given:
-            raise ParameterError(f"{', '.join(given)} cannot be given: {data} describes its table and its muscle itself")
+            raise ParameterError(
+                f"{', '.join(given)} cannot be given: {data} describes its table and its muscle "
+                "itself"
+            )
         from pamrs.fit import load_measured_muscle
 
         measured = load_measured_muscle(data)
-        return measured.data, measured.muscle, measured.tolerance, measured.noise, None
+        return _Inputs(measured.data, measured.muscle, measured.tolerance, measured.noise)
     start, tolerance, base = _start(muscle, sizes)
     map_ = _table(data, float(start.parameters["rest_length"]), where, clipped)
-    return map_.checked_against(start), start, tolerance, None, base
+    return _Inputs(map_.checked_against(start), start, tolerance, rig=base)
 
 
 def _table(data: Path, rest_length: float, where: Sequence[str], clipped: str | None) -> ForceMap:
@@ -242,15 +396,24 @@ def _table(data: Path, rest_length: float, where: Sequence[str], clipped: str | 
     )
 
 
-def _loops(data: Path, muscle: str | None, sizes: Mapping[str, str], where: Sequence[str], clipped: str | None) -> ForceMap:
-    """The map of hysteresis loops: friction needs the rest length alone, any other size is for the check of the forces."""
+def _loops(
+    data: Path,
+    muscle: str | None,
+    sizes: Mapping[str, str],
+    where: Sequence[str],
+    clipped: str | None,
+) -> ForceMap:
+    """The map of hysteresis loops: friction needs the rest length alone, any other size is for the
+    check of the forces.
+    """
     from pamrs.errors import ParameterError
 
     if data.suffix.lower() == ".toml" or muscle is not None or set(sizes) - {"rest_length"}:
-        return _inputs(data, muscle, sizes, where, clipped)[0]
+        return _inputs(data, muscle, sizes, where, clipped).data
     if not sizes:
         raise ParameterError(
-            "the rest length is missing: give --rest-length (like '300 mm'), or --muscle with a rig file or a name of the library"
+            "the rest length is missing: give --rest-length (like '300 mm'), or --muscle with a "
+            "rig file or a name of the library"
         )
     return _table(data, quantity("rest_length", sizes["rest_length"], "length")[0], where, clipped)
 
@@ -264,8 +427,15 @@ def _prior(text: str | None) -> dict[str, float]:
     for part in [] if text is None else text.split(","):
         name, equals, value = (piece.strip() for piece in part.partition("="))
         if not equals or name not in COEFFICIENTS:
-            raise ParameterError(f"--prior = {part.strip()!r} is not allowed: NAME=VALUE with a name of {', '.join(COEFFICIENTS)}")
-        known[name] = quantity("prior", f"{value} 1" if name == "modulus_slope" else value, _MODULI.get(name, "pressure"))[0]
+            raise ParameterError(
+                f"--prior = {part.strip()!r} is not allowed: NAME=VALUE with a name of "
+                f"{', '.join(COEFFICIENTS)}"
+            )
+        known[name] = quantity(
+            "prior",
+            f"{value} 1" if name == "modulus_slope" else value,
+            _MODULI.get(name, "pressure"),
+        )[0]
     return known
 
 
@@ -285,7 +455,9 @@ def _filter(text: str) -> tuple[str, str]:
     return column.strip(), value.strip()
 
 
-def _start(muscle: str | None, sizes: Mapping[str, str]) -> tuple[Muscle, dict[str, float], Rig | None]:
+def _start(
+    muscle: str | None, sizes: Mapping[str, str]
+) -> tuple[Muscle, dict[str, float], Rig | None]:
     """The nominal muscle, what is known of it, and the rig that it is of."""
     from pamrs.errors import ParameterError
     from pamrs.rig import Muscle
@@ -302,8 +474,8 @@ def _start(muscle: str | None, sizes: Mapping[str, str]) -> tuple[Muscle, dict[s
     lacking = [f"--{name.replace('_', '-')}" for name in GEOMETRY if name not in values]
     if lacking:
         raise ParameterError(
-            f"the geometry of the muscle is missing: give {', '.join(lacking)} (like --rest-length '300 mm'), "
-            "or --muscle with a rig file or a name of the library"
+            f"the geometry of the muscle is missing: give {', '.join(lacking)} (like --rest-length "
+            "'300 mm'), or --muscle with a rig file or a name of the library"
         )
     return Muscle(**values), tolerance, None
 
@@ -311,12 +483,18 @@ def _start(muscle: str | None, sizes: Mapping[str, str]) -> tuple[Muscle, dict[s
 # ------------------------------------------------------------------------ outputs
 
 
-def _summary(fit: MuscleFit, comparison: ModelComparison | None, friction: str, notes: Sequence[str]) -> str:
+def _summary(
+    fit: MuscleFit, comparison: ModelComparison | None, friction: str, notes: Sequence[str]
+) -> str:
     """What goes to standard output."""
     from pamrs.fit.remarks import cross_validation
 
     cross, reason = cross_validation(fit)
-    lines = [fit.fit_report().rstrip("\n"), *(f"  note: {note}" for note in notes), *([f"  {friction}"] if friction else [])]
+    lines = [
+        fit.fit_report().rstrip("\n"),
+        *(f"  note: {note}" for note in notes),
+        *([f"  {friction}"] if friction else []),
+    ]
     if cross is None:
         lines.append(f"  leave one pressure out: not possible, {reason}")
     else:
@@ -326,30 +504,36 @@ def _summary(fit: MuscleFit, comparison: ModelComparison | None, friction: str, 
     return text if comparison is None else f"{text}\n{comparison.to_text()}"
 
 
+@dataclass(frozen=True)
+class _Outputs:
+    """The files to write."""
+
+    report: Path | None
+    rig: Path | None
+    json: Path | None
+    png: Path | None
+
+
 def _contents(
     fit: MuscleFit,
     comparison: ModelComparison | None,
     friction: FrictionFit | None,
     command: str,
     base: Rig | None,
-    *,
-    report: Path | None,
-    rig: Path | None,
-    json: Path | None,
-    png: Path | None,
+    files: _Outputs,
 ) -> dict[Path, str | bytes]:
     """Every file to write with its content; made before the first is written."""
     from pamrs.fit import report as pages
 
     contents: dict[Path, str | bytes] = {}
-    if report is not None:
-        contents[report] = pages.render_html(fit, comparison, command=command)
-    if png is not None:
-        contents[png] = pages.render_png(fit, comparison)
-    if rig is not None:
-        contents[rig] = fit.to_rig(base).to_toml_text()
-    if json is not None:
-        contents[json] = _json(fit, comparison, friction, command)
+    if files.report is not None:
+        contents[files.report] = pages.render_html(fit, comparison, command=command)
+    if files.png is not None:
+        contents[files.png] = pages.render_png(fit, comparison)
+    if files.rig is not None:
+        contents[files.rig] = fit.to_rig(base).to_toml_text()
+    if files.json is not None:
+        contents[files.json] = _json(fit, comparison, friction, command)
     return contents
 
 
@@ -367,7 +551,9 @@ def _command(context: typer.Context) -> str:
     return shlex.join(words)
 
 
-def _json(fit: MuscleFit, comparison: ModelComparison | None, friction: FrictionFit | None, command: str) -> str:
+def _json(
+    fit: MuscleFit, comparison: ModelComparison | None, friction: FrictionFit | None, command: str
+) -> str:
     import json
 
     from pamrs.fit.remarks import cross_validation
@@ -391,5 +577,11 @@ def _json(fit: MuscleFit, comparison: ModelComparison | None, friction: Friction
 def _friction_json(fit: FrictionFit, data: ForceMap, command: str) -> str:
     import json
 
-    document = {"schema": FRICTION_SCHEMA, "name": data.label, "source": data.source, "command": command, "rows": len(data)}
+    document = {
+        "schema": FRICTION_SCHEMA,
+        "name": data.label,
+        "source": data.source,
+        "command": command,
+        "rows": len(data),
+    }
     return json.dumps({**document, "fit": fit.to_dict()}, indent=1, allow_nan=False) + "\n"

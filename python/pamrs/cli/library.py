@@ -13,14 +13,22 @@ __all__ = ["library_command"]
 
 
 def library_command(
-    name: Annotated[str | None, typer.Argument(help="A muscle of the library; without it, all are listed.")] = None,
-    rig: Annotated[Path | None, typer.Option(help="Write a rig file: a bench with this muscle.")] = None,
-    facts: Annotated[bool, typer.Option("--facts", help="Every published fact beside ours.")] = False,
+    name: Annotated[
+        str | None, typer.Argument(help="A muscle of the library; without it, all are listed.")
+    ] = None,
+    rig: Annotated[
+        Path | None, typer.Option(help="Write a rig file: a bench with this muscle.")
+    ] = None,
+    facts: Annotated[
+        bool, typer.Option("--facts", help="Every published fact beside ours.")
+    ] = False,
 ) -> None:
     """List the muscles of the 2014 dissertation, or print one with the origin of each number."""
     check_writable(rig)
     if facts and (name is not None or rig is not None):
-        raise typer.BadParameter("--facts prints the facts of all muscles: leave out NAME and --rig")
+        raise typer.BadParameter(
+            "--facts prints the facts of all muscles: leave out NAME and --rig"
+        )
     if rig is not None and name is None:
         raise typer.BadParameter("--rig needs the NAME of a muscle")
     from pamrs.library import text

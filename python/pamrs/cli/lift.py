@@ -15,14 +15,28 @@ SCHEMA: Final = "pamrs.lift/1"
 
 
 def lift_command(
-    rig: Annotated[Path, typer.Argument(help="Rig file (TOML), or the name of a rig of the package.")],
-    pressure: Annotated[str | None, typer.Option(help='Gauge pressure, like "8 bar"; that of the supply by default.')] = None,
-    payload: Annotated[str | None, typer.Option(help='Mass at the tip, like "120 kg"; that of the rig by default.')] = None,
-    to: Annotated[str | None, typer.Option(help='How far it is to be lifted, like "90 deg"; to the upper stop by default.')] = None,
+    rig: Annotated[
+        Path, typer.Argument(help="Rig file (TOML), or the name of a rig of the package.")
+    ],
+    pressure: Annotated[
+        str | None,
+        typer.Option(help='Gauge pressure, like "8 bar"; that of the supply by default.'),
+    ] = None,
+    payload: Annotated[
+        str | None, typer.Option(help='Mass at the tip, like "120 kg"; that of the rig by default.')
+    ] = None,
+    to: Annotated[
+        str | None,
+        typer.Option(
+            help='How far it is to be lifted, like "90 deg"; to the upper stop by default.'
+        ),
+    ] = None,
     png: Annotated[Path | None, typer.Option(help="Write a picture.")] = None,
     json: Annotated[Path | None, typer.Option(help=f"Write the result (schema {SCHEMA}).")] = None,
 ) -> None:
-    """Say what an arm lifts and holds at a pressure, up to which angle, and how much it could lift at most."""
+    """Say what an arm lifts and holds at a pressure, up to which angle, and how much it could lift
+    at most.
+    """
     check_writable(png, json)
     from pamrs.design import lift
     from pamrs.errors import ParameterError
@@ -44,7 +58,14 @@ def lift_command(
     if json is not None:
         import json as encoder
 
-        write({json: encoder.dumps({"schema": SCHEMA, **result.to_dict()}, indent=1, allow_nan=False) + "\n"})
+        write(
+            {
+                json: encoder.dumps(
+                    {"schema": SCHEMA, **result.to_dict()}, indent=1, allow_nan=False
+                )
+                + "\n"
+            }
+        )
     if png is not None:
         result.plot(png)
         typer.echo(f"written: {png}", err=True)

@@ -14,23 +14,39 @@ INCOMPLETE: Final = 3
 
 
 def prove_command(
-    folder: Annotated[Path, typer.Argument(help="Folder with cases/NAME/case.toml (or NAME/case.toml), and maybe manifest.json.")],
-    results: Annotated[Path | None, typer.Option(help="Where NAME/out.json and run.json go; by default results in the folder.")] = None,
+    folder: Annotated[
+        Path,
+        typer.Argument(
+            help="Folder with cases/NAME/case.toml (or NAME/case.toml), and maybe manifest.json."
+        ),
+    ],
+    results: Annotated[
+        Path | None,
+        typer.Option(help="Where NAME/out.json and run.json go; by default results in the folder."),
+    ] = None,
     jobs: Annotated[int, typer.Option(help="Cases at a time.")] = 1,
     limit: Annotated[int | None, typer.Option(help="Only the first so many cases.")] = None,
-    fresh: Annotated[bool, typer.Option("--fresh", help="Diagnose again what has a result.")] = False,
-    timeout: Annotated[float, typer.Option(help="Seconds after which a case is given up.")] = 1800.0,
+    fresh: Annotated[
+        bool, typer.Option("--fresh", help="Diagnose again what has a result.")
+    ] = False,
+    timeout: Annotated[
+        float, typer.Option(help="Seconds after which a case is given up.")
+    ] = 1800.0,
 ) -> None:
-    """Diagnose every case of a folder, each in a process that is given that case alone; answer keys are not opened.
+    """Diagnose every case of a folder, each in a process that is given that case alone; answer keys
+    are not opened.
 
-    A run that was stopped goes on where it was. Exit code 0: every case has a result; 3: some case could not be diagnosed.
+    A run that was stopped goes on where it was. Exit code 0: every case has a result; 3: some case
+    could not be diagnosed.
     """
     from pamrs.diagnosis.prove import prove
 
     def say(text: str) -> None:
         typer.echo(text, err=True)
 
-    proof = prove(folder, results=results, jobs=jobs, limit=limit, fresh=fresh, timeout=timeout, say=say)
+    proof = prove(
+        folder, results=results, jobs=jobs, limit=limit, fresh=fresh, timeout=timeout, say=say
+    )
     typer.echo(proof.table())
     for name, error in proof.failed.items():
         typer.echo(f"{name}: {error}")

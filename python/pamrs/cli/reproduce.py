@@ -15,15 +15,35 @@ __all__ = ["reproduce_command"]
 
 
 def reproduce_command(
-    chapter: Annotated[list[str], typer.Argument(help="Chapters of the 2014 dissertation: ch3, ch4, ch5.")],
-    output: Annotated[Path, typer.Option(help="Folder for facts.csv, facts.md and one PNG for each figure; made if it is not there.")],
-    page: Annotated[Path | None, typer.Option(help="Where to write the Markdown page, instead of facts.md in the folder.")] = None,
+    chapter: Annotated[
+        list[str], typer.Argument(help="Chapters of the 2014 dissertation: ch3, ch4, ch5.")
+    ],
+    output: Annotated[
+        Path,
+        typer.Option(
+            help=(
+                "Folder for facts.csv, facts.md and one PNG for each figure; made if it is not "
+                "there."
+            )
+        ),
+    ],
+    page: Annotated[
+        Path | None,
+        typer.Option(help="Where to write the Markdown page, instead of facts.md in the folder."),
+    ] = None,
     search: Annotated[
         bool,
-        typer.Option(help="Also run what takes minutes: joint searches (ch3, extra search), fine gain maps, diagnoses."),
+        typer.Option(
+            help=(
+                "Also run what takes minutes: joint searches (ch3, extra search), fine gain maps, "
+                "diagnoses."
+            )
+        ),
     ] = True,
 ) -> None:
-    """Set what a chapter of the dissertation states beside what this package gives, with a verdict for each statement."""
+    """Set what a chapter of the dissertation states beside what this package gives, with a verdict
+    for each statement.
+    """
     from pamrs import reproduce
     from pamrs.comparison import table, to_csv, verdicts
     from pamrs.reproduce.page import page as to_page
@@ -36,7 +56,11 @@ def reproduce_command(
     sections = []
     for name in chapters:
         with progress(f"reproducing {name}"):
-            sections.append(reproduce.section(name, search=search, progress=lambda text: typer.echo(f"  {text}", err=True)))
+            sections.append(
+                reproduce.section(
+                    name, search=search, progress=lambda text: typer.echo(f"  {text}", err=True)
+                )
+            )
     rows = [row for section in sections for row in section.rows]
     headings = {group: text for section in sections for group, text in section.headings.items()}
     target = output / "facts.md" if page is None else page
@@ -47,7 +71,11 @@ def reproduce_command(
     contents: dict[Path, str | bytes] = {
         output / "facts.csv": to_csv(rows),
         target: to_page(sections, shlex.join(words), folder),
-        **{output / f"{picture.name}.png": picture.png for section in sections for picture in section.pictures},
+        **{
+            output / f"{picture.name}.png": picture.png
+            for section in sections
+            for picture in section.pictures
+        },
     }
     typer.echo(table(rows, headings=headings))
     typer.echo("")

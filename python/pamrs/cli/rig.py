@@ -16,12 +16,18 @@ rig_app = typer.Typer(help="Work with rig files.")
 
 
 @rig_app.command("check")
-def _rig_check(file: Annotated[Path, typer.Argument(help="Rig file (TOML), or the name of a rig of the package.")]) -> None:
+def _rig_check(
+    file: Annotated[
+        Path, typer.Argument(help="Rig file (TOML), or the name of a rig of the package.")
+    ],
+) -> None:
     """Check a rig file, say what is connected to what, and list its parameters in SI units."""
     from pamrs.simulation import core_rig
 
     rig = rig_named(file)
-    core_rig(rig)  # what only the whole model shows: lengths that the muscle cannot have, angles that the tendon does not reach
+    # what only the whole model shows: lengths that the muscle cannot have, angles that the tendon
+    # does not reach
+    core_rig(rig)
     for line in rig.wiring:
         typer.echo(line)
     width = max((len(name) for name in rig.parameters), default=0)
@@ -29,15 +35,23 @@ def _rig_check(file: Annotated[Path, typer.Argument(help="Rig file (TOML), or th
         known = f"{parameter.value:.6g}" if parameter.known else "unknown"
         spread = f" ± {parameter.tol:.3g}" if parameter.known and parameter.tol else ""
         typer.echo(f"{name:<{width}}  {known}{spread} {parameter.unit}")
-    typer.echo(f"{file}: rig {rig.name!r} is valid, {len(rig.parameters)} parameters, {len(rig.effects)} effects")
+    typer.echo(
+        f"{file}: rig {rig.name!r} is valid, {len(rig.parameters)} parameters, {len(rig.effects)} "
+        "effects"
+    )
 
 
 @rig_app.command("new")
 def _rig_new(
     file: Annotated[Path, typer.Argument(help="The file to write; it must not be there yet.")],
-    like: Annotated[str, typer.Option(help=f"Rig of the package to begin with: {', '.join(rigs.names())}.")] = "shoulder",
+    like: Annotated[
+        str, typer.Option(help=f"Rig of the package to begin with: {', '.join(rigs.names())}.")
+    ] = "shoulder",
     name: Annotated[
-        str | None, typer.Option(help="What to call the rig; by default as the file, or its folder if that is rig.toml.")
+        str | None,
+        typer.Option(
+            help="What to call the rig; by default as the file, or its folder if that is rig.toml."
+        ),
     ] = None,
 ) -> None:
     """Write a rig file to begin with, every key explained in comments."""

@@ -1,4 +1,6 @@
-"""``pamrs simulate``: a rig driven by a recording, or by steps that are written on the command line."""
+"""``pamrs simulate``: a rig driven by a recording, or by steps that are written on the command
+line.
+"""
 
 from __future__ import annotations
 
@@ -20,26 +22,54 @@ if TYPE_CHECKING:
 
 __all__ = ["simulate_command"]
 
-_DIMENSIONS = {"valve_command": "voltage", "supply_command": "pressure", "pressure": "pressure", "length": "length"}
+_DIMENSIONS = {
+    "valve_command": "voltage",
+    "supply_command": "pressure",
+    "pressure": "pressure",
+    "length": "length",
+}
 _INITIAL = {"Pa": "pressure", "rad": "angle", "rad/s": "angular speed", "m": "length", "m/s": "m/s"}
 
 
 def simulate_command(
-    rig: Annotated[Path, typer.Argument(help="Rig file (TOML), or the name of a rig of the package.")],
-    input: Annotated[Path | None, typer.Option("--input", help="Recording whose inputs drive the rig (CSV).")] = None,
+    rig: Annotated[
+        Path, typer.Argument(help="Rig file (TOML), or the name of a rig of the package.")
+    ],
+    input: Annotated[
+        Path | None, typer.Option("--input", help="Recording whose inputs drive the rig (CSV).")
+    ] = None,
     hold: Annotated[
         list[str] | None,
-        typer.Option(help="Without a recording: a signal of steps, 'valve_command = 5 V, 8 V @ 1 s'; one --hold for each signal."),
+        typer.Option(
+            help=(
+                "Without a recording: a signal of steps, 'valve_command = 5 V, 8 V @ 1 s'; one "
+                "--hold for each signal."
+            )
+        ),
     ] = None,
-    initial: Annotated[list[str] | None, typer.Option(help="Without a recording: where it begins, 'muscle_pressure = 2 bar'.")] = None,
+    initial: Annotated[
+        list[str] | None,
+        typer.Option(help="Without a recording: where it begins, 'muscle_pressure = 2 bar'."),
+    ] = None,
     duration: Annotated[str, typer.Option(help="Without a recording: how long.")] = "5 s",
-    sample_time: Annotated[str, typer.Option(help="Without a recording: time between two rows.")] = "5 ms",
-    output: Annotated[Path | None, typer.Option("--output", help="Where to write the simulated channels (CSV).")] = None,
-    plot: Annotated[Path | None, typer.Option(help="Write a picture of the channels, beside the recorded ones (PNG).")] = None,
+    sample_time: Annotated[
+        str, typer.Option(help="Without a recording: time between two rows.")
+    ] = "5 ms",
+    output: Annotated[
+        Path | None, typer.Option("--output", help="Where to write the simulated channels (CSV).")
+    ] = None,
+    plot: Annotated[
+        Path | None,
+        typer.Option(help="Write a picture of the channels, beside the recorded ones (PNG)."),
+    ] = None,
     animation: Annotated[Path | None, typer.Option(help="Write the arm as it moves (GIF).")] = None,
-    speed: Annotated[float, typer.Option(help="Of the animation: times faster than it happens.")] = 1.0,
+    speed: Annotated[
+        float, typer.Option(help="Of the animation: times faster than it happens.")
+    ] = 1.0,
 ) -> None:
-    """Drive a rig with a recording's inputs, or with steps, and write what its channels would be."""
+    """Drive a rig with a recording's inputs, or with steps, and write what its channels would
+    be.
+    """
     if output is None and plot is None and animation is None:
         raise typer.BadParameter("nothing would be written: give --output, --plot or --animation")
     if input is not None and (hold or initial):
@@ -56,10 +86,17 @@ def simulate_command(
         _say_what_is_held(loaded, recording, input)
         with progress(f"simulating {loaded.name}"):
             result = replay(loaded, recording)
-        recorded = {name: (recording.time[rows], recording.channels[name][rows]) for name, rows in recording.mask.items()}
+        recorded = {
+            name: (recording.time[rows], recording.channels[name][rows])
+            for name, rows in recording.mask.items()
+        }
     else:
         result = _steps(
-            loaded, hold or [], initial or [], exact("duration", duration, "time"), exact("sample_time", sample_time, "time")
+            loaded,
+            hold or [],
+            initial or [],
+            exact("duration", duration, "time"),
+            exact("sample_time", sample_time, "time"),
         )
     if output is not None:
         _write_csv(output, result)
@@ -86,10 +123,15 @@ def _say_what_is_held(rig: Rig, recording: Recording, path: Path) -> None:
     driving = {"valve_command", "supply_command", *(["length"] if has_frame(rig) else [])}
     for name, rows in recording.mask.items():
         if channel_of(name) in driving and rows.any() and not rows.all():
-            typer.echo(f"{path}: {int((~rows).sum())} unusable samples of {name} hold the last usable one", err=True)
+            typer.echo(
+                f"{path}: {int((~rows).sum())} unusable samples of {name} hold the last usable one",
+                err=True,
+            )
 
 
-def _steps(rig: Rig, hold: list[str], initial: list[str], duration: float, sample_time: float) -> Simulation:
+def _steps(
+    rig: Rig, hold: list[str], initial: list[str], duration: float, sample_time: float
+) -> Simulation:
     """Simulate under signals of steps."""
     import numpy as np
 
@@ -98,7 +140,9 @@ def _steps(rig: Rig, hold: list[str], initial: list[str], duration: float, sampl
 
     if not (0.0 < sample_time <= duration and duration / sample_time < 1e8):
         given = f"--duration = {duration:g} s with --sample-time = {sample_time:g} s"
-        raise ParameterError(f"{given} is not allowed: two times > 0 s are needed that give from 2 to 1e8 rows")
+        raise ParameterError(
+            f"{given} is not allowed: two times > 0 s are needed that give from 2 to 1e8 rows"
+        )
     time = np.asarray(np.arange(round(duration / sample_time) + 1) * sample_time, dtype=np.float64)
     drive: dict[str, Any] = {}
     for text in hold:
@@ -128,17 +172,24 @@ def _held(text: str, time: NDArray[np.float64]) -> tuple[str, NDArray[np.float64
     dimension = _DIMENSIONS.get(channel_of(name))
     if not equals or dimension is None:
         raise ParameterError(
-            f"--hold = {text!r} is not allowed: a signal like 'valve_command = 5 V, 8 V @ 1 s' is needed, "
-            f"one of {', '.join(_DIMENSIONS)}, with the name of the block behind a dot where it has one"
+            f"--hold = {text!r} is not allowed: a signal like 'valve_command = 5 V, 8 V @ 1 s' is "
+            f"needed, one of {', '.join(_DIMENSIONS)}, with the name of the block behind a dot "
+            "where it has one"
         )
     values, last = np.zeros(time.size), 0.0
     for k, step in enumerate(steps.split(",")):
         value, at, when = step.partition("@")
         if (k > 0) != bool(at):
-            raise ParameterError(f"--hold = {text!r} is not allowed: every value but the first needs its time, like '8 V @ 1 s'")
+            raise ParameterError(
+                f"--hold = {text!r} is not allowed: every value but the first needs its time, like "
+                "'8 V @ 1 s'"
+            )
         begin = exact("hold", when, "time") if at else last
         if k > 0 and not last < begin <= time[-1]:
-            raise ParameterError(f"--hold = {text!r} is not allowed: times that rise from 0 to {time[-1]:g} s are needed")
+            raise ParameterError(
+                f"--hold = {text!r} is not allowed: times that rise from 0 to {time[-1]:g} s are "
+                "needed"
+            )
         last = begin
         values[time >= begin - 1e-9] = exact("hold", value, dimension)
     return name, values
@@ -151,7 +202,9 @@ def _began(text: str) -> tuple[str, float]:
     name, equals, value = text.partition("=")
     unit = UNITS.get(channel_of(name.strip()), "")
     if not equals or unit not in _INITIAL:
-        raise ParameterError(f"--initial = {text!r} is not allowed: a state like 'muscle_pressure = 2 bar' is needed")
+        raise ParameterError(
+            f"--initial = {text!r} is not allowed: a state like 'muscle_pressure = 2 bar' is needed"
+        )
     return name.strip(), exact("initial", value, _INITIAL[unit])
 
 

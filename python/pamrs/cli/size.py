@@ -21,24 +21,50 @@ SCHEMA: Final = "pamrs.sizing/1"
 def size_command(
     point: Annotated[
         list[str],
-        typer.Option(help='POSITION:FORCE of all muscles together: "30 mm:7 kN", or "10 %:7 kN" of contraction; may be repeated.'),
+        typer.Option(
+            help=(
+                'POSITION:FORCE of all muscles together: "30 mm:7 kN", or "10 %:7 kN" of '
+                "contraction; may be repeated."
+            )
+        ),
     ],
     muscle: Annotated[
-        list[str] | None, typer.Argument(help="Names of the library, or rig files with --pressure; the whole library by default.")
+        list[str] | None,
+        typer.Argument(
+            help="Names of the library, or rig files with --pressure; the whole library by default."
+        ),
     ] = None,
     pressure: Annotated[
-        str | None, typer.Option(help="Working pressure of every candidate; by default the highest of its tests.")
+        str | None,
+        typer.Option(
+            help="Working pressure of every candidate; by default the highest of its tests."
+        ),
     ] = None,
     valve: Annotated[
-        str | None, typer.Option(help='Effective area "8.4 mm2" or sonic conductance "2 l/(s bar)"; the shoulder\'s valve by default.')
+        str | None,
+        typer.Option(
+            help=(
+                'Effective area "8.4 mm2" or sonic conductance "2 l/(s bar)"; the shoulder\'s '
+                "valve by default."
+            )
+        ),
     ] = None,
-    supply: Annotated[str | None, typer.Option(help="Pressure of the supply; 13.8 bar by default.")] = None,
-    dead_volume: Annotated[str | None, typer.Option(help='Volume of the tubing, like "20 ml"; none by default.')] = None,
-    core: Annotated[str | None, typer.Option(help='Diameter kept free in the middle of the bundle, like "40 mm".')] = None,
+    supply: Annotated[
+        str | None, typer.Option(help="Pressure of the supply; 13.8 bar by default.")
+    ] = None,
+    dead_volume: Annotated[
+        str | None, typer.Option(help='Volume of the tubing, like "20 ml"; none by default.')
+    ] = None,
+    core: Annotated[
+        str | None,
+        typer.Option(help='Diameter kept free in the middle of the bundle, like "40 mm".'),
+    ] = None,
     max_count: Annotated[int, typer.Option(help="Largest bundle considered.")] = 100,
     json: Annotated[Path | None, typer.Option(help=f"Write the result (schema {SCHEMA}).")] = None,
 ) -> None:
-    """Count the muscles that a force over a stroke needs, and compare candidates (dissertation 3.2.3)."""
+    """Count the muscles that a force over a stroke needs, and compare candidates (dissertation
+    3.2.3).
+    """
     check_writable(json)
     from pamrs import library
     from pamrs.design.sizing import size
@@ -49,8 +75,14 @@ def size_command(
     working = None if pressure is None else _size("pressure", pressure, "pressure")
     candidates = [_candidate(name, working) for name in muscle or library.names()]
     result = size(candidates, requirement, filling=filling, core=free, max_count=max_count)
-    contents: dict[Path, str | bytes] = {} if json is None else {json: _json(result, requirement, filling, free, max_count)}
-    area, supplied, dead = filling.area * 1e6, filling.supply_pressure / 1e5, filling.dead_volume * 1e3
+    contents: dict[Path, str | bytes] = (
+        {} if json is None else {json: _json(result, requirement, filling, free, max_count)}
+    )
+    area, supplied, dead = (
+        filling.area * 1e6,
+        filling.supply_pressure / 1e5,
+        filling.dead_volume * 1e3,
+    )
     typer.echo(f"required: {', '.join(point)}")
     typer.echo(f"valve {area:.4g} mm2, supply {supplied:.4g} bar, dead volume {dead:.4g} l\n")
     typer.echo(result.table())
@@ -75,7 +107,9 @@ def _size(name: str, text: str, dimension: str, *, zero: bool = False) -> float:
 
 
 def _measures(text: str, unit: str) -> bool:
-    """Whether a number with a unit has the dimension of ``unit``; False where it has no unit that is known."""
+    """Whether a number with a unit has the dimension of ``unit``; False where it has no unit that
+    is known.
+    """
     from pamrs.errors import ParameterError
     from pamrs.units import same_dimension
 
@@ -95,13 +129,20 @@ def _requirement(points: Sequence[str]) -> Requirement:
     for text in points:
         position, colon, force = text.partition(":")
         if not colon:
-            raise ParameterError(f"--point = {text!r} is not allowed: POSITION:FORCE is needed, like '30 mm:7 kN'")
+            raise ParameterError(
+                f"--point = {text!r} is not allowed: POSITION:FORCE is needed, like '30 mm:7 kN'"
+            )
         pairs.append((position, force))
     kind = "contraction" if _measures(pairs[0][0], "1") else "stroke"
     if any(_measures(position, "1") != (kind == "contraction") for position, _ in pairs):
-        raise ParameterError(f"--point: {', '.join(points)}: all positions must be strokes, or all contractions")
+        raise ParameterError(
+            f"--point: {', '.join(points)}: all positions must be strokes, or all contractions"
+        )
     dimension = "dimensionless" if kind == "contraction" else "length"
-    values = [(exact("point", position, dimension), exact("point", force, "force")) for position, force in pairs]
+    values = [
+        (exact("point", position, dimension), exact("point", force, "force"))
+        for position, force in pairs
+    ]
     try:
         return Requirement(values, position=kind)
     except ParameterError as error:
@@ -134,7 +175,9 @@ def _candidate(name: str, pressure: float | None) -> Candidate:
         return Candidate.from_library(name, pressure=pressure)
     muscle = named_muscle(name, "MUSCLE")[0]
     if pressure is None:
-        raise ParameterError(f"MUSCLE = {name!r} is a rig file, which has no working pressure: give --pressure")
+        raise ParameterError(
+            f"MUSCLE = {name!r} is a rig file, which has no working pressure: give --pressure"
+        )
     return Candidate(name, muscle, pressure)
 
 
@@ -147,13 +190,18 @@ def _remarks(candidates: Sequence[Candidate]) -> list[str]:
 
     tested = {name: library.entry(name).max_pressure for name in library.names()}
     return [
-        f"{item.name}: {item.pressure / 1e5:.4g} bar is above the highest pressure of its tests, {tested[item.name] / 1e5:.4g} bar"
+        (
+            f"{item.name}: {item.pressure / 1e5:.4g} bar is above the highest pressure of its "
+            f"tests, {tested[item.name] / 1e5:.4g} bar"
+        )
         for item in candidates
         if item.pressure > tested.get(item.name, item.pressure) * (1.0 + 1e-9)
     ]
 
 
-def _json(result: SizingResult, requirement: Requirement, filling: Filling, core: float, max_count: int) -> str:
+def _json(
+    result: SizingResult, requirement: Requirement, filling: Filling, core: float, max_count: int
+) -> str:
     import json
     from dataclasses import asdict
 

@@ -1,4 +1,5 @@
-"""Controllers of the joint angle, sampled, for one arm or a batch of them; trajectories, metrics, tuning and stability.
+"""Controllers of the joint angle, sampled, for one arm or a batch of them; trajectories, metrics,
+tuning and stability.
 
 Names are loaded when they are first used; what needs an extra says so then.
 """
@@ -13,9 +14,21 @@ from pamrs.control._air import AirModel, OrificeInverse
 from pamrs.control._cascade import Cascade, PressureLoop, cascaded_pid
 from pamrs.control._feedforward import Feedforward, Parallel
 from pamrs.control._fuzzy import FUZZY_SETS, Fuzzy, fuzzy_rules, fuzzy_surface
-from pamrs.control._hysteresis import DeadZoneCompensation, HysteresisCompensation, HystereticTorque, SlipMemory
+from pamrs.control._hysteresis import (
+    DeadZoneCompensation,
+    HysteresisCompensation,
+    HystereticTorque,
+    SlipMemory,
+)
 from pamrs.control._joint_sensor import JointSensor
-from pamrs.control._model import ArmModel, FullTorque, GaylordTorque, SimplifiedTorque, TorqueModel, torque_line
+from pamrs.control._model import (
+    ArmModel,
+    FullTorque,
+    GaylordTorque,
+    SimplifiedTorque,
+    TorqueModel,
+    torque_line,
+)
 from pamrs.control._neural import NETWORKS, Neural
 from pamrs.control._parts import ANTI_WINDUP, FilteredDerivative, Integrator, LowPass
 from pamrs.control._pid import PID, PIDLaw
@@ -24,7 +37,17 @@ from pamrs.control._sampled import SampledController
 from pamrs.control._sliding import Sliding, SlidingController
 
 if TYPE_CHECKING:
-    from pamrs.control import gym, iosystem, linear, live, metrics, simulated_device, stability, trajectories, tuning
+    from pamrs.control import (
+        gym,
+        iosystem,
+        linear,
+        live,
+        metrics,
+        simulated_device,
+        stability,
+        trajectories,
+        tuning,
+    )
     from pamrs.control._loop import Actuation, ClosedLoop, closed_loop
     from pamrs.control._sensors import Sensors
     from pamrs.control._sweeping import Sweep, sweep
@@ -97,7 +120,17 @@ __all__ = [
     "tuning",
 ]
 
-_MODULES: Final = ("gym", "iosystem", "linear", "live", "metrics", "simulated_device", "stability", "trajectories", "tuning")
+_MODULES: Final = (
+    "gym",
+    "iosystem",
+    "linear",
+    "live",
+    "metrics",
+    "simulated_device",
+    "stability",
+    "trajectories",
+    "tuning",
+)
 _HOMES: Final[dict[str, str]] = {
     "Actuation": "pamrs.control._loop",
     "ClosedLoop": "pamrs.control._loop",

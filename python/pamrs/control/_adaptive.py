@@ -1,12 +1,16 @@
-"""Adaptive sliding-mode control (dissertation 5.3.2, (5.12)-(5.15) corrected; Slotine & Li, Applied Nonlinear Control, 1991, ch. 9).
+"""Adaptive sliding-mode control (dissertation 5.3.2, (5.12)-(5.15) corrected; Slotine & Li, Applied
+Nonlinear Control, 1991, ch. 9).
 
 ::
 
-    P_d = (Y a - C2)/C1 - KD sgn(s)        Y = [theta_r'', theta_r', sin(theta)]        a = [I, b, m g r]
+    P_d = (Y a - C2)/C1 - KD sgn(s)
+    Y = [theta_r'', theta_r', sin(theta)]
+    a = [I, b, m g r]
     a' = -Gamma Y^T s_D                    s_D = s where |s| > deadband, else 0
 
-With the simplified plant ``V = I s^2/2 + (a - a*)^T Gamma^-1 (a - a*)/2`` has ``V' = -b s^2 - C1 KD |s|`` outside the deadband and does
-not grow; the projection onto the bounds does not change that as long as they hold the true values.
+With the simplified plant ``V = I s^2/2 + (a - a*)^T Gamma^-1 (a - a*)/2`` has
+``V' = -b s^2 - C1 KD |s|`` outside the deadband and does not grow; the projection onto the bounds
+does not change that as long as they hold the true values.
 """
 
 from __future__ import annotations
@@ -43,22 +47,25 @@ def dead(s: Value, deadband: Value) -> Value:
 
 
 class AdaptiveSliding(SlidingController):
-    """Adaptive sliding-mode control; answers a desired gauge pressure [Pa] for a :class:`pamrs.control.Cascade`.
+    """Adaptive sliding-mode control; answers a desired gauge pressure [Pa] for a
+    :class:`pamrs.control.Cascade`.
 
-    Adaptation stands still while the pressure asked for is beyond a limit and would be carried farther beyond: an arm that lies on its
-    stop cannot follow, and teaches nothing. It may be switched off.
+    Adaptation stands still while the pressure asked for is beyond a limit and would be carried
+    farther beyond: an arm that lies on its stop cannot follow, and teaches nothing. It may be
+    switched off.
 
     Parameters
     ----------
     arm : ArmModel
         Torque model, and the estimates to start with.
     gains : sequence of three float or ndarray, shape (n,)
-        Diagonal of Gamma for I, b and m g r, SI with radians [kg m2, N m s/rad, N m, each per rad/s of s, its factor in Y, and second].
+        Diagonal of Gamma for I, b and m g r, SI with radians [kg m2, N m s/rad, N m, each per rad/s
+        of s, its factor in Y, and second].
     deadband : float or ndarray, shape (n,)
         Of s [rad/s]; 0.02 as printed.
     bounds : sequence of three pairs, or None
-        Projection of the estimates; by default from 0 to ten times the start, or to the arm's own scale where that is 0. None: free, as
-        in the dissertation, whose estimates drift.
+        Projection of the estimates; by default from 0 to ten times the start, or to the arm's own
+        scale where that is 0. None: free, as in the dissertation, whose estimates drift.
     hold_at_limit : bool
         Whether adaptation stands still at a limit of the pressure.
     **others
@@ -67,7 +74,8 @@ class AdaptiveSliding(SlidingController):
     Raises
     ------
     ParameterError
-        If a number is not finite or not allowed, or a start is outside its bounds; the message names it.
+        If a number is not finite or not allowed, or a start is outside its bounds; the message
+        names it.
     """
 
     _STATE: ClassVar[Mapping[str, Any]] = {"inertia": 0.0, "viscous": 0.0, "weight": 0.0}
@@ -85,9 +93,13 @@ class AdaptiveSliding(SlidingController):
         **others: Any,
     ) -> None:
         if len(gains) != 3:
-            raise ParameterError(f"gains has {len(gains)} entries: three are needed, for I, b and m g r")
+            raise ParameterError(
+                f"gains has {len(gains)} entries: three are needed, for I, b and m g r"
+            )
         pairs = zip(_NAMES, gains, strict=True)
-        self._gains: tuple[Value, ...] = tuple(as_value(f"gains[{name}]", value, lower=0.0) for name, value in pairs)
+        self._gains: tuple[Value, ...] = tuple(
+            as_value(f"gains[{name}]", value, lower=0.0) for name, value in pairs
+        )
         self._deadband = as_value("deadband", deadband, lower=0.0)
         self.hold_at_limit = bool(hold_at_limit)
         self._bounds = _bounds(arm, bounds)
@@ -99,8 +111,9 @@ class AdaptiveSliding(SlidingController):
     def published(cls, arm: ArmModel, trial: int, **others: Any) -> AdaptiveSliding:
         """With the gains of Table 5.2, deadband 0.02 and without projection, as printed.
 
-        The unit of the printed gains is not stated. Taken as SI with radians the estimates of I and b move as far as Fig. 5.10 shows
-        (to about 1000 and 200 in 100 s), that of m g r hardly: its unit there is another, since a payload of 50 lb weighs 200 N m.
+        The unit of the printed gains is not stated. Taken as SI with radians the estimates of I and
+        b move as far as Fig. 5.10 shows (to about 1000 and 200 in 100 s), that of m g r hardly: its
+        unit there is another, since a payload of 50 lb weighs 200 N m.
 
         Parameters
         ----------
@@ -137,11 +150,16 @@ class AdaptiveSliding(SlidingController):
         return {"inertia": self.arm.inertia, "viscous": self.arm.viscous, "weight": self.arm.weight}
 
     def update(self, time: float, measurement: Measurement, reference: Reference) -> Value:
-        """Desired gauge pressure [Pa] for a sample, within 0 and the limit; see :meth:`pamrs.control.Controller.update`."""
+        """Desired gauge pressure [Pa] for a sample, within 0 and the limit; see
+        :meth:`pamrs.control.Controller.update`.
+        """
         angle, rate, acceleration, s, switching = self._surface(time, measurement, reference)
         inertia, viscous, weight = self._inertia, self._viscous, self._weight
         sine = sin(angle)
-        wanted = self.arm.pressure(inertia * acceleration + viscous * rate + weight * sine, angle) - switching
+        wanted = (
+            self.arm.pressure(inertia * acceleration + viscous * rate + weight * sine, angle)
+            - switching
+        )
         pressure = clip(wanted, 0.0, self._limit)
         error = dead(s, self._deadband)
         if self.hold_at_limit:
@@ -155,38 +173,57 @@ class AdaptiveSliding(SlidingController):
             )
             if self._bounds is not None:
                 (a, b), (c, d), (e, f) = self._bounds
-                inertia, viscous, weight = clip(inertia, a, b), clip(viscous, c, d), clip(weight, e, f)
+                inertia, viscous, weight = (
+                    clip(inertia, a, b),
+                    clip(viscous, c, d),
+                    clip(weight, e, f),
+                )
             self._inertia, self._viscous, self._weight = inertia, viscous, weight
         return pressure
 
 
 def held(error: Value, excess: Value) -> Value:
-    """0 where adapting by an error would carry a pressure farther beyond its limit, which it is by ``excess``; else the error."""
+    """0 where adapting by an error would carry a pressure farther beyond its limit, which it is by
+    ``excess``; else the error.
+    """
     # every adaptation moves the pressure against the sign of s
     if error.__class__ is float and excess.__class__ is float:
         return 0.0 if error * excess < 0.0 else error
     return np.where(error * excess < 0.0, 0.0, error)
 
 
-def _bounds(arm: ArmModel, bounds: Sequence[tuple[float, float]] | str | None) -> tuple[tuple[float, float], ...] | None:
+def _bounds(
+    arm: ArmModel, bounds: Sequence[tuple[float, float]] | str | None
+) -> tuple[tuple[float, float], ...] | None:
     """Checked bounds of the three estimates."""
     if bounds is None:
         return None
     starts = [np.asarray(value) for value in arm.gains]
     if isinstance(bounds, str):
         if bounds != "default":
-            raise ParameterError(f"bounds = {bounds!r} is not allowed: 'default', three pairs or None")
+            raise ParameterError(
+                f"bounds = {bounds!r} is not allowed: 'default', three pairs or None"
+            )
         tops = [10.0 * float(start.max()) for start in starts]
         # an arm of which nothing is known: what its muscles could move at all
-        torque = float(np.max(arm.torque.at(np.linspace(*arm.angle_range, 33))[0])) * arm.pressure_limit
+        torque = (
+            float(np.max(arm.torque.at(np.linspace(*arm.angle_range, 33))[0])) * arm.pressure_limit
+        )
         scale = (torque / 10.0, torque / 10.0, torque)
-        bounds = [(0.0, top if top > 0.0 else other) for top, other in zip(tops, scale, strict=True)]
+        bounds = [
+            (0.0, top if top > 0.0 else other) for top, other in zip(tops, scale, strict=True)
+        ]
     if len(bounds) != 3:
-        raise ParameterError(f"bounds has {len(bounds)} entries: three pairs are needed, for I, b and m g r")
+        raise ParameterError(
+            f"bounds has {len(bounds)} entries: three pairs are needed, for I, b and m g r"
+        )
     checked = []
     for name, start, pair in zip(_NAMES, starts, bounds, strict=True):
         low, high = float(pair[0]), float(pair[1])
         if not (low < high and np.all(start >= low) and np.all(start <= high)):
-            raise ParameterError(f"bounds[{name}] = {(low, high)} is not allowed: rising, with the start {start.tolist()} within")
+            raise ParameterError(
+                f"bounds[{name}] = {(low, high)} is not allowed: rising, with the start "
+                f"{start.tolist()} within"
+            )
         checked.append((low, high))
     return tuple(checked)

@@ -1,4 +1,6 @@
-"""The way of the air, backwards: from a wanted change of pressure to the valve command that makes it (4.13), (4.14)."""
+"""The way of the air, backwards: from a wanted change of pressure to the valve command that makes
+it (4.13), (4.14).
+"""
 
 from __future__ import annotations
 
@@ -21,12 +23,15 @@ __all__ = ["AirModel", "OrificeInverse"]
 
 Array = NDArray[np.float64]
 
-_LAMINAR: Final = 0.999  # pressure ratio above which the orifice law is a line (physics reference, section 3)
+_LAMINAR: Final = (
+    0.999  # pressure ratio above which the orifice law is a line (physics reference, section 3)
+)
 _LEAST_FLOW: Final = 1e-12  # of the choked one: nothing flows, and any area is as good
 
 
 class OrificeInverse:
-    """Area that lets a mass flow through, ``A_d = mdot_d/(pu f(pd/pu))``, with ``f`` tabulated from the core's orifice law.
+    """Area that lets a mass flow through, ``A_d = mdot_d/(pu f(pd/pu))``, with ``f`` tabulated from
+    the core's orifice law.
 
     Parameters
     ----------
@@ -34,7 +39,13 @@ class OrificeInverse:
         Of the gas: [Pa, absolute], [K], [J/(kg K)], [1].
     """
 
-    def __init__(self, ambient_pressure: float, temperature: float, gas_constant: float, heat_capacity_ratio: float) -> None:
+    def __init__(
+        self,
+        ambient_pressure: float,
+        temperature: float,
+        gas_constant: float,
+        heat_capacity_ratio: float,
+    ) -> None:
         core = _core.Gas(ambient_pressure, temperature, gas_constant, heat_capacity_ratio)
         upstream = 1e5  # the law is in proportion to it
 
@@ -52,7 +63,9 @@ class OrificeInverse:
         self._slope = float(per_pressure(np.array([_LAMINAR]))[0]) / (1.0 - _LAMINAR)
 
     def flow(self, upstream: Value, downstream: Value) -> Value:
-        """Mass flow per area [kg/(s m2)] between absolute pressures [Pa], zero for none or a reversed difference."""
+        """Mass flow per area [kg/(s m2)] between absolute pressures [Pa], zero for none or a
+        reversed difference.
+        """
         ratio = downstream / upstream
         if ratio.__class__ is float:
             if ratio <= self.critical:
@@ -63,11 +76,15 @@ class OrificeInverse:
         ratio = np.asarray(ratio)
         gap = np.maximum(1.0 - ratio, 0.0)
         return upstream * np.where(
-            ratio <= self.critical, self._choked, np.where(ratio <= _LAMINAR, self._between(np.sqrt(gap)), self._slope * gap)
+            ratio <= self.critical,
+            self._choked,
+            np.where(ratio <= _LAMINAR, self._between(np.sqrt(gap)), self._slope * gap),
         )
 
     def area(self, mass_flow: Value, upstream: Value, downstream: Value) -> Value:
-        """Effective area [m2] for a mass flow [kg/s] >= 0; zero for no flow, very large where nothing can flow."""
+        """Effective area [m2] for a mass flow [kg/s] >= 0; zero for no flow, very large where
+        nothing can flow.
+        """
         unit, least = self.flow(upstream, downstream), _LEAST_FLOW * self._choked * upstream
         if unit.__class__ is float and least.__class__ is float:
             return mass_flow / (unit if unit > least else least)
@@ -85,7 +102,8 @@ class AirModel:
     Raises
     ------
     ParameterError
-        If it has not, or its area table is level somewhere but at its ends, so that it has no inverse.
+        If it has not, or its area table is level somewhere but at its ends, so that it has no
+        inverse.
     """
 
     def __init__(self, rig: Rig) -> None:
@@ -94,24 +112,40 @@ class AirModel:
         muscle, joint, table = _parts(rig)
         for block in ("valve", "chamber"):
             if len(rig.tables(block)) != 1:
-                raise ParameterError(f"rig {rig.name!r} has {len(rig.tables(block))} [{block}]: a controller's model needs exactly one")
-        valve, chamber = next(iter(rig.tables("valve").values())), next(iter(rig.tables("chamber").values()))
+                raise ParameterError(
+                    f"rig {rig.name!r} has {len(rig.tables(block))} [{block}]: a controller's "
+                    "model needs exactly one"
+                )
+        valve, chamber = (
+            next(iter(rig.tables("valve").values())),
+            next(iter(rig.tables("chamber").values())),
+        )
         gas: dict[str, float] = rig.model["gas"]
         self.ambient = float(gas["ambient_pressure"])
         self.supply_pressure = _supply_pressure(rig)
-        self.alpha_in, self.alpha_out, self.alpha = (float(chamber[name]) for name in ("alpha_in", "alpha_out", "alpha"))
+        self.alpha_in, self.alpha_out, self.alpha = (
+            float(chamber[name]) for name in ("alpha_in", "alpha_out", "alpha")
+        )
         self._rt = float(gas["gas_constant"]) * float(gas["temperature"])
         low, high = float(table["min_angle"]), float(table["max_angle"])
-        contraction = joint.shortening(np.linspace(low, high, 1025)) / float(muscle.parameters["rest_length"])
-        volume = int(muscle.parameters["count"]) * muscle.air_volume(contraction) + float(chamber["dead_volume"])
+        contraction = joint.shortening(np.linspace(low, high, 1025)) / float(
+            muscle.parameters["rest_length"]
+        )
+        volume = int(muscle.parameters["count"]) * muscle.air_volume(contraction) + float(
+            chamber["dead_volume"]
+        )
         self.volume = Spline(low, high, volume)
-        self.orifice = OrificeInverse(self.ambient, gas["temperature"], gas["gas_constant"], gas["heat_capacity_ratio"])
+        self.orifice = OrificeInverse(
+            self.ambient, gas["temperature"], gas["gas_constant"], gas["heat_capacity_ratio"]
+        )
         self.null, self.half_range = float(valve["null_voltage"]), float(valve["half_range"])
         self.largest_area = float(valve["discharge_area_max"])
         self._fraction, self._opening = _inverse(valve)
 
     def opening(self, area: Value) -> Value:
-        """Opening ``|x|`` [1] of an effective area [m2] >= 0: the area table backwards, 1 where it cannot be so large."""
+        """Opening ``|x|`` [1] of an effective area [m2] >= 0: the area table backwards, 1 where it
+        cannot be so large.
+        """
         fraction = area / self.largest_area
         places, values = self._fraction, self._opening
         if fraction.__class__ is float:
@@ -126,13 +160,18 @@ class AirModel:
         k = np.clip(np.searchsorted(p, fraction, side="right") - 1, 0, p.size - 2)
         inside = (v[k + 1] - v[k]) / (p[k + 1] - p[k]) * (np.asarray(fraction) - p[k]) + v[k]
         return np.where(
-            np.asarray(fraction) <= p[0], np.where(np.asarray(fraction) > 0.0, v[0], 0.0), np.where(fraction >= p[-1], v[-1], inside)
+            np.asarray(fraction) <= p[0],
+            np.where(np.asarray(fraction) > 0.0, v[0], 0.0),
+            np.where(fraction >= p[-1], v[-1], inside),
         )
 
-    def command(self, pressure_rate: Value, pressure: Value, supply: Value, angle: Value, rate: Value) -> Value:
+    def command(
+        self, pressure_rate: Value, pressure: Value, supply: Value, angle: Value, rate: Value
+    ) -> Value:
         """Valve command less its null [V] that changes the pressure at a rate.
 
-        ``mdot_d = (P_d' V + alpha P V')/(R T alpha_in)`` or ``alpha_out`` by its sign (4.13), the area (4.14), and the valve's table.
+        ``mdot_d = (P_d' V + alpha P V')/(R T alpha_in)`` or ``alpha_out`` by its sign (4.13), the
+        area (4.14), and the valve's table.
 
         Parameters
         ----------
@@ -146,26 +185,43 @@ class AirModel:
         Returns
         -------
         float or ndarray
-            From minus to plus the half range; 0 where the supply is below the muscle and air would be needed.
+            From minus to plus the half range; 0 where the supply is below the muscle and air would
+            be needed.
         """
         inside, feed = pressure + self.ambient, supply + self.ambient
-        demand = pressure_rate * self.volume(angle) + self.alpha * inside * (self.volume.slope(angle) * rate)
+        demand = pressure_rate * self.volume(angle) + self.alpha * inside * (
+            self.volume.slope(angle) * rate
+        )
         if demand.__class__ is float and feed.__class__ is float:
             if demand > 0.0:
                 if feed <= inside:
                     return 0.0
-                return self.half_range * self.opening(self.orifice.area(demand / (self._rt * self.alpha_in), feed, inside))
+                return self.half_range * self.opening(
+                    self.orifice.area(demand / (self._rt * self.alpha_in), feed, inside)
+                )
             if demand == 0.0:
                 return 0.0
-            return -self.half_range * self.opening(self.orifice.area(-demand / (self._rt * self.alpha_out), inside, self.ambient))
+            return -self.half_range * self.opening(
+                self.orifice.area(-demand / (self._rt * self.alpha_out), inside, self.ambient)
+            )
         demand, feed, inside = np.broadcast_arrays(demand, feed, inside)
-        filling = self.opening(self.orifice.area(np.maximum(demand, 0.0) / (self._rt * self.alpha_in), feed, inside))
-        venting = self.opening(self.orifice.area(np.maximum(-demand, 0.0) / (self._rt * self.alpha_out), inside, self.ambient))
-        return self.half_range * np.where(demand > 0.0, np.where(feed <= inside, 0.0, filling), -venting)
+        filling = self.opening(
+            self.orifice.area(np.maximum(demand, 0.0) / (self._rt * self.alpha_in), feed, inside)
+        )
+        venting = self.opening(
+            self.orifice.area(
+                np.maximum(-demand, 0.0) / (self._rt * self.alpha_out), inside, self.ambient
+            )
+        )
+        return self.half_range * np.where(
+            demand > 0.0, np.where(feed <= inside, 0.0, filling), -venting
+        )
 
 
 def _inverse(valve: dict[str, Any]) -> tuple[list[float], list[float]]:
-    """Area fractions that rise strictly, and the opening of each: level stretches at the ends are left out."""
+    """Area fractions that rise strictly, and the opening of each: level stretches at the ends are
+    left out.
+    """
     opening, fraction = [float(x) for x in valve["opening"]], [float(x) for x in valve["fraction"]]
     first, last = 0, len(fraction) - 1
     while first < last and fraction[first + 1] == fraction[0]:
@@ -174,5 +230,8 @@ def _inverse(valve: dict[str, Any]) -> tuple[list[float], list[float]]:
         last -= 1
     opening, fraction = opening[first : last + 1], fraction[first : last + 1]
     if len(fraction) < 2 or any(b <= a for a, b in zip(fraction[:-1], fraction[1:], strict=True)):
-        raise ParameterError(f"valve.area_fraction.fraction = {valve['fraction']} has no inverse: it must rise between its ends")
+        raise ParameterError(
+            f"valve.area_fraction.fraction = {valve['fraction']} has no inverse: it must rise "
+            "between its ends"
+        )
     return fraction, opening

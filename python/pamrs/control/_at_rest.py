@@ -1,4 +1,5 @@
-"""What a linear model leaves of a rig: effects without a derivative are refused, the others at rest.
+"""What a linear model leaves of a rig: effects without a derivative are refused, the others at
+rest.
 
 What each effect asks for stands in the catalogue (:class:`pamrs.effects.EffectInfo`).
 """
@@ -54,7 +55,9 @@ def resting(rig: Rig) -> Rig:
     kept = []
     for effect in rig.effects:
         values, changes = effect["parameters"], EFFECTS[effect["id"]].at_rest
-        if any(act == "out_below" and values.get(key, bound) < bound for act, key, bound in changes):
+        if any(
+            act == "out_below" and values.get(key, bound) < bound for act, key, bound in changes
+        ):
             continue
         held = {key: value for act, key, value in changes if act == "set" and key in values}
         kept.append({**effect, "parameters": {**values, **held}})
@@ -84,4 +87,6 @@ def without_dry_friction(rig: Rig) -> Rig:
     for name in {effect["id"] for effect in rig.effects}:
         if EFFECTS[name].dry_friction:
             rig = rig.without_effect(name)
-    return rig.with_parameters({name: 0.0 for name in rig.parameters if name.rpartition(".")[2] == "coulomb"})
+    return rig.with_parameters(
+        {name: 0.0 for name in rig.parameters if name.rpartition(".")[2] == "coulomb"}
+    )

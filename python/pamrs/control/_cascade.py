@@ -1,4 +1,6 @@
-"""Cascade control: the outer loop asks for a pressure, an inner PI loop makes it with the valve (dissertation 5.3, Fig. 5.3; ch. 6)."""
+"""Cascade control: the outer loop asks for a pressure, an inner PI loop makes it with the valve
+(dissertation 5.3, Fig. 5.3; ch. 6).
+"""
 
 from __future__ import annotations
 
@@ -9,7 +11,13 @@ import numpy as np
 
 from pamrs.control._parts import LowPass
 from pamrs.control._pid import PID, PIDLaw
-from pamrs.control._protocol import Controller, Measurement, Reference, Value, check_answers_pressure
+from pamrs.control._protocol import (
+    Controller,
+    Measurement,
+    Reference,
+    Value,
+    check_answers_pressure,
+)
 from pamrs.control._sampled import Fixed, Restorer, SampledController
 from pamrs.errors import ParameterError
 
@@ -20,16 +28,18 @@ _ANGLE_GAINS: Final[Mapping[str, float]] = {"kp": 6e5, "ki": 1.2e6, "kd": 1e5}
 
 
 class PressureLoop(SampledController):
-    """PI control of the muscle's pressure by the valve, desired and measured pressure low-passed (5.3.1).
+    """PI control of the muscle's pressure by the valve, desired and measured pressure low-passed
+    (5.3.1).
 
-    As a controller of its own it takes ``reference.angle`` as the desired gauge pressure [Pa]; in a :class:`Cascade` the outer loop
-    gives it.
+    As a controller of its own it takes ``reference.angle`` as the desired gauge pressure [Pa]; in a
+    :class:`Cascade` the outer loop gives it.
 
     Parameters
     ----------
     kp, ki : float or ndarray, shape (n,)
-        Gains [V/Pa, V/(Pa s)]; not printed. With the shoulder's valve (some 0.55 MPa/s per volt near its null) the default crosses over
-        at about 100 rad/s; a quarter of it made the adaptive laws oscillate.
+        Gains [V/Pa, V/(Pa s)]; not printed. With the shoulder's valve (some 0.55 MPa/s per volt
+        near its null) the default crosses over at about 100 rad/s; a quarter of it made the
+        adaptive laws oscillate.
     period : float
         Time between two updates [s].
     limits, null, anti_windup, tracking_time
@@ -45,7 +55,12 @@ class PressureLoop(SampledController):
 
     _PARTS: ClassVar[tuple[str, ...]] = ("law", "desired_filter", "pressure_filter")
 
-    kp, ki, limits, null = Fixed("law.kp"), Fixed("law.ki"), Fixed("law.limits"), Fixed("law.offset")
+    kp, ki, limits, null = (
+        Fixed("law.kp"),
+        Fixed("law.ki"),
+        Fixed("law.limits"),
+        Fixed("law.offset"),
+    )
 
     def __init__(
         self,
@@ -59,8 +74,20 @@ class PressureLoop(SampledController):
         tracking_time: Value = 0.5,
         pressure_filter: Value = 0.005,
     ) -> None:
-        self.law = PIDLaw(kp, ki, 0.0, period=period, limits=limits, offset=null, anti_windup=anti_windup, tracking_time=tracking_time)
-        self.desired_filter, self.pressure_filter = LowPass(pressure_filter, period), LowPass(pressure_filter, period)
+        self.law = PIDLaw(
+            kp,
+            ki,
+            0.0,
+            period=period,
+            limits=limits,
+            offset=null,
+            anti_windup=anti_windup,
+            tracking_time=tracking_time,
+        )
+        self.desired_filter, self.pressure_filter = (
+            LowPass(pressure_filter, period),
+            LowPass(pressure_filter, period),
+        )
         super().__init__(period, (*self.law.gains, self.pressure_filter.time_constant))
         self.reset()
 
@@ -74,7 +101,9 @@ class PressureLoop(SampledController):
             desired = self._sized("desired pressure", desired)
         pressure = self._read(measurement, "muscle_pressure")
         self._tick(time)
-        return self.law.update(self.desired_filter.update(desired) - self.pressure_filter.update(pressure))
+        return self.law.update(
+            self.desired_filter.update(desired) - self.pressure_filter.update(pressure)
+        )
 
 
 class Cascade(SampledController):
@@ -83,7 +112,8 @@ class Cascade(SampledController):
     Parameters
     ----------
     outer : Controller
-        Sliding, adaptive, neural, one of your own with ``answers = "pressure"``; a PID of the angle is in :func:`cascaded_pid`.
+        Sliding, adaptive, neural, one of your own with ``answers = "pressure"``; a PID of the angle
+        is in :func:`cascaded_pid`.
     inner : PressureLoop, optional
         By default one with the gains and the period that it has by itself.
 
@@ -106,7 +136,9 @@ class Cascade(SampledController):
         self.outer = outer
         self.inner = PressureLoop(period=outer.period) if inner is None else inner
         if self.inner.period != outer.period:
-            raise ParameterError(f"inner.period = {self.inner.period} s is not the outer's {outer.period} s")
+            raise ParameterError(
+                f"inner.period = {self.inner.period} s is not the outer's {outer.period} s"
+            )
         super().__init__(outer.period, parts=(outer, self.inner))
         self._before = Restorer(outer)
         self.reset()
@@ -140,14 +172,16 @@ def cascaded_pid(
     inner: PressureLoop | None = None,
     **others: Any,
 ) -> Cascade:
-    """Cascaded PID (Fig. 5.18), with ``kd = 0`` the cascaded PI of ch. 6: angle PID gives P_d, pressure PI the volts.
+    """Cascaded PID (Fig. 5.18), with ``kd = 0`` the cascaded PI of ch. 6: angle PID gives P_d,
+    pressure PI the volts.
 
     Parameters
     ----------
     pressure_limit : float
         Largest gauge pressure that is asked for [Pa].
     kp, ki, kd : float or ndarray, shape (n,)
-        Gains of the angle [Pa/rad, Pa/(rad s), Pa s/rad]; none are printed: the defaults follow on the simulated shoulder.
+        Gains of the angle [Pa/rad, Pa/(rad s), Pa s/rad]; none are printed: the defaults follow on
+        the simulated shoulder.
     period : float
         Time between two updates [s].
     inner : PressureLoop, optional
@@ -164,6 +198,12 @@ def cascaded_pid(
     ParameterError
         As :class:`pamrs.control.PID` and :class:`Cascade`.
     """
-    outer = PID(kp, ki, kd, period=period, **{"output_filter": 0.0, "limits": (0.0, pressure_limit), "null": 0.0, **others})
+    outer = PID(
+        kp,
+        ki,
+        kd,
+        period=period,
+        **{"output_filter": 0.0, "limits": (0.0, pressure_limit), "null": 0.0, **others},
+    )
     outer.answers = "pressure"
     return Cascade(outer, PressureLoop(period=period) if inner is None else inner)

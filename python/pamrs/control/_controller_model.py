@@ -1,4 +1,6 @@
-"""Linear models of sampled controllers about an operating point, by differences of one update over its state and its measurements."""
+"""Linear models of sampled controllers about an operating point, by differences of one update over
+its state and its measurements.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,11 @@ __all__ = ["LinearController", "heard", "linear_controller"]
 Array = NDArray[np.float64]
 
 #: Half width of the differences in what is measured [SI].
-_WIDTHS: Final[dict[str, float]] = {"joint_angle": 1e-5, "joint_rate": 1e-5, "muscle_pressure": 10.0}
+_WIDTHS: Final[dict[str, float]] = {
+    "joint_angle": 1e-5,
+    "joint_rate": 1e-5,
+    "muscle_pressure": 10.0,
+}
 #: By how much of the slope the slopes of both sides may differ.
 _KINK: Final = 0.01
 SIDES: Final = ("", "up", "down", "mean")
@@ -26,7 +32,8 @@ SIDES: Final = ("", "up", "down", "mean")
 
 @dataclass(frozen=True)
 class LinearController:
-    """``x+ = A x + B y, u = C x + D y`` from one sample to the next, about an operating point; y are :attr:`inputs`.
+    """``x+ = A x + B y, u = C x + D y`` from one sample to the next, about an operating point; y
+    are :attr:`inputs`.
 
     Attributes
     ----------
@@ -59,9 +66,10 @@ def linear_controller(
 ) -> LinearController:
     """Any controller with a state of floats about an operating point, by differences of one update.
 
-    Exact for a controller that is linear inside its limits (PID, cascade). What does not reach the command (a clock), or is never
-    moved by a measurement (an integral without a gain), is left out. A law with a corner at the point (a dead band's edge, a limit, a
-    switching line) has two slopes there and no linear model: it is refused unless a side is chosen.
+    Exact for a controller that is linear inside its limits (PID, cascade). What does not reach the
+    command (a clock), or is never moved by a measurement (an integral without a gain), is left out.
+    A law with a corner at the point (a dead band's edge, a limit, a switching line) has two slopes
+    there and no linear model: it is refused unless a side is chosen.
 
     Parameters
     ----------
@@ -72,86 +80,171 @@ def linear_controller(
     angle : float, optional
         Another reference [rad].
     state : mapping, optional
-        The controller's state at the operating point, for one whose integrals have to hold the arm up (a cascade, whose outer integral
-        is the pressure): ``controller.state`` after a closed loop that has come to rest there. By default that of a controller which
-        has seen the point three times.
+        The controller's state at the operating point, for one whose integrals have to hold the arm
+        up (a cascade, whose outer integral is the pressure): ``controller.state`` after a closed
+        loop that has come to rest there. By default that of a controller which has seen the point
+        three times.
     side : {"", "up", "down", "mean"}
-        Of what is measured or remembered, where the slopes towards larger and smaller values differ by more than one percent: which
-        of them, or the mean of both. By default such a controller is refused.
+        Of what is measured or remembered, where the slopes towards larger and smaller values differ
+        by more than one percent: which of them, or the mean of both. By default such a controller
+        is refused.
 
     Returns
     -------
     LinearController
-        From ``joint_angle``, ``joint_rate`` and ``muscle_pressure``, those of them that are in ``point``.
+        From ``joint_angle``, ``joint_rate`` and ``muscle_pressure``, those of them that are in
+        ``point``.
 
     Raises
     ------
     ParameterError
-        If the side is unknown, the controller answers what is not a finite number, has a corner at the point, or no measurement reaches
-        its command: it is at a limit.
+        If the side is unknown, the controller answers what is not a finite number, has a corner at
+        the point, or no measurement reaches its command: it is at a limit.
     """
     if side not in SIDES:
-        raise ParameterError(f"side = {side!r} is not allowed: one of {', '.join(map(repr, SIDES))}")
-    inputs = tuple(name for name in ("joint_angle", "joint_rate", "muscle_pressure") if name in point)
+        raise ParameterError(
+            f"side = {side!r} is not allowed: one of {', '.join(map(repr, SIDES))}"
+        )
+    inputs = tuple(
+        name for name in ("joint_angle", "joint_rate", "muscle_pressure") if name in point
+    )
     reference = Reference(point["joint_angle"] if angle is None else angle)
+    update = _Update(
+        controller, dict(point), reference, _settled(controller, point, reference, state)
+    )
+    slopes, middle = _slopes(update, inputs, side)
+    controller.reset()
+    command = float(middle[-1])
+    n = len(update.paths)
+    whole = np.array([slope for slope, _ in slopes]).T
+    if not (np.isfinite(whole).all() and math.isfinite(command)):
+        raise ParameterError(
+            "the controller's command is not finite at the operating point: no linear model is "
+            "there"
+        )
+    if not whole[n].any() or not whole[:, n:].any():
+        raise ParameterError(
+            f"the controller answers {command:g} whatever it measures: it is at a limit; give the "
+            "state in which it holds the arm here"
+        )
+    # an integral with a gain of zero is heard, but nothing moves it; it would count as a motion
+    # that never dies out
+    moved = heard(whole[:n, :n].T, np.abs(whole[:n, n:]).sum(axis=1))
+    kept = sorted(set(heard(whole[:n, :n], whole[n, :n])) & set(moved))
+    if side == "":
+        _refuse_corners(update, inputs, [step for _, step in slopes], kept)
+    a, b = whole[np.ix_(kept, kept)], whole[np.ix_(kept, range(n, n + len(inputs)))]
+    c, d = whole[[n]][:, kept], whole[[n]][:, n:]
+    return LinearController(a, b, c, d, inputs, controller.period, command)
+
+
+def _settled(
+    controller: Controller,
+    point: Mapping[str, float],
+    reference: Reference,
+    state: Mapping[str, Any] | None,
+) -> Mapping[str, Any]:
+    """The controller's state at the operating point: the one given, or after three updates
+    there.
+    """
     controller.reset()
     if state is None:
         for k in range(3):  # filters and differences have seen something
             controller.update(k * controller.period, point, reference)
     else:
         controller.restore(state)
-    start = controller.state
-    clocks = [value for path, value in _floats(start) if path[-1] == "time"]  # of the parts too
-    now = max(clocks, default=2.0 * controller.period) + controller.period
-    paths = [path for path, value in _floats(start) if path[-1] != "time"]
+    return controller.state
 
-    def answered(state: Mapping[str, Any], sample: Mapping[str, float]) -> Array:
-        controller.restore(state)
-        command = float(controller.update(now, sample, reference))
-        after = controller.state
-        return np.array([*(_at(after, path) for path in paths), command])
 
-    middle = answered(start, point)
-    command = float(middle[-1])
+class _Update:
+    """One update of a controller as a function of its state and of what is measured.
+
+    Parameters
+    ----------
+    controller : Controller
+    point : dict of str to float
+        Channels at the operating point.
+    reference : Reference
+    start : mapping
+        The controller's state there.
+    """
+
+    def __init__(
+        self,
+        controller: Controller,
+        point: dict[str, float],
+        reference: Reference,
+        start: Mapping[str, Any],
+    ) -> None:
+        self.controller, self.point, self.reference = controller, point, reference
+        self.start = start
+        floats = list(_floats(start))
+        self.paths = [path for path, _ in floats if path[-1] != "time"]
+        clocks = [value for path, value in floats if path[-1] == "time"]  # of the parts too
+        self.now = max(clocks, default=2.0 * controller.period) + controller.period
+
+    def __call__(self, state: Mapping[str, Any], sample: Mapping[str, float]) -> Array:
+        """Every float of the state after the update, and behind them the command."""
+        self.controller.restore(state)
+        command = float(self.controller.update(self.now, sample, self.reference))
+        after = self.controller.state
+        return np.array([*(_at(after, path) for path in self.paths), command])
+
+
+def _slopes(
+    update: _Update, inputs: tuple[str, ...], side: str
+) -> tuple[list[tuple[Array, Array]], Array]:
+    """Slopes over every float of the state and every input, and what is answered at the point
+    itself.
+    """
+    start, point = update.start, update.point
+    middle = update(start, point)
     slopes = []
-    for path in paths:
+    for path in update.paths:
         width = 1e-4 * max(1.0, abs(_at(start, path)))
-        up, down = (answered(_changed(start, path, s * width), point) for s in (1.0, -1.0))
+        up, down = (update(_changed(start, path, s * width), point) for s in (1.0, -1.0))
         slopes.append(_slope(up, middle, down, width, side))
     for name in inputs:
-        up, down = (answered(start, {**point, name: point[name] + s * _WIDTHS[name]}) for s in (1.0, -1.0))
-        slopes.append(_slope(up, middle, down, _WIDTHS[name], side))
-    controller.reset()
-    n = len(paths)
-    whole = np.array([slope for slope, _ in slopes]).T
-    if not (np.isfinite(whole).all() and math.isfinite(command)):
-        raise ParameterError("the controller's command is not finite at the operating point: no linear model is there")
-    if not whole[n].any() or not whole[:, n:].any():
-        raise ParameterError(
-            f"the controller answers {command:g} whatever it measures: it is at a limit; give the state in which it holds the arm here"
-        )
-    # an integral with a gain of zero is heard, but nothing moves it; it would count as a motion that never dies out
-    moved = heard(whole[:n, :n].T, np.abs(whole[:n, n:]).sum(axis=1))
-    kept = sorted(set(heard(whole[:n, :n], whole[n, :n])) & set(moved))
-    for name, (_, step) in zip([*(".".join(map(str, path)) for path in paths), *inputs], slopes, strict=True):
-        if side == "" and step[[*kept, n]].any():
-            k = [*kept, n][int(np.argmax(step[[*kept, n]]))]
-            what = "its command" if k == n else ".".join(map(str, paths[k]))
+        width = _WIDTHS[name]
+        up, down = (update(start, {**point, name: point[name] + s * width}) for s in (1.0, -1.0))
+        slopes.append(_slope(up, middle, down, width, side))
+    return slopes, middle
+
+
+def _refuse_corners(
+    update: _Update, inputs: tuple[str, ...], steps: list[Array], kept: list[int]
+) -> None:
+    """Name the first slope that differs between its sides, of the states that are kept or of the
+    command.
+    """
+    n = len(update.paths)
+    names = [".".join(map(str, path)) for path in update.paths]
+    places = [*kept, n]
+    for name, step in zip([*names, *inputs], steps, strict=True):
+        if step[places].any():
+            k = places[int(np.argmax(step[places]))]
+            what = "its command" if k == n else names[k]
             raise ParameterError(
-                f"the controller has a corner at the operating point: the slopes of {what} over {name} differ by {step[k]:.3g} between "
-                "its sides; choose a side (up, down, mean), or another point"
+                f"the controller has a corner at the operating point: the slopes of {what} over "
+                f"{name} differ by {step[k]:.3g} between its sides; choose a side (up, down, "
+                "mean), or another point"
             )
-    a, b = whole[np.ix_(kept, kept)], whole[np.ix_(kept, range(n, n + len(inputs)))]
-    return LinearController(a, b, whole[[n]][:, kept], whole[[n]][:, n:], inputs, controller.period, command)
 
 
 def _slope(up: Array, middle: Array, down: Array, width: float, side: str) -> tuple[Array, Array]:
-    """Slope of what is answered, and by how much it differs between both sides; zero where that is next to nothing."""
+    """Slope of what is answered, and by how much it differs between both sides; zero where that is
+    next to nothing.
+    """
     above, below = (up - middle) / width, (middle - down) / width
     # the last digits of what is differenced are no corner
-    slack = _KINK * np.maximum(np.abs(above), np.abs(below)) + 1e-11 * np.maximum(1.0, np.abs(middle)) / width
+    slack = (
+        _KINK * np.maximum(np.abs(above), np.abs(below))
+        + 1e-11 * np.maximum(1.0, np.abs(middle)) / width
+    )
     apart = np.abs(above - below)
-    return {"up": above, "down": below}.get(side, 0.5 * (above + below)), np.where(apart > slack, apart, 0.0)
+    return {"up": above, "down": below}.get(side, 0.5 * (above + below)), np.where(
+        apart > slack, apart, 0.0
+    )
 
 
 def heard(a: Array, c: Array) -> list[int]:
@@ -193,4 +286,7 @@ def _changed(state: Any, path: Path, change: float) -> Any:
         copied = state.copy()
         copied[path[0]] += change
         return copied
-    return {key: _changed(value, path[1:], change) if key == path[0] else value for key, value in state.items()}
+    return {
+        key: _changed(value, path[1:], change) if key == path[0] else value
+        for key, value in state.items()
+    }

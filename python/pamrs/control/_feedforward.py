@@ -1,4 +1,6 @@
-"""Model-based feedforward (dissertation 4.3.2, (4.11)-(4.14)), alone and beside an output feedback."""
+"""Model-based feedforward (dissertation 4.3.2, (4.11)-(4.14)), alone and beside an output
+feedback.
+"""
 
 from __future__ import annotations
 
@@ -22,8 +24,9 @@ __all__ = ["Feedforward", "Parallel"]
 class Feedforward(SampledController):
     """Inverse dynamics, inverse muscle force, pressure-rate law and inverse orifice.
 
-    ``tau_d = I theta_d'' + m g r sin(theta_d)``, ``P_d`` that gives it at ``theta_d``, ``P_d' = kM (P_d - P)``, and the valve command
-    that :meth:`pamrs.control.AirModel.command` finds at the measured angle, rate and pressures.
+    ``tau_d = I theta_d'' + m g r sin(theta_d)``, ``P_d`` that gives it at ``theta_d``,
+    ``P_d' = kM (P_d - P)``, and the valve command that :meth:`pamrs.control.AirModel.command` finds
+    at the measured angle, rate and pressures.
 
     Parameters
     ----------
@@ -32,7 +35,8 @@ class Feedforward(SampledController):
     air : AirModel
         Its model of valve and chamber.
     km : float or ndarray, shape (n,)
-        ``kM`` [1/s]: 0.5 was best in the dissertation, 1.0 simulated; with 0 the feedforward is off, and the valve closed (5 V).
+        ``kM`` [1/s]: 0.5 was best in the dissertation, 1.0 simulated; with 0 the feedforward is
+        off, and the valve closed (5 V).
     period : float
         Time between two updates [s].
     friction : bool
@@ -44,9 +48,10 @@ class Feedforward(SampledController):
 
     Notes
     -----
-    The supply's pressure is that of the channel ``supply_pressure`` where there is one, else the rig's initial one. With ``km = 0`` the
-    whole feedforward is switched off, also what would hold the pressure while the volume changes, as in the dissertation's series
-    (kM = 0 is pure feedback there).
+    The supply's pressure is that of the channel ``supply_pressure`` where there is one, else the
+    rig's initial one. With ``km = 0`` the whole feedforward is switched off, also what would hold
+    the pressure while the volume changes, as in the dissertation's series (kM = 0 is pure feedback
+    there).
 
     Raises
     ------
@@ -73,11 +78,21 @@ class Feedforward(SampledController):
     ) -> None:
         self.arm, self.air = arm, air
         self._km = as_value("km", km, lower=0.0)
-        self._on: Value = (1.0 if self._km > 0.0 else 0.0) if isinstance(self._km, float) else (self._km > 0.0).astype(float)
+        self._on: Value = (
+            (1.0 if self._km > 0.0 else 0.0)
+            if isinstance(self._km, float)
+            else (self._km > 0.0).astype(float)
+        )
         self._friction = bool(friction)
-        self.sensor = JointSensor(period, angle_filter=angle_filter, rate_filter=rate_filter, measured_rate=measured_rate)
+        self.sensor = JointSensor(
+            period, angle_filter=angle_filter, rate_filter=rate_filter, measured_rate=measured_rate
+        )
         self.low_pass = LowPass(pressure_filter, period)
-        filters = (self.low_pass.time_constant, self.sensor.low_pass.time_constant, self.sensor.slope.time_constant)
+        filters = (
+            self.low_pass.time_constant,
+            self.sensor.low_pass.time_constant,
+            self.sensor.slope.time_constant,
+        )
         super().__init__(period, (self._km, *arm.gains, *filters))
         self._limits, self._null = (air.null - air.half_range, air.null + air.half_range), air.null
         self.reset()
@@ -89,7 +104,7 @@ class Feedforward(SampledController):
         Parameters
         ----------
         rig : Rig
-            The nominal rig, with the payload that the controller believes in.
+            The nominal rig, with the payload that the controller assumes.
         km : float or ndarray, shape (n,)
             [1/s].
         **others
@@ -111,13 +126,19 @@ class Feedforward(SampledController):
 
     def update(self, time: float, measurement: Measurement, reference: Reference) -> Value:
         """Valve command [V] for a sample; see :meth:`pamrs.control.Controller.update`."""
-        return clip(self._null + self.offset(time, measurement, reference), self._limits[0], self._limits[1])
+        return clip(
+            self._null + self.offset(time, measurement, reference), self._limits[0], self._limits[1]
+        )
 
     def offset(self, time: float, measurement: Measurement, reference: Reference) -> Value:
         """As :meth:`update`, less the valve's null [V]."""
         aim = self._aim(reference)
         pressure = self._read(measurement, "muscle_pressure")
-        supply = self._read(measurement, "supply_pressure") if "supply_pressure" in measurement else self.air.supply_pressure
+        supply = (
+            self._read(measurement, "supply_pressure")
+            if "supply_pressure" in measurement
+            else self.air.supply_pressure
+        )
         angle, rate = self.sensor.read(self, measurement)
         self._tick(time)
         angle, rate = self.sensor.update(angle, rate)
@@ -134,8 +155,9 @@ class Parallel(SampledController):
     feedforward : Feedforward
         The model's part.
     feedback : Controller
-        PID, fuzzy or another that answers valve volts. One with ``answer`` (as these have) is told of the feedforward before its
-        limits, so that its anti-windup knows when the sum is at a limit.
+        PID, fuzzy or another that answers valve volts. One with ``answer`` (as these have) is told
+        of the feedforward before its limits, so that its anti-windup knows when the sum is at a
+        limit.
 
     Raises
     ------
@@ -148,7 +170,10 @@ class Parallel(SampledController):
     def __init__(self, feedforward: Feedforward, feedback: Controller) -> None:
         check_drives_valve(feedback)
         if feedforward.period != feedback.period:
-            raise ParameterError(f"feedback.period = {feedback.period} s is not the feedforward's {feedforward.period} s")
+            raise ParameterError(
+                f"feedback.period = {feedback.period} s is not the feedforward's "
+                f"{feedforward.period} s"
+            )
         self.feedforward, self.feedback = feedforward, feedback
         super().__init__(feedforward.period, parts=(feedforward, feedback))
         self._answer = getattr(feedback, "answer", None) is not None

@@ -1,4 +1,6 @@
-"""Fuzzy control of the joint angle (dissertation 4.3.1.2, (4.10); Passino & Yurkovich, Fuzzy Control, 1998)."""
+"""Fuzzy control of the joint angle (dissertation 4.3.1.2, (4.10); Passino & Yurkovich, Fuzzy
+Control, 1998).
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,8 @@ FUZZY_SETS: Final = ("NB", "NM", "NS", "ZE", "PS", "PM", "PB")
 """Names of the sets, centres -1, -2/3, ... 1."""
 _HALF: Final = 3  # sets on each side of zero
 
-#: Gains as printed: 4.4.1.2 (optimum at 23 kg), 4.4.2 and Fig. 4.13 (beside a feedforward), Fig. 4.14 (series of kM).
+#: Gains as printed: 4.4.1.2 (optimum at 23 kg), 4.4.2 and Fig. 4.13 (beside a feedforward), Fig.
+#: 4.14 (series of kM).
 _PRINTED: Final[Mapping[str, Mapping[str, float]]] = {
     "optimal_23kg": {"g1": 0.45, "g2": 0.6, "h": 0.65},
     "feedforward": {"g1": 0.4, "g2": 0.3, "h": 0.7},
@@ -32,9 +35,10 @@ _PRINTED: Final[Mapping[str, Mapping[str, float]]] = {
 def fuzzy_rules(table: str | ArrayLike = "anti_diagonal") -> NDArray[np.float64]:
     """Centre of the output set for each pair of sets.
 
-    Table 4.1 is printed as a picture. ``anti_diagonal`` is the standard table, output index ``clip(i + j, -3, 3)``: error NS and rate
-    PS give ZE. The text quotes "positive small" for that pair; ``quoted`` is the standard table with the smallest change that gives it:
-    where error and rate cancel, the output leans to the rate by one set, ``i + j + sgn(j) [i + j = 0]``.
+    Table 4.1 is printed as a picture. ``anti_diagonal`` is the standard table, output index
+    ``clip(i + j, -3, 3)``: error NS and rate PS give ZE. The text quotes "positive small" for that
+    pair; ``quoted`` is the standard table with the smallest change that gives it: where error and
+    rate cancel, the output leans to the rate by one set, ``i + j + sgn(j) [i + j = 0]``.
 
     Parameters
     ----------
@@ -54,22 +58,31 @@ def fuzzy_rules(table: str | ArrayLike = "anti_diagonal") -> NDArray[np.float64]
     i, j = np.meshgrid(np.arange(-_HALF, _HALF + 1), np.arange(-_HALF, _HALF + 1), indexing="ij")
     if isinstance(table, str):
         if table not in ("anti_diagonal", "quoted"):
-            raise ParameterError(f"table = {table!r} is not allowed: 'anti_diagonal', 'quoted' or 7 x 7 numbers are needed")
+            raise ParameterError(
+                f"table = {table!r} is not allowed: 'anti_diagonal', 'quoted' or 7 x 7 numbers are "
+                "needed"
+            )
         index = (i + j + (np.sign(j) * (i + j == 0) if table == "quoted" else 0)).astype(np.float64)
         return np.clip(index, -_HALF, _HALF) / _HALF
     given = np.asarray(table, dtype=np.float64)
     if given.shape != (7, 7) or not np.all(np.isfinite(given)) or np.any(np.abs(given) > _HALF):
-        raise ParameterError(f"table of shape {given.shape} is not allowed: 7 x 7 output indices from -3 to 3 are needed")
+        raise ParameterError(
+            f"table of shape {given.shape} is not allowed: 7 x 7 output indices from -3 to 3 are "
+            "needed"
+        )
     return given / _HALF
 
 
-def fuzzy_surface(error: Value, rate: Value, rules: Sequence[Sequence[float]], rules_array: NDArray[np.float64]) -> Value:
+def fuzzy_surface(
+    error: Value, rate: Value, rules: Sequence[Sequence[float]], rules_array: NDArray[np.float64]
+) -> Value:
     """Output of the rules for scaled inputs, before h.
 
-    Triangular sets that overlap by half, so that two of each input are active and their memberships sum to one; premise by the minimum
-    (4.10); centre of gravity of the output sets, each a triangle cut off at its premise ``m`` with the area ``w (m - m^2/2)``.
-    With the minimum as premise the surface is not quite monotone: it falls by at most 0.007 (``anti_diagonal``) or 0.02 (``quoted``)
-    of its range where it should rise.
+    Triangular sets that overlap by half, so that two of each input are active and their memberships
+    sum to one; premise by the minimum (4.10); centre of gravity of the output sets, each a triangle
+    cut off at its premise ``m`` with the area ``w (m - m^2/2)``. With the minimum as premise the
+    surface is not quite monotone: it falls by at most 0.007 (``anti_diagonal``) or 0.02
+    (``quoted``) of its range where it should rise.
 
     Parameters
     ----------
@@ -104,30 +117,43 @@ def fuzzy_surface(error: Value, rate: Value, rules: Sequence[Sequence[float]], r
         m = a if a < b else b
         w11 = m * (2.0 - m)
         low, high = rules[i], rules[i + 1]
-        return (w00 * low[j] + w01 * low[j + 1] + w10 * high[j] + w11 * high[j + 1]) / (w00 + w01 + w10 + w11)
-    places = np.broadcast_arrays((np.clip(error, -1.0, 1.0) + 1.0) * 3.0, (np.clip(rate, -1.0, 1.0) + 1.0) * 3.0)
+        return (w00 * low[j] + w01 * low[j + 1] + w10 * high[j] + w11 * high[j + 1]) / (
+            w00 + w01 + w10 + w11
+        )
+    places = np.broadcast_arrays(
+        (np.clip(error, -1.0, 1.0) + 1.0) * 3.0, (np.clip(rate, -1.0, 1.0) + 1.0) * 3.0
+    )
     return _surface(places[0], places[1], rules_array)
 
 
-def _surface(x: NDArray[np.float64], y: NDArray[np.float64], rules_array: NDArray[np.float64]) -> NDArray[np.float64]:
+def _surface(
+    x: NDArray[np.float64], y: NDArray[np.float64], rules_array: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """The same for arrays of places among the sets, 0 to 6."""
     i, j = np.minimum(x.astype(np.intp), 5), np.minimum(y.astype(np.intp), 5)
     a, b = x - i, y - j
     na, nb = 1.0 - a, 1.0 - b
     p00, p01, p10, p11 = np.minimum(na, nb), np.minimum(na, b), np.minimum(a, nb), np.minimum(a, b)
     w00, w01, w10, w11 = p00 * (2.0 - p00), p01 * (2.0 - p01), p10 * (2.0 - p10), p11 * (2.0 - p11)
-    total = w00 * rules_array[i, j] + w01 * rules_array[i, j + 1] + w10 * rules_array[i + 1, j] + w11 * rules_array[i + 1, j + 1]
+    total = (
+        w00 * rules_array[i, j]
+        + w01 * rules_array[i, j + 1]
+        + w10 * rules_array[i + 1, j]
+        + w11 * rules_array[i + 1, j + 1]
+    )
     return np.asarray(total / (w00 + w01 + w10 + w11))
 
 
 class Fuzzy(OutputFeedback):
     """Fuzzy control of the joint angle by the valve, volts around the closed valve.
 
-    ``u = null + h f(e/g1, e'/g2)``, low-passed, with ``f`` the surface of :func:`fuzzy_surface`; ``e = theta_d - theta``.
+    ``u = null + h f(e/g1, e'/g2)``, low-passed, with ``f`` the surface of :func:`fuzzy_surface`;
+    ``e = theta_d - theta``.
 
-    The printed gains are in **radians** and volts: the experiments lag by some 0.75 s on a ramp of about 15 deg/s, an error of 0.2 rad,
-    which g1 = 0.45 rad scales into the middle of the sets and 0.45 deg would saturate throughout; so scaled, the slope at the origin
-    h/g1 = 1.44 V/rad is that of the PID tuned on the same rig (kP = 1.4).
+    The printed gains are in **radians** and volts: the experiments lag by some 0.75 s on a ramp of
+    about 15 deg/s, an error of 0.2 rad, which g1 = 0.45 rad scales into the middle of the sets and
+    0.45 deg would saturate throughout; so scaled, the slope at the origin h/g1 = 1.44 V/rad is that
+    of the PID tuned on the same rig (kP = 1.4).
 
     Parameters
     ----------
@@ -184,7 +210,11 @@ class Fuzzy(OutputFeedback):
         angle_filter: Value = 0.0,
         measured_rate: bool = False,
     ) -> None:
-        self._g1, self._g2, self._h = positive_gain("g1", g1), positive_gain("g2", g2), as_value("h", h, lower=0.0)
+        self._g1, self._g2, self._h = (
+            positive_gain("g1", g1),
+            positive_gain("g2", g2),
+            as_value("h", h, lower=0.0),
+        )
         self.rules = fuzzy_rules(table)
         self._rows: list[list[float]] = self.rules.tolist()
         self.low_pass = LowPass(output_filter, period, initial=0.0)
@@ -201,7 +231,9 @@ class Fuzzy(OutputFeedback):
         self._error_scale, self._rate_scale = self._scale / self._g1, self._scale / self._g2
         self.reset()
 
-    def answer(self, time: float, measurement: Measurement, reference: Reference, bias: Value) -> Value:
+    def answer(
+        self, time: float, measurement: Measurement, reference: Reference, bias: Value
+    ) -> Value:
         """As :meth:`update`, with ``bias`` [V] added before the limits."""
         aim = self._aim(reference)
         if bias.__class__ is not float:
@@ -209,6 +241,11 @@ class Fuzzy(OutputFeedback):
         angle, rate = self.sensor.read(self, measurement)
         self._tick(time)
         angle, rate = self.sensor.update(angle, rate)
-        error, error_rate = (aim.angle - angle) * self._error_scale, (aim.rate - rate) * self._rate_scale
-        output = self.low_pass.update(self._h * fuzzy_surface(error, error_rate, self._rows, self.rules))
+        error, error_rate = (
+            (aim.angle - angle) * self._error_scale,
+            (aim.rate - rate) * self._rate_scale,
+        )
+        output = self.low_pass.update(
+            self._h * fuzzy_surface(error, error_rate, self._rows, self.rules)
+        )
         return clip(self._null + output + bias, self._limits[0], self._limits[1])

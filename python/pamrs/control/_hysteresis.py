@@ -1,15 +1,17 @@
-"""Hysteresis compensation, the future work of 5.5: model-based laws with the muscle friction that a diagnosis found.
+"""Hysteresis compensation, the future work of 5.5: model-based laws with the muscle friction that a
+diagnosis found.
 
-The effect ``muscle_hysteresis`` (Maxwell slip; Vo-Minh et al., IEEE/ASME Trans. Mechatronics 16, 2011) adds to the pull of each muscle
-``(W0 + c P) z``, z from -1 while it contracts to +1 while it lengthens, a memory of the way it moved. At a given memory the torque is
-still a line in the pressure, so that every law that inverts ``C1 P + C2`` inverts it with
+The effect ``muscle_hysteresis`` (Maxwell slip; Vo-Minh et al., IEEE/ASME Trans. Mechatronics
+16, 2011) adds to the pull of each muscle ``(W0 + c P) z``, z from -1 while it contracts to +1 while
+it lengthens, a memory of the way it moved. At a given memory the torque is still a line in the
+pressure, so that every law that inverts ``C1 P + C2`` inverts it with
 
 ::
 
     C1' = C1 + n c z r(theta)        C2' = C2 + n W0 z r(theta)
 
-``r`` the torque arm. The static effect ``activation_pressure`` shifts the line, ``C2' - C1' p_th``, and ``valve_dead_zone`` is undone
-by :class:`DeadZoneCompensation`.
+``r`` the torque arm. The static effect ``activation_pressure`` shifts the line, ``C2' - C1' p_th``,
+and ``valve_dead_zone`` is undone by :class:`DeadZoneCompensation`.
 """
 
 from __future__ import annotations
@@ -37,7 +39,8 @@ _LEAST: Final = 0.05  # of C1 without friction that stays in any case
 
 
 class SlipMemory(Stateful):
-    """Which way a muscle has been moving: four Maxwell-slip elements, rate-independent, as the core's.
+    """Which way a muscle has been moving: four Maxwell-slip elements, rate-independent, as the
+    core's.
 
     Parameters
     ----------
@@ -49,7 +52,9 @@ class SlipMemory(Stateful):
 
     def __init__(self, presliding: float) -> None:
         if not 0.0 < presliding < float("inf"):
-            raise ParameterError(f"presliding = {presliding} m is not allowed: a finite number above zero is needed")
+            raise ParameterError(
+                f"presliding = {presliding} m is not allowed: a finite number above zero is needed"
+            )
         self._distance = tuple(share * presliding for share in _SHARE)
         self.reset()
 
@@ -61,8 +66,14 @@ class SlipMemory(Stateful):
     def moved(self, change: Value) -> None:
         """Take note of a change of the muscle's length [m]."""
         d = self._distance
-        self._a, self._b = clip(self._a + change / d[0], -1.0, 1.0), clip(self._b + change / d[1], -1.0, 1.0)
-        self._c, self._d = clip(self._c + change / d[2], -1.0, 1.0), clip(self._d + change / d[3], -1.0, 1.0)
+        self._a, self._b = (
+            clip(self._a + change / d[0], -1.0, 1.0),
+            clip(self._b + change / d[1], -1.0, 1.0),
+        )
+        self._c, self._d = (
+            clip(self._c + change / d[2], -1.0, 1.0),
+            clip(self._d + change / d[3], -1.0, 1.0),
+        )
 
     @property
     def mean(self) -> Value:
@@ -71,7 +82,8 @@ class SlipMemory(Stateful):
 
 
 class HystereticTorque(Stateful):
-    """A torque model with the static muscle effects of a rig; its memory is moved by :meth:`follow`.
+    """A torque model with the static muscle effects of a rig; its memory is moved by
+    :meth:`follow`.
 
     Parameters
     ----------
@@ -94,15 +106,24 @@ class HystereticTorque(Stateful):
         found = {entry["id"]: entry["parameters"] for entry in rig.effects}
         if not {"muscle_hysteresis", "activation_pressure"} & set(found):
             there = ", ".join(found) or "none"
-            raise ParameterError(f"rig {rig.name!r} has no muscle_hysteresis and no activation_pressure; its effects: {there}")
-        friction = found.get("muscle_hysteresis", {"friction_constant": 0.0, "friction_pressure": 0.0, "presliding": 1e-3})
+            raise ParameterError(
+                f"rig {rig.name!r} has no muscle_hysteresis and no activation_pressure; its "
+                f"effects: {there}"
+            )
+        friction = found.get(
+            "muscle_hysteresis",
+            {"friction_constant": 0.0, "friction_pressure": 0.0, "presliding": 1e-3},
+        )
         self.base, count = base, int(muscle.parameters["count"])
         self._constant = count * float(friction["friction_constant"])
         self._by_pressure = count * float(friction["friction_pressure"])
         self._threshold = float(found.get("activation_pressure", {"threshold": 0.0})["threshold"])
         low, high = float(table["min_angle"]), float(table["max_angle"])
         angle = np.linspace(low, high, 1025)
-        self._travel, self._arm = Spline(low, high, joint.shortening(angle)), Spline(low, high, joint.torque_arm(angle))
+        self._travel, self._arm = (
+            Spline(low, high, joint.shortening(angle)),
+            Spline(low, high, joint.torque_arm(angle)),
+        )
         self.memory = SlipMemory(float(friction["presliding"]))
         self.reset()
 
@@ -112,7 +133,10 @@ class HystereticTorque(Stateful):
         """Move the memory to an angle [rad]."""
         # the arm sinks a little into its stops, and the muscle moves with it
         inside = clip(angle, self._travel.low, self._travel.high)
-        last, self._shortening = self._shortening, self._travel(inside) + self._travel.slope(inside) * (angle - inside)
+        last, self._shortening = (
+            self._shortening,
+            self._travel(inside) + self._travel.slope(inside) * (angle - inside),
+        )
         if last is not None:
             self.memory.moved(last - self._shortening)
 
@@ -122,23 +146,29 @@ class HystereticTorque(Stateful):
         arm = self.memory.mean * self._arm(angle)
         slope = c1 + self._by_pressure * arm
         least = _LEAST * c1
-        slope = (slope if slope > least else least) if slope.__class__ is float else np.maximum(slope, least)
+        slope = (
+            (slope if slope > least else least)
+            if slope.__class__ is float
+            else np.maximum(slope, least)
+        )
         return slope, c2 + self._constant * arm - slope * self._threshold
 
 
 class HysteresisCompensation(SampledController):
-    """A feedforward, sliding, adaptive or neural controller that knows the hysteresis of the diagnosed rig.
+    """A feedforward, sliding, adaptive or neural controller that knows the hysteresis of the
+    diagnosed rig.
 
     Parameters
     ----------
     controller : Controller
-        One with a model of the arm (``arm``), in a :class:`pamrs.control.Cascade` or :class:`pamrs.control.Parallel` or by itself. It
-        is copied, not changed.
+        One with a model of the arm (``arm``), in a :class:`pamrs.control.Cascade` or
+        :class:`pamrs.control.Parallel` or by itself. It is copied, not changed.
     rig : Rig
         The diagnosed rig.
     source : {"desired", "measured"}
-        Angle that moves the memory: the desired one is free of noise and turns when the arm should, the measured one is what the muscle
-        does. The networks of :class:`pamrs.control.Neural` learn what they use, and are not wrapped.
+        Angle that moves the memory: the desired one is free of noise and turns when the arm should,
+        the measured one is what the muscle does. The networks of :class:`pamrs.control.Neural`
+        learn what they use, and are not wrapped.
 
     Raises
     ------
@@ -150,12 +180,17 @@ class HysteresisCompensation(SampledController):
 
     def __init__(self, controller: Controller, rig: Rig, *, source: str = "desired") -> None:
         if source not in ("desired", "measured"):
-            raise ParameterError(f"source = {source!r} is not allowed: 'desired' or 'measured' is needed")
+            raise ParameterError(
+                f"source = {source!r} is not allowed: 'desired' or 'measured' is needed"
+            )
         self.source = source
         self.controller: Any = copy.deepcopy(controller)
         owner = _owner(self.controller)
         if owner is None:
-            raise ParameterError(f"controller is a {type(controller).__name__} without a model that is inverted: nothing to compensate")
+            raise ParameterError(
+                f"controller is a {type(controller).__name__} without a model that is inverted: "
+                "nothing to compensate"
+            )
         self.torque = HystereticTorque(owner.arm.torque, rig)
         owner.arm = owner.arm.replace(torque=self.torque)
         super().__init__(controller.period, parts=(self.controller,))
@@ -165,8 +200,14 @@ class HysteresisCompensation(SampledController):
         self.reset()
 
     def update(self, time: float, measurement: Measurement, reference: Reference) -> Value:
-        """What the controller answers with the memory moved to the sample; see :meth:`pamrs.control.Controller.update`."""
-        angle = self._aim(reference).angle if self.source == "desired" else self._read(measurement, "joint_angle")
+        """What the controller answers with the memory moved to the sample; see
+        :meth:`pamrs.control.Controller.update`.
+        """
+        angle = (
+            self._aim(reference).angle
+            if self.source == "desired"
+            else self._read(measurement, "joint_angle")
+        )
         before = self._before.take()
         self.torque.follow(angle)
         try:
@@ -180,10 +221,11 @@ class HysteresisCompensation(SampledController):
 
 
 class DeadZoneCompensation(SampledController):
-    """A controller of the valve whose command jumps over the spool's dead zone, the effect ``valve_dead_zone``.
+    """A controller of the valve whose command jumps over the spool's dead zone, the effect
+    ``valve_dead_zone``.
 
-    ``x_e = sgn(x) max(|x| - d, 0)/(1 - d)`` backwards: ``x = sgn(x_e) (d + (1 - d)|x_e|)``, linear within ``blend`` of the null so that
-    the valve does not chatter across it.
+    ``x_e = sgn(x) max(|x| - d, 0)/(1 - d)`` backwards: ``x = sgn(x_e) (d + (1 - d)|x_e|)``, linear
+    within ``blend`` of the null so that the valve does not chatter across it.
 
     Parameters
     ----------
@@ -197,8 +239,8 @@ class DeadZoneCompensation(SampledController):
     Raises
     ------
     ParameterError
-        If the controller answers a pressure, the rig has not the effect on its one valve, or ``blend`` is not within 0 (left out) and
-        1.
+        If the controller answers a pressure, the rig has not the effect on its one valve, or
+        ``blend`` is not within 0 (left out) and 1.
     """
 
     _PARTS: ClassVar[tuple[str, ...]] = ("controller",)
@@ -208,7 +250,10 @@ class DeadZoneCompensation(SampledController):
         found = [entry for entry in rig.effects if entry["id"] == "valve_dead_zone"]
         valves = rig.tables("valve")
         if len(found) != 1 or len(valves) != 1:
-            raise ParameterError(f"rig {rig.name!r} has {len(found)} valve_dead_zone on {len(valves)} valves: one on one is needed")
+            raise ParameterError(
+                f"rig {rig.name!r} has {len(found)} valve_dead_zone on {len(valves)} valves: one "
+                "on one is needed"
+            )
         if not 0.0 < blend < 1.0:
             raise ParameterError(f"blend = {blend} is not allowed: above 0 and below 1")
         self.controller, self.blend = controller, float(blend)
@@ -220,16 +265,23 @@ class DeadZoneCompensation(SampledController):
 
     def update(self, time: float, measurement: Measurement, reference: Reference) -> Value:
         """Valve command [V] for a sample; see :meth:`pamrs.control.Controller.update`."""
-        opening = (self.controller.update(time, measurement, reference) - self.null) / self.half_range
+        opening = (
+            self.controller.update(time, measurement, reference) - self.null
+        ) / self.half_range
         jump = clip(opening / self.blend, -1.0, 1.0)
-        return self.null + self.half_range * (self.half_width * jump + (1.0 - self.half_width) * opening)
+        return self.null + self.half_range * (
+            self.half_width * jump + (1.0 - self.half_width) * opening
+        )
 
 
 def _owner(controller: Any) -> Any:
     """The part of a controller whose ``arm`` is inverted at every sample, or None."""
     from pamrs.control._neural import Neural
 
-    for part in (controller, *(getattr(controller, name, None) for name in ("outer", "feedforward", "controller"))):
+    for part in (
+        controller,
+        *(getattr(controller, name, None) for name in ("outer", "feedforward", "controller")),
+    ):
         if getattr(part, "arm", None) is not None and not isinstance(part, Neural):
             return part
     return None

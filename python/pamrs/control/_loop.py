@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 __all__ = ["Actuation", "ClosedLoop", "actuation_of", "closed_loop", "tracked_of"]
 
 Array = NDArray[np.float64]
-#: From a controller's command to the keywords of :meth:`pamrs.Simulator.step`: ``lambda u: {"valve_command": {"flexor": u, ...}}``.
+#: From a controller's command to the keywords of :meth:`pamrs.Simulator.step`:
+#: ``lambda u: {"valve_command": {"flexor": u, ...}}``.
 Actuation: TypeAlias = "Callable[[Any], Mapping[str, Any]]"
 #: Beyond any valve's command [V]: what answers more answers something else.
 MOST_VOLTS = 1000.0
@@ -91,7 +92,14 @@ class ClosedLoop:
             If the unit is unknown or the run has less than three rows.
         """
         rate = self.channels.get(self.joint.replace("joint_angle", "joint_rate", 1))
-        return evaluate(self.time, self.reference.angle, self.angle, rate=rate, parts=self.trajectory.phases, unit=unit)
+        return evaluate(
+            self.time,
+            self.reference.angle,
+            self.angle,
+            rate=rate,
+            parts=self.trajectory.phases,
+            unit=unit,
+        )
 
     def to_pandas(self) -> pd.DataFrame:
         """All columns as a table indexed by time [s].
@@ -112,7 +120,12 @@ class ClosedLoop:
             from pamrs.errors import missing_package
 
             raise missing_package(error, "io") from None
-        columns = {"reference": self.reference.angle, "reference_rate": self.reference.rate, "command": self.command, **self.channels}
+        columns = {
+            "reference": self.reference.angle,
+            "reference_rate": self.reference.rate,
+            "command": self.command,
+            **self.channels,
+        }
         return pd.DataFrame(columns, index=pd.Index(self.time, name="time"))
 
 
@@ -134,8 +147,9 @@ def closed_loop(
 ) -> ClosedLoop:
     """Let a controller follow a trajectory with a simulated plant.
 
-    At each of its samples, ``controller.period`` apart, the controller sees the plant and the reference of that moment; what it answers
-    is held exactly until its next sample. The plant may be another than the model that the controller was made with.
+    At each of its samples, ``controller.period`` apart, the controller sees the plant and the
+    reference of that moment; what it answers is held exactly until its next sample. The plant may
+    be another than the model that the controller was made with.
 
     Parameters
     ----------
@@ -148,16 +162,18 @@ def closed_loop(
     duration : float, optional
         [s]; the trajectory's by default.
     sample_time : float, optional
-        Time between two rows [s], a divisor of the controller's period; by default the longest that is at most 1 ms. Not for a
-        simulator.
+        Time between two rows [s], a divisor of the controller's period; by default the longest that
+        is at most 1 ms. Not for a simulator.
     step, initial : optional
         As for :class:`pamrs.Simulator`; not for a simulator.
     sensors : Sensors or Reader, optional
-        What the controller is told; the truth by default. A reader, ``sensors.started(controller.period)``, goes on from loop to loop,
-        where sensors begin again, with their noise and their delay.
+        What the controller is told; the truth by default. A reader,
+        ``sensors.started(controller.period)``, goes on from loop to loop, where sensors begin
+        again, with their noise and their delay.
     actuation : callable, optional
-        From the command to the keywords of :meth:`pamrs.Simulator.step`: ``lambda u: {"valve_command": {"flexor": u, "extensor":
-        10.0 - u}}``. By default the command is that of the only valve, or of the only regulator of a rig without valves.
+        From the command to the keywords of :meth:`pamrs.Simulator.step`: ``lambda u:
+        {"valve_command": {"flexor": u, "extensor": 10.0 - u}}``. By default the command is that of
+        the only valve, or of the only regulator of a rig without valves.
     measured : mapping of str to str, optional
         What the controller calls a channel -> the rig's name of it, for rigs with named blocks:
         ``{"joint_angle": "joint_angle.elbow"}``. The other channels keep their names.
@@ -166,7 +182,8 @@ def closed_loop(
     start : float
         Time of the trajectory, and of the controller, at which the loop begins [s].
     reset : bool
-        Whether the controller is reset first; without, it goes on (with ``start``) from what it has learnt.
+        Whether the controller is reset first; without, it goes on (with ``start``) from what it has
+        learnt.
 
     Returns
     -------
@@ -175,8 +192,8 @@ def closed_loop(
     Raises
     ------
     ParameterError
-        If times do not fit together, a name is unknown, the controller answers what is not a finite number, or a pressure where a
-        valve is driven.
+        If times do not fit together, a name is unknown, the controller answers what is not a finite
+        number, or a pressure where a valve is driven.
     SimulationError
         If the plant's state leaves the range in which the model holds.
 
@@ -185,19 +202,24 @@ def closed_loop(
     >>> import pamrs
     >>> from pamrs.control import PID, closed_loop
     >>> from pamrs.control.trajectories import degrees, step
-    >>> run = closed_loop(pamrs.rigs.shoulder(), PID(1.4, 0.5, period=0.005), step(*degrees(15, 40), duration=2.0))
+    >>> run = closed_loop(pamrs.rigs.shoulder(), PID(1.4, 0.5, period=0.005),
+    ...     step(*degrees(15, 40), duration=2.0))
     >>> run.time.size, bool(run.angle[-1] > run.angle[0])
     (2001, True)
     """
     simulator = _simulator(plant, controller, sample_time, step, initial)
     dt = simulator.sample_time
     every = whole_samples("controller.period", controller.period, dt, least=1)
-    total = whole_samples("duration", trajectory.duration if duration is None else duration, dt, least=1)
+    total = whole_samples(
+        "duration", trajectory.duration if duration is None else duration, dt, least=1
+    )
     check_angles(trajectory, total * dt)
     if not math.isfinite(start):
         raise ParameterError(f"start = {start} s is not allowed: a finite number is needed")
     act = actuation_of(simulator.rig, controller) if actuation is None else actuation
-    began = round(start / dt) if abs(round(start / dt) * dt - start) < 1e-9 * dt else start / dt  # a restart at the same float
+    began = (
+        round(start / dt) if abs(round(start / dt) * dt - start) < 1e-9 * dt else start / dt
+    )  # a restart at the same float
     names = _recorded(simulator.rig, channels, measured)
     read = reader_of(sensors, controller.period)
     if reset:
@@ -217,7 +239,9 @@ def closed_loop(
         except (TypeError, ValueError):
             value = math.nan
         if not math.isfinite(value):
-            raise ParameterError(f"the controller's command at {now:g} s is {command!r}: one finite number is needed")
+            raise ParameterError(
+                f"the controller's command at {now:g} s is {command!r}: one finite number is needed"
+            )
         commands[k : k + every + 1] = value  # the last row is what it would go on with
         k += every
         return act(value)
@@ -228,7 +252,16 @@ def closed_loop(
     time = np.asarray(np.arange(total + 1) * dt, dtype=np.float64)
     wanted = trajectory(np.asarray((began + np.arange(total + 1)) * dt, dtype=np.float64))
     out = {name: run[name] for name in names}
-    return ClosedLoop(time, wanted, commands, out, trajectory, simulator.rig, run.events, alias.get("joint_angle", "joint_angle"))
+    return ClosedLoop(
+        time,
+        wanted,
+        commands,
+        out,
+        trajectory,
+        simulator.rig,
+        run.events,
+        alias.get("joint_angle", "joint_angle"),
+    )
 
 
 def _check_volts(rig: Rig, commands: Array) -> None:
@@ -236,26 +269,38 @@ def _check_volts(rig: Rig, commands: Array) -> None:
     largest = float(np.nanmax(np.abs(commands)))
     if rig.tables("valve") and largest > MOST_VOLTS:
         raise ParameterError(
-            f"the controller answered {largest:.3g} V: if that is a pressure [Pa], set its answers = 'pressure' and put it in a "
-            "pamrs.control.Cascade"
+            f"the controller answered {largest:.3g} V: if that is a pressure [Pa], set its answers "
+            "= 'pressure' and put it in a pamrs.control.Cascade"
         )
 
 
 def _simulator(
-    plant: Rig | Simulator, controller: Controller, sample_time: float | None, step: float | None, initial: Mapping[str, float] | None
+    plant: Rig | Simulator,
+    controller: Controller,
+    sample_time: float | None,
+    step: float | None,
+    initial: Mapping[str, float] | None,
 ) -> Simulator:
     """The simulator that a run goes on with."""
     check_controller(controller)
     if isinstance(plant, Simulator):
         if not (sample_time is None and step is None and initial is None):
-            raise ParameterError("sample_time, step or initial is given, and the simulator has its own: give a Rig instead")
+            raise ParameterError(
+                "sample_time, step or initial is given, and the simulator has its own: give a Rig "
+                "instead"
+            )
         return plant
     return Simulator(
-        plant, sample_time=default_step(controller.period) if sample_time is None else sample_time, step=step, initial=initial
+        plant,
+        sample_time=default_step(controller.period) if sample_time is None else sample_time,
+        step=step,
+        initial=initial,
     )
 
 
-def _recorded(rig: Rig, channels: Iterable[str] | None, measured: Mapping[str, str] | None) -> list[str]:
+def _recorded(
+    rig: Rig, channels: Iterable[str] | None, measured: Mapping[str, str] | None
+) -> list[str]:
     """Names of the channels that are kept; the tracked ones always are."""
     known, tracked = core_rig(rig).channels, tracked_of(rig, measured)
     if channels is None:
@@ -263,7 +308,10 @@ def _recorded(rig: Rig, channels: Iterable[str] | None, measured: Mapping[str, s
     wanted = list(dict.fromkeys([*tracked, *channels]))
     for name in wanted:
         if name not in known:
-            raise ParameterError(f"channels has {name!r}, and the rig has no such channel; it has: {', '.join(known)}")
+            raise ParameterError(
+                f"channels has {name!r}, and the rig has no such channel; it has: "
+                f"{', '.join(known)}"
+            )
     return wanted
 
 
@@ -288,10 +336,16 @@ def tracked_of(rig: Rig, measured: Mapping[str, str] | None) -> tuple[str, str]:
     known = core_rig(rig).channels
     for name in (measured or {}).values():
         if name not in known:
-            raise ParameterError(f"measured has {name!r}, and the rig has no such channel; it has: {', '.join(known)}")
+            raise ParameterError(
+                f"measured has {name!r}, and the rig has no such channel; it has: "
+                f"{', '.join(known)}"
+            )
     angle = (measured or {}).get("joint_angle", "joint_angle")
     if angle not in known:
-        raise ParameterError(f"the rig {rig.name!r} has no channel {angle!r}; name the joint by measured; it has: {', '.join(known)}")
+        raise ParameterError(
+            f"the rig {rig.name!r} has no channel {angle!r}; name the joint by measured; it has: "
+            f"{', '.join(known)}"
+        )
     return angle, angle.replace("joint_angle", "joint_rate", 1)
 
 
@@ -314,7 +368,9 @@ def actuation_of(rig: Rig, controller: Controller) -> Actuation:
         If there is no such input, or more than one, or a valve would be given a pressure.
     """
     inputs = core_rig(rig).inputs
-    found = [name for name in inputs if name.startswith("valve_command")] or [n for n in inputs if n.startswith("supply_command")]
+    found = [name for name in inputs if name.startswith("valve_command")] or [
+        n for n in inputs if n.startswith("supply_command")
+    ]
     if len(found) != 1:
         raise ParameterError(
             f"the rig {rig.name!r} has the inputs {', '.join(inputs) or 'none'}: "

@@ -1,7 +1,9 @@
-"""What a model-based controller knows of its arm: inertia, gravity, and the torque of the muscles as a line in the pressure.
+"""What a model-based controller knows of its arm: inertia, gravity, and the torque of the muscles
+as a line in the pressure.
 
-At an angle the torque of every force model is ``tau = C1(theta) P + C2(theta)``: exactly so for the full model (:class:`FullTorque`,
-from the core's own muscle and joint), and with cubic C1 and C2 for the simplified one, (5.1)-(5.3) (:class:`SimplifiedTorque`).
+At an angle the torque of every force model is ``tau = C1(theta) P + C2(theta)``: exactly so for the
+full model (:class:`FullTorque`, from the core's own muscle and joint), and with cubic C1 and C2 for
+the simplified one, (5.1)-(5.3) (:class:`SimplifiedTorque`).
 """
 
 from __future__ import annotations
@@ -22,11 +24,20 @@ from pamrs.rig import Joint
 if TYPE_CHECKING:
     from pamrs.rig import Muscle, Rig
 
-__all__ = ["ArmModel", "FullTorque", "GaylordTorque", "SimplifiedTorque", "TorqueModel", "torque_line"]
+__all__ = [
+    "ArmModel",
+    "FullTorque",
+    "GaylordTorque",
+    "SimplifiedTorque",
+    "TorqueModel",
+    "torque_line",
+]
 
 Array = NDArray[np.float64]
 
-_NODES: Final = 1025  # of a table over the joint's range; makes its error some 1e-9 of the largest value
+_NODES: Final = (
+    1025  # of a table over the joint's range; makes its error some 1e-9 of the largest value
+)
 _LEAST_SLOPE: Final = 0.01  # of the largest C1: below it a pressure says nothing about the torque
 _INCH: Final = 0.0254
 
@@ -42,10 +53,16 @@ def _parts(rig: Rig) -> tuple[Muscle, Joint, dict[str, Any]]:
     """Muscle, joint and joint's table of a rig that a controller of one joint can know."""
     for block in ("muscle", "joint", "arm"):
         if len(rig.tables(block)) != 1:
-            raise ParameterError(f"rig {rig.name!r} has {len(rig.tables(block))} [{block}]: a controller's model needs exactly one")
+            raise ParameterError(
+                f"rig {rig.name!r} has {len(rig.tables(block))} [{block}]: a controller's model "
+                "needs exactly one"
+            )
     arm = next(iter(rig.tables("arm").values()))
     if arm["kind"] != "one_link":
-        raise ParameterError(f"rig {rig.name!r} has an arm of kind {arm['kind']!r}: a controller's model needs one_link")
+        raise ParameterError(
+            f"rig {rig.name!r} has an arm of kind {arm['kind']!r}: a controller's model needs "
+            "one_link"
+        )
     name = next(iter(rig.tables("muscle")))
     own = next(iter(rig.tables("joint").values()))
     return rig.muscle_of(name), Joint.from_model(rig.tables("transmission").get(name, own)), own
@@ -54,12 +71,15 @@ def _parts(rig: Rig) -> tuple[Muscle, Joint, dict[str, Any]]:
 def _supply_pressure(rig: Rig) -> float:
     supplies = rig.tables("supply")
     if not supplies:
-        raise ParameterError(f"rig {rig.name!r} has no [supply]: the pressure limit cannot be taken from it")
+        raise ParameterError(
+            f"rig {rig.name!r} has no [supply]: the pressure limit cannot be taken from it"
+        )
     return max(float(supply["initial_pressure"]) for supply in supplies.values())
 
 
 def torque_line(rig: Rig, angle: ArrayLike) -> tuple[Array, Array]:
-    """``C1`` and ``C2`` of the full model at angles, exact: the core's muscle while contracting, without friction.
+    """``C1`` and ``C2`` of the full model at angles, exact: the core's muscle while contracting,
+    without friction.
 
     Parameters
     ----------
@@ -87,8 +107,8 @@ def torque_line(rig: Rig, angle: ArrayLike) -> tuple[Array, Array]:
 class FullTorque:
     """Torque of the full model from tables over the joint's range; beyond it that of its ends.
 
-    Where C1 falls below a hundredth of its largest value (a muscle at the end of its stroke) it is held there, so that what would need
-    any pressure asks for the limit.
+    Where C1 falls below a hundredth of its largest value (a muscle at the end of its stroke) it is
+    held there, so that what would need any pressure asks for the limit.
 
     Parameters
     ----------
@@ -98,7 +118,8 @@ class FullTorque:
     Attributes
     ----------
     error : float
-        Largest error of the tables half way between their places, relative to the largest values [1].
+        Largest error of the tables half way between their places, relative to the largest values
+        [1].
 
     Raises
     ------
@@ -112,11 +133,22 @@ class FullTorque:
         c1, c2 = torque_line(rig, np.linspace(low, high, _NODES))
         self._floor = float(_LEAST_SLOPE * c1.max())
         if not self._floor > 0.0:
-            raise ParameterError(f"rig {rig.name!r}: pressure lowers the torque everywhere, so no pressure can be asked for")
+            raise ParameterError(
+                f"rig {rig.name!r}: pressure lowers the torque everywhere, so no pressure can be "
+                "asked for"
+            )
         self.slope, self.rest = Spline(low, high, c1), Spline(low, high, c2)
         between = 0.5 * (np.linspace(low, high, _NODES)[1:] + np.linspace(low, high, _NODES)[:-1])
-        pairs = zip((self.slope(between), self.rest(between)), torque_line(rig, between), (c1, c2), strict=True)
-        self.error = max(float(np.abs(table - exact).max() / max(np.abs(values).max(), 1e-300)) for table, exact, values in pairs)
+        pairs = zip(
+            (self.slope(between), self.rest(between)),
+            torque_line(rig, between),
+            (c1, c2),
+            strict=True,
+        )
+        self.error = max(
+            float(np.abs(table - exact).max() / max(np.abs(values).max(), 1e-300))
+            for table, exact, values in pairs
+        )
 
     def at(self, angle: Value) -> tuple[Value, Value]:
         """``C1`` [N m/Pa] and ``C2`` [N m] at an angle [rad]."""
@@ -127,7 +159,8 @@ class FullTorque:
 
 
 class SimplifiedTorque:
-    """Simplified torque model (5.1)-(5.3): ``C1 = k1 x^3 + k2 x^2 + k3 x + k4``, ``C2 = k5 x^3 + k6 x^2 + k7 x + k8``.
+    """Simplified torque model (5.1)-(5.3): ``C1 = k1 x^3 + k2 x^2 + k3 x + k4``,
+    ``C2 = k5 x^3 + k6 x^2 + k7 x + k8``.
 
     Parameters
     ----------
@@ -157,17 +190,26 @@ class SimplifiedTorque:
     ) -> None:
         k = np.asarray(coefficients, dtype=np.float64)
         if k.shape != (8,) or not np.all(np.isfinite(k)):
-            raise ParameterError(f"coefficients of shape {k.shape} are not allowed: eight finite numbers are needed")
+            raise ParameterError(
+                f"coefficients of shape {k.shape} are not allowed: eight finite numbers are needed"
+            )
         self.coefficients: tuple[float, ...] = tuple(k.tolist())
         self.angle_range = (float(angle_range[0]), float(angle_range[1]))
         self.rms, self.largest, self.relative = rms, largest, relative
         least = float(np.polyval(k[:4], np.linspace(*self.angle_range, 501)).min())
         if not least > 0.0:
-            raise ParameterError(f"coefficients give C1 = {least:g} N m/Pa within the range: above zero is needed")
+            raise ParameterError(
+                f"coefficients give C1 = {least:g} N m/Pa within the range: above zero is needed"
+            )
 
     @classmethod
     def fit(
-        cls, rig: Rig, *, low: float = math.radians(15.0), high: float = math.radians(110.0), pressure: float | None = None
+        cls,
+        rig: Rig,
+        *,
+        low: float = math.radians(15.0),
+        high: float = math.radians(110.0),
+        pressure: float | None = None,
     ) -> SimplifiedTorque:
         """By least squares from the full model, over even angles and pressures from zero.
 
@@ -193,21 +235,29 @@ class SimplifiedTorque:
         _, _, table = _parts(rig)
         low, high = max(low, float(table["min_angle"])), min(high, float(table["max_angle"]))
         if not low < high:
-            raise ParameterError(f"low = {low:g} rad and high = {high:g} rad leave nothing of the joint's range")
-        top = _supply_pressure(rig) if pressure is None else float(positive_gain("pressure", pressure))
+            raise ParameterError(
+                f"low = {low:g} rad and high = {high:g} rad leave nothing of the joint's range"
+            )
+        top = (
+            _supply_pressure(rig)
+            if pressure is None
+            else float(positive_gain("pressure", pressure))
+        )
         angle = np.linspace(low, high, 191)
         c1, c2 = torque_line(rig, angle)
         powers = np.vander(angle, 4)
         scaled = np.linspace(0.0, 1.0, 21)
         torque = np.outer(scaled * top, c1) + c2
-        columns = np.concatenate([(scaled[:, None, None] * powers), np.broadcast_to(powers, (21, *powers.shape))], axis=2).reshape(
-            -1, 8
-        )
+        columns = np.concatenate(
+            [(scaled[:, None, None] * powers), np.broadcast_to(powers, (21, *powers.shape))], axis=2
+        ).reshape(-1, 8)
         k = np.linalg.lstsq(columns, torque.ravel(), rcond=None)[0]
         residual = columns @ k - torque.ravel()
         k[:4] /= top
         rms, biggest = float(np.sqrt(np.mean(residual**2))), float(np.abs(torque).max())
-        return cls(k, (low, high), rms=rms, largest=float(np.abs(residual).max()), relative=rms / biggest)
+        return cls(
+            k, (low, high), rms=rms, largest=float(np.abs(residual).max()), relative=rms / biggest
+        )
 
     def at(self, angle: Value) -> tuple[Value, Value]:
         """``C1`` [N m/Pa] and ``C2`` [N m] at an angle [rad]."""
@@ -221,10 +271,12 @@ class SimplifiedTorque:
 
 
 class GaylordTorque:
-    """The educated guess of (5.25): Gaylord's force on a constant arm, ``C1 = n (3 L^2 - B^2)/(4 pi N^2) r_eff``, ``C2 = 0``.
+    """The educated guess of (5.25): Gaylord's force on a constant arm,
+    ``C1 = n (3 L^2 - B^2)/(4 pi N^2) r_eff``, ``C2 = 0``.
 
-    The length is linear in the angle, ``L = L0 - r_eff (theta - theta_0)``. As printed, L = 5 in with B = 11.23 in, the force would be
-    negative (3 L^2 < B^2): the muscle's own rest length is taken, and its own B and N, which for the shoulder are 11.33 in and 1.02.
+    The length is linear in the angle, ``L = L0 - r_eff (theta - theta_0)``. As printed, L = 5 in
+    with B = 11.23 in, the force would be negative (3 L^2 < B^2): the muscle's own rest length is
+    taken, and its own B and N, which for the shoulder are 11.33 in and 1.02.
 
     Parameters
     ----------
@@ -246,7 +298,10 @@ class GaylordTorque:
         low, high = float(table["min_angle"]), float(table["max_angle"])
         angle = np.linspace(low, high, _NODES)
         rest = float(muscle.parameters["rest_length"])
-        contraction = np.minimum(radius * (angle - float(joint.parameters["rest_angle"])) / rest, muscle.contraction_limits[1])
+        contraction = np.minimum(
+            radius * (angle - float(joint.parameters["rest_angle"])) / rest,
+            muscle.contraction_limits[1],
+        )
         c1 = int(muscle.parameters["count"]) * gaylord.gas_area(contraction) * radius
         self._slope = Spline(low, high, np.maximum(c1, _LEAST_SLOPE * c1.max()))
 
@@ -257,7 +312,8 @@ class GaylordTorque:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class ArmModel:
-    """Equation of motion (5.4) as a controller has it: ``I theta'' + b theta' + m g r sin(theta) = C1(theta) P + C2(theta)``.
+    """Equation of motion (5.4) as a controller has it: ``I theta'' + b theta' + m g r sin(theta) =
+    C1(theta) P + C2(theta)``.
 
     Attributes
     ----------
@@ -285,13 +341,20 @@ class ArmModel:
     def __post_init__(self) -> None:
         for name in ("inertia", "viscous", "weight"):
             object.__setattr__(self, name, as_value(name, getattr(self, name)))
-        object.__setattr__(self, "pressure_limit", float(positive_gain("pressure_limit", self.pressure_limit)))
+        object.__setattr__(
+            self, "pressure_limit", float(positive_gain("pressure_limit", self.pressure_limit))
+        )
         low, high = (float(value) for value in self.angle_range)
         if not (math.isfinite(low) and math.isfinite(high) and low < high):
-            raise ParameterError(f"angle_range = {self.angle_range} is not allowed: two finite angles, the first below the second")
+            raise ParameterError(
+                f"angle_range = {self.angle_range} is not allowed: two finite angles, the first "
+                "below the second"
+            )
 
     @classmethod
-    def from_rig(cls, rig: Rig, *, torque: str | TorqueModel = "full", pressure_limit: float | None = None) -> ArmModel:
+    def from_rig(
+        cls, rig: Rig, *, torque: str | TorqueModel = "full", pressure_limit: float | None = None
+    ) -> ArmModel:
         """The nominal model of a rig, with its payload.
 
         Parameters
@@ -310,14 +373,21 @@ class ArmModel:
         Raises
         ------
         ParameterError
-            As :func:`torque_line`; if there is no such torque model or no supply to take the limit from.
+            As :func:`torque_line`; if there is no such torque model or no supply to take the limit
+            from.
         """
         _, _, joint = _parts(rig)
         arm = next(iter(rig.tables("arm").values()))
-        makers: dict[str, Any] = {"full": FullTorque, "simplified": SimplifiedTorque.fit, "gaylord": GaylordTorque}
+        makers: dict[str, Any] = {
+            "full": FullTorque,
+            "simplified": SimplifiedTorque.fit,
+            "gaylord": GaylordTorque,
+        }
         if isinstance(torque, str):
             if torque not in makers:
-                raise ParameterError(f"torque = {torque!r} is not allowed: one of {', '.join(makers)}, or a model")
+                raise ParameterError(
+                    f"torque = {torque!r} is not allowed: one of {', '.join(makers)}, or a model"
+                )
             torque_model: TorqueModel = makers[torque](rig)
         else:
             torque_model = torque
@@ -335,8 +405,14 @@ class ArmModel:
         return dataclasses.replace(self, **changes)
 
     def scaled(self, factor: Value) -> ArmModel:
-        """With ``I``, ``b`` and ``m g r`` times a factor: the wrong estimates of 5.4.1, 0.1 and 10."""
-        return self.replace(inertia=self.inertia * factor, viscous=self.viscous * factor, weight=self.weight * factor)
+        """With ``I``, ``b`` and ``m g r`` times a factor: the wrong estimates of 5.4.1, 0.1
+        and 10.
+        """
+        return self.replace(
+            inertia=self.inertia * factor,
+            viscous=self.viscous * factor,
+            weight=self.weight * factor,
+        )
 
     @property
     def gains(self) -> tuple[Value, ...]:
@@ -344,6 +420,8 @@ class ArmModel:
         return self.inertia, self.viscous, self.weight
 
     def pressure(self, torque: Value, angle: Value) -> Value:
-        """Gauge pressure [Pa] that gives a torque [N m] at an angle [rad], without limits (4.12)."""
+        """Gauge pressure [Pa] that gives a torque [N m] at an angle [rad], without limits
+        (4.12).
+        """
         c1, c2 = self.torque.at(angle)
         return (torque - c2) / c1

@@ -1,9 +1,13 @@
-"""Adaptive neural-network control (dissertation 5.3.3, (5.16)-(5.25) corrected; Sanner & Slotine, IEEE Trans. Neural Networks 3, 1992).
+"""Adaptive neural-network control (dissertation 5.3.3, (5.16)-(5.25) corrected; Sanner & Slotine,
+IEEE Trans. Neural Networks 3, 1992).
 
 ::
 
-    P_d = H(theta) theta_r'' + C(theta) theta_r' + G(theta) - KD sgn(s)        H, C, G = sum_k c_k phi(h theta - k), phi triangular
-    c_k,H' = -gamma_H phi theta_r'' s_D        c_k,C' = -gamma_C phi theta_r' s_D        c_k,G' = -gamma_G phi s_D
+    P_d = H(theta) theta_r'' + C(theta) theta_r' + G(theta) - KD sgn(s)
+    H, C, G = sum_k c_k phi(h theta - k), phi triangular
+    c_k,H' = -gamma_H phi theta_r'' s_D
+    c_k,C' = -gamma_C phi theta_r' s_D
+    c_k,G' = -gamma_G phi s_D
 """
 
 from __future__ import annotations
@@ -32,21 +36,24 @@ __all__ = ["NETWORKS", "Neural"]
 Array = NDArray[np.float64]
 
 NETWORKS: Final = ("H", "C", "G")
-"""The networks: of the reference acceleration [Pa s2/rad], of the reference rate [Pa s/rad], and of gravity and elasticity [Pa]."""
+"""The networks: of the reference acceleration [Pa s2/rad], of the reference rate [Pa s/rad], and of
+gravity and elasticity [Pa]."""
 _SCHEMA: Final = "pamrs.networks/1"
 
 
 class Neural(SlidingController):
-    """Adaptive neural-network control; answers a desired gauge pressure [Pa] for a :class:`pamrs.control.Cascade`.
+    """Adaptive neural-network control; answers a desired gauge pressure [Pa] for a
+    :class:`pamrs.control.Cascade`.
 
-    The nodes' triangles overlap so that at every angle of the range two are active and sum to one; beyond the range the last node
-    holds.
+    The nodes' triangles overlap so that at every angle of the range two are active and sum to one;
+    beyond the range the last node holds.
 
     Parameters
     ----------
     arm : ArmModel
-        Gives range and pressure limit and, with ``start="model"``, the start: ``H = I/C1``, ``C = b/C1``, ``G = (m g r sin - C2)/C1``
-        (5.17)-(5.19). With the torque ``"gaylord"`` that is the educated guess of (5.25).
+        Gives range and pressure limit and, with ``start="model"``, the start: ``H = I/C1``,
+        ``C = b/C1``, ``G = (m g r sin - C2)/C1`` (5.17)-(5.19). With the torque ``"gaylord"`` that
+        is the educated guess of (5.25).
     start : {"zero", "model"}
         What the networks know at first.
     nodes : int
@@ -56,23 +63,26 @@ class Neural(SlidingController):
     deadband : float or ndarray, shape (n,)
         Of s [rad/s]; 0.02 as printed for 5.3.2.
     bounds : sequence of three float, or None
-        Largest absolute weight of each network; by default the pressure limit over 20 rad/s2, over 50 rad/s, and itself.
-        None: free.
+        Largest absolute weight of each network; by default the pressure limit over 20 rad/s2, over
+        50 rad/s, and itself. None: free.
     hold_at_limit : bool
         As for :class:`pamrs.control.AdaptiveSliding`.
     **others
-        As for :class:`pamrs.control.SlidingController`, with defaults of its own: while the networks know nothing the switching
-        term alone carries the arm, so that ``switching`` is 0.4 MPa over a ``boundary_layer`` of 2 rad/s, ``slope`` 3 /s. With the
-        20 kPa over 0.2 rad/s that serve the other laws the start from zero oscillates on the simulated shoulder and learns nothing.
+        As for :class:`pamrs.control.SlidingController`, with defaults of its own: while the
+        networks know nothing the switching term alone carries the arm, so that ``switching`` is 0.4
+        MPa over a ``boundary_layer`` of 2 rad/s, ``slope`` 3 /s. With the 20 kPa over 0.2 rad/s
+        that serve the other laws the start from zero oscillates on the simulated shoulder and
+        learns nothing.
 
     Notes
     -----
-    The gains are not printed. With the defaults and a large supply the start from zero learns the simulated shoulder (9 kg, waves
-    between 28 and 82 deg) from 9 deg rms in the first 20 s to 0.3 deg after 300 s, with or without bounds. A tank that runs empty is
-    learnt as well: on the shoulder's own 15 l the error grows after some 220 s, and with wider bounds than the default bursts came
-    after 80 s; long training needs a larger supply.
-    The switching term suits an arm with its payload (I of 8 to 20 kg m2): with none, 0.6,
-    it is too stiff for the pressure loop and the arm oscillates; it must fall with I.
+    The gains are not printed. With the defaults and a large supply the start from zero learns the
+    simulated shoulder (9 kg, waves between 28 and 82 deg) from 9 deg rms in the first 20 s to 0.3
+    deg after 300 s, with or without bounds. A tank that runs empty is learnt as well: on the
+    shoulder's own 15 l the error grows after some 220 s, and with wider bounds than the default
+    bursts came after 80 s; long training needs a larger supply. The switching term suits an arm
+    with its payload (I of 8 to 20 kg m2): with none, 0.6, it is too stiff for the pressure loop and
+    the arm oscillates; it must fall with I.
 
     Raises
     ------
@@ -99,21 +109,37 @@ class Neural(SlidingController):
         if start not in ("zero", "model"):
             raise ParameterError(f"start = {start!r} is not allowed: 'zero' or 'model' is needed")
         if not (isinstance(nodes, int) and not isinstance(nodes, bool) and 2 <= nodes <= 10_000):
-            raise ParameterError(f"nodes = {nodes} is not allowed: a whole number from 2 to 10000 is needed")
+            raise ParameterError(
+                f"nodes = {nodes} is not allowed: a whole number from 2 to 10000 is needed"
+            )
         if len(gains) != 3:
-            raise ParameterError(f"gains has {len(gains)} entries: three are needed, for H, C and G")
+            raise ParameterError(
+                f"gains has {len(gains)} entries: three are needed, for H, C and G"
+            )
         pairs = zip(NETWORKS, gains, strict=True)
-        self._gains: tuple[Value, ...] = tuple(as_value(f"gains[{name}]", value, lower=0.0) for name, value in pairs)
+        self._gains: tuple[Value, ...] = tuple(
+            as_value(f"gains[{name}]", value, lower=0.0) for name, value in pairs
+        )
         self._deadband, self._nodes = as_value("deadband", deadband, lower=0.0), nodes
         self.hold_at_limit = bool(hold_at_limit)
         limit = arm.pressure_limit
         chosen = (limit / 20.0, limit / 50.0, limit) if bounds == "default" else bounds
-        if chosen is not None and not (len(chosen) == 3 and all(isinstance(b, (int, float)) and b > 0.0 for b in chosen)):
-            raise ParameterError(f"bounds = {bounds!r} is not allowed: 'default', three numbers above zero or None")
-        self._bounds: tuple[float, ...] | None = None if chosen is None else tuple(float(b) for b in chosen)
+        if chosen is not None and not (
+            len(chosen) == 3 and all(isinstance(b, (int, float)) and b > 0.0 for b in chosen)
+        ):
+            raise ParameterError(
+                f"bounds = {bounds!r} is not allowed: 'default', three numbers above zero or None"
+            )
+        self._bounds: tuple[float, ...] | None = (
+            None if chosen is None else tuple(float(b) for b in chosen)
+        )
         self._first, last = float(arm.angle_range[0]), float(arm.angle_range[1])
         self._density = (nodes - 1) / (last - self._first)
-        self._initial = self._of_model(arm, last) if start == "model" else {name: [0.0] * nodes for name in NETWORKS}
+        self._initial = (
+            self._of_model(arm, last)
+            if start == "model"
+            else {name: [0.0] * nodes for name in NETWORKS}
+        )
         defaults: dict[str, Any] = {"slope": 3.0, "switching": 4e5, "boundary_layer": 2.0}
         super().__init__(arm, gains=(*self._gains, self._deadband), **{**defaults, **others})
         self._given_batch = self._gain_batch
@@ -122,12 +148,22 @@ class Neural(SlidingController):
 
     def _of_model(self, arm: ArmModel, last: float) -> dict[str, list[float]]:
         if not all(isinstance(value, float) for value in arm.gains):
-            raise ParameterError("arm has arrays for estimates: networks start from one arm, whose numbers are floats")
+            raise ParameterError(
+                "arm has arrays for estimates: networks start from one arm, whose numbers are "
+                "floats"
+            )
         angle = np.linspace(self._first, last, self._nodes)
         c1, c2 = (np.broadcast_to(value, angle.shape) for value in arm.torque.at(angle))
-        started = {"H": arm.inertia / c1, "C": arm.viscous / c1, "G": (arm.weight * np.sin(angle) - c2) / c1}
+        started = {
+            "H": arm.inertia / c1,
+            "C": arm.viscous / c1,
+            "G": (arm.weight * np.sin(angle) - c2) / c1,
+        }
         if self._bounds is not None:
-            started = {name: np.clip(w, -b, b) for (name, w), b in zip(started.items(), self._bounds, strict=True)}
+            started = {
+                name: np.clip(w, -b, b)
+                for (name, w), b in zip(started.items(), self._bounds, strict=True)
+            }
         return {name: weights.tolist() for name, weights in started.items()}
 
     def _start(self) -> dict[str, Any]:
@@ -149,7 +185,9 @@ class Neural(SlidingController):
         return np.maximum(1.0 - np.abs(place[..., None] - np.arange(self._nodes)), 0.0)
 
     def update(self, time: float, measurement: Measurement, reference: Reference) -> Value:
-        """Desired gauge pressure [Pa] for a sample, within 0 and the limit; see :meth:`pamrs.control.Controller.update`."""
+        """Desired gauge pressure [Pa] for a sample, within 0 and the limit; see
+        :meth:`pamrs.control.Controller.update`.
+        """
         surface: tuple[Any, ...] = self._surface(time, measurement, reference)
         if self._batch is not None:
             return self._of_batch(*(np.broadcast_to(value, self._batch) for value in surface))
@@ -174,7 +212,9 @@ class Neural(SlidingController):
         if self.hold_at_limit:
             error = held(error, wanted - pressure)
         if error != 0.0:
-            for network, gain, factor, bound in zip((h, c, g), self._rates, (acceleration, rate, 1.0), self._tops, strict=True):
+            for network, gain, factor, bound in zip(
+                (h, c, g), self._rates, (acceleration, rate, 1.0), self._tops, strict=True
+            ):
                 step = gain * factor * error
                 low, high = network[k] - step * before, network[j] - step * after
                 network[k] = -bound if low < -bound else bound if low > bound else low
@@ -189,7 +229,9 @@ class Neural(SlidingController):
     def _tops(self) -> tuple[float, ...]:
         return (math.inf, math.inf, math.inf) if self._bounds is None else self._bounds
 
-    def _of_batch(self, angle: Array, rate: Array, acceleration: Array, s: Array, switching: Array) -> Array:
+    def _of_batch(
+        self, angle: Array, rate: Array, acceleration: Array, s: Array, switching: Array
+    ) -> Array:
         """The same for a batch, each plant with weights of its own."""
         n = s.size
         networks: list[Array] = []
@@ -197,7 +239,9 @@ class Neural(SlidingController):
             weights = np.asarray(getattr(self, f"_{name}"), dtype=np.float64)
             networks.append(np.tile(weights, (n, 1)) if weights.ndim == 1 else weights)
             setattr(self, f"_{name}", networks[-1])
-        place = np.minimum(np.maximum((angle - self._first) * self._density, 0.0), self._nodes - 1.0)
+        place = np.minimum(
+            np.maximum((angle - self._first) * self._density, 0.0), self._nodes - 1.0
+        )
         k = np.minimum(place.astype(np.intp), self._nodes - 2)
         after = place - k
         before = 1.0 - after
@@ -209,7 +253,9 @@ class Neural(SlidingController):
         if self.hold_at_limit:
             error = held(error, wanted - pressure)
         factors: tuple[Any, ...] = (acceleration, rate, 1.0)
-        for weights, gain, factor, bound in zip(networks, self._rates, factors, self._tops, strict=True):
+        for weights, gain, factor, bound in zip(
+            networks, self._rates, factors, self._tops, strict=True
+        ):
             step = gain * factor * error
             weights[row, k] = np.minimum(np.maximum(weights[row, k] - step * before, -bound), bound)
             weights[row, j] = np.minimum(np.maximum(weights[row, j] - step * after, -bound), bound)
@@ -218,7 +264,8 @@ class Neural(SlidingController):
     # ------------------------------------------------------------------ kept
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write the weights to a JSON file, whole or not at all; :meth:`load` gives the same numbers to the last bit.
+        """Write the weights to a JSON file, whole or not at all; :meth:`load` gives the same
+        numbers to the last bit.
 
         Parameters
         ----------
@@ -230,7 +277,11 @@ class Neural(SlidingController):
         Path
             The file written.
         """
-        content = {"schema": _SCHEMA, "angle_range": list(self.arm.angle_range), "nodes": self._nodes}
+        content = {
+            "schema": _SCHEMA,
+            "angle_range": list(self.arm.angle_range),
+            "nodes": self._nodes,
+        }
         weights = {name: array.tolist() for name, array in self.weights.items()}
         return write_atomically(path, json.dumps({**content, "weights": weights}) + "\n")
 
@@ -240,34 +291,46 @@ class Neural(SlidingController):
         Parameters
         ----------
         path : path-like
-            Written by :meth:`save` of a controller with the same nodes over the same range. Weights of a batch make this a controller
-            of such a batch, as gains in arrays do.
+            Written by :meth:`save` of a controller with the same nodes over the same range. Weights
+            of a batch make this a controller of such a batch, as gains in arrays do.
 
         Raises
         ------
         ParameterError
-            If the file is not of that kind, or of other nodes; the message says which. Nothing is changed then.
+            If the file is not of that kind, or of other nodes; the message says which. Nothing is
+            changed then.
         """
         try:
             content = json.loads(Path(path).read_text(encoding="utf-8"))
             if content["schema"] != _SCHEMA:
-                raise ParameterError(f"{path}: schema is {content['schema']!r}; {_SCHEMA!r} is needed")
+                raise ParameterError(
+                    f"{path}: schema is {content['schema']!r}; {_SCHEMA!r} is needed"
+                )
             nodes, span = content["nodes"], tuple(content["angle_range"])
-            weights = {name: np.asarray(content["weights"][name], dtype=np.float64) for name in NETWORKS}
+            weights = {
+                name: np.asarray(content["weights"][name], dtype=np.float64) for name in NETWORKS
+            }
         except ParameterError:
             raise
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise ParameterError(f"{path}: no networks of pamrs ({error})") from error
         if nodes != self._nodes or span != tuple(self.arm.angle_range):
             own = f"{self._nodes} nodes over {tuple(self.arm.angle_range)} rad"
-            raise ParameterError(f"{path}: {nodes} nodes over {span} rad; this controller has {own}")
+            raise ParameterError(
+                f"{path}: {nodes} nodes over {span} rad; this controller has {own}"
+            )
         shapes = {array.shape for array in weights.values()}
         if len(shapes) != 1 or (shape := shapes.pop())[-1:] != (nodes,) or len(shape) > 2:
-            raise ParameterError(f"{path}: weights of the shapes {sorted(shapes)} for {nodes} nodes")
+            raise ParameterError(
+                f"{path}: weights of the shapes {sorted(shapes)} for {nodes} nodes"
+            )
         plants = shape[0] if len(shape) == 2 else None
         for size in (self._given_batch, self._batch):
             if plants is not None and size not in (None, plants):
-                raise ParameterError(f"{path}: weights of {plants} plants; this controller is one of a batch of {size}")
+                raise ParameterError(
+                    f"{path}: weights of {plants} plants; this controller is one of a batch of "
+                    f"{size}"
+                )
         self._gain_batch = self._given_batch if plants is None else plants
         self._batch = self._size = self._batch if plants is None else plants
         if not all(np.all(np.isfinite(array)) for array in weights.values()):

@@ -1,4 +1,6 @@
-"""What PID and fuzzy control share: the joint as measured, a unit of the angle, volts around the closed valve, printed gains."""
+"""What PID and fuzzy control share: the joint as measured, a unit of the angle, volts around the
+closed valve, printed gains.
+"""
 
 from __future__ import annotations
 
@@ -53,8 +55,12 @@ class OutputFeedback(SampledController):
         self._unit, self._scale = unit, angle_factor(unit)
         low, high, self._null = limits_around(limits, null)
         self._limits = low, high
-        self.sensor = JointSensor(period, angle_filter=angle_filter, rate_filter=rate_filter, measured_rate=measured_rate)
-        super().__init__(period, (*gains, self.sensor.low_pass.time_constant, self.sensor.slope.time_constant))
+        self.sensor = JointSensor(
+            period, angle_filter=angle_filter, rate_filter=rate_filter, measured_rate=measured_rate
+        )
+        super().__init__(
+            period, (*gains, self.sensor.low_pass.time_constant, self.sensor.slope.time_constant)
+        )
 
     @classmethod
     def published(cls, name: str, **others: Any) -> Self:
@@ -63,10 +69,11 @@ class OutputFeedback(SampledController):
         Parameters
         ----------
         name : str
-            Of :class:`pamrs.control.PID`: ``feedforward`` (4.4.2, to be used beside a feedforward of kM = 1.0), ``experiment_23kg``
-            (4.5.1.2, best combined), ``optimal_11kg`` (Fig. 4.9, kP just above 1 and kI near 4). Of :class:`pamrs.control.Fuzzy`:
-            ``optimal_23kg`` (4.4.1.2), ``feedforward`` (4.4.2 and Fig. 4.13, beside a feedforward), ``feedforward_gain_series``
-            (Fig. 4.14).
+            Of :class:`pamrs.control.PID`: ``feedforward`` (4.4.2, to be used beside a feedforward
+            of kM = 1.0), ``experiment_23kg`` (4.5.1.2, best combined), ``optimal_11kg`` (Fig. 4.9,
+            kP just above 1 and kI near 4). Of :class:`pamrs.control.Fuzzy`: ``optimal_23kg``
+            (4.4.1.2), ``feedforward`` (4.4.2 and Fig. 4.13, beside a feedforward),
+            ``feedforward_gain_series`` (Fig. 4.14).
         **others
             The other arguments; for a PID ``anti_windup="none"`` as in the dissertation.
 
@@ -80,7 +87,9 @@ class OutputFeedback(SampledController):
             If there is no such set of gains.
         """
         if name not in cls._PUBLISHED:
-            raise ParameterError(f"name = {name!r} is not allowed: one of {', '.join(cls._PUBLISHED)}")
+            raise ParameterError(
+                f"name = {name!r} is not allowed: one of {', '.join(cls._PUBLISHED)}"
+            )
         return cls(**{**cls._PUBLISHED[name], "unit": "rad", **others})
 
     def update(self, time: float, measurement: Measurement, reference: Reference) -> Value:
@@ -88,5 +97,7 @@ class OutputFeedback(SampledController):
         return self.answer(time, measurement, reference, 0.0)
 
     @abc.abstractmethod
-    def answer(self, time: float, measurement: Measurement, reference: Reference, bias: Value) -> Value:
+    def answer(
+        self, time: float, measurement: Measurement, reference: Reference, bias: Value
+    ) -> Value:
         """As :meth:`update`, with ``bias`` [V] added before the limits: a feedforward beside it."""

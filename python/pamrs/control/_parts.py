@@ -1,6 +1,8 @@
-"""Parts of controllers: low-pass, filtered derivative, integral with anti-windup, and the joint as it is measured.
+"""Parts of controllers: low-pass, filtered derivative, integral with anti-windup, and the joint as
+it is measured.
 
-All are sampled with a period, exact for what they say they hold between samples, and have an explicit state.
+All are sampled with a period, exact for what they say they hold between samples, and have an
+explicit state.
 """
 
 from __future__ import annotations
@@ -18,7 +20,8 @@ from pamrs.errors import ParameterError
 __all__ = ["ANTI_WINDUP", "FilteredDerivative", "Integrator", "LowPass"]
 
 ANTI_WINDUP: Final = ("clamping", "back_calculation", "none")
-"""How an integral is kept from growing while the output is at a limit; ``none`` as in the dissertation."""
+"""How an integral is kept from growing while the output is at a limit; ``none`` as in the
+dissertation."""
 
 
 def _pole(time_constant: Value, period: float) -> Value:
@@ -30,10 +33,12 @@ def _pole(time_constant: Value, period: float) -> Value:
 
 
 class LowPass(Stateful):
-    """First-order low-pass ``tau y' = x - y``, exact for an input that is held from sample to sample.
+    """First-order low-pass ``tau y' = x - y``, exact for an input that is held from sample to
+    sample.
 
-    ``update(x)`` answers what the continuous filter gives at the end of the period over which ``x`` is held: ``y += (1 - a)(x - y)``,
-    ``a = exp(-T/tau)``. A unit step from the first sample on gives ``1 - exp(-(k + 1) T/tau)``.
+    ``update(x)`` answers what the continuous filter gives at the end of the period over which ``x``
+    is held: ``y += (1 - a)(x - y)``, ``a = exp(-T/tau)``. A unit step from the first sample on
+    gives ``1 - exp(-(k + 1) T/tau)``.
 
     Parameters
     ----------
@@ -42,7 +47,8 @@ class LowPass(Stateful):
     period : float
         ``T`` [s].
     initial : float, optional
-        Output before the first sample; by default the first input, so that it begins without a transient.
+        Output before the first sample; by default the first input, so that it begins without a
+        transient.
 
     Raises
     ------
@@ -52,7 +58,9 @@ class LowPass(Stateful):
 
     _STATE: ClassVar[Mapping[str, Any]] = {"output": None}
 
-    def __init__(self, time_constant: Value, period: float, *, initial: float | None = None) -> None:
+    def __init__(
+        self, time_constant: Value, period: float, *, initial: float | None = None
+    ) -> None:
         self.time_constant = as_value("time_constant", time_constant, lower=0.0)
         pole = _pole(self.time_constant, positive_number("period", period))
         self._share = 1.0 - pole
@@ -72,16 +80,21 @@ class LowPass(Stateful):
             return value
         output = last + self._share * (value - last)
         if self._passes:
-            output = value if self._share.__class__ is float else np.where(self._share == 1.0, value, output)
+            output = (
+                value
+                if self._share.__class__ is float
+                else np.where(self._share == 1.0, value, output)
+            )
         self._output = output
         return output
 
 
 class FilteredDerivative(Stateful):
-    """Low-passed derivative ``tau y' = x' - y``, exact for an input that is linear from sample to sample.
+    """Low-passed derivative ``tau y' = x' - y``, exact for an input that is linear from sample to
+    sample.
 
-    ``y_k = a y_(k-1) + (1 - a)(x_k - x_(k-1))/T``: a ramp gives its slope without a bias, which the form for a held input does not. The
-    first sample gives 0.
+    ``y_k = a y_(k-1) + (1 - a)(x_k - x_(k-1))/T``: a ramp gives its slope without a bias, which the
+    form for a held input does not. The first sample gives 0.
 
     Parameters
     ----------
@@ -122,8 +135,9 @@ class Integrator(Stateful):
     period : float
         ``T`` [s].
     anti_windup : {"clamping", "back_calculation", "none"}
-        ``clamping`` holds the integral while the output is beyond a limit and the rate points outwards; ``back_calculation`` takes
-        ``excess/tracking_time`` off the rate; ``none`` integrates on.
+        ``clamping`` holds the integral while the output is beyond a limit and the rate points
+        outwards; ``back_calculation`` takes ``excess/tracking_time`` off the rate; ``none``
+        integrates on.
     tracking_time : float or ndarray, shape (n,)
         Time constant of the back-calculation [s].
 
@@ -135,9 +149,13 @@ class Integrator(Stateful):
 
     _STATE: ClassVar[Mapping[str, Any]] = {"integral": 0.0}
 
-    def __init__(self, period: float, *, anti_windup: str = "clamping", tracking_time: Value = 0.5) -> None:
+    def __init__(
+        self, period: float, *, anti_windup: str = "clamping", tracking_time: Value = 0.5
+    ) -> None:
         if anti_windup not in ANTI_WINDUP:
-            raise ParameterError(f"anti_windup = {anti_windup!r} is not allowed: one of {', '.join(ANTI_WINDUP)}")
+            raise ParameterError(
+                f"anti_windup = {anti_windup!r} is not allowed: one of {', '.join(ANTI_WINDUP)}"
+            )
         self._period = positive_number("period", period)
         self._mode = ANTI_WINDUP.index(anti_windup)
         # from one sample to the next not more than the whole excess is taken off

@@ -1,4 +1,6 @@
-"""Proportional-integral-derivative control (dissertation (4.9)): the law, and the controller of the joint angle."""
+"""Proportional-integral-derivative control (dissertation (4.9)): the law, and the controller of the
+joint angle.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,8 @@ from pamrs.control._values import as_value, clip, limits_around
 
 __all__ = ["PID", "PIDLaw"]
 
-#: Gains as printed: 4.4.2 (with feedforward, kM 1.0), 4.5.1.2 (best combined at 23 kg), Fig. 4.9 (about, at 11 kg).
+#: Gains as printed: 4.4.2 (with feedforward, kM 1.0), 4.5.1.2 (best combined at 23 kg), Fig. 4.9
+#: (about, at 11 kg).
 _PRINTED: Final[Mapping[str, Mapping[str, float]]] = {
     "feedforward": {"kp": 5.0, "ki": 2.0, "kd": 0.0},
     "experiment_23kg": {"kp": 1.4, "ki": 2.5, "kd": 0.0},
@@ -24,8 +27,9 @@ _PRINTED: Final[Mapping[str, Mapping[str, float]]] = {
 class PIDLaw(Stateful):
     """``u = offset + kP e + kI int e dt + kD e'``, limited, then low-passed.
 
-    The integral counts from the next sample on, as if the error were held. The limits come before the low-pass, whose output then never
-    leaves them, and the anti-windup looks at the limits alone.
+    The integral counts from the next sample on, as if the error were held. The limits come before
+    the low-pass, whose output then never leaves them, and the anti-windup looks at the limits
+    alone.
 
     Parameters
     ----------
@@ -73,7 +77,9 @@ class PIDLaw(Stateful):
         self._through = self._output_filter.__class__ is float and self._output_filter == 0.0
         self.low_pass = LowPass(self._output_filter, period, initial=0.0)
         self.integrator = Integrator(period, anti_windup=anti_windup, tracking_time=tracking_time)
-        self.derives = bool((self._kd != 0.0) if isinstance(self._kd, float) else (self._kd != 0.0).any())
+        self.derives = bool(
+            (self._kd != 0.0) if isinstance(self._kd, float) else (self._kd != 0.0).any()
+        )
 
     @property
     def gains(self) -> tuple[Value, ...]:
@@ -108,14 +114,17 @@ class PIDLaw(Stateful):
 
 
 class PID(OutputFeedback):
-    """PID control of the joint angle by the valve (dissertation 4.3.1.1), volts around the closed valve.
+    """PID control of the joint angle by the valve (dissertation 4.3.1.1), volts around the closed
+    valve.
 
-    ``e = theta_d - theta``, ``e' = theta_d' - theta'``; a low-pass on the output as in 4.3.1.1. A gain may be an array: each plant of a
-    batch then has its own.
+    ``e = theta_d - theta``, ``e' = theta_d' - theta'``; a low-pass on the output as in 4.3.1.1. A
+    gain may be an array: each plant of a batch then has its own.
 
-    The printed gains are taken as volts per **radian**: 5 V open the valve wholly, which with degrees kP = 1.4 would do at an error of
-    3.6 deg and kI = 2.5 after a second at 2 deg, a switch rather than the slow, winding-up loop that 4.5 describes; and the fuzzy
-    controller tuned on the same rig has the slope h/g1 = 0.65/0.45 = 1.44 V/rad, almost kP = 1.4, with g1 surely in radians.
+    The printed gains are taken as volts per **radian**: 5 V open the valve wholly, which with
+    degrees kP = 1.4 would do at an error of 3.6 deg and kI = 2.5 after a second at 2 deg, a switch
+    rather than the slow, winding-up loop that 4.5 describes; and the fuzzy controller tuned on the
+    same rig has the slope h/g1 = 0.65/0.45 = 1.44 V/rad, almost kP = 1.4, with g1 surely in
+    radians.
 
     Parameters
     ----------
@@ -156,7 +165,12 @@ class PID(OutputFeedback):
     _PARTS: ClassVar[tuple[str, ...]] = ("law", "sensor")
     _PUBLISHED = _PRINTED
 
-    kp, ki, kd, output_filter = Fixed("law.kp"), Fixed("law.ki"), Fixed("law.kd"), Fixed("law.output_filter")
+    kp, ki, kd, output_filter = (
+        Fixed("law.kp"),
+        Fixed("law.ki"),
+        Fixed("law.kd"),
+        Fixed("law.output_filter"),
+    )
 
     def __init__(
         self,
@@ -199,8 +213,12 @@ class PID(OutputFeedback):
         self._simple = not self.law.derives and self.sensor._through
         self.reset()
 
-    def answer(self, time: float, measurement: Measurement, reference: Reference, bias: Value) -> Value:
-        """As :meth:`update`, with ``bias`` [V] added before the limits, so that the anti-windup knows of a feedforward beside it."""
+    def answer(
+        self, time: float, measurement: Measurement, reference: Reference, bias: Value
+    ) -> Value:
+        """As :meth:`update`, with ``bias`` [V] added before the limits, so that the anti-windup
+        knows of a feedforward beside it.
+        """
         aim = self._aim(reference)
         if bias.__class__ is not float:
             bias = self._sized("bias", bias)
@@ -211,4 +229,6 @@ class PID(OutputFeedback):
         angle, rate = self.sensor.read(self, measurement)
         self._tick(time)
         angle, rate = self.sensor.update(angle, rate)
-        return self.law.update(self._scale * (aim.angle - angle), self._scale * (aim.rate - rate), bias)
+        return self.law.update(
+            self._scale * (aim.angle - angle), self._scale * (aim.rate - rate), bias
+        )

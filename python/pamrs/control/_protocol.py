@@ -1,13 +1,15 @@
 """What every controller is: sampled, with a state of its own, for one plant or for a batch of them.
 
-A controller is made once, with its gains and its period, and is then called at each of its samples::
+A controller is made once, with its gains and its period, and is then called at each of its
+samples::
 
     controller.reset()
     command = controller.update(time, measurement, reference)
 
-``measurement`` maps channels to values in SI units (``joint_angle`` [rad], ``muscle_pressure`` [Pa, gauge], ...), as
-:meth:`pamrs.Simulator.observe` and a live device give them. Every value, gain and reference is a float, or an array of shape ``(n,)``
-for a batch of n plants at once: the same code does both, and the answer has the shape of what went in.
+``measurement`` maps channels to values in SI units (``joint_angle`` [rad], ``muscle_pressure`` [Pa,
+gauge], ...), as :meth:`pamrs.Simulator.observe` and a live device give them. Every value, gain and
+reference is a float, or an array of shape ``(n,)`` for a batch of n plants at once: the same code
+does both, and the answer has the shape of what went in.
 """
 
 from __future__ import annotations
@@ -22,7 +24,15 @@ from numpy.typing import NDArray
 
 from pamrs.errors import ParameterError
 
-__all__ = ["Controller", "Measurement", "Reference", "Value", "check_answers_pressure", "check_controller", "check_drives_valve"]
+__all__ = [
+    "Controller",
+    "Measurement",
+    "Reference",
+    "Value",
+    "check_answers_pressure",
+    "check_controller",
+    "check_drives_valve",
+]
 
 #: A float, or one number for each plant of a batch.
 Value: TypeAlias = "float | NDArray[np.float64]"
@@ -49,7 +59,8 @@ class Controller(abc.ABC):
     period : float
         Time between two updates [s].
     answers : {"valve", "pressure"}
-        What :meth:`update` gives: a valve command [V], or a desired gauge pressure [Pa] that a :class:`pamrs.control.Cascade` makes.
+        What :meth:`update` gives: a valve command [V], or a desired gauge pressure [Pa] that a
+        :class:`pamrs.control.Cascade` makes.
     """
 
     period: float
@@ -75,8 +86,8 @@ class Controller(abc.ABC):
         Returns
         -------
         float or ndarray, shape (n,)
-            What is held until the next sample: a valve command [V], or a desired gauge pressure [Pa] where a
-            pressure loop follows.
+            What is held until the next sample: a valve command [V], or a desired gauge pressure
+            [Pa] where a pressure loop follows.
 
         Raises
         ------
@@ -87,7 +98,9 @@ class Controller(abc.ABC):
     @property
     @abc.abstractmethod
     def state(self) -> dict[str, Any]:
-        """The numbers that everything to come depends on (copies); give them back to :meth:`restore`."""
+        """The numbers that everything to come depends on (copies); give them back to
+        :meth:`restore`.
+        """
 
     @abc.abstractmethod
     def restore(self, state: Mapping[str, Any]) -> None:
@@ -119,10 +132,15 @@ def check_controller(controller: Any) -> None:
         If it is no controller, or its period is not above zero.
     """
     if not isinstance(controller, Controller):
-        raise ParameterError(f"controller is a {type(controller).__name__}; a pamrs.control.Controller is needed")
+        raise ParameterError(
+            f"controller is a {type(controller).__name__}; a pamrs.control.Controller is needed"
+        )
     period = getattr(controller, "period", math.nan)
     if not (isinstance(period, (int, float, np.number)) and math.isfinite(period) and period > 0.0):
-        raise ParameterError(f"controller.period = {period!r} is not allowed: a number of seconds above zero is needed")
+        raise ParameterError(
+            f"controller.period = {period!r} is not allowed: a number of seconds above zero is "
+            "needed"
+        )
 
 
 def check_drives_valve(controller: Controller) -> None:
@@ -140,8 +158,8 @@ def check_drives_valve(controller: Controller) -> None:
     """
     if controller.answers != "valve":
         raise ParameterError(
-            f"controller is a {type(controller).__name__}, which answers a {controller.answers} [Pa], no valve command: "
-            "put it in a pamrs.control.Cascade"
+            f"controller is a {type(controller).__name__}, which answers a {controller.answers} "
+            "[Pa], no valve command: put it in a pamrs.control.Cascade"
         )
 
 
@@ -160,6 +178,7 @@ def check_answers_pressure(outer: Controller) -> None:
     """
     if outer.answers != "pressure":
         raise ParameterError(
-            f"outer is a {type(outer).__name__} with answers = {outer.answers!r}, which is not allowed: 'pressure' is needed, a "
-            "desired gauge pressure [Pa] (an angle PID is in cascaded_pid; a controller of your own says answers = 'pressure')"
+            f"outer is a {type(outer).__name__} with answers = {outer.answers!r}, which is not "
+            "allowed: 'pressure' is needed, a desired gauge pressure [Pa] (an angle PID is in "
+            "cascaded_pid; a controller of your own says answers = 'pressure')"
         )

@@ -1,9 +1,12 @@
-"""What all controllers here have in common: an explicit state, a clock that is watched, and channels that are checked.
+"""What all controllers here have in common: an explicit state, a clock that is watched, and
+channels that are checked.
 
-**Time.** A controller is discrete: its filters and integrals are made for its period, and every update counts as one period. A sample
-that comes between half and one and a half periods after the last one (:attr:`SampledController.jitter`) is such an update; one that is
-earlier, at the same time or before, or later, is refused: a loop that lost samples must hold the last measurement and call at every
-period, or ``reset()``. So the answer depends on the samples alone, not on the scatter of a clock.
+**Time.** A controller is discrete: its filters and integrals are made for its period, and every
+update counts as one period. A sample that comes between half and one and a half periods after the
+last one (:attr:`SampledController.jitter`) is such an update; one that is earlier, at the same time
+or before, or later, is refused: a loop that lost samples must hold the last measurement and call at
+every period, or ``reset()``. So the answer depends on the samples alone, not on the scatter of a
+clock.
 """
 
 from __future__ import annotations
@@ -26,8 +29,8 @@ __all__ = ["Fixed", "Restorer", "SampledController", "Stateful"]
 class Stateful:
     """Something with a state that can be read, given back and forgotten.
 
-    A subclass lists its own numbers in ``_STATE`` (name -> start value; the attribute has an underscore before the name) and the
-    attributes that are stateful themselves in ``_PARTS``.
+    A subclass lists its own numbers in ``_STATE`` (name -> start value; the attribute has an
+    underscore before the name) and the attributes that are stateful themselves in ``_PARTS``.
     """
 
     _STATE: ClassVar[Mapping[str, Any]] = {}
@@ -61,7 +64,8 @@ class Stateful:
         Raises
         ------
         ParameterError
-            If it is not one; the message says what is missing, too much or not finite. Nothing is changed then.
+            If it is not one; the message says what is missing, too much or not finite. Nothing is
+            changed then.
         """
         self._check_state(state)
         for name in self._STATE:
@@ -70,25 +74,36 @@ class Stateful:
             getattr(self, part).restore(state[part])
 
     def _leaves(self) -> dict[str, bool]:
-        """Every attribute in which a number of the state is kept, dotted, and whether it is changed in place."""
+        """Every attribute in which a number of the state is kept, dotted, and whether it is changed
+        in place.
+        """
         found = {f"_{name}": isinstance(start, list) for name, start in self._start().items()}
         for part in self._PARTS:
             one = getattr(self, part)
             # another's controller has its state and restore only
             found |= {
                 f"{part}.{name}": changed
-                for name, changed in (one._leaves() if isinstance(one, Stateful) else {"state": False}).items()
+                for name, changed in (
+                    one._leaves() if isinstance(one, Stateful) else {"state": False}
+                ).items()
             }
         return found
 
-    def _check_state(self, state: Mapping[str, Any], where: str = "state", batch: int | None = -1) -> None:
+    def _check_state(
+        self, state: Mapping[str, Any], where: str = "state", batch: int | None = -1
+    ) -> None:
         """Refuse what is no state for a batch of a size, None being one plant and -1 any."""
         expected = {*self._STATE, *self._PARTS}
         if not isinstance(state, Mapping):
-            raise ParameterError(f"{where} is a {type(state).__name__}; a mapping of {', '.join(sorted(expected))} is needed")
+            raise ParameterError(
+                f"{where} is a {type(state).__name__}; a mapping of {', '.join(sorted(expected))} "
+                "is needed"
+            )
         missing, extra = sorted(expected - set(state)), sorted(map(str, set(state) - expected))
         if missing or extra:
-            raise ParameterError(f"{where} is not of a {type(self).__name__}: missing {missing}, too much {extra}")
+            raise ParameterError(
+                f"{where} is not of a {type(self).__name__}: missing {missing}, too much {extra}"
+            )
         for name, start in self._start().items():
             if state[name] is None and start is None:
                 continue
@@ -97,14 +112,21 @@ class Stateful:
             except ValueError:  # rows of different lengths
                 array = np.empty(0, dtype=np.object_)
             if array.dtype.kind not in "iuf":
-                raise ParameterError(f"{where}.{name} = {state[name]!r} is not allowed: numbers are needed")
+                raise ParameterError(
+                    f"{where}.{name} = {state[name]!r} is not allowed: numbers are needed"
+                )
             if not np.all(np.isfinite(array)):
                 raise ParameterError(f"{where}.{name} is not finite")
             shape = () if start is None else np.shape(start)[-1:] if isinstance(start, list) else ()
             rows = array.shape[: array.ndim - len(shape)]
-            if array.shape[len(rows) :] != shape or (rows != () and (len(rows) > 1 or batch not in (-1, rows[0]))):
+            if array.shape[len(rows) :] != shape or (
+                rows != () and (len(rows) > 1 or batch not in (-1, rows[0]))
+            ):
                 plants = "" if batch in (-1, None) else f" of {batch}"
-                raise ParameterError(f"{where}.{name} has shape {array.shape}; {shape} is needed, or that for each of a batch{plants}")
+                raise ParameterError(
+                    f"{where}.{name} has shape {array.shape}; {shape} is needed, or that for each "
+                    f"of a batch{plants}"
+                )
         for part in self._PARTS:
             one = getattr(self, part)
             if isinstance(one, Stateful):
@@ -112,7 +134,8 @@ class Stateful:
 
 
 class Fixed:
-    """What a controller was made with: it can be read, not set, since what follows from it is worked out once.
+    """What a controller was made with: it can be read, not set, since what follows from it is
+    worked out once.
 
     Parameters
     ----------
@@ -130,11 +153,14 @@ class Fixed:
         return self if one is None else self._get(one)
 
     def __set__(self, one: Any, value: Any) -> None:
-        raise AttributeError(f"{self._name} of a {type(one).__name__} cannot be set: make a new one with it")
+        raise AttributeError(
+            f"{self._name} of a {type(one).__name__} cannot be set: make a new one with it"
+        )
 
 
 class Restorer:
-    """Numbers of a part that are put back when a later part refuses the sample, so that the whole refuses it.
+    """Numbers of a part that are put back when a later part refuses the sample, so that the whole
+    refuses it.
 
     Parameters
     ----------
@@ -160,7 +186,9 @@ class Restorer:
 
     def put_back(self, taken: Any) -> None:
         """As they were when they were taken."""
-        for name, value in zip(self._names, taken if len(self._names) > 1 else (taken,), strict=True):
+        for name, value in zip(
+            self._names, taken if len(self._names) > 1 else (taken,), strict=True
+        ):
             where, _, last = name.rpartition(".")
             owner = operator.attrgetter(where)(self._part) if where else self._part
             if last == "state":
@@ -189,12 +217,21 @@ class SampledController(Stateful, Controller):
 
     jitter: ClassVar[float] = 0.5
 
-    def __init__(self, period: float, gains: Iterable[Any] = (), parts: Iterable[Controller] = ()) -> None:
+    def __init__(
+        self, period: float, gains: Iterable[Any] = (), parts: Iterable[Controller] = ()
+    ) -> None:
         self.period = positive_number("period", period)
         sizes = {value.size for value in gains if isinstance(value, np.ndarray)}
-        sizes |= {part._gain_batch for part in parts if isinstance(part, SampledController) and part._gain_batch is not None}
+        sizes |= {
+            part._gain_batch
+            for part in parts
+            if isinstance(part, SampledController) and part._gain_batch is not None
+        }
         if len(sizes) > 1:
-            raise ParameterError(f"gains have the lengths {sorted(sizes)}: arrays of one length, or numbers, are needed")
+            raise ParameterError(
+                f"gains have the lengths {sorted(sizes)}: arrays of one length, or numbers, are "
+                "needed"
+            )
         self._gain_batch: int | None = sizes.pop() if sizes else None
         self._early = (1.0 - self.jitter) * self.period
         self._late = (1.0 + self.jitter) * self.period
@@ -211,7 +248,9 @@ class SampledController(Stateful, Controller):
 
     @property
     def state(self) -> dict[str, Any]:
-        """The numbers that everything to come depends on (copies); give them back to :meth:`restore`."""
+        """The numbers that everything to come depends on (copies); give them back to
+        :meth:`restore`.
+        """
         return {"time": self._last, "batch": self._batch, **Stateful.state.__get__(self)}
 
     def restore(self, state: Mapping[str, Any]) -> None:
@@ -225,7 +264,8 @@ class SampledController(Stateful, Controller):
         Raises
         ------
         ParameterError
-            If it is not one; the message says what is missing, too much or not finite. Nothing is changed then.
+            If it is not one; the message says what is missing, too much or not finite. Nothing is
+            changed then.
         """
         super().restore(state)
         self._last = None if state["time"] is None else float(state["time"])
@@ -234,20 +274,42 @@ class SampledController(Stateful, Controller):
     def _leaves(self) -> dict[str, bool]:
         return {"_last": False, "_batch": False, "_size": False, **super()._leaves()}
 
-    def _check_state(self, state: Mapping[str, Any], where: str = "state", batch: int | None = -1) -> None:
+    def _check_state(
+        self, state: Mapping[str, Any], where: str = "state", batch: int | None = -1
+    ) -> None:
         if not isinstance(state, Mapping) or "time" not in state or "batch" not in state:
-            raise ParameterError(f"{where} is not of a {type(self).__name__}: time and batch are needed in it")
+            raise ParameterError(
+                f"{where} is not of a {type(self).__name__}: time and batch are needed in it"
+            )
         time, own = state["time"], state["batch"]
         if time is not None and not (_is(time, numbers.Real) and math.isfinite(time)):
-            raise ParameterError(f"{where}.time = {time!r} is not allowed: a finite number or None is needed")
+            raise ParameterError(
+                f"{where}.time = {time!r} is not allowed: a finite number or None is needed"
+            )
         if own is not None and not (_is(own, numbers.Integral) and own >= 1):
-            raise ParameterError(f"{where}.batch = {own!r} is not allowed: a whole number from 1 on or None is needed")
+            raise ParameterError(
+                f"{where}.batch = {own!r} is not allowed: a whole number from 1 on or None is "
+                "needed"
+            )
         if self._gain_batch is not None and own != self._gain_batch:
-            raise ParameterError(f"{where}.batch = {own!r} is not allowed: the gains are those of a batch of {self._gain_batch}")
-        super()._check_state({name: value for name, value in state.items() if name not in ("time", "batch")}, where, own)
-        parts = [state[part].get("batch") for part in self._PARTS if isinstance(getattr(self, part), SampledController)]
+            raise ParameterError(
+                f"{where}.batch = {own!r} is not allowed: the gains are those of a batch of "
+                f"{self._gain_batch}"
+            )
+        super()._check_state(
+            {name: value for name, value in state.items() if name not in ("time", "batch")},
+            where,
+            own,
+        )
+        parts = [
+            state[part].get("batch")
+            for part in self._PARTS
+            if isinstance(getattr(self, part), SampledController)
+        ]
         if len(sizes := {size for size in (own, *parts) if size is not None}) > 1:
-            raise ParameterError(f"{where} has parts for batches of {sorted(sizes)}: one size is needed")
+            raise ParameterError(
+                f"{where} has parts for batches of {sorted(sizes)}: one size is needed"
+            )
 
     # ------------------------------------------------------------------ for update()
 
@@ -259,8 +321,9 @@ class SampledController(Stateful, Controller):
                 raise self._refusal(f"time = {time} s is not allowed: finite is needed")
         elif not self._early < time - last < self._late:
             raise self._refusal(
-                f"time = {time:.9g} s comes {time - last:.4g} s after the last sample: from {self._early:.4g} to {self._late:.4g} s is "
-                f"allowed (period = {self.period:g} s); after lost samples hold the last measurement, or reset()"
+                f"time = {time:.9g} s comes {time - last:.4g} s after the last sample: from "
+                f"{self._early:.4g} to {self._late:.4g} s is allowed (period = {self.period:g} s); "
+                "after lost samples hold the last measurement, or reset()"
             )
         self._last = time
         self._batch = self._size
@@ -276,7 +339,8 @@ class SampledController(Stateful, Controller):
             value = measurement[channel]
         except KeyError:
             raise self._refusal(
-                f"measurement has no channel {channel!r}, which {type(self).__name__} needs; it has: {', '.join(map(str, measurement))}"
+                f"measurement has no channel {channel!r}, which {type(self).__name__} needs; it "
+                f"has: {', '.join(map(str, measurement))}"
             ) from None
         if value.__class__ is float and value - value == 0.0:
             # in a batch everything is one: the answer has its length from the first sample on
@@ -289,16 +353,28 @@ class SampledController(Stateful, Controller):
             angle, rate, acceleration = reference
         except (TypeError, ValueError):
             raise self._refusal(
-                f"reference = {reference!r} is not allowed: a Reference of angle [rad], rate and acceleration is needed"
+                f"reference = {reference!r} is not allowed: a Reference of angle [rad], rate and "
+                "acceleration is needed"
             ) from None
         if angle.__class__ is float and rate.__class__ is float and acceleration.__class__ is float:
             total = angle + rate + acceleration
             if total - total == 0.0:
-                return reference if reference.__class__ is Reference else Reference(angle, rate, acceleration)
-        return Reference(*(self._sized(f"reference.{name}", value) for name, value in zip(Reference._fields, reference, strict=True)))
+                return (
+                    reference
+                    if reference.__class__ is Reference
+                    else Reference(angle, rate, acceleration)
+                )
+        return Reference(
+            *(
+                self._sized(f"reference.{name}", value)
+                for name, value in zip(Reference._fields, reference, strict=True)
+            )
+        )
 
     def _sized(self, name: str, value: Any) -> Value:
-        """What is not a finite float already: an array of the batch's length, or something to refuse."""
+        """What is not a finite float already: an array of the batch's length, or something to
+        refuse.
+        """
         try:
             checked = as_value(name, value)
         except ParameterError as error:

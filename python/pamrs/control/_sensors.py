@@ -21,17 +21,20 @@ __all__ = ["Reader", "Sensors", "reader_of"]
 class Sensors:
     """Imperfect sensors between a plant and its controller.
 
-    A channel is first delayed, then gets noise, then is rounded. In a batch every plant gets the same noise (common random numbers), so
-    that gains are compared on the same day; one run with a seed is the same run alone or in a batch.
+    A channel is first delayed, then gets noise, then is rounded. In a batch every plant gets the
+    same noise (common random numbers), so that gains are compared on the same day; one run with a
+    seed is the same run alone or in a batch.
 
     Parameters
     ----------
     noise : mapping of str to float
-        Channel -> standard deviation of independent normal noise at each of the controller's samples [SI unit of the channel].
+        Channel -> standard deviation of independent normal noise at each of the controller's
+        samples [SI unit of the channel].
     resolution : mapping of str to float
         Channel -> step of the quantiser [SI unit]; the value is the nearest multiple.
     delay : float
-        How old every channel is [s], a multiple of the controller's period; before anything is old enough the first sample stands.
+        How old every channel is [s], a multiple of the controller's period; before anything is old
+        enough the first sample stands.
     seed : int
         Of the noise.
 
@@ -52,17 +55,37 @@ class Sensors:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        for label, table, zero in (("noise", self.noise, True), ("resolution", self.resolution, False)):
+        for label, table, zero in (
+            ("noise", self.noise, True),
+            ("resolution", self.resolution, False),
+        ):
             if not isinstance(table, Mapping):
-                raise ParameterError(f"{label} = {table!r} is not allowed: a mapping of channels to numbers is needed")
+                raise ParameterError(
+                    f"{label} = {table!r} is not allowed: a mapping of channels to numbers is "
+                    "needed"
+                )
             for channel, value in table.items():
-                if not (isinstance(value, numbers.Real) and math.isfinite(value) and (value > 0.0 or (zero and value == 0.0))):
+                if not (
+                    isinstance(value, numbers.Real)
+                    and math.isfinite(value)
+                    and (value > 0.0 or (zero and value == 0.0))
+                ):
                     need = "zero or more" if zero else "a number above zero"
-                    raise ParameterError(f"{label} of {channel} = {value} is not allowed: {need} is needed")
-        if not (isinstance(self.delay, numbers.Real) and math.isfinite(self.delay) and self.delay >= 0.0):
+                    raise ParameterError(
+                        f"{label} of {channel} = {value} is not allowed: {need} is needed"
+                    )
+        if not (
+            isinstance(self.delay, numbers.Real) and math.isfinite(self.delay) and self.delay >= 0.0
+        ):
             raise ParameterError(f"delay = {self.delay} s is not allowed: zero or more is needed")
-        if isinstance(self.seed, bool) or not isinstance(self.seed, numbers.Integral) or self.seed < 0:
-            raise ParameterError(f"seed = {self.seed!r} is not allowed: a whole number from 0 on is needed")
+        if (
+            isinstance(self.seed, bool)
+            or not isinstance(self.seed, numbers.Integral)
+            or self.seed < 0
+        ):
+            raise ParameterError(
+                f"seed = {self.seed!r} is not allowed: a whole number from 0 on is needed"
+            )
 
     def started(self, period: float) -> Reader:
         """Sensors at the beginning of a run.
@@ -83,15 +106,19 @@ class Sensors:
         """
         count = round(self.delay / period)
         if abs(count * period - self.delay) > 1e-6 * period:
-            raise ParameterError(f"delay = {self.delay} s is not allowed: a multiple of the controller's period = {period} s is needed")
+            raise ParameterError(
+                f"delay = {self.delay} s is not allowed: a multiple of the controller's period = "
+                f"{period} s is needed"
+            )
         return Reader(self, count, float(period))
 
 
 class Reader:
     """Sensors in use: called with each sample of the plant, it says what is read.
 
-    Made by :meth:`Sensors.started`. Given to a loop in the place of sensors it goes on from loop to loop, and its :attr:`state` can be
-    kept, so that a loop with noise or a delay can be cut anywhere.
+    Made by :meth:`Sensors.started`. Given to a loop in the place of sensors it goes on from loop to
+    loop, and its :attr:`state` can be kept, so that a loop with noise or a delay can be cut
+    anywhere.
 
     Attributes
     ----------
@@ -106,8 +133,13 @@ class Reader:
 
     @property
     def state(self) -> dict[str, Any]:
-        """What everything to come depends on (copies): ``late``, the samples on their way, and ``random``."""
-        return {"late": [dict(sample) for sample in self._late], "random": self._random.bit_generator.state}
+        """What everything to come depends on (copies): ``late``, the samples on their way, and
+        ``random``.
+        """
+        return {
+            "late": [dict(sample) for sample in self._late],
+            "random": self._random.bit_generator.state,
+        }
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Go on from a state, bit for bit.
@@ -127,9 +159,14 @@ class Reader:
             late = [dict(sample) for sample in state["late"]]
             random.bit_generator.state = state["random"]
         except (KeyError, TypeError, ValueError) as error:
-            raise ParameterError(f"state is not one of a reader ({error}): late and random are needed") from None
+            raise ParameterError(
+                f"state is not one of a reader ({error}): late and random are needed"
+            ) from None
         if len(late) > (self._late.maxlen or 0):
-            raise ParameterError(f"state.late has {len(late)} samples; at most {self._late.maxlen} are needed for this delay")
+            raise ParameterError(
+                f"state.late has {len(late)} samples; at most {self._late.maxlen} are needed for "
+                "this delay"
+            )
         self._random, self._late = random, deque(late, maxlen=self._late.maxlen)
 
     def __call__(self, sample: Measurement) -> dict[str, Value]:
@@ -155,13 +192,18 @@ class Reader:
             read[channel] = _there(read, channel) + size * float(self._random.standard_normal())
         for channel, size in self._sensors.resolution.items():
             value = _there(read, channel)
-            read[channel] = size * (np.round(value / size) if isinstance(value, np.ndarray) else round(value / size))
+            read[channel] = size * (
+                np.round(value / size) if isinstance(value, np.ndarray) else round(value / size)
+            )
         return read
 
 
 def _there(sample: Measurement, channel: str) -> Value:
     if channel not in sample:
-        raise ParameterError(f"sensors have {channel!r}, and the plant has no such channel; it has: {', '.join(sample)}")
+        raise ParameterError(
+            f"sensors have {channel!r}, and the plant has no such channel; it has: "
+            f"{', '.join(sample)}"
+        )
     return sample[channel]
 
 
@@ -182,14 +224,18 @@ def reader_of(sensors: Sensors | Reader | None, period: float) -> Reader | None:
     Raises
     ------
     ParameterError
-        If a delay is not a multiple of the period, a reader is for another period, or it is neither.
+        If a delay is not a multiple of the period, a reader is for another period, or it is
+        neither.
     """
     if sensors is None or isinstance(sensors, Sensors):
         return None if sensors is None else sensors.started(period)
     if not isinstance(sensors, Reader):
-        raise ParameterError(f"sensors is a {type(sensors).__name__}; Sensors, or a Reader that goes on, are needed")
+        raise ParameterError(
+            f"sensors is a {type(sensors).__name__}; Sensors, or a Reader that goes on, are needed"
+        )
     if sensors.period != period:
         raise ParameterError(
-            f"sensors are read every {sensors.period:g} s, the controller's period is {period:g} s: the same is needed"
+            f"sensors are read every {sensors.period:g} s, the controller's period is {period:g} "
+            "s: the same is needed"
         )
     return sensors

@@ -1,12 +1,15 @@
-"""Sliding-mode control (dissertation 5.3.1, (5.5)-(5.11) corrected; Slotine & Li, Applied Nonlinear Control, 1991, ch. 7 and 9).
+"""Sliding-mode control (dissertation 5.3.1, (5.5)-(5.11) corrected; Slotine & Li, Applied Nonlinear
+Control, 1991, ch. 7 and 9).
 
 ::
 
     s = theta' - theta_r'
-    theta_r' = theta_d' - lambda (theta - theta_d)        theta_r'' = theta_d'' - lambda (theta' - theta_d')
+    theta_r' = theta_d' - lambda (theta - theta_d)
+    theta_r'' = theta_d'' - lambda (theta' - theta_d')
     P_d = (I theta_r'' + b theta_r' + m g r sin(theta) - C2)/C1 - KD sgn(s)
 
-On the simplified plant (5.4) with the right parameters ``I s' = -b s - C1 KD sgn(s)``, so that ``s s' < 0`` outside the boundary layer.
+On the simplified plant (5.4) with the right parameters ``I s' = -b s - C1 KD sgn(s)``, so that
+``s s' < 0`` outside the boundary layer.
 """
 
 from __future__ import annotations
@@ -38,7 +41,8 @@ class Surface(NamedTuple):
 
 
 class SlidingController(SampledController):
-    """What the sliding family has in common: the surface, its switching term, and the limits of the pressure.
+    """What the sliding family has in common: the surface, its switching term, and the limits of the
+    pressure.
 
     Parameters
     ----------
@@ -75,14 +79,22 @@ class SlidingController(SampledController):
         gains: tuple[Any, ...] = (),
     ) -> None:
         self.arm = arm
-        self._slope, self._switching = positive_gain("slope", slope), as_value("switching", switching, lower=0.0)
+        self._slope, self._switching = (
+            positive_gain("slope", slope),
+            as_value("switching", switching, lower=0.0),
+        )
         self._boundary_layer = as_value("boundary_layer", boundary_layer, lower=0.0)
         # a layer of a billionth of a rad/s is the signum, and needs no case of its own in a batch
         self._layer = clip(self._boundary_layer, 1e-12, 1e300)
         self._sharp = isinstance(self._boundary_layer, float) and self._boundary_layer == 0.0
-        self.sensor = JointSensor(period, angle_filter=angle_filter, rate_filter=rate_filter, measured_rate=measured_rate)
+        self.sensor = JointSensor(
+            period, angle_filter=angle_filter, rate_filter=rate_filter, measured_rate=measured_rate
+        )
         filters = (self.sensor.low_pass.time_constant, self.sensor.slope.time_constant)
-        super().__init__(period, (self._slope, self._switching, self._boundary_layer, *arm.gains, *filters, *gains))
+        super().__init__(
+            period,
+            (self._slope, self._switching, self._boundary_layer, *arm.gains, *filters, *gains),
+        )
         self._limit = arm.pressure_limit
 
     def _surface(self, time: float, measurement: Measurement, reference: Reference) -> Surface:
@@ -99,10 +111,12 @@ class SlidingController(SampledController):
 
 
 class Sliding(SlidingController):
-    """Sliding-mode control with fixed estimates; answers a desired gauge pressure [Pa] for a :class:`pamrs.control.Cascade`.
+    """Sliding-mode control with fixed estimates; answers a desired gauge pressure [Pa] for a
+    :class:`pamrs.control.Cascade`.
 
-    The defaults are not printed; they were found on the simulated shoulder. A boundary layer keeps the valve from chattering at the
-    rate of the samples; the dissertation calls its own runs free of chatter, which the plain signum is not.
+    The defaults are not printed; they were found on the simulated shoulder. A boundary layer keeps
+    the valve from chattering at the rate of the samples; the dissertation calls its own runs free
+    of chatter, which the plain signum is not.
 
     Parameters
     ----------
@@ -122,7 +136,9 @@ class Sliding(SlidingController):
         self.reset()
 
     def update(self, time: float, measurement: Measurement, reference: Reference) -> Value:
-        """Desired gauge pressure [Pa] for a sample, within 0 and the limit; see :meth:`pamrs.control.Controller.update`."""
+        """Desired gauge pressure [Pa] for a sample, within 0 and the limit; see
+        :meth:`pamrs.control.Controller.update`.
+        """
         arm = self.arm
         angle, rate, acceleration, _, switching = self._surface(time, measurement, reference)
         torque = arm.inertia * acceleration + arm.viscous * rate + arm.weight * sin(angle)

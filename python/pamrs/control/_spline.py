@@ -11,7 +11,8 @@ __all__ = ["Spline"]
 
 
 class Spline:
-    """Cubic spline through values at even places, held beyond the ends; the same for floats and arrays, bit for bit.
+    """Cubic spline through values at even places, held beyond the ends; the same for floats and
+    arrays, bit for bit.
 
     Parameters
     ----------
@@ -26,13 +27,17 @@ class Spline:
 
         self.low, self.high, self.cells = float(low), float(high), values.size - 1
         self._step = (self.high - self.low) / self.cells
-        self._coefficients = np.ascontiguousarray(CubicSpline(np.arange(values.size) * self._step, values).c.T)
+        self._coefficients = np.ascontiguousarray(
+            CubicSpline(np.arange(values.size) * self._step, values).c.T
+        )
         self._rows: list[list[float]] = self._coefficients.tolist()
 
     def __call__(self, place: Value) -> Value:
         """Value at a place."""
         if place.__class__ is float:
-            x = (self.low if place < self.low else self.high if place > self.high else place) - self.low
+            x = (
+                self.low if place < self.low else self.high if place > self.high else place
+            ) - self.low
             cell = int(x / self._step)
             if cell >= self.cells:
                 cell = self.cells - 1
@@ -45,7 +50,9 @@ class Spline:
     def slope(self, place: Value) -> Value:
         """Derivative at a place; beyond the ends that of the end."""
         if place.__class__ is float:
-            x = (self.low if place < self.low else self.high if place > self.high else place) - self.low
+            x = (
+                self.low if place < self.low else self.high if place > self.high else place
+            ) - self.low
             cell = int(x / self._step)
             if cell >= self.cells:
                 cell = self.cells - 1

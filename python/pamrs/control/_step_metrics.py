@@ -1,4 +1,6 @@
-"""Rise, overshoot and settling of a step, for one run ``(samples,)`` or a batch ``(n, samples)``."""
+"""Rise, overshoot and settling of a step, for one run ``(samples,)`` or a batch
+``(n, samples)``.
+"""
 
 from __future__ import annotations
 
@@ -16,9 +18,15 @@ Array = NDArray[np.float64]
 
 
 def rise_time(
-    time: ArrayLike, angle: ArrayLike, start: float, target: float, *, shares: tuple[float, float] = (0.1, 0.9)
+    time: ArrayLike,
+    angle: ArrayLike,
+    start: float,
+    target: float,
+    *,
+    shares: tuple[float, float] = (0.1, 0.9),
 ) -> float | Array:
-    """Time from the first crossing of one share of a step to the first crossing of the other, straight lines between samples.
+    """Time from the first crossing of one share of a step to the first crossing of the other,
+    straight lines between samples.
 
     Parameters
     ----------
@@ -41,7 +49,9 @@ def rise_time(
     """
     low, high = shares
     if not 0.0 <= low < high <= 1.0:
-        raise ParameterError(f"shares = {shares} is not allowed: two rising numbers from 0 to 1 are needed")
+        raise ParameterError(
+            f"shares = {shares} is not allowed: two rising numbers from 0 to 1 are needed"
+        )
     t, y = _normalised(time, angle, start, target)
     first, second = (_crossing(t, y, share) for share in shares)
     reached = np.isfinite(second)
@@ -69,8 +79,11 @@ def overshoot(time: ArrayLike, angle: ArrayLike, start: float, target: float) ->
     return plain(np.maximum(y.max(axis=-1) - 1.0, 0.0))
 
 
-def settling_time(time: ArrayLike, angle: ArrayLike, start: float, target: float, *, band: float = 0.02) -> float | Array:
-    """Time from which the angle stays within a band around the target, straight lines between samples.
+def settling_time(
+    time: ArrayLike, angle: ArrayLike, start: float, target: float, *, band: float = 0.02
+) -> float | Array:
+    """Time from which the angle stays within a band around the target, straight lines between
+    samples.
 
     Parameters
     ----------
@@ -100,14 +113,21 @@ def settling_time(time: ArrayLike, angle: ArrayLike, start: float, target: float
     a, b = (np.take_along_axis(away, k[..., None], axis=-1)[..., 0] for k in (last, next_one))
     share = np.where(a > b, a / np.where(a > b, a - b, 1.0), 0.0)
     found = t[last] + share * (t[next_one] - t[last]) - t[0]
-    return plain(_of_good(y, np.where(~outside.any(axis=-1), 0.0, np.where(outside[..., -1], np.inf, found))))
+    return plain(
+        _of_good(y, np.where(~outside.any(axis=-1), 0.0, np.where(outside[..., -1], np.inf, found)))
+    )
 
 
-def _normalised(time: ArrayLike, angle: ArrayLike, start: float, target: float) -> tuple[Array, Array]:
+def _normalised(
+    time: ArrayLike, angle: ArrayLike, start: float, target: float
+) -> tuple[Array, Array]:
     """Checked time and the share of the step that was made."""
     t, y = checked(time, "angle", angle)
     if not (math.isfinite(start) and math.isfinite(target) and start != target):
-        raise ParameterError(f"start = {start} and target = {target} are not allowed: two different finite angles are needed")
+        raise ParameterError(
+            f"start = {start} and target = {target} are not allowed: two different finite angles "
+            "are needed"
+        )
     return t, np.asarray((y - start) / (target - start), dtype=np.float64)
 
 
@@ -123,4 +143,6 @@ def _crossing(t: Array, y: Array, share: float) -> Array:
     before = np.maximum(k - 1, 0)
     a, b = (np.take_along_axis(y, i[..., None], axis=-1)[..., 0] for i in (before, k))
     part = np.where(b > a, (share - a) / np.where(b > a, b - a, 1.0), 1.0)
-    return np.where(there.any(axis=-1), t[before] + np.clip(part, 0.0, 1.0) * (t[k] - t[before]), np.inf)
+    return np.where(
+        there.any(axis=-1), t[before] + np.clip(part, 0.0, 1.0) * (t[k] - t[before]), np.inf
+    )

@@ -57,7 +57,9 @@ class Sweep:
 
 
 class _Sums:
-    """nu, omega and the largest error of every plant, sample by sample, so that nothing has to be kept."""
+    """nu, omega and the largest error of every plant, sample by sample, so that nothing has to be
+    kept.
+    """
 
     def __init__(self, n: int, factor: float) -> None:
         self._factor = factor
@@ -66,7 +68,9 @@ class _Sums:
         self.error = np.zeros(n)
 
     def add(self, time: float, wanted: float, angle: Array, rate: Array) -> None:
-        """Go on to a sample: trapezoids of the squared error, total variation of the slope's sine."""
+        """Go on to a sample: trapezoids of the squared error, total variation of the slope's
+        sine.
+        """
         self.error = wanted - angle
         square, slope = self.error * self.error, slope_sine(self._factor * rate)
         if self._last is not None:
@@ -95,7 +99,8 @@ def sweep(
     unit: str = "rad",
     threads: int | None = None,
 ) -> Sweep:
-    """Close one controller around many plants at once, each with a gain of its own or with another payload.
+    """Close one controller around many plants at once, each with a gain of its own or with another
+    payload.
 
     Parameters
     ----------
@@ -135,7 +140,9 @@ def sweep(
     dt = default_step(period) if sample_time is None else sample_time
     batch = Batch(plants, n=n, sample_time=dt, step=step, initial=initial, threads=threads)
     every = whole_samples("controller.period", period, dt, least=1)
-    total = whole_samples("duration", trajectory.duration if duration is None else duration, dt, least=1)
+    total = whole_samples(
+        "duration", trajectory.duration if duration is None else duration, dt, least=1
+    )
     check_angles(trajectory, total * dt)
     act = actuation_of(batch.rigs[0], controller) if actuation is None else actuation
     read = reader_of(sensors, period)
@@ -162,6 +169,12 @@ def sweep(
     failed = run.failed
     found = [
         np.where(failed, np.nan, values)
-        for values in (factor**2 * sums.squares, sums.variation, np.sqrt(sums.squares / (total * dt)), sums.largest, sums.error)
+        for values in (
+            factor**2 * sums.squares,
+            sums.variation,
+            np.sqrt(sums.squares / (total * dt)),
+            sums.largest,
+            sums.error,
+        )
     ]
     return Sweep(found[0], found[1], found[2], found[3], found[4], failed, run, trajectory, unit)

@@ -13,11 +13,13 @@ _NAMES: Final = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
 
 
 class Termination:
-    """While it is open, Ctrl-C is a KeyboardInterrupt, and SIGTERM, SIGHUP and SIGBREAK are ``SystemExit(128 + number)``.
+    """While it is open, Ctrl-C is a KeyboardInterrupt, and SIGTERM, SIGHUP and SIGBREAK are
+    ``SystemExit(128 + number)``.
 
-    An exception is raised once at most and only while :attr:`armed`, so that none can come between the loop and its safe command; what
-    comes later is kept in :attr:`late`. Handlers that the program has set, or that ignore a signal (``nohup``), stay. Outside the main
-    thread nothing is done: signals do not reach it.
+    An exception is raised once at most and only while :attr:`armed`, so that none can come between
+    the loop and its safe command; what comes later is kept in :attr:`late`. Handlers that the
+    program has set, or that ignore a signal (``nohup``), stay. Outside the main thread nothing is
+    done: signals do not reach it.
 
     Attributes
     ----------

@@ -1,4 +1,6 @@
-"""Numbers of one plant or of a batch: the few operations that need a word for both, lean for plain floats."""
+"""Numbers of one plant or of a batch: the few operations that need a word for both, lean for plain
+floats.
+"""
 
 from __future__ import annotations
 
@@ -10,13 +12,24 @@ import numpy as np
 from pamrs.control._protocol import Value
 from pamrs.errors import ParameterError
 
-__all__ = ["angle_factor", "as_value", "clip", "limits_around", "positive_gain", "positive_number", "sign", "sin"]
+__all__ = [
+    "angle_factor",
+    "as_value",
+    "clip",
+    "limits_around",
+    "positive_gain",
+    "positive_number",
+    "sign",
+    "sin",
+]
 
 #: How many of a unit are in a radian.
 _PER_RADIAN: Final[dict[str, float]] = {"rad": 1.0, "deg": 180.0 / math.pi}
 
 
-def as_value(name: str, value: Any, *, lower: float = -math.inf, upper: float = math.inf, above: bool = False) -> Value:
+def as_value(
+    name: str, value: Any, *, lower: float = -math.inf, upper: float = math.inf, above: bool = False
+) -> Value:
     """A finite float, or a finite array of shape (n,), within bounds.
 
     Parameters
@@ -43,16 +56,24 @@ def as_value(name: str, value: Any, *, lower: float = -math.inf, upper: float = 
     try:
         array = np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError):
-        raise ParameterError(f"{name} = {value!r} is not allowed: a number or an array of shape (n,) is needed") from None
+        raise ParameterError(
+            f"{name} = {value!r} is not allowed: a number or an array of shape (n,) is needed"
+        ) from None
     if array.ndim > 1 or array.size == 0:
-        raise ParameterError(f"{name} has shape {array.shape}: a number or an array of shape (n,) is needed")
+        raise ParameterError(
+            f"{name} has shape {array.shape}: a number or an array of shape (n,) is needed"
+        )
     wrong = ~(np.isfinite(array) & (array >= lower) & (array <= upper))
     if above:
         wrong |= array == lower
     if np.any(wrong):
         first = np.atleast_1d(array)[np.atleast_1d(wrong)][0]
         bound = f"above {lower:g}" if above else f"from {lower:g}"
-        allowed = "finite" if lower == -math.inf and upper == math.inf else f"finite, {bound} to {upper:g}"
+        allowed = (
+            "finite"
+            if lower == -math.inf and upper == math.inf
+            else f"finite, {bound} to {upper:g}"
+        )
         raise ParameterError(f"{name} = {first:g} is not allowed: {allowed} is needed")
     if array.ndim == 0:
         return float(array)
@@ -76,21 +97,30 @@ def positive_number(name: str, value: Any) -> float:
 
 
 def limits_around(limits: Any, null: Any) -> tuple[float, float, float]:
-    """Limits of an output and what is put out for no error, checked: two finite numbers, the first below the second, null within."""
+    """Limits of an output and what is put out for no error, checked: two finite numbers, the first
+    below the second, null within.
+    """
     try:
         low, high = (float(limit) for limit in limits)
         middle = float(null)
     except (TypeError, ValueError):
         low = high = middle = math.nan
     if not (math.isfinite(low) and math.isfinite(high) and low <= middle <= high and low < high):
-        raise ParameterError(f"limits = {limits!r} are not allowed: two finite numbers are needed, rising, with {null!r} between them")
+        raise ParameterError(
+            f"limits = {limits!r} are not allowed: two finite numbers are needed, rising, with "
+            f"{null!r} between them"
+        )
     return low, high, middle
 
 
 def angle_factor(unit: str) -> float:
-    """How many of a unit, ``"rad"`` or ``"deg"``, are in a radian; a ParameterError for another one."""
+    """How many of a unit, ``"rad"`` or ``"deg"``, are in a radian; a ParameterError for another
+    one.
+    """
     if unit not in _PER_RADIAN:
-        raise ParameterError(f"unit = {unit!r} is not allowed: one of {', '.join(_PER_RADIAN)} is needed")
+        raise ParameterError(
+            f"unit = {unit!r} is not allowed: one of {', '.join(_PER_RADIAN)} is needed"
+        )
     return _PER_RADIAN[unit]
 
 

@@ -1,19 +1,25 @@
 """Gymnasium environments: one arm, and many of them in one :class:`pamrs.Batch`.
 
-Importing this module registers ``pamrs/Shoulder-v0``; ``gymnasium.make("pamrs.control.gym:pamrs/Shoulder-v0")`` imports it too.
+Importing this module registers ``pamrs/Shoulder-v0``;
+``gymnasium.make("pamrs.control.gym:pamrs/Shoulder-v0")`` imports it too.
 
-**Task.** Follow a lift, hold and return to an angle that is drawn at each reset, or a trajectory that is given.
+**Task.** Follow a lift, hold and return to an angle that is drawn at each reset, or a trajectory
+that is given.
 
-**Action.** Opening of the valve, from -1 (venting, 0 V) over 0 (closed) to 1 (filling, 10 V), held for one sample.
+**Action.** Opening of the valve, from -1 (venting, 0 V) over 0 (closed) to 1 (filling, 10 V), held
+for one sample.
 
-**Observation.** Joint angle [rad], joint rate [rad/s], muscle pressure [Pa, gauge], reference angle [rad] and its rate [rad/s], and the
-opening that was held last, which the reward asks for; kept within the bounds of the space: the stops with 0.2 rad of give, 30 rad/s,
-vacuum and twice the supply.
+**Observation.** Joint angle [rad], joint rate [rad/s], muscle pressure [Pa, gauge], reference angle
+[rad] and its rate [rad/s], and the opening that was held last, which the reward asks for; kept
+within the bounds of the space: the stops with 0.2 rad of give, 30 rad/s, vacuum and twice the
+supply.
 
-**Reward.** ``-(error^2 + effort * change^2)`` for each sample: error [rad] after the step, change of the opening since the last one. A
-plant that leaves the range of its model costs ``penalty`` more.
+**Reward.** ``-(error^2 + effort * change^2)`` for each sample: error [rad] after the step, change
+of the opening since the last one. A plant that leaves the range of its model costs ``penalty``
+more.
 
-**End.** *Terminated* when the plant leaves the range of its model; *truncated* when the record is over.
+**End.** *Terminated* when the plant leaves the range of its model; *truncated* when the record is
+over.
 """
 
 from __future__ import annotations
@@ -63,41 +69,72 @@ class _Task:
         joints, valves = self.rig.tables("joint"), self.rig.tables("valve")
         if any(set(tables) != {""} for tables in (joints, valves, self.rig.tables("chamber"))):
             raise ParameterError(
-                f"rig {self.rig.name!r} is not allowed: one joint, one valve and one chamber, without names, are needed"
+                f"rig {self.rig.name!r} is not allowed: one joint, one valve and one chamber, "
+                "without names, are needed"
             )
         joint = joints[""]
         self.low, self.high = float(joint["min_angle"]), float(joint["max_angle"])
         self.rest = float(joint["rest_angle"])
         reach = self.high - self.low
-        self.targets = (self.low + 0.2 * reach, self.low + 0.6 * reach) if targets is None else targets
+        self.targets = (
+            (self.low + 0.2 * reach, self.low + 0.6 * reach) if targets is None else targets
+        )
         if not self.low <= self.targets[0] <= self.targets[1] <= self.high:
-            raise ParameterError(f"targets = {targets} is not allowed: rising, from {self.low:g} to {self.high:g} rad")
-        if not (math.isfinite(effort) and effort >= 0.0 and math.isfinite(penalty) and penalty >= 0.0):
-            raise ParameterError(f"effort = {effort} and penalty = {penalty} are not allowed: zero or more is needed")
+            raise ParameterError(
+                f"targets = {targets} is not allowed: rising, from {self.low:g} to {self.high:g} "
+                "rad"
+            )
+        if not (
+            math.isfinite(effort) and effort >= 0.0 and math.isfinite(penalty) and penalty >= 0.0
+        ):
+            raise ParameterError(
+                f"effort = {effort} and penalty = {penalty} are not allowed: zero or more is needed"
+            )
         sample_time = positive_number("sample_time", sample_time)
-        self.trajectory, self.sample_time, self.effort, self.penalty = trajectory, sample_time, effort, penalty
+        self.trajectory, self.sample_time, self.effort, self.penalty = (
+            trajectory,
+            sample_time,
+            effort,
+            penalty,
+        )
         self.null, self.range = (float(valves[""][key]) for key in ("null_voltage", "half_range"))
         length = 15.0 if trajectory is None else trajectory.duration
         self.samples = math.floor(length / sample_time + 1e-9)
         if self.samples < 1:
-            raise ParameterError(f"sample_time = {sample_time} s is not allowed: the record of {length:g} s needs one sample at least")
-        supply = max(float(table["initial_pressure"]) for table in self.rig.tables("supply").values())
+            raise ParameterError(
+                f"sample_time = {sample_time} s is not allowed: the record of {length:g} s needs "
+                "one sample at least"
+            )
+        supply = max(
+            float(table["initial_pressure"]) for table in self.rig.tables("supply").values()
+        )
         ambient = float(self.rig.tables("gas")[""]["ambient_pressure"])
         least = [self.low - 0.2, -30.0, -ambient, self.low - 0.2, -30.0, -1.0]
         most = [self.high + 0.2, 30.0, 2.0 * supply, self.high + 0.2, 30.0, 1.0]
-        self.observed = gymnasium.spaces.Box(np.array(least, dtype=np.float32), np.array(most, dtype=np.float32), dtype=np.float32)
+        self.observed = gymnasium.spaces.Box(
+            np.array(least, dtype=np.float32), np.array(most, dtype=np.float32), dtype=np.float32
+        )
         self.acted = gymnasium.spaces.Box(-1.0, 1.0, (1,), dtype=np.float32)
 
     def draw(self, random: np.random.Generator) -> Trajectory:
         """The trajectory of an episode."""
-        target = float(random.uniform(*self.targets))  # drawn also where it is not used, so that seeds mean the same
+        target = float(
+            random.uniform(*self.targets)
+        )  # drawn also where it is not used, so that seeds mean the same
         if self.trajectory is not None:
             return self.trajectory
         return lift_hold_return(self.rest, target, duration=15.0)
 
     def seen(self, sample: dict[str, Any], angle: Any, rate: Any, opening: Any) -> Array32:
         """The observation, kept in its space."""
-        values = [sample["joint_angle"], sample["joint_rate"], sample["muscle_pressure"], angle, rate, opening]
+        values = [
+            sample["joint_angle"],
+            sample["joint_rate"],
+            sample["muscle_pressure"],
+            angle,
+            rate,
+            opening,
+        ]
         space = self.observed
         return np.clip(np.stack(values, axis=-1).astype(np.float32), space.low, space.high)
 
@@ -154,7 +191,9 @@ class ShoulderEnv(gymnasium.Env[Array32, Array32]):
         self._simulator = Simulator(self._task.rig, sample_time=sample_time)
         self._trajectory: Trajectory | None = None
 
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array32, dict[str, Any]]:
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Array32, dict[str, Any]]:
         """Begin an episode at rest.
 
         Parameters
@@ -175,7 +214,9 @@ class ShoulderEnv(gymnasium.Env[Array32, Array32]):
         self._k, self._opening = 0, 0.0
         sample = self._simulator.reset()
         wanted = self._trajectory(0.0)
-        return self._task.seen(sample, wanted.angle, wanted.rate, self._opening), {"target": _target(self._trajectory)}
+        return self._task.seen(sample, wanted.angle, wanted.rate, self._opening), {
+            "target": _target(self._trajectory)
+        }
 
     def step(self, action: Array32) -> tuple[Array32, float, bool, bool, dict[str, Any]]:
         """Hold an opening for one sample.
@@ -206,7 +247,9 @@ class ShoulderEnv(gymnasium.Env[Array32, Array32]):
         self._k += 1
         wanted = self._trajectory(self._k * self._task.sample_time)
         error = float(wanted.angle) - sample["joint_angle"]
-        reward = float(self._task.worth(error, opening - self._opening)) - (self._task.penalty if failed else 0.0)
+        reward = float(self._task.worth(error, opening - self._opening)) - (
+            self._task.penalty if failed else 0.0
+        )
         self._opening = opening
         info = {"error": error, "valve_command": self._task.volts(opening)}
         seen = self._task.seen(sample, wanted.angle, wanted.rate, opening)
@@ -214,11 +257,12 @@ class ShoulderEnv(gymnasium.Env[Array32, Array32]):
 
 
 class ShoulderVectorEnv(gymnasium.vector.VectorEnv[Array32, Array32, Any]):
-    """Many arms in one :class:`pamrs.Batch`; arm ``i`` of a reset with ``seed`` is :class:`ShoulderEnv` reset with ``seed + i``.
+    """Many arms in one :class:`pamrs.Batch`; arm ``i`` of a reset with ``seed`` is
+    :class:`ShoulderEnv` reset with ``seed + i``.
 
-    All episodes begin and end together: the batch has one clock. When one plant leaves the range of its model, that one is terminated
-    and all others are truncated. The step after an end begins the next episodes and ignores its actions
-    (``AutoresetMode.NEXT_STEP``).
+    All episodes begin and end together: the batch has one clock. When one plant leaves the range of
+    its model, that one is terminated and all others are truncated. The step after an end begins the
+    next episodes and ignores its actions (``AutoresetMode.NEXT_STEP``).
 
     Parameters
     ----------
@@ -254,7 +298,10 @@ class ShoulderVectorEnv(gymnasium.vector.VectorEnv[Array32, Array32, Any]):
         self._task = _Task(rig, trajectory, targets, sample_time, effort, penalty)
         self._batch = Batch(self._task.rig, n=num_envs, sample_time=sample_time)
         self.num_envs = num_envs
-        self.single_observation_space, self.single_action_space = self._task.observed, self._task.acted
+        self.single_observation_space, self.single_action_space = (
+            self._task.observed,
+            self._task.acted,
+        )
         self.observation_space = batch_space(self._task.observed, num_envs)
         self.action_space = batch_space(self._task.acted, num_envs)
         self._randoms = [np.random.default_rng() for _ in range(num_envs)]
@@ -280,9 +327,15 @@ class ShoulderVectorEnv(gymnasium.vector.VectorEnv[Array32, Array32, Any]):
             ``target`` [rad], shape (n,).
         """
         if seed is not None:
-            seeds = [int(seed) + i for i in range(self.num_envs)] if isinstance(seed, (int, np.integer)) else list(seed)
+            seeds = (
+                [int(seed) + i for i in range(self.num_envs)]
+                if isinstance(seed, (int, np.integer))
+                else list(seed)
+            )
             if len(seeds) != self.num_envs:
-                raise ParameterError(f"seed has {len(seeds)} entries; one for each of {self.num_envs} arms is needed")
+                raise ParameterError(
+                    f"seed has {len(seeds)} entries; one for each of {self.num_envs} arms is needed"
+                )
             for i, own in enumerate(seeds):
                 if own is not None:
                     self._randoms[i] = gymnasium.utils.seeding.np_random(int(own))[0]
@@ -299,10 +352,14 @@ class ShoulderVectorEnv(gymnasium.vector.VectorEnv[Array32, Array32, Any]):
 
     def _wanted(self) -> tuple[Array, Array]:
         now = self._k * self._task.sample_time
-        points = np.array([trajectory(now)[:2] for trajectory in self._trajectories], dtype=np.float64)
+        points = np.array(
+            [trajectory(now)[:2] for trajectory in self._trajectories], dtype=np.float64
+        )
         return points[:, 0], points[:, 1]
 
-    def step(self, actions: Array32) -> tuple[Array32, Array, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
+    def step(
+        self, actions: Array32
+    ) -> tuple[Array32, Array, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
         """Hold an opening of every arm for one sample.
 
         Parameters
@@ -335,14 +392,22 @@ class ShoulderVectorEnv(gymnasium.vector.VectorEnv[Array32, Array32, Any]):
         self._over = bool(failed.any()) or self._k >= self._task.samples
         truncated = ~failed if self._over else none
         there = np.ones(self.num_envs, dtype=np.bool_)
-        info = {"error": error, "_error": there, "valve_command": self._task.volts(openings), "_valve_command": there}
+        info = {
+            "error": error,
+            "_error": there,
+            "valve_command": self._task.volts(openings),
+            "_valve_command": there,
+        }
         return self._task.seen(sample, angle, rate, openings), reward, failed, truncated, info
 
 
 def _check_render_mode(render_mode: str | None) -> None:
     """Refuse what ``gymnasium.make`` passes on, where it is not None."""
     if render_mode is not None:
-        raise ParameterError(f"render_mode = {render_mode!r} is not allowed: there is none; Simulation.animate draws an arm")
+        raise ParameterError(
+            f"render_mode = {render_mode!r} is not allowed: there is none; Simulation.animate "
+            "draws an arm"
+        )
 
 
 def _target(trajectory: Trajectory) -> float:
@@ -353,9 +418,16 @@ def _target(trajectory: Trajectory) -> float:
 def _openings(action: Any, n: int) -> Array:
     values = np.asarray(action, dtype=np.float64)
     if values.shape not in ((n, 1), (n,)) or not np.isfinite(values).all():
-        raise ParameterError(f"action with the shape {values.shape} is not allowed: ({n}, 1) finite numbers are needed")
+        raise ParameterError(
+            f"action with the shape {values.shape} is not allowed: ({n}, 1) finite numbers are "
+            "needed"
+        )
     return np.clip(values.reshape(n), -1.0, 1.0)
 
 
 if ID not in gymnasium.registry:
-    gymnasium.register(ID, entry_point="pamrs.control.gym:ShoulderEnv", vector_entry_point="pamrs.control.gym:ShoulderVectorEnv")
+    gymnasium.register(
+        ID,
+        entry_point="pamrs.control.gym:ShoulderEnv",
+        vector_entry_point="pamrs.control.gym:ShoulderVectorEnv",
+    )

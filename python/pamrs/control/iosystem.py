@@ -1,8 +1,10 @@
-"""A rig as a ``control.NonlinearIOSystem``: in discrete time, one step of it being one sample of the simulator.
+"""A rig as a ``control.NonlinearIOSystem``: in discrete time, one step of it being one sample of
+the simulator.
 
-The core has no state derivative to give, and a derivative would lose what happens between steps (hard stops, remembered hysteresis, the
-books of air and energy). So the system is discrete, its state is the simulator's, its update is restore and step, and
-``control.input_output_response`` gives what :func:`pamrs.simulate` gives, to the last bit.
+The core has no state derivative to give, and a derivative would lose what happens between steps
+(hard stops, remembered hysteresis, the balances of mass and energy). So the system is discrete, its
+state is the simulator's, its update is restore and step, and ``control.input_output_response``
+gives what :func:`pamrs.simulate` gives, to the last bit.
 """
 
 from __future__ import annotations
@@ -27,7 +29,12 @@ Array = NDArray[np.float64]
 
 
 def iosystem(
-    rig: Rig, *, sample_time: float, step: float | None = None, outputs: Sequence[str] | None = None, name: str | None = None
+    rig: Rig,
+    *,
+    sample_time: float,
+    step: float | None = None,
+    outputs: Sequence[str] | None = None,
+    name: str | None = None,
 ) -> control.NonlinearIOSystem:
     """A rig as a discrete-time input-output system of python-control.
 
@@ -47,21 +54,24 @@ def iosystem(
     Returns
     -------
     control.NonlinearIOSystem
-        Inputs and outputs have the names of the channels, of a named block ``joint_angle_elbow``, as python-control allows no dot.
-        Its states are ``x[0] ...``: the physical ones first (absolute pressures), then memories and books; :func:`initial_state` makes
-        them from initial values by name.
+        Inputs and outputs have the names of the channels, of a named block ``joint_angle_elbow``,
+        as python-control allows no dot. Its states are ``x[0] ...``: the physical ones first
+        (absolute pressures), then memories and balances; :func:`initial_state` makes them from
+        initial values by name.
 
     Raises
     ------
     ParameterError
-        If an argument is not allowed, the rig has no command, or it has the effect ``clock_skew``, whose state grows.
+        If an argument is not allowed, the rig has no command, or it has the effect ``clock_skew``,
+        whose state grows.
     MissingPackageError
         If python-control is not installed.
     """
     library = python_control()
     if any(effect["id"] == "clock_skew" for effect in rig.effects):
         raise ParameterError(
-            "clock_skew is not allowed here: it keeps the samples before, a state that grows; delay the inputs instead"
+            "clock_skew is not allowed here: it keeps the samples before, a state that grows; "
+            "delay the inputs instead"
         )
     compiled = core_rig(rig)
     simulator = Simulator(rig, sample_time=sample_time, step=step)
@@ -71,7 +81,10 @@ def iosystem(
     channels = list(compiled.channels if outputs is None else outputs)
     for channel in channels:
         if channel not in compiled.channels:
-            raise ParameterError(f"outputs has {channel!r}, and the rig has no such channel; it has: {', '.join(compiled.channels)}")
+            raise ParameterError(
+                f"outputs has {channel!r}, and the rig has no such channel; it has: "
+                f"{', '.join(compiled.channels)}"
+            )
 
     def updated(_: float, state: Array, command: Array, __: Mapping[str, Any]) -> Array:
         simulator.restore(state)
@@ -97,7 +110,9 @@ def iosystem(
     )
 
 
-def initial_state(rig: Rig, *, sample_time: float, initial: Mapping[str, float] | None = None) -> Array:
+def initial_state(
+    rig: Rig, *, sample_time: float, initial: Mapping[str, float] | None = None
+) -> Array:
     """The state of :func:`iosystem` at initial values by name.
 
     Parameters

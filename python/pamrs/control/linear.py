@@ -1,4 +1,6 @@
-"""Linear models of rigs about an operating point; those of controllers are in ``_controller_model``."""
+"""Linear models of rigs about an operating point; those of controllers are in
+``_controller_model``.
+"""
 
 from __future__ import annotations
 
@@ -32,16 +34,19 @@ FRICTIONS: Final = ("rest", "moving")
 
 @dataclass(frozen=True)
 class LinearModel:
-    """``x' = A x + B u, y = C x`` about an operating point; every number is a deviation from :attr:`point`, SI.
+    """``x' = A x + B u, y = C x`` about an operating point; every number is a deviation from
+    :attr:`point`, SI.
 
     Attributes
     ----------
     a, b, c : ndarray, shapes (n, n), (n, m), (p, n)
     states, inputs, outputs : tuple of str
-        Channels of the rig; among the states also what effects move, by the effect's name (``input_path_lag.lag``, with the block
-        behind another dot where it has a name). A state is the true value, an output what the sensor reads.
+        Channels of the rig; among the states also what effects move, by the effect's name
+        (``input_path_lag.lag``, with the block behind another dot where it has a name). A state is
+        the true value, an output what the sensor reads.
     point : mapping of str to float
-        Values of all channels, as the sensors read them (zeros included), and of the inputs at the operating point.
+        Values of all channels, as the sensors read them (zeros included), and of the inputs at the
+        operating point.
     side : str
         Which way the valve opens, see :func:`linearise`.
     """
@@ -70,11 +75,15 @@ class LinearModel:
         library = python_control()
         d = np.zeros((len(self.outputs), len(self.inputs)))
         labels = {"states": self.states, "inputs": self.inputs, "outputs": self.outputs}
-        names = {kind: [channel.replace(".", "_") for channel in channels] for kind, channels in labels.items()}  # it allows no dot
+        names = {
+            kind: [channel.replace(".", "_") for channel in channels]
+            for kind, channels in labels.items()
+        }  # it allows no dot
         return library.ss(self.a, self.b, self.c, d, **names)
 
     def driven_by(self, state: str) -> LinearModel:
-        """The model with a state as its only input, for example the pressure of a chamber that a fast inner loop holds.
+        """The model with a state as its only input, for example the pressure of a chamber that a
+        fast inner loop holds.
 
         Parameters
         ----------
@@ -91,7 +100,9 @@ class LinearModel:
             If there is no such state.
         """
         if state not in self.states:
-            raise ParameterError(f"state = {state!r} is not allowed: one of {', '.join(self.states)}")
+            raise ParameterError(
+                f"state = {state!r} is not allowed: one of {', '.join(self.states)}"
+            )
         k = self.states.index(state)
         rest = [i for i in range(len(self.states)) if i != k]
         rows = [i for i, name in enumerate(self.outputs) if name != state]
@@ -117,7 +128,9 @@ class LinearModel:
             If the period is not above zero.
         """
         if not (math.isfinite(period) and period > 0.0):
-            raise ParameterError(f"period = {period} s is not allowed: a finite time above zero is needed")
+            raise ParameterError(
+                f"period = {period} s is not allowed: a finite time above zero is needed"
+            )
         from scipy.linalg import expm
 
         n, m = self.b.shape
@@ -128,9 +141,15 @@ class LinearModel:
 
 
 def equilibrium(
-    rig: Rig, angle: float, *, joint: str = "", chamber: str = "", initial: Mapping[str, float] | None = None
+    rig: Rig,
+    angle: float,
+    *,
+    joint: str = "",
+    chamber: str = "",
+    initial: Mapping[str, float] | None = None,
 ) -> dict[str, float]:
-    """The state that holds a joint at an angle with every valve closed, as initial values of a simulation.
+    """The state that holds a joint at an angle with every valve closed, as initial values of a
+    simulation.
 
     Parameters
     ----------
@@ -151,16 +170,23 @@ def equilibrium(
     Raises
     ------
     ParameterError
-        If the rig has no such blocks, the angle is not between the stops, or no pressure up to that of the supply holds it.
+        If the rig has no such blocks, the angle is not between the stops, or no pressure up to that
+        of the supply holds it.
     """
     from scipy.optimize import brentq
 
     joints = rig.tables("joint")
     if joint not in joints or chamber not in rig.tables("chamber") or not rig.tables("valve"):
-        raise ParameterError(f"rig {rig.name!r} needs a valve, the joint {joint!r} and the chamber {chamber!r}; name those it has")
+        raise ParameterError(
+            f"rig {rig.name!r} needs a valve, the joint {joint!r} and the chamber {chamber!r}; "
+            "name those it has"
+        )
     low, high = (joints[joint][key] for key in ("min_angle", "max_angle"))
     if not low < angle < high:
-        raise ParameterError(f"angle = {angle} rad is not allowed: between the stops at {low:g} and {high:g} rad is needed")
+        raise ParameterError(
+            f"angle = {angle} rad is not allowed: between the stops at {low:g} and {high:g} rad is "
+            "needed"
+        )
     rate = dotted("joint_rate", joint)
     start = {**(initial or {}), dotted("joint_angle", joint): float(angle), rate: 0.0}
 
@@ -169,7 +195,10 @@ def equilibrium(
 
     most = max(float(table.get("initial_pressure", 0.0)) for table in rig.tables("supply").values())
     if not drifting(0.0) < 0.0 < drifting(most):
-        raise ParameterError(f"no pressure from 0 to {most:g} Pa holds {dotted('joint_angle', joint)} = {angle:g} rad at rest")
+        raise ParameterError(
+            f"no pressure from 0 to {most:g} Pa holds {dotted('joint_angle', joint)} = {angle:g} "
+            "rad at rest"
+        )
     return _filled(rig, start, chamber, float(brentq(drifting, 0.0, most, xtol=1e-6, rtol=1e-14)))
 
 
@@ -186,14 +215,16 @@ def linearise(
 ) -> LinearModel:
     """A rig about an angle that it holds with its valves closed.
 
-    A and B are the exact derivatives of the core's state equation, by dual numbers, with whatever effects are in the rig: what they
-    move (a lag, a delay, a creeping strain, a mounting that gives way, the air's mass where its temperature counts) are states like
-    the others. Memories of direction (``muscle_hysteresis``) are as they are in presliding, springs about the point. What begins
-    later (``payload_change``, ``external_torque``) has not begun.
+    A and B are the exact derivatives of the core's state equation, by dual numbers, with whatever
+    effects are in the rig: what they move (a lag, a delay, a creeping strain, a mounting that gives
+    way, the air's mass where its temperature counts) are states like the others. Memories of
+    direction (``muscle_hysteresis``) are as they are in presliding, springs about the point. What
+    begins later (``payload_change``, ``external_torque``) has not begun.
 
-    Two things have no derivative or a local one. **A valve** lets air in on one side of its null and out on the other, with different
-    slopes: ``side`` chooses. **Coulomb friction** ``f tanh(rate/w)`` is at rest a viscous damping with the slope ``f/w``, which no
-    motion beyond ``w`` has: ``friction`` chooses.
+    Two things have no derivative or a local one. **A valve** lets air in on one side of its null
+    and out on the other, with different slopes: ``side`` chooses. **Coulomb friction**
+    ``f tanh(rate/w)`` is at rest a viscous damping with the slope ``f/w``, which no motion beyond
+    ``w`` has: ``friction`` chooses.
 
     Parameters
     ----------
@@ -204,13 +235,14 @@ def linearise(
     side : {"mean", "fill", "vent"}
         Slope by the opening above, below, or on both sides of the valve's null.
     friction : {"rest", "moving"}
-        Dry friction as it is at rest, or as in a motion that does not turn round: without Coulomb friction, ``joint_coulomb_stribeck``
-        and ``muscle_hysteresis``.
+        Dry friction as it is at rest, or as in a motion that does not turn round: without Coulomb
+        friction, ``joint_coulomb_stribeck`` and ``muscle_hysteresis``.
     held : tuple of str
-        Kinds of states (or effects) that are regarded as constant; the tank's pressure by default, a slow one with an eigenvalue of
-        zero.
+        Kinds of states (or effects) that are regarded as constant; the tank's pressure by default,
+        a slow one with an eigenvalue of zero.
     joint, chamber, initial
-        As for :func:`equilibrium`; of several joints each has to rest, so that ``initial`` must hold the others.
+        As for :func:`equilibrium`; of several joints each has to rest, so that ``initial`` must
+        hold the others.
 
     Returns
     -------
@@ -220,13 +252,16 @@ def linearise(
     Raises
     ------
     ParameterError
-        As :func:`equilibrium`, or if the side or the friction is unknown, the rig has an effect without a linear model (play, dead
-        zone, relay: the message names it), another joint does not rest, or a command moves nothing.
+        As :func:`equilibrium`, or if the side or the friction is unknown, the rig has an effect
+        without a linear model (play, dead zone, relay: the message names it), another joint does
+        not rest, or a command moves nothing.
     """
     if side not in SIDES:
         raise ParameterError(f"side = {side!r} is not allowed: one of {', '.join(SIDES)}")
     if friction not in FRICTIONS:
-        raise ParameterError(f"friction = {friction!r} is not allowed: one of {', '.join(FRICTIONS)}")
+        raise ParameterError(
+            f"friction = {friction!r} is not allowed: one of {', '.join(FRICTIONS)}"
+        )
     check_smooth(rig, supplies="supply_pressure" not in held)
     rig = resting(without_dry_friction(rig) if friction == "moving" else rig)
     start = equilibrium(rig, angle, joint=joint, chamber=chamber, initial=initial)
@@ -240,13 +275,18 @@ def linearise(
     named = [row for row, k in enumerate(free) if states[k] in outputs]
     for k, name in enumerate(inputs):
         if not set(heard(a.T, b[:, k])) & set(named):
-            raise ParameterError(f"{name} moves nothing about {commands[name]:g} V (side = {side!r}): no linear model is there")
+            raise ParameterError(
+                f"{name} moves nothing about {commands[name]:g} V (side = {side!r}): no linear "
+                "model is there"
+            )
     # what an effect moves and nothing feels (a lag of no time, a share of nothing) is no state
     felt = np.abs(c).sum(axis=0)
     felt[named] += 1.0
     kept = heard(a, felt)
     names = tuple(states[free[k]] for k in kept), tuple(inputs), tuple(outputs[k] for k in read)
-    return LinearModel(a[np.ix_(kept, kept)], b[kept], c[:, kept], *names, {**first, **commands}, side)
+    return LinearModel(
+        a[np.ix_(kept, kept)], b[kept], c[:, kept], *names, {**first, **commands}, side
+    )
 
 
 def _check_rest(simulator: Simulator, commands: Mapping[str, float]) -> None:
@@ -257,8 +297,9 @@ def _check_rest(simulator: Simulator, commands: Mapping[str, float]) -> None:
     for name, values in block.items():
         if channel_of(name) == "joint_rate" and not abs(values[0]) < _REST:
             raise ParameterError(
-                f"{name} is {values[0]:.3g} rad/s a quarter of a millisecond after the start: the joint does not rest; give initial "
-                "values that hold it: those of equilibrium for each joint in turn, until none moves"
+                f"{name} is {values[0]:.3g} rad/s a quarter of a millisecond after the start: the "
+                "joint does not rest; give initial values that hold it: those of equilibrium for "
+                "each joint in turn, until none moves"
             )
 
 
@@ -282,10 +323,15 @@ def _after(rig: Rig, states: Mapping[str, float], inputs: Mapping[str, float]) -
 
 def _closed(rig: Rig) -> dict[str, float]:
     """Every valve at its null."""
-    return {dotted("valve_command", name): float(table["null_voltage"]) for name, table in rig.tables("valve").items()}
+    return {
+        dotted("valve_command", name): float(table["null_voltage"])
+        for name, table in rig.tables("valve").items()
+    }
 
 
-def _filled(rig: Rig, start: Mapping[str, float], chamber: str, pressure: float) -> dict[str, float]:
+def _filled(
+    rig: Rig, start: Mapping[str, float], chamber: str, pressure: float
+) -> dict[str, float]:
     """A state with a pressure in a chamber, and in the lines that rest with it."""
     filled = {**start, dotted("muscle_pressure", chamber): pressure}
     if len(rig.tables("chamber")) == 1:

@@ -1,9 +1,12 @@
-"""Controllers on a live loop: anything that can be read and written, with a safe stop whatever happens.
+"""Controllers on a live loop: anything that can be read and written, with a safe stop whatever
+happens.
 
-Before the first reading the safe command is written. The controller is called for every period of its own clock, as if it were in a
-simulation: a tick that brought no usable reading, or that the machine was too late for, is answered with the last good reading, and
-**its answer is not written**: the plant keeps the last command. A reading that took longer than a period, or one whose answer did, is
-not usable either: the plant has moved on. So filters and integrals keep their time, and nothing new is commanded on what was not seen.
+Before the first reading the safe command is written. The controller is called for every period of
+its own clock, as if it were in a simulation: a tick that brought no usable reading, or that the
+machine was too late for, is answered with the last good reading, and **its answer is not written**:
+the plant keeps the last command. A reading that took longer than a period, or one whose answer did,
+is not usable either: the plant has moved on. So filters and integrals keep their time, and nothing
+new is commanded on what was not seen.
 """
 
 from __future__ import annotations
@@ -32,12 +35,14 @@ _SAFE_ATTEMPTS: Final = 3
 
 
 class LiveError(PamrsError, RuntimeError):
-    """The safe command could not be written, or the device or the controller failed; the plant may need a hand.
+    """The safe command could not be written, or the device or the controller failed; the plant may
+    need a hand.
 
     Attributes
     ----------
     run : LiveRun or None
-        What was recorded until then; its reason is ``"failed"`` where something failed before the end.
+        What was recorded until then; its reason is ``"failed"`` where something failed before the
+        end.
     """
 
     def __init__(self, message: str, run: LiveRun | None = None) -> None:
@@ -48,14 +53,18 @@ class LiveError(PamrsError, RuntimeError):
 class Device(Protocol):
     """A plant as a live loop sees it.
 
-    Both calls must come back, or raise, within a fraction of the controller's period: give the driver its timeouts. While one hangs
-    nobody can write, as a driver is seldom safe to use from a second thread; what a call that hung brings is not acted on, and the safe
-    command follows as soon as it is back. That the valve closes when its program hangs, is killed (SIGKILL) or loses its power is the
-    device's own task: a watchdog in its firmware, or a valve that rests where it is safe.
+    Both calls must come back, or raise, within a fraction of the controller's period: give the
+    driver its timeouts. While one hangs nobody can write, as a driver is seldom safe to use from a
+    second thread; what a call that hung brings is not acted on, and the safe command follows as
+    soon as it is back. That the valve closes when its program hangs, is killed (SIGKILL) or loses
+    its power is the device's own task: a watchdog in its firmware, or a valve that rests where it
+    is safe.
     """
 
     def read(self) -> Mapping[str, float] | None:
-        """The channels now in SI units; None, an exception or a value that is not finite count as a missed reading."""
+        """The channels now in SI units; None, an exception or a value that is not finite count as a
+        missed reading.
+        """
 
     def write(self, command: float) -> None:
         """Hold a command from now on."""
@@ -85,13 +94,15 @@ class SystemClock:
 
 @dataclass(frozen=True)
 class LiveRun:
-    """A live loop as it went; arrays have one row for each period of the controller, to the end or the stop.
+    """A live loop as it went; arrays have one row for each period of the controller, to the end or
+    the stop.
 
     Attributes
     ----------
     reason : {"finished", "lost_sensor", "overrun", "interrupted", "failed"}
-        Why it ended; overrun if too many periods in a row were left out as the machine, or ``read`` and ``write``, were too slow: a
-        longer period helps (5 to 10 ms on an ordinary operating system). Interrupted by Ctrl-C, failed in :attr:`LiveError.run` only.
+        Why it ended; overrun if too many periods in a row were left out as the machine, or ``read``
+        and ``write``, were too slow: a longer period helps (5 to 10 ms on an ordinary operating
+        system). Interrupted by Ctrl-C, failed in :attr:`LiveError.run` only.
     time : ndarray, shape (rows,)
         Nominal time of each period [s].
     reference, command : ndarray, shape (rows,)
@@ -149,31 +160,35 @@ def run_live(
 ) -> LiveRun:
     """Let a controller follow a trajectory with a live device.
 
-    The safe command is written before the first reading, at the end, at a lost sensor, at Ctrl-C and before any exception goes on. In
-    the main thread SIGTERM, SIGHUP and SIGBREAK are such exceptions while the loop runs, ``SystemExit(128 + number)``, unless the
-    program handles or ignores them itself. For what no program can answer see :class:`Device`.
+    The safe command is written before the first reading, at the end, at a lost sensor, at Ctrl-C
+    and before any exception goes on. In the main thread SIGTERM, SIGHUP and SIGBREAK are such
+    exceptions while the loop runs, ``SystemExit(128 + number)``, unless the program handles or
+    ignores them itself. For what no program can answer see :class:`Device`.
 
     Parameters
     ----------
     device : Device
         Anything with ``read()`` and ``write(command)``.
     controller : Controller
-        For one plant; it is reset first. It answers what the device takes, volts: one that answers a pressure belongs in a
-        :class:`pamrs.control.Cascade`.
+        For one plant; it is reset first. It answers what the device takes, volts: one that answers
+        a pressure belongs in a :class:`pamrs.control.Cascade`.
     trajectory : Trajectory
     duration : float, optional
         [s], a multiple of the controller's period; the trajectory's by default.
     safe : float
-        The command that is safe: 5 V closes the valve and keeps the air, 0 V vents the muscle, and the arm comes down.
+        The command that is safe: 5 V closes the valve and keeps the air, 0 V vents the muscle, and
+        the arm comes down.
     limits : (float, float)
         Commands are kept within; the safe one too.
     most_missed : int
-        Readings missed in a row that are borne; one more is a lost sensor. Periods left out by an overrun count too.
+        Readings missed in a row that are borne; one more is a lost sensor. Periods left out by an
+        overrun count too.
     stamp : str, optional
-        Channel that rises with every new reading, a time or a counter: one that does not rise is stale, and counts as missed. By
-        default ``time``, if the first reading has it.
+        Channel that rises with every new reading, a time or a counter: one that does not rise is
+        stale, and counts as missed. By default ``time``, if the first reading has it.
     plausible : mapping of str to (float, float), optional
-        Channel -> lowest and highest value [SI] that can be: a reading outside, or without the channel, counts as missed.
+        Channel -> lowest and highest value [SI] that can be: a reading outside, or without the
+        channel, counts as missed.
     clock : Clock, optional
         The machine's by default.
 
@@ -187,10 +202,22 @@ def run_live(
     ParameterError
         If an argument is not allowed.
     LiveError
-        If ``write`` or the controller failed, the clock went back, or the controller answered what is not a finite number; the cause is
-        chained, the record so far is :attr:`LiveError.run`. The safe command was written, unless the message says that it could not be.
+        If ``write`` or the controller failed, the clock went back, or the controller answered what
+        is not a finite number; the cause is chained, the record so far is :attr:`LiveError.run`.
+        The safe command was written, unless the message says that it could not be.
     """
-    loop = _Loop(device, controller, trajectory, duration, safe, limits, most_missed, stamp, plausible, clock or SystemClock())
+    loop = _Loop(
+        device,
+        controller,
+        trajectory,
+        duration,
+        safe,
+        limits,
+        most_missed,
+        stamp,
+        plausible,
+        clock or SystemClock(),
+    )
     reason, failed = "failed", None
     with Termination() as termination:
         try:
@@ -198,7 +225,9 @@ def run_live(
         except BaseException as error:  # SystemExit too goes on only after the safe command
             failed = error
         unsafe = loop.stop()
-    if isinstance(failed, KeyboardInterrupt) or (failed is None and termination.late == signal.SIGINT):
+    if isinstance(failed, KeyboardInterrupt) or (
+        failed is None and termination.late == signal.SIGINT
+    ):
         reason, failed = "interrupted", None
     if isinstance(failed, Exception):
         text = f"the live loop failed at {loop.k * loop.period:g} s: {failed}{unsafe}"
@@ -234,14 +263,33 @@ class _Loop:
         check_drives_valve(controller)
         low, high = _pair("limits", limits)
         if not low <= safe <= high:
-            raise ParameterError(f"safe = {safe} is not allowed: from {low:g} to {high:g} is needed")
+            raise ParameterError(
+                f"safe = {safe} is not allowed: from {low:g} to {high:g} is needed"
+            )
         if isinstance(most_missed, bool) or not isinstance(most_missed, int) or most_missed < 0:
-            raise ParameterError(f"most_missed = {most_missed!r} is not allowed: a whole number from 0 on is needed")
-        self.device, self.controller, self.trajectory, self.clock = device, controller, trajectory, clock
-        self.safe, self.low, self.high, self.most_missed, self.stamp = float(safe), low, high, most_missed, stamp
-        self.plausible = {name: _pair(f"plausible[{name}]", pair) for name, pair in (plausible or {}).items()}
+            raise ParameterError(
+                f"most_missed = {most_missed!r} is not allowed: a whole number from 0 on is needed"
+            )
+        self.device, self.controller, self.trajectory, self.clock = (
+            device,
+            controller,
+            trajectory,
+            clock,
+        )
+        self.safe, self.low, self.high, self.most_missed, self.stamp = (
+            float(safe),
+            low,
+            high,
+            most_missed,
+            stamp,
+        )
+        self.plausible = {
+            name: _pair(f"plausible[{name}]", pair) for name, pair in (plausible or {}).items()
+        }
         self.period = controller.period
-        self.total = whole_samples("duration", trajectory.duration if duration is None else duration, self.period, least=1)
+        self.total = whole_samples(
+            "duration", trajectory.duration if duration is None else duration, self.period, least=1
+        )
         check_angles(trajectory, self.total * self.period)
         self.k = 0
         self.held = self.safe
@@ -296,7 +344,10 @@ class _Loop:
         late = self.clock.now() - due
         # after a tick that was on time a period is waited, never two
         if late < -2.0 * self.period:
-            raise ParameterError(f"the clock went back, to {-late:.4g} s before the next sample: one that never does is needed")
+            raise ParameterError(
+                f"the clock went back, to {-late:.4g} s before the next sample: one that never "
+                "does is needed"
+            )
         return late
 
     def _wanted(self) -> Reference:
@@ -307,7 +358,9 @@ class _Loop:
         self.last, wanted = reading, self._wanted()
         command = float(self.controller.update(self.k * self.period, reading, wanted))
         if not math.isfinite(command):
-            raise ParameterError(f"the controller's command is {command}: a finite number is needed")
+            raise ParameterError(
+                f"the controller's command is {command}: a finite number is needed"
+            )
         if self.clock.now() - begun > self.period:
             self.missed += 1
             self.in_a_row += 1
@@ -318,7 +371,9 @@ class _Loop:
         self._note(wanted, late, reading)
 
     def _without_reading(self, late: float) -> None:
-        """A period that the controller lives through with the last reading, and the plant with the last command."""
+        """A period that the controller lives through with the last reading, and the plant with the
+        last command.
+        """
         self.in_a_row += 1
         wanted = self._wanted()
         if self.last is not None:
@@ -333,14 +388,19 @@ class _Loop:
         """A usable reading, or None."""
         try:
             given = self.device.read()
-            reading = None if given is None else {name: float(value) for name, value in given.items()}
+            reading = (
+                None if given is None else {name: float(value) for name, value in given.items()}
+            )
         except Exception:  # whatever a driver raises, the arm has to be held
             return None
         if not reading or not all(map(math.isfinite, reading.values())):
             return None
         if self.last is not None and not self.last.keys() <= reading.keys():
             return None  # a channel that was there is gone
-        if any(not low <= reading.get(name, math.nan) <= high for name, (low, high) in self.plausible.items()):
+        if any(
+            not low <= reading.get(name, math.nan) <= high
+            for name, (low, high) in self.plausible.items()
+        ):
             return None
         if self.stamp is None:
             self.stamp = "time" if "time" in reading else ""
@@ -357,17 +417,36 @@ class _Loop:
             try:
                 self.device.write(self.safe)
             except BaseException as error:  # a second Ctrl-C must not keep the valve open
-                why = f"; and the safe command {self.safe:g} could not be written: {type(error).__name__} {error}"
+                why = (
+                    f"; and the safe command {self.safe:g} could not be written: "
+                    f"{type(error).__name__} {error}"
+                )
             else:
                 return ""
         return why
 
     def result(self, reason: str) -> LiveRun:
         """What happened."""
-        when, wanted, command, late = (np.array([row[i] for row in self.rows], dtype=np.float64) for i in range(4))
+        when, wanted, command, late = (
+            np.array([row[i] for row in self.rows], dtype=np.float64) for i in range(4)
+        )
         names = dict.fromkeys(name for row in self.rows for name in (row[4] or ()))
-        channels = {n: np.array([math.nan if r[4] is None else r[4].get(n, math.nan) for r in self.rows]) for n in names}
-        return LiveRun(reason, when, wanted, command, channels, late, self.missed, self.overruns, self.safe, self.stall)
+        channels = {
+            n: np.array([math.nan if r[4] is None else r[4].get(n, math.nan) for r in self.rows])
+            for n in names
+        }
+        return LiveRun(
+            reason,
+            when,
+            wanted,
+            command,
+            channels,
+            late,
+            self.missed,
+            self.overruns,
+            self.safe,
+            self.stall,
+        )
 
 
 def _pair(name: str, given: Any) -> tuple[float, float]:
@@ -377,5 +456,7 @@ def _pair(name: str, given: Any) -> tuple[float, float]:
     except (TypeError, ValueError):
         low = high = math.nan
     if not (math.isfinite(low) and math.isfinite(high) and low < high):
-        raise ParameterError(f"{name} = {given} is not allowed: two rising finite numbers are needed")
+        raise ParameterError(
+            f"{name} = {given} is not allowed: two rising finite numbers are needed"
+        )
     return low, high

@@ -1,9 +1,12 @@
-"""How well a loop follows: the metrics of 4.4.1 and the usual ones of a step; for one run ``(samples,)`` or a batch ``(n, samples)``.
+"""How well a loop follows: the metrics of 4.4.1 and the usual ones of a step; for one run
+``(samples,)`` or a batch ``(n, samples)``.
 
-The curvature (4.16) of the graph of angle over time adds a rate squared to one, so its value, and with it the optimum by (4.18),
-depends on the units that the axes carry: in degrees and seconds a moving arm counts for almost nothing, in radians for nearly as much
-as a resting one. The dissertation does not say which it used. Everything here takes ``unit`` (``"rad"`` by default) for it; time is in
-seconds. The curvature is taken in absolute value, as a signed integral would cancel oscillation.
+The curvature (4.16) of the graph of angle over time adds a rate squared to one, so its value, and
+with it the optimum by (4.18), depends on the units that the axes carry: in degrees and seconds a
+moving arm counts for almost nothing, in radians for nearly as much as a resting one. The
+dissertation does not say which it used. Everything here takes ``unit`` (``"rad"`` by default) for
+it; time is in seconds. The curvature is taken in absolute value, as a signed integral would cancel
+oscillation.
 """
 
 from __future__ import annotations
@@ -76,7 +79,9 @@ class Metrics:
     unit: str
 
 
-def squared_error(time: ArrayLike, reference: ArrayLike, angle: ArrayLike, *, unit: str = "rad") -> float | Array:
+def squared_error(
+    time: ArrayLike, reference: ArrayLike, angle: ArrayLike, *, unit: str = "rad"
+) -> float | Array:
     """Integral of the squared error, nu (4.15), by the trapezoidal rule.
 
     Parameters
@@ -96,14 +101,16 @@ def squared_error(time: ArrayLike, reference: ArrayLike, angle: ArrayLike, *, un
     Raises
     ------
     ParameterError
-        If shapes do not fit, time does not rise, a value is not finite (in a batch that run failed, and its result is NaN), or the
-        unit is unknown.
+        If shapes do not fit, time does not rise, a value is not finite (in a batch that run failed,
+        and its result is NaN), or the unit is unknown.
     """
     t, e = _error(time, reference, angle)
     return plain(angle_factor(unit) ** 2 * integral(t, e * e))
 
 
-def curvature(time: ArrayLike, angle: ArrayLike, *, rate: ArrayLike | None = None, unit: str = "rad") -> Array:
+def curvature(
+    time: ArrayLike, angle: ArrayLike, *, rate: ArrayLike | None = None, unit: str = "rad"
+) -> Array:
     """Absolute curvature of the graph of the angle over time, ``|y''| / (1 + y'^2)^(3/2)`` (4.16).
 
     Parameters
@@ -132,12 +139,15 @@ def curvature(time: ArrayLike, angle: ArrayLike, *, rate: ArrayLike | None = Non
     return np.asarray(np.abs(acceleration) / (1.0 + v * v) ** 1.5, dtype=np.float64)
 
 
-def total_curvature(time: ArrayLike, angle: ArrayLike, *, rate: ArrayLike | None = None, unit: str = "rad") -> float | Array:
+def total_curvature(
+    time: ArrayLike, angle: ArrayLike, *, rate: ArrayLike | None = None, unit: str = "rad"
+) -> float | Array:
     """Integral of the absolute curvature over time, omega (4.17).
 
-    ``y'' / (1 + y'^2)^(3/2)`` is the time derivative of ``y' / sqrt(1 + y'^2)``, so omega is the total variation of that: exact
-    between samples wherever the rate is monotone between them, and no second derivative is taken. Noise of the angle adds to it at
-    every sample: give a simulated or smoothed one.
+    ``y'' / (1 + y'^2)^(3/2)`` is the time derivative of ``y' / sqrt(1 + y'^2)``, so omega is the
+    total variation of that: exact between samples wherever the rate is monotone between them, and
+    no second derivative is taken. Noise of the angle adds to it at every sample: give a simulated
+    or smoothed one.
 
     Parameters
     ----------
@@ -173,9 +183,14 @@ def slope_sine(rate: Array) -> Array:
 
 
 def combined(
-    error: ArrayLike, curve: ArrayLike, *, weights: tuple[float, float] = WEIGHTS, axis: int | tuple[int, ...] | None = None
+    error: ArrayLike,
+    curve: ArrayLike,
+    *,
+    weights: tuple[float, float] = WEIGHTS,
+    axis: int | tuple[int, ...] | None = None,
 ) -> Array:
-    """J (4.18) of each of a set of runs: ``W_nu nu / min(nu) + W_omega omega / min(omega)``; at least the sum of the weights.
+    """J (4.18) of each of a set of runs: ``W_nu nu / min(nu) + W_omega omega / min(omega)``; at
+    least the sum of the weights.
 
     J compares the runs of one set; it says nothing across sets.
 
@@ -186,7 +201,8 @@ def combined(
     weights : (float, float)
         W_nu and W_omega, not negative.
     axis : int or tuple of int, optional
-        Axes over which the runs are one set, for example those of the gains where another is the payload; all by default.
+        Axes over which the runs are one set, for example those of the gains where another is the
+        payload; all by default.
 
     Returns
     -------
@@ -196,13 +212,19 @@ def combined(
     Raises
     ------
     ParameterError
-        If shapes differ, a weight is negative, a value is not above zero, or every run of a set failed.
+        If shapes differ, a weight is negative, a value is not above zero, or every run of a set
+        failed.
     """
     nu, omega = (np.asarray(values, dtype=np.float64) for values in (error, curve))
     if nu.shape != omega.shape or nu.size == 0:
-        raise ParameterError(f"error and curve have the shapes {nu.shape} and {omega.shape}; the same one, not empty, is needed")
+        raise ParameterError(
+            f"error and curve have the shapes {nu.shape} and {omega.shape}; the same one, not "
+            "empty, is needed"
+        )
     if not all(math.isfinite(w) and w >= 0.0 for w in weights) or len(weights) != 2:
-        raise ParameterError(f"weights = {weights} is not allowed: two numbers from 0 on are needed")
+        raise ParameterError(
+            f"weights = {weights} is not allowed: two numbers from 0 on are needed"
+        )
     failed = ~(np.isfinite(nu) & np.isfinite(omega))
     total = np.zeros(nu.shape)
     for name, values, weight in (("error", nu, weights[0]), ("curve", omega, weights[1])):
@@ -211,7 +233,9 @@ def combined(
         if np.isinf(least).any():
             raise ParameterError("every run of a set failed: there is nothing to compare")
         if (least <= 0.0).any():
-            raise ParameterError(f"{name} = {least.min():g} is not allowed: above zero is needed, as it divides")
+            raise ParameterError(
+                f"{name} = {least.min():g} is not allowed: above zero is needed, as it divides"
+            )
         total += weight * np.where(failed, 0.0, values) / least
     return np.where(failed, np.inf, total)
 
@@ -239,7 +263,8 @@ def rms(time: ArrayLike, reference: ArrayLike, angle: ArrayLike) -> float | Arra
 
 
 def lag(time: ArrayLike, reference: ArrayLike, angle: ArrayLike) -> float | Array:
-    """By how much the angle is late: least squares of ``reference - angle = lag * reference'``, to first order in the lag.
+    """By how much the angle is late: least squares of ``reference - angle = lag * reference'``, to
+    first order in the lag.
 
     Parameters
     ----------
@@ -264,7 +289,9 @@ def lag(time: ArrayLike, reference: ArrayLike, angle: ArrayLike) -> float | Arra
     return plain(np.where(moved > 0.0, shared / np.where(moved > 0.0, moved, 1.0), 0.0 * shared))
 
 
-def steady_error(time: ArrayLike, reference: ArrayLike, angle: ArrayLike, *, window: float = 1.0) -> float | Array:
+def steady_error(
+    time: ArrayLike, reference: ArrayLike, angle: ArrayLike, *, window: float = 1.0
+) -> float | Array:
     """Mean error over the end of a record.
 
     Parameters
@@ -286,12 +313,17 @@ def steady_error(time: ArrayLike, reference: ArrayLike, angle: ArrayLike, *, win
     """
     t, e = _error(time, reference, angle)
     if not 0.0 < window <= t[-1] - t[0]:
-        raise ParameterError(f"window = {window} s is not allowed: above 0 and at most {t[-1] - t[0]:g} s is needed")
+        raise ParameterError(
+            f"window = {window} s is not allowed: above 0 and at most {t[-1] - t[0]:g} s is needed"
+        )
     return plain(e[..., t >= t[-1] - window * (1.0 + 1e-12)].mean(axis=-1))
 
 
 def phases(
-    time: ArrayLike, reference: ArrayLike, angle: ArrayLike, parts: Mapping[str, tuple[float, float]]
+    time: ArrayLike,
+    reference: ArrayLike,
+    angle: ArrayLike,
+    parts: Mapping[str, tuple[float, float]],
 ) -> dict[str, dict[str, float | Array]]:
     """Errors in each part of a record, for example of lift, hold and return.
 
@@ -300,7 +332,8 @@ def phases(
     time, reference, angle
         As for :func:`squared_error`.
     parts : mapping of str to (float, float)
-        Begin and end [s], as :attr:`pamrs.control.Trajectory.phases`; parts without two samples are left out.
+        Begin and end [s], as :attr:`pamrs.control.Trajectory.phases`; parts without two samples are
+        left out.
 
     Returns
     -------
@@ -380,12 +413,17 @@ def _error(time: ArrayLike, reference: ArrayLike, angle: ArrayLike) -> tuple[Arr
     t, y = checked(time, "angle", angle)
     r = np.asarray(reference, dtype=np.float64)
     if r.shape not in (y.shape, t.shape):
-        raise ParameterError(f"reference has the shape {r.shape}; that of angle {y.shape} or of time {t.shape} is needed")
+        raise ParameterError(
+            f"reference has the shape {r.shape}; that of angle {y.shape} or of time {t.shape} is "
+            "needed"
+        )
     _, r = checked(time, "reference", r)
     return t, np.asarray(r - y, dtype=np.float64)
 
 
-def _rate(time: ArrayLike, angle: ArrayLike, rate: ArrayLike | None, unit: str) -> tuple[Array, Array]:
+def _rate(
+    time: ArrayLike, angle: ArrayLike, rate: ArrayLike | None, unit: str
+) -> tuple[Array, Array]:
     """Checked time and rate in the unit per second."""
     factor = angle_factor(unit)
     t, y = checked(time, "angle", angle)

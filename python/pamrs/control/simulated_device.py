@@ -1,4 +1,6 @@
-"""A rig that behaves like hardware on a bus: it goes on while nobody looks, readings fail, and time is not even. For rehearsals."""
+"""A rig that behaves like hardware on a bus: it goes on while nobody looks, readings fail, and time
+is not even. For rehearsals.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,8 @@ FAULTS: Final = ("exception", "none", "nan", "stale")
 
 
 class VirtualClock:
-    """A clock that only moves when somebody waits, a little late each time; a minute of a loop takes no longer than its arithmetic.
+    """A clock that only moves when somebody waits, a little late each time; a minute of a loop
+    takes no longer than its arithmetic.
 
     Parameters
     ----------
@@ -37,10 +40,17 @@ class VirtualClock:
         If a time is negative or not finite.
     """
 
-    def __init__(self, jitter: float = 0.0, *, stalls: Mapping[float, float] | None = None, seed: int = 0) -> None:
-        for name, value in (("jitter", jitter), *(("stalls", v) for pair in (stalls or {}).items() for v in pair)):
+    def __init__(
+        self, jitter: float = 0.0, *, stalls: Mapping[float, float] | None = None, seed: int = 0
+    ) -> None:
+        for name, value in (
+            ("jitter", jitter),
+            *(("stalls", v) for pair in (stalls or {}).items() for v in pair),
+        ):
             if not (math.isfinite(value) and value >= 0.0):
-                raise ParameterError(f"{name} has {value} s, which is not allowed: zero or more is needed")
+                raise ParameterError(
+                    f"{name} has {value} s, which is not allowed: zero or more is needed"
+                )
         self._jitter, self._time = jitter, 0.0
         self._stalls = sorted((stalls or {}).items())
         self._random = np.random.default_rng(seed)
@@ -58,7 +68,8 @@ class VirtualClock:
 
 
 class SimulatedDevice:
-    """A rig with one valve behind ``read()`` and ``write(command)``; it moves with its clock, whatever the loop does.
+    """A rig with one valve behind ``read()`` and ``write(command)``; it moves with its clock,
+    whatever the loop does.
 
     Parameters
     ----------
@@ -98,12 +109,16 @@ class SimulatedDevice:
         initial: Mapping[str, float] | None = None,
     ) -> None:
         if not 0.0 <= dropouts <= 1.0:
-            raise ParameterError(f"dropouts = {dropouts} is not allowed: a probability from 0 to 1 is needed")
+            raise ParameterError(
+                f"dropouts = {dropouts} is not allowed: a probability from 0 to 1 is needed"
+            )
         if not faults or any(fault not in FAULTS for fault in faults):
             raise ParameterError(f"faults = {faults} is not allowed: some of {', '.join(FAULTS)}")
         valves = rig.tables("valve")
         if len(valves) != 1:
-            raise ParameterError(f"rig {rig.name!r} is not allowed: it has {len(valves)} valves, and one is needed")
+            raise ParameterError(
+                f"rig {rig.name!r} is not allowed: it has {len(valves)} valves, and one is needed"
+            )
         self.simulator = Simulator(rig, sample_time=sample_time, initial=initial)
         self.clock, self.command = clock, float(next(iter(valves.values()))["null_voltage"])
         self.written: list[tuple[float, float]] = []
@@ -138,6 +153,8 @@ class SimulatedDevice:
 
     def _advance(self) -> None:
         """Let the plant live until now."""
-        behind = round((self.clock.now() - self._began - self.simulator.time) / self.simulator.sample_time)
+        behind = round(
+            (self.clock.now() - self._began - self.simulator.time) / self.simulator.sample_time
+        )
         if behind > 0:
             self.simulator.run(np.full(behind, self.command))

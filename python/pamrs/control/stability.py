@@ -1,7 +1,9 @@
-"""Stability of a sampled loop about an operating point: margins, closed-loop spectrum, and the gains that are stable over payload.
+"""Stability of a sampled loop about an operating point: margins, closed-loop spectrum, and the
+gains that are stable over payload.
 
-Everything here is the discrete loop itself, with the exact hold and the delay in it, not a continuous approximation. It speaks of small
-motions about one point: see :func:`pamrs.control.linear.linearise` for what that leaves out, dry friction above all.
+Everything here is the discrete loop itself, with the exact hold and the delay in it, not a
+continuous approximation. It speaks of small motions about one point: see
+:func:`pamrs.control.linear.linearise` for what that leaves out, dry friction above all.
 """
 
 from __future__ import annotations
@@ -15,7 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs.control._protocol import Controller
-from pamrs.control.linear import SIDES, LinearController, LinearModel, linear_controller, linearise, python_control
+from pamrs.control.linear import (
+    SIDES,
+    LinearController,
+    LinearModel,
+    linear_controller,
+    linearise,
+    python_control,
+)
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
 
@@ -31,11 +40,12 @@ class Margins:
     Attributes
     ----------
     gain : float
-        The factor nearest to one by which all gains may change until the loop is at its boundary: above one how far they may grow,
-        below one how far an unstable loop has to be taken back; infinite if there is none.
+        The factor nearest to one by which all gains may change until the loop is at its boundary:
+        above one how far they may grow, below one how far an unstable loop has to be taken back;
+        infinite if there is none.
     phase : float or None
-        [rad]; infinite without a crossing of gain one. None if the closed loop is unstable: whatever its curve crosses, it has no phase
-        to lose.
+        [rad]; infinite without a crossing of gain one. None if the closed loop is unstable:
+        whatever its curve crosses, it has no phase to lose.
     gain_frequency, phase_frequency : float
         Where they are found [rad/s]: phase -180 deg, and gain one.
     delay : float or None
@@ -58,13 +68,26 @@ class Margins:
 
     def __str__(self) -> str:
         """What the margins say, with units."""
-        factor = f"all gains times {self.gain:.3g} (at {self.gain_frequency:.3g} rad/s)" if math.isfinite(self.gain) else "no gain"
+        factor = (
+            f"all gains times {self.gain:.3g} (at {self.gain_frequency:.3g} rad/s)"
+            if math.isfinite(self.gain)
+            else "no gain"
+        )
         eigenvalue = f"largest eigenvalue {self.radius:.6g} per sample"
         if self.phase is None or self.delay is None:
-            return f"unstable ({eigenvalue}): no margin of phase or delay; nearest boundary: {factor}"
-        phase = f"{math.degrees(self.phase):.3g} deg (at {self.phase_frequency:.3g} rad/s)" if math.isfinite(self.phase) else "any"
+            return (
+                f"unstable ({eigenvalue}): no margin of phase or delay; nearest boundary: {factor}"
+            )
+        phase = (
+            f"{math.degrees(self.phase):.3g} deg (at {self.phase_frequency:.3g} rad/s)"
+            if math.isfinite(self.phase)
+            else "any"
+        )
         delay = f"{self.delay:.3g} s" if math.isfinite(self.delay) else "any"
-        return f"stable ({eigenvalue}): phase to spare {phase}, delay to spare {delay}; nearest boundary: {factor}"
+        return (
+            f"stable ({eigenvalue}): phase to spare {phase}, delay to spare {delay}; nearest "
+            f"boundary: {factor}"
+        )
 
 
 @dataclass(frozen=True)
@@ -135,7 +158,9 @@ def loop_matrix(model: LinearModel, controller: LinearController, *, delay: floa
     return out
 
 
-def spectral_radius(model: LinearModel, controller: LinearController, *, delay: float = 0.0) -> float:
+def spectral_radius(
+    model: LinearModel, controller: LinearController, *, delay: float = 0.0
+) -> float:
     """Largest absolute eigenvalue of :func:`loop_matrix`.
 
     Parameters
@@ -155,7 +180,13 @@ def spectral_radius(model: LinearModel, controller: LinearController, *, delay: 
     return float(np.abs(np.linalg.eigvals(loop_matrix(model, controller, delay=delay))).max())
 
 
-def margins(model: LinearModel, controller: Controller | LinearController, *, delay: float = 0.0, points: int = 4000) -> Margins:
+def margins(
+    model: LinearModel,
+    controller: Controller | LinearController,
+    *,
+    delay: float = 0.0,
+    points: int = 4000,
+) -> Margins:
     """Gain and phase margin of a sampled loop, opened at the command, by python-control.
 
     Parameters
@@ -167,7 +198,8 @@ def margins(model: LinearModel, controller: Controller | LinearController, *, de
     delay : float
         As for :func:`loop_matrix` [s].
     points : int
-        Frequencies between a millionth of the Nyquist frequency and itself, evenly on a logarithmic axis.
+        Frequencies between a millionth of the Nyquist frequency and itself, evenly on a logarithmic
+        axis.
 
     Returns
     -------
@@ -181,20 +213,34 @@ def margins(model: LinearModel, controller: Controller | LinearController, *, de
         If python-control is not installed.
     """
     library = python_control()
-    linear = controller if isinstance(controller, LinearController) else linear_controller(controller, model.point)
+    linear = (
+        controller
+        if isinstance(controller, LinearController)
+        else linear_controller(controller, model.point)
+    )
     phi, gamma, c = _delayed(model, linear.period, delay)
     b_c, d_c = _by_outputs(model, linear)
     period = linear.period
     plant = library.ss(phi, gamma, c, np.zeros((c.shape[0], 1)), period)
-    feedback = library.ss(linear.a, b_c, linear.c, d_c, period) if linear.a.size else library.ss([], [], [], d_c, period)
+    feedback = (
+        library.ss(linear.a, b_c, linear.c, d_c, period)
+        if linear.a.size
+        else library.ss([], [], [], d_c, period)
+    )
     frequencies = np.geomspace(1e-6, 1.0, points) * math.pi / period
     z = np.exp(1j * frequencies * period)
-    response = np.array([-(feedback(point, squeeze=False) @ plant(point, squeeze=False))[0, 0] for point in z])
+    response = np.array(
+        [-(feedback(point, squeeze=False) @ plant(point, squeeze=False))[0, 0] for point in z]
+    )
     opened = library.frd(response, frequencies, smooth=True)
     gain, phase, _, at_gain, at_phase, _ = library.stability_margins(opened)
     last = float(response[-1].real)
-    nyquist = 1.0 / abs(last) if last < 0.0 else math.inf  # the curve ends there on the real axis, which no crossing shows
-    if abs(math.log(nyquist)) < (math.inf if gain is None or math.isinf(gain) else abs(math.log(gain))):
+    nyquist = (
+        1.0 / abs(last) if last < 0.0 else math.inf
+    )  # the curve ends there on the real axis, which no crossing shows
+    if abs(math.log(nyquist)) < (
+        math.inf if gain is None or math.isinf(gain) else abs(math.log(gain))
+    ):
         gain, at_gain = nyquist, math.pi / period
     gain, phase = (float(value) if value is not None else math.inf for value in (gain, phase))
     spare = math.radians(phase) / float(at_phase) if math.isfinite(phase) and at_phase else math.inf
@@ -216,11 +262,13 @@ def stable_region(
 ) -> StableRegion:
     """Which gains are stable for small motions, payload by payload.
 
-    A valve has another slope when it fills than when it vents: gains count as stable if they are with both.
+    A valve has another slope when it fills than when it vents: gains count as stable if they are
+    with both.
 
-    Coulomb friction is strong damping for a motion slower than its transition speed, and none for a faster one: the shoulder at
-    45 deg under ``PID(kp, period=0.005)`` is stable up to kp = 8.0 V/rad with its 1.5 N m counted as at rest, and up to 0.47 V/rad
-    as in motion. With gains that are stable by the first only, small motions die out and large ones need not: at kp = 7 the arm
+    Coulomb friction is strong damping for a motion slower than its transition speed, and none for a
+    faster one: the shoulder at 45 deg under ``PID(kp, period=0.005)`` is stable up to kp = 8.0
+    V/rad with its 1.5 N m counted as at rest, and up to 0.47 V/rad as in motion. With gains that
+    are stable by the first only, small motions die out and large ones need not: at kp = 7 the arm
     comes to rest after a push of 0.1 rad, and after one of 0.3 rad swings over 1.8 rad for good.
 
     Parameters
@@ -240,7 +288,8 @@ def stable_region(
     sides : sequence of str
         As for :func:`pamrs.control.linear.linearise`.
     friction : {"rest", "moving"}
-        As there: the region for motions below, or beyond, the speed at which Coulomb friction has turned round.
+        As there: the region for motions below, or beyond, the speed at which Coulomb friction has
+        turned round.
 
     Returns
     -------
@@ -264,15 +313,24 @@ def stable_region(
         loaded = rig.with_parameters({"arm.payload": float(mass)})
         models = [linearise(loaded, angle, side=side, friction=friction) for side in sides]
         for index in itertools.product(*(range(values.size) for values in grid.values())):
-            made = controller(**{name: float(values[i]) for (name, values), i in zip(grid.items(), index, strict=True)})
+            made = controller(
+                **{
+                    name: float(values[i])
+                    for (name, values), i in zip(grid.items(), index, strict=True)
+                }
+            )
             linear = linear_controller(made, models[0].point)
-            radius[(p, *index)] = max(spectral_radius(model, linear, delay=delay) for model in models)
+            radius[(p, *index)] = max(
+                spectral_radius(model, linear, delay=delay) for model in models
+            )
             period = linear.period
     return StableRegion(masses, grid, radius, period, friction)
 
 
 def _delayed(model: LinearModel, period: float, delay: float) -> tuple[Array, Array, Array]:
-    """The sampled plant with the commands on their way as states: state, input and output matrix."""
+    """The sampled plant with the commands on their way as states: state, input and output
+    matrix.
+    """
     if len(model.inputs) != 1:
         raise ParameterError(f"the model has the inputs {', '.join(model.inputs)}; one is needed")
     if not (math.isfinite(delay) and delay >= 0.0):
@@ -283,7 +341,9 @@ def _delayed(model: LinearModel, period: float, delay: float) -> tuple[Array, Ar
         return phi, gamma, model.c
     # over one period the command before last acts first, the last one from then on
     late = delay - (count - 1) * period
-    last = model.sampled(period - late)[1] if period - late > 1e-12 * period else np.zeros_like(gamma)
+    last = (
+        model.sampled(period - late)[1] if period - late > 1e-12 * period else np.zeros_like(gamma)
+    )
     before = gamma - last
     n = phi.shape[0]
     out, into = np.zeros((n + count, n + count)), np.zeros((n + count, 1))

@@ -1,10 +1,12 @@
-"""Where the joint should be over time: the trajectories of chapters 4, 5 and 6, steps, and a user's table.
+"""Where the joint should be over time: the trajectories of chapters 4, 5 and 6, steps, and a user's
+table.
 
-All angles are radians in and out (``numpy.deg2rad`` or :func:`pamrs.control.trajectories.degrees` for the printed ones), rates and
-accelerations are the analytic derivatives of the angle. Where the angle has a corner (a ramp that begins or ends, a triangle's tip, a
-step) the derivative does not exist: **the rate there is that of what follows** (right-continuous, as a command is held), and **the
-acceleration is that of the smooth pieces**, without the impulses between them. A controller that needs the impulse does not exist;
-one that is fed a ramp's corner sees its rate jump.
+All angles are radians in and out (``numpy.deg2rad`` or :func:`pamrs.control.trajectories.degrees`
+for the printed ones), rates and accelerations are the analytic derivatives of the angle. Where the
+angle has a corner (a ramp that begins or ends, a triangle's tip, a step) the derivative does not
+exist: **the rate there is that of what follows** (right-continuous, as a command is held), and
+**the acceleration is that of the smooth pieces**, without the impulses between them. A controller
+that needs the impulse does not exist; one that is fed a ramp's corner sees its rate jump.
 """
 
 from __future__ import annotations
@@ -58,14 +60,16 @@ class _Shape(Protocol):
 class Trajectory:
     """A reference over time, made by the functions of this module.
 
-    Calling it with a time [s] gives a :class:`pamrs.control.Reference` of floats, with an array of times one of arrays of that shape.
+    Calling it with a time [s] gives a :class:`pamrs.control.Reference` of floats, with an array of
+    times one of arrays of that shape.
 
     Attributes
     ----------
     name : str
         What it is, for tables and legends.
     duration : float
-        Length of the record [s]. Past it a trajectory goes on as its function says (it holds, or repeats).
+        Length of the record [s]. Past it a trajectory goes on as its function says (it holds, or
+        repeats).
     phases : mapping of str to (float, float)
         Named parts of the record: begin and end [s].
     """
@@ -94,10 +98,14 @@ class Trajectory:
         """
         if isinstance(time, np.ndarray):
             if not np.isfinite(time).all():
-                raise ParameterError("time is not finite: every entry has to be a finite number of seconds")
+                raise ParameterError(
+                    "time is not finite: every entry has to be a finite number of seconds"
+                )
             return Reference(*self._shape.over(time))
         if not math.isfinite(time):
-            raise ParameterError(f"time = {time} is not allowed: a finite number of seconds is needed")
+            raise ParameterError(
+                f"time = {time} is not allowed: a finite number of seconds is needed"
+            )
         return Reference(*self._shape.at(time))
 
     def sampled(self, sample_time: float, duration: float | None = None) -> tuple[Array, Reference]:
@@ -123,7 +131,9 @@ class Trajectory:
         """
         sample_time = _positive("sample_time", sample_time)
         length = self.duration if duration is None else _least_zero("duration", duration)
-        time = np.asarray(np.arange(math.floor(length / sample_time + 1e-9) + 1) * sample_time, dtype=np.float64)
+        time = np.asarray(
+            np.arange(math.floor(length / sample_time + 1e-9) + 1) * sample_time, dtype=np.float64
+        )
         return time, self(time)
 
 
@@ -132,7 +142,9 @@ class _Pieces:
     """Cubics one after the other; before the first and behind the last the angle rests."""
 
     starts: tuple[float, ...]
-    cubics: tuple[tuple[float, float, float, float], ...]  # constant first, in the time since the piece's start; the last rests
+    cubics: tuple[
+        tuple[float, float, float, float], ...
+    ]  # constant first, in the time since the piece's start; the last rests
 
     def at(self, time: float) -> tuple[float, float, float]:
         k = bisect_right(self.starts, time) - 1
@@ -150,7 +162,11 @@ class _Pieces:
         s = time - starts[k]
         inside = found >= 0
         angle = np.where(inside, a + s * (b + s * (c + s * d)), cubics[0, 0])
-        return angle, np.where(inside, b + s * (2.0 * c + s * 3.0 * d), 0.0), np.where(inside, 2.0 * c + 6.0 * d * s, 0.0)
+        return (
+            angle,
+            np.where(inside, b + s * (2.0 * c + s * 3.0 * d), 0.0),
+            np.where(inside, 2.0 * c + 6.0 * d * s, 0.0),
+        )
 
     @cached_property
     def _arrays(self) -> tuple[Array, Array]:
@@ -188,7 +204,11 @@ class _Waves:
         turn = self.frequency * time % 1.0
         rising = turn < 0.5
         angle += self.height * (np.where(rising, 2.0 * turn, 2.0 - 2.0 * turn) - 0.5)
-        return angle, rate + np.where(rising, 2.0, -2.0) * self.height * self.frequency, acceleration
+        return (
+            angle,
+            rate + np.where(rising, 2.0, -2.0) * self.height * self.frequency,
+            acceleration,
+        )
 
 
 @dataclass(frozen=True)
@@ -208,7 +228,9 @@ class _Cycles:
         s = time % one
         back = s >= self.rise + self.hold
         s -= (self.rise + self.hold) if back else 0.0
-        start, swing = (self.high, self.low - self.high) if back else (self.low, self.high - self.low)
+        start, swing = (
+            (self.high, self.low - self.high) if back else (self.low, self.high - self.low)
+        )
         if s >= self.rise:
             return start + swing, 0.0, 0.0
         w = math.pi / self.rise
@@ -259,13 +281,19 @@ def check_angles(trajectory: Trajectory, duration: float) -> None:
     largest = float(np.max(np.abs(trajectory(np.linspace(0.0, duration, 257)).angle)))
     if largest > MOST_ANGLE:
         raise ParameterError(
-            f"the trajectory goes to {largest:.4g} rad, and {MOST_ANGLE:g} rad either way is allowed: if these are degrees, "
-            "pamrs.control.trajectories.degrees converts them"
+            f"the trajectory goes to {largest:.4g} rad, and {MOST_ANGLE:g} rad either way is "
+            "allowed: if these are degrees, pamrs.control.trajectories.degrees converts them"
         )
 
 
 def lift_hold_return(
-    low: float, high: float, *, ramp: float = 5.0, hold: float = 5.0, duration: float = 25.0, delay: float = 0.0
+    low: float,
+    high: float,
+    *,
+    ramp: float = 5.0,
+    hold: float = 5.0,
+    duration: float = 25.0,
+    delay: float = 0.0,
 ) -> Trajectory:
     """Ramp up, hold, ramp back, rest: the trajectory of 4.4 and 4.5, and one of 5.5.
 
@@ -283,8 +311,8 @@ def lift_hold_return(
     Returns
     -------
     Trajectory
-        With the phases ``lift``, ``hold``, ``return`` and, where the record is longer, ``rest``. At a corner the rate is that of what
-        follows; the acceleration is zero throughout.
+        With the phases ``lift``, ``hold``, ``return`` and, where the record is longer, ``rest``. At
+        a corner the rate is that of what follows; the acceleration is zero throughout.
 
     Raises
     ------
@@ -292,13 +320,27 @@ def lift_hold_return(
         If a number is not finite, or a time is outside its range.
     """
     low, high = _finite("low", low), _finite("high", high)
-    ramp, hold, delay = _positive("ramp", ramp), _positive("hold", hold), _least_zero("delay", delay)
+    ramp, hold, delay = (
+        _positive("ramp", ramp),
+        _positive("hold", hold),
+        _least_zero("delay", delay),
+    )
     ends = [delay, delay + ramp, delay + ramp + hold, delay + 2.0 * ramp + hold]
     length = _positive("duration", duration)
     if length < ends[-1]:
-        raise ParameterError(f"duration = {duration} s is not allowed: the return ends at {ends[-1]:g} s")
+        raise ParameterError(
+            f"duration = {duration} s is not allowed: the return ends at {ends[-1]:g} s"
+        )
     slope = (high - low) / ramp
-    pieces = _Pieces(tuple(ends), ((low, slope, 0.0, 0.0), (high, 0.0, 0.0, 0.0), (high, -slope, 0.0, 0.0), (low, 0.0, 0.0, 0.0)))
+    pieces = _Pieces(
+        tuple(ends),
+        (
+            (low, slope, 0.0, 0.0),
+            (high, 0.0, 0.0, 0.0),
+            (high, -slope, 0.0, 0.0),
+            (low, 0.0, 0.0, 0.0),
+        ),
+    )
     phases = {"lift": (ends[0], ends[1]), "hold": (ends[1], ends[2]), "return": (ends[2], ends[3])}
     if length > ends[-1]:
         phases["rest"] = (ends[3], length)
@@ -345,9 +387,11 @@ def compound(
     triangle_frequency: float = 0.16,
     duration: float = 100.0,
 ) -> Trajectory:
-    """The compound trajectory (5.24) of chapter 5: ``sum A_i cos(w_i t) + triangle + bias``; it goes on for ever.
+    """The compound trajectory (5.24) of chapter 5: ``sum A_i cos(w_i t) + triangle + bias``; it
+    goes on for ever.
 
-    The triangle begins at its lowest value and rises; the dissertation prints frequency, height and bias of it, not its phase.
+    The triangle begins at its lowest value and rises; the dissertation prints frequency, height and
+    bias of it, not its phase.
 
     Parameters
     ----------
@@ -365,7 +409,8 @@ def compound(
     Returns
     -------
     Trajectory
-        At the triangle's tips the rate is that of what follows, and the acceleration that of the cosines.
+        At the triangle's tips the rate is that of what follows, and the acceleration that of the
+        cosines.
 
     Raises
     ------
@@ -373,14 +418,24 @@ def compound(
         If a number is not finite or outside its range.
     """
     given = [(math.radians(a), w) for a, w in TABLE_5_1] if cosines is None else cosines
-    waves = tuple((_finite("cosines amplitude", a), _finite("cosines frequency", w)) for a, w in given)
+    waves = tuple(
+        (_finite("cosines amplitude", a), _finite("cosines frequency", w)) for a, w in given
+    )
     mean = _finite("bias", bias) + _finite("triangle_bias", triangle_bias)
-    shape = _Waves(waves, mean, _finite("triangle", triangle), _least_zero("triangle_frequency", triangle_frequency))
+    shape = _Waves(
+        waves,
+        mean,
+        _finite("triangle", triangle),
+        _least_zero("triangle_frequency", triangle_frequency),
+    )
     return Trajectory("compound", _positive("duration", duration), shape)
 
 
-def cosine_cycles(low: float, high: float, *, rise: float = 6.0, hold: float = 5.0, cycles: int = 8) -> Trajectory:
-    """Half-cosine lifts and returns with holds between: the cycles of 6.4.2; at rest below before and behind them.
+def cosine_cycles(
+    low: float, high: float, *, rise: float = 6.0, hold: float = 5.0, cycles: int = 8
+) -> Trajectory:
+    """Half-cosine lifts and returns with holds between: the cycles of 6.4.2; at rest below before
+    and behind them.
 
     Parameters
     ----------
@@ -394,7 +449,8 @@ def cosine_cycles(low: float, high: float, *, rise: float = 6.0, hold: float = 5
     Returns
     -------
     Trajectory
-        The rate is continuous; the acceleration jumps where a rest begins or ends, and there is that of what follows.
+        The rate is continuous; the acceleration jumps where a rest begins or ends, and there is
+        that of what follows.
 
     Raises
     ------
@@ -404,13 +460,18 @@ def cosine_cycles(low: float, high: float, *, rise: float = 6.0, hold: float = 5
     low, high = _finite("low", low), _finite("high", high)
     rise, hold = _positive("rise", rise), _least_zero("hold", hold)
     if isinstance(cycles, bool) or not isinstance(cycles, (int, np.integer)) or cycles < 1:
-        raise ParameterError(f"cycles = {cycles!r} is not allowed: a whole number from 1 on is needed")
+        raise ParameterError(
+            f"cycles = {cycles!r} is not allowed: a whole number from 1 on is needed"
+        )
     shape = _Cycles(low, high, rise, hold, int(cycles))
     return Trajectory("cosine cycles", 2.0 * (rise + hold) * int(cycles), shape)
 
 
-def from_samples(time: ArrayLike, angle: ArrayLike, *, smoothing: float | None = 0.0, name: str = "table") -> Trajectory:
-    """A trajectory through a table of times and angles, by a natural cubic spline; outside the table it rests at the ends.
+def from_samples(
+    time: ArrayLike, angle: ArrayLike, *, smoothing: float | None = 0.0, name: str = "table"
+) -> Trajectory:
+    """A trajectory through a table of times and angles, by a natural cubic spline; outside the
+    table it rests at the ends.
 
     Parameters
     ----------
@@ -419,9 +480,9 @@ def from_samples(time: ArrayLike, angle: ArrayLike, *, smoothing: float | None =
     angle : array_like, shape (n,)
         [rad]
     smoothing : float or None
-        Weight [s^3] of the integral of the squared acceleration [rad^2/s^3] against the sum of squared deviations [rad^2]
-        (``scipy.interpolate.make_smoothing_spline``): 0 goes through every point; None chooses by generalised cross-validation, for a
-        table with noise.
+        Weight [s^3] of the integral of the squared acceleration [rad^2/s^3] against the sum of
+        squared deviations [rad^2] (``scipy.interpolate.make_smoothing_spline``): 0 goes through
+        every point; None chooses by generalised cross-validation, for a table with noise.
     name : str
         For tables and legends.
 
@@ -437,17 +498,27 @@ def from_samples(time: ArrayLike, angle: ArrayLike, *, smoothing: float | None =
     """
     t, y = (np.asarray(values, dtype=np.float64) for values in (time, angle))
     if t.ndim != 1 or t.shape != y.shape or t.size < 5:
-        raise ParameterError(f"time and angle have the shapes {t.shape} and {y.shape}; (n,) with n >= 5 is needed for both")
+        raise ParameterError(
+            f"time and angle have the shapes {t.shape} and {y.shape}; (n,) with n >= 5 is needed "
+            "for both"
+        )
     if not (np.isfinite(t).all() and np.isfinite(y).all()):
         raise ParameterError("time or angle is not finite: every entry has to be a finite number")
     if not (np.diff(t) > 0.0).all():
         k = int(np.argmin(np.diff(t)))
-        raise ParameterError(f"time[{k + 1}] = {t[k + 1]:g} s is not allowed: times have to rise, and time[{k}] is {t[k]:g} s")
+        raise ParameterError(
+            f"time[{k + 1}] = {t[k + 1]:g} s is not allowed: times have to rise, and time[{k}] is "
+            f"{t[k]:g} s"
+        )
     weight = None if smoothing is None else _least_zero("smoothing", smoothing)
     from scipy.interpolate import CubicSpline, PPoly, make_smoothing_spline
 
     t = t - t[0]
-    spline = CubicSpline(t, y, bc_type="natural") if weight == 0.0 else PPoly.from_spline(make_smoothing_spline(t, y, lam=weight).tck)
+    spline = (
+        CubicSpline(t, y, bc_type="natural")
+        if weight == 0.0
+        else PPoly.from_spline(make_smoothing_spline(t, y, lam=weight).tck)
+    )
     inside = np.flatnonzero(np.diff(spline.x) > 0.0)
     cubics = [(float(c[3]), float(c[2]), float(c[1]), float(c[0])) for c in spline.c[:, inside].T]
     end = float(spline(t[-1]))

@@ -1,7 +1,8 @@
-"""Gains by the combined metric J (4.18): whole grids at once, and the same J by CMA-ES or Optuna; on plants that the model is not.
+"""Gains by the combined metric J (4.18): whole grids at once, and the same J by CMA-ES or Optuna;
+on plants that the model is not.
 
-Every evaluation is a closed loop of :func:`pamrs.control.sweep`; a grid, over payloads too, is one call of it, a generation of a search
-is another.
+Every evaluation is a closed loop of :func:`pamrs.control.sweep`; a grid, over payloads too, is one
+call of it, a generation of a search is another.
 """
 
 from __future__ import annotations
@@ -73,7 +74,8 @@ class GainMap:
         Returns
         -------
         list of dict of str to float
-            ``payload`` [kg], each gain, and ``j``, ``squared_error``, ``curvature`` and ``rms`` there.
+            ``payload`` [kg], each gain, and ``j``, ``squared_error``, ``curvature`` and ``rms``
+            there.
 
         Raises
         ------
@@ -86,19 +88,29 @@ class GainMap:
         found = []
         for p, mass in enumerate(self.payloads):
             values = getattr(self, by)[p]
-            index = np.unravel_index(int(np.argmin(np.where(np.isnan(values), np.inf, values))), values.shape)
+            index = np.unravel_index(
+                int(np.argmin(np.where(np.isnan(values), np.inf, values))), values.shape
+            )
             row = {"payload": float(mass)}
-            row |= {name: float(axis[i]) for (name, axis), i in zip(self.axes.items(), index, strict=True)}
+            row |= {
+                name: float(axis[i])
+                for (name, axis), i in zip(self.axes.items(), index, strict=True)
+            }
             row |= {name: float(getattr(self, name)[(p, *index)]) for name in metrics}
             found.append(row)
         return found
 
     @property
     def scale(self) -> Array:
-        """min(nu) and min(omega) of each payload, shape (p, 2): what J divides by, to compare a search with the map."""
+        """min(nu) and min(omega) of each payload, shape (p, 2): what J divides by, to compare a
+        search with the map.
+        """
         ok = np.isfinite(self.squared_error) & np.isfinite(self.curvature)
         axes = tuple(range(1, ok.ndim))
-        return np.stack([np.where(ok, m, np.inf).min(axis=axes) for m in (self.squared_error, self.curvature)], axis=1)
+        return np.stack(
+            [np.where(ok, m, np.inf).min(axis=axes) for m in (self.squared_error, self.curvature)],
+            axis=1,
+        )
 
 
 @dataclass(frozen=True)
@@ -151,7 +163,8 @@ def gain_map(
     plant : Rig
         What is controlled; the model that the controller has may be another, see :func:`perturbed`.
     controller : callable
-        Makes the controller of all plants from arrays of gains by name: ``lambda kp, ki: PID(kp, ki)``.
+        Makes the controller of all plants from arrays of gains by name:
+        ``lambda kp, ki: PID(kp, ki)``.
     axes : mapping of str to sequence of float
         Values of each gain.
     trajectory : Trajectory
@@ -162,7 +175,8 @@ def gain_map(
     unit : {"rad", "deg"}
         Of the angle in nu and omega.
     **loop
-        As for :func:`pamrs.control.sweep`: ``duration``, ``sample_time``, ``sensors``, ``initial`` of numbers, ``threads``.
+        As for :func:`pamrs.control.sweep`: ``duration``, ``sample_time``, ``sensors``, ``initial``
+        of numbers, ``threads``.
 
     Returns
     -------
@@ -178,14 +192,27 @@ def gain_map(
         raise ParameterError("axes is empty: values of one gain at least are needed")
     for name, values in grid.items():
         if values.ndim != 1 or values.size == 0 or not np.isfinite(values).all():
-            raise ParameterError(f"axes {name} with the shape {values.shape} is not allowed: (n,) finite numbers, n >= 1, are needed")
-    masses = np.array([plant.parameter("arm.payload").value]) if payloads is None else np.asarray(payloads, dtype=np.float64)
+            raise ParameterError(
+                f"axes {name} with the shape {values.shape} is not allowed: (n,) finite numbers, n "
+                ">= 1, are needed"
+            )
+    masses = (
+        np.array([plant.parameter("arm.payload").value])
+        if payloads is None
+        else np.asarray(payloads, dtype=np.float64)
+    )
     if masses.ndim != 1 or masses.size == 0:
         raise ParameterError(f"payloads has the shape {masses.shape}; (n,) with n >= 1 is needed")
     shape = (masses.size, *(values.size for values in grid.values()))
     points = np.meshgrid(*grid.values(), indexing="ij")
-    gains = {name: np.tile(values.ravel(), masses.size) for name, values in zip(grid, points, strict=True)}
-    loaded = [plant if payloads is None else plant.with_parameters({"arm.payload": float(mass)}) for mass in masses]
+    gains = {
+        name: np.tile(values.ravel(), masses.size)
+        for name, values in zip(grid, points, strict=True)
+    }
+    loaded = [
+        plant if payloads is None else plant.with_parameters({"arm.payload": float(mass)})
+        for mass in masses
+    ]
     rigs = [rig for rig in loaded for _ in range(points[0].size)]
     done = sweep(rigs, controller(**gains), trajectory, unit=unit, **loop)
     nu, omega = done.squared_error.reshape(shape), done.curvature.reshape(shape)
@@ -211,10 +238,12 @@ def search_gains(
 ) -> GainSearch:
     """The gains with the smallest J by a search, a population at a time.
 
-    J divides by the smallest nu and omega of a set of runs, which a search does not know beforehand: it takes ``scale``, for example a
-    row of :attr:`GainMap.scale`, or else the smallest ones of a first population of random gains, which counts as evaluations.
+    J divides by the smallest nu and omega of a set of runs, which a search does not know
+    beforehand: it takes ``scale``, for example a row of :attr:`GainMap.scale`, or else the smallest
+    ones of a first population of random gains, which counts as evaluations.
 
-    A search of few evaluations may end worse than a map or a guess that is at hand already: given as ``start``, it is one of the runs.
+    A search of few evaluations may end worse than a map or a guess that is at hand already: given
+    as ``start``, it is one of the runs.
 
     Parameters
     ----------
@@ -225,15 +254,16 @@ def search_gains(
     method : {"cma", "optuna"}
         CMA-ES, or Optuna's tree-structured Parzen estimator.
     evaluations : int
-        Most closed loops, the first population too; without a scale two populations at least. CMA-ES leaves a rest that is no whole
-        population.
+        Most closed loops, the first population too; without a scale two populations at least.
+        CMA-ES leaves a rest that is no whole population.
     population : int
         Loops in one batch.
     seed : int
         The same seed gives the same result; the random numbers of the caller stay as they are.
     start : mapping of str to float, optional
-        One value of each gain, within its bounds, for example the gains of a row of :meth:`GainMap.best`. The search begins there: its
-        first evaluation, after the population that finds a scale, is the start itself, so that the result is never worse. By default
+        One value of each gain, within its bounds, for example the gains of a row of
+        :meth:`GainMap.best`. The search begins there: its first evaluation, after the population
+        that finds a scale, is the start itself, so that the result is never worse. By default
         CMA-ES begins in the middle of the bounds, Optuna anywhere.
     scale : (float, float), optional
         nu and omega that J divides by.
@@ -251,59 +281,116 @@ def search_gains(
     """
     low, high = _box(bounds)
     given = None if start is None else _within(start, bounds)
-    if method not in METHODS:
-        raise ParameterError(f"method = {method!r} is not allowed: one of {', '.join(METHODS)}")
-    if not 4 <= population <= evaluations:
-        raise ParameterError(f"population = {population} is not allowed: from 4 to evaluations = {evaluations} is needed")
-    if scale is None and evaluations < 2 * population:
-        raise ParameterError(
-            f"evaluations = {evaluations} is not allowed: without a scale two populations = {2 * population} are needed, as the first "
-            "finds it"
-        )
-    if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed < 2**32:
-        raise ParameterError(f"seed = {seed!r} is not allowed: a whole number from 0 to 2**32 - 1 is needed")
-    if scale is not None and not all(math.isfinite(s) and s > 0.0 for s in scale):
-        raise ParameterError(f"scale = {scale} is not allowed: two numbers above zero are needed")
-    begin = None if given is None else (given - low) / (high - low)
-    tried: list[Array] = []
-    metrics: list[tuple[Array, Array]] = []
-
-    def runs(points: Array) -> tuple[Array, Array]:
-        """Nu and omega of points in the unit cube."""
-        gains = low + points * (high - low)
-        if begin is not None and given is not None:
-            gains[np.all(points == begin, axis=1)] = given  # to the last bit
-        named = {name: np.ascontiguousarray(gains[:, k]) for k, name in enumerate(bounds)}
-        done = sweep([plant] * len(gains), controller(**named), trajectory, unit=unit, **loop)
-        tried.append(gains)
-        metrics.append((done.squared_error, done.curvature))
-        return metrics[-1]
-
+    _check_search(method, evaluations, population, seed, scale)
+    loops = _Loops(
+        plant, controller, trajectory, {**loop, "unit": unit}, tuple(bounds), low, high, given
+    )
     rng = np.random.default_rng(seed)
-    if scale is None:
-        first = runs(rng.random((population, low.size)))
-        ok = np.isfinite(first[0]) & np.isfinite(first[1])
-        if not ok.any():
-            raise ParameterError("every run of the first population failed: there is nothing to compare; narrow the bounds")
-        scale = float(first[0][ok].min()), float(first[1][ok].min())
-    by = scale
+    by = _first_scale(loops, rng.random((population, low.size))) if scale is None else scale
 
     def objective(points: Array) -> Array:
-        nu, omega = runs(points)
+        nu, omega = loops.run(points)
         value = weights[0] * nu / by[0] + weights[1] * omega / by[1]
         return np.where(np.isfinite(value), np.minimum(value, _FAILED), _FAILED)
 
-    left = evaluations - sum(map(len, tried))
-    (_cma if method == "cma" else _optuna)(objective, low.size, left, population, rng, begin)
-    nu, omega = (np.concatenate([pair[k] for pair in metrics]) for k in range(2))
+    left = evaluations - sum(map(len, loops.tried))
+    searched = _cma if method == "cma" else _optuna
+    searched(objective, low.size, left, population, rng, loops.begin)
+    nu, omega = (np.concatenate([pair[k] for pair in loops.metrics]) for k in range(2))
     values = weights[0] * nu / by[0] + weights[1] * omega / by[1]
     values = np.where(np.isfinite(values), values, np.inf)
-    points = np.concatenate(tried)
+    points = np.concatenate(loops.tried)
     best = int(np.argmin(values))
     if math.isinf(values[best]):
         raise ParameterError("every run failed: there is nothing to compare; narrow the bounds")
     gains = {name: float(points[best, k]) for k, name in enumerate(bounds)}
     return GainSearch(gains, float(values[best]), by, points, values, nu, omega, method, seed)
+
+
+def _check_search(
+    method: str, evaluations: int, population: int, seed: int, scale: tuple[float, float] | None
+) -> None:
+    """Refuse the arguments of a search that cannot be.
+
+    Raises
+    ------
+    ParameterError
+        Which argument, its value and what is allowed.
+    """
+    if method not in METHODS:
+        raise ParameterError(f"method = {method!r} is not allowed: one of {', '.join(METHODS)}")
+    if not 4 <= population <= evaluations:
+        raise ParameterError(
+            f"population = {population} is not allowed: from 4 to evaluations = {evaluations} is "
+            "needed"
+        )
+    if scale is None and evaluations < 2 * population:
+        raise ParameterError(
+            f"evaluations = {evaluations} is not allowed: without a scale two populations = "
+            f"{2 * population} are needed, as the first finds it"
+        )
+    if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed < 2**32:
+        raise ParameterError(
+            f"seed = {seed!r} is not allowed: a whole number from 0 to 2**32 - 1 is needed"
+        )
+    if scale is not None and not all(math.isfinite(s) and s > 0.0 for s in scale):
+        raise ParameterError(f"scale = {scale} is not allowed: two numbers above zero are needed")
+
+
+@dataclass
+class _Loops:
+    """Closed loops of points of the unit cube between the lowest and highest gains; every one is
+    kept.
+
+    ``given`` are the gains of the start. ``tried`` holds the gains of each batch, ``metrics`` its
+    nu and omega.
+    """
+
+    plant: Rig
+    controller: Factory
+    trajectory: Trajectory
+    settings: dict[str, Any]
+    names: tuple[str, ...]
+    low: Array
+    high: Array
+    given: Array | None
+    tried: list[Array] = field(default_factory=list)
+    metrics: list[tuple[Array, Array]] = field(default_factory=list)
+
+    @property
+    def begin(self) -> Array | None:
+        """The start in the unit cube."""
+        return None if self.given is None else (self.given - self.low) / (self.high - self.low)
+
+    def run(self, points: Array) -> tuple[Array, Array]:
+        """Nu and omega of points in the unit cube, in one batch."""
+        gains = self.low + points * (self.high - self.low)
+        if self.begin is not None and self.given is not None:
+            gains[np.all(points == self.begin, axis=1)] = self.given  # to the last bit
+        named = {name: np.ascontiguousarray(gains[:, k]) for k, name in enumerate(self.names)}
+        plants = [self.plant] * len(gains)
+        done = sweep(plants, self.controller(**named), self.trajectory, **self.settings)
+        self.tried.append(gains)
+        self.metrics.append((done.squared_error, done.curvature))
+        return self.metrics[-1]
+
+
+def _first_scale(loops: _Loops, points: Array) -> tuple[float, float]:
+    """The smallest nu and omega of a first population.
+
+    Raises
+    ------
+    ParameterError
+        If every run failed.
+    """
+    nu, omega = loops.run(points)
+    ok = np.isfinite(nu) & np.isfinite(omega)
+    if not ok.any():
+        raise ParameterError(
+            "every run of the first population failed: there is nothing to compare; narrow the "
+            "bounds"
+        )
+    return float(nu[ok].min()), float(omega[ok].min())
 
 
 def perturbed(
@@ -315,19 +402,21 @@ def perturbed(
     friction: float | None = None,
     inertia: float | None = None,
 ) -> Rig:
-    """A plant that the controller's model is not quite: muscle force, friction and arm inertia off by a few per cent, as in 4.4.2.
+    """A plant that the controller's model is not quite: muscle force, friction and arm inertia off
+    by a few per cent, as in 4.4.2.
 
     Parameters
     ----------
     rig : Rig
         The controller's model, with an arm and a tendon-driven muscle with a diameter.
     seed : int, optional
-        Factors that are not given are ``1 +- spread * (0.5 to 1)``, so that each is really off; without a seed they are one.
+        Factors that are not given are ``1 +- spread * (0.5 to 1)``, so that each is really off;
+        without a seed they are one.
     spread : float
         From 0 to 0.5.
     force : float, optional
-        Factor on the muscles' cross-section, and so on what pressure pulls with; their volume goes with it. The bladder's elastic
-        force, a smaller part, keeps its modulus.
+        Factor on the muscles' cross-section, and so on what pressure pulls with; their volume goes
+        with it. The bladder's elastic force, a smaller part, keeps its modulus.
     friction : float, optional
         On the arm's viscous and Coulomb friction.
     inertia : float, optional
@@ -354,17 +443,27 @@ def perturbed(
     chosen = [1.0, 1.0, 1.0]
     if seed is not None:
         if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
-            raise ParameterError(f"seed = {seed!r} is not allowed: a whole number from 0 on is needed")
+            raise ParameterError(
+                f"seed = {seed!r} is not allowed: a whole number from 0 on is needed"
+            )
         rng = np.random.default_rng(seed)
         chosen = (1.0 + spread * rng.choice([-1.0, 1.0], 3) * rng.uniform(0.5, 1.0, 3)).tolist()
     factors = {}
-    for (name, given), drawn in zip((("force", force), ("friction", friction), ("inertia", inertia)), chosen, strict=True):
+    for (name, given), drawn in zip(
+        (("force", force), ("friction", friction), ("inertia", inertia)), chosen, strict=True
+    ):
         factors[name] = drawn if given is None else float(given)
         if not (math.isfinite(factors[name]) and factors[name] > 0.0):
             raise ParameterError(f"{name} = {given} is not allowed: a factor above zero is needed")
     names = {"muscle.rest_diameter": math.sqrt(factors["force"]), "arm.inertia": factors["inertia"]}
     names |= {"arm.viscous": factors["friction"], "arm.coulomb": factors["friction"]}
-    return rig.with_parameters({name: factor * rig.parameter(name).value for name, factor in names.items() if factor != 1.0})
+    return rig.with_parameters(
+        {
+            name: factor * rig.parameter(name).value
+            for name, factor in names.items()
+            if factor != 1.0
+        }
+    )
 
 
 def _box(bounds: Mapping[str, tuple[float, float]]) -> tuple[Array, Array]:
@@ -372,33 +471,62 @@ def _box(bounds: Mapping[str, tuple[float, float]]) -> tuple[Array, Array]:
         raise ParameterError("bounds is empty: one gain at least is needed")
     for name, (low, high) in bounds.items():
         if not (math.isfinite(low) and math.isfinite(high) and low < high):
-            raise ParameterError(f"bounds of {name} = ({low}, {high}) are not allowed: two rising finite numbers are needed")
-    return np.array([b[0] for b in bounds.values()], dtype=np.float64), np.array([b[1] for b in bounds.values()], dtype=np.float64)
+            raise ParameterError(
+                f"bounds of {name} = ({low}, {high}) are not allowed: two rising finite numbers "
+                "are needed"
+            )
+    return np.array([b[0] for b in bounds.values()], dtype=np.float64), np.array(
+        [b[1] for b in bounds.values()], dtype=np.float64
+    )
 
 
 def _within(start: Mapping[str, float], bounds: Mapping[str, tuple[float, float]]) -> Array:
     """A start in the order of the bounds, checked."""
     if not isinstance(start, Mapping) or set(start) != set(bounds):
-        raise ParameterError(f"start = {start} is not allowed: one value each of {', '.join(bounds)} is needed, as in bounds")
+        raise ParameterError(
+            f"start = {start} is not allowed: one value each of {', '.join(bounds)} is needed, as "
+            "in bounds"
+        )
     for name, (low, high) in bounds.items():
         value = start[name]
-        if not isinstance(value, numbers.Real) or isinstance(value, bool) or not low <= value <= high:
-            raise ParameterError(f"start of {name} = {value!r} is not allowed: a number within its bounds, {low} to {high}, is needed")
+        if (
+            not isinstance(value, numbers.Real)
+            or isinstance(value, bool)
+            or not low <= value <= high
+        ):
+            raise ParameterError(
+                f"start of {name} = {value!r} is not allowed: a number within its bounds, {low} to "
+                f"{high}, is needed"
+            )
     return np.array([start[name] for name in bounds], dtype=np.float64)
 
 
 def _cma(
-    objective: Callable[[Array], Array], size: int, budget: int, population: int, rng: np.random.Generator, begin: Array | None
+    objective: Callable[[Array], Array],
+    size: int,
+    budget: int,
+    population: int,
+    rng: np.random.Generator,
+    begin: Array | None,
 ) -> None:
-    """CMA-ES from a start or the middle, and from random places when it has converged, until the budget is spent."""
+    """CMA-ES from a start or the middle, and from random places when it has converged, until the
+    budget is spent.
+    """
     try:
         import cma  # type: ignore[import-untyped]
     except ImportError as error:
         raise missing_package(error, "search") from None
     if size == 1:
-        raise ParameterError("bounds has one gain; CMA-ES needs two at least: take optuna, or a gain_map")
+        raise ParameterError(
+            "bounds has one gain; CMA-ES needs two at least: take optuna, or a gain_map"
+        )
     # its own random numbers: numpy's global ones stay as they are
-    options = {"bounds": [0.0, 1.0], "verbose": -9, "seed": np.nan, "randn": lambda *shape: rng.standard_normal(shape)}
+    options = {
+        "bounds": [0.0, 1.0],
+        "verbose": -9,
+        "seed": np.nan,
+        "randn": lambda *shape: rng.standard_normal(shape),
+    }
     start, given = (np.full(size, 0.5), None) if begin is None else (begin, begin)
     while budget >= population:
         strategy = cma.CMAEvolutionStrategy(start, 0.3, {**options, "popsize": population})
@@ -412,9 +540,16 @@ def _cma(
 
 
 def _optuna(
-    objective: Callable[[Array], Array], size: int, budget: int, population: int, rng: np.random.Generator, begin: Array | None
+    objective: Callable[[Array], Array],
+    size: int,
+    budget: int,
+    population: int,
+    rng: np.random.Generator,
+    begin: Array | None,
 ) -> None:
-    """Optuna's Parzen estimator, from a start if there is one, a population at a time (points that wait count as bad ones)."""
+    """Optuna's Parzen estimator, from a start if there is one, a population at a time (points that
+    wait count as bad ones).
+    """
     try:
         import optuna
     except ImportError as error:
@@ -423,14 +558,18 @@ def _optuna(
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", optuna.exceptions.ExperimentalWarning)  # of constant_liar
+            warnings.simplefilter(
+                "ignore", optuna.exceptions.ExperimentalWarning
+            )  # of constant_liar
             sampler = optuna.samplers.TPESampler(seed=int(rng.integers(2**31)), constant_liar=True)
         study = optuna.create_study(sampler=sampler)
         if begin is not None:
             study.enqueue_trial({str(k): float(value) for k, value in enumerate(begin)})
         while budget > 0:
             trials = [study.ask() for _ in range(min(population, budget))]
-            points = np.array([[trial.suggest_float(str(k), 0.0, 1.0) for k in range(size)] for trial in trials])
+            points = np.array(
+                [[trial.suggest_float(str(k), 0.0, 1.0) for k in range(size)] for trial in trials]
+            )
             for trial, value in zip(trials, objective(points), strict=True):
                 study.tell(trial, float(value))
             budget -= len(trials)

@@ -8,20 +8,35 @@ dissertation's own choice of muscles (3.2.3); :mod:`pamrs.design.figures` draws.
 >>> import math, pamrs
 >>> from pamrs.design import JointProblem, optimise
 >>> muscle = pamrs.library.pam_a_1in()
->>> problem = JointProblem(muscle, 6, torque=400.0, min_angle=math.radians(15), max_angle=math.radians(120), pressure=1.3e6)
+>>> problem = JointProblem(muscle, 6, torque=400.0, min_angle=math.radians(15),
+...     max_angle=math.radians(120), pressure=1.3e6)
 >>> optimise(problem, "de", evaluations=200).met()
 True
 
-Searches need ``pip install pamrs[search]``, figures ``pamrs[plot]``; both are imported when they are used.
+Searches need ``pip install pamrs[search]``, figures ``pamrs[plot]``; both are imported when they
+are used.
 """
 
 from __future__ import annotations
 
 from pamrs.design._evaluator import Genetic, History, Search
 from pamrs.design._filling import Filling
-from pamrs.design._joint_design import AREA_TOLERANCE, JointDesign, MethodComparison, compare_methods, optimise
+from pamrs.design._joint_design import (
+    AREA_TOLERANCE,
+    JointDesign,
+    MethodComparison,
+    compare_methods,
+    optimise,
+)
 from pamrs.design._lifting import Lift, lift
-from pamrs.design._pressure import ParetoFront, PressureSearch, Trial, least_pressure, minimum_pressure, pareto_front
+from pamrs.design._pressure import (
+    ParetoFront,
+    PressureSearch,
+    Trial,
+    least_pressure,
+    minimum_pressure,
+    pareto_front,
+)
 from pamrs.design._problem import DEFAULT_BOUNDS, LENGTHS, SYMBOLS, JointProblem, Scores
 from pamrs.design._search import METHODS, search
 from pamrs.errors import MissingPackageError

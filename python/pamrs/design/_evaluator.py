@@ -30,11 +30,12 @@ class Genetic:
     bits : int
         Binary digits of each length (not printed).
     mutation : float
-        Probability that a child gets one of its lengths at random (not printed; the text names MATLAB's ``ga()``, which
-        by default makes a fifth of the children by mutation, and has the same population, elites and generations).
+        Probability that a child gets one of its lengths at random (not printed; the text names
+        MATLAB's ``ga()``, which by default makes a fifth of the children by mutation, and has the
+        same population, elites and generations).
     tolerance : float or None
-        The search has converged when the best fitness fell by less than this share over ``stall`` generations; None runs all
-        generations. The text prints neither number; these are MATLAB's.
+        The search has converged when the best fitness fell by less than this share over ``stall``
+        generations; None runs all generations. The text prints neither number; these are MATLAB's.
     stall : int
         See ``tolerance``.
 
@@ -60,9 +61,14 @@ class Genetic:
         if not 1 <= self.bits <= 52:
             raise ParameterError(f"bits = {self.bits} is not allowed: 1 to 52 are needed")
         if not 0.0 <= self.mutation <= 1.0:
-            raise ParameterError(f"mutation = {self.mutation} is not allowed: a probability from 0 to 1 is needed")
+            raise ParameterError(
+                f"mutation = {self.mutation} is not allowed: a probability from 0 to 1 is needed"
+            )
         if self.stall < 1 or (self.tolerance is not None and not self.tolerance >= 0.0):
-            raise ParameterError(f"tolerance = {self.tolerance}, stall = {self.stall} are not allowed: from 0 and from 1 on are needed")
+            raise ParameterError(
+                f"tolerance = {self.tolerance}, stall = {self.stall} are not allowed: from 0 and "
+                "from 1 on are needed"
+            )
 
 
 @dataclass(frozen=True)
@@ -119,7 +125,9 @@ class Search:
 
 @dataclass
 class Evaluator:
-    """The objective on the unit cube: counts evaluations, keeps the history, stops answering when the budget is spent."""
+    """The objective on the unit cube: counts evaluations, keeps the history, stops answering when
+    the budget is spent.
+    """
 
     objective: Objective
     lower: Array
@@ -160,5 +168,7 @@ class Evaluator:
     def result(self, method: str, seed: int) -> Search:
         """What was found."""
         used, best, middle, points = zip(*self._rows, strict=True)
-        history = History(np.array(used, dtype=np.int64), np.array(best), np.array(middle), np.array(points))
+        history = History(
+            np.array(used, dtype=np.int64), np.array(best), np.array(middle), np.array(points)
+        )
         return Search(method, points[-1], best[-1], self.used, seed, self.left > 0, history)

@@ -15,7 +15,9 @@ from pamrs.errors import ParameterError
 __all__ = ["Filling"]
 
 _HEAT_CAPACITY_RATIO: Final = 1.4
-_CHOKED: Final = (2.0 / (_HEAT_CAPACITY_RATIO + 1.0)) ** (_HEAT_CAPACITY_RATIO / (_HEAT_CAPACITY_RATIO - 1.0))
+_CHOKED: Final = (2.0 / (_HEAT_CAPACITY_RATIO + 1.0)) ** (
+    _HEAT_CAPACITY_RATIO / (_HEAT_CAPACITY_RATIO - 1.0)
+)
 _LAMINAR: Final = 0.999  # the orifice law changes its form at these two ratios
 
 
@@ -54,7 +56,8 @@ class Filling:
 
     @classmethod
     def from_sonic_conductance(cls, conductance: float, **others: float) -> Filling:
-        """From the sonic conductance of ISO 6358 [m3/(s Pa)], reference air of 1.185 kg/m3 (1 bar, 20 degC, 65 %).
+        """From the sonic conductance of ISO 6358 [m3/(s Pa)], reference air of 1.185 kg/m3 (1 bar,
+        20 degC, 65 %).
 
         Parameters
         ----------
@@ -68,7 +71,9 @@ class Filling:
 
     @property
     def _gas(self) -> _core.Gas:
-        return _core.Gas(self.ambient_pressure, self.temperature, self.gas_constant, _HEAT_CAPACITY_RATIO)
+        return _core.Gas(
+            self.ambient_pressure, self.temperature, self.gas_constant, _HEAT_CAPACITY_RATIO
+        )
 
     def time(self, volume: float, pressure: float) -> float:
         """Time to fill a constant volume from ambient to a gauge pressure [s].
@@ -83,7 +88,8 @@ class Filling:
         Returns
         -------
         float
-            ``(V / (R T)) integral dp / mdot(p)``, the orifice law of the rigs with a constant supply.
+            ``(V / (R T)) integral dp / mdot(p)``, the orifice law of the rigs with a constant
+            supply.
 
         Raises
         ------
@@ -93,7 +99,9 @@ class Filling:
         positive("volume", volume)
         positive("pressure", pressure)
         if pressure >= self.supply_pressure:
-            raise ParameterError(f"pressure = {pressure:g} Pa is not below the supply's {self.supply_pressure:g} Pa")
+            raise ParameterError(
+                f"pressure = {pressure:g} Pa is not below the supply's {self.supply_pressure:g} Pa"
+            )
         supply = self.supply_pressure + self.ambient_pressure
         start, end = self.ambient_pressure / supply, (self.ambient_pressure + pressure) / supply
         # 1/mdot has an integrable infinity near r = 1, so even steps in log(1 - r)
@@ -108,7 +116,8 @@ class Filling:
         return (volume + self.dead_volume) * total / (self.gas_constant * self.temperature)
 
     def energy(self, rest_volume: float, end_volume: float, pressure: float) -> float:
-        """Energy taken from the tank for one stroke [J]: ``mass R T``, as the tank's ``(P_initial - P_final) V`` (ch. 6).
+        """Energy taken from the tank for one stroke [J]: ``mass R T``, as the tank's
+        ``(P_initial - P_final) V`` (ch. 6).
 
         Parameters
         ----------

@@ -62,13 +62,17 @@ def decode(genes: Sequence[int], bits: int) -> Array:
 
 
 def child(first: Sequence[int], second: Sequence[int]) -> Member:
-    """One design out of two: the head of one and the tail of the other, cut at a random place (``cxOnePoint``)."""
+    """One design out of two: the head of one and the tail of the other, cut at a random place
+    (``cxOnePoint``).
+    """
     pair = tools.cxOnePoint(_Genes(first), _Genes(second))
     return random.choice(pair)
 
 
 def redraw_one(genes: Member, bits: int, probability: float) -> Member:
-    """With a probability, one variable at random: each of its digits turned with one half (``mutFlipBit``)."""
+    """With a probability, one variable at random: each of its digits turned with one half
+    (``mutFlipBit``).
+    """
     if random.random() < probability:
         start = bits * random.randrange(len(genes) // bits)
         genes[start : start + bits] = tools.mutFlipBit(genes[start : start + bits], indpb=0.5)[0]
@@ -78,7 +82,8 @@ def redraw_one(genes: Member, bits: int, probability: float) -> Member:
 def evolve(evaluator: Evaluator, settings: Genetic) -> None:
     """Run the algorithm until the evaluations are used up or the best fitness stands still.
 
-    The two best of a generation survive, and every other member of the next is a child of these two.
+    The two best of a generation survive, and every other member of the next is a child of these
+    two.
 
     Parameters
     ----------
@@ -89,7 +94,9 @@ def evolve(evaluator: Evaluator, settings: Genetic) -> None:
     """
     toolbox = base.Toolbox()
     toolbox.register("digit", random.randint, 0, 1)
-    toolbox.register("member", tools.initRepeat, _Genes, toolbox.digit, n=settings.bits * evaluator.lower.size)
+    toolbox.register(
+        "member", tools.initRepeat, _Genes, toolbox.digit, n=settings.bits * evaluator.lower.size
+    )
     toolbox.register("population", tools.initRepeat, list, toolbox.member)
     toolbox.register("select", tools.selBest, k=settings.elites)
     toolbox.register("mate", child)
@@ -99,7 +106,10 @@ def evolve(evaluator: Evaluator, settings: Genetic) -> None:
     _assign(population, evaluator, settings.bits)
     while evaluator.left and not _settled(evaluator.best, settings):
         elites = toolbox.select(population)
-        children = [toolbox.mutate(toolbox.mate(*elites[:2])) for _ in range(settings.population - settings.elites)]
+        children = [
+            toolbox.mutate(toolbox.mate(*elites[:2]))
+            for _ in range(settings.population - settings.elites)
+        ]
         _assign(children, evaluator, settings.bits)
         population = elites + children
 
@@ -118,7 +128,12 @@ def _settled(best: Array, settings: Genetic) -> bool:
 
 
 def evolve_two(
-    objectives: Callable[[Array], Array], size: int, *, population: int, generations: int, progress: Callable[[int, int], None] | None
+    objectives: Callable[[Array], Array],
+    size: int,
+    *,
+    population: int,
+    generations: int,
+    progress: Callable[[int, int], None] | None,
 ) -> Array:
     """NSGA-II (Deb 2002, with its usual settings) for two objectives on the unit cube.
 

@@ -21,7 +21,8 @@ __all__ = ["AREA_TOLERANCE", "JointDesign", "MethodComparison", "compare_methods
 
 Array = NDArray[np.float64]
 
-#: Area below the threshold that counts as "essentially zero", over the area under the threshold [1].
+#: Area below the threshold that counts as "essentially zero", over the area under the threshold
+#: [1].
 AREA_TOLERANCE: Final = 1e-3
 
 _ROUNDING: Final = 1e-9  # a smaller shortfall of torque is none
@@ -55,7 +56,10 @@ class JointDesign:
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.area_tolerance) and self.area_tolerance >= 0.0):
-            raise ParameterError(f"area_tolerance = {self.area_tolerance} is not allowed: a finite number from 0 on is needed")
+            raise ParameterError(
+                f"area_tolerance = {self.area_tolerance} is not allowed: a finite number from 0 on "
+                "is needed"
+            )
 
     @classmethod
     def of(cls, problem: JointProblem, lengths: ArrayLike) -> JointDesign:
@@ -81,44 +85,60 @@ class JointDesign:
 
     @property
     def needed_pressure(self) -> float | None:
-        """Smallest pressure at which this joint gives the torque at every angle [Pa]; None if there is none."""
+        """Smallest pressure at which this joint gives the torque at every angle [Pa]; None if there
+        is none.
+        """
         value = float(self.problem.needed_pressure(self.lengths)[0])
         return value if value < 1e10 else None
 
     @property
     def shortfall(self) -> tuple[float, float]:
-        """How far the least torque is below the wanted one, over the wanted one [1], 0 where nothing is; and its angle [rad]."""
+        """How far the least torque is below the wanted one, over the wanted one [1], 0 where
+        nothing is; and its angle [rad].
+        """
         torque = self.scores.torque[0]
         index = int(np.argmin(torque))
         share = 1.0 - float(torque[index]) / self.problem.torque
         return (share if share > _ROUNDING else 0.0), float(self.problem.angles[index])
 
     def met(self, tolerance: float | None = None) -> bool:
-        """Whether the whole range is reached and the area below the threshold is at most a share of that under it.
+        """Whether the whole range is reached and the area below the threshold is at most a share of
+        that under it.
 
-        The share is ``tolerance``, by default :attr:`area_tolerance`. The torque may be below the wanted one by more than that
-        over a few angles: see :attr:`shortfall`.
+        The share is ``tolerance``, by default :attr:`area_tolerance`. The torque may be below the
+        wanted one by more than that over a few angles: see :attr:`shortfall`.
         """
         scores, share = self.scores, self.area_tolerance if tolerance is None else tolerance
-        return bool(scores.available[0] and scores.area_below[0] <= share * self.problem.required_area)
+        return bool(
+            scores.available[0] and scores.area_below[0] <= share * self.problem.required_area
+        )
 
     def summary(self) -> str:
-        """The design in words, lengths in mm and inches; says so where the requirement is not met."""
+        """The design in words, lengths in mm and inches; says so where the requirement is not
+        met.
+        """
         problem, scores = self.problem, self.scores
         lines = [f"{'length':<14}{'mm':>9}{'in':>9}   bounds [mm]"]
         for name, value in zip(LENGTHS, self.lengths.tolist(), strict=True):
             low, high = (1e3 * bound for bound in problem.bounds[name])
-            edge = "  at its bound" if min(1e3 * value - low, high - 1e3 * value) < 1e-3 * (high - low) else ""
-            lines.append(f"{name:<14}{1e3 * value:>9.2f}{value / 0.0254:>9.3f}   {low:.4g} to {high:.4g}{edge}")
+            edge = (
+                "  at its bound"
+                if min(1e3 * value - low, high - 1e3 * value) < 1e-3 * (high - low)
+                else ""
+            )
+            lines.append(
+                f"{name:<14}{1e3 * value:>9.2f}{value / 0.0254:>9.3f}   {low:.4g} to "
+                f"{high:.4g}{edge}"
+            )
         torque = scores.torque[0]
         below, needed = float(scores.area_below[0]), self.needed_pressure
         last = math.degrees(float(scores.max_angle[0]))
         share = 100.0 * below / problem.required_area
         lines += [
-            f"pressure {bar_and_psi(problem.pressure)}, torque {torque.min():.4g} to {torque.max():.4g} N m, "
-            f"wanted {problem.torque:.4g} N m",
-            f"J = {float(scores.fitness[0]):.6g} J: area below {below:.4g} J ({share:.3g} % of the work wanted), "
-            f"above {float(scores.area_above[0]):.4g} J",
+            f"pressure {bar_and_psi(problem.pressure)}, torque {torque.min():.4g} to "
+            f"{torque.max():.4g} N m, wanted {problem.torque:.4g} N m",
+            f"J = {float(scores.fitness[0]):.6g} J: area below {below:.4g} J ({share:.3g} % of the "
+            f"work wanted), above {float(scores.area_above[0]):.4g} J",
             f"stroke {100.0 * float(np.nanmax(scores.contraction[0])):.3g} % of the rest length, "
             f"radius about the axis {1e3 * self.size:.4g} mm",
         ]
@@ -126,7 +146,14 @@ class JointDesign:
             lines.append(self._how_met())
         else:
             end = math.degrees(problem.max_angle)
-            why = "" if scores.available[0] else f"; the muscles turn the joint up to {last:.4g} deg only, {end:.4g} deg are required"
+            why = (
+                ""
+                if scores.available[0]
+                else (
+                    f"; the muscles turn the joint up to {last:.4g} deg only, {end:.4g} deg are "
+                    "required"
+                )
+            )
             lines.append(f"THE REQUIREMENT IS NOT MET: this is the best found{why}")
         lines.append(
             "no pressure makes this joint good enough"
@@ -140,7 +167,10 @@ class JointDesign:
         short, angle = self.shortfall
         if short == 0.0:
             return "the requirement is met"
-        least = f"least torque {100.0 * short:.2g} % below the wanted one at {math.degrees(angle):.4g} deg"
+        least = (
+            f"least torque {100.0 * short:.2g} % below the wanted one at {math.degrees(angle):.4g} "
+            "deg"
+        )
         return f"met within {100.0 * self.area_tolerance:.3g} % of the work wanted; {least}"
 
     def to_dict(self) -> dict[str, Any]:
@@ -183,11 +213,20 @@ class JointDesign:
     def to_toml(self) -> str:
         """The block ``[joint]`` of a rig file with this joint and its range."""
         problem = self.problem
-        angles = {"rest_angle": problem.min_angle, "min_angle": problem.min_angle, "max_angle": problem.max_angle}
+        angles = {
+            "rest_angle": problem.min_angle,
+            "min_angle": problem.min_angle,
+            "max_angle": problem.max_angle,
+        }
         lengths = dict(zip(LENGTHS, self.lengths.tolist(), strict=True))
         lines = ["[joint]", f'kind         = "{problem.kind}"']
-        lines += [f'{name:<12} = {{ value = {value:.9g}, unit = "m" }}' for name, value in lengths.items()]
-        lines += [f'{name:<12} = {{ value = {math.degrees(value):.9g}, unit = "deg" }}' for name, value in angles.items()]
+        lines += [
+            f'{name:<12} = {{ value = {value:.9g}, unit = "m" }}' for name, value in lengths.items()
+        ]
+        lines += [
+            f'{name:<12} = {{ value = {math.degrees(value):.9g}, unit = "deg" }}'
+            for name, value in angles.items()
+        ]
         return "\n".join(lines) + "\n"
 
 
@@ -222,8 +261,16 @@ def optimise(
     ParameterError
         If an argument is not possible.
     """
-    options: dict[str, Any] = {"method": method, "evaluations": evaluations, "seed": seed, "genetic": genetic, "progress": progress}
-    found = search(lambda points: problem.evaluate(points).fitness, problem.lower, problem.upper, **options)
+    options: dict[str, Any] = {
+        "method": method,
+        "evaluations": evaluations,
+        "seed": seed,
+        "genetic": genetic,
+        "progress": progress,
+    }
+    found = search(
+        lambda points: problem.evaluate(points).fitness, problem.lower, problem.upper, **options
+    )
     return JointDesign(problem, found.point, found, area_tolerance)
 
 
@@ -249,20 +296,36 @@ class MethodComparison:
     evaluations: NDArray[np.int64]
 
     def rows(self) -> list[dict[str, Any]]:
-        """For each method the median, quartiles, best and worst objective [J] and the evaluations of one run."""
+        """For each method the median, quartiles, best and worst objective [J] and the evaluations
+        of one run.
+        """
         result = []
         for name, values, used in zip(self.methods, self.fitness, self.evaluations, strict=True):
             names = ("best", "quartile_low", "median", "quartile_high", "worst")
-            numbers = dict(zip(names, np.percentile(values, [0.0, 25.0, 50.0, 75.0, 100.0]).tolist(), strict=True))
-            result.append({"method": name, "evaluations": int(used.max()), "runs": len(values), **numbers})
+            numbers = dict(
+                zip(
+                    names,
+                    np.percentile(values, [0.0, 25.0, 50.0, 75.0, 100.0]).tolist(),
+                    strict=True,
+                )
+            )
+            result.append(
+                {"method": name, "evaluations": int(used.max()), "runs": len(values), **numbers}
+            )
         return result
 
     def table(self) -> str:
         """:meth:`rows` as text, J in joule."""
         keys = ("best", "quartile_low", "median", "quartile_high", "worst")
-        lines = [f"{'method':<8}{'evaluations':>12}{'runs':>6}" + "".join(f"{key.replace('_', ' '):>15}" for key in keys)]
+        lines = [
+            f"{'method':<8}{'evaluations':>12}{'runs':>6}"
+            + "".join(f"{key.replace('_', ' '):>15}" for key in keys)
+        ]
         for row in self.rows():
-            lines.append(f"{row['method']:<8}{row['evaluations']:>12}{row['runs']:>6}" + "".join(f"{row[key]:>15.6g}" for key in keys))
+            lines.append(
+                f"{row['method']:<8}{row['evaluations']:>12}{row['runs']:>6}"
+                + "".join(f"{row[key]:>15.6g}" for key in keys)
+            )
         return "\n".join(lines)
 
 
@@ -304,10 +367,15 @@ def compare_methods(
     if not methods or not seeds:
         raise ParameterError("methods and seeds must not be empty")
     settings = genetic or Genetic(tolerance=None)
-    fitness, used = np.zeros((len(methods), len(seeds))), np.zeros((len(methods), len(seeds)), dtype=np.int64)
+    fitness, used = (
+        np.zeros((len(methods), len(seeds))),
+        np.zeros((len(methods), len(seeds)), dtype=np.int64),
+    )
     for row, method in enumerate(methods):
         for column, seed in enumerate(seeds):
-            found = optimise(problem, method, evaluations=evaluations, seed=seed, genetic=settings).search
+            found = optimise(
+                problem, method, evaluations=evaluations, seed=seed, genetic=settings
+            ).search
             assert found is not None
             fitness[row, column], used[row, column] = found.value, found.evaluations
             if progress is not None:

@@ -1,7 +1,9 @@
-"""What an arm can lift and hold: the torque of its muscles at a pressure against that of gravity, over the joint's range.
+"""What an arm can lift and hold: the torque of its muscles at a pressure against that of gravity,
+over the joint's range.
 
-Statics only: pressure is taken as reached slowly, so that nothing is carried on by its swing. Coulomb friction of the arm and
-hysteresis of the muscles are losses while lifting and help while holding.
+Statics only: pressure is taken as reached slowly, so that nothing is carried on by its swing.
+Coulomb friction of the arm and hysteresis of the muscles are losses while lifting and help while
+holding.
 """
 
 from __future__ import annotations
@@ -46,16 +48,18 @@ class Lift:
     angle : ndarray (n,)
         Angles from the lower stop to the end that was asked for [rad].
     torque, torque_holding : ndarray (n,)
-        Torque of the muscles at each angle while they shorten, and the most with which they resist being drawn out [N m].
+        Torque of the muscles at each angle while they shorten, and the most with which they resist
+        being drawn out [N m].
     gravity : ndarray (n,)
         Torque of the arm's and the payload's weight at each angle [N m].
     coulomb : float
         Coulomb friction of the arm [N m].
     capacity : ndarray (n,)
-        Payload that would just be lifted past each angle [kg]: negative where not even the empty arm is, infinite where a payload
-        does not weigh on the joint.
+        Payload that would just be lifted past each angle [kg]: negative where not even the empty
+        arm is, infinite where a payload does not weigh on the joint.
     reached : float
-        Angle up to which the arm is lifted from its lower stop [rad]; that stop itself where it is not lifted at all.
+        Angle up to which the arm is lifted from its lower stop [rad]; that stop itself where it is
+        not lifted at all.
     held : float
         Angle up to which it is held when brought there [rad].
     regained : tuple of (float, float)
@@ -65,8 +69,8 @@ class Lift:
     margin, margin_angle : float
         Least of muscles less friction less gravity over the range [N m], and where [rad].
     payload_limit : float or None
-        The most that is lifted over the whole range [kg]: infinite where no payload weighs on the joint, None where not even the empty
-        arm is lifted.
+        The most that is lifted over the whole range [kg]: infinite where no payload weighs on the
+        joint, None where not even the empty arm is lifted.
     limit_angle : float
         Where that is decided [rad].
     left_out : tuple of str
@@ -113,9 +117,16 @@ class Lift:
         at = float(np.interp(self.reached, self.angle, self.gravity))
         muscles = float(np.interp(self.reached, self.angle, self.torque))
         lost = f" less {self.coulomb:.3g} N m of friction" if self.coulomb else ""
-        where = f"beyond {_degrees(self.reached)} deg" if self.reached > self.angle[0] else f"off its stop at {first} deg"
+        where = (
+            f"beyond {_degrees(self.reached)} deg"
+            if self.reached > self.angle[0]
+            else f"off its stop at {first} deg"
+        )
         balance = f"there the muscles give {muscles:.4g} N m{lost}, gravity takes {at:.4g} N m"
-        again = "".join(f"; brought there, it goes on from {_degrees(a)} to {_degrees(b)} deg" for a, b in self.regained)
+        again = "".join(
+            f"; brought there, it goes on from {_degrees(a)} to {_degrees(b)} deg"
+            for a, b in self.regained
+        )
         return f"cannot lift {load} {where} at {bar}: {balance}{again}; {self._limit()}"
 
     def _limit(self) -> str:
@@ -124,7 +135,10 @@ class Lift:
             return f"up to {last} deg it does not even lift the empty arm"
         if math.isinf(self.payload_limit):
             return f"up to {last} deg no payload weighs on the joint"
-        return f"up to {last} deg at most {_kg(self.payload_limit)}, decided at {_degrees(self.limit_angle)} deg"
+        return (
+            f"up to {last} deg at most {_kg(self.payload_limit)}, decided at "
+            f"{_degrees(self.limit_angle)} deg"
+        )
 
     def summary(self) -> str:
         """The result as text: the sentence, and torques and capacity at a dozen angles."""
@@ -137,7 +151,10 @@ class Lift:
         for row in rows.tolist():
             margin = self.torque[row] - self.coulomb - self.gravity[row]
             state = "lifted" if self.lifts[row] else "held" if self.holds[row] else "not held"
-            numbers = f"{math.degrees(self.angle[row]):>11.1f}{self.torque[row]:>15.1f}{self.gravity[row]:>15.1f}{margin:>14.1f}"
+            numbers = (
+                f"{math.degrees(self.angle[row]):>11.1f}{self.torque[row]:>15.1f}"
+                f"{self.gravity[row]:>15.1f}{margin:>14.1f}"
+            )
             lines.append(f"{numbers}{max(float(self.capacity[row]), 0.0):>18.1f}  {state}")
         if self.left_out:
             lines += ["", f"without the effects of the rig: {', '.join(self.left_out)}"]
@@ -151,8 +168,15 @@ class Lift:
             if isinstance(value, np.ndarray):
                 shown[name] = [item if math.isfinite(item) else None for item in value.tolist()]
             else:
-                shown[name] = None if isinstance(value, float) and not math.isfinite(value) else value
-        return {**shown, "lifts": self.lifts.tolist(), "holds": self.holds.tolist(), "text": self.text}
+                shown[name] = (
+                    None if isinstance(value, float) and not math.isfinite(value) else value
+                )
+        return {
+            **shown,
+            "lifts": self.lifts.tolist(),
+            "holds": self.holds.tolist(),
+            "text": self.text,
+        }
 
     def plot(self, path: str | os.PathLike[str]) -> Path:
         """Write a picture of torques and capacity over the angle, a PNG.
@@ -183,12 +207,14 @@ class Lift:
         return write_atomically(path, lift_png(self))
 
 
-def lift(rig: Rig, *, pressure: float | None = None, to: float | None = None, points: int = 721) -> Lift:
+def lift(
+    rig: Rig, *, pressure: float | None = None, to: float | None = None, points: int = 721
+) -> Lift:
     """What a one-link rig lifts and holds at a pressure.
 
-    At each angle the torque of the muscles ``n F(P, d(theta)/L0) dd/dtheta`` stands against gravity's
-    ``(m lc + mp l) g sin(theta)`` (sections 4 and 5 of the physics reference; dissertation (3.24)). A payload that is too much
-    is a result, not an error.
+    At each angle the torque of the muscles ``n F(P, d(theta)/L0) dd/dtheta`` stands against
+    gravity's ``(m lc + mp l) g sin(theta)`` (sections 4 and 5 of the physics reference;
+    dissertation (3.24)). A payload that is too much is a result, not an error.
 
     Parameters
     ----------
@@ -199,7 +225,8 @@ def lift(rig: Rig, *, pressure: float | None = None, to: float | None = None, po
     to : float, optional
         Angle up to which the payload is to be lifted [rad]; the upper stop by default.
     points : int
-        Angles at which the torques are given; where signs change is found to round-off between them.
+        Angles at which the torques are given; where signs change is found to round-off between
+        them.
 
     Returns
     -------
@@ -208,8 +235,8 @@ def lift(rig: Rig, *, pressure: float | None = None, to: float | None = None, po
     Raises
     ------
     ParameterError
-        If the rig has no muscle, joint or arm, there is no pressure, a value is not finite or outside its range; the message
-        names it.
+        If the rig has no muscle, joint or arm, there is no pressure, a value is not finite or
+        outside its range; the message names it.
 
     Examples
     --------
@@ -222,17 +249,29 @@ def lift(rig: Rig, *, pressure: float | None = None, to: float | None = None, po
 
     missing = [block for block in ("muscle", "joint", "arm") if block not in rig.blocks]
     if missing:
-        raise ParameterError(f"rig {rig.name!r} has no [{missing[0]}]: lifting needs muscle, joint and arm")
+        raise ParameterError(
+            f"rig {rig.name!r} has no [{missing[0]}]: lifting needs muscle, joint and arm"
+        )
     if rig.tables("arm")[""]["kind"] != "one_link":
-        raise ParameterError(f"rig {rig.name!r} has an arm of several links: what it lifts is found for a one-link arm only")
-    core_rig(rig)  # refuses lengths that the muscle cannot have, and angles that the tendon does not reach
+        raise ParameterError(
+            f"rig {rig.name!r} has an arm of several links: what it lifts is found for a one-link "
+            "arm only"
+        )
+    core_rig(
+        rig
+    )  # refuses lengths that the muscle cannot have, and angles that the tendon does not reach
     pressure = _pressure(rig, pressure)
     joint = next(iter(rig.tables("joint").values()))
     low, high = float(joint["min_angle"]), float(joint["max_angle"])
     end = high if to is None else float(to)
     if not low < end <= high:
-        allowed = f"above joint.min_angle = {_degrees(low)} deg, at most joint.max_angle = {_degrees(high)} deg"
-        raise ParameterError(f"to = {end:g} rad ({math.degrees(end):.4g} deg) is not allowed: {allowed}")
+        allowed = (
+            f"above joint.min_angle = {_degrees(low)} deg, at most joint.max_angle = "
+            f"{_degrees(high)} deg"
+        )
+        raise ParameterError(
+            f"to = {end:g} rad ({math.degrees(end):.4g} deg) is not allowed: {allowed}"
+        )
     if points < 3:
         raise ParameterError(f"points = {points} is not allowed: at least 3")
     balance = _Balance(rig, pressure)
@@ -246,7 +285,9 @@ def lift(rig: Rig, *, pressure: float | None = None, to: float | None = None, po
     regained = tuple(zip(later[::2], later[1::2], strict=False))
     margin_angle = _least(balance.excess, angle)
     limit, limit_angle = balance.limit(angle)
-    left_out = tuple(e["id"] for e in rig.effects if e["id"] not in (*_WITHOUT_TORQUE, "muscle_hysteresis"))
+    left_out = tuple(
+        e["id"] for e in rig.effects if e["id"] not in (*_WITHOUT_TORQUE, "muscle_hysteresis")
+    )
     return Lift(
         rig=rig.name,
         pressure=pressure,
@@ -275,25 +316,44 @@ class _Balance:
     def __init__(self, rig: Rig, pressure: float) -> None:
         self.arm = rig.tables("arm")[""]
         own, transmissions = next(iter(rig.tables("joint").values())), rig.tables("transmission")
-        self.groups = [(rig.muscle_of(name), Joint.from_model(transmissions.get(name, own))) for name in rig.tables("muscle")]
+        self.groups = [
+            (rig.muscle_of(name), Joint.from_model(transmissions.get(name, own)))
+            for name in rig.tables("muscle")
+        ]
         self.pressure = pressure
         self.coulomb = float(self.arm["coulomb"])
-        self.hysteresis = (0.0, 0.0)  # of one muscle: constant [N], by pressure [N/Pa]; the effect of the catalogue
+        self.hysteresis = (
+            0.0,
+            0.0,
+        )  # of one muscle: constant [N], by pressure [N/Pa]; the effect of the catalogue
         for effect in rig.effects:
             if effect["id"] == "muscle_hysteresis":
-                self.hysteresis = effect["parameters"]["friction_constant"], effect["parameters"]["friction_pressure"]
+                self.hysteresis = (
+                    effect["parameters"]["friction_constant"],
+                    effect["parameters"]["friction_pressure"],
+                )
 
     def torque(self, angle: Array, direction: float) -> Array:
-        """Of the muscles, while they shorten or are about to be drawn out [N m]; those that would lower the arm are vented."""
+        """Of the muscles, while they shorten or are about to be drawn out [N m]; those that would
+        lower the arm are vented.
+        """
         total = np.zeros(angle.shape)
         for muscle, joint in self.groups:
             rest, count = float(muscle.parameters["rest_length"]), int(muscle.parameters["count"])
             arm = joint.torque_arm(angle)
             # a muscle on the other side of the joint lengthens where the arm rises
             way = direction * np.sign(np.where(arm == 0.0, 1.0, arm))
-            pressure = np.where(arm < 0.0, 0.0, self.pressure) if len(self.groups) > 1 else np.full(angle.shape, self.pressure)
+            pressure = (
+                np.where(arm < 0.0, 0.0, self.pressure)
+                if len(self.groups) > 1
+                else np.full(angle.shape, self.pressure)
+            )
             friction = self.hysteresis[0] + self.hysteresis[1] * np.maximum(pressure, 0.0)
-            total += count * (muscle.force(pressure, joint.shortening(angle) / rest, way) + way * friction) * arm
+            total += (
+                count
+                * (muscle.force(pressure, joint.shortening(angle) / rest, way) + way * friction)
+                * arm
+            )
         return total
 
     def weight(self, angle: Array) -> Array:
@@ -331,7 +391,12 @@ class _Balance:
         # where a payload helps or does not weigh, the muscles must still do their part
         helped = self.weight(angle) <= 0.0
         load = 0.0 if math.isinf(limit) else limit
-        rest = (self.torque(angle, _LIFTING) - self.coulomb - self.own(angle) - load * self.weight(angle))[helped]
+        rest = (
+            self.torque(angle, _LIFTING)
+            - self.coulomb
+            - self.own(angle)
+            - load * self.weight(angle)
+        )[helped]
         if rest.size and rest.min() < 0.0:
             return None, float(angle[helped][rest.argmin()])
         return limit, where
@@ -341,10 +406,15 @@ def _pressure(rig: Rig, pressure: float | None) -> float:
     """The pressure asked for, or the supply's."""
     if pressure is None:
         if "supply" not in rig.blocks:
-            raise ParameterError(f"pressure is missing: the rig {rig.name!r} has no [supply] whose pressure could be taken")
+            raise ParameterError(
+                f"pressure is missing: the rig {rig.name!r} has no [supply] whose pressure could "
+                "be taken"
+            )
         return max(float(supply["initial_pressure"]) for supply in rig.tables("supply").values())
     if not (math.isfinite(pressure) and 0.0 <= pressure <= 1e8):
-        raise ParameterError(f"pressure = {pressure} Pa is not allowed: a gauge pressure from 0 to 1e8 Pa")
+        raise ParameterError(
+            f"pressure = {pressure} Pa is not allowed: a gauge pressure from 0 to 1e8 Pa"
+        )
     return float(pressure)
 
 
@@ -356,7 +426,13 @@ def _crossings(function: Callable[[Array], Array], angle: Array) -> list[float]:
     found = []
     for index in np.flatnonzero(positive[1:] != positive[:-1]).tolist():
         low, high = float(angle[index]), float(angle[index + 1])
-        found.append(float(brentq(lambda x: float(function(np.array([x]))[0]), low, high, xtol=1e-14, rtol=1e-14)))
+        found.append(
+            float(
+                brentq(
+                    lambda x: float(function(np.array([x]))[0]), low, high, xtol=1e-14, rtol=1e-14
+                )
+            )
+        )
     return found
 
 
@@ -369,7 +445,12 @@ def _least(function: Callable[[Array], Array], angle: Array) -> float:
     if not math.isfinite(values[best]) or best in (0, angle.size - 1):
         return float(angle[best])
     around = (float(angle[best - 1]), float(angle[best + 1]))
-    found = minimize_scalar(lambda x: float(function(np.array([x]))[0]), bounds=around, method="bounded", options={"xatol": 1e-10})
+    found = minimize_scalar(
+        lambda x: float(function(np.array([x]))[0]),
+        bounds=around,
+        method="bounded",
+        options={"xatol": 1e-10},
+    )
     return float(found.x if found.fun < values[best] else angle[best])
 
 

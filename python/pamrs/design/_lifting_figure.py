@@ -1,4 +1,6 @@
-"""The picture of what an arm lifts: torques over the angle, and the payload that each angle would take."""
+"""The picture of what an arm lifts: torques over the angle, and the payload that each angle would
+take.
+"""
 
 from __future__ import annotations
 
@@ -39,7 +41,14 @@ def lift_png(result: Lift) -> bytes:
         figure = Figure(figsize=(10.0, 4.0), dpi=150, layout="constrained")
         figure.get_layout_engine().set(w_pad=0.1, h_pad=0.08)  # type: ignore[union-attr, call-arg]
         title = f"{result.rig} {result.text}"
-        figure.suptitle("\n".join(textwrap.wrap(title, 118)), x=0.012, ha="left", fontsize=9.5, fontweight="bold", color="#111827")
+        figure.suptitle(
+            "\n".join(textwrap.wrap(title, 118)),
+            x=0.012,
+            ha="left",
+            fontsize=9.5,
+            fontweight="bold",
+            color="#111827",
+        )
         left, right = figure.subplots(1, 2)
         _torques(left, result)
         _capacity(right, result)
@@ -58,12 +67,43 @@ def _torques(axes: Axes, result: Lift) -> None:
     angle, lifting = np.degrees(result.angle), result.torque - result.coulomb
     holding = result.torque_holding + result.coulomb
     short = lifting < result.gravity
-    axes.fill_between(angle, lifting, result.gravity, where=short, interpolate=True, color=COLOURS["before"], alpha=0.22, lw=0)
+    axes.fill_between(
+        angle,
+        lifting,
+        result.gravity,
+        where=short,
+        interpolate=True,
+        color=COLOURS["before"],
+        alpha=0.22,
+        lw=0,
+    )
     if float(np.abs(holding - lifting).max()) > 0.01 * float(np.abs(lifting).max()):
-        axes.plot(angle, holding, color=COLOURS["after"], lw=1.0, ls=(0, (5, 2)), label="muscles and friction, holding")
-    axes.plot(angle, lifting, color=COLOURS["after"], lw=1.8, label=f"muscles less friction, lifting, {result.pressure / 1e5:.3g} bar")
-    axes.plot(angle, result.gravity, color=COLOURS["before"], lw=1.8, label=f"gravity with {result.payload:.4g} kg")
-    axes.set_ylim(min(0.0, 1.1 * float(lifting.min())), 1.3 * max(float(holding.max()), float(result.gravity.max())))
+        axes.plot(
+            angle,
+            holding,
+            color=COLOURS["after"],
+            lw=1.0,
+            ls=(0, (5, 2)),
+            label="muscles and friction, holding",
+        )
+    axes.plot(
+        angle,
+        lifting,
+        color=COLOURS["after"],
+        lw=1.8,
+        label=f"muscles less friction, lifting, {result.pressure / 1e5:.3g} bar",
+    )
+    axes.plot(
+        angle,
+        result.gravity,
+        color=COLOURS["before"],
+        lw=1.8,
+        label=f"gravity with {result.payload:.4g} kg",
+    )
+    axes.set_ylim(
+        min(0.0, 1.1 * float(lifting.min())),
+        1.3 * max(float(holding.max()), float(result.gravity.max())),
+    )
     axes.set_ylabel("torque [N m]")
     axes.legend(loc="upper right")
 
@@ -71,8 +111,16 @@ def _torques(axes: Axes, result: Lift) -> None:
 def _capacity(axes: Axes, result: Lift) -> None:
     """Payload that is just lifted past each angle, against the one that there is."""
     capacity = np.where(np.isfinite(result.capacity), np.maximum(result.capacity, 0.0), math.nan)
-    axes.plot(np.degrees(result.angle), capacity, color=COLOURS["after"], lw=1.8, label="payload that is just lifted past the angle")
-    axes.axhline(result.payload, color=COLOURS["before"], lw=1.4, label=f"payload, {result.payload:.4g} kg")
+    axes.plot(
+        np.degrees(result.angle),
+        capacity,
+        color=COLOURS["after"],
+        lw=1.8,
+        label="payload that is just lifted past the angle",
+    )
+    axes.axhline(
+        result.payload, color=COLOURS["before"], lw=1.4, label=f"payload, {result.payload:.4g} kg"
+    )
     there = capacity[np.isfinite(capacity)]
     middle = float(np.median(there)) if there.size else 0.0
     axes.set_ylim(0.0, 1.3 * max(2.2 * middle, 1.2 * result.payload, 1e-9))

@@ -1,4 +1,6 @@
-"""The smallest pressure: the outer loop of dissertation 3.5, a direct search beside it, and pressure against size."""
+"""The smallest pressure: the outer loop of dissertation 3.5, a direct search beside it, and
+pressure against size.
+"""
 
 from __future__ import annotations
 
@@ -16,14 +18,23 @@ from pamrs.design._search import PUBLISHED_EVALUATIONS, search, seeded
 from pamrs.errors import ParameterError, missing_package
 from pamrs.units import bar_and_psi
 
-__all__ = ["ParetoFront", "PressureSearch", "Trial", "least_pressure", "minimum_pressure", "pareto_front"]
+__all__ = [
+    "ParetoFront",
+    "PressureSearch",
+    "Trial",
+    "least_pressure",
+    "minimum_pressure",
+    "pareto_front",
+]
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Trial:
-    """One pressure tried: gauge pressure [Pa], area left below the threshold [J], whether the requirement was met, searches made."""
+    """One pressure tried: gauge pressure [Pa], area left below the threshold [J], whether the
+    requirement was met, searches made.
+    """
 
     pressure: float
     area_below: float
@@ -40,8 +51,8 @@ class PressureSearch:
     met : bool
         Whether any pressure up to ``highest`` was enough.
     design : JointDesign
-        The design at the smallest pressure at which this search succeeded, its problem at that pressure; the best found where
-        it never did.
+        The design at the smallest pressure at which this search succeeded, its problem at that
+        pressure; the best found where it never did.
     trials : tuple of Trial
         In the order tried.
     evaluations : int
@@ -58,22 +69,32 @@ class PressureSearch:
 
     @property
     def pressure(self) -> float | None:
-        """The smallest pressure at which this search succeeded [Pa], no bound; None where it never did."""
+        """The smallest pressure at which this search succeeded [Pa], no bound; None where it never
+        did.
+        """
         return self.design.problem.pressure if self.met else None
 
     @property
     def least_possible_pressure(self) -> float:
-        """Pressure below which no joint can do [Pa]; the share of the work that may be missing is the design's ``area_tolerance``."""
+        """Pressure below which no joint can do [Pa]; the share of the work that may be missing is
+        the design's ``area_tolerance``.
+        """
         return self.design.problem.least_possible_pressure(self.design.area_tolerance)
 
     def summary(self) -> str:
         """The result in a line or two."""
         tried = f"{len(self.trials)} pressures, {self.evaluations} evaluations"
-        least = f"no joint of any shape could do with less than {bar_and_psi(self.least_possible_pressure)}"
+        least = (
+            "no joint of any shape could do with less than "
+            f"{bar_and_psi(self.least_possible_pressure)}"
+        )
         if not self.met:
             highest = max(trial.pressure for trial in self.trials)
             return f"NO PRESSURE UP TO {bar_and_psi(highest)} IS ENOUGH ({tried})\n{least}"
-        return f"pressure {bar_and_psi(self.design.problem.pressure)}: the smallest at which this search succeeded ({tried})\n{least}"
+        return (
+            f"pressure {bar_and_psi(self.design.problem.pressure)}: the smallest at which this "
+            f"search succeeded ({tried})\n{least}"
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Numbers in SI units, ready for JSON."""
@@ -101,10 +122,12 @@ def minimum_pressure(
     genetic: Genetic | None = None,
     progress: Progress | None = None,
 ) -> PressureSearch:
-    """Repeat the search at other pressures until the area below the threshold is essentially zero (3.5.1).
+    """Repeat the search at other pressures until the area below the threshold is essentially zero
+    (3.5.1).
 
-    From the problem's pressure upward by half as much again until a search succeeds, then by bisection. A search may miss what
-    another start finds, so the result depends on the start and is no bound: see :func:`least_pressure`.
+    From the problem's pressure upward by half as much again until a search succeeds, then by
+    bisection. A search may miss what another start finds, so the result depends on the start and is
+    no bound: see :func:`least_pressure`.
 
     Parameters
     ----------
@@ -133,13 +156,23 @@ def minimum_pressure(
         If an argument is not possible.
     """
     limit = 4.0 * problem.pressure if highest is None else highest
-    for name, value in (("tolerance", tolerance), ("area_tolerance", area_tolerance), ("highest", limit)):
+    for name, value in (
+        ("tolerance", tolerance),
+        ("area_tolerance", area_tolerance),
+        ("highest", limit),
+    ):
         if not (math.isfinite(value) and value > 0.0):
-            raise ParameterError(f"{name} = {value} is not allowed: a finite number above 0 is needed")
+            raise ParameterError(
+                f"{name} = {value} is not allowed: a finite number above 0 is needed"
+            )
     if tries < 1:
         raise ParameterError(f"tries = {tries} is not allowed: a whole number from 1 on is needed")
     trials: list[Trial] = []
-    options: dict[str, Any] = {"evaluations": evaluations, "genetic": genetic, "area_tolerance": area_tolerance}
+    options: dict[str, Any] = {
+        "evaluations": evaluations,
+        "genetic": genetic,
+        "area_tolerance": area_tolerance,
+    }
     used = 0
 
     def attempt(pressure: float) -> JointDesign:
@@ -156,7 +189,10 @@ def minimum_pressure(
         assert best is not None
         trials.append(Trial(pressure, float(best.scores.area_below[0]), best.met(), count))
         if progress is not None:
-            progress(len(trials), len(trials) + max(0, math.ceil(math.log2(max(high - low, tolerance) / tolerance))))
+            progress(
+                len(trials),
+                len(trials) + max(0, math.ceil(math.log2(max(high - low, tolerance) / tolerance))),
+            )
         return best
 
     low, high = 0.0, min(problem.pressure, limit)
@@ -184,7 +220,8 @@ def least_pressure(
     seed: int = 0,
     progress: Progress | None = None,
 ) -> JointDesign | None:
-    """Look for the design with the smallest :meth:`JointProblem.needed_pressure`, without an outer loop.
+    """Look for the design with the smallest :meth:`JointProblem.needed_pressure`, without an outer
+    loop.
 
     Parameters
     ----------
@@ -198,7 +235,8 @@ def least_pressure(
     Returns
     -------
     JointDesign or None
-        Its problem at the pressure that it needs; None if no design was found that any pressure makes good enough.
+        Its problem at the pressure that it needs; None if no design was found that any pressure
+        makes good enough.
 
     Raises
     ------
@@ -206,7 +244,9 @@ def least_pressure(
         If an argument is not possible.
     """
     if not largest_size > 0.0:
-        raise ParameterError(f"largest_size = {largest_size} is not allowed: a length above 0 m is needed")
+        raise ParameterError(
+            f"largest_size = {largest_size} is not allowed: a length above 0 m is needed"
+        )
 
     def objective(points: Array) -> Array:
         needed = problem.needed_pressure(points)
@@ -215,8 +255,20 @@ def least_pressure(
         excess = problem.size(points) / largest_size - 1.0
         return np.where(excess > 0.0, 3e10 * (1.0 + excess), needed)
 
-    found = search(objective, problem.lower, problem.upper, method=method, evaluations=evaluations, seed=seed, progress=progress)
-    return JointDesign(problem.replace(pressure=found.value), found.point, found) if found.value < 1e10 else None
+    found = search(
+        objective,
+        problem.lower,
+        problem.upper,
+        method=method,
+        evaluations=evaluations,
+        seed=seed,
+        progress=progress,
+    )
+    return (
+        JointDesign(problem.replace(pressure=found.value), found.point, found)
+        if found.value < 1e10
+        else None
+    )
 
 
 @dataclass(frozen=True)
@@ -239,11 +291,20 @@ class ParetoFront:
 
     def to_dict(self) -> dict[str, Any]:
         """Numbers in SI units, ready for JSON."""
-        return {"size": self.size.tolist(), "pressure": self.pressure.tolist(), "lengths": self.lengths.tolist()}
+        return {
+            "size": self.size.tolist(),
+            "pressure": self.pressure.tolist(),
+            "lengths": self.lengths.tolist(),
+        }
 
 
 def pareto_front(
-    problem: JointProblem, *, population: int = 80, generations: int = 100, seed: int = 0, progress: Progress | None = None
+    problem: JointProblem,
+    *,
+    population: int = 80,
+    generations: int = 100,
+    seed: int = 0,
+    progress: Progress | None = None,
 ) -> ParetoFront:
     """Pressure needed against size of the joint, both to be small (NSGA-II of DEAP).
 
@@ -274,8 +335,8 @@ def pareto_front(
     """
     if population < 4 or population % 4 or generations < 1 or seed < 0:
         raise ParameterError(
-            f"population = {population}, generations = {generations}, seed = {seed} are not allowed: "
-            "a multiple of four, at least 1 and at least 0 are needed"
+            f"population = {population}, generations = {generations}, seed = {seed} are not "
+            "allowed: a multiple of four, at least 1 and at least 0 are needed"
         )
     try:
         from pamrs.design._genetic import evolve_two
@@ -288,9 +349,13 @@ def pareto_front(
         return np.stack([problem.needed_pressure(points), problem.size(points)], axis=1)
 
     with seeded(seed):
-        unit = evolve_two(objectives, span.size, population=population, generations=generations, progress=progress)
+        unit = evolve_two(
+            objectives, span.size, population=population, generations=generations, progress=progress
+        )
     values = objectives(unit)
     good = np.flatnonzero(values[:, 0] < 1e10)
     order = good[np.lexsort((values[good, 0], values[good, 1]))]
-    order = order[np.concatenate([[True], np.diff(values[order, 1]) > 0.0])] if len(order) else order
+    order = (
+        order[np.concatenate([[True], np.diff(values[order, 1]) > 0.0])] if len(order) else order
+    )
     return ParetoFront(values[order, 1], values[order, 0], problem.lower + unit[order] * span)

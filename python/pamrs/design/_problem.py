@@ -1,4 +1,6 @@
-"""The design problem of dissertation 3.5: which four lengths let a bundle turn a tendon joint with a wanted torque."""
+"""The design problem of dissertation 3.5: which four lengths let a bundle turn a tendon joint with
+a wanted torque.
+"""
 
 from __future__ import annotations
 
@@ -34,7 +36,9 @@ DEFAULT_BOUNDS: Final[dict[str, tuple[float, float]]] = {
     "lower_offset": (-0.0127, 0.0254),
 }
 
-_HOPELESS: Final = 1e10  # [Pa], stands for "no pressure is enough"; larger the less of the range is reached
+_HOPELESS: Final = (
+    1e10  # [Pa], stands for "no pressure is enough"; larger the less of the range is reached
+)
 
 
 @dataclass(frozen=True)
@@ -46,7 +50,8 @@ class Scores:
     fitness : (n,) array
         ``J`` of (3.25) [J]; smaller is better.
     area_below, area_above : (n,) array
-        Areas between the torque and the threshold over the angle, below and above the threshold [J].
+        Areas between the torque and the threshold over the angle, below and above the threshold
+        [J].
     max_angle : (n,) array
         Largest angle, not above the required one, up to which the muscles can turn the joint [rad].
     available : (n,) bool array
@@ -70,10 +75,12 @@ class Scores:
 class JointProblem:
     """One joint to be designed: muscles, wanted torque and range, and where its lengths may lie.
 
-    The objective is (3.25), (3.26): ``J = A_b + weight_above A_t + PF`` with the areas in N m rad = J, the work that is
-    missing or left over; ``PF`` is ``penalty`` where the muscles cannot turn the joint up to ``max_angle``. They can as far as
-    the tendon reaches, the moment arm is positive, and the contraction is at most ``max_contraction`` and within the braid's
-    limits. The muscles are at rest length at ``min_angle``. A muscle pulls or is slack, so a negative force counts as none.
+    The objective is (3.25), (3.26): ``J = A_b + weight_above A_t + PF`` with the areas in N m rad =
+    J, the work that is missing or left over; ``PF`` is ``penalty`` where the muscles cannot turn
+    the joint up to ``max_angle``. They can as far as the tendon reaches, the moment arm is
+    positive, and the contraction is at most ``max_contraction`` and within the braid's limits. The
+    muscles are at rest length at ``min_angle``. A muscle pulls or is slack, so a negative force
+    counts as none.
 
     Parameters
     ----------
@@ -88,8 +95,8 @@ class JointProblem:
     pressure : float
         Gauge pressure [Pa].
     bounds : mapping of str to (float, float)
-        Lowest and highest value of each of :data:`LENGTHS` [m]; equal ones fix a length. Those left out keep
-        :data:`DEFAULT_BOUNDS`.
+        Lowest and highest value of each of :data:`LENGTHS` [m]; equal ones fix a length. Those left
+        out keep :data:`DEFAULT_BOUNDS`.
     max_contraction : float
         Largest stroke over the rest length [1]; 15 % in the text.
     penalty : float
@@ -125,16 +132,21 @@ class JointProblem:
             least = 1 if name == "count" else 3
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
-                raise ParameterError(f"{name} = {value!r} is not allowed: a whole number from {least} on is needed")
+                raise ParameterError(
+                    f"{name} = {value!r} is not allowed: a whole number from {least} on is needed"
+                )
         for name in ("torque", "pressure", "max_contraction"):
             _above_zero(name, getattr(self, name))
         for name in ("penalty", "weight_above"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 0.0):
-                raise ParameterError(f"{name} = {getattr(self, name)} is not allowed: a finite number from 0 on is needed")
+                raise ParameterError(
+                    f"{name} = {getattr(self, name)} is not allowed: a finite number from 0 on is "
+                    "needed"
+                )
         if not (-math.pi <= self.min_angle < self.max_angle <= math.pi):
             raise ParameterError(
-                f"min_angle = {self.min_angle}, max_angle = {self.max_angle} are not allowed: angles from -pi to pi rad, "
-                "the first below the second, are needed"
+                f"min_angle = {self.min_angle}, max_angle = {self.max_angle} are not allowed: "
+                "angles from -pi to pi rad, the first below the second, are needed"
             )
         if self.kind not in ("tendon", "published"):
             raise ParameterError(f"kind = {self.kind!r} is not allowed: 'tendon' or 'published'")
@@ -184,7 +196,11 @@ class JointProblem:
         Joint
         """
         row = self._rows(design)[0]
-        return Joint(kind=self.kind, rest_angle=self.min_angle, **dict(zip(LENGTHS, row.tolist(), strict=True)))
+        return Joint(
+            kind=self.kind,
+            rest_angle=self.min_angle,
+            **dict(zip(LENGTHS, row.tolist(), strict=True)),
+        )
 
     # ------------------------------------------------------------------ evaluation
 
@@ -231,7 +247,8 @@ class JointProblem:
         Returns
         -------
         ndarray, shape (n,)
-            1e10 Pa and more for a design that no pressure makes good; the more the less of its range it can be turned over.
+            1e10 Pa and more for a design that no pressure makes good; the more the less of its
+            range it can be turned over.
         """
         contraction, arm, torque_arm, held = self._motion(designs)
         turned = self._turned(contraction, arm, held) & (torque_arm > 0.0)
@@ -242,12 +259,15 @@ class JointProblem:
         pull = self.torque / (self.count * np.where(turned, torque_arm, 1.0))
         each = np.where(turned, (pull - passive) / np.where(turned, slope, 1.0), 0.0)
         missing = 1.0 - turned.mean(axis=1)
-        return np.asarray(np.where(missing > 0.0, _HOPELESS * (1.0 + missing), np.maximum(each.max(axis=1), 0.0)))
+        return np.asarray(
+            np.where(missing > 0.0, _HOPELESS * (1.0 + missing), np.maximum(each.max(axis=1), 0.0))
+        )
 
     def size(self, designs: ArrayLike) -> Array:
         """Radius about the joint's axis that holds both ends of the tendon at every angle [m].
 
-        ``max(hypot(lu + d_max, ru), hypot(ll, rl))``: the muscle's end moves away from the axis by its stroke ``d``.
+        ``max(hypot(lu + d_max, ru), hypot(ll, rl))``: the muscle's end moves away from the axis by
+        its stroke ``d``.
 
         Parameters
         ----------
@@ -260,14 +280,19 @@ class JointProblem:
         """
         rows = self._rows(designs)
         contraction = self._motion(rows)[0]
-        stroke = np.where(np.isnan(contraction), 0.0, contraction).max(axis=1) * float(self.muscle.parameters["rest_length"])
-        return np.asarray(np.maximum(np.hypot(rows[:, 0] + stroke, rows[:, 1]), np.hypot(rows[:, 2], rows[:, 3])))
+        stroke = np.where(np.isnan(contraction), 0.0, contraction).max(axis=1) * float(
+            self.muscle.parameters["rest_length"]
+        )
+        return np.asarray(
+            np.maximum(np.hypot(rows[:, 0] + stroke, rows[:, 1]), np.hypot(rows[:, 2], rows[:, 3]))
+        )
 
     def least_possible_pressure(self, area_tolerance: float = 0.0) -> float:
         """Pressure below which no joint of any shape can meet the requirement [Pa].
 
-        The work wanted must come out of the muscles' stroke: ``torque * range <= count * integral F dd``. A joint whose moment
-        arm fits the muscle at every angle would need just this pressure.
+        The work wanted must come out of the muscles' stroke:
+        ``torque * range <= count * integral F dd``. A joint whose moment arm fits the muscle at
+        every angle would need just this pressure.
 
         Parameters
         ----------
@@ -279,15 +304,21 @@ class JointProblem:
         length = float(self.muscle.parameters["rest_length"])
         passive = self.muscle.force(0.0, contraction)
         slope = (self.muscle.force(self.pressure, contraction) - passive) / self.pressure
-        work, work_slope = (_running_integral(contraction * length, values) for values in (passive, slope))
+        work, work_slope = (
+            _running_integral(contraction * length, values) for values in (passive, slope)
+        )
         possible = work_slope > 0.0
-        needed = ((1.0 - area_tolerance) * self.required_area / self.count - work[possible]) / work_slope[possible]
+        needed = (
+            (1.0 - area_tolerance) * self.required_area / self.count - work[possible]
+        ) / work_slope[possible]
         return float(needed.min())
 
     def _rows(self, designs: ArrayLike) -> Array:
         rows = np.atleast_2d(np.asarray(designs, dtype=np.float64))
         if rows.ndim != 2 or rows.shape[1] != len(LENGTHS):
-            raise ParameterError(f"designs has shape {rows.shape}: rows of {', '.join(LENGTHS)} are needed")
+            raise ParameterError(
+                f"designs has shape {rows.shape}: rows of {', '.join(LENGTHS)} are needed"
+            )
         if not np.all(np.isfinite(rows)):
             raise ParameterError("designs must hold finite lengths")
         if np.any(rows[:, [0, 2]] <= 0.0):
@@ -295,7 +326,9 @@ class JointProblem:
         return rows
 
     def _motion(self, designs: ArrayLike) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
-        """Contraction, moment arm and torque arm at every angle (n, points), NaN out of reach, and where the muscle's model holds."""
+        """Contraction, moment arm and torque arm at every angle (n, points), NaN out of reach, and
+        where the muscle's model holds.
+        """
         rows = self._rows(designs)
         length = float(self.muscle.parameters["rest_length"])
         contraction, arm, torque_arm = (np.full((len(rows), self.points), np.nan) for _ in range(3))
@@ -303,7 +336,9 @@ class JointProblem:
         for index, row in enumerate(rows):
             try:
                 joint = self.joint(row)
-            except ParameterError:  # the tendon would be folded over at the least angle: out of reach
+            except (
+                ParameterError
+            ):  # the tendon would be folded over at the least angle: out of reach
                 continue
             reached = joint.reaches(angles)
             contraction[index, reached] = joint.shortening(angles[reached]) / length
@@ -317,7 +352,9 @@ class JointProblem:
     def _turned(self, contraction: Array, arm: Array, held: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Where the muscles can turn the joint."""
         with np.errstate(invalid="ignore"):
-            return np.asarray(held & (arm > 0.0) & (contraction <= self.max_contraction * (1.0 + 1e-12)))
+            return np.asarray(
+                held & (arm > 0.0) & (contraction <= self.max_contraction * (1.0 + 1e-12))
+            )
 
 
 def _above_zero(name: str, value: float) -> None:
@@ -329,20 +366,29 @@ def _checked_bounds(given: Mapping[str, tuple[float, float]]) -> dict[str, tuple
     """Every length with its bounds."""
     for name in given:
         if name not in LENGTHS:
-            raise ParameterError(f"bounds has {name!r}, which is not a length of the joint: {', '.join(LENGTHS)}")
+            raise ParameterError(
+                f"bounds has {name!r}, which is not a length of the joint: {', '.join(LENGTHS)}"
+            )
     bounds = {}
     for name in LENGTHS:
         pair = given.get(name, DEFAULT_BOUNDS[name])
         if len(pair) != 2 or not all(math.isfinite(value) for value in pair) or pair[0] > pair[1]:
-            raise ParameterError(f"bounds[{name!r}] = {pair} is not allowed: two finite lengths, the lower one first, are needed")
+            raise ParameterError(
+                f"bounds[{name!r}] = {pair} is not allowed: two finite lengths, the lower one "
+                "first, are needed"
+            )
         if name.endswith("axial") and pair[0] <= 0.0:
-            raise ParameterError(f"bounds[{name!r}] = {pair} is not allowed: this length must be above 0 m")
+            raise ParameterError(
+                f"bounds[{name!r}] = {pair} is not allowed: this length must be above 0 m"
+            )
         bounds[name] = (float(pair[0]), float(pair[1]))
     return bounds
 
 
 def _areas(angles: Array, excess: Array) -> tuple[Array, Array]:
-    """Areas below and above zero of the straight lines between points, (n, points) -> (n,), (n,)."""
+    """Areas below and above zero of the straight lines between points, (n, points) -> (n,),
+    (n,).
+    """
     step = np.diff(angles)
     plus, minus = np.maximum(excess, 0.0), np.maximum(-excess, 0.0)
     # of a line from p above zero to q below it, the share p/(p + q) is above

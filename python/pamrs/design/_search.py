@@ -1,4 +1,6 @@
-"""Searches of a box under a budget of evaluations: the published genetic algorithm, two others beside it, and blind chance."""
+"""Searches of a box under a budget of evaluations: the published genetic algorithm, two others
+beside it, and blind chance.
+"""
 
 from __future__ import annotations
 
@@ -42,10 +44,12 @@ def search(
     lower, upper : array_like, shape (d,)
         The box; a coordinate with equal limits is fixed.
     method : {"ga", "de", "cma", "random"}
-        The genetic algorithm of 3.5 (operators of DEAP); differential evolution (scipy, 20 members, else its defaults, no
-        polishing); CMA-ES (cma, from random starts, the population doubled at each); random points.
+        The genetic algorithm of 3.5 (operators of DEAP); differential evolution (scipy, 20 members,
+        else its defaults, no polishing); CMA-ES (cma, from random starts, the population doubled at
+        each); random points.
     evaluations : int
-        Budget, at least one population. All methods but a converged genetic algorithm use it up exactly.
+        Budget, at least one population. All methods but a converged genetic algorithm use it up
+        exactly.
     seed : int
         The same seed gives the same result; the random numbers of the caller are left as they are.
     genetic : Genetic, optional
@@ -68,7 +72,10 @@ def search(
     if method not in METHODS:
         raise ParameterError(f"method = {method!r} is not allowed: {', '.join(METHODS)}")
     if evaluations < settings.population:
-        raise ParameterError(f"evaluations = {evaluations} is not allowed: at least one population of {settings.population} is needed")
+        raise ParameterError(
+            f"evaluations = {evaluations} is not allowed: at least one population of "
+            f"{settings.population} is needed"
+        )
     if seed < 0:
         raise ParameterError(f"seed = {seed} is not allowed: a whole number from 0 on is needed")
     low, high = np.asarray(lower, dtype=np.float64), np.asarray(upper, dtype=np.float64)
@@ -136,9 +143,16 @@ def _cma(evaluator: Evaluator, seed: int) -> None:
     size = evaluator.lower.size
     population = 4 + int(3 * np.log(size))
     # its own random numbers: numpy's global ones stay as they are
-    options = {"bounds": [0.0, 1.0], "verbose": -9, "seed": np.nan, "randn": lambda *shape: rng.standard_normal(shape)}
+    options = {
+        "bounds": [0.0, 1.0],
+        "verbose": -9,
+        "seed": np.nan,
+        "randn": lambda *shape: rng.standard_normal(shape),
+    }
     while evaluator.left:
-        strategy = cma.CMAEvolutionStrategy(rng.random(size), 0.3, {**options, "popsize": population})
+        strategy = cma.CMAEvolutionStrategy(
+            rng.random(size), 0.3, {**options, "popsize": population}
+        )
         while evaluator.left and not strategy.stop():
             points = strategy.ask()
             strategy.tell(points, evaluator(points).tolist())

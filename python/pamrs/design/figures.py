@@ -1,4 +1,6 @@
-"""The picture of a joint design: search history, torque, the joint at its limits, methods, and pressure against size."""
+"""The picture of a joint design: search history, torque, the joint at its limits, methods, and
+pressure against size.
+"""
 
 from __future__ import annotations
 
@@ -24,11 +26,20 @@ __all__ = ["summary_png"]
 
 _SERIES: Final = ("#0072b2", "#d55e00", "#009e73", "#cc79a7")
 _QUIET, _INK, _PLATE, _MUSCLE = "#9aa3af", "#374151", "#e5e7eb", "#c79a00"
-_NAMES: Final = {"ga": "genetic\n(3.5)", "de": "differential\nevolution", "cma": "CMA-ES", "random": "random\npoints"}
+_NAMES: Final = {
+    "ga": "genetic\n(3.5)",
+    "de": "differential\nevolution",
+    "cma": "CMA-ES",
+    "random": "random\npoints",
+}
 
 
 def summary_png(
-    design: JointDesign, title: str, *, comparison: MethodComparison | None = None, front: ParetoFront | None = None
+    design: JointDesign,
+    title: str,
+    *,
+    comparison: MethodComparison | None = None,
+    front: ParetoFront | None = None,
 ) -> bytes:
     """One picture of a design.
 
@@ -59,14 +70,26 @@ def summary_png(
         (f"The joint at its limits: {_sizes(design)} mm", lambda axes: _joint(axes, design)),
     ]
     if comparison is not None:
-        panels.append(("Best objective of each run, equal evaluations", lambda axes: _methods(axes, comparison)))
+        panels.append(
+            (
+                "Best objective of each run, equal evaluations",
+                lambda axes: _methods(axes, comparison),
+            )
+        )
     if front is not None:
         panels.append(("Pressure needed against size", lambda axes: _front(axes, front, design)))
     rows = -(-len(panels) // 2)
     with mpl.rc_context({**STYLE, "font.size": 8.5, "legend.fontsize": 8.0}):
         figure = Figure(figsize=(10.0, 0.5 + 3.3 * rows), dpi=160, layout="constrained")
         figure.get_layout_engine().set(w_pad=0.1, h_pad=0.1, wspace=0.04, hspace=0.04)  # type: ignore[union-attr, call-arg]
-        figure.suptitle("\n".join(textwrap.wrap(title, 92)), x=0.012, ha="left", fontsize=13, fontweight="bold", color="#111827")
+        figure.suptitle(
+            "\n".join(textwrap.wrap(title, 92)),
+            x=0.012,
+            ha="left",
+            fontsize=13,
+            fontweight="bold",
+            color="#111827",
+        )
         grid = figure.subplots(rows, 2, squeeze=False).ravel()
         for axes, (name, draw) in zip(grid, panels, strict=False):
             axes.set_title(name)
@@ -79,7 +102,10 @@ def summary_png(
 
 
 def _sizes(design: JointDesign) -> str:
-    return ", ".join(f"{symbol} {1e3 * value:.1f}" for symbol, value in zip(SYMBOLS, design.lengths.tolist(), strict=True))
+    return ", ".join(
+        f"{symbol} {1e3 * value:.1f}"
+        for symbol, value in zip(SYMBOLS, design.lengths.tolist(), strict=True)
+    )
 
 
 def _history(design: JointDesign) -> Any:
@@ -92,7 +118,15 @@ def _fitness(axes: Axes, design: JointDesign) -> None:
     history = _history(design)
     generation = np.arange(len(history.best))
     top = 3.0 * float(history.best[0])  # what is above, mostly by the penalty, lies on the edge
-    axes.plot(generation, np.minimum(history.middle, top), ".", ms=3.5, color=_QUIET, label="median of the generation", clip_on=False)
+    axes.plot(
+        generation,
+        np.minimum(history.middle, top),
+        ".",
+        ms=3.5,
+        color=_QUIET,
+        label="median of the generation",
+        clip_on=False,
+    )
     axes.step(generation, history.best, where="post", color=_SERIES[0], lw=1.6, label="best so far")
     _log_scale(axes)
     axes.set_ylim(0.7 * float(history.best[-1]), top)
@@ -104,7 +138,8 @@ def _fitness(axes: Axes, design: JointDesign) -> None:
         ha="right",
         color=_SERIES[0],
     )
-    axes.set(xlabel=f"generation ({_NAMES[design.search.method].replace(chr(10), ' ')})", ylabel="J [J]")  # type: ignore[union-attr]
+    method = _NAMES[design.search.method].replace("\n", " ")  # type: ignore[union-attr]
+    axes.set(xlabel=f"generation ({method})", ylabel="J [J]")
     axes.legend(loc="upper right")
 
 
@@ -127,7 +162,13 @@ def _lengths(axes: Axes, design: JointDesign) -> None:
         axes.step(generation, values[:, column], where="post", color=colour, lw=1.5)
         text = f"{symbol} {values[-1, column]:.1f}"
         axes.annotate(
-            text, (1.0, ends[column]), (4, 0), xycoords=("axes fraction", "data"), textcoords="offset points", va="center", color=colour
+            text,
+            (1.0, ends[column]),
+            (4, 0),
+            xycoords=("axes fraction", "data"),
+            textcoords="offset points",
+            va="center",
+            color=colour,
         )
     axes.set(xlabel="generation", ylabel="length [mm]")
     axes.set_ylim(values.min() - 0.08 * span, values.max() + 0.08 * span)
@@ -147,19 +188,41 @@ def _torque(axes: Axes, design: JointDesign) -> None:
     problem, scores = design.problem, design.scores
     angle, torque = np.degrees(problem.angles), scores.torque[0]
     axes.fill_between(
-        angle, torque, problem.torque, where=torque < problem.torque, interpolate=True, color=COLOURS["before"], alpha=0.25, lw=0
+        angle,
+        torque,
+        problem.torque,
+        where=torque < problem.torque,
+        interpolate=True,
+        color=COLOURS["before"],
+        alpha=0.25,
+        lw=0,
     )
-    axes.axhline(problem.torque, color=_INK, lw=1.1, ls=(0, (5, 2)), label=f"wanted, {problem.torque:.4g} N m")
+    axes.axhline(
+        problem.torque,
+        color=_INK,
+        lw=1.1,
+        ls=(0, (5, 2)),
+        label=f"wanted, {problem.torque:.4g} N m",
+    )
     if design.search is not None:
         first = problem.evaluate(_history(design).points[0])
-        axes.plot(angle, first.torque[0], color=_QUIET, lw=1.3, label="best of the first generation")
-    axes.plot(angle, torque, color=_SERIES[0], lw=1.8, label=f"result at {problem.pressure / 1e5:.4g} bar")
+        axes.plot(
+            angle, first.torque[0], color=_QUIET, lw=1.3, label="best of the first generation"
+        )
+    axes.plot(
+        angle, torque, color=_SERIES[0], lw=1.8, label=f"result at {problem.pressure / 1e5:.4g} bar"
+    )
     if not scores.available[0]:
         axes.axvline(math.degrees(scores.max_angle[0]), color=COLOURS["before"], lw=1.0)
         axes.annotate(
-            "limit of the stroke or the tendon", (math.degrees(scores.max_angle[0]), 0.03), (-4, 0),
-            xycoords=("data", "axes fraction"), textcoords="offset points", ha="right", color=COLOURS["before"],
-        )  # fmt: skip
+            "limit of the stroke or the tendon",
+            (math.degrees(scores.max_angle[0]), 0.03),
+            (-4, 0),
+            xycoords=(("data"), ("axes fraction")),
+            textcoords=("offset points"),
+            ha=("right"),
+            color=COLOURS["before"],
+        )
     axes.set(xlabel="joint angle [deg]", ylabel="torque [N m]")
     axes.set_ylim(0.0, 1.3 * max(problem.torque, float(torque.max())))
     axes.legend(loc="upper right", ncols=2)
@@ -179,18 +242,50 @@ def _joint(axes: Axes, design: JointDesign) -> None:
         along = math.pi - angle
         direction = np.array([math.cos(along), math.sin(along)])
         foot = lower_axial * direction
-        end = math.hypot(lower_axial, lower_offset) * np.array([math.cos(along - lean), math.sin(along - lean)])
+        end = math.hypot(lower_axial, lower_offset) * np.array(
+            [math.cos(along - lean), math.sin(along - lean)]
+        )
         pin = np.array([upper_axial + stroke, upper_offset])
-        axes.plot(*np.stack([np.zeros(2), reach * direction]).T, color=colour, lw=5, solid_capstyle="round", zorder=1, alpha=0.75)
-        axes.add_patch(Polygon([(0.0, 0.0), tuple(foot), tuple(end)], facecolor=_PLATE, edgecolor=colour, lw=1.2, zorder=2))
-        axes.plot(*np.stack([pin, end]).T, color=colour, lw=1.8, marker="o", ms=5, mfc="white", zorder=4)
-        axes.plot([pin[0], reach], [pin[1], pin[1]], color=_MUSCLE, lw=(4.5, 9.0)[index], alpha=(0.9, 0.45)[index], zorder=3 - index)
+        axes.plot(
+            *np.stack([np.zeros(2), reach * direction]).T,
+            color=colour,
+            lw=5,
+            solid_capstyle="round",
+            zorder=1,
+            alpha=0.75,
+        )
+        axes.add_patch(
+            Polygon(
+                [(0.0, 0.0), tuple(foot), tuple(end)],
+                facecolor=_PLATE,
+                edgecolor=colour,
+                lw=1.2,
+                zorder=2,
+            )
+        )
+        axes.plot(
+            *np.stack([pin, end]).T, color=colour, lw=1.8, marker="o", ms=5, mfc="white", zorder=4
+        )
+        axes.plot(
+            [pin[0], reach],
+            [pin[1], pin[1]],
+            color=_MUSCLE,
+            lw=(4.5, 9.0)[index],
+            alpha=(0.9, 0.45)[index],
+            zorder=3 - index,
+        )
         place = 1.13 * reach * direction
         axes.plot(*(1.1 * place), alpha=0.0)  # room for the angle
-        axes.annotate(f"{math.degrees(angle):.4g} deg", tuple(place), ha="center", va="center", color=_INK)
+        axes.annotate(
+            f"{math.degrees(angle):.4g} deg", tuple(place), ha="center", va="center", color=_INK
+        )
     axes.plot(0.0, 0.0, "o", ms=8, color=_INK, zorder=5)
-    axes.annotate("muscles", (reach, upper_offset), (0, 9), textcoords="offset points", ha="right", color=_INK)
-    axes.annotate("upper link", (reach, 0.0), (0, -13), textcoords="offset points", ha="right", color=_INK)
+    axes.annotate(
+        "muscles", (reach, upper_offset), (0, 9), textcoords="offset points", ha="right", color=_INK
+    )
+    axes.annotate(
+        "upper link", (reach, 0.0), (0, -13), textcoords="offset points", ha="right", color=_INK
+    )
     axes.set_aspect("equal", adjustable="datalim")
     axes.margins(0.12)
     axes.grid(visible=False)
@@ -215,13 +310,27 @@ def _methods(axes: Axes, comparison: MethodComparison) -> None:
 def _front(axes: Axes, front: ParetoFront, design: JointDesign) -> None:
     """The front, the smallest pressure any joint needs, and the design."""
     if len(front.size):
-        axes.plot(1e3 * front.size, front.pressure / 1e5, "o-", ms=3, lw=0.9, color=_SERIES[0], label="none is better in both")
+        axes.plot(
+            1e3 * front.size,
+            front.pressure / 1e5,
+            "o-",
+            ms=3,
+            lw=0.9,
+            color=_SERIES[0],
+            label="none is better in both",
+        )
     least = design.problem.least_possible_pressure() / 1e5
-    axes.axhline(least, color=_INK, lw=1.0, ls=(0, (5, 2)), label="work of the stroke: no joint needs less")
+    axes.axhline(
+        least, color=_INK, lw=1.0, ls=(0, (5, 2)), label="work of the stroke: no joint needs less"
+    )
     needed = design.needed_pressure
     if needed is not None:
-        axes.plot(1e3 * design.size, needed / 1e5, "*", ms=12, color=_SERIES[1], label="this design")
+        axes.plot(
+            1e3 * design.size, needed / 1e5, "*", ms=12, color=_SERIES[1], label="this design"
+        )
     values = [least, *(front.pressure / 1e5), *([] if needed is None else [needed / 1e5])]
     axes.set_ylim(0.0, min(1.1 * max(values), 5.0 * least))
-    axes.set(xlabel="radius about the axis that holds the tendon's ends [mm]", ylabel="pressure [bar]")
+    axes.set(
+        xlabel="radius about the axis that holds the tendon's ends [mm]", ylabel="pressure [bar]"
+    )
     axes.legend(loc="upper right")

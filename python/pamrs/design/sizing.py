@@ -1,7 +1,7 @@
 """Muscle sizing as in dissertation 3.2.3: candidates compared for one force/stroke requirement.
 
-Each candidate is counted until the bundle meets the requirement, and compared by mass, packed volume, air, filling time,
-specific force, and the force that is left when one muscle fails.
+Each candidate is counted until the bundle meets the requirement, and compared by mass, packed
+volume, air, filling time, specific force, and the force that is left when one muscle fails.
 """
 
 from __future__ import annotations
@@ -68,7 +68,8 @@ class Candidate:
     Raises
     ------
     ParameterError
-        If the pressure or mass is not a finite number above zero, or the count not a whole number from 1 on.
+        If the pressure or mass is not a finite number above zero, or the count not a whole number
+        from 1 on.
     """
 
     name: str
@@ -85,7 +86,9 @@ class Candidate:
             _whole("count", self.count)
 
     @classmethod
-    def from_library(cls, item: str | Entry, *, pressure: float | None = None, count: int | None = None) -> Candidate:
+    def from_library(
+        cls, item: str | Entry, *, pressure: float | None = None, count: int | None = None
+    ) -> Candidate:
         """A muscle of :mod:`pamrs.library`; at the highest pressure of its tests unless told.
 
         Parameters
@@ -98,7 +101,13 @@ class Candidate:
             Muscles in the bundle.
         """
         known = entry(item) if isinstance(item, str) else item
-        return cls(known.name, known.muscle, known.max_pressure if pressure is None else pressure, known.mass, count)
+        return cls(
+            known.name,
+            known.muscle,
+            known.max_pressure if pressure is None else pressure,
+            known.mass,
+            count,
+        )
 
 
 @dataclass(frozen=True)
@@ -108,15 +117,17 @@ class Requirement:
     Parameters
     ----------
     points : sequence of (position, force)
-        Positions from zero on, in increasing order, and the total force wanted there [N], not below zero. A blocked force
-        alone is ``[(0.0, force)]``.
+        Positions from zero on, in increasing order, and the total force wanted there [N], not below
+        zero. A blocked force alone is ``[(0.0, force)]``.
     position : {"stroke", "contraction"}
-        Whether positions are strokes [m], the same for every candidate, or contractions of each candidate's own length [1].
+        Whether positions are strokes [m], the same for every candidate, or contractions of each
+        candidate's own length [1].
 
     Raises
     ------
     ParameterError
-        If there is no point, a number is not finite or negative, positions do not increase, or no force is wanted at all.
+        If there is no point, a number is not finite or negative, positions do not increase, or no
+        force is wanted at all.
     """
 
     points: Sequence[tuple[float, float]]
@@ -124,10 +135,14 @@ class Requirement:
 
     def __post_init__(self) -> None:
         if self.position not in ("stroke", "contraction"):
-            raise ParameterError(f"position = {self.position!r} is not allowed: 'stroke' or 'contraction'")
+            raise ParameterError(
+                f"position = {self.position!r} is not allowed: 'stroke' or 'contraction'"
+            )
         values = np.asarray(self.points, dtype=np.float64)
         if values.ndim != 2 or values.shape[1:] != (2,) or values.shape[0] == 0:
-            raise ParameterError(f"points has shape {values.shape}: pairs of (position, force) are needed")
+            raise ParameterError(
+                f"points has shape {values.shape}: pairs of (position, force) are needed"
+            )
         if not np.all(np.isfinite(values)) or np.any(values < 0.0):
             raise ParameterError("points must hold finite positions and forces, none below zero")
         if np.any(np.diff(values[:, 0]) <= 0.0):
@@ -146,7 +161,8 @@ class Requirement:
 
 
 def packed_diameter(count: int, diameter: float, core: float = 0.0) -> float:
-    """Diameter of the circle around ``count`` equal circles on one ring around the arm's centre [m].
+    """Diameter of the circle around ``count`` equal circles on one ring around the arm's centre
+    [m].
 
     Parameters
     ----------
@@ -181,12 +197,14 @@ class SizingResult:
     Attributes
     ----------
     rows : list of dict
-        One per feasible candidate, in the order given; SI units. Keys: name, count, pressure, mass, force_margin,
-        packed_diameter_rest, packed_diameter_full, packed_volume_rest, packed_volume_full, air_volume_rest, air_volume_end,
-        air_volume_full, air_mass_per_stroke, energy_per_stroke, fill_time_rest, fill_time_full, blocked_force,
-        specific_force, share_left, margin_left. None where a mass is not known. ``full`` is the free contraction at the working
-        pressure, ``end`` the last point of the requirement; ``share_left`` is the part of the force that is left when one
-        muscle fails, ``margin_left`` that force over the required one (1 or more still meets it).
+        One per feasible candidate, in the order given; SI units. Keys: name, count, pressure, mass,
+        force_margin, packed_diameter_rest, packed_diameter_full, packed_volume_rest,
+        packed_volume_full, air_volume_rest, air_volume_end, air_volume_full, air_mass_per_stroke,
+        energy_per_stroke, fill_time_rest, fill_time_full, blocked_force, specific_force,
+        share_left, margin_left. None where a mass is not known. ``full`` is the free contraction at
+        the working pressure, ``end`` the last point of the requirement; ``share_left`` is the part
+        of the force that is left when one muscle fails, ``margin_left`` that force over the
+        required one (1 or more still meets it).
     infeasible : dict
         Name to reason, for every other candidate.
     best : dict
@@ -225,15 +243,27 @@ class SizingResult:
         return {"rows": self.rows, "infeasible": self.infeasible, "best": self.best}
 
     def table(self) -> str:
-        """The comparison as text: one column per candidate, the best of each line marked with a star."""
+        """The comparison as text: one column per candidate, the best of each line marked with a
+        star.
+        """
         width = max([14, *(len(row["name"]) + 2 for row in self.rows)])
-        lines = ["".ljust(30) + "".join(str(row["name"]).rjust(width) for row in self.rows)] if self.rows else []
+        lines = (
+            ["".ljust(30) + "".join(str(row["name"]).rjust(width) for row in self.rows)]
+            if self.rows
+            else []
+        )
         winners = {key: self.best[rule] for rule, (key, _) in _RULES.items()}
         for label, key, unit in _LINES if self.rows else ():
             line = label.ljust(30)
             for row in self.rows:
                 value = row[key]
-                text = "-" if value is None else f"{from_si(value, *unit):.4g}" if unit else f"{value:.4g}"
+                text = (
+                    "-"
+                    if value is None
+                    else f"{from_si(value, *unit):.4g}"
+                    if unit
+                    else f"{value:.4g}"
+                )
                 line += (text + (" *" if winners.get(key) == row["name"] else "  ")).rjust(width)
             lines.append(line.rstrip())
         lines += [f"{name}: not feasible: {reason}" for name, reason in self.infeasible.items()]
@@ -298,13 +328,16 @@ def size(
     Examples
     --------
     >>> from pamrs.design.sizing import Requirement, size
-    >>> result = size(["elbow_0625in", "large_2in_effective"], Requirement([(0.0, 18e3), (0.03, 7e3)]))
+    >>> result = size(["elbow_0625in", "large_2in_effective"],
+    ...     Requirement([(0.0, 18e3), (0.03, 7e3)]))
     >>> [(row["name"], row["count"]) for row in result.rows]
     [('elbow_0625in', 6), ('large_2in_effective', 1)]
     """
     _whole("max_count", max_count)
     positive("core", core, zero=True)
-    chosen = [item if isinstance(item, Candidate) else Candidate.from_library(item) for item in candidates]
+    chosen = [
+        item if isinstance(item, Candidate) else Candidate.from_library(item) for item in candidates
+    ]
     if not chosen:
         raise ParameterError("candidates is empty: at least one is needed")
     seen = [candidate.name for candidate in chosen]
@@ -319,29 +352,52 @@ def size(
             count, reason = _count(candidate, requirement, supply, max_count)
             if not reason:
                 rows.append(_row(candidate, count, requirement, supply, core))
-        except ParameterError as error:  # its geometry has no solution at a length that is asked for
+        except (
+            ParameterError
+        ) as error:  # its geometry has no solution at a length that is asked for
             reason = str(error)
         if reason:
-            hint = f" (its pressure is {candidate.pressure:g} Pa: were bar meant?)" if candidate.pressure < _LEAST_PRESSURE else ""
+            hint = (
+                f" (its pressure is {candidate.pressure:g} Pa: were bar meant?)"
+                if candidate.pressure < _LEAST_PRESSURE
+                else ""
+            )
             infeasible[candidate.name] = reason + hint
     return SizingResult(rows, infeasible)
 
 
-def _count(candidate: Candidate, requirement: Requirement, filling: Filling, max_count: int) -> tuple[int, str]:
+def _count(
+    candidate: Candidate, requirement: Requirement, filling: Filling, max_count: int
+) -> tuple[int, str]:
     """Smallest count that is enough, or the reason why none is."""
     muscle = candidate.muscle
     if candidate.pressure >= filling.supply_pressure:
-        return 0, f"its pressure of {candidate.pressure:g} Pa is not below the supply's {filling.supply_pressure:g} Pa"
+        return (
+            0,
+            (
+                f"its pressure of {candidate.pressure:g} Pa is not below the supply's "
+                f"{filling.supply_pressure:g} Pa"
+            ),
+        )
     contraction = requirement.contraction(muscle.parameters["rest_length"])
     limit = muscle.contraction_limits[1]
     if contraction[-1] > limit:
-        return 0, f"it would contract by {contraction[-1]:.3f}, beyond the braid's limit {limit:.3f}"
+        return (
+            0,
+            f"it would contract by {contraction[-1]:.3f}, beyond the braid's limit {limit:.3f}",
+        )
     wanted = requirement.array[:, 1]
     one = muscle.force(candidate.pressure, contraction)
     weak = np.flatnonzero((one <= 0.0) & (wanted > 0.0))
     if weak.size:
         at = int(weak[0])
-        return 0, f"at a contraction of {contraction[at]:.3f} one muscle gives {one[at]:.1f} N: no number is enough"
+        return (
+            0,
+            (
+                f"at a contraction of {contraction[at]:.3f} one muscle gives {one[at]:.1f} N: no "
+                "number is enough"
+            ),
+        )
     asked = wanted > 0.0
     needed = max(1, math.ceil(float(np.max(wanted[asked] / one[asked])) * (1.0 - 1e-12)))
     if candidate.count is not None and needed > candidate.count:
@@ -351,7 +407,9 @@ def _count(candidate: Candidate, requirement: Requirement, filling: Filling, max
     return candidate.count or needed, ""
 
 
-def _row(candidate: Candidate, count: int, requirement: Requirement, filling: Filling, core: float) -> dict[str, Any]:
+def _row(
+    candidate: Candidate, count: int, requirement: Requirement, filling: Filling, core: float
+) -> dict[str, Any]:
     """Every figure of one feasible candidate, SI units."""
     muscle, pressure = candidate.muscle, candidate.pressure
     rest_length = float(muscle.parameters["rest_length"])
@@ -359,7 +417,9 @@ def _row(candidate: Candidate, count: int, requirement: Requirement, filling: Fi
     asked = wanted > 0.0
     margin = count * float(np.min(muscle.force(pressure, contraction[asked]) / wanted[asked]))
     full = max(free_contraction(muscle, pressure), float(contraction[-1]))
-    rest, end, inflated = (count * float(v) for v in muscle.air_volume([0.0, float(contraction[-1]), full]))
+    rest, end, inflated = (
+        count * float(v) for v in muscle.air_volume([0.0, float(contraction[-1]), full])
+    )
     bounds = [packed_diameter(count, 2.0 * float(muscle.radius(e)), core) for e in (0.0, full)]
     lengths = (rest_length, rest_length * (1.0 - full))
     energy = filling.energy(rest, end, pressure)

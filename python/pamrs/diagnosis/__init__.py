@@ -1,12 +1,15 @@
-"""Diagnosis: locate a mismatch between model and recordings, name the omitted physics or say that it is not listed.
+"""Diagnosis: locate a mismatch between model and recordings, name the omitted physics or say that
+it is not listed.
 
-A rig is cut at every measured channel, so that each tank, chamber, joint and hanging load has a residual of its own. The baseline is
-refitted inside its tolerances first; what then exceeds the noise level is located by block and condition, and the effects of the
-catalogue compete with each other and with "unlisted" on held-out recordings.
+A rig is cut at every measured channel, so that each tank, chamber, joint and hanging load has a
+residual of its own. The baseline is refitted inside its tolerances first; what then exceeds the
+noise level is located by block and condition, and the effects of the catalogue compete with each
+other and with "unlisted" on held-out recordings.
 
-Public are `diagnose`, `Diagnosis`, `DiagnosisSettings`, and these packages and modules, each with its own list: `settings` (every
-number that steers a verdict), `result` and `schema` (what is returned), `prove` (many cases, each in a process of its own), and the
-steps in the order in which they work: `prepare`, `fit`, `noise`, `screen`, `evidence`, `search`, `next_experiment`, `explain`.
+Public are `diagnose`, `Diagnosis`, `DiagnosisSettings`, and these packages and modules, each with
+its own list: `settings` (every number that steers a verdict), `result` and `schema` (what is
+returned), `prove` (many cases, each in a process of its own), and the steps in the order in which
+they work: `prepare`, `fit`, `noise`, `screen`, `evidence`, `search`, `next_experiment`, `explain`.
 """
 
 from __future__ import annotations
@@ -22,8 +25,15 @@ from pamrs.channels import dotted
 from pamrs.diagnosis.evidence import Group
 from pamrs.diagnosis.explain import assemble
 from pamrs.diagnosis.fit import Problem
-from pamrs.diagnosis.noise import floors
-from pamrs.diagnosis.prepare import Block, Prepared, available_blocks, check_plausible, check_sense, prepare
+from pamrs.diagnosis.noise import noise_levels
+from pamrs.diagnosis.prepare import (
+    Block,
+    Prepared,
+    available_blocks,
+    check_plausible,
+    check_sense,
+    prepare,
+)
 from pamrs.diagnosis.result import Diagnosis
 from pamrs.diagnosis.search import examine
 from pamrs.diagnosis.settings import DiagnosisSettings
@@ -37,7 +47,10 @@ __all__ = ["Diagnosis", "DiagnosisSettings", "diagnose"]
 
 def _usable_share(block: Block, recordings: list[Prepared]) -> float:
     """Share of a block's rows that may be used, over all recordings."""
-    rows = [p.usable(block.channel, block.drives, p.starts(block.window, block.drives)) for p in recordings]
+    rows = [
+        p.usable(block.channel, block.drives, p.starts(block.window, block.drives))
+        for p in recordings
+    ]
     return float(sum(r.sum() for r in rows)) / sum(r.size for r in rows)
 
 
@@ -48,8 +61,8 @@ def _unsettled(rig: Rig) -> list[str]:
     return [name for name in unknown if name.partition(".")[0] in moving]
 
 
-def _doubted(group: Group, factor: float) -> Group:
-    """A group of joints whose names are believed less, the rest going to ``unlisted``."""
+def _capped(group: Group, factor: float) -> Group:
+    """A group of joints whose names have a smaller probability, the rest going to ``unlisted``."""
     if group.mismatch is None or group.mismatch.kind != "arm":
         return group
     kept = {k: p if k in ("", "unlisted") else factor * p for k, p in group.probabilities.items()}
@@ -64,30 +77,41 @@ def _in_range(name: str) -> Iterator[None]:
         yield
     except SimulationError as error:
         raise DiagnosisError(
-            f"case {name!r}: the model, driven by the recordings, leaves the range in which it holds ({error}); check the "
-            "rig's geometry and the recordings' units and columns"
+            f"case {name!r}: the model, driven by the recordings, leaves the range in which it "
+            f"holds ({error}); check the rig's geometry and the recordings' units and columns"
         ) from error
 
 
 def _drowned(problem: Problem, rig: Rig) -> dict[str, str]:
-    """Regulators whose outflow only the difference of two measured pressures tells, where that is mostly noise; why, by block.
+    """Regulators whose outflow only the difference of two measured pressures tells, where that is
+    mostly noise; why, by block.
 
-    That noise grows with the droop, so that a fit would take the droop towards zero to be rid of it (errors in variables).
+    That noise grows with the droop, so that a fit would take the droop towards zero to be rid of it
+    (errors in variables).
     """
     tables, most = rig.tables("supply"), problem.settings.prepare.regulator_droop_shift
     drooping = [name for name in regulators_of(rig) if tables[name]["droop"] > 0.0]
-    regulated = [b for b in problem.blocks if b.kind == "supply" and b.name.partition(".")[2] in drooping]
+    regulated = [
+        b for b in problem.blocks if b.kind == "supply" and b.name.partition(".")[2] in drooping
+    ]
     recordings = problem.recordings
     found = {}
-    floor = floors(replace(problem, blocks=regulated), problem.core) if regulated else {}
+    noise_level = (
+        noise_levels(replace(problem, blocks=regulated), problem.core) if regulated else {}
+    )
     for block in regulated:
-        gains = [(floor[block.name, p.recording.name].sample / p.noise[block.channel]) ** 2 - 1.0 for p in recordings]
-        pull = math.sqrt(sum(max(0.0, gain) * p.n for gain, p in zip(gains, recordings, strict=True)))
-        if pull > most:
+        gains = [
+            (noise_level[block.name, p.recording.name].sample / p.noise[block.channel]) ** 2 - 1.0
+            for p in recordings
+        ]
+        shift = math.sqrt(
+            sum(max(0.0, gain) * p.n for gain, p in zip(gains, recordings, strict=True))
+        )
+        if shift > most:
             found[block.name] = (
-                f"block {block.name} was left out: only the difference of two measured pressures tells the regulator's flow, and their "
-                f"noise would move its droop by {pull:.2g} standard deviations; at most {most:g} is allowed (a flow meter would "
-                "settle it)"
+                f"block {block.name} was left out: only the difference of two measured pressures "
+                f"tells the regulator's flow, and their noise would move its droop by {shift:.2g} "
+                f"standard deviations; at most {most:g} is allowed (a flow meter would settle it)"
             )
     return found
 
@@ -125,13 +149,15 @@ def diagnose(
     Returns
     -------
     Diagnosis
-        Verdict, location, named effects with probabilities, fit before and after, model with the effect.
+        Verdict, location, named effects with probabilities, fit before and after, model with the
+        effect.
 
     Raises
     ------
     DiagnosisError
-        If the recordings are too short, lack the channels that any block needs, or cannot be of this rig (units, swapped columns,
-        dead sensors); the message says what was found and what is allowed.
+        If the recordings are too short, lack the channels that any block needs, or cannot be of
+        this rig (units, swapped columns, dead sensors); the message says what was found and what is
+        allowed.
     CaseError
         If the folder is not a case.
 
@@ -154,20 +180,24 @@ def diagnose(
     gas, motion = [b for b in blocks if b.kind != "arm"], [b for b in blocks if b.kind == "arm"]
     with _in_range(case.name):
         groups = [
-            group for members in (gas, motion) if members for group in examine(inner, outer, case.rig, members, say)
+            group
+            for members in (gas, motion)
+            if members
+            for group in examine(inner, outer, case.rig, members, say)
         ]
         unsettled = _unsettled(case.rig) if motion else []
         factor = chosen.verdict.unknown_geometry_probability
         if unsettled:
-            groups = [_doubted(group, factor) for group in groups]
+            groups = [_capped(group, factor) for group in groups]
         say("putting the answer together")
         diagnosis = assemble(case, inner, outer, groups)
     warnings = [*diagnosis.warnings, *left_out]
     if unsettled:
         what = "length" if case.rig.model["load"] else "angle"
         warnings.append(
-            f"{', '.join(unsettled)}: marked unknown, and no fit moves them; a wrong one bends the {what} as an effect would, so that "
-            f"no effect of muscles and what they move is believed by more than {100 * factor:.0f} %"
+            f"{', '.join(unsettled)}: marked unknown, and no fit moves them; a wrong one bends the "
+            f"{what} as an effect would, so the probability of an effect of muscles and what they "
+            f"move is capped at {100 * factor:.0f} %"
         )
     if not math.isfinite(sum(diagnosis.probabilities.values())):
         raise DiagnosisError("the probabilities are not finite: please report this case")
@@ -179,17 +209,21 @@ def _check_rig(case: Case) -> None:
     rig = case.rig
     if rig.effects:
         raise DiagnosisError(
-            f"the nominal rig of case {case.name!r} already has the effect {rig.effects[0]['id']!r}; diagnose a rig without effects"
+            f"the nominal rig of case {case.name!r} already has the effect "
+            f"{rig.effects[0]['id']!r}; diagnose a rig without effects"
         )
     if (rig.model["load"] or {}).get("kind") == "frame":
         raise DiagnosisError(
-            f"load.kind = 'frame' of case {case.name!r} is not allowed: a frame holds the length, and its force is for pamrs fit; "
-            "'mass', or a rig with [joint] and [arm], or without a muscle, can be diagnosed"
+            f"load.kind = 'frame' of case {case.name!r} is not allowed: a frame holds the length, "
+            "and its force is for pamrs fit; 'mass', or a rig with [joint] and [arm], or without a "
+            "muscle, can be diagnosed"
         )
 
 
 def _problems(case: Case, settings: DiagnosisSettings) -> tuple[Problem, Problem, list[str]]:
-    """Recordings to fit and held-out ones (the same where there are no others) by block, and which blocks were left out, and why."""
+    """Recordings to fit and held-out ones (the same where there are no others) by block, and which
+    blocks were left out, and why.
+    """
     rig = case.rig
     fitted = [prepare(r, rig, settings) for r in case.fit or case.recordings]
     held = [prepare(r, rig, settings) for r in case.held_out if case.fit]
@@ -205,8 +239,8 @@ def _problems(case: Case, settings: DiagnosisSettings) -> tuple[Problem, Problem
         )
     if not blocks:
         raise DiagnosisError(
-            f"case {case.name!r}: its channels ({', '.join(channels)}) do not surround any block of the rig "
-            f"({', '.join(rig.blocks)}); measure {_wanted(rig)}"
+            f"case {case.name!r}: its channels ({', '.join(channels)}) do not surround any block "
+            f"of the rig ({', '.join(rig.blocks)}); measure {_wanted(rig)}"
         )
     inner = Problem(blocks, fitted, core_rig(rig), settings)
     with _in_range(case.name):
@@ -215,5 +249,8 @@ def _problems(case: Case, settings: DiagnosisSettings) -> tuple[Problem, Problem
     if not inner.blocks:
         raise DiagnosisError(f"case {case.name!r}: {'; '.join(drowned.values())}")
     check_sense(inner.blocks, [*fitted, *held], inner.core, case.name)
-    left_out = [f"block {name} was left out: only {100 * share:.0f} % of its samples are usable" for name, share in thin.items()]
+    left_out = [
+        f"block {name} was left out: only {100 * share:.0f} % of its samples are usable"
+        for name, share in thin.items()
+    ]
     return inner, replace(inner, recordings=held) if held else inner, [*left_out, *drowned.values()]

@@ -1,7 +1,8 @@
-"""Blinded trials: every case of a folder diagnosed in a process of its own that is given that case's folder only.
+"""Blinded trials: every case of a folder diagnosed in a process of its own that is given that
+case's folder only.
 
-The answer keys of a trial (``python -m trial write``) lie beside the cases; nothing here opens them. A result that is there is kept, so
-a run that was stopped goes on where it was.
+The answer keys of a trial (``python -m trial write``) lie beside the cases; nothing here opens
+them. A result that is there is kept, so a run that was stopped goes on where it was.
 """
 
 from __future__ import annotations
@@ -24,7 +25,17 @@ from typing import Any, Final
 from pamrs._writing import write_atomically
 from pamrs.errors import CaseError, ParameterError
 
-__all__ = ["MANIFEST", "SCHEMA", "Proof", "case_digest", "cases_of", "code_digest", "prove", "valid_result", "worker"]
+__all__ = [
+    "MANIFEST",
+    "SCHEMA",
+    "Proof",
+    "case_digest",
+    "cases_of",
+    "code_digest",
+    "prove",
+    "valid_result",
+    "worker",
+]
 
 SCHEMA: Final = "pamrs.prove/1"
 MANIFEST: Final = "manifest.json"
@@ -45,8 +56,8 @@ class Proof:
     results : Path
         Folder with ``NAME/out.json`` and ``run.json``.
     cases : dict of str to dict
-        By name: ``verdict``, ``effects``, ``wrong_parameters``, ``unexplained`` (blocks without a name) and ``seconds``, or ``error``;
-        as in ``run.json``.
+        By name: ``verdict``, ``effects``, ``wrong_parameters``, ``unexplained`` (blocks without a
+        name) and ``seconds``, or ``error``; as in ``run.json``.
     kept : int
         Results that were there before.
     """
@@ -64,16 +75,29 @@ class Proof:
     def verdicts(self) -> dict[str, int]:
         """Number of cases by verdict, ``error`` last."""
         found = [str(entry.get("verdict", "error")) for entry in self.cases.values()]
-        return {word: found.count(word) for word in (*_VERDICTS, "error") if word != "error" or word in found}
+        return {
+            word: found.count(word)
+            for word in (*_VERDICTS, "error")
+            if word != "error" or word in found
+        }
 
     def table(self) -> str:
         """The verdicts counted, and the time that a diagnosis took, as text."""
         counts = self.verdicts
         seconds = sorted(float(e["seconds"]) for e in self.cases.values() if "seconds" in e)
-        lines = [f"{'verdict':<12}{'cases':>7}", *(f"{word:<12}{count:>7}" for word, count in counts.items())]
+        lines = [
+            f"{'verdict':<12}{'cases':>7}",
+            *(f"{word:<12}{count:>7}" for word, count in counts.items()),
+        ]
         lines.append(f"{'all':<12}{sum(counts.values()):>7}")
         if seconds:
-            lines += ["", f"seconds for a diagnosis: median {seconds[len(seconds) // 2]:.1f}, longest {seconds[-1]:.1f}"]
+            lines += [
+                "",
+                (
+                    f"seconds for a diagnosis: median {seconds[len(seconds) // 2]:.1f}, longest "
+                    f"{seconds[-1]:.1f}"
+                ),
+            ]
         return "\n".join(lines)
 
 
@@ -103,7 +127,9 @@ def cases_of(folder: str | os.PathLike[str]) -> tuple[list[Path], str | None]:
     inside = home / "cases" if (home / "cases").is_dir() else home
     found = sorted(p.parent for p in inside.glob("*/case.toml"))
     if not found:
-        raise CaseError(f"{home}: no case below it; NAME/case.toml or cases/NAME/case.toml is needed")
+        raise CaseError(
+            f"{home}: no case below it; NAME/case.toml or cases/NAME/case.toml is needed"
+        )
     manifest = home / MANIFEST
     if not manifest.is_file():
         return found, None
@@ -111,9 +137,14 @@ def cases_of(folder: str | os.PathLike[str]) -> tuple[list[Path], str | None]:
     try:
         listed = set(json.loads(content)["keys"])
     except (ValueError, KeyError, TypeError) as error:
-        raise CaseError(f"{manifest}: not a manifest, a table 'keys' from cases to digests is needed") from error
+        raise CaseError(
+            f"{manifest}: not a manifest, a table 'keys' from cases to digests is needed"
+        ) from error
     names = {p.name for p in found}
-    for wrong, words in ((names - listed, "does not list"), (listed - names, "lists cases that are not there:")):
+    for wrong, words in (
+        (names - listed, "does not list"),
+        (listed - names, "lists cases that are not there:"),
+    ):
         if wrong:
             more = f" and {len(wrong) - 3} more" if len(wrong) > 3 else ""
             raise CaseError(f"{manifest}: {words} {', '.join(sorted(wrong)[:3])}{more}")
@@ -126,25 +157,40 @@ def valid_result(path: Path) -> dict[str, Any] | None:
         told = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
-    good = isinstance(told, dict) and told.get("schema") == _RESULT and told.get("verdict") in _VERDICTS
+    good = (
+        isinstance(told, dict)
+        and told.get("schema") == _RESULT
+        and told.get("verdict") in _VERDICTS
+    )
     return told if good else None
 
 
 def case_digest(folder: Path) -> str:
-    """SHA-256 over every file of a case, so that a result of another case of the same name is not kept."""
+    """SHA-256 over every file of a case, so that a result of another case of the same name is not
+    kept.
+    """
     return _digest(Path(folder).resolve(), lambda path: True)
 
 
 def code_digest() -> str:
-    """SHA-256 over every file of the installed package, so that results of different code can be told apart."""
-    return _digest(Path(__file__).parents[1], lambda path: path.suffix in (".py", ".so", ".pyd", ".toml", ".json"))
+    """SHA-256 over every file of the installed package, so that results of different code can be
+    told apart.
+    """
+    return _digest(
+        Path(__file__).parents[1],
+        lambda path: path.suffix in (".py", ".so", ".pyd", ".toml", ".json"),
+    )
 
 
 def _digest(home: Path, wanted: Callable[[Path], bool]) -> str:
     total = hashlib.sha256()
     for path in sorted(home.rglob("*")):
         if path.is_file() and wanted(path):
-            total.update(path.relative_to(home).as_posix().encode() + b"\0" + hashlib.sha256(path.read_bytes()).digest())
+            total.update(
+                path.relative_to(home).as_posix().encode()
+                + b"\0"
+                + hashlib.sha256(path.read_bytes()).digest()
+            )
     return total.hexdigest()
 
 
@@ -153,8 +199,16 @@ def _machine() -> dict[str, Any]:
     model = platform.processor()
     with contextlib.suppress(OSError):
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-        model = next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), model)
-    return {"system": platform.platform(), "processor": model, "cores": os.cpu_count(), "python": platform.python_version()}
+        model = next(
+            (line.partition(":")[2].strip() for line in lines if line.startswith("model name")),
+            model,
+        )
+    return {
+        "system": platform.platform(),
+        "processor": model,
+        "cores": os.cpu_count(),
+        "python": platform.python_version(),
+    }
 
 
 def worker(words: Sequence[str] | None = None) -> int:
@@ -206,12 +260,21 @@ class _Running:
 
 
 def _launch(command: Sequence[str], case: Path, out: Path) -> _Running:
-    """Start a worker in an empty folder, with one thread for linear algebra and its words in files."""
+    """Start a worker in an empty folder, with one thread for linear algebra and its words in
+    files.
+    """
     home = tempfile.TemporaryDirectory(prefix="pamrs-prove-")
     paths = [os.path.abspath(p) for p in os.environ.get("PYTHONPATH", "").split(os.pathsep) if p]
     threads = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-    environment = {**os.environ, **threads, **({"PYTHONPATH": os.pathsep.join(paths)} if paths else {})}
-    with open(Path(home.name, "stdout"), "wb") as told, open(Path(home.name, "stderr"), "wb") as cried:
+    environment = {
+        **os.environ,
+        **threads,
+        **({"PYTHONPATH": os.pathsep.join(paths)} if paths else {}),
+    }
+    with (
+        open(Path(home.name, "stdout"), "wb") as told,
+        open(Path(home.name, "stderr"), "wb") as cried,
+    ):
         process = subprocess.Popen(
             [*command, str(case.resolve()), str(out.resolve())],
             cwd=home.name, env=environment, stdin=subprocess.DEVNULL, stdout=told, stderr=cried,
@@ -228,8 +291,13 @@ def _ended(running: _Running, out: Path) -> dict[str, Any]:
     if result is None:
         lines = running.text("stderr").splitlines()
         code = running.process.returncode
-        why = lines[-1].strip() if lines else f"the worker ended with code {code} and wrote no result"
-        return {"error": why if code >= 0 else f"the worker was killed by signal {-code}", "wall_seconds": wall}
+        why = (
+            lines[-1].strip() if lines else f"the worker ended with code {code} and wrote no result"
+        )
+        return {
+            "error": why if code >= 0 else f"the worker was killed by signal {-code}",
+            "wall_seconds": wall,
+        }
     entry = _entry(result)
     with contextlib.suppress(ValueError, IndexError):  # what it cost is not worth a result
         entry |= json.loads(running.text("stdout").splitlines()[-1])
@@ -240,18 +308,35 @@ def _entry(result: dict[str, Any]) -> dict[str, Any]:
     seconds = result.get("seconds")
     known = isinstance(seconds, int | float) and math.isfinite(seconds)
     named = {
-        "effects": [e.get("id") for e in result.get("effects") or []] if result["verdict"] == "effects" else [],
+        "effects": [e.get("id") for e in result.get("effects") or []]
+        if result["verdict"] == "effects"
+        else [],
         "wrong_parameters": [w.get("name") for w in result.get("wrong_parameters") or []],
-        "unexplained": [u.get("block") for u in result.get("unexplained") or [] if u.get("verdict") == "unlisted"],
+        "unexplained": [
+            u.get("block")
+            for u in result.get("unexplained") or []
+            if u.get("verdict") == "unlisted"
+        ],
     }
-    return {"verdict": result["verdict"], **{key: v for key, v in named.items() if v}, **({"seconds": seconds} if known else {})}
+    return {
+        "verdict": result["verdict"],
+        **{key: v for key, v in named.items() if v},
+        **({"seconds": seconds} if known else {}),
+    }
 
 
 def _said(entry: dict[str, Any]) -> str:
-    """What a case came to, in one line: verdict, names, and blocks that keep a mismatch without one."""
+    """What a case came to, in one line: verdict, names, and blocks that keep a mismatch without
+    one.
+    """
     if "error" in entry:
         return f"error: {entry['error']}"
-    names = ", ".join([*entry.get("effects", []), *(f"wrong {name}" for name in entry.get("wrong_parameters", []))])
+    names = ", ".join(
+        [
+            *entry.get("effects", []),
+            *(f"wrong {name}" for name in entry.get("wrong_parameters", [])),
+        ]
+    )
     kept = ", ".join(entry.get("unexplained", []))
     beside = f"; without a name in {kept}" if kept and entry["verdict"] != "unlisted" else ""
     return f"{entry['verdict']}{' ' * bool(names)}{names}{beside}"
@@ -308,7 +393,8 @@ def prove(
     Returns
     -------
     Proof
-        Verdicts and errors. A case that fails is an error in it, and is tried again by the next run.
+        Verdicts and errors. A case that fails is an error in it, and is tried again by the next
+        run.
 
     Raises
     ------
@@ -352,11 +438,17 @@ class _Run:
     waiting: list[Path]
 
     @classmethod
-    def of(cls, cases: list[Path], target: Path, jobs: int, manifest: str | None, *, fresh: bool) -> _Run:
+    def of(
+        cls, cases: list[Path], target: Path, jobs: int, manifest: str | None, *, fresh: bool
+    ) -> _Run:
         """What an earlier run left of these cases."""
         from pamrs import __version__
 
-        code, earlier, digests = code_digest(), _before(target), {case.name: case_digest(case) for case in cases}
+        code, earlier, digests = (
+            code_digest(),
+            _before(target),
+            {case.name: case_digest(case) for case in cases},
+        )
         entries: dict[str, dict[str, Any]] = {}
         waiting: list[Path] = []
         for case in cases:
@@ -365,16 +457,33 @@ class _Run:
             if result is None or known.get("case_sha256", digests[case.name]) != digests[case.name]:
                 waiting.append(case)
             else:
-                entries[case.name] = {**_entry(result), **{k: v for k, v in known.items() if k != "error"}}
-        told = {"schema": SCHEMA, "version": __version__, "code": code, "machine": _machine(), "jobs": jobs}
-        return cls(cases, target, code, digests, {**told, "manifest_sha256": manifest}, entries, waiting)
+                entries[case.name] = {
+                    **_entry(result),
+                    **{k: v for k, v in known.items() if k != "error"},
+                }
+        told = {
+            "schema": SCHEMA,
+            "version": __version__,
+            "code": code,
+            "machine": _machine(),
+            "jobs": jobs,
+        }
+        return cls(
+            cases, target, code, digests, {**told, "manifest_sha256": manifest}, entries, waiting
+        )
 
     def record(self) -> None:
         """Write what is known to ``run.json``."""
-        ordered = {case.name: self.entries[case.name] for case in self.cases if case.name in self.entries}
-        write_atomically(self.target / "run.json", json.dumps({**self.head, "cases": ordered}, indent=1) + "\n")
+        ordered = {
+            case.name: self.entries[case.name] for case in self.cases if case.name in self.entries
+        }
+        write_atomically(
+            self.target / "run.json", json.dumps({**self.head, "cases": ordered}, indent=1) + "\n"
+        )
 
-    def finish(self, command: Sequence[str], jobs: int, timeout: float, tell: Callable[[str], None]) -> None:
+    def finish(
+        self, command: Sequence[str], jobs: int, timeout: float, tell: Callable[[str], None]
+    ) -> None:
         """Diagnose what waits, so many cases at a time, each in a process of its own."""
         began, todo, kept = time.perf_counter(), len(self.waiting), len(self.entries)
         running: list[_Running] = []
@@ -395,7 +504,10 @@ class _Run:
                     left = (time.perf_counter() - began) / done * (todo - done)
                     rest = f"; about {_span(left)} left" if done < todo else ""
                     place = f"[{kept + done}/{len(self.cases)}]"
-                    tell(f"{place} {one.case.name}: {_said(entry)}, {entry['wall_seconds']:.1f} s{rest}")
+                    tell(
+                        f"{place} {one.case.name}: {_said(entry)}, {entry['wall_seconds']:.1f} "
+                        f"s{rest}"
+                    )
                 if not ended:
                     time.sleep(_POLL)
         finally:

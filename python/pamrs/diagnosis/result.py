@@ -1,4 +1,6 @@
-"""What a diagnosis returns: verdict, location, named physics, fit, traces; as text, JSON and pages."""
+"""What a diagnosis returns: verdict, location, named physics, fit, traces; as text, JSON and
+pages.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,16 @@ from pamrs import report
 from pamrs._writing import write_atomically
 from pamrs.channels import UNITS
 from pamrs.diagnosis.settings import DiagnosisSettings
-from pamrs.findings import DEFINITIONS, VERDICTS, Findings, ModelFile, Trace, object_of, to_plain, told
+from pamrs.findings import (
+    DEFINITIONS,
+    VERDICTS,
+    Findings,
+    ModelFile,
+    Trace,
+    object_of,
+    to_plain,
+    told,
+)
 from pamrs.report import text as words
 
 __all__ = ["SCHEMA", "VERDICTS", "Diagnosis", "ModelFile", "Trace", "schema"]
@@ -38,25 +49,30 @@ class Diagnosis(Findings):
     verdict : str
         ``none``, ``parameters``, ``effects`` or ``unlisted``.
     where : Where
-        ``block``, ``channel``, ``intervals`` (pairs in s), ``conditions`` (``name``, ``share`` of the excess and of the ``time``,
-        ``mean``, ``text``), ``text``; optionally ``recording``, to which the intervals belong.
+        ``block``, ``channel``, ``intervals`` (pairs in s), ``conditions`` (``name``, ``share`` of
+        the excess and of the ``time``, ``mean``, ``text``), ``text``; optionally ``recording``, to
+        which the intervals belong.
     effects : list of EffectFound
-        What is named (with the verdict ``unlisted`` what comes closest): ``id``, ``probability``, ``name`` (in words), ``parameters``
-        {name: {value, std, unit, interval?, identifiable?}}, most probable first; SI, 95 % intervals; ``events``, what
-        happened in single recordings (``recording``, ``time`` and the effect's other parameters, SI), and ``inclusion``, the share of
-        resampled recordings in which the screen would have taken the effect.
+        What is named (with the verdict ``unlisted`` what comes closest): ``id``, ``probability``,
+        ``name`` (in words), ``parameters`` {name: {value, std, unit, interval?, identifiable?}},
+        most probable first; SI, 95 % intervals; ``events``, what happened in single recordings
+        (``recording``, ``time`` and the effect's other parameters, SI), and ``inclusion``, the
+        share of resampled recordings in which the screen would have taken the effect.
     ambiguity : list of list of str
-        Sets of names (effects, wrong parameters by dotted name, ``unlisted``, ``parameters``) that the data cannot separate; empty when
-        settled.
+        Sets of names (effects, wrong parameters by dotted name, ``unlisted``, ``parameters``) that
+        the data cannot separate; empty when settled.
     probabilities : dict
-        Probability of what the case may be told to have: names of all its blocks joined by ``+``, ``none``, ``parameters`` (that moved
-        inside their tolerances), or ``unlisted`` (something is missing and nothing has a name). Those of each block are in ``blocks``.
+        Probability of what the case may be told to have: names of all its blocks joined by ``+``,
+        ``none``, ``parameters`` (that moved inside their tolerances), or ``unlisted`` (something is
+        missing and nothing has a name). Those of each block are in ``blocks``.
     parameters : dict of str to ParameterFound
         {name: {nominal, value, std, unit, moved_sigmas, identifiable}}, SI.
     fit : FitErrors
-        ``channels`` and ``held_out``: {channel: {noise, before, refit, after}} in SI, and ``gap_closed``.
+        ``channels`` and ``held_out``: {channel: {noise, before, refit, after}} in SI, and
+        ``gap_closed``.
     next_experiment : NextExperiment
-        ``text``, ``excitation``, ``expected_information_bits``, and ``ranking`` and ``curves`` of what was simulated.
+        ``text``, ``excitation``, ``expected_information_bits``, and ``ranking`` and ``curves`` of
+        what was simulated.
     warnings : list of str
         What the user should know before trusting the rest.
     seconds : float
@@ -68,27 +84,35 @@ class Diagnosis(Findings):
     traces : list of Trace
         Measured and simulated channels.
     blocks : list of BlockVerdict
-        The verdict of each group of blocks: ``blocks`` (their names), ``verdict``, ``probabilities``, ``effects``,
-        ``wrong_parameters``, ``ambiguity``, and ``mismatch``: for each block its ``channel``, ``unit``, and ``fitted`` and ``held_out``
-        {before, refit, after: {noises, size, more_than_noise}}, what is more than noise in units of the noise and in SI.
+        The verdict of each group of blocks: ``blocks`` (their names), ``verdict``,
+        ``probabilities``, ``effects``, ``wrong_parameters``, ``ambiguity``, and ``mismatch``: for
+        each block its ``channel``, ``unit``, and ``fitted`` and ``held_out`` {before, refit, after:
+        {noises, size, more_than_noise}}, the residual above the noise, in units of the noise and in
+        SI.
     unexplained : list of Unexplained
-        Blocks that keep a mismatch: ``block``, ``channel``, ``unit``, ``noises``, ``size`` (SI), and the ``verdict`` of their group.
+        Blocks with a mismatch that stays unexplained: ``block``, ``channel``, ``unit``, ``noises``,
+        ``size`` (SI), and the ``verdict`` of their group.
     wrong_parameters : list of WrongParameter
-        Values of the rig file that are wrong: ``name``, ``block``, ``nominal``, ``tolerance``, ``value``, ``std``, ``interval`` (95 %),
-        ``unit``, ``moved_sigmas``, ``probability``, and ``held_out`` {channel: {before, refit, after}}, the error as in ``fit``, SI.
+        Values of the rig file that are wrong: ``name``, ``block``, ``nominal``, ``tolerance``,
+        ``value``, ``std``, ``interval`` (95 %), ``unit``, ``moved_sigmas``, ``probability``, and
+        ``held_out`` {channel: {before, refit, after}}, the error as in ``fit``, SI.
     residuals : dict of str to BlockResidual
-        {block: {rms, noise, excess, p_value, channel}}, residual of each block's refitted baseline against its noise.
+        {block: {rms, noise, excess, p_value, channel}}, residual of each block's refitted baseline
+        against the noise level.
     condition_map : ConditionMap or None
-        ``x_label``, ``y_label``, ``x_edges`` (m+1,), ``y_edges`` (n+1,), ``z`` and ``z_after`` (n, m): mean
-        residual in units of the noise, NaN where there are no data; ``block``.
+        ``x_label``, ``y_label``, ``x_edges`` (m+1,), ``y_edges`` (n+1,), ``z`` and ``z_after`` (n,
+        m): mean residual in units of the noise, NaN where there are no data; ``block``.
     timings : dict
         Seconds of each stage, optional.
     tried : list of Tried
-        Every set of effects that was fitted: ``blocks``, ``effects``, what it leaves of each block's variance in units of the noise's
-        (``fitted``, ``held_out``), ``gap_closed``, its ``values``.
-    asked : list of Asked
-        Every lasting effect that acts where the mismatch is: ``id``, ``blocks``, ``promised``, the share of the mismatch that its
-        signature could take before any fit, and ``left``, the share that it leaves fitted alone (None where it promised too little).
+        Every set of effects that was fitted: ``blocks``, ``effects``, what it leaves of each
+        block's variance in units of the noise's (``fitted``, ``held_out``), ``gap_closed``, its
+        ``values``.
+    tested : list of Tested
+        Every persistent effect that acts where the mismatch is: ``id``, ``blocks``,
+        ``predicted_gain``, the share of the mismatch that its signature could take before any fit,
+        and ``left``, the share that it leaves fitted alone (None where the predicted gain is too
+        small).
     settings : DiagnosisSettings
         The numbers that the verdict rests on.
 
@@ -109,8 +133,14 @@ class Diagnosis(Findings):
         return words.headline(self)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the content of the JSON file: exactly the keys of the schema, null for no number."""
-        own = [f.name for f in dataclasses.fields(self) if f.metadata.get("json", True) and f.name != "settings"]
+        """Return the content of the JSON file: exactly the keys of the schema, null for no
+        number.
+        """
+        own = [
+            f.name
+            for f in dataclasses.fields(self)
+            if f.metadata.get("json", True) and f.name != "settings"
+        ]
         found = {name: to_plain(getattr(self, name)) for name in own}
         return {"schema": SCHEMA, **found, "settings": self.settings.to_dict()}
 
@@ -137,11 +167,17 @@ class Diagnosis(Findings):
         lines = [f"Diagnosis of {self.case}", *textwrap.wrap(self.headline + ".", 96)]
         where = self.where.text
         if where:
-            lines += ["", *textwrap.wrap(where, 96, initial_indent="where  ", subsequent_indent=" " * 7)]
+            lines += [
+                "",
+                *textwrap.wrap(where, 96, initial_indent="where  ", subsequent_indent=" " * 7),
+            ]
         if self.probabilities:
             lines.append("")
             for name, p in words.ranked_probabilities(self, 5):
-                lines.append(f"{words.hypothesis_label(name):<38.38} {words.format_probability(p):>7}  {'#' * round(30 * p)}")
+                lines.append(
+                    f"{words.hypothesis_label(name):<38.38} {words.format_probability(p):>7}  "
+                    f"{'#' * round(30 * p)}"
+                )
         for effect in self.effects:
             lines.append("")
             lines.append(effect.name or words.label(effect.id))
@@ -155,7 +191,9 @@ class Diagnosis(Findings):
             lines += ["", *textwrap.wrap(words.sentence_of(wrong), 96)]
         lines += self._summary_fit()
         for kept in self.unexplained:
-            lines += textwrap.wrap(f"Open: {words.kept_sentence(kept)}", 96, subsequent_indent="  ")
+            lines += textwrap.wrap(
+                f"Unexplained: {words.kept_sentence(kept)}", 96, subsequent_indent="  "
+            )
         if len(self.ambiguity) > 1:
             sets = "; ".join(words.set_label(s) for s in self.ambiguity)
             lines += ["", *textwrap.wrap(f"Not separable: {sets}.", 96, subsequent_indent="  ")]
@@ -187,7 +225,9 @@ class Diagnosis(Findings):
             for key in ("noise", "before", "refit", "after"):
                 value = entry[key]
                 shown = float(value) * factor if words.is_number(value) else None
-                row = (f"{row:<22}" if key == "noise" else row) + f"{words.format_number(shown, unicode=False):>11}"
+                row = (
+                    f"{row:<22}" if key == "noise" else row
+                ) + f"{words.format_number(shown, unicode=False):>11}"
             lines.append(row)
         gap = self.fit.gap_closed
         if words.is_number(gap):
@@ -234,7 +274,11 @@ class Diagnosis(Findings):
             for name, p in words.ranked_probabilities(self, 5)
         )
         gap = self.fit.gap_closed
-        closed = f"<p>{100 * float(gap):.0f} % of the gap to the noise closed on {self.proof}.</p>" if words.is_number(gap) else ""
+        closed = (
+            f"<p>{100 * float(gap):.0f} % of the gap to the noise closed on {self.proof}.</p>"
+            if words.is_number(gap)
+            else ""
+        )
         where = html.escape(self.where.text)
         return (
             f"<div><p><b>{html.escape(self.headline)}.</b></p><p>{where}</p>"
@@ -244,7 +288,9 @@ class Diagnosis(Findings):
 
 
 def schema() -> dict[str, Any]:
-    """Return the JSON Schema of `pamrs.diagnosis/1` as a dictionary, made from the types of the result."""
+    """Return the JSON Schema of `pamrs.diagnosis/1` as a dictionary, made from the types of the
+    result.
+    """
     definitions = dict(DEFINITIONS)
     found = object_of(Diagnosis, definitions)
     return {
@@ -252,8 +298,10 @@ def schema() -> dict[str, Any]:
         "$id": "urn:pamrs:schema:pamrs.diagnosis:1",
         "title": SCHEMA,
         **found,
-        "description": "Result of a diagnosis: which physics the simulation of a rig leaves out. All quantities in SI; null where the "
-        "data give no number.",
+        ("description"): (
+            "Result of a diagnosis: which physics the simulation of a rig leaves out. All "
+            "quantities in SI; null where the data give no number."
+        ),
         "required": ["schema", *found["required"]],
         "properties": {"schema": {"const": SCHEMA}, **found["properties"]},
         "$defs": definitions,

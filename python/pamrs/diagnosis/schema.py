@@ -1,6 +1,7 @@
 """The committed JSON schema of a result, beside the types that it is made from.
 
-``python -m pamrs.diagnosis.schema`` writes it again; with ``--check`` it only says whether it is what the types give.
+``python -m pamrs.diagnosis.schema`` writes it again; with ``--check`` it only says whether it is
+what the types give.
 """
 
 from __future__ import annotations
@@ -31,5 +32,9 @@ def is_current() -> bool:
 
 if __name__ == "__main__":
     if "--check" in sys.argv[1:]:
-        sys.exit(0 if is_current() else f"{FILE} is not what the types give; python -m pamrs.diagnosis.schema writes it")
+        sys.exit(
+            0
+            if is_current()
+            else f"{FILE} is not what the types give; python -m pamrs.diagnosis.schema writes it"
+        )
     write_atomically(FILE, text())

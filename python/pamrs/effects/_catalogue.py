@@ -20,7 +20,15 @@ def _words(effect: str) -> dict[str, Any]:
 
 
 #: Fields of a parameter that are the core's as they stand.
-_AS_TOLD: Final = ("channel", "repeats", "tried", "same_everywhere", "time_constant", "restricts", "like")
+_AS_TOLD: Final = (
+    "channel",
+    "repeats",
+    "tried",
+    "same_everywhere",
+    "time_constant",
+    "restricts",
+    "like",
+)
 
 
 def _pair(value: list[float] | None) -> tuple[float, float] | None:
@@ -66,8 +74,13 @@ def _same_data(told: dict[str, Any] | None, words: dict[str, Any]) -> SameData |
 def _info(told: dict[str, Any]) -> EffectInfo:
     """One effect, as the core tells it, with its words."""
     words = _words(told["id"])
-    terms = tuple(Term(**{**term, "variables": tuple(term["variables"])}) for term in words.get("terms", ()))
-    meanings = {**{term.name: f"coefficient of {term.formula}" for term in terms}, **words["parameters"]}
+    terms = tuple(
+        Term(**{**term, "variables": tuple(term["variables"])}) for term in words.get("terms", ())
+    )
+    meanings = {
+        **{term.name: f"coefficient of {term.formula}" for term in terms},
+        **words["parameters"],
+    }
     kink = told["kink"]
     return EffectInfo(
         id=told["id"],
@@ -86,13 +99,20 @@ def _info(told: dict[str, Any]) -> EffectInfo:
         label=words.get("label", ""),
         acts_in=tuple(told["acts_in"]),
         experiment=words.get("experiment", ""),
-        excitation=tuple((k, tuple(v) if isinstance(v, list) else v) for k, v in words.get("excitation", {}).items()),
+        excitation=tuple(
+            (k, tuple(v) if isinstance(v, list) else v)
+            for k, v in words.get("excitation", {}).items()
+        ),
         last_only=told["last_only"],
         on_loads=told["on_loads"],
         supplies=tuple(told["supplies"]),
         dry_friction=told["dry_friction"],
-        kink=None if kink is None else (tuple(kink["where_not_zero"]), kink["why"], kink["of_supplies"]),
-        at_rest=tuple((act, *change) for told_change in told["at_rest"] for act, change in told_change.items()),
+        kink=None
+        if kink is None
+        else (tuple(kink["where_not_zero"]), kink["why"], kink["of_supplies"]),
+        at_rest=tuple(
+            (act, *change) for told_change in told["at_rest"] for act, change in told_change.items()
+        ),
     )
 
 
@@ -101,13 +121,21 @@ def _of_words(effect: str) -> Words:
     return Words(*(words[key] for key in ("what", "letter", "symbols", "odd_in")))
 
 
-EFFECTS: Final[dict[str, EffectInfo]] = {told["id"]: _info(told) for told in json.loads(_core.effects())}
+EFFECTS: Final[dict[str, EffectInfo]] = {
+    told["id"]: _info(told) for told in json.loads(_core.effects())
+}
 """Every effect by its id, in the order of the chain; sums of terms last."""
-CATALOGUE: Final[dict[str, EffectInfo]] = {name: effect for name, effect in EFFECTS.items() if effect.catalogue}
+CATALOGUE: Final[dict[str, EffectInfo]] = {
+    name: effect for name, effect in EFFECTS.items() if effect.catalogue
+}
 """Those that a diagnosis may name."""
-TERMS: Final[dict[str, tuple[Term, ...]]] = {name: effect.terms for name, effect in EFFECTS.items() if effect.terms}
+TERMS: Final[dict[str, tuple[Term, ...]]] = {
+    name: effect.terms for name, effect in EFFECTS.items() if effect.terms
+}
 """Terms of each sum, in the order of its parameters."""
-CLOSURE_OF: Final[dict[str, str]] = {("arm" if EFFECTS[name].at == "joint" else EFFECTS[name].at): name for name in TERMS}
+CLOSURE_OF: Final[dict[str, str]] = {
+    ("arm" if EFFECTS[name].at == "joint" else EFFECTS[name].at): name for name in TERMS
+}
 """Sum of terms of each block of the cut chain."""
 WORDS: Final[dict[str, Words]] = {name: _of_words(name) for name in TERMS}
 """How each sum of terms is put into words."""
@@ -116,6 +144,8 @@ MEMORY_OF: Final[dict[str, str]] = {"time": "memory_time", "distance": "memory_a
 
 
 def find_parameter(name: str) -> EffectParameter:
-    """The parameter of a dotted name such as ``leak_muscle.conductance``; KeyError if there is none."""
+    """The parameter of a dotted name such as ``leak_muscle.conductance``; KeyError if there is
+    none.
+    """
     effect, _, short = name.partition(".")
     return {p.name: p for form in reversed(EFFECTS[effect].forms) for p in form.parameters}[short]

@@ -27,7 +27,8 @@ class EffectParameter:
         Value that switches the effect off (with the other parameters that have one at theirs);
         None for a parameter that gives the effect its shape.
     expected : (low, high) or None
-        Where it usually lies; an effect is less probable the further outside it needs the parameter.
+        Where it usually lies; an effect is less probable the further outside it needs the
+        parameter.
     prior : (mean, standard deviation) or None
         What is known of it before any data.
     role : str
@@ -97,7 +98,8 @@ class EffectParameter:
 
 @dataclass(frozen=True, slots=True)
 class SameData:
-    """When an effect leaves the very recordings that another one leaves: nothing in them can tell the two apart.
+    """When an effect leaves the very recordings that another one leaves: nothing in them can tell
+    the two apart.
 
     Attributes
     ----------
@@ -196,7 +198,8 @@ class EffectInfo:
     id, name, block : str
         Public identifier, words, and the block in which it acts.
     at : str
-        Kind of the blocks of which it can take one by its name, ``""`` for an effect on the whole rig.
+        Kind of the blocks of which it can take one by its name, ``""`` for an effect on the whole
+        rig.
     equation, fingerprint, separates : str
         Governing equation; what it looks like in recordings; what it is confused with and what
         separates them.
@@ -212,7 +215,8 @@ class EffectInfo:
     same_data : SameData or None
         Another effect whose recordings it leaves where a parameter is zero.
     terms : tuple of Term
-        Of a sum of terms, in the order of its parameters; behind them stand the shapes of its memories.
+        Of a sum of terms, in the order of its parameters; behind them stand the shapes of its
+        memories.
     label : str
         Short name for tables and figures; the id in words by default.
     acts_in : tuple of str
@@ -232,11 +236,11 @@ class EffectInfo:
     dry_friction : bool
         Whether a motion that does not turn round does not feel it as damping.
     kink : (names, why, of_supplies) or None
-        Why it has no linear model: it is there where any of these parameters is not zero, maybe only
-        while the pressure of a supply moves.
+        Why it has no linear model: it is there where any of these parameters is not zero, maybe
+        only while the pressure of a supply moves.
     at_rest : tuple of (str, str, float)
-        How it is changed for a linear model about a state of rest: ``("set", parameter, value)``, or
-        ``("out_below", parameter, value)`` where it is left out below a value.
+        How it is changed for a linear model about a state of rest: ``("set", parameter, value)``,
+        or ``("out_below", parameter, value)`` where it is left out below a value.
     """
 
     id: str
@@ -299,14 +303,18 @@ class EffectInfo:
 
     @property
     def needs(self) -> tuple[tuple[str, str], ...]:
-        """What a rig must have for it: one of these blocks, each with its kind (empty: any); empty for the usual."""
+        """What a rig must have for it: one of these blocks, each with its kind (empty: any); empty
+        for the usual.
+        """
         if self.on_loads:
             return (("load", "mass"), ("joint", ""))
         return tuple(("supply", kind) for kind in self.supplies)
 
     @property
     def transient(self) -> bool:
-        """Whether it happens at times of its own in each recording, so that all recordings cannot share its parameters."""
+        """Whether it happens at times of its own in each recording, so that all recordings cannot
+        share its parameters.
+        """
         return any(parameter.role == "time" for parameter in self.parameters)
 
     @property
@@ -323,5 +331,7 @@ class EffectInfo:
         return tuple(f"{self.id}.{parameter.name}" for parameter in self.parameters)
 
     def neutral(self) -> dict[str, float]:
-        """The parameters at which it does nothing; empty for an effect that replaces an equation and has none."""
+        """The parameters at which it does nothing; empty for an effect that replaces an equation
+        and has none.
+        """
         return {p.name: p.neutral for p in self.parameters if p.neutral is not None}

@@ -1,4 +1,6 @@
-"""The catalogue as text: the list of its effects, one effect in full, and what switches it on in a rig file."""
+"""The catalogue as text: the list of its effects, one effect in full, and what switches it on in a
+rig file.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,11 @@ _ORDER: Final = ("supply", "valve", "line", "chamber", "muscle", "joint", "arm",
 def catalogue() -> dict[str, list[EffectInfo]]:
     """The effects of the catalogue by block, blocks and effects in the order of the chain."""
     listed = CATALOGUE.values()
-    return {block: [info for info in listed if info.block == block] for block in _ORDER if any(i.block == block for i in listed)}
+    return {
+        block: [info for info in listed if info.block == block]
+        for block in _ORDER
+        if any(i.block == block for i in listed)
+    }
 
 
 def entry(effect: str) -> EffectInfo:
@@ -46,9 +52,15 @@ def entry(effect: str) -> EffectInfo:
     near = (
         [name for name in listed if word and word in name]
         or difflib.get_close_matches(word, listed, n=3, cutoff=0.6)
-        or [name for name in listed if difflib.get_close_matches(word, name.split("_"), n=1, cutoff=0.6)]
+        or [
+            name
+            for name in listed
+            if difflib.get_close_matches(word, name.split("_"), n=1, cutoff=0.6)
+        ]
     )
-    hint = f"did you mean {' or '.join(near)}?" if near else f"the catalogue has: {', '.join(listed)}"
+    hint = (
+        f"did you mean {' or '.join(near)}?" if near else f"the catalogue has: {', '.join(listed)}"
+    )
     raise ParameterError(f"effect {effect!r} is not in the catalogue; {hint}")
 
 
@@ -62,7 +74,9 @@ def where(info: EffectInfo) -> str:
 def range_of(parameter: EffectParameter) -> str:
     """Bounds of a parameter, where it is expected, and the value at which it does nothing."""
     text = f"{parameter.lower:g} to {parameter.upper:g}"
-    text += "" if parameter.expected is None else ", expected {:g} to {:g}".format(*parameter.expected)
+    text += (
+        "" if parameter.expected is None else ", expected {:g} to {:g}".format(*parameter.expected)
+    )
     return text if parameter.neutral is None else f"{text}, off at {parameter.neutral:g}"
 
 
@@ -90,7 +104,9 @@ def snippet(effect: str, values: Mapping[str, float] | None = None) -> str:
     width = max(len(parameter.name) for parameter in info.parameters)
     lines = ["[[effects]]", f'id = "{info.id}"', "[effects.parameters]"]
     for p in info.parameters:
-        lines.append(f'{p.name:<{width}} = {{ value = {given.get(p.name, p.default):g}, unit = "{p.unit}" }}')
+        lines.append(
+            f'{p.name:<{width}} = {{ value = {given.get(p.name, p.default):g}, unit = "{p.unit}" }}'
+        )
     return "\n".join(lines)
 
 
@@ -99,11 +115,14 @@ def overview() -> str:
     rows = [(block, info.id, info.name) for block, infos in catalogue().items() for info in infos]
     left, middle = (max(len(row[column]) for row in rows) for column in (0, 1))
     lines = [f"{'block':<{left}}  {'id':<{middle}}  name"]
-    return "\n".join([*lines, *(f"{block:<{left}}  {name:<{middle}}  {words}" for block, name, words in rows)])
+    return "\n".join(
+        [*lines, *(f"{block:<{left}}  {name:<{middle}}  {words}" for block, name, words in rows)]
+    )
 
 
 def description(effect: str) -> str:
-    """One effect in full: equation, fingerprint, what it is confusable with, parameters, lines of a rig file.
+    """One effect in full: equation, fingerprint, what it is confusable with, parameters, lines of a
+    rig file.
 
     Parameters
     ----------
@@ -131,10 +150,25 @@ def description(effect: str) -> str:
     }
     lines = [f"{info.id}: {info.name}", ""]
     for head, text in facts.items():
-        lines += textwrap.wrap(text, _WIDTH, initial_indent=f"  {head:<13}", subsequent_indent=" " * 15)
-    rows = [(p.name, f"{p.default:g} {p.unit}" if p.unit != "1" else f"{p.default:g}", range_of(p), p.meaning) for p in info.parameters]
+        lines += textwrap.wrap(
+            text, _WIDTH, initial_indent=f"  {head:<13}", subsequent_indent=" " * 15
+        )
+    rows = [
+        (
+            p.name,
+            f"{p.default:g} {p.unit}" if p.unit != "1" else f"{p.default:g}",
+            range_of(p),
+            p.meaning,
+        )
+        for p in info.parameters
+    ]
     widths = [max(len(row[column]) for row in rows) for column in range(3)]
     lines += ["", "parameters: name, typical value, range, meaning", ""]
     for row in rows:
-        lines.append("  " + "  ".join([*(f"{text:<{width}}" for text, width in zip(row, widths, strict=False)), row[3]]))
+        lines.append(
+            "  "
+            + "  ".join(
+                [*(f"{text:<{width}}" for text, width in zip(row, widths, strict=False)), row[3]]
+            )
+        )
     return "\n".join([*lines, "", "in a rig file", "", textwrap.indent(snippet(effect), "  ")])

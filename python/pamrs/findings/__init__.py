@@ -10,7 +10,15 @@ which they become JSON, `object_of`, `reference` and `DEFINITIONS`, by which a s
 
 from __future__ import annotations
 
-from pamrs.findings._details import Asked, BlockResidual, ConditionMap, Curves, NextExperiment, RankedExperiment, Tried
+from pamrs.findings._details import (
+    BlockResidual,
+    ConditionMap,
+    Curves,
+    NextExperiment,
+    RankedExperiment,
+    Tested,
+    Tried,
+)
 from pamrs.findings._entries import (
     VERDICTS,
     BlockMismatch,
@@ -36,7 +44,6 @@ from pamrs.findings._trace import ModelFile, Trace
 __all__ = [
     "DEFINITIONS",
     "VERDICTS",
-    "Asked",
     "BlockMismatch",
     "BlockResidual",
     "BlockVerdict",
@@ -56,6 +63,7 @@ __all__ = [
     "ParameterFound",
     "RankedExperiment",
     "StageError",
+    "Tested",
     "Trace",
     "Tried",
     "Unexplained",

@@ -1,4 +1,6 @@
-"""What stands beside the answer: the next experiment, residuals, conditions, everything that was tried."""
+"""What stands beside the answer: the next experiment, residuals, conditions, everything that was
+tried.
+"""
 
 from __future__ import annotations
 
@@ -12,12 +14,12 @@ import numpy.typing as npt
 from pamrs.findings._entry import Entry, told
 
 __all__ = [
-    "Asked",
     "BlockResidual",
     "ConditionMap",
     "Curves",
     "NextExperiment",
     "RankedExperiment",
+    "Tested",
     "Tried",
 ]
 
@@ -114,7 +116,7 @@ class NextExperiment(Entry):
 
 @dataclass(frozen=True, eq=False)
 class BlockResidual(Entry):
-    """Residual of a block's refitted baseline against its noise.
+    """Residual of a block's refitted baseline against the noise level.
 
     Attributes
     ----------
@@ -179,9 +181,9 @@ class Tried(Entry):
     prior : float
         Sum of squares of the baseline's movement [tolerances].
     suspects : list of str
-        Blocks that kept an excess.
+        Blocks whose residual exceeds the noise.
     gain : float
-        Gain in chi-square that the screen promised.
+        Gain in chi-square that the screen predicted.
     """
 
     blocks: list[str]
@@ -199,7 +201,7 @@ class Tried(Entry):
 
 
 @dataclass(frozen=True, eq=False)
-class Asked(Entry):
+class Tested(Entry):
     """A persistent effect that acts where the mismatch is.
 
     Attributes
@@ -208,13 +210,13 @@ class Asked(Entry):
         Its id.
     blocks : list of str
         Where.
-    promised : float
+    predicted_gain : float
         Share of the mismatch that its signature could take before any fit.
     left : float or None
-        Share that it leaves fitted alone; None where it promised too little.
+        Share that it leaves fitted alone; None where the predicted gain is too small.
     """
 
     id: str
     blocks: list[str]
-    promised: float
+    predicted_gain: float
     left: float | None

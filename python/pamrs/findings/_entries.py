@@ -238,14 +238,14 @@ class BlockVerdict(Entry):
 
 @dataclass(frozen=True, eq=False)
 class Unexplained(Entry):
-    """A block that keeps a mismatch.
+    """A block with a mismatch that stays unexplained.
 
     Attributes
     ----------
     block, channel, unit : str
         The block, the channel that it predicts, and its SI unit.
     noises, size : float
-        How much, in units of the noise and in the unit of the channel.
+        How large it is, in units of the noise and in the unit of the channel.
     verdict : str
         Of its group of blocks.
     """
@@ -287,9 +287,7 @@ class ChannelError(Entry):
 
     noise: float = field(metadata=told("standard deviation of the sensor noise"))
     before: float = field(metadata=told("root mean square error of the nominal model"))
-    refit: float = field(
-        metadata=told("root mean square error after refitting parameters only")
-    )
+    refit: float = field(metadata=told("root mean square error after refitting parameters only"))
     after: float = field(metadata=told("root mean square error with the effect"))
 
 
@@ -331,8 +329,8 @@ class WrongParameter(Entry):
     probability: float = field(metadata=told(kind="probability"))
     held_out: dict[str, StageError] = field(
         metadata=told(
-            "root mean square error of each channel it acts on: nominal model, refitted inside "
-            "the tolerances, with the other value"
+            "root mean square error of each channel it acts on: nominal model, refitted inside the "
+            "tolerances, with the other value"
         )
     )
 

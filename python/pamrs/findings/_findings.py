@@ -4,8 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from pamrs.findings._details import Asked, BlockResidual, ConditionMap, NextExperiment, Tried
-from pamrs.findings._entries import VERDICTS, BlockVerdict, EffectFound, FitErrors, ParameterFound, Unexplained, Where, WrongParameter
+from pamrs.findings._details import BlockResidual, ConditionMap, NextExperiment, Tested, Tried
+from pamrs.findings._entries import (
+    VERDICTS,
+    BlockVerdict,
+    EffectFound,
+    FitErrors,
+    ParameterFound,
+    Unexplained,
+    Where,
+    WrongParameter,
+)
 from pamrs.findings._entry import told
 from pamrs.findings._trace import ModelFile, Trace
 
@@ -36,7 +45,7 @@ class Findings:
     blocks : list of BlockVerdict
         The verdict of each group of blocks.
     unexplained : list of Unexplained
-        Blocks that keep a mismatch, the largest first.
+        Blocks with a mismatch that stays unexplained, the largest first.
     wrong_parameters : list of WrongParameter
         Values of the rig file that are wrong.
     parameters : dict of str to ParameterFound
@@ -56,14 +65,14 @@ class Findings:
     traces : list of Trace
         Measured and simulated channels.
     residuals : dict of str to BlockResidual
-        Residual of each block's refitted baseline against its noise.
+        Residual of each block's refitted baseline against the noise level.
     condition_map : ConditionMap or None
         Mean residual over two conditions.
     timings : dict
         Seconds of each stage, optional.
     tried : list of Tried
         Every set of effects that was fitted.
-    asked : list of Asked
+    tested : list of Tested
         Every persistent effect that acts where the mismatch is.
 
     Raises
@@ -93,7 +102,9 @@ class Findings:
     )
     unexplained: list[Unexplained] = field(
         default_factory=list,
-        metadata=told("blocks that keep a mismatch, the largest first", required=False),
+        metadata=told(
+            "blocks with a mismatch that stays unexplained, the largest first", required=False
+        ),
     )
     wrong_parameters: list[WrongParameter] = field(
         default_factory=list,
@@ -111,7 +122,7 @@ class Findings:
     condition_map: ConditionMap | None = field(default=None, metadata=told(json=False))
     timings: dict[str, float] = field(default_factory=dict, metadata=told(json=False))
     tried: list[Tried] = field(default_factory=list, metadata=told(json=False))
-    asked: list[Asked] = field(default_factory=list, metadata=told(json=False))
+    tested: list[Tested] = field(default_factory=list, metadata=told(json=False))
 
     def __post_init__(self) -> None:
         if self.verdict not in VERDICTS:

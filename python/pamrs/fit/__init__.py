@@ -1,4 +1,5 @@
-"""Fit quasi-static muscle models to measured forces, and predict untested pressures (dissertation 2.2.6 and 2.3).
+"""Fit quasi-static muscle models to measured forces, and predict untested pressures (dissertation
+2.2.6 and 2.3).
 
 Names are loaded when they are first used, so that importing the package costs next to nothing.
 """

@@ -35,8 +35,9 @@ def from_recording(
     Returns
     -------
     ForceMap
-        One row for each sample. The direction is that of the stroke between two turning points; near the turns, where the
-        smoothed length moves at less than a tenth of its usual speed, it is 0. Masked samples are flagged.
+        One row for each sample. The direction is that of the stroke between two turning points;
+        near the turns, where the smoothed length moves at less than a tenth of its usual speed, it
+        is 0. Masked samples are flagged.
 
     Raises
     ------
@@ -47,7 +48,10 @@ def from_recording(
     needed = ("length", pressure, "force")
     lacking = [channel for channel in needed if channel not in recording.channels]
     if lacking:
-        raise RecordingError(f"recording {recording.name!r} has no channel {lacking[0]!r}; it has: {', '.join(recording.channels)}")
+        raise RecordingError(
+            f"recording {recording.name!r} has no channel {lacking[0]!r}; it has: "
+            f"{', '.join(recording.channels)}"
+        )
     return ForceMap.from_arrays(
         *(recording.channels[channel] for channel in needed),
         rest_length=rest_length,
@@ -62,7 +66,9 @@ def from_recording(
 
 
 def _strokes(length: Array) -> Array:
-    """Direction of each sample: the sign of the stroke it belongs to, 0 near the turns and where there is no length."""
+    """Direction of each sample: the sign of the stroke it belongs to, 0 near the turns and where
+    there is no length.
+    """
     rows = np.flatnonzero(np.isfinite(length))
     way = np.zeros(len(length))
     if len(rows) < 3:
@@ -78,7 +84,9 @@ def _strokes(length: Array) -> Array:
     moving = np.abs(speed) > 0.1 * usual
     for start, stop in zip(turns[:-1], turns[1:], strict=True):
         stroke = np.sign(values[stop] - values[start])
-        way[rows[start : stop + 1]] = np.where(moving[start : stop + 1] & (np.sign(speed[start : stop + 1]) == stroke), stroke, 0.0)
+        way[rows[start : stop + 1]] = np.where(
+            moving[start : stop + 1] & (np.sign(speed[start : stop + 1]) == stroke), stroke, 0.0
+        )
     return way
 
 

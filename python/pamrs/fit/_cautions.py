@@ -1,4 +1,6 @@
-"""What to know before using the numbers of a fit: what its points hardly tell, what is implausible, which point stands apart."""
+"""What to know before using the numbers of a fit: what its points hardly tell, what is implausible,
+which point stands apart.
+"""
 
 from __future__ import annotations
 
@@ -33,7 +35,9 @@ _MAD: Final = 1.4826  # standard deviation of a normal distribution over its med
 _LOOP: Final = 4.0  # standard errors
 
 
-def cautions(problem: Problem, found: Estimate, rows: Mask, labels: Sequence[str], parameters: Parameters) -> list[str]:
+def cautions(
+    problem: Problem, found: Estimate, rows: Mask, labels: Sequence[str], parameters: Parameters
+) -> list[str]:
     """Every warning of a fit, in words.
 
     Parameters
@@ -68,17 +72,21 @@ def _range(problem: Problem, found: Estimate, rows: Mask, unknowns: int) -> list
     span = float(np.ptp(problem.length[rows])) / problem.blank.parameters["rest_length"]
     if found.condition_number > _LARGE_CONDITION:
         notes.append(
-            f"condition number {found.condition_number:.2g}: lengths over {100 * span:.3g} % of the rest length and "
-            f"{len(np.unique(problem.level[rows]))} pressure levels hardly separate {', '.join(found.design.names)}; single "
-            "moduli mean little, forces inside the fitted range are not affected"
+            f"condition number {found.condition_number:.2g}: lengths over {100 * span:.3g} % of "
+            f"the rest length and {len(np.unique(problem.level[rows]))} pressure levels hardly "
+            f"separate {', '.join(found.design.names)}; single moduli mean little, forces inside "
+            "the fitted range are not affected"
         )
     if span < _NARROW:
-        notes.append(f"the fitted lengths span {100 * span:.2g} % of the rest length only: the fit knows nothing of other lengths")
+        notes.append(
+            f"the fitted lengths span {100 * span:.2g} % of the rest length only: the fit knows "
+            "nothing of other lengths"
+        )
     spare = int(rows.sum()) - unknowns
     if problem.free and problem.noise is None and spare < _FEW_SPARE:
         notes.append(
-            f"{int(rows.sum())} points for {unknowns} unknowns: the scatter, which weighs data against the tolerances, is "
-            "hardly known; give noise, fit less, or take more points"
+            f"{int(rows.sum())} points for {unknowns} unknowns: the scatter, which weighs data "
+            "against the tolerances, is hardly known; give noise, fit less, or take more points"
         )
     return notes
 
@@ -90,18 +98,27 @@ def _moduli(found: Estimate, parameters: Parameters) -> list[str]:
     unsure = sum(item.stderr > abs(item.value) for item in moduli)
     if found.design.polynomial and len(found.design.base) > 1 and 2 * unsure >= len(moduli):
         notes.append(
-            f"{unsure} of {len(moduli)} moduli are not told from zero: a lower order may predict as well, compare_models (--compare) "
-            "ranks them"
+            f"{unsure} of {len(moduli)} moduli are not told from zero: a lower order may predict "
+            "as well, compare_models (--compare) ranks them"
         )
-    stiff = [f"{item.name} = {item.value:.2g} Pa" for item in moduli if item.unit == "Pa" and abs(item.value) > _STIFF]
+    stiff = [
+        f"{item.name} = {item.value:.2g} Pa"
+        for item in moduli
+        if item.unit == "Pa" and abs(item.value) > _STIFF
+    ]
     if stiff:
-        notes.append(f"{', '.join(stiff)}: beyond 1 GPa, no rubber is that stiff; take a lower order, or check the units")
+        notes.append(
+            f"{', '.join(stiff)}: beyond 1 GPa, no rubber is that stiff; take a lower order, or "
+            "check the units"
+        )
     return notes
 
 
 def _geometry(problem: Problem, found: Estimate, parameters: Parameters) -> list[str]:
     """Free geometry that the points do not tell, or that went far from where it was known to be."""
-    notes = [] if found.success else [f"the search of the geometry did not converge: {found.message}"]
+    notes = (
+        [] if found.success else [f"the search of the geometry did not converge: {found.message}"]
+    )
     for free in problem.free:
         item = parameters[free.name]
         place = f"{free.name} = {item.value:.4g} {item.unit}"
@@ -109,15 +126,21 @@ def _geometry(problem: Problem, found: Estimate, parameters: Parameters) -> list
             if abs(item.value - free.nominal) > _MOVED * abs(free.nominal):
                 share = 100.0 * (item.value / free.nominal - 1.0)
                 notes.append(
-                    f"{place} moved by {share:+.0f} % from the nominal {free.nominal:.4g} {item.unit}: it stands for something else; "
-                    "give a tolerance"
+                    f"{place} moved by {share:+.0f} % from the nominal {free.nominal:.4g} "
+                    f"{item.unit}: it stands for something else; give a tolerance"
                 )
             continue
         if item.stderr_plain > _UNINFORMED * free.tolerance:
-            notes.append(f"{free.name}: the data say nothing, its value is the prior's (tolerance {free.tolerance:.3g} {item.unit})")
+            notes.append(
+                f"{free.name}: the data say nothing, its value is the prior's (tolerance "
+                f"{free.tolerance:.3g} {item.unit})"
+            )
         away = abs(item.value - free.nominal) / free.tolerance
         if away > _FAR:
-            notes.append(f"{place} lies {away:.1f} tolerances from the nominal {free.nominal:.4g} {item.unit}")
+            notes.append(
+                f"{place} lies {away:.1f} tolerances from the nominal {free.nominal:.4g} "
+                f"{item.unit}"
+            )
     return notes
 
 
@@ -130,19 +153,22 @@ def _points(problem: Problem, found: Estimate, rows: Mask, labels: Sequence[str]
     weight = problem.weight[rows]
     named = [label for label, fitted in zip(labels, rows.tolist(), strict=True) if fitted]
     words = ", ".join(
-        f"{named[i]} ({pressure[i] / 1e3:.4g} kPa, {1e3 * length[i]:.4g} mm: {force[i]:.4g} N, the others predict "
-        f"{force[i] - error / weight[i]:.4g} N)"
+        f"{named[i]} ({pressure[i] / 1e3:.4g} kPa, {1e3 * length[i]:.4g} mm: {force[i]:.4g} N, the "
+        f"others predict {force[i] - error / weight[i]:.4g} N)"
         for i, error in apart
     )
     which = "it" if len(apart) == 1 else "them"
-    return [f"{words}: further from the other points than {_APART:g} times their scatter; check {which}"]
+    return [
+        f"{words}: further from the other points than {_APART:g} times their scatter; check {which}"
+    ]
 
 
 def outlying(problem: Problem, found: Estimate, rows: Mask) -> list[tuple[int, float]]:
     """Points that stand apart, one after the other: each is taken away before the next is sought.
 
-    The error of a point predicted by the others is ``r_i / (1 - h_i)`` with the hat matrix, its standard deviation
-    ``sigma / sqrt(1 - h_i)``; sigma is taken from the median of all points, which outliers do not move.
+    The error of a point predicted by the others is ``r_i / (1 - h_i)`` with the hat matrix, its
+    standard deviation ``sigma / sqrt(1 - h_i)``; sigma is taken from the median of all points,
+    which outliers do not move.
 
     Parameters
     ----------
@@ -156,11 +182,16 @@ def outlying(problem: Problem, found: Estimate, rows: Mask) -> list[tuple[int, f
     Returns
     -------
     list of (int, float)
-        Place among the fitted rows and weighted error of the prediction from the others. Empty with few points to spare, and
-        when more than 5 stand apart: then it is the model that errs.
+        Place among the fitted rows and weighted error of the prediction from the others. Empty with
+        few points to spare, and when more than 5 stand apart: then it is the model that errs.
     """
-    prior = np.concatenate([problem.expected(found.design)[1], [1.0 / free.tolerance for free in problem.free]])
-    matrix, residual = np.vstack([found.jacobian, np.diag(found.sigma * prior)]), found.residual.copy()
+    prior = np.concatenate(
+        [problem.expected(found.design)[1], [1.0 / free.tolerance for free in problem.free]]
+    )
+    matrix, residual = (
+        np.vstack([found.jacobian, np.diag(found.sigma * prior)]),
+        found.residual.copy(),
+    )
     count = len(residual)
     places = np.arange(count)
     apart: list[tuple[int, float]] = []
@@ -184,12 +215,16 @@ def outlying(problem: Problem, found: Estimate, rows: Mask) -> list[tuple[int, f
 
 
 def _scatter(scaled: Array, told: Mask, level: Index) -> Array:
-    """Standard deviation about each point from medians: of all points, or of its own level where that scatters more."""
+    """Standard deviation about each point from medians: of all points, or of its own level where
+    that scatters more.
+    """
     spread = np.full(len(scaled), _MAD * float(np.median(np.abs(scaled[told]))))
     for group in np.unique(level):
         own = told & (level == group)
         if np.sum(own) >= _FEW_SPARE:
-            spread[level == group] = np.maximum(spread[level == group], _MAD * float(np.median(np.abs(scaled[own]))))
+            spread[level == group] = np.maximum(
+                spread[level == group], _MAD * float(np.median(np.abs(scaled[own])))
+            )
     return spread
 
 
@@ -201,10 +236,15 @@ def _basis(matrix: Array) -> Array:
 
 
 def _loops(problem: Problem, found: Estimate, rows: Mask) -> list[str]:
-    """Hysteresis that a muscle without friction leaves in the residuals; the elbow model has a branch of its own for it."""
+    """Hysteresis that a muscle without friction leaves in the residuals; the elbow model has a
+    branch of its own for it.
+    """
     way, force = problem.direction[rows], problem.force[rows]
     given = problem.blank.parameters
-    rubs = any(given[name] for name in ("friction_coefficient", "friction_pressure_slope", "friction_floor"))
+    rubs = any(
+        given[name]
+        for name in ("friction_coefficient", "friction_pressure_slope", "friction_floor")
+    )
     if len(way) and not rubs and np.all(way == way[0]) and way[0] != 0:
         word = "contracting" if way[0] < 0 else "lengthening"
         return [f"all rows are {word}: friction cannot be told and is in the moduli"]
@@ -213,11 +253,17 @@ def _loops(problem: Problem, found: Estimate, rows: Mask) -> list[str]:
     side, residual = way * np.abs(force), found.residual / problem.weight[rows]
     share = float(side @ residual) / float(side @ side)
     rest = residual - share * side
-    if abs(share) <= _LOOP * math.sqrt(float(rest @ rest) / (max(len(rest) - 1, 1) * float(side @ side))):
+    if abs(share) <= _LOOP * math.sqrt(
+        float(rest @ rest) / (max(len(rest) - 1, 1) * float(side @ side))
+    ):
         return []
     if share < 0.0:
-        return [f"the forces while lengthening lie {-200 * share:.2g} % below those while contracting: are the directions exchanged?"]
+        return [
+            f"the forces while lengthening lie {-200 * share:.2g} % below those while contracting: "
+            "are the directions exchanged?"
+        ]
     return [
-        f"the forces while lengthening and contracting differ by +- {100 * share:.2g} %, and the muscle has no friction: fit it first, "
-        "fit_friction(data).to_muscle(muscle) (--friction fit)"
+        f"the forces while lengthening and contracting differ by +- {100 * share:.2g} %, and the "
+        "muscle has no friction: fit it first, fit_friction(data).to_muscle(muscle) (--friction "
+        "fit)"
     ]

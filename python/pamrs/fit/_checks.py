@@ -1,7 +1,7 @@
 """Checks of a force map as a whole: columns in another unit, pressures that are absolute.
 
-Units are named only where the factor between two of them explains what was found; where several columns
-can be to blame, all are named.
+Units are named only where the factor between two of them explains what was found; where several
+columns can be to blame, all are named.
 """
 
 from __future__ import annotations
@@ -15,7 +15,14 @@ from numpy.typing import NDArray
 from pamrs.errors import RecordingError
 from pamrs.units import parse_unit
 
-__all__ = ["FORCE_HIGH", "PRESSURE_HIGH", "absolute_pressures", "check_forces", "check_units", "reachable"]
+__all__ = [
+    "FORCE_HIGH",
+    "PRESSURE_HIGH",
+    "absolute_pressures",
+    "check_forces",
+    "check_units",
+    "reachable",
+]
 
 Array = NDArray[np.float64]
 
@@ -47,10 +54,14 @@ def reachable(length: Array, rest: float) -> NDArray[np.bool_]:
     return ~((ratio < _LENGTH_LOW) | (ratio > _LENGTH_HIGH))
 
 
-def _slips(quantity: str, low: float, high: float, units: Mapping[str, str]) -> list[tuple[str, str, float]]:
-    """(unit, read as, factor) of the mistakes that make values too large by a factor from ``low`` to ``high``.
+def _slips(
+    quantity: str, low: float, high: float, units: Mapping[str, str]
+) -> list[tuple[str, str, float]]:
+    """(unit, read as, factor) of the mistakes that make values too large by a factor from ``low``
+    to ``high``.
 
-    ``units`` says what the columns were read as. Where it does not, only mistakes with the SI unit count.
+    ``units`` says what the columns were read as. Where it does not, only mistakes with the SI unit
+    count.
     """
     known = _UNITS[quantity]
     found = []
@@ -67,8 +78,11 @@ def _words(slips: list[tuple[str, str, float]]) -> str:
     return " or ".join(f"in {unit}, read as {read_as}" for unit, read_as, _ in slips)
 
 
-def check_units(label: str, length: Array, pressure: Array, rest: float, units: Mapping[str, str]) -> None:
-    """Refuse lengths and pressures that as a whole are in another unit; single stray rows are flagged elsewhere.
+def check_units(
+    label: str, length: Array, pressure: Array, rest: float, units: Mapping[str, str]
+) -> None:
+    """Refuse lengths and pressures that as a whole are in another unit; single stray rows are
+    flagged elsewhere.
 
     Parameters
     ----------
@@ -109,11 +123,19 @@ def check_units(label: str, length: Array, pressure: Array, rest: float, units: 
     slips = _slips("length", factor / _LONGEST[1], factor / _LONGEST[0], units)
     if slips:
         times = slips[0][2]
-        wrong = f"{times:.4g} times too small" if times > 1.0 else f"{1.0 / times:.4g} times too large"
+        wrong = (
+            f"{times:.4g} times too small" if times > 1.0 else f"{1.0 / times:.4g} times too large"
+        )
         advice = f"Either rest_length is {wrong}, or the length column is {_words(slips)}"
     else:
-        advice = f"They differ by a factor of {max(factor, 1.0 / max(factor, 1e-12)):.3g}: check rest_length and the length column"
-    raise RecordingError(f"{label}: lengths up to {longest:.4g} m do not go with rest_length = {rest:g} m: wrong unit? {advice}")
+        advice = (
+            f"They differ by a factor of {max(factor, 1.0 / max(factor, 1e-12)):.3g}: check "
+            "rest_length and the length column"
+        )
+    raise RecordingError(
+        f"{label}: lengths up to {longest:.4g} m do not go with rest_length = {rest:g} m: wrong "
+        f"unit? {advice}"
+    )
 
 
 def _column_words(name: str, slips: list[tuple[str, str, float]]) -> str:
@@ -137,8 +159,8 @@ def check_forces(label: str, largest: float, able: float, units: Mapping[str, st
     Raises
     ------
     RecordingError
-        If the forces are beyond three times or below a hundredth of it. The forces, the pressures or the muscle's
-        sizes may be to blame: all are named.
+        If the forces are beyond three times or below a hundredth of it. The forces, the pressures
+        or the muscle's sizes may be to blame: all are named.
     """
     if able <= 0.0 or _FORCE_LOW * able <= largest <= FORCE_HIGH * able:
         return
@@ -163,11 +185,14 @@ def check_forces(label: str, largest: float, able: float, units: Mapping[str, st
     )
 
 
-def absolute_pressures(pressure: Array, contraction: Array, force: Array, level: NDArray[np.intp]) -> list[str]:
-    """A note if the forces vanish near ambient pressure, as they do when the pressures are absolute.
+def absolute_pressures(
+    pressure: Array, contraction: Array, force: Array, level: NDArray[np.intp]
+) -> list[str]:
+    """A note if the forces vanish near ambient pressure, as they do when the pressures are
+    absolute.
 
-    At the longest lengths, where the rubber is hardly strained, a line through force over pressure is zero near zero
-    gauge pressure, or at what it takes to lift the bladder against the braid.
+    At the longest lengths, where the rubber is hardly strained, a line through force over pressure
+    is zero near zero gauge pressure, or at what it takes to lift the bladder against the braid.
 
     Parameters
     ----------
@@ -179,8 +204,9 @@ def absolute_pressures(pressure: Array, contraction: Array, force: Array, level:
     Returns
     -------
     list of str
-        Empty where nothing is to say, or the rows cannot tell: no length near the rest length, fewer than four levels
-        there, a pressure well below ambient, or a standard error beyond 5 kPa.
+        Empty where nothing is to say, or the rows cannot tell: no length near the rest length,
+        fewer than four levels there, a pressure well below ambient, or a standard error beyond 5
+        kPa.
     """
     near = contraction >= -_NEAR_REST
     if float(np.min(pressure)) < _AMBIENT[0] or not near.any():
@@ -200,6 +226,6 @@ def absolute_pressures(pressure: Array, contraction: Array, force: Array, level:
     if not (_AMBIENT[0] <= vanish <= _AMBIENT[1] and error <= _SURE):
         return []
     return [
-        f"forces vanish near {vanish / 1e3:.3g} kPa at the longest lengths: are the pressures absolute? "
-        "gauge pressures are needed (subtract the ambient pressure)"
+        f"forces vanish near {vanish / 1e3:.3g} kPa at the longest lengths: are the pressures "
+        "absolute? gauge pressures are needed (subtract the ambient pressure)"
     ]

@@ -35,17 +35,19 @@ class ModelComparison:
     Attributes
     ----------
     rows : list of dict
-        One entry a candidate, best first, those that could not be ranked last. Errors are fractions of the map's largest force.
+        One entry a candidate, best first, those that could not be ranked last. Errors are fractions
+        of the map's largest force.
 
         ``model``, ``order``, ``geometry``, ``free`` (list), ``nvarys``, ``condition_number``;
-        ``rank``: 1 is best, None when the data do not determine the candidate, with ``reason`` in words;
-        ``rms``, ``max``: all levels fitted; ``lopo_rms``, ``lopo_max``, ``lopo_stderr``: leave-one-pressure-out over all points,
-        ``lopo_interior_rms``, ``lopo_end_rms``: levels between others, and the two outer levels;
-        ``lopo_excess``, ``lopo_excess_stderr``: squared leave-one-pressure-out error of a level beyond that of the first rank, mean
-        over the levels and its standard error, in squares of the map's largest force;
-        ``aicc``, ``bic``: with the effective sample size, ``aicc`` None when that is too small for the number of unknowns;
-        ``subset_rms``, ``subset_max``: fitted to the chosen levels only, error on the others, with ``subset_reason`` when impossible;
-        ``recommended``: True for one candidate.
+        ``rank``: 1 is best, None when the data do not determine the candidate, with ``reason`` in
+        words; ``rms``, ``max``: all levels fitted; ``lopo_rms``, ``lopo_max``, ``lopo_stderr``:
+        leave-one-pressure-out over all points, ``lopo_interior_rms``, ``lopo_end_rms``: levels
+        between others, and the two outer levels; ``lopo_excess``, ``lopo_excess_stderr``: squared
+        leave-one-pressure-out error of a level beyond that of the first rank, mean over the levels
+        and its standard error, in squares of the map's largest force; ``aicc``, ``bic``: with the
+        effective sample size, ``aicc`` None when that is too small for the number of unknowns;
+        ``subset_rms``, ``subset_max``: fitted to the chosen levels only, error on the others, with
+        ``subset_reason`` when impossible; ``recommended``: True for one candidate.
     fits : dict of (model, order) to MuscleFit
         The fits of all levels.
     effective_size : float
@@ -72,7 +74,9 @@ class ModelComparison:
 
     @property
     def recommended(self) -> MuscleFit:
-        """The fit with the fewest unknowns of those that predict no worse than the best, see :func:`compare_models`."""
+        """The fit with the fewest unknowns of those that predict no worse than the best, see
+        :func:`compare_models`.
+        """
         return self._fit(next(row for row in self.rows if row["recommended"]))
 
     def _fit(self, row: Mapping[str, Any]) -> MuscleFit:
@@ -84,13 +88,25 @@ class ModelComparison:
 
     def to_text(self) -> str:
         """The comparison as a table; errors in percent of the largest force."""
-        head = f"{'rank':>4}  {'model':15} {'M':>2} {'k':>3} {'rms':>6} {'max':>6} | {'LOPO rms':>8} {'max':>6} {'ends':>6}"
-        head += f" | {'AICc':>7} {'BIC':>7}" + (f" | {'subset':>7} {'max':>6}" if self.subset else "")
+        head = (
+            f"{'rank':>4}  {'model':15} {'M':>2} {'k':>3} {'rms':>6} {'max':>6} | {'LOPO rms':>8} "
+            f"{'max':>6} {'ends':>6}"
+        )
+        head += f" | {'AICc':>7} {'BIC':>7}" + (
+            f" | {'subset':>7} {'max':>6}" if self.subset else ""
+        )
         lines = [
-            f"{self.ndata} points, effectively {self.effective_size:.3g} independent, the number that AICc and BIC here count",
+            (
+                f"{self.ndata} points, effectively {self.effective_size:.3g} independent, the "
+                "number that AICc and BIC here count"
+            ),
             "errors in % of the map's largest force; k unknowns",
             *(
-                ["subset: fitted to " + ", ".join(f"{p / 1e3:g}" for p in self.subset) + " kPa, error on the other levels"]
+                [
+                    "subset: fitted to "
+                    + ", ".join(f"{p / 1e3:g}" for p in self.subset)
+                    + " kPa, error on the other levels"
+                ]
                 if self.subset
                 else []
             ),
@@ -98,8 +114,14 @@ class ModelComparison:
         ]
         lines += [self._line(row) for row in self.rows]
         lines += [
-            "* fewest unknowns among those that predict pressures left out (LOPO) no worse than rank 1:",
-            f"  the excess of their squared errors, level by level, is within one standard error, their rms within {_NEAR:g} times",
+            (
+                "* fewest unknowns among those that predict pressures left out (LOPO) no worse "
+                "than rank 1:"
+            ),
+            (
+                "  the excess of their squared errors, level by level, is within one standard "
+                f"error, their rms within {_NEAR:g} times"
+            ),
         ]
         lines += [f"note: {note}" for note in self.notes]
         return "\n".join(lines) + "\n"
@@ -115,14 +137,22 @@ class ModelComparison:
         start = f"{place:>4}  {row['model']:15} {row['order'] or '':>2} {row['nvarys']:3d} "
         if row["rank"] is None:
             return start + f"not ranked: {row['reason']}"
-        line = start + f"{share('rms', 6)} {share('max', 6)} | {share('lopo_rms', 8)} {share('lopo_max', 6)} {share('lopo_end_rms', 6)}"
+        line = start + (
+            f"{share('rms', 6)} {share('max', 6)} | {share('lopo_rms', 8)} "
+            f"{share('lopo_max', 6)} {share('lopo_end_rms', 6)}"
+        )
         line += f" | {number('aicc')} {number('bic')}"
-        return line + (f" | {share('subset_rms', 7)} {share('subset_max', 6)}" if self.subset else "")
+        return line + (
+            f" | {share('subset_rms', 7)} {share('subset_max', 6)}" if self.subset else ""
+        )
 
     def __repr__(self) -> str:
         ranked = sum(row["rank"] is not None for row in self.rows)
         first = self.rows[0]
-        return f"ModelComparison({ranked} of {len(self.rows)} ranked, best {first['model']} {first['order'] or ''})"
+        return (
+            f"ModelComparison({ranked} of {len(self.rows)} ranked, best {first['model']} "
+            f"{first['order'] or ''})"
+        )
 
 
 def compare_models(
@@ -140,30 +170,35 @@ def compare_models(
 ) -> ModelComparison:
     """Fit every model and order, and rank them by leave-one-pressure-out error.
 
-    The ranking asks what a fit is for: pressures that were not measured. AICc and BIC stand beside it, computed with the
-    number of effectively independent points, since residuals of a quasi-static map are smooth model error and counting every
-    point would favour many unknowns. That number is ``n (1 - r_e)/(1 + r_e) (1 - r_P)/(1 + r_P)`` with the correlation of
-    neighbouring residuals along contraction and along pressure (negative ones count as 0), of the best-ranked candidate, and
-    at least the number of pressure levels.
+    The ranking asks what a fit is for: pressures that were not measured. AICc and BIC stand beside
+    it, computed with the number of effectively independent points, since residuals of a
+    quasi-static map are smooth model error and counting every point would favour many unknowns.
+    That number is ``n (1 - r_e)/(1 + r_e) (1 - r_P)/(1 + r_P)`` with the correlation of
+    neighbouring residuals along contraction and along pressure (negative ones count as 0), of the
+    best-ranked candidate, and at least the number of pressure levels.
 
-    Recommended is the candidate with the fewest unknowns among those that predict no worse than the first rank: the squared
-    errors of each level left out are subtracted level by level, and the mean of these differences may be one standard error at
-    most. Differences of pairs do not know the scatter that all candidates share, such as hysteresis or noise.
+    Recommended is the candidate with the fewest unknowns among those that predict no worse than the
+    first rank: the squared errors of each level left out are subtracted level by level, and the
+    mean of these differences may be one standard error at most. Differences of pairs do not know
+    the scatter that all candidates share, such as hysteresis or noise.
 
     Parameters
     ----------
     data : ForceMap
         Measured forces.
     muscle : Muscle
-        Nominal muscle; its friction is that of every candidate. :meth:`pamrs.fit.FrictionFit.to_muscle` gives it that of the loops.
+        Nominal muscle; its friction is that of every candidate.
+        :meth:`pamrs.fit.FrictionFit.to_muscle` gives it that of the loops.
     models : iterable of str, optional
         Models to compare; all by default.
     orders : iterable of int
         Orders of the models with a stress polynomial.
     free, tolerance
-        Geometry to fit and what is known, as in :func:`pamrs.fit.fit_muscle`; what a model does not have is left out for that model.
+        Geometry to fit and what is known, as in :func:`pamrs.fit.fit_muscle`; what a model does not
+        have is left out for that model.
     levels : sequence of int or float, optional
-        Indices or pressures of a few levels: every candidate is also fitted to these alone and its error on the others shown.
+        Indices or pressures of a few levels: every candidate is also fitted to these alone and its
+        error on the others shown.
     weights, direction, noise
         As in :func:`pamrs.fit.fit_muscle`.
 
@@ -184,59 +219,124 @@ def compare_models(
     unknown = [name for name in chosen if name not in MODELS]
     if unknown or not chosen:
         raise ParameterError(f"models = {chosen} is not allowed: of {', '.join(MODELS)}")
-    pairs = [(name, order) for name in chosen for order in (wanted if name in POLYNOMIAL_MODELS else [None])]
+    pairs = [
+        (name, order)
+        for name in chosen
+        for order in (wanted if name in POLYNOMIAL_MODELS else [None])
+    ]
     if not pairs:
-        raise ParameterError("orders is empty: the models with a stress polynomial need one order at least")
+        raise ParameterError(
+            "orders is empty: the models with a stress polynomial need one order at least"
+        )
+    rows: list[dict[str, Any]] = []
     fits: dict[tuple[str, int | None], MuscleFit] = {}
-    rows, names = [], tuple(free)
+    names = tuple(free)
+    shared = {"weights": weights, "direction": direction, "noise": noise}
     for name, order in pairs:
         blank = template(muscle, name, None if name != muscle.model else muscle.geometry, order)
         used = tuple(item for item in names if has_effect(item, name, blank.geometry))
-        spread = {key: value for key, value in (tolerance or {}).items() if key not in COEFFICIENTS or key in ELASTIC_PARAMETERS[name]}
-        settings: dict[str, Any] = {"model": name, "order": order, "free": used, "tolerance": spread, "weights": weights}
-        row, fit = _candidate(data, muscle, {**settings, "direction": direction, "noise": noise}, levels)
+        spread = _of_model(tolerance or {}, name)
+        settings = {"model": name, "order": order, "free": used, "tolerance": spread, **shared}
+        row, fit = _candidate(data, muscle, settings, levels)
         rows.append({**row, "geometry": blank.geometry, "free": list(used)})
         if fit is not None:
             fits[name, order] = fit
-    ranked = sorted((row for row in rows if row["reason"] is None), key=lambda row: (row["lopo_rms"], row["nvarys"]))
+    ranked, size = _ranked(rows, fits)
+    subset = [] if levels is None else [float(data.levels[i]) for i in level_indices(data, levels)]
+    rows = ranked + [row for row in rows if row["reason"] is not None]
+    count = int(data.used.sum())
+    return ModelComparison(rows, fits, size, count, subset, _loops(data, muscle, direction))
+
+
+def _of_model(tolerance: Mapping[str, float], model: str) -> dict[str, float]:
+    """What is known of the geometry, and of those coefficients that a model has."""
+    foreign = set(COEFFICIENTS) - set(ELASTIC_PARAMETERS[model])
+    return {key: value for key, value in tolerance.items() if key not in foreign}
+
+
+def _ranked(
+    rows: list[dict[str, Any]], fits: Mapping[tuple[str, int | None], MuscleFit]
+) -> tuple[list[dict[str, Any]], float]:
+    """The candidates by rank, their criteria written into them, and the number of independent
+    points.
+
+    Raises
+    ------
+    FitError
+        If no candidate was fitted.
+    """
+    ranked = [row for row in rows if row["reason"] is None]
+    ranked.sort(key=lambda row: (row["lopo_rms"], row["nvarys"]))
     if not ranked:
-        raise FitError("the data determine none of the candidates: " + "; ".join(f"{row['model']}: {row['reason']}" for row in rows))
-    size = effective_size(fits[ranked[0]["model"], ranked[0]["order"]])
-    least = _level_squares(fits[ranked[0]["model"], ranked[0]["order"]])
+        reasons = "; ".join(f"{row['model']}: {row['reason']}" for row in rows)
+        raise FitError(f"the data determine none of the candidates: {reasons}")
+    first = fits[ranked[0]["model"], ranked[0]["order"]]
+    size, least = effective_size(first), _level_squares(first)
     for place, row in enumerate(ranked, start=1):
         fit = fits[row["model"], row["order"]]
         _, row["aicc"], row["bic"] = fit.criteria(size)
         row["rank"] = place
         row["lopo_excess"], row["lopo_excess_stderr"] = _paired(_level_squares(fit) - least)
-    near = _NEAR * ranked[0]["lopo_rms"]  # a candidate that fails at one level only has an excess of one standard error, however large
-    eligible = [row for row in ranked if row["lopo_excess"] <= row["lopo_excess_stderr"] and row["lopo_rms"] <= near]
+    # a candidate that fails at one level only has an excess of one standard error, however large
+    near = _NEAR * ranked[0]["lopo_rms"]
+    eligible = [
+        row
+        for row in ranked
+        if row["lopo_excess"] <= row["lopo_excess_stderr"] and row["lopo_rms"] <= near
+    ]
     min(eligible, key=lambda row: (row["nvarys"], row["lopo_rms"]))["recommended"] = True
-    subset = [] if levels is None else [float(data.levels[index]) for index in level_indices(data, levels)]
-    rows = ranked + [row for row in rows if row["reason"] is not None]
-    return ModelComparison(rows, fits, size, int(data.used.sum()), subset, _loops(data, muscle, direction))
+    return ranked, size
 
 
 def _loops(data: ForceMap, muscle: Muscle, direction: str | None) -> tuple[str, ...]:
-    """A note where the rows are loops and the muscle has no friction: only one model then has two branches."""
+    """A note where the rows are loops and the muscle has no friction: only one model then has two
+    branches.
+    """
     way = data.direction[data.used]
-    rubs = any(muscle.parameters[name] for name in ("friction_coefficient", "friction_pressure_slope", "friction_floor"))
+    rubs = any(
+        muscle.parameters[name]
+        for name in ("friction_coefficient", "friction_pressure_slope", "friction_floor")
+    )
     if direction is None or rubs or not (np.any(way < 0) and np.any(way > 0)):
         return ()
     return (
-        "the rows are loops and the muscle has no friction: only elbow_linear has a branch for each direction, which favours it; "
-        "fit friction first, fit_friction(data).to_muscle(muscle)",
+        "the rows are loops and the muscle has no friction: only elbow_linear has a branch for "
+        "each direction, which favours it; fit friction first, "
+        "fit_friction(data).to_muscle(muscle)",
     )
 
 
 _EMPTY: dict[str, Any] = dict.fromkeys(
-    ("rank", "reason", "condition_number", "rms", "max", "lopo_rms", "lopo_max", "lopo_stderr", "lopo_interior_rms", "lopo_end_rms",
-     "lopo_excess", "lopo_excess_stderr", "aicc", "bic", "subset_rms", "subset_max", "subset_reason")
-)  # fmt: skip
+    (
+        ("rank"),
+        ("reason"),
+        ("condition_number"),
+        ("rms"),
+        ("max"),
+        ("lopo_rms"),
+        ("lopo_max"),
+        ("lopo_stderr"),
+        ("lopo_interior_rms"),
+        ("lopo_end_rms"),
+        ("lopo_excess"),
+        ("lopo_excess_stderr"),
+        ("aicc"),
+        ("bic"),
+        ("subset_rms"),
+        ("subset_max"),
+        ("subset_reason"),
+    )
+)
 
 
 def _level_squares(fit: MuscleFit) -> Array:
-    """Sum of squared leave-one-pressure-out errors of each level, in squares of the map's largest force."""
-    return fit.leave_one_pressure_out().level_squares() / float(fit.data.force[fit.data.used].max()) ** 2
+    """Sum of squared leave-one-pressure-out errors of each level, in squares of the map's largest
+    force.
+    """
+    return (
+        fit.leave_one_pressure_out().level_squares()
+        / float(fit.data.force[fit.data.used].max()) ** 2
+    )
 
 
 def _paired(difference: Array) -> tuple[float, float]:
@@ -248,7 +348,13 @@ def _candidate(
     data: ForceMap, muscle: Muscle, settings: dict[str, Any], levels: Sequence[float] | None
 ) -> tuple[dict[str, Any], MuscleFit | None]:
     """One row of the table, and the fit of all levels where there is one."""
-    row = {"model": settings["model"], "order": settings["order"], "nvarys": _unknowns(settings), "recommended": False, **_EMPTY}
+    row = {
+        "model": settings["model"],
+        "order": settings["order"],
+        "nvarys": _unknowns(settings),
+        "recommended": False,
+        **_EMPTY,
+    }
     try:
         fit = fit_muscle(data, muscle, **settings)
         cross = fit.leave_one_pressure_out()
@@ -271,18 +377,23 @@ def _candidate(
             row["subset_reason"] = str(reason)
         else:
             if others is None:
-                raise ParameterError(f"levels = {list(levels)} are all levels of the map: none is left to predict")
+                raise ParameterError(
+                    f"levels = {list(levels)} are all levels of the map: none is left to predict"
+                )
             row["subset_rms"], row["subset_max"] = others
     return row, fit
 
 
 def _unknowns(settings: Mapping[str, Any]) -> int:
     name = settings["model"]
-    return len(settings["free"]) + (2 * settings["order"] if name in POLYNOMIAL_MODELS else len(CONSTANTS[name]))
+    return len(settings["free"]) + (
+        2 * settings["order"] if name in POLYNOMIAL_MODELS else len(CONSTANTS[name])
+    )
 
 
 def effective_size(fit: MuscleFit) -> float:
-    """Number of effectively independent points of a fit, from the correlation of neighbouring residuals.
+    """Number of effectively independent points of a fit, from the correlation of neighbouring
+    residuals.
 
     Parameters
     ----------
@@ -298,7 +409,9 @@ def effective_size(fit: MuscleFit) -> float:
     level, length, way = fit.data.level[rows], fit.data.length[rows], fit.data.direction[rows]
     order = np.lexsort((length, level, way))
     level, length, way, residual = level[order], length[order], way[order], fit.residual[order]
-    same = (level[1:] == level[:-1]) & (way[1:] == way[:-1])  # neighbours on one branch: the branches of a loop lie apart
+    same = (level[1:] == level[:-1]) & (
+        way[1:] == way[:-1]
+    )  # neighbours on one branch: the branches of a loop lie apart
     along = _correlation(residual[1:][same], residual[:-1][same])
     below, above = [np.empty(0)], [np.empty(0)]
     for branch in np.unique(way):

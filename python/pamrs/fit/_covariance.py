@@ -16,7 +16,9 @@ _FEWEST_LEVELS = 5
 
 
 def levels_needed(unknowns: int) -> int:
-    """Fitted levels that the jackknife needs: fewer than the unknowns would leave combinations of them without any spread."""
+    """Fitted levels that the jackknife needs: fewer than the unknowns would leave combinations of
+    them without any spread.
+    """
     return max(_FEWEST_LEVELS, unknowns + 1)
 
 
@@ -35,14 +37,17 @@ def covariances(problem: Problem, result: Estimate, level: Index) -> tuple[Array
     Returns
     -------
     plain : (p, p) array
-        ``sigma^2 (J'J + sigma^2 D)^-1`` with the priors' information ``D``: residuals taken as independent.
+        ``sigma^2 (J'J + sigma^2 D)^-1`` with the priors' information ``D``: residuals taken as
+        independent.
     robust : (p, p) array or None
-        Delete-one-level jackknife (CR3) of the linearised fit plus the priors' own share: it holds when the
-        residuals of one level hang together. None with fewer than 5 levels or no more levels than parameters,
-        or when a level cannot be spared.
+        Delete-one-level jackknife (CR3) of the linearised fit plus the priors' own share: it holds
+        when the residuals of one level hang together. None with fewer than 5 levels or no more
+        levels than parameters, or when a level cannot be spared.
     """
     p = result.jacobian.shape[1]
-    prior = np.concatenate([problem.expected(result.design)[1], [1.0 / free.tolerance for free in problem.free]])
+    prior = np.concatenate(
+        [problem.expected(result.design)[1], [1.0 / free.tolerance for free in problem.free]]
+    )
     jacobian = result.jacobian / result.sigma if result.sigma > 0.0 else result.jacobian
     if p == 0:
         return np.empty((0, 0)), np.empty((0, 0))
@@ -61,7 +66,8 @@ def covariances(problem: Problem, result: Estimate, level: Index) -> tuple[Array
     residual = result.residual / result.sigma
     moves = []
     for group in groups:
-        # In the basis of the singular vectors the information matrix is 1; taking a level away leaves 1 - B'B.
+        # In the basis of the singular vectors the information matrix is 1; taking a level away
+        # leaves 1 - B'B.
         rows = jacobian[level == group] @ root
         left = np.eye(p) - rows.T @ rows
         if np.linalg.eigvalsh(left)[0] < 1e-9:

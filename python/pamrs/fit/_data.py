@@ -14,7 +14,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pamrs.errors import ParameterError, RecordingError
-from pamrs.fit._checks import FORCE_HIGH, PRESSURE_HIGH, absolute_pressures, check_forces, check_units, reachable
+from pamrs.fit._checks import (
+    FORCE_HIGH,
+    PRESSURE_HIGH,
+    absolute_pressures,
+    check_forces,
+    check_units,
+    reachable,
+)
 
 if TYPE_CHECKING:
     from pamrs.rig import Muscle
@@ -57,7 +64,8 @@ class ForceMap:
     Attributes
     ----------
     length, pressure, force : (n,) array
-        Length between the fittings [m], gauge pressure [Pa], pulling force [N] of every row, also of those not used.
+        Length between the fittings [m], gauge pressure [Pa], pulling force [N] of every row, also
+        of those not used.
     rest_length : float
         Length at zero contraction [m].
     direction : (n,) int8 array
@@ -69,7 +77,8 @@ class ForceMap:
     level : (n,) int array
         Index into ``levels``, -1 where the row is not used.
     levels : (m,) array
-        Pressure levels [Pa], ascending: the median of their rows. Every level has at least one used row.
+        Pressure levels [Pa], ascending: the median of their rows. Every level has at least one used
+        row.
     name, source : str
         What to call the map, and where it came from.
     notes : tuple of str
@@ -127,13 +136,15 @@ class ForceMap:
         direction : (n,) array_like, optional
             Negative while contracting, positive while lengthening, 0 or NaN where unknown.
         clipped : float, optional
-            A force that means "off the scale" [N], 0.0 for readings that stop at zero; rows with exactly it are flagged.
+            A force that means "off the scale" [N], 0.0 for readings that stop at zero; rows with
+            exactly it are flagged.
         level_tolerance : float, optional
             Pressures within it are one level [Pa]; by default 2 % of the pressure, at least 3 kPa.
         faulty : (n,) array_like of bool, optional
             Rows that an earlier check of the recording has masked.
         check_duplicates : bool
-            Flag rows that repeat an earlier one exactly; off for time series, where a resting bench repeats itself.
+            Flag rows that repeat an earlier one exactly; off for time series, where a resting bench
+            repeats itself.
         name, source : str
             What to call the map, and where it came from.
         notes : sequence of str
@@ -150,53 +161,68 @@ class ForceMap:
         Raises
         ------
         RecordingError
-            If the columns differ in length, a column looks like the wrong unit, or fewer than two rows are usable.
+            If the columns differ in length, a column looks like the wrong unit, or fewer than two
+            rows are usable.
         ParameterError
             If ``rest_length`` or ``level_tolerance`` is not possible.
         """
         label = name or source or "force map"
-        columns = {"length": _column(length), "pressure": _column(pressure), "force": _column(force)}
+        columns = {
+            "length": _column(length),
+            "pressure": _column(pressure),
+            "force": _column(force),
+        }
         sizes = [len(values) for values in columns.values()]
         if len(set(sizes)) != 1:
-            raise RecordingError(f"{label}: length, pressure and force have {sizes} rows; the same number is needed")
+            raise RecordingError(
+                f"{label}: length, pressure and force have {sizes} rows; the same number is needed"
+            )
         long, gas, pull = columns.values()
         rest = _rest_length(rest_length)
-        if level_tolerance is not None and not (math.isfinite(level_tolerance) and level_tolerance > 0.0):
-            raise ParameterError(f"level_tolerance = {level_tolerance!r} Pa is not allowed: a positive number is needed")
-        n = len(long)
-        reason = np.full(n, "", dtype=object)
-
-        def flag(rows: Mask, why: str) -> None:
-            reason[rows & (reason == "")] = why
-
-        if faulty is not None:
-            flag(np.asarray(faulty, dtype=bool), "sensor fault")
-        finite = np.isfinite(long) & np.isfinite(gas) & np.isfinite(pull)
-        flag(~finite, "not a number")
+        if level_tolerance is not None and not (
+            math.isfinite(level_tolerance) and level_tolerance > 0.0
+        ):
+            raise ParameterError(
+                f"level_tolerance = {level_tolerance!r} Pa is not allowed: a positive number is "
+                "needed"
+            )
         given = dict(units or {})
+        finite = np.isfinite(long) & np.isfinite(gas) & np.isfinite(pull)
         check_units(label, long[finite], gas[finite], rest, given)
-        if clipped is not None:
-            flag(finite & np.isclose(pull, clipped, rtol=1e-9, atol=1e-12), "clipped")
-        flag(finite & (gas < 0.0), "negative pressure")
-        flag(finite & (gas > PRESSURE_HIGH), "pressure out of range")
-        flag(finite & ~reachable(long, rest), "length out of range")
-        way = _directions(direction, n, label)
+        way = _directions(direction, len(long), label)
+        reason = _reasons(long, gas, pull, rest, faulty=faulty, clipped=clipped)
         if check_duplicates:
-            flag(finite & _duplicates(long, gas, pull, way.astype(np.float64)), "duplicate")
+            again = finite & _duplicates(long, gas, pull, way.astype(np.float64))
+            reason[again & (reason == "")] = "duplicate"
         found = list(notes)
         zeros = int(np.sum((reason == "") & (pull == 0.0) & (gas > 0.0)))
         if clipped is None and zeros >= 3:
             hint = "if the reading stops at zero, say so: clipped = 0 (--clipped '0 N')"
-            found.insert(0, f"{zeros} rows have a force of exactly 0 N under pressure and are used; {hint}")
+            found.insert(
+                0, f"{zeros} rows have a force of exactly 0 N under pressure and are used; {hint}"
+            )
         map_ = cls(
-            *(long, gas, pull, rest, way, reason == "", tuple(reason), np.full(n, -1), np.empty(0), name, source, tuple(found)),
+            length=long,
+            pressure=gas,
+            force=pull,
+            rest_length=rest,
+            direction=way,
+            used=reason == "",
+            reason=tuple(reason),
+            level=np.full(len(long), -1),
+            levels=np.empty(0),
+            name=name,
+            source=source,
+            notes=tuple(found),
             row_numbers=None if row_numbers is None else np.asarray(row_numbers, dtype=np.intp),
             units=given,
         )
         map_._check_count()
         map_ = map_._with_levels(level_tolerance)
         pressure, contraction, force, level, _ = map_.used_rows()
-        return replace(map_, notes=(*map_.notes, *absolute_pressures(pressure, contraction, force, level)))
+        return replace(
+            map_, notes=(*map_.notes, *absolute_pressures(pressure, contraction, force, level))
+        )
 
     def _with_levels(self, tolerance: float | None) -> ForceMap:
         """The map with its pressure levels found from the used rows."""
@@ -211,7 +237,9 @@ class ForceMap:
         if not drop.any():
             return self
         used = self.used & ~drop
-        reason = tuple(why if gone else old for gone, old in zip(drop.tolist(), self.reason, strict=True))
+        reason = tuple(
+            why if gone else old for gone, old in zip(drop.tolist(), self.reason, strict=True)
+        )
         kept = np.unique(self.level[used])
         level = np.where(used, np.searchsorted(kept, self.level), -1)
         map_ = replace(self, used=used, reason=reason, level=level, levels=self.levels[kept])
@@ -222,7 +250,10 @@ class ForceMap:
         count = int(self.used.sum())
         if count < 2:
             why = "; ".join(self._counts()) or f"{len(self.length)} rows in all"
-            raise RecordingError(f"{self.label}: {count} usable {'row' if count == 1 else 'rows'}, two at least are needed ({why})")
+            raise RecordingError(
+                f"{self.label}: {count} usable {'row' if count == 1 else 'rows'}, two at least are "
+                f"needed ({why})"
+            )
 
     # ----------------------------------------------------------------- reading
 
@@ -230,7 +261,10 @@ class ForceMap:
         return len(self.length)
 
     def __repr__(self) -> str:
-        return f"ForceMap({self.label!r}, {int(self.used.sum())} of {len(self)} rows used, {len(self.levels)} pressure levels)"
+        return (
+            f"ForceMap({self.label!r}, {int(self.used.sum())} of {len(self)} rows used, "
+            f"{len(self.levels)} pressure levels)"
+        )
 
     @property
     def label(self) -> str:
@@ -239,12 +273,16 @@ class ForceMap:
 
     @property
     def contraction(self) -> Array:
-        """Contraction ratio ``1 - length/rest_length`` of every row [1]; NaN where the length is."""
+        """Contraction ratio ``1 - length/rest_length`` of every row [1]; NaN where the length
+        is.
+        """
         return np.asarray(1.0 - self.length / self.rest_length)
 
     @property
     def issues(self) -> list[str]:
-        """What was found, in words: how many rows are not used, why, and the first of them, then what concerns no single row."""
+        """What was found, in words: how many rows are not used, why, and the first of them, then
+        what concerns no single row.
+        """
         return [*self._counts(), *self.notes]
 
     def _counts(self) -> list[str]:
@@ -252,15 +290,26 @@ class ForceMap:
         for index, why in enumerate(self.reason):
             if why:
                 rows.setdefault(why, []).append(index)
-        return [f"{self._found(why, found)}: not used ({self._places(found)})" for why, found in rows.items()]
+        return [
+            f"{self._found(why, found)}: not used ({self._places(found)})"
+            for why, found in rows.items()
+        ]
 
     def _found(self, why: str, rows: Sequence[int]) -> str:
         one, several, rest = _WORDS.get(why, ("is", "are", why))
-        return f"1 row of {len(self)} {one} {rest}" if len(rows) == 1 else f"{len(rows)} rows of {len(self)} {several} {rest}"
+        return (
+            f"1 row of {len(self)} {one} {rest}"
+            if len(rows) == 1
+            else f"{len(rows)} rows of {len(self)} {several} {rest}"
+        )
 
     def _places(self, rows: Sequence[int]) -> str:
         """The first of some rows, by their number in the file or else by their index."""
-        one, several, numbers = ("index", "indices", rows) if self.row_numbers is None else ("row", "rows", self.row_numbers[rows])
+        one, several, numbers = (
+            ("index", "indices", rows)
+            if self.row_numbers is None
+            else ("row", "rows", self.row_numbers[rows])
+        )
         shown = ", ".join(str(number) for number in numbers[:_SHOWN])
         more = f" and {len(rows) - _SHOWN} more" if len(rows) > _SHOWN else ""
         return f"{one if len(rows) == 1 else several} {shown}{more}"
@@ -273,9 +322,17 @@ class ForceMap:
         return [f"row {self.row_numbers[index]}" for index in used]
 
     def used_rows(self) -> tuple[Array, Array, Array, Index, NDArray[np.int8]]:
-        """Pressure [Pa], contraction [1], force [N], level and direction of the used rows, (k,) arrays."""
+        """Pressure [Pa], contraction [1], force [N], level and direction of the used rows, (k,)
+        arrays.
+        """
         rows = self.used
-        return self.pressure[rows], self.contraction[rows], self.force[rows], self.level[rows], self.direction[rows]
+        return (
+            self.pressure[rows],
+            self.contraction[rows],
+            self.force[rows],
+            self.level[rows],
+            self.direction[rows],
+        )
 
     # --------------------------------------------------------------- narrowing
 
@@ -290,7 +347,8 @@ class ForceMap:
         Returns
         -------
         ForceMap
-            With the same rows; those of other levels get the reason ``"left out"``. Its ``levels`` are the chosen ones.
+            With the same rows; those of other levels get the reason ``"left out"``. Its ``levels``
+            are the chosen ones.
 
         Raises
         ------
@@ -302,7 +360,10 @@ class ForceMap:
         count = len(self.levels)
         strange = [index for index in levels if not -count <= index < count]
         if strange or not len(levels):
-            raise ParameterError(f"levels = {list(levels)} is not allowed: indices from 0 to {count - 1}, one at least")
+            raise ParameterError(
+                f"levels = {list(levels)} is not allowed: indices from 0 to {count - 1}, one at "
+                "least"
+            )
         chosen = np.unique(np.asarray(levels, dtype=np.intp) % count)
         return self._without(~np.isin(self.level, chosen), LEFT_OUT)
 
@@ -329,7 +390,10 @@ class ForceMap:
             nearest = int(np.argmin(np.abs(self.levels - pressure)))
             if not abs(self.levels[nearest] - pressure) <= max(0.05 * abs(pressure), 5e3):
                 have = ", ".join(f"{level / 1e3:g}" for level in self.levels)
-                raise ParameterError(f"levels: no measurement at {pressure / 1e3:g} kPa; there are levels at {have} kPa")
+                raise ParameterError(
+                    f"levels: no measurement at {pressure / 1e3:g} kPa; there are levels at {have} "
+                    "kPa"
+                )
             found.add(nearest)
         return sorted(found)
 
@@ -344,20 +408,24 @@ class ForceMap:
         Returns
         -------
         ForceMap
-            Rows outside the braid's limits are flagged ``"beyond the braid"``, those at lengths for which the geometry has no
-            solution ``"no solution"``, and single ones beyond three times what the gas could do ``"force out of range"``.
+            Rows outside the braid's limits are flagged ``"beyond the braid"``, those at lengths for
+            which the geometry has no solution ``"no solution"``, and single ones beyond three times
+            what the gas could do ``"force out of range"``.
 
         Raises
         ------
         ParameterError
             If the muscle's rest length differs from the map's.
         RecordingError
-            If the forces are beyond three times or below a hundredth of what the gas could do (a wrong unit), or fewer
-            than two rows are left.
+            If the forces are beyond three times or below a hundredth of what the gas could do (a
+            wrong unit), or fewer than two rows are left.
         """
         rest = float(muscle.parameters["rest_length"])
         if not math.isclose(rest, self.rest_length, rel_tol=1e-6):
-            raise ParameterError(f"rest_length: the muscle has {rest:g} m, the force map {self.rest_length:g} m; the same is needed")
+            raise ParameterError(
+                f"rest_length: the muscle has {rest:g} m, the force map {self.rest_length:g} m; "
+                "the same is needed"
+            )
         low, high = muscle.contraction_limits
         e = self.contraction
         map_ = self._without(self.used & ~((e >= low) & (e <= high)), "beyond the braid")
@@ -368,7 +436,9 @@ class ForceMap:
         check_forces(self.label, float(np.quantile(pull, _MOST)), able, self.units)
         if able <= 0.0:  # no pressure, or no pull of the gas: nothing to judge by
             return map_
-        return map_._without(map_.used & (np.abs(self.force) > FORCE_HIGH * able), "force out of range")
+        return map_._without(
+            map_.used & (np.abs(self.force) > FORCE_HIGH * able), "force out of range"
+        )
 
 
 # ------------------------------------------------------------------------- checks
@@ -398,8 +468,37 @@ def _rest_length(value: float) -> float:
     rest = float(value)
     if not (math.isfinite(rest) and _REST_LOW <= rest <= _REST_HIGH):
         hint = "; in mm, probably" if 10.0 < rest < 1e4 else ""
-        raise ParameterError(f"rest_length = {rest:g} m is not allowed: from {_REST_LOW:g} to {_REST_HIGH:g} m{hint}")
+        raise ParameterError(
+            f"rest_length = {rest:g} m is not allowed: from {_REST_LOW:g} to {_REST_HIGH:g} m{hint}"
+        )
     return rest
+
+
+def _reasons(
+    length: Array,
+    pressure: Array,
+    force: Array,
+    rest: float,
+    *,
+    faulty: ArrayLike | None,
+    clipped: float | None,
+) -> NDArray[np.object_]:
+    """Why each row by itself is not used, ``""`` where it is; the first reason that applies."""
+    reason = np.full(len(length), "", dtype=object)
+
+    def flag(rows: Mask, why: str) -> None:
+        reason[rows & (reason == "")] = why
+
+    if faulty is not None:
+        flag(np.asarray(faulty, dtype=bool), "sensor fault")
+    finite = np.isfinite(length) & np.isfinite(pressure) & np.isfinite(force)
+    flag(~finite, "not a number")
+    if clipped is not None:
+        flag(finite & np.isclose(force, clipped, rtol=1e-9, atol=1e-12), "clipped")
+    flag(finite & (pressure < 0.0), "negative pressure")
+    flag(finite & (pressure > PRESSURE_HIGH), "pressure out of range")
+    flag(finite & ~reachable(length, rest), "length out of range")
+    return reason
 
 
 def _directions(direction: ArrayLike | None, n: int, label: str) -> NDArray[np.int8]:
@@ -407,7 +506,9 @@ def _directions(direction: ArrayLike | None, n: int, label: str) -> NDArray[np.i
         return np.zeros(n, dtype=np.int8)
     given = np.asarray(direction, dtype=np.float64).ravel()
     if len(given) != n:
-        raise RecordingError(f"{label}: direction has {len(given)} rows, length has {n}; the same is needed")
+        raise RecordingError(
+            f"{label}: direction has {len(given)} rows, length has {n}; the same is needed"
+        )
     return np.asarray(np.sign(np.nan_to_num(given, nan=0.0)), dtype=np.int8)
 
 
@@ -428,11 +529,16 @@ def _cluster(pressure: Array, tolerance: float | None) -> tuple[Index, Array, li
     """
 
     def width(at: float) -> float:
-        return tolerance if tolerance is not None else max(_LEVEL_ABSOLUTE, _LEVEL_RELATIVE * abs(at))
+        return (
+            tolerance if tolerance is not None else max(_LEVEL_ABSOLUTE, _LEVEL_RELATIVE * abs(at))
+        )
 
     order = np.argsort(pressure, kind="stable")
     ranked = pressure[order].tolist()
-    starts = [0, *(i for i in range(1, len(ranked)) if ranked[i] - ranked[i - 1] > width(ranked[i - 1]))]
+    starts = [
+        0,
+        *(i for i in range(1, len(ranked)) if ranked[i] - ranked[i - 1] > width(ranked[i - 1])),
+    ]
     edges: list[int] = []
     note: list[str] = []
     for start, stop in zip(starts, [*starts[1:], len(ranked)], strict=True):
@@ -442,8 +548,8 @@ def _cluster(pressure: Array, tolerance: float | None) -> tuple[Index, Array, li
                 if ranked[i] - ranked[edges[-1]] > width(ranked[edges[-1]]):
                     edges.append(i)
             note.append(
-                f"pressures from {ranked[start] / 1e3:.4g} to {ranked[stop - 1] / 1e3:.4g} kPa have no gaps: "
-                f"cut into {len([e for e in edges if e >= start])} levels"
+                f"pressures from {ranked[start] / 1e3:.4g} to {ranked[stop - 1] / 1e3:.4g} kPa "
+                f"have no gaps: cut into {len([e for e in edges if e >= start])} levels"
             )
     rank = np.zeros(len(ranked), dtype=np.intp)
     rank[edges[1:]] = 1

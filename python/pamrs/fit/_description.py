@@ -32,7 +32,8 @@ _TOP: Final = (
 )
 
 
-#: Moduli of a muscle whose moduli a fit is to find, in the order that it takes unless told otherwise.
+#: Moduli of a muscle whose moduli a fit is to find, in the order that it takes unless told
+#: otherwise.
 NO_MODULI: Final = (0.0, 0.0, 0.0, 0.0)
 _ZEROS: Final[dict[str, Any]] = {
     "modulus_slope": {"value": list(NO_MODULI), "unit": "1"},
@@ -91,7 +92,10 @@ def read_description(file: Path) -> Description:
     reader.unknown_keys("", document, _TOP)
     if document.get("schema") != SCHEMA:
         reader.problem(f"schema = {document.get('schema')!r} is not allowed: {SCHEMA!r} is needed")
-    texts = {key: _text(reader, document, key) for key in ("name", "description", "source", "file", "delimiter", "decimal")}
+    texts = {
+        key: _text(reader, document, key)
+        for key in ("name", "description", "source", "file", "delimiter", "decimal")
+    }
     if "file" not in document:
         reader.problem("file is missing: the table with the measurements")
     maps = {key: _text_table(reader, document, key) for key in ("columns", "where")}
@@ -105,13 +109,17 @@ def read_description(file: Path) -> Description:
         if not reader.problems:
             reader.problems += muscle_problems("muscle", model)
     else:
-        reader.problem("the block [muscle] is missing: the geometry of the muscle, as in a rig file")
+        reader.problem(
+            "the block [muscle] is missing: the geometry of the muscle, as in a rig file"
+        )
     if reader.problems:
         raise RecordingError(joined(str(file), reader.problems))
     table = Path(os.path.normpath(file.parent / texts["file"]))
     if not table.exists():
         advice = texts["source"] or "correct file in the description"
-        raise RecordingError(f"{file}: file = {texts['file']!r}: there is no file {table}; {advice}")
+        raise RecordingError(
+            f"{file}: file = {texts['file']!r}: there is no file {table}; {advice}"
+        )
     options = {
         "rest_length": model["rest_length"],
         "columns": maps["columns"],
@@ -127,8 +135,17 @@ def read_description(file: Path) -> Description:
 
 
 def with_moduli(block: Mapping[str, Any]) -> dict[str, Any]:
-    """A ``[muscle]`` block with zeros where it leaves out the moduli of its model, which a fit is to find."""
-    return {**{key: value for key, value in _ZEROS.items() if str(block.get("model", "robinson")) in models_with(key)}, **block}
+    """A ``[muscle]`` block with zeros where it leaves out the moduli of its model, which a fit is
+    to find.
+    """
+    return {
+        **{
+            key: value
+            for key, value in _ZEROS.items()
+            if str(block.get("model", "robinson")) in models_with(key)
+        },
+        **block,
+    }
 
 
 def _document(file: Path) -> dict[str, Any]:
@@ -152,7 +169,9 @@ def _text(reader: Reader, document: Mapping[str, Any], key: str) -> str:
 
 def _text_table(reader: Reader, document: Mapping[str, Any], key: str) -> dict[str, str]:
     table = document.get(key, {})
-    if isinstance(table, Mapping) and all(isinstance(value, (str, int, float)) for value in table.values()):
+    if isinstance(table, Mapping) and all(
+        isinstance(value, (str, int, float)) for value in table.values()
+    ):
         return {str(name): str(value) for name, value in table.items()}
     reader.problem(f"{key} = {table!r} is not allowed: a table of texts is needed")
     return {}
@@ -163,7 +182,11 @@ def _quantity(reader: Reader, document: Mapping[str, Any], key: str, unit: str) 
     raw = document.get(key)
     if raw is None:
         return None
-    if not isinstance(raw, Mapping) or set(raw) != {"value", "unit"} or not isinstance(raw["unit"], str):
+    if (
+        not isinstance(raw, Mapping)
+        or set(raw) != {"value", "unit"}
+        or not isinstance(raw["unit"], str)
+    ):
         reader.problem(f"{key} = {raw!r} is not allowed: write {{ value = ..., unit = {unit!r} }}")
         return None
     return reader.scalar(key, unit, raw["value"], raw["unit"], -1e9, 1e9)

@@ -1,8 +1,9 @@
 """The force of every model as a linear form: gas force plus columns times coefficients.
 
-``F(P, e) = P gas_area(e) + sum_jk w_j(P) x_jk basis_k(e)``: for moduli linear in pressure the weights ``w`` are
-``(P, 1)`` and ``x`` the slopes ``m_k`` and offsets ``b_k``; for constant coefficients there is one weight, 1; for
-moduli free at each level the weights are hat functions over the levels, that is linear interpolation.
+``F(P, e) = P gas_area(e) + sum_jk w_j(P) x_jk basis_k(e)``: for moduli linear in pressure the
+weights ``w`` are ``(P, 1)`` and ``x`` the slopes ``m_k`` and offsets ``b_k``; for constant
+coefficients there is one weight, 1; for moduli free at each level the weights are hat functions
+over the levels, that is linear interpolation.
 """
 
 from __future__ import annotations
@@ -45,7 +46,8 @@ def template(muscle: Muscle, model: str | None, geometry: str | None, order: int
     model, geometry : str, optional
         None keeps the muscle's own; another model comes with its own geometry unless one is named.
     order : int, optional
-        Order M of the stress polynomial; None takes the number of moduli that the muscle has, else 4.
+        Order M of the stress polynomial; None takes the number of moduli that the muscle has,
+        else 4.
 
     Returns
     -------
@@ -66,11 +68,20 @@ def template(muscle: Muscle, model: str | None, geometry: str | None, order: int
         given = muscle.parameters
         own = max(len(given["modulus_slope"]), len(given["modulus_offset"]))
         terms = (own or _DEFAULT_ORDER) if order is None else order
-        if isinstance(terms, bool) or not isinstance(terms, (int, np.integer)) or not 1 <= terms <= _LARGEST_ORDER:
-            raise ParameterError(f"order = {order!r} is not allowed: a whole number from 1 to {_LARGEST_ORDER}")
+        if (
+            isinstance(terms, bool)
+            or not isinstance(terms, (int, np.integer))
+            or not 1 <= terms <= _LARGEST_ORDER
+        ):
+            raise ParameterError(
+                f"order = {order!r} is not allowed: a whole number from 1 to {_LARGEST_ORDER}"
+            )
         changes |= {"modulus_slope": [0.0] * int(terms), "modulus_offset": [0.0] * int(terms)}
     elif order is not None:
-        raise ParameterError(f"order = {order!r} is not allowed: the model {name} has no stress polynomial; leave order out")
+        raise ParameterError(
+            f"order = {order!r} is not allowed: the model {name} has no stress polynomial; leave "
+            "order out"
+        )
     else:
         changes |= dict.fromkeys(CONSTANTS[name], 0.0)
     return muscle.replace(**changes)
@@ -112,32 +123,48 @@ class Design:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the coefficients: ``m1.. b1..``, the model's own, or ``E1_100kPa`` when free at each level."""
+        """Names of the coefficients: ``m1.. b1..``, the model's own, or ``E1_100kPa`` when free at
+        each level.
+        """
         if self.per_level:
-            return tuple(f"{name}_{level}" for level in _level_names(self.knots) for name in self.base)
+            return tuple(
+                f"{name}_{level}" for level in _level_names(self.knots) for name in self.base
+            )
         if self.polynomial:
             return tuple(f"{letter}{name[1:]}" for letter in "mb" for name in self.base)
         return self.base
 
     @property
     def kinds(self) -> tuple[tuple[tuple[str, int, float], ...], ...]:
-        """What each coefficient is a sum of: parameter of the muscle, place in it, factor; ``("modulus_slope", 0, 1.0)`` for ``m1``."""
+        """What each coefficient is a sum of: parameter of the muscle, place in it, factor;
+        ``("modulus_slope", 0, 1.0)`` for ``m1``.
+        """
         places = range(len(self.base))
         if self.polynomial and self.per_level:
             pressures = self.knots.tolist()
-            return tuple((("modulus_slope", k, p), ("modulus_offset", k, 1.0)) for p in pressures for k in places)
+            return tuple(
+                (("modulus_slope", k, p), ("modulus_offset", k, 1.0))
+                for p in pressures
+                for k in places
+            )
         if self.polynomial:
-            return tuple(((kind, k, 1.0),) for kind in ("modulus_slope", "modulus_offset") for k in places)
+            return tuple(
+                ((kind, k, 1.0),) for kind in ("modulus_slope", "modulus_offset") for k in places
+            )
         groups = len(self.knots) if self.per_level else 1
         return tuple(((name, 0, 1.0),) for _ in range(groups) for name in self.base)
 
     @property
     def units(self) -> tuple[str, ...]:
         """SI units of the coefficients."""
-        return tuple("1" if self.polynomial and name.startswith("m") else "Pa" for name in self.names)
+        return tuple(
+            "1" if self.polynomial and name.startswith("m") else "Pa" for name in self.names
+        )
 
     def weights(self, pressure: Array) -> Array:
-        """``w_j(P)``, shape ``(n, j)``; beyond the outer levels the hat functions continue as straight lines."""
+        """``w_j(P)``, shape ``(n, j)``; beyond the outer levels the hat functions continue as
+        straight lines.
+        """
         ones = np.ones_like(pressure)
         if self.per_level:
             if len(self.knots) == 1:
@@ -151,8 +178,12 @@ class Design:
             return weights
         return np.stack([pressure, ones], axis=1) if self.polynomial else ones[:, None]
 
-    def columns(self, muscle: Muscle, pressure: Array, contraction: Array, direction: Array, weights: Array) -> tuple[Array, Array]:
-        """Gas force (n,) and the columns (n, k) of the coefficients, without friction; all inputs (n,)."""
+    def columns(
+        self, muscle: Muscle, pressure: Array, contraction: Array, direction: Array, weights: Array
+    ) -> tuple[Array, Array]:
+        """Gas force (n,) and the columns (n, k) of the coefficients, without friction; all inputs
+        (n,).
+        """
         gas, basis = _parts(muscle, pressure, contraction, direction)
         return gas, (weights[:, :, None] * basis[:, None, :]).reshape(len(gas), len(self.names))
 
@@ -165,7 +196,8 @@ class Design:
         """The template muscle with the coefficients in it."""
         if self.per_level:
             raise FitError(
-                "moduli that are free at each level make no single muscle: use muscle_at(pressure), or fit with moduli='linear'"
+                "moduli that are free at each level make no single muscle: use "
+                "muscle_at(pressure), or fit with moduli='linear'"
             )
         if self.polynomial:
             slope, offset = x.reshape(2, -1).tolist()
@@ -182,17 +214,27 @@ class Design:
 
 def _level_names(knots: Array) -> list[str]:
     """Pressures like ``343.8kPa``, with as many decimals as tell them apart."""
-    decimals = next(d for d in range(1, 20) if len(set(np.round(knots / 1e3, d).tolist())) == len(knots))
+    decimals = next(
+        d for d in range(1, 20) if len(set(np.round(knots / 1e3, d).tolist())) == len(knots)
+    )
     return [f"{round(pressure / 1e3, decimals):.12g}kPa" for pressure in knots.tolist()]
 
 
-def _parts(muscle: Muscle, pressure: Array, contraction: Array, direction: Array) -> tuple[Array, Array]:
-    """Gas force and elastic basis of a template muscle; the lengthening branch of ``elbow_linear`` has its own."""
+def _parts(
+    muscle: Muscle, pressure: Array, contraction: Array, direction: Array
+) -> tuple[Array, Array]:
+    """Gas force and elastic basis of a template muscle; the lengthening branch of ``elbow_linear``
+    has its own.
+    """
     if muscle.model == "elbow_linear" and np.any(direction > 0):
-        still = muscle.replace(friction_coefficient=0.0, friction_pressure_slope=0.0, friction_floor=0.0)
+        still = muscle.replace(
+            friction_coefficient=0.0, friction_pressure_slope=0.0, friction_floor=0.0
+        )
         way = np.where(direction == 0, -1.0, direction)
         gas = still.force(pressure, contraction, direction=way)
-        loaded = still.replace(bladder_modulus=_UNIT_MODULUS).force(pressure, contraction, direction=way)
+        loaded = still.replace(bladder_modulus=_UNIT_MODULUS).force(
+            pressure, contraction, direction=way
+        )
         return gas, ((loaded - gas) / _UNIT_MODULUS)[:, None]
     # A map repeats its lengths at every level, and the braid solve is what costs.
     distinct, at = np.unique(contraction, return_inverse=True)
@@ -203,5 +245,8 @@ def _parts(muscle: Muscle, pressure: Array, contraction: Array, direction: Array
 def friction_factor(muscle: Muscle, pressure: Array, direction: Array, force: Array) -> Array:
     """``1 + d c_F sign(F)`` of (2.36), the factor between the force without and with friction."""
     given = muscle.parameters
-    c_f = np.maximum(given["friction_coefficient"] + given["friction_pressure_slope"] * pressure, given["friction_floor"])
+    c_f = np.maximum(
+        given["friction_coefficient"] + given["friction_pressure_slope"] * pressure,
+        given["friction_floor"],
+    )
     return np.asarray(1.0 + direction * c_f * np.sign(force))

@@ -11,7 +11,9 @@ from pamrs.recordings.table import split_rows
 
 __all__ = ["decimal_of", "delimiter_of"]
 
-_DELIMITERS: Final = "\t;,| "  # the blank stands for any run of blanks; a decimal comma makes ";" likelier than ","
+_DELIMITERS: Final = (
+    "\t;,| "  # the blank stands for any run of blanks; a decimal comma makes ";" likelier than ","
+)
 _LINES: Final = 500  # of a long table
 _COMMA = re.compile(r"[+-]?(\d+,\d*|,\d+)([eE][+-]?\d+)?")
 _POINT = re.compile(r"[+-]?(\d+\.\d*|\.\d+)([eE][+-]?\d+)?")
@@ -20,7 +22,8 @@ _GIVE: Final = "in the .toml description or to load_force_map"
 
 
 def delimiter_of(text: str, source: str) -> str:
-    """What separates the cells: the mark with which nearly all rows have as many cells as the header, two at least.
+    """What separates the cells: the mark with which nearly all rows have as many cells as the
+    header, two at least.
 
     Parameters
     ----------
@@ -39,11 +42,15 @@ def delimiter_of(text: str, source: str) -> str:
     RecordingError
         If no mark does.
     """
-    numbered = [(number, line) for number, line in enumerate(text.splitlines(), start=1) if line.strip()][:_LINES]
+    numbered = [
+        (number, line) for number, line in enumerate(text.splitlines(), start=1) if line.strip()
+    ][:_LINES]
     if len(numbered) < 2:
         return ","  # there is no table, which the reader says
     numbers, lines = zip(*numbered, strict=True)
-    widths = {mark: [len(row) for row in split_rows("\n".join(lines), mark)] for mark in _DELIMITERS}
+    widths = {
+        mark: [len(row) for row in split_rows("\n".join(lines), mark)] for mark in _DELIMITERS
+    }
     for mark, (header, *rows) in widths.items():
         odd = sum(width != header for width in rows)
         if header > 1 and odd <= max(1, len(rows) // 20) and 2 * odd < len(rows):
@@ -51,11 +58,19 @@ def delimiter_of(text: str, source: str) -> str:
     widest = max(_DELIMITERS.strip(" "), key=lambda mark: widths[mark][0])
     header, *rows = widths[widest]
     if header == 1:
-        what = f"the first row, {lines[0].strip()[:60]!r}, is not parted by tabulators, semicolons or commas"
+        what = (
+            f"the first row, {lines[0].strip()[:60]!r}, is not parted by tabulators, semicolons or "
+            "commas"
+        )
     else:
         row = next(i for i, width in enumerate(rows) if width != header)
-        what = f"with the delimiter {widest!r} the header has {header} cells, row {numbers[row + 1]} has {rows[row]}"
-        what += " (commas cannot both part the cells and mark the decimals)" if widest == "," else ""
+        what = (
+            f"with the delimiter {widest!r} the header has {header} cells, row {numbers[row + 1]} "
+            f"has {rows[row]}"
+        )
+        what += (
+            " (commas cannot both part the cells and mark the decimals)" if widest == "," else ""
+        )
     raise RecordingError(
         f"{source}: cells cannot be told apart: {what}. The first row must hold the headings; "
         f"give delimiter and decimal {_GIVE}, like delimiter = ';' and decimal = ','"
@@ -63,7 +78,8 @@ def delimiter_of(text: str, source: str) -> str:
 
 
 def decimal_of(columns: Iterable[Sequence[str]], source: str) -> str:
-    """Decimal mark of the measured columns: the comma if numbers are written with it, else the point.
+    """Decimal mark of the measured columns: the comma if numbers are written with it, else the
+    point.
 
     Parameters
     ----------
@@ -88,18 +104,22 @@ def decimal_of(columns: Iterable[Sequence[str]], source: str) -> str:
         return "."
     for cell in commas:
         if cell.count(",") + cell.count(".") > 1 and re.fullmatch(r"[+-]?\d[\d.,]*", cell):
-            raise RecordingError(f"{source}: {cell!r} has a mark between thousands: write numbers with the decimal mark only")
+            raise RecordingError(
+                f"{source}: {cell!r} has a mark between thousands: write numbers with the decimal "
+                "mark only"
+            )
     marked = [cell for cell in commas if _COMMA.fullmatch(cell)]
     pointed = [cell for cell in cells if _POINT.fullmatch(cell)]
     if marked and pointed:
         raise RecordingError(
-            f"{source}: {marked[0]!r} and {pointed[0]!r}: which mark is the decimal one? Write all numbers with the same, "
-            f"or give decimal (and delimiter) {_GIVE}"
+            f"{source}: {marked[0]!r} and {pointed[0]!r}: which mark is the decimal one? Write all "
+            f"numbers with the same, or give decimal (and delimiter) {_GIVE}"
         )
     whole = [cell for cell in cells if re.fullmatch(r"[+-]?\d+", cell)]
     if marked and whole and all(_GROUPED.fullmatch(cell) for cell in marked):
         raise RecordingError(
-            f"{source}: {marked[0]!r} beside {whole[0]!r}: does the comma mark decimals or thousands? "
-            f"For decimals give decimal = ',' {_GIVE}; thousands must be written without a mark"
+            f"{source}: {marked[0]!r} beside {whole[0]!r}: does the comma mark decimals or "
+            f"thousands? For decimals give decimal = ',' {_GIVE}; thousands must be written "
+            "without a mark"
         )
     return "," if marked else "."

@@ -1,4 +1,6 @@
-"""The estimate behind every fit: linear coefficients exactly, free geometry around them by variable projection."""
+"""The estimate behind every fit: linear coefficients exactly, free geometry around them by variable
+projection.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +32,9 @@ _NO_TOLERANCE_SCALE = 0.02  # of the nominal value
 
 @dataclass(frozen=True)
 class Free:
-    """A geometry parameter that is fitted: its nominal value, and one standard deviation of what is known of it (infinite: nothing)."""
+    """A geometry parameter that is fitted: its nominal value, and one standard deviation of what is
+    known of it (infinite: nothing).
+    """
 
     name: str
     nominal: float
@@ -39,12 +43,18 @@ class Free:
     @property
     def scale(self) -> float:
         """Step size of the search."""
-        return self.tolerance if math.isfinite(self.tolerance) else _NO_TOLERANCE_SCALE * max(abs(self.nominal), 1e-3)
+        return (
+            self.tolerance
+            if math.isfinite(self.tolerance)
+            else _NO_TOLERANCE_SCALE * max(abs(self.nominal), 1e-3)
+        )
 
 
 @dataclass(frozen=True)
 class Known:
-    """What is known of one kind of coefficient before the fit: its values (zero beyond the last) and one standard deviation."""
+    """What is known of one kind of coefficient before the fit: its values (zero beyond the last)
+    and one standard deviation.
+    """
 
     values: tuple[float, ...]
     tolerance: float
@@ -57,8 +67,9 @@ _UNKNOWN = Known((), math.inf)
 class Problem:
     """Rows of a force map and what is to be fitted to them; all arrays ``(n,)``.
 
-    ``knot`` is the pressure that the moduli see: that of the row, or of its level when moduli are free at each level.
-    ``weight`` multiplies force residuals. ``known`` has the priors of coefficients, by kind; they need a known ``noise``.
+    ``knot`` is the pressure that the moduli see: that of the row, or of its level when moduli are
+    free at each level. ``weight`` multiplies force residuals. ``known`` has the priors of
+    coefficients, by kind; they need a known ``noise``.
     """
 
     blank: Muscle
@@ -86,23 +97,35 @@ class Problem:
     def muscle(self, values: Array) -> Muscle:
         """The template with other geometry values."""
         return (
-            self.blank.replace(**{free.name: float(v) for free, v in zip(self.free, values, strict=True)}) if self.free else self.blank
+            self.blank.replace(
+                **{free.name: float(v) for free, v in zip(self.free, values, strict=True)}
+            )
+            if self.free
+            else self.blank
         )
 
     def system(self, design: Design, muscle: Muscle, rows: Mask) -> tuple[Array, Array]:
         """Weighted design matrix (n, k) and target (n,) of some rows for one geometry."""
         contraction = 1.0 - self.length[rows] / muscle.parameters["rest_length"]
         pressure, direction, force = self.pressure[rows], self.direction[rows], self.force[rows]
-        gas, columns = design.columns(muscle, pressure, contraction, direction, design.weights(self.knot(rows)))
+        gas, columns = design.columns(
+            muscle, pressure, contraction, direction, design.weights(self.knot(rows))
+        )
         factor = friction_factor(muscle, pressure, direction, force)
         weight = self.weight[rows]
         return columns * (factor * weight)[:, None], (force - factor * gas) * weight
 
     def expected(self, design: Design) -> tuple[Array, Array]:
-        """Prior values of the coefficients (k,) and their information ``1/tolerance`` (k,), 0 without a prior."""
+        """Prior values of the coefficients (k,) and their information ``1/tolerance`` (k,), 0
+        without a prior.
+        """
         values, variance = np.zeros(len(design.names)), np.zeros(len(design.names))
         for i, parts in enumerate(design.kinds):
-            for kind, place, factor in parts:  # one, or slope and offset of a modulus at one pressure
+            for (
+                kind,
+                place,
+                factor,
+            ) in parts:  # one, or slope and offset of a modulus at one pressure
                 if factor == 0.0:  # a slope at no pressure
                     continue
                 known = self.known.get(kind, _UNKNOWN)
@@ -111,7 +134,9 @@ class Problem:
         return np.where(np.isfinite(variance), values, 0.0), 1.0 / np.sqrt(variance)
 
     def equations(self, design: Design, muscle: Muscle, rows: Mask) -> tuple[Array, Array]:
-        """:meth:`system`, and below it one equation for each coefficient with a prior, weighted by the noise."""
+        """:meth:`system`, and below it one equation for each coefficient with a prior, weighted by
+        the noise.
+        """
         matrix, target = self.system(design, muscle, rows)
         values, information = self.expected(design)
         prior = np.flatnonzero(information)
@@ -128,10 +153,12 @@ class Problem:
         outside = int(np.sum((self.length > longest) | (self.length < shortest)))
         if outside:
             raise FitError(
-                f"{outside} of {len(self.length)} points have lengths that this geometry cannot reach: the braid allows "
-                f"{shortest:.4g} to {longest:.4g} m, the points span {self.length.min():.4g} to {self.length.max():.4g} m; check "
-                f"rest_length = {rest:g} m and braid_angle = {math.degrees(muscle.parameters['braid_angle']):.4g} deg, or flag the "
-                "rows with data.checked_against(muscle)"
+                f"{outside} of {len(self.length)} points have lengths that this geometry cannot "
+                f"reach: the braid allows {shortest:.4g} to {longest:.4g} m, the points span "
+                f"{self.length.min():.4g} to {self.length.max():.4g} m; check rest_length = "
+                f"{rest:g} m and braid_angle = "
+                f"{math.degrees(muscle.parameters['braid_angle']):.4g} deg, or flag the rows with "
+                "data.checked_against(muscle)"
             )
 
 
@@ -193,7 +220,8 @@ def estimate(problem: Problem, rows: Mask, start: Estimate | None = None) -> Est
     Raises
     ------
     FitError
-        If the rows do not determine the unknowns, or no geometry of the search reaches their lengths.
+        If the rows do not determine the unknowns, or no geometry of the search reaches their
+        lengths.
     """
     design = problem.design(rows)
     _check_counts(problem, design, rows)
@@ -204,7 +232,8 @@ def estimate(problem: Problem, rows: Mask, start: Estimate | None = None) -> Est
         problem.system(design, blank, rows)
     except ParameterError as error:
         raise FitError(
-            f"the nominal geometry does not do at every fitted length: {error}; data.checked_against(muscle) flags such rows"
+            f"the nominal geometry does not do at every fitted length: {error}; "
+            "data.checked_against(muscle) flags such rows"
         ) from error
     if not problem.free:
         return _at(problem, design, rows, blank, nominal, None, "linear least squares", True)
@@ -214,50 +243,78 @@ def estimate(problem: Problem, rows: Mask, start: Estimate | None = None) -> Est
 def _check_counts(problem: Problem, design: Design, rows: Mask) -> None:
     """Name what is missing before the algebra does."""
     n, k = int(rows.sum()), len(design.names)
-    told = int(np.count_nonzero(problem.expected(design)[1]))  # a coefficient with a prior needs no point
-    # A tolerance is an equation of its own, but what it weighs against the data must come from points to spare.
-    extra = sum(math.isinf(free.tolerance) for free in problem.free) if problem.noise is not None else len(problem.free)
+    told = int(
+        np.count_nonzero(problem.expected(design)[1])
+    )  # a coefficient with a prior needs no point
+    # A tolerance is an equation of its own, but what it weighs against the data must come from
+    # points to spare.
+    extra = (
+        sum(math.isinf(free.tolerance) for free in problem.free)
+        if problem.noise is not None
+        else len(problem.free)
+    )
     terms = len(design.base)
     what = f"order {terms}" if design.polynomial else f"the model {problem.blank.model}"
-    unknowns = [*(design.names if k <= 8 else (*design.names[:3], "...", design.names[-1])), *(free.name for free in problem.free)]
+    unknowns = [
+        *(design.names if k <= 8 else (*design.names[:3], "...", design.names[-1])),
+        *(free.name for free in problem.free),
+    ]
     if design.per_level and told < k:
-        counts = {int(level): int(np.sum(rows & (problem.level == level))) for level in np.unique(problem.level[rows])}
-        short = [f"{problem.levels[level] / 1e3:g} kPa ({count})" for level, count in counts.items() if count < terms]
+        counts = {
+            int(level): int(np.sum(rows & (problem.level == level)))
+            for level in np.unique(problem.level[rows])
+        }
+        short = [
+            f"{problem.levels[level] / 1e3:g} kPa ({count})"
+            for level, count in counts.items()
+            if count < terms
+        ]
         if short:
             enough = [level for level, count in counts.items() if count >= terms]
             raise FitError(
-                f"moduli free at each level need {terms} points at every level for {what}; fewer at {', '.join(short)}. "
-                f"Levels with enough: {enough or 'none'}"
+                f"moduli free at each level need {terms} points at every level for {what}; fewer "
+                f"at {', '.join(short)}. Levels with enough: {enough or 'none'}"
             )
     elif design.polynomial and told < k and len(np.unique(problem.level[rows])) < 2:
         only = problem.levels[problem.level[rows][0]] / 1e3
         raise FitError(
-            f"one pressure level only ({only:g} kPa): slopes m_k and offsets b_k are collinear; give two levels at least, "
-            "or moduli='per_level'"
+            f"one pressure level only ({only:g} kPa): slopes m_k and offsets b_k are collinear; "
+            "give two levels at least, or moduli='per_level'"
         )
     needed = k - told + extra + 1
     if n < needed:
         hint = ", or a known noise" if extra and problem.noise is None else ""
         raise FitError(
-            f"{n} usable points, but {what} has {k + len(problem.free)} unknowns ({', '.join(unknowns)}); {needed} points are "
-            f"needed at least{hint}"
+            f"{n} usable points, but {what} has {k + len(problem.free)} unknowns "
+            f"({', '.join(unknowns)}); {needed} points are needed at least{hint}"
         )
     lengths = len(np.unique(np.round(problem.length[rows], 9)))
     if lengths < terms and told < k:
-        raise FitError(f"{lengths} different lengths, but {what} has {terms} functions of length; {terms} different lengths are needed")
+        raise FitError(
+            f"{lengths} different lengths, but {what} has {terms} functions of length; {terms} "
+            "different lengths are needed"
+        )
 
 
 def _hint(problem: Problem, rows: Mask) -> str:
     lengths = np.unique(np.round(problem.length[rows], 9))
     span = (lengths[-1] - lengths[0]) / problem.blank.parameters["rest_length"]
     return (
-        f" ({int(rows.sum())} points, {len(np.unique(problem.level[rows]))} pressure levels, {len(lengths)} lengths over "
-        f"{100 * span:.3g} % of the rest length); take a lower order, or more lengths and pressures"
+        f" ({int(rows.sum())} points, {len(np.unique(problem.level[rows]))} pressure levels, "
+        f"{len(lengths)} lengths over {100 * span:.3g} % of the rest length); take a lower order, "
+        "or more lengths and pressures"
     )
 
 
 def _at(
-    problem: Problem, design: Design, rows: Mask, blank: Muscle, values: Array, sigma: float | None, message: str, success: bool
+    problem: Problem,
+    design: Design,
+    rows: Mask,
+    blank: Muscle,
+    values: Array,
+    sigma: float | None,
+    message: str,
+    success: bool,
 ) -> Estimate:
     """The estimate for one geometry: coefficients, Jacobian, noise."""
     matrix, target = problem.system(design, blank, rows)
@@ -273,11 +330,22 @@ def _at(
     plain = math.sqrt(float(residual @ residual) / freedom)
     noise = problem.noise if problem.noise is not None else (sigma or plain)
     return Estimate(
-        design, blank, found.x, values, residual, np.hstack([matrix, slopes]), noise, found.condition_number, message, success
+        design,
+        blank,
+        found.x,
+        values,
+        residual,
+        np.hstack([matrix, slopes]),
+        noise,
+        found.condition_number,
+        message,
+        success,
     )
 
 
-def geometry_slopes(problem: Problem, values: Array, function: Callable[[Muscle], Array], n: int) -> Array:
+def geometry_slopes(
+    problem: Problem, values: Array, function: Callable[[Muscle], Array], n: int
+) -> Array:
     """Differences of a function of the muscle by the free geometry.
 
     Parameters
@@ -313,39 +381,96 @@ def geometry_slopes(problem: Problem, values: Array, function: Callable[[Muscle]
 
 
 def _search(problem: Problem, design: Design, rows: Mask, start: Estimate | None) -> Estimate:
-    """Variable projection: least squares over the geometry, with the coefficients solved exactly inside.
+    """Variable projection: least squares over the geometry, with the coefficients solved exactly
+    inside.
 
-    Residuals of the priors, ``(value - nominal)/tolerance``, stand beside data residuals divided by their
-    standard deviation; that is estimated from the residuals, and the search repeated until it stays.
+    Residuals of the priors, ``(value - nominal)/tolerance``, stand beside data residuals divided by
+    their standard deviation; that is estimated from the residuals, and the search repeated until it
+    stays.
     """
     from scipy.optimize import least_squares
 
-    nominal = np.array([free.nominal for free in problem.free])
-    scale = np.array([free.scale for free in problem.free])
-    prior = np.array([1.0 / free.tolerance for free in problem.free])  # 0 without a tolerance
-    weighted = problem.force[rows] * problem.weight[rows]
-    least = 1e-9 * float(np.abs(weighted).max())
-    n, k = len(weighted), len(design.names)
-    priors = int(np.count_nonzero(problem.expected(design)[1]))
-    impossible = np.full(n + priors + len(nominal), np.inf)
+    space = _Geometry(problem, design, rows)
+    z = (
+        np.zeros(len(space.nominal))
+        if start is None
+        else (start.geometry - space.nominal) / space.scale
+    )
+    sigma = problem.noise or (start.sigma if start else space.scatter(z))
+    found = None
+    settled = problem.noise is not None
+    for _ in range(_SIGMA_ROUNDS):
+        found = least_squares(
+            space.residuals, z, jac=space.jacobian, args=(sigma,), x_scale=1.0, xtol=1e-12
+        )
+        z = np.asarray(found.x)
+        if problem.noise is not None:
+            break
+        new = space.scatter_at(z, np.asarray(found.fun), sigma)
+        settled = abs(new / sigma - 1.0) < 1e-3 or new == space.least
+        sigma = new
+        if settled:
+            break
+    assert found is not None
+    success = bool(found.success) and settled
+    message = f"variable projection: {found.message}"
+    message += "" if settled else " The noise estimate did not settle."
+    values = space.nominal + z * space.scale
+    result = _at(problem, design, rows, problem.muscle(values), values, sigma, message, success)
+    _check_identified(problem, result)
+    return result
 
-    def residuals(z: Array, sigma: float) -> Array:
-        values = nominal + z * scale
+
+class _Geometry:
+    """The space that is searched: the free geometry ``z`` in steps of its scale from the nominal
+    one.
+
+    Parameters
+    ----------
+    problem : Problem
+        Data and unknowns.
+    design : Design
+        Of the fitted rows.
+    rows : (n,) bool array
+        The rows to fit.
+    """
+
+    def __init__(self, problem: Problem, design: Design, rows: Mask) -> None:
+        self.problem, self.design, self.rows = problem, design, rows
+        self.nominal = np.array([free.nominal for free in problem.free])
+        self.scale = np.array([free.scale for free in problem.free])
+        # 0 without a tolerance
+        self.prior = np.array([1.0 / free.tolerance for free in problem.free])
+        weighted = problem.force[rows] * problem.weight[rows]
+        #: the least standard deviation that rounding leaves
+        self.least = 1e-9 * float(np.abs(weighted).max())
+        self.n, self.k = len(weighted), len(design.names)
+        priors = int(np.count_nonzero(problem.expected(design)[1]))
+        self.impossible = np.full(self.n + priors + len(self.nominal), np.inf)
+
+    def residuals(self, z: Array, sigma: float) -> Array:
+        """Data residuals over ``sigma``, those of coefficients with a prior, those of the geometry.
+
+        Infinite where the geometry is impossible: the search then shortens its step.
+        """
+        values = self.nominal + z * self.scale
         try:
-            blank = problem.muscle(values)
-            problem.check_reach(blank)
-            matrix, target = problem.equations(design, blank, rows)
-        except (ParameterError, FitError):  # least_squares shortens a step that ends in infinity
-            return impossible
-        return np.concatenate([project_out(matrix, target) / sigma, (values - nominal) * prior])
+            blank = self.problem.muscle(values)
+            self.problem.check_reach(blank)
+            matrix, target = self.problem.equations(self.design, blank, self.rows)
+        except (ParameterError, FitError):
+            return self.impossible
+        own = (values - self.nominal) * self.prior
+        return np.concatenate([project_out(matrix, target) / sigma, own])
 
-    def jacobian(z: Array, sigma: float) -> Array:
-        here = residuals(z, sigma)
+    def jacobian(self, z: Array, sigma: float) -> Array:
+        """Derivative of the residuals, central where both sides are possible."""
+        here = self.residuals(z, sigma)
         columns = []
         for j in range(len(z)):
             step = np.zeros_like(z)
             step[j] = _STEP
-            up, down = residuals(z + step, sigma), residuals(z - step, sigma)
+            up, down = self.residuals(z + step, sigma), self.residuals(z - step, sigma)
             ends = np.isfinite(up[0]), np.isfinite(down[0])
             if all(ends):
                 columns.append((up - down) / (2.0 * _STEP))
@@ -355,45 +480,43 @@ def _search(problem: Problem, design: Design, rows: Mask, start: Estimate | None
                 columns.append((here - down) / _STEP if ends[1] else np.zeros_like(here))
         return np.stack(columns, axis=1)
 
-    z = np.zeros(len(nominal)) if start is None else (start.geometry - nominal) / scale
-    first = residuals(z, 1.0)[:n]
-    sigma = problem.noise or (start.sigma if start else max(math.sqrt(float(first @ first) / max(n - k, 1)), least))
-    found = None
-    settled = problem.noise is not None
-    for _ in range(_SIGMA_ROUNDS):
-        found = least_squares(residuals, z, jac=jacobian, args=(sigma,), x_scale=1.0, xtol=1e-12)
-        z = np.asarray(found.x)
-        if problem.noise is not None:
-            break
-        slopes = jacobian(z, sigma)[:n]
-        share = np.linalg.lstsq(slopes.T @ slopes + np.diag((prior * scale) ** 2), slopes.T @ slopes, rcond=None)[0]
-        rest = found.fun[:n] * sigma
-        freedom = max(n - k - float(np.trace(share)), 1.0)
-        new = max(math.sqrt(float(rest @ rest) / freedom), least)
-        settled = abs(new / sigma - 1.0) < 1e-3 or new == least
-        sigma = new
-        if settled:
-            break
-    assert found is not None
-    success = bool(found.success) and settled
-    message = f"variable projection: {found.message}" + ("" if settled else " The noise estimate did not settle.")
-    values = nominal + z * scale
-    result = _at(problem, design, rows, problem.muscle(values), values, sigma, message, success)
-    _check_identified(problem, result)
-    return result
+    def scatter(self, z: Array) -> float:
+        """Standard deviation of the data residuals before a search."""
+        first = self.residuals(z, 1.0)[: self.n]
+        return max(math.sqrt(float(first @ first) / max(self.n - self.k, 1)), self.least)
+
+    def scatter_at(self, z: Array, residuals: Array, sigma: float) -> float:
+        """Standard deviation of the data residuals at the end of a search with ``sigma``.
+
+        The geometry takes as many degrees of freedom as the data, not the priors, determine.
+        """
+        slopes = self.jacobian(z, sigma)[: self.n]
+        told = slopes.T @ slopes
+        share = np.linalg.lstsq(told + np.diag((self.prior * self.scale) ** 2), told, rcond=None)[0]
+        rest = residuals[: self.n] * sigma
+        freedom = max(self.n - self.k - float(np.trace(share)), 1.0)
+        return max(math.sqrt(float(rest @ rest) / freedom), self.least)
 
 
 def _check_identified(problem: Problem, result: Estimate) -> None:
     """Refuse a geometry that neither the data nor a tolerance determines."""
     names = (*result.design.names, *(free.name for free in problem.free))
-    information = np.concatenate([problem.expected(result.design)[1], [1.0 / free.tolerance for free in problem.free]])
+    information = np.concatenate(
+        [problem.expected(result.design)[1], [1.0 / free.tolerance for free in problem.free]]
+    )
     priors = np.diag(result.sigma * information)
     loose = [free.name for free in problem.free if math.isinf(free.tolerance)]
     stacked = np.vstack([result.jacobian, priors])
-    hint = f"; give a tolerance for {', '.join(loose)}" if loose else "; take a lower order, or free less geometry"
+    hint = (
+        f"; give a tolerance for {', '.join(loose)}"
+        if loose
+        else "; take a lower order, or free less geometry"
+    )
     _, _, s, _ = decompose(stacked, names, hint)
     if loose and s[-1] < 1e-7 * s[0]:  # differences carry no more digits
-        raise FitError(f"the fitted points do not determine {', '.join(loose)} beside the other unknowns{hint}")
+        raise FitError(
+            f"the fitted points do not determine {', '.join(loose)} beside the other unknowns{hint}"
+        )
 
 
 def refitted(problem: Problem, result: Estimate, rows: Mask, gone: int) -> Estimate:

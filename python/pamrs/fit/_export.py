@@ -17,35 +17,60 @@ __all__ = ["fit_report", "to_dict", "to_rig"]
 def fit_report(fit: MuscleFit) -> str:
     """What :meth:`MuscleFit.fit_report` returns."""
     order = "" if fit.order is None else f", order {fit.order}"
-    moduli = "" if not fit.nvarys else f", moduli {'linear in pressure' if fit.moduli_kind == 'linear' else 'free at each level'}"
+    moduli = (
+        ""
+        if not fit.nvarys
+        else (
+            ", moduli "
+            f"{'linear in pressure' if fit.moduli_kind == 'linear' else 'free at each level'}"
+        )
+    )
     rms, worst = fit.errors_of("fitted") or (0.0, 0.0)
     lines = [
         f"{fit.data.label}: {fit.model}{order}{moduli}",
-        f"  points fitted {fit.ndata} of {len(fit.data.used)} rows, {fit.nvarys} unknowns, condition number {fit.condition_number:.3g}",
-        f"  force error, of the map's largest force: rms {100 * rms:.2f} %, max {100 * worst:.2f} %; R2 {fit.rsquared:.5f}",
+        (
+            f"  points fitted {fit.ndata} of {len(fit.data.used)} rows, {fit.nvarys} unknowns, "
+            f"condition number {fit.condition_number:.3g}"
+        ),
+        (
+            f"  force error, of the map's largest force: rms {100 * rms:.2f} %, max "
+            f"{100 * worst:.2f} %; R2 {fit.rsquared:.5f}"
+        ),
     ]
     held_out = fit.errors_of("held_out")
     if held_out is not None:
-        lines.append(f"  levels not fitted, of the same:          rms {100 * held_out[0]:.2f} %, max {100 * held_out[1]:.2f} %")
+        lines.append(
+            f"  levels not fitted, of the same:          rms {100 * held_out[0]:.2f} %, max "
+            f"{100 * held_out[1]:.2f} %"
+        )
     aicc = "none" if fit.aicc is None else f"{fit.aicc:.1f}"
     lines.append(f"  {_scatter(fit)}")
-    lines.append(f"  with all {fit.ndata} points as independent: AIC {fit.aic:.1f}, AICc {aicc}, BIC {fit.bic:.1f}")
+    lines.append(
+        f"  with all {fit.ndata} points as independent: AIC {fit.aic:.1f}, AICc {aicc}, BIC "
+        f"{fit.bic:.1f}"
+    )
     if fit.params:
         kind = "by level" if fit.errors == "level" else "plain"
         lines += ["", f"  {'':18} {'value':>12} {'std error':>11}  unit   (standard errors {kind})"]
     for item in fit.params.values():
         nominal = "" if item.init_value is None else f"   nominal {item.init_value:.5g}"
         known = "" if item.tolerance is None else f" +- {item.tolerance:.2g}"
-        lines.append(f"  {item.name:18} {item.value:12.5g} {item.stderr:11.2g}  {item.unit}{nominal}{known}")
+        lines.append(
+            f"  {item.name:18} {item.value:12.5g} {item.stderr:11.2g}  {item.unit}{nominal}{known}"
+        )
     errors = fit.error_by_pressure()
     lines += [
         "",
         "  force error of each level, of the largest force of that level:",
         "  level [kPa]  points       rms [%]       max [%]",
     ]
-    for level, points, mean, largest, fitted in zip(errors.levels, errors.points, errors.rms, errors.max, errors.fitted, strict=True):
+    for level, points, mean, largest, fitted in zip(
+        errors.levels, errors.points, errors.rms, errors.max, errors.fitted, strict=True
+    ):
         mark = "" if fitted else "  not fitted"
-        lines.append(f"  {level / 1e3:11.5g} {points:7d} {100 * mean:13.2f} {100 * largest:13.2f}{mark}")
+        lines.append(
+            f"  {level / 1e3:11.5g} {points:7d} {100 * mean:13.2f} {100 * largest:13.2f}{mark}"
+        )
     lines += [f"  {errors.note}"] if errors.note else []
     lines += [f"  note: {note}" for note in (*fit.data.issues, *fit.warnings)]
     return "\n".join(lines) + "\n"
@@ -58,8 +83,15 @@ def _scatter(fit: MuscleFit) -> str:
     text = f"chi2 {fit.chisqr:.4g}{unit}, residual rms {rms:.4g} N"
     if fit.stated_noise is None:
         return text
-    shown = f"{fit.stated_noise:.4g} N" if fit.weights == "force" else f"{100 * fit.stated_noise:.3g} % of the level's largest force"
-    return f"{text}, reduced chi2 {fit.redchi / fit.stated_noise**2:.4g} with the stated noise of {shown}"
+    shown = (
+        f"{fit.stated_noise:.4g} N"
+        if fit.weights == "force"
+        else f"{100 * fit.stated_noise:.3g} % of the level's largest force"
+    )
+    return (
+        f"{text}, reduced chi2 {fit.redchi / fit.stated_noise**2:.4g} with the stated noise of "
+        f"{shown}"
+    )
 
 
 def to_rig(fit: MuscleFit, rig: Rig | None) -> Rig:
@@ -74,9 +106,15 @@ def to_rig(fit: MuscleFit, rig: Rig | None) -> Rig:
     base = rig.model
     if base["muscle"] is not None:
         parameters["count"] = base["muscle"]["count"]
-    known = {name: given.tol for name, given in rig.parameters.items() if given.tol > 0.0 and _kept(name, given.value, parameters)}
+    known = {
+        name: given.tol
+        for name, given in rig.parameters.items()
+        if given.tol > 0.0 and _kept(name, given.value, parameters)
+    }
     fitted = {f"muscle.{free.name}": fit.params[free.name].stderr for free in fit.free}
-    return Rig(rig.name, {**base, "muscle": parameters}, {**known, **fitted}, rig._effect_std, rig.source)
+    return Rig(
+        rig.name, {**base, "muscle": parameters}, {**known, **fitted}, rig._effect_std, rig.source
+    )
 
 
 def _kept(name: str, value: float, muscle: Mapping[str, Any]) -> bool:

@@ -19,10 +19,20 @@ from numpy.typing import NDArray
 from pamrs.report.figures import COLOURS, STYLE, svg_text
 
 if TYPE_CHECKING:
+    from pamrs.fit._data import ForceMap
     from pamrs.fit._result import MuscleFit
     from pamrs.fit._statistics import FitStatistics
 
-__all__ = ["ErrorCurve", "errors_svg", "family_svg", "moduli_svg", "pressure_colours", "residuals_svg", "summary_png", "thinned"]
+__all__ = [
+    "ErrorCurve",
+    "errors_svg",
+    "family_svg",
+    "moduli_svg",
+    "pressure_colours",
+    "residuals_svg",
+    "summary_png",
+    "thinned",
+]
 
 Array = NDArray[np.float64]
 
@@ -54,7 +64,8 @@ class ErrorCurve:
     fitted : (m,) bool array
         Whether the level was fitted.
     left_levels, left_rms : (k,) array
-        The same where every fitted level in turn is predicted from the others; empty when that was not done.
+        The same where every fitted level in turn is predicted from the others; empty when that was
+        not done.
     """
 
     name: str
@@ -72,7 +83,9 @@ def pressure_colours(levels: Array) -> tuple[Any, Normalize]:
     """A map from pressure [kPa] to colours dark enough for lines on white, and its range."""
     steps = mpl.colormaps["viridis"](np.linspace(0.0, 0.88, 64))
     low, high = float(levels.min()) / 1e3, float(levels.max()) / 1e3
-    return LinearSegmentedColormap.from_list("pressure", steps.tolist()), Normalize(low, high if high > low else low + 1.0)
+    return LinearSegmentedColormap.from_list("pressure", steps.tolist()), Normalize(
+        low, high if high > low else low + 1.0
+    )
 
 
 def thinned(rows: NDArray[np.intp]) -> NDArray[np.intp]:
@@ -91,48 +104,96 @@ def _fitted_levels(fit: MuscleFit) -> set[int]:
 
 
 def _draw_family(axes: Axes, fit: MuscleFit, *, size: float = 26.0) -> Any:
-    """Measured points and model lines over contraction, coloured by pressure; returns what a colour bar needs."""
+    """Measured points and model lines over contraction, coloured by pressure; returns what a colour
+    bar needs.
+    """
     data = fit.data
     cmap, norm = pressure_colours(data.levels)
     contraction, shown = 100.0 * data.contraction, _fitted_levels(fit)
-    off = thinned(np.flatnonzero((data.level < 0) & np.isfinite(contraction) & np.isfinite(data.force)))
+    _draw_unused(axes, data, contraction, size)
+    force = data.force[data.used]
+    largest = float(force.max())
+    floor = min(float(force.min()), -0.04 * largest)
+    for index, level in enumerate(data.levels.tolist()):
+        rows = np.flatnonzero(data.level == index)
+        colour = cmap(norm(level / 1e3))
+        _draw_model(axes, fit, level, contraction[rows], floor, colour)
+        rows = thinned(rows)
+        face = colour if index in shown else "white"
+        axes.scatter(
+            contraction[rows],
+            data.force[rows],
+            s=size,
+            facecolor=face,
+            edgecolor=colour,
+            lw=1.1,
+            zorder=3,
+        )
+    _family_legend(axes, fit, size)
+    axes.set_ylim(floor - 0.02 * largest, 1.06 * largest)
+    axes.set_xlabel("contraction [%]")
+    axes.set_ylabel("pulling force [N]")
+    axes.legend(loc="upper right")
+    return mpl.cm.ScalarMappable(norm, cmap)
+
+
+def _draw_unused(axes: Axes, data: ForceMap, contraction: Array, size: float) -> None:
+    """Crosses at the rows that are not used, as far as they are near the others."""
+    off = thinned(
+        np.flatnonzero((data.level < 0) & np.isfinite(contraction) & np.isfinite(data.force))
+    )
     used = contraction[data.used]
     low, high = float(used.min()), float(used.max())
     inside = off[(contraction[off] >= low - 20) & (contraction[off] <= high + 20)]
     if len(inside):
-        axes.scatter(contraction[inside], data.force[inside], marker="x", s=0.55 * size, color=_QUIET, lw=0.8, label="not used")
-    floor = min(float(data.force[data.used].min()), -0.04 * float(data.force[data.used].max()))
-    largest, fitted = float(data.force[data.used].max()), data.levels[sorted(shown)]
-    grid = np.linspace(low, high, _FINE)
-    both = bool(np.any(data.direction[data.used]))
-    ways: list[tuple[float | None, Any]] = [(-1.0, "-"), (1.0, (0, (5, 2)))] if both else [(None, "-")]
+        axes.scatter(
+            contraction[inside], data.force[inside],
+            marker="x", s=0.55 * size, color=_QUIET, lw=0.8, label="not used",
+        )  # fmt: skip
+
+
+def _draw_model(
+    axes: Axes, fit: MuscleFit, level: float, contraction: Array, floor: float, colour: Any
+) -> None:
+    """The model at one pressure: a line where it was measured, dotted beyond, dashed while
+    lengthening.
+    """
+    data, shown = fit.data, sorted(_fitted_levels(fit))
+    fitted = data.levels[shown]
+    if fit.moduli_kind != "linear" and not fitted.min() <= level <= fitted.max():
+        return  # free moduli have no law beyond
+    used = 100.0 * data.contraction[data.used]
+    grid = np.linspace(float(used.min()), float(used.max()), _FINE)
     lengths = (1.0 - grid / 100.0) * data.rest_length
-    for index, level in enumerate(data.levels.tolist()):
-        rows = np.flatnonzero(data.level == index)
-        colour = cmap(norm(level / 1e3))
-        if fit.moduli_kind == "linear" or fitted.min() <= level <= fitted.max():  # free moduli have no law beyond
-            own = (grid >= contraction[rows].min() - 1e-9) & (grid <= contraction[rows].max() + 1e-9)
-            for way, dash in ways:
-                force = fit.predict(level, length=lengths, direction=way)
-                axes.plot(grid, np.where(force > floor, force, np.nan), color=colour, lw=0.8, ls=(0, (1, 2)))
-                axes.plot(grid[own], force[own], color=colour, lw=1.3, ls=dash)
-        rows = thinned(rows)
-        face = colour if index in shown else "white"
-        axes.scatter(contraction[rows], data.force[rows], s=size, facecolor=face, edgecolor=colour, lw=1.1, zorder=3)
-    if shown != set(range(len(data.levels))):
+    own = (grid >= contraction.min() - 1e-9) & (grid <= contraction.max() + 1e-9)
+    ways: list[tuple[float | None, Any]] = [(-1.0, "-"), (1.0, (0, (5, 2)))]
+    for way, dash in ways if np.any(data.direction[data.used]) else [(None, "-")]:
+        force = fit.predict(level, length=lengths, direction=way)
+        beyond = np.where(force > floor, force, np.nan)
+        axes.plot(grid, beyond, color=colour, lw=0.8, ls=(0, (1, 2)))
+        axes.plot(grid[own], force[own], color=colour, lw=1.3, ls=dash)
+
+
+def _family_legend(axes: Axes, fit: MuscleFit, size: float) -> None:
+    """One entry for each kind of point and line."""
+    data, both = fit.data, bool(np.any(fit.data.direction[fit.data.used]))
+    if _fitted_levels(fit) != set(range(len(data.levels))):
         axes.scatter([], [], s=size, facecolor=_INK, edgecolor=_INK, label="measured, fitted")
-        axes.scatter([], [], s=size, facecolor="white", edgecolor=_INK, lw=1.1, label="measured, left out of the fit")
+        axes.scatter(
+            [],
+            [],
+            s=size,
+            facecolor="white",
+            edgecolor=_INK,
+            lw=1.1,
+            label="measured, left out of the fit",
+        )
     else:
         axes.scatter([], [], s=size, facecolor=_INK, edgecolor=_INK, label="measured")
     axes.plot([], [], color=_INK, lw=1.3, label="model, contracting" if both else "model")
     if both:
         axes.plot([], [], color=_INK, lw=1.3, ls=(0, (5, 2)), label="model, lengthening")
     axes.plot([], [], color=_INK, lw=0.8, ls=(0, (1, 2)), label="model beyond the level's data")
-    axes.set_ylim(floor - 0.02 * largest, 1.06 * largest)
-    axes.set_xlabel("contraction [%]")
-    axes.set_ylabel("pulling force [N]")
-    axes.legend(loc="upper right")
-    return mpl.cm.ScalarMappable(norm, cmap)
 
 
 def family_svg(fit: MuscleFit, prefix: str = "family") -> str:
@@ -173,12 +234,16 @@ def _coefficients(fit: FitStatistics | None) -> dict[str, _Curve]:
 
 
 def _span(line: _Curve | None, points: _Curve | None) -> tuple[float, float]:
-    """Limits [MPa] that show the line with its band and the points that are known well, whatever the wild ones do."""
+    """Limits [MPa] that show the line with its band and the points that are known well, whatever
+    the wild ones do.
+    """
     values = [] if line is None else [line[1] - 2 * line[2], line[1] + 2 * line[2]]
     if points is not None:
         known = points[2] <= 2 * float(np.median(points[2]))
         if line is not None:
-            known = np.abs(points[1] - np.interp(points[0], line[0], line[1])) <= 2 * float(np.ptp(np.concatenate(values)))
+            known = np.abs(points[1] - np.interp(points[0], line[0], line[1])) <= 2 * float(
+                np.ptp(np.concatenate(values))
+            )
         values.append(points[1][known])
     everything = np.concatenate(values) / 1e6
     low, high = float(everything.min()), float(everything.max())
@@ -186,7 +251,9 @@ def _span(line: _Curve | None, points: _Curve | None) -> tuple[float, float]:
     return low - room, high + room
 
 
-def moduli_svg(fit: MuscleFit, per_level: FitStatistics | None = None, prefix: str = "moduli") -> str | None:
+def moduli_svg(
+    fit: MuscleFit, per_level: FitStatistics | None = None, prefix: str = "moduli"
+) -> str | None:
     """Moduli over pressure, with bands of two standard errors.
 
     Parameters
@@ -210,7 +277,9 @@ def moduli_svg(fit: MuscleFit, per_level: FitStatistics | None = None, prefix: s
     columns = min(len(names), 4)
     rows = math.ceil(len(names) / columns)
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(10.0 if columns > 1 else 5.6, 2.9 * rows + 0.3), layout="constrained")
+        figure = Figure(
+            figsize=(10.0 if columns > 1 else 5.6, 2.9 * rows + 0.3), layout="constrained"
+        )
         panels = figure.subplots(rows, columns, squeeze=False, sharex=True).ravel()
         for panel, name in zip(panels, names, strict=False):
             _draw_modulus(panel, lines.get(name), points.get(name))
@@ -229,19 +298,31 @@ def moduli_svg(fit: MuscleFit, per_level: FitStatistics | None = None, prefix: s
 def _draw_modulus(axes: Axes, line: _Curve | None, points: _Curve | None) -> None:
     if line is not None:
         kpa, mpa, band = line[0] / 1e3, line[1] / 1e6, 2 * line[2] / 1e6
-        axes.fill_between(kpa, mpa - band, mpa + band, color=COLOURS["after"], alpha=0.16, lw=0, label="± 2 standard errors")
+        axes.fill_between(
+            kpa,
+            mpa - band,
+            mpa + band,
+            color=COLOURS["after"],
+            alpha=0.16,
+            lw=0,
+            label="± 2 standard errors",
+        )
         axes.plot(kpa, mpa, color=COLOURS["after"], lw=1.6, label="one fit of all levels")
     low, high = _span(line, points)
     if points is not None:
         kpa, mpa, bar = points[0] / 1e3, points[1] / 1e6, 2 * points[2] / 1e6
         colour = COLOURS["before"]
-        _, _, bars = axes.errorbar(kpa, mpa, bar, fmt="o", ms=4, color=colour, elinewidth=0.9, label="each level alone")
+        _, _, bars = axes.errorbar(
+            kpa, mpa, bar, fmt="o", ms=4, color=colour, elinewidth=0.9, label="each level alone"
+        )
         for lines in bars:
             lines.set_alpha(0.35)
         outside = int(np.sum((mpa < low) | (mpa > high)))
         if outside:
             text = f"{outside} level{'s' if outside > 1 else ''} off the scale"
-            axes.text(0.98, 0.03, text, transform=axes.transAxes, ha="right", fontsize="small", color=_INK)
+            axes.text(
+                0.98, 0.03, text, transform=axes.transAxes, ha="right", fontsize="small", color=_INK
+            )
     axes.axhline(0.0, color="#6b7280", lw=0.7)
     axes.set_ylim(low, high)
 
@@ -250,8 +331,12 @@ def _draw_modulus(axes: Axes, line: _Curve | None, points: _Curve | None) -> Non
 
 
 def _draw_errors(axes: Axes, curves: Sequence[ErrorCurve], *, left: bool) -> None:
-    """Error (2.37) of each model over pressure; ``left`` draws the predicted levels instead of the fitted ones."""
-    drawn = [100 * np.maximum(curve.left_rms if left else curve.rms, _LEAST_ERROR) for curve in curves]
+    """Error (2.37) of each model over pressure; ``left`` draws the predicted levels instead of the
+    fitted ones.
+    """
+    drawn = [
+        100 * np.maximum(curve.left_rms if left else curve.rms, _LEAST_ERROR) for curve in curves
+    ]
     values = np.concatenate([np.ones(0), *drawn])
     if values.size:
         axes.set_ylim(values.min() / 1.6, values.max() * 1.6)
@@ -264,8 +349,26 @@ def _draw_errors(axes: Axes, curves: Sequence[ErrorCurve], *, left: bool) -> Non
         fitted = np.zeros(len(levels), dtype=bool) if left else curve.fitted
         axes.plot(levels / 1e3, 100 * rms, color=colour, lw=1.1, zorder=2)
         for rows, face in ((fitted, colour), (~fitted, "white")):
-            axes.scatter(levels[rows] / 1e3, 100 * rms[rows], marker=mark, s=24, facecolor=face, edgecolor=colour, lw=1.1, zorder=3)
-        axes.plot([], [], color=colour, marker=mark, ms=5, lw=1.1, mfc="white" if left else colour, label=curve.name)
+            axes.scatter(
+                levels[rows] / 1e3,
+                100 * rms[rows],
+                marker=mark,
+                s=24,
+                facecolor=face,
+                edgecolor=colour,
+                lw=1.1,
+                zorder=3,
+            )
+        axes.plot(
+            [],
+            [],
+            color=colour,
+            marker=mark,
+            ms=5,
+            lw=1.1,
+            mfc="white" if left else colour,
+            label=curve.name,
+        )
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.yaxis.set_minor_formatter(lambda value, _: f"{value:g}" if f"{value:e}"[0] in "25" else "")
     axes.tick_params(axis="y", which="minor", labelsize="small")
@@ -273,7 +376,8 @@ def _draw_errors(axes: Axes, curves: Sequence[ErrorCurve], *, left: bool) -> Non
 
 
 def errors_svg(curves: Sequence[ErrorCurve], prefix: str = "errors") -> str:
-    """Error (2.37) of each pressure level, fitted on the left, predicted from the other levels on the right.
+    """Error (2.37) of each pressure level, fitted on the left, predicted from the other levels on
+    the right.
 
     Parameters
     ----------
@@ -293,14 +397,22 @@ def errors_svg(curves: Sequence[ErrorCurve], prefix: str = "errors") -> str:
         panels = figure.subplots(1, 1 + int(both), sharey=True, squeeze=False)[0]
         _draw_errors(panels[0], curves, left=False)
         everything = all(curve.fitted.all() for curve in curves)
-        panels[0].set_title("Levels as fitted" if everything else "Fitted levels (filled) and others (open)")
+        panels[0].set_title(
+            "Levels as fitted" if everything else "Fitted levels (filled) and others (open)"
+        )
         panels[0].set_ylabel("rms error / largest force of the level [%]")
         if both:
             _draw_errors(panels[1], curves, left=True)
             panels[1].set_title("Each level predicted from the others")
         if len(curves) > 1:
             handles, labels = panels[0].get_legend_handles_labels()
-            figure.legend(handles, labels, loc="outside lower center", ncols=min(len(curves), 7), columnspacing=1.4)
+            figure.legend(
+                handles,
+                labels,
+                loc="outside lower center",
+                ncols=min(len(curves), 7),
+                columnspacing=1.4,
+            )
         return svg_text(figure, prefix)
 
 
@@ -355,7 +467,13 @@ def residuals_svg(fit: MuscleFit, prefix: str = "residuals") -> str:
         figure = Figure(figsize=(10.0, 4.2), layout="constrained")
         axes = figure.subplots()
         colours = _draw_residuals(axes, fit)
-        figure.colorbar(colours, ax=axes, label="measured − model [% of the largest force]", extend="both", pad=0.015)
+        figure.colorbar(
+            colours,
+            ax=axes,
+            label="measured − model [% of the largest force]",
+            extend="both",
+            pad=0.015,
+        )
         return svg_text(figure, prefix)
 
 
@@ -379,26 +497,60 @@ def summary_png(fit: MuscleFit, curves: Sequence[ErrorCurve], title: str) -> byt
     bytes
         PNG of 1600 x 1000 pixels.
     """
-    style = {**STYLE, "font.size": 8.5, "axes.titlesize": 9.5, "legend.fontsize": 8.0, "axes.labelsize": 8.5}
+    style = {
+        **STYLE,
+        "font.size": 8.5,
+        "axes.titlesize": 9.5,
+        "legend.fontsize": 8.0,
+        "axes.labelsize": 8.5,
+    }
     with mpl.rc_context(style):
         figure = Figure(figsize=(10.0, 6.25), dpi=160, layout="constrained")
         figure.get_layout_engine().set(w_pad=0.1, h_pad=0.08, wspace=0.03, hspace=0.03)  # type: ignore[union-attr, call-arg]
-        figure.suptitle("\n".join(textwrap.wrap(title, 84)), x=0.012, ha="left", fontsize=14, fontweight="bold", color="#111827")
+        figure.suptitle(
+            "\n".join(textwrap.wrap(title, 84)),
+            x=0.012,
+            ha="left",
+            fontsize=14,
+            fontweight="bold",
+            color="#111827",
+        )
         left, right = figure.subfigures(1, 2, width_ratios=[1.35, 1.0], squeeze=False)[0]
         axes = left.subplots()
-        left.colorbar(_draw_family(axes, fit, size=20.0), ax=axes, label="pressure [kPa]", location="bottom", pad=0.02, aspect=40)
+        left.colorbar(
+            _draw_family(axes, fit, size=20.0),
+            ax=axes,
+            label="pressure [kPa]",
+            location="bottom",
+            pad=0.02,
+            aspect=40,
+        )
         axes.set_title("Force: measured against model")
         upper, lower = right.subplots(2, 1, gridspec_kw={"height_ratios": [1.25, 1.0]})
         _draw_errors(upper, curves, left=False)
         for curve, (colour, _) in zip(curves, _SERIES * 3, strict=False):
             if len(curve.left_levels):
-                upper.plot(curve.left_levels / 1e3, 100 * curve.left_rms, color=colour, lw=0.9, ls=(0, (4, 2)))
+                upper.plot(
+                    curve.left_levels / 1e3,
+                    100 * curve.left_rms,
+                    color=colour,
+                    lw=0.9,
+                    ls=(0, (4, 2)),
+                )
         upper.set_title("Error by pressure (dashed: left out)")
         upper.set_ylabel("rms / largest force [%]")
         if len(curves) > 1:
-            upper.legend(loc="upper center", bbox_to_anchor=(0.45, -0.22), ncols=3, fontsize=7.0, columnspacing=1.0)
+            upper.legend(
+                loc="upper center",
+                bbox_to_anchor=(0.45, -0.22),
+                ncols=3,
+                fontsize=7.0,
+                columnspacing=1.0,
+            )
         colours = _draw_residuals(lower, fit, size=26.0)
-        lower.set_title("Residual (squares: left out)" if np.any(~fit.fitted & fit.data.used) else "Residual")
+        lower.set_title(
+            "Residual (squares: left out)" if np.any(~fit.fitted & fit.data.used) else "Residual"
+        )
         right.colorbar(colours, ax=lower, label="measured − model [%]", extend="both", pad=0.02)
         stream = io.BytesIO()
         figure.savefig(stream, format="png", dpi=160)

@@ -24,7 +24,14 @@ __all__ = ["read_map"]
 Array = NDArray[np.float64]
 
 # channel -> SI unit
-_UNITS: Final = {"length": "m", "contraction": "1", "pressure": "Pa", "force": "N", "direction": "1", "time": "s"}
+_UNITS: Final = {
+    "length": "m",
+    "contraction": "1",
+    "pressure": "Pa",
+    "force": "N",
+    "direction": "1",
+    "time": "s",
+}
 _ALIASES: Final = {
     "muscle_length": "length",
     "contraction_ratio": "contraction",
@@ -46,7 +53,9 @@ _DIRECTIONS: Final = {
 }
 _HEADING = re.compile(r"^(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]*(?:\([^()]*\))?)[\])]\s*$")
 _NARROW: Final = 0.006  # a map of contractions from 0 to less than 0.6 % is one of fractions
-_SET_POINTS: Final = 50  # a pressure with fewer distinct values in a time series is a set point, not a sensor
+_SET_POINTS: Final = (
+    50  # a pressure with fewer distinct values in a time series is a set point, not a sensor
+)
 
 
 class _Column(NamedTuple):
@@ -67,10 +76,14 @@ def read_map(
     decimal: str | None,
     name: str | None,
 ) -> ForceMap:
-    """Read a force map from a table; arguments and errors as those of :func:`pamrs.fit.load_force_map`."""
+    """Read a force map from a table; arguments and errors as those of
+    :func:`pamrs.fit.load_force_map`.
+    """
     source = str(file)
     if rest_length is None:
-        raise RecordingError(f"{source}: rest_length is missing: give the length at zero contraction, in m")
+        raise RecordingError(
+            f"{source}: rest_length is missing: give the length at zero contraction, in m"
+        )
     if file.is_dir():
         raise RecordingError(f"{source}: cannot be read (a folder, not a file)")
     _one_character(delimiter, decimal, source)
@@ -83,19 +96,24 @@ def read_map(
     title = name or "_".join([file.name.removesuffix(".gz").rsplit(".", 1)[0], *wanted.values()])
     if "time" in found:
         if wanted:
-            raise RecordingError(f"{source}: where does not apply to a table with a time column, which is one recording")
-        recording = load_recording(file, columns=_channels(table, found), delimiter=delimiter, decimal=decimal, name=title)
-        return from_recording(recording, rest_length=rest_length, clipped=clipped, level_tolerance=level_tolerance)
+            raise RecordingError(
+                f"{source}: where does not apply to a table with a time column, which is one "
+                "recording"
+            )
+        recording = load_recording(
+            file, columns=_channels(table, found), delimiter=delimiter, decimal=decimal, name=title
+        )
+        return from_recording(
+            recording, rest_length=rest_length, clipped=clipped, level_tolerance=level_tolerance
+        )
     keep, notes = _kept(table, wanted, decimal, source)
     if where is None:
         _one_specimen(table, strange, source)
-    strange = [heading for heading in strange if heading not in wanted]
-    if strange:
-        notes.append(f"columns not used: {', '.join(strange)}")
-    if table.ragged:
-        rows = "1 row has" if len(table.ragged) == 1 else f"{len(table.ragged)} rows have"
-        notes.append(f"{rows} too few or too many cells (first: row {table.ragged[0]})")
-    values = {channel: _numbers(table, column, channel, source, decimal)[keep] for channel, column in found.items()}
+    notes += _left_over(table, [heading for heading in strange if heading not in wanted])
+    values = {
+        channel: _numbers(table, column, channel, source, decimal)[keep]
+        for channel, column in found.items()
+    }
     if "length" not in values:
         contraction = _fraction(values["contraction"], source)
         notes += _narrow(contraction, found["contraction"])
@@ -112,17 +130,35 @@ def read_map(
         source=source,
         notes=notes,
         row_numbers=np.asarray(table.row_numbers)[keep].tolist(),
-        units={channel: column.unit for channel, column in found.items() if channel in ("length", "pressure", "force")},
+        units={
+            channel: column.unit
+            for channel, column in found.items()
+            if channel in ("length", "pressure", "force")
+        },
     )
+
+
+def _left_over(table: Table, strange: Sequence[str]) -> list[str]:
+    """Notes on what of a table is not used: columns of unknown meaning, and rows with a wrong
+    number of cells.
+    """
+    notes = [f"columns not used: {', '.join(strange)}"] if strange else []
+    if table.ragged:
+        rows = "1 row has" if len(table.ragged) == 1 else f"{len(table.ragged)} rows have"
+        notes.append(f"{rows} too few or too many cells (first: row {table.ragged[0]})")
+    return notes
 
 
 def _one_character(delimiter: str | None, decimal: str | None, source: str) -> None:
     if delimiter and len(delimiter) != 1:
         raise RecordingError(
-            f"{source}: delimiter = {delimiter!r} is not allowed: one character is needed, like ',' or ';' or '\\t' (tabulator)"
+            f"{source}: delimiter = {delimiter!r} is not allowed: one character is needed, like "
+            "',' or ';' or '\\t' (tabulator)"
         )
     if decimal and decimal not in (".", ","):
-        raise RecordingError(f"{source}: decimal = {decimal!r} is not allowed: '.' or ',' is needed")
+        raise RecordingError(
+            f"{source}: decimal = {decimal!r} is not allowed: '.' or ',' is needed"
+        )
 
 
 def _delimiter(file: Path) -> str:
@@ -131,7 +167,9 @@ def _delimiter(file: Path) -> str:
 
 def _texts(table: Table, found: Mapping[str, _Column]) -> list[Sequence[str]]:
     """Cells of the columns with numbers, where they are text."""
-    columns = [table.cells[column.position] for channel, column in found.items() if channel != "direction"]
+    columns = [
+        table.cells[column.position] for channel, column in found.items() if channel != "direction"
+    ]
     return [cells for cells in columns if not isinstance(cells, np.ndarray)]
 
 
@@ -139,7 +177,9 @@ def _renamed(table: Table, columns: Mapping[str, str] | None, source: str) -> li
     given = table.header or []
     strange = [key for key in columns or {} if key not in given]
     if strange:
-        raise RecordingError(f"{source}: columns names {strange[0]!r}, but {_has(strange[0], given)}")
+        raise RecordingError(
+            f"{source}: columns names {strange[0]!r}, but {_has(strange[0], given)}"
+        )
     return [(columns or {}).get(heading, heading) for heading in given]
 
 
@@ -172,12 +212,18 @@ def _understood(headings: Sequence[str], source: str) -> tuple[dict[str, _Column
             strange.append(heading)
             continue
         if channel in found:
-            problems.append(f"column {heading!r}: {channel} is there twice (an empty name in columns leaves one out)")
+            problems.append(
+                f"column {heading!r}: {channel} is there twice (an empty name in columns leaves "
+                "one out)"
+            )
             continue
         if unit is None and channel == "direction":
             unit = "1"
         if unit is None:
-            problems.append(f"column {heading!r} has no unit: write '{channel} [{_UNITS[channel]}]', with the unit its values are in")
+            problems.append(
+                f"column {heading!r} has no unit: write '{channel} [{_UNITS[channel]}]', with the "
+                "unit its values are in"
+            )
             continue
         try:
             to_si(1.0, unit, _UNITS[channel])
@@ -190,23 +236,30 @@ def _understood(headings: Sequence[str], source: str) -> tuple[dict[str, _Column
         if lacking:
             problems.append(_lacking(lacking, headings, strange))
         if {"length", "contraction"} <= set(found):
-            problems.append("both length and contraction are there: leave one out with an empty name in columns")
+            problems.append(
+                "both length and contraction are there: leave one out with an empty name in columns"
+            )
     if problems:
         raise RecordingError(joined(source, problems))
     return found, strange
 
 
 def _lacking(channels: Sequence[str], headings: Sequence[str], strange: Sequence[str]) -> str:
-    """What is missing, what there is, and how to map it; a heading whose unit fits alone is proposed."""
+    """What is missing, what there is, and how to map it; a heading whose unit fits alone is
+    proposed.
+    """
     maps = []
     for channel in channels:
         fitting = [heading for heading in strange if _measures(heading, _UNITS[channel])]
         unit = _HEADING.match(fitting[0])["unit"].strip() if len(fitting) == 1 else _UNITS[channel]  # type: ignore[index]
         maps.append(f'"{fitting[0] if len(fitting) == 1 else "..."}" = "{channel} [{unit}]"')
-    names = ", ".join(channel + (" (or contraction)" if channel == "length" else "") for channel in channels)
+    names = ", ".join(
+        channel + (" (or contraction)" if channel == "length" else "") for channel in channels
+    )
     return (
-        f"no column for {names}; there are: {', '.join(headings)}. Rename the headings, or map them with "
-        f"columns = {{ {', '.join(maps)} }} in a .toml description (in Python: the argument columns)"
+        f"no column for {names}; there are: {', '.join(headings)}. Rename the headings, or map "
+        f"them with columns = {{ {', '.join(maps)} }} in a .toml description (in Python: the "
+        "argument columns)"
     )
 
 
@@ -222,20 +275,31 @@ def _measures(heading: str, si_unit: str) -> bool:
 def _has(name: str, header: Sequence[str]) -> str:
     """What the file has in place of a heading, and the one that is nearly it."""
     plain = name.strip().lower()
-    near = [heading for heading in header if plain and (heading.lower().startswith(plain) or _split(heading)[0] == _split(name)[0])]
+    near = [
+        heading
+        for heading in header
+        if plain and (heading.lower().startswith(plain) or _split(heading)[0] == _split(name)[0])
+    ]
     near = near or difflib.get_close_matches(name, header, n=1, cutoff=0.6)
     return f"the file has: {', '.join(header)}" + (f"; did you mean {near[0]!r}?" if near else "")
 
 
 def _numbers(table: Table, column: _Column, channel: str, source: str, decimal: str) -> Array:
     if channel == "direction" and not isinstance(table.cells[column.position], np.ndarray):
-        return _direction_cells([str(cell) for cell in table.cells[column.position]], column.heading, table.row_numbers, source)
+        return _direction_cells(
+            [str(cell) for cell in table.cells[column.position]],
+            column.heading,
+            table.row_numbers,
+            source,
+        )
     values = table.numbers(column.position, column.heading, source, None, decimal)
     unit = parse_unit(column.unit)
     return np.asarray(values * unit.scale + unit.offset)
 
 
-def _direction_cells(cells: Sequence[str], heading: str, numbers: Sequence[int], source: str) -> Array:
+def _direction_cells(
+    cells: Sequence[str], heading: str, numbers: Sequence[int], source: str
+) -> Array:
     values = np.zeros(len(cells))
     for row, cell in enumerate(cells):
         text = cell.strip().lower()
@@ -244,7 +308,8 @@ def _direction_cells(cells: Sequence[str], heading: str, numbers: Sequence[int],
         except ValueError:
             words = ", ".join(filter(None, _DIRECTIONS))
             raise RecordingError(
-                f"{source}: column {heading!r}, row {numbers[row]}: {cell[:40]!r} is not allowed: -1, 0, 1, {words}"
+                f"{source}: column {heading!r}, row {numbers[row]}: {cell[:40]!r} is not allowed: "
+                f"-1, 0, 1, {words}"
             ) from None
     return values
 
@@ -252,7 +317,9 @@ def _direction_cells(cells: Sequence[str], heading: str, numbers: Sequence[int],
 def _fraction(contraction: Array, source: str) -> Array:
     usual = float(np.nanmedian(np.abs(contraction))) if np.isfinite(contraction).any() else 0.0
     if usual > 1.0:
-        raise RecordingError(f"{source}: contraction around {usual:.4g}: wrong unit? The column is probably in %")
+        raise RecordingError(
+            f"{source}: contraction around {usual:.4g}: wrong unit? The column is probably in %"
+        )
     return contraction
 
 
@@ -260,19 +327,29 @@ def _narrow(contraction: Array, column: _Column) -> list[str]:
     """A note if contractions in percent are as small as fractions would be."""
     finite = contraction[np.isfinite(contraction)]
     span = float(np.ptp(finite)) if len(finite) else 0.0
-    if parse_unit(column.unit).scale == 1.0 or not 0.0 < span < _NARROW or float(np.max(np.abs(finite))) > _NARROW:
+    if (
+        parse_unit(column.unit).scale == 1.0
+        or not 0.0 < span < _NARROW
+        or float(np.max(np.abs(finite))) > _NARROW
+    ):
         return []
-    return [f"contractions span only {100.0 * span:.2g} %: are they fractions? write contraction [1]"]
+    return [
+        f"contractions span only {100.0 * span:.2g} %: are they fractions? write contraction [1]"
+    ]
 
 
 def _cells(table: Table, heading: str, source: str) -> list[str]:
     header = table.header or []
     if heading not in header:
-        raise RecordingError(f"{source}: where names the column {heading!r}, but {_has(heading, header)}")
+        raise RecordingError(
+            f"{source}: where names the column {heading!r}, but {_has(heading, header)}"
+        )
     return [str(cell).strip() for cell in table.cells[header.index(heading)]]
 
 
-def _kept(table: Table, where: Mapping[str, str], decimal: str, source: str) -> tuple[NDArray[np.bool_], list[str]]:
+def _kept(
+    table: Table, where: Mapping[str, str], decimal: str, source: str
+) -> tuple[NDArray[np.bool_], list[str]]:
     """Rows that ``where`` asks for, and a note about the others."""
     keep = np.ones(len(table.cells[0]), dtype=bool)
     for heading, value in where.items():
@@ -280,13 +357,20 @@ def _kept(table: Table, where: Mapping[str, str], decimal: str, source: str) -> 
         same = np.array([_alike(cell, value, decimal) for cell in cells])
         if not same.any():
             have = list(dict.fromkeys(cells))
-            raise RecordingError(f"{source}: where: no row has {heading} = {value!r}; there are: {', '.join(have[:12])}")
+            raise RecordingError(
+                f"{source}: where: no row has {heading} = {value!r}; there are: "
+                f"{', '.join(have[:12])}"
+            )
         keep &= same
     others = int((~keep).sum())
     chosen = ", ".join(f"{heading} = {value}" for heading, value in where.items())
     if not others:
         return keep, []
-    rows = f"1 row of the file is not {chosen} and belongs" if others == 1 else f"{others} rows of the file are not {chosen} and belong"
+    rows = (
+        f"1 row of the file is not {chosen} and belongs"
+        if others == 1
+        else f"{others} rows of the file are not {chosen} and belong"
+    )
     return keep, [f"{rows} to another map"]
 
 
@@ -306,15 +390,17 @@ def _one_specimen(table: Table, strange: Sequence[str], source: str) -> None:
             values = list(dict.fromkeys(_cells(table, heading, source)))
             if len(values) > 1:
                 raise RecordingError(
-                    f"{source}: column {heading!r} has {len(values)} values ({', '.join(values[:6])}): "
-                    f"choose one, where {heading} = {values[0]}"
+                    f"{source}: column {heading!r} has {len(values)} values "
+                    f"({', '.join(values[:6])}): choose one, where {heading} = {values[0]}"
                 )
 
 
 def _channels(table: Table, found: Mapping[str, _Column]) -> list[str]:
     """Headings for :func:`load_recording`: canonical channels, nothing for the other columns."""
     if "contraction" in found:
-        raise RecordingError("a recording with a time column needs the column length, not contraction")
+        raise RecordingError(
+            "a recording with a time column needs the column length, not contraction"
+        )
     headings = [""] * len(table.cells)
     for channel, (index, _, unit) in found.items():
         if channel == "pressure":

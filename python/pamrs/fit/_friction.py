@@ -1,14 +1,15 @@
 """Friction of a muscle from its hysteresis loops: the coefficients of (2.36).
 
-``F_total = F + d c_F |F|`` with ``c_F = max(c0 + c1 P, floor)`` and ``d`` = -1 while contracting, +1 while lengthening
-(Robinson 2014, (2.36)). At one contraction half the difference of the two branches is ``c_F |F|`` and half their sum
-is ``F``, whatever the force model: friction comes from the loops alone, and the mean curve goes to the fit of the moduli.
+``F_total = F + d c_F |F|`` with ``c_F = max(c0 + c1 P, floor)`` and ``d`` = -1 while contracting,
++1 while lengthening (Robinson 2014, (2.36)). At one contraction half the difference of the two
+branches is ``c_F |F|`` and half their sum is ``F``, whatever the force model: friction comes from
+the loops alone, and the mean curve goes to the fit of the moduli.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -29,9 +30,15 @@ Mask = NDArray[np.bool_]
 
 _FEWEST: Final = 4  # rows of a branch
 _BINS: Final = 200  # of a branch's contraction: rows nearer than that are averaged
-_BLOCKS: Final = 8  # stretches of contraction whose coefficients are compared for the standard error
-_SLACK: Final = 0.05  # of a level's largest mean force: below it a loop tells nothing about the ratio
-_HALFWAY: Final = 2.0 / 7.0  # of the presliding distance, where slip elements of 1/8, 1/4, 1/2 and 1 of it average to zero
+_BLOCKS: Final = (
+    8  # stretches of contraction whose coefficients are compared for the standard error
+)
+_SLACK: Final = (
+    0.05  # of a level's largest mean force: below it a loop tells nothing about the ratio
+)
+_HALFWAY: Final = (
+    2.0 / 7.0
+)  # of the presliding distance, where slip elements of 1/8, 1/4, 1/2 and 1 of it average to zero
 _PART_WAY: Final = 0.95  # of the way to either branch: rows within are in transition
 _RESOLVED: Final = 3  # rows in transition that a reversal needs
 _SIGNIFICANT: Final = 0.05
@@ -49,7 +56,8 @@ class FrictionLevel:
     coefficient, stderr : float
         ``c_F`` and its standard error from the scatter over the contraction [1].
     contraction, force, half_width : (k,) array
-        Contractions of the branch with fewer of them, within both [1], mean force of the branches there [N], half their difference [N].
+        Contractions of the branch with fewer of them, within both [1], mean force of the branches
+        there [N], half their difference [N].
     rows : int
         Rows of both branches.
     at_floor : bool
@@ -77,7 +85,8 @@ class FrictionFit:
     floor : float
         The least that ``c_F`` becomes, as given [1].
     presliding : float or None
-        Distance of motion over which the force goes from one branch to the other [m]; None if not determinable.
+        Distance of motion over which the force goes from one branch to the other [m]; None if not
+        determinable.
     presliding_reason : str
         How it was found, or why it is not determinable.
     levels : list of FrictionLevel
@@ -115,19 +124,26 @@ class FrictionFit:
     issues: list[str]
 
     def __repr__(self) -> str:
-        c0, c1 = self.params["friction_coefficient"].value, self.params["friction_pressure_slope"].value
+        c0, c1 = (
+            self.params["friction_coefficient"].value,
+            self.params["friction_pressure_slope"].value,
+        )
         law = f"max({c0:.4g} {'-' if c1 < 0.0 else '+'} {1e6 * abs(c1):.4g}/MPa P, {self.floor:g})"
         return f"FrictionFit(c_F = {law}, {len(self.levels)} levels)"
 
     @property
     def told(self) -> bool:
-        """Whether the loops tell a friction from none: all levels together, by four standard errors, at two levels above the floor."""
+        """Whether the loops tell a friction from none: all levels together, by four standard
+        errors, at two levels above the floor.
+        """
         mean, spread = _pooled(self.levels)
         return self.ndata >= 2 and mean > _SURE * spread
 
     @property
     def slope_significant(self) -> bool:
-        """Whether the slope over pressure differs from zero at 5 %; False where that cannot be tested."""
+        """Whether the slope over pressure differs from zero at 5 %; False where that cannot be
+        tested.
+        """
         return self.slope_pvalue < _SIGNIFICANT
 
     def predict(self, pressure: ArrayLike) -> Array:
@@ -150,12 +166,19 @@ class FrictionFit:
         p = np.asarray(pressure, dtype=np.float64)
         if not np.all(np.isfinite(p)):
             raise ParameterError("pressure: a value is not finite")
-        line = self.params["friction_coefficient"].value + self.params["friction_pressure_slope"].value * p
+        line = (
+            self.params["friction_coefficient"].value
+            + self.params["friction_pressure_slope"].value * p
+        )
         return np.maximum(line, self.floor)
 
     def mean_curve(self) -> tuple[Array, Array, Array]:
-        """Pressure [Pa], contraction [1] and mean force of both branches [N] of all levels: data free of friction."""
-        pressure = np.concatenate([np.full(len(level.force), level.pressure) for level in self.levels])
+        """Pressure [Pa], contraction [1] and mean force of both branches [N] of all levels: data
+        free of friction.
+        """
+        pressure = np.concatenate(
+            [np.full(len(level.force), level.pressure) for level in self.levels]
+        )
         return (
             pressure,
             np.concatenate([level.contraction for level in self.levels]),
@@ -173,9 +196,12 @@ class FrictionFit:
         Returns
         -------
         Muscle
-            A copy with the friction arguments replaced; its presliding distance stays where none was determinable.
+            A copy with the friction arguments replaced; its presliding distance stays where none
+            was determinable.
         """
-        changes = {name: parameter.value for name, parameter in self.params.items()} | {"friction_floor": self.floor}
+        changes = {name: parameter.value for name, parameter in self.params.items()} | {
+            "friction_floor": self.floor
+        }
         if self.presliding is not None:
             changes["friction_presliding"] = self.presliding
         return muscle.replace(**changes)
@@ -194,14 +220,17 @@ class FrictionFit:
         for level, law in zip(self.levels, self.best_fit.tolist(), strict=True):
             floor = "  on the floor" if level.at_floor else ""
             lines.append(
-                f"  {level.pressure / 1e3:11.1f}{level.coefficient:10.4f} +- {level.stderr:.4f}{law:10.4f}{level.rows:7d}{floor}"
+                f"  {level.pressure / 1e3:11.1f}{level.coefficient:10.4f} +- "
+                f"{level.stderr:.4f}{law:10.4f}{level.rows:7d}{floor}"
             )
         return "\n".join([*lines, *(f"  note: {issue}" for issue in self.issues)])
 
     def to_dict(self) -> dict[str, Any]:
         """The result as plain data, SI units; None where a number is not determinable."""
         return {
-            "parameters": [{**asdict(item), "stderr": _or_none(item.stderr)} for item in self.params.values()],
+            "parameters": [
+                {**asdict(item), "stderr": _or_none(item.stderr)} for item in self.params.values()
+            ],
             "floor": self.floor,
             "presliding": self.presliding,
             "presliding_reason": self.presliding_reason,
@@ -234,7 +263,10 @@ class FrictionFit:
     def _slope_words(self) -> str:
         if math.isnan(self.slope_pvalue):
             return "its significance cannot be tested without a spare pressure"
-        return f"{'significant' if self.slope_significant else 'not significant'}, p = {self.slope_pvalue:.2g}"
+        return (
+            f"{'significant' if self.slope_significant else 'not significant'}, p = "
+            f"{self.slope_pvalue:.2g}"
+        )
 
 
 def fit_friction(
@@ -254,7 +286,8 @@ def fit_friction(
     data : ForceMap, optional
         A map with directions; else give arrays.
     pressure, contraction, force, direction : (n,) array_like, optional
-        Gauge pressure [Pa], contraction [1], force [N], and -1 while contracting, +1 while lengthening, in the order measured.
+        Gauge pressure [Pa], contraction [1], force [N], and -1 while contracting, +1 while
+        lengthening, in the order measured.
     rest_length : float, optional
         With arrays [m]; without it the presliding distance, a length, is not determined.
     floor : float
@@ -275,65 +308,25 @@ def fit_friction(
         raise ParameterError(f"floor = {floor!r} is not allowed: at least 0 and below 1")
     rested = data is not None or rest_length is not None
     if data is None:
-        missing = [
-            word
-            for word, values in (("pressure", pressure), ("contraction", contraction), ("force", force), ("direction", direction))
-            if values is None
-        ]
-        if missing or pressure is None or contraction is None or force is None:
-            raise ParameterError(f"{', '.join(missing)}: needed when no ForceMap is given")
-        rest = 1.0 if rest_length is None else rest_length
-        length = rest * (1.0 - np.asarray(contraction, dtype=np.float64))
-        data = ForceMap.from_arrays(length, pressure, force, rest_length=rest, direction=direction, check_duplicates=False)
-    gas, e, pull, level, way = data.used_rows()
-    if not np.any(way != 0):
-        raise RecordingError(f"{data.label}: no row has a direction of motion; friction needs both branches of the loop")
-    issues = list(data.issues)
-    unknown = int(np.sum(way == 0))
-    if unknown:
-        issues.append(f"{unknown} rows have no direction of motion: not used here")
-    levels: list[FrictionLevel] = []
-    least = WEAK * float(np.abs(pull).max())
-    for index, nominal in enumerate(data.levels.tolist()):
-        rows = level == index
-        if float(np.abs(pull[rows]).max()) < least:
-            issues.append(f"{nominal / 1e3:.0f} kPa: forces below {100 * WEAK:g} % of the map's largest: no coefficient")
-            continue
-        found = _loop(float(np.median(gas[rows])), e[rows], pull[rows], way[rows])
-        if isinstance(found, str):
-            issues.append(f"{nominal / 1e3:.0f} kPa: {found}: no coefficient")
-        else:
-            levels.append(found)
-    if not levels:
-        raise RecordingError(f"{data.label}: no pressure gives a coefficient ({'; '.join(issues)})")
-    if len(levels) < 2:
-        raise RecordingError(f"{data.label}: one pressure only ({levels[0].pressure / 1e3:.0f} kPa): the slope c1 is not determinable")
+        data = _map(pressure, contraction, force, direction, rest_length)
+    levels, issues = _loops(data)
     line, above = _law(levels, floor)
     above &= np.array([x.coefficient > floor for x in levels])
-    if above.sum() == 1:
-        issues.append(
-            f"one pressure only stands above the floor of {floor:g}: the slope c1 is hardly determined by it and its neighbour"
-        )
-    pooled, spread = _pooled(levels)
-    if pooled < -_SURE * spread:
-        issues.append(
-            f"forces while lengthening lie below those while contracting (c_F = {pooled:.2g} +- {spread:.1g}): "
-            "are the directions exchanged?"
-        )
-    if not above.any():
-        issues.append(f"no coefficient stands above the floor of {floor:g}: the law is its floor at every pressure")
-    levels = [
-        FrictionLevel(x.pressure, x.coefficient, x.stderr, x.contraction, x.force, x.half_width, x.rows, not bool(on))
-        for x, on in zip(levels, above, strict=True)
-    ]
+    issues += _doubts(levels, above, floor)
+    levels = [replace(x, at_floor=not bool(on)) for x, on in zip(levels, above, strict=True)]
     free = max(int(above.sum()) - 2, 0)
-    distance, reason = _presliding(data, levels) if rested else (None, "not determinable: a length, and rest_length is not given")
-    pressures = np.array([x.pressure for x in levels])
-    best = np.maximum(line.values[0] + line.values[1] * pressures, floor)
+    if rested:
+        distance, reason = _presliding(data, levels)
+    else:
+        distance, reason = None, "not determinable: a length, and rest_length is not given"
+    best = np.maximum(
+        line.values[0] + line.values[1] * np.array([x.pressure for x in levels]), floor
+    )
+    names = {"friction_coefficient": "1", "friction_pressure_slope": "1/Pa"}
     return FrictionFit(
         params={
-            "friction_coefficient": LawParameter("friction_coefficient", float(line.values[0]), float(line.stderr[0]), "1"),
-            "friction_pressure_slope": LawParameter("friction_pressure_slope", float(line.values[1]), float(line.stderr[1]), "1/Pa"),
+            name: LawParameter(name, float(line.values[k]), float(line.stderr[k]), unit)
+            for k, (name, unit) in enumerate(names.items())
         },
         floor=floor,
         presliding=distance,
@@ -352,11 +345,107 @@ def fit_friction(
     )
 
 
+def _map(
+    pressure: ArrayLike | None,
+    contraction: ArrayLike | None,
+    force: ArrayLike | None,
+    direction: ArrayLike | None,
+    rest_length: float | None,
+) -> ForceMap:
+    """The map of arrays; one of a muscle 1 m long where no length is known.
+
+    Raises
+    ------
+    ParameterError
+        If an array is missing.
+    """
+    given = {
+        "pressure": pressure,
+        "contraction": contraction,
+        "force": force,
+        "direction": direction,
+    }
+    missing = [word for word, values in given.items() if values is None]
+    if missing or pressure is None or contraction is None or force is None:
+        raise ParameterError(f"{', '.join(missing)}: needed when no ForceMap is given")
+    rest = 1.0 if rest_length is None else rest_length
+    length = rest * (1.0 - np.asarray(contraction, dtype=np.float64))
+    return ForceMap.from_arrays(
+        length, pressure, force, rest_length=rest, direction=direction, check_duplicates=False
+    )
+
+
+def _loops(data: ForceMap) -> tuple[list[FrictionLevel], list[str]]:
+    """The loop of every pressure that has one, and what was found of the others.
+
+    Raises
+    ------
+    RecordingError
+        If no direction is known, or fewer than two pressures have both branches.
+    """
+    gas, e, pull, level, way = data.used_rows()
+    if not np.any(way != 0):
+        raise RecordingError(
+            f"{data.label}: no row has a direction of motion; friction needs both branches of the "
+            "loop"
+        )
+    issues = list(data.issues)
+    unknown = int(np.sum(way == 0))
+    if unknown:
+        issues.append(f"{unknown} rows have no direction of motion: not used here")
+    levels: list[FrictionLevel] = []
+    least = WEAK * float(np.abs(pull).max())
+    for index, nominal in enumerate(data.levels.tolist()):
+        rows, title = level == index, f"{nominal / 1e3:.0f} kPa"
+        if float(np.abs(pull[rows]).max()) < least:
+            issues.append(
+                f"{title}: forces below {100 * WEAK:g} % of the map's largest: no coefficient"
+            )
+            continue
+        found = _loop(float(np.median(gas[rows])), e[rows], pull[rows], way[rows])
+        if isinstance(found, str):
+            issues.append(f"{title}: {found}: no coefficient")
+        else:
+            levels.append(found)
+    if not levels:
+        raise RecordingError(f"{data.label}: no pressure gives a coefficient ({'; '.join(issues)})")
+    if len(levels) < 2:
+        raise RecordingError(
+            f"{data.label}: one pressure only ({levels[0].pressure / 1e3:.0f} kPa): the slope c1 "
+            "is not determinable"
+        )
+    return levels, issues
+
+
+def _doubts(levels: list[FrictionLevel], above: Mask, floor: float) -> list[str]:
+    """What speaks against a law: levels at the floor, branches that are exchanged."""
+    found: list[str] = []
+    if above.sum() == 1:
+        found.append(
+            f"one pressure only stands above the floor of {floor:g}: the slope c1 is hardly "
+            "determined by it and its neighbour"
+        )
+    pooled, spread = _pooled(levels)
+    if pooled < -_SURE * spread:
+        found.append(
+            f"forces while lengthening lie below those while contracting (c_F = {pooled:.2g} "
+            f"+- {spread:.1g}): are the directions exchanged?"
+        )
+    if not above.any():
+        found.append(
+            f"no coefficient stands above the floor of {floor:g}: the law is its floor at every "
+            "pressure"
+        )
+    return found
+
+
 def _or_none(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def _loop(pressure: float, contraction: Array, force: Array, way: NDArray[np.int8]) -> FrictionLevel | str:
+def _loop(
+    pressure: float, contraction: Array, force: Array, way: NDArray[np.int8]
+) -> FrictionLevel | str:
     """The loop of one level, or why it has none."""
     branches = [(contraction[way == d], force[way == d]) for d in (-1, 1)]
     for (e, _), word in zip(branches, ("contracting", "lengthening"), strict=True):
@@ -375,21 +464,27 @@ def _loop(pressure: float, contraction: Array, force: Array, way: NDArray[np.int
     blocks = [part for part in np.array_split(np.flatnonzero(strong), _BLOCKS) if len(part)]
     parts = np.array([_ratio(half[part], size[part]) for part in blocks])
     stderr = float(np.std(parts, ddof=1) / math.sqrt(len(parts))) if len(parts) > 1 else 0.0
-    return FrictionLevel(pressure, coefficient, stderr, grid, mean, half, sum(len(e) for e, _ in branches))
+    return FrictionLevel(
+        pressure, coefficient, stderr, grid, mean, half, sum(len(e) for e, _ in branches)
+    )
 
 
 def _merged(contraction: Array, force: Array) -> tuple[Array, Array]:
     """One branch by rising contraction; repeated passes are averaged."""
     spacing = float(np.ptp(contraction)) / _BINS
     bins = (
-        np.rint((contraction - contraction.min()) / spacing).astype(np.int64) if spacing > 0.0 else np.zeros(len(force), dtype=np.int64)
+        np.rint((contraction - contraction.min()) / spacing).astype(np.int64)
+        if spacing > 0.0
+        else np.zeros(len(force), dtype=np.int64)
     )
     _, inverse, counts = np.unique(bins, return_inverse=True, return_counts=True)
     return np.bincount(inverse, contraction) / counts, np.bincount(inverse, force) / counts
 
 
 def _ratio(half: Array, size: Array) -> float:
-    """Slope of ``half = c size`` by least absolute deviations: the weighted median of the ratios."""
+    """Slope of ``half = c size`` by least absolute deviations: the weighted median of the
+    ratios.
+    """
     ratio = half / size
     order = np.argsort(ratio)
     share = np.cumsum(size[order])
@@ -397,20 +492,30 @@ def _ratio(half: Array, size: Array) -> float:
 
 
 def _pooled(levels: list[FrictionLevel]) -> tuple[float, float]:
-    """One coefficient for all levels and its standard error, from the levels' own errors or their scatter, whichever is larger."""
-    value, error = (np.array([getattr(x, key) for x in levels]) for key in ("coefficient", "stderr"))
+    """One coefficient for all levels and its standard error, from the levels' own errors or their
+    scatter, whichever is larger.
+    """
+    value, error = (
+        np.array([getattr(x, key) for x in levels]) for key in ("coefficient", "stderr")
+    )
     weight = 1.0 / np.maximum(error, 1e-9) ** 2
     mean = float(weight @ value / weight.sum())
     return mean, float(1.0 / math.sqrt(weight.sum()))
 
 
 def _law(levels: list[FrictionLevel], floor: float) -> tuple[LevelLine, Mask]:
-    """The line through the levels above the floor, and which they are: the split with the least squares of ``max(line, floor)``."""
-    pressure, value, error = (np.array([getattr(x, key) for x in levels]) for key in ("pressure", "coefficient", "stderr"))
+    """The line through the levels above the floor, and which they are: the split with the least
+    squares of ``max(line, floor)``.
+    """
+    pressure, value, error = (
+        np.array([getattr(x, key) for x in levels]) for key in ("pressure", "coefficient", "stderr")
+    )
     design = np.column_stack([np.ones_like(pressure), pressure])
     count = len(levels)
     best: tuple[float, LevelLine, Mask] | None = None
-    for first, last in [(0, n) for n in range(count, 1, -1)] + [(n, count) for n in range(1, count - 1)]:
+    for first, last in [(0, n) for n in range(count, 1, -1)] + [
+        (n, count) for n in range(1, count - 1)
+    ]:
         above = (np.arange(count) >= first) & (np.arange(count) < last)
         line = fit_levels(design[above], value[above], error[above])
         law = design @ line.values
@@ -466,7 +571,10 @@ def _presliding(data: ForceMap, levels: list[FrictionLevel]) -> tuple[float | No
         return value, f"{value * 1e3:.3g} mm, median of {len(found)} reversals"
     if not len(turns):
         return None, "not determinable: no reversal within a pressure"
-    return None, f"not determinable: the rows are too sparse after {sparse} of {len(turns)} reversals"
+    return (
+        None,
+        f"not determinable: the rows are too sparse after {sparse} of {len(turns)} reversals",
+    )
 
 
 def _runs(level: NDArray[np.intp], way: NDArray[np.int8], turn: int) -> tuple[slice, slice]:

@@ -1,8 +1,9 @@
-"""A law over a few pressure levels, where the levels and not the samples are the independent observations.
+"""A law over a few pressure levels, where the levels and not the samples are the independent
+observations.
 
-Each level brings a mean and its standard error. Levels scatter about a law by more than these errors tell,
-because each was measured in a run of its own; that extra scatter is estimated (Paule & Mandel 1982) and goes
-into the weights and the standard errors.
+Each level brings a mean and its standard error. Levels scatter about a law by more than these
+errors tell, because each was measured in a run of its own; that extra scatter is estimated (Paule &
+Mandel 1982) and goes into the weights and the standard errors.
 """
 
 from __future__ import annotations
@@ -31,7 +32,8 @@ class LawParameter:
     name : str
         Its name.
     value, stderr : float
-        Value and standard error; ``stderr`` is NaN where it cannot be known (one level for each coefficient).
+        Value and standard error; ``stderr`` is NaN where it cannot be known (one level for each
+        coefficient).
     unit : str
         SI unit.
     """
@@ -53,9 +55,11 @@ class LevelLine:
     covar : (k, k) array
         Their covariance, the extra scatter included.
     between : float
-        Standard deviation of the levels about the law beyond their own errors; NaN without a spare level.
+        Standard deviation of the levels about the law beyond their own errors; NaN without a spare
+        level.
     redchi : float
-        Reduced chi-square with the levels' own errors alone: above 1, the law or the errors do not suffice.
+        Reduced chi-square with the levels' own errors alone: above 1, the law or the errors do not
+        suffice.
     """
 
     values: Array
@@ -100,7 +104,10 @@ def fit_levels(design: Array, observed: Array, stderr: Array) -> LevelLine:
     redchi = chisqr / free if free else float("nan")
     between = 0.0 if free else float("nan")
     if free and chisqr > free:
-        low, high = 0.0, float(np.sum((observed - columns @ values) ** 2)) / free + float(np.max(own))
+        low, high = (
+            0.0,
+            float(np.sum((observed - columns @ values) ** 2)) / free + float(np.max(own)),
+        )
         while solved(high)[2] > free:
             high *= 4.0
         for _ in range(_STEPS):
@@ -114,8 +121,9 @@ def fit_levels(design: Array, observed: Array, stderr: Array) -> LevelLine:
 def mean_of_series(values: Array) -> tuple[float, float]:
     """Mean and its standard error of repeats in the order they were measured.
 
-    Repeats that drift or hang together count as fewer: ``n (1 - r)/(1 + r)`` of them, at least 2, with ``r`` the
-    correlation of neighbours, corrected for its bias in a short series and kept within 0 and 0.9.
+    Repeats that drift or hang together count as fewer: ``n (1 - r)/(1 + r)`` of them, at least 2,
+    with ``r`` the correlation of neighbours, corrected for its bias in a short series and kept
+    within 0 and 0.9.
 
     Parameters
     ----------

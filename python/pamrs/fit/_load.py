@@ -21,7 +21,8 @@ __all__ = ["MeasuredMuscle", "load_force_map", "load_measured_muscle"]
 
 @dataclass(frozen=True, eq=False)
 class MeasuredMuscle:
-    """A force map with the muscle it was measured on, as a ``pamrs.force_map/1`` file describes them.
+    """A force map with the muscle it was measured on, as a ``pamrs.force_map/1`` file describes
+    them.
 
     Attributes
     ----------
@@ -61,23 +62,27 @@ def load_force_map(
     Parameters
     ----------
     path : path-like
-        A table (``.csv``, ``.tsv``, ``.txt``, ``.dat``, each also ``.gz``, or ``.parquet``) with the columns length or
-        contraction, pressure, force and, if known, direction (-1 or "contracting", 1 or "lengthening"). Units are in the
-        headings: ``length [mm]``, ``pressure_kPa``, ``force (N)``. With a column ``time`` it is read as a recording of a
-        bench. Or a ``.toml`` description (schema ``pamrs.force_map/1``), to which no other argument applies.
+        A table (``.csv``, ``.tsv``, ``.txt``, ``.dat``, each also ``.gz``, or ``.parquet``) with
+        the columns length or contraction, pressure, force and, if known, direction (-1 or
+        "contracting", 1 or "lengthening"). Units are in the headings: ``length [mm]``,
+        ``pressure_kPa``, ``force (N)``. With a column ``time`` it is read as a recording of a
+        bench. Or a ``.toml`` description (schema ``pamrs.force_map/1``), to which no other argument
+        applies.
     rest_length : float, optional
         Length at zero contraction [m]; needed for a table.
     columns : mapping of str to str, optional
         From the file's headings to headings as above; an empty one leaves the column out.
     where : mapping of str to str or float, optional
-        Column of the file -> value: only rows with these values belong to the map. Numbers count as numbers: 1 is 1.000.
+        Column of the file -> value: only rows with these values belong to the map. Numbers count as
+        numbers: 1 is 1.000.
     clipped, level_tolerance : float, optional
         As in :meth:`ForceMap.from_arrays`.
     delimiter : str, optional
-        What separates cells, ``" "`` for any run of blanks; by default the tabulator, semicolon, comma, bar or blank with
-        which the rows have as many cells as the header.
+        What separates cells, ``" "`` for any run of blanks; by default the tabulator, semicolon,
+        comma, bar or blank with which the rows have as many cells as the header.
     decimal : str, optional
-        Decimal mark; by default the comma if the measured columns have numbers like ``12,5``, else the point.
+        Decimal mark; by default the comma if the measured columns have numbers like ``12,5``, else
+        the point.
     name : str, optional
         What to call the map; by default the file's stem, or what the description says.
 
@@ -88,13 +93,24 @@ def load_force_map(
     Raises
     ------
     RecordingError
-        If the file cannot be read, its cells cannot be told apart, a column is missing, has no unit or the wrong one, or
-        fewer than two rows are usable.
+        If the file cannot be read, its cells cannot be told apart, a column is missing, has no unit
+        or the wrong one, or fewer than two rows are usable.
     """
     file = Path(path)
     if file.suffix.lower() == ".toml":
-        given = {"rest_length": rest_length, "columns": columns, "where": where, "clipped": clipped, "level_tolerance": level_tolerance}
-        for key, value in {**given, "delimiter": delimiter, "decimal": decimal, "name": name}.items():
+        given = {
+            "rest_length": rest_length,
+            "columns": columns,
+            "where": where,
+            "clipped": clipped,
+            "level_tolerance": level_tolerance,
+        }
+        for key, value in {
+            **given,
+            "delimiter": delimiter,
+            "decimal": decimal,
+            "name": name,
+        }.items():
             if value is not None:
                 raise ParameterError(f"{key} cannot be given: {file} describes its table itself")
         return load_measured_muscle(file).data
@@ -112,14 +128,16 @@ def load_force_map(
 
 
 def load_measured_muscle(path: str | os.PathLike[str]) -> MeasuredMuscle:
-    """Read a ``pamrs.force_map/1`` description: where the table is, what its columns are, which muscle it is of.
+    """Read a ``pamrs.force_map/1`` description: where the table is, what its columns are, which
+    muscle it is of.
 
     Parameters
     ----------
     path : path-like
-        The TOML file. ``file`` in it is relative to its folder; ``columns`` maps the table's headings to headings with
-        units; ``where`` picks rows; ``clipped_force``, ``level_tolerance`` and ``noise`` are quantities; ``[muscle]`` is as in a rig
-        file, with ``tol`` as the standard deviation of what is known.
+        The TOML file. ``file`` in it is relative to its folder; ``columns`` maps the table's
+        headings to headings with units; ``where`` picks rows; ``clipped_force``,
+        ``level_tolerance`` and ``noise`` are quantities; ``[muscle]`` is as in a rig file, with
+        ``tol`` as the standard deviation of what is known.
 
     Returns
     -------
@@ -132,4 +150,6 @@ def load_measured_muscle(path: str | os.PathLike[str]) -> MeasuredMuscle:
     """
     found = read_description(Path(path))
     data = load_force_map(found.table, **found.options)
-    return MeasuredMuscle(data.checked_against(found.muscle), found.muscle, found.tolerance, found.noise, found.text)
+    return MeasuredMuscle(
+        data.checked_against(found.muscle), found.muscle, found.tolerance, found.noise, found.text
+    )

@@ -40,7 +40,9 @@ class Solution:
     condition_number: float
 
 
-def decompose(matrix: Array, names: Sequence[str], hint: str = "") -> tuple[Array, Array, Array, Array]:
+def decompose(
+    matrix: Array, names: Sequence[str], hint: str = ""
+) -> tuple[Array, Array, Array, Array]:
     """Scale the columns to length 1 and take the SVD.
 
     Parameters
@@ -60,19 +62,30 @@ def decompose(matrix: Array, names: Sequence[str], hint: str = "") -> tuple[Arra
     Raises
     ------
     FitError
-        If a column is zero or columns are collinear (smallest singular value below 1e-10 of the largest).
+        If a column is zero or columns are collinear (smallest singular value below 1e-10 of the
+        largest).
     """
     scale = np.linalg.norm(matrix, axis=0)
     empty = [name for name, size in zip(names, scale.tolist(), strict=True) if size == 0.0]
     if empty:
-        raise FitError(f"{', '.join(empty)} {'has' if len(empty) == 1 else 'have'} no effect on any fitted point{hint}")
+        raise FitError(
+            f"{', '.join(empty)} {'has' if len(empty) == 1 else 'have'} no effect on any fitted "
+            f"point{hint}"
+        )
     if not np.isfinite(matrix).all():
         raise FitError("the model gives no finite force at some of the fitted points")
     u, s, vt = np.linalg.svd(matrix / scale, full_matrices=False)
     if s[-1] <= RANK_TOLERANCE * s[0]:
         share = np.abs(vt[-1])
-        mixed = [name for name, part in zip(names, share.tolist(), strict=True) if part > 0.1 * share.max()]
-        raise FitError(f"the fitted points cannot tell apart {', '.join(mixed)}: their columns are collinear{hint}")
+        mixed = [
+            name
+            for name, part in zip(names, share.tolist(), strict=True)
+            if part > 0.1 * share.max()
+        ]
+        raise FitError(
+            f"the fitted points cannot tell apart {', '.join(mixed)}: their columns are "
+            f"collinear{hint}"
+        )
     return scale, u, s, vt
 
 
@@ -107,7 +120,9 @@ def solve(matrix: Array, target: Array, names: Sequence[str], hint: str = "") ->
 
 
 def project_out(matrix: Array, target: Array) -> Array:
-    """The part of ``target`` that no combination of the columns reaches (the inner step of variable projection)."""
+    """The part of ``target`` that no combination of the columns reaches (the inner step of variable
+    projection).
+    """
     if matrix.shape[1] == 0:
         return target
     q, _ = np.linalg.qr(matrix / np.maximum(np.linalg.norm(matrix, axis=0), np.finfo(float).tiny))

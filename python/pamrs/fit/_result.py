@@ -35,21 +35,25 @@ OUTSIDE_PRESSURE, OUTSIDE_CONTRACTION = 1, 2
 class MuscleFit(FitStatistics):
     """A fitted muscle: made by :func:`pamrs.fit.fit_muscle`.
 
-    It has the numbers of the fit (:class:`pamrs.fit._statistics.FitStatistics`), errors by pressure and on pressures left out,
-    and it predicts.
+    It has the numbers of the fit (:class:`pamrs.fit._statistics.FitStatistics`), errors by pressure
+    and on pressures left out, and it predicts.
     """
 
     @cached_property
     def all_residuals(self) -> Array:
         """Measured minus model force [N] of all used rows of the map, fitted or not."""
         everything = np.ones_like(self._rows)
-        matrix, target = self._problem.system(self._estimate.design, self._estimate.blank, everything)
+        matrix, target = self._problem.system(
+            self._estimate.design, self._estimate.blank, everything
+        )
         return (target - matrix @ self._estimate.x) / self._problem.weight
 
     def error_by_pressure(self) -> PressureErrors:
-        """The measure (2.37) of every level of the map, fitted or not: rms of ``(F - F_model)/F_max`` of the level.
+        """The measure (2.37) of every level of the map, fitted or not: rms of
+        ``(F - F_model)/F_max`` of the level.
 
-        Levels whose own largest force is below 1 % of the map's are not in it but named: no force there to measure errors by.
+        Levels whose own largest force is below 1 % of the map's are not in it but named: no force
+        there to measure errors by.
         """
         everything = np.ones_like(self._rows)
         return PressureErrors.of(self._problem, self.all_residuals, everything, self._rows)
@@ -74,16 +78,21 @@ class MuscleFit(FitStatistics):
 
     @property
     def rms_error(self) -> float:
-        """Rms force error of all used rows, fitted or not, as a fraction of the map's largest force [1]."""
+        """Rms force error of all used rows, fitted or not, as a fraction of the map's largest force
+        [1].
+        """
         return (self.errors_of("all") or (0.0, 0.0))[0]
 
     @property
     def max_error(self) -> float:
-        """Largest force error of all used rows, fitted or not, as a fraction of the map's largest force [1]."""
+        """Largest force error of all used rows, fitted or not, as a fraction of the map's largest
+        force [1].
+        """
         return (self.errors_of("all") or (0.0, 0.0))[1]
 
     def leave_one_pressure_out(self) -> CrossValidation:
-        """Predict every fitted level by a fit of the other levels; geometry, where free, is fitted anew each time.
+        """Predict every fitted level by a fit of the other levels; geometry, where free, is fitted
+        anew each time.
 
         Returns
         -------
@@ -103,21 +112,37 @@ class MuscleFit(FitStatistics):
     # -------------------------------------------------------------- prediction
 
     def _points(
-        self, pressure: ArrayLike, contraction: ArrayLike | None, length: ArrayLike | None, direction: ArrayLike | None
+        self,
+        pressure: ArrayLike,
+        contraction: ArrayLike | None,
+        length: ArrayLike | None,
+        direction: ArrayLike | None,
     ) -> tuple[Array, Array, Array]:
         """Pressure, contraction, direction in one shape; direction NaN-free, 0 where none."""
         if (contraction is None) == (length is None):
             raise ParameterError("give contraction or length, one of the two")
         if length is not None:
-            contraction = 1.0 - np.asarray(length, dtype=np.float64) / self._estimate.blank.parameters["rest_length"]
+            contraction = (
+                1.0
+                - np.asarray(length, dtype=np.float64)
+                / self._estimate.blank.parameters["rest_length"]
+            )
         way = 0.0 if direction is None else direction
-        p, e, d = np.broadcast_arrays(*(np.asarray(v, dtype=np.float64) for v in (pressure, contraction, way)))
+        p, e, d = np.broadcast_arrays(
+            *(np.asarray(v, dtype=np.float64) for v in (pressure, contraction, way))
+        )
         for name, values in (("pressure", p), ("contraction", e), ("direction", d)):
             if not np.isfinite(values).all():
                 raise ParameterError(f"{name} has a value that is not finite")
         return p, e, d
 
-    def outside(self, pressure: ArrayLike, contraction: ArrayLike | None = None, *, length: ArrayLike | None = None) -> Flags:
+    def outside(
+        self,
+        pressure: ArrayLike,
+        contraction: ArrayLike | None = None,
+        *,
+        length: ArrayLike | None = None,
+    ) -> Flags:
         """Where a prediction extrapolates.
 
         Parameters
@@ -128,15 +153,20 @@ class MuscleFit(FitStatistics):
         Returns
         -------
         ndarray of uint8
-            0 inside the fitted range, 1 pressure outside, 2 contraction outside, 3 both, in the broadcast shape.
+            0 inside the fitted range, 1 pressure outside, 2 contraction outside, 3 both, in the
+            broadcast shape.
         """
         p, e, _ = self._points(pressure, contraction, length, None)
-        seen_e = 1.0 - self._problem.length[self._rows] / self._estimate.blank.parameters["rest_length"]
+        seen_e = (
+            1.0 - self._problem.length[self._rows] / self._estimate.blank.parameters["rest_length"]
+        )
         seen_p = self._problem.knot(self._rows)
         slack_p, slack_e = 1e-9 * float(seen_p.max()), 1e-9
         beyond_p = (p < seen_p.min() - slack_p) | (p > seen_p.max() + slack_p)
         beyond_e = (e < seen_e.min() - slack_e) | (e > seen_e.max() + slack_e)
-        return np.asarray(beyond_p * OUTSIDE_PRESSURE + beyond_e * OUTSIDE_CONTRACTION, dtype=np.uint8)
+        return np.asarray(
+            beyond_p * OUTSIDE_PRESSURE + beyond_e * OUTSIDE_CONTRACTION, dtype=np.uint8
+        )
 
     def predict(
         self,
@@ -153,11 +183,13 @@ class MuscleFit(FitStatistics):
         pressure : array_like
             Gauge pressure [Pa].
         contraction : array_like, optional
-            Contraction ratio [1] of the *fitted* rest length; this or ``length``. All arguments broadcast.
+            Contraction ratio [1] of the *fitted* rest length; this or ``length``. All arguments
+            broadcast.
         length : array_like, optional
             Length [m].
         direction : array_like, optional
-            -1 while contracting, +1 while lengthening, 0 midway between the branches; None without friction.
+            -1 while contracting, +1 while lengthening, 0 midway between the branches; None without
+            friction.
 
         Returns
         -------
@@ -167,8 +199,9 @@ class MuscleFit(FitStatistics):
         Raises
         ------
         ParameterError
-            If a value is not finite, a pressure below vacuum, a contraction beyond the braid's limits, or a pressure beyond the
-            fitted levels where moduli free at each level have no law.
+            If a value is not finite, a pressure below vacuum, a contraction beyond the braid's
+            limits, or a pressure beyond the fitted levels where moduli free at each level have no
+            law.
         """
         p, e, d = self._points(pressure, contraction, length, direction)
         design, blank = self._estimate.design, self._estimate.blank
@@ -179,8 +212,9 @@ class MuscleFit(FitStatistics):
         slack = 1e-9 * high
         if p.size and (p.min() < low - slack or p.max() > high + slack):
             raise ParameterError(
-                f"pressure from {p.min() / 1e3:g} to {p.max() / 1e3:g} kPa: moduli free at each level are known from {low / 1e3:g} to "
-                f"{high / 1e3:g} kPa; moduli='linear' has a law beyond"
+                f"pressure from {p.min() / 1e3:g} to {p.max() / 1e3:g} kPa: moduli free at each "
+                f"level are known from {low / 1e3:g} to {high / 1e3:g} kPa; moduli='linear' has a "
+                "law beyond"
             )
         blank.force(p, e)  # refuses what the braid cannot do
         flat_p, flat_d = p.ravel(), d.ravel()
@@ -189,7 +223,12 @@ class MuscleFit(FitStatistics):
         return np.asarray(force * friction_factor(blank, flat_p, flat_d, force)).reshape(p.shape)
 
     def predict_std(
-        self, pressure: ArrayLike, contraction: ArrayLike | None = None, *, length: ArrayLike | None = None, new_point: bool = False
+        self,
+        pressure: ArrayLike,
+        contraction: ArrayLike | None = None,
+        *,
+        length: ArrayLike | None = None,
+        new_point: bool = False,
     ) -> Array:
         """Standard error of the predicted force [N], from ``covar``.
 
@@ -203,7 +242,8 @@ class MuscleFit(FitStatistics):
         Returns
         -------
         ndarray
-            In the broadcast shape. It knows the scatter and the priors, not the model's own error beyond the fitted range.
+            In the broadcast shape. It knows the scatter and the priors, not the model's own error
+            beyond the fitted range.
         """
         p, e, d = self._points(pressure, contraction, length, None)
         shape, p, d = p.shape, p.ravel(), d.ravel()
@@ -212,15 +252,22 @@ class MuscleFit(FitStatistics):
         weights = design.weights(p)
 
         def force(muscle: Muscle) -> Array:
-            gas, columns = design.columns(muscle, p, 1.0 - lengths / muscle.parameters["rest_length"], d, weights)
+            gas, columns = design.columns(
+                muscle, p, 1.0 - lengths / muscle.parameters["rest_length"], d, weights
+            )
             return np.asarray(gas + columns @ x)
 
         _, columns = design.columns(self._estimate.blank, p, e.ravel(), d, weights)
-        slopes = np.hstack([columns, geometry_slopes(self._problem, self._estimate.geometry, force, len(p))])
+        slopes = np.hstack(
+            [columns, geometry_slopes(self._problem, self._estimate.geometry, force, len(p))]
+        )
         variance = np.einsum("ni,ij,nj->n", slopes, self.covar, slopes)
         if new_point:
             if self.weights != "force":
-                raise ParameterError("new_point = True needs a fit with weights='force': the scatter is one number in N only there")
+                raise ParameterError(
+                    "new_point = True needs a fit with weights='force': the scatter is one number "
+                    "in N only there"
+                )
             variance = variance + self.noise**2
         return np.asarray(np.sqrt(np.maximum(variance, 0.0))).reshape(shape)
 
@@ -241,7 +288,9 @@ class MuscleFit(FitStatistics):
         used = chosen.used
         way = chosen.direction[used] if np.any(self._problem.direction) else None
         if way is not None and self.model == "elbow_linear":
-            way = np.where(way == 0, -1, way)  # as in the fit: rows of unknown direction are on the contracting branch
+            way = np.where(
+                way == 0, -1, way
+            )  # as in the fit: rows of unknown direction are on the contracting branch
         force = self.predict(chosen.pressure[used], length=chosen.length[used], direction=way)
         return determination(chosen.force[used], force)
 
@@ -253,13 +302,15 @@ class MuscleFit(FitStatistics):
         Parameters
         ----------
         rig : Rig, optional
-            Gets its muscle replaced, the number of muscles kept. None makes a bench: gas, muscle, and a dead volume of a tenth
-            of the muscle's air; without joint and arm it cannot be simulated.
+            Gets its muscle replaced, the number of muscles kept. None makes a bench: gas, muscle,
+            and a dead volume of a tenth of the muscle's air; without joint and arm it cannot be
+            simulated.
 
         Returns
         -------
         Rig
-            Fitted geometry carries its standard error as tolerance; the rig's other tolerances stay where the number does.
+            Fitted geometry carries its standard error as tolerance; the rig's other tolerances stay
+            where the number does.
 
         Raises
         ------
@@ -276,7 +327,9 @@ class MuscleFit(FitStatistics):
 
         return to_dict(self)
 
-    def report(self, path: str | os.PathLike[str], comparison: ModelComparison | None = None) -> Path:
+    def report(
+        self, path: str | os.PathLike[str], comparison: ModelComparison | None = None
+    ) -> Path:
         """Write the report, one HTML file that needs no network.
 
         Parameters
@@ -300,7 +353,9 @@ class MuscleFit(FitStatistics):
 
         return write_report(self, path, comparison)
 
-    def figure(self, path: str | os.PathLike[str], comparison: ModelComparison | None = None) -> Path:
+    def figure(
+        self, path: str | os.PathLike[str], comparison: ModelComparison | None = None
+    ) -> Path:
         """Write one picture of the fit, a PNG of 1600 x 1000 pixels; arguments as :meth:`report`.
 
         Parameters
@@ -327,4 +382,7 @@ class MuscleFit(FitStatistics):
 
     def __repr__(self) -> str:
         order = "" if self.order is None else f" of order {self.order}"
-        return f"MuscleFit({self.model}{order}, {self.ndata} points, max error {100 * self.max_error:.2f} % of the largest force)"
+        return (
+            f"MuscleFit({self.model}{order}, {self.ndata} points, max error "
+            f"{100 * self.max_error:.2f} % of the largest force)"
+        )

@@ -41,7 +41,13 @@ GEOMETRY: Final[dict[str, str]] = {
 }
 
 #: Coefficients of the models that can have a prior.
-COEFFICIENTS: Final[tuple[str, ...]] = ("modulus_slope", "modulus_offset", "c10", "c01", "bladder_modulus")
+COEFFICIENTS: Final[tuple[str, ...]] = (
+    "modulus_slope",
+    "modulus_offset",
+    "c10",
+    "c01",
+    "bladder_modulus",
+)
 
 _ELLIPTIC_ONLY = ("k0", "contraction_slope", "extension_slope", "neck_floor")
 _WALLLESS = ("gaylord",)
@@ -49,7 +55,9 @@ _WALLLESS = ("gaylord",)
 
 def has_effect(name: str, model: str, geometry: str) -> bool:
     """Whether a geometry parameter enters the force of a model."""
-    return not (name in _ELLIPTIC_ONLY and geometry == "cylinder") and not (name == "wall_thickness" and model in _WALLLESS)
+    return not (name in _ELLIPTIC_ONLY and geometry == "cylinder") and not (
+        name == "wall_thickness" and model in _WALLLESS
+    )
 
 
 def solution(
@@ -79,14 +87,21 @@ def solution(
         raise ParameterError(f"noise = {noise!r} is not allowed: a positive number is needed")
     if known and noise is None:
         raise ParameterError(
-            f"tolerance of {', '.join(known)} needs noise: the standard deviation of the forces that it is weighed against"
+            f"tolerance of {', '.join(known)} needs noise: the standard deviation of the forces "
+            "that it is weighed against"
         )
     rest = float(blank.parameters["rest_length"])
     if not math.isclose(rest, data.rest_length, rel_tol=1e-6):
-        raise ParameterError(f"rest_length: the muscle has {rest:g} m, the force map {data.rest_length:g} m; the same is needed")
+        raise ParameterError(
+            f"rest_length: the muscle has {rest:g} m, the force map {data.rest_length:g} m; the "
+            "same is needed"
+        )
     problem = _problem(data, blank, moduli, unknowns, known, noise, direction)
     if not float(problem.force[rows].max()) > 0.0:
-        raise FitError(f"the largest force of the fitted rows is {problem.force[rows].max():g} N: a pulling force is needed")
+        raise FitError(
+            f"the largest force of the fitted rows is {problem.force[rows].max():g} N: a pulling "
+            "force is needed"
+        )
     if weights == "level":
         problem = _weighted(problem, rows)
     return _result(data, problem, rows, estimate(problem, rows), errors)
@@ -99,27 +114,38 @@ def _choices(*, weights: str, errors: str, direction: str | None) -> None:
         ("direction", direction, ("data", None)),
     ):
         if value not in allowed:
-            raise ParameterError(f"{name} = {value!r} is not allowed: {' or '.join(repr(choice) for choice in allowed)}")
+            raise ParameterError(
+                f"{name} = {value!r} is not allowed: "
+                f"{' or '.join(repr(choice) for choice in allowed)}"
+            )
 
 
 def level_indices(data: ForceMap, levels: Sequence[float]) -> list[int]:
     """Indices of levels given as whole numbers (indices) or floats (pressures in Pa)."""
     chosen = np.asarray(levels)
     if chosen.ndim != 1 or not len(chosen) or chosen.dtype.kind not in "iuf":
-        raise ParameterError(f"levels = {levels!r} is not allowed: a list of indices, or of pressures in Pa as floats")
+        raise ParameterError(
+            f"levels = {levels!r} is not allowed: a list of indices, or of pressures in Pa as "
+            "floats"
+        )
     if chosen.dtype.kind == "f":
         return data.level_indices(chosen.tolist())
     count = len(data.levels)
     if np.any((chosen < -count) | (chosen >= count)):
         raise ParameterError(
-            f"levels = {chosen.tolist()} is not allowed: indices from 0 to {count - 1}; pressures are given as floats, in Pa"
+            f"levels = {chosen.tolist()} is not allowed: indices from 0 to {count - 1}; pressures "
+            "are given as floats, in Pa"
         )
     return sorted({int(index) % count for index in chosen})
 
 
 def _chosen(data: ForceMap, levels: Sequence[float] | None) -> Mask:
     level = data.level[data.used]
-    return np.ones(len(level), dtype=bool) if levels is None else np.isin(level, level_indices(data, levels))
+    return (
+        np.ones(len(level), dtype=bool)
+        if levels is None
+        else np.isin(level, level_indices(data, levels))
+    )
 
 
 def _free(blank: Muscle, names: tuple[str, ...], tolerance: dict[str, float]) -> tuple[Free, ...]:
@@ -128,10 +154,15 @@ def _free(blank: Muscle, names: tuple[str, ...], tolerance: dict[str, float]) ->
         if name not in GEOMETRY:
             raise ParameterError(f"free: {name!r} is not allowed: of {', '.join(GEOMETRY)}")
         if not has_effect(name, blank.model, blank.geometry):
-            raise ParameterError(f"free: {name!r} has no effect on the model {blank.model} with {blank.geometry} geometry")
+            raise ParameterError(
+                f"free: {name!r} has no effect on the model {blank.model} with {blank.geometry} "
+                "geometry"
+            )
     if len(set(names)) < len(names):
         raise ParameterError(f"free = {list(names)} names a parameter twice")
-    return tuple(Free(name, float(known[name]), float(tolerance.get(name, math.inf))) for name in names)
+    return tuple(
+        Free(name, float(known[name]), float(tolerance.get(name, math.inf))) for name in names
+    )
 
 
 def _is_number(value: object) -> bool:
@@ -144,7 +175,10 @@ def _tolerances(tolerance: Mapping[str, float] | None) -> dict[str, float]:
         if name not in allowed:
             raise ParameterError(f"tolerance: {name!r} is not allowed: of {', '.join(allowed)}")
         if not (_is_number(value) and value > 0.0):
-            raise ParameterError(f"tolerance: {name} = {value!r} is not allowed: a positive number is needed (infinite for no prior)")
+            raise ParameterError(
+                f"tolerance: {name} = {value!r} is not allowed: a positive number is needed "
+                "(infinite for no prior)"
+            )
     return dict(tolerance or {})
 
 
@@ -154,8 +188,13 @@ def _known(muscle: Muscle, blank: Muscle, tolerance: Mapping[str, float]) -> dic
     known: dict[str, Known] = {}
     for name in (name for name in COEFFICIENTS if math.isfinite(tolerance.get(name, math.inf))):
         if name not in ELASTIC_PARAMETERS[blank.model]:
-            raise ParameterError(f"tolerance: {name!r} is not allowed: the model {blank.model} has no such coefficient")
-        known[name] = Known(tuple(np.atleast_1d(own.get(name, 0.0)).tolist()), float(tolerance[name]))
+            raise ParameterError(
+                f"tolerance: {name!r} is not allowed: the model {blank.model} has no such "
+                "coefficient"
+            )
+        known[name] = Known(
+            tuple(np.atleast_1d(own.get(name, 0.0)).tolist()), float(tolerance[name])
+        )
     return known
 
 
@@ -184,23 +223,38 @@ def _problem(
         "direction": steps,
         "levels": data.levels,
     }
-    return Problem(blank=blank, moduli=moduli, free=free, known=known, noise=noise, weight=np.ones(len(force)), **arrays)
+    return Problem(
+        blank=blank,
+        moduli=moduli,
+        free=free,
+        known=known,
+        noise=noise,
+        weight=np.ones(len(force)),
+        **arrays,
+    )
 
 
 def _weighted(problem: Problem, rows: Mask) -> Problem:
     """The problem with every fitted residual over the largest force of its level."""
     tops = level_forces(problem)
     weak = tops < WEAK * float(problem.force.max())
-    named = [f"{problem.levels[i] / 1e3:g} kPa ({tops[i]:.3g} N)" for i in np.unique(problem.level[rows]) if weak[i]]
+    named = [
+        f"{problem.levels[i] / 1e3:g} kPa ({tops[i]:.3g} N)"
+        for i in np.unique(problem.level[rows])
+        if weak[i]
+    ]
     if named:
         raise FitError(
-            f"weights = 'level' divides by the largest force of a level, which is below {100 * WEAK:g} % of the map's largest at "
-            f"{', '.join(named)}: leave these levels out, or take weights = 'force'"
+            "weights = 'level' divides by the largest force of a level, which is below "
+            f"{100 * WEAK:g} % of the map's largest at {', '.join(named)}: leave these levels out, "
+            "or take weights = 'force'"
         )
     return replace(problem, weight=1.0 / np.where(weak, 1.0, tops)[problem.level])
 
 
-def _result(data: ForceMap, problem: Problem, rows: Mask, found: Estimate, errors: str) -> FitStatistics:
+def _result(
+    data: ForceMap, problem: Problem, rows: Mask, found: Estimate, errors: str
+) -> FitStatistics:
     plain, robust = covariances(problem, found, problem.level[rows])
     warnings = []
     kind = errors
@@ -209,9 +263,15 @@ def _result(data: ForceMap, problem: Problem, rows: Mask, found: Estimate, error
         if found.sigma > 0.0:
             count, needed = len(np.unique(problem.level[rows])), levels_needed(len(plain))
             why = (
-                f"errors by level need {needed} fitted levels for {len(plain)} unknowns, there are {count}"
+                (
+                    f"errors by level need {needed} fitted levels for {len(plain)} unknowns, there "
+                    f"are {count}"
+                )
                 if count < needed
-                else f"errors by level leave out one level at a time, and one of the {count} cannot be missed"
+                else (
+                    f"errors by level leave out one level at a time, and one of the {count} cannot "
+                    "be missed"
+                )
             )
             warnings.append(f"standard errors take the residuals as independent: {why}")
     covar = plain if kind == "plain" or robust is None else robust
@@ -232,15 +292,21 @@ def _result(data: ForceMap, problem: Problem, rows: Mask, found: Estimate, error
     )
 
 
-def _parameters(problem: Problem, found: Estimate, covar: Array, plain: Array) -> dict[str, FitParameter]:
+def _parameters(
+    problem: Problem, found: Estimate, covar: Array, plain: Array
+) -> dict[str, FitParameter]:
     spread, spread_plain = np.sqrt(np.diag(covar)).tolist(), np.sqrt(np.diag(plain)).tolist()
     parameters = {}
     expected, information = problem.expected(found.design)
     for i, (name, unit) in enumerate(zip(found.design.names, found.design.units, strict=True)):
         told = (float(expected[i]), 1.0 / float(information[i])) if information[i] else (None, None)
-        parameters[name] = FitParameter(name, float(found.x[i]), spread[i], unit, spread_plain[i], *told)
+        parameters[name] = FitParameter(
+            name, float(found.x[i]), spread[i], unit, spread_plain[i], *told
+        )
     for i, free in enumerate(problem.free, start=len(found.x)):
         known = free.tolerance if math.isfinite(free.tolerance) else None
         value = float(found.geometry[i - len(found.x)])
-        parameters[free.name] = FitParameter(free.name, value, spread[i], GEOMETRY[free.name], spread_plain[i], free.nominal, known)
+        parameters[free.name] = FitParameter(
+            free.name, value, spread[i], GEOMETRY[free.name], spread_plain[i], free.nominal, known
+        )
     return parameters

@@ -111,14 +111,22 @@ class FitStatistics:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """How the rows were used: ``weights``, ``direction`` and ``noise`` of :func:`pamrs.fit.fit_muscle`."""
+        """How the rows were used: ``weights``, ``direction`` and ``noise`` of
+        :func:`pamrs.fit.fit_muscle`.
+        """
         problem = self._problem
         weights = "force" if np.all(problem.weight == 1.0) else "level"
-        return {"weights": weights, "direction": "data" if np.any(problem.direction) else None, "noise": problem.noise}
+        return {
+            "weights": weights,
+            "direction": "data" if np.any(problem.direction) else None,
+            "noise": problem.noise,
+        }
 
     @property
     def moduli_names(self) -> tuple[str, ...]:
-        """What the columns of :meth:`moduli` are: ``E1``..., ``c10`` and ``c01``, ``bladder_modulus``, or none."""
+        """What the columns of :meth:`moduli` are: ``E1``..., ``c10`` and ``c01``,
+        ``bladder_modulus``, or none.
+        """
         return self._estimate.design.base
 
     @property
@@ -128,12 +136,18 @@ class FitStatistics:
 
     @property
     def muscle(self) -> Muscle:
-        """The fitted muscle; FitError when the moduli are free at each level (see :meth:`muscle_at`)."""
+        """The fitted muscle; FitError when the moduli are free at each level (see
+        :meth:`muscle_at`).
+        """
         return self._estimate.design.muscle(self._estimate.blank, self._estimate.x)
 
     def muscle_at(self, pressure: float) -> Muscle:
-        """The fitted muscle with the moduli of one gauge pressure [Pa], right at that pressure only."""
-        return self._estimate.design.muscle_at(self._estimate.blank, self._estimate.x, float(pressure))
+        """The fitted muscle with the moduli of one gauge pressure [Pa], right at that pressure
+        only.
+        """
+        return self._estimate.design.muscle_at(
+            self._estimate.blank, self._estimate.x, float(pressure)
+        )
 
     @property
     def x(self) -> Array:
@@ -148,7 +162,9 @@ class FitStatistics:
     @property
     def best_fit(self) -> Array:
         """Model force of the fitted rows [N]."""
-        return np.asarray(self._problem.force[self._rows] - self.residual / self._problem.weight[self._rows])
+        return np.asarray(
+            self._problem.force[self._rows] - self.residual / self._problem.weight[self._rows]
+        )
 
     @property
     def residual(self) -> Array:
@@ -201,8 +217,8 @@ class FitStatistics:
         Parameters
         ----------
         effective_size : float, optional
-            Number of independent points ``n``; ``ndata`` by default. Residuals of a quasi-static map are model error and
-            hang together, so ``ndata`` overstates the evidence.
+            Number of independent points ``n``; ``ndata`` by default. Residuals of a quasi-static
+            map are model error and hang together, so ``ndata`` overstates the evidence.
 
         Returns
         -------
@@ -224,7 +240,9 @@ class FitStatistics:
 
     @property
     def aicc(self) -> float | None:
-        """Akaike's criterion corrected for few points, ``n = ndata``; None when there are too few."""
+        """Akaike's criterion corrected for few points, ``n = ndata``; None when there are too
+        few.
+        """
         return self.criteria()[1]
 
     @property
@@ -272,13 +290,17 @@ class FitStatistics:
         levels = self._problem.levels[np.unique(self._problem.level[self._rows])]
         count, terms = len(self._estimate.x), len(design.base)
         # E_k at a level is a weighted sum of the coefficients of basis function k.
-        maps = np.einsum("lj,kq->lkjq", design.weights(levels), np.eye(terms)).reshape(len(levels), terms, count)
+        maps = np.einsum("lj,kq->lkjq", design.weights(levels), np.eye(terms)).reshape(
+            len(levels), terms, count
+        )
         spread = np.einsum("lki,ij,lkj->lk", maps, self.covar[:count, :count], maps)
         return levels, design.moduli(self._estimate.x, levels), np.sqrt(np.maximum(spread, 0.0))
 
 
 def determination(measured: Array, model: Array) -> float:
-    """1 - residual sum of squares over that about the mean; 0 or 1 when all measurements are equal."""
+    """1 - residual sum of squares over that about the mean; 0 or 1 when all measurements are
+    equal.
+    """
     total = float(np.sum((measured - measured.mean()) ** 2))
     rest = float(np.sum((measured - model) ** 2))
     if total == 0.0:

@@ -17,13 +17,15 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 
-#: Share of the map's largest force below which a level's own largest force is no scale for its errors.
+#: Share of the map's largest force below which a level's own largest force is no scale for its
+#: errors.
 WEAK: Final = 0.01
 
 
 @dataclass(frozen=True, repr=False)
 class PressureErrors:
-    """Error of each pressure level, the measure (2.37), where the level pulls enough to be its scale.
+    """Error of each pressure level, the measure (2.37), where the level pulls enough to be its
+    scale.
 
     Attributes
     ----------
@@ -32,11 +34,13 @@ class PressureErrors:
     points : (m,) int array
         Number of points.
     rms, max : (m,) array
-        Root mean square, and largest magnitude, of ``(F - F_model)/F_max`` with the level's own largest measured force [1].
+        Root mean square, and largest magnitude, of ``(F - F_model)/F_max`` with the level's own
+        largest measured force [1].
     fitted : (m,) bool array
         Whether the level was part of the fit.
     weak : (k,) array
-        Pressure of the levels that are not in the arrays above [Pa]: their largest force is below 1 % of the map's largest.
+        Pressure of the levels that are not in the arrays above [Pa]: their largest force is below 1
+        % of the map's largest.
     """
 
     levels: Array
@@ -52,11 +56,18 @@ class PressureErrors:
         if not len(self.weak):
             return ""
         names = ", ".join(f"{pressure / 1e3:.5g}" for pressure in self.weak)
-        return f"{names} kPa: not in this table, the largest force there is below {100 * WEAK:g} % of the map's largest"
+        return (
+            f"{names} kPa: not in this table, the largest force there is below {100 * WEAK:g} % of "
+            "the map's largest"
+        )
 
     def __repr__(self) -> str:
         left = f", {len(self.weak)} left out" if len(self.weak) else ""
-        worst = f", rms at most {100 * self.rms.max():.2f} % of the level's largest force" if len(self.rms) else ""
+        worst = (
+            f", rms at most {100 * self.rms.max():.2f} % of the level's largest force"
+            if len(self.rms)
+            else ""
+        )
         return f"PressureErrors({len(self.levels)} levels{left}{worst})"
 
     @classmethod
@@ -79,7 +90,9 @@ class PressureErrors:
 
 def level_forces(problem: Problem) -> Array:
     """Largest measured force of every level [N]; zero or negative where a level does not pull."""
-    return np.array([problem.force[problem.level == level].max() for level in range(len(problem.levels))])
+    return np.array(
+        [problem.force[problem.level == level].max() for level in range(len(problem.levels))]
+    )
 
 
 def summary(error: Array, scale: float) -> tuple[float, float] | None:
@@ -104,7 +117,8 @@ class CrossValidation:
     rms, max : float
         Over all points, as fractions of the map's largest force.
     interior_rms, interior_max : float or None
-        The same over the levels between others (interpolation in pressure); None when there are none.
+        The same over the levels between others (interpolation in pressure); None when there are
+        none.
     end_rms, end_max : float
         Over the lowest and the highest level, which are extrapolated.
     rms_stderr : float
@@ -125,13 +139,15 @@ class CrossValidation:
 
     def __repr__(self) -> str:
         return (
-            f"CrossValidation({len(np.unique(self.level))} levels, each from the others: rms {100 * self.rms:.2f} %, "
-            f"max {100 * self.max:.2f} % of the map's largest force)"
+            f"CrossValidation({len(np.unique(self.level))} levels, each from the others: rms "
+            f"{100 * self.rms:.2f} %, max {100 * self.max:.2f} % of the map's largest force)"
         )
 
     def level_squares(self) -> Array:
         """Sum of the squared prediction errors of each fitted level [N2], by rising pressure."""
-        return np.array([np.sum(self.residual[self.level == group] ** 2) for group in np.unique(self.level)])
+        return np.array(
+            [np.sum(self.residual[self.level == group] ** 2) for group in np.unique(self.level)]
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Everything as plain numbers, errors as fractions."""
@@ -154,8 +170,9 @@ class CrossValidation:
 def leave_one_out(problem: Problem, result: Estimate, rows: Mask) -> CrossValidation:
     """Predict each fitted level from the others.
 
-    Without free geometry and priors the refits follow from the one decomposition: the prediction error of a level is
-    ``(1 - H_g)^-1 r_g`` with its block ``H_g`` of the hat matrix. Otherwise everything is refitted.
+    Without free geometry and priors the refits follow from the one decomposition: the prediction
+    error of a level is ``(1 - H_g)^-1 r_g`` with its block ``H_g`` of the hat matrix. Otherwise
+    everything is refitted.
 
     Parameters
     ----------
@@ -178,7 +195,9 @@ def leave_one_out(problem: Problem, result: Estimate, rows: Mask) -> CrossValida
     level = problem.level[rows]
     groups = np.unique(level)
     if len(groups) < 2:
-        raise FitError("two pressure levels at least are needed to predict one from the others; there is one")
+        raise FitError(
+            "two pressure levels at least are needed to predict one from the others; there is one"
+        )
     linear = not (problem.free or problem.known or result.design.per_level)
     error = _by_hat_matrix(problem, result, level) if linear else _by_refits(problem, result, rows)
     error = error / problem.weight[rows]
@@ -193,26 +212,47 @@ def leave_one_out(problem: Problem, result: Estimate, rows: Mask) -> CrossValida
     dropped = np.array([np.sqrt(np.mean(error[level != group] ** 2)) / top for group in groups])
     spread = float(np.sqrt((1.0 - 1.0 / len(groups)) * np.sum((dropped - dropped.mean()) ** 2)))
     return CrossValidation(
-        by_pressure, problem.force[rows] - error, error, level, rms, worst, interior[0], interior[1], end_rms, end_max, spread
+        by_pressure,
+        problem.force[rows] - error,
+        error,
+        level,
+        rms,
+        worst,
+        interior[0],
+        interior[1],
+        end_rms,
+        end_max,
+        spread,
     )
 
 
 def _gone(problem: Problem, level: int, why: str) -> FitError:
-    return FitError(f"without {problem.levels[level] / 1e3:g} kPa the other levels do not determine the fit: {why}")
+    return FitError(
+        f"without {problem.levels[level] / 1e3:g} kPa the other levels do not determine the fit: "
+        f"{why}"
+    )
 
 
 def _by_hat_matrix(problem: Problem, result: Estimate, level: NDArray[np.intp]) -> Array:
     if not result.jacobian.shape[1]:
         return result.residual
-    span, _, _ = np.linalg.svd(result.jacobian / np.linalg.norm(result.jacobian, axis=0), full_matrices=False)
+    span, _, _ = np.linalg.svd(
+        result.jacobian / np.linalg.norm(result.jacobian, axis=0), full_matrices=False
+    )
     error = np.empty_like(result.residual)
     for group in np.unique(level):
         own = level == group
         left = np.eye(span.shape[1]) - span[own].T @ span[own]
         if np.linalg.eigvalsh(left)[0] < 1e-9:
-            raise _gone(problem, int(group), f"{int(np.sum(~own))} points for {', '.join(result.design.names)}")
+            raise _gone(
+                problem,
+                int(group),
+                f"{int(np.sum(~own))} points for {', '.join(result.design.names)}",
+            )
         # (1 - H_g)^-1 r_g by the Woodbury identity: small matrices however long the level is.
-        error[own] = result.residual[own] + span[own] @ np.linalg.solve(left, span[own].T @ result.residual[own])
+        error[own] = result.residual[own] + span[own] @ np.linalg.solve(
+            left, span[own].T @ result.residual[own]
+        )
     return error
 
 

@@ -1,4 +1,6 @@
-"""What a muscle fit means, in plain sentences: headline, quality, where the model does not apply."""
+"""What a muscle fit means, in plain sentences: headline, quality, where the model does not
+apply.
+"""
 
 from __future__ import annotations
 
@@ -36,12 +38,20 @@ Array = NDArray[np.float64]
 #: One sentence for each force model.
 MODEL_WORDS = {
     "gaylord": "the gas force of an ideal braided cylinder, without wall or elasticity",
-    "chou_hannaford": "an ideal braided cylinder with a wall of constant thickness, without elasticity",
-    "mooney_rivlin": "an ideal braided cylinder with a rubber bladder of two Mooney-Rivlin constants",
+    ("chou_hannaford"): (
+        "an ideal braided cylinder with a wall of constant thickness, without elasticity"
+    ),
+    ("mooney_rivlin"): (
+        "an ideal braided cylinder with a rubber bladder of two Mooney-Rivlin constants"
+    ),
     "ferraresi": "a braided cylinder with a bladder of constant thickness and a polynomial stress",
     "kothera": "a braided cylinder with a bladder that thins as it widens and a polynomial stress",
-    "robinson": "a braid with elliptic ends and a bladder that thins as it widens, with a polynomial stress",
-    "elbow_linear": "a braided cylinder with a bladder that thins as it widens and one constant modulus",
+    ("robinson"): (
+        "a braid with elliptic ends and a bladder that thins as it widens, with a polynomial stress"
+    ),
+    ("elbow_linear"): (
+        "a braided cylinder with a bladder that thins as it widens and one constant modulus"
+    ),
 }
 _MUCH = 0.3  # share of the squared residual that counts as a pattern
 _WIDE_CONDITION = 100.0
@@ -82,7 +92,11 @@ def cross_validation(fit: MuscleFit) -> tuple[CrossValidation | None, str]:
 def friction_words(muscle: Muscle) -> str:
     """The friction law (2.36) of a muscle with its numbers; empty without friction."""
     given = muscle.parameters
-    c0, c1, floor = given["friction_coefficient"], given["friction_pressure_slope"], given["friction_floor"]
+    c0, c1, floor = (
+        given["friction_coefficient"],
+        given["friction_pressure_slope"],
+        given["friction_floor"],
+    )
     if not (c0 or c1 or floor):
         return ""
     return f"c_F = max(c0 + c1 P, {floor:.4g}), c0 = {c0:.4g}, c1 = {1e6 * c1:.4g} 1/MPa"
@@ -94,8 +108,9 @@ def headline(fit: MuscleFit) -> str:
     if held_out is not None:
         seen = len(np.unique(fit.data.level[fit.fitted]))
         return (
-            f"Fitted on {seen} pressures, the {_named(fit)} predicts the other {len(fit.data.levels) - seen} "
-            f"within {percent(held_out[1], 2)} of the largest force, {percent(held_out[0], 2)} rms"
+            f"Fitted on {seen} pressures, the {_named(fit)} predicts the other "
+            f"{len(fit.data.levels) - seen} within {percent(held_out[1], 2)} of the largest force, "
+            f"{percent(held_out[0], 2)} rms"
         )
     reached = f"{percent(fit.max_error, 2)} of the largest force, {percent(fit.rms_error, 2)} rms"
     return f"The {_named(fit)} meets every point within {reached}"
@@ -106,10 +121,10 @@ def opening(fit: MuscleFit) -> list[str]:
     data = fit.data
     pressure, contraction, force, _, _ = data.used_rows()
     span = (
-        f"{data.label}: {int(data.used.sum())} of {len(data)} rows are used, at {len(data.levels)} pressures from "
-        f"{_kpa(pressure.min())} to {_kpa(pressure.max())} kPa, contraction "
-        f"{percent(float(contraction.min()), 2)} "
-        f"to {percent(float(contraction.max()), 2)}, forces up to {format_number(force.max(), 4)} N."
+        f"{data.label}: {int(data.used.sum())} of {len(data)} rows are used, at {len(data.levels)} "
+        f"pressures from {_kpa(pressure.min())} to {_kpa(pressure.max())} kPa, contraction "
+        f"{percent(float(contraction.min()), 2)} to {percent(float(contraction.max()), 2)}, forces "
+        f"up to {format_number(force.max(), 4)} N."
     )
     kind = "" if not fit.nvarys else f" {fit.nvarys} numbers were fitted to {fit.ndata} points."
     words = f"The model: {MODEL_WORDS[fit.model]}.{kind}"
@@ -121,11 +136,13 @@ def opening(fit: MuscleFit) -> list[str]:
         words += f" At the pressures that it has not seen it is off by {unseen}: {expected}"
     elif cross is not None:
         words += (
-            f" Leaving out one pressure after the other and predicting it from the rest gives {percent(cross.rms)} rms and "
-            f"{percent(cross.max)} at most: {expected}"
+            " Leaving out one pressure after the other and predicting it from the rest gives "
+            f"{percent(cross.rms)} rms and {percent(cross.max)} at most: {expected}"
         )
     else:
-        words += f" How well it predicts pressures that it has not seen could not be tested: {reason}."
+        words += (
+            f" How well it predicts pressures that it has not seen could not be tested: {reason}."
+        )
     return [span, words]
 
 
@@ -195,43 +212,50 @@ def limits(fit: MuscleFit) -> list[str]:
     low, high = float(np.min(data.contraction[rows])), float(np.max(data.contraction[rows]))
     bottom, top = float(np.min(data.pressure[rows])), float(np.max(data.pressure[rows]))
     lines = [
-        f"The fit knows contractions from {percent(low, 2)} to {percent(high, 2)} and pressures from {_kpa(bottom)} to "
-        f"{_kpa(top)} kPa. Beyond them the polynomial goes where it likes: the dotted parts of the lines in the figure."
+        f"The fit knows contractions from {percent(low, 2)} to {percent(high, 2)} and pressures "
+        f"from {_kpa(bottom)} to {_kpa(top)} kPa. Beyond them the polynomial goes where it likes: "
+        "the dotted parts of the lines in the figure."
     ]
     pattern = residual_pattern(fit)
     e, p, worst = pattern.worst
     lines.append(
-        f"The worst point is at {percent(e, 2)} contraction and {_kpa(p)} kPa: measured {format_number(abs(worst))} N "
-        f"{'above' if worst > 0 else 'below'} the model, {percent(abs(worst) / float(force.max()), 2)} of the largest force."
+        f"The worst point is at {percent(e, 2)} contraction and {_kpa(p)} kPa: measured "
+        f"{format_number(abs(worst))} N {'above' if worst > 0 else 'below'} the model, "
+        f"{percent(abs(worst) / float(force.max()), 2)} of the largest force."
     )
     if pattern.by_contraction > max(_MUCH, 2 * pattern.expected_contraction):
         lines.append(
-            f"{percent(pattern.by_contraction, 2)} of the squared residual repeats at the same contraction at every pressure "
-            f"(chance: {percent(pattern.expected_contraction, 2)}). That is geometry or strain law, not noise: the braid of this "
-            f"muscle does "
-            "not follow the assumed shape there, and standard errors do not know it."
+            f"{percent(pattern.by_contraction, 2)} of the squared residual repeats at the same "
+            f"contraction at every pressure (chance: {percent(pattern.expected_contraction, 2)}). "
+            "That is geometry or strain law, not noise: the braid of this muscle does not follow "
+            "the assumed shape there, and standard errors do not know it."
         )
     if pattern.by_level > max(_MUCH, 2 * pattern.expected_level):
         lines.append(
-            f"{percent(pattern.by_level, 2)} of the squared residual is common to a whole pressure level (chance: "
-            f"{percent(pattern.expected_level, 2)}): moduli linear in pressure do not follow every level, or the gauge was off there."
+            f"{percent(pattern.by_level, 2)} of the squared residual is common to a whole pressure "
+            f"level (chance: {percent(pattern.expected_level, 2)}): moduli linear in pressure do "
+            "not follow every level, or the gauge was off there."
         )
     cross, _ = cross_validation(fit)
-    if cross is not None and cross.interior_rms is not None and cross.end_rms > 2 * cross.interior_rms:
+    if (
+        cross is not None
+        and cross.interior_rms is not None
+        and cross.end_rms > 2 * cross.interior_rms
+    ):
         lines.append(
             f"Predicted from the others, the lowest and the highest pressure come out "
             f"{format_number(cross.end_rms / cross.interior_rms, 2)} "
-            f"times worse ({percent(cross.end_rms)} rms) than those between others ({percent(cross.interior_rms)}): measure the "
-            f"ends of the range "
-            "that matters."
+            f"times worse ({percent(cross.end_rms)} rms) than those between others "
+            f"({percent(cross.interior_rms)}): measure the ends of the range that matters."
         )
     errors = fit.error_by_pressure()
     bad = errors.levels[errors.rms > max(3 * float(np.median(errors.rms)), 0.05)]
     if len(bad):
         shown = ", ".join(f"{_kpa(level)}" for level in bad[:6])
         lines.append(
-            f"At {shown} kPa the error is beyond 5 % of that level's own largest force: the forces are small there (a pressure near "
-            "the one at which the muscle begins to pull), so a small error in newtons is a large one in percent."
+            f"At {shown} kPa the error is beyond 5 % of that level's own largest force: the forces "
+            "are small there (a pressure near the one at which the muscle begins to pull), so a "
+            "small error in newtons is a large one in percent."
         )
     return lines
 
@@ -243,44 +267,50 @@ def meaning(fit: MuscleFit) -> list[str]:
     if share is not None and fit.nvarys:
         gas, elastic = share
         lines.append(
-            f"At the largest measured force the gas alone would pull {format_number(gas, 4)} N; the bladder "
-            f"{'takes' if elastic < 0 else 'adds'} {format_number(abs(elastic), 3)} N ({percent(abs(elastic) / gas, 2)})."
+            f"At the largest measured force the gas alone would pull {format_number(gas, 4)} N; "
+            f"the bladder {'takes' if elastic < 0 else 'adds'} {format_number(abs(elastic), 3)} N "
+            f"({percent(abs(elastic) / gas, 2)})."
         )
     if fit.order is not None and fit.moduli_kind == "linear":
         lines.append(
-            "E_k = m_k P + b_k are the coefficients of the stress over strain, from the first power up. b_k is the rubber as it "
-            "is without "
-            "pressure; m_k is how it stiffens with pressure, in Pa per Pa."
+            "E_k = m_k P + b_k are the coefficients of the stress over strain, from the first "
+            "power up. b_k is the rubber as it is without pressure; m_k is how it stiffens with "
+            "pressure, in Pa per Pa."
         )
     condition = fit.condition_number
     if fit.nvarys > 1 and condition > _WIDE_CONDITION:
         lines.append(
-            f"The condition number is {format_number(condition, 2)}: the columns of single moduli look alike over the measured "
-            f"lengths, and about "
-            f"{math.log10(condition):.0f} digits of a single modulus are lost. The force, their sum, is not affected inside the "
-            f"measured range; "
-            "do not read a single modulus as a material constant."
+            f"The condition number is {format_number(condition, 2)}: the columns of single moduli "
+            f"look alike over the measured lengths, and about {math.log10(condition):.0f} digits "
+            "of a single modulus are lost. The force, their sum, is not affected inside the "
+            "measured range; do not read a single modulus as a material constant."
         )
     elif fit.nvarys > 1:
         lines.append(
-            f"The condition number is {format_number(condition, 2)}: the measured lengths and pressures tell the moduli apart."
+            f"The condition number is {format_number(condition, 2)}: the measured lengths and "
+            "pressures tell the moduli apart."
         )
     unsure = [name for name, p in fit.params.items() if p.stderr > abs(p.value)]
     if unsure:
         few = ", ".join(unsure[:8]) + (" and more" if len(unsure) > 8 else "")
         lines.append(f"Not told from zero (standard error larger than the value): {few}.")
     for free in fit.free:
-        moved = (fit.params[free.name].value - free.nominal) / free.tolerance  # an infinite tolerance moves by nothing
+        moved = (
+            fit.params[free.name].value - free.nominal
+        ) / free.tolerance  # an infinite tolerance moves by nothing
         if abs(moved) > 2:
             lines.append(
-                f"{free.name} moved {signed(moved)} tolerances from what was known of it. For a muscle that is not an open braid "
-                "around a bladder it stands for whatever does that part there, and is not the angle or size a ruler would find."
+                f"{free.name} moved {signed(moved)} tolerances from what was known of it. For a "
+                "muscle that is not an open braid around a bladder it stands for whatever does "
+                "that part there, and is not the angle or size a ruler would find."
             )
     return lines
 
 
 def _bladder_share(fit: MuscleFit) -> tuple[float, float] | None:
-    """Gas force, and force of the bladder, at the fitted point of the largest force [N]; None when gas does not pull there."""
+    """Gas force, and force of the bladder, at the fitted point of the largest force [N]; None when
+    gas does not pull there.
+    """
     rows = np.flatnonzero(fit.fitted)
     at = rows[int(np.argmax(fit.data.force[rows]))]
     level, length = float(fit.data.levels[fit.data.level[at]]), float(fit.data.length[at])
@@ -296,5 +326,8 @@ def ranking_words(comparison: ModelComparison) -> str:
     best, chosen = comparison.best, comparison.recommended
     text = f"Best at pressures it has not seen: {title(best)} ({best.nvarys} unknowns)."
     if chosen is not best:
-        text += f" {title(chosen)} does as well within the uncertainty of that error with {chosen.nvarys} unknowns: take that one."
+        text += (
+            f" {title(chosen)} does as well within the uncertainty of that error with "
+            f"{chosen.nvarys} unknowns: take that one."
+        )
     return text

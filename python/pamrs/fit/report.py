@@ -1,4 +1,6 @@
-"""The report of a muscle fit: one offline HTML page, one PNG. Needs ``pip install pamrs[report]``."""
+"""The report of a muscle fit: one offline HTML page, one PNG. Needs
+``pip install pamrs[report]``.
+"""
 
 from __future__ import annotations
 
@@ -19,9 +21,21 @@ if TYPE_CHECKING:
     from pamrs.fit._result import MuscleFit
     from pamrs.fit._statistics import FitStatistics
 
-__all__ = ["error_curves", "render_friction_png", "render_html", "render_png", "write_figure", "write_report"]
+__all__ = [
+    "error_curves",
+    "render_friction_png",
+    "render_html",
+    "render_png",
+    "write_figure",
+    "write_report",
+]
 
-_SHOWN_UNITS = {"Pa": ("MPa", 1e-6), "m": ("mm", 1e3), "rad": ("°", 57.29577951308232), "1": ("", 1.0)}
+_SHOWN_UNITS = {
+    "Pa": ("MPa", 1e-6),
+    "m": ("mm", 1e3),
+    "rad": ("°", 57.29577951308232),
+    "1": ("", 1.0),
+}
 
 
 #: Levels up to which the moduli of each are shown beside the straight lines.
@@ -67,7 +81,9 @@ def error_curves(fit: MuscleFit, comparison: ModelComparison | None = None) -> l
 
 
 def _level_by_level(fit: MuscleFit) -> FitStatistics | None:
-    """The same fit with moduli free at each level that has points enough; None where that says nothing."""
+    """The same fit with moduli free at each level that has points enough; None where that says
+    nothing.
+    """
     import numpy as np
 
     from pamrs.fit._solution import solution
@@ -79,7 +95,9 @@ def _level_by_level(fit: MuscleFit) -> FitStatistics | None:
     enough = np.flatnonzero(counts > terms)
     if not 2 <= len(enough) <= _MOST_LEVELS:
         return None
-    fixed = {free.name: fit.params[free.name].value for free in fit.free if free.name != "rest_length"}
+    fixed = {
+        free.name: fit.params[free.name].value for free in fit.free if free.name != "rest_length"
+    }
     if any(p.name == "rest_length" for p in fit.params.values()):
         return None
     try:
@@ -105,13 +123,19 @@ def _parameters(fit: MuscleFit) -> list[dict[str, Any]]:
     rows = []
     for p in fit.params.values():
         unit, factor = _SHOWN_UNITS.get(p.unit, (p.unit, 1.0))
-        moved = None if p.tolerance is None or p.init_value is None else (p.value - p.init_value) / p.tolerance
+        moved = (
+            None
+            if p.tolerance is None or p.init_value is None
+            else (p.value - p.init_value) / p.tolerance
+        )
         rows.append(
             {
                 "name": p.name,
                 "value": format_uncertain(p.value * factor, p.stderr * factor),
                 "unit": unit,
-                "nominal": "" if p.init_value is None else format_uncertain(p.init_value * factor, (p.tolerance or 0.0) * factor),
+                "nominal": ""
+                if p.init_value is None
+                else format_uncertain(p.init_value * factor, (p.tolerance or 0.0) * factor),
                 "moved": "" if moved is None else remarks.signed(moved),
                 "alarm": moved is not None and abs(moved) > 3,
                 "weak": p.stderr > abs(p.value),
@@ -127,7 +151,13 @@ def _share(value: float | None) -> str:
 def _levels(fit: MuscleFit) -> list[dict[str, Any]]:
     errors = fit.error_by_pressure()
     cross, _ = remarks.cross_validation(fit)
-    predicted = {} if cross is None else dict(zip(cross.by_pressure.levels.tolist(), cross.by_pressure.rms.tolist(), strict=True))
+    predicted = (
+        {}
+        if cross is None
+        else dict(
+            zip(cross.by_pressure.levels.tolist(), cross.by_pressure.rms.tolist(), strict=True)
+        )
+    )
     return [
         {
             "level": f"{level / 1e3:.5g}",
@@ -153,20 +183,33 @@ def _ranking(comparison: ModelComparison) -> list[dict[str, Any]]:
     rows = []
     for row in comparison.rows:
         cells = {name: _share(row[name]) for name in shown}
-        cells |= {name: format_number(row[name], 4) if row[name] is not None else "–" for name in ("aicc", "bic")}
-        start = {name: row[name] for name in ("model", "geometry", "nvarys", "rank", "reason", "recommended")}
+        cells |= {
+            name: format_number(row[name], 4) if row[name] is not None else "–"
+            for name in ("aicc", "bic")
+        }
+        start = {
+            name: row[name]
+            for name in ("model", "geometry", "nvarys", "rank", "reason", "recommended")
+        }
         rows.append({**start, **cells, "order": row["order"] or ""})
     return rows
 
 
 def _facts(fit: MuscleFit) -> list[tuple[str, str]]:
-    facts = [(remarks.percent(fit.rms_error), "rms error, of the largest force"), (remarks.percent(fit.max_error), "largest error")]
+    facts = [
+        (remarks.percent(fit.rms_error), "rms error, of the largest force"),
+        (remarks.percent(fit.max_error), "largest error"),
+    ]
     held_out = fit.errors_of("held_out")
     if held_out is not None:
-        facts.append((remarks.percent(held_out[1]), "largest error at pressures that were not fitted"))
+        facts.append(
+            (remarks.percent(held_out[1]), "largest error at pressures that were not fitted")
+        )
     cross, _ = remarks.cross_validation(fit)
     if cross is not None:
-        facts.append((remarks.percent(cross.rms), "rms, each fitted pressure predicted from the others"))
+        facts.append(
+            (remarks.percent(cross.rms), "rms, each fitted pressure predicted from the others")
+        )
     facts.append((format_number(fit.condition_number, 2), "condition number"))
     return facts
 
@@ -198,7 +241,9 @@ def _block(fit: MuscleFit) -> str:
 # -------------------------------------------------------------------------- pages
 
 
-def render_html(fit: MuscleFit, comparison: ModelComparison | None = None, *, command: str = "") -> str:
+def render_html(
+    fit: MuscleFit, comparison: ModelComparison | None = None, *, command: str = ""
+) -> str:
     """The report as one HTML page that loads nothing.
 
     Parameters
@@ -263,8 +308,16 @@ def render_html(fit: MuscleFit, comparison: ModelComparison | None = None, *, co
     )
 
 
-def write_report(fit: MuscleFit, path: str | os.PathLike[str], comparison: ModelComparison | None = None, *, command: str = "") -> Path:
-    """Write :func:`render_html` to `path` and return the path; the file appears whole or not at all."""
+def write_report(
+    fit: MuscleFit,
+    path: str | os.PathLike[str],
+    comparison: ModelComparison | None = None,
+    *,
+    command: str = "",
+) -> Path:
+    """Write :func:`render_html` to `path` and return the path; the file appears whole or not at
+    all.
+    """
     from pamrs._writing import write_atomically
 
     return write_atomically(path, render_html(fit, comparison, command=command))
@@ -285,7 +338,8 @@ def render_png(fit: MuscleFit, comparison: ModelComparison | None = None) -> byt
 
 
 def render_friction_png(fit: FrictionFit, data: ForceMap) -> bytes:
-    """Measured loops with their mean curves, and the friction coefficient over pressure: a PNG of 1600 x 800 pixels.
+    """Measured loops with their mean curves, and the friction coefficient over pressure: a PNG of
+    1600 x 800 pixels.
 
     Parameters
     ----------
@@ -309,8 +363,12 @@ def render_friction_png(fit: FrictionFit, data: ForceMap) -> bytes:
     return friction_png(fit, data)
 
 
-def write_figure(fit: MuscleFit, path: str | os.PathLike[str], comparison: ModelComparison | None = None) -> Path:
-    """Write :func:`render_png` to `path` and return the path; the file appears whole or not at all."""
+def write_figure(
+    fit: MuscleFit, path: str | os.PathLike[str], comparison: ModelComparison | None = None
+) -> Path:
+    """Write :func:`render_png` to `path` and return the path; the file appears whole or not at
+    all.
+    """
     from pamrs._writing import write_atomically
 
     return write_atomically(path, render_png(fit, comparison))

@@ -1,8 +1,10 @@
-"""The muscles of the 2014 dissertation: geometry, moduli, published facts, and where each number comes from.
+"""The muscles of the 2014 dissertation: geometry, moduli, published facts, and where each number
+comes from.
 
-``pamrs.library.elbow_0625in()`` is a :class:`pamrs.Muscle`; ``pamrs.library.entry("elbow_0625in")`` also has the origin of
-each number, the mass, the highest pressure and the published facts. ``python -m pamrs.library`` derives the identified numbers
-again and prints every fact beside what the muscle gives.
+``pamrs.library.elbow_0625in()`` is a :class:`pamrs.Muscle`; ``pamrs.library.entry("elbow_0625in")``
+also has the origin of each number, the mass, the highest pressure and the published facts.
+``python -m pamrs.library`` derives the identified numbers again and prints every fact beside what
+the muscle gives.
 """
 
 from __future__ import annotations
@@ -31,7 +33,14 @@ __all__ = [
     "pam_b_075in",
 ]
 
-_NAMES: Final = ("elbow_0625in", "large_2in", "large_2in_effective", "ch2_075in", "pam_a_1in", "pam_b_075in")
+_NAMES: Final = (
+    "elbow_0625in",
+    "large_2in",
+    "large_2in_effective",
+    "ch2_075in",
+    "pam_a_1in",
+    "pam_b_075in",
+)
 
 
 def names() -> list[str]:
@@ -60,7 +69,9 @@ def entry(name: str) -> Entry:
     if name not in _NAMES:
         near = difflib.get_close_matches(str(name), _NAMES, n=1)
         hint = f" Did you mean {near[0]!r}?" if near else ""
-        raise ParameterError(f"name = {name!r} is not in the library.{hint} There are: {', '.join(_NAMES)}")
+        raise ParameterError(
+            f"name = {name!r} is not in the library.{hint} There are: {', '.join(_NAMES)}"
+        )
     file = resources.files(__name__).joinpath(f"{name}.toml")
     return read_entry(file.read_text(encoding="utf-8"), source=f"{name}.toml")
 
@@ -71,7 +82,9 @@ def elbow_0625in() -> Muscle:
 
 
 def large_2in() -> Muscle:
-    """The 2-in silicone muscle of 3.2.2 with the published braid angle, which gives 2.5 times its published force."""
+    """The 2-in silicone muscle of 3.2.2 with the published braid angle, which gives 2.5 times its
+    published force.
+    """
     return entry("large_2in").muscle
 
 

@@ -70,7 +70,8 @@ class Entry:
     parameters : dict
         Arguments of :class:`pamrs.Muscle` in SI units.
     origins : dict
-        Where each number comes from, in words: ``published: ...``, ``deduced: ...``, ``identified from ...``, ``assumed: ...``.
+        Where each number comes from, in words: ``published: ...``, ``deduced: ...``,
+        ``identified from ...``, ``assumed: ...``.
     mass : float or None
         Mass of one muscle [kg]; None where none is published.
     max_pressure : float
@@ -78,7 +79,8 @@ class Entry:
     facts : tuple of Fact
         What is published about it.
     identification : dict
-        Prior and conditions from which :func:`pamrs.library._identify.derive` derives the identified numbers.
+        Prior and conditions from which :func:`pamrs.library._identify.derive` derives the
+        identified numbers.
     """
 
     name: str
@@ -122,12 +124,15 @@ def read_entry(text: str, source: str) -> Entry:
     Raises
     ------
     ParameterError
-        If the text is no TOML, a key is missing, a number has no origin, or a unit is unknown; the message names the file.
+        If the text is no TOML, a key is missing, a number has no origin, or a unit is unknown; the
+        message names the file.
     """
     try:
         document = tomllib.loads(text)
         if document.get("schema") != SCHEMA:
-            raise ParameterError(f"schema = {document.get('schema')!r} is not allowed: it must be {SCHEMA!r}")
+            raise ParameterError(
+                f"schema = {document.get('schema')!r} is not allowed: it must be {SCHEMA!r}"
+            )
         numbers = {**document["muscle"], **document["properties"]}
         without = [key for key, item in numbers.items() if not item.get("origin")]
         if without:
@@ -141,7 +146,9 @@ def read_entry(text: str, source: str) -> Entry:
             mass=None if mass is None else quantity(mass),
             max_pressure=quantity(document["properties"]["max_pressure"]),
             facts=tuple(_fact(item) for item in document.get("fact", [])),
-            identification={key: document[key] for key in ("prior", "condition", "angle") if key in document},
+            identification={
+                key: document[key] for key in ("prior", "condition", "angle") if key in document
+            },
         )
     except tomllib.TOMLDecodeError as error:
         raise ParameterError(f"{source}: not valid TOML: {error}") from error
@@ -155,7 +162,10 @@ def _fact(item: Mapping[str, Any]) -> Fact:
     published = quantity(item["published"])
     relation = item.get("relation", "equals")
     if relation not in RELATIONS:
-        raise ParameterError(f"fact {item['name']!r}: relation = {relation!r} is not allowed: one of {', '.join(RELATIONS)}")
+        raise ParameterError(
+            f"fact {item['name']!r}: relation = {relation!r} is not allowed: one of "
+            f"{', '.join(RELATIONS)}"
+        )
     tolerance = 0.0
     if "tolerance" in item:
         relative = item["tolerance"]["unit"] == "%"

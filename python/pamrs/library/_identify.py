@@ -1,9 +1,10 @@
 """Moduli from published facts: the least change of a prior that satisfies them.
 
-The unknowns are the slopes ``m_k`` and offsets ``b_k`` of ``E_k = m_k P + b_k``. The force is linear in them, so each fact
-is one linear equation. There are fewer facts than unknowns: the facts determine as many combinations as they have rank, and
-the rest stays at a prior. Of all moduli that satisfy the facts, the one nearest to the prior is taken, the distance of each
-number counted in its prior standard deviation (weighted least norm).
+The unknowns are the slopes ``m_k`` and offsets ``b_k`` of ``E_k = m_k P + b_k``. The force is
+linear in them, so each fact is one linear equation. There are fewer facts than unknowns: the facts
+determine as many combinations as they have rank, and the rest stays at a prior. Of all moduli that
+satisfy the facts, the one nearest to the prior is taken, the distance of each number counted in its
+prior standard deviation (weighted least norm).
 """
 
 from __future__ import annotations
@@ -36,7 +37,8 @@ class Identification:
     conditions : tuple of str
         The facts used, one equation each.
     rank, unknowns : int
-        Combinations that the facts determine, and numbers sought; the difference is left to the prior.
+        Combinations that the facts determine, and numbers sought; the difference is left to the
+        prior.
     change : ndarray (unknowns,)
         How far each number moved from its prior, in prior standard deviations.
     """
@@ -97,7 +99,8 @@ def derive(entry: Entry) -> Identification:
     Parameters
     ----------
     entry : Entry
-        A muscle of the library; its stored moduli are not used, nor its braid angle where that is identified.
+        A muscle of the library; its stored moduli are not used, nor its braid angle where that is
+        identified.
 
     Returns
     -------
@@ -125,7 +128,9 @@ def derive(entry: Entry) -> Identification:
         values, rank = least_norm(matrix, right, prior, spread)
         left = np.abs(matrix @ values - right)
         if np.any(left > 1e-8 * np.abs(matrix * spread).sum(axis=1)):
-            raise ParameterError(f"the facts of {entry.name} contradict each other: {left} is left over")
+            raise ParameterError(
+                f"the facts of {entry.name} contradict each other: {left} is left over"
+            )
     identified["modulus_slope"] = values[:order].tolist()
     identified["modulus_offset"] = values[order:].tolist()
     return Identification(
@@ -138,10 +143,16 @@ def derive(entry: Entry) -> Identification:
 
 
 def _prior(item: Mapping[str, Any]) -> tuple[Array, Array]:
-    """Prior values and standard deviations of (slopes, offsets); the deviation is the value itself."""
+    """Prior values and standard deviations of (slopes, offsets); the deviation is the value
+    itself.
+    """
     hardness = item.get("shore_hardness")
-    softer = gent_modulus(hardness["value"]) / gent_modulus(hardness["reference"]) if hardness else 1.0
-    prior = np.array([*item["modulus_slope"], *(softer * v for v in item["modulus_offset"])], dtype=np.float64)
+    softer = (
+        gent_modulus(hardness["value"]) / gent_modulus(hardness["reference"]) if hardness else 1.0
+    )
+    prior = np.array(
+        [*item["modulus_slope"], *(softer * v for v in item["modulus_offset"])], dtype=np.float64
+    )
     return prior, np.abs(prior)
 
 
@@ -153,7 +164,9 @@ def _equation(muscle: Any, item: Mapping[str, Any], order: int) -> tuple[Array, 
     if kind == "free_contraction":
         # 0 = P a_gas(e) + sum_k (m_k P + b_k) basis_k(e)
         basis = muscle.elastic_basis(item["contraction"])[:order]
-        return np.concatenate([pressure * basis, basis]), -pressure * float(muscle.gas_area(item["contraction"]))
+        return np.concatenate([pressure * basis, basis]), -pressure * float(
+            muscle.gas_area(item["contraction"])
+        )
     if kind == "softening":
         # tangent modulus: 0 = sum_k k E_k eps^(k-1)
         tangent = (powers + 1.0) * item["strain"] ** powers
@@ -161,4 +174,6 @@ def _equation(muscle: Any, item: Mapping[str, Any], order: int) -> tuple[Array, 
     if kind == "linear_rubber":
         # the rubber alone (P = 0) is a straight line: b_2 = 0 (order 2)
         return np.concatenate([np.zeros(order), powers]), 0.0
-    raise ParameterError(f"condition kind = {kind!r} is not known: free_contraction, softening, linear_rubber")
+    raise ParameterError(
+        f"condition kind = {kind!r} is not known: free_contraction, softening, linear_rubber"
+    )

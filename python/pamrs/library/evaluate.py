@@ -23,7 +23,9 @@ BEGINS: Final = 0.01
 
 
 def root_between(function: Callable[[float], float], low: float, high: float) -> float | None:
-    """Where ``function`` changes sign between ``low`` and ``high``, to round-off; None where the ends have the same sign."""
+    """Where ``function`` changes sign between ``low`` and ``high``, to round-off; None where the
+    ends have the same sign.
+    """
     from scipy.optimize import brentq
 
     if function(low) * function(high) > 0.0:
@@ -44,7 +46,8 @@ def free_contraction(muscle: Muscle, pressure: float) -> float:
     Returns
     -------
     float
-        The smallest contraction at which the force is zero, or the braid's limit where the force still pulls there.
+        The smallest contraction at which the force is zero, or the braid's limit where the force
+        still pulls there.
 
     Raises
     ------
@@ -52,7 +55,9 @@ def free_contraction(muscle: Muscle, pressure: float) -> float:
         If the pressure is not finite and positive.
     """
     if not (math.isfinite(pressure) and pressure > 0.0):
-        raise ParameterError(f"pressure = {pressure} Pa is not allowed: a finite gauge pressure above zero is needed")
+        raise ParameterError(
+            f"pressure = {pressure} Pa is not allowed: a finite gauge pressure above zero is needed"
+        )
     limit = muscle.contraction_limits[1]
     grid = np.linspace(0.0, limit, 401)
     pushing = np.flatnonzero(muscle.force(pressure, grid) <= 0.0)
@@ -61,12 +66,16 @@ def free_contraction(muscle: Muscle, pressure: float) -> float:
     first = int(pushing[0])
     if first == 0:
         return 0.0
-    found = root_between(lambda e: float(muscle.force(pressure, e)), float(grid[first - 1]), float(grid[first]))
+    found = root_between(
+        lambda e: float(muscle.force(pressure, e)), float(grid[first - 1]), float(grid[first])
+    )
     return float(grid[first]) if found is None else found
 
 
 def activation_pressure(muscle: Muscle, contraction: float = BEGINS) -> float:
-    """Pressure at which the free muscle has contracted by ``contraction`` [Pa]: zero of a force linear in pressure."""
+    """Pressure at which the free muscle has contracted by ``contraction`` [Pa]: zero of a force
+    linear in pressure.
+    """
     at_zero, at_bar = (float(muscle.force(pressure, contraction)) for pressure in (0.0, 1e5))
     return -at_zero * 1e5 / (at_bar - at_zero)
 
@@ -74,7 +83,9 @@ def activation_pressure(muscle: Muscle, contraction: float = BEGINS) -> float:
 def polynomial(muscle: Muscle, pressure: float) -> np.ndarray[Any, np.dtype[np.float64]]:
     """Moduli ``E_k = m_k P + b_k`` of orders 1, 2, ... at a gauge pressure [Pa]."""
     parameters = muscle.parameters
-    slope, offset = (np.asarray(parameters[f"modulus_{key}"], dtype=np.float64) for key in ("slope", "offset"))
+    slope, offset = (
+        np.asarray(parameters[f"modulus_{key}"], dtype=np.float64) for key in ("slope", "offset")
+    )
     return slope * pressure + offset
 
 
@@ -90,19 +101,28 @@ def _angle_for_force(muscle: Muscle, pressure: float, force: float) -> float:
 
     found = root_between(excess, math.radians(45.0), math.radians(85.0))
     if found is None:
-        raise ParameterError(f"no braid angle between 45 and 85 deg gives a blocked force of {force:g} N at {pressure:g} Pa")
+        raise ParameterError(
+            f"no braid angle between 45 and 85 deg gives a blocked force of {force:g} N at "
+            f"{pressure:g} Pa"
+        )
     return found
 
 
 def _angle_for_diameter(muscle: Muscle, contraction: float, diameter: float) -> float:
-    """Braid angle [rad] at which a cylinder has a given diameter: D/D0 = tan(alpha) sqrt(1/sin(alpha)^2 - (1 - e)^2)."""
+    """Braid angle [rad] at which a cylinder has a given diameter: D/D0 = tan(alpha)
+    sqrt(1/sin(alpha)^2 - (1 - e)^2).
+    """
     ratio = diameter / float(muscle.parameters["rest_diameter"])
     return math.asin(math.sqrt((ratio**2 - 1.0) / (ratio**2 - (1.0 - contraction) ** 2)))
 
 
 def _wall_for_force(muscle: Muscle, pressure: float, force: float) -> float:
     top = 0.45 * float(muscle.parameters["rest_diameter"])
-    found = root_between(lambda wall: float(muscle.replace(wall_thickness=wall).force(pressure, 0.0)) - force, 1e-7, top)
+    found = root_between(
+        lambda wall: float(muscle.replace(wall_thickness=wall).force(pressure, 0.0)) - force,
+        1e-7,
+        top,
+    )
     if found is None:
         raise ParameterError(f"no wall gives a blocked force of {force:g} N")
     return found
@@ -154,7 +174,9 @@ def _friction(muscle: Muscle, pressure: float) -> float:
 
 
 def _dual_loss(muscle: Muscle, pressure: float, contraction: float) -> float:
-    """(One muscle at 2P less two at P) over the one's blocked force [1]; same air for both (6.2)."""
+    """(One muscle at 2P less two at P) over the one's blocked force [1]; same air for both
+    (6.2).
+    """
     single = float(muscle.force(2.0 * pressure, contraction))
     pair = 2.0 * float(muscle.force(pressure, contraction))
     return (single - pair) / float(muscle.force(2.0 * pressure, 0.0))
@@ -182,26 +204,36 @@ KINDS: Final[dict[str, Callable[[Entry, At], float]]] = {
     "fibre_length": lambda entry, at: entry.muscle.fibre_length,
     "braid_angle": lambda entry, at: float(entry.parameters["braid_angle"]),
     "blocked_force": lambda entry, at: float(entry.muscle.force(at["pressure"], 0.0)),
-    "gaylord_force": lambda entry, at: float(entry.muscle.replace(model="gaylord").force(at["pressure"], 0.0)),
+    "gaylord_force": lambda entry, at: float(
+        entry.muscle.replace(model="gaylord").force(at["pressure"], 0.0)
+    ),
     "angle_for_force": lambda entry, at: _angle_for_force(entry.muscle, **at),
     "angle_for_diameter": lambda entry, at: _angle_for_diameter(entry.muscle, **at),
     "wall_for_force": lambda entry, at: _wall_for_force(entry.muscle, **at),
     "free_length": lambda entry, at: 1.0 - free_contraction(entry.muscle, at["pressure"]),
     "diameter": lambda entry, at: 2.0 * float(entry.muscle.radius(at["contraction"])),
     "published_ratio": lambda entry, at: at["force"] / at["mass"],
-    "specific_force": lambda entry, at: float(entry.muscle.force(at["pressure"], 0.0)) / (entry.mass or math.nan),
+    "specific_force": lambda entry, at: (
+        float(entry.muscle.force(at["pressure"], 0.0)) / (entry.mass or math.nan)
+    ),
     "activation": lambda entry, at: activation_pressure(entry.muscle),
     "blocked_deadband": lambda entry, at: activation_pressure(entry.muscle, 0.0),
     "rubber_nonlinearity": lambda entry, at: _rubber_nonlinearity(entry.muscle, at["strain"]),
     "softening_strain": lambda entry, at: _softening_strain(entry.muscle, at["pressure"]),
-    "hoop_strain_free": lambda entry, at: _hoop_strain(entry.muscle, free_contraction(entry.muscle, at["pressure"])),
+    "hoop_strain_free": lambda entry, at: _hoop_strain(
+        entry.muscle, free_contraction(entry.muscle, at["pressure"])
+    ),
     "smallest_radius": lambda entry, at: _smallest_radius(entry.muscle),
     "closing_extension": lambda entry, at: _closing_extension(entry.muscle),
     "wall_from_closing": lambda entry, at: _wall_from_closing(entry.muscle, **at),
     "friction": lambda entry, at: _friction(entry.muscle, at["pressure"]),
     "dual_loss": lambda entry, at: _dual_loss(entry.muscle, **at),
     "dual_free_gain": lambda entry, at: _dual_free_gain(entry.muscle, **at),
-    "offset_share_hiding_loss": lambda entry, at: at["visible"] / _dual_loss(entry.muscle, at["pressure"], at["contraction"]),
-    "loss_ratio_to_a": lambda entry, at: _dual_loss(entry.muscle, **at) / _dual_loss(_muscle_a(), **at),
+    "offset_share_hiding_loss": lambda entry, at: (
+        at["visible"] / _dual_loss(entry.muscle, at["pressure"], at["contraction"])
+    ),
+    "loss_ratio_to_a": lambda entry, at: (
+        _dual_loss(entry.muscle, **at) / _dual_loss(_muscle_a(), **at)
+    ),
     "loss_ratio_rubber": lambda entry, at: _loss_ratio_rubber(entry.muscle, at),
 }

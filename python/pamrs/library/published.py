@@ -1,4 +1,6 @@
-"""Every published fact beside what the library's muscle gives: value, deviation, and agree / differs / cannot tell."""
+"""Every published fact beside what the library's muscle gives: value, deviation, and agree /
+differs / cannot tell.
+"""
 
 from __future__ import annotations
 
@@ -46,13 +48,17 @@ def headings() -> dict[str, str]:
 
 
 def table(rows: Iterable[Comparison], *, notes: bool = True, titles: bool = True) -> str:
-    """The comparison as text, as :func:`pamrs.comparison.table`, under the titles of the muscles."""
+    """The comparison as text, as :func:`pamrs.comparison.table`, under the titles of the
+    muscles.
+    """
     return comparison.table(rows, notes=notes, titles=titles, headings=headings())
 
 
 def _compare(item: Entry, fact: Fact) -> Comparison:
     if fact.kind not in KINDS:
-        raise ParameterError(f"{item.name}: fact kind = {fact.kind!r} is not known: one of {', '.join(KINDS)}")
+        raise ParameterError(
+            f"{item.name}: fact kind = {fact.kind!r} is not known: one of {', '.join(KINDS)}"
+        )
     scale = parse_unit(fact.unit).scale
     return judge(
         item.name,

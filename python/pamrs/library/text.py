@@ -1,4 +1,6 @@
-"""The library as text: the list of its muscles, one muscle with the origin of each number, and every published fact."""
+"""The library as text: the list of its muscles, one muscle with the origin of each number, and
+every published fact.
+"""
 
 from __future__ import annotations
 
@@ -34,7 +36,9 @@ def overview() -> str:
     for name in names():
         item = entry(name)
         mass = "unknown" if item.mass is None else _shown("mass", item.mass)
-        lines.append(f"{name:<21}{_shown('max_pressure', item.max_pressure):>13}{mass:>13}  {item.title}")
+        lines.append(
+            f"{name:<21}{_shown('max_pressure', item.max_pressure):>13}{mass:>13}  {item.title}"
+        )
     return "\n".join(lines)
 
 
@@ -57,10 +61,15 @@ def description(name: str) -> str:
     """
     item = entry(name)
     values = {**item.parameters, "mass": item.mass, "max_pressure": item.max_pressure}
-    shown = {key: "unknown" if value is None else _shown(key, value) for key, value in values.items()}
+    shown = {
+        key: "unknown" if value is None else _shown(key, value) for key, value in values.items()
+    }
     width, room = max(map(len, shown)), max(map(len, shown.values()))
     lines = [f"{name}: {item.title}", ""]
-    lines += [f"  {key:<{width}}  {text:<{room}}  {item.origins.get(key, 'not published')}" for key, text in shown.items()]
+    lines += [
+        f"  {key:<{width}}  {text:<{room}}  {item.origins.get(key, 'not published')}"
+        for key, text in shown.items()
+    ]
     rows = compare(name)
     return "\n".join([*lines, "", table(rows, titles=False), "", verdicts(rows)])
 
@@ -83,11 +92,16 @@ def facts(others: Sequence[Comparison] = (), below: str = "") -> str:
     for name in names():
         item, again = entry(name), derive(entry(name))
         slope, offset = (again.parameters[f"modulus_{key}"] for key in ("slope", "offset"))
-        lines.append(f"{name}: m = {_shown('modulus_slope', slope)}; b = {_shown('modulus_offset', offset)}")
+        lines.append(
+            f"{name}: m = {_shown('modulus_slope', slope)}; b = {_shown('modulus_offset', offset)}"
+        )
         if "braid_angle" in again.parameters:
             lines.append(f"    braid angle {np.degrees(again.parameters['braid_angle']):.4f} deg")
         lines += [
-            f"    facts: {', '.join(again.conditions) or 'none'}; they determine {again.rank} of {again.unknowns} combinations",
+            (
+                f"    facts: {', '.join(again.conditions) or 'none'}; they determine {again.rank} "
+                f"of {again.unknowns} combinations"
+            ),
             f"    prior: {item.identification['prior']['origin']}",
             f"    moved by {np.round(again.change, 3)} prior standard deviations",
         ]

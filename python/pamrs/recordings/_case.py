@@ -61,7 +61,9 @@ class Case:
     def channels(self) -> tuple[str, ...]:
         """The channels that every recording has."""
         first = self.recordings[0].channels
-        return tuple(name for name in first if all(name in other.channels for other in self.recordings))
+        return tuple(
+            name for name in first if all(name in other.channels for other in self.recordings)
+        )
 
     def with_rig(self, rig: Rig) -> Case:
         """The same recordings with another rig.
@@ -84,8 +86,8 @@ def load_case(folder: str | os.PathLike[str]) -> Case:
     Parameters
     ----------
     folder : path-like
-        A folder with a ``case.toml`` of the schema ``pamrs.case/1``, or that file itself. File names in
-        it are relative to the folder and may point out of it.
+        A folder with a ``case.toml`` of the schema ``pamrs.case/1``, or that file itself. File
+        names in it are relative to the folder and may point out of it.
 
     Returns
     -------
@@ -95,7 +97,8 @@ def load_case(folder: str | os.PathLike[str]) -> Case:
     Raises
     ------
     CaseError
-        If a file is missing or ``case.toml``, the rig or a recording is wrong; all problems are listed.
+        If a file is missing or ``case.toml``, the rig or a recording is wrong; all problems are
+        listed.
     """
     given = Path(folder)
     file = given if given.name == "case.toml" else given / "case.toml"
@@ -130,7 +133,9 @@ def _document(file: Path, given: Path) -> dict[str, Any]:
         raise CaseError(f"{file}: not valid TOML: {error}") from error
 
 
-def _unknown(problems: list[str], prefix: str, given: Iterable[str], allowed: tuple[str, ...]) -> None:
+def _unknown(
+    problems: list[str], prefix: str, given: Iterable[str], allowed: tuple[str, ...]
+) -> None:
     for key in given:
         if key not in allowed:
             near = difflib.get_close_matches(key, allowed, n=1)
@@ -155,8 +160,14 @@ def _rig(problems: list[str], home: Path, name: str) -> Rig | None:
 
 
 def _recordings(problems: list[str], home: Path, entries: Any, source: str) -> list[Recording]:
-    if not isinstance(entries, list) or not entries or not all(isinstance(entry, Mapping) for entry in entries):
-        problems.append("recording is missing: one table [[recording]] with file and role for each is needed")
+    if (
+        not isinstance(entries, list)
+        or not entries
+        or not all(isinstance(entry, Mapping) for entry in entries)
+    ):
+        problems.append(
+            "recording is missing: one table [[recording]] with file and role for each is needed"
+        )
         return []
     recordings: list[Recording] = []
     for index, entry in enumerate(entries):
@@ -175,7 +186,9 @@ def _recordings(problems: list[str], home: Path, entries: Any, source: str) -> l
         file = home / str(name)
         if not file.exists():
             advice = f"; {source}" if source else "; copy it there, or correct file in case.toml"
-            problems.append(f"{label}file = {name!r}: there is no file {os.path.normpath(file)}{advice}")
+            problems.append(
+                f"{label}file = {name!r}: there is no file {os.path.normpath(file)}{advice}"
+            )
             continue
         options = {key: entry[key] for key in _FORMAT if key in entry}
         try:
@@ -184,8 +197,16 @@ def _recordings(problems: list[str], home: Path, entries: Any, source: str) -> l
         except RecordingError as error:
             problems.append(str(error))
     names = [recording.name for recording in recordings]
-    problems += [f"two recordings are called {name!r}" for name in dict.fromkeys(names) if names.count(name) > 1]
-    if recordings and not problems and all(recording.role == "held_out" for recording in recordings):
+    problems += [
+        f"two recordings are called {name!r}"
+        for name in dict.fromkeys(names)
+        if names.count(name) > 1
+    ]
+    if (
+        recordings
+        and not problems
+        and all(recording.role == "held_out" for recording in recordings)
+    ):
         problems.append("no recording has the role 'fit': nothing is left to fit")
     return recordings
 

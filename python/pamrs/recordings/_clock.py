@@ -44,7 +44,9 @@ class Grid:
         The rows that are used, in order (repeated time stamps are left out).
     """
 
-    def __init__(self, stamps: Array, rows: NDArray[np.intp], step: float, usual: float, events: list[Event]) -> None:
+    def __init__(
+        self, stamps: Array, rows: NDArray[np.intp], step: float, usual: float, events: list[Event]
+    ) -> None:
         self.rows = rows
         self.sample_time = step
         self.events = events
@@ -59,7 +61,9 @@ class Grid:
         share = np.where(np.abs(self.time - stamps[self._left]) <= near, 0.0, share)
         self._share = np.where(np.abs(stamps[self._right] - self.time) <= near, 1.0, share)
         single = (self._share == 0.0) | (self._share == 1.0)
-        self._reachable = single | ((span <= _GAP * usual) & (self._share > 0.0) & (self._share < 1.0))
+        self._reachable = single | (
+            (span <= _GAP * usual) & (self._share > 0.0) & (self._share < 1.0)
+        )
 
     def lay(self, values: Array, usable: Mask) -> tuple[Array, Mask]:
         """Values of the used rows on the grid; NaN where the mask is False.
@@ -115,11 +119,14 @@ def lay_grid(stamps: Array, source: str, sample_time: float | None) -> Grid:
     back = int(np.sum(intervals < 0.0))
     if back > max(1, len(forward)):
         raise RecordingError(
-            f"{source}: column 'time' runs backwards: {back} of its {len(intervals)} steps are negative, from {stamps[0]:.6g} s to "
-            f"{stamps[-1]:.6g} s; time that rises from row to row is needed (sort the rows, or correct the column)"
+            f"{source}: column 'time' runs backwards: {back} of its {len(intervals)} steps are "
+            f"negative, from {stamps[0]:.6g} s to {stamps[-1]:.6g} s; time that rises from row to "
+            "row is needed (sort the rows, or correct the column)"
         )
     if not len(forward):
-        raise RecordingError(f"{source}: column 'time': two rows at least, at different times, are needed")
+        raise RecordingError(
+            f"{source}: column 'time': two rows at least, at different times, are needed"
+        )
     usual = float(np.median(forward))
     ordinary = forward[forward < _GAP * usual]
     usual = _plain(float(np.mean(ordinary)), len(stamps))
@@ -143,23 +150,31 @@ def lay_grid(stamps: Array, source: str, sample_time: float | None) -> Grid:
     for index in np.flatnonzero(jumps)[:_MOST_EVENTS]:
         way = "back" if intervals[index] < 0 else "forward"
         text = (
-            f"the clock steps {way} by {abs(float(intervals[index])):.6g} s; what follows is placed after "
-            f"{_JUMP_HOLE} empty samples, because the true pause is not known"
+            f"the clock steps {way} by {abs(float(intervals[index])):.6g} s; what follows is "
+            f"placed after {_JUMP_HOLE} empty samples, because the true pause is not known"
         )
         events.append(Event("clock_jump", float(placed[index]), float(placed[index + 1]), text))
     further = int(jumps.sum()) - _MOST_EVENTS
     if further > 0:
         last = np.flatnonzero(jumps)
         first_at, last_at = float(placed[last[_MOST_EVENTS]]), float(placed[last[-1] + 1])
-        events.append(Event("clock_jump", first_at, last_at, f"{further} further steps of the clock"))
+        events.append(
+            Event("clock_jump", first_at, last_at, f"{further} further steps of the clock")
+        )
     events += _gaps(placed, elapsed, jumps, usual)
     return Grid(placed, rows, step, usual, events)
 
 
 def _plain(interval: float, count: int) -> float:
-    """The interval in few digits if that does not shift the grid visibly over the whole recording."""
+    """The interval in few digits if that does not shift the grid visibly over the whole
+    recording.
+    """
     short = float(f"{interval:.4g}")
-    return short if abs(short / interval - 1.0) * count < 0.5 * _ON_SAMPLE else float(f"{interval:.9g}")
+    return (
+        short
+        if abs(short / interval - 1.0) * count < 0.5 * _ON_SAMPLE
+        else float(f"{interval:.9g}")
+    )
 
 
 def _exact(placed: Array, kept: Array, jumps: Mask) -> Array:
@@ -174,7 +189,8 @@ def _gaps(placed: Array, elapsed: Array, jumps: Mask, usual: float) -> list[Even
         total = int(missing.sum())
         share = 100.0 * total / (total + len(placed))
         text = (
-            f"{len(holes)} gaps, about {total} samples ({share:.0f} %) are missing, the longest gap {float(elapsed[holes].max()):.6g} s"
+            f"{len(holes)} gaps, about {total} samples ({share:.0f} %) are missing, the longest "
+            f"gap {float(elapsed[holes].max()):.6g} s"
         )
         return [Event("gap", float(placed[holes[0]]), float(placed[holes[-1] + 1]), text)]
     return [

@@ -29,7 +29,9 @@ COMMANDS: Final = frozenset({"valve_command", "supply_command", "reference"})
 #: Stops and dry friction hold these exactly still.
 MECHANICAL: Final = frozenset({"joint_angle", "length"})
 #: Transducers whose end of range is a fault.
-CLIPPING: Final = frozenset({"supply_pressure", "line_pressure", "muscle_pressure", "force", "joint_torque"})
+CLIPPING: Final = frozenset(
+    {"supply_pressure", "line_pressure", "muscle_pressure", "force", "joint_torque"}
+)
 
 
 class Fault(NamedTuple):
@@ -77,7 +79,9 @@ def find_faults(channel: str, values: Array) -> list[Fault]:
     for kind, start, stop in stretches.suspects():
         length = stop - start
         where = "its extreme value" if kind == "saturated" else "exactly one value"
-        faults.append(Fault(kind, int(good[start]), int(good[stop - 1]) + 1, f"{length} samples at {where}"))
+        faults.append(
+            Fault(kind, int(good[start]), int(good[stop - 1]) + 1, f"{length} samples at {where}")
+        )
     return faults
 
 
@@ -106,7 +110,8 @@ def _outliers(data: Array, good: NDArray[np.intp]) -> list[Fault]:
     if len(rows) > n // 50:
         return []
     return [
-        Fault("outlier", int(good[first]), int(good[last]) + 1, f"a spike of {off[first]:.3g} (SI)") for first, last in _groups(rows)
+        Fault("outlier", int(good[first]), int(good[last]) + 1, f"a spike of {off[first]:.3g} (SI)")
+        for first, last in _groups(rows)
     ]
 
 
@@ -120,7 +125,9 @@ def _groups(rows: NDArray[np.intp]) -> list[tuple[int, int]]:
 
 
 def _quantum(data: Array) -> float:
-    """The smallest step between values, near enough: a low quantile of the steps that are not rounding."""
+    """The smallest step between values, near enough: a low quantile of the steps that are not
+    rounding.
+    """
     steps = np.diff(np.unique(data))
     span = float(data.max() - data.min())
     steps = steps[steps > 1e-9 * max(span, abs(float(data[0])) * 1e-3)]
@@ -144,7 +151,9 @@ class _Stretches:
         self.rest_windows, self.limit = self._noise()
 
     def _noise(self) -> tuple[int, float]:
-        """Number of windows in which the channel rests but its noise lives, and the longest run allowed."""
+        """Number of windows in which the channel rests but its noise lives, and the longest run
+        allowed.
+        """
         count = len(self.data) // _WINDOW
         if count < 3:
             return 0, math.inf
@@ -155,7 +164,11 @@ class _Stretches:
         signs = np.sign(steps)
         reversals = np.sum(signs[:, 1:] * signs[:, :-1] < 0, axis=1) + _skipped_reversals(signs)
         noisy = reversals >= 5
-        calm = spans <= np.quantile(spans[noisy], 0.5) * 2 + _REST * self.quantum if noisy.any() else noisy
+        calm = (
+            spans <= np.quantile(spans[noisy], 0.5) * 2 + _REST * self.quantum
+            if noisy.any()
+            else noisy
+        )
         alive = noisy & calm
         number = int(alive.sum())
         if number < 3:
@@ -181,7 +194,9 @@ class _Stretches:
                 found.append(("frozen", start, stop))
         for value in clipped:
             at = (self.data[self.starts] == value) & (self.lengths >= 3)
-            found += [("saturated", int(self.starts[i]), int(self.stops[i])) for i in np.flatnonzero(at)]
+            found += [
+                ("saturated", int(self.starts[i]), int(self.stops[i])) for i in np.flatnonzero(at)
+            ]
         return sorted(found, key=lambda item: item[1])
 
     def _ordinary_extreme(self, value: float) -> bool:
@@ -191,7 +206,9 @@ class _Stretches:
         return value == self.low and abs(value) <= 0.02 * (self.high - self.low)
 
     def _believable(self, start: int, stop: int) -> bool:
-        """Whether an overlong run is the sensor's doing and not that of a joint held by friction."""
+        """Whether an overlong run is the sensor's doing and not that of a joint held by
+        friction.
+        """
         if self.channel not in MECHANICAL:
             return True
         lively = self.rest_windows * _WINDOW >= 3 * (stop - start)

@@ -1,7 +1,8 @@
 """Recordings: tables of named channels with units, checked and laid on a uniform grid.
 
-Headings carry the unit, ``muscle_pressure [bar]``; everything inside is SI, with gauge pressures and
-radians. Whatever cannot be trusted is reported as an :class:`Issue` and masked, never used silently.
+Headings carry the unit, ``muscle_pressure [bar]``; everything inside is SI, with gauge pressures
+and radians. Whatever cannot be trusted is reported as an :class:`Issue` and masked, never used
+silently.
 """
 
 from __future__ import annotations
@@ -40,8 +41,8 @@ class _Channel(NamedTuple):
     upper: float
 
 
-#: Canonical channels: SI unit and the range of the possible (SI; pressures gauge). Where a rig has several blocks of a kind, the
-#: name of the block stands behind a dot: ``muscle_pressure.flexor``.
+#: Canonical channels: SI unit and the range of the possible (SI; pressures gauge). Where a rig has
+#: several blocks of a kind, the name of the block stands behind a dot: ``muscle_pressure.flexor``.
 CHANNELS: Final[dict[str, _Channel]] = {
     name: _Channel(UNITS[name], lower, upper)
     for name, lower, upper in (
@@ -72,7 +73,8 @@ class Issue:
     Attributes
     ----------
     kind : str
-        ``nan``, ``gap``, ``clock_jump``, ``frozen``, ``saturated``, ``outlier``, ``constant`` or ``short``.
+        ``nan``, ``gap``, ``clock_jump``, ``frozen``, ``saturated``, ``outlier``, ``constant`` or
+        ``short``.
     channel : str
         Canonical name; ``time`` for the clock.
     start, stop : float
@@ -126,8 +128,8 @@ class Recording:
 
     def __repr__(self) -> str:
         return (
-            f"Recording({self.name!r}, {self.role}, {len(self)} samples every {self.sample_time:g} s: "
-            f"{', '.join(self.channels)}; {len(self.issues)} issues)"
+            f"Recording({self.name!r}, {self.role}, {len(self)} samples every {self.sample_time:g} "
+            f"s: {', '.join(self.channels)}; {len(self.issues)} issues)"
         )
 
     @property
@@ -155,7 +157,10 @@ class Recording:
         combined = np.ones(len(self), dtype=bool)
         for channel in channels or self.channels:
             if channel not in self.mask:
-                raise RecordingError(f"recording {self.name!r} has no channel {channel!r}; it has: {', '.join(self.channels)}")
+                raise RecordingError(
+                    f"recording {self.name!r} has no channel {channel!r}; it has: "
+                    f"{', '.join(self.channels)}"
+                )
             combined &= self.mask[channel]
         return combined
 
@@ -204,8 +209,8 @@ class Recording:
         keep = (self.time >= low - slack) & (self.time <= high + slack)
         if keep.sum() < 2:
             raise RecordingError(
-                f"recording {self.name!r}: start = {low:g} and stop = {high:g} s leave {int(keep.sum())} samples of "
-                f"0 to {self.duration:g} s; at least 2 are needed"
+                f"recording {self.name!r}: start = {low:g} and stop = {high:g} s leave "
+                f"{int(keep.sum())} samples of 0 to {self.duration:g} s; at least 2 are needed"
             )
         offset = float(self.time[keep][0])
         issues = [
@@ -272,20 +277,27 @@ def load_recording(
     Raises
     ------
     RecordingError
-        If the file cannot be read or a column cannot be understood; the message names file and column.
+        If the file cannot be read or a column cannot be understood; the message names file and
+        column.
     """
     file = Path(path)
     source = str(file)
     if role not in ("fit", "held_out"):
         raise RecordingError(f"{source}: role = {role!r} is not allowed: 'fit' or 'held_out'")
     if sample_time is not None and not (math.isfinite(sample_time) and sample_time > 0.0):
-        raise RecordingError(f"{source}: sample_time = {sample_time!r} s is not allowed: a positive number is needed")
+        raise RecordingError(
+            f"{source}: sample_time = {sample_time!r} s is not allowed: a positive number is needed"
+        )
     if len(delimiter) != 1:
-        raise RecordingError(f"{source}: delimiter = {delimiter!r} is not allowed: one character is needed")
+        raise RecordingError(
+            f"{source}: delimiter = {delimiter!r} is not allowed: one character is needed"
+        )
     if file.is_dir():
         raise RecordingError(f"{source}: cannot be read (a folder, not a file)")
     if not header and not isinstance(columns, Sequence):
-        raise RecordingError(f"{source}: without a header, columns must list what each column is: 'name [unit]'")
+        raise RecordingError(
+            f"{source}: without a header, columns must list what each column is: 'name [unit]'"
+        )
     table = read_table(file, delimiter=delimiter, header=header)
     wanted = _understood(_headings(table, columns, source), source)
     raw, units = _si_columns(table, wanted, source, thousands, decimal)
@@ -296,20 +308,29 @@ def load_recording(
 # ------------------------------------------------------------------------- columns
 
 
-def _headings(table: Table, columns: Sequence[str] | Mapping[str, str] | None, source: str) -> list[str]:
+def _headings(
+    table: Table, columns: Sequence[str] | Mapping[str, str] | None, source: str
+) -> list[str]:
     found = table.header
     if columns is None:
         return found or []
     if isinstance(columns, str):
-        raise RecordingError(f"{source}: columns = {columns!r} is not allowed: a list of headings is needed")
+        raise RecordingError(
+            f"{source}: columns = {columns!r} is not allowed: a list of headings is needed"
+        )
     if isinstance(columns, Mapping):
         given = found or []
         strange = [key for key in columns if key not in given]
         if strange:
-            raise RecordingError(f"{source}: columns names {strange[0]!r}, but the file has: {', '.join(given)}")
+            raise RecordingError(
+                f"{source}: columns names {strange[0]!r}, but the file has: {', '.join(given)}"
+            )
         return [columns.get(heading, heading) for heading in given]
     if len(columns) != len(table.cells):
-        raise RecordingError(f"{source}: columns lists {len(columns)} headings, but there are {len(table.cells)} columns")
+        raise RecordingError(
+            f"{source}: columns lists {len(columns)} headings, but there are {len(table.cells)} "
+            "columns"
+        )
     return list(columns)
 
 
@@ -326,12 +347,17 @@ def _understood(headings: list[str], source: str) -> dict[str, tuple[int, str]]:
         if match is None or channel not in CHANNELS or name.endswith("."):
             near = difflib.get_close_matches(channel.lower(), CHANNELS, n=1, cutoff=0.6)
             hint = f"did you mean {near[0]!r}?" if near else f"known are {', '.join(CHANNELS)}"
-            problems.append(f"unknown column {heading!r}; {hint} (columns = {{{heading!r} = ''}} leaves it out)")
+            problems.append(
+                f"unknown column {heading!r}; {hint} (columns = {{{heading!r} = ''}} leaves it out)"
+            )
             continue
         expected = _REFERENCE_UNITS if channel == "reference" else (CHANNELS[channel].unit,)
         unit = match["unit"]
         if unit is None or not unit.strip():
-            problems.append(f"column {heading!r} has no unit: write '{name} [{expected[0]}]', with the unit its values are in")
+            problems.append(
+                f"column {heading!r} has no unit: write '{name} [{expected[0]}]', with the unit "
+                "its values are in"
+            )
         elif name in wanted:
             problems.append(f"column {heading!r}: the channel {name!r} is there twice")
         else:
@@ -368,7 +394,10 @@ def _si_columns(
     if isinstance(thousands, Mapping):
         strange = [key for key in thousands if key not in wanted]
         if strange:
-            raise RecordingError(f"{source}: thousands names {strange[0]!r}, but the channels are: {', '.join(wanted)}")
+            raise RecordingError(
+                f"{source}: thousands names {strange[0]!r}, but the channels are: "
+                f"{', '.join(wanted)}"
+            )
     raw: dict[str, Array] = {}
     units: dict[str, str] = {}
     for name, (index, unit) in wanted.items():
@@ -400,7 +429,10 @@ def _assemble(
     count = len(next(iter(raw.values())))
     if "time" not in raw:
         if sample_time is None:
-            raise RecordingError(f"{source}: column 'time' is missing (give sample_time if the rows are evenly spaced)")
+            raise RecordingError(
+                f"{source}: column 'time' is missing (give sample_time if the rows are evenly "
+                "spaced)"
+            )
         raw["time"] = np.asarray(np.arange(count) * sample_time, dtype=np.float64)
     if count < 2:
         raise RecordingError(f"{source}: one row only; two at least are needed")
@@ -412,9 +444,14 @@ def _assemble(
         text = f"{int((~stamped).sum())} rows without a time are left out"
         issues.append(Issue("nan", "time", 0.0, float(grid.time[-1]), text))
     if ragged:
-        text = f"{len(ragged)} rows with too few or too many cells (first: row {ragged[0]}) are masked there"
+        text = (
+            f"{len(ragged)} rows with too few or too many cells (first: row {ragged[0]}) are "
+            "masked there"
+        )
         issues.append(Issue("nan", "time", 0.0, float(grid.time[-1]), text))
-    issues += [Issue(event.kind, "time", event.start, event.stop, event.text) for event in grid.events]
+    issues += [
+        Issue(event.kind, "time", event.start, event.stop, event.text) for event in grid.events
+    ]
     if len(grid.time) < _FEW:
         text = f"{len(grid.time)} samples only: too few to judge noise or faults"
         issues.append(Issue("short", "time", 0.0, float(grid.time[-1]), text))
@@ -429,7 +466,9 @@ def _assemble(
     return Recording(name, role, grid.time, grid.sample_time, channels, masks, issues, units)
 
 
-def _judged(channel: str, values: Array, grid: Grid, source: str, issues: list[Issue]) -> tuple[Array, Mask]:
+def _judged(
+    channel: str, values: Array, grid: Grid, source: str, issues: list[Issue]
+) -> tuple[Array, Mask]:
     """One channel on the grid with its mask; what is wrong with it goes to ``issues``."""
     values = values.copy()
     limits = CHANNELS[channel_of(channel)]
@@ -439,8 +478,9 @@ def _judged(channel: str, values: Array, grid: Grid, source: str, issues: list[I
     if bad > max(3, len(values) // 50):
         worst = float(values[impossible][0])
         raise RecordingError(
-            f"{source}: column {channel!r}: {worst:.6g} {limits.unit} and {bad - 1} more values are not "
-            f"possible ({limits.lower:g} to {limits.upper:g} {limits.unit}); right column and unit?"
+            f"{source}: column {channel!r}: {worst:.6g} {limits.unit} and {bad - 1} more values "
+            f"are not possible ({limits.lower:g} to {limits.upper:g} {limits.unit}); right column "
+            "and unit?"
         )
     found: list[tuple[str, int, int, str]] = _runs(~usable, "nan", "no value")
     found += _runs(impossible, "outlier", "an impossible value")
@@ -456,13 +496,20 @@ def _judged(channel: str, values: Array, grid: Grid, source: str, issues: list[I
             total = sum(stop - start for _, start, stop, _ in same)
             start, _ = grid.when(same[0][1], same[0][2])
             _, stop = grid.when(same[-1][1], same[-1][2])
-            issues.append(Issue(kind, channel, start, stop, f"{len(same)} stretches, {total} samples in all"))
+            issues.append(
+                Issue(kind, channel, start, stop, f"{len(same)} stretches, {total} samples in all")
+            )
         else:
-            issues += [Issue(kind, channel, *grid.when(first, last), text) for _, first, last, text in same]
+            issues += [
+                Issue(kind, channel, *grid.when(first, last), text) for _, first, last, text in same
+            ]
     return grid.lay(values, usable)
 
 
 def _runs(flags: Mask, kind: str, text: str) -> list[tuple[str, int, int, str]]:
     padded: NDArray[Any] = np.concatenate([[False], flags, [False]])
     edges = np.flatnonzero(padded[1:] != padded[:-1])
-    return [(kind, int(a), int(b), f"{text} ({int(b - a)} samples)") for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    return [
+        (kind, int(a), int(b), f"{text} ({int(b - a)} samples)")
+        for a, b in zip(edges[::2], edges[1::2], strict=True)
+    ]

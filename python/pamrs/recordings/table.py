@@ -1,7 +1,7 @@
 """Reads the table of a recording: text or Parquet in, columns of numbers out.
 
-Nothing is judged here but whether a cell is a number; empty cells and the usual words for "no value"
-become NaN.
+Nothing is judged here but whether a cell is a number; empty cells and the usual words for "no
+value" become NaN.
 """
 
 from __future__ import annotations
@@ -55,7 +55,9 @@ class Table:
         self.row_numbers = row_numbers
         self.ragged = ragged
 
-    def numbers(self, index: int, label: str, source: str, thousands: str | None, decimal: str) -> Array:
+    def numbers(
+        self, index: int, label: str, source: str, thousands: str | None, decimal: str
+    ) -> Array:
         """Column ``index`` as numbers, NaN where it has no value.
 
         Raises
@@ -81,7 +83,10 @@ class Table:
                 values[row] = math.nan if text.lower() in _NO_VALUE else float(text)
             except ValueError:
                 raise RecordingError(
-                    f"{source}: column {label!r}, row {self.row_numbers[row]}: {text[:40]!r} is not a number"
+                    (
+                        f"{source}: column {label!r}, row {self.row_numbers[row]}: {text[:40]!r} "
+                        "is not a number"
+                    )
                     + _number_hint(text, thousands, decimal)
                 ) from None
         return values
@@ -143,17 +148,25 @@ def read_text(path: Path) -> str:
     packed = path.suffix == ".gz"
     ending = (path.with_suffix("").suffix if packed else path.suffix).lower()
     if ending not in _TEXT:
-        raise RecordingError(f"{path}: the format {ending!r} is not read here; readable are {_READABLE}")
+        raise RecordingError(
+            f"{path}: the format {ending!r} is not read here; readable are {_READABLE}"
+        )
     try:
         data = path.read_bytes()
         raw = gzip.decompress(data) if packed else data
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError:
-        raise RecordingError(f"{path}: not a text file in UTF-8; readable are {_READABLE}") from None
+        raise RecordingError(
+            f"{path}: not a text file in UTF-8; readable are {_READABLE}"
+        ) from None
     except (OSError, EOFError, zlib.error) as error:
-        raise RecordingError(f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})") from error
+        raise RecordingError(
+            f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})"
+        ) from error
     if "\x00" in text:
-        raise RecordingError(f"{path}: not a text file (it has zero bytes); readable are {_READABLE}")
+        raise RecordingError(
+            f"{path}: not a text file (it has zero bytes); readable are {_READABLE}"
+        )
     return text
 
 
@@ -177,7 +190,8 @@ def _parse(text: str, source: str, delimiter: str, header: bool) -> Table:
             rows[index] = (row + [""] * width)[:width] if len(row) < width else [""] * width
     if len(ragged) > max(1, len(rows) // 20):
         raise RecordingError(
-            f"{source}: {len(ragged)} of {len(rows)} rows do not have {width} cells (first: row {ragged[0]}, delimiter {delimiter!r})"
+            f"{source}: {len(ragged)} of {len(rows)} rows do not have {width} cells (first: row "
+            f"{ragged[0]}, delimiter {delimiter!r})"
         )
     return Table(headings, list(zip(*rows, strict=True)), numbers, ragged)
 
@@ -202,7 +216,9 @@ def _parquet(path: Path) -> Table:
     try:
         import pandas as pd
     except ImportError as error:
-        raise RecordingError(f"{path}: Parquet needs pandas and pyarrow: pip install 'pamrs[io]' pyarrow") from error
+        raise RecordingError(
+            f"{path}: Parquet needs pandas and pyarrow: pip install 'pamrs[io]' pyarrow"
+        ) from error
     try:
         frame = pd.read_parquet(path)
         columns = [np.asarray(frame[name], dtype=np.float64) for name in frame.columns]

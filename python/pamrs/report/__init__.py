@@ -28,7 +28,9 @@ def require(*packages: str) -> None:
         try:
             importlib.import_module(package)
         except ImportError as error:
-            text = f"the report needs {error.name}, which is not installed: pip install pamrs[report]"
+            text = (
+                f"the report needs {error.name}, which is not installed: pip install pamrs[report]"
+            )
             raise ImportError(text, name=error.name) from error
 
 

@@ -50,7 +50,8 @@ COLOURS = {
     "after": "#0072b2",
     "quiet": "#b9bec6",
 }
-"""Colours of the curves (after Okabe and Ito: told apart by colour-blind readers and in grey print)."""
+"""Colours of the curves (after Okabe and Ito: told apart by colour-blind readers and in grey
+print)."""
 
 CHAIN = ("supply", "valve", "line", "chamber", "muscle", "joint", "arm", "sensors")
 MAX_POINTS = 1500
@@ -87,7 +88,9 @@ STYLE: Any = {
 """Matplotlib settings of every figure."""
 
 
-def decimate(time: FloatArray, values: FloatArray, points: int = MAX_POINTS) -> tuple[FloatArray, FloatArray]:
+def decimate(
+    time: FloatArray, values: FloatArray, points: int = MAX_POINTS
+) -> tuple[FloatArray, FloatArray]:
     """Thin a curve for drawing, keeping the extremes of every stretch.
 
     Parameters
@@ -100,7 +103,8 @@ def decimate(time: FloatArray, values: FloatArray, points: int = MAX_POINTS) -> 
     Returns
     -------
     tuple of ndarray
-        Times and values of at most `points` samples, in order; a stretch that is all NaN stays a gap.
+        Times and values of at most `points` samples, in order; a stretch that is all NaN stays a
+        gap.
     """
     n = len(time)
     if n <= points:
@@ -112,7 +116,9 @@ def decimate(time: FloatArray, values: FloatArray, points: int = MAX_POINTS) -> 
         if np.all(np.isnan(part)):
             chosen.append(int(start))
         else:
-            chosen.extend(sorted({int(start + np.nanargmin(part)), int(start + np.nanargmax(part))}))
+            chosen.extend(
+                sorted({int(start + np.nanargmin(part)), int(start + np.nanargmax(part))})
+            )
     index = np.asarray(chosen, dtype=np.int64)
     return time[index], values[index]
 
@@ -124,7 +130,9 @@ def _rms(values: FloatArray | None) -> float:
 
 
 def _largest(*curves: FloatArray | None) -> float:
-    sizes = [float(np.nanmax(np.abs(c))) for c in curves if c is not None and np.any(np.isfinite(c))]
+    sizes = [
+        float(np.nanmax(np.abs(c))) for c in curves if c is not None and np.any(np.isfinite(c))
+    ]
     return max(sizes, default=math.nan)
 
 
@@ -136,14 +144,20 @@ def _has(values: FloatArray | None, besides: FloatArray | None = None) -> bool:
 
 
 def telling_trace(diagnosis: Findings) -> Trace | None:
-    """Trace that shows the most: the telling channel, held out if possible, with the largest improvement."""
+    """Trace that shows the most: the telling channel, held out if possible, with the largest
+    improvement.
+    """
     if not diagnosis.traces:
         return None
     channel = diagnosis.where.channel
 
     def merit(trace: Trace) -> tuple[bool, bool, float]:
         gain = _rms(trace.residual_before) / max(_rms(trace.residual_after), 1e-300)
-        return trace.channel == channel, trace.role == "held_out", gain if math.isfinite(gain) else 0.0
+        return (
+            trace.channel == channel,
+            trace.role == "held_out",
+            gain if math.isfinite(gain) else 0.0,
+        )
 
     return max(diagnosis.traces, key=merit)
 
@@ -175,13 +189,18 @@ def _draw_curves(axes: Axes, trace: Trace, *, width: float = 1.2) -> None:
 
 
 def _draw_residuals(axes: Axes, trace: Trace, noise: float | None, *, width: float = 1.0) -> None:
-    """Residuals of the refitted baseline and with the effect, over a band of two noise deviations."""
+    """Residuals of the refitted baseline and with the effect, over a band of two noise
+    deviations.
+    """
     before, after = trace.residual_before, trace.residual_after
     unit, factor = display_unit(trace.unit, _largest(before, after))
     if noise is not None:
-        axes.axhspan(-2 * noise * factor, 2 * noise * factor, color="#dfe3e8", lw=0, label="noise (± 2 std)")
+        axes.axhspan(
+            -2 * noise * factor, 2 * noise * factor, color="#dfe3e8", lw=0, label="noise (± 2 std)"
+        )
     axes.axhline(0.0, color="#6b7280", lw=0.7)
-    # in the colours of the curves above: what is left before the effect is what the refit leaves, where there was one
+    # in the colours of the curves above: what is left before the effect is what the refit leaves,
+    # where there was one
     refitted = trace.refit is not None and _has(trace.refit, trace.before)
     first = ("refit", "parameters refitted") if refitted else ("before", "before")
     for values, name, text in ((before, *first), (after, "after", "with what was found")):
@@ -204,7 +223,9 @@ def legend_above(axes: Axes, *, columns: int = 4) -> None:
 
 
 def _shade(axes: Axes, diagnosis: Findings, trace: Trace) -> None:
-    """Mark the intervals that carry the excess, where they are known to belong to this recording."""
+    """Mark the intervals that carry the excess, where they are known to belong to this
+    recording.
+    """
     if diagnosis.where.recording == trace.recording:
         for start, stop in diagnosis.where.intervals:
             axes.axvspan(start, stop, color="#f5e6b8", alpha=0.5, lw=0, zorder=0)
@@ -220,7 +241,9 @@ def svg_text(figure: Figure, prefix: str) -> str:
     text = text[text.index("<svg") :]
     text = re.sub(r'\bid="', f'id="{prefix}-', text)
     text = text.replace("url(#", f"url(#{prefix}-").replace('href="#', f'href="#{prefix}-')
-    text = re.sub(r' width="[\d.]+pt"', "", re.sub(r' height="[\d.]+pt"', "", text, count=1), count=1)
+    text = re.sub(
+        r' width="[\d.]+pt"', "", re.sub(r' height="[\d.]+pt"', "", text, count=1), count=1
+    )
     return text.strip()
 
 
@@ -230,7 +253,7 @@ def traces_svg(diagnosis: Findings, traces: Sequence[Trace], prefix: str) -> str
     Parameters
     ----------
     diagnosis : Findings
-        For noise floors and marked intervals.
+        For noise levels and marked intervals.
     traces : sequence of Trace
         Channels of one recording, at least one.
     prefix : str
@@ -269,7 +292,8 @@ HYPOTHESES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#c79a00", "#56b4e9")
 
 
 def separating_curves(curves: Curves, prefix: str = "next") -> str:
-    """The next experiment as every hypothesis predicts it, and what each cannot explain of the leading one's outcome.
+    """The next experiment as every hypothesis predicts it, and what each cannot explain of the
+    leading one's outcome.
 
     Parameters
     ----------
@@ -297,7 +321,9 @@ def _separating(curves: Curves) -> Figure:
     for place, (name, curve) in enumerate(values.items()):
         x, y = decimate(time, np.asarray(curve, dtype=np.float64))
         # the leading one is broad, the others are dashed over it: they often lie on it
-        style: dict[str, Any] = {"lw": 2.6, "alpha": 0.75} if place == 0 else {"lw": 1.2, "ls": (0, (4 + place, 2))}
+        style: dict[str, Any] = (
+            {"lw": 2.6, "alpha": 0.75} if place == 0 else {"lw": 1.2, "ls": (0, (4 + place, 2))}
+        )
         upper.plot(x, factor * y, color=colours[name], label=hypothesis_label(name), **style)
     upper.set_ylabel(f"{label(curves.channel)} [{unit}]" if unit else label(curves.channel))
     upper.set_title("predicted from the same commands")
@@ -320,7 +346,7 @@ def _separating(curves: Curves) -> Figure:
 
 
 def _block_rows(diagnosis: Findings) -> list[tuple[str, float, bool]]:
-    """Name, residual in units of the noise floor, whether located; in the order of the chain."""
+    """Name, residual in units of the noise level, whether located; in the order of the chain."""
     rows = []
     for name, entry in diagnosis.residuals.items():
         if is_number(entry.rms) and is_number(entry.noise) and entry.noise > 0:
@@ -335,21 +361,23 @@ def _draw_blocks(axes: Axes, rows: Sequence[tuple[str, float, bool]], least_rows
     colours = [COLOURS["before"] if r[2] else COLOURS["quiet"] for r in rows]
     axes.barh(position, size - left, left=left, color=colours, height=0.62)
     axes.axvline(1.0, color="#1f1f1f", lw=1.1, ls=(0, (3, 2)))
-    axes.text(1.0, -0.62, " noise floor", va="bottom", ha="left", color="#374151", fontsize="small")
+    axes.text(1.0, -0.62, " noise level", va="bottom", ha="left", color="#374151", fontsize="small")
     axes.set_xscale("log")
     axes.set_xlim(left, max(3.0, float(size.max()) * 1.9))
     for y, value in zip(position.tolist(), size.tolist(), strict=True):
-        axes.text(value, y, f"  {format_number(value, 2)}×", va="center", ha="left", fontsize="small")
+        axes.text(
+            value, y, f"  {format_number(value, 2)}×", va="center", ha="left", fontsize="small"
+        )
     axes.set_yticks(position, [label(r[0]) for r in rows])
     axes.set_ylim(max(len(rows), least_rows) - 0.45, -1.0)
     axes.xaxis.set_major_formatter(lambda v, _: format_number(v, 1))
     axes.xaxis.set_minor_formatter("")
     axes.grid(axis="y", visible=False)
-    axes.set_xlabel("residual of the refitted baseline / noise floor")
+    axes.set_xlabel("residual of the refitted baseline / noise level")
 
 
 def blocks_svg(diagnosis: Findings, prefix: str = "blocks") -> str | None:
-    """Bar chart of each block's residual against its noise floor; None when there are no blocks."""
+    """Bar chart of each block's residual against its noise level; None when there are no blocks."""
     rows = _block_rows(diagnosis)
     if not rows:
         return None
@@ -372,7 +400,10 @@ def _grids(
             if z.shape != (len(y) - 1, len(x) - 1) and z.T.shape == (len(y) - 1, len(x) - 1):
                 z = z.T
             if z.shape != (len(y) - 1, len(x) - 1):
-                raise ValueError(f"condition_map {key} has shape {z.shape}; the edges ask for {(len(y) - 1, len(x) - 1)}")
+                raise ValueError(
+                    f"condition_map {key} has shape {z.shape}; the edges ask for "
+                    f"{(len(y) - 1, len(x) - 1)}"
+                )
             grids.append((title, np.ma.masked_invalid(z)))
     sizes = [np.abs(z.compressed()) for _, z in grids]
     everything = np.concatenate(sizes) if sizes else np.empty(0)
@@ -389,7 +420,9 @@ def _draw_map(axes: Axes, x: FloatArray, y: FloatArray, z: Any, limit: float) ->
 
 
 def map_svg(diagnosis: Findings, prefix: str = "map") -> str | None:
-    """Heat maps of the mean residual over the two telling conditions, before and after; None without data."""
+    """Heat maps of the mean residual over the two telling conditions, before and after; None
+    without data.
+    """
     content = diagnosis.condition_map and _grids(diagnosis.condition_map)
     if not content or diagnosis.condition_map is None:
         return None
@@ -399,8 +432,16 @@ def map_svg(diagnosis: Findings, prefix: str = "map") -> str | None:
         return svg_text(figure, prefix)
 
 
-def _draw_maps(part: Any, condition_map: ConditionMap, content: Any, title_style: dict[str, Any], bar_style: dict[str, Any]) -> None:
-    """Heat maps side by side in a figure or a part of one, with one label for both and one colour bar."""
+def _draw_maps(
+    part: Any,
+    condition_map: ConditionMap,
+    content: Any,
+    title_style: dict[str, Any],
+    bar_style: dict[str, Any],
+) -> None:
+    """Heat maps side by side in a figure or a part of one, with one label for both and one colour
+    bar.
+    """
     x, y, grids, limit = content
     axes = part.subplots(1, len(grids), sharey=True, squeeze=False)[0]
     for panel, (title, z) in zip(axes, grids, strict=True):
@@ -418,7 +459,10 @@ def _draw_probabilities(axes: Axes, diagnosis: Findings) -> None:
     axes.barh(position, [p for _, p in rows], color=colours, height=0.62)
     for y, (_, p) in zip(position.tolist(), rows, strict=True):
         axes.text(p + 0.015, y, format_probability(p), va="center", fontsize="small")
-    axes.set_yticks(position, [textwrap.shorten(hypothesis_label(name), 34, placeholder=" …") for name, _ in rows])
+    axes.set_yticks(
+        position,
+        [textwrap.shorten(hypothesis_label(name), 34, placeholder=" …") for name, _ in rows],
+    )
     axes.set_xlim(0.0, 1.16)
     axes.set_xticks([0.0, 0.5, 1.0])
     axes.set_ylim(max(len(rows), 5) - 0.4, -0.6)
@@ -438,7 +482,13 @@ def summary_png(diagnosis: Findings) -> bytes:
     bytes
         PNG of 1600 x 1000 pixels.
     """
-    style = {**STYLE, "font.size": 8.5, "axes.titlesize": 9.5, "legend.fontsize": 8.0, "axes.labelsize": 8.5}
+    style = {
+        **STYLE,
+        "font.size": 8.5,
+        "axes.titlesize": 9.5,
+        "legend.fontsize": 8.0,
+        "axes.labelsize": 8.5,
+    }
     with mpl.rc_context(style):
         figure = Figure(figsize=(10.0, 6.25), dpi=160, layout="constrained")
         figure.get_layout_engine().set(w_pad=0.12, h_pad=0.06, wspace=0.03, hspace=0.03)  # type: ignore[union-attr, call-arg]
@@ -447,11 +497,15 @@ def summary_png(diagnosis: Findings) -> bytes:
         left, right = figure.subfigures(1, 2, width_ratios=[1.45, 1.0], squeeze=False)[0]
         trace = telling_trace(diagnosis)
         if trace is not None:
-            upper, lower = left.subplots(2, 1, sharex=True, gridspec_kw={"height_ratios": [1.7, 1.0]})
+            upper, lower = left.subplots(
+                2, 1, sharex=True, gridspec_kw={"height_ratios": [1.7, 1.0]}
+            )
             _draw_curves(upper, trace, width=1.1)
             _draw_residuals(lower, trace, _noise(diagnosis, trace), width=0.8)
             role = "held-out recording" if trace.role == "held_out" else "fitted recording"
-            upper.set_title(f"{label(trace.channel).capitalize()}, {role} {trace.recording}", pad=20)
+            upper.set_title(
+                f"{label(trace.channel).capitalize()}, {role} {trace.recording}", pad=20
+            )
             lower.set_title("What the model does not explain", pad=20)
             for panel in (upper, lower):
                 panel.legend(
@@ -488,7 +542,13 @@ def _draw_right(right: Any, diagnosis: Findings) -> None:
         _head(parts[0], "Probability of each hypothesis")
     if content and diagnosis.condition_map is not None:
         _head(parts[-1], "When: residual over two conditions")
-        _draw_maps(parts[-1], diagnosis.condition_map, content, {"fontweight": "normal", "pad": 4}, {"pad": 0.02, "aspect": 28})
+        _draw_maps(
+            parts[-1],
+            diagnosis.condition_map,
+            content,
+            {"fontweight": "normal", "pad": 4},
+            {"pad": 0.02, "aspect": 28},
+        )
     elif rows:
         _draw_blocks(parts[-1].subplots(), rows, least_rows=4)
         _head(parts[-1], "Where the residual is")

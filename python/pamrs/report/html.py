@@ -81,18 +81,29 @@ def _blocks(diagnosis: Findings) -> list[dict[str, Any]]:
     rows = []
     for entry in diagnosis.blocks:
         found = [*entry.effects, *entry.wrong_parameters]
-        leading, chance = max(entry.probabilities.items(), key=lambda kv: kv[1], default=("none", math.nan))
+        leading, chance = max(
+            entry.probabilities.items(), key=lambda kv: kv[1], default=("none", math.nan)
+        )
         sizes = []
         for block in entry.mismatch:
             part = block.held_out or block.fitted
             unit, factor = words.display_unit(block.unit, abs(part.refit.size))
             shown = [
-                f"{words.format_number(s.noises, 2)} ({words.format_number(s.size * factor, 2)} {unit})"
+                (
+                    f"{words.format_number(s.noises, 2)} "
+                    f"({words.format_number(s.size * factor, 2)} {unit})"
+                )
                 if s.more_than_noise
                 else "noise only"
                 for s in (part.refit, part.after)
             ]
-            sizes.append({"block": words.label(block.block.replace(".", " ")), "refit": shown[0], "after": shown[1]})
+            sizes.append(
+                {
+                    "block": words.label(block.block.replace(".", " ")),
+                    "refit": shown[0],
+                    "after": shown[1],
+                }
+            )
         rows.append(
             {
                 "verdict": WRONG if entry.wrong_parameters else BADGES[entry.verdict],
@@ -112,7 +123,9 @@ def _wrong(diagnosis: Findings) -> list[dict[str, Any]]:
         unit, factor = words.display_unit(entry.unit, abs(entry.nominal))
         errors = []
         for channel, error in entry.held_out.items():
-            shown, scale = words.display_unit(UNITS.get(channel.partition(".")[0], ""), max(error.values()))
+            shown, scale = words.display_unit(
+                UNITS.get(channel.partition(".")[0], ""), max(error.values())
+            )
             before, after = (words.format_number(error[key] * scale) for key in ("refit", "after"))
             errors.append(f"{words.label(channel)}: {before} to {after} {shown}")
         interval = [float(v) * factor for v in entry.interval]
@@ -131,15 +144,28 @@ def _wrong(diagnosis: Findings) -> list[dict[str, Any]]:
     return rows
 
 
-def _asked(diagnosis: Findings) -> list[dict[str, str]]:
-    """Effects that were asked, in percent of the mismatch."""
+def _tested(diagnosis: Findings) -> list[dict[str, str]]:
+    """Effects that were tested, in percent of the mismatch."""
 
     def percent(share: float | None) -> str:
-        return "not fitted" if share is None else "all" if share >= 1.0 else f"{100 * share:.0f} %" if share > 0.005 else "under 1 %"
+        return (
+            "not fitted"
+            if share is None
+            else "all"
+            if share >= 1.0
+            else f"{100 * share:.0f} %"
+            if share > 0.005
+            else "under 1 %"
+        )
 
     return [
-        {"name": words.label(a.id), "blocks": ", ".join(a.blocks), "promised": percent(a.promised), "left": percent(a.left)}
-        for a in diagnosis.asked
+        {
+            "name": words.label(a.id),
+            "blocks": ", ".join(a.blocks),
+            "predicted_gain": percent(a.predicted_gain),
+            "left": percent(a.left),
+        }
+        for a in diagnosis.tested
     ]
 
 
@@ -147,7 +173,9 @@ def _intervals(diagnosis: Findings) -> list[str]:
     """Where in time the excess is, in words."""
     spans = [(float(a), float(b)) for a, b in diagnosis.where.intervals]
     told = next((t for t in diagnosis.traces if t.recording == diagnosis.where.recording), None)
-    if told is not None and sum(b - a for a, b in spans) > THROUGHOUT * float(told.time[-1] - told.time[0]):
+    if told is not None and sum(b - a for a, b in spans) > THROUGHOUT * float(
+        told.time[-1] - told.time[0]
+    ):
         return ["throughout the recording"]
     return [f"{a:.2f} to {b:.2f} s" for a, b in spans]
 
@@ -172,7 +200,9 @@ def _parameters(diagnosis: Findings) -> list[dict[str, Any]]:
                 "nominal": words.format_number(p.nominal, 4),
                 "value": words.format_uncertain(p.value, p.std) if known else "–",
                 "unit": _unit(p.unit),
-                "moved": f"{moved:+.1f}".replace("-", "−") if known and math.isfinite(moved) else "–",
+                "moved": f"{moved:+.1f}".replace("-", "−")
+                if known and math.isfinite(moved)
+                else "–",
                 "bar": min(1.0, abs(moved) / 4.0) if known and math.isfinite(moved) else 0.0,
                 "right": moved >= 0,
                 "flag": flag,
@@ -193,7 +223,11 @@ def _fit(errors: dict[str, ChannelError]) -> list[dict[str, Any]]:
         for key in ("noise", "before", "refit", "after"):
             value = entry[key]
             good = words.is_number(value)
-            ratio = float(value) / float(noise) if good and words.is_number(noise) and float(noise) > 0 else math.nan
+            ratio = (
+                float(value) / float(noise)
+                if good and words.is_number(noise) and float(noise) > 0
+                else math.nan
+            )
             times = "–" if math.isnan(ratio) else f"{words.format_number(ratio, 2)}×"
             shown = words.format_number(float(value) * factor) if good else "–"
             cells.append({"key": key, "value": shown, "times": "" if key == "noise" else times})
@@ -202,7 +236,9 @@ def _fit(errors: dict[str, ChannelError]) -> list[dict[str, Any]]:
 
 
 def _recordings(diagnosis: Findings) -> tuple[list[dict[str, Any]], int]:
-    """One fitted and up to two held-out recordings with their figure, and how many are not shown."""
+    """One fitted and up to two held-out recordings with their figure, and how many are not
+    shown.
+    """
     telling = figures.telling_trace(diagnosis)
     groups: dict[tuple[str, str], list[Trace]] = {}
     for trace in diagnosis.traces:
@@ -210,7 +246,9 @@ def _recordings(diagnosis: Findings) -> tuple[list[dict[str, Any]], int]:
     keys = list(groups)
     if telling is not None:
         keys.sort(key=lambda k: k != (telling.role, telling.recording))
-    chosen = [k for k in keys if k[0] != "held_out"][:1] + [k for k in keys if k[0] == "held_out"][:HELD_OUT_SHOWN]
+    chosen = [k for k in keys if k[0] != "held_out"][:1] + [k for k in keys if k[0] == "held_out"][
+        :HELD_OUT_SHOWN
+    ]
     shown = []
     for i, key in enumerate(chosen):
         traces = sorted(groups[key], key=lambda t: t.channel != diagnosis.where.channel)
@@ -245,7 +283,9 @@ def _facts(diagnosis: Findings) -> list[tuple[str, str]]:
     facts = []
     if diagnosis.probabilities:
         name, p = words.ranked_probabilities(diagnosis, len(diagnosis.probabilities))[0]
-        facts.append((words.format_probability(p), f"probability of: {words.hypothesis_label(name)}"))
+        facts.append(
+            (words.format_probability(p), f"probability of: {words.hypothesis_label(name)}")
+        )
     gap = diagnosis.fit.gap_closed
     if words.is_number(gap):
         facts.append(
@@ -260,7 +300,9 @@ def _facts(diagnosis: Findings) -> list[tuple[str, str]]:
         facts.append((words.label(diagnosis.where.block), seen))
     facts.append(
         (
-            f"{diagnosis.seconds:.0f} s" if diagnosis.seconds >= 10 else f"{diagnosis.seconds:.1f} s",
+            f"{diagnosis.seconds:.0f} s"
+            if diagnosis.seconds >= 10
+            else f"{diagnosis.seconds:.1f} s",
             "computing time",
         )
     )
@@ -288,7 +330,8 @@ def _ranking(diagnosis: Findings) -> list[dict[str, str]]:
     """The experiments that were compared, the most telling first."""
     return [
         {
-            "name": words.label(entry.name) + (f" with {words.label(entry.sensor)}" if entry.sensor else ""),
+            "name": words.label(entry.name)
+            + (f" with {words.label(entry.sensor)}" if entry.sensor else ""),
             "bits": words.format_number(entry.bits, 2),
             "effort": f"{entry.effort_s / 60.0:.1f} min",
         }
@@ -315,7 +358,9 @@ def render(diagnosis: Findings) -> str:
     return render_page(
         Path(__file__).with_name("template.html.j2"),
         d=diagnosis,
-        badge=WRONG if diagnosis.verdict == "parameters" and diagnosis.wrong_parameters else BADGES[diagnosis.verdict],
+        badge=WRONG
+        if diagnosis.verdict == "parameters" and diagnosis.wrong_parameters
+        else BADGES[diagnosis.verdict],
         headline=words.headline(diagnosis),
         paragraphs=[p.strip() for p in diagnosis.text.split("\n\n") if p.strip()],
         facts=_facts(diagnosis),
@@ -331,7 +376,7 @@ def render(diagnosis: Findings) -> str:
         wrong=_wrong(diagnosis),
         kept=[words.kept_sentence(u) for u in diagnosis.unexplained],
         ambiguity=[words.set_label(list(s)) for s in diagnosis.ambiguity],
-        asked=_asked(diagnosis),
+        tested=_tested(diagnosis),
         experiment=diagnosis.next_experiment.text,
         excitation=_excitation(diagnosis),
         bits=words.format_number(bits, 2) if words.is_number(bits) else "",

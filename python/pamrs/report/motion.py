@@ -27,10 +27,16 @@ __all__ = ["channels_png", "write_animation"]
 
 Array = NDArray[np.float64]
 
-#: Panels from top to bottom: (title, unit, factor from SI, channels); those of which nothing was simulated are left out.
+#: Panels from top to bottom: (title, unit, factor from SI, channels); those of which nothing was
+#: simulated are left out.
 _PANELS: Final = (
     ("valve command", "V", 1.0, ("valve_command",)),
-    ("pressure, gauge", "bar", 1e-5, ("supply_command", "supply_pressure", "line_pressure", "muscle_pressure")),
+    (
+        "pressure, gauge",
+        "bar",
+        1e-5,
+        ("supply_command", "supply_pressure", "line_pressure", "muscle_pressure"),
+    ),
     ("joint angle", "deg", 180.0 / math.pi, ("joint_angle",)),
     ("joint torque of the muscles", "N m", 1.0, ("joint_torque",)),
     ("length of the muscle", "mm", 1e3, ("length",)),
@@ -39,7 +45,12 @@ _PANELS: Final = (
 )
 #: A recorded channel that is drawn beside a simulated one of another name.
 _RECORDED_AS: Final = {"muscle_force": "force"}
-_NAMES: Final = {"supply_command": "set", "supply_pressure": "supply", "line_pressure": "line", "muscle_pressure": "muscle"}
+_NAMES: Final = {
+    "supply_command": "set",
+    "supply_pressure": "supply",
+    "line_pressure": "line",
+    "muscle_pressure": "muscle",
+}
 _FRAMES: Final = 150
 _SLOWEST: Final = 1e-3
 _FAINT: Final = "#9ca3af"
@@ -47,7 +58,9 @@ _FAINT: Final = "#9ca3af"
 _OWN: Final = (COLOURS["after"], "#0f766e", "#b45309", "#7c3aed", "#be123c", "#4d7c0f")
 
 
-def channels_png(result: Simulation, measured: Mapping[str, tuple[Array, Array]] | None = None) -> bytes:
+def channels_png(
+    result: Simulation, measured: Mapping[str, tuple[Array, Array]] | None = None
+) -> bytes:
     """Channels of a simulation over time, a PNG.
 
     Parameters
@@ -64,27 +77,55 @@ def channels_png(result: Simulation, measured: Mapping[str, tuple[Array, Array]]
     given = measured or {}
     there = [(title, unit, factor, _of(result, heads)) for title, unit, factor, heads in _PANELS]
     there = [panel for panel in there if panel[3]]
-    moving = [panel for panel in there if any(_tells(result, name) or _recorded(name, given) for name in panel[3])] or there
+    moving = [
+        panel
+        for panel in there
+        if any(_tells(result, name) or _recorded(name, given) for name in panel[3])
+    ] or there
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(10.0, 1.0 + 1.75 * len(moving)), dpi=110, layout="constrained")
         rows = figure.subplots(len(moving), 1, sharex=True, squeeze=False)[:, 0]
         for axes, (title, unit, factor, names) in zip(rows, moving, strict=True):
             heads = [channel_of(name) for name in names]
             for name, head in zip(names, heads, strict=True):
-                label, nth = _label(name, len(set(heads)) > 1), [n for n in names if channel_of(n) == head].index(name)
+                label, nth = (
+                    _label(name, len(set(heads)) > 1),
+                    [n for n in names if channel_of(n) == head].index(name),
+                )
                 other = _recorded(name, given)
                 if other:
                     time, value = given[other]
-                    axes.plot(time, factor * value, color=COLOURS["measured"], lw=0.9, label=f"{label} recorded".strip())
+                    axes.plot(
+                        time,
+                        factor * value,
+                        color=COLOURS["measured"],
+                        lw=0.9,
+                        label=f"{label} recorded".strip(),
+                    )
                 time, value = decimate(result.time, factor * result[name])
-                faint = head in ("supply_pressure", "supply_command", "line_pressure") and len(set(heads)) > 1
+                faint = (
+                    head in ("supply_pressure", "supply_command", "line_pressure")
+                    and len(set(heads)) > 1
+                )
                 style = {"supply_command": "--", "line_pressure": ":"}.get(head, "-")
-                colour = _FAINT if faint and nth == 0 and head == "supply_pressure" else _OWN[nth % len(_OWN)]
-                axes.plot(time, value, style, color=colour, lw=1.3, label=f"{label} simulated".strip())
+                colour = (
+                    _FAINT
+                    if faint and nth == 0 and head == "supply_pressure"
+                    else _OWN[nth % len(_OWN)]
+                )
+                axes.plot(
+                    time, value, style, color=colour, lw=1.3, label=f"{label} simulated".strip()
+                )
             axes.set_title(title)
             axes.set_ylabel(unit)
             if len(axes.lines) > 1:
-                axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=4, fontsize="small", borderaxespad=0.1)
+                axes.legend(
+                    loc="lower right",
+                    bbox_to_anchor=(1.0, 1.0),
+                    ncols=4,
+                    fontsize="small",
+                    borderaxespad=0.1,
+                )
         rows[-1].set_xlabel("time [s]")
         stream = io.BytesIO()
         figure.savefig(stream, format="png")
@@ -97,7 +138,9 @@ def _of(result: Simulation, heads: tuple[str, ...]) -> list[str]:
 
 
 def _recorded(name: str, given: Mapping[str, Any]) -> str:
-    """Name of the recorded channel that belongs beside a simulated one, empty where there is none."""
+    """Name of the recorded channel that belongs beside a simulated one, empty where there is
+    none.
+    """
     head, dot, block = name.partition(".")
     other = _RECORDED_AS.get(head, head) + dot + block
     return other if other in given else ""
@@ -133,7 +176,8 @@ def write_animation(result: Simulation, path: Path, *, speed: float = 1.0) -> Pa
     Raises
     ------
     ParameterError
-        If the rig has nothing that moves, there are fewer than two samples, or the speed is not a finite number above zero.
+        If the rig has nothing that moves, there are fewer than two samples, or the speed is not a
+        finite number above zero.
     """
     import tempfile
     from pathlib import Path as File
@@ -143,13 +187,19 @@ def write_animation(result: Simulation, path: Path, *, speed: float = 1.0) -> Pa
     if not result.under("joint_angle") and "length" not in result:
         raise ParameterError(f"the rig {result.rig.name!r} has no arm and no load to draw")
     if result.time.size < 2:
-        raise ParameterError(f"{result.time.size} sample is not enough to draw a motion: two at least")
+        raise ParameterError(
+            f"{result.time.size} sample is not enough to draw a motion: two at least"
+        )
     if not (math.isfinite(speed) and speed > 0.0):
         raise ParameterError(f"speed = {speed} is not allowed: a finite number above zero")
     if not _SLOWEST <= speed <= 1.0 / _SLOWEST:
-        raise ParameterError(f"speed = {speed:g} is not allowed: from {_SLOWEST:g} to {1.0 / _SLOWEST:g}")
+        raise ParameterError(
+            f"speed = {speed:g} is not allowed: from {_SLOWEST:g} to {1.0 / _SLOWEST:g}"
+        )
     duration = float(result.time[-1] - result.time[0]) / speed
-    delay = max(2, math.ceil(100.0 * duration / _FRAMES))  # hundredths of a second: what a GIF knows, and players keep
+    delay = max(
+        2, math.ceil(100.0 * duration / _FRAMES)
+    )  # hundredths of a second: what a GIF knows, and players keep
     shown = np.arange(0.0, 100.0 * duration + 1e-9, delay) * 0.01 * speed + result.time[0]
     frames = np.clip(np.searchsorted(result.time, shown - 1e-9), 0, result.time.size - 1)
     with mpl.rc_context(STYLE), tempfile.TemporaryDirectory() as folder:
@@ -158,7 +208,9 @@ def write_animation(result: Simulation, path: Path, *, speed: float = 1.0) -> Pa
         scene = _Scene(axes, result, float(figure.get_size_inches()[0]))
         motion = FuncAnimation(figure, scene.draw, frames=frames.tolist(), blit=False)
         picture = File(folder) / "motion.gif"
-        rate: Any = 100.0 / delay * (1.0 - 1e-9)  # a hair slow: the writer cuts the delay to whole milliseconds
+        rate: Any = (
+            100.0 / delay * (1.0 - 1e-9)
+        )  # a hair slow: the writer cuts the delay to whole milliseconds
         motion.save(picture, writer=PillowWriter(fps=rate))
         return write_atomically(path, picture.read_bytes())
 
@@ -166,7 +218,9 @@ def write_animation(result: Simulation, path: Path, *, speed: float = 1.0) -> Pa
 class _Muscles:
     """The muscles of one group: a line as wide as they are, coloured by pressure."""
 
-    def __init__(self, axes: Axes, result: Simulation, name: str, scale: float, span: tuple[float, float]) -> None:
+    def __init__(
+        self, axes: Axes, result: Simulation, name: str, scale: float, span: tuple[float, float]
+    ) -> None:
         muscle = result.rig.muscle_of(name)
         self.result, self.name, self.scale, self.span = result, name, scale, span
         self.rest = float(muscle.parameters["rest_length"])
@@ -177,20 +231,24 @@ class _Muscles:
         self.line: Any = axes.plot([], [], solid_capstyle="round", alpha=0.85)[0]
 
     def draw(self, row: int, base: Array, along: Array, side: float) -> Array:
-        """From a distance beyond a joint towards it, on one side of the link that carries them; the end that moves."""
+        """From a distance beyond a joint towards it, on one side of the link that carries them; the
+        end that moves.
+        """
         beside = side * 1.2 * float(self.widths.max()) * np.array([along[1], -along[0]])
         far = base + 1.1 * self.rest * along + beside
         near = far - self.rest * (1.0 - float(self.contraction[row])) * along
         self.line.set_data([far[0], near[0]], [far[1], near[1]])
         self.line.set_linewidth(self.scale * float(self.widths[row]))
         low, high = self.span
-        self.line.set_color(mpl.colormaps["viridis"](0.15 + 0.75 * (float(self.pressure[row]) - low) / (high - low)))
+        self.line.set_color(
+            mpl.colormaps["viridis"](0.15 + 0.75 * (float(self.pressure[row]) - low) / (high - low))
+        )
         return near
 
 
 class _Scene:
-    """The fixed link, the links that hang from it (angles from straight down, then from link to link) and the muscles along the link
-    before each joint; or the mass that hangs from a muscle.
+    """The fixed link, the links that hang from it (angles from straight down, then from link to
+    link) and the muscles along the link before each joint; or the mass that hangs from a muscle.
     """
 
     def __init__(self, axes: Axes, result: Simulation, width: float) -> None:
@@ -219,12 +277,20 @@ class _Scene:
         joints = list(result.under("joint_angle"))
         self.groups = [_Muscles(axes, result, name, scale, span) for name in groups]
         self.at = [self._joint_of(name, joints) for name in groups]
-        fixed = ([0.0, 0.0], [0.0, top]) if self.angles else ([-0.4 * reach, 0.4 * reach], [1.1 * max(rests)] * 2)
+        fixed = (
+            ([0.0, 0.0], [0.0, top])
+            if self.angles
+            else ([-0.4 * reach, 0.4 * reach], [1.1 * max(rests)] * 2)
+        )
         axes.plot(*fixed, color=COLOURS["measured"], lw=5.0, solid_capstyle="round")
-        self.arm: Any = axes.plot([], [], "-o", color=COLOURS["after"], lw=4.0, ms=4.0, solid_capstyle="round")[0]
+        self.arm: Any = axes.plot(
+            [], [], "-o", color=COLOURS["after"], lw=4.0, ms=4.0, solid_capstyle="round"
+        )[0]
         payload = sum(float(table.get("payload", 0.0)) for table in links.values())
         payload += sum(float(load.get("mass", 0.0)) for load in rig.tables("load").values())
-        self.payload: Any = axes.plot([], [], "o", color=COLOURS["before"], ms=7.0 + min(payload, 60.0) / 6.0)[0]
+        self.payload: Any = axes.plot(
+            [], [], "o", color=COLOURS["before"], ms=7.0 + min(payload, 60.0) / 6.0
+        )[0]
         self.text: Any = axes.set_title("")
         self.base = np.array([0.0, 0.0])
         self.top = top
@@ -252,11 +318,16 @@ class _Scene:
         if self.angles:
             self.arm.set_data([p[0] for p in points], [p[1] for p in points])
             tip = points[-1]
-            said = " / ".join(f"{math.degrees(float(angle[row])):.0f}" for angle in self.angles) + " deg"
+            said = (
+                " / ".join(f"{math.degrees(float(angle[row])):.0f}" for angle in self.angles)
+                + " deg"
+            )
         else:
             tip = near - np.array([0.0, 0.05 * self.top])
             said = f"{1e3 * float(self.result['length'][row]):.0f} mm"
         self.payload.set_data([tip[0]], [tip[1]])
-        bars = " / ".join(f"{float(p[row]) / 1e5:.1f}" for p in self.result.under("muscle_pressure").values())
+        bars = " / ".join(
+            f"{float(p[row]) / 1e5:.1f}" for p in self.result.under("muscle_pressure").values()
+        )
         self.text.set_text(f"{self.result.time[row]:.2f} s    {said}    {bars} bar")
         return self.arm, self.payload, self.text, *(group.line for group in self.groups)

@@ -34,7 +34,9 @@ def render_page(template: Path, **content: Any) -> str:
     str
         HTML text.
     """
-    environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment = jinja2.Environment(
+        autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
     style = Path(__file__).with_name("style.css").read_text(encoding="utf-8")
     page = environment.from_string(template.read_text(encoding="utf-8"))
     return page.render(style=Markup(style), version=_version(), **content)  # noqa: S704

@@ -54,7 +54,9 @@ def set_label(identifiers: list[str]) -> str:
     """Readable name of a hypothesis: effects that act together, parameters that are wrong."""
     if not identifiers:
         return label("none")
-    return " + ".join(f"wrong {label(i.replace('.', ' '))}" if "." in i else label(i) for i in identifiers)
+    return " + ".join(
+        f"wrong {label(i.replace('.', ' '))}" if "." in i else label(i) for i in identifiers
+    )
 
 
 def hypothesis_label(key: str) -> str:
@@ -166,7 +168,9 @@ def is_named(diagnosis: Findings, hypothesis: str) -> bool:
 
 
 def moved_parameters(diagnosis: Findings, least: float = 1.0) -> list[str]:
-    """Names of identifiable parameters that moved by at least `least` tolerances, farthest first."""
+    """Names of identifiable parameters that moved by at least `least` tolerances, farthest
+    first.
+    """
     moved = [
         (abs(p.moved_sigmas), name)
         for name, p in diagnosis.parameters.items()
@@ -176,7 +180,9 @@ def moved_parameters(diagnosis: Findings, least: float = 1.0) -> list[str]:
 
 
 def sentence_of(wrong: WrongParameter) -> str:
-    """What the rig file says of a parameter and what the recordings say: ``chamber dead volume is 360 +- 5 cm3, not 150 +- 23``."""
+    """What the rig file says of a parameter and what the recordings say:
+    ``chamber dead volume is 360 +- 5 cm3, not 150 +- 23``.
+    """
     unit, factor = display_unit(wrong.unit, abs(wrong.nominal))
     keys = ("value", "std", "nominal", "tolerance")
     values = {key: float(v) * factor if is_number(v := wrong[key]) else math.nan for key in keys}
@@ -187,21 +193,34 @@ def sentence_of(wrong: WrongParameter) -> str:
 
 
 def kept_sentence(kept: Unexplained) -> str:
-    """What a block keeps: ``the arm keeps 15 times its noise (0.4 deg) that no listed effect explains``."""
+    """What is left in a block: ``the residual of the arm is 15 times the noise level (0.4 deg), and
+    no listed effect explains it``.
+    """
     unit, factor = display_unit(kept.unit, abs(kept.size))
     size = format_number(kept.size * factor, 2, unicode=False)
-    why = "no listed effect explains" if kept.verdict == "unlisted" else "what is named does not explain"
+    why = (
+        "no listed effect explains it"
+        if kept.verdict == "unlisted"
+        else "what is named does not explain it"
+    )
     times = format_number(kept.noises, 2, unicode=False)
-    return f"the {_spoken(kept.block)} keeps {times} times its noise ({size} {unit}) that {why}".replace("°", "deg")
+    return (
+        f"the residual of the {_spoken(kept.block)} is {times} times the noise level ({size} "
+        f"{unit}), and {why}"
+    ).replace("°", "deg")
 
 
 def _spoken(name: str) -> str:
-    """A block or a parameter of the rig file by its dotted name, in words: ``chamber flexor``, ``chamber dead volume``."""
+    """A block or a parameter of the rig file by its dotted name, in words: ``chamber flexor``,
+    ``chamber dead volume``.
+    """
     return label(name.replace(".", " "))
 
 
 def headline(diagnosis: Findings) -> str:
-    """One sentence that states the verdict: what was found in each block, then what stays open."""
+    """One sentence that states the verdict: what was found in each block, then what stays
+    unexplained.
+    """
     blocks = _blocks(diagnosis)
     named = [b for b in blocks if b.effects or b.wrong_parameters]
     doubtful = [b for b in blocks if b.verdict == "unlisted" and len(b.ambiguity) > 1]
@@ -210,12 +229,18 @@ def headline(diagnosis: Findings) -> str:
     found = [_found(diagnosis, block) for block in sorted(named, key=lambda b: not b.effects)]
     text = "; ".join(dict.fromkeys([*found, *(_found(diagnosis, block) for block in doubtful)]))
     open_ = {name for b in doubtful for name in b.blocks}
-    kept = [kept_sentence(u) for u in diagnosis.unexplained if u.verdict == "unlisted" and u.block not in open_]
+    kept = [
+        kept_sentence(u)
+        for u in diagnosis.unexplained
+        if u.verdict == "unlisted" and u.block not in open_
+    ]
     return "; ".join([text[:1].upper() + text[1:], *kept[:2]])
 
 
 def _blocks(diagnosis: Findings) -> list[BlockVerdict]:
-    """The groups of blocks with their names; one of the whole case where a result does not tell them apart."""
+    """The groups of blocks with their names; one of the whole case where a result does not tell
+    them apart.
+    """
     if diagnosis.blocks:
         return diagnosis.blocks
     block = diagnosis.where.block
@@ -247,7 +272,9 @@ def _found(diagnosis: Findings, block: BlockVerdict) -> str:
     if len(block.ambiguity) > 1:
         rivals = f"these recordings cannot tell {_from_each_other(block.ambiguity)}"
         healthy = any(s in (["none"], ["parameters"]) for s in block.ambiguity)
-        if all("." in name or name in ("none", "parameters") for s in block.ambiguity for name in s):
+        if all(
+            "." in name or name in ("none", "parameters") for s in block.ambiguity for name in s
+        ):
             return f"the rig file {'may be' if healthy else 'is'} wrong: {rivals}"
         if healthy:
             return f"physics may be missing{place}: {rivals}"
@@ -270,7 +297,11 @@ def _found(diagnosis: Findings, block: BlockVerdict) -> str:
 def _from_each_other(sets: list[list[str]]) -> str:
     """Hypotheses that are left: ``a from b``, ``a, b and c apart``."""
     told = [_answer(s) for s in sets]
-    return f"{told[0]} from {told[1]}" if len(told) == 2 else f"{', '.join(told[:-1])} and {told[-1]} apart"
+    return (
+        f"{told[0]} from {told[1]}"
+        if len(told) == 2
+        else f"{', '.join(told[:-1])} and {told[-1]} apart"
+    )
 
 
 def _answer(names: list[str]) -> str:
@@ -291,16 +322,24 @@ def _unnamed(diagnosis: Findings) -> str:
     doubtful = [s for s in diagnosis.ambiguity if s not in (["none"], ["parameters"])]
     rivals = " or ".join(_answer(s) for s in doubtful)
     if diagnosis.verdict == "none" and doubtful:
-        return f"The model explains these recordings down to their noise, but they cannot rule out {rivals}{place}"
+        return (
+            "The model explains these recordings down to the noise level, but they cannot rule out "
+            f"{rivals}{place}"
+        )
     if diagnosis.verdict == "none":
-        return "Nothing is missing: the model explains these recordings down to their noise"
+        return "Nothing is missing: the model explains these recordings down to the noise level"
     if diagnosis.verdict == "parameters" and doubtful:
-        return f"Parameter values may explain the difference; these recordings cannot rule out {rivals}{place}"
+        return (
+            "Parameter values may explain the difference; these recordings cannot rule out "
+            f"{rivals}{place}"
+        )
     if diagnosis.verdict == "parameters":
         moved = [label(n.replace(".", " ")) for n in moved_parameters(diagnosis)[:3]]
         which = f": {', '.join(moved)}" if moved else ""
         return f"No physics is missing; parameter values explain the difference{which}"
     if len(doubtful) > 1:
-        return f"Physics is missing{place}: these recordings cannot tell {_from_each_other(doubtful)}"
+        return (
+            f"Physics is missing{place}: these recordings cannot tell {_from_each_other(doubtful)}"
+        )
     kept = [kept_sentence(u) for u in diagnosis.unexplained if u.verdict == "unlisted"]
     return "; ".join([f"Physics outside the catalogue acts{place or ' on this rig'}", *kept[:2]])

@@ -1,7 +1,7 @@
 """The 2014 dissertation chapter by chapter: what it states beside what this package gives.
 
-``pamrs.reproduce.section("ch3")`` runs the experiments of a chapter and has its statements, each with a verdict, and its pictures;
-``pamrs reproduce ch3 --output DIR`` writes them.
+``pamrs.reproduce.section("ch3")`` runs the experiments of a chapter and has its statements, each
+with a verdict, and its pictures; ``pamrs reproduce ch3 --output DIR`` writes them.
 """
 
 from __future__ import annotations
@@ -43,10 +43,18 @@ def check(name: str) -> None:
     if name not in _CHAPTERS:
         near = difflib.get_close_matches(str(name), _CHAPTERS, n=1)
         hint = f" Did you mean {near[0]!r}?" if near else ""
-        raise ParameterError(f"chapter = {name!r} is not reproduced.{hint} There are: {', '.join(_CHAPTERS)}")
+        raise ParameterError(
+            f"chapter = {name!r} is not reproduced.{hint} There are: {', '.join(_CHAPTERS)}"
+        )
 
 
-def section(name: str, *, search: bool = True, pictures: bool = True, progress: Callable[[str], None] | None = None) -> Section:
+def section(
+    name: str,
+    *,
+    search: bool = True,
+    pictures: bool = True,
+    progress: Callable[[str], None] | None = None,
+) -> Section:
     """Run the experiments of a chapter.
 
     Parameters
@@ -54,8 +62,8 @@ def section(name: str, *, search: bool = True, pictures: bool = True, progress: 
     name : str
         One of :func:`names`.
     search : bool
-        Whether searches that take minutes run too: in chapter 3 those of joints (extra ``search``), in chapter 4 finer maps of gains
-        and the diagnoses.
+        Whether searches that take minutes run too: in chapter 3 those of joints (extra ``search``),
+        in chapter 4 finer maps of gains and the diagnoses.
     pictures : bool
         Whether its pictures are drawn (extra ``plot``).
     progress : callable, optional

@@ -1,8 +1,10 @@
-"""Chapter 3 of the 2014 dissertation, structural design of manipulators: its statements beside what this package gives.
+"""Chapter 3 of the 2014 dissertation, structural design of manipulators: its statements beside what
+this package gives.
 
-Nothing here is tuned to agree. Two things in the chapter can be read in two ways, and both readings stand in the table: its
-angles (here rotations from the rest angle, where its equations begin; "from the vertical" is the other) and its joint torque
-(power-conserving, or by (3.6)-(3.8) as printed). What it does not give is the elbow rig's: :data:`CHOSEN` says from where.
+Nothing here is tuned to agree. Two things in the chapter can be read in two ways, and both readings
+stand in the table: its angles (here rotations from the rest angle, where its equations begin; "from
+the vertical" is the other) and its joint torque (power-conserving, or by (3.6)-(3.8) as printed).
+What it does not give is the elbow rig's: :data:`CHOSEN` says from where.
 """
 
 from __future__ import annotations
@@ -14,6 +16,7 @@ from functools import cache, partial
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pamrs.comparison import Comparison, Told, judge
 from pamrs.design import lift
@@ -23,10 +26,23 @@ from pamrs.rig import Joint, Muscle
 from pamrs.simulation import Simulation
 from pamrs.units import parse_unit, to_si
 
-__all__ = ["CHOSEN", "GROUPS", "SHARE", "TITLE", "chosen", "facts", "headings", "in_short", "step_by_area"]
+__all__ = [
+    "CHOSEN",
+    "GROUPS",
+    "SHARE",
+    "TITLE",
+    "chosen",
+    "facts",
+    "headings",
+    "in_short",
+    "step_by_area",
+]
+
+Array = NDArray[np.float64]
 
 TITLE: Final = "Chapter 3: structural design of manipulators"
-#: Largest relative deviation that counts as agreement: the chapter claims errors "on the order of a few percent" (3.6).
+#: Largest relative deviation that counts as agreement: the chapter claims errors "on the order of a
+#: few percent" (3.6).
 SHARE: Final = 0.05
 #: The experiments by the name under which figures find their group.
 GROUPS: Final = {
@@ -36,23 +52,52 @@ GROUPS: Final = {
     "ramp": "ramp of 4 s and hold of 6 s with 100 lb (3.4, Fig. 3.16)",
     "construction": "requirements, construction and tests (3.2 to 3.6)",
 }
-#: Numbers of the elbow rig that the dissertation does not give: the unit in which they are shown, and why they are what they are.
+#: Numbers of the elbow rig that the dissertation does not give: the unit in which they are shown,
+#: and why they are what they are.
 CHOSEN: Final[dict[str, tuple[str, str]]] = {
-    "valve.discharge_area_max": ("mm2", "the shoulder's valve; the make is published (Festo, 4.2.1), the size is not"),
+    "valve.discharge_area_max": (
+        "mm2",
+        "the shoulder's valve; the make is published (Festo, 4.2.1), the size is not",
+    ),
     "chamber.dead_volume": ("l", "the shoulder's: six muscles on one manifold and one hose"),
-    "supply.volume": ("m3", "so large that a stroke changes its pressure by less than 0.1 %: its pressure was set (4.2.1)"),
-    "muscle.wall_thickness": ("in", "1/16 in, the next stock size of latex tube; no wall is published"),
-    "arm.inertia": ("kg m2", "7 kg (4.1) spread over the links' 33 in, of which forearm and hand are 20 in: 4.24 kg, m l^2/3"),
-    "arm.first_moment": ("kg m", "the same, m l/2; with all 7 kg in forearm and hand 1.78 kg m, 3 % more torque with 100 lb"),
+    "supply.volume": (
+        "m3",
+        (
+            "so large that a stroke changes its pressure by less than 0.1 %: its pressure was set "
+            "(4.2.1)"
+        ),
+    ),
+    "muscle.wall_thickness": (
+        "in",
+        "1/16 in, the next stock size of latex tube; no wall is published",
+    ),
+    "arm.inertia": (
+        "kg m2",
+        (
+            "7 kg (4.1) spread over the links' 33 in, of which forearm and hand are 20 in: 4.24 "
+            "kg, m l^2/3"
+        ),
+    ),
+    "arm.first_moment": (
+        "kg m",
+        "the same, m l/2; with all 7 kg in forearm and hand 1.78 kg m, 3 % more torque with 100 lb",
+    ),
     "arm.viscous": ("N m s/rad", "the shoulder's, a tendon joint too"),
     "arm.coulomb": ("N m", "the shoulder's, a tendon joint too"),
     "joint.max_angle": (
         "deg",
-        "beyond the typical 100 deg of 4.2.1; of the chapter only the step with the rig's own valve swings into it",
+        (
+            "beyond the typical 100 deg of 4.2.1; of the chapter only the step with the rig's own "
+            "valve swings into it"
+        ),
     ),
 }
-#: Other choices of what is not published: friction none and twice, dead volume none and twice, all 7 kg in the forearm.
-_FRICTION: Final[tuple[dict[str, float], ...]] = ({"viscous": 0.0, "coulomb": 0.0}, {"viscous": 6.0, "coulomb": 3.0})
+#: Other choices of what is not published: friction none and twice, dead volume none and twice, all
+#: 7 kg in the forearm.
+_FRICTION: Final[tuple[dict[str, float], ...]] = (
+    {"viscous": 0.0, "coulomb": 0.0},
+    {"viscous": 6.0, "coulomb": 3.0},
+)
 _HEAVY: Final[dict[str, float]] = {"inertia": 0.602, "first_moment": 1.778}
 _DEAD: Final[tuple[dict[str, float], ...]] = ({"dead_volume": 1e-7}, {"dead_volume": 3e-4})
 
@@ -117,7 +162,8 @@ def chosen() -> list[tuple[str, str, str]]:
     """Name, value with its unit, and reason of each number of :data:`CHOSEN`."""
     rig = elbow.arm_rig()
     return [
-        (name, f"{rig.parameter(name).value / parse_unit(unit).scale:.4g} {unit}", reason) for name, (unit, reason) in CHOSEN.items()
+        (name, f"{rig.parameter(name).value / parse_unit(unit).scale:.4g} {unit}", reason)
+        for name, (unit, reason) in CHOSEN.items()
     ]
 
 
@@ -138,20 +184,26 @@ def in_short(rows: list[Comparison]) -> list[str]:
     printed = [ours(group, f"{fact}, {_PRINTED}", digits) for group, fact, digits in _LAWS_TOLD]
     conserving = [ours(group, fact, digits) for group, fact, digits in _LAWS_TOLD]
     return [
-        "With angles read as rotations from the rest angle and joint torque as printed in (3.6)-(3.8), 200 ft lbf last to "
-        f"{printed[0]} deg (published 78), the ramp has a largest torque of {printed[1]} ft lbf (190) at {printed[2]} deg (83), and "
-        f"the step sweeps {printed[3]} deg (90). With a torque that conserves power it is {conserving[0]} deg, {conserving[1]} ft lbf "
-        f"at {conserving[2]} deg, and {conserving[3]} deg. With angles read from the vertical the range fits with neither.",
-        f"The blocked force of 820 lbf is met neither by the default model ({ours('elbow_0625in', blocked)} lbf) nor by the chapter's "
-        f"own (3.19) ({ours('elbow_0625in', blocked + ', thin wall (3.19)')} lbf); no modulus changes it. A braid angle of "
-        f"{ours('elbow_0625in', 'braid angle for 820 lbf', 1)} deg instead of 72.5 would give it, and "
-        f"{ours('elbow_0625in', 'braid angle for 1.75 in, cylinder', 1)} deg the published largest diameter.",
+        "With angles read as rotations from the rest angle and joint torque as printed in "
+        f"(3.6)-(3.8), 200 ft lbf last to {printed[0]} deg (published 78), the ramp has a largest "
+        f"torque of {printed[1]} ft lbf (190) at {printed[2]} deg (83), and the step sweeps "
+        f"{printed[3]} deg (90). With a torque that conserves power it is {conserving[0]} deg, "
+        f"{conserving[1]} ft lbf at {conserving[2]} deg, and {conserving[3]} deg. With angles read "
+        "from the vertical the range fits with neither.",
+        "The blocked force of 820 lbf is met neither by the default model "
+        f"({ours('elbow_0625in', blocked)} lbf) nor by the chapter's own (3.19) "
+        f"({ours('elbow_0625in', blocked + ', thin wall (3.19)')} lbf); no modulus changes it. A "
+        f"braid angle of {ours('elbow_0625in', 'braid angle for 820 lbf', 1)} deg instead of 72.5 "
+        f"would give it, and {ours('elbow_0625in', 'braid angle for 1.75 in, cylinder', 1)} deg "
+        "the published largest diameter.",
         "The 2-in muscle of Table 3.2 contradicts itself: 2 in and 78 deg mean "
         f"{ours('large_2in', 'blocked force at 90 psi')} lbf at 90 psi, not 4280.",
-        "The peak rate of the step is decided by a valve area that is not published, and with an area that gives it the mean rate is "
+        "The peak rate of the step is decided by a valve area that is not published, and with an "
+        "area that gives it the mean rate is "
         f"{ours('step', 'mean rate over 90 deg, the same valve')} deg/s, not 60.",
         f"Table 3.5's lengths need {ours('shoulder: 6 pam_a_1in at 190 psi', stroke, 1)} and "
-        f"{ours('elbow: 8 pam_b_075in at 150 psi', stroke, 1)} % of stroke where (3.26) allows 15 %.",
+        f"{ours('elbow: 8 pam_b_075in at 150 psi', stroke, 1)} % of stroke where (3.26) allows 15 "
+        "%.",
     ]
 
 
@@ -161,7 +213,9 @@ class _Group:
     def __init__(self, name: str) -> None:
         self.title, self.rows = GROUPS[name], list[Comparison]()
 
-    def say(self, fact: str, where: str, published: float, ours: float, unit: str = "", **more: Any) -> None:
+    def say(
+        self, fact: str, where: str, published: float, ours: float, unit: str = "", **more: Any
+    ) -> None:
         """Judge one statement, within :data:`SHARE` unless told."""
         more.setdefault("tolerance", SHARE * abs(published) if math.isfinite(published) else 0.0)
         self.rows.append(judge(self.title, fact, where, published, ours, unit, **more))
@@ -177,12 +231,20 @@ def _muscle() -> Muscle:
 
 
 def _muscles() -> list[Comparison]:
-    """What the library knows of the chapter's two muscles, and six of the one against two of the other."""
+    """What the library knows of the chapter's two muscles, and six of the one against two of the
+    other.
+    """
     from pamrs.design.elbow_muscles import compare_design
     from pamrs.library.published import compare
 
-    rows = [row for name in ("elbow_0625in", "large_2in", "large_2in_effective") for row in compare(name)]
-    return [row for row in rows if re.search(r"\b3\.2|Table 3", row.where)] + compare_design("large_2in_effective")
+    rows = [
+        row
+        for name in ("elbow_0625in", "large_2in", "large_2in_effective")
+        for row in compare(name)
+    ]
+    return [row for row in rows if re.search(r"\b3\.2|Table 3", row.where)] + compare_design(
+        "large_2in_effective"
+    )
 
 
 # ------------------------------------------------------------------ 3.2.4, Figure 3.7
@@ -195,18 +257,39 @@ def _chapter_torque(rotation: Any, share: float) -> Any:
 
 def _torque() -> list[Comparison]:
     """Torque at 150 psi over the rotation."""
-    group, rest, end = _Group("torque"), elbow.rest_angle(), math.radians(_RANGE)
-    ranges = {law: np.degrees(elbow.torque_range(partial(elbow.elbow_torque, law=law), _LEAST)) for law in elbow.LAWS}
-    own = {share: np.degrees(elbow.torque_range(partial(_chapter_torque, share=share), _LEAST)) for share in (0.0, 0.5, 1.0)}
-    at_end = {law: float(elbow.elbow_torque(end, law=law)) / FOOT_POUND for law in elbow.LAWS}
+    group = _Group("torque")
+    _torque_at_rest(group)
+    _range_of_torque(group, *_ranges())
+    _torque_overall(group)
+    return group.rows
+
+
+def _ranges() -> tuple[dict[str, Array], dict[float, Array]]:
+    """Rotations with 200 ft lbf [deg], shape (2,).
+
+    By torque law, and with the muscle of (3.21) by its share of C01.
+    """
+    laws = {
+        law: np.degrees(elbow.torque_range(partial(elbow.elbow_torque, law=law), _LEAST))
+        for law in elbow.LAWS
+    }
+    own = {
+        share: np.degrees(elbow.torque_range(partial(_chapter_torque, share=share), _LEAST))
+        for share in (0.0, 0.5, 1.0)
+    }
+    return laws, own
+
+
+def _torque_at_rest(group: _Group) -> None:
+    """Where the range begins: the rest angle, and the torque there."""
+    rest = elbow.rest_angle()
     at_rest = float(elbow.elbow_torque(0.0)) / FOOT_POUND
     blocked = float(_muscle().force(150.0 * PSI, 0.0)) / to_si(1.0, "lbf", "force")
-    steep = np.degrees(elbow.torque_range(partial(elbow.elbow_torque, law="printed", muscle=elbow.steeper_braid()), _LEAST))
-    low, high = (float(elbow.elbow_torque(end, law="printed", psi=psi)) for psi in (50.0, 150.0))
-    upright = float(elbow.elbow_torque(end - rest, law="printed")) / FOOT_POUND
-    rotation = np.linspace(0.0, 100.0, 401)
-    torque = elbow.elbow_torque(np.radians(rotation)) / FOOT_POUND
-    figure = "3.2.4, Fig. 3.7"
+    steep = np.degrees(
+        elbow.torque_range(
+            partial(elbow.elbow_torque, law="printed", muscle=elbow.steeper_braid()), _LEAST
+        )
+    )
     group.say(
         "rest angle of the lower link from the vertical",
         "3.3.1 against l0, r0, lT of 3.2.4",
@@ -223,9 +306,23 @@ def _torque() -> list[Comparison]:
         at_rest,
         "ft lbf",
         relation="above",
-        note=f"our blocked force is {blocked:.0f} lbf, with the published 820 lbf it would be {at_rest * 820.0 / blocked:.0f}; a braid "
-        f"of 73.5 deg has that force (and 200 ft lbf from {steep[0]:.1f} to {steep[1]:.1f} deg, torque as printed)",
+        note=(
+            f"our blocked force is {blocked:.0f} lbf, with the published 820 lbf it would be "
+            f"{at_rest * 820.0 / blocked:.0f}; a braid of 73.5 deg has that force (and 200 ft lbf "
+            f"from {steep[0]:.1f} to {steep[1]:.1f} deg, torque as printed)"
+        ),
     )
+
+
+def _range_of_torque(group: _Group, ranges: dict[str, Array], own: dict[float, Array]) -> None:
+    """Rotations between which there are 200 ft lbf: as we have the torque, as printed, and read
+    otherwise.
+    """
+    rest, end = elbow.rest_angle(), math.radians(_RANGE)
+    at_end = {law: float(elbow.elbow_torque(end, law=law)) / FOOT_POUND for law in elbow.LAWS}
+    low, high = (float(elbow.elbow_torque(end, law="printed", psi=psi)) for psi in (50.0, 150.0))
+    upright = float(elbow.elbow_torque(end - rest, law="printed")) / FOOT_POUND
+    figure = "3.2.4, Fig. 3.7"
     group.say(
         "first rotation with 200 ft lbf",
         figure,
@@ -233,7 +330,10 @@ def _torque() -> list[Comparison]:
         ranges["conserving"][0],
         "deg",
         tolerance=SHARE * _RANGE,
-        note=f"printed torque law: {ranges['printed'][0]:.1f} deg; with the muscle of (3.21) too: {own[0.5][0]:.1f} deg",
+        note=(
+            f"printed torque law: {ranges['printed'][0]:.1f} deg; with the muscle of (3.21) too: "
+            f"{own[0.5][0]:.1f} deg"
+        ),
     )
     group.say(
         _LAST,
@@ -241,8 +341,11 @@ def _torque() -> list[Comparison]:
         _RANGE,
         ranges["conserving"][1],
         "deg",
-        note=f"at {_RANGE:g} deg our torque is {at_end['conserving']:.0f} ft lbf; (3.6)-(3.8) as printed are smaller by the square "
-        f"of the cosine of the tendon's angle, there by {100.0 * (1.0 - at_end['printed'] / at_end['conserving']):.0f} %: next line",
+        note=(
+            f"at {_RANGE:g} deg our torque is {at_end['conserving']:.0f} ft lbf; (3.6)-(3.8) as "
+            "printed are smaller by the square of the cosine of the tendon's angle, there by "
+            f"{100.0 * (1.0 - at_end['printed'] / at_end['conserving']):.0f} %: next line"
+        ),
     )
     group.say(
         f"{_LAST}, {_PRINTED}",
@@ -250,7 +353,10 @@ def _torque() -> list[Comparison]:
         _RANGE,
         ranges["printed"][1],
         "deg",
-        note=f"{50.0 + 100.0 * (_LEAST - low) / (high - low):.0f} psi instead of 150 would give exactly {_RANGE:g} deg",
+        note=(
+            f"{50.0 + 100.0 * (_LEAST - low) / (high - low):.0f} psi instead of 150 would give "
+            f"exactly {_RANGE:g} deg"
+        ),
     )
     group.say(
         f"{_LAST}, as printed, with the muscle of (3.21)",
@@ -258,8 +364,10 @@ def _torque() -> list[Comparison]:
         _RANGE,
         own[0.5][1],
         "deg",
-        note="Gaylord less Mooney-Rivlin; constants (not printed) equal, from the free contraction to 63 %: "
-        f"{own[1.0][1]:.1f} deg with C01 alone, {own[0.0][1]:.1f} with C10 alone",
+        note=(
+            "Gaylord less Mooney-Rivlin; constants (not printed) equal, from the free contraction "
+            f"to 63 %: {own[1.0][1]:.1f} deg with C01 alone, {own[0.0][1]:.1f} with C10 alone"
+        ),
     )
     group.say(
         f"{_LAST}, printed torque, angle from the vertical",
@@ -267,8 +375,17 @@ def _torque() -> list[Comparison]:
         _RANGE,
         ranges["printed"][1] + math.degrees(rest),
         "deg",
-        note=f"read so, the torque at {_RANGE:g} deg would be {upright:.0f} ft lbf; rotation from the rest angle is what fits",
+        note=(
+            f"read so, the torque at {_RANGE:g} deg would be {upright:.0f} ft lbf; rotation from "
+            "the rest angle is what fits"
+        ),
     )
+
+
+def _torque_overall(group: _Group) -> None:
+    """The largest torque, and what a seventh muscle adds."""
+    rotation = np.linspace(0.0, 100.0, 401)
+    torque = elbow.elbow_torque(np.radians(rotation)) / FOOT_POUND
     group.say(
         "largest torque",
         "3.6: in excess of 200 ft-lb",
@@ -278,7 +395,10 @@ def _torque() -> list[Comparison]:
         relation="above",
         note=f"at {rotation[torque.argmax()]:.0f} deg of rotation",
     )
-    ends = {n: np.degrees(elbow.torque_range(partial(elbow.elbow_torque, count=n), _LEAST)) for n in (6, 7, 8, 10)}
+    ends = {
+        n: np.degrees(elbow.torque_range(partial(elbow.elbow_torque, count=n), _LEAST))
+        for n in (6, 7, 8, 10)
+    }
     group.say(
         "range gained with seven muscles over torque gained",
         "3.2.4: 'only modestly increased'",
@@ -288,7 +408,6 @@ def _torque() -> list[Comparison]:
         note="'modestly' read as less than half in proportion; 200 ft lbf with "
         + ", ".join(f"{n} muscles from {a:.1f} to {b:.1f} deg" for n, (a, b) in ends.items()),
     )
-    return group.rows
 
 
 # ------------------------------------------------------------------ 3.2.4, Figure 3.8
@@ -312,27 +431,56 @@ def step_by_area(law: str = "conserving") -> tuple[elbow.Step, ...]:
 
 def _step() -> list[Comparison]:
     """The step of Fig. 3.8."""
-    group, figure = _Group("step"), "3.2.4, Fig. 3.8"
-    ours, peak = elbow.step(), math.radians(200.0)
-    fitted = elbow.step(elbow.valve_for_peak(peak))
-    spread = [1e6 * elbow.valve_for_peak(peak, law="conserving", **change) for change in (*_FRICTION, *_DEAD, _HEAVY)]
-    slow = max((item for item in step_by_area() if item.mean < math.radians(57.3)), key=lambda item: item.area)
+    group, peak = _Group("step"), math.radians(200.0)
+    ours, fitted = elbow.step(), elbow.step(elbow.valve_for_peak(peak))
+    _rotation_of_step(group, ours, fitted)
+    _rates_of_step(group, ours, fitted, peak)
+    return group.rows
+
+
+def _rotation_of_step(group: _Group, ours: elbow.Step, fitted: elbow.Step) -> None:
+    """How far the arm turns."""
+    figure = "3.2.4, Fig. 3.8"
     group.say(
         "rotation swept",
         figure,
         90.0,
         math.degrees(ours.swept),
         "deg",
-        note=f"where the arm comes to rest; with the valve chosen below it swings to {math.degrees(fitted.first_turn):.0f} deg first",
+        note=(
+            "where the arm comes to rest; with the valve chosen below it swings to "
+            f"{math.degrees(fitted.first_turn):.0f} deg first"
+        ),
     )
-    group.say(f"rotation swept, {_PRINTED}", figure, 90.0, math.degrees(elbow.rotation_reached(100.0, 150.0, law="printed")), "deg")
+    group.say(
+        f"rotation swept, {_PRINTED}",
+        figure,
+        90.0,
+        math.degrees(elbow.rotation_reached(100.0, 150.0, law="printed")),
+        "deg",
+    )
+
+
+def _rates_of_step(group: _Group, ours: elbow.Step, fitted: elbow.Step, peak: float) -> None:
+    """How fast it turns, with the rig's valve and with one chosen for a peak rate [rad/s]."""
+    figure = "3.2.4, Fig. 3.8"
+    spread = [
+        1e6 * elbow.valve_for_peak(peak, law="conserving", **change)
+        for change in (*_FRICTION, *_DEAD, _HEAVY)
+    ]
+    slow = max(
+        (item for item in step_by_area() if item.mean < math.radians(57.3)),
+        key=lambda item: item.area,
+    )
     group.say(
         "peak rate with the rig's valve",
         figure,
         200.0,
         math.degrees(ours.peak),
         "deg/s",
-        cannot_tell=f"no valve area is published; the rig's, {1e6 * ours.area:.1f} mm2, is the shoulder's",
+        cannot_tell=(
+            f"no valve area is published; the rig's, {1e6 * ours.area:.1f} mm2, is the shoulder's"
+        ),
     )
     group.say(
         "peak rate, valve area chosen for it",
@@ -341,8 +489,10 @@ def _step() -> list[Comparison]:
         math.degrees(fitted.peak),
         "deg/s",
         used=True,
-        note=f"{1e6 * fitted.area:.2f} mm2 effective; {min(spread):.2f} to {max(spread):.2f} mm2 with no to twice the rig's friction "
-        "or dead volume, or all 7 kg in the forearm",
+        note=(
+            f"{1e6 * fitted.area:.2f} mm2 effective; {min(spread):.2f} to {max(spread):.2f} mm2 "
+            "with no to twice the rig's friction or dead volume, or all 7 kg in the forearm"
+        ),
     )
     group.say(
         "mean rate over 90 deg, the same valve",
@@ -350,9 +500,13 @@ def _step() -> list[Comparison]:
         60.0,
         math.degrees(fitted.mean),
         "deg/s",
-        note=f"ours passes 90 deg in its first swing, at {fitted.arrival:.2f} s; with {1e6 * slow.area:.2f} mm2 (peak "
-        f"{math.degrees(slow.peak):.0f} deg/s) that swing turns at {math.degrees(slow.first_turn):.0f} deg and 90 deg are reached at "
-        f"{slow.arrival:.2f} s, a mean of {math.degrees(slow.mean):.0f} deg/s: the mean hangs on whether the first swing gets there",
+        note=(
+            f"ours passes 90 deg in its first swing, at {fitted.arrival:.2f} s; with "
+            f"{1e6 * slow.area:.2f} mm2 (peak {math.degrees(slow.peak):.0f} deg/s) that swing "
+            f"turns at {math.degrees(slow.first_turn):.0f} deg and 90 deg are reached at "
+            f"{slow.arrival:.2f} s, a mean of {math.degrees(slow.mean):.0f} deg/s: the mean hangs "
+            "on whether the first swing gets there"
+        ),
     )
     group.say(
         "mean rate over 90 deg against the design goal",
@@ -362,40 +516,60 @@ def _step() -> list[Comparison]:
         "deg/s",
         relation="above",
     )
-    return group.rows
 
 
 # ------------------------------------------------------- 3.3.2, Figures 3.12 and 3.13
 
 
 def _sides(hysteresis: bool) -> tuple[float, float]:
-    """Rotation [deg] and torque (3.24) [ft lbf] on the falling side less those on the rising side, mean from 40 to 145 psi."""
+    """Rotation [deg] and torque (3.24) [ft lbf] on the falling side less those on the rising side,
+    mean from 40 to 145 psi.
+    """
     result, psi = elbow.triangle(hysteresis=hysteresis), np.linspace(40.0, 145.0, 106)
     angle = np.degrees(elbow.at_same_pressure(result, result["joint_angle"], psi))
-    torque = np.array(elbow.at_same_pressure(result, elbow.payload_torque(135.0, result["joint_angle"]), psi)) / FOOT_POUND
+    torque = (
+        np.array(
+            elbow.at_same_pressure(result, elbow.payload_torque(135.0, result["joint_angle"]), psi)
+        )
+        / FOOT_POUND
+    )
     return float((angle[1] - angle[0]).mean()), float((torque[1] - torque[0]).mean())
 
 
 def _triangle() -> list[Comparison]:
     """The triangular pressure of Figs. 3.12 and 3.13."""
+    group = _Group("triangle")
+    static, printed = (elbow.static_curve(135.0, law=law) for law in elbow.LAWS)
+    _rates_of_triangle(group, static, printed)
+    _loops_of_triangle(group, static)
+    return group.rows
+
+
+def _rates_of_triangle(
+    group: _Group, static: elbow.StaticCurve, printed: elbow.StaticCurve
+) -> None:
+    """The rate where the arm sets off, at its largest, and at the top of the pressure."""
     from pamrs.library.evaluate import activation_pressure
 
-    group, speed = _Group("triangle"), 150.0 / 10.0  # psi/s
-    static, printed = (elbow.static_curve(135.0, law=law) for law in elbow.LAWS)
+    speed = 150.0 / 10.0  # psi/s
     rate = np.degrees(static.slope) * speed
     rubber = activation_pressure(_muscle()) / PSI
-    joint, rest = Joint.from_model(elbow.arm_rig().model["joint"]), float(_muscle().parameters["rest_length"])
+    joint, rest = (
+        Joint.from_model(elbow.arm_rig().model["joint"]),
+        float(_muscle().parameters["rest_length"]),
+    )
     contraction = float(joint.shortening(elbow.rest_angle() + static.rotation[-1])) / rest
-    (turned, loop), (turned_plain, loop_plain) = _sides(True), _sides(False)
-    lower, upper = elbow.payload_torque(135.0, elbow.rest_angle() + np.interp([75.0, 150.0], static.psi, static.rotation)) / FOOT_POUND
     group.say(
         "largest rate over the rate when the arm sets off",
         "3.3.2: 'increases significantly'",
         1.0,
         float(rate.max() / rate[0]),
         relation="above",
-        note=f"lifted slowly: {rate[0]:.1f} deg/s at {static.psi[0]:.0f} psi, {rate.max():.1f} at {static.psi[rate.argmax()]:.0f} psi; "
-        f"in ours the payload keeps the arm down to {static.psi[0]:.0f} psi, the rubber only to {rubber:.0f} psi (2.2.2: about 10)",
+        note=(
+            f"lifted slowly: {rate[0]:.1f} deg/s at {static.psi[0]:.0f} psi, {rate.max():.1f} at "
+            f"{static.psi[rate.argmax()]:.0f} psi; in ours the payload keeps the arm down to "
+            f"{static.psi[0]:.0f} psi, the rubber only to {rubber:.0f} psi (2.2.2: about 10)"
+        ),
     )
     group.say(
         "rate at the top of the pressure over the largest",
@@ -403,8 +577,25 @@ def _triangle() -> list[Comparison]:
         0.0,
         float(rate[-1] / rate.max()),
         tolerance=SHARE,
-        note=f"{rate[-1]:.1f} deg/s (printed torque law {math.degrees(printed.slope[-1]) * speed:.1f}): at 150 psi our muscles are "
-        f"shortened by {100.0 * contraction:.0f} %, where the payload holds them, not by their largest contraction of 37 %",
+        note=(
+            f"{rate[-1]:.1f} deg/s (printed torque law "
+            f"{math.degrees(printed.slope[-1]) * speed:.1f}): at 150 psi our muscles are shortened "
+            f"by {100.0 * contraction:.0f} %, where the payload holds them, not by their largest "
+            "contraction of 37 %"
+        ),
+    )
+
+
+def _loops_of_triangle(group: _Group, static: elbow.StaticCurve) -> None:
+    """Rotation and torque on the falling side beside the rising one, and the torque over the
+    pressure.
+    """
+    (turned, loop), (turned_plain, loop_plain) = _sides(True), _sides(False)
+    lower, upper = (
+        elbow.payload_torque(
+            135.0, elbow.rest_angle() + np.interp([75.0, 150.0], static.psi, static.rotation)
+        )
+        / FOOT_POUND
     )
     group.say(
         "rotation at the same pressure, falling less rising",
@@ -413,8 +604,10 @@ def _triangle() -> list[Comparison]:
         turned,
         "deg",
         relation="above",
-        note="mean from 40 to 145 psi with the hysteresis (2.36) of the 0.75-in muscle, c_F = 0.16 - 0.145 P[MPa]: none is published "
-        f"for this one; without it {turned_plain:.1f} deg",
+        note=(
+            "mean from 40 to 145 psi with the hysteresis (2.36) of the 0.75-in muscle, c_F = 0.16 "
+            f"- 0.145 P[MPa]: none is published for this one; without it {turned_plain:.1f} deg"
+        ),
     )
     group.say(
         "torque (3.24) at the same pressure, falling less rising",
@@ -433,7 +626,6 @@ def _triangle() -> list[Comparison]:
         relation="above",
         note=f"{lower:.0f} and {upper:.0f} ft lbf; 135 lb at 20 in are 225 at most",
     )
-    return group.rows
 
 
 # -------------------------------------------------------------------- 3.4, Figure 3.16
@@ -443,7 +635,11 @@ def _peak(result: Simulation) -> tuple[float, float, float]:
     """Largest torque [ft lbf] of a simulation, its rotation [deg] and time [s]."""
     row = int(np.argmax(result["joint_torque"]))
     rotation = float(result["joint_angle"][row]) - elbow.rest_angle()
-    return float(result["joint_torque"][row]) / FOOT_POUND, math.degrees(rotation), float(result.time[row])
+    return (
+        float(result["joint_torque"][row]) / FOOT_POUND,
+        math.degrees(rotation),
+        float(result.time[row]),
+    )
 
 
 def _ramp() -> list[Comparison]:
@@ -452,16 +648,30 @@ def _ramp() -> list[Comparison]:
     choices: tuple[Mapping[str, float], ...] = ({}, *_FRICTION, _HEAVY)
     for law, words in (("conserving", ""), ("printed", f", {_PRINTED}")):
         torque, rotation, time = _peak(elbow.ramp_and_hold(law=law))
-        others = [_peak(elbow.ramp_and_hold(law=law, hysteresis=h, **change)) for h in (False, True) for change in choices]
+        others = [
+            _peak(elbow.ramp_and_hold(law=law, hysteresis=h, **change))
+            for h in (False, True)
+            for change in choices
+        ]
         torques, angles, _ = zip(*others, strict=True)
         note = (
-            f"in a swing, at {time:.1f} s; {min(torques):.0f} to {max(torques):.0f} ft lbf at {min(angles):.0f} to {max(angles):.0f} "
-            "deg with no to twice the rig's friction, all 7 kg in the forearm, or hysteresis (2.36)"
+            f"in a swing, at {time:.1f} s; {min(torques):.0f} to {max(torques):.0f} ft lbf at "
+            f"{min(angles):.0f} to {max(angles):.0f} deg with no to twice the rig's friction, all "
+            "7 kg in the forearm, or hysteresis (2.36)"
         )
         group.say("largest torque" + words, figure, 190.0, torque, "ft lbf", note=note)
         at_rest = math.degrees(elbow.rotation_reached(100.0, 145.0, law=law))
-        group.say("rotation at the largest torque" + words, figure, 83.0, rotation, "deg", note=f"at rest {at_rest:.1f} deg")
-    static = float(elbow.payload_torque(100.0, elbow.rest_angle() + math.radians(83.0))) / FOOT_POUND
+        group.say(
+            "rotation at the largest torque" + words,
+            figure,
+            83.0,
+            rotation,
+            "deg",
+            note=f"at rest {at_rest:.1f} deg",
+        )
+    static = (
+        float(elbow.payload_torque(100.0, elbow.rest_angle() + math.radians(83.0))) / FOOT_POUND
+    )
     leaving = float(elbow.static_curve(100.0).psi[0])
     group.say(
         "torque of 100 lb at rest at 83 deg by (3.24)",
@@ -470,7 +680,10 @@ def _ramp() -> list[Comparison]:
         static,
         "ft lbf",
         cannot_tell="the text does not say whether 190 ft-lb is (3.24) or the model's",
-        note=f"100 lb at 20 in are never more than 166.7; {20.0 * 190.0 / static:.1f} in would be needed: a swing, or another lever",
+        note=(
+            f"100 lb at 20 in are never more than 166.7; {20.0 * 190.0 / static:.1f} in would be "
+            "needed: a swing, or another lever"
+        ),
     )
     group.say(
         "pressure reached",
@@ -478,7 +691,10 @@ def _ramp() -> list[Comparison]:
         145.0,
         145.0,
         "psi",
-        cannot_tell="a limit of the pressure regulator, which is no part of the rig; the pressure is prescribed",
+        cannot_tell=(
+            "a limit of the pressure regulator, which is no part of the rig; the pressure is "
+            "prescribed"
+        ),
     )
     group.say(
         "delay until the pressure rises, from 10 psi of deadband",
@@ -486,8 +702,14 @@ def _ramp() -> list[Comparison]:
         0.5,
         10.0 / (150.0 / 4.0),
         "s",
-        cannot_tell="the dissertation against itself: 10 psi are 0.27 s of this ramp, the delay is given as 0.5 to 1 s",
-        note=f"in ours the payload keeps the arm on its stop until {leaving:.0f} psi, {leaving / (150.0 / 4.0):.2f} s",
+        cannot_tell=(
+            "the dissertation against itself: 10 psi are 0.27 s of this ramp, the delay is given "
+            "as 0.5 to 1 s"
+        ),
+        note=(
+            f"in ours the payload keeps the arm on its stop until {leaving:.0f} psi, "
+            f"{leaving / (150.0 / 4.0):.2f} s"
+        ),
     )
     return group.rows
 
@@ -498,13 +720,23 @@ def _ramp() -> list[Comparison]:
 def _construction() -> list[Comparison]:
     """What is said of the arm as it was built."""
     group = _Group("construction")
-    limit = lift(elbow.arm_rig(), pressure=150.0 * PSI, to=elbow.rest_angle() + math.radians(90.0)).payload_limit or 0.0
+    _payloads(group)
+    _bending(group)
+    _not_modelled(group)
+    return group.rows
+
+
+def _payloads(group: _Group) -> None:
+    """What the arm lifts."""
+    limit = (
+        lift(
+            elbow.arm_rig(), pressure=150.0 * PSI, to=elbow.rest_angle() + math.radians(90.0)
+        ).payload_limit
+        or 0.0
+    )
     lever = 2.0 * _LEAST / (316.0 * POUND * 9.80665 * INCH)
     lifted = math.degrees(elbow.rotation_reached(380.0, 150.0))
     wrist = float(elbow.payload_torque(380.0, 0.5 * math.pi, 7.0 * INCH)) / FOOT_POUND
-    # a cantilever of steel, 200 GPa, under a force at its end
-    moment = to_si(500.0, "lbf", "force") * (33.0 * INCH) ** 3 / (3.0 * 200e9 * 0.5 * INCH)
-    bar = (64.0 * moment / math.pi) ** 0.25
     group.say(
         "payload of one arm of two that lift 316 lb",
         "3.2.1",
@@ -512,7 +744,10 @@ def _construction() -> list[Comparison]:
         limit / POUND,
         "lb",
         cannot_tell="where the weight lies on the arms is not said",
-        note=f"ours at the tip, over 90 deg at 150 psi; 200 ft-lb of each arm bear half of 316 lb at {lever:.1f} in, not at 20",
+        note=(
+            "ours at the tip, over 90 deg at 150 psi; 200 ft-lb of each arm bear half of 316 lb at "
+            f"{lever:.1f} in, not at 20"
+        ),
     )
     group.say(
         "largest payload tested",
@@ -521,8 +756,17 @@ def _construction() -> list[Comparison]:
         math.nan,
         "lb",
         cannot_tell="on which joint and how far is not said",
-        note=f"ours lifts 380 lb at the elbow by {lifted:.1f} deg at 150 psi; at the wrist, 7 in, it is {wrist:.0f} ft lbf at most",
+        note=(
+            f"ours lifts 380 lb at the elbow by {lifted:.1f} deg at 150 psi; at the wrist, 7 in, "
+            f"it is {wrist:.0f} ft lbf at most"
+        ),
     )
+
+
+def _bending(group: _Group) -> None:
+    """A cantilever of steel, 200 GPa, under a force at its end."""
+    moment = to_si(500.0, "lbf", "force") * (33.0 * INCH) ** 3 / (3.0 * 200e9 * 0.5 * INCH)
+    bar = (64.0 * moment / math.pi) ** 0.25
     group.say(
         "bending under 500 lb at the tip",
         "3.2.5: not more than 0.5 in",
@@ -531,17 +775,47 @@ def _construction() -> list[Comparison]:
         "in",
         relation="below",
         cannot_tell="links are rigid here, and no section is published",
-        note=f"a steel cantilever of 33 in needs {1e8 * moment:.0f} cm4 for it, as a round bar of {1e3 * bar:.0f} mm has",
+        note=(
+            f"a steel cantilever of 33 in needs {1e8 * moment:.0f} cm4 for it, as a round bar of "
+            f"{1e3 * bar:.0f} mm has"
+        ),
     )
+
+
+def _not_modelled(group: _Group) -> None:
+    """What no simulation of ours can tell."""
     for fact, where, value, unit, reason in (
-        ("safety factor of the joints at the largest torque", "3.2.5", 1.5, "", "stresses of the structure are not modelled"),
-        ("pressure without catastrophic failure", "3.2.2", 1000.0, "psi", "bursting is not modelled"),
+        (
+            "safety factor of the joints at the largest torque",
+            "3.2.5",
+            1.5,
+            "",
+            "stresses of the structure are not modelled",
+        ),
+        (
+            "pressure without catastrophic failure",
+            "3.2.2",
+            1000.0,
+            "psi",
+            "bursting is not modelled",
+        ),
         ("cycles to full contraction without change", "3.2.2", 3000.0, "", "wear is not modelled"),
-        ("static torque, model against measurement", "3.6, Fig. 3.15", math.nan, "", "measured torques are in the figure only"),
-        ("force, model against measurement", "3.4, Figs. 3.1, 3.3, 3.14", math.nan, "", "measured forces are in the figures only"),
+        (
+            "static torque, model against measurement",
+            "3.6, Fig. 3.15",
+            math.nan,
+            "",
+            "measured torques are in the figure only",
+        ),
+        (
+            "force, model against measurement",
+            "3.4, Figs. 3.1, 3.3, 3.14",
+            math.nan,
+            "",
+            "measured forces are in the figures only",
+        ),
     ):
         group.say(fact, where, value, math.nan, unit, relation="above", cannot_tell=reason)
-    return group.rows
 
 
 # ----------------------------------------------------------------------------------- 3.5

@@ -1,4 +1,6 @@
-"""The pictures of chapter 4: our curves beside its reference, and its optima as marks (its figures are not digitised)."""
+"""The pictures of chapter 4: our curves beside its reference, and its optima as marks (its figures
+are not digitised).
+"""
 
 from __future__ import annotations
 
@@ -26,17 +28,25 @@ _KEPT: Final = 64
 _PAYLOAD: Final = ("#56b4e9", "#0072b2", "#d55e00", "#1f1f1f")
 _NAMES: Final = ("11 kg", "23 kg", "34 kg", "45 kg")
 _REFERENCE: Final[dict[str, Any]] = {"color": "#9ca3af", "lw": 2.4, "zorder": 0}
-_SHORT: Final = {RIG: "the rig as it is", RESTORED: "damped, activation 50 kPa", DAMPED: "damped, 6000 N s/m"}
+_SHORT: Final = {
+    RIG: "the rig as it is",
+    RESTORED: "damped, activation 50 kPa",
+    DAMPED: "damped, 6000 N s/m",
+}
 
 
 def pictures() -> list[Picture]:
-    """Every picture of the chapter, in the order of its figures, from the experiments that were run last.
+    """Every picture of the chapter, in the order of its figures, from the experiments that were run
+    last.
 
     Returns
     -------
     list of Picture
     """
-    return [Picture(name, GROUPS[group], caption, drawing.png(draw, _KEPT)) for name, group, draw, caption in _pictures()]
+    return [
+        Picture(name, GROUPS[group], caption, drawing.png(draw, _KEPT))
+        for name, group, draw, caption in _pictures()
+    ]
 
 
 def _pictures() -> list[tuple[str, str, Callable[[], Figure], str]]:
@@ -47,9 +57,17 @@ def _pictures() -> list[tuple[str, str, Callable[[], Figure], str]]:
             "rig_model",
             "rig",
             partial(_lifts, RIG, model),
-            "Figs. 4.6 and 4.7 on the rig as it is: feedforward with fuzzy and with PID feedback, angle and pressure.",
+            (
+                "Figs. 4.6 and 4.7 on the rig as it is: feedforward with fuzzy and with PID "
+                "feedback, angle and pressure."
+            ),
         ),
-        ("rig_feedback", "rig", partial(_lifts, RIG, feedback), "Figs. 4.10 and 4.11 on the rig as it is: PID and fuzzy control."),
+        (
+            "rig_feedback",
+            "rig",
+            partial(_lifts, RIG, feedback),
+            "Figs. 4.10 and 4.11 on the rig as it is: PID and fuzzy control.",
+        ),
         (
             "restored_model",
             "restored",
@@ -66,13 +84,19 @@ def _pictures() -> list[tuple[str, str, Callable[[], Figure], str]]:
             "series",
             "restored",
             _series,
-            "Fig. 4.14: the series of kM with 23 kg, on the rig, with damping alone, and with muscles that wake at 50 kPa too.",
+            (
+                "Fig. 4.14: the series of kM with 23 kg, on the rig, with damping alone, and with "
+                "muscles that wake at 50 kPa too."
+            ),
         ),
         (
             "rig_maps",
             "rig maps",
             partial(_maps, RIG),
-            "Fig. 4.5 and its like for PID on the rig, 23 kg: metrics over their least; circle: optimum, cross: published.",
+            (
+                "Fig. 4.5 and its like for PID on the rig, 23 kg: metrics over their least; "
+                "circle: optimum, cross: published."
+            ),
         ),
         (
             "restored_maps",
@@ -80,8 +104,18 @@ def _pictures() -> list[tuple[str, str, Callable[[], Figure], str]]:
             partial(_maps, RESTORED),
             "The same with damped muscles that wake at 50 kPa.",
         ),
-        ("optima", "restored maps", _optima, "Fig. 4.9: gains of the smallest J by payload; grey: what the text prints."),
-        ("effects", "effects", _effects, "How many of the statements agree, one candidate at a time and some together."),
+        (
+            "optima",
+            "restored maps",
+            _optima,
+            "Fig. 4.9: gains of the smallest J by payload; grey: what the text prints.",
+        ),
+        (
+            "effects",
+            "effects",
+            _effects,
+            "How many of the statements agree, one candidate at a time and some together.",
+        ),
     ]
 
 
@@ -97,15 +131,30 @@ def _lifts(plant: str, controllers: tuple[str, str]) -> Figure:
         upper, lower = axes[0][column], axes[1][column]
         _reference(upper, runs[name])
         for k, colour in enumerate(_PAYLOAD):
-            upper.plot(runs[name].time, np.degrees(runs[name].angle[k]), color=colour, lw=1.0, label=_NAMES[k])
+            upper.plot(
+                runs[name].time,
+                np.degrees(runs[name].angle[k]),
+                color=colour,
+                lw=1.0,
+                label=_NAMES[k],
+            )
             lower.plot(runs[name].time, runs[name].pressure[k] / 1e3, color=colour, lw=1.0)
         gains = lift.GAINS[name]
         letters = ("kM", "kP", "kI") if len(gains) == 3 else ("kM", "g1", "g2", "h")
-        upper.set_title(f"{name}: " + ", ".join(f"{a} {b:g}" for a, b in zip(letters, gains, strict=True) if a != "kM" or b))
+        upper.set_title(
+            f"{name}: "
+            + ", ".join(f"{a} {b:g}" for a, b in zip(letters, gains, strict=True) if a != "kM" or b)
+        )
         lower.set_xlabel("time [s]")
     axes[0][0].set_ylabel("angle [deg]")
     axes[1][0].set_ylabel("pressure [kPa]")
-    figure.legend(*axes[0][1].get_legend_handles_labels(), loc="outside upper center", ncols=5, fontsize=7.5, frameon=False)
+    figure.legend(
+        *axes[0][1].get_legend_handles_labels(),
+        loc="outside upper center",
+        ncols=5,
+        fontsize=7.5,
+        frameon=False,
+    )
     axes[0][0].set_ylim(0.0, 135.0)
     return figure
 
@@ -118,7 +167,13 @@ def _series() -> Figure:
         _reference(cell, runs["series, kM 0"])
         for (km, name), colour in zip(SERIES.items(), _PAYLOAD, strict=True):
             rms = float(np.degrees(np.asarray(runs[name].metrics.rms)[1]))
-            cell.plot(runs[name].time, np.degrees(runs[name].angle[1]), color=colour, lw=1.0, label=f"kM {km:g}: {rms:.1f} deg RMS")
+            cell.plot(
+                runs[name].time,
+                np.degrees(runs[name].angle[1]),
+                color=colour,
+                lw=1.0,
+                label=f"kM {km:g}: {rms:.1f} deg RMS",
+            )
         cell.set_title(_SHORT[plant])
         cell.set_xlabel("time [s]")
         cell.set_ylim(0.0, 185.0)
@@ -143,7 +198,14 @@ def _maps(plant: str) -> Figure:
         )
         for cell, (name, values) in zip(axes[line], shown, strict=True):
             share = np.minimum(values[1] / np.nanmin(values[1]), 10.0)
-            field = cell.contourf(x, y, share.T, levels=np.geomspace(1.0, 10.0, 13), cmap="viridis_r", norm=LogNorm(1.0, 10.0))
+            field = cell.contourf(
+                x,
+                y,
+                share.T,
+                levels=np.geomspace(1.0, 10.0, 13),
+                cmap="viridis_r",
+                norm=LogNorm(1.0, 10.0),
+            )
             best = gains.best(values)[1]
             cell.plot(*best, "o", color="white", mec="#1f1f1f", ms=6, clip_on=False)
             cell.plot(*published, "x", color="#d55e00", ms=7, mew=2)
@@ -160,14 +222,37 @@ def _optima() -> Figure:
     """Gains of the smallest J over the payload, two plants, both units."""
     figure, axes = drawing.figure(1, 4, 2.8, squeeze=False)
     done, kilograms = latest(), (11, 23, 34)
-    printed = {"kP": ((11, 1.1), (23, 1.4)), "kI": ((11, 4.0), (23, 2.5)), "g1": ((23, 0.45),), "h": ((23, 0.65),)}
-    cells = zip(axes[0], (("pid", 0, "kP"), ("pid", 1, "kI"), ("fuzzy", 0, "g1"), ("fuzzy", 1, "h")), strict=True)
+    printed = {
+        "kP": ((11, 1.1), (23, 1.4)),
+        "kI": ((11, 4.0), (23, 2.5)),
+        "g1": ((23, 0.45),),
+        "h": ((23, 0.65),),
+    }
+    cells = zip(
+        axes[0],
+        (("pid", 0, "kP"), ("pid", 1, "kI"), ("fuzzy", 0, "g1"), ("fuzzy", 1, "h")),
+        strict=True,
+    )
     for cell, (kind, which, label) in cells:
         for plant, colour in ((RIG, COLOURS["before"]), (RESTORED, COLOURS["after"])):
             for unit, style in (("rad", "-o"), ("deg", ":s")):
                 best = done.maps[plant, kind].best(done.maps[plant, kind].j[unit])
-                cell.plot(kilograms, [pair[which] for pair in best], style, color=colour, ms=4, label=f"{_SHORT[plant]}, {unit}")
-        cell.plot(*zip(*printed[label], strict=True), "D", color="#9ca3af", ms=7, zorder=0, label="printed")
+                cell.plot(
+                    kilograms,
+                    [pair[which] for pair in best],
+                    style,
+                    color=colour,
+                    ms=4,
+                    label=f"{_SHORT[plant]}, {unit}",
+                )
+        cell.plot(
+            *zip(*printed[label], strict=True),
+            "D",
+            color="#9ca3af",
+            ms=7,
+            zorder=0,
+            label="printed",
+        )
         cell.set_title(label)
         cell.set_xlabel("payload [kg]")
         cell.set_ylim(bottom=0.0)
@@ -182,7 +267,10 @@ def _effects() -> Figure:
     names = list(counts)[::-1]
     figure, axes = drawing.figure(1, 1, 0.26 * len(names) + 0.8, squeeze=False)
     cell = axes[0][0]
-    colours = [COLOURS["after"] if counts[name][0] > counts[RIG][0] + 2 else COLOURS["quiet"] for name in names]
+    colours = [
+        COLOURS["after"] if counts[name][0] > counts[RIG][0] + 2 else COLOURS["quiet"]
+        for name in names
+    ]
     cell.barh(names, [counts[name][0] for name in names], color=colours)
     cell.axvline(counts[RIG][0], color=COLOURS["before"], lw=1.2)
     for row, name in enumerate(names):

@@ -1,4 +1,6 @@
-"""What 4.4 and 4.5 say of lifting, holding and returning, put to one plant; which plant, and so which physics, is the caller's."""
+"""What 4.4 and 4.5 say of lifting, holding and returning, put to one plant; which plant, and so
+which physics, is the caller's.
+"""
 
 from __future__ import annotations
 
@@ -14,12 +16,18 @@ from pamrs.reproduce._lift import Lifts
 __all__ = ["SERIES", "statements"]
 
 #: kM of the series of Fig. 4.14 and the names of its runs.
-SERIES: Final = {0.0: "series, kM 0", 0.25: "series, kM 0.25", 0.5: "series, kM 0.5", 1.0: "series, kM 1"}
+SERIES: Final = {
+    0.0: "series, kM 0",
+    0.25: "series, kM 0.25",
+    0.5: "series, kM 0.5",
+    1.0: "series, kM 1",
+}
 _KG: Final = ("11", "23", "34", "45")
 _PHASES: Final = ("lift", "hold", "return")
 #: Overshoot and swing that a figure of 80 deg would not show [deg].
 _UNSEEN: Final = 2.0
-#: The controllers of Fig. 4.15, kM = 0.5; beside the feedforward the PID has the gains that it has alone, as none are printed.
+#: The controllers of Fig. 4.15, kM = 0.5; beside the feedforward the PID has the gains that it has
+#: alone, as none are printed.
 _PAIRS: Final = (("PID", "FF+PID, PID's gains"), ("fuzzy", "FF+fuzzy, kM 0.5"))
 
 
@@ -37,7 +45,10 @@ def statements(group: str, runs: Mapping[str, Lifts]) -> list[Comparison]:
     -------
     list of Comparison
     """
-    return [judge(group, *row[:5], **row[5]) for row in (*_simulated(runs), *_feedback(runs), *_model(runs), *_compared(runs))]
+    return [
+        judge(group, *row[:5], **row[5])
+        for row in (*_simulated(runs), *_feedback(runs), *_model(runs), *_compared(runs))
+    ]
 
 
 Row = tuple[str, str, float, float, str, dict[str, Any]]
@@ -96,15 +107,22 @@ def _simulated(runs: Mapping[str, Lifts]) -> list[Row]:
 def _feedback(runs: Mapping[str, Lifts]) -> list[Row]:
     """4.5.1.3: PID and fuzzy control, 11, 23 and 34 kg."""
     pid, fuzzy = runs["PID"], runs["fuzzy"]
+    return [*_fuzzy_alone(fuzzy), *_pid_alone(pid), *_beside(pid, fuzzy)]
+
+
+def _fuzzy_alone(fuzzy: Lifts) -> list[Row]:
+    """Fuzzy control: lag, overshoot and what is left at the end of the hold."""
     lag = np.asarray(fuzzy.metrics.lag)[:3]
-    nu = np.asarray(pid.metrics.squared_error)
-    late = np.abs(pid.error("return", "mean")[1]) / np.abs(fuzzy.error("return", "mean")[1])
-    early = fuzzy.error("lift", "mean")[1] / pid.error("lift", "mean")[1]
-    lifting = slice(round(5.0 / 0.01), round(10.0 / 0.01) + 1)
-    reversals = [int((np.diff(np.sign(run.rate[1, lifting])) != 0).sum()) for run in (fuzzy, pid)]
     settled = fuzzy.error("hold", "final")[:3]
     return [
-        ("fuzzy: lag, mean of 11, 23, 34 kg", "4.5.1.3", 0.75, float(lag.mean()), "s", {"tolerance": 0.15, "note": _list(lag, 2)}),
+        (
+            "fuzzy: lag, mean of 11, 23, 34 kg",
+            "4.5.1.3",
+            0.75,
+            float(lag.mean()),
+            "s",
+            {"tolerance": 0.15, "note": _list(lag, 2)},
+        ),
         (
             "fuzzy: largest overshoot",
             "4.5.1.3: 'no overshoot'",
@@ -129,6 +147,13 @@ def _feedback(runs: Mapping[str, Lifts]) -> list[Row]:
             "deg",
             {"relation": "above", "note": _list(settled)},
         ),
+    ]
+
+
+def _pid_alone(pid: Lifts) -> list[Row]:
+    """PID control: delay, and what grows with payload."""
+    nu = np.asarray(pid.metrics.squared_error)
+    return [
         (
             "PID, 23 kg: delay until the arm moves",
             "4.5.1.3: 'about 1 s'",
@@ -137,7 +162,10 @@ def _feedback(runs: Mapping[str, Lifts]) -> list[Row]:
             "s",
             {
                 "tolerance": 0.3,
-                "note": "until 1 deg from where it was; ours begins at rest, with the pressure that holds the arm",
+                ("note"): (
+                    "until 1 deg from where it was; ours begins at rest, with the pressure that "
+                    "holds the arm"
+                ),
             },
         ),
         (
@@ -154,7 +182,10 @@ def _feedback(runs: Mapping[str, Lifts]) -> list[Row]:
             _UNSEEN,
             float(pid.undershoot[2]),
             "deg",
-            {"relation": "above", "note": f"from {_UNSEEN:.0f} deg on, a stop at 5.5; {_list(pid.undershoot)}"},
+            {
+                "relation": "above",
+                "note": f"from {_UNSEEN:.0f} deg on, a stop at 5.5; {_list(pid.undershoot)}",
+            },
         ),
         (
             "PID, 34 kg: error in the return over the lift",
@@ -164,7 +195,24 @@ def _feedback(runs: Mapping[str, Lifts]) -> list[Row]:
             "",
             {"relation": "above"},
         ),
-        ("lift, 23 kg: mean error, fuzzy over PID", "4.5.1.3, Fig. 4.12: lags more", 1.0, float(early), "", {"relation": "above"}),
+    ]
+
+
+def _beside(pid: Lifts, fuzzy: Lifts) -> list[Row]:
+    """Both with 23 kg: errors in lift and return, oscillation."""
+    late = np.abs(pid.error("return", "mean")[1]) / np.abs(fuzzy.error("return", "mean")[1])
+    early = fuzzy.error("lift", "mean")[1] / pid.error("lift", "mean")[1]
+    lifting = slice(round(5.0 / 0.01), round(10.0 / 0.01) + 1)
+    reversals = [int((np.diff(np.sign(run.rate[1, lifting])) != 0).sum()) for run in (fuzzy, pid)]
+    return [
+        (
+            "lift, 23 kg: mean error, fuzzy over PID",
+            "4.5.1.3, Fig. 4.12: lags more",
+            1.0,
+            float(early),
+            "",
+            {"relation": "above"},
+        ),
         (
             "return, 23 kg: mean error, PID over fuzzy",
             "4.5.1.3, Fig. 4.12: reacts more slowly",
@@ -186,14 +234,15 @@ def _feedback(runs: Mapping[str, Lifts]) -> list[Row]:
 
 def _model(runs: Mapping[str, Lifts]) -> list[Row]:
     """4.5.2: 45 kg, and the series of kM with 23 kg."""
-    heavy = runs["FF+fuzzy, kM 0.5"].error("rest", "final")
-    total = {km: float(np.degrees(np.asarray(runs[name].metrics.rms)[1])) for km, name in SERIES.items()}
-    rest = {km: abs(float(runs[name].error("rest", "final")[1])) for km, name in SERIES.items()}
-    lag = {km: float(np.asarray(runs[name].metrics.lag)[1]) for km, name in SERIES.items()}
-    told = "; ".join(f"kM {km:g}: {value:.2f}" for km, value in total.items())
-    settled = "; ".join(f"kM {km:g}: {value:.2f}" for km, value in rest.items())
-    run = runs["FF+fuzzy, kM 0.5"]
-    low, high = (run.between(*span, run.pressure)[3].mean() / PSI for span in ((4.0, 5.0), (14.0, 15.0)))
+    return [*_heavy(runs["FF+fuzzy, kM 0.5"]), *_series(runs)]
+
+
+def _heavy(run: Lifts) -> list[Row]:
+    """45 kg: the pressure at rest, and the error that stays."""
+    heavy = run.error("rest", "final")
+    low, high = (
+        run.between(*span, run.pressure)[3].mean() / PSI for span in ((4.0, 5.0), (14.0, 15.0))
+    )
     return [
         (
             "pressure at rest, 45 kg",
@@ -201,7 +250,10 @@ def _model(runs: Mapping[str, Lifts]) -> list[Row]:
             40.0,
             float(low),
             "psi",
-            {"relation": "below", "note": f"at the hold {high:.0f} psi; 'low angles (i.e., low pressures)' (4.5.2.2)"},
+            {
+                "relation": "below",
+                "note": f"at the hold {high:.0f} psi; 'low angles (i.e., low pressures)' (4.5.2.2)",
+            },
         ),
         (
             "FF+fuzzy, kM 0.5, 45 kg: error 5 s after the return",
@@ -209,8 +261,27 @@ def _model(runs: Mapping[str, Lifts]) -> list[Row]:
             1.0,
             abs(float(heavy[3])),
             "deg",
-            {"relation": "above", "note": "from 1 deg on; the text's reason is its model below 40 psi, with friction and hysteresis"},
+            {
+                "relation": "above",
+                ("note"): (
+                    "from 1 deg on; the text's reason is its model below 40 psi, with friction and "
+                    "hysteresis"
+                ),
+            },
         ),
+    ]
+
+
+def _series(runs: Mapping[str, Lifts]) -> list[Row]:
+    """23 kg: errors and lag over kM."""
+    total = {
+        km: float(np.degrees(np.asarray(runs[name].metrics.rms)[1])) for km, name in SERIES.items()
+    }
+    rest = {km: abs(float(runs[name].error("rest", "final")[1])) for km, name in SERIES.items()}
+    lag = {km: float(np.asarray(runs[name].metrics.lag)[1]) for km, name in SERIES.items()}
+    told = "; ".join(f"kM {km:g}: {value:.2f}" for km, value in total.items())
+    settled = "; ".join(f"kM {km:g}: {value:.2f}" for km, value in rest.items())
+    return [
         (
             "kM with the smallest RMS error, 23 kg",
             "4.5.2.2",
@@ -227,14 +298,24 @@ def _model(runs: Mapping[str, Lifts]) -> list[Row]:
             "deg",
             {"relation": "below", "note": settled + " deg"},
         ),
-        ("error at rest, kM 1 less kM 0.25", "4.5.2.2: increases with kM", 0.0, rest[1.0] - rest[0.25], "deg", {"relation": "above"}),
+        (
+            "error at rest, kM 1 less kM 0.25",
+            "4.5.2.2: increases with kM",
+            0.0,
+            rest[1.0] - rest[0.25],
+            "deg",
+            {"relation": "above"},
+        ),
         (
             "lag, kM 0 less the largest of the others",
             "4.5.2.2: slowest with kM 0",
             0.0,
             lag[0.0] - max(lag[0.25], lag[0.5], lag[1.0]),
             "s",
-            {"relation": "above", "note": "; ".join(f"kM {km:g}: {value:.2f}" for km, value in lag.items()) + " s"},
+            {
+                "relation": "above",
+                "note": "; ".join(f"kM {km:g}: {value:.2f}" for km, value in lag.items()) + " s",
+            },
         ),
     ]
 
@@ -243,7 +324,10 @@ def _compared(runs: Mapping[str, Lifts]) -> list[Row]:
     """4.5.3: the four controllers with 11 kg."""
     rows: list[Row] = []
     for plain, with_model in _PAIRS:
-        shares = {phase: float(runs[with_model].error(phase)[0] / runs[plain].error(phase)[0]) for phase in _PHASES}
+        shares = {
+            phase: float(runs[with_model].error(phase)[0] / runs[plain].error(phase)[0])
+            for phase in _PHASES
+        }
         rows.append(
             (
                 f"11 kg: error with feedforward, worst stage over {plain} alone",
@@ -251,7 +335,10 @@ def _compared(runs: Mapping[str, Lifts]) -> list[Row]:
                 1.0,
                 max(shares.values()),
                 "",
-                {"relation": "below", "note": "; ".join(f"{phase} {share:.2f}" for phase, share in shares.items())},
+                {
+                    "relation": "below",
+                    "note": "; ".join(f"{phase} {share:.2f}" for phase, share in shares.items()),
+                },
             )
         )
     names = ("PID", "FF+PID, PID's gains", "FF+PID, kM 0.5")
@@ -263,7 +350,13 @@ def _compared(runs: Mapping[str, Lifts]) -> list[Row]:
             1.0,
             beside / alone,
             "",
-            {"relation": "below", "note": f"with the same kP 1.4 and kI 2.5; with the simulation's 5 and 2: {quoted / alone:.1f}"},
+            {
+                "relation": "below",
+                ("note"): (
+                    "with the same kP 1.4 and kI 2.5; with the simulation's 5 and 2: "
+                    f"{quoted / alone:.1f}"
+                ),
+            },
         )
     )
     return rows

@@ -1,7 +1,9 @@
-"""Chapter 5 of the 2014 dissertation, advanced control: its statements beside what the simulated shoulder gives.
+"""Chapter 5 of the 2014 dissertation, advanced control: its statements beside what the simulated
+shoulder gives.
 
-Its results are pictures without numbers, so that most statements are orders: this error is below that one. One set of gains serves
-every statement; what is neither printed nor known of its rig is in :func:`chosen`. Nothing is tuned to agree.
+Its results are pictures without numbers, so that most statements are orders: this error is below
+that one. One set of gains serves every statement; what is neither printed nor known of its rig is
+in :func:`chosen`. Nothing is tuned to agree.
 """
 
 from __future__ import annotations
@@ -31,7 +33,9 @@ Progress = Callable[[str], None]
 Array = NDArray[np.float64]
 
 
-def facts(*, search: bool = True, progress: Progress | None = None, plan: Plan = FULL) -> list[Comparison]:
+def facts(
+    *, search: bool = True, progress: Progress | None = None, plan: Plan = FULL
+) -> list[Comparison]:
     """Every statement of the chapter beside ours.
 
     Parameters
@@ -53,7 +57,9 @@ def facts(*, search: bool = True, progress: Progress | None = None, plan: Plan =
         "sliding": lambda: _sliding(plan),
         "adaptive sliding": lambda: _adaptive(plan),
         "networks": lambda: _neural(plan),
-        f"adaptive sliding, {plan.training:g} s of training": lambda: [] if plan.trained("adaptive sliding") else [],
+        f"adaptive sliding, {plan.training:g} s of training": lambda: (
+            [] if plan.trained("adaptive sliding") else []
+        ),
         f"networks, {plan.training:g} s of training": lambda: [] if plan.trained("neural") else [],
         "compound trajectory": lambda: chapter5_comparison.compound(plan),
         "lift, hold, return": lambda: chapter5_comparison.lift(plan),
@@ -81,10 +87,15 @@ def chosen() -> list[tuple[str, str, str]]:
         (
             "supply.volume",
             f"{tracking.SOURCE_VOLUME:g} m3",
-            "a constant source: 4.2.1 has a 'high pressure air source' and no volume; the library's 15 l run empty after some 220 s of "
-            "this motion, and networks then learn the shortage",
+            "a constant source: 4.2.1 has a 'high pressure air source' and no volume; the "
+            "library's 15 l run empty after some 220 s of this motion, and networks then learn the "
+            "shortage",
         ),
-        ("payload", f"{MIDDLE:g} lb", "where the chapter names none (Figs. 5.8 to 5.11, 5.19, 5.20); the middle one of 5.4.3"),
+        (
+            "payload",
+            f"{MIDDLE:g} lb",
+            "where the chapter names none (Figs. 5.8 to 5.11, 5.19, 5.20); the middle one of 5.4.3",
+        ),
         (
             "sampling",
             f"{1e3 * tracking.PERIOD:g} ms",
@@ -92,26 +103,49 @@ def chosen() -> list[tuple[str, str, str]]:
         ),
         (
             "pressure loop",
-            f"{loop['kp']:.0e} V/Pa, {loop['ki']:.0e} V/(Pa s), filters of {1e3 * loop['pressure_filter']:g} ms",
-            "not printed; with half of it the arm without payload oscillates under the switching gain that 50 lb need",
+            (
+                f"{loop['kp']:.0e} V/Pa, {loop['ki']:.0e} V/(Pa s), filters of "
+                f"{1e3 * loop['pressure_filter']:g} ms"
+            ),
+            (
+                "not printed; with half of it the arm without payload oscillates under the "
+                "switching gain that 50 lb need"
+            ),
         ),
         (
             "lambda, KD, boundary layer",
-            f"{surface['slope']:g} 1/s, {1e-6 * surface['switching']:g} MPa over {surface['boundary_layer']:g} rad/s",
-            "not printed; one for the three laws, best J (4.18) at 25 lb of those that do not oscillate with another payload; "
-            "KD of twice that oscillates without payload",
+            (
+                f"{surface['slope']:g} 1/s, {1e-6 * surface['switching']:g} MPa over "
+                f"{surface['boundary_layer']:g} rad/s"
+            ),
+            "not printed; one for the three laws, best J (4.18) at 25 lb of those that do not "
+            "oscillate with another payload; KD of twice that oscillates without payload",
         ),
         (
             "cascaded PID",
-            f"{1e-6 * pid['kp']:g} MPa/rad, {1e-6 * pid['ki']:g} MPa/(rad s), {1e-6 * pid['kd']:g} MPa s/rad",
+            (
+                f"{1e-6 * pid['kp']:g} MPa/rad, {1e-6 * pid['ki']:g} MPa/(rad s), "
+                f"{1e-6 * pid['kd']:g} MPa s/rad"
+            ),
             "not printed; chosen in the same way",
         ),
-        ("Gamma of I, b, m g r", ", ".join(f"{g:g}" for g in gains["adaptive sliding"]["gains"]), "for the comparison; see Table 5.2"),
-        ("gamma_H, gamma_C, gamma_G", ", ".join(f"{g:g}" for g in own), "not printed; larger ones learn faster and fall back"),
+        (
+            "Gamma of I, b, m g r",
+            ", ".join(f"{g:g}" for g in gains["adaptive sliding"]["gains"]),
+            "for the comparison; see Table 5.2",
+        ),
+        (
+            "gamma_H, gamma_C, gamma_G",
+            ", ".join(f"{g:g}" for g in own),
+            "not printed; larger ones learn faster and fall back",
+        ),
         (
             "hysteresis",
             "15 N + 0.8 cm2 P for each muscle",
-            "a plant's effect: 7 % of the torque at 60 deg and 50 psi; 5.2 names the loop of Fig. 5.2, not its size",
+            (
+                "a plant's effect: 7 % of the torque at 60 deg and 50 psi; 5.2 names the loop of "
+                "Fig. 5.2, not its size"
+            ),
         ),
     ]
 
@@ -122,14 +156,38 @@ def chosen() -> list[tuple[str, str, str]]:
 def _rig(plan: Plan, search: bool) -> list[Comparison]:
     group, arm = Group("rig"), tracking.arm_model(PAYLOADS)
     inertia = np.asarray(arm.inertia)
-    group.say("inertia with 50 lb over that without", "5.4.3", 30.0, inertia[-1] / inertia[0], tolerance=1.5)
+    group.say(
+        "inertia with 50 lb over that without",
+        "5.4.3",
+        30.0,
+        inertia[-1] / inertia[0],
+        tolerance=1.5,
+    )
     wanted = np.degrees(tracking.waves(plan.record).sampled(tracking.PERIOD)[1].angle)
     low, high = (float(limit) for limit in (wanted.min(), wanted.max()))
-    group.say("smallest angle of (5.24), above the arm's rest", "5.2: 15 to 110 deg", 15.0, low, "deg", relation="above",
-              note="the phase of its triangle is not printed; ours begins low; the arm then lies on its stop")  # fmt: skip
+    group.say(
+        ("smallest angle of (5.24), above the arm's rest"),
+        ("5.2: 15 to 110 deg"),
+        15.0,
+        low,
+        ("deg"),
+        relation=("above"),
+        note=(
+            "the phase of its triangle is not printed; ours begins low; the arm then lies on "
+            "its stop"
+        ),
+    )
     group.say("largest angle of (5.24)", "5.2: 15 to 110 deg", 110.0, high, "deg", relation="below")
     fastest = max(w for _, w in _table())
-    group.say("largest frequency", "5.5", 0.25, fastest / (2.0 * math.pi), "Hz", tolerance=0.005, note="the fastest sinusoid")
+    group.say(
+        "largest frequency",
+        "5.5",
+        0.25,
+        fastest / (2.0 * math.pi),
+        "Hz",
+        tolerance=0.005,
+        note="the fastest sinusoid",
+    )
     torque: Any = arm.torque
     group.say(
         "simplified torque (5.1) against the full model",
@@ -138,7 +196,10 @@ def _rig(plan: Plan, search: bool) -> list[Comparison]:
         100.0 * torque.relative,
         "%",
         cannot_tell="no number is printed",
-        note=f"rms {torque.rms:.1f} N m, largest {torque.largest:.1f} N m from 15 to 110 deg and to the source's pressure",
+        note=(
+            f"rms {torque.rms:.1f} N m, largest {torque.largest:.1f} N m from 15 to 110 deg and to "
+            "the source's pressure"
+        ),
     )
     if search:
         for kind in tracking.GRIDS:
@@ -151,9 +212,11 @@ def _rig(plan: Plan, search: bool) -> list[Comparison]:
                 math.nan,
                 float(used),
                 cannot_tell="the chapter prints none",
-                note=f"{len(found.gains)} sets, all payloads: J {listed(found.j[:, found.chosen])}, error "
-                f"{listed(found.rms[:, found.chosen])} deg with 0, 25, 50 lb; "
-                f"best J at 25 lb of those with at most {tracking.MOST_J:g}",
+                note=(
+                    f"{len(found.gains)} sets, all payloads: J {listed(found.j[:, found.chosen])}, "
+                    f"error {listed(found.rms[:, found.chosen])} deg with 0, 25, 50 lb; best J at "
+                    f"25 lb of those with at most {tracking.MOST_J:g}"
+                ),
             )
     return group.rows
 
@@ -182,8 +245,11 @@ def _sliding(plan: Plan) -> list[Comparison]:
                 rms[p, k],
                 "deg",
                 relation="below",
-                note=f"rms from {SETTLED:g} s; second half over first half {later[row]:.2f}, above 1.5 Hz {ripple[row]:.2f} deg: "
-                "bounded, no oscillation" + _why_far(factor, payload, rms[p, k]),
+                note=(
+                    f"rms from {SETTLED:g} s; second half over first half {later[row]:.2f}, above "
+                    f"1.5 Hz {ripple[row]:.2f} deg: bounded, no oscillation"
+                )
+                + _why_far(factor, payload, rms[p, k]),
             )
     group.smaller(
         "exact over the better of the wrong estimates, largest of the payloads",
@@ -214,9 +280,13 @@ def _sliding(plan: Plan) -> list[Comparison]:
         least,
         "deg",
         relation="below",
-        note=f"KD {listed([1e-6 * v for v in _SWITCHING], 1)} MPa over the same layer: " + "; ".join(text)
-        + "; no single KD serves both factors: what 10 times the weight needs chatters with a tenth of it",
-    )  # fmt: skip
+        note=(f"KD {listed([1e-6 * v for v in _SWITCHING], 1)} MPa over the same layer: ")
+        + ("; ").join(text)
+        + (
+            "; no single KD serves both factors: what 10 times the weight needs chatters with a "
+            "tenth of it"
+        ),
+    )
     return group.rows
 
 
@@ -226,9 +296,9 @@ def _why_far(factor: str, payload: float, error: float) -> str:
         return ""
     weight = float(np.asarray(tracking.arm_model([payload]).weight)[0])
     return (
-        f"; nine weights too many, {9.0 * weight:.0f} N m, are more than the muscles have (890 N m at 13 bar and 90 deg, "
-        "chapter 3), so that full pressure is asked for and the arm lies near its upper stop: the published curve is that of a light "
-        "arm, as ours is with 0 lb"
+        f"; nine weights too many, {9.0 * weight:.0f} N m, are more than the muscles have (890 N m "
+        "at 13 bar and 90 deg, chapter 3), so that full pressure is asked for and the arm lies "
+        "near its upper stop: the published curve is that of a light arm, as ours is with 0 lb"
     )
 
 
@@ -236,7 +306,8 @@ def _why_far(factor: str, payload: float, error: float) -> str:
 
 
 def share_by_angle(angle: Array, values: Array, bins: int = 12) -> float:
-    """How much of a signal's variance, its straight line in time taken off, goes with the angle alone [1].
+    """How much of a signal's variance, its straight line in time taken off, goes with the angle
+    alone [1].
 
     Parameters
     ----------
@@ -256,26 +327,47 @@ def share_by_angle(angle: Array, values: Array, bins: int = 12) -> float:
     if total <= 1e-18 * max(1.0, float(np.mean(values**2))):
         return 0.0
     order = np.array_split(np.argsort(angle), bins)
-    return float(sum(part.size * rest[part].mean() ** 2 for part in order if part.size) / (rest.size * total))
+    return float(
+        sum(part.size * rest[part].mean() ** 2 for part in order if part.size) / (rest.size * total)
+    )
 
 
 def _adaptive(plan: Plan) -> list[Comparison]:
-    group, run, names = Group("adaptive"), plan.adaptation(), list(TRIALS)
+    group, run = Group("adaptive"), plan.adaptation()
+    notes = {name: np.array(run.noted[name]) for name in ("inertia", "viscous", "weight")}
+    _learning(group, run)
+    _estimates(group, run, notes)
+    _weight_by_angle(group, run, notes["weight"])
+    _long_run(group, plan)
+    return group.rows
+
+
+def _learning(group: Group, run: Track) -> None:
+    """Fig. 5.9: the error of each trial, early and late."""
     end = float(run.time[-1])
     early, late = run.rms(min(SETTLED, 0.1 * end), 0.3 * end), run.rms(0.8 * end)
-    notes = {name: np.array(run.noted[name]) for name in ("inertia", "viscous", "weight")}
     ripple = run.ripple(0.8 * end)
-    own = names.index("ours")
-    for k, name in enumerate(names):
-        text = f"{early[k]:.2f} deg to {0.3 * end:.0f} s, {late[k]:.2f} deg in the last fifth; above 1.5 Hz {ripple[k]:.2f} deg"
+    for k, name in enumerate(TRIALS):
+        text = (
+            f"{early[k]:.2f} deg to {0.3 * end:.0f} s, {late[k]:.2f} deg in the last fifth; above "
+            f"1.5 Hz {ripple[k]:.2f} deg"
+        )
         if name.startswith("Trial"):
             group.smaller(
                 f"late error over early error, {name}", "5.4.2, Fig. 5.9", late[k] / early[k], text,
                 cannot_tell="the unit of the printed gains is not stated; SI with radians here",
             )  # fmt: skip
         else:
-            group.smaller(f"late error over early error, {name}", "5.4.2: 'somewhat useful after a learning period'",
-                          late[k] / early[k], text)  # fmt: skip
+            group.smaller(
+                (f"late error over early error, {name}"),
+                ("5.4.2: 'somewhat useful after a learning period'"),
+                late[k] / early[k],
+                text,
+            )
+
+
+def _estimates(group: Group, run: Track, notes: dict[str, Array]) -> None:
+    """Fig. 5.10: the estimates of I and b, where they end and whether they come to rest."""
     final = notes["inertia"][-1]
     group.say(
         "largest over smallest final estimate of I, Trials 1 to 3",
@@ -283,8 +375,11 @@ def _adaptive(plan: Plan) -> list[Comparison]:
         1.0,
         float(final[:3].max() / max(final[:3].min(), 1e-9)),
         relation="above",
-        note=f"I {listed(final[:3], 0)} kg m2 (arm {float(np.asarray(tracking.arm_model([MIDDLE]).inertia)[0]):.1f}), b "
-        f"{listed(notes['viscous'][-1][:3], 0)} N m s/rad; Fig. 5.10 has axes to 1500 and 200",
+        note=(
+            f"I {listed(final[:3], 0)} kg m2 (arm "
+            f"{float(np.asarray(tracking.arm_model([MIDDLE]).inertia)[0]):.1f}), b "
+            f"{listed(notes['viscous'][-1][:3], 0)} N m s/rad; Fig. 5.10 has axes to 1500 and 200"
+        ),
     )
     fifth = max(1, len(run.noted_at) // 5)
     for name, label in (("inertia", "I"), ("viscous", "b")):
@@ -298,19 +393,27 @@ def _adaptive(plan: Plan) -> list[Comparison]:
             relation="above",
             note=f"Trials 1 to 3: {listed(moved)}",
         )
+
+
+def _weight_by_angle(group: Group, run: Track, weight: Array) -> None:
+    """Fig. 5.10: how far the estimate of m g r goes with the angle."""
+    own = list(TRIALS).index("ours")
     half = len(run.noted_at) // 2
     shares = []
-    for k in range(len(names)):
+    for k in range(len(TRIALS)):
         bent = np.interp(run.noted_at, run.time, run.angle[k])
-        shares.append(share_by_angle(bent[half:], notes["weight"][half:, k]))
+        shares.append(share_by_angle(bent[half:], weight[half:, k]))
     group.say(
         "share of the estimate of m g r that goes with the angle, Trial 1",
         "5.4.2, Fig. 5.10: 'angle dependence, most notably in Trial 1'",
         0.25,
         shares[0],
         relation="above",
-        cannot_tell="the unit of m g r in Table 5.2 cannot be recovered (Fig. 5.10 has 0.2 to 0.8 where 25 lb weigh 118 N m)",
-        note=f"as printed it moves by {np.ptp(notes['weight'][:, 0]):.2f} N m only",
+        cannot_tell=(
+            "the unit of m g r in Table 5.2 cannot be recovered (Fig. 5.10 has 0.2 to 0.8 where 25 "
+            "lb weigh 118 N m)"
+        ),
+        note=f"as printed it moves by {np.ptp(weight[:, 0]):.2f} N m only",
     )
     group.say(
         "the same with our gain of m g r",
@@ -318,25 +421,37 @@ def _adaptive(plan: Plan) -> list[Comparison]:
         0.25,
         shares[own],
         relation="above",
-        note=f"second half, its trend taken off; {np.ptp(notes['weight'][half:, own]):.1f} N m of ripple: what the cubic C1 and C2 "
-        "miss is taken for weight, as the chapter supposes",
+        note=(
+            f"second half, its trend taken off; {np.ptp(weight[half:, own]):.1f} N m of ripple: "
+            "what the cubic C1 and C2 miss is taken for weight, as the chapter supposes"
+        ),
     )
+
+
+def _long_run(group: Group, plan: Plan) -> None:
+    """5.5: the error after a long time of learning."""
     trained = plan.trained("adaptive sliding")
-    if trained is not None:
-        rows = [k for k, case in enumerate(plan.cases) if case[1] == ""]
-        last = float(trained.time[-1])
-        first, end_ = trained.rms(SETTLED, 0.1 * last + SETTLED), trained.rms(0.9 * last)
-        worst = max(rows, key=lambda k: end_[k] / first[k])
-        group.say(
-            f"error at the end of {plan.training:g} s over that at its begin, worst payload",
-            "5.5: 'appeared to diverge; if the system runs for an extended duration, instability may occur'",
-            1.0,
-            float(end_[worst] / first[worst]),
-            relation="above",
-            note=f"{listed(first[rows])} deg, then {listed(end_[rows])} deg with {listed([plan.cases[k][0] for k in rows], 0)} lb; "
-            f"estimates of I {listed(np.asarray(trained.learnt['inertia'])[rows], 1)} kg m2",
-        )
-    return group.rows
+    if trained is None:
+        return
+    rows = [k for k, case in enumerate(plan.cases) if case[1] == ""]
+    last = float(trained.time[-1])
+    first, end_ = trained.rms(SETTLED, 0.1 * last + SETTLED), trained.rms(0.9 * last)
+    worst = max(rows, key=lambda k: end_[k] / first[k])
+    group.say(
+        f"error at the end of {plan.training:g} s over that at its begin, worst payload",
+        (
+            "5.5: 'appeared to diverge; if the system runs for an extended duration, instability "
+            "may occur'"
+        ),
+        1.0,
+        float(end_[worst] / first[worst]),
+        relation="above",
+        note=(
+            f"{listed(first[rows])} deg, then {listed(end_[rows])} deg with "
+            f"{listed([plan.cases[k][0] for k in rows], 0)} lb; estimates of I "
+            f"{listed(np.asarray(trained.learnt['inertia'])[rows], 1)} kg m2"
+        ),
+    )
 
 
 # ------------------------------------------------------------------------------- 5.4.3
@@ -344,42 +459,77 @@ def _adaptive(plan: Plan) -> list[Comparison]:
 
 def _neural(plan: Plan) -> list[Comparison]:
     group, zero, later = Group("neural"), plan.learning(), plan.prepared()
+    _from_zero(group, zero)
+    _from_model(group, zero, later)
+    _from_training(group, zero, later)
+    _from_gaylord(group, zero, later)
+    return group.rows
+
+
+#: Runs from zero by their payload, and the runs that begin otherwise, as :data:`STARTS` and
+#: ``Plan.prepared`` have them.
+_ZERO: Final = {payload: k for k, (_, payload) in enumerate(STARTS)}
+_MODEL, _TAUGHT, _GUESS = 0, 1, 2
+
+
+def _from_zero(group: Group, zero: Track) -> None:
+    """Fig. 5.14: networks that know nothing, by payload."""
     end = float(zero.time[-1])
     early, late, whole = zero.rms(0.0, 0.2 * end), zero.rms(0.8 * end), zero.rms(0.0)
-    by = {payload: k for k, (_, payload) in enumerate(STARTS)}
     for payload in PAYLOADS:
-        k = by[payload]
+        k = _ZERO[payload]
         group.smaller(
-            f"error of the last fifth over the first, from zero, {payload:g} lb", "5.4.3, Fig. 5.14", late[k] / early[k],
-            "rms by fifths of the record " + listed([float(zero.rms(a * end / 5, (a + 1) * end / 5)[k]) for a in range(5)]) + " deg",
-        )  # fmt: skip
+            (f"error of the last fifth over the first, from zero, {payload:g} lb"),
+            ("5.4.3, Fig. 5.14"),
+            late[k] / early[k],
+            ("rms by fifths of the record ")
+            + listed([float(zero.rms(a * end / 5, (a + 1) * end / 5)[k]) for a in range(5)])
+            + (" deg"),
+        )
     for low, high in ((0.0, 25.0), (25.0, 50.0)):
         group.say(
-            f"error over the record, {high:g} lb over {low:g} lb", "5.4.3: 'generally, error increases with payload'", 1.0,
-            whole[by[high]] / whole[by[low]], relation="above", note=f"last fifth {late[by[high]]:.2f} against {late[by[low]]:.2f} deg",
-        )  # fmt: skip
+            (f"error over the record, {high:g} lb over {low:g} lb"),
+            ("5.4.3: 'generally, error increases with payload'"),
+            1.0,
+            whole[_ZERO[high]] / whole[_ZERO[low]],
+            relation="above",
+            note=f"last fifth {late[_ZERO[high]]:.2f} against {late[_ZERO[low]]:.2f} deg",
+        )
     group.say(
         "error of the last fifth, from zero, 50 lb",
         "5.4.3: 'nearly converged ... very low error'",
         math.nan,
-        late[by[50.0]],
+        late[_ZERO[50.0]],
         "deg",
         cannot_tell="no number is printed",
     )
-    model, taught, guess = 0, 1, 2
-    nu, nu_later = zero.nu(), later.nu()
-    group.smaller("squared error with a start from the model, over from zero, 50 lb", "5.4.3, Fig. 5.11",
-                  nu_later[model] / nu[by[50.0]],
-                  "the simplified model with the right numbers; the chapter's was an overestimate")  # fmt: skip
-    weights, other = np.array(zero.noted["G"][-1])[by[50.0]], np.array(later.noted["G"][-1])[model]
-    seen = (weights > 0.0) & _visited(zero, by[50.0], weights.size)
+
+
+def _gravity(zero: Track) -> tuple[Array, NDArray[np.bool_]]:
+    """The network of G that 50 lb teach from zero, and where the arm was with them."""
+    weights = np.array(zero.noted["G"][-1])[_ZERO[50.0]]
+    return weights, (weights > 0.0) & _visited(zero, _ZERO[50.0], weights.size)
+
+
+def _from_model(group: Group, zero: Track, later: Track) -> None:
+    """Figs. 5.11 to 5.13: a start from the simplified model, and what both networks come to."""
+    group.smaller(
+        "squared error with a start from the model, over from zero, 50 lb",
+        "5.4.3, Fig. 5.11",
+        later.nu()[_MODEL] / zero.nu()[_ZERO[50.0]],
+        "the simplified model with the right numbers; the chapter's was an overestimate",
+    )
+    (weights, seen), other = _gravity(zero), np.array(later.noted["G"][-1])[_MODEL]
     group.say(
         "deviation of G from zero from G from the model, over its mean, where the arm was",
         "5.4.3, Figs. 5.12 and 5.13: 'final structures very similar'",
         0.1,
         float(np.sqrt(np.mean((weights[seen] - other[seen]) ** 2)) / np.mean(other[seen])),
         relation="below",
-        note="10 % counts as similar; H from zero stays far below the arm's and C goes to its bound: the motion is slow",
+        note=(
+            "10 % counts as similar; H from zero stays far below the arm's and C goes to its "
+            "bound: the motion is slow"
+        ),
     )
     degrees = np.degrees(np.linspace(*tracking.arm_model([0.0]).angle_range, weights.size))
     above = (degrees > 94.0) & (degrees < 111.0)
@@ -391,22 +541,49 @@ def _neural(plan: Plan) -> list[Comparison]:
         relation="below",
         note="the arm falls back where it has not been; half counts as limited",
     )
-    group.smaller("squared error after 15 lb of training, over from zero, 50 lb", "5.4.3, Fig. 5.17", nu_later[taught] / nu[by[50.0]],
-                  "the figure's legend has 10 lb, the text 15")  # fmt: skip
-    old, new = (float(np.array(later.noted["G"][k])[taught][seen].mean()) for k in (0, -1))
-    group.say("mean G after 50 lb over that after 15 lb", "5.4.3, Fig. 5.16", 1.0, new / old, relation="above")
-    ratio = nu_later[guess] / nu[by[0.0]]
-    group.smaller("squared error with Gaylord's estimate, over from zero, 0 lb", "5.5, Fig. 5.21: 'slightly reduces'", ratio,
-                  "the approach from rest included, of either")  # fmt: skip
+
+
+def _from_training(group: Group, zero: Track, later: Track) -> None:
+    """Figs. 5.16 and 5.17: a start from what 15 lb taught."""
+    group.smaller(
+        "squared error after 15 lb of training, over from zero, 50 lb",
+        "5.4.3, Fig. 5.17",
+        later.nu()[_TAUGHT] / zero.nu()[_ZERO[50.0]],
+        "the figure's legend has 10 lb, the text 15",
+    )
+    _, seen = _gravity(zero)
+    old, new = (float(np.array(later.noted["G"][k])[_TAUGHT][seen].mean()) for k in (0, -1))
+    group.say(
+        "mean G after 50 lb over that after 15 lb",
+        "5.4.3, Fig. 5.16",
+        1.0,
+        new / old,
+        relation="above",
+    )
+
+
+def _from_gaylord(group: Group, zero: Track, later: Track) -> None:
+    """Figs. 5.21 and 5.22: a start from Gaylord's estimate."""
+    group.smaller(
+        "squared error with Gaylord's estimate, over from zero, 0 lb",
+        "5.5, Fig. 5.21: 'slightly reduces'",
+        later.nu()[_GUESS] / zero.nu()[_ZERO[0.0]],
+        "the approach from rest included, of either",
+    )
     for name in ("C", "G"):
-        first, last = (np.array(later.noted[name][k])[guess] for k in (0, -1))
-        there = _visited(later, guess, first.size)
+        first, last = (np.array(later.noted[name][k])[_GUESS] for k in (0, -1))
+        there = _visited(later, _GUESS, first.size)
         group.say(
-            f"mean {name} after learning over Gaylord's estimate, 0 lb", "5.5, Fig. 5.22: 'initial estimate is low'", 1.0,
-            float(last[there].mean() / first[there].mean()), relation="above",
-            note="as printed (5.25) is negative (3 L^2 < B^2): the shoulder's own length, braid and turns, r_eff of 0.7 in",
-        )  # fmt: skip
-    return group.rows
+            (f"mean {name} after learning over Gaylord's estimate, 0 lb"),
+            ("5.5, Fig. 5.22: 'initial estimate is low'"),
+            1.0,
+            float(last[there].mean() / first[there].mean()),
+            relation="above",
+            note=(
+                "as printed (5.25) is negative (3 L^2 < B^2): the shoulder's own length, braid and "
+                "turns, r_eff of 0.7 in"
+            ),
+        )
 
 
 def _visited(run: Track, row: int, nodes: int) -> NDArray[np.bool_]:
@@ -433,7 +610,10 @@ def in_short(rows: list[Comparison]) -> list[str]:
     held = [row for row in rows if row.group == GROUPS["effects"]]
     tells = [f"{row.fact.removeprefix('orders of 5.5 that hold, ')} {row.ours:.0f}" for row in held]
     restored = [
-        f"{row.fact.removeprefix('orders of 5.5 that hold, ')} restores: {row.note.split('restored: ')[1].split('; lost')[0]}"
+        (
+            f"{row.fact.removeprefix('orders of 5.5 that hold, ')} restores: "
+            f"{row.note.split('restored: ')[1].split('; lost')[0]}"
+        )
         for row in held
         if "restored: " in row.note
     ]
@@ -441,14 +621,21 @@ def in_short(rows: list[Comparison]) -> list[str]:
     rms = ", ".join(f"{kind} {ours('compound', f'{kind}, {MIDDLE:g} lb: rms')}" for kind in KINDS)
     lift = ", ".join(f"{kind} {ours('lift', f'{kind}, {MIDDLE:g} lb: rms')}" for kind in KINDS)
     return [
-        f"After training the rms errors with 25 lb are {rms} deg on the compound trajectory and {lift} deg on lift, hold and return.",
-        f"Of the {held[0].published:.0f} orders of 5.5 hold: {', '.join(tells)}; each effect is in the plant alone and unknown to the "
-        "controllers, which were trained with it." + "".join(f" {text}." for text in restored),
-        "Wrong estimates leave sliding bounded and without oscillation; with ten times the estimates of a loaded arm it is "
+        (
+            f"After training the rms errors with 25 lb are {rms} deg on the compound trajectory "
+            f"and {lift} deg on lift, hold and return."
+        ),
+        f"Of the {held[0].published:.0f} orders of 5.5 hold: {', '.join(tells)}; each effect is in "
+        "the plant alone and unknown to the controllers, which were trained with "
+        "it." + "".join(f" {text}." for text in restored),
+        "Wrong estimates leave sliding bounded and without oscillation; with ten times the "
+        "estimates of a loaded arm it is "
         f"{ours('sliding', 'error with estimates times 10, 25 lb', 0)} deg off, and "
         f"{ours('sliding', 'error with estimates times 10, 0 lb', 0)} deg without payload.",
         "Networks that know nothing come within "
-        f"{ours('neural', 'error of the last fifth, from zero, 50 lb', 1)} deg with 50 lb in 100 s, and what 15 lb taught leaves "
-        f"{ours('neural', 'squared error after 15 lb of training, over from zero, 50 lb')} of the squared error.",
+        f"{ours('neural', 'error of the last fifth, from zero, 50 lb', 1)} deg with 50 lb in 100 "
+        "s, and what 15 lb taught leaves "
+        f"{ours('neural', 'squared error after 15 lb of training, over from zero, 50 lb')} of the "
+        "squared error.",
         f"Compensation of the diagnosed hysteresis leaves {left} of sliding's error.",
     ]

@@ -42,40 +42,116 @@ def pictures(plan: Plan = FULL) -> list[Picture]:
     -------
     list of Picture
     """
-    return [Picture(name, GROUPS[group], caption, drawing.png(draw, _KEPT)) for name, group, draw, caption in _pictures(plan)]
+    return [
+        Picture(name, GROUPS[group], caption, drawing.png(draw, _KEPT))
+        for name, group, draw, caption in _pictures(plan)
+    ]
 
 
 def _pictures(plan: Plan) -> list[tuple[str, str, Callable[[], Figure], str]]:
     """Name, group, function and caption of each picture."""
     return [
-        ("fig5_08_sliding", "sliding", lambda: _sliding(plan),
-         "Fig. 5.8: sliding with right and wrong estimates: angle and error without payload, squared error with each."),
-        ("fig5_10_estimates", "adaptive", lambda: _estimates(plan),
-         "Fig. 5.10: estimates with the gains of Table 5.2 (SI, radians) and with ours, 25 lb; dashed: the arm's."),
-        ("fig5_11_start", "neural", lambda: _start(plan),
-         "Figs. 5.11 and 5.17: networks with 50 lb that know nothing, the model, or what 15 lb taught."),
-        ("fig5_12_networks", "neural", lambda: _networks(plan),
-         "Figs. 5.12, 5.13, 5.16: the three networks with 50 lb, from light (begin) to dark (end)."),
-        ("fig5_14_payloads", "neural", lambda: _payloads(plan),
-         "Figs. 5.14 and 5.21: networks from zero with 0, 25 and 50 lb, and from Gaylord's estimate with 0 lb."),
-        ("training", "compound", lambda: _training(plan),
-         "Error of each 20 s of the training: without payload adaptive sliding drifts away, networks fall back now and then."),
-        ("fig5_19_compound", "compound", lambda: _compared(plan, "compound"),
-         "Fig. 5.19: the four controllers with 25 lb on the compound trajectory, the adaptive ones after their training."),
-        ("fig5_20_lift", "lift", lambda: _compared(plan, "lift"),
-         "Fig. 5.20: the same on lift, hold and return."),
-        ("orders", "effects", lambda: _orders(plan),
-         "The orders of 5.5 as ratios that the chapter has below one, by what the plant has and no controller knows."),
-        ("hysteresis", "hysteresis", lambda: _hysteresis(plan),
-         "Sliding on a plant with hysteresis, without and with compensation: error over time and over the angle."),
-    ]  # fmt: skip
+        (
+            "fig5_08_sliding",
+            "sliding",
+            lambda: _sliding(plan),
+            (
+                "Fig. 5.8: sliding with right and wrong estimates: angle and error without "
+                "payload, squared error with each."
+            ),
+        ),
+        (
+            "fig5_10_estimates",
+            "adaptive",
+            lambda: _estimates(plan),
+            (
+                "Fig. 5.10: estimates with the gains of Table 5.2 (SI, radians) and with ours, 25 "
+                "lb; dashed: the arm's."
+            ),
+        ),
+        (
+            "fig5_11_start",
+            "neural",
+            lambda: _start(plan),
+            (
+                "Figs. 5.11 and 5.17: networks with 50 lb that know nothing, the model, or what 15 "
+                "lb taught."
+            ),
+        ),
+        (
+            "fig5_12_networks",
+            "neural",
+            lambda: _networks(plan),
+            (
+                "Figs. 5.12, 5.13, 5.16: the three networks with 50 lb, from light (begin) to dark "
+                "(end)."
+            ),
+        ),
+        (
+            "fig5_14_payloads",
+            "neural",
+            lambda: _payloads(plan),
+            (
+                "Figs. 5.14 and 5.21: networks from zero with 0, 25 and 50 lb, and from Gaylord's "
+                "estimate with 0 lb."
+            ),
+        ),
+        (
+            "training",
+            "compound",
+            lambda: _training(plan),
+            (
+                "Error of each 20 s of the training: without payload adaptive sliding drifts away, "
+                "networks fall back now and then."
+            ),
+        ),
+        (
+            "fig5_19_compound",
+            "compound",
+            lambda: _compared(plan, "compound"),
+            (
+                "Fig. 5.19: the four controllers with 25 lb on the compound trajectory, the "
+                "adaptive ones after their training."
+            ),
+        ),
+        (
+            "fig5_20_lift",
+            "lift",
+            lambda: _compared(plan, "lift"),
+            "Fig. 5.20: the same on lift, hold and return.",
+        ),
+        (
+            "orders",
+            "effects",
+            lambda: _orders(plan),
+            (
+                "The orders of 5.5 as ratios that the chapter has below one, by what the plant has "
+                "and no controller knows."
+            ),
+        ),
+        (
+            "hysteresis",
+            "hysteresis",
+            lambda: _hysteresis(plan),
+            (
+                "Sliding on a plant with hysteresis, without and with compensation: error over "
+                "time and over the angle."
+            ),
+        ),
+    ]
 
 
 def _angles(axes: Axes, curves: Sequence[Curve]) -> None:
     run = curves[0][0]
     for track, row, _, colour in curves:
         axes.plot(*decimate(track.time, np.degrees(track.angle[row])), color=colour, lw=1.2)
-    axes.plot(*decimate(run.time, np.degrees(run.wanted)), color=_INK, lw=0.9, ls=(0, (4, 2)), label="desired")
+    axes.plot(
+        *decimate(run.time, np.degrees(run.wanted)),
+        color=_INK,
+        lw=0.9,
+        ls=(0, (4, 2)),
+        label="desired",
+    )
     axes.set(ylabel="angle [deg]", ylim=(0.0, 140.0))
     axes.legend(loc="upper right", fontsize=8)
 
@@ -111,14 +187,32 @@ def _sliding(plan: Plan) -> Figure:
     figure, (angle, error, square) = drawing.figure(3, 1, 6.4, sharex=True)
     _angles(angle, free)
     _errors(error, free, 40.0)
-    for p, (payload, style) in enumerate(zip(PAYLOADS, ("-", (0, (4, 2)), (0, (1, 1.5))), strict=True)):
+    for p, (payload, style) in enumerate(
+        zip(PAYLOADS, ("-", (0, (4, 2)), (0, (1, 1.5))), strict=True)
+    ):
         for k in range(len(WRONG)):
-            square.plot(*decimate(run.time, run.cumulative()[p * len(WRONG) + k]), color=_COLOURS[k], lw=1.3, ls=style)
+            square.plot(
+                *decimate(run.time, run.cumulative()[p * len(WRONG) + k]),
+                color=_COLOURS[k],
+                lw=1.3,
+                ls=style,
+            )
         square.plot([], [], color=_INK, ls=style, label=f"{payload:g} lb")
     square.axhline(400.0, color=_INK, lw=0.7)
-    square.annotate("top of the axis of Fig. 5.8(c)", (0.01, 400.0), (0, 3), xycoords=("axes fraction", "data"),
-                    textcoords="offset points", fontsize=8)  # fmt: skip
-    square.set(ylabel="mean squared error\nso far [deg²]", xlabel="time [s]", yscale="log", xlim=(0.0, float(run.time[-1])))
+    square.annotate(
+        ("top of the axis of Fig. 5.8(c)"),
+        (0.01, 400.0),
+        (0, 3),
+        xycoords=(("axes fraction"), ("data")),
+        textcoords="offset points",
+        fontsize=8,
+    )
+    square.set(
+        ylabel="mean squared error\nso far [deg²]",
+        xlabel="time [s]",
+        yscale="log",
+        xlim=(0.0, float(run.time[-1])),
+    )
     square.set_ylim(5.0, 4e4)
     square.legend(loc="upper right", ncols=3, fontsize=8)
     return figure
@@ -158,7 +252,9 @@ def _start(plan: Plan) -> Figure:
 
 def _payloads(plan: Plan) -> Figure:
     zero, later = plan.learning(), plan.prepared()
-    curves = [(zero, _row(payload), f"{payload:g} lb", _COLOURS[k]) for k, payload in enumerate(PAYLOADS)]
+    curves = [
+        (zero, _row(payload), f"{payload:g} lb", _COLOURS[k]) for k, payload in enumerate(PAYLOADS)
+    ]
     return _three([*curves, (later, 2, "0 lb, Gaylord", _COLOURS[3])], 45.0)
 
 
@@ -167,16 +263,28 @@ def _networks(plan: Plan) -> Figure:
     figure, grid = drawing.figure(3, 3, 6.0, sharex=True, sharey="row")
     low, high = np.degrees(tracking.arm_model([0.0]).angle_range)
     for column, (track, row, words) in enumerate(
-        ((zero, _row(50.0), "from zero"), (later, 0, "from the model"), (later, 1, f"after {LATER[1][0]}"))
+        (
+            (zero, _row(50.0), "from zero"),
+            (later, 0, "from the model"),
+            (later, 1, f"after {LATER[1][0]}"),
+        )
     ):
         for axes, (name, label) in zip(
-            grid[:, column], {"H": "H [kPa s²/rad]", "C": "C [kPa s/rad]", "G": "G [kPa]"}.items(), strict=True
+            grid[:, column],
+            {"H": "H [kPa s²/rad]", "C": "C [kPa s/rad]", "G": "G [kPa]"}.items(),
+            strict=True,
         ):
             notes = track.noted[name]
             for k, weights in enumerate(notes):
                 values = 1e-3 * np.asarray(weights)[row]
                 shade = mpl.colormaps["Blues"](0.25 + 0.75 * k / max(1, len(notes) - 1))
-                axes.plot(np.linspace(low, high, values.size), values, color=shade, lw=1.3, label=f"{track.noted_at[k]:g} s")
+                axes.plot(
+                    np.linspace(low, high, values.size),
+                    values,
+                    color=shade,
+                    lw=1.3,
+                    label=f"{track.noted_at[k]:g} s",
+                )
             if column == 0:
                 axes.set(ylabel=label)
         grid[0, column].set_title(words, fontsize=9)
@@ -195,7 +303,13 @@ def _training(plan: Plan) -> Figure:
         for k, (payload, effect) in enumerate(plan.cases):
             if effect in ("", "muscle_hysteresis"):
                 words = f"{payload:g} lb" + (", hysteresis" if effect else "")
-                one.plot(0.5 * (edges[1:] + edges[:-1]), values[:, k], color=_COLOURS[min(k, 3)], lw=1.2, label=words)
+                one.plot(
+                    0.5 * (edges[1:] + edges[:-1]),
+                    values[:, k],
+                    color=_COLOURS[min(k, 3)],
+                    lw=1.2,
+                    label=words,
+                )
         one.set(title=kind, xlabel="time [s]", yscale="log")
     axes[0].set(ylabel="rms error [deg]")
     axes[1].legend(loc="upper right", fontsize=8)
@@ -230,10 +344,15 @@ def _orders(plan: Plan) -> Figure:
 
 def _hysteresis(plan: Plan) -> Figure:
     figure, (over_time, over_angle) = drawing.figure(1, 2, 3.2, sharey=True)
-    for known, colour, words in ((False, _COLOURS[1], "without"), (True, _COLOURS[2], "with compensation")):
+    for known, colour, words in (
+        (False, _COLOURS[1], "without"),
+        (True, _COLOURS[2], "with compensation"),
+    ):
         run = plan.compensated(known)
         part = run.time >= tracking.SETTLED
-        over_time.plot(*decimate(run.time[part], run.error[0][part]), color=colour, lw=1.0, label=words)
+        over_time.plot(
+            *decimate(run.time[part], run.error[0][part]), color=colour, lw=1.0, label=words
+        )
         over_angle.plot(np.degrees(run.angle[0][part]), run.error[0][part], color=colour, lw=0.6)
     over_time.set(xlabel="time [s]", ylabel="error [deg]")
     over_angle.set(xlabel="angle [deg]")

@@ -1,4 +1,6 @@
-"""What the statements of chapter 5 have in common: the names of their groups, and how one is written down."""
+"""What the statements of chapter 5 have in common: the names of their groups, and how one is
+written down.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +33,9 @@ class Group:
     def __init__(self, name: str) -> None:
         self.title, self.rows = GROUPS[name], list[Comparison]()
 
-    def say(self, fact: str, where: str, published: float, ours: float, unit: str = "", **more: Any) -> None:
+    def say(
+        self, fact: str, where: str, published: float, ours: float, unit: str = "", **more: Any
+    ) -> None:
         """Judge one statement."""
         self.rows.append(judge(self.title, fact, where, published, float(ours), unit, **more))
 

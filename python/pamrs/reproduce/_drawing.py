@@ -1,4 +1,6 @@
-"""What the pictures of all chapters have in common: an empty figure, and a small PNG of a full one."""
+"""What the pictures of all chapters have in common: an empty figure, and a small PNG of a full
+one.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +37,8 @@ def figure(rows: int = 1, columns: int = 1, height: float = 3.6, **more: Any) ->
 
 
 def png(draw: Callable[[], Figure], colours: int) -> bytes:
-    """Draw in the house's style, and keep few colours: a third to half of the size, no difference to the eye.
+    """Draw in the house's style, and keep few colours: a third to half of the size, no difference
+    to the eye.
 
     Parameters
     ----------
@@ -54,7 +57,11 @@ def png(draw: Callable[[], Figure], colours: int) -> bytes:
     with mpl.rc_context(STYLE):
         stream = io.BytesIO()
         draw().savefig(stream, format="png")
-    image = Image.open(stream).convert("RGB").quantize(colours, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
+    image = (
+        Image.open(stream)
+        .convert("RGB")
+        .quantize(colours, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
+    )
     small = io.BytesIO()
     image.save(small, format="png", optimize=True)
     return small.getvalue()

@@ -1,8 +1,10 @@
-"""The experiments of dissertation chapter 3 on the elbow rig: torque at a pressure, step, triangular pressure, ramp and hold.
+"""The experiments of dissertation chapter 3 on the elbow rig: torque at a pressure, step,
+triangular pressure, ramp and hold.
 
-Every number that the chapter does not give is the rig's (``pamrs/rigs/elbow.toml``, which says where it is from); what is varied
-here to find the reason of a difference is an argument. Rotations are counted from the rest angle, at which the muscles are at
-rest length: the joint cannot be below it, and the chapter's equations (3.1)-(3.8) begin there, at no contraction.
+Every number that the chapter does not give is the rig's (``pamrs/rigs/elbow.toml``, which says
+where it is from); what is varied here to find the reason of a difference is an argument. Rotations
+are counted from the rest angle, at which the muscles are at rest length: the joint cannot be below
+it, and the chapter's equations (3.1)-(3.8) begin there, at no contraction.
 """
 
 from __future__ import annotations
@@ -27,8 +29,10 @@ if TYPE_CHECKING:
     from pamrs.rig import Muscle
 
 __all__ = [
-    "FOOT_POUND", "HYSTERESIS", "INCH", "LAWS", "POUND", "PSI", "StaticCurve", "Step", "arm_rig", "at_same_pressure", "elbow_torque",
-    "mooney_rivlin", "payload_torque", "ramp_and_hold", "rest_angle", "rotation_reached", "static_curve", "steeper_braid", "step",
+    "FOOT_POUND", "HYSTERESIS", "INCH", "LAWS", "POUND", "PSI", "StaticCurve", "Step", "arm_rig",
+    "at_same_pressure", "elbow_torque",
+    "mooney_rivlin", "payload_torque", "ramp_and_hold", "rest_angle", "rotation_reached",
+    "static_curve", "steeper_braid", "step",
     "torque_range", "triangle", "valve_for_peak", "without_supply",
 ]  # fmt: skip
 
@@ -41,8 +45,13 @@ INCH: Final = to_si(1.0, "in", "length")
 
 #: Kind of the joint by how its torque is counted: power-conserving, or by (3.6)-(3.8) as printed.
 LAWS: Final = {"conserving": "tendon", "printed": "published"}
-#: (2.36): hysteresis of the 0.75-in latex muscle of chapter 2, the only number published for a latex muscle.
-HYSTERESIS: Final = {"friction_coefficient": 0.16, "friction_pressure_slope": -0.145e-6, "friction_floor": 0.01}
+#: (2.36): hysteresis of the 0.75-in latex muscle of chapter 2, the only number published for a
+#: latex muscle.
+HYSTERESIS: Final = {
+    "friction_coefficient": 0.16,
+    "friction_pressure_slope": -0.145e-6,
+    "friction_floor": 0.01,
+}
 
 _SAMPLE: Final = 0.01  # s; the step of the integration is a tenth of it at most
 _STEP_SAMPLE: Final = 0.002
@@ -50,7 +59,12 @@ _FREE: Final = 0.37  # contraction of the unloaded muscle at 150 psi, 3.2.2
 
 
 def arm_rig(
-    *, law: str = "conserving", pounds: float | None = None, psi: float | None = None, area: float | None = None, **arm: float
+    *,
+    law: str = "conserving",
+    pounds: float | None = None,
+    psi: float | None = None,
+    area: float | None = None,
+    **arm: float,
 ) -> Rig:
     """The elbow rig with another torque law, payload, supply or valve.
 
@@ -78,7 +92,9 @@ def arm_rig(
     """
     if law not in LAWS:
         raise ParameterError(f"law = {law!r} is not allowed: one of {', '.join(LAWS)}")
-    values: dict[str, float] = {f"arm.{name}": value for name, value in arm.items() if name != "dead_volume"}
+    values: dict[str, float] = {
+        f"arm.{name}": value for name, value in arm.items() if name != "dead_volume"
+    }
     if "dead_volume" in arm:
         values["chamber.dead_volume"] = arm["dead_volume"]
     if pounds is not None:
@@ -131,12 +147,14 @@ def _muscle() -> Muscle:
 
 @cache
 def mooney_rivlin(share: float = 0.5) -> Muscle:
-    """The muscle of (3.21), Gaylord's force less a Mooney-Rivlin bladder, its constants from the free contraction of 3.2.2.
+    """The muscle of (3.21), Gaylord's force less a Mooney-Rivlin bladder, its constants from the
+    free contraction of 3.2.2.
 
     Parameters
     ----------
     share : float
-        ``c01/(c10 + c01)``, from 0 to 1: one published fact fixes one of the two constants, and none is printed.
+        ``c01/(c10 + c01)``, from 0 to 1: one published fact fixes one of the two constants, and
+        none is printed.
 
     Returns
     -------
@@ -165,7 +183,8 @@ def steeper_braid(degrees: float = 73.5) -> Muscle:
     Parameters
     ----------
     degrees : float
-        Braid angle [deg]; 73.5 gives both the published blocked force and the published largest diameter.
+        Braid angle [deg]; 73.5 gives both the published blocked force and the published largest
+        diameter.
 
     Returns
     -------
@@ -176,7 +195,14 @@ def steeper_braid(degrees: float = 73.5) -> Muscle:
     return soft.replace(modulus_scale=gas / (gas - float(soft.force(pressure, _FREE))))
 
 
-def elbow_torque(rotation: Any, *, law: str = "conserving", psi: float = 150.0, count: int = 6, muscle: Muscle | None = None) -> Array:
+def elbow_torque(
+    rotation: Any,
+    *,
+    law: str = "conserving",
+    psi: float = 150.0,
+    count: int = 6,
+    muscle: Muscle | None = None,
+) -> Array:
     """Torque of the elbow's muscles at rest [N m].
 
     Parameters
@@ -202,7 +228,9 @@ def elbow_torque(rotation: Any, *, law: str = "conserving", psi: float = 150.0, 
     return joint.torque(muscle or _muscle(), psi * PSI, angle, count=count)
 
 
-def torque_range(torque: Callable[[Array], Array], least: float, *, last: float = math.radians(110.0)) -> tuple[float, float]:
+def torque_range(
+    torque: Callable[[Array], Array], least: float, *, last: float = math.radians(110.0)
+) -> tuple[float, float]:
     """The first and the last rotation at which a torque is at least ``least``.
 
     Parameters
@@ -231,7 +259,11 @@ def torque_range(torque: Callable[[Array], Array], least: float, *, last: float 
         return float(torque(np.array([x]))[0]) - least
 
     first = 0.0 if low == 0 else float(brentq(excess, grid[low - 1], grid[low]))
-    end = float(grid[-1]) if high == grid.size - 1 else float(brentq(excess, grid[high], grid[high + 1]))
+    end = (
+        float(grid[-1])
+        if high == grid.size - 1
+        else float(brentq(excess, grid[high], grid[high + 1]))
+    )
     return first, end
 
 
@@ -252,7 +284,13 @@ def payload_torque(pounds: float, angle: Any, lever: float | None = None) -> Arr
     ndarray
     """
     arm = named("elbow").model["arm"]
-    return np.asarray(pounds * POUND * arm["gravity"] * (arm["length"] if lever is None else lever) * np.sin(angle))
+    return np.asarray(
+        pounds
+        * POUND
+        * arm["gravity"]
+        * (arm["length"] if lever is None else lever)
+        * np.sin(angle)
+    )
 
 
 def rotation_reached(pounds: float, psi: float, *, law: str = "conserving") -> float:
@@ -269,7 +307,10 @@ def rotation_reached(pounds: float, psi: float, *, law: str = "conserving") -> f
     -------
     float
     """
-    return lift(arm_rig(law=law, pounds=pounds, coulomb=0.0), pressure=psi * PSI).reached - rest_angle()
+    return (
+        lift(arm_rig(law=law, pounds=pounds, coulomb=0.0), pressure=psi * PSI).reached
+        - rest_angle()
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -291,7 +332,9 @@ class StaticCurve:
     slope: Array
 
 
-def static_curve(pounds: float, top: float = 150.0, *, law: str = "conserving", points: int = 400) -> StaticCurve:
+def static_curve(
+    pounds: float, top: float = 150.0, *, law: str = "conserving", points: int = 400
+) -> StaticCurve:
     """The rest position of a payload over pressure.
 
     Parameters
@@ -358,7 +401,14 @@ class Step:
         return math.radians(90.0) / self.arrival
 
 
-def step(area: float | None = None, *, law: str = "conserving", pounds: float = 100.0, seconds: float = 6.0, **arm: float) -> Step:
+def step(
+    area: float | None = None,
+    *,
+    law: str = "conserving",
+    pounds: float = 100.0,
+    seconds: float = 6.0,
+    **arm: float,
+) -> Step:
     """The step of Fig. 3.8: a supply at 150 psi, the valve opened at once, a tip payload.
 
     Parameters
@@ -380,7 +430,9 @@ def step(area: float | None = None, *, law: str = "conserving", pounds: float = 
     """
     rig = arm_rig(law=law, pounds=pounds, psi=150.0, area=area, **arm)
     valve = rig.model["valve"]
-    command = np.full(round(seconds / _STEP_SAMPLE) + 1, valve["null_voltage"] + valve["half_range"])
+    command = np.full(
+        round(seconds / _STEP_SAMPLE) + 1, valve["null_voltage"] + valve["half_range"]
+    )
     result = simulate(rig, command, sample_time=_STEP_SAMPLE)
     rotation, rate = result["joint_angle"] - rest_angle(), result["joint_rate"]
     moving = int(np.argmax(rotation > math.radians(1.0)))
@@ -434,12 +486,19 @@ def valve_for_peak(rate: float, *, law: str = "conserving", **arm: float) -> flo
 
     low, high = math.log(1e-7), math.log(1e-4)
     if excess(low) > 0.0 or excess(high) < 0.0:
-        raise ParameterError(f"rate = {rate:g} rad/s is not allowed: no valve from 0.1 to 100 mm2 has this peak")
+        raise ParameterError(
+            f"rate = {rate:g} rad/s is not allowed: no valve from 0.1 to 100 mm2 has this peak"
+        )
     return math.exp(float(brentq(excess, low, high, xtol=1e-4)))
 
 
 def triangle(
-    *, pounds: float = 135.0, top: float = 150.0, frequency: float = 0.05, law: str = "conserving", hysteresis: bool = False
+    *,
+    pounds: float = 135.0,
+    top: float = 150.0,
+    frequency: float = 0.05,
+    law: str = "conserving",
+    hysteresis: bool = False,
 ) -> Simulation:
     """One period of the triangular pressure of Fig. 3.12, prescribed.
 
@@ -465,7 +524,12 @@ def triangle(
 
 
 def ramp_and_hold(
-    *, pounds: float = 100.0, top: float = 145.0, law: str = "conserving", hysteresis: bool = False, **arm: float
+    *,
+    pounds: float = 100.0,
+    top: float = 145.0,
+    law: str = "conserving",
+    hysteresis: bool = False,
+    **arm: float,
 ) -> Simulation:
     """The test of Fig. 3.16: 4 s of ramp to a pressure and 6 s of hold, prescribed.
 
@@ -490,7 +554,9 @@ def ramp_and_hold(
     return simulate(rig, pressure=np.minimum(150.0 * time / 4.0, top) * PSI, sample_time=_SAMPLE)
 
 
-def at_same_pressure(result: Simulation, values: Array, psi: Sequence[float] | Array) -> tuple[Array, Array]:
+def at_same_pressure(
+    result: Simulation, values: Array, psi: Sequence[float] | Array
+) -> tuple[Array, Array]:
     """Values at given pressures on the rising and on the falling side of one triangular period.
 
     Parameters

@@ -1,7 +1,8 @@
-"""Lift, hold and return of the elbow under the controllers of chapter 4: every experiment, with what is varied as an argument.
+"""Lift, hold and return of the elbow under the controllers of chapter 4: every experiment, with
+what is varied as an argument.
 
-The controllers know the rig, its valve and the payload; the plant differs from it in muscle force, friction and inertia as in 4.4.2,
-and in whatever a :class:`Variant` adds.
+The controllers know the rig, its valve and the payload; the plant differs from it in muscle force,
+friction and inertia as in 4.4.2, and in whatever a :class:`Variant` adds.
 """
 
 from __future__ import annotations
@@ -13,7 +14,18 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.control import PID, Actuation, AirModel, ArmModel, Feedforward, Fuzzy, Metrics, Parallel, Trajectory, sweep
+from pamrs.control import (
+    PID,
+    Actuation,
+    AirModel,
+    ArmModel,
+    Feedforward,
+    Fuzzy,
+    Metrics,
+    Parallel,
+    Trajectory,
+    sweep,
+)
 from pamrs.control.metrics import combined, evaluate
 from pamrs.control.trajectories import degrees, lift_hold_return
 from pamrs.control.tuning import perturbed
@@ -32,7 +44,7 @@ __all__ = [
     "Lifts",
     "Map",
     "Variant",
-    "believed",
+    "assumed",
     "fuzzy_map",
     "lifts",
     "pid_map",
@@ -83,7 +95,8 @@ class Variant:
     effects : mapping of str to mapping of str to float
         Effects of the catalogue that it has not.
     regulated : bool
-        Whether a regulator with the lag and droop of the rig ``regulated_joint`` feeds it; the model has a supply that holds.
+        Whether a regulator with the lag and droop of the rig ``regulated_joint`` feeds it; the
+        model has a supply that holds.
     """
 
     known: Mapping[str, float] = field(default_factory=dict)
@@ -104,14 +117,18 @@ def _activation(pressure: float) -> dict[str, dict[str, float]]:
     return {"activation_pressure": {"threshold": pressure}}
 
 
-_HYSTERESIS: Final = {"muscle_hysteresis": {"friction_constant": 15.0, "friction_pressure": 1e-4, "presliding": 1e-3}}
+_HYSTERESIS: Final = {
+    "muscle_hysteresis": {"friction_constant": 15.0, "friction_pressure": 1e-4, "presliding": 1e-3}
+}
 #: One candidate at a time, and the pairs that it takes two of.
 VARIANTS: Final[Mapping[str, Variant]] = {
     "the rig": Variant(),
     "valve 4.2 mm2": Variant(known=_valve(4.2)),
     "valve 2.44 mm2": Variant(known=_valve(2.44)),
     "supply 0.45 MPa": Variant(known={"supply.initial_pressure": 0.45e6}),
-    "regulated supply, dead band 50 kPa": Variant(effects={"supply_regulator_deadband": {"dead_band": 5e4}}, regulated=True),
+    "regulated supply, dead band 50 kPa": Variant(
+        effects={"supply_regulator_deadband": {"dead_band": 5e4}}, regulated=True
+    ),
     "input lag 50 ms": Variant(effects={"input_path_lag": {"time_constant": 0.05}}),
     "pressure lag 50 ms": Variant(effects={"pressure_lag": {"time_constant": 0.05}}),
     "tube 2e-9 m3/(s Pa)": Variant(effects={"tube_flow_restriction": {"conductance": 2e-9}}),
@@ -125,9 +142,13 @@ VARIANTS: Final[Mapping[str, Variant]] = {
     "muscle damping 6000 N s/m": Variant(effects=_damping(6000.0)),
     "muscle damping 12000 N s/m": Variant(effects=_damping(12000.0)),
     "damping 6000 N s/m, valve 4.2 mm2": Variant(_valve(4.2), {}, _damping(6000.0)),
-    "damping 12000 N s/m, activation 50 kPa": Variant(effects={**_damping(12000.0), **_activation(5e4)}),
+    "damping 12000 N s/m, activation 50 kPa": Variant(
+        effects={**_damping(12000.0), **_activation(5e4)}
+    ),
     "damping 6000 N s/m, valve 2.44 mm2": Variant(_valve(2.44), {}, _damping(6000.0)),
-    "damping 12000 N s/m, activation 50 kPa, valve 4.2 mm2": Variant(_valve(4.2), {}, {**_damping(12000.0), **_activation(5e4)}),
+    "damping 12000 N s/m, activation 50 kPa, valve 4.2 mm2": Variant(
+        _valve(4.2), {}, {**_damping(12000.0), **_activation(5e4)}
+    ),
 }
 
 
@@ -136,12 +157,14 @@ def trajectory() -> Trajectory:
     return lift_hold_return(*degrees(LOW, HIGH), delay=5.0)
 
 
-def believed(variant: Variant = VARIANTS["the rig"]) -> Rig:
+def assumed(variant: Variant = VARIANTS["the rig"]) -> Rig:
     """The rig as the controllers know it."""
     return named("elbow").with_parameters(variant.known)
 
 
-def plant(variant: Variant = VARIANTS["the rig"], payload: float = PAYLOADS[1], seed: int | None = _SEED) -> Rig:
+def plant(
+    variant: Variant = VARIANTS["the rig"], payload: float = PAYLOADS[1], seed: int | None = _SEED
+) -> Rig:
     """What is controlled.
 
     Parameters
@@ -157,10 +180,15 @@ def plant(variant: Variant = VARIANTS["the rig"], payload: float = PAYLOADS[1], 
     -------
     Rig
     """
-    rig = perturbed(believed(variant).with_parameters({"arm.payload": payload}), seed).with_parameters(variant.hidden)
+    rig = perturbed(
+        assumed(variant).with_parameters({"arm.payload": payload}), seed
+    ).with_parameters(variant.hidden)
     if variant.regulated:
         model = rig.model
-        fed = {**named("regulated_joint").model["supply"], "initial_pressure": model["supply"]["initial_pressure"]}
+        fed = {
+            **named("regulated_joint").model["supply"],
+            "initial_pressure": model["supply"]["initial_pressure"],
+        }
         rig = Rig(rig.name, {**model, "supply": fed})
     for name, values in variant.effects.items():
         rig = rig.with_effect(name, values)
@@ -198,12 +226,16 @@ class Lifts:
     @property
     def overshoot(self) -> Array:
         """Above the angle of the hold [deg], zero for none."""
-        return np.asarray(np.maximum(self.between(0.0, 25.0).max(axis=1) - HIGH, 0.0), dtype=np.float64)
+        return np.asarray(
+            np.maximum(self.between(0.0, 25.0).max(axis=1) - HIGH, 0.0), dtype=np.float64
+        )
 
     @property
     def undershoot(self) -> Array:
         """Below the angle of rest after the return [deg], zero for none."""
-        return np.asarray(np.maximum(LOW - self.between(15.0, 25.0).min(axis=1), 0.0), dtype=np.float64)
+        return np.asarray(
+            np.maximum(LOW - self.between(15.0, 25.0).min(axis=1), 0.0), dtype=np.float64
+        )
 
     @property
     def swing(self) -> Array:
@@ -215,15 +247,21 @@ class Lifts:
         """From the begin of the lift until the arm has turned by 1 deg [s]."""
         since = self.between(5.0, 25.0)
         moved = np.abs(since - since[:, :1]) > 1.0
-        return np.asarray(np.where(moved.any(axis=1), np.argmax(moved, axis=1) * _ROW, np.nan), dtype=np.float64)
+        return np.asarray(
+            np.where(moved.any(axis=1), np.argmax(moved, axis=1) * _ROW, np.nan), dtype=np.float64
+        )
 
     def error(self, phase: str, kind: str = "rms") -> Array:
         """Error of a phase ``lift``, ``hold``, ``return`` or ``rest`` [deg]."""
         return np.asarray(np.degrees(self.metrics.phases[phase][kind]), dtype=np.float64)
 
 
-def _controller(gains: Sequence[tuple[float, ...]], base: Rig, mass: Array, anti_windup: str) -> Parallel:
-    """One controller for a batch: the gains of each plant, all of the same kind of feedback, and the payload that it knows."""
+def _controller(
+    gains: Sequence[tuple[float, ...]], base: Rig, mass: Array, anti_windup: str
+) -> Parallel:
+    """One controller for a batch: the gains of each plant, all of the same kind of feedback, and
+    the payload that it knows.
+    """
     arm, table = ArmModel.from_rig(base), base.model["arm"]
     arms = arm.replace(
         inertia=table["inertia"] + mass * table["length"] ** 2,
@@ -245,7 +283,8 @@ def lifts(
     seed: int | None = _SEED,
     duration: float | None = None,
 ) -> dict[str, dict[str, Lifts]]:
-    """Lift, hold and return of plants, under controllers, with payloads: one batch for each valve and kind of feedback.
+    """Lift, hold and return of plants, under controllers, with payloads: one batch for each valve
+    and kind of feedback.
 
     Parameters
     ----------
@@ -277,7 +316,9 @@ def lifts(
             raise ParameterError(f"names has {name!r}; the plants are: {', '.join(VARIANTS)}")
     groups: dict[tuple[Any, ...], list[str]] = {}
     for name in names:
-        groups.setdefault((VARIANTS[name].regulated, *sorted(VARIANTS[name].known.items())), []).append(name)
+        groups.setdefault(
+            (VARIANTS[name].regulated, *sorted(VARIANTS[name].known.items())), []
+        ).append(name)
     found: dict[str, dict[str, Lifts]] = {name: {} for name in names}
     for members in groups.values():
         for size in (3, 4):
@@ -303,7 +344,7 @@ def _run(
         rigs += made[i * len(payloads) : (i + 1) * len(payloads)] * len(gains)
     each = [values for _ in members for values in gains.values() for _ in payloads]
     mass = np.array([m for _ in members for _ in gains for m in payloads])
-    path, base = trajectory(), believed(VARIANTS[members[0]])
+    path, base = trajectory(), assumed(VARIANTS[members[0]])
     run = sweep(
         rigs,
         _controller(each, base, mass, anti_windup),
@@ -312,7 +353,9 @@ def _run(
         sample_time=PERIOD,
         step=_STEP,
         initial=_at_rest(rigs),
-        actuation=_fed(float(base.parameter("supply.initial_pressure").value)) if VARIANTS[members[0]].regulated else None,
+        actuation=_fed(float(base.parameter("supply.initial_pressure").value))
+        if VARIANTS[members[0]].regulated
+        else None,
         channels=("joint_angle", "joint_rate", "muscle_pressure"),
         record_every=round(_ROW / PERIOD),
     ).run
@@ -325,7 +368,9 @@ def _run(
         for label in gains:
             rows = slice(place, place + len(payloads))
             place += len(payloads)
-            angle, rate, pressure = (np.array(run[c][rows]) for c in ("joint_angle", "joint_rate", "muscle_pressure"))
+            angle, rate, pressure = (
+                np.array(run[c][rows]) for c in ("joint_angle", "joint_rate", "muscle_pressure")
+            )
             metrics = evaluate(run.time, reference, angle, rate=rate, parts=path.phases)
             found[name][label] = Lifts(run.time, reference, angle, rate, pressure, metrics)
 
@@ -379,7 +424,9 @@ class Map:
         return [(float(first[i]), float(second[k])) for i, k in places]
 
     def smooth(self, unit: str) -> Array:
-        """Mean of J at the neighbours of the optimum over J there, payload by payload: 1 is flat."""
+        """Mean of J at the neighbours of the optimum over J there, payload by payload: 1 is
+        flat.
+        """
         shares = []
         for v in self.j[unit]:
             i, k = np.unravel_index(int(np.nanargmin(v)), v.shape)
@@ -388,7 +435,12 @@ class Map:
         return np.array(shares)
 
 
-def pid_map(kp: Sequence[float], ki: Sequence[float], name: str = "the rig", payloads: Sequence[float] = PAYLOADS[:3]) -> Map:
+def pid_map(
+    kp: Sequence[float],
+    ki: Sequence[float],
+    name: str = "the rig",
+    payloads: Sequence[float] = PAYLOADS[:3],
+) -> Map:
     """Gains kP and kI [V/rad, V/(rad s)] of the PID with kD = 0, in one batch.
 
     Parameters
@@ -404,17 +456,31 @@ def pid_map(kp: Sequence[float], ki: Sequence[float], name: str = "the rig", pay
     -------
     Map
     """
-    return _map({"kP": kp, "kI": ki}, name, payloads, lambda p, i: PID(p, i, period=PERIOD, anti_windup="none"))
+    return _map(
+        {"kP": kp, "kI": ki},
+        name,
+        payloads,
+        lambda p, i: PID(p, i, period=PERIOD, anti_windup="none"),
+    )
 
 
 def fuzzy_map(
-    g1: Sequence[float], h: Sequence[float], name: str = "the rig", payloads: Sequence[float] = PAYLOADS[:3], *, g2: float = 0.6
+    g1: Sequence[float],
+    h: Sequence[float],
+    name: str = "the rig",
+    payloads: Sequence[float] = PAYLOADS[:3],
+    *,
+    g2: float = 0.6,
 ) -> Map:
-    """Gains g1 [rad] and h [V] of the fuzzy controller with a fixed g2 [rad/s], in one batch; as :func:`pid_map`."""
+    """Gains g1 [rad] and h [V] of the fuzzy controller with a fixed g2 [rad/s], in one batch; as
+    :func:`pid_map`.
+    """
     return _map({"g1": g1, "h": h}, name, payloads, lambda a, b: Fuzzy(a, g2, b, period=PERIOD))
 
 
-def _map(gains: Mapping[str, Sequence[float]], name: str, payloads: Sequence[float], make: Any) -> Map:
+def _map(
+    gains: Mapping[str, Sequence[float]], name: str, payloads: Sequence[float], make: Any
+) -> Map:
     axes = {label: np.asarray(values, dtype=np.float64) for label, values in gains.items()}
     first, second = (m.ravel() for m in np.meshgrid(*axes.values(), indexing="ij"))
     shape = (len(payloads), *(values.size for values in axes.values()))
@@ -438,7 +504,11 @@ def _map(gains: Mapping[str, Sequence[float]], name: str, payloads: Sequence[flo
     for unit in ("rad", "deg"):
         # a part at a time: the whole record several times over would be a gigabyte
         parts = [
-            np.atleast_1d(evaluate(time, wanted, angle[i : i + 100], rate=rate[i : i + 100], unit=unit).curvature)
+            np.atleast_1d(
+                evaluate(
+                    time, wanted, angle[i : i + 100], rate=rate[i : i + 100], unit=unit
+                ).curvature
+            )
             for i in range(0, len(rigs), 100)
         ]
         omega[unit] = np.where(done.failed, np.nan, np.concatenate(parts)).reshape(shape)

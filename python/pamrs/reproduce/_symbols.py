@@ -31,56 +31,138 @@ SYMBOLS: Final = (
     Symbol("nu", "integral of the squared error over time (4.15)", "rad2 s or deg2 s", _CONTROL),
     Symbol(
         "omega",
-        "integral of the absolute curvature of the angle over time (4.16), (4.17): how restless the motion is; its value depends on "
-        "the unit of the angle, which is radians unless degrees are named",
+        "integral of the absolute curvature of the angle over time (4.16), (4.17): how restless "
+        "the motion is; its value depends on the unit of the angle, which is radians unless "
+        "degrees are named",
         "1",
         _CONTROL,
     ),
-    Symbol("J", "0.25 nu + 0.75 omega, each over its least of the runs compared (4.18); 1 at best", "1", _CONTROL),
     Symbol(
         "J",
-        "what the genetic algorithm minimises (3.25): missing work, a share of the work to spare, a penalty (3.26)",
+        "0.25 nu + 0.75 omega, each over its least of the runs compared (4.18); 1 at best",
+        "1",
+        _CONTROL,
+    ),
+    Symbol(
+        "J",
+        (
+            "what the genetic algorithm minimises (3.25): missing work, a share of the work to "
+            "spare, a penalty (3.26)"
+        ),
         "joule",
         ("ch3",),
     ),
     Symbol("GA", "the genetic algorithm of 3.5", "", ("ch3",)),
-    Symbol("l0, r0, lT", "ends of a tendon along and across its link, and its length (3.2.4)", "in", ("ch3",)),
+    Symbol(
+        "l0, r0, lT",
+        "ends of a tendon along and across its link, and its length (3.2.4)",
+        "in",
+        ("ch3",),
+    ),
     Symbol("C10, C01", "constants of the Mooney-Rivlin bladder (3.21)", "Pa", ("ch3",)),
     Symbol(
-        "c_F", "friction: share by which a muscle's force is lower while it shortens, higher while it lengthens (2.36)", "1", ("ch3",)
+        "c_F",
+        (
+            "friction: share by which a muscle's force is lower while it shortens, higher while it "
+            "lengthens (2.36)"
+        ),
+        "1",
+        ("ch3",),
     ),
-    Symbol("rotation", "angle of the elbow from where the empty muscles hold it, the rest angle", "deg", ("ch3",)),
-    Symbol("PID", "proportional, integral and derivative control", "", _CONTROL),
-    Symbol("FF+PID, FF+fuzzy", "feedforward of the arm's model with PID or fuzzy control beside it (4.3.2)", "", ("ch4",)),
-    Symbol("kP, kI", "proportional and integral gain of the PID", "V/rad, V/(rad s)", ("ch4",)),
-    Symbol("kM", "gain of the feedforward, from pressure error to wanted rate of pressure; 0: none", "1/s", ("ch4",)),
-    Symbol("g1, h", "error at which a fuzzy input is full, and voltage of a full output", "rad, V", ("ch4",)),
-    Symbol("lag", "by how much the angle is late, by least squares", "s", ("ch4",)),
-    Symbol("activation", "pressure up to which a muscle does not pull: it wakes there", "kPa", ("ch4",)),
-    Symbol("damping", "force against the rate at which one muscle's length changes", "N s/m", ("ch4",)),
     Symbol(
-        "I, b, m g r", "inertia, viscous friction and weight times lever of the arm with its payload", "kg m2, N m s/rad, N m", ("ch5",)
+        "rotation",
+        "angle of the elbow from where the empty muscles hold it, the rest angle",
+        "deg",
+        ("ch3",),
     ),
-    Symbol("C1, C2", "torque of the muscles at an angle: C1 times pressure, and C2 (5.1)", "N m/Pa, N m", ("ch5",)),
+    Symbol("PID", "proportional, integral and derivative control", "", _CONTROL),
+    Symbol(
+        "FF+PID, FF+fuzzy",
+        "feedforward of the arm's model with PID or fuzzy control beside it (4.3.2)",
+        "",
+        ("ch4",),
+    ),
+    Symbol("kP, kI", "proportional and integral gain of the PID", "V/rad, V/(rad s)", ("ch4",)),
+    Symbol(
+        "kM",
+        "gain of the feedforward, from pressure error to wanted rate of pressure; 0: none",
+        "1/s",
+        ("ch4",),
+    ),
+    Symbol(
+        "g1, h",
+        "error at which a fuzzy input is full, and voltage of a full output",
+        "rad, V",
+        ("ch4",),
+    ),
+    Symbol("lag", "by how much the angle is late, by least squares", "s", ("ch4",)),
+    Symbol(
+        "activation", "pressure up to which a muscle does not pull: it wakes there", "kPa", ("ch4",)
+    ),
+    Symbol(
+        "damping", "force against the rate at which one muscle's length changes", "N s/m", ("ch4",)
+    ),
+    Symbol(
+        "I, b, m g r",
+        "inertia, viscous friction and weight times lever of the arm with its payload",
+        "kg m2, N m s/rad, N m",
+        ("ch5",),
+    ),
+    Symbol(
+        "C1, C2",
+        "torque of the muscles at an angle: C1 times pressure, and C2 (5.1)",
+        "N m/Pa, N m",
+        ("ch5",),
+    ),
     Symbol("lambda", "slope of the sliding surface: rate error over angle error", "1/s", ("ch5",)),
-    Symbol("KD", "switching gain: pressure that is asked for beyond the boundary layer", "Pa", ("ch5",)),
-    Symbol("boundary layer", "distance from the sliding surface within which the switching is proportional", "rad/s", ("ch5",)),
-    Symbol("Gamma", "gains of the adaptation of I, b and m g r (Table 5.2)", "SI with radians", ("ch5",)),
+    Symbol(
+        "KD", "switching gain: pressure that is asked for beyond the boundary layer", "Pa", ("ch5",)
+    ),
+    Symbol(
+        "boundary layer",
+        "distance from the sliding surface within which the switching is proportional",
+        "rad/s",
+        ("ch5",),
+    ),
+    Symbol(
+        "Gamma",
+        "gains of the adaptation of I, b and m g r (Table 5.2)",
+        "SI with radians",
+        ("ch5",),
+    ),
     Symbol(
         "H, C, G",
-        "what the three networks learn over the angle, from acceleration, rate and 1 to pressure (5.17)-(5.19); "
-        "gamma_H, gamma_C and gamma_G are their gains",
+        "what the three networks learn over the angle, from acceleration, rate and 1 to pressure "
+        "(5.17)-(5.19); gamma_H, gamma_C and gamma_G are their gains",
         "Pa s2/rad, Pa s/rad, Pa",
         ("ch5",),
     ),
-    Symbol("L, B, r_eff", "length of a muscle, of a fibre of its braid, and lever of a constant arm (5.25)", "in", ("ch5",)),
     Symbol(
-        "effects such as `muscle_creep`", "physics that a plant has and a model has not; `pamrs effects` explains each", "", ("ch5",)
+        "L, B, r_eff",
+        "length of a muscle, of a fibre of its braid, and lever of a constant arm (5.25)",
+        "in",
+        ("ch5",),
     ),
-    Symbol("effects such as `muscle_creep`", "physics that the diagnosis names; `pamrs effects` explains each", "", ("ch4",)),
+    Symbol(
+        "effects such as `muscle_creep`",
+        "physics that a plant has and a model has not; `pamrs effects` explains each",
+        "",
+        ("ch5",),
+    ),
+    Symbol(
+        "effects such as `muscle_creep`",
+        "physics that the diagnosis names; `pamrs effects` explains each",
+        "",
+        ("ch4",),
+    ),
     Symbol("lb", "pound: of mass", "0.4536 kg", ("ch3", "ch5")),
     Symbol("lbf, ft lbf", "pound of force, and foot times it", "4.448 N, 1.356 N m", ("ch3",)),
-    Symbol("psi", "pound of force on a square inch; every pressure is above the ambient one", "6.895 kPa", _ALL),
+    Symbol(
+        "psi",
+        "pound of force on a square inch; every pressure is above the ambient one",
+        "6.895 kPa",
+        _ALL,
+    ),
 )
 
 

@@ -1,7 +1,9 @@
-"""The tracking experiments of chapter 5 on the shoulder rig: what is varied (controller, payload, estimates, effects) is an argument.
+"""The tracking experiments of chapter 5 on the shoulder rig: what is varied (controller, payload,
+estimates, effects) is an argument.
 
-All loops of one controller run in one batch. The rig's source is constant here (:data:`SOURCE_VOLUME`): the dissertation names a
-"high pressure air source" (4.2.1) and no volume, and the library's tank of 15 l runs empty after some 220 s of the compound trajectory.
+All loops of one controller run in one batch. The rig's source is constant here
+(:data:`SOURCE_VOLUME`): the dissertation names a "high pressure air source" (4.2.1) and no volume,
+and the library's tank of 15 l runs empty after some 220 s of the compound trajectory.
 """
 
 from __future__ import annotations
@@ -63,17 +65,20 @@ PAYLOADS: Final = (0.0, 25.0, 50.0)
 KINDS: Final = ("cascaded PID", "sliding", "adaptive sliding", "neural")
 #: Time between two samples of controllers and plants [s].
 PERIOD: Final = 0.005
-#: The trajectory begins at 95 deg, the arm at rest at 15: what is before counts as the approach [s].
+#: The trajectory begins at 95 deg, the arm at rest at 15: what is before counts as the approach
+#: [s].
 SETTLED: Final = 10.0
 SOURCE_VOLUME: Final = 1000.0
 
-#: Of the pressure loop that all four share [V/Pa, V/(Pa s), s], and of the rate's filter [s]: twice as fast as the package's default,
-#: since with that the arm without a payload (0.634 kg m2) oscillates under the switching gain that 50 lb need.
+#: Of the pressure loop that all four share [V/Pa, V/(Pa s), s], and of the rate's filter [s]: twice
+#: as fast as the package's default, since with that the arm without a payload (0.634 kg m2)
+#: oscillates under the switching gain that 50 lb need.
 LOOP: Final[Mapping[str, Any]] = {"kp": 4e-4, "ki": 2e-4, "pressure_filter": 0.0025}
 RATE_FILTER: Final = 0.0025
 
 _SURFACE: Final = {"slope": 6.0, "switching": 2e5, "boundary_layer": 2.0}
-#: One set of gains for every table and picture, :func:`tuned` shows how they were found. The sliding family shares its surface.
+#: One set of gains for every table and picture, :func:`tuned` shows how they were found. The
+#: sliding family shares its surface.
 GAINS: Final[Mapping[str, Mapping[str, Any]]] = {
     "cascaded PID": {"kp": 6e5, "ki": 2.4e6, "kd": 1e5},
     "sliding": _SURFACE,
@@ -101,8 +106,12 @@ def lift() -> Trajectory:
 
 @cache
 def plant(payload: float, effect: str = "", parameters: tuple[tuple[str, float], ...] = ()) -> Rig:
-    """The shoulder with a payload [lb], a source that stays as it is, and perhaps an effect of the catalogue."""
-    rig = shoulder().with_parameters({"arm.payload": payload * POUND, "supply.volume": SOURCE_VOLUME})
+    """The shoulder with a payload [lb], a source that stays as it is, and perhaps an effect of the
+    catalogue.
+    """
+    rig = shoulder().with_parameters(
+        {"arm.payload": payload * POUND, "supply.volume": SOURCE_VOLUME}
+    )
     return rig.with_effect(effect, dict(parameters)) if effect else rig
 
 
@@ -111,8 +120,12 @@ def _simplified() -> ArmModel:
     return ArmModel.from_rig(shoulder(), torque="simplified")
 
 
-def arm_model(payloads: Sequence[float], factor: Value = 1.0, torque: str = "simplified") -> ArmModel:
-    """What the controllers know, (5.1)-(5.4): the right I, b and m g r for the payload [lb] of each plant, times a factor."""
+def arm_model(
+    payloads: Sequence[float], factor: Value = 1.0, torque: str = "simplified"
+) -> ArmModel:
+    """What the controllers know, (5.1)-(5.4): the right I, b and m g r for the payload [lb] of each
+    plant, times a factor.
+    """
     base = _simplified() if torque == "simplified" else ArmModel.from_rig(shoulder(), torque=torque)
     exact = [ArmModel.from_rig(plant(payload), torque=base.torque) for payload in payloads]
     known = base.replace(
@@ -124,25 +137,36 @@ def arm_model(payloads: Sequence[float], factor: Value = 1.0, torque: str = "sim
 
 
 def controller(kind: str, arm: ArmModel, **changes: Any) -> Cascade:
-    """A controller of :data:`KINDS` with the gains of :data:`GAINS`, and the pressure loop that all of them have."""
+    """A controller of :data:`KINDS` with the gains of :data:`GAINS`, and the pressure loop that all
+    of them have.
+    """
     if kind not in GAINS:
-        raise ParameterError(f"kind = {kind!r} is not a controller of the chapter: {', '.join(KINDS)}")
+        raise ParameterError(
+            f"kind = {kind!r} is not a controller of the chapter: {', '.join(KINDS)}"
+        )
     own: dict[str, Any] = {**GAINS[kind], "period": PERIOD, "rate_filter": RATE_FILTER, **changes}
     inner = PressureLoop(period=PERIOD, **LOOP)
     if kind == "cascaded PID":
         return cascaded_pid(arm.pressure_limit, inner=inner, **own)
     if kind == "neural":
-        # the networks start from one arm: only a start from the model needs its numbers, one set for all
+        # the networks start from one arm: only a start from the model needs its numbers, one set
+        # for all
         return Cascade(Neural(_one(arm), **own), inner)
-    return Cascade({"sliding": Sliding, "adaptive sliding": AdaptiveSliding}[kind](arm, **own), inner)
+    return Cascade(
+        {"sliding": Sliding, "adaptive sliding": AdaptiveSliding}[kind](arm, **own), inner
+    )
 
 
 def _one(arm: ArmModel) -> ArmModel:
-    return arm.replace(**{name: float(np.max(getattr(arm, name))) for name in ("inertia", "viscous", "weight")})
+    return arm.replace(
+        **{name: float(np.max(getattr(arm, name))) for name in ("inertia", "viscous", "weight")}
+    )
 
 
 class _Watched(Controller):
-    """A cascade that starts from what it has learnt (one row for each plant; empty: nothing), and notes its estimates now and then."""
+    """A cascade that starts from what it has learnt (one row for each plant; empty: nothing), and
+    notes its estimates now and then.
+    """
 
     def __init__(self, cascade: Any, learnt: Mapping[str, Array], every: int) -> None:
         self.cascade, self.learnt, self.every, self.period = cascade, learnt, every, cascade.period
@@ -156,7 +180,9 @@ class _Watched(Controller):
         self.cascade.reset()
         if self.learnt:
             fresh, plants = self.cascade.state, len(next(iter(self.learnt.values())))
-            self.cascade.restore({**fresh, "outer": {**fresh["outer"], "batch": plants, **self.learnt}})
+            self.cascade.restore(
+                {**fresh, "outer": {**fresh["outer"], "batch": plants, **self.learnt}}
+            )
         self.times, self.notes, self._samples = [], {name: [] for name in self.names}, 0
 
     @property
@@ -176,7 +202,9 @@ class _Watched(Controller):
     @property
     def known(self) -> dict[str, Array]:
         """What is known now; after a first sample with one row for each plant."""
-        return {name: np.array(getattr(self.outer, f"_{name}"), dtype=np.float64) for name in self.names}
+        return {
+            name: np.array(getattr(self.outer, f"_{name}"), dtype=np.float64) for name in self.names
+        }
 
     def note(self, time: float) -> None:
         """Take note of what is known now."""
@@ -248,7 +276,13 @@ class Track:
     def mean(self, begin: float, end: float) -> Array:
         """Mean error [deg], shape (n,)."""
         part = self._part(begin, end)
-        return np.asarray(np.degrees(steady_error(self.time[part], self.wanted[part], self.angle[:, part], window=end - begin)))
+        return np.asarray(
+            np.degrees(
+                steady_error(
+                    self.time[part], self.wanted[part], self.angle[:, part], window=end - begin
+                )
+            )
+        )
 
     def nu(self, begin: float = 0.0, end: float = math.inf) -> Array:
         """Integral of the squared error (4.15) [deg^2 s], shape (n,)."""
@@ -258,17 +292,29 @@ class Track:
     def omega(self, begin: float = 0.0, end: float = math.inf) -> Array:
         """Absolute curvature (4.17) of the angle in radians over seconds, shape (n,)."""
         part = self._part(begin, end)
-        return np.asarray(total_curvature(self.time[part], self.angle[:, part], rate=self.rate[:, part]))
+        return np.asarray(
+            total_curvature(self.time[part], self.angle[:, part], rate=self.rate[:, part])
+        )
 
     def ripple(self, begin: float = SETTLED, end: float = math.inf) -> Array:
-        """Root mean square of the error above 1.5 Hz [deg]: the trajectory has nothing there but the corners of its triangle."""
+        """Root mean square of the error above 1.5 Hz [deg]: the trajectory has nothing there but
+        the corners of its triangle.
+        """
         from scipy.signal import butter, sosfiltfilt
 
         sos = butter(4, 1.5, "highpass", fs=1.0 / (self.time[1] - self.time[0]), output="sos")
-        return np.asarray(np.sqrt(np.mean(sosfiltfilt(sos, self.error, axis=1)[:, self._part(begin, end)] ** 2, axis=1)))
+        return np.asarray(
+            np.sqrt(
+                np.mean(
+                    sosfiltfilt(sos, self.error, axis=1)[:, self._part(begin, end)] ** 2, axis=1
+                )
+            )
+        )
 
     def cumulative(self) -> Array:
-        """Mean squared error up to each time [deg^2], as the chapter's figures have it, shape (n, samples)."""
+        """Mean squared error up to each time [deg^2], as the chapter's figures have it, shape (n,
+        samples).
+        """
         step = self.time[1] - self.time[0]
         squares = self.error**2
         total = np.cumsum(0.5 * (squares[:, 1:] + squares[:, :-1]), axis=1) * step
@@ -286,7 +332,8 @@ class Tuning:
     j, rms : ndarray, shape (payloads, gains)
         J (4.18), each payload a set of its own [1], and the error [deg].
     chosen : int
-        The gains with the smallest J at the middle payload, of those with a J of at most :data:`MOST_J` at every payload.
+        The gains with the smallest J at the middle payload, of those with a J of at most
+        :data:`MOST_J` at every payload.
     """
 
     gains: list[dict[str, float]]
@@ -296,15 +343,20 @@ class Tuning:
 
 
 def tuned(kind: str, payloads: Sequence[float] = PAYLOADS, duration: float = 30.0) -> Tuning:
-    """The grid of :data:`GRIDS` on the compound trajectory, all payloads in one batch; the controllers know the payload.
+    """The grid of :data:`GRIDS` on the compound trajectory, all payloads in one batch; the
+    controllers know the payload.
 
     The best of all at 25 lb oscillate without a payload, and are left out by their J there.
     """
     grid = GRIDS[kind]
     tried = [dict(zip(grid, values, strict=True)) for values in itertools.product(*grid.values())]
     every = [payload for payload in payloads for _ in tried]
-    columns: dict[str, Any] = {name: np.array([gains[name] for _ in payloads for gains in tried]) for name in grid}
-    done = follow(kind, [plant(payload) for payload in every], arm_model(every), waves(duration), **columns)
+    columns: dict[str, Any] = {
+        name: np.array([gains[name] for _ in payloads for gains in tried]) for name in grid
+    }
+    done = follow(
+        kind, [plant(payload) for payload in every], arm_model(every), waves(duration), **columns
+    )
     shape = (len(payloads), len(tried))
     j = combined(done.nu(SETTLED).reshape(shape), done.omega(SETTLED).reshape(shape), axis=1)
     usable = np.where(j.max(axis=0) <= MOST_J, j[len(payloads) // 2], np.inf)
@@ -348,20 +400,37 @@ def follow(
     Raises
     ------
     ParameterError
-        If there is no such controller, or numbers do not fit together: what was learnt needs one row for each plant.
+        If there is no such controller, or numbers do not fit together: what was learnt needs one
+        row for each plant.
     """
     taught = {name: np.asarray(values, dtype=np.float64) for name, values in (learnt or {}).items()}
     for name, values in taught.items():
         if values.shape[:1] != (len(plants),):
-            raise ParameterError(f"learnt[{name!r}] has the shape {values.shape}; one row for each of {len(plants)} plants is needed")
+            raise ParameterError(
+                f"learnt[{name!r}] has the shape {values.shape}; one row for each of {len(plants)} "
+                "plants is needed"
+            )
     made = controller(kind, arm, **changes)
     watched = _Watched(made if wrap is None else wrap(made), taught, round(note_every / PERIOD))
-    done = sweep(plants, watched, trajectory, sample_time=PERIOD, channels=("joint_angle", "joint_rate", "muscle_pressure"))
+    done = sweep(
+        plants,
+        watched,
+        trajectory,
+        sample_time=PERIOD,
+        channels=("joint_angle", "joint_rate", "muscle_pressure"),
+    )
     if note_every:
         watched.note(trajectory.duration)
     run = done.run
     wanted = np.asarray(trajectory(run.time).angle)
     return Track(
-        run.time, wanted, run["joint_angle"], run["joint_rate"], done.failed, watched.known, np.array(watched.times), watched.notes,
+        run.time,
+        wanted,
+        run["joint_angle"],
+        run["joint_rate"],
+        done.failed,
+        watched.known,
+        np.array(watched.times),
+        watched.notes,
         run["muscle_pressure"],
-    )  # fmt: skip
+    )

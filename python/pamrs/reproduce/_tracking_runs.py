@@ -12,22 +12,48 @@ import numpy as np
 
 from pamrs.control import Cascade, HysteresisCompensation, Neural
 from pamrs.recordings import Case, Recording
-from pamrs.reproduce._tracking import PAYLOADS, PERIOD, Track, arm_model, controller, follow, lift, plant, waves
+from pamrs.reproduce._tracking import (
+    PAYLOADS,
+    PERIOD,
+    Track,
+    arm_model,
+    controller,
+    follow,
+    lift,
+    plant,
+    waves,
+)
 from pamrs.rig import Rig
 from pamrs.simulation import Simulator
 
 if TYPE_CHECKING:
     from pamrs.diagnosis.result import Diagnosis
 
-__all__ = ["CASES", "EFFECTS", "FULL", "HYSTERESIS", "MIDDLE", "SHORT", "STARTS", "TRIALS", "WRONG", "Plan"]
+__all__ = [
+    "CASES",
+    "EFFECTS",
+    "FULL",
+    "HYSTERESIS",
+    "MIDDLE",
+    "SHORT",
+    "STARTS",
+    "TRIALS",
+    "WRONG",
+    "Plan",
+]
 
 Parameters = tuple[tuple[str, float], ...]
 
 #: The payload of the tables where the dissertation names none [lb].
 MIDDLE: Final = 25.0
-#: Friction of the braid: torque at 60 deg and 50 psi then differs by 7 % between contraction and extension, at 90 deg by 10 %
-#: (Fig. 5.2 has such a loop; how large it is cannot be read from the text).
-HYSTERESIS: Final[Parameters] = (("friction_constant", 15.0), ("friction_pressure", 8e-5), ("presliding", 1e-3))
+#: Friction of the braid: torque at 60 deg and 50 psi then differs by 7 % between contraction and
+#: extension, at 90 deg by 10 % (Fig. 5.2 has such a loop; how large it is cannot be read from the
+#: text).
+HYSTERESIS: Final[Parameters] = (
+    ("friction_constant", 15.0),
+    ("friction_pressure", 8e-5),
+    ("presliding", 1e-3),
+)
 #: What the plant may have that no controller knows of, one at a time.
 EFFECTS: Final[Mapping[str, Parameters]] = {
     "muscle_hysteresis": HYSTERESIS,
@@ -38,7 +64,10 @@ EFFECTS: Final[Mapping[str, Parameters]] = {
     "valve_dead_zone": (("half_width", 0.03),),
 }
 #: Plants of the comparison: payload [lb] and effect.
-CASES: Final[tuple[tuple[float, str], ...]] = (*((p, "") for p in PAYLOADS), *((MIDDLE, effect) for effect in EFFECTS))
+CASES: Final[tuple[tuple[float, str], ...]] = (
+    *((p, "") for p in PAYLOADS),
+    *((MIDDLE, effect) for effect in EFFECTS),
+)
 #: Factors on the estimates of I, b and m g r (5.4.1).
 WRONG: Final = (1.0, 0.1, 10.0)
 #: Table 5.2 as printed, taken as SI with radians, and this package's gains.
@@ -80,25 +109,43 @@ class Plan:
     def estimates(self) -> Track:
         """Sliding with right and wrong estimates: a row for each factor of each payload."""
         every = [(payload, factor) for payload in PAYLOADS for factor in WRONG]
-        arm = arm_model([payload for payload, _ in every], np.array([factor for _, factor in every]))
+        arm = arm_model(
+            [payload for payload, _ in every], np.array([factor for _, factor in every])
+        )
         return follow("sliding", [plant(payload) for payload, _ in every], arm, waves(self.record))
 
     @cache  # noqa: B019
     def switching(self, values: tuple[float, ...], payload: float = MIDDLE) -> Track:
-        """Sliding with estimates times 10 and 0.1: a row for each switching gain [Pa] of each factor, boundary layer as it was."""
+        """Sliding with estimates times 10 and 0.1: a row for each switching gain [Pa] of each
+        factor, boundary layer as it was.
+        """
         every = [(factor, value) for factor in (10.0, 0.1) for value in values]
         arm = arm_model([payload] * len(every), np.array([factor for factor, _ in every]))
         gains = np.array([value for _, value in every])
-        return follow("sliding", [plant(payload)] * len(every), arm, waves(min(self.record, 50.0)), switching=gains)
+        return follow(
+            "sliding",
+            [plant(payload)] * len(every),
+            arm,
+            waves(min(self.record, 50.0)),
+            switching=gains,
+        )
 
     @cache  # noqa: B019
     def adaptation(self) -> Track:
-        """Adaptive sliding with every set of :data:`TRIALS`, from the right estimates on, which are not bounded."""
+        """Adaptive sliding with every set of :data:`TRIALS`, from the right estimates on, which are
+        not bounded.
+        """
         n, columns = len(TRIALS), zip(*TRIALS.values(), strict=True)
         gains = tuple(np.array(column) for column in columns)
         arm = arm_model([MIDDLE] * n)
         return follow(
-            "adaptive sliding", [plant(MIDDLE)] * n, arm, waves(self.record), gains=gains, bounds=None, note_every=self.record / 200.0
+            "adaptive sliding",
+            [plant(MIDDLE)] * n,
+            arm,
+            waves(self.record),
+            gains=gains,
+            bounds=None,
+            note_every=self.record / 200.0,
         )
 
     @cache  # noqa: B019
@@ -106,11 +153,19 @@ class Plan:
         """Networks from zero, a row for each of :data:`STARTS`."""
         payloads = [payload for _, payload in STARTS]
         every = self.record / 5.0
-        return follow("neural", [plant(p) for p in payloads], arm_model(payloads), waves(self.record), note_every=every)
+        return follow(
+            "neural",
+            [plant(p) for p in payloads],
+            arm_model(payloads),
+            waves(self.record),
+            note_every=every,
+        )
 
     @cache  # noqa: B019
     def prepared(self) -> Track:
-        """Networks that know something: the simplified model at 50 lb, what 15 lb taught, Gaylord's estimate without payload."""
+        """Networks that know something: the simplified model at 50 lb, what 15 lb taught, Gaylord's
+        estimate without payload.
+        """
         taught = self.learning().learnt
         first = {name: [] for name in taught}  # type: dict[str, list[Any]]
         for start, payload in LATER:
@@ -139,7 +194,12 @@ class Plan:
         """The training of an adaptive controller on every case; None for the others."""
         if kind not in ("adaptive sliding", "neural"):
             return None
-        return follow(kind, [_rig(case) for case in self.cases], arm_model([p for p, _ in self.cases]), waves(self.training))
+        return follow(
+            kind,
+            [_rig(case) for case in self.cases],
+            arm_model([p for p, _ in self.cases]),
+            waves(self.training),
+        )
 
     @cache  # noqa: B019
     def compared(self, kind: str, trajectory: str) -> Track:
@@ -157,7 +217,9 @@ class Plan:
         def wrap(cascade: Cascade) -> Any:
             return HysteresisCompensation(cascade, self.model()) if known else cascade
 
-        return follow("sliding", [rig], arm_model([MIDDLE]), waves(min(self.record, 60.0)), wrap=wrap)
+        return follow(
+            "sliding", [rig], arm_model([MIDDLE]), waves(min(self.record, 60.0)), wrap=wrap
+        )
 
     def model(self) -> Rig:
         """The rig that the diagnosis found, or, where it was not asked for, the true one."""
@@ -170,7 +232,9 @@ class Plan:
         if found is None:
             from pamrs.diagnosis import diagnose
 
-            recordings = [_recording(role, seed, begin) for seed, (role, begin) in enumerate(_RECORDED)]
+            recordings = [
+                _recording(role, seed, begin) for seed, (role, begin) in enumerate(_RECORDED)
+            ]
             found = diagnose(Case("shoulder_under_pid", plant(MIDDLE), recordings, Path(".")))
             self.__dict__["_found"] = found
         return found
@@ -188,16 +252,24 @@ def _recording(role: str, seed: int, begin: float, seconds: float = 16.0) -> Rec
 
     def answer(sample: dict[str, float]) -> float:
         one = {name: float(value) for name, value in sample.items()}
-        return float(np.asarray(pid.update(one["time"], one, path(begin - 4.0 + one["time"]))).reshape(-1)[0])
+        return float(
+            np.asarray(pid.update(one["time"], one, path(begin - 4.0 + one["time"]))).reshape(-1)[0]
+        )
 
     run = simulator.control(answer, 4.0 + seconds)
     inside = slice(round(4.0 / PERIOD), round((4.0 + seconds) / PERIOD))
     rng = np.random.default_rng(seed)
     time: Any = PERIOD * np.arange(inside.stop - inside.start)
     names = (*_NOISE, "valve_command")
-    channels = {name: np.asarray(run[name])[inside] + rng.normal(0.0, 1.0, time.size) * _NOISE.get(name, 0.0) for name in names}
+    channels = {
+        name: np.asarray(run[name])[inside]
+        + rng.normal(0.0, 1.0, time.size) * _NOISE.get(name, 0.0)
+        for name in names
+    }
     mask = {name: np.ones(time.size, dtype=bool) for name in names}
-    return Recording(f"{role}_{begin:g}s", role, time, PERIOD, channels, mask, [], dict.fromkeys(names, "SI"))
+    return Recording(
+        f"{role}_{begin:g}s", role, time, PERIOD, channels, mask, [], dict.fromkeys(names, "SI")
+    )
 
 
 FULL: Final = Plan()

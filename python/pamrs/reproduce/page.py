@@ -87,11 +87,23 @@ def page(sections: Sequence[Section], command: str, folder: str | os.PathLike[st
         "",
         f"Made by `{command}`; change the code, not this page.",
         "",
-        "R. M. Robinson, *Pneumatic Artificial Muscle Actuators for Compliant Robotic Manipulators*, University of Maryland, 2014.",
-        'Each statement stands beside our number with a verdict: "agree" and "differs" by the criterion of its line, "cannot tell"',
-        'where the source or the model leaves it open. "Used to identify" means that the statement chose one of our numbers, so that',
+        (
+            "R. M. Robinson, *Pneumatic Artificial Muscle Actuators for Compliant Robotic "
+            "Manipulators*, University of Maryland, 2014."
+        ),
+        (
+            'Each statement stands beside our number with a verdict: "agree" and "differs" by the '
+            'criterion of its line, "cannot tell"'
+        ),
+        (
+            'where the source or the model leaves it open. "Used to identify" means that the '
+            "statement chose one of our numbers, so that"
+        ),
         "agreement proves nothing.",
-        'Under "where", 3.2.4 is a section of the source and (3.24) an equation; [1] is a remark below its table.',
+        (
+            'Under "where", 3.2.4 is a section of the source and (3.24) an equation; [1] is a '
+            "remark below its table."
+        ),
         "",
     ]
     for section in sections:
@@ -99,12 +111,22 @@ def page(sections: Sequence[Section], command: str, folder: str | os.PathLike[st
         lines += [f"- {sentence}" for sentence in section.in_short] + [""]
         lines += _symbols(section)
         if section.chosen:
-            lines += ["### Numbers that the source does not give", "", "| number | value | from |", "|---|---|---|"]
-            lines += [f"| `{name}` | {value} | {reason} |" for name, value, reason in section.chosen] + [""]
+            lines += [
+                "### Numbers that the source does not give",
+                "",
+                "| number | value | from |",
+                "|---|---|---|",
+            ]
+            lines += [
+                f"| `{name}` | {value} | {reason} |" for name, value, reason in section.chosen
+            ] + [""]
         below: dict[str, str] = {}
         for picture in section.pictures:
             file = (Path(folder) / f"{picture.name}.png").as_posix()
-            below[picture.group] = below.get(picture.group, "") + f"![{picture.caption}]({file})\n\n*{picture.caption}*\n\n"
+            below[picture.group] = (
+                below.get(picture.group, "")
+                + f"![{picture.caption}]({file})\n\n*{picture.caption}*\n\n"
+            )
         lines += [markdown(section.rows, headings=section.headings, below=below)]
     return "\n".join(lines).rstrip() + "\n"
 
@@ -114,4 +136,11 @@ def _symbols(section: Section) -> list[str]:
     if not section.symbols:
         return []
     rows = [f"| {name} | {meaning} | {unit} |" for name, meaning, unit in section.symbols]
-    return ["### Symbols and abbreviations", "", "| symbol | meaning | unit |", "|---|---|---|", *rows, ""]
+    return [
+        "### Symbols and abbreviations",
+        "",
+        "| symbol | meaning | unit |",
+        "|---|---|---|",
+        *rows,
+        "",
+    ]

@@ -14,4 +14,13 @@ from pamrs.rig._muscle import Muscle
 from pamrs.rig._reader import Reader
 from pamrs.rig._rig import Parameter, Rig, load_rig, parse_rig
 
-__all__ = ["Joint", "Muscle", "Parameter", "Reader", "Rig", "load_rig", "muscle_problems", "parse_rig"]
+__all__ = [
+    "Joint",
+    "Muscle",
+    "Parameter",
+    "Reader",
+    "Rig",
+    "load_rig",
+    "muscle_problems",
+    "parse_rig",
+]

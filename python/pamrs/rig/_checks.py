@@ -16,7 +16,8 @@ def block_problems(model: Mapping[str, Any]) -> list[str]:
     Parameters
     ----------
     model : mapping
-        As :attr:`pamrs.Rig.model`; a table with a value that could not be read (None) is passed over.
+        As :attr:`pamrs.Rig.model`; a table with a value that could not be read (None) is passed
+        over.
 
     Returns
     -------
@@ -36,12 +37,15 @@ def block_problems(model: Mapping[str, Any]) -> list[str]:
 
 
 def muscle_problems(label: str, muscle: Mapping[str, Any]) -> list[str]:
-    """What does not go together in a muscle; ``label`` is what the block is called, ``"muscle.flexor"``."""
+    """What does not go together in a muscle; ``label`` is what the block is called,
+    ``"muscle.flexor"``.
+    """
     problems = []
     slope, offset = muscle.get("modulus_slope", []), muscle.get("modulus_offset", [])
     if len(slope) != len(offset):
         problems.append(
-            f"{label}.modulus_slope has {len(slope)} values and {label}.modulus_offset {len(offset)}; the same number is needed"
+            f"{label}.modulus_slope has {len(slope)} values and {label}.modulus_offset "
+            f"{len(offset)}; the same number is needed"
         )
     factors = muscle.get("extension_factors", [])
     if factors and len(factors) != 3:
@@ -59,9 +63,16 @@ def _valve(label: str, valve: Mapping[str, Any]) -> list[str]:
     """What is wrong with a valve's area table."""
     opening, fraction, label = valve["opening"], valve["fraction"], f"{label}.area_fraction"
     if len(opening) != len(fraction) or len(opening) < 2:
-        return [f"{label}: opening has {len(opening)} values and fraction {len(fraction)}; the same number, two at least, is needed"]
+        return [
+            f"{label}: opening has {len(opening)} values and fraction {len(fraction)}; the same "
+            "number, two at least, is needed"
+        ]
     problems = []
-    if opening[0] != 0.0 or opening[-1] != 1.0 or any(b <= a for a, b in zip(opening, opening[1:], strict=False)):
+    if (
+        opening[0] != 0.0
+        or opening[-1] != 1.0
+        or any(b <= a for a, b in zip(opening, opening[1:], strict=False))
+    ):
         problems.append(f"{label}.opening = {opening} is not allowed: it must rise from 0 to 1")
     if any(b < a for a, b in zip(fraction, fraction[1:], strict=False)):
         problems.append(f"{label}.fraction = {fraction} is not allowed: it must not fall")
@@ -80,14 +91,23 @@ def _rising(label: str, low: str, high: str, unit: str, table: Mapping[str, Any]
     """Limits of a range that are the wrong way round."""
     if table[low] < table[high]:
         return []
-    return [f"{label}.{high} = {table[high]:g} {unit} is not allowed: more than {label}.{low} = {table[low]:g} {unit} is needed"]
+    return [
+        f"{label}.{high} = {table[high]:g} {unit} is not allowed: more than {label}.{low} = "
+        f"{table[low]:g} {unit} is needed"
+    ]
 
 
 def _link(label: str, link: Mapping[str, Any]) -> list[str]:
     """A link that nothing holds against its joint: the arm's mass matrix could not be solved."""
-    if link["inertia"] + link["mass"] * link["centre"] ** 2 + link["payload"] * link["length"] ** 2 > 0.0:
+    if (
+        link["inertia"] + link["mass"] * link["centre"] ** 2 + link["payload"] * link["length"] ** 2
+        > 0.0
+    ):
         return []
-    return [f"{label} has no inertia about its joint (inertia + mass centre^2 + payload length^2 = 0 kg m2): more is needed"]
+    return [
+        f"{label} has no inertia about its joint (inertia + mass centre^2 + payload length^2 = 0 "
+        "kg m2): more is needed"
+    ]
 
 
 def _vacuum(model: Mapping[str, Any], ambient: float) -> list[str]:
@@ -101,4 +121,10 @@ def _vacuum(model: Mapping[str, Any], ambient: float) -> list[str]:
     ]
 
 
-_CHECKS = {"valve": _valve, "muscle": muscle_problems, "joint": _joint, "link": _link, "load": _load}
+_CHECKS = {
+    "valve": _valve,
+    "muscle": muscle_problems,
+    "joint": _joint,
+    "link": _link,
+    "load": _load,
+}

@@ -20,16 +20,17 @@ Array = NDArray[np.float64]
 
 
 class Joint:
-    """A joint that a bundle of muscles turns: four-parameter tendon, constant pulley, or a polynomial.
+    """A joint that a bundle of muscles turns: four-parameter tendon, constant pulley, or a
+    polynomial.
 
-    Every kind but ``published`` conserves power: ``tau dtheta = F dd`` (dissertation ch. 3, corrected; section 4 of the physics
-    reference).
+    Every kind but ``published`` conserves power: ``tau dtheta = F dd`` (dissertation ch. 3,
+    corrected; section 4 of the physics reference).
 
     Parameters
     ----------
     kind : {"tendon", "published", "pulley", "polynomial"}
-        ``published`` is the tendon joint with the torque as printed in (3.6)-(3.8), too small by the square of the cosine of the
-        tendon's angle.
+        ``published`` is the tendon joint with the torque as printed in (3.6)-(3.8), too small by
+        the square of the cosine of the tendon's angle.
     rest_angle : float
         Joint angle at which the muscles are at rest length [rad].
     upper_axial, upper_offset, lower_axial, lower_offset : float
@@ -47,7 +48,8 @@ class Joint:
     Examples
     --------
     >>> import pamrs
-    >>> joint = pamrs.Joint(rest_angle=0.26, upper_axial=0.0254, upper_offset=0.0274, lower_axial=0.0274, lower_offset=0.0048)
+    >>> joint = pamrs.Joint(rest_angle=0.26, upper_axial=0.0254, upper_offset=0.0274,
+    ...     lower_axial=0.0274, lower_offset=0.0048)
     >>> joint.shortening([0.6, 1.0]).round(4)
     array([0.0071, 0.0168])
     """
@@ -76,9 +78,14 @@ class Joint:
         }
         for name, value in self._spec.items():
             if isinstance(value, float) and not math.isfinite(value):
-                raise ParameterError(f"joint.{name} = {value} is not allowed: a finite number is needed")
+                raise ParameterError(
+                    f"joint.{name} = {value} is not allowed: a finite number is needed"
+                )
         if not all(math.isfinite(value) for value in self._spec["coefficients"]):
-            raise ParameterError(f"joint.coefficients = {self._spec['coefficients']} is not allowed: finite numbers are needed")
+            raise ParameterError(
+                f"joint.coefficients = {self._spec['coefficients']} is not allowed: finite numbers "
+                "are needed"
+            )
         self._core = _core.Joint(json.dumps(self._spec))
 
     @classmethod
@@ -99,7 +106,10 @@ class Joint:
     @property
     def parameters(self) -> dict[str, Any]:
         """Every argument that the joint was made with, SI units (a copy)."""
-        return {name: list(value) if isinstance(value, list) else value for name, value in self._spec.items()}
+        return {
+            name: list(value) if isinstance(value, list) else value
+            for name, value in self._spec.items()
+        }
 
     def shortening(self, angle: ArrayLike) -> Array:
         """How far the muscle is shortened [m].
@@ -122,7 +132,8 @@ class Joint:
         return self._over(self._core.shortening, angle)
 
     def moment_arm(self, angle: ArrayLike) -> Array:
-        """Rate of shortening per rate of angle, ``dd/dtheta`` [m]; arguments and errors as :meth:`shortening`.
+        """Rate of shortening per rate of angle, ``dd/dtheta`` [m]; arguments and errors as
+        :meth:`shortening`.
 
         Parameters
         ----------
@@ -136,7 +147,8 @@ class Joint:
         return self._over(self._core.moment_arm, angle)
 
     def torque_arm(self, angle: ArrayLike) -> Array:
-        """Torque per pull [m]: the moment arm, except for ``published``; otherwise as :meth:`shortening`.
+        """Torque per pull [m]: the moment arm, except for ``published``; otherwise as
+        :meth:`shortening`.
 
         Parameters
         ----------
@@ -163,7 +175,9 @@ class Joint:
         """
         return self._over(self._core.reaches, angle) > 0.5
 
-    def torque(self, muscle: Muscle, pressure: ArrayLike, angle: ArrayLike, *, count: int = 1) -> Array:
+    def torque(
+        self, muscle: Muscle, pressure: ArrayLike, angle: ArrayLike, *, count: int = 1
+    ) -> Array:
         """Torque of a bundle of equal muscles [N m].
 
         Parameters
@@ -199,7 +213,10 @@ class Joint:
         return Joint.from_model, (self.parameters,)
 
     def __repr__(self) -> str:
-        return f"Joint({self._spec['kind']}, rest_angle={math.degrees(self._spec['rest_angle']):.4g} deg)"
+        return (
+            f"Joint({self._spec['kind']}, rest_angle={math.degrees(self._spec['rest_angle']):.4g} "
+            "deg)"
+        )
 
 
 _STOPS = ("min_angle", "max_angle", "stop_stiffness", "stop_damping")

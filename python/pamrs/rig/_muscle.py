@@ -21,7 +21,8 @@ Array = NDArray[np.float64]
 class Muscle:
     """A braided muscle with one of the quasi-static force models of the dissertation (ch. 2 to 4).
 
-    Every model is ``F = P gas_area(e) + modulus_scale sum_j (slope_j P + offset_j) elastic_basis(e)[j]``.
+    Every model is ``F = P gas_area(e) + modulus_scale sum_j (slope_j P + offset_j)
+    elastic_basis(e)[j]``.
 
     Parameters
     ----------
@@ -32,35 +33,40 @@ class Muscle:
     wall_thickness : float
         Bladder thickness at rest [m].
     model : str
-        ``gaylord``, ``chou_hannaford``, ``mooney_rivlin``, ``ferraresi`` (2.8), ``kothera`` (2.16), ``robinson``
-        (2.16 on elliptic ends) or ``elbow_linear`` (4.4)-(4.7).
+        ``gaylord``, ``chou_hannaford``, ``mooney_rivlin``, ``ferraresi`` (2.8), ``kothera`` (2.16),
+        ``robinson`` (2.16 on elliptic ends) or ``elbow_linear`` (4.4)-(4.7).
     geometry : {"cylinder", "elliptic", "elliptic_published"}, optional
-        Shape of the ends; by default that of the model's source: elliptic for ``robinson``, else cylinder.
+        Shape of the ends; by default that of the model's source: elliptic for ``robinson``, else
+        cylinder.
     modulus_slope, modulus_offset : sequence of float
-        ``m_k`` [1] and ``b_k`` [Pa] of the moduli ``E_k = m_k P + b_k``, from order 1 on (``ferraresi``, ``kothera``,
-        ``robinson``).
+        ``m_k`` [1] and ``b_k`` [Pa] of the moduli ``E_k = m_k P + b_k``, from order 1 on
+        (``ferraresi``, ``kothera``, ``robinson``).
     c10, c01 : float
         Mooney-Rivlin constants [Pa] (``mooney_rivlin``).
     bladder_modulus : float
         ``E_R`` [Pa] (``elbow_linear``).
     extension_factors : sequence of float
-        Factors on the wall's pressure, on FL and on FT while the muscle lengthens [1] (``elbow_linear``).
+        Factors on the wall's pressure, on FL and on FT while the muscle lengthens [1]
+        (``elbow_linear``).
     friction_coefficient, friction_pressure_slope, friction_floor : float
-        ``c_F = max(coefficient + slope P, floor)`` of the friction hysteresis (2.36) [1, 1/Pa, 1]; all zero: none.
+        ``c_F = max(coefficient + slope P, floor)`` of the friction hysteresis (2.36) [1, 1/Pa, 1];
+        all zero: none.
     friction_presliding : float
-        Motion over which the force goes from one branch of the hysteresis to the other in a simulation [m].
+        Motion over which the force goes from one branch of the hysteresis to the other in a
+        simulation [m].
     count : int
         Muscles in parallel in a rig; the methods here are those of one muscle.
     modulus_scale : float
         Factor on every elastic parameter [1].
     k0, contraction_slope, extension_slope, neck_floor : float
-        Axis ratio of the elliptic ends at rest, its slopes per unit contraction, and the smallest radius in
-        extension relative to rest [1].
+        Axis ratio of the elliptic ends at rest, its slopes per unit contraction, and the smallest
+        radius in extension relative to rest [1].
 
     Raises
     ------
     ParameterError
-        If a value is not finite or not possible, or the model has no such parameter; the message names it.
+        If a value is not finite or not possible, or the model has no such parameter; the message
+        names it.
 
     Examples
     --------
@@ -126,9 +132,14 @@ class Muscle:
             entries = value if isinstance(value, list) else [value]
             for entry in entries:
                 if isinstance(entry, (float, np.floating)) and not np.isfinite(entry):
-                    raise ParameterError(f"muscle.{name} = {entry} is not allowed: a finite number is needed")
+                    raise ParameterError(
+                        f"muscle.{name} = {entry} is not allowed: a finite number is needed"
+                    )
         if len(self._model["extension_factors"]) != 3:
-            raise ParameterError(f"muscle.extension_factors = {list(extension_factors)} is not allowed: three numbers are needed")
+            raise ParameterError(
+                f"muscle.extension_factors = {list(extension_factors)} is not allowed: three "
+                "numbers are needed"
+            )
         self._core = _core.Muscle(json.dumps(self._model, default=float))
 
     @classmethod
@@ -152,8 +163,9 @@ class Muscle:
         Parameters
         ----------
         **changes
-            Parameters of :class:`Muscle`. With another ``model`` the elastic parameters that it does not have are left
-            out, and the geometry becomes the model's own unless one is given.
+            Parameters of :class:`Muscle`. With another ``model`` the elastic parameters that it
+            does not have are left out, and the geometry becomes the model's own unless one is
+            given.
 
         Returns
         -------
@@ -166,13 +178,17 @@ class Muscle:
         """
         unknown = [name for name in changes if name not in self._model]
         if unknown:
-            raise ParameterError(f"muscle.{unknown[0]} is not a parameter: {', '.join(self._model)}")
+            raise ParameterError(
+                f"muscle.{unknown[0]} is not a parameter: {', '.join(self._model)}"
+            )
         parameters = self.parameters
         model = str(changes.get("model", self.model))
         if model != self.model:
             parameters["geometry"] = None
             kept = ELASTIC_PARAMETERS.get(model, ())
-            for name in {name for names in ELASTIC_PARAMETERS.values() for name in names}.difference(kept):
+            for name in {
+                name for names in ELASTIC_PARAMETERS.values() for name in names
+            }.difference(kept):
                 parameters.pop(name)
             if "modulus_slope" in kept and not parameters["modulus_slope"]:
                 parameters["modulus_slope"] = parameters["modulus_offset"] = [0.0]
@@ -191,7 +207,10 @@ class Muscle:
     @property
     def parameters(self) -> dict[str, Any]:
         """Every argument that the muscle was made with, SI units (a copy)."""
-        return {name: list(value) if isinstance(value, list) else value for name, value in self._model.items()}
+        return {
+            name: list(value) if isinstance(value, list) else value
+            for name, value in self._model.items()
+        }
 
     @property
     def fibre_length(self) -> float:
@@ -272,7 +291,8 @@ class Muscle:
         return self._over(self._core.air_volume, contraction)
 
     def circumferential_strain(self, contraction: ArrayLike) -> Array:
-        """Hoop strain of the wall's mid-line, ``(R - t/2)/(R0 - t0/2) - 1`` (2.15) [1]; otherwise as :meth:`radius`.
+        """Hoop strain of the wall's mid-line, ``(R - t/2)/(R0 - t0/2) - 1`` (2.15) [1]; otherwise
+        as :meth:`radius`.
 
         Parameters
         ----------
@@ -286,7 +306,8 @@ class Muscle:
         return self._over(self._core.circumferential_strain, contraction)
 
     def braid_taut(self, contraction: ArrayLike) -> NDArray[np.bool_]:
-        """Whether the radius has reached its floor in extension; arguments and errors as :meth:`radius`.
+        """Whether the radius has reached its floor in extension; arguments and errors as
+        :meth:`radius`.
 
         Parameters
         ----------
@@ -300,7 +321,8 @@ class Muscle:
         return self._over(self._core.braid_taut, contraction) > 0.5
 
     def gas_area(self, contraction: ArrayLike) -> Array:
-        """Force per gauge pressure without elasticity, while contracting [m2]; otherwise as :meth:`radius`.
+        """Force per gauge pressure without elasticity, while contracting [m2]; otherwise as
+        :meth:`radius`.
 
         Parameters
         ----------
@@ -324,8 +346,8 @@ class Muscle:
         Returns
         -------
         ndarray
-            Shape S + (J,): one column for each order of the stress polynomial, for ``c10`` and ``c01``, or for the
-            bladder modulus; none for ``gaylord`` and ``chou_hannaford``.
+            Shape S + (J,): one column for each order of the stress polynomial, for ``c10`` and
+            ``c01``, or for the bladder modulus; none for ``gaylord`` and ``chou_hannaford``.
 
         Raises
         ------
@@ -336,7 +358,9 @@ class Muscle:
         columns = self._core.elastic_basis(np.ascontiguousarray(e.ravel()))
         return columns.reshape(*e.shape, columns.shape[1])
 
-    def force(self, pressure: ArrayLike, contraction: ArrayLike, direction: ArrayLike | None = None) -> Array:
+    def force(
+        self, pressure: ArrayLike, contraction: ArrayLike, direction: ArrayLike | None = None
+    ) -> Array:
         """Pulling force of one muscle [N], exact solve.
 
         Parameters
@@ -346,8 +370,9 @@ class Muscle:
         contraction : array_like
             Contraction ratio [1]; broadcast against ``pressure``.
         direction : array_like, optional
-            Direction of motion, from -1 (contracting) to +1 (lengthening): adds the friction hysteresis and, for
-            ``elbow_linear``, the lengthening branch. None: the contracting branch without friction.
+            Direction of motion, from -1 (contracting) to +1 (lengthening): adds the friction
+            hysteresis and, for ``elbow_linear``, the lengthening branch. None: the contracting
+            branch without friction.
 
         Returns
         -------
@@ -357,12 +382,14 @@ class Muscle:
         Raises
         ------
         ParameterError
-            If a value is not finite, a pressure below vacuum, a contraction beyond the braid's limits or a direction
-            outside -1 to 1.
+            If a value is not finite, a pressure below vacuum, a contraction beyond the braid's
+            limits or a direction outside -1 to 1.
         """
         return self._forces(self._core.force, pressure, contraction, direction)
 
-    def force_table(self, pressure: ArrayLike, contraction: ArrayLike, direction: ArrayLike | None = None) -> Array:
+    def force_table(
+        self, pressure: ArrayLike, contraction: ArrayLike, direction: ArrayLike | None = None
+    ) -> Array:
         """Pulling force of one muscle [N] from the compiled table; otherwise as :meth:`force`.
 
         Parameters
@@ -396,7 +423,9 @@ class Muscle:
         given = [pressure, contraction] if direction is None else [pressure, contraction, direction]
         arrays = np.broadcast_arrays(*(np.asarray(value, dtype=np.float64) for value in given))
         flat = [np.ascontiguousarray(array.ravel()) for array in arrays]
-        return function(flat[0], flat[1], flat[2] if len(flat) > 2 else None).reshape(arrays[0].shape)
+        return function(flat[0], flat[1], flat[2] if len(flat) > 2 else None).reshape(
+            arrays[0].shape
+        )
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Muscle.from_model, (self.parameters,)

@@ -1,8 +1,8 @@
 """Which block is connected to which: the ports of a rig, what they default to, and what cannot be.
 
-A port is a key that names another block (:data:`pamrs.rig.schema.PORTS`). What a file leaves out follows from the names: a
-valve feeds the chamber of its own name, a muscle pulls on the only joint. What the names do not settle is a problem, never a
-guess.
+A port is a key that names another block (:data:`pamrs.rig.schema.PORTS`). What a file leaves out
+follows from the names: a valve feeds the chamber of its own name, a muscle pulls on the only joint.
+What the names do not settle is a problem, never a guess.
 """
 
 from __future__ import annotations
@@ -16,7 +16,8 @@ from pamrs.rig.schema import BLOCKS, PORTS, Port, kind_of, qualified, tables_of
 __all__ = ["Ports", "bare", "connect", "effect_problem", "near_name", "wiring"]
 
 Ports = dict[str, dict[str, dict[str, str]]]
-"""Kind of block -> name -> port -> the block at its other end in full, ``""`` for the inlet of a line that valves feed."""
+"""Kind of block -> name -> port -> the block at its other end in full, ``""`` for the inlet of a
+line that valves feed."""
 
 _PLURAL: Final = {"supply": "supplies"}
 _NEEDS: Final = (("joint", "muscle"), ("joint", "arm"), ("arm", "joint"), ("load", "muscle"))
@@ -28,14 +29,16 @@ def connect(model: Mapping[str, Any]) -> tuple[Ports, list[str]]:
     Parameters
     ----------
     model : mapping
-        As :attr:`pamrs.Rig.model`; ``model["ports"]`` has what the file gives. Values may be None where they are not known.
+        As :attr:`pamrs.Rig.model`; ``model["ports"]`` has what the file gives. Values may be None
+        where they are not known.
 
     Returns
     -------
     ports : dict
         Links stand base first.
     problems : list of str
-        Everything that is not connected or cannot be, one sentence each. With any, ``ports`` is not complete.
+        Everything that is not connected or cannot be, one sentence each. With any, ``ports`` is not
+        complete.
     """
     connector = _Connector(model)
     connector.whole_blocks()
@@ -44,7 +47,11 @@ def connect(model: Mapping[str, Any]) -> tuple[Ports, list[str]]:
     connector.muscles()
     connector.arm()
     problems = connector.problems
-    problems += [text for entry in model.get("effects", ()) if (text := effect_problem(model, entry["id"], entry.get("at", "")))]
+    problems += [
+        text
+        for entry in model.get("effects", ())
+        if (text := effect_problem(model, entry["id"], entry.get("at", "")))
+    ]
     return connector.ports, problems
 
 
@@ -67,25 +74,35 @@ def effect_problem(model: Mapping[str, Any], effect: str, place: str) -> str:
 
 
 def wiring(model: Mapping[str, Any], ports: Ports) -> list[str]:
-    """One line for each way that the air takes and each way that the force takes, to be read by a person."""
+    """One line for each way that the air takes and each way that the force takes, to be read by a
+    person.
+    """
     lines, used = [], set()
     inner = {qualified("line", name): ends for name, ends in ports["line"].items()}
     for name, ends in ports["valve"].items():
         way = [ends["from"], qualified("valve", name), ends["to"]]
         if ends["to"] in inner:
             way.append(inner[ends["to"]]["to"])
-        lines.append(way if way[-1] == "ambient" else [*way, "ambient"])  # a valve also vents what it fills
+        lines.append(
+            way if way[-1] == "ambient" else [*way, "ambient"]
+        )  # a valve also vents what it fills
     lines += [[ends["from"], name, ends["to"]] for name, ends in inner.items() if ends["from"]]
     for way in lines:
         used.update(way)
-    stores = [qualified(kind, name) for kind in ("supply", "chamber") for name in tables_of(model, kind)]
+    stores = [
+        qualified(kind, name) for kind in ("supply", "chamber") for name in tables_of(model, kind)
+    ]
     carried = {ends["joint"]: qualified("link", name) for name, ends in ports["link"].items()}
     pulls = []
     for name, ends in ports["muscle"].items():
         own = [qualified("transmission", name)] if name in tables_of(model, "transmission") else []
         moved = [] if ends["joint"] == "load" else [carried.get(ends["joint"], "arm")]
         pulls.append([ends["chamber"], qualified("muscle", name), *own, ends["joint"], *moved])
-    chain = [part for name, ends in ports["link"].items() for part in (ends["joint"], qualified("link", name))]
+    chain = [
+        part
+        for name, ends in ports["link"].items()
+        for part in (ends["joint"], qualified("link", name))
+    ]
     return [
         *(f"air: {' -> '.join(way)}" for way in lines),
         *(f"air: {name}, shut off" for name in stores if name not in used),
@@ -95,7 +112,9 @@ def wiring(model: Mapping[str, Any], ports: Ports) -> list[str]:
 
 
 def near_name(given: str, names: Iterable[str], short: Iterable[str] = ()) -> str:
-    """What an unknown name may have meant, else what is there; ``short`` are other ways to say the same names."""
+    """What an unknown name may have meant, else what is there; ``short`` are other ways to say the
+    same names.
+    """
     allowed = list(names)
     near = difflib.get_close_matches(given, [*allowed, *short], n=1)
     if near:
@@ -114,13 +133,28 @@ class _Connector:
 
     # --------------------------------------------------------------------- one port
 
-    def settle(self, block: str, name: str, port: str, defaults: Iterable[str], wanted: Iterable[str] = ()) -> str | None:
-        """The other end of a port: as given, else the first default that is not empty, else None after noting a problem."""
-        label, info = qualified(block, name), next(entry for entry in PORTS[block] if entry.name == port)
+    def settle(
+        self, block: str, name: str, port: str, defaults: Iterable[str], wanted: Iterable[str] = ()
+    ) -> str | None:
+        """The other end of a port: as given, else the first default that is not empty, else None
+        after noting a problem.
+        """
+        label, info = (
+            qualified(block, name),
+            next(entry for entry in PORTS[block] if entry.name == port),
+        )
         text = self.given.get(label, {}).get(port)
-        end = self.find(f"{label}.{port}", info, text) if text is not None else next(filter(None, defaults), None)
+        end = (
+            self.find(f"{label}.{port}", info, text)
+            if text is not None
+            else next(filter(None, defaults), None)
+        )
         if text is None and end is None:
-            self.missing(label, port, list(wanted) or [*info.kinds, *(word for word in info.words if word in BLOCKS)])
+            self.missing(
+                label,
+                port,
+                list(wanted) or [*info.kinds, *(word for word in info.words if word in BLOCKS)],
+            )
         if end is not None:
             self.ports[block][name][port] = end
         return end
@@ -141,20 +175,27 @@ class _Connector:
         else:
             short = [name for kind in port.kinds for name in self.tables[kind] if name]
             what = " and no ".join([*port.kinds, *port.words])
-            self.problems.append(f"{label} = {text!r} names no {what}{near_name(text, allowed, short)}")
+            self.problems.append(
+                f"{label} = {text!r} names no {what}{near_name(text, allowed, short)}"
+            )
         return None
 
     def missing(self, label: str, port: str, kinds: list[str]) -> None:
         """Note a port that no default settles."""
         there = [
-            f"the {_PLURAL.get(kind, kind + 's')} {', '.join(name or kind for name in self.tables[kind])}"
+            (
+                f"the {_PLURAL.get(kind, kind + 's')} "
+                f"{', '.join(name or kind for name in self.tables[kind])}"
+            )
             for kind in kinds
             if self.tables[kind]
         ]
         if there:
             unfed = label.partition(".")[0] == "line" and port == "from" and self.tables["valve"]
             other = ", or lead a valve to it" if unfed else ""
-            self.problems.append(f"{label}.{port} is missing: the rig has {' and '.join(there)}; say which{other}")
+            self.problems.append(
+                f"{label}.{port} is missing: the rig has {' and '.join(there)}; say which{other}"
+            )
         else:
             needed = " or ".join(f"[{kind}]" for kind in kinds)
             self.problems.append(f"the block [{label}] needs the block {needed}, which is missing")
@@ -168,7 +209,9 @@ class _Connector:
         return qualified(kind, name) if name in self.tables[kind] else ""
 
     def only(self, kind: str, among: Iterable[str] | None = None, *, of: str = "") -> str:
-        """The only block of a kind, ``""`` if there is none or more; for a block with a name, ``of``, not another's partner."""
+        """The only block of a kind, ``""`` if there is none or more; for a block with a name,
+        ``of``, not another's partner.
+        """
         names = list(self.tables[kind] if among is None else among)
         if len(names) != 1 or (of and names[0] and names[0] != of and self._partnered(names[0])):
             return ""
@@ -182,18 +225,29 @@ class _Connector:
 
     def valves(self) -> None:
         """Both ends of every valve."""
-        own = {name: self.given.get(qualified("line", name), {}).get("from") for name in self.tables["line"]}
+        own = {
+            name: self.given.get(qualified("line", name), {}).get("from")
+            for name in self.tables["line"]
+        }
         inlets = [name for name, start in own.items() if start is None]
         for name in self.tables["valve"]:
-            start = self.settle("valve", name, "from", (self.same("supply", name), self.only("supply")), ("supply",))
+            start = self.settle(
+                "valve", name, "from", (self.same("supply", name), self.only("supply")), ("supply",)
+            )
             line = qualified("line", name) if name in inlets else ""
-            defaults = (line, self.same("chamber", name), self.only("line", inlets, of=name), self.only("chamber", of=name))
+            defaults = (
+                line,
+                self.same("chamber", name),
+                self.only("line", inlets, of=name),
+                self.only("chamber", of=name),
+            )
             end = self.settle("valve", name, "to", defaults)
             self.two_ends("valve", name, start, end)
             fed = next((line for line in own if qualified("line", line) == end), None)
             if fed is not None and own[fed] is not None:
                 self.problems.append(
-                    f"{qualified('valve', name)}.to = {end!r} is not allowed: {end}.from = {own[fed]!r}, so that no valve feeds it"
+                    f"{qualified('valve', name)}.to = {end!r} is not allowed: {end}.from = "
+                    f"{own[fed]!r}, so that no valve feeds it"
                 )
 
     def lines(self) -> None:
@@ -201,13 +255,18 @@ class _Connector:
         ends = [ports.get("to") for ports in self.ports["valve"].values()]
         for name, table in self.tables["line"].items():
             label = qualified("line", name)
-            end = self.settle("line", name, "to", (self.same("chamber", name), self.only("chamber", of=name)))
+            end = self.settle(
+                "line", name, "to", (self.same("chamber", name), self.only("chamber", of=name))
+            )
             if "from" not in self.given.get(label, {}):
                 if label in ends:
                     self.ports["line"][name]["from"] = ""
-                    if kind_of("line", table) == "orifice" and table.get("inlet_volume") == 0.0:  # its pressure would have no rate
+                    if (
+                        kind_of("line", table) == "orifice" and table.get("inlet_volume") == 0.0
+                    ):  # its pressure would have no rate
                         self.problems.append(
-                            f"{label}.inlet_volume = 0 m3 is not allowed: more is needed between an orifice and the valves that feed it"
+                            f"{label}.inlet_volume = 0 m3 is not allowed: more is needed between "
+                            "an orifice and the valves that feed it"
                         )
                     continue
                 if None in ends and not self.same("supply", name):
@@ -217,14 +276,17 @@ class _Connector:
             self.two_ends("line", name, start, end)
             if start is not None and table.get("inlet_volume"):
                 self.problems.append(
-                    f"{label}.inlet_volume = {table['inlet_volume']:g} m3 is not allowed: {label} begins at {start}, "
-                    "and only an inlet that valves feed has a volume of its own"
+                    f"{label}.inlet_volume = {table['inlet_volume']:g} m3 is not allowed: {label} "
+                    f"begins at {start}, and only an inlet that valves feed has a volume of its own"
                 )
 
     def two_ends(self, block: str, name: str, start: str | None, end: str | None) -> None:
         """Note a valve or line that leads back to where it begins."""
         if start is not None and start == end:
-            self.problems.append(f"{qualified(block, name)}: from and to are both {start}; two different ends are needed")
+            self.problems.append(
+                f"{qualified(block, name)}: from and to are both {start}; two different ends are "
+                "needed"
+            )
 
     # ----------------------------------------------------------------------- force
 
@@ -233,20 +295,39 @@ class _Connector:
         transmissions, load = self.tables["transmission"], "load" if self.tables["load"] else ""
         for name in self.tables["muscle"]:
             label = qualified("muscle", name)
-            self.settle("muscle", name, "chamber", (self.same("chamber", name), self.only("chamber", of=name)))
+            self.settle(
+                "muscle",
+                name,
+                "chamber",
+                (self.same("chamber", name), self.only("chamber", of=name)),
+            )
             if self.tables["arm"] and not self.tables["joint"]:
                 continue  # the joint that is missing has been noted
-            joint = self.settle("muscle", name, "joint", (self.same("joint", name), self.only("joint"), load))
+            joint = self.settle(
+                "muscle", name, "joint", (self.same("joint", name), self.only("joint"), load)
+            )
             own = qualified("transmission", name)
             if joint == "load" and name in transmissions:
-                self.problems.append(f"the block [{own}] is not allowed: {label} pulls on the load, straight")
-            free = [qualified("joint", j) for j, table in self.tables["joint"].items() if kind_of("joint", table) == "free"]
+                self.problems.append(
+                    f"the block [{own}] is not allowed: {label} pulls on the load, straight"
+                )
+            free = [
+                qualified("joint", j)
+                for j, table in self.tables["joint"].items()
+                if kind_of("joint", table) == "free"
+            ]
             if joint in free and name not in transmissions:
-                self.problems.append(f"{label} pulls on {joint}, which is free: the block [{own}] is missing")
+                self.problems.append(
+                    f"{label} pulls on {joint}, which is free: the block [{own}] is missing"
+                )
         for name in transmissions:
             if name not in self.tables["muscle"]:
                 hint = near_name(name, filter(None, self.tables["muscle"])) if name else ""
-                whose = f"named after no muscle{hint}" if name else "without a name, as no muscle is: name it as its muscle"
+                whose = (
+                    f"named after no muscle{hint}"
+                    if name
+                    else "without a name, as no muscle is: name it as its muscle"
+                )
                 self.problems.append(f"the block [{qualified('transmission', name)}] is {whose}")
 
     # ------------------------------------------------------------------------- arm
@@ -255,26 +336,38 @@ class _Connector:
         """Note blocks that need each other or exclude each other."""
         for block, needs in _NEEDS:
             if self.tables[block] and not self.tables[needs]:
-                self.problems.append(f"the block [{block}] needs the block [{needs}], which is missing")
+                self.problems.append(
+                    f"the block [{block}] needs the block [{needs}], which is missing"
+                )
         if self.tables["load"] and (self.tables["joint"] or self.tables["arm"]):
-            self.problems.append("the block [load] does not go with [joint] and [arm]: a rig has one or the others")
+            self.problems.append(
+                "the block [load] does not go with [joint] and [arm]: a rig has one or the others"
+            )
 
     def arm(self) -> None:
         """Note what does not fit between arm, joints and links; put the links in order."""
         links, joints = self.tables["link"], self.tables["joint"]
         kind = kind_of("arm", self.tables["arm"][""]) if self.tables["arm"] else None
         if links and not self.tables["arm"]:
-            self.problems.append("the block [link] needs the block [arm] with kind = 'planar', which is missing")
+            self.problems.append(
+                "the block [link] needs the block [arm] with kind = 'planar', which is missing"
+            )
         if kind == "one_link":
             if links:
                 names = ", ".join(self.all_of(["link"]))
-                self.problems.append(f"arm.kind = 'one_link' is not allowed with {names}: 'planar' is needed for links")
+                self.problems.append(
+                    f"arm.kind = 'one_link' is not allowed with {names}: 'planar' is needed for "
+                    "links"
+                )
             if len(joints) > 1:
                 self.problems.append(
-                    f"arm.kind = 'one_link' is not allowed with the joints {', '.join(joints)}: one joint, or 'planar' with a link each"
+                    f"arm.kind = 'one_link' is not allowed with the joints {', '.join(joints)}: "
+                    "one joint, or 'planar' with a link each"
                 )
         elif kind == "planar" and not links:
-            self.problems.append("arm.kind = 'planar' needs a block [link] for each joint, and there is none")
+            self.problems.append(
+                "arm.kind = 'planar' needs a block [link] for each joint, and there is none"
+            )
         elif kind == "planar":
             self.joints_of_links()
             self.chain()
@@ -283,14 +376,23 @@ class _Connector:
         """Give every link its joint, and note joints that have none or several."""
         moved: dict[str, str] = {}
         for name in self.tables["link"]:
-            label, joint = qualified("link", name), self.settle("link", name, "joint", (self.same("joint", name),))
+            label, joint = (
+                qualified("link", name),
+                self.settle("link", name, "joint", (self.same("joint", name),)),
+            )
             if joint in moved:
-                self.problems.append(f"{label}.joint = {joint!r} is not allowed: {joint} moves {moved[joint]} already")
+                self.problems.append(
+                    f"{label}.joint = {joint!r} is not allowed: {joint} moves {moved[joint]} "
+                    "already"
+                )
             elif joint is not None:
                 moved[joint] = label
         if all("joint" in ports for ports in self.ports["link"].values()):
             alone = [joint for joint in self.all_of(["joint"]) if joint not in moved]
-            self.problems += [f"{joint} moves no link: a [link] with joint = {joint!r} is needed" for joint in alone]
+            self.problems += [
+                f"{joint} moves no link: a [link] with joint = {joint!r} is needed"
+                for joint in alone
+            ]
 
     def chain(self) -> None:
         """Put the links base first, and note those that stand on the same one or in a circle."""
@@ -301,7 +403,10 @@ class _Connector:
             on = self.settle("link", name, "on", (before,))
             before = label
             if on in carries:
-                self.problems.append(f"{label}.on = {on!r} is not allowed: {on} carries {qualified('link', carries[on])} already")
+                self.problems.append(
+                    f"{label}.on = {on!r} is not allowed: {on} carries "
+                    f"{qualified('link', carries[on])} already"
+                )
             elif on is not None:
                 carries[on] = name
         if len(carries) < len(self.tables["link"]):
@@ -312,6 +417,9 @@ class _Connector:
             place = qualified("link", carries[place])
         around = [qualified("link", name) for name in self.tables["link"] if name not in ordered]
         if around:
-            self.problems.append(f"{', '.join(around)}: each is on another of them, in a circle; one link of an arm is on the base")
+            self.problems.append(
+                f"{', '.join(around)}: each is on another of them, in a circle; one link of an arm "
+                "is on the base"
+            )
         else:
             self.ports["link"] = {name: self.ports["link"][name] for name in ordered}

@@ -14,7 +14,19 @@ from pamrs.errors import ParameterError, RigError, joined
 from pamrs.rig._checks import block_problems
 from pamrs.rig._ports import bare, connect, near_name
 from pamrs.rig.muscle_models import own_geometry
-from pamrs.rig.schema import BLOCKS, PORTS, REQUIRED_BLOCKS, SCHEMA, SINGLE_BLOCKS, Key, Port, keys_of, kind_of, qualified, tables_of
+from pamrs.rig.schema import (
+    BLOCKS,
+    PORTS,
+    REQUIRED_BLOCKS,
+    SCHEMA,
+    SINGLE_BLOCKS,
+    Key,
+    Port,
+    keys_of,
+    kind_of,
+    qualified,
+    tables_of,
+)
 from pamrs.units import to_si
 
 __all__ = ["Content", "Reader", "read_model"]
@@ -99,7 +111,9 @@ class Reader:
         """A whole rig file."""
         self.unknown_keys("", document, [*_TOP, *BLOCKS])
         if document.get("schema") != SCHEMA:
-            self.problem(f"schema = {_shown(document.get('schema'))} is not allowed: {SCHEMA!r} is needed")
+            self.problem(
+                f"schema = {_shown(document.get('schema'))} is not allowed: {SCHEMA!r} is needed"
+            )
         name = document.get("name", "rig")
         if not isinstance(name, str) or not name.strip():
             self.problem(f"name = {_shown(name)} is not allowed: a text is needed")
@@ -117,7 +131,9 @@ class Reader:
         return Content(name, model, self.tolerances, self.effect_std)
 
     def blocks(self, block: str, raw: Any) -> dict[str, Any] | None:
-        """A block without a name, or all blocks of a kind by their names; None where there is none."""
+        """A block without a name, or all blocks of a kind by their names; None where there is
+        none.
+        """
         if raw is None:
             if block in REQUIRED_BLOCKS:
                 self.problem(f"the block [{block}] is missing")
@@ -137,15 +153,27 @@ class Reader:
             if block in SINGLE_BLOCKS:
                 self.problem(f"{named} is not allowed: a rig has one [{block}], without a name")
             else:
-                self.problem(f"[{block}] has {', '.join(others)} beside {named}: either one [{block}] or only named ones are needed")
+                self.problem(
+                    f"[{block}] has {', '.join(others)} beside {named}: either one [{block}] or "
+                    "only named ones are needed"
+                )
             return None
         wrong = [name for name in names if not _NAME.fullmatch(name)]
         for name in wrong:
-            self.problem(f"[{block}.{name!r}]: the name {name!r} is not allowed: letters, digits, _ and - are needed")
+            self.problem(
+                f"[{block}.{name!r}]: the name {name!r} is not allowed: letters, digits, _ and - "
+                "are needed"
+            )
             self.whole = False
-        return {name: self.block(block, raw[name], name, ports=PORTS.get(block, ())) for name in names if name not in wrong}
+        return {
+            name: self.block(block, raw[name], name, ports=PORTS.get(block, ()))
+            for name in names
+            if name not in wrong
+        }
 
-    def block(self, block: str, table: Mapping[str, Any], name: str = "", *, ports: Iterable[Port] = ()) -> dict[str, Any]:
+    def block(
+        self, block: str, table: Mapping[str, Any], name: str = "", *, ports: Iterable[Port] = ()
+    ) -> dict[str, Any]:
         """One block by the keys of its table; the ports that it may have go to :attr:`ports`."""
         label = qualified(block, name)
         groups: dict[str, list[str]] = {}
@@ -153,19 +181,27 @@ class Reader:
             if key.path:
                 groups.setdefault(key.path[0], []).append(key.path[1])
         allowed = [port.name for port in ports]
-        self.unknown_keys(f"{label}.", table, [*allowed, *(k.name for k in BLOCKS[block] if not k.path), *groups])
+        self.unknown_keys(
+            f"{label}.", table, [*allowed, *(k.name for k in BLOCKS[block] if not k.path), *groups]
+        )
         for group, members in groups.items():
             inner = table.get(group)
             if isinstance(inner, Mapping):
                 self.unknown_keys(f"{label}.{group}.", inner, members)
             elif inner is not None:
-                self.problem(f"{label}.{group} = {_shown(inner)} is not allowed: give {', '.join(members)} as a table")
+                self.problem(
+                    f"{label}.{group} = {_shown(inner)} is not allowed: give {', '.join(members)} "
+                    "as a table"
+                )
         for port in allowed:
             other = table.get(port)
             if isinstance(other, str):
                 self.ports.setdefault(label, {})[port] = other
             elif other is not None:
-                self.problem(f"{label}.{port} = {_shown(other)} is not allowed: the name of a block is needed")
+                self.problem(
+                    f"{label}.{port} = {_shown(other)} is not allowed: the name of a block is "
+                    "needed"
+                )
         keys = keys_of(block, table)
         for key in BLOCKS[block]:
             if key not in keys and _dig(table, key.where) is not None:
@@ -177,45 +213,67 @@ class Reader:
         return content
 
     def sensors(self, model: dict[str, Any], raw: Any) -> None:
-        """Put in the sensors that a file leaves out, and hold their names against the chambers and joints.
+        """Put in the sensors that a file leaves out, and hold their names against the chambers and
+        joints.
 
-        Sensors without a name are those of every chamber and joint, so that they are always there where none has a name.
+        Sensors without a name are those of every chamber and joint, so that they are always there
+        where none has a name.
         """
         if raw is None:
             model["sensors"] = self.block("sensors", {})
-        owners = {"pressure_zero": tables_of(model, "chamber"), "angle_zero": tables_of(model, "joint")}
+        owners = {
+            "pressure_zero": tables_of(model, "chamber"),
+            "angle_zero": tables_of(model, "joint"),
+        }
         self._length_zero(model, raw)
         for name, table in tables_of(model, "sensors").items():
             if not name or not self.whole:
                 continue
             if not any(name in names for names in owners.values()):
-                named = dict.fromkeys(other for names in owners.values() for other in names if other)
-                self.problem(f"the block [sensors.{name}] is named after no chamber and no joint{near_name(name, named)}")
+                named = dict.fromkeys(
+                    other for names in owners.values() for other in names if other
+                )
+                self.problem(
+                    f"the block [sensors.{name}] is named after no chamber and no "
+                    f"joint{near_name(name, named)}"
+                )
                 continue
             for key, names in owners.items():
                 if name not in names:
                     del table[key]
                     if key in raw[name]:
                         what = "chamber" if key == "pressure_zero" else "joint"
-                        self.problem(f"sensors.{name}.{key} is not allowed: the rig has no {what}.{name}")
+                        self.problem(
+                            f"sensors.{name}.{key} is not allowed: the rig has no {what}.{name}"
+                        )
 
     def _length_zero(self, model: dict[str, Any], raw: Any) -> None:
-        """The zero of the length is that of a mass that moves, and a rig has one: sensors without a name have it."""
+        """The zero of the length is that of a mass that moves, and a rig has one: sensors without a
+        name have it.
+        """
         moves = (model["load"] or {}).get("kind") == "mass"
         for name, table in tables_of(model, "sensors").items():
             if moves and not name:
                 continue
-            given = isinstance(raw, Mapping) and "length_zero" in (raw.get(name) or {} if name else raw)
+            given = isinstance(raw, Mapping) and "length_zero" in (
+                raw.get(name) or {} if name else raw
+            )
             if given and self.whole:
                 label = qualified("sensors", name)
-                needs = 'a [load] with kind = "mass" is needed' if not moves else "it stands in [sensors], without a name"
+                needs = (
+                    'a [load] with kind = "mass" is needed'
+                    if not moves
+                    else "it stands in [sensors], without a name"
+                )
                 self.problem(f"{label}.length_zero is not allowed: {needs}")
             table.pop("length_zero", None)
 
     # -------------------------------------------------------------------- values
 
     def value(self, block: str, key: Key, raw: Any) -> Any:
-        """The value of one key in SI, None after noting what is wrong with it; ``block`` is what its block is called."""
+        """The value of one key in SI, None after noting what is wrong with it; ``block`` is what
+        its block is called.
+        """
         label = ".".join((block, *key.where))
         if raw is None:
             if key.default is None:
@@ -223,7 +281,10 @@ class Reader:
             return list(key.default) if isinstance(key.default, tuple) else key.default
         if key.kind == "choice":
             if raw not in key.choices:
-                self.problem(f"{label} = {_shown(raw)} is not allowed: one of {', '.join(map(repr, key.choices))}")
+                self.problem(
+                    f"{label} = {_shown(raw)} is not allowed: one of "
+                    f"{', '.join(map(repr, key.choices))}"
+                )
                 return None
             return raw
         bare_allowed = key.kind == "count" or bool(key.path)
@@ -243,12 +304,18 @@ class Reader:
             return int(value)
         return value
 
-    def quantity(self, label: str, key: Key, raw: Any, bare_allowed: bool) -> tuple[Any, str, Mapping[str, Any]]:
-        """Number, unit and the whole table of ``{ value, unit, tol, unknown }``, or of a bare number."""
+    def quantity(
+        self, label: str, key: Key, raw: Any, bare_allowed: bool
+    ) -> tuple[Any, str, Mapping[str, Any]]:
+        """Number, unit and the whole table of ``{ value, unit, tol, unknown }``, or of a bare
+        number.
+        """
         if not isinstance(raw, Mapping):
             if bare_allowed:
                 return raw, key.unit, {}
-            self.problem(f"{label} = {_shown(raw)} has no unit: write {{ value = ..., unit = {key.unit!r} }}")
+            self.problem(
+                f"{label} = {_shown(raw)} has no unit: write {{ value = ..., unit = {key.unit!r} }}"
+            )
             return None, key.unit, {}
         self.unknown_keys(f"{label}.", raw, _QUANTITY)
         if "value" not in raw:
@@ -294,7 +361,10 @@ class Reader:
         if not isinstance(numbers, list) or not numbers:
             self.problem(f"{label} = {_shown(numbers)} is not allowed: a list of numbers is needed")
             return None
-        values = [self.scalar(f"{label}[{i}]", key.unit, number, unit, key.lower, key.upper) for i, number in enumerate(numbers)]
+        values = [
+            self.scalar(f"{label}[{i}]", key.unit, number, unit, key.lower, key.upper)
+            for i, number in enumerate(numbers)
+        ]
         known = [value for value in values if value is not None]
         return known if len(known) == len(values) else None
 
@@ -309,7 +379,9 @@ class Reader:
                 self.problem(f"{label}: tol and unknown = true exclude each other")
             self.tolerances[name] = math.inf
         elif "tol" in extra:
-            tol = self.scalar(f"{label}.tol", key.unit, extra["tol"], unit, 0.0, 1e300, difference=True)
+            tol = self.scalar(
+                f"{label}.tol", key.unit, extra["tol"], unit, 0.0, 1e300, difference=True
+            )
             if tol:
                 self.tolerances[name] = tol
 
@@ -318,7 +390,9 @@ class Reader:
     def effects(self, raw: Any) -> list[dict[str, Any]]:
         """The tables ``[[effects]]``."""
         if not isinstance(raw, list) or not all(isinstance(entry, Mapping) for entry in raw):
-            self.problem("effects is not allowed as it stands: one table [[effects]] for each is needed")
+            self.problem(
+                "effects is not allowed as it stands: one table [[effects]] for each is needed"
+            )
             return []
         if not raw:
             return []
@@ -330,36 +404,57 @@ class Reader:
             self.unknown_keys(f"{label}.", entry, ("id", "at", "form", "parameters"))
             identity = entry.get("id")
             if not isinstance(identity, str) or identity not in EFFECTS:
-                self.problem(f"{label}.id = {_shown(identity)} is not in the catalogue{near_name(str(identity), CATALOGUE)}")
+                self.problem(
+                    f"{label}.id = {_shown(identity)} is not in the "
+                    f"catalogue{near_name(str(identity), CATALOGUE)}"
+                )
                 continue
             info = EFFECTS[identity]
             place = self.place(label, info.at or "rig", entry.get("at", ""))
-            if any(identity == other["id"] and (not place or other.get("at", "") in ("", place)) for other in found):
-                self.problem(f"{label}.id = {identity!r} is there twice: of several each needs another block (at)")
+            if any(
+                identity == other["id"] and (not place or other.get("at", "") in ("", place))
+                for other in found
+            ):
+                self.problem(
+                    f"{label}.id = {identity!r} is there twice: of several each needs another "
+                    "block (at)"
+                )
                 continue
             given = entry.get("parameters", {})
             if not isinstance(given, Mapping):
-                self.problem(f"{label}.parameters = {_shown(given)} is not allowed: a table is needed")
+                self.problem(
+                    f"{label}.parameters = {_shown(given)} is not allowed: a table is needed"
+                )
                 continue
             name = entry.get("form", "")
             form = next((form for form in info.forms if name in ("", form.name)), None)
             if form is None:
                 names = ", ".join(repr(form.name) for form in info.forms)
-                self.problem(f"{label}.form = {_shown(name)} is not allowed: {identity} has {names}")
+                self.problem(
+                    f"{label}.form = {_shown(name)} is not allowed: {identity} has {names}"
+                )
                 continue
-            self.unknown_keys(f"{identity}.", given, [parameter.name for parameter in form.parameters])
+            self.unknown_keys(
+                f"{identity}.", given, [parameter.name for parameter in form.parameters]
+            )
             values = {
-                parameter.name: self.effect_value(identity, place, parameter, given.get(parameter.name))
+                parameter.name: self.effect_value(
+                    identity, place, parameter, given.get(parameter.name)
+                )
                 for parameter in form.parameters
             }
             own = {"form": name} if name and name != info.forms[0].name else {}
-            found.append({"id": identity, **({"at": place} if place else {}), **own, "parameters": values})
+            found.append(
+                {"id": identity, **({"at": place} if place else {}), **own, "parameters": values}
+            )
         return found
 
     def place(self, label: str, block: str, raw: Any) -> str:
         """Name of the block that an effect acts on, ``""`` for every one of its kind."""
         if not isinstance(raw, str):
-            self.problem(f"{label}.at = {_shown(raw)} is not allowed: the name of a {block} is needed")
+            self.problem(
+                f"{label}.at = {_shown(raw)} is not allowed: the name of a {block} is needed"
+            )
             return ""
         return bare(block, raw)
 
@@ -369,26 +464,37 @@ class Reader:
         if raw is None:
             return float(parameter.default)
         if not isinstance(raw, Mapping):
-            self.problem(f"{label} = {_shown(raw)} has no unit: write {{ value = ..., unit = {parameter.unit!r} }}")
+            self.problem(
+                f"{label} = {_shown(raw)} has no unit: write {{ value = ..., unit = "
+                f"{parameter.unit!r} }}"
+            )
             return None
         self.unknown_keys(f"{label}.", raw, ("value", "unit", "std"))
         unit = raw.get("unit")
         if "value" not in raw or not isinstance(unit, str):
             self.problem(f"{label}: value and unit (like {parameter.unit!r}) are needed")
             return None
-        value = self.scalar(label, parameter.unit, raw["value"], unit, parameter.lower, parameter.upper)
+        value = self.scalar(
+            label, parameter.unit, raw["value"], unit, parameter.lower, parameter.upper
+        )
         if "std" in raw:
-            std = self.scalar(f"{label}.std", parameter.unit, raw["std"], unit, 0.0, 1e300, difference=True)
+            std = self.scalar(
+                f"{label}.std", parameter.unit, raw["std"], unit, 0.0, 1e300, difference=True
+            )
             if std is not None:
                 self.effect_std.setdefault(qualified(identity, place), {})[parameter.name] = std
         return value
 
 
 def _block_names(block: str, table: Mapping[str, Any]) -> list[str]:
-    """Entries of a block that are blocks with a name, and neither a key of its own nor a mistyped one."""
+    """Entries of a block that are blocks with a name, and neither a key of its own nor a mistyped
+    one.
+    """
     own = {*(key.where[0] for key in BLOCKS[block]), *(port.name for port in PORTS.get(block, ()))}
     names = [
-        name for name, inner in table.items() if name not in own and isinstance(inner, Mapping) and not {"value", "unit"} & {*inner}
+        name
+        for name, inner in table.items()
+        if name not in own and isinstance(inner, Mapping) and not {"value", "unit"} & {*inner}
     ]
     if own & {*table}:
         names = [name for name in names if not difflib.get_close_matches(name, own, n=1)]

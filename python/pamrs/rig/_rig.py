@@ -1,9 +1,10 @@
 """Rigs: the nominal model of a test stand, read from TOML with units and tolerances.
 
-A rig is blocks around a gas: supplies, valves, lines and chambers that the air goes through, muscles, joints and an arm or a
-load that the force goes through, sensors. Only ``gas`` and ``chamber`` are always there. A block that stands once needs no name;
-several of a kind have one each, and ports say which is connected to which. Everything inside is SI; angles are radians, pressures
-gauge.
+A rig is blocks around a gas: supplies, valves, lines and chambers that the air goes through,
+muscles, joints and an arm or a load that the force goes through, sensors. Only ``gas`` and
+``chamber`` are always there. A block that stands once needs no name; several of a kind have one
+each, and ports say which is connected to which. Everything inside is SI; angles are radians,
+pressures gauge.
 """
 
 from __future__ import annotations
@@ -27,7 +28,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Parameter", "Rig", "load_rig", "parse_rig"]
 
-#: By the core and from the ports when they are needed; what a rig differs from by numbers only, and what was made of it.
+#: By the core and from the ports when they are needed; what a rig differs from by numbers only, and
+#: what was made of it.
 _MADE_AGAIN = ("_compiled", "_connected", "_origin", "_grown")
 
 
@@ -38,14 +40,15 @@ class Parameter:
     Attributes
     ----------
     name : str
-        Dotted name, ``"valve.discharge_area_max"`` or, of a block with a name, ``"valve.flexor.discharge_area_max"``.
+        Dotted name, ``"valve.discharge_area_max"`` or, of a block with a name,
+        ``"valve.flexor.discharge_area_max"``.
     value : float
         SI value; only a placeholder where ``known`` is False.
     unit : str
         The SI unit.
     tol : float
-        One standard deviation of what the user knows, SI; 0 when the value is taken as exact, infinite
-        when it is unknown.
+        One standard deviation of what the user knows, SI; 0 when the value is taken as exact,
+        infinite when it is unknown.
     lower, upper : float
         Bounds of the possible, SI.
     known : bool
@@ -88,8 +91,9 @@ class Rig:
     def model(self) -> dict[str, Any]:
         """The nested model in SI values (a copy).
 
-        A block is its table, named ones are ``{name: table}``, an absent one is None. ``"ports"`` has the ports that the file
-        gives, by the full name of the block; :meth:`ports` has all of them.
+        A block is its table, named ones are ``{name: table}``, an absent one is None. ``"ports"``
+        has the ports that the file gives, by the full name of the block; :meth:`ports` has all of
+        them.
         """
         return copy.deepcopy(self._model)
 
@@ -104,7 +108,8 @@ class Rig:
         Returns
         -------
         dict
-            Name -> SI table, in the order of the file; ``""`` is the name of a block without one. Empty when the rig has none.
+            Name -> SI table, in the order of the file; ``""`` is the name of a block without one.
+            Empty when the rig has none.
 
         Raises
         ------
@@ -126,7 +131,8 @@ class Rig:
         Returns
         -------
         dict
-            Name -> port -> block in full, ``"chamber.flexor"``; links base first. The ``from`` of a line that valves feed is ``""``.
+            Name -> port -> block in full, ``"chamber.flexor"``; links base first. The ``from`` of a
+            line that valves feed is ``""``.
 
         Raises
         ------
@@ -140,7 +146,9 @@ class Rig:
 
     @property
     def wiring(self) -> list[str]:
-        """The ways of the air and of the force in words, one line each: ``"air: supply -> valve -> chamber -> ambient"``."""
+        """The ways of the air and of the force in words, one line each:
+        ``"air: supply -> valve -> chamber -> ambient"``.
+        """
         return wiring(self._model, self._ports())
 
     def _ports(self) -> Ports:
@@ -159,25 +167,31 @@ class Rig:
 
     @property
     def effects(self) -> list[dict[str, Any]]:
-        """The omitted physics already in the model: ``{"id", "parameters": {name: SI value}}`` each.
+        """The omitted physics already in the model: ``{"id", "parameters": {name: SI value}}``
+        each.
 
-        With ``"at"`` if it acts on one block only, and ``"form"`` if it has another form than the first.
+        With ``"at"`` if it acts on one block only, and ``"form"`` if it has another form than the
+        first.
         """
         effects: list[dict[str, Any]] = copy.deepcopy(self._model["effects"])
         return effects
 
     @property
     def effect_std(self) -> dict[str, dict[str, float]]:
-        """Standard deviations of the effects' parameters, where the file gives them: id -> name -> SI.
+        """Standard deviations of the effects' parameters, where the file gives them: id -> name ->
+        SI.
 
-        Of several effects of one id each has the name of its block behind a dot, ``"leak_muscle.flexor"``.
+        Of several effects of one id each has the name of its block behind a dot,
+        ``"leak_muscle.flexor"``.
         """
         found: dict[str, dict[str, float]] = {}
         ids = [entry["id"] for entry in self._model["effects"]]
         for entry in self._model["effects"]:
             full = qualified(entry["id"], entry.get("at", ""))
             if full in self._effect_std:
-                found[entry["id"] if ids.count(entry["id"]) == 1 else full] = dict(self._effect_std[full])
+                found[entry["id"] if ids.count(entry["id"]) == 1 else full] = dict(
+                    self._effect_std[full]
+                )
         return found
 
     @property
@@ -196,7 +210,10 @@ class Rig:
         """
         names = list(tables_of(self._model, "muscle"))
         if len(names) > 1:
-            raise ParameterError(f"rig {self.name!r} has the muscles {', '.join(names)}: take one by Rig.muscle_of(name)")
+            raise ParameterError(
+                f"rig {self.name!r} has the muscles {', '.join(names)}: take one by "
+                "Rig.muscle_of(name)"
+            )
         return self.muscle_of(names[0]) if names else None
 
     def muscle_of(self, name: str = "") -> Muscle:
@@ -219,7 +236,9 @@ class Rig:
         tables = tables_of(self._model, "muscle")
         if name not in tables:
             there = ", ".join(map(repr, tables)) or "none"
-            raise ParameterError(f"name = {name!r}: rig {self.name!r} has no such muscle; it has: {there}")
+            raise ParameterError(
+                f"name = {name!r}: rig {self.name!r} has no such muscle; it has: {there}"
+            )
         from pamrs.rig._muscle import Muscle
 
         return Muscle.from_model(tables[name])
@@ -230,7 +249,8 @@ class Rig:
         Parameters
         ----------
         name : str
-            For example ``"arm.payload"``, or ``"chamber.flexor.dead_volume"`` of a block with a name.
+            For example ``"arm.payload"``, or ``"chamber.flexor.dead_volume"`` of a block with a
+            name.
 
         Returns
         -------
@@ -243,7 +263,9 @@ class Rig:
         """
         table, key = self._scalar(self._model, name)
         tol = self._tolerances.get(name, 0.0)
-        return Parameter(name, float(table[key.name]), key.unit, tol, key.lower, key.upper, not math.isinf(tol))
+        return Parameter(
+            name, float(table[key.name]), key.unit, tol, key.lower, key.upper, not math.isinf(tol)
+        )
 
     def _scalars(self) -> Iterator[tuple[str, Key]]:
         for block in BLOCKS:
@@ -253,7 +275,9 @@ class Rig:
                         yield f"{qualified(block, name)}.{key.name}", key
 
     def _scalar(self, model: dict[str, Any], dotted: str) -> tuple[dict[str, Any], Key]:
-        """The table in which ``model`` has a scalar, and what is known of it; the model is of the form of this rig's own."""
+        """The table in which ``model`` has a scalar, and what is known of it; the model is of the
+        form of this rig's own.
+        """
         block, name, own = split_name(dotted)
         table = tables_of(model, block).get(name, {}) if block in BLOCKS else {}
         key = next((key for key in BLOCKS.get(block, ()) if key.name == own and own in table), None)
@@ -270,7 +294,8 @@ class Rig:
         Parameters
         ----------
         values : mapping of str to float
-            Dotted name -> SI value. Tolerances stay; an unknown parameter that gets a value stays unknown.
+            Dotted name -> SI value. Tolerances stay; an unknown parameter that gets a value stays
+            unknown.
 
         Returns
         -------
@@ -299,7 +324,8 @@ class Rig:
         found = Rig(self.name, model, self._tolerances, self._effect_std, self.source)
         return found._with_origin(self, {name: float(value) for name, value in values.items()})
 
-    # A rig that differs from another one by numbers only is not wired again: the core takes the numbers.
+    # A rig that differs from another one by numbers only is not wired again: the core takes the
+    # numbers.
 
     def _with_origin(self, base: Rig, values: Mapping[str, float]) -> Rig:
         """Note that this rig is another one with other numbers."""
@@ -308,7 +334,7 @@ class Rig:
         return self
 
     def _with_entry(self, entry: dict[str, Any], std: dict[str, dict[str, float]]) -> Rig:
-        """This rig with one effect more, as an entry of its model."""
+        """The same rig with one effect more, as an entry of its model."""
         model = {**self._model, "effects": [*self._model["effects"], entry]}
         found = Rig(self.name, model, self._tolerances, {**self._effect_std, **std}, self.source)
         origin, before = self.__dict__.get("_origin", (self, {}))
@@ -334,8 +360,9 @@ class Rig:
     ) -> Rig:
         """A rig with one effect more.
 
-        Several of one id can be there, each at a block of its own and with its own parameters. One at the same block is
-        replaced; one that acts everywhere replaces all of its id, and is replaced by one at a block.
+        Several of one id can be there, each at a block of its own and with its own parameters. One
+        at the same block is replaced; one that acts everywhere replaces all of its id, and is
+        replaced by one at a block.
 
         Parameters
         ----------
@@ -346,7 +373,8 @@ class Rig:
         std : mapping of str to float, optional
             Standard deviations, SI; written to the file as a note of how well each is known.
         at : str, optional
-            Name of the one block on which it acts, for example of a chamber; by default it acts on every block of its kind.
+            Name of the one block on which it acts, for example of a chamber; by default it acts on
+            every block of its kind.
         form : str, optional
             Name of one of its forms; by default the first.
 
@@ -364,14 +392,22 @@ class Rig:
 
         info = EFFECTS.get(effect)
         if info is None:
-            raise ParameterError(f"effect = {effect!r} is not in the catalogue{near_name(str(effect), CATALOGUE)}")
+            raise ParameterError(
+                f"effect = {effect!r} is not in the catalogue{near_name(str(effect), CATALOGUE)}"
+            )
         at = bare(info.at, at)
         given = dict(parameters or {})
         if form and form not in (allowed := [known.name for known in info.forms]):
-            raise ParameterError(f"form = {form!r} is not allowed: {effect} has {', '.join(map(repr, allowed))}")
+            raise ParameterError(
+                f"form = {form!r} is not allowed: {effect} has {', '.join(map(repr, allowed))}"
+            )
         chosen_form = info.form(form)
         names = [parameter.name for parameter in chosen_form.parameters]
-        problems = [f"unknown parameter {name!r}; it has: {', '.join(names)}" for name in {*given, *(std or {})} if name not in names]
+        problems = [
+            f"unknown parameter {name!r}; it has: {', '.join(names)}"
+            for name in {*given, *(std or {})}
+            if name not in names
+        ]
         problems += [text] if (text := effect_problem(self._model, effect, at)) else []
         chosen: dict[str, float] = {}
         for parameter in chosen_form.parameters:
@@ -399,12 +435,14 @@ class Rig:
         effect : str, optional
             Its id; None removes all.
         at : str, optional
-            Only the one at the block of this name, ``""`` for the one that acts everywhere; by default wherever it acts.
+            Only the one at the block of this name, ``""`` for the one that acts everywhere; by
+            default wherever it acts.
 
         Returns
         -------
         Rig
         """
+
         def stays(entry: Mapping[str, Any]) -> bool:
             if effect is None:
                 return False
@@ -421,7 +459,8 @@ class Rig:
     # ------------------------------------------------------------------ writing
 
     def to_json(self) -> str:
-        """The model as JSON text, as the core takes it: every block in a list, every port in full (SI, radians, gauge pressures).
+        """The model as JSON text, as the core takes it: every block in a list, every port in full
+        (SI, radians, gauge pressures).
 
         Returns
         -------
@@ -435,7 +474,9 @@ class Rig:
         return core_json(self._model, self._ports())
 
     def to_toml_text(self) -> str:
-        """The rig as TOML in SI units; reading it gives the same numbers to the last bit, the same names and the same ports."""
+        """The rig as TOML in SI units; reading it gives the same numbers to the last bit, the same
+        names and the same ports.
+        """
         return toml_text(Content(self.name, self._model, self._tolerances, self._effect_std))
 
     def to_toml(self, path: str | os.PathLike[str]) -> Path:
@@ -465,7 +506,9 @@ class Rig:
 
 
 def _opened(model: dict[str, Any], tables: set[tuple[str, str]]) -> dict[str, Any]:
-    """A model with copies of some of its tables, by block and name; what is not changed is shared."""
+    """A model with copies of some of its tables, by block and name; what is not changed is
+    shared.
+    """
     opened = dict(model)
     for block, name in tables:
         content: Any = opened.get(block)
@@ -498,8 +541,8 @@ def load_rig(path: str | os.PathLike[str]) -> Rig:
     Raises
     ------
     RigError
-        If the file cannot be read, or with every problem found in it: unknown keys, missing or wrong
-        units, values that are not finite or not possible, blocks that do not fit together.
+        If the file cannot be read, or with every problem found in it: unknown keys, missing or
+        wrong units, values that are not finite or not possible, blocks that do not fit together.
     """
     file = Path(path)
     if file.is_dir():

@@ -1,4 +1,6 @@
-"""Writes the model of a rig: as TOML that reads back the same to the last bit, and as the JSON that the core takes."""
+"""Writes the model of a rig: as TOML that reads back the same to the last bit, and as the JSON that
+the core takes.
+"""
 
 from __future__ import annotations
 
@@ -49,7 +51,9 @@ def toml_text(content: Content) -> str:
         spread = content.effect_std.get(qualified(effect["id"], place), {})
         for name, value in effect["parameters"].items():
             std = f", std = {_number(spread[name])}" if name in spread else ""
-            lines.append(f"{name} = {{ value = {_number(value)}, unit = {_text(units[name])}{std} }}")
+            lines.append(
+                f"{name} = {{ value = {_number(value)}, unit = {_text(units[name])}{std} }}"
+            )
     return "\n".join(lines) + "\n"
 
 
@@ -57,7 +61,11 @@ def _block(content: Content, block: str, name: str, table: Mapping[str, Any]) ->
     """The lines of one block: its ports as the file gave them, its keys, its groups of keys."""
     label = qualified(block, name)
     given = content.model.get("ports", {}).get(label, {})
-    yield from (f"{port.name} = {_text(given[port.name])}" for port in PORTS.get(block, ()) if port.name in given)
+    yield from (
+        f"{port.name} = {_text(given[port.name])}"
+        for port in PORTS.get(block, ())
+        if port.name in given
+    )
     groups: dict[str, list[str]] = {}
     for key in keys_of(block, table):
         if key.name not in table:
@@ -79,7 +87,9 @@ def _entry(key: Key, value: Any, tol: float) -> str:
         numbers = "[" + ", ".join(_number(item) for item in value) + "]"
         if key.path:
             return numbers
-    note = "" if tol == 0.0 else (", unknown = true" if math.isinf(tol) else f", tol = {_number(tol)}")
+    note = (
+        "" if tol == 0.0 else (", unknown = true" if math.isinf(tol) else f", tol = {_number(tol)}")
+    )
     if key.kind == "vector":
         return f"{{ value = {numbers}, unit = {_text(key.unit)}{note} }}"
     if key.path and not note:
@@ -117,30 +127,49 @@ def core_json(model: Mapping[str, Any], ports: Ports) -> str:
     Returns
     -------
     str
-        JSON text; SI, radians, gauge pressures. Keys that the kind of a block does not have are left out.
+        JSON text; SI, radians, gauge pressures. Keys that the kind of a block does not have are
+        left out.
     """
     transmissions, joints = tables_of(model, "transmission"), tables_of(model, "joint")
     document = {
         "name": model["name"],
         "gas": model["gas"],
         "supplies": [{"name": name, **table} for name, table in tables_of(model, "supply").items()],
-        "valves": [{"name": name, **ports["valve"][name], **table} for name, table in tables_of(model, "valve").items()],
+        "valves": [
+            {"name": name, **ports["valve"][name], **table}
+            for name, table in tables_of(model, "valve").items()
+        ],
         "lines": [_line(name, table, ports) for name, table in tables_of(model, "line").items()],
-        "chambers": [{"name": name, **table} for name, table in tables_of(model, "chamber").items()],
+        "chambers": [
+            {"name": name, **table} for name, table in tables_of(model, "chamber").items()
+        ],
         "muscles": [
-            {"name": name, **ports["muscle"][name], "transmission": _transmission(transmissions.get(name)), "muscle": table}
+            {
+                "name": name,
+                **ports["muscle"][name],
+                "transmission": _transmission(transmissions.get(name)),
+                "muscle": table,
+            }
             for name, table in tables_of(model, "muscle").items()
         ],
         "joints": [_joint(name, table) for name, table in joints.items()],
         "arm": _arm(model, ports),
         "load": model["load"],
         "sensors": [
-            {"name": name, "pressure_zero": table.get("pressure_zero", 0.0), "angle_zero": table.get("angle_zero", 0.0)}
+            {
+                "name": name,
+                "pressure_zero": table.get("pressure_zero", 0.0),
+                "angle_zero": table.get("angle_zero", 0.0),
+            }
             | {key: table[key] for key in ("length_zero",) if key in table}
             for name, table in tables_of(model, "sensors").items()
         ],
         "effects": [
-            {key: effect.get(key, "") for key in ("id", "at", "form") if key != "form" or key in effect}
+            {
+                key: effect.get(key, "")
+                for key in ("id", "at", "form")
+                if key != "form" or key in effect
+            }
             | {"parameters": effect["parameters"]}
             for effect in model["effects"]
         ],
@@ -156,16 +185,29 @@ def _line(name: str, table: Mapping[str, Any], ports: Ports) -> dict[str, Any]:
 
 def _joint(name: str, table: Mapping[str, Any]) -> dict[str, Any]:
     own = None if kind_of("joint", table) == "free" else _transmission(table)
-    return {"name": name, "transmission": own, "rest_angle": table["rest_angle"], **{key: table[key] for key in _STOPS}}
+    return {
+        "name": name,
+        "transmission": own,
+        "rest_angle": table["rest_angle"],
+        **{key: table[key] for key in _STOPS},
+    }
 
 
 def _transmission(table: Mapping[str, Any] | None) -> dict[str, Any] | None:
     """How a muscle pulls on its joint; None where it is the joint's own way."""
-    return None if table is None else {key: value for key, value in table.items() if key not in _STOPS}
+    return (
+        None if table is None else {key: value for key, value in table.items() if key not in _STOPS}
+    )
 
 
 def _arm(model: Mapping[str, Any], ports: Ports) -> dict[str, Any] | None:
     if model["arm"] is None:
         return None
     tables = tables_of(model, "link")
-    return {**model["arm"], "links": [{"name": name, "joint": ends["joint"], **tables[name]} for name, ends in ports["link"].items()]}
+    return {
+        **model["arm"],
+        "links": [
+            {"name": name, "joint": ends["joint"], **tables[name]}
+            for name, ends in ports["link"].items()
+        ],
+    }

@@ -4,7 +4,14 @@ from __future__ import annotations
 
 from typing import Final
 
-__all__ = ["ELASTIC_PARAMETERS", "GEOMETRIES", "MODELS", "POLYNOMIAL_MODELS", "models_with", "own_geometry"]
+__all__ = [
+    "ELASTIC_PARAMETERS",
+    "GEOMETRIES",
+    "MODELS",
+    "POLYNOMIAL_MODELS",
+    "models_with",
+    "own_geometry",
+]
 
 _POLYNOMIAL: Final = ("modulus_slope", "modulus_offset")
 #: model -> the elastic parameters that it has, in the order of the physics reference.

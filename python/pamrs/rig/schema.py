@@ -1,6 +1,8 @@
-"""Every key of a rig file in one table: unit, bounds and default of each; and the ports by which blocks name each other.
+"""Every key of a rig file in one table: unit, bounds and default of each; and the ports by which
+blocks name each other.
 
-The bounds are those of the possible, not of the likely: outside them a value is a mistake in the file.
+The bounds are those of the possible, not of the likely: outside them a value is a mistake in the
+file.
 """
 
 from __future__ import annotations
@@ -28,7 +30,8 @@ __all__ = [
 
 SCHEMA: Final = "pamrs.rig/1"
 REQUIRED_BLOCKS: Final = ("gas", "chamber")
-#: Blocks that stand once and have no name; every other one may stand several times, then each with a name.
+#: Blocks that stand once and have no name; every other one may stand several times, then each with
+#: a name.
 SINGLE_BLOCKS: Final = ("gas", "arm", "load")
 
 Kind = Literal["scalar", "count", "vector", "choice"]
@@ -54,7 +57,8 @@ class Key(NamedTuple):
     path : tuple of str
         Where the file has it inside the block: ``("end_ratio", "k0")``.
     only : tuple of str
-        The kinds of the block (force model of a muscle, kind of a joint) that have this key; empty for all.
+        The kinds of the block (force model of a muscle, kind of a joint) that have this key; empty
+        for all.
     note : str
         What it is, where the name does not say it.
     """
@@ -115,7 +119,8 @@ _KINDS: Final = {
     "load": ("kind", "mass"),
 }
 
-#: How far a muscle shortens at an angle: of a joint, or of a muscle's own transmission in the joint's place.
+#: How far a muscle shortens at an angle: of a joint, or of a muscle's own transmission in the
+#: joint's place.
 _GEOMETRY: Final = (
     Key("upper_axial", "m", 1e-6, 10.0, only=_TENDON),
     Key("upper_offset", "m", -10.0, 10.0, only=_TENDON),
@@ -137,9 +142,23 @@ BLOCKS: Final[dict[str, tuple[Key, ...]]] = {
     "supply": (
         Key("kind", default="tank", kind="choice", choices=("tank", "constant", "regulator")),
         Key("volume", "m3", 1e-7, 1e3, only=("tank",)),
-        Key("initial_pressure", "Pa", 0.0, 1e8, note="of a regulator what it is set to until it gets a command"),
+        Key(
+            "initial_pressure",
+            "Pa",
+            0.0,
+            1e8,
+            note="of a regulator what it is set to until it gets a command",
+        ),
         Key("time_constant", "s", 1e-4, 100.0, 0.05, only=("regulator",)),
-        Key("droop", "Pa s/kg", 0.0, 1e12, 0.0, only=("regulator",), note="fall of the outlet pressure per mass flow"),
+        Key(
+            "droop",
+            "Pa s/kg",
+            0.0,
+            1e12,
+            0.0,
+            only=("regulator",),
+            note="fall of the outlet pressure per mass flow",
+        ),
     ),
     "valve": (
         Key("discharge_area_max", "m2", 1e-11, 1e-2),
@@ -153,7 +172,14 @@ BLOCKS: Final[dict[str, tuple[Key, ...]]] = {
         Key("length", "m", 1e-3, 1e3, only=("tube",)),
         Key("diameter", "m", 1e-4, 0.2, only=("tube",)),
         Key("discharge_area", "m2", 1e-12, 1e-1, only=("orifice",)),
-        Key("inlet_volume", "m3", 0.0, 1.0, 0.0, note="at its inlet where valves feed it, besides half of the tube's own"),
+        Key(
+            "inlet_volume",
+            "m3",
+            0.0,
+            1.0,
+            0.0,
+            note="at its inlet where valves feed it, besides half of the tube's own",
+        ),
     ),
     "chamber": (
         Key("dead_volume", "m3", 1e-10, 1e2),
@@ -175,18 +201,31 @@ BLOCKS: Final[dict[str, tuple[Key, ...]]] = {
         Key("c10", "Pa", -1e11, 1e11, only=models_with("c10")),
         Key("c01", "Pa", -1e11, 1e11, 0.0, only=models_with("c01")),
         Key("bladder_modulus", "Pa", -1e11, 1e11, only=models_with("bladder_modulus")),
-        Key("extension_factors", "1", -10.0, 10.0, (0.3, 0.8, 0.8), kind="vector", only=models_with("extension_factors")),
+        Key(
+            "extension_factors",
+            "1",
+            -10.0,
+            10.0,
+            (0.3, 0.8, 0.8),
+            kind="vector",
+            only=models_with("extension_factors"),
+        ),
         Key("modulus_scale", "1", 0.0, 100.0, 1.0),
         Key("k0", "1", 0.0, 100.0, 1.64, path=("end_ratio", "k0")),
         Key("contraction_slope", "1", -1e3, 1e3, 2.405, path=("end_ratio", "contraction_slope")),
         Key("extension_slope", "1", -1e3, 1e3, 6.105, path=("end_ratio", "extension_slope")),
         Key("neck_floor", "1", 0.0, 1.0, 0.80, path=("end_ratio", "neck_floor")),
         Key("friction_coefficient", "1", -1.0, 1.0, 0.0, path=("friction", "coefficient")),
-        Key("friction_pressure_slope", "1/Pa", -1e-4, 1e-4, 0.0, path=("friction", "pressure_slope")),
+        Key(
+            "friction_pressure_slope", "1/Pa", -1e-4, 1e-4, 0.0, path=("friction", "pressure_slope")
+        ),
         Key("friction_floor", "1", 0.0, 1.0, 0.0, path=("friction", "floor")),
         Key("friction_presliding", "m", 1e-7, 1.0, 1e-3, path=("friction", "presliding")),
     ),
-    "transmission": (Key("kind", default="tendon", kind="choice", choices=_TRANSMISSIONS), *_GEOMETRY),
+    "transmission": (
+        Key("kind", default="tendon", kind="choice", choices=_TRANSMISSIONS),
+        *_GEOMETRY,
+    ),
     "joint": (
         Key("kind", default="tendon", kind="choice", choices=(*_TRANSMISSIONS, "free")),
         *_GEOMETRY,
@@ -238,27 +277,54 @@ BLOCKS: Final[dict[str, tuple[Key, ...]]] = {
 #: block -> its ports. What they default to stands here in words; :mod:`pamrs.rig._ports` does it.
 PORTS: Final[dict[str, tuple[Port, ...]]] = {
     "valve": (
-        Port("from", ("supply", "chamber"), default="the supply of the same name, else the only supply"),
+        Port(
+            "from",
+            ("supply", "chamber"),
+            default="the supply of the same name, else the only supply",
+        ),
         Port(
             "to",
             ("line", "chamber"),
-            default="the line without from or the chamber of the same name, else the only line without from, else the only chamber",
+            default=(
+                "the line without from or the chamber of the same name, else the only line without "
+                "from, else the only chamber"
+            ),
         ),
     ),
     "line": (
         Port(
             "from",
             ("supply", "chamber"),
-            default="the valves that lead to it, else the supply of the same name, else, without valves, the only supply",
+            default=(
+                "the valves that lead to it, else the supply of the same name, else, without "
+                "valves, the only supply"
+            ),
         ),
-        Port("to", ("chamber",), ("ambient",), default="the chamber of the same name, else the only chamber"),
+        Port(
+            "to",
+            ("chamber",),
+            ("ambient",),
+            default="the chamber of the same name, else the only chamber",
+        ),
     ),
     "muscle": (
-        Port("chamber", ("chamber",), default="the chamber of the same name, else the only chamber"),
-        Port("joint", ("joint",), ("load",), default="the joint of the same name, else the only joint, else the load"),
+        Port(
+            "chamber", ("chamber",), default="the chamber of the same name, else the only chamber"
+        ),
+        Port(
+            "joint",
+            ("joint",),
+            ("load",),
+            default="the joint of the same name, else the only joint, else the load",
+        ),
     ),
     "link": (
-        Port("on", ("link",), ("base",), default="the link before it in the file, for the first the base"),
+        Port(
+            "on",
+            ("link",),
+            ("base",),
+            default="the link before it in the file, for the first the base",
+        ),
         Port("joint", ("joint",), default="the joint of the same name"),
     ),
 }
@@ -271,7 +337,9 @@ def keys_of(block: str, content: Mapping[str, Any]) -> tuple[Key, ...]:
 
 
 def kind_of(block: str, content: Mapping[str, Any]) -> Any:
-    """Force model of a muscle, kind of a supply, line, joint, transmission, arm or load, None for the other blocks."""
+    """Force model of a muscle, kind of a supply, line, joint, transmission, arm or load, None for
+    the other blocks.
+    """
     name, default = _KINDS.get(block, ("", None))
     return content.get(name, default)
 
@@ -282,16 +350,20 @@ def qualified(block: str, name: str) -> str:
 
 
 def split_name(dotted: str) -> tuple[str, str, str]:
-    """Block, name of the block (``""`` without one) and key of a dotted name such as ``"valve.flexor.half_range"``."""
+    """Block, name of the block (``""`` without one) and key of a dotted name such as
+    ``"valve.flexor.half_range"``.
+    """
     block, _, rest = dotted.partition(".")
     name, _, key = rest.rpartition(".")
     return block, name, key
 
 
 def tables_of(model: Mapping[str, Any], block: str) -> dict[str, dict[str, Any]]:
-    """Tables of a model by the name of the block, ``""`` for one without a name; empty where there is none.
+    """Tables of a model by the name of the block, ``""`` for one without a name; empty where there
+    is none.
 
-    No value of a block is a table, so that the content itself shows whether its entries are values or named blocks.
+    No value of a block is a table, so that the content itself shows whether its entries are values
+    or named blocks.
     """
     content = model.get(block)
     if content is None:

@@ -1,4 +1,6 @@
-"""Rigs that come with the package, by name; light, so that the command line can list them in its help."""
+"""Rigs that come with the package, by name; light, so that the command line can list them in its
+help.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,8 @@ __all__ = ["bench", "names", "named", "sealed_chamber", "shoulder", "template"]
 
 _BENCH: Final = """schema = "pamrs.rig/1"
 name = "bench"
-gas = {{ ambient_pressure = {{ value = 101325.0, unit = "Pa" }}, temperature = {{ value = 293.15, unit = "K" }} }}
+gas = {{ ambient_pressure = {{ value = 101325.0, unit = "Pa" }}, temperature = {{ value = 293.15, \
+unit = "K" }} }}
 [chamber]
 dead_volume = {{ value = {volume!r}, unit = "m3" }}
 """
@@ -28,7 +31,9 @@ _INSIDE: Final = 0.999  # of the range of the muscle that the frame uses
 
 
 def names() -> list[str]:
-    """Names of the rigs that come with the package, the shoulder first, the others by the alphabet."""
+    """Names of the rigs that come with the package, the shoulder first, the others by the
+    alphabet.
+    """
     files = (file.name for file in resources.files(__name__).iterdir())
     found = sorted(name.removesuffix(".toml") for name in files if name.endswith(".toml"))
     return sorted(found, key=lambda name: name != _FIRST)
@@ -36,7 +41,9 @@ def names() -> list[str]:
 
 def _text(name: str) -> str:
     if name not in names():
-        raise ParameterError(f"rig = {name!r} does not come with the package; there are: {', '.join(names())}")
+        raise ParameterError(
+            f"rig = {name!r} does not come with the package; there are: {', '.join(names())}"
+        )
     return resources.files(__name__).joinpath(f"{name}.toml").read_text(encoding="utf-8")
 
 
@@ -63,7 +70,8 @@ def named(name: str) -> Rig:
 
 
 def template(like: str = "shoulder", name: str | None = None) -> str:
-    """A rig file to begin with: a rig of the package, and in comments every key that a rig file may have.
+    """A rig file to begin with: a rig of the package, and in comments every key that a rig file may
+    have.
 
     Parameters
     ----------
@@ -93,12 +101,15 @@ def template(like: str = "shoulder", name: str | None = None) -> str:
 
 
 def shoulder() -> Rig:
-    """The shoulder joint of the 2014 dissertation: six muscles, spool valve, tank, arm with a payload."""
+    """The shoulder joint of the 2014 dissertation: six muscles, spool valve, tank, arm with a
+    payload.
+    """
     return named("shoulder")
 
 
 def bench(muscle: Muscle, name: str = "bench") -> Rig:
-    """A bench: one muscle on a load frame over all lengths that it can have, and a dead volume of a tenth of the muscle's own.
+    """A bench: one muscle on a load frame over all lengths that it can have, and a dead volume of a
+    tenth of the muscle's own.
 
     It has no valve: :func:`pamrs.simulate` takes the length and, where it is held, the pressure.
 
@@ -119,7 +130,11 @@ def bench(muscle: Muscle, name: str = "bench") -> Rig:
     rig = parse_rig(_BENCH.format(volume=0.1 * float(muscle.air_volume(0.0))), source="bench")
     low, high = muscle.contraction_range
     rest = float(muscle.parameters["rest_length"])
-    frame = {"kind": "frame", "min_length": rest * (1.0 - _INSIDE * high), "max_length": rest * (1.0 - _INSIDE * low)}
+    frame = {
+        "kind": "frame",
+        "min_length": rest * (1.0 - _INSIDE * high),
+        "max_length": rest * (1.0 - _INSIDE * low),
+    }
     own = {key.name: muscle.parameters[key.name] for key in keys_of("muscle", muscle.parameters)}
     return Rig(name, {**rig.model, "muscle": {**own, "count": 1}, "load": frame})
 

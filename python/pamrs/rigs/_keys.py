@@ -10,23 +10,35 @@ from pamrs.rig.schema import BLOCKS, PORTS, SINGLE_BLOCKS, Key, Port
 __all__ = ["every_key"]
 
 _INTRODUCTION = """\
-Every key that a rig file may have. Each number is { value, unit }, any unit of the right dimension; with tol (one standard
-deviation of what you know) it may move in a diagnosis or a fit, with unknown = true it is sought. Pressures are gauge.
+Every key that a rig file may have. Each number is { value, unit }, any unit \
+of the right dimension; with tol (one standard
+deviation of what you know) it may move in a diagnosis or a fit, with unknown = true it is sought. \
+Pressures are gauge.
 A block that is left out is not there: only [gas] and [chamber] are needed.
 
-A block that stands once needs no name. Several of a kind have one each, of letters, digits, _ and -: [valve.flexor] and
-[valve.extensor], whose parameters are called valve.flexor.half_range and so on. A port is the name of another block, in full as
-"chamber.flexor" or "supply", or only "flexor" where that is clear. [transmission.flexor] is that of [muscle.flexor], in place of the
-joint's own; [sensors.flexor] has the zeros of [chamber.flexor] and [joint.flexor], [sensors] those of all of them."""
+A block that stands once needs no name. Several of a kind have one each, of letters, digits, _ and \
+-: [valve.flexor] and
+[valve.extensor], whose parameters are called valve.flexor.half_range and so on. A port is the \
+name of another block, in full as
+"chamber.flexor" or "supply", or only "flexor" where that is clear. [transmission.flexor] is that \
+of [muscle.flexor], in place of the
+joint's own; [sensors.flexor] has the zeros of [chamber.flexor] and [joint.flexor], [sensors] \
+those of all of them."""
 
 
 def every_key() -> str:
     """Comments with all blocks, their keys with unit, bounds and default, and the effects."""
     lines = [f"# {line}".rstrip() for line in _INTRODUCTION.splitlines()]
     for block, keys in BLOCKS.items():
-        lines += ["#", f"# [{block}]" + ("" if block in SINGLE_BLOCKS else f" or, for each of several, [{block}.NAME]")]
+        lines += [
+            "#",
+            f"# [{block}]"
+            + ("" if block in SINGLE_BLOCKS else f" or, for each of several, [{block}.NAME]"),
+        ]
         lines += [f"#   {_port(port)}" for port in PORTS.get(block, ())]
-        for group, members in groupby(keys, key=lambda key: key.where[0] if len(key.where) > 1 else ""):
+        for group, members in groupby(
+            keys, key=lambda key: key.where[0] if len(key.where) > 1 else ""
+        ):
             if group:
                 lines.append(f"# {group} = a table of:")
             lines += [f"#   {_line(key, inner=bool(group))}" for key in members]
@@ -56,7 +68,11 @@ def _line(key: Key, *, inner: bool) -> str:
 def _numbers(key: Key) -> str:
     what = {"vector": "list", "count": "whole number"}.get(key.kind, "number")
     unit = "" if key.unit == "1" else f" [{key.unit}]"
-    bounds = f" from {key.lower:.4g} to {key.upper:.4g}" if math.isfinite(key.lower) and math.isfinite(key.upper) else ""
+    bounds = (
+        f" from {key.lower:.4g} to {key.upper:.4g}"
+        if math.isfinite(key.lower) and math.isfinite(key.upper)
+        else ""
+    )
     return f"{what}{unit}{bounds}"
 
 
@@ -73,8 +89,13 @@ def _effects() -> list[str]:
     for name, info in EFFECTS.items():
         lines.append(f'# id = "{name}"')
         if info.at:
-            lines.append(f"#   at                   name of the one {info.at} that it acts on; default {info.everywhere}")
+            lines.append(
+                f"#   at                   name of the one {info.at} that it acts on; default "
+                f"{info.everywhere}"
+            )
         for parameter in info.parameters:
             unit = "" if parameter.unit == "1" else f" [{parameter.unit}]"
-            lines.append(f"#   parameters.{parameter.name}: number{unit}, default {parameter.default:g}")
+            lines.append(
+                f"#   parameters.{parameter.name}: number{unit}, default {parameter.default:g}"
+            )
     return lines

@@ -1,7 +1,8 @@
 """Run a rig: once, sample by sample, many at once, or driven by a recording.
 
 :func:`simulate` returns a :class:`Simulation`; :class:`Simulator` goes from sample to sample,
-:class:`Batch` runs many rigs on all processors, :func:`replay` gives a rig the inputs of a recording.
+:class:`Batch` runs many rigs on all processors, :func:`replay` gives a rig the inputs of a
+recording.
 """
 
 from __future__ import annotations
@@ -9,7 +10,15 @@ from __future__ import annotations
 from pamrs.simulation._batch import Batch, BatchRun, Failure
 from pamrs.simulation._driving import has_frame, regulators_of
 from pamrs.simulation._replay import differences, replay
-from pamrs.simulation._simulation import Balance, Event, Simulation, core_rig, default_step, simulate, whole_samples
+from pamrs.simulation._simulation import (
+    Balance,
+    Event,
+    Simulation,
+    core_rig,
+    default_step,
+    simulate,
+    whole_samples,
+)
 from pamrs.simulation._simulator import Simulator
 
 __all__ = [

@@ -1,4 +1,6 @@
-"""Many plants advanced together, sample by sample: gain sweeps, payload sweeps, vector environments."""
+"""Many plants advanced together, sample by sample: gain sweeps, payload sweeps, vector
+environments.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,13 @@ from pamrs import _core
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
 from pamrs.simulation._driving import Inputs, initial_values, keywords
-from pamrs.simulation._simulation import MOST_NUMBERS, check_run, chosen_step, core_rig, whole_samples
+from pamrs.simulation._simulation import (
+    MOST_NUMBERS,
+    check_run,
+    chosen_step,
+    core_rig,
+    whole_samples,
+)
 
 __all__ = ["Batch", "BatchRun", "Failure"]
 
@@ -48,10 +56,11 @@ class BatchRun(Mapping[str, Array]):
     time : ndarray, shape (rows,)
         Time of each row [s].
     channels : dict of str to ndarray, shape (n, rows)
-        Channels and commands by name in SI units, pressures gauge; a command is the one held from that row. The samples of all
-        plants at one time lie next to each other in memory.
+        Channels and commands by name in SI units, pressures gauge; a command is the one held from
+        that row. The samples of all plants at one time lie next to each other in memory.
     status : tuple of Failure or None
-        Why and when each plant ended, None for those that did not. A plant that ended stays at its last good sample.
+        Why and when each plant ended, None for those that did not. A plant that ended stays at its
+        last good sample.
     """
 
     time: Array
@@ -67,7 +76,9 @@ class BatchRun(Mapping[str, Array]):
         try:
             return self.channels[channel]
         except KeyError:
-            raise KeyError(f"{channel!r} was not recorded; there are: {', '.join(self.channels)}") from None
+            raise KeyError(
+                f"{channel!r} was not recorded; there are: {', '.join(self.channels)}"
+            ) from None
 
     def __iter__(self) -> Any:
         return iter(self.channels)
@@ -83,16 +94,19 @@ class BatchRun(Mapping[str, Array]):
 class Batch:
     """Plants that take their commands together, each as if it were alone.
 
-    Every plant gives bit for bit what :class:`pamrs.Simulator` gives, whatever stands beside it and however many threads there
-    are. A plant whose state leaves the range in which the model holds is kept: its channels stay at its last good sample,
-    :attr:`status` says why, and the others go on. A batch can be pickled and copied; it belongs to one thread at a time.
+    Every plant gives bit for bit what :class:`pamrs.Simulator` gives, whatever stands beside it and
+    however many threads there are. A plant whose state leaves the range in which the model holds is
+    kept: its channels stay at its last good sample, :attr:`status` says why, and the others go on.
+    A batch can be pickled and copied; it belongs to one thread at a time.
 
     Parameters
     ----------
     rig : Rig or sequence of Rig
-        The model of all plants, or one for each: rigs with the same inputs and channels, other parameters.
+        The model of all plants, or one for each: rigs with the same inputs and channels, other
+        parameters.
     n : int, optional
-        Number of plants; needed where neither a sequence of rigs nor an array of initial values says it.
+        Number of plants; needed where neither a sequence of rigs nor an array of initial values
+        says it.
     sample_time : float
         Time between two samples [s].
     step : float, optional
@@ -105,7 +119,8 @@ class Batch:
     Raises
     ------
     ParameterError
-        If an argument is not finite, outside its range or of another length; the message names it, and the row.
+        If an argument is not finite, outside its range or of another length; the message names it,
+        and the row.
     RigError
         If the rigs do not have the same inputs and channels.
 
@@ -138,7 +153,10 @@ class Batch:
         count = _plants(n, len(given) if many else None, initial)
         channels = len(core_rig(given[0]).channels)
         if count * channels > MOST_NUMBERS:
-            raise ParameterError(f"n = {count} is not allowed: at most {MOST_NUMBERS // channels} plants of {channels} channels (2 GB)")
+            raise ParameterError(
+                f"n = {count} is not allowed: at most {MOST_NUMBERS // channels} plants of "
+                f"{channels} channels (2 GB)"
+            )
         self.rigs: tuple[Rig, ...] = tuple(given) if many else (given[0],) * count
         """The rig of each plant."""
         self.sample_time = float(sample_time)
@@ -148,7 +166,9 @@ class Batch:
         self._begin(self._starting(initial))
 
     def _begin(self, initial: dict[str, Array]) -> None:
-        """A core for initial values, and its first state, to begin again from without new threads."""
+        """A core for initial values, and its first state, to begin again from without new
+        threads.
+        """
         self._initial = initial
         self._core = self._started(initial)
         self._first = self._core.states
@@ -161,11 +181,19 @@ class Batch:
 
     def _starting(self, initial: Mapping[str, ArrayLike] | None) -> dict[str, Array]:
         names = initial_values(dict.fromkeys(initial or {}, 0.0), self.rigs[0])
-        return {name: _rowwise(f"initial {name}", (initial or {})[name], len(self)) for name in names}
+        return {
+            name: _rowwise(f"initial {name}", (initial or {})[name], len(self)) for name in names
+        }
 
     def _started(self, initial: Mapping[str, Array]) -> _core.Batch:
         like = core_rig(self.rigs[0])
-        return _core.Batch([core_rig(rig, like) for rig in self.rigs], self.sample_time, self._step, dict(initial), self._threads)
+        return _core.Batch(
+            [core_rig(rig, like) for rig in self.rigs],
+            self.sample_time,
+            self._step,
+            dict(initial),
+            self._threads,
+        )
 
     def __len__(self) -> int:
         return len(self.rigs)
@@ -182,7 +210,9 @@ class Batch:
 
     @property
     def state(self) -> dict[str, Any]:
-        """What everything to come depends on (copies): ``samples``, ``rows`` and ``status``; give it back to :meth:`restore`."""
+        """What everything to come depends on (copies): ``samples``, ``rows`` and ``status``; give
+        it back to :meth:`restore`.
+        """
         return {"samples": self._core.samples, "rows": self._core.states, "status": self.status}
 
     def restore(self, state: Mapping[str, Any]) -> None:
@@ -196,22 +226,38 @@ class Batch:
         Raises
         ------
         ParameterError
-            If it is not one; the message says what is wrong, and the row. The batch then stays as it is.
+            If it is not one; the message says what is wrong, and the row. The batch then stays as
+            it is.
         """
         needed = {"samples", "rows", "status"}
         if not isinstance(state, Mapping) or set(state) != needed:
-            what = f"has {', '.join(map(str, state)) or 'nothing'}" if isinstance(state, Mapping) else f"is a {type(state).__name__}"
-            raise ParameterError(f"state {what}; samples, rows and status are needed, as of Batch.state")
+            what = (
+                f"has {', '.join(map(str, state)) or 'nothing'}"
+                if isinstance(state, Mapping)
+                else f"is a {type(state).__name__}"
+            )
+            raise ParameterError(
+                f"state {what}; samples, rows and status are needed, as of Batch.state"
+            )
         try:
             samples = int(state["samples"])
-            rows = [np.ascontiguousarray(np.asarray(row, dtype=np.float64).reshape(-1)) for row in state["rows"]]
-            status = [None if ended is None else (float(ended[0]), str(ended[1])) for ended in state["status"]]
+            rows = [
+                np.ascontiguousarray(np.asarray(row, dtype=np.float64).reshape(-1))
+                for row in state["rows"]
+            ]
+            status = [
+                None if ended is None else (float(ended[0]), str(ended[1]))
+                for ended in state["status"]
+            ]
         except (TypeError, ValueError, IndexError, OverflowError):
             raise ParameterError(
-                "state is not one of a batch: its rows are arrays of numbers, its status None or (time, message)"
+                "state is not one of a batch: its rows are arrays of numbers, its status None or "
+                "(time, message)"
             ) from None
         if not 0 <= samples < 2**53:
-            raise ParameterError(f"state.samples = {samples} is not allowed: a number from 0 on is needed")
+            raise ParameterError(
+                f"state.samples = {samples} is not allowed: a number from 0 on is needed"
+            )
         self._core.restore(samples, rows, status)
 
     def reset(self, initial: Mapping[str, ArrayLike] | None = None) -> dict[str, Array]:
@@ -269,16 +315,24 @@ class Batch:
         Raises
         ------
         ParameterError
-            If a command is missing, not finite (the index is the plant's) or of another length; the batch stays as it is.
+            If a command is missing, not finite (the index is the plant's) or of another length; the
+            batch stays as it is.
         """
         signals = self._inputs.rows(
-            len(self), valve_command=valve_command, supply_command=supply_command, length=length, pressure=pressure
+            len(self),
+            valve_command=valve_command,
+            supply_command=supply_command,
+            length=length,
+            pressure=pressure,
         )
         return self._named(self._core.advance(1, signals, True))
 
     def control(
         self,
-        update: Callable[[dict[str, Any]], ArrayLike | Mapping[str, ArrayLike] | Mapping[str, Mapping[str, ArrayLike]]],
+        update: Callable[
+            [dict[str, Any]],
+            ArrayLike | Mapping[str, ArrayLike] | Mapping[str, Mapping[str, ArrayLike]],
+        ],
         duration: float,
         *,
         period: float | None = None,
@@ -287,14 +341,15 @@ class Batch:
     ) -> BatchRun:
         """Close the loop of every plant with one sampled controller.
 
-        The controller sees the present sample every ``period``; what it answers is held exactly until the next.
+        The controller sees the present sample every ``period``; what it answers is held exactly
+        until the next.
 
         Parameters
         ----------
         update : callable
-            Takes the sample (channel -> values of all plants, shape (n,), in SI units, read-only, and ``time`` [s]); returns the valve
-            commands [V], shape (n,) or one for all, of several valves a mapping of names, or a mapping of the keywords of
-            :meth:`step`.
+            Takes the sample (channel -> values of all plants, shape (n,), in SI units, read-only,
+            and ``time`` [s]); returns the valve commands [V], shape (n,) or one for all, of several
+            valves a mapping of names, or a mapping of the keywords of :meth:`step`.
         duration : float
             How long [s].
         period : float, optional
@@ -307,18 +362,24 @@ class Batch:
         Returns
         -------
         BatchRun
-            Arrays of shape (n, rows). A plant whose state leaves the model's range, or that is answered a command that is not
-            finite or not possible, ends there, and the others go on.
+            Arrays of shape (n, rows). A plant whose state leaves the model's range, or that is
+            answered a command that is not finite or not possible, ends there, and the others go on.
 
         Raises
         ------
         ParameterError
-            If the period or the duration is not a multiple of the sample time, a channel is not known, more than 2 GB would be
-            recorded, or the controller answers what no plant can take.
+            If the period or the duration is not a multiple of the sample time, a channel is not
+            known, more than 2 GB would be recorded, or the controller answers what no plant can
+            take.
         """
         if not callable(update):
-            raise ParameterError(f"update is a {type(update).__name__}; something that can be called with a sample is needed")
-        every = whole_samples("period", self.sample_time if period is None else period, self.sample_time, least=1)
+            raise ParameterError(
+                f"update is a {type(update).__name__}; something that can be called with a sample "
+                "is needed"
+            )
+        every = whole_samples(
+            "period", self.sample_time if period is None else period, self.sample_time, least=1
+        )
         total = whole_samples("duration", duration, self.sample_time, least=0)
         book = self._book(total, channels, record_every)
         # what is recorded is what was, whatever the controller does with its sample
@@ -326,7 +387,9 @@ class Batch:
         signals: dict[str, Array] = {}
         while True:
             if k % every == 0 and k < total:
-                signals = self._inputs.rows(len(self), **keywords(update({"time": self.time, **sample})))
+                signals = self._inputs.rows(
+                    len(self), **keywords(update({"time": self.time, **sample}))
+                )
             if k % book.every == 0:
                 book.write(k // book.every, sample, signals)
             if k == total:
@@ -335,23 +398,35 @@ class Batch:
             stop = min(k + every - k % every, k + book.every - k % book.every, total)
             sample = self._named(self._core.advance(stop - k, signals, False), writeable=False)
             k = stop
-        time = np.asarray(began + np.arange(0, total + 1, book.every) * self.sample_time, dtype=np.float64)
+        time = np.asarray(
+            began + np.arange(0, total + 1, book.every) * self.sample_time, dtype=np.float64
+        )
         return BatchRun(time, {name: rows.T for name, rows in book.rows.items()}, self.status)
 
     def _book(self, total: int, channels: Sequence[str] | None, every: int) -> _Book:
         if isinstance(every, bool) or not isinstance(every, (int, np.integer)) or every < 1:
-            raise ParameterError(f"record_every = {every!r} is not allowed: a whole number of samples, 1 at least, is needed")
+            raise ParameterError(
+                f"record_every = {every!r} is not allowed: a whole number of samples, 1 at least, "
+                "is needed"
+            )
         known = (*self._channels, *self._commands)
-        names = list(dict.fromkeys(known if channels is None else [channels] if isinstance(channels, str) else channels))
+        names = list(
+            dict.fromkeys(
+                known if channels is None else [channels] if isinstance(channels, str) else channels
+            )
+        )
         for name in names:
             if name not in known:
-                raise ParameterError(f"channels has {name!r}, which these plants do not have; there are: {', '.join(known)}")
+                raise ParameterError(
+                    f"channels has {name!r}, which these plants do not have; there are: "
+                    f"{', '.join(known)}"
+                )
         rows = total // int(every) + 1
         if rows * len(self) * len(names) > MOST_NUMBERS:
             most = MOST_NUMBERS // (len(self) * len(names))
             raise ParameterError(
-                f"{rows} rows of {len(names)} channels of {len(self)} plants are not allowed: at most {most} rows (2 GB); "
-                "choose fewer channels or a larger record_every"
+                f"{rows} rows of {len(names)} channels of {len(self)} plants are not allowed: at "
+                f"most {most} rows (2 GB); choose fewer channels or a larger record_every"
             )
         return _Book({name: np.full((rows, len(self)), np.nan) for name in names}, int(every))
 
@@ -372,11 +447,16 @@ class Batch:
 
     def __repr__(self) -> str:
         names = ", ".join(dict.fromkeys(rig.name for rig in self.rigs))
-        return f"Batch({len(self)} x {names}, time={self.time:.6g} s, sample_time={self.sample_time:g} s)"
+        return (
+            f"Batch({len(self)} x {names}, time={self.time:.6g} s, "
+            f"sample_time={self.sample_time:g} s)"
+        )
 
 
 class _Book(NamedTuple):
-    """What is recorded: arrays of shape (rows, n), so that what comes together is written together."""
+    """What is recorded: arrays of shape (rows, n), so that what comes together is written
+    together.
+    """
 
     rows: dict[str, Array]
     every: int
@@ -391,19 +471,31 @@ class _Book(NamedTuple):
 
 def _plants(n: int | None, rigs: int | None, initial: Mapping[str, ArrayLike] | None) -> int:
     """Number of plants from what says it."""
-    sizes = {f"initial {name}": int(np.size(values)) for name, values in (initial or {}).items() if np.ndim(values) > 0}
+    sizes = {
+        f"initial {name}": int(np.size(values))
+        for name, values in (initial or {}).items()
+        if np.ndim(values) > 0
+    }
     if n is not None:
         if isinstance(n, bool) or not isinstance(n, (int, np.integer)) or n < 1:
-            raise ParameterError(f"n = {n!r} is not allowed: a whole number of plants, 1 at least, is needed")
+            raise ParameterError(
+                f"n = {n!r} is not allowed: a whole number of plants, 1 at least, is needed"
+            )
         sizes = {"n": int(n), **sizes}
     if rigs is not None:
         sizes = {"rig": rigs, **sizes}
     if not sizes:
-        raise ParameterError("n is missing: the number of plants (or a sequence of rigs, or an array of initial values)")
+        raise ParameterError(
+            "n is missing: the number of plants (or a sequence of rigs, or an array of initial "
+            "values)"
+        )
     first, count = next(iter(sizes.items()))
     for name, size in sizes.items():
         if size != count or size < 1:
-            raise ParameterError(f"{name} is for {size} plants, {first} for {count}; one number of plants, 1 at least, is needed")
+            raise ParameterError(
+                f"{name} is for {size} plants, {first} for {count}; one number of plants, 1 at "
+                "least, is needed"
+            )
     return count
 
 
@@ -416,17 +508,32 @@ def _rowwise(name: str, values: ArrayLike, n: int) -> Array:
     if array.ndim == 0:
         array = np.full(n, float(array))
     if array.shape != (n,):
-        raise ParameterError(f"{name} has the shape {array.shape}; ({n},) is needed, one value for each plant")
+        raise ParameterError(
+            f"{name} has the shape {array.shape}; ({n},) is needed, one value for each plant"
+        )
     for row in np.flatnonzero(~np.isfinite(array))[:1]:
-        raise ParameterError(f"{name}[{row}] = {array[row]} is not allowed: a finite number is needed")
+        raise ParameterError(
+            f"{name}[{row}] = {array[row]} is not allowed: a finite number is needed"
+        )
     return np.ascontiguousarray(array)
 
 
 def _threads(threads: int | None) -> int:
     """How many threads may work."""
     if threads is None:
-        has = os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else range(os.cpu_count() or 1)
+        has = (
+            os.sched_getaffinity(0)
+            if hasattr(os, "sched_getaffinity")
+            else range(os.cpu_count() or 1)
+        )
         return min(len(has), _MOST_THREADS)
-    if isinstance(threads, bool) or not isinstance(threads, (int, np.integer)) or not 1 <= threads <= _MOST_THREADS:
-        raise ParameterError(f"threads = {threads!r} is not allowed: a whole number from 1 to {_MOST_THREADS} is needed")
+    if (
+        isinstance(threads, bool)
+        or not isinstance(threads, (int, np.integer))
+        or not 1 <= threads <= _MOST_THREADS
+    ):
+        raise ParameterError(
+            f"threads = {threads!r} is not allowed: a whole number from 1 to {_MOST_THREADS} is "
+            "needed"
+        )
     return int(threads)

@@ -1,4 +1,6 @@
-"""What drives a rig: commands and prescribed channels from a user's arguments to the names of the core, checked."""
+"""What drives a rig: commands and prescribed channels from a user's arguments to the names of the
+core, checked.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,16 @@ from pamrs.errors import ParameterError
 if TYPE_CHECKING:
     from pamrs.rig import Rig
 
-__all__ = ["Inputs", "Signals", "has_frame", "initial_values", "keywords", "regulators_of", "sensor_zero", "signals_of"]
+__all__ = [
+    "Inputs",
+    "Signals",
+    "has_frame",
+    "initial_values",
+    "keywords",
+    "regulators_of",
+    "sensor_zero",
+    "signals_of",
+]
 
 Array = NDArray[np.float64]
 #: One array for a block without a name or the only one of its kind, else one for each name.
@@ -70,10 +81,13 @@ def signals_of(
     Raises
     ------
     ParameterError
-        If a signal is missing, not taken by the rig, of another length or outside its range; the message names it.
+        If a signal is missing, not taken by the rig, of another length or outside its range; the
+        message names it.
     """
     inputs = Inputs(rig)
-    given = inputs.named(valve_command=valve_command, supply_command=supply_command, length=length, pressure=pressure)
+    given = inputs.named(
+        valve_command=valve_command, supply_command=supply_command, length=length, pressure=pressure
+    )
     sizes = {name: np.size(values) for name, values in given.items() if np.ndim(values) > 0}
     count = rows if rows is not None else (next(iter(sizes.values())) if sizes else None)
     signals = {}
@@ -100,7 +114,11 @@ class Inputs:
         }
         self._valves = [dotted("valve_command", name) for name in self._names["valve_command"][0]]
         self._frame = has_frame(rig)
-        self._fed = {valve["to"].partition(".")[2] for valve in rig.ports("valve").values() if valve["to"].startswith("chamber")}
+        self._fed = {
+            valve["to"].partition(".")[2]
+            for valve in rig.ports("valve").values()
+            if valve["to"].startswith("chamber")
+        }
         self._ranges: dict[str, tuple[float, float, str]] = {}
         self._load = rig.tables("load").get("", {})
         self._ambient = float(rig.tables("gas")[""]["ambient_pressure"])
@@ -115,9 +133,14 @@ class Inputs:
         length: ArrayLike | None = None,
         pressure: Signals | None = None,
     ) -> dict[str, ArrayLike]:
-        """A user's arguments by the core's names, as they were given; arguments and errors as of :func:`signals_of`."""
+        """A user's arguments by the core's names, as they were given; arguments and errors as of
+        :func:`signals_of`.
+        """
         given: dict[str, ArrayLike] = {}
-        for channel, signal in (("valve_command", valve_command), ("supply_command", supply_command)):
+        for channel, signal in (
+            ("valve_command", valve_command),
+            ("supply_command", supply_command),
+        ):
             if signal is not None:
                 given |= _named(channel, signal, *self._names[channel])
         if length is not None:
@@ -126,7 +149,9 @@ class Inputs:
             given |= _named("pressure", pressure, *self._names["pressure"])
         for name in self._valves:
             if name not in given:
-                raise ParameterError(f"{name} is missing: a rig with a valve needs one value per sample [V]")
+                raise ParameterError(
+                    f"{name} is missing: a rig with a valve needs one value per sample [V]"
+                )
         self._check_prescribed(given)
         return given
 
@@ -137,7 +162,9 @@ class Inputs:
         length: float | None = None,
         pressure: float | Mapping[str, float] | None = None,
     ) -> dict[str, float]:
-        """Commands of one sample, checked, by the core's names; arguments and errors as of :func:`signals_of`."""
+        """Commands of one sample, checked, by the core's names; arguments and errors as of
+        :func:`signals_of`.
+        """
         if (
             self._only is not None
             and isinstance(valve_command, float)
@@ -145,7 +172,12 @@ class Inputs:
             and supply_command is length is pressure is None
         ):
             return {self._only: valve_command}
-        given = self.named(valve_command=valve_command, supply_command=supply_command, length=length, pressure=pressure)
+        given = self.named(
+            valve_command=valve_command,
+            supply_command=supply_command,
+            length=length,
+            pressure=pressure,
+        )
         numbers: dict[str, float] = {}
         for name, value in given.items():
             low, high, allowed = self.range(name)
@@ -156,7 +188,9 @@ class Inputs:
         return numbers
 
     def rows(self, rows: int, **signals: Any) -> dict[str, Array]:
-        """Commands of one sample of several plants, one number for each; whether the numbers are possible is not looked at."""
+        """Commands of one sample of several plants, one number for each; whether the numbers are
+        possible is not looked at.
+        """
         given = {}
         for name, values in self.named(**signals).items():
             try:
@@ -166,7 +200,10 @@ class Inputs:
             if array.ndim == 0:
                 array = np.full(rows, float(array))
             if array.shape != (rows,):
-                raise ParameterError(f"{name} has the shape {array.shape}; ({rows},) is needed, one value for each plant")
+                raise ParameterError(
+                    f"{name} has the shape {array.shape}; ({rows},) is needed, one value for each "
+                    "plant"
+                )
             given[name] = array
         return given
 
@@ -191,21 +228,31 @@ class Inputs:
         if self._frame and "length" not in given:
             raise ParameterError("length is missing: a load frame needs one value per sample [m]")
         if not self._frame and "length" in given:
-            raise ParameterError('length is given, which only a rig with a load frame takes ([load] kind = "frame")')
+            raise ParameterError(
+                'length is given, which only a rig with a load frame takes ([load] kind = "frame")'
+            )
         for name in given:
             channel, _, chamber = name.partition(".")
             if channel == "pressure" and chamber in self._fed:
-                raise ParameterError(f"{name} is given, which only a rig without [valve] takes: there the valve decides")
+                raise ParameterError(
+                    f"{name} is given, which only a rig without [valve] takes: there the valve "
+                    "decides"
+                )
             if channel == "supply_command" and not self._names["supply_command"][0]:
                 raise ParameterError(
-                    'supply_command is given, which only a supply takes that is a regulator ([supply] kind = "regulator")'
+                    "supply_command is given, which only a supply takes that is a regulator "
+                    '([supply] kind = "regulator")'
                 )
 
 
 def keywords(answer: Any) -> dict[str, Any]:
     """What a controller answers as keywords of :meth:`pamrs.Simulator.step`."""
     known = ("valve_command", "supply_command", "length", "pressure")
-    if not isinstance(answer, (float, np.ndarray)) and isinstance(answer, Mapping) and any(name in known for name in answer):
+    if (
+        not isinstance(answer, (float, np.ndarray))
+        and isinstance(answer, Mapping)
+        and any(name in known for name in answer)
+    ):
         return dict(answer)
     return {"valve_command": answer}
 
@@ -216,18 +263,25 @@ def initial_values(initial: Mapping[str, float] | None, rig: Rig) -> dict[str, f
     for name, value in (initial or {}).items():
         channel, _, block = name.partition(".")
         if channel not in _INITIAL:
-            raise ParameterError(f"initial has the unknown entry {name!r}; allowed: {', '.join(_INITIAL)}")
+            raise ParameterError(
+                f"initial has the unknown entry {name!r}; allowed: {', '.join(_INITIAL)}"
+            )
         tables = rig.tables(_INITIAL[channel])
         if not tables:
-            raise ParameterError(f"initial has {name!r}, but the rig {rig.name!r} has no [{_INITIAL[channel]}]")
+            raise ParameterError(
+                f"initial has {name!r}, but the rig {rig.name!r} has no [{_INITIAL[channel]}]"
+            )
         if block not in tables:
             raise ParameterError(
-                f"initial has {name!r}; the rig {rig.name!r} has: {', '.join(dotted(channel, other) for other in tables)}"
+                f"initial has {name!r}; the rig {rig.name!r} has: "
+                f"{', '.join(dotted(channel, other) for other in tables)}"
             )
         try:
             start[name] = float(value)
         except (TypeError, ValueError):
-            raise ParameterError(f"initial {name} = {value!r} is not allowed: a number is needed") from None
+            raise ParameterError(
+                f"initial {name} = {value!r} is not allowed: a number is needed"
+            ) from None
     return start
 
 
@@ -247,14 +301,17 @@ def sensor_zero(rig: Rig, key: str, block: str) -> float:
     return float(sensors.get(block, sensors.get("", {})).get(key, 0.0))
 
 
-def _named(channel: str, given: Signals | None, names: list[str], block: str) -> dict[str, ArrayLike]:
+def _named(
+    channel: str, given: Signals | None, names: list[str], block: str
+) -> dict[str, ArrayLike]:
     """A user's argument as signals by the core's names."""
     if given is None:
         return {}
     if not isinstance(given, Mapping):
         if len(names) > 1:
             raise ParameterError(
-                f"{channel} is one signal, and the rig has a {block} each of: {', '.join(names)}; give a mapping of names"
+                f"{channel} is one signal, and the rig has a {block} each of: {', '.join(names)}; "
+                "give a mapping of names"
             )
         return {dotted(channel, names[0] if names else ""): given}
     if set(given) == {""} and len(names) == 1:
@@ -262,12 +319,15 @@ def _named(channel: str, given: Signals | None, names: list[str], block: str) ->
     for name in given:
         if name not in names:
             raise ParameterError(
-                f"{channel} has {name!r}, and the rig has no {block} of that name; it has: {', '.join(names) or 'none'}"
+                f"{channel} has {name!r}, and the rig has no {block} of that name; it has: "
+                f"{', '.join(names) or 'none'}"
             )
     return {dotted(channel, name): values for name, values in given.items()}
 
 
-def _signal(name: str, values: ArrayLike, rows: int | None, allowed_range: tuple[float, float, str]) -> Array:
+def _signal(
+    name: str, values: ArrayLike, rows: int | None, allowed_range: tuple[float, float, str]
+) -> Array:
     """One signal as a checked array; a number stays the same in every row."""
     try:
         signal = np.asarray(values, dtype=np.float64)
@@ -277,7 +337,9 @@ def _signal(name: str, values: ArrayLike, rows: int | None, allowed_range: tuple
         signal = np.full(rows, float(signal))
     if signal.ndim != 1 or signal.size == 0 or (rows is not None and signal.size != rows):
         needed = "(n,) with n >= 1" if rows is None else f"({rows},)"
-        raise ParameterError(f"{name} has the shape {signal.shape}; {needed} is needed, one value for each row")
+        raise ParameterError(
+            f"{name} has the shape {signal.shape}; {needed} is needed, one value for each row"
+        )
     low, high, allowed = allowed_range
     bad = np.flatnonzero(~((signal >= low) & (signal <= high) & np.isfinite(signal)))
     if bad.size:

@@ -20,7 +20,8 @@ __all__ = ["differences", "replay"]
 
 Array = NDArray[np.float64]
 
-#: State of a recording's first row that a simulation begins with, the block that has it and the zero of its sensor.
+#: State of a recording's first row that a simulation begins with, the block that has it and the
+#: zero of its sensor.
 _STATES = {
     "muscle_pressure": ("chamber", "pressure_zero"),
     "supply_pressure": ("supply", ""),
@@ -35,15 +36,17 @@ _RECORDED_AS = {"muscle_force": "force"}
 def replay(rig: Rig, recording: Recording) -> Simulation:
     """Simulate a rig from a recording's first values under its inputs.
 
-    Commands of valves and regulators come from the recording, the length of a load frame and the pressures of chambers that nothing
-    feeds as well; what a recording leaves unusable holds its last usable value.
+    Commands of valves and regulators come from the recording, the length of a load frame and the
+    pressures of chambers that nothing feeds as well; what a recording leaves unusable holds its
+    last usable value.
 
     Parameters
     ----------
     rig : Rig
         The model.
     recording : Recording
-        As :func:`pamrs.load_recording` gives it; channels of a block with a name carry it (``valve_command.flexor``).
+        As :func:`pamrs.load_recording` gives it; channels of a block with a name carry it
+        (``valve_command.flexor``).
 
     Returns
     -------
@@ -63,9 +66,13 @@ def replay(rig: Rig, recording: Recording) -> Simulation:
     for channel, (block, _) in _STATES.items():
         own = prescribed.get(channel)
         for name in rig.tables(block):
-            if _usable(recording, channel, name) and (own is None or (isinstance(own, dict) and name not in own)):
+            if _usable(recording, channel, name) and (
+                own is None or (isinstance(own, dict) and name not in own)
+            ):
                 full = dotted(channel, name)
-                initial[full] = float(recording.channels[full][recording.mask[full]][0]) - _zero(rig, channel, name)
+                initial[full] = float(recording.channels[full][recording.mask[full]][0]) - _zero(
+                    rig, channel, name
+                )
     if not drive:
         drive["duration"] = float(recording.time[-1])
     return simulate(rig, sample_time=recording.sample_time, initial=initial, **drive)
@@ -89,15 +96,21 @@ def _drive(rig: Rig, recording: Recording) -> dict[str, Any]:
         drive["length"] = _held(recording, "length")
     # Where muscles pull and nothing feeds them, their measured pressure is what moves them.
     if (frame or rig.tables("joint")) and not (valves or rig.tables("supply")):
-        given = [name for name in rig.tables("chamber") if _usable(recording, "muscle_pressure", name)]
+        given = [
+            name for name in rig.tables("chamber") if _usable(recording, "muscle_pressure", name)
+        ]
         full = {name: dotted("muscle_pressure", name) for name in given}
         if given:
-            drive["pressure"] = {name: _held(recording, full[name]) - _zero(rig, "muscle_pressure", name) for name in given}
+            drive["pressure"] = {
+                name: _held(recording, full[name]) - _zero(rig, "muscle_pressure", name)
+                for name in given
+            }
     return drive
 
 
 def differences(result: Simulation, recording: Recording) -> dict[str, float]:
-    """Root mean square of simulated less recorded, for each channel that both have and that was not prescribed.
+    """Root mean square of simulated less recorded, for each channel that both have and that was not
+    prescribed.
 
     Parameters
     ----------
@@ -112,7 +125,12 @@ def differences(result: Simulation, recording: Recording) -> dict[str, float]:
         Channel -> difference in its SI unit.
     """
     drive = _drive(result.rig, recording)
-    skipped = {"time", "valve_command", "supply_command", *(["length"] if "length" in drive else [])}
+    skipped = {
+        "time",
+        "valve_command",
+        "supply_command",
+        *(["length"] if "length" in drive else []),
+    }
     skipped |= {dotted("muscle_pressure", name) for name in drive.get("pressure", ())}
     found = {}
     for name in result:
@@ -121,7 +139,9 @@ def differences(result: Simulation, recording: Recording) -> dict[str, float]:
         if {head, name} & skipped or other not in recording.mask or not recording.mask[other].any():
             continue
         rows = recording.mask[other]
-        found[name] = float(np.sqrt(np.mean((result[name][rows] - recording.channels[other][rows]) ** 2)))
+        found[name] = float(
+            np.sqrt(np.mean((result[name][rows] - recording.channels[other][rows]) ** 2))
+        )
     return found
 
 
@@ -132,7 +152,9 @@ def _usable(recording: Recording, channel: str, name: str = "") -> bool:
 
 
 def _held(recording: Recording, name: str) -> Array:
-    """A channel whose unusable samples repeat the last usable one, as a valve does that hears nothing new."""
+    """A channel whose unusable samples repeat the last usable one, as a valve does that hears
+    nothing new.
+    """
     if not _usable(recording, name):
         raise RecordingError(f"{recording.name}: no usable {name}, which the rig needs")
     rows = recording.mask[name]

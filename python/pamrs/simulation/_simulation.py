@@ -36,7 +36,8 @@ class Event(NamedTuple):
     time : float
         When [s], by a straight line through the step in which it happened.
     kind : str
-        ``min_stop_reached``, ``min_stop_left``, ``max_stop_reached``, ``max_stop_left``, ``choked`` or ``unchoked``.
+        ``min_stop_reached``, ``min_stop_left``, ``max_stop_reached``, ``max_stop_left``, ``choked``
+        or ``unchoked``.
     block : str
         Where: ``joint.elbow``, ``load``, ``valve.flexor``, ``line``.
     """
@@ -53,17 +54,19 @@ class Balance:
     Attributes
     ----------
     supplied, vented, stored : float
-        Mass out of the supplies, mass to the ambient (what regulators relieve included), gain of all chambers and lines by what
-        flowed [kg].
+        Mass out of the supplies, mass to the ambient (what regulators relieve included), gain of
+        all chambers and lines by what flowed [kg].
     implied : float
-        Gain by the gas law at the rest temperature, ``P V/(R T)`` [kg]. The constant coefficients of filling, emptying and volume
-        change are no energy balance, so that it differs from ``stored`` where they are not 1; with the effect ``heat_transfer``
-        the two differ by the gas's temperature alone.
+        Gain by the gas law at the rest temperature, ``P V/(R T)`` [kg]. The constant coefficients
+        of filling, emptying and volume change are no energy balance, so that it differs from
+        ``stored`` where they are not 1; with the effect ``heat_transfer`` the two differ by the
+        gas's temperature alone.
     energy : float
-        ``R T`` times the mass supplied, what section 6 of the dissertation calls ``E_in``: ``(P_initial - P_final) V`` of a
-        tank [J].
+        ``R T`` times the mass supplied, what section 6 of the dissertation calls ``E_in``:
+        ``(P_initial - P_final) V`` of a tank [J].
     exergy : float
-        ``R T ln(P/P_a)`` times the mass supplied at the supply's pressure ``P``: the most work that it could do [J].
+        ``R T ln(P/P_a)`` times the mass supplied at the supply's pressure ``P``: the most work that
+        it could do [J].
     muscle_work : float
         Work of the muscles, ``F dd`` [J].
     joint_work : float
@@ -86,23 +89,34 @@ class Balance:
 
     @property
     def created(self) -> float:
-        """Mass that the gas coefficients make or lose [kg]: what pressure and volume say is stored, less what flowed in."""
+        """Mass that the gas coefficients make or lose [kg]: what pressure and volume say is stored,
+        less what flowed in.
+        """
         return self.implied - self.stored
 
     @property
     def efficiency(self) -> float:
         """Lifting work by energy supplied [1] (dissertation 6.4); NaN where nothing was supplied.
 
-        An arm that swings is lifted again and again, and the spring of its muscles gives the work back: then it is above 1.
+        An arm that swings is lifted again and again, and the spring of its muscles gives the work
+        back: then it is above 1.
         """
         return self.joint_work / self.energy if self.energy > 0.0 else math.nan
 
     def __str__(self) -> str:
-        air = f"air {1e3 * self.supplied:.4g} g supplied, {1e3 * self.vented:.4g} g vented, {1e3 * self.implied:.4g} g more stored"
+        air = (
+            f"air {1e3 * self.supplied:.4g} g supplied, {1e3 * self.vented:.4g} g vented, "
+            f"{1e3 * self.implied:.4g} g more stored"
+        )
         if abs(self.created) > 1e-3 * max(self.supplied, self.vented, 1e-12):
-            reason = "the constant gas coefficients, which are no energy balance; the effect heat_transfer is"
+            reason = (
+                "the constant gas coefficients, which are no energy balance; the effect "
+                "heat_transfer is"
+            )
             air += f" ({1e3 * self.created:+.4g} g by {reason})"
-        share = f" ({100.0 * self.muscle_work / self.exergy:.1f} % of it)" if self.exergy > 0.0 else ""
+        share = (
+            f" ({100.0 * self.muscle_work / self.exergy:.1f} % of it)" if self.exergy > 0.0 else ""
+        )
         return (
             f"{air}\nair's energy R T m {self.energy:.4g} J, exergy {self.exergy:.4g} J; "
             f"net work of the muscles {self.muscle_work:.4g} J"
@@ -113,14 +127,18 @@ class Balance:
 class Simulation(Mapping[str, Array]):
     """Simulated channels by name, SI, gauge pressures; ``time`` [s] is a channel too.
 
-    ``result["muscle_pressure"]`` is an array with one row per sample; ``result.time`` is ``result["time"]``.
+    ``result["muscle_pressure"]`` is an array with one row per sample; ``result.time`` is
+    ``result["time"]``.
     """
 
-    def __init__(self, channels: Mapping[str, Array], rig: Rig, events: Sequence[tuple[float, str, str]] = ()) -> None:
+    def __init__(
+        self, channels: Mapping[str, Array], rig: Rig, events: Sequence[tuple[float, str, str]] = ()
+    ) -> None:
         self._channels = dict(channels)
         self.rig = rig
         self.events = [Event(*event) for event in events]
-        """Stops that were reached or left, flows that became choked or no longer are, in the order of time."""
+        """Stops that were reached or left, flows that became choked or no longer are, in the order
+        of time."""
 
     @property
     def time(self) -> Array:
@@ -131,7 +149,9 @@ class Simulation(Mapping[str, Array]):
         try:
             return self._channels[channel]
         except KeyError:
-            raise KeyError(f"no channel {channel!r}; there are: {', '.join(self._channels)}") from None
+            raise KeyError(
+                f"no channel {channel!r}; there are: {', '.join(self._channels)}"
+            ) from None
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._channels)
@@ -153,13 +173,17 @@ class Simulation(Mapping[str, Array]):
             Name of the block ("" where it has none) -> channel.
         """
         split = {name: name.partition(".") for name in self._channels}
-        return {block: self._channels[name] for name, (head, _, block) in split.items() if head == channel}
+        return {
+            block: self._channels[name]
+            for name, (head, _, block) in split.items()
+            if head == channel
+        }
 
     @property
     def balance(self) -> Balance:
         """Mass, energy and work from the first to the last row."""
         channels = self._channels
-        gain = {name: float(channels[name][-1] - channels[name][0]) for name in _BOOKS}
+        gain = {name: float(channels[name][-1] - channels[name][0]) for name in _BALANCES}
         masses = [m for channel in ("air_mass", "line_mass") for m in self.under(channel).values()]
         return Balance(
             supplied=gain["mass_supplied"],
@@ -178,20 +202,37 @@ class Simulation(Mapping[str, Array]):
         total = sum(float(mass[-1] - mass[0]) for mass in self.under("line_mass").values())
         for name, volume in self.under("air_volume").items():
             zero = sensor_zero(self.rig, "pressure_zero", name)
-            absolute = self._channels[dotted("muscle_pressure", name)] - zero + gas["ambient_pressure"]
-            total += float(absolute[-1] * volume[-1] - absolute[0] * volume[0]) / (gas["gas_constant"] * gas["temperature"])
+            absolute = (
+                self._channels[dotted("muscle_pressure", name)] - zero + gas["ambient_pressure"]
+            )
+            total += float(absolute[-1] * volume[-1] - absolute[0] * volume[0]) / (
+                gas["gas_constant"] * gas["temperature"]
+            )
         return total
 
     def summary(self) -> str:
-        """Where every motion and pressure ends, what happened on the way, and what went where, in a few lines."""
+        """Where every motion and pressure ends, what happened on the way, and what went where, in a
+        few lines.
+        """
         said = [f"{self.rig.name}: {self.time[-1]:g} s, {self.time.size} rows"]
-        for channel, unit, factor in (("muscle_pressure", "bar", 1e-5), ("joint_angle", "deg", 180.0 / math.pi), ("length", "mm", 1e3)):
+        for channel, unit, factor in (
+            ("muscle_pressure", "bar", 1e-5),
+            ("joint_angle", "deg", 180.0 / math.pi),
+            ("length", "mm", 1e3),
+        ):
             for block, values in self.under(channel).items():
-                low, high, last = (factor * float(v) for v in (values.min(), values.max(), values[-1]))
-                said.append(f"{dotted(channel, block)}: from {low:.4g} to {high:.4g} {unit}, at the end {last:.4g} {unit}")
+                low, high, last = (
+                    factor * float(v) for v in (values.min(), values.max(), values[-1])
+                )
+                said.append(
+                    f"{dotted(channel, block)}: from {low:.4g} to {high:.4g} {unit}, at the end "
+                    f"{last:.4g} {unit}"
+                )
         kinds = dict.fromkeys((event.block, event.kind) for event in self.events)
         for block, kind in kinds:
-            times = [event.time for event in self.events if (event.block, event.kind) == (block, kind)]
+            times = [
+                event.time for event in self.events if (event.block, event.kind) == (block, kind)
+            ]
             often = "" if len(times) == 1 else f" and {len(times) - 1} times more"
             said.append(f"{block}: {kind.replace('_', ' ')} at {times[0]:.4g} s{often}")
         return "\n".join([*said, *self._fallen(), str(self.balance)])
@@ -200,9 +241,14 @@ class Simulation(Mapping[str, Array]):
         """Joints that end on their lower stop although their muscles are under pressure."""
         said = []
         for name, joint in self.rig.tables("joint").items():
-            angle, torque = (self._channels[dotted(channel, name)] for channel in ("joint_angle", "joint_torque"))
+            angle, torque = (
+                self._channels[dotted(channel, name)] for channel in ("joint_angle", "joint_torque")
+            )
             if angle[-1] <= joint["min_angle"] + 1e-3 and torque[-1] > _TELLING_TORQUE:
-                said.append(f"{dotted('joint', name)}: ends on its lower stop; {torque[-1]:.3g} N m of its muscles do not lift the arm")
+                said.append(
+                    f"{dotted('joint', name)}: ends on its lower stop; {torque[-1]:.3g} N m of its "
+                    "muscles do not lift the arm"
+                )
         return said
 
     def to_pandas(self) -> pd.DataFrame:
@@ -212,7 +258,12 @@ class Simulation(Mapping[str, Array]):
         columns = {name: values for name, values in self._channels.items() if name != "time"}
         return pd.DataFrame(columns, index=pd.Index(self.time, name="time"))
 
-    def plot(self, path: str | os.PathLike[str], *, recorded: Mapping[str, tuple[Array, Array]] | None = None) -> Path:
+    def plot(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        recorded: Mapping[str, tuple[Array, Array]] | None = None,
+    ) -> Path:
         """Write a picture of the channels over time, a PNG.
 
         Parameters
@@ -256,7 +307,8 @@ class Simulation(Mapping[str, Array]):
         ImportError
             If matplotlib is missing; names the extra to install.
         ParameterError
-            If the rig has no arm, there are fewer than two samples, or the speed is not a finite number above zero.
+            If the rig has no arm, there are fewer than two samples, or the speed is not a finite
+            number above zero.
         """
         written: Path = _motion().write_animation(self, Path(path), speed=speed)
         return written
@@ -274,10 +326,12 @@ def _motion() -> ModuleType:
 
 
 def core_rig(rig: Rig, like: _core.Rig | None = None) -> _core.Rig:
-    """The compiled rig of a description, kept with it so that a second simulation costs no compilation.
+    """The compiled rig of a description, kept with it so that a second simulation costs no
+    compilation.
 
-    A rig that differs from another one by the values of its parameters only is that one with other values: nothing is read or
-    wired again. Of any other, muscles that are those of ``like`` are not compiled again.
+    A rig that differs from another one by the values of its parameters only is that one with other
+    values: nothing is read or wired again. Of any other, muscles that are those of ``like`` are not
+    compiled again.
     """
     cached: Any = rig.__dict__.get("_compiled")
     if cached is None:
@@ -290,7 +344,9 @@ def core_rig(rig: Rig, like: _core.Rig | None = None) -> _core.Rig:
 
 
 def _revalued(rig: Rig, like: _core.Rig | None) -> _core.Rig | None:
-    """The compiled rig from which this one differs by numbers, with these; None where there is none or it cannot be."""
+    """The compiled rig from which this one differs by numbers, with these; None where there is none
+    or it cannot be.
+    """
     origin, values = rig.__dict__.get("_origin", (None, {}))
     if origin is None:
         return None
@@ -320,23 +376,29 @@ def simulate(
     rig : Rig
         The model.
     valve_command : array_like, shape (n,), or mapping of str to array_like, optional
-        Command [V]; entry ``k`` is held over ``[k, k + 1)`` samples. Needed by a rig with a valve; of several valves, one for each
-        name. A number is held throughout where another signal or ``duration`` says how long.
+        Command [V]; entry ``k`` is held over ``[k, k + 1)`` samples. Needed by a rig with a valve;
+        of several valves, one for each name. A number is held throughout where another signal or
+        ``duration`` says how long.
     sample_time : float
         Time between rows [s].
     step : float, optional
-        RK4 step [s]; divides ``sample_time``. By default the longest that does and is at most 1 ms. Where the rig is stiffer (small
-        volumes behind large openings, hard stops, a small mass), each step is divided until it is stable.
+        RK4 step [s]; divides ``sample_time``. By default the longest that does and is at most 1 ms.
+        Where the rig is stiffer (small volumes behind large openings, hard stops, a small mass),
+        each step is divided until it is stable.
     initial : mapping of str to float, optional
-        Initial ``muscle_pressure``, ``supply_pressure``, ``line_pressure`` [Pa, gauge], ``joint_angle`` [rad], ``joint_rate``
-        [rad/s], or with a linear load ``length`` [m], ``length_rate`` [m/s]; of a block with a name, ``muscle_pressure.flexor``.
-        What is left out is at rest: pressures as the rig file has them, joint at its rest angle, muscle at its rest length.
+        Initial ``muscle_pressure``, ``supply_pressure``, ``line_pressure`` [Pa, gauge],
+        ``joint_angle`` [rad], ``joint_rate`` [rad/s], or with a linear load ``length`` [m],
+        ``length_rate`` [m/s]; of a block with a name, ``muscle_pressure.flexor``. What is left out
+        is at rest: pressures as the rig file has them, joint at its rest angle, muscle at its rest
+        length.
     duration : float, optional
         Simulated time [s], where no signal has a length.
     supply_command : array_like, shape (n,), or mapping of str to array_like, optional
-        Set pressure [Pa, gauge] of a regulator, held like ``valve_command``; its initial pressure where it is left out.
+        Set pressure [Pa, gauge] of a regulator, held like ``valve_command``; its initial pressure
+        where it is left out.
     length : array_like, shape (n,), optional
-        Length of the muscle at each row [m], straight lines between: what a load frame (``[load] kind = "frame"``) prescribes.
+        Length of the muscle at each row [m], straight lines between: what a load frame
+        (``[load] kind = "frame"``) prescribes.
     pressure : array_like, shape (n,), or mapping of str to array_like, optional
         Gauge pressure at each row [Pa], straight lines between, of a chamber without a valve.
 
@@ -364,13 +426,24 @@ def simulate(
     rows = _rows(sample_time, duration, valve_command, supply_command, length, pressure)
     check_rows(rig, rows or 0)
     signals, count = signals_of(
-        rig, valve_command=valve_command, supply_command=supply_command, length=length, pressure=pressure, rows=rows
+        rig,
+        valve_command=valve_command,
+        supply_command=supply_command,
+        length=length,
+        pressure=pressure,
+        rows=rows,
     )
     if count is None:
-        raise ParameterError("duration is missing: a finite time >= 0 s is needed (or give valve_command)")
+        raise ParameterError(
+            "duration is missing: a finite time >= 0 s is needed (or give valve_command)"
+        )
     check_rows(rig, count)
     start = initial_values(initial, rig)
-    held = {name: signal for name, signal in signals.items() if channel_of(name) in ("valve_command", "supply_command")}
+    held = {
+        name: signal
+        for name, signal in signals.items()
+        if channel_of(name) in ("valve_command", "supply_command")
+    }
     driven = {}
     for name, signal in signals.items():
         if name in held:
@@ -378,9 +451,16 @@ def simulate(
             continue
         first = name.replace("pressure", "muscle_pressure", 1)
         if start.setdefault(first, float(signal[0])) != float(signal[0]):
-            raise ParameterError(f"initial {first} = {start[first]:g} does not go with {name}[0] = {signal[0]:g}: leave one out")
-        driven[name] = np.ascontiguousarray(np.append(signal[1:], signal[-1]))  # for the end of each sample; the last is not run
-    channels, events = core_rig(rig).simulate(count, driven, sample_time, chosen_step(sample_time, step), start)
+            raise ParameterError(
+                f"initial {first} = {start[first]:g} does not go with {name}[0] = {signal[0]:g}: "
+                "leave one out"
+            )
+        driven[name] = np.ascontiguousarray(
+            np.append(signal[1:], signal[-1])
+        )  # for the end of each sample; the last is not run
+    channels, events = core_rig(rig).simulate(
+        count, driven, sample_time, chosen_step(sample_time, step), start
+    )
     time = np.asarray(np.arange(count) * sample_time, dtype=np.float64)
     return Simulation({"time": time, **held, **channels}, rig, events)
 
@@ -388,9 +468,18 @@ def simulate(
 def check_run(rig: Rig, sample_time: float) -> None:
     """Refuse what is not a rig and a sample time [s] that is not a finite number above zero."""
     if not isinstance(rig, Rig):
-        raise ParameterError(f"rig is a {type(rig).__name__}; a Rig is needed: pamrs.rigs.shoulder(), pamrs.load_rig(path)")
-    if not (isinstance(sample_time, (int, float, np.number)) and np.isfinite(sample_time) and sample_time > 0):
-        raise ParameterError(f"sample_time = {sample_time} is not allowed: a finite time > 0 s is needed")
+        raise ParameterError(
+            f"rig is a {type(rig).__name__}; a Rig is needed: pamrs.rigs.shoulder(), "
+            "pamrs.load_rig(path)"
+        )
+    if not (
+        isinstance(sample_time, (int, float, np.number))
+        and np.isfinite(sample_time)
+        and sample_time > 0
+    ):
+        raise ParameterError(
+            f"sample_time = {sample_time} is not allowed: a finite time > 0 s is needed"
+        )
 
 
 def check_rows(rig: Rig, rows: int) -> None:
@@ -398,17 +487,23 @@ def check_rows(rig: Rig, rows: int) -> None:
     channels = len(core_rig(rig).channels)
     if rows * channels > MOST_NUMBERS:
         raise ParameterError(
-            f"{rows} rows of {channels} channels are not allowed: at most {MOST_NUMBERS // channels} rows (2 GB); "
-            "give a longer sample_time, or run pamrs.Simulator piece by piece"
+            f"{rows} rows of {channels} channels are not allowed: at most "
+            f"{MOST_NUMBERS // channels} rows (2 GB); give a longer sample_time, or run "
+            "pamrs.Simulator piece by piece"
         )
 
 
 def whole_samples(name: str, value: float, sample_time: float, least: int) -> int:
     """A time [s] as a whole number of samples, ``least`` at least; an error names it."""
-    count = round(value / sample_time) if isinstance(value, (int, float, np.number)) and np.isfinite(value) else -1
+    count = (
+        round(value / sample_time)
+        if isinstance(value, (int, float, np.number)) and np.isfinite(value)
+        else -1
+    )
     if count < least or abs(count * sample_time - value) > 1e-6 * sample_time:
         raise ParameterError(
-            f"{name} = {value} s is not allowed: a multiple of sample_time = {sample_time} s, {least} at least, is needed"
+            f"{name} = {value} s is not allowed: a multiple of sample_time = {sample_time} s, "
+            f"{least} at least, is needed"
         )
     return count
 
@@ -417,18 +512,27 @@ def _rows(sample_time: float, duration: float | None, *given: Signals | None) ->
     """Number of rows from the duration; None where a signal says it."""
     if duration is None:
         return None
-    signals = [v for g in given if g is not None for v in (g.values() if isinstance(g, Mapping) else [g])]
+    signals = [
+        v for g in given if g is not None for v in (g.values() if isinstance(g, Mapping) else [g])
+    ]
     if any(np.ndim(signal) > 0 for signal in signals):
         raise ParameterError(
-            f"duration = {duration} is not allowed together with a signal that sets it (valve_command, length, pressure)"
+            f"duration = {duration} is not allowed together with a signal that sets it "
+            "(valve_command, length, pressure)"
         )
-    if not (isinstance(duration, (int, float, np.number)) and np.isfinite(duration) and duration >= 0):
-        raise ParameterError(f"duration = {duration} is not allowed: a finite time >= 0 s (or give valve_command)")
+    if not (
+        isinstance(duration, (int, float, np.number)) and np.isfinite(duration) and duration >= 0
+    ):
+        raise ParameterError(
+            f"duration = {duration} is not allowed: a finite time >= 0 s (or give valve_command)"
+        )
     return round(duration / sample_time) + 1
 
 
 def chosen_step(sample_time: float, step: float | None) -> float:
-    """The RK4 step [s] to begin with: the one given, or the longest that divides the sample time and is at most 1 ms."""
+    """The RK4 step [s] to begin with: the one given, or the longest that divides the sample time
+    and is at most 1 ms.
+    """
     if step is not None and not isinstance(step, (int, float, np.number)):
         raise ParameterError(f"step = {step!r} is not allowed: a time > 0 s is needed")
     return default_step(sample_time) if step is None else float(step)
@@ -443,4 +547,11 @@ def default_step(sample_time: float, longest: float = 1e-3) -> float:
 MOST_NUMBERS = 250_000_000
 _TELLING_TORQUE = 1.0  # N m
 #: Channels of the core that are sums since the start.
-_BOOKS = ("mass_supplied", "mass_vented", "energy_supplied", "exergy_supplied", "muscle_work", "joint_work")
+_BALANCES = (
+    "mass_supplied",
+    "mass_vented",
+    "energy_supplied",
+    "exergy_supplied",
+    "muscle_work",
+    "joint_work",
+)

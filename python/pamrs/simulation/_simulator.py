@@ -12,7 +12,15 @@ from pamrs import _core
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
 from pamrs.simulation._driving import Inputs, Signals, initial_values, keywords, signals_of
-from pamrs.simulation._simulation import Event, Simulation, check_rows, check_run, chosen_step, core_rig, whole_samples
+from pamrs.simulation._simulation import (
+    Event,
+    Simulation,
+    check_rows,
+    check_run,
+    chosen_step,
+    core_rig,
+    whole_samples,
+)
 
 __all__ = ["Simulator"]
 
@@ -22,8 +30,9 @@ Array = NDArray[np.float64]
 class Simulator:
     """A rig that takes one command after the other.
 
-    The command is held exactly over one sample. A simulator can be pickled and copied, and goes on from a state bit for bit as
-    the run that it was taken from. It belongs to one thread at a time. A run that Ctrl-C ends stays at a sample in between.
+    The command is held exactly over one sample. A simulator can be pickled and copied, and goes on
+    from a state bit for bit as the run that it was taken from. It belongs to one thread at a time.
+    A run that Ctrl-C ends stays at a sample in between.
 
     Parameters
     ----------
@@ -51,7 +60,14 @@ class Simulator:
     (0.5, True)
     """
 
-    def __init__(self, rig: Rig, *, sample_time: float, step: float | None = None, initial: Mapping[str, float] | None = None) -> None:
+    def __init__(
+        self,
+        rig: Rig,
+        *,
+        sample_time: float,
+        step: float | None = None,
+        initial: Mapping[str, float] | None = None,
+    ) -> None:
         check_run(rig, sample_time)
         self.rig = rig
         self.sample_time = float(sample_time)
@@ -59,7 +75,8 @@ class Simulator:
         self._initial = initial_values(initial, rig)
         self._inputs = Inputs(rig)
         self.events: list[Event] = []
-        """What happened since the start or the last :meth:`reset` or :meth:`restore`, see :class:`pamrs.simulation.Event`."""
+        """What happened since the start or the last :meth:`reset` or :meth:`restore`, see
+        :class:`pamrs.simulation.Event`."""
         self._core = self._started(self._initial)
 
     def _started(self, initial: Mapping[str, float]) -> _core.Simulator:
@@ -72,7 +89,9 @@ class Simulator:
 
     @property
     def state(self) -> Array:
-        """The numbers that everything to come depends on (a copy); give them back to :meth:`restore`."""
+        """The numbers that everything to come depends on (a copy); give them back to
+        :meth:`restore`.
+        """
         return self._core.state
 
     def restore(self, state: ArrayLike) -> None:
@@ -135,8 +154,8 @@ class Simulator:
         supply_command : float or mapping of str to float, optional
             Set pressure of a regulator [Pa, gauge].
         length, pressure : float, optional
-            Length [m] that a load frame, and gauge pressure [Pa] that a chamber without a valve reaches by the end of the sample;
-            as for :func:`pamrs.simulate`.
+            Length [m] that a load frame, and gauge pressure [Pa] that a chamber without a valve
+            reaches by the end of the sample; as for :func:`pamrs.simulate`.
 
         Returns
         -------
@@ -148,9 +167,12 @@ class Simulator:
         ParameterError
             If the command is missing or not finite.
         SimulationError
-            If the state leaves the range in which the model holds; the simulator then stays at the last good sample.
+            If the state leaves the range in which the model holds; the simulator then stays at the
+            last good sample.
         """
-        sample, events = self._core.hold(1, self._inputs.numbers(valve_command, supply_command, length, pressure))
+        sample, events = self._core.hold(
+            1, self._inputs.numbers(valve_command, supply_command, length, pressure)
+        )
         if events:
             self.events += [Event(*event) for event in events]
         return sample
@@ -189,7 +211,12 @@ class Simulator:
         """
         check_rows(self.rig, samples or 0)
         signals, count = signals_of(
-            self.rig, valve_command=valve_command, supply_command=supply_command, length=length, pressure=pressure, rows=samples
+            self.rig,
+            valve_command=valve_command,
+            supply_command=supply_command,
+            length=length,
+            pressure=pressure,
+            rows=samples,
         )
         if count is None:
             raise ParameterError("samples is missing: no signal says how many there are")
@@ -198,21 +225,24 @@ class Simulator:
 
     def control(
         self,
-        update: Callable[[dict[str, float]], float | Mapping[str, float] | Mapping[str, Mapping[str, float]]],
+        update: Callable[
+            [dict[str, float]], float | Mapping[str, float] | Mapping[str, Mapping[str, float]]
+        ],
         duration: float,
         *,
         period: float | None = None,
     ) -> Simulation:
         """Close the loop with a sampled controller.
 
-        The controller sees the present sample every ``period`` and what it answers is held exactly until the next; the rows in between
-        are simulated at the sample time.
+        The controller sees the present sample every ``period`` and what it answers is held exactly
+        until the next; the rows in between are simulated at the sample time.
 
         Parameters
         ----------
         update : callable
-            Takes the sample (channel -> value in SI units, and ``time`` [s]); returns the valve command [V], of several valves a
-            mapping of names, or a mapping of the keywords of :meth:`step`.
+            Takes the sample (channel -> value in SI units, and ``time`` [s]); returns the valve
+            command [V], of several valves a mapping of names, or a mapping of the keywords of
+            :meth:`step`.
         duration : float
             How long [s].
         period : float, optional
@@ -226,13 +256,19 @@ class Simulator:
         Raises
         ------
         ParameterError
-            If the period is not a multiple of the sample time, or the controller answers what :meth:`step` refuses.
+            If the period is not a multiple of the sample time, or the controller answers what
+            :meth:`step` refuses.
         SimulationError
             As :meth:`step`.
         """
         if not callable(update):
-            raise ParameterError(f"update is a {type(update).__name__}; something that can be called with a sample is needed")
-        every = whole_samples("period", self.sample_time if period is None else period, self.sample_time, least=1)
+            raise ParameterError(
+                f"update is a {type(update).__name__}; something that can be called with a sample "
+                "is needed"
+            )
+        every = whole_samples(
+            "period", self.sample_time if period is None else period, self.sample_time, least=1
+        )
         total = whole_samples("duration", duration, self.sample_time, least=0)
         check_rows(self.rig, total + 1)
         sample, began, happened = self.observe(), self.time, len(self.events)
@@ -272,4 +308,7 @@ class Simulator:
         self.events = list(events)
 
     def __repr__(self) -> str:
-        return f"Simulator({self.rig.name}, time={self.time:.6g} s, sample_time={self.sample_time:g} s)"
+        return (
+            f"Simulator({self.rig.name}, time={self.time:.6g} s, sample_time={self.sample_time:g} "
+            "s)"
+        )

@@ -1,7 +1,8 @@
 //! Pressure of a chamber whose volume may change.
 //!
-//! `dP/dt = R T/V (alpha_in mdot_in - alpha_out mdot_out) - alpha P (dV/dt)/V`, dissertation (3.17), (4.3),
-//! and (6.4) with its sign corrected; polytropic coefficients after Richer & Hurmuzlu (2000).
+//! `dP/dt = R T/V (alpha_in mdot_in - alpha_out mdot_out) - alpha P (dV/dt)/V`, dissertation
+//! (3.17), (4.3), and (6.4) with its sign corrected; polytropic coefficients after Richer &
+//! Hurmuzlu (2000).
 
 use super::gas::Gas;
 use crate::scalar::Scalar;
@@ -35,7 +36,8 @@ pub struct ChamberState<S> {
 /// Rate of the absolute pressure [Pa/s]; `rt` is `R T` [J/kg].
 #[inline]
 pub fn pressure_rate<S: Scalar>(c: &ChamberState<S>, alpha: &Polytropic<S>, rt: f64) -> S {
-    ((alpha.inflow * c.inflow - alpha.outflow * c.outflow) * rt - alpha.volume * c.pressure * c.volume_rate)
+    ((alpha.inflow * c.inflow - alpha.outflow * c.outflow) * rt
+        - alpha.volume * c.pressure * c.volume_rate)
         / c.volume
 }
 
@@ -64,8 +66,13 @@ mod tests {
     #[test]
     fn expansion_of_a_shut_chamber_is_polytropic() {
         let alpha = Polytropic { inflow: 1.4, outflow: 1.0, volume: 1.2 };
-        let state =
-            ChamberState { pressure: 3e5, volume: 1e-3, volume_rate: 1e-4, inflow: 0.0, outflow: 0.0 };
+        let state = ChamberState {
+            pressure: 3e5,
+            volume: 1e-3,
+            volume_rate: 1e-4,
+            inflow: 0.0,
+            outflow: 0.0,
+        };
         assert!((pressure_rate(&state, &alpha, 8.4e4) + 1.2 * 3e5 * 0.1_f64).abs() < 1e-9);
     }
 }

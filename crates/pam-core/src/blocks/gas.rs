@@ -1,12 +1,12 @@
 //! Isentropic orifice flow, choked, subsonic and (next to equal pressures) laminar.
 //!
-//! `mdot = Cd A pu sqrt(2/(R T)) psi(pd/pu)`, dissertation (3.13)-(3.16) with the choked and subsonic
-//! branches in their right order and the exponent `(gamma+1)/gamma`.
+//! `mdot = Cd A pu sqrt(2/(R T)) psi(pd/pu)`, dissertation (3.13)-(3.16) with the choked and
+//! subsonic branches in their right order and the exponent `(gamma+1)/gamma`.
 
 use crate::scalar::{constant, Scalar};
 
-/// Pressure ratio above which the flow is taken as laminar, linear in `1 - r`; it removes the infinite
-/// slope of the subsonic branch at `r = 1`.
+/// Pressure ratio above which the flow is taken as laminar, linear in `1 - r`; it removes the
+/// infinite slope of the subsonic branch at `r = 1`.
 pub const LAMINAR_RATIO: f64 = 0.999;
 
 /// Constants of the gas and of the orifice equation that follow from them.
@@ -29,7 +29,8 @@ pub struct Gas {
 impl Gas {
     /// The derived constants of a gas.
     pub fn new(ambient_pressure: f64, temperature: f64, gas_constant: f64, gamma: f64) -> Self {
-        let psi_choked = (2.0 / (gamma + 1.0)).powf(1.0 / (gamma - 1.0)) * (gamma / (gamma + 1.0)).sqrt();
+        let psi_choked =
+            (2.0 / (gamma + 1.0)).powf(1.0 / (gamma - 1.0)) * (gamma / (gamma + 1.0)).sqrt();
         let mut gas = Self {
             ambient_pressure,
             temperature,
@@ -50,7 +51,8 @@ impl Gas {
         (s * (s - ratio) * (self.gamma / (self.gamma - 1.0))).sqrt()
     }
 
-    /// Flow function `psi(r)` of the ratio of downstream to upstream absolute pressure, `0 <= r <= 1` [1].
+    /// Flow function `psi(r)` of the ratio of downstream to upstream absolute pressure,
+    /// `0 <= r <= 1` [1].
     #[inline]
     pub fn psi<S: Scalar>(&self, ratio: S) -> S {
         let r = ratio.re();
@@ -63,8 +65,8 @@ impl Gas {
         }
     }
 
-    /// Mass flow [kg/s] from `upstream` to `downstream` (absolute pressures [Pa]) through a discharge
-    /// area `Cd A` [m2]; negative when the downstream pressure is the higher one.
+    /// Mass flow [kg/s] from `upstream` to `downstream` (absolute pressures [Pa]) through a
+    /// discharge area `Cd A` [m2]; negative when the downstream pressure is the higher one.
     #[inline]
     pub fn mass_flow<S: Scalar>(&self, area: S, upstream: S, downstream: S) -> S {
         if upstream.re() >= downstream.re() {
@@ -80,23 +82,26 @@ impl Gas {
         self.critical_ratio
     }
 
-    /// Largest change of mass flow per pressure [kg/(s Pa)] of a discharge area [m2]: next to equal pressures.
+    /// Largest change of mass flow per pressure [kg/(s Pa)] of a discharge area [m2]: next to equal
+    /// pressures.
     pub fn steepest(&self, area: f64) -> f64 {
         area * self.flow_factor * self.psi_laminar / (1.0 - LAMINAR_RATIO)
     }
 
-    /// Choked mass flow [kg/s] through a discharge area [m2] from an upstream absolute pressure [Pa].
+    /// Choked mass flow [kg/s] through a discharge area [m2] from an upstream absolute pressure
+    /// [Pa].
     #[inline]
     pub fn choked_flow<S: Scalar>(&self, area: S, upstream: S) -> S {
         area * upstream * (self.psi_choked * self.flow_factor)
     }
 
-    /// Discharge area [m2] that passes the choked flow of a sonic conductance [m3/(s Pa)] (ISO 6358:
-    /// `mdot = C rho0 p`, `rho0` at 100 kPa and 293.15 K).
+    /// Discharge area [m2] that passes the choked flow of a sonic conductance [m3/(s Pa)] (ISO
+    /// 6358: `mdot = C rho0 p`, `rho0` at 100 kPa and 293.15 K).
     pub fn area_of_conductance<S: Scalar>(&self, conductance: S) -> S {
         const ISO_DENSITY: f64 = 1.185;
         conductance
-            * (ISO_DENSITY * (293.15 / self.temperature).sqrt() / (self.psi_choked * self.flow_factor))
+            * (ISO_DENSITY * (293.15 / self.temperature).sqrt()
+                / (self.psi_choked * self.flow_factor))
     }
 }
 

@@ -1,4 +1,5 @@
-//! The blocks of a rig: the way of the air (gas, supply, valve, tube, chamber) and that of the force (joint, arm).
+//! The blocks of a rig: the way of the air (gas, supply, valve, tube, chamber) and that of the
+//! force (joint, arm).
 
 pub mod arm;
 pub mod chamber;

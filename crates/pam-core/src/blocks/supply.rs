@@ -1,8 +1,9 @@
 //! Where the air comes from.
 //!
-//! A tank empties isothermally, `dP/dt = -(R T/V) mdot` (dissertation 6.3); a constant source keeps its pressure; a relieving
-//! regulator brings its outlet to the set pressure with a lag, less by its droop under flow:
-//! `dP/dt = (P_set - k mdot - P)/tau` (P. Beater, *Pneumatic Drives*, 2007, ch. 8).
+//! A tank empties isothermally, `dP/dt = -(R T/V) mdot` (dissertation 6.3); a constant source keeps
+//! its pressure; a relieving regulator brings its outlet to the set pressure with a lag, less by
+//! its droop under flow: `dP/dt = (P_set - k mdot - P)/tau` (P. Beater, *Pneumatic Drives*, 2007,
+//! ch. 8).
 
 use crate::scalar::{constant, Scalar};
 
@@ -23,23 +24,28 @@ pub enum Supply<S> {
 }
 
 impl<S: Scalar> Supply<S> {
-    /// Rate of the absolute pressure [Pa/s] while a mass flow [kg/s] goes out; `rt` is `R T` [J/kg], `set` the set pressure
-    /// [Pa, absolute].
+    /// Rate of the absolute pressure [Pa/s] while a mass flow [kg/s] goes out; `rt` is `R T`
+    /// [J/kg], `set` the set pressure [Pa, absolute].
     #[inline]
     pub fn pressure_rate(&self, pressure: S, outflow: S, rt: f64, set: S) -> S {
         match self {
             Self::Tank(volume) => -(outflow * rt) / *volume,
             Self::Constant => constant(0.0),
-            Self::Regulator { time_constant, droop } => (-pressure - *droop * outflow + set) / *time_constant,
+            Self::Regulator { time_constant, droop } => {
+                (-pressure - *droop * outflow + set) / *time_constant
+            }
         }
     }
 
-    /// Largest eigenvalue [1/s] under openings that let `steepest` [kg/(s Pa)] more through for each Pa.
+    /// Largest eigenvalue [1/s] under openings that let `steepest` [kg/(s Pa)] more through for
+    /// each Pa.
     pub fn fastest(&self, steepest: f64, rt: f64) -> f64 {
         match self {
             Self::Tank(volume) => rt * steepest / volume.re(),
             Self::Constant => 0.0,
-            Self::Regulator { time_constant, droop } => (1.0 + droop.re() * steepest) / time_constant.re(),
+            Self::Regulator { time_constant, droop } => {
+                (1.0 + droop.re() * steepest) / time_constant.re()
+            }
         }
     }
 }

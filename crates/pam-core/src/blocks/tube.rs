@@ -1,8 +1,8 @@
 //! Tube by its conductance and critical pressure ratio.
 //!
-//! `mdot = C rho0 p_up sqrt(T0/T) psi(r)`, `psi = sqrt(1 - ((r - b)/(1 - b))^2)` above `b` (ISO 6358-1:2013, linear above
-//! [`LAMINAR_RATIO`]), with `C = 0.029 d^2/sqrt(L/d^1.25 + 510)` and `b = 474 C/d^2` of a tube (ISO 6358-3 practice; P. Beater,
-//! *Pneumatic Drives*, 2007).
+//! `mdot = C rho0 p_up sqrt(T0/T) psi(r)`, `psi = sqrt(1 - ((r - b)/(1 - b))^2)` above `b` (ISO
+//! 6358-1:2013, linear above [`LAMINAR_RATIO`]), with `C = 0.029 d^2/sqrt(L/d^1.25 + 510)` and
+//! `b = 474 C/d^2` of a tube (ISO 6358-3 practice; P. Beater, *Pneumatic Drives*, 2007).
 
 use super::gas::LAMINAR_RATIO;
 use crate::scalar::{constant, Scalar};
@@ -30,11 +30,13 @@ impl<S: Scalar> Tube<S> {
         let square = diameter * diameter;
         let conductance = square * 0.029 / (length / diameter.powf(1.25) + 510.0).sqrt();
         let ratio = conductance * 474.0 / square;
-        let critical_ratio = if ratio.re() > HIGHEST_RATIO { constant(HIGHEST_RATIO) } else { ratio };
+        let critical_ratio =
+            if ratio.re() > HIGHEST_RATIO { constant(HIGHEST_RATIO) } else { ratio };
         Self::of_conductance(conductance, critical_ratio, temperature)
     }
 
-    /// A restriction of a sonic conductance [m3/(s Pa)] and a critical pressure ratio with gas of a temperature [K].
+    /// A restriction of a sonic conductance [m3/(s Pa)] and a critical pressure ratio with gas of a
+    /// temperature [K].
     pub fn of_conductance(conductance: S, critical_ratio: S, temperature: f64) -> Self {
         let factor = REFERENCE_DENSITY * (REFERENCE_TEMPERATURE / temperature).sqrt();
         Self { flow_factor: conductance * factor, critical_ratio }
@@ -77,9 +79,10 @@ impl<S: Scalar> Tube<S> {
         }
     }
 
-    /// Absolute pressure [Pa] at the other end, from that at this one and the mass flow from here to there [kg/s]: the inverse of
-    /// [`Self::mass_flow`] in closed form. A flow away from here says less and less of the other end the closer it is to choking:
-    /// from [`MOST_TOLD`] of it on, the other end is held at the pressure that this share belongs to.
+    /// Absolute pressure [Pa] at the other end, from that at this one and the mass flow from here
+    /// to there [kg/s]: the inverse of [`Self::mass_flow`] in closed form. A flow away from here
+    /// says less and less of the other end the closer it is to choking: from [`MOST_TOLD`] of it
+    /// on, the other end is held at the pressure that this share belongs to.
     pub fn other_end(&self, here: S, flow: S) -> S {
         let share = flow / (self.flow_factor * here);
         let (b, rest) = (self.critical_ratio, -self.critical_ratio + 1.0);
@@ -114,7 +117,10 @@ impl Tube<f64> {
     /// The same in another scalar type.
     #[inline]
     pub fn lift<S: Scalar>(&self) -> Tube<S> {
-        Tube { flow_factor: constant(self.flow_factor), critical_ratio: constant(self.critical_ratio) }
+        Tube {
+            flow_factor: constant(self.flow_factor),
+            critical_ratio: constant(self.critical_ratio),
+        }
     }
 }
 
@@ -144,7 +150,8 @@ mod tests {
         for flow in [-1.0, -1e-3, -1e-5, 1e-5, 1e-3, 2e-3, 1.0] {
             let exact = tube.lift::<Dual64>().other_end(here.into(), Dual64::new(flow, 1.0));
             let h = 1e-6 * flow;
-            let difference = (tube.other_end(here, flow + h) - tube.other_end(here, flow - h)) / (2.0 * h);
+            let difference =
+                (tube.other_end(here, flow + h) - tube.other_end(here, flow - h)) / (2.0 * h);
             assert!(
                 (exact.eps - difference).abs() <= 1e-6 * difference.abs(),
                 "{flow}: {} {difference}",
@@ -157,7 +164,8 @@ mod tests {
     fn flow_is_continuous_and_turns_with_the_pressures() {
         let tube = Tube::<f64>::new(2.0, 0.004, 293.15);
         for r in [tube.critical_ratio(), LAMINAR_RATIO] {
-            let (a, b) = (tube.mass_flow(5e5, 5e5 * (r - 1e-12)), tube.mass_flow(5e5, 5e5 * (r + 1e-12)));
+            let (a, b) =
+                (tube.mass_flow(5e5, 5e5 * (r - 1e-12)), tube.mass_flow(5e5, 5e5 * (r + 1e-12)));
             assert!((a - b).abs() < 1e-8 * a, "jump at {r}");
         }
         assert_eq!(tube.mass_flow(3e5, 2e5), -tube.mass_flow(2e5, 3e5));

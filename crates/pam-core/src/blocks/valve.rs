@@ -1,7 +1,7 @@
 //! Proportional 5/3 servo-valve: spool command to discharge area.
 //!
-//! `x = clip((u - u0)/half_range, -1, 1)`; `A = A_max a(|x|)` with a piecewise linear area table; `x > 0`
-//! fills the chamber from the supply, `x < 0` vents it.
+//! `x = clip((u - u0)/half_range, -1, 1)`; `A = A_max a(|x|)` with a piecewise linear area table;
+//! `x > 0` fills the chamber from the supply, `x < 0` vents it.
 
 use crate::error::{Error, Result};
 use crate::scalar::{constant, Scalar};
@@ -55,8 +55,8 @@ impl AreaTable {
         while cell + 1 < last && x > self.opening[cell + 1] {
             cell += 1;
         }
-        let slope =
-            (self.fraction[cell + 1] - self.fraction[cell]) / (self.opening[cell + 1] - self.opening[cell]);
+        let slope = (self.fraction[cell + 1] - self.fraction[cell])
+            / (self.opening[cell + 1] - self.opening[cell]);
         (opening - self.opening[cell]) * slope + self.fraction[cell]
     }
 }

@@ -18,7 +18,8 @@
 //!
 //! ```text
 //! integral f   dz = (L - 2b') R   + 2 b (c sin v1 + a (v1 + sin v1 cos v1)/2)
-//! integral f^2 dz = (L - 2b') R^2 + 2 b (c^2 sin v1 + a c (v1 + sin v1 cos v1) + a^2 (sin v1 - sin^3 v1/3))
+//! integral f^2 dz = (L - 2b') R^2
+//!     + 2 b (c^2 sin v1 + a c (v1 + sin v1 cos v1) + a^2 (sin v1 - sin^3 v1/3))
 //! ```
 
 use std::f64::consts::PI;
@@ -76,8 +77,15 @@ pub struct EndShape<S> {
 }
 
 impl<S: Scalar> Ends<S> {
-    /// The ends at contraction ratio `e`; `ratio` must be positive for the result to have a meaning.
-    pub fn new(braid: &Braid, law: &EndRatio, rule: &GaussLegendre<ARC_NODES>, arc: Arc, e: S) -> Self {
+    /// The ends at contraction ratio `e`; `ratio` must be positive for the result to have a
+    /// meaning.
+    pub fn new(
+        braid: &Braid,
+        law: &EndRatio,
+        rule: &GaussLegendre<ARC_NODES>,
+        arc: Arc,
+        e: S,
+    ) -> Self {
         let extension = e.re() < 0.0;
         let slope = if extension { law.extension_slope } else { law.contraction_slope };
         let ratio = -e * slope + law.k0;
@@ -116,7 +124,8 @@ impl<S: Scalar> Ends<S> {
     pub fn fibre_length(&self, braid: &Braid, rule: &GaussLegendre<ARC_NODES>, radius: S) -> S {
         let end = self.shape(braid, radius);
         // The arc divided by |a|: smooth through R = R0, where the ends vanish.
-        let twist = self.ratio * self.sin_end * (2.0 * PI * braid.turns) / (self.length * self.arc_angle);
+        let twist =
+            self.ratio * self.sin_end * (2.0 * PI * braid.turns) / (self.length * self.arc_angle);
         let mut sum = constant::<S>(0.0);
         for i in 0..ARC_NODES {
             let (cos, sin) = (self.cos[i], self.sin[i]);

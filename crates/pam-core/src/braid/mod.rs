@@ -5,14 +5,16 @@
 //! ```text
 //! B  = L0 / sin(alpha)   N = L0 / (2 pi R0 tan(alpha))   VB = pi (R0^2 - (R0 - t0)^2) L0
 //! L  = L0 (1 - e)        eps_c = (R - t/2)/(R0 - t0/2) - 1
-//! I1 = integral f dz     I2 = integral f^2 dz            f outer profile: elliptic ends or cylinder
+//! I1 = integral f dz
+//! I2 = integral f^2 dz
+//! f outer profile: elliptic ends or cylinder
 //! t  = (I1 - sqrt(I1^2 - L VB/pi)) / L = (VB/pi) / (I1 + sqrt(I1^2 - L VB/pi))
 //! V  = pi integral (f - t)^2 dz = pi I2 - VB             the rubber is incompressible
 //! ```
 //!
-//! In extension the radius stops at `R_floor = max(sqrt(VB/(pi L)), neck_floor R0)`; there the braid
-//! is taut. Everything depends on the contraction ratio alone. Derivatives are exact: the root is
-//! differentiated implicitly, `dR/de = -(dB_est/de)/(dB_est/dR)`.
+//! In extension the radius stops at `R_floor = max(sqrt(VB/(pi L)), neck_floor R0)`; there the
+//! braid is taut. Everything depends on the contraction ratio alone. Derivatives are exact: the
+//! root is differentiated implicitly, `dR/de = -(dB_est/de)/(dB_est/dR)`.
 
 pub mod cylinder;
 pub mod elliptic;
@@ -34,7 +36,8 @@ pub const SHORTEST: f64 = 0.58;
 const ROOT_TOLERANCE: f64 = 1e-15;
 /// Steps in which the root nearest to the rest radius is looked for.
 const SCAN_STEPS: u32 = 16;
-/// Relative distance from the floor below which the nearest radius of the published ends is the floor.
+/// Relative distance from the floor below which the nearest radius of the published ends is the
+/// floor.
 const FLOOR_TOLERANCE: f64 = 1e-9;
 /// How far beyond the cylinder's radius a root is looked for in contraction.
 const SCAN_REACH: f64 = 1.6;
@@ -91,8 +94,8 @@ pub struct EndRatio {
 pub enum Profile {
     /// Toroidal ends of elliptic section and a cylindrical middle.
     Elliptic,
-    /// The same ends with the literal printed choices, for comparison: the fibre's arc over `pi/3`, and the radius that
-    /// brings its length nearest to the fibre's where none meets it.
+    /// The same ends with the literal printed choices, for comparison: the fibre's arc over `pi/3`,
+    /// and the radius that brings its length nearest to the fibre's where none meets it.
     EllipticPublished,
     /// One radius over the whole length.
     Cylinder,
@@ -207,10 +210,13 @@ impl MuscleGeometry {
                         "the published ends have only a nearest radius, without a derivative",
                     ));
                 }
-                Profile::Cylinder => cylinder::radius(&self.braid, (-at + 1.0) * self.braid.rest_length),
+                Profile::Cylinder => {
+                    cylinder::radius(&self.braid, (-at + 1.0) * self.braid.rest_length)
+                }
                 Profile::Elliptic | Profile::EllipticPublished => {
                     let along = self.fibre_length(at, Dual64::new(root.x, 0.0)).eps;
-                    let across = self.fibre_length(Dual64::new(e, 0.0), Dual64::new(root.x, 1.0)).eps;
+                    let across =
+                        self.fibre_length(Dual64::new(e, 0.0), Dual64::new(root.x, 1.0)).eps;
                     Dual64::new(root.x, -along / across)
                 }
             }
@@ -290,7 +296,9 @@ impl MuscleGeometry {
     fn closed_integrals<S: Scalar>(&self, e: S, radius: S) -> (S, S) {
         match self.profile {
             Profile::Cylinder => cylinder::integrals((-e + 1.0) * self.braid.rest_length, radius),
-            Profile::Elliptic | Profile::EllipticPublished => self.ends_at(e).integrals(&self.braid, radius),
+            Profile::Elliptic | Profile::EllipticPublished => {
+                self.ends_at(e).integrals(&self.braid, radius)
+            }
         }
     }
 
@@ -320,7 +328,8 @@ impl MuscleGeometry {
             Profile::Cylinder if cylinder < floor.x => Ok((floor, true)),
             Profile::Cylinder => Ok((Root { x: cylinder, iterations: 0 }, false)),
             Profile::Elliptic | Profile::EllipticPublished => {
-                let slope = if e < 0.0 { self.ends.extension_slope } else { self.ends.contraction_slope };
+                let slope =
+                    if e < 0.0 { self.ends.extension_slope } else { self.ends.contraction_slope };
                 let ratio = self.ends.k0 - slope * e;
                 if ratio <= 0.0 {
                     return Err(unsolved(e, "the axis ratio of the ends would not be positive"));
@@ -343,8 +352,9 @@ impl MuscleGeometry {
     /// The root of `B_est(R) = B` nearest to the rest radius, between it and `limit`.
     fn scan(&self, e: f64, limit: f64) -> Option<Root> {
         let ends = self.ends_at(e);
-        let excess =
-            |radius: f64| ends.fibre_length(&self.braid, &self.rule, radius) - self.braid.fibre_length;
+        let excess = |radius: f64| {
+            ends.fibre_length(&self.braid, &self.rule, radius) - self.braid.fibre_length
+        };
         let rest = self.braid.rest_radius;
         let start = excess(rest);
         // At |e| of rounding size the excess at rest may vanish or have the wrong sign.
@@ -382,12 +392,22 @@ impl MuscleGeometry {
     }
 
     fn ends_at<S: Scalar>(&self, e: S) -> Ends<S> {
-        let arc = if self.profile == Profile::EllipticPublished { Arc::Published } else { Arc::Parametric };
+        let arc = if self.profile == Profile::EllipticPublished {
+            Arc::Published
+        } else {
+            Arc::Parametric
+        };
         Ends::new(&self.braid, &self.ends, &self.rule, arc, e)
     }
 
     /// Thickness, volume and strain at a known outer radius.
-    fn shape_at<S: Scalar>(&self, e: S, radius: S, braid_taut: bool, iterations: u32) -> Result<Shape<S>> {
+    fn shape_at<S: Scalar>(
+        &self,
+        e: S,
+        radius: S,
+        braid_taut: bool,
+        iterations: u32,
+    ) -> Result<Shape<S>> {
         let braid = &self.braid;
         let length = (-e + 1.0) * braid.rest_length;
         if self.profile != Profile::Cylinder {
@@ -441,7 +461,10 @@ mod tests {
 
     fn grid(geometry: &MuscleGeometry) -> Vec<f64> {
         let (low, high) = geometry.range();
-        (0..=60).map(|i| low + (high - low) * f64::from(i) / 60.0).map(|e| e.clamp(low, high)).collect()
+        (0..=60)
+            .map(|i| low + (high - low) * f64::from(i) / 60.0)
+            .map(|e| e.clamp(low, high))
+            .collect()
     }
 
     #[test]
@@ -462,7 +485,8 @@ mod tests {
             for e in grid(geometry) {
                 let shape = geometry.solve(e).unwrap();
                 if !shape.braid_taut {
-                    let excess = geometry.fibre_length(e, shape.radius) / geometry.braid.fibre_length - 1.0;
+                    let excess =
+                        geometry.fibre_length(e, shape.radius) / geometry.braid.fibre_length - 1.0;
                     assert!(excess.abs() < 2e-14, "{e}: {excess:e}");
                     assert!(shape.iterations < 40, "{e}: {}", shape.iterations);
                 }

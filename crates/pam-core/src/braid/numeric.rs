@@ -111,29 +111,10 @@ pub fn brent(
         if middle.abs() <= width || fb == 0.0 {
             return Some(Root { x: b, iterations });
         }
-        if last.abs() >= width && fa.abs() > fb.abs() {
-            let s = fb / fa;
-            let (mut p, mut q) = if a == c {
-                (2.0 * middle * s, 1.0 - s)
-            } else {
-                let (q, r) = (fa / fc, fb / fc);
-                (s * (2.0 * middle * q * (q - r) - (b - a) * (r - 1.0)), (q - 1.0) * (r - 1.0) * (s - 1.0))
-            };
-            if p > 0.0 {
-                q = -q;
-            } else {
-                p = -p;
-            }
-            if 2.0 * p < (3.0 * middle * q - (width * q).abs()).min((last * q).abs()) {
-                last = step;
-                step = p / q;
-            } else {
-                step = middle;
-                last = middle;
-            }
-        } else {
-            step = middle;
-            last = middle;
+        let near = last.abs() >= width && fa.abs() > fb.abs();
+        match near.then(|| interpolated([a, b, c], [fa, fb, fc], width, last)).flatten() {
+            Some(found) => (last, step) = (step, found),
+            None => (last, step) = (middle, middle),
         }
         (a, fa) = (b, fb);
         b += if step.abs() > width { step } else { width.copysign(middle) };
@@ -145,7 +126,29 @@ pub fn brent(
     None
 }
 
-/// The least value of a function on `[0, 1]`: the best of `steps` equal steps, then golden-section search about it.
+/// Step from the second of three points towards the root by inverse quadratic interpolation, by the
+/// secant where the first is the third; `None` where it leaves the bracket or does not halve the
+/// last step but one.
+#[inline]
+fn interpolated([a, b, c]: [f64; 3], [fa, fb, fc]: [f64; 3], width: f64, last: f64) -> Option<f64> {
+    let middle = 0.5 * (c - b);
+    let s = fb / fa;
+    let (mut p, mut q) = if a == c {
+        (2.0 * middle * s, 1.0 - s)
+    } else {
+        let (q, r) = (fa / fc, fb / fc);
+        (s * (2.0 * middle * q * (q - r) - (b - a) * (r - 1.0)), (q - 1.0) * (r - 1.0) * (s - 1.0))
+    };
+    if p > 0.0 {
+        q = -q;
+    } else {
+        p = -p;
+    }
+    (2.0 * p < (3.0 * middle * q - (width * q).abs()).min((last * q).abs())).then(|| p / q)
+}
+
+/// The least value of a function on `[0, 1]`: the best of `steps` equal steps, then golden-section
+/// search about it.
 pub fn minimum(f: impl Fn(f64) -> f64, steps: u32) -> Root {
     const GOLDEN: f64 = 0.618_033_988_749_894_8;
     const NARROWED: u32 = 80;

@@ -12,13 +12,14 @@ pub enum Block {
     Supply(usize),
     /// Commands, neighbouring pressures and the angles of its muscles to a chamber's pressure.
     Chamber(usize),
-    /// Chamber pressures to the angle of a joint (muscles, joints and arm), or to the length of the muscle on a linear load.
+    /// Chamber pressures to the angle of a joint (muscles, joints and arm), or to the length of the
+    /// muscle on a linear load.
     Arm(usize),
 }
 
 impl Block {
-    /// The block of a name: `supply`, `chamber` or `arm` (`load` of a linear load), with the name of the supply, chamber or
-    /// joint behind it where it has one (`chamber.flexor`).
+    /// The block of a name: `supply`, `chamber` or `arm` (`load` of a linear load), with the name
+    /// of the supply, chamber or joint behind it where it has one (`chamber.flexor`).
     ///
     /// # Errors
     /// [`Error::Model`] for another name.
@@ -30,7 +31,12 @@ impl Block {
             .iter()
             .enumerate()
             .map(|(k, s)| (dotted("supply", &s.name), Self::Supply(k))))
-        .chain(spec.chambers.iter().enumerate().map(|(k, c)| (dotted("chamber", &c.name), Self::Chamber(k))))
+        .chain(
+            spec.chambers
+                .iter()
+                .enumerate()
+                .map(|(k, c)| (dotted("chamber", &c.name), Self::Chamber(k))),
+        )
         .chain(joints.enumerate().map(|(k, name)| (name, Self::Arm(k))));
         let blocks: Vec<_> = blocks.collect();
         blocks.iter().find(|(n, _)| n == name).map(|(_, block)| *block).ok_or_else(|| {
@@ -103,22 +109,40 @@ pub(super) fn hidden(layout: &Layout, measured: &Measured<'_>) -> Vec<usize> {
     inlets.filter(|place| measured.signal(*place).is_none()).collect()
 }
 
-pub(super) fn check(rig: &Rig, block: Block, measured: &Measured<'_>, starts: &[usize]) -> Result<()> {
+pub(super) fn check(
+    rig: &Rig,
+    block: Block,
+    measured: &Measured<'_>,
+    starts: &[usize],
+) -> Result<()> {
     let n = measured.samples;
     if starts.first() != Some(&0)
         || starts.windows(2).any(|w| w[1] <= w[0])
         || starts.last().is_some_and(|s| *s >= n)
     {
         let worst = starts.last().copied().unwrap_or(0) as f64;
-        return Err(Error::parameter("starts", worst, format!("sample indices rising from 0, below {n}")));
+        return Err(Error::parameter(
+            "starts",
+            worst,
+            format!("sample indices rising from 0, below {n}"),
+        ));
     }
-    if matches!(block, Block::Arm(_)) && rig.spec().load.as_ref().is_some_and(|load| load.is_frame()) {
-        return Err(Error::Model("the block load cannot be predicted: a frame holds the length".into()));
+    if matches!(block, Block::Arm(_))
+        && rig.spec().load.as_ref().is_some_and(|load| load.is_frame())
+    {
+        return Err(Error::Model(
+            "the block load cannot be predicted: a frame holds the length".into(),
+        ));
     }
     let hidden = hidden(rig.layout(), measured);
     for place in neighbours(rig, block) {
         if measured.signal(place).is_none() && !hidden.contains(&place) {
-            let name = rig.names().initial.iter().find(|(_, p)| *p == place).map_or("?", |(n, _)| n.as_str());
+            let name = rig
+                .names()
+                .initial
+                .iter()
+                .find(|(_, p)| *p == place)
+                .map_or("?", |(n, _)| n.as_str());
             return Err(Error::Model(format!(
                 "block '{block:?}' cannot be predicted: {name} was not measured"
             )));
@@ -127,7 +151,8 @@ pub(super) fn check(rig: &Rig, block: Block, measured: &Measured<'_>, starts: &[
     Ok(())
 }
 
-/// Places of the states that a block needs measured: its own, every angle, and the pressures next to it.
+/// Places of the states that a block needs measured: its own, every angle, and the pressures next
+/// to it.
 fn neighbours(rig: &Rig, block: Block) -> Vec<usize> {
     let (layout, wiring) = (rig.layout(), &rig.wiring);
     let mut places: Vec<usize> = (layout.angle(0)..layout.rate(0)).collect();
@@ -146,7 +171,8 @@ fn neighbours(rig: &Rig, block: Block) -> Vec<usize> {
         }
     }
     // The pressure of a constant supply is known without measuring it.
-    let constant = |place: &usize| rig.spec().supplies.get(*place).is_some_and(|s| s.kind == "constant");
+    let constant =
+        |place: &usize| rig.spec().supplies.get(*place).is_some_and(|s| s.kind == "constant");
     places.retain(|place| !constant(place));
     places
 }

@@ -5,7 +5,8 @@ use crate::plant::{Channel, Plant, Rig};
 use crate::scalar::{constant, Scalar};
 use crate::{Error, Result};
 
-/// A measured signal, smoothed, with its time derivative at each sample; as the sensor reads it, SI, gauge.
+/// A measured signal, smoothed, with its time derivative at each sample; as the sensor reads it,
+/// SI, gauge.
 #[derive(Debug, Clone, Copy)]
 pub struct Signal<'a> {
     /// Values, one per sample.
@@ -32,7 +33,8 @@ impl Signal<'_> {
         Ok(())
     }
 
-    /// Sample and fraction some time [s] after a fraction of sample `k`, inside the recording, and whether that is where it asks for.
+    /// Sample and fraction some time [s] after a fraction of sample `k`, inside the recording, and
+    /// whether that is where it asks for.
     pub(crate) fn later(&self, k: usize, fraction: f64, dt: f64, shift: f64) -> (usize, f64, bool) {
         let last = (self.value.len() - 1) as f64;
         let wanted = k as f64 + fraction + shift / dt;
@@ -54,8 +56,11 @@ impl Signal<'_> {
         let [p0, m0, p1, m1] = self.ends(k, dt);
         let (t, t2) = (fraction, fraction * fraction);
         let t3 = t2 * t;
-        let value = p0 + m0 * (t - 2.0 * t2 + t3) + (p1 - p0) * (3.0 * t2 - 2.0 * t3) + m1 * (t3 - t2);
-        let slope = m0 * (1.0 - 4.0 * t + 3.0 * t2) + (p1 - p0) * 6.0 * (t - t2) + m1 * (3.0 * t2 - 2.0 * t);
+        let value =
+            p0 + m0 * (t - 2.0 * t2 + t3) + (p1 - p0) * (3.0 * t2 - 2.0 * t3) + m1 * (t3 - t2);
+        let slope = m0 * (1.0 - 4.0 * t + 3.0 * t2)
+            + (p1 - p0) * 6.0 * (t - t2)
+            + m1 * (3.0 * t2 - 2.0 * t);
         (value, slope / dt)
     }
 
@@ -76,13 +81,13 @@ pub struct Measured<'a> {
 }
 
 impl<'a> Measured<'a> {
-    /// Commands (one for each input of the rig, held over each sample) and measured channels by name: `supply_pressure`,
-    /// `muscle_pressure`, `line_pressure`, `joint_angle`, `length` of the muscle on a linear load, each with the name of its block
-    /// behind it where it has one.
+    /// Commands (one for each input of the rig, held over each sample) and measured channels by
+    /// name: `supply_pressure`, `muscle_pressure`, `line_pressure`, `joint_angle`, `length` of the
+    /// muscle on a linear load, each with the name of its block behind it where it has one.
     ///
     /// # Errors
-    /// [`Error::Length`] or [`Error::Parameter`] for bad arrays; [`Error::Model`] for a name that the rig does not have, or a
-    /// command that is missing.
+    /// [`Error::Length`] or [`Error::Parameter`] for bad arrays; [`Error::Model`] for a name that
+    /// the rig does not have, or a command that is missing.
     pub fn new(
         rig: &Rig,
         samples: usize,
@@ -92,7 +97,9 @@ impl<'a> Measured<'a> {
         let mut own = Vec::new();
         for name in &rig.names().inputs {
             let Some((_, values)) = commands.iter().find(|(n, _)| n == name) else {
-                return Err(Error::Model(format!("{name} is missing: one value per sample is needed")));
+                return Err(Error::Model(format!(
+                    "{name} is missing: one value per sample is needed"
+                )));
             };
             if values.len() != samples {
                 let why = "one per sample".into();
@@ -107,15 +114,18 @@ impl<'a> Measured<'a> {
         let layout = rig.layout();
         let mut places = Vec::new();
         for (name, signal) in signals {
-            let place = rig.names().channels.iter().find(|(n, _)| n == name).and_then(|(_, c)| match *c {
-                Channel::Supply(k) => Some(layout.supply(k)),
-                Channel::Pressure(k) => Some(layout.pressure(k)),
-                Channel::Angle(k) => Some(layout.angle(k)),
-                Channel::Length => Some(layout.angle(0)),
-                _ => None,
-            });
+            let place =
+                rig.names().channels.iter().find(|(n, _)| n == name).and_then(|(_, c)| match *c {
+                    Channel::Supply(k) => Some(layout.supply(k)),
+                    Channel::Pressure(k) => Some(layout.pressure(k)),
+                    Channel::Angle(k) => Some(layout.angle(k)),
+                    Channel::Length => Some(layout.angle(0)),
+                    _ => None,
+                });
             let Some(place) = place else {
-                return Err(Error::Model(format!("{name} is not a channel at which this rig can be cut")));
+                return Err(Error::Model(format!(
+                    "{name} is not a channel at which this rig can be cut"
+                )));
             };
             signal.check(name, samples)?;
             places.push((place, *signal));
@@ -139,8 +149,8 @@ pub(super) struct Driven<'a, S> {
     lag: S,
     /// Whether another clock than the block's records it.
     shifted: bool,
-    /// Length of the muscles at rest [m], where a length stands for the shortening of a linear load; `zero` is then that of the
-    /// shortening, the length's with the other sign.
+    /// Length of the muscles at rest [m], where a length stands for the shortening of a linear
+    /// load; `zero` is then that of the shortening, the length's with the other sign.
     rest: Option<f64>,
 }
 
@@ -189,19 +199,25 @@ pub(super) fn zero<S: Scalar>(plant: &Plant<'_, S>, place: usize) -> S {
 /// Time constant of the sensor of a state [s].
 fn lag<S: Scalar>(plant: &Plant<'_, S>, place: usize) -> S {
     let layout = plant.rig().layout();
-    let gas = (layout.pressure(0)..layout.mass(0)).contains(&place).then(|| place - layout.supplies);
+    let gas =
+        (layout.pressure(0)..layout.mass(0)).contains(&place).then(|| place - layout.supplies);
     gas.and_then(|gas| plant.lagging(gas)).map_or(constant(0.0), |(_, lag)| lag)
 }
 
 impl<S: Scalar> Driven<'_, S> {
-    /// True state at a fraction of sample `k`, read so much later [s] where another clock records it; an angle brings its rate along.
+    /// True state at a fraction of sample `k`, read so much later [s] where another clock records
+    /// it; an angle brings its rate along.
     #[inline]
     pub fn write(&self, rig: &Rig, k: usize, fraction: f64, dt: f64, shift: S, state: &mut [S]) {
         let layout = rig.layout();
-        let (cell, t, inside) =
-            if self.shifted { self.signal.later(k, fraction, dt, shift.re()) } else { (k, fraction, false) };
+        let (cell, t, inside) = if self.shifted {
+            self.signal.later(k, fraction, dt, shift.re())
+        } else {
+            (k, fraction, false)
+        };
         let (value, slope) = self.signal.at(cell, t, dt);
-        let (value, slope, sign) = self.rest.map_or((value, slope, 1.0), |rest| (rest - value, -slope, -1.0));
+        let (value, slope, sign) =
+            self.rest.map_or((value, slope, 1.0), |rest| (rest - value, -slope, -1.0));
         let pressure = self.place < layout.angle(0);
         if pressure {
             state[self.place] = -self.zero + (value + rig.gas.ambient_pressure) + self.lag * slope;
@@ -222,8 +238,8 @@ impl<S: Scalar> Driven<'_, S> {
     }
 }
 
-/// Gases (and their valves) whose measured pressure is that in front of a tube, where what feeds the valve is measured, constant or
-/// the block's own: the pressure behind can then be told.
+/// Gases (and their valves) whose measured pressure is that in front of a tube, where what feeds
+/// the valve is measured, constant or the block's own: the pressure behind can then be told.
 pub(super) fn taps<S: Scalar>(
     plant: &Plant<'_, S>,
     block: Block,
@@ -235,5 +251,6 @@ pub(super) fn taps<S: Scalar>(
         constant || place == block.output(layout) || measured.signal(place).is_some()
     };
     let fed = plant.taps().filter(|(gas, _)| measured.signal(layout.pressure(*gas)).is_some());
-    fed.filter(|(_, valve)| rig.wiring.valves[*valve].from.place(layout).is_none_or(known)).collect()
+    fed.filter(|(_, valve)| rig.wiring.valves[*valve].from.place(layout).is_none_or(known))
+        .collect()
 }

@@ -1,4 +1,5 @@
-//! Prediction of a block with its derivatives, some parameters at a time in the lanes of a dual number.
+//! Prediction of a block with its derivatives, some parameters at a time in the lanes of a dual
+//! number.
 
 use super::block::{check, Block};
 use super::boundary::Measured;
@@ -16,8 +17,8 @@ use nalgebra::Const;
 pub struct Prediction {
     /// Predicted output at each sample, as the sensor reads it.
     pub value: Vec<f64>,
-    /// Row-major `samples x (parameters + initial states)`: derivatives with respect to each parameter and to the
-    /// initial states of the window that the row belongs to.
+    /// Row-major `samples x (parameters + initial states)`: derivatives with respect to each
+    /// parameter and to the initial states of the window that the row belongs to.
     pub jacobian: Vec<f64>,
     /// Columns of the jacobian.
     pub columns: usize,
@@ -25,12 +26,12 @@ pub struct Prediction {
 
 /// Predict a block's output over windows.
 ///
-/// `starts` are the sample indices at which windows begin (rising, the first one 0). `parameters` are those to
-/// differentiate with respect to; pass none for values alone (`columns` is then 0).
+/// `starts` are the sample indices at which windows begin (rising, the first one 0). `parameters`
+/// are those to differentiate with respect to; pass none for values alone (`columns` is then 0).
 ///
 /// # Errors
-/// [`Error::Parameter`] for bad arguments; [`Error::Model`] when the block lacks a measured neighbour;
-/// [`Error::Integration`] when the state leaves the model's range.
+/// [`Error::Parameter`] for bad arguments; [`Error::Model`] when the block lacks a measured
+/// neighbour; [`Error::Integration`] when the state leaves the model's range.
 pub fn predict(
     rig: &Rig,
     block: Block,
@@ -46,7 +47,8 @@ pub fn predict(
     if parameters.is_empty() {
         let plant = Plant::new(rig, rig.parameters().lift(), false)?;
         let bumps = vec![0.0; initial];
-        Cut::new(plant, block, measured, timing, bumps).run(starts, |k, y, _, _, _| out.value[k] = y)?;
+        Cut::new(plant, block, measured, timing, bumps)
+            .run(starts, |k, y, _, _, _| out.value[k] = y)?;
         return Ok(out);
     }
     out.columns = parameters.len() + initial;
@@ -74,8 +76,8 @@ pub fn predict(
     Ok(out)
 }
 
-/// Terms of the closure in a block at each sample of a prediction, row-major `samples x terms`, and their number: what its
-/// coefficients multiply.
+/// Terms of the closure in a block at each sample of a prediction, row-major `samples x terms`, and
+/// their number: what its coefficients multiply.
 ///
 /// # Errors
 /// As [`predict`]; [`Error::Model`] for a block without a closure.
@@ -95,13 +97,18 @@ pub fn closure_terms(
     let plant = Plant::new(rig, rig.parameters().lift(), false)?;
     let (mut found, mut count) = (Vec::new(), 0);
     let bumps = vec![0.0; block.initial_count(rig)];
-    Cut::new(plant, block, measured, timing, bumps).run(starts, |_, _, stepper, state, controls| {
-        let terms = stepper.plant.terms(at, state, controls, &stepper.scratch);
-        count = terms.len();
-        found.extend(terms);
-    })?;
+    Cut::new(plant, block, measured, timing, bumps).run(
+        starts,
+        |_, _, stepper, state, controls| {
+            let terms = stepper.plant.terms(at, state, controls, &stepper.scratch);
+            count = terms.len();
+            found.extend(terms);
+        },
+    )?;
     if count == 0 {
-        return Err(Error::Model(format!("block '{block:?}' has no closure: no sum of terms acts there")));
+        return Err(Error::Model(format!(
+            "block '{block:?}' has no closure: no sum of terms acts there"
+        )));
     }
     Ok((found, count))
 }

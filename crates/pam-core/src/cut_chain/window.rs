@@ -1,4 +1,5 @@
-//! The windows of a prediction: each starts from the measurement, and measured neighbours drive the block through it.
+//! The windows of a prediction: each starts from the measurement, and measured neighbours drive the
+//! block through it.
 
 use super::block::Block;
 use super::boundary::{driven, rest_length, taps, zero, Driven, Measured};
@@ -71,7 +72,11 @@ impl<'a, S: Number> Cut<'a, S> {
             timing,
             simulated,
             bumps,
-            driving: drivers.iter().filter(|driver| !own.contains(&driver.place)).copied().collect(),
+            driving: drivers
+                .iter()
+                .filter(|driver| !own.contains(&driver.place))
+                .copied()
+                .collect(),
             driving_taps: taps
                 .iter()
                 .copied()
@@ -200,11 +205,23 @@ impl<'a, S: Number> Cut<'a, S> {
         }
         let last = self.measured.samples as i64 - 1;
         let command = |input: usize, sample: i64| commands[input][sample.clamp(0, last) as usize];
-        plant.skewed_controls(clocks.command, time, self.timing.step(), self.timing.sample_time, command)
+        plant.skewed_controls(
+            clocks.command,
+            time,
+            self.timing.step(),
+            self.timing.sample_time,
+            command,
+        )
     }
 
     /// The steps from sample `k` to the next.
-    fn sample(&mut self, k: usize, course: &mut Course<S>, clocks: Clocks<S>, controls: Controls<S>) {
+    fn sample(
+        &mut self,
+        k: usize,
+        course: &mut Course<S>,
+        clocks: Clocks<S>,
+        controls: Controls<S>,
+    ) {
         let (dt, step) = (self.timing.sample_time, self.timing.step());
         let h = 1.0 / self.timing.substeps as f64;
         let (mut clocks, mut controls) = (clocks, controls);
@@ -216,21 +233,23 @@ impl<'a, S: Number> Cut<'a, S> {
                 controls = self.controls(k, time, &clocks);
             }
             let (driving, taps) = (&self.driving, &self.driving_taps);
-            let drive = |plant: &Plant<'a, S>, controls: &Controls<S>, fraction: f64, y: &mut [S]| {
-                let (rig, share) = (plant.rig(), (i as f64 + fraction) * h);
-                for driver in driving {
-                    driver.write(rig, k, share, dt, clocks.neighbour, y);
-                }
-                for (gas, valve) in taps {
-                    let place = rig.layout().pressure(*gas);
-                    // a smooth signal goes from one reading to the next, and so do the commands that they were read under
-                    let (was, now) = (last.spool[*valve], controls.spool[*valve]);
-                    // a spool with a motion of its own is already where it is at that instant
-                    let moving = moves(&rig.wiring.ports.command[*valve]);
-                    let spool = if moving { now } else { was + (now - was) * share };
-                    y[place] = plant.behind_tube(*gas, y[place], y, spool);
-                }
-            };
+            let drive =
+                |plant: &Plant<'a, S>, controls: &Controls<S>, fraction: f64, y: &mut [S]| {
+                    let (rig, share) = (plant.rig(), (i as f64 + fraction) * h);
+                    for driver in driving {
+                        driver.write(rig, k, share, dt, clocks.neighbour, y);
+                    }
+                    for (gas, valve) in taps {
+                        let place = rig.layout().pressure(*gas);
+                        // a smooth signal goes from one reading to the next, and so do the commands
+                        // that they were read under
+                        let (was, now) = (last.spool[*valve], controls.spool[*valve]);
+                        // a spool with a motion of its own is already where it is at that instant
+                        let moving = moves(&rig.wiring.ports.command[*valve]);
+                        let spool = if moving { now } else { was + (now - was) * share };
+                        y[place] = plant.behind_tube(*gas, y[place], y, spool);
+                    }
+                };
             self.stepper.step(state, memory, &controls, time, step, &self.simulated, drive);
         }
         if !self.taps.is_empty() {

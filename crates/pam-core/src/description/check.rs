@@ -1,5 +1,6 @@
-//! Whether the words and fixed numbers of a description are possible. The bounds of a parameter stand where it enters the
-//! table of parameters, and how blocks fit together is the wiring's: both in [`crate::plant`].
+//! Whether the words and fixed numbers of a description are possible. The bounds of a parameter
+//! stand where it enters the table of parameters, and how blocks fit together is the wiring's: both
+//! in [`crate::plant`].
 
 use super::{dotted, ArmSpec, LinkSpec, LoadSpec, RigSpec};
 use crate::blocks::joint::Joint;
@@ -114,7 +115,13 @@ impl LoadSpec {
     fn validate(&self) -> Result<()> {
         let block = Block { kind: "load", name: "" };
         block.choice("kind", &self.kind, &["mass", "frame"])?;
-        block.range("min_length", self.min_length, 1e-3, self.max_length, "m (below load.max_length)")?;
+        block.range(
+            "min_length",
+            self.min_length,
+            1e-3,
+            self.max_length,
+            "m (below load.max_length)",
+        )?;
         block.range("max_length", self.max_length, self.min_length, 20.0, "m")?;
         if self.is_frame() {
             return Ok(());

@@ -18,7 +18,8 @@ pub struct GasSpec {
     pub heat_capacity_ratio: f64,
 }
 
-/// Where a flow begins or ends, as a description names it: `supply`, `chamber.flexor`, `line.flexor`, `ambient`.
+/// Where a flow begins or ends, as a description names it: `supply`, `chamber.flexor`,
+/// `line.flexor`, `ambient`.
 pub type Port = String;
 
 /// Supply of air; initial pressure gauge [Pa].
@@ -39,7 +40,8 @@ pub struct SupplySpec {
     pub droop: f64,
 }
 
-/// Proportional servo-valve from a supply (or a chamber: a manifold) to a chamber or the inlet of a line.
+/// Proportional servo-valve from a supply (or a chamber: a manifold) to a chamber or the inlet of a
+/// line.
 #[allow(missing_docs)]
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -77,7 +79,8 @@ pub struct LineSpec {
     pub inlet_volume: f64,
 }
 
-/// Chamber: dead (or, without a muscle, total) volume and polytropic coefficients; initial pressure gauge [Pa].
+/// Chamber: dead (or, without a muscle, total) volume and polytropic coefficients; initial pressure
+/// gauge [Pa].
 #[allow(missing_docs)]
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -92,7 +95,8 @@ pub struct ChamberSpec {
     pub alpha: f64,
 }
 
-/// How a muscle pulls on a joint; the lengths are those of its kind, see [`crate::blocks::joint::Joint`].
+/// How a muscle pulls on a joint; the lengths are those of its kind, see
+/// [`crate::blocks::joint::Joint`].
 #[allow(missing_docs)]
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -201,7 +205,8 @@ pub struct LinkSpec {
     pub coulomb_speed: f64,
 }
 
-/// Linear load on a muscle, in the place of joint and arm: a hanging `mass`, or a `frame` that prescribes the length.
+/// Linear load on a muscle, in the place of joint and arm: a hanging `mass`, or a `frame` that
+/// prescribes the length.
 #[allow(missing_docs)]
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -233,7 +238,8 @@ impl LoadSpec {
     }
 }
 
-/// Constant sensor errors: measured = true + zero; of the chamber or joint of its name, of all (and of a load) without a name.
+/// Constant sensor errors: measured = true + zero; of the chamber or joint of its name, of all (and
+/// of a load) without a name.
 #[allow(missing_docs)]
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -292,10 +298,11 @@ impl RigSpec {
     /// Read a specification from JSON text.
     ///
     /// # Errors
-    /// [`Error::Model`] for text that is not of this form (unknown keys included), and as [`Self::validate`].
+    /// [`Error::Model`] for text that is not of this form (unknown keys included), and as
+    /// [`Self::validate`].
     pub fn from_json(text: &str) -> Result<Self> {
-        let spec: Self =
-            serde_json::from_str(text).map_err(|e| Error::Model(format!("rig description: {e}")))?;
+        let spec: Self = serde_json::from_str(text)
+            .map_err(|e| Error::Model(format!("rig description: {e}")))?;
         spec.validate()?;
         Ok(spec)
     }
@@ -314,7 +321,8 @@ pub fn dotted(block: &str, name: &str) -> String {
 /// Read a muscle on its own from JSON text.
 ///
 /// # Errors
-/// [`Error::Model`] for text that is not of this form; [`Error::Parameter`] for an impossible value.
+/// [`Error::Model`] for text that is not of this form; [`Error::Parameter`] for an impossible
+/// value.
 pub fn muscle_from_json(text: &str) -> Result<MuscleSpec> {
     let spec: MuscleSpec =
         serde_json::from_str(text).map_err(|e| Error::Model(format!("muscle description: {e}")))?;

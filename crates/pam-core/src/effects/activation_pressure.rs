@@ -1,9 +1,10 @@
 //! `activation_pressure`: pressure that a muscle needs before its bladder presses on the braid.
 //!
-//! The force is that of the gauge pressure less `p_th`, and that of none below it: `p_e = p - min(p, p_th)` for `p > 0`, the corner at
-//! `p_th` rounded over a tenth of it on either side. N. G. Tsagarakis & D. G. Caldwell, "Improved modelling and assessment of pneumatic
-//! muscle actuators", ICRA 2000; E. G. Hocking & N. M. Wereley, "Analysis of nonlinear elastic behavior in miniature pneumatic artificial
-//! muscles", Smart Materials and Structures 22, 2013.
+//! The force is that of the gauge pressure less `p_th`, and that of none below it:
+//! `p_e = p - min(p, p_th)` for `p > 0`, the corner at `p_th` rounded over a tenth of it on either
+//! side. N. G. Tsagarakis & D. G. Caldwell, "Improved modelling and assessment of pneumatic muscle
+//! actuators", ICRA 2000; E. G. Hocking & N. M. Wereley, "Analysis of nonlinear elastic behavior in
+//! miniature pneumatic artificial muscles", Smart Materials and Structures 22, 2013.
 
 use super::{Effect, EffectInfo, EffectParameter, Form, Port};
 use crate::blocks::gas::Gas;
@@ -18,9 +19,9 @@ pub const INFO: EffectInfo = EffectInfo {
     source: "Tsagarakis & Caldwell (2000); Hocking & Wereley (2013)",
     forms: &[Form {
         name: "threshold",
-        parameters: &[
-            EffectParameter::new("threshold", "Pa", 0.0, 1e7, 20000.0).starts(&[10000.0, 50000.0]).off(0.0),
-        ],
+        parameters: &[EffectParameter::new("threshold", "Pa", 0.0, 1e7, 20000.0)
+            .starts(&[10000.0, 50000.0])
+            .off(0.0)],
         states: &[],
         integrates: false,
         ports: &[Port::Gauge],
@@ -68,7 +69,10 @@ mod tests {
 
     #[test]
     fn it_takes_the_threshold_and_nothing_below_zero() {
-        assert_eq!((effective(1e5, 2e4), effective(1e4, 2e4), effective(-3e3, 2e4)), (8e4, 0.0, -3e3));
+        assert_eq!(
+            (effective(1e5, 2e4), effective(1e4, 2e4), effective(-3e3, 2e4)),
+            (8e4, 0.0, -3e3)
+        );
         for p in [-1e4, 0.0, 1.0, 3e5] {
             assert_eq!(effective(p, 0.0), p);
         }

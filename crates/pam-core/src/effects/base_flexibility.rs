@@ -1,9 +1,10 @@
 //! `base_flexibility`: a mounting that gives way under the torque of the first joint.
 //!
-//! `q'' + 2 zeta w q' + w^2 q = -c w^2 tau` with the compliance `c` and the base's own frequency `w`, so that its inertia is `1/(c w^2)`;
-//! `tau` is all that joint and base exchange. The link stands at `theta + q` against gravity, the sensor and the muscles see `theta`. At
-//! `c = 0` nothing moves. Two states; at the start the base carries the arm's weight at rest. M. W. Spong, "Modeling and control of elastic
-//! joint robots", ASME J. Dyn. Syst. Meas. Control 109, 1987.
+//! `q'' + 2 zeta w q' + w^2 q = -c w^2 tau` with the compliance `c` and the base's own frequency
+//! `w`, so that its inertia is `1/(c w^2)`; `tau` is all that joint and base exchange. The link
+//! stands at `theta + q` against gravity, the sensor and the muscles see `theta`. At `c = 0`
+//! nothing moves. Two states; at the start the base carries the arm's weight at rest. M. W. Spong,
+//! "Modeling and control of elastic joint robots", ASME J. Dyn. Syst. Meas. Control 109, 1987.
 
 use super::{At, Effect, EffectInfo, EffectParameter, EffectState, Form, Port, Role};
 use crate::blocks::gas::Gas;
@@ -19,9 +20,15 @@ pub const INFO: EffectInfo = EffectInfo {
     forms: &[Form {
         name: "one_mode",
         parameters: &[
-            EffectParameter::new("compliance", "rad/(N m)", 0.0, 1.0, 5e-5).starts(&[2e-5, 0.0002]).off(0.0),
-            EffectParameter::new("natural_frequency", "Hz", 0.01, 1000.0, 8.0).starts(&[5.0, 12.0]).usually(3.0, 15.0),
-            EffectParameter::new("damping_ratio", "1", 0.0, 10.0, 0.03).starts(&[0.03]).usually(0.0, 0.05),
+            EffectParameter::new("compliance", "rad/(N m)", 0.0, 1.0, 5e-5)
+                .starts(&[2e-5, 0.0002])
+                .off(0.0),
+            EffectParameter::new("natural_frequency", "Hz", 0.01, 1000.0, 8.0)
+                .starts(&[5.0, 12.0])
+                .usually(3.0, 15.0),
+            EffectParameter::new("damping_ratio", "1", 0.0, 10.0, 0.03)
+                .starts(&[0.03])
+                .usually(0.0, 0.05),
         ],
         states: &[
             EffectState { name: "angle", role: Role::Moves },
@@ -34,7 +41,8 @@ pub const INFO: EffectInfo = EffectInfo {
     ..EffectInfo::USUAL
 };
 
-/// Angular acceleration of the base [rad/s2] at its angle and rate, under the torque of the joint on the link [N m].
+/// Angular acceleration of the base [rad/s2] at its angle and rate, under the torque of the joint
+/// on the link [N m].
 #[inline]
 pub fn acceleration<S: Scalar>(base: [S; 3], angle: S, rate: S, torque: S) -> S {
     let [compliance, frequency, damping] = base;

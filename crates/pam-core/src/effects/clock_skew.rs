@@ -1,11 +1,14 @@
 //! `clock_skew`: pressures, and angles too or not, are recorded by another clock than the commands.
 //!
-//! A pressure that is recorded at `t` was there at `t - d(t)` of the commands' clock, `d = d_0 + r t`, an angle at `t - a d(t)`: the share `a`
-//! is 1 where one logger records both and 0 where the angle is on the commands' clock. Commands act on the recording later by `d`. Within a
-//! step the held commands are averaged over the shifted time, so that an edge moves through it continuously and the shift can be
-//! differentiated. The rate of some 1e-4 changes no other time. A clock that is ahead (`d < 0`) is known to a prediction from recordings; a
-//! simulation, which cannot answer a command that is still to come, takes it as no shift.
-//! D. L. Mills, "Internet time synchronization: the network time protocol", IEEE Trans. Communications 39, 1991 (offset and skew).
+//! A pressure that is recorded at `t` was there at `t - d(t)` of the commands' clock,
+//! `d = d_0 + r t`, an angle at `t - a d(t)`: the share `a` is 1 where one logger records both and
+//! 0 where the angle is on the commands' clock. Commands act on the recording later by `d`. Within
+//! a step the held commands are averaged over the shifted time, so that an edge moves through it
+//! continuously and the shift can be differentiated. The rate of some 1e-4 changes no other time. A
+//! clock that is ahead (`d < 0`) is known to a prediction from recordings; a simulation, which
+//! cannot answer a command that is still to come, takes it as no shift. D. L. Mills, "Internet time
+//! synchronization: the network time protocol", IEEE Trans. Communications 39, 1991 (offset and
+//! skew).
 
 use super::{Effect, EffectInfo, EffectParameter, Form, Kink, Port, SameData, Use};
 use crate::blocks::gas::Gas;
@@ -36,7 +39,9 @@ pub const INFO: EffectInfo = EffectInfo {
         parameters: &[
             EffectParameter::new("offset", "s", -10.0, 10.0, 0.01).starts(&[0.005, 0.03]).off(0.0),
             EffectParameter::new("rate", "1", -0.01, 0.01, 0.0001).starts(&[0.0, 0.0003]).off(0.0),
-            EffectParameter::new("angle_share", "1", 0.0, 1.0, 1.0).starts(&[0.0, 1.0]).role(Use::Choice),
+            EffectParameter::new("angle_share", "1", 0.0, 1.0, 1.0)
+                .starts(&[0.0, 1.0])
+                .role(Use::Choice),
         ],
         states: &[],
         integrates: false,
@@ -52,7 +57,8 @@ pub fn shift<S: Scalar>(offset: S, rate: S, time: f64) -> S {
     offset + rate * time
 }
 
-/// A reading so late [samples], from the readings of the samples before (newest last) and the present one.
+/// A reading so late [samples], from the readings of the samples before (newest last) and the
+/// present one.
 pub fn late(past: impl Fn(usize) -> Option<f64>, present: f64, shift: f64) -> f64 {
     if shift <= 0.0 {
         return present;
@@ -68,8 +74,15 @@ pub fn late(past: impl Fn(usize) -> Option<f64>, present: f64, shift: f64) -> f6
     near + (far - near) * (shift - back as f64)
 }
 
-/// Mean over a step [s] that begins at a time of values that are held over each sample, seen later by a shift.
-pub fn held_mean<S: Scalar>(value: impl Fn(i64) -> S, time: f64, step: f64, sample_time: f64, shift: S) -> S {
+/// Mean over a step [s] that begins at a time of values that are held over each sample, seen later
+/// by a shift.
+pub fn held_mean<S: Scalar>(
+    value: impl Fn(i64) -> S,
+    time: f64,
+    step: f64,
+    sample_time: f64,
+    shift: S,
+) -> S {
     // In samples; what lies nearer to an edge than rounding lies on it.
     let from = -shift / sample_time + time / sample_time;
     let to = from + step / sample_time;
@@ -117,7 +130,8 @@ mod tests {
         let mean = |time: f64, shift: f64| held_mean(value, time, 1e-3, 5e-3, shift);
         assert_eq!((mean(0.014, 0.0), mean(0.015, 0.0), mean(0.015, 2e-3)), (1.0, 5.0, 1.0));
         assert!((mean(0.017, 2.25e-3) - (0.25 * 1.0 + 0.75 * 5.0)).abs() < 1e-9);
-        let slope = held_mean(|k| Dual64::from(value(k)), 0.017, 1e-3, 5e-3, Dual64::new(2.25e-3, 1.0)).eps;
+        let slope =
+            held_mean(|k| Dual64::from(value(k)), 0.017, 1e-3, 5e-3, Dual64::new(2.25e-3, 1.0)).eps;
         assert!((slope + 4.0 / 1e-3).abs() < 1e-6, "{slope}");
     }
 

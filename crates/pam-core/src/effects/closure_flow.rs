@@ -1,11 +1,15 @@
-//! `closure_flow`: mass flow into a chamber that no named effect explains, as a sum of coefficients times terms of a fixed dictionary.
+//! `closure_flow`: mass flow into a chamber that no named effect explains, as a sum of coefficients
+//! times terms of a fixed dictionary.
 //!
-//! `m = sum_k c_k t_k`, every coefficient in kg/s: `p` is the absolute pressure and `ps` that of the supply in bar, `x` the opening of the valve
-//! (-1 vents fully, 1 fills fully), `dV` the rate of the volume in l/s. Air that comes in is counted as inflow, air that goes out as outflow.
-//! Two memories, `z' = (p - z)/T` and `zx' = (x - zx)/T`; around the null `n = exp(-(x/0.05)^2/2)`, on one side of it
-//! `tanh(x/0.01)`. See `closure_torque`.
+//! `m = sum_k c_k t_k`, every coefficient in kg/s: `p` is the absolute pressure and `ps` that of
+//! the supply in bar, `x` the opening of the valve (-1 vents fully, 1 fills fully), `dV` the rate
+//! of the volume in l/s. Air that comes in is counted as inflow, air that goes out as outflow. Two
+//! memories, `z' = (p - z)/T` and `zx' = (x - zx)/T`; around the null `n = exp(-(x/0.05)^2/2)`, on
+//! one side of it `tanh(x/0.01)`. See `closure_torque`.
 
-use super::{At, BAR, Effect, EffectInfo, EffectParameter, EffectState, Extremes, Form, LITRE, Port, Role};
+use super::{
+    At, Effect, EffectInfo, EffectParameter, EffectState, Extremes, Form, Port, Role, BAR, LITRE,
+};
 use crate::blocks::gas::Gas;
 use crate::made_by;
 use crate::scalar::{constant, tanh, Scalar};
@@ -18,7 +22,8 @@ pub const PARAMETERS: usize = TERMS + 1;
 pub const STATES: usize = 2;
 /// Opening around the null in which its term counts.
 const NULL: f64 = 0.05;
-/// Opening over which the terms of a side turn on: what a dead zone or a lap takes is the same beyond it.
+/// Opening over which the terms of a side turn on: what a dead zone or a lap takes is the same
+/// beyond it.
 const SIDE: f64 = 0.01;
 
 const fn term(name: &'static str) -> EffectParameter {
@@ -122,7 +127,8 @@ impl<S: Scalar> Here<S> {
     }
 }
 
-/// Largest change of the flow per pressure of the chamber [kg/(s bar)], up to an absolute pressure [bar].
+/// Largest change of the flow per pressure of the chamber [kg/(s bar)], up to an absolute pressure
+/// [bar].
 pub fn steepest(values: &[f64; PARAMETERS], pressure: f64) -> f64 {
     let c = |name: &str| {
         let k = INFO.parameters().iter().position(|p| p.name == name);
@@ -204,14 +210,18 @@ mod tests {
 
     #[test]
     fn each_term_is_what_its_name_says() {
-        let filling = Here { pressure: 3.0, supply: 8.0, opening: 0.5, volume_rate: 0.1, memory: [2.5, 0.1] };
+        let filling =
+            Here { pressure: 3.0, supply: 8.0, opening: 0.5, volume_rate: 0.1, memory: [2.5, 0.1] };
         let venting = Here { opening: -0.05, ..filling };
         let of = |point: &Here<f64>, name: &str| point.terms()[place(name)];
         assert_eq!((of(&filling, "filling"), of(&venting, "filling")), (2.5, 0.0));
         assert_eq!((of(&filling, "opening_pressure"), of(&venting, "abs_opening")), (1.5, 0.05));
         assert!((of(&filling, "volume_rate") - 0.3).abs() < 1e-12);
         assert!((of(&filling, "opening_memory_pressure") - 1.2).abs() < 1e-12);
-        assert_eq!((of(&filling, "pressure_memory"), of(&filling, "supply_difference")), (0.5, 5.0));
+        assert_eq!(
+            (of(&filling, "pressure_memory"), of(&filling, "supply_difference")),
+            (0.5, 5.0)
+        );
         assert!((of(&venting, "sign_venting") - 3.0 * 5.0_f64.tanh()).abs() < 1e-12);
         assert_eq!((of(&venting, "sign_filling"), of(&filling, "sign_filling")), (0.0, 8.0));
         assert!(of(&filling, "at_null") < 1e-20);

@@ -1,9 +1,13 @@
-//! `closure_supply`: mass flow into a supply that no named effect explains, as a sum of coefficients times terms of a fixed dictionary.
+//! `closure_supply`: mass flow into a supply that no named effect explains, as a sum of
+//! coefficients times terms of a fixed dictionary.
 //!
-//! `m = sum_k c_k t_k`, every coefficient in kg/s: `p` is the absolute pressure in bar, `x` the sum of the openings through which its valves fill.
-//! One memory, `z' = (p - z)/T`: of a tank whose gas has been cooled or warmed by its change. See `closure_torque`.
+//! `m = sum_k c_k t_k`, every coefficient in kg/s: `p` is the absolute pressure in bar, `x` the sum
+//! of the openings through which its valves fill. One memory, `z' = (p - z)/T`: of a tank whose gas
+//! has been cooled or warmed by its change. See `closure_torque`.
 
-use super::{At, BAR, Effect, EffectInfo, EffectParameter, EffectState, Extremes, Form, Port, Role};
+use super::{
+    At, Effect, EffectInfo, EffectParameter, EffectState, Extremes, Form, Port, Role, BAR,
+};
 use crate::blocks::gas::Gas;
 use crate::made_by;
 use crate::scalar::{constant, Scalar};
@@ -35,9 +39,7 @@ pub const INFO: EffectInfo = EffectInfo {
             term("pressure_memory"),
             EffectParameter::new("memory_time", "s", 0.01, 1e6, 1.0).starts(&[0.1, 0.5, 2.0, 8.0]),
         ],
-        states: &[
-            EffectState { name: "pressure", role: Role::Moves },
-        ],
+        states: &[EffectState { name: "pressure", role: Role::Moves }],
         integrates: true,
         ports: &[Port::Inflow],
         make: made_by!(make),
@@ -77,7 +79,8 @@ impl<S: Scalar> Here<S> {
     }
 }
 
-/// Largest change of the flow per pressure of the supply [kg/(s bar)], with all of so many valves open.
+/// Largest change of the flow per pressure of the supply [kg/(s bar)], with all of so many valves
+/// open.
 pub fn steepest(values: &[f64; PARAMETERS], valves: f64) -> f64 {
     values[1].abs() + values[3].abs() * valves + values[4].abs()
 }

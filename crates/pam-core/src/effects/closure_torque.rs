@@ -1,12 +1,17 @@
-//! `closure_torque`: torque that no named effect explains, as a sum of coefficients times terms of a fixed dictionary.
+//! `closure_torque`: torque that no named effect explains, as a sum of coefficients times terms of
+//! a fixed dictionary.
 //!
-//! `tau = sum_k c_k t_k(s, a, w, memory)`, every coefficient in N m: `s` is the gauge pressure in bar (the mean over the groups that pull
-//! on the joint), `a` the angle in rad, `w` the rate in rad/s. Three terms remember, with a state each: `z' = (a - z)/T` (creep of the
-//! angle), `zs' = (s - zs)/T` (of the pressure) and the rate-independent `q' = w/d (1 - q sign w)`, which is 1 after a motion by some `d` and
-//! -1 after one back (P. R. Dahl, *A solid friction model*, 1968). A model of a mismatch, not a name for it: S. L. Brunton, J. L. Proctor &
-//! J. N. Kutz, PNAS 113, 2016 (sparse dictionaries).
+//! `tau = sum_k c_k t_k(s, a, w, memory)`, every coefficient in N m: `s` is the gauge pressure in
+//! bar (the mean over the groups that pull on the joint), `a` the angle in rad, `w` the rate in
+//! rad/s. Three terms remember, with a state each: `z' = (a - z)/T` (creep of the angle),
+//! `zs' = (s - zs)/T` (of the pressure) and the rate-independent `q' = w/d (1 - q sign w)`, which
+//! is 1 after a motion by some `d` and -1 after one back (P. R. Dahl, *A solid friction model*,
+//! 1968). A model of a mismatch, not a name for it: S. L. Brunton, J. L. Proctor & J. N. Kutz, PNAS
+//! 113, 2016 (sparse dictionaries).
 
-use super::{At, BAR, Effect, EffectInfo, EffectParameter, EffectState, Extremes, Form, Port, Role};
+use super::{
+    At, Effect, EffectInfo, EffectParameter, EffectState, Extremes, Form, Port, Role, BAR,
+};
 use crate::blocks::gas::Gas;
 use crate::made_by;
 use crate::scalar::{constant, tanh, Scalar};
@@ -56,7 +61,8 @@ pub const INFO: EffectInfo = EffectInfo {
             term("slip"),
             term("pressure_slip"),
             EffectParameter::new("memory_time", "s", 0.01, 1e6, 1.0).starts(&[0.1, 0.5, 2.0, 8.0]),
-            EffectParameter::new("memory_angle", "rad", 0.01, 10.0, 0.1).starts(&[0.02, 0.05, 0.15, 0.4]),
+            EffectParameter::new("memory_angle", "rad", 0.01, 10.0, 0.1)
+                .starts(&[0.02, 0.05, 0.15, 0.4]),
         ],
         states: &[
             EffectState { name: "angle", role: Role::Moves },
@@ -72,7 +78,8 @@ pub const INFO: EffectInfo = EffectInfo {
 
 /// Speed over which the terms `sign` and `pressure_sign` turn [rad/s].
 pub const SIGN_SPEED: f64 = 0.02;
-/// Speed from which the slip is no faster [rad/s]: it has long been on its end by then, and would want ever shorter steps.
+/// Speed from which the slip is no faster [rad/s]: it has long been on its end by then, and would
+/// want ever shorter steps.
 const FASTEST_SLIP: f64 = 10.0;
 
 /// A joint at one instant: gauge pressure [bar], angle [rad], rate [rad/s], and what it remembers.
@@ -144,7 +151,8 @@ impl<S: Scalar> Here<S> {
     }
 }
 
-/// Damping [N m s/rad] and stiffness [N m/rad] that it adds at most, up to a gauge pressure [bar] and an angle [rad].
+/// Damping [N m s/rad] and stiffness [N m/rad] that it adds at most, up to a gauge pressure [bar]
+/// and an angle [rad].
 pub fn resistance(values: &[f64; PARAMETERS], pressure: f64, angle: f64) -> (f64, f64) {
     let c = |name: &str| {
         let k = INFO.parameters().iter().position(|p| p.name == name);
@@ -243,11 +251,23 @@ mod tests {
         let point = here(3.0, 0.5, -2.0, [0.2, 1.0, -0.4]);
         let terms = point.terms();
         let of = |name: &str| terms[place(name)];
-        assert_eq!((of("constant"), of("angle_squared"), of("pressure_angle_squared")), (1.0, 0.25, 0.75));
-        assert_eq!((of("rate_quadratic"), of("pressure_rate"), of("angle_rate")), (-4.0, -6.0, -1.0));
+        assert_eq!(
+            (of("constant"), of("angle_squared"), of("pressure_angle_squared")),
+            (1.0, 0.25, 0.75)
+        );
+        assert_eq!(
+            (of("rate_quadratic"), of("pressure_rate"), of("angle_rate")),
+            (-4.0, -6.0, -1.0)
+        );
         assert_eq!((of("sign"), of("pressure_sign")), (-1.0, -3.0));
-        assert!((of("pressure_creep") - 0.9).abs() < 1e-12 && (of("pressure_memory") - 2.0).abs() < 1e-12);
-        assert!((of("pressure_slip") + 1.2).abs() < 1e-12 && (of("sine_4") - 2.0_f64.sin()).abs() < 1e-12);
+        assert!(
+            (of("pressure_creep") - 0.9).abs() < 1e-12
+                && (of("pressure_memory") - 2.0).abs() < 1e-12
+        );
+        assert!(
+            (of("pressure_slip") + 1.2).abs() < 1e-12
+                && (of("sine_4") - 2.0_f64.sin()).abs() < 1e-12
+        );
         let mut coefficients = [0.0; TERMS];
         assert_eq!(point.torque(&coefficients), 0.0);
         coefficients[place("pressure_rate")] = 2.0;

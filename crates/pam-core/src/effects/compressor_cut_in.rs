@@ -1,14 +1,15 @@
 //! `compressor_cut_in`: a compressor that starts at one pressure of the tank and stops at another.
 //!
-//! `m_c = s Q rho0`, `s` from 0 to 1 when the gauge pressure falls below the cut-in pressure and back when it rises above the cut-out
-//! pressure; `Q` is the free air delivery (ISO 1217: volume at the reference state of ISO 6358). The relay turns between steps;
-//! what it gives in the rest of the step in which the pressure crosses is added by the share of the step that is left, so that the
-//! moment moves with the pressures and not by whole steps. Acts on tanks.
+//! `m_c = s Q rho0`, `s` from 0 to 1 when the gauge pressure falls below the cut-in pressure and
+//! back when it rises above the cut-out pressure; `Q` is the free air delivery (ISO 1217: volume at
+//! the reference state of ISO 6358). The relay turns between steps; what it gives in the rest of
+//! the step in which the pressure crosses is added by the share of the step that is left, so that
+//! the moment moves with the pressures and not by whole steps. Acts on tanks.
 
 use super::{At, Effect, EffectInfo, EffectParameter, EffectState, Form, Kink, Port, Role, Use};
 use crate::blocks::gas::Gas;
-use crate::made_by;
 use crate::blocks::tube::REFERENCE_DENSITY;
+use crate::made_by;
 use crate::scalar::{constant, Scalar};
 
 /// What it is.
@@ -26,13 +27,19 @@ pub const INFO: EffectInfo = EffectInfo {
     forms: &[Form {
         name: "relay",
         parameters: &[
-            EffectParameter::new("free_air_delivery", "m3/s", 0.0, 1.0, 0.002).starts(&[0.002]).off(0.0),
-            EffectParameter::new("cut_in_pressure", "Pa", 0.0, 1e8, 1.2e6).starts(&[1e6, 1.3e6]).role(Use::Threshold).on("supply_pressure"),
-            EffectParameter::new("cut_out_pressure", "Pa", 0.0, 1e8, 1.4e6).starts(&[1.2e6, 1.5e6]).role(Use::Threshold).on("supply_pressure"),
+            EffectParameter::new("free_air_delivery", "m3/s", 0.0, 1.0, 0.002)
+                .starts(&[0.002])
+                .off(0.0),
+            EffectParameter::new("cut_in_pressure", "Pa", 0.0, 1e8, 1.2e6)
+                .starts(&[1e6, 1.3e6])
+                .role(Use::Threshold)
+                .on("supply_pressure"),
+            EffectParameter::new("cut_out_pressure", "Pa", 0.0, 1e8, 1.4e6)
+                .starts(&[1.2e6, 1.5e6])
+                .role(Use::Threshold)
+                .on("supply_pressure"),
         ],
-        states: &[
-            EffectState { name: "running", role: Role::Keeps },
-        ],
+        states: &[EffectState { name: "running", role: Role::Keeps }],
         integrates: false,
         ports: &[Port::Feed],
         make: made_by!(make),

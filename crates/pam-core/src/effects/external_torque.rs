@@ -1,11 +1,11 @@
 //! `external_torque`: something pushes a link for a while, up to three times in a recording.
 //!
-//! A torque on the joint from a time on for a duration, each edge over a rise (20 ms of a blow, half a second of a hand), and a second
-//! and a third of their own. The environment pushes, not the base. Time counts
-//! from the start of the recording. K. Ohnishi, M. Shibata & T. Murakami, "Motion control for advanced mechatronics", IEEE/ASME Trans.
-//! Mechatronics 1, 1996 (disturbance torque).
+//! A torque on the joint from a time on for a duration, each edge over a rise (20 ms of a blow,
+//! half a second of a hand), and a second and a third of their own. The environment pushes, not the
+//! base. Time counts from the start of the recording. K. Ohnishi, M. Shibata & T. Murakami, "Motion
+//! control for advanced mechatronics", IEEE/ASME Trans. Mechatronics 1, 1996 (disturbance torque).
 
-use super::{Effect, EffectInfo, EffectParameter, Form, Port, risen_over, Use};
+use super::{risen_over, Effect, EffectInfo, EffectParameter, Form, Port, Use};
 use crate::blocks::gas::Gas;
 use crate::made_by;
 use crate::scalar::Scalar;
@@ -19,16 +19,31 @@ pub const INFO: EffectInfo = EffectInfo {
     forms: &[Form {
         name: "pushes",
         parameters: &[
-            EffectParameter::new("torque", "N m", -1e9, 1e9, 5.0).starts(&[-5.0, 5.0]).off(0.0).tried(1.0),
+            EffectParameter::new("torque", "N m", -1e9, 1e9, 5.0)
+                .starts(&[-5.0, 5.0])
+                .off(0.0)
+                .tried(1.0),
             EffectParameter::new("time", "s", -1e9, 1e9, 5.0).starts(&[5.0, 15.0]).role(Use::Time),
-            EffectParameter::new("duration", "s", 0.0, 1e9, 1.0).starts(&[0.5, 3.0]).role(Use::Duration).tried(1.0),
-            EffectParameter::new("torque_2", "N m", -1e9, 1e9, 0.0).starts(&[0.0]).off(0.0).again("torque"),
+            EffectParameter::new("duration", "s", 0.0, 1e9, 1.0)
+                .starts(&[0.5, 3.0])
+                .role(Use::Duration)
+                .tried(1.0),
+            EffectParameter::new("torque_2", "N m", -1e9, 1e9, 0.0)
+                .starts(&[0.0])
+                .off(0.0)
+                .again("torque"),
             EffectParameter::new("time_2", "s", -1e9, 1e9, 0.0).starts(&[0.0]).again("time"),
             EffectParameter::new("duration_2", "s", 0.0, 1e9, 1.0).starts(&[1.0]).again("duration"),
-            EffectParameter::new("torque_3", "N m", -1e9, 1e9, 0.0).starts(&[0.0]).off(0.0).again("torque"),
+            EffectParameter::new("torque_3", "N m", -1e9, 1e9, 0.0)
+                .starts(&[0.0])
+                .off(0.0)
+                .again("torque"),
             EffectParameter::new("time_3", "s", -1e9, 1e9, 0.0).starts(&[0.0]).again("time"),
             EffectParameter::new("duration_3", "s", 0.0, 1e9, 1.0).starts(&[1.0]).again("duration"),
-            EffectParameter::new("rise", "s", 0.02, 1e9, 0.02).starts(&[0.02]).role(Use::Rise).tried(0.4),
+            EffectParameter::new("rise", "s", 0.02, 1e9, 0.02)
+                .starts(&[0.02])
+                .role(Use::Rise)
+                .tried(0.4),
         ],
         states: &[],
         integrates: false,

@@ -1,18 +1,19 @@
 //! `heat_transfer`: gas temperature from an energy balance with heat exchange at the wall.
 //!
-//! `dp/dt = (kappa R/V)(m_in Ts - m_out T) - kappa p V'/V + ((kappa-1)/V) h A (Tw - T)` with `T = p V/(m R)`,
-//! `dm/dt = m_in - m_out` and `h = h0 sqrt(p T/(p0 T0))`, in place of the constant polytropic coefficients. The wall stays
-//! at the rest temperature. The gas mass is the state, so that the temperature cannot drift. Wall area: the cylinder
-//! of each muscle's volume and length; the cube of the chamber's volume when it is rigid.
-//! Only a `share` of the gas may follow the balance, while the rest keeps the coefficients: a nominal model whose coefficients are
-//! nearly right is left by a little, not by all. The mass then is the one that the gas temperature stands for, and not what flowed.
-//! A recording may begin just after a fill: the gas is then warmer than the wall by an initial rise.
-//! Carneiro & de Almeida (2006); Al-Ibrahim & Otis (1992).
+//! `dp/dt = (kappa R/V)(m_in Ts - m_out T) - kappa p V'/V + ((kappa-1)/V) h A (Tw - T)` with
+//! `T = p V/(m R)`, `dm/dt = m_in - m_out` and `h = h0 sqrt(p T/(p0 T0))`, in place of the constant
+//! polytropic coefficients. The wall stays at the rest temperature. The gas mass is the state, so
+//! that the temperature cannot drift. Wall area: the cylinder of each muscle's volume and length;
+//! the cube of the chamber's volume when it is rigid. Only a `share` of the gas may follow the
+//! balance, while the rest keeps the coefficients: a nominal model whose coefficients are nearly
+//! right is left by a little, not by all. The mass then is the one that the gas temperature stands
+//! for, and not what flowed. A recording may begin just after a fill: the gas is then warmer than
+//! the wall by an initial rise. Carneiro & de Almeida (2006); Al-Ibrahim & Otis (1992).
 
 use super::{AtRest, Effect, EffectInfo, EffectParameter, Form, Port, Use};
-use crate::made_by;
 use crate::blocks::chamber::{gas_temperature, ChamberState};
 use crate::blocks::gas::Gas;
+use crate::made_by;
 use crate::scalar::Scalar;
 
 /// What it is.
@@ -26,9 +27,16 @@ pub const INFO: EffectInfo = EffectInfo {
     forms: &[Form {
         name: "energy_balance",
         parameters: &[
-            EffectParameter::new("heat_transfer_coefficient", "W/(m2 K)", 1.0, 10000.0, 50.0).starts(&[20.0, 80.0]),
-            EffectParameter::new("initial_temperature_rise", "K", 0.0, 200.0, 0.0).starts(&[5.0]).role(Use::Held).sealed(Use::Size),
-            EffectParameter::new("share", "1", 0.0, 1.0, 1.0).starts(&[0.2]).role(Use::Size).sealed(Use::Held),
+            EffectParameter::new("heat_transfer_coefficient", "W/(m2 K)", 1.0, 10000.0, 50.0)
+                .starts(&[20.0, 80.0]),
+            EffectParameter::new("initial_temperature_rise", "K", 0.0, 200.0, 0.0)
+                .starts(&[5.0])
+                .role(Use::Held)
+                .sealed(Use::Size),
+            EffectParameter::new("share", "1", 0.0, 1.0, 1.0)
+                .starts(&[0.2])
+                .role(Use::Size)
+                .sealed(Use::Held),
         ],
         states: &[],
         integrates: false,
@@ -83,7 +91,8 @@ impl<S: Scalar> Effect<S> for Heat<S> {
     }
 
     fn wall_rate(&self, gas: &Gas, volume: f64, wall: f64) -> f64 {
-        (gas.gamma - 1.0) * self.coefficient.re() * wall * gas.temperature / (gas.ambient_pressure * volume)
+        (gas.gamma - 1.0) * self.coefficient.re() * wall * gas.temperature
+            / (gas.ambient_pressure * volume)
     }
 }
 
@@ -94,12 +103,20 @@ mod tests {
     #[test]
     fn limits_are_adiabatic_and_isothermal() {
         let gas = Gas::new(101_325.0, 293.15, 287.05, 1.4);
-        let state =
-            ChamberState { pressure: 4e5, volume: 1e-3, volume_rate: 1e-4, inflow: 0.0, outflow: 0.0 };
+        let state = ChamberState {
+            pressure: 4e5,
+            volume: 1e-3,
+            volume_rate: 1e-4,
+            inflow: 0.0,
+            outflow: 0.0,
+        };
         let adiabatic = pressure_rate(&gas, &state, 293.15, 0.05, 0.0);
         assert!((adiabatic + 1.4 * 4e5 * 0.1_f64).abs() < 1e-9);
         let mass = 4e5 * 1e-3 / (287.05 * 293.15);
         assert!((gas_temperature(&gas, 4e5, 1e-3, mass) - 293.15_f64).abs() < 1e-10);
-        assert!(pressure_rate(&gas, &state, 330.0, 0.05, 50.0) < adiabatic, "hot gas cools at the wall");
+        assert!(
+            pressure_rate(&gas, &state, 330.0, 0.05, 50.0) < adiabatic,
+            "hot gas cools at the wall"
+        );
     }
 }

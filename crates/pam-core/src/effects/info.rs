@@ -1,4 +1,5 @@
-//! What an effect is: its identifier, its forms with their parameters, states and ports, and where it comes from.
+//! What an effect is: its identifier, its forms with their parameters, states and ports, and where
+//! it comes from.
 
 use super::port::{Effect, Port};
 use crate::blocks::gas::Gas;
@@ -33,7 +34,8 @@ pub enum Use {
     Place,
     /// From below or above that place.
     Side,
-    /// A level of a measured channel at which something switches, which no fit can move: the first on, the second off.
+    /// A level of a measured channel at which something switches, which no fit can move: the first
+    /// on, the second off.
     Threshold,
 }
 
@@ -52,8 +54,8 @@ pub struct EffectParameter {
     pub default: f64,
     /// Values from which a fit starts, small to large.
     pub starts: &'static [f64],
-    /// Value that switches the effect off (with the other parameters that have one at theirs); none for a parameter that
-    /// gives the effect its shape.
+    /// Value that switches the effect off (with the other parameters that have one at theirs); none
+    /// for a parameter that gives the effect its shape.
     pub neutral: Option<f64>,
     /// Where it usually lies, as prior knowledge.
     pub expected: Option<(f64, f64)>,
@@ -65,14 +67,17 @@ pub struct EffectParameter {
     pub role_sealed: Option<Use>,
     /// Kind of the measured channel in which a place or a threshold lies.
     pub channel: &'static str,
-    /// Parameter of which it is another one (`torque` of `torque_2`): held unless an event needs it.
+    /// Parameter of which it is another one (`torque` of `torque_2`): held unless an event needs
+    /// it.
     pub repeats: &'static str,
-    /// Value that a search gives it while it looks for the time of an event, or scans another parameter.
+    /// Value that a search gives it while it looks for the time of an event, or scans another
+    /// parameter.
     pub tried: Option<f64>,
-    /// Least, greatest and number of values that are tried one by one, evenly in their logarithm, before any is fitted: a
-    /// resonance has to be met.
+    /// Least, greatest and number of values that are tried one by one, evenly in their logarithm,
+    /// before any is fitted: a resonance has to be met.
     pub scan: Option<(f64, f64, u32)>,
-    /// The effect's size is the same in all recordings, so that its scatter between them speaks against the effect.
+    /// The effect's size is the same in all recordings, so that its scatter between them speaks
+    /// against the effect.
     pub same_everywhere: bool,
     /// Recordings must last as long as it, or so, to tell it.
     pub time_constant: bool,
@@ -80,14 +85,21 @@ pub struct EffectParameter {
     pub restricts: bool,
     /// Parameter of the rig (`valve.discharge_area_max`) in parts of which it is tried.
     pub like: &'static str,
-    /// Kinds of block of the cut chain in which the effect acts only while this parameter is not zero.
+    /// Kinds of block of the cut chain in which the effect acts only while this parameter is not
+    /// zero.
     pub needed_in: &'static [&'static str],
 }
 
 impl EffectParameter {
     /// A parameter between two bounds, with a typical value.
     #[must_use]
-    pub const fn new(name: &'static str, unit: &'static str, lower: f64, upper: f64, default: f64) -> Self {
+    pub const fn new(
+        name: &'static str,
+        unit: &'static str,
+        lower: f64,
+        upper: f64,
+        default: f64,
+    ) -> Self {
         Self {
             name,
             unit,
@@ -281,7 +293,8 @@ pub struct Form {
     pub make: Make,
 }
 
-/// When an effect leaves the very recordings that another one leaves, so that nothing in them can tell the two apart.
+/// When an effect leaves the very recordings that another one leaves, so that nothing in them can
+/// tell the two apart.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct SameData {
     /// The other effect.
@@ -325,13 +338,15 @@ pub struct EffectInfo {
     pub id: &'static str,
     /// Block in which it acts.
     pub block: &'static str,
-    /// Kind of the blocks of which it can take one, by its name; empty for an effect on the whole rig.
+    /// Kind of the blocks of which it can take one, by its name; empty for an effect on the whole
+    /// rig.
     pub at: &'static str,
     /// Whether it is a name for physics; a sum of terms is none.
     pub named: bool,
     /// Place among the effects at one port: lower ones act first.
     pub order: u8,
-    /// Kinds of block of the cut chain in which it acts, where these are others than those of its block.
+    /// Kinds of block of the cut chain in which it acts, where these are others than those of its
+    /// block.
     pub acts_in: &'static [&'static str],
     /// Kinds of supply that it acts on; empty for all.
     pub supplies: &'static [&'static str],

@@ -1,11 +1,15 @@
-//! `input_path_lag`: command delay, spool and line, lumped into one lag and one delay between command and opening.
+//! `input_path_lag`: command delay, spool and line, lumped into one lag and one delay between
+//! command and opening.
 //!
-//! `w' = (x - w)/T` of the normalised command `x`, then the delay `D` as three equal lags `z_i' = (z_(i-1) - z_i)/(D/3)`, `z_0 = w`: a
-//! delay that can be differentiated. Commands are held, so that the chain moves in closed form over any time, by the phi functions of
-//! exponential integrators (M. Hochbruck & A. Ostermann, *Acta Numerica* 19, 2010), and no step is too long for it.
-//! E. Richer & Y. Hurmuzlu (2000); J. F. Carneiro & F. G. de Almeida (2006).
+//! `w' = (x - w)/T` of the normalised command `x`, then the delay `D` as three equal lags
+//! `z_i' = (z_(i-1) - z_i)/(D/3)`, `z_0 = w`: a delay that can be differentiated. Commands are
+//! held, so that the chain moves in closed form over any time, by the phi functions of exponential
+//! integrators (M. Hochbruck & A. Ostermann, *Acta Numerica* 19, 2010), and no step is too long for
+//! it. E. Richer & Y. Hurmuzlu (2000); J. F. Carneiro & F. G. de Almeida (2006).
 
-use super::{BEGINNING, BEGUN, Effect, EffectInfo, EffectParameter, EffectState, Form, Port, Role, begun};
+use super::{
+    begun, Effect, EffectInfo, EffectParameter, EffectState, Form, Port, Role, BEGINNING, BEGUN,
+};
 use crate::blocks::gas::Gas;
 use crate::made_by;
 use crate::scalar::{constant, Scalar};
@@ -15,11 +19,14 @@ pub const INFO: EffectInfo = EffectInfo {
     id: "input_path_lag",
     block: "valve",
     at: "valve",
-    source: "Richer & Hurmuzlu (2000); Carneiro & de Almeida (2006); Hochbruck & Ostermann (2010) for its closed form",
+    source: "Richer & Hurmuzlu (2000); Carneiro & de Almeida (2006); Hochbruck & Ostermann (2010) \
+        for its closed form",
     forms: &[Form {
         name: "lag_and_delay",
         parameters: &[
-            EffectParameter::new("time_constant", "s", 0.0, 100.0, 0.005).starts(&[0.003, 0.015]).off(0.0),
+            EffectParameter::new("time_constant", "s", 0.0, 100.0, 0.005)
+                .starts(&[0.003, 0.015])
+                .off(0.0),
             EffectParameter::new("delay", "s", 0.0, 100.0, 0.0).starts(&[0.005]).off(0.0),
         ],
         states: &[
@@ -41,12 +48,19 @@ const STAGES: f64 = 3.0;
 /// A shorter lag [s] counts as none.
 pub const SHORTEST: f64 = 2e-5;
 
-/// Positions along the chain: behind the lag, and behind each part of the delay. The last one opens the valve.
+/// Positions along the chain: behind the lag, and behind each part of the delay. The last one opens
+/// the valve.
 pub type Chain<S> = [S; 4];
 
 /// The chain a time [s] later, its input held.
 #[inline]
-pub fn moved<S: Scalar>(from: &Chain<S>, input: S, time_constant: S, delay: S, time: f64) -> Chain<S> {
+pub fn moved<S: Scalar>(
+    from: &Chain<S>,
+    input: S,
+    time_constant: S,
+    delay: S,
+    time: f64,
+) -> Chain<S> {
     let zero = constant::<S>(0.0);
     let lagging = time_constant.re() > SHORTEST;
     // Distances from where the chain goes, and what is left of the first one.
@@ -87,8 +101,8 @@ fn phi<S: Scalar>(x: S, e: S, ex: S) -> [S; 3] {
     [one, two, (two - e * 0.5) / x]
 }
 
-/// Rates of the chain [1/s], its input held; of a lag that counts as none they are zero, and what follows it is fed by its
-/// input.
+/// Rates of the chain [1/s], its input held; of a lag that counts as none they are zero, and what
+/// follows it is fed by its input.
 pub fn rates<S: Scalar>(chain: &Chain<S>, input: S, time_constant: S, delay: S) -> Chain<S> {
     let zero = constant::<S>(0.0);
     let lagging = time_constant.re() > SHORTEST;
@@ -178,7 +192,9 @@ mod tests {
     #[test]
     fn closed_form_is_the_integral_of_the_chain() {
         let start = [0.3, 0.1, -0.2, 0.05];
-        for (tc, delay) in [(5e-3, 9e-3), (4e-3, 12e-3), (4e-3, 12.001e-3), (2e-3, 30e-3), (30e-3, 3e-3)] {
+        for (tc, delay) in
+            [(5e-3, 9e-3), (4e-3, 12e-3), (4e-3, 12.001e-3), (2e-3, 30e-3), (30e-3, 3e-3)]
+        {
             let exact = moved(&start, 0.8, tc, delay, 7e-3);
             let numeric = integrated(start, 0.8, tc, delay, 7e-3);
             for (a, b) in exact.iter().zip(numeric) {
@@ -206,7 +222,10 @@ mod tests {
             for (k, rate) in rates(&start, 0.8, tc, delay).into_iter().enumerate() {
                 let counts = (first..last).contains(&k);
                 let expected: f64 = if counts { (now[k] - was[k]) / h } else { 0.0 };
-                assert!((rate - expected).abs() < 1e-4 * expected.abs() + 1e-5, "{tc} {delay} {k}: {rate}");
+                assert!(
+                    (rate - expected).abs() < 1e-4 * expected.abs() + 1e-5,
+                    "{tc} {delay} {k}: {rate}"
+                );
             }
         }
     }
@@ -217,10 +236,13 @@ mod tests {
         for (tc, delay) in [(5e-3, 9e-3), (4e-3, 12e-3)] {
             let run = |t: f64, d: f64| moved(&start.map(|s| s.re), 0.8, t, d, 3e-3)[3];
             let by_lag = moved(&start, 0.8.into(), Dual64::new(tc, 1.0), delay.into(), 3e-3)[3].eps;
-            let by_delay = moved(&start, 0.8.into(), tc.into(), Dual64::new(delay, 1.0), 3e-3)[3].eps;
+            let by_delay =
+                moved(&start, 0.8.into(), tc.into(), Dual64::new(delay, 1.0), 3e-3)[3].eps;
             let h = 1e-7;
             assert!((by_lag - (run(tc + h, delay) - run(tc - h, delay)) / (2.0 * h)).abs() < 1e-3);
-            assert!((by_delay - (run(tc, delay + h) - run(tc, delay - h)) / (2.0 * h)).abs() < 1e-3);
+            assert!(
+                (by_delay - (run(tc, delay + h) - run(tc, delay - h)) / (2.0 * h)).abs() < 1e-3
+            );
         }
     }
 }

@@ -1,8 +1,9 @@
 //! `joint_coulomb_stribeck`: friction of the joint that is larger at rest than in motion.
 //!
-//! `tau = -(f_s - f) exp(-(w/w_s)^2) tanh(10 w/w_s)` beside the arm's own Coulomb friction `f`: the stiction above it, that fades over the
-//! Stribeck speed `w_s`. Its sign changes over a tenth of that speed. B. Armstrong-Helouvry, P. Dupont & C. Canudas de Wit, "A survey of
-//! models, analysis tools and compensation methods for the control of machines with friction", Automatica 30, 1994.
+//! `tau = -(f_s - f) exp(-(w/w_s)^2) tanh(10 w/w_s)` beside the arm's own Coulomb friction `f`: the
+//! stiction above it, that fades over the Stribeck speed `w_s`. Its sign changes over a tenth of
+//! that speed. B. Armstrong-Helouvry, P. Dupont & C. Canudas de Wit, "A survey of models, analysis
+//! tools and compensation methods for the control of machines with friction", Automatica 30, 1994.
 
 use super::{At, Effect, EffectInfo, EffectParameter, Extremes, Form, Port};
 use crate::blocks::gas::Gas;
@@ -20,7 +21,8 @@ pub const INFO: EffectInfo = EffectInfo {
         name: "exponential",
         parameters: &[
             EffectParameter::new("stiction", "N m", 0.0, 1e6, 1.0).starts(&[0.5, 3.0]).off(0.0),
-            EffectParameter::new("stribeck_speed", "rad/s", 0.001, 1000.0, 0.05).starts(&[0.02, 0.1]),
+            EffectParameter::new("stribeck_speed", "rad/s", 0.001, 1000.0, 0.05)
+                .starts(&[0.02, 0.1]),
         ],
         states: &[],
         integrates: false,

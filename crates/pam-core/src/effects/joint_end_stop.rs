@@ -1,11 +1,15 @@
 //! `joint_end_stop`: a stop of the joint before the nominal one.
 //!
-//! `tau = -k d (d/d_0)^(n-1) (1 + c d')` for a depth `d` beyond the stop's angle, never a pull, the corner rounded over 0.2 deg; `k` is the
-//! stop's secant stiffness at a depth of `d_0` = 10 deg, so that the exponent `n` (1 metal, 2 to 3 rubber) leaves its unit alone. It is
-//! an upper stop where `side` is positive, a lower one where it is negative. K. H. Hunt & F. R. E. Crossley, "Coefficient of
-//! restitution interpreted as damping in vibroimpact", ASME J. Applied Mechanics 42, 1975.
+//! `tau = -k d (d/d_0)^(n-1) (1 + c d')` for a depth `d` beyond the stop's angle, never a pull, the
+//! corner rounded over 0.2 deg; `k` is the stop's secant stiffness at a depth of `d_0` = 10 deg, so
+//! that the exponent `n` (1 metal, 2 to 3 rubber) leaves its unit alone. It is an upper stop where
+//! `side` is positive, a lower one where it is negative. K. H. Hunt & F. R. E. Crossley,
+//! "Coefficient of restitution interpreted as damping in vibroimpact", ASME J. Applied Mechanics
+//! 42, 1975.
 
-use super::{At, Effect, EffectInfo, EffectParameter, Extremes, Form, Port, beyond, progressive, Use};
+use super::{
+    beyond, progressive, At, Effect, EffectInfo, EffectParameter, Extremes, Form, Port, Use,
+};
 use crate::blocks::gas::Gas;
 use crate::made_by;
 use crate::scalar::{constant, Scalar};
@@ -20,8 +24,13 @@ pub const INFO: EffectInfo = EffectInfo {
     forms: &[Form {
         name: "progressive",
         parameters: &[
-            EffectParameter::new("stiffness", "N m/rad", 0.0, 1e9, 500.0).starts(&[200.0, 2000.0]).off(0.0),
-            EffectParameter::new("angle", "rad", -7.0, 7.0, 1.2).starts(&[1.2]).role(Use::Place).on("joint_angle"),
+            EffectParameter::new("stiffness", "N m/rad", 0.0, 1e9, 500.0)
+                .starts(&[200.0, 2000.0])
+                .off(0.0),
+            EffectParameter::new("angle", "rad", -7.0, 7.0, 1.2)
+                .starts(&[1.2])
+                .role(Use::Place)
+                .on("joint_angle"),
             EffectParameter::new("dissipation", "s/rad", 0.0, 10000.0, 0.5).starts(&[0.5]),
             EffectParameter::new("exponent", "1", 1.0, 4.0, 1.0).starts(&[1.5]),
             EffectParameter::new("side", "1", -1.0, 1.0, 1.0).starts(&[-1.0, 1.0]).role(Use::Side),
@@ -103,10 +112,14 @@ mod tests {
 
     #[test]
     fn rubber_grows_stiffer() {
-        let at = |degrees: f64| -torque([500.0, 1.2, 0.0, 3.0, 1.0], 1.2 + degrees.to_radians(), 0.0);
+        let at =
+            |degrees: f64| -torque([500.0, 1.2, 0.0, 3.0, 1.0], 1.2 + degrees.to_radians(), 0.0);
         let depth = |degrees: f64| degrees.to_radians() - 0.5 * CORNER;
         let power = |degrees: f64| 500.0 * depth(degrees).powi(3) / SECANT.powi(2);
-        assert!((at(15.0) / power(15.0) - 1.0).abs() < 1e-12 && (at(2.0) / power(2.0) - 1.0).abs() < 1e-12);
+        assert!(
+            (at(15.0) / power(15.0) - 1.0).abs() < 1e-12
+                && (at(2.0) / power(2.0) - 1.0).abs() < 1e-12
+        );
         let slope = (at(10.0001) - at(9.9999)) / 0.0002_f64.to_radians();
         assert!((slope / tangent(500.0, 3.0, depth(10.0)) - 1.0).abs() < 1e-6);
         // neither a logarithm of nothing nor its slope

@@ -1,13 +1,14 @@
 //! `leak_muscle`: leakage of the chamber (muscle, fitting or hose) to ambient.
 //!
-//! A hole leaks like an orifice, a porous wall or a long thin crack like a laminar path; `s` is the share of the latter:
-//! `m_l = C rho0 sqrt(T0/T) [ (1-s) p psi(pa/p)/psi(0) + s (p^2 - pa^2)/p_ref ]` with the sonic conductance `C` of ISO 6358 and
-//! `p_ref` = 500 kPa absolute. Sealed, choked and with `s = 0` the absolute pressure decays with the time constant
-//! `V/(alpha_out C rho0 R T)`. Beater, *Pneumatic Drives* (2007).
+//! A hole leaks like an orifice, a porous wall or a long thin crack like a laminar path; `s` is the
+//! share of the latter: `m_l = C rho0 sqrt(T0/T) [ (1-s) p psi(pa/p)/psi(0) + s (p^2 - pa^2)/p_ref
+//! ]` with the sonic conductance `C` of ISO 6358 and `p_ref` = 500 kPa absolute. Sealed, choked and
+//! with `s = 0` the absolute pressure decays with the time constant `V/(alpha_out C rho0 R T)`.
+//! Beater, *Pneumatic Drives* (2007).
 
 use super::{Effect, EffectInfo, EffectParameter, Extremes, Form, Port, Use};
-use crate::made_by;
 use crate::blocks::gas::Gas;
+use crate::made_by;
 use crate::scalar::{constant, Scalar};
 
 /// What it is.
@@ -19,8 +20,13 @@ pub const INFO: EffectInfo = EffectInfo {
     forms: &[Form {
         name: "orifice_and_laminar",
         parameters: &[
-            EffectParameter::new("conductance", "m3/(s Pa)", 0.0, 1e-7, 5e-12).starts(&[1e-11]).off(0.0).same_everywhere(),
-            EffectParameter::new("laminar_share", "1", 0.0, 1.0, 0.0).starts(&[0.3]).role(Use::Choice),
+            EffectParameter::new("conductance", "m3/(s Pa)", 0.0, 1e-7, 5e-12)
+                .starts(&[1e-11])
+                .off(0.0)
+                .same_everywhere(),
+            EffectParameter::new("laminar_share", "1", 0.0, 1.0, 0.0)
+                .starts(&[0.3])
+                .role(Use::Choice),
         ],
         states: &[],
         integrates: false,
@@ -30,8 +36,8 @@ pub const INFO: EffectInfo = EffectInfo {
     ..EffectInfo::USUAL
 };
 
-/// Absolute pressure at which a laminar path of the same conductance leaks as much as a choked orifice, up to
-/// the counter pressure [Pa].
+/// Absolute pressure at which a laminar path of the same conductance leaks as much as a choked
+/// orifice, up to the counter pressure [Pa].
 pub const REFERENCE_PRESSURE: f64 = 5e5;
 
 /// Leaking mass flow [kg/s] out of a chamber at an absolute pressure [Pa].
@@ -41,7 +47,8 @@ pub fn mass_flow<S: Scalar>(gas: &Gas, conductance: S, laminar_share: S, pressur
     let area = gas.area_of_conductance(conductance);
     let orifice = gas.mass_flow(area, pressure, constant(ambient));
     let choked = gas.choked_flow(area, pressure);
-    let laminar = choked * (pressure - constant::<S>(ambient * ambient) / pressure) / REFERENCE_PRESSURE;
+    let laminar =
+        choked * (pressure - constant::<S>(ambient * ambient) / pressure) / REFERENCE_PRESSURE;
     orifice + laminar_share * (laminar - orifice)
 }
 

@@ -1,28 +1,30 @@
 //! Physics that a nominal model leaves out: one file each, plugged into the ports of the blocks.
 //!
-//! A file says what the effect is ([`EffectInfo`]) and what it does at its ports ([`Effect`]); nothing else in this crate
-//! knows it by name. An effect that is absent costs the step loop at most one branch on a flag. What it remembers (a
-//! spool's position, a creeping strain, a relay) stands behind the states of the rig, see [`crate::plant::Layout`].
+//! A file says what the effect is ([`EffectInfo`]) and what it does at its ports ([`Effect`]);
+//! nothing else in this crate knows it by name. An effect that is absent costs the step loop at
+//! most one branch on a flag. What it remembers (a spool's position, a creeping strain, a relay)
+//! stands behind the states of the rig, see [`crate::plant::Layout`].
 
 mod info;
 mod port;
 
 pub(crate) use self::info::BEGINNING;
 pub use self::info::{
-    AtRest, Dual, EffectInfo, EffectParameter, EffectState, Form, Kink, Make, Number, Role, SameData, Use,
-    LANES,
+    AtRest, Dual, EffectInfo, EffectParameter, EffectState, Form, Kink, Make, Number, Role,
+    SameData, Use, LANES,
 };
 pub(crate) use self::port::{begun, BAR, BEGUN, LITRE};
 pub use self::port::{At, AtMuscle, Effect, Extremes, Port};
 use crate::scalar::{constant, Scalar};
 
-/// The modules of the effects, and the list of what they are; a file that stands elsewhere is named behind its module.
+/// The modules of the effects, and the list of what they are; a file that stands elsewhere is named
+/// behind its module.
 macro_rules! catalogue {
     ($($(#[$when:meta])? $effect:ident $(= $file:literal)?,)*) => {
         $($(#[$when])? $(#[path = $file])? pub mod $effect;)*
 
-        /// Every effect of the core, in the order of the chain; behind them the closures, which model a mismatch without
-        /// naming it.
+        /// Every effect of the core, in the order of the chain; behind them the closures, which
+        /// model a mismatch without naming it.
         pub const EFFECTS: &[&EffectInfo] = &[$($(#[$when])? &$effect::INFO,)*];
     };
 }
@@ -59,7 +61,8 @@ catalogue! {
     closure_torque,
 }
 
-/// Time that a sudden change takes [s]: short for an arm, long enough for a step, so that its moment can be fitted.
+/// Time that a sudden change takes [s]: short for an arm, long enough for a step, so that its
+/// moment can be fitted.
 pub const RISE: f64 = 0.02;
 
 /// From 0 before a time to 1 after it [s], along `3 s^2 - 2 s^3` over [`RISE`].
@@ -93,7 +96,8 @@ pub fn beyond<S: Scalar>(x: S, width: f64) -> S {
     }
 }
 
-/// `d (d/d_0)^(n-1)`: what a contact that grows stiffer with its depth `d` is multiplied with, `d` itself at the depth `d_0`.
+/// `d (d/d_0)^(n-1)`: what a contact that grows stiffer with its depth `d` is multiplied with, `d`
+/// itself at the depth `d_0`.
 #[inline]
 pub fn progressive<S: Scalar>(depth: S, unit: f64, exponent: S) -> S {
     if depth.re() < SHALLOW {

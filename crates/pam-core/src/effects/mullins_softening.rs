@@ -1,9 +1,11 @@
 //! `mullins_softening`: a bladder that is softer wherever it has been stretched before.
 //!
-//! `F_b -> F_b (1 - D tanh((e_m - e)/w))` of the bladder's part of the force, `e_m` the largest contraction since the start: a first
-//! stretch is as stiff as the model says, the way back and all later cycles up to `e_m` are softer. R. W. Ogden & D. G. Roxburgh, "A
-//! pseudo-elastic model for the Mullins effect in filled rubber", Proc. R. Soc. A 455, 1999, with contraction in the place of energy;
-//! J. Diani, B. Fayolle & P. Gilormini, "A review on the Mullins effect", European Polymer Journal 45, 2009.
+//! `F_b -> F_b (1 - D tanh((e_m - e)/w))` of the bladder's part of the force, `e_m` the largest
+//! contraction since the start: a first stretch is as stiff as the model says, the way back and all
+//! later cycles up to `e_m` are softer. R. W. Ogden & D. G. Roxburgh, "A pseudo-elastic model for
+//! the Mullins effect in filled rubber", Proc. R. Soc. A 455, 1999, with contraction in the place
+//! of energy; J. Diani, B. Fayolle & P. Gilormini, "A review on the Mullins effect", European
+//! Polymer Journal 45, 2009.
 
 use super::{At, Effect, EffectInfo, EffectParameter, EffectState, Form, Kink, Port, Role};
 use crate::blocks::gas::Gas;
@@ -27,9 +29,7 @@ pub const INFO: EffectInfo = EffectInfo {
             EffectParameter::new("softening", "1", 0.0, 1.0, 0.2).starts(&[0.1, 0.3]).off(0.0),
             EffectParameter::new("contraction_width", "1", 0.0001, 10.0, 0.03).starts(&[0.03]),
         ],
-        states: &[
-            EffectState { name: "largest", role: Role::Keeps },
-        ],
+        states: &[EffectState { name: "largest", role: Role::Keeps }],
         integrates: false,
         ports: &[Port::Bladder],
         make: made_by!(make),
@@ -37,7 +37,8 @@ pub const INFO: EffectInfo = EffectInfo {
     ..EffectInfo::USUAL
 };
 
-/// What the softening adds to the force [N] of a bladder's force [N] at a contraction ratio, after a largest one.
+/// What the softening adds to the force [N] of a bladder's force [N] at a contraction ratio, after
+/// a largest one.
 #[inline]
 pub fn change<S: Scalar>(softening: S, width: S, bladder: S, contraction: S, largest: S) -> S {
     if contraction.re() >= largest.re() {

@@ -1,9 +1,10 @@
 //! `muscle_creep`: standard linear solid, a spring and a damper in series beside the muscle.
 //!
-//! `F_c = k (L - L_d)`, `L_d' = (L - L_d)/tau`: at constant length the force relaxes, at constant pressure the length creeps on in the
-//! direction of its last change. One state for each group of muscles, the length `L_d` of the damper; at the start it is that of the
-//! muscle, at rest. W. N. Findley, J. S. Lai & K. Onaran, *Creep and Relaxation of Nonlinear Viscoelastic Materials* (1976);
-//! H. F. Schulte Jr, "The characteristics of the McKibben artificial muscle" (1961).
+//! `F_c = k (L - L_d)`, `L_d' = (L - L_d)/tau`: at constant length the force relaxes, at constant
+//! pressure the length creeps on in the direction of its last change. One state for each group of
+//! muscles, the length `L_d` of the damper; at the start it is that of the muscle, at rest. W. N.
+//! Findley, J. S. Lai & K. Onaran, *Creep and Relaxation of Nonlinear Viscoelastic Materials*
+//! (1976); H. F. Schulte Jr, "The characteristics of the McKibben artificial muscle" (1961).
 
 use super::{At, AtMuscle, Effect, EffectInfo, EffectParameter, EffectState, Form, Port, Role};
 use crate::blocks::gas::Gas;
@@ -20,12 +21,14 @@ pub const INFO: EffectInfo = EffectInfo {
     forms: &[Form {
         name: "standard_linear_solid",
         parameters: &[
-            EffectParameter::new("stiffness", "N/m", 0.0, 1e7, 500.0).starts(&[200.0, 2000.0]).off(0.0),
-            EffectParameter::new("time_constant", "s", 0.001, 1e6, 3.0).starts(&[1.0, 10.0]).time_constant(),
+            EffectParameter::new("stiffness", "N/m", 0.0, 1e7, 500.0)
+                .starts(&[200.0, 2000.0])
+                .off(0.0),
+            EffectParameter::new("time_constant", "s", 0.001, 1e6, 3.0)
+                .starts(&[1.0, 10.0])
+                .time_constant(),
         ],
-        states: &[
-            EffectState { name: "", role: Role::Moves },
-        ],
+        states: &[EffectState { name: "", role: Role::Moves }],
         integrates: true,
         ports: &[Port::Force],
         make: made_by!(make),

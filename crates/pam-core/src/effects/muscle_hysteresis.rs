@@ -1,10 +1,12 @@
-//! `muscle_hysteresis`: rate-independent friction of the braid as a pressure-scaled Maxwell-slip model.
+//! `muscle_hysteresis`: rate-independent friction of the braid as a pressure-scaled Maxwell-slip
+//! model.
 //!
-//! Elements `zeta_i <- clip(zeta_i + dL/d_i, -1, 1)` with `d_i = d (1/8, 1/4, 1/2, 1)`; force per muscle
-//! `F_h = (W0 + c pg) mean(zeta)`: more pull while the muscle is extended, less while it contracts. `c = 0` and a
-//! vanishing `d` is constant Coulomb friction, `W0 = 0` pressure-proportional friction. Vo-Minh et al. (2011);
-//! Al-Bender, Lampaert & Swevers (2005). Between steps the elements are updated by exact return mapping; inside a
-//! step the force follows the stage's length, so that smooth stretches keep the integrator's order.
+//! Elements `zeta_i <- clip(zeta_i + dL/d_i, -1, 1)` with `d_i = d (1/8, 1/4, 1/2, 1)`; force per
+//! muscle `F_h = (W0 + c pg) mean(zeta)`: more pull while the muscle is extended, less while it
+//! contracts. `c = 0` and a vanishing `d` is constant Coulomb friction, `W0 = 0`
+//! pressure-proportional friction. Vo-Minh et al. (2011); Al-Bender, Lampaert & Swevers (2005).
+//! Between steps the elements are updated by exact return mapping; inside a step the force follows
+//! the stage's length, so that smooth stretches keep the integrator's order.
 
 use super::{AtMuscle, Effect, EffectInfo, EffectParameter, EffectState, Form, Port, Role};
 use crate::blocks::gas::Gas;
@@ -19,12 +21,18 @@ pub const INFO: EffectInfo = EffectInfo {
     at: "muscle",
     order: 1,
     dry_friction: true,
-    source: "Vo-Minh et al. (2011); Al-Bender, Lampaert & Swevers (2005); Robinson (2014) (2.36) as a special case",
+    source: "Vo-Minh et al. (2011); Al-Bender, Lampaert & Swevers (2005); Robinson (2014) (2.36) \
+        as a special case",
     forms: &[Form {
         name: "maxwell_slip",
         parameters: &[
-            EffectParameter::new("friction_constant", "N", 0.0, 10000.0, 5.0).starts(&[2.0]).off(0.0),
-            EffectParameter::new("friction_pressure", "m2", 0.0, 1.0, 5e-5).starts(&[2e-5]).off(0.0).same_everywhere(),
+            EffectParameter::new("friction_constant", "N", 0.0, 10000.0, 5.0)
+                .starts(&[2.0])
+                .off(0.0),
+            EffectParameter::new("friction_pressure", "m2", 0.0, 1.0, 5e-5)
+                .starts(&[2e-5])
+                .off(0.0)
+                .same_everywhere(),
             EffectParameter::new("presliding", "m", 1e-6, 0.1, 0.001).starts(&[0.0005, 0.003]),
         ],
         states: &[

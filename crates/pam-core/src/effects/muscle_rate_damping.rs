@@ -1,8 +1,10 @@
-//! `muscle_rate_damping`: viscous force of the muscle, that grows with pressure and differs with direction.
+//! `muscle_rate_damping`: viscous force of the muscle, that grows with pressure and differs with
+//! direction.
 //!
-//! `F_v = (b_0 + b_1 p_g) L'` while contracting, `s` times that while lengthening; the part of the pressure below zero does not count.
-//! D. B. Reynolds, D. W. Repperger, C. A. Phillips & G. Bandry, "Modeling the dynamic characteristics of pneumatic muscle", Annals of
-//! Biomedical Engineering 31, 2003: damping is less in relaxation than in contraction.
+//! `F_v = (b_0 + b_1 p_g) L'` while contracting, `s` times that while lengthening; the part of the
+//! pressure below zero does not count. D. B. Reynolds, D. W. Repperger, C. A. Phillips & G. Bandry,
+//! "Modeling the dynamic characteristics of pneumatic muscle", Annals of Biomedical Engineering 31,
+//! 2003: damping is less in relaxation than in contraction.
 
 use super::{AtMuscle, Effect, EffectInfo, EffectParameter, Extremes, Form, Port};
 use crate::blocks::gas::Gas;
@@ -19,8 +21,12 @@ pub const INFO: EffectInfo = EffectInfo {
     forms: &[Form {
         name: "linear",
         parameters: &[
-            EffectParameter::new("damping_constant", "N s/m", 0.0, 1e7, 200.0).starts(&[100.0]).off(0.0),
-            EffectParameter::new("damping_pressure", "m s", 0.0, 10.0, 0.0005).starts(&[0.0005]).off(0.0),
+            EffectParameter::new("damping_constant", "N s/m", 0.0, 1e7, 200.0)
+                .starts(&[100.0])
+                .off(0.0),
+            EffectParameter::new("damping_pressure", "m s", 0.0, 10.0, 0.0005)
+                .starts(&[0.0005])
+                .off(0.0),
             EffectParameter::new("lengthening_share", "1", 0.0, 10.0, 1.0).starts(&[1.0]),
         ],
         states: &[],

@@ -1,13 +1,17 @@
 //! `pam_crowding_contact`: muscles that swell until they press on their neighbours or on the frame.
 //!
-//! `F = -A p_g d (d/d_0)^(n-1) (1 - m L'/sqrt(L'^2 + v^2))` for each muscle, `d = max(e - e_c, 0)` its contraction beyond that at which they
-//! touch, the corner rounded over 0.005, `d_0` = 0.1: what presses sideways is the gas, so that the loss grows with pressure, and the patch
-//! that touches grows with the depth, so that `n` is 1 where sides meet flat, 1.5 where round ones do (Hertz) and 2 where pointed ones do.
-//! What touches rubs, against the motion, by a share `m` of the loss, in full from a few times `v` = 3 mm/s. R. M. Robinson, C. S. Kothera &
-//! N. M. Wereley, "Variable recruitment testing of pneumatic artificial muscles for robotic manipulators", IEEE/ASME Trans. Mechatronics 20,
-//! 2015.
+//! `F = -A p_g d (d/d_0)^(n-1) (1 - m L'/sqrt(L'^2 + v^2))` for each muscle, `d = max(e - e_c, 0)`
+//! its contraction beyond that at which they touch, the corner rounded over 0.005, `d_0` = 0.1:
+//! what presses sideways is the gas, so that the loss grows with pressure, and the patch that
+//! touches grows with the depth, so that `n` is 1 where sides meet flat, 1.5 where round ones do
+//! (Hertz) and 2 where pointed ones do. What touches rubs, against the motion, by a share `m` of
+//! the loss, in full from a few times `v` = 3 mm/s. R. M. Robinson, C. S. Kothera & N. M. Wereley,
+//! "Variable recruitment testing of pneumatic artificial muscles for robotic manipulators",
+//! IEEE/ASME Trans. Mechatronics 20, 2015.
 
-use super::{AtMuscle, Effect, EffectInfo, EffectParameter, Extremes, Form, Port, beyond, progressive};
+use super::{
+    beyond, progressive, AtMuscle, Effect, EffectInfo, EffectParameter, Extremes, Form, Port,
+};
 use crate::blocks::gas::Gas;
 use crate::made_by;
 use crate::scalar::{constant, Scalar};
@@ -22,8 +26,11 @@ pub const INFO: EffectInfo = EffectInfo {
     forms: &[Form {
         name: "progressive",
         parameters: &[
-            EffectParameter::new("contact_area", "m2", 0.0, 1.0, 0.001).starts(&[0.0005, 0.003]).off(0.0),
-            EffectParameter::new("onset_contraction", "1", -1.0, 1.0, 0.12).starts(&[0.04, 0.08, 0.15]),
+            EffectParameter::new("contact_area", "m2", 0.0, 1.0, 0.001)
+                .starts(&[0.0005, 0.003])
+                .off(0.0),
+            EffectParameter::new("onset_contraction", "1", -1.0, 1.0, 0.12)
+                .starts(&[0.04, 0.08, 0.15]),
             EffectParameter::new("exponent", "1", 1.0, 2.0, 1.0).starts(&[1.5]).prior(1.5, 0.25),
             EffectParameter::new("rubbing", "1", 0.0, 1.0, 0.0).starts(&[0.1]),
         ],
@@ -43,13 +50,17 @@ const SECANT: f64 = 0.1;
 /// Speed of a muscle's length by which most of the rubbing is there [m/s].
 const SLOW: f64 = 3e-3;
 
-/// Force of one muscle [N] at a gauge pressure [Pa], a contraction ratio and a rate of its length [m/s].
+/// Force of one muscle [N] at a gauge pressure [Pa], a contraction ratio and a rate of its length
+/// [m/s].
 #[inline]
 pub fn force<S: Scalar>(contact: [S; 4], pressure: S, contraction: S, length_rate: S) -> S {
     let [area, onset, exponent, rubbing] = contact;
     let positive = if pressure.re() > 0.0 { pressure } else { constant(0.0) };
     let against = rubbing * length_rate / (length_rate * length_rate + SLOW * SLOW).sqrt();
-    -(area * positive * progressive(beyond(contraction - onset, CORNER), SECANT, exponent) * (-against + 1.0))
+    -(area
+        * positive
+        * progressive(beyond(contraction - onset, CORNER), SECANT, exponent)
+        * (-against + 1.0))
 }
 
 /// Largest damping [N s/m] up to a gauge pressure [Pa] and a contraction ratio.
@@ -108,7 +119,8 @@ mod tests {
         let slope = (force(rough, 4e5, 0.2, 1e-6) - force(rough, 4e5, 0.2, -1e-6)) / 2e-6;
         assert!((slope / largest(rough, 4e5, 0.2) - 1.0).abs() < 1e-6);
         let pointed = [1e-3, 0.12, 1.6, 0.2];
-        let slope = (force(pointed, 4e5, 0.200_001, -1.0) - force(pointed, 4e5, 0.199_999, -1.0)) / 2e-6;
+        let slope =
+            (force(pointed, 4e5, 0.200_001, -1.0) - force(pointed, 4e5, 0.199_999, -1.0)) / 2e-6;
         assert!((-slope / stiffest(pointed, 4e5, 0.2) - 1.0).abs() < 0.03);
     }
 

@@ -1,9 +1,10 @@
 //! `payload_change`: the payload becomes another one during a recording.
 //!
-//! `m_p -> m_p + dm` from a time on, taken up over [`super::RISE`]: mass, inertia and weight together. Of a linear load it is the hanging
-//! mass. What is taken up moves with the link already, so that no impulse is exchanged. Time counts from the start of the recording.
+//! `m_p -> m_p + dm` from a time on, taken up over [`super::RISE`]: mass, inertia and weight
+//! together. Of a linear load it is the hanging mass. What is taken up moves with the link already,
+//! so that no impulse is exchanged. Time counts from the start of the recording.
 
-use super::{Effect, EffectInfo, EffectParameter, Form, Port, risen, Use};
+use super::{risen, Effect, EffectInfo, EffectParameter, Form, Port, Use};
 use crate::blocks::gas::Gas;
 use crate::made_by;
 use crate::scalar::Scalar;
@@ -19,7 +20,11 @@ pub const INFO: EffectInfo = EffectInfo {
     forms: &[Form {
         name: "step",
         parameters: &[
-            EffectParameter::new("mass_change", "kg", -1e6, 1e6, 1.0).starts(&[-2.0, 2.0]).off(0.0).tried(0.3).same_everywhere(),
+            EffectParameter::new("mass_change", "kg", -1e6, 1e6, 1.0)
+                .starts(&[-2.0, 2.0])
+                .off(0.0)
+                .tried(0.3)
+                .same_everywhere(),
             EffectParameter::new("time", "s", -1e9, 1e9, 5.0).starts(&[5.0, 15.0]).role(Use::Time),
         ],
         states: &[],
@@ -59,6 +64,9 @@ mod tests {
 
     #[test]
     fn it_is_there_after_its_time() {
-        assert_eq!((change(2.0, 3.0, 2.9), change(2.0, 3.0, 3.1), change(0.0, 3.0, 4.0)), (0.0, 2.0, 0.0));
+        assert_eq!(
+            (change(2.0, 3.0, 2.9), change(2.0, 3.0, 3.1), change(0.0, 3.0, 4.0)),
+            (0.0, 2.0, 0.0)
+        );
     }
 }

@@ -1,9 +1,12 @@
 //! `payload_swing`: a part of the payload that hangs on a cord instead of being fixed to the link.
 //!
-//! A mass `mu = s m_p` at the end of a cord of length `l` from the end of the link, at the angle `phi` from the gravity vector. With the
-//! acceleration `a` of the cord's upper end, along the cord `r = (sin phi, -cos phi)` and across it `t = (cos phi, sin phi)`:
-//! `l phi'' = -(a + g) t - 2 zeta sqrt(g/l) l phi'`, pull on the link `-mu [((a + g) r - l phi'^2) r - 2 zeta sqrt(g/l) l phi' t]`. At `s = 0`
-//! nothing pulls. Double pendulum, L. D. Landau & E. M. Lifshitz, *Mechanics*, section 5. Two states; at the start the cord hangs at rest.
+//! A mass `mu = s m_p` at the end of a cord of length `l` from the end of the link, at the angle
+//! `phi` from the gravity vector. With the acceleration `a` of the cord's upper end, along the cord
+//! `r = (sin phi, -cos phi)` and across it `t = (cos phi, sin phi)`:
+//! `l phi'' = -(a + g) t - 2 zeta sqrt(g/l) l phi'`, pull on the link
+//! `-mu [((a + g) r - l phi'^2) r - 2 zeta sqrt(g/l) l phi' t]`. At `s = 0` nothing pulls. Double
+//! pendulum, L. D. Landau & E. M. Lifshitz, *Mechanics*, section 5. Two states; at the start the
+//! cord hangs at rest.
 
 use super::{Effect, EffectInfo, EffectParameter, EffectState, Form, Port, Role};
 use crate::blocks::gas::Gas;
@@ -21,8 +24,14 @@ pub const INFO: EffectInfo = EffectInfo {
         name: "pendulum",
         parameters: &[
             EffectParameter::new("swinging_share", "1", 0.0, 1.0, 0.5).starts(&[0.2, 0.8]).off(0.0),
-            EffectParameter::new("length", "m", 0.001, 100.0, 0.3).starts(&[0.15, 0.5]).usually(0.1, 0.5).scan(0.06, 1.5, 14),
-            EffectParameter::new("damping_ratio", "1", 0.0, 10.0, 0.02).starts(&[0.02]).usually(0.0, 0.03).tried(0.08),
+            EffectParameter::new("length", "m", 0.001, 100.0, 0.3)
+                .starts(&[0.15, 0.5])
+                .usually(0.1, 0.5)
+                .scan(0.06, 1.5, 14),
+            EffectParameter::new("damping_ratio", "1", 0.0, 10.0, 0.02)
+                .starts(&[0.02])
+                .usually(0.0, 0.03)
+                .tried(0.08),
         ],
         states: &[
             EffectState { name: "angle", role: Role::Moves },
@@ -50,22 +59,31 @@ pub struct Cord<S> {
 }
 
 impl<S: Scalar> Cord<S> {
-    /// A cord of a length [m] and damping ratio at an angle [rad] and its rate, under gravity [m/s2].
+    /// A cord of a length [m] and damping ratio at an angle [rad] and its rate, under gravity
+    /// [m/s2].
     #[inline]
     pub fn new(length: S, damping_ratio: S, gravity: f64, angle: S, rate: S) -> Self {
         let (sin, cos) = angle.sin_cos();
         let damping = damping_ratio * (length * gravity.abs()).sqrt() * rate * 2.0;
-        Self { along: [sin, -cos], across: [cos, sin], damping, centripetal: length * rate * rate, length }
+        Self {
+            along: [sin, -cos],
+            across: [cos, sin],
+            damping,
+            centripetal: length * rate * rate,
+            length,
+        }
     }
 
-    /// Angular acceleration [rad/s2] where the upper end accelerates [m/s2], gravity counted as an acceleration upwards.
+    /// Angular acceleration [rad/s2] where the upper end accelerates [m/s2], gravity counted as an
+    /// acceleration upwards.
     #[inline]
     pub fn acceleration(&self, felt: [S; 2]) -> S {
         -(felt[0] * self.across[0] + felt[1] * self.across[1] + self.damping) / self.length
     }
 }
 
-/// Bound of the pendulum's frequency [rad/s], the link's inertia without the swinging mass being smaller by `ratio`.
+/// Bound of the pendulum's frequency [rad/s], the link's inertia without the swinging mass being
+/// smaller by `ratio`.
 pub fn fastest(length: f64, gravity: f64, ratio: f64) -> f64 {
     (gravity.abs() / length * (1.0 + ratio)).sqrt()
 }

@@ -16,7 +16,8 @@ pub enum Port {
     Command,
     /// Valve: what its flow passes through. One effect at most.
     Passage,
-    /// Valve: a path beside its opening, from the supply to the chamber and from the chamber to the ambient.
+    /// Valve: a path beside its opening, from the supply to the chamber and from the chamber to the
+    /// ambient.
     Clearance,
     /// Supply or chamber: gas lost to the ambient.
     Leak,
@@ -48,7 +49,8 @@ pub enum Port {
     Clock,
 }
 
-/// What an effect sees of the block that it acts on. Pressures absolute [Pa] where nothing else is said.
+/// What an effect sees of the block that it acts on. Pressures absolute [Pa] where nothing else is
+/// said.
 #[derive(Debug, Clone, Copy)]
 pub enum At<S> {
     /// A supply.
@@ -122,8 +124,9 @@ pub struct Extremes {
     pub valves: usize,
 }
 
-/// An effect that is switched on, with its parameters in a scalar type: what it does at its ports, what it remembers, how
-/// fast it is. `own` are its states at one block; what is not said does nothing.
+/// An effect that is switched on, with its parameters in a scalar type: what it does at its ports,
+/// what it remembers, how fast it is. `own` are its states at one block; what is not said does
+/// nothing.
 pub trait Effect<S: Scalar>: Debug + Send + Sync {
     /// Write its states where a recording begins: nothing has moved for long.
     fn start(&self, _gas: &Gas, _at: &At<S>, _own: &mut [S]) {}
@@ -131,8 +134,8 @@ pub trait Effect<S: Scalar>: Debug + Send + Sync {
     /// Write the rates of its states.
     fn rates(&self, _at: &At<S>, _own: &[S], _rates: &mut [S]) {}
 
-    /// [`Port::Command`]: normalised position of the valve so long [s] after a step began with the states `own`, the
-    /// position that comes in being held.
+    /// [`Port::Command`]: normalised position of the valve so long [s] after a step began with the
+    /// states `own`, the position that comes in being held.
     fn position(&self, _own: &[S], input: S, _age: f64) -> S {
         input
     }
@@ -142,12 +145,14 @@ pub trait Effect<S: Scalar>: Debug + Send + Sync {
         self.position(own, input, step)
     }
 
-    /// [`Port::Passage`]: mass flow [kg/s] through an area [m2] between two pressures; against the arrow where it vents.
+    /// [`Port::Passage`]: mass flow [kg/s] through an area [m2] between two pressures; against the
+    /// arrow where it vents.
     fn through(&self, gas: &Gas, area: S, upstream: S, downstream: S, _venting: bool) -> S {
         gas.mass_flow(area, upstream, downstream)
     }
 
-    /// [`Port::Passage`]: whether the pressure sensor sits between the valve and what the flow passes through.
+    /// [`Port::Passage`]: whether the pressure sensor sits between the valve and what the flow
+    /// passes through.
     fn taps(&self) -> bool {
         false
     }
@@ -157,7 +162,8 @@ pub trait Effect<S: Scalar>: Debug + Send + Sync {
         downstream
     }
 
-    /// [`Port::Passage`]: pressure at the other end, for the pressure there and a mass flow [kg/s] to that end.
+    /// [`Port::Passage`]: pressure at the other end, for the pressure there and a mass flow [kg/s]
+    /// to that end.
     fn behind(&self, there: S, _flow: S) -> S {
         there
     }
@@ -180,15 +186,30 @@ pub trait Effect<S: Scalar>: Debug + Send + Sync {
     /// [`Port::Feed`]: change the mass flow that is drawn [kg/s] and the set pressure of a supply.
     fn feed(&self, _own: &[S], _pressure: S, _drawn: &mut S, _set: &mut S) {}
 
-    /// [`Port::Feed`]: bring the states to the end of a step [s] from one pressure to another; where it switched on the
-    /// way, a mass flow [kg/s] and the time for which the supply gets it [s], negative where it had got too much.
-    fn switched(&self, _gas: &Gas, _own: &mut [S], _from: S, _to: S, _step: f64) -> Option<(S, f64)> {
+    /// [`Port::Feed`]: bring the states to the end of a step [s] from one pressure to another;
+    /// where it switched on the way, a mass flow [kg/s] and the time for which the supply gets it
+    /// [s], negative where it had got too much.
+    fn switched(
+        &self,
+        _gas: &Gas,
+        _own: &mut [S],
+        _from: S,
+        _to: S,
+        _step: f64,
+    ) -> Option<(S, f64)> {
         None
     }
 
-    /// [`Port::Balance`]: rate of the pressure [Pa/s], and what it adds to the rate of the mass [kg/s]. `fixed` is the
-    /// rate by fixed coefficients.
-    fn balance(&self, _gas: &Gas, _chamber: &ChamberState<S>, _wall: S, _mass: S, fixed: S) -> (S, S) {
+    /// [`Port::Balance`]: rate of the pressure [Pa/s], and what it adds to the rate of the mass
+    /// [kg/s]. `fixed` is the rate by fixed coefficients.
+    fn balance(
+        &self,
+        _gas: &Gas,
+        _chamber: &ChamberState<S>,
+        _wall: S,
+        _mass: S,
+        fixed: S,
+    ) -> (S, S) {
         (fixed, constant(0.0))
     }
 
@@ -202,7 +223,8 @@ pub trait Effect<S: Scalar>: Debug + Send + Sync {
         gauge
     }
 
-    /// [`Port::Bladder`]: what it adds to the force of one muscle [N] whose bladder's part is `bladder`.
+    /// [`Port::Bladder`]: what it adds to the force of one muscle [N] whose bladder's part is
+    /// `bladder`.
     fn bladder(&self, _own: &[S], _bladder: S, _contraction: S) -> S {
         constant(0.0)
     }
@@ -212,7 +234,8 @@ pub trait Effect<S: Scalar>: Debug + Send + Sync {
         constant(0.0)
     }
 
-    /// Bring the states to the end of a step in which a muscle of a rest length [m] moved between two contraction ratios.
+    /// Bring the states to the end of a step in which a muscle of a rest length [m] moved between
+    /// two contraction ratios.
     fn moved(&self, _own: &mut [S], _from: S, _to: S, _rest_length: f64) {}
 
     /// [`Port::Torque`]: what it adds to the torque of a joint [N m].
@@ -225,7 +248,8 @@ pub trait Effect<S: Scalar>: Debug + Send + Sync {
         constant(0.0)
     }
 
-    /// [`Port::Payload`]: what it adds to the mass [kg] at a time [s]; infinite times ask for what is there in the end.
+    /// [`Port::Payload`]: what it adds to the mass [kg] at a time [s]; infinite times ask for what
+    /// is there in the end.
     fn payload(&self, _time: f64) -> S {
         constant(0.0)
     }
@@ -240,7 +264,8 @@ pub trait Effect<S: Scalar>: Debug + Send + Sync {
         None
     }
 
-    /// [`Port::Mounting`]: angular acceleration [rad/s2] under a torque [N m]; its states are angle and rate.
+    /// [`Port::Mounting`]: angular acceleration [rad/s2] under a torque [N m]; its states are angle
+    /// and rate.
     fn mounting(&self, _own: &[S], _torque: S) -> S {
         constant(0.0)
     }
@@ -260,8 +285,9 @@ pub trait Effect<S: Scalar>: Debug + Send + Sync {
         (constant(0.0), constant(0.0))
     }
 
-    /// Write the rates of states that [`Self::follow`] or [`Self::read`] moves in closed form, where a linear model asks for
-    /// them; `input` is the position, or the pressure [Pa], that comes in.
+    /// Write the rates of states that [`Self::follow`] or [`Self::read`] moves in closed form,
+    /// where a linear model asks for them; `input` is the position, or the pressure [Pa], that
+    /// comes in.
     fn linear_rates(&self, _own: &[S], _input: S, _rates: &mut [S]) {}
 
     /// Fastest rate of what it moves by itself [1/s].
@@ -279,8 +305,8 @@ pub trait Effect<S: Scalar>: Debug + Send + Sync {
         0.0
     }
 
-    /// Largest damping and stiffness: of one muscle [N s/m] and by its contraction ratio [N], of a joint [N m s/rad] and
-    /// [N m/rad].
+    /// Largest damping and stiffness: of one muscle [N s/m] and by its contraction ratio [N], of a
+    /// joint [N m s/rad] and [N m/rad].
     fn resistance(&self, _most: &Extremes) -> (f64, f64) {
         (0.0, 0.0)
     }
@@ -295,7 +321,8 @@ pub trait Effect<S: Scalar>: Debug + Send + Sync {
         0.0
     }
 
-    /// [`Port::Hanging`]: fastest rate [1/s], the link's inertia without the hanging mass being smaller by a ratio.
+    /// [`Port::Hanging`]: fastest rate [1/s], the link's inertia without the hanging mass being
+    /// smaller by a ratio.
     fn swing_rate(&self, _gravity: f64, _ratio: f64) -> f64 {
         0.0
     }

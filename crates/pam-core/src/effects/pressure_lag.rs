@@ -1,7 +1,9 @@
-//! `pressure_lag`: the recorded pressure lags behind the true one, by the transducer, its snubber or its line.
+//! `pressure_lag`: the recorded pressure lags behind the true one, by the transducer, its snubber
+//! or its line.
 //!
-//! `T y' = p - y`. Over a step the true pressure is taken as straight, which has a closed form: no lag is too short for a step. Where the
-//! recorded pressure drives a block, the true one is `y + T y'`. At `T = 0` both are the same. E. O. Doebelin, *Measurement Systems*, ch. 6.
+//! `T y' = p - y`. Over a step the true pressure is taken as straight, which has a closed form: no
+//! lag is too short for a step. Where the recorded pressure drives a block, the true one is
+//! `y + T y'`. At `T = 0` both are the same. E. O. Doebelin, *Measurement Systems*, ch. 6.
 
 use super::{At, AtRest, Effect, EffectInfo, EffectParameter, EffectState, Form, Port, Role};
 use crate::blocks::gas::Gas;
@@ -18,12 +20,10 @@ pub const INFO: EffectInfo = EffectInfo {
     source: "Doebelin, Measurement Systems, ch. 6",
     forms: &[Form {
         name: "first_order",
-        parameters: &[
-            EffectParameter::new("time_constant", "s", 0.0, 100.0, 0.005).starts(&[0.003, 0.02]).off(0.0),
-        ],
-        states: &[
-            EffectState { name: "", role: Role::Moves },
-        ],
+        parameters: &[EffectParameter::new("time_constant", "s", 0.0, 100.0, 0.005)
+            .starts(&[0.003, 0.02])
+            .off(0.0)],
+        states: &[EffectState { name: "", role: Role::Moves }],
         integrates: false,
         ports: &[Port::Reading],
         make: made_by!(make),
@@ -40,7 +40,8 @@ pub fn read<S: Scalar>(reading: S, from: S, to: S, time_constant: S, step: f64) 
     let behind = time_constant * (to - from) / step;
     let steps = if time_constant.re() > 0.0 { step / time_constant.re() } else { f64::INFINITY };
     // Further back than the number's last digit reaches.
-    let left = if steps < 700.0 { (-constant::<S>(step) / time_constant).exp() } else { constant(0.0) };
+    let left =
+        if steps < 700.0 { (-constant::<S>(step) / time_constant).exp() } else { constant(0.0) };
     to - behind + (reading - from + behind) * left
 }
 

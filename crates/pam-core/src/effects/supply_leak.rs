@@ -1,12 +1,13 @@
 //! `supply_leak`: leakage of a tank, its fittings or the supply line to the ambient.
 //!
-//! `m_l = C rho0 sqrt(T0/T) p psi(pa/p)/psi(0)`, out of the supply at all times, with the sonic conductance `C` of ISO 6358. A tank
-//! with every valve shut loses its absolute pressure with the time constant `V/(C rho0 R T)`; behind a regulator the leak shows as
-//! droop. P. Beater, *Pneumatic Drives* (2007).
+//! `m_l = C rho0 sqrt(T0/T) p psi(pa/p)/psi(0)`, out of the supply at all times, with the sonic
+//! conductance `C` of ISO 6358. A tank with every valve shut loses its absolute pressure with the
+//! time constant `V/(C rho0 R T)`; behind a regulator the leak shows as droop. P. Beater,
+//! *Pneumatic Drives* (2007).
 
 use super::{Effect, EffectInfo, EffectParameter, Form, Port};
-use crate::made_by;
 use crate::blocks::gas::Gas;
+use crate::made_by;
 use crate::scalar::{constant, Scalar};
 
 /// What it is.
@@ -18,9 +19,9 @@ pub const INFO: EffectInfo = EffectInfo {
     source: "Beater, Pneumatic Drives (2007); ISO 6358",
     forms: &[Form {
         name: "orifice",
-        parameters: &[
-            EffectParameter::new("conductance", "m3/(s Pa)", 0.0, 1e-6, 1e-11).starts(&[1e-11, 1e-9]).off(0.0),
-        ],
+        parameters: &[EffectParameter::new("conductance", "m3/(s Pa)", 0.0, 1e-6, 1e-11)
+            .starts(&[1e-11, 1e-9])
+            .off(0.0)],
         states: &[],
         integrates: false,
         ports: &[Port::Leak],

@@ -1,9 +1,10 @@
 //! `supply_regulator_deadband`: a pressure regulator that does nothing about a small error.
 //!
-//! `P' = (e_a - k m)/tau` with `e_a = sgn(e) max(|e| - b, 0)` of the error `e = P_set - P`: within the dead band `b` only the flow
-//! that is drawn moves the pressure. A step below the band is not answered, a larger one ends short of its aim by the band.
-//! C. Robinson, *Modeling and control of pneumatic artificial muscles* (2014), ch. 3; P. Beater, *Pneumatic Drives* (2007), ch. 8.
-//! Acts on regulators.
+//! `P' = (e_a - k m)/tau` with `e_a = sgn(e) max(|e| - b, 0)` of the error `e = P_set - P`: within
+//! the dead band `b` only the flow that is drawn moves the pressure. A step below the band is not
+//! answered, a larger one ends short of its aim by the band. C. Robinson, *Modeling and control of
+//! pneumatic artificial muscles* (2014), ch. 3; P. Beater, *Pneumatic Drives* (2007), ch. 8. Acts
+//! on regulators.
 
 use super::{Effect, EffectInfo, EffectParameter, Form, Kink, Port};
 use crate::blocks::gas::Gas;
@@ -24,9 +25,9 @@ pub const INFO: EffectInfo = EffectInfo {
     source: "Robinson (2014), ch. 3; Beater, Pneumatic Drives (2007)",
     forms: &[Form {
         name: "symmetric",
-        parameters: &[
-            EffectParameter::new("dead_band", "Pa", 0.0, 1e7, 20000.0).starts(&[5000.0, 50000.0]).off(0.0),
-        ],
+        parameters: &[EffectParameter::new("dead_band", "Pa", 0.0, 1e7, 20000.0)
+            .starts(&[5000.0, 50000.0])
+            .off(0.0)],
         states: &[],
         integrates: false,
         ports: &[Port::Feed],

@@ -1,20 +1,25 @@
-//! `tube_flow_restriction`: finite conductance between a valve and what it feeds, such as a hose that the model leaves out.
+//! `tube_flow_restriction`: finite conductance between a valve and what it feeds, such as a hose
+//! that the model leaves out.
 //!
-//! Valve and tube in series without volume between them: the pressure at the node is that at which both pass the same mass,
-//! `m_v(p_1, p_n) = m_t(p_n, p_2)`, the tube by ISO 6358 with its sonic conductance and a critical ratio of 0.3. The node is found by
-//! Newton steps inside a bracket; one more step in the scalar's own arithmetic gives it its exact derivatives. Not stiff: nothing is
-//! stored at the node (a volume there is a `[line]`'s inlet volume). ISO 6358-3 (2014); W. Eckersten, "Simplified flow calculations for
-//! pneumatic components", 1975. A conductance of [`NONE`] or more restricts nothing.
+//! Valve and tube in series without volume between them: the pressure at the node is that at which
+//! both pass the same mass, `m_v(p_1, p_n) = m_t(p_n, p_2)`, the tube by ISO 6358 with its sonic
+//! conductance and a critical ratio of 0.3. The node is found by Newton steps inside a bracket; one
+//! more step in the scalar's own arithmetic gives it its exact derivatives. Not stiff: nothing is
+//! stored at the node (a volume there is a `[line]`'s inlet volume). ISO 6358-3 (2014); W.
+//! Eckersten, "Simplified flow calculations for pneumatic components", 1975. A conductance of
+//! [`NONE`] or more restricts nothing.
 //!
-//! With a `tap` of [`AT_VALVE`] or more the transducer of what the valve feeds sits at the valve's end of the tube and reads the node,
-//! which leads the muscle's pressure while air flows. Where such a reading drives a block, it gives the valve's flow, and the muscle's
-//! pressure is that to which the tube passes it ([`Tube::other_end`]); see [`crate::plant`]'s `tap.rs`. In front of a `[line]` that is the
-//! line's inlet; of two valves at one chamber the first one has the transducer.
+//! With a `tap` of [`AT_VALVE`] or more the transducer of what the valve feeds sits at the valve's
+//! end of the tube and reads the node, which leads the muscle's pressure while air flows. Where
+//! such a reading drives a block, it gives the valve's flow, and the muscle's pressure is that to
+//! which the tube passes it ([`Tube::other_end`]); see [`crate::plant`]'s `tap.rs`. In front of a
+//! `[line]` that is the line's inlet; of two valves at one chamber the first one has the
+//! transducer.
 
 use super::{At, AtRest, Effect, EffectInfo, EffectParameter, EffectState, Form, Port, Role, Use};
-use crate::made_by;
 use crate::blocks::gas::Gas;
 use crate::blocks::tube::Tube;
+use crate::made_by;
 use crate::scalar::{constant, Scalar};
 use num_dual::Dual64;
 
@@ -29,12 +34,18 @@ pub const INFO: EffectInfo = EffectInfo {
     forms: &[Form {
         name: "iso_6358",
         parameters: &[
-            EffectParameter::new("conductance", "m3/(s Pa)", 1e-15, 1.0, 1.2e-8).starts(&[1.2e-8]).off(1.0).role(Use::Size).restricts().like("valve.discharge_area_max"),
-            EffectParameter::new("tap", "1", 0.0, 1.0, 0.0).starts(&[0.0, 1.0]).role(Use::Choice).needed_in(&["arm"]),
+            EffectParameter::new("conductance", "m3/(s Pa)", 1e-15, 1.0, 1.2e-8)
+                .starts(&[1.2e-8])
+                .off(1.0)
+                .role(Use::Size)
+                .restricts()
+                .like("valve.discharge_area_max"),
+            EffectParameter::new("tap", "1", 0.0, 1.0, 0.0)
+                .starts(&[0.0, 1.0])
+                .role(Use::Choice)
+                .needed_in(&["arm"]),
         ],
-        states: &[
-            EffectState { name: "reading", role: Role::Keeps },
-        ],
+        states: &[EffectState { name: "reading", role: Role::Keeps }],
         integrates: false,
         ports: &[Port::Passage],
         make: made_by!(make),
@@ -54,8 +65,8 @@ pub fn tube<S: Scalar>(conductance: S, temperature: f64) -> Tube<S> {
     Tube::of_conductance(conductance, constant(CRITICAL_RATIO), temperature)
 }
 
-/// Mass flow [kg/s] through an area [m2] and then a tube, between two absolute pressures [Pa]; the other way round if `tube_first`.
-/// Negative when the downstream pressure is the higher one.
+/// Mass flow [kg/s] through an area [m2] and then a tube, between two absolute pressures [Pa]; the
+/// other way round if `tube_first`. Negative when the downstream pressure is the higher one.
 pub fn mass_flow<S: Scalar>(
     gas: &Gas,
     area: S,
@@ -131,7 +142,8 @@ impl Series<'_, f64> {
             let (a, b) = dual.flows(upstream.into(), Dual64::new(node, 1.0), downstream.into());
             (a - b).re_and_eps()
         };
-        // It falls with the node's pressure, from what comes in at the lower end to what goes out at the upper.
+        // It falls with the node's pressure, from what comes in at the lower end to what goes out
+        // at the upper.
         let (mut low, mut high) = (downstream, upstream);
         let mut node = 0.5 * (low + high);
         let mut slope = 0.0;
@@ -231,9 +243,12 @@ mod tests {
         assert!((flow(area, 1e-3, [8e5, 2e5], false) / open - 1.0).abs() < 1e-6);
         let narrow = tube(1e-10, 293.15).mass_flow(8e5, 2e5);
         assert!((flow(area, 1e-10, [8e5, 2e5], false) / narrow - 1.0).abs() < 1e-3);
-        for (p, first) in
-            [([8e5, 2e5], false), ([8e5, 7.9e5], false), ([3e5, 1e5], true), ([3e5, 2.9999e5], true)]
-        {
+        for (p, first) in [
+            ([8e5, 2e5], false),
+            ([8e5, 7.9e5], false),
+            ([3e5, 1e5], true),
+            ([3e5, 2.9999e5], true),
+        ] {
             let both = flow(area, 1.2e-8, p, first);
             let free = gas.mass_flow(area, p[0], p[1]);
             assert!(both > 0.3 * free && both < free, "{p:?}: {both} of {free}");
@@ -252,7 +267,9 @@ mod tests {
     fn derivatives_are_those_of_differences() {
         let gas = gas();
         let run = |x: [f64; 4]| mass_flow(&gas, x[0], &tube(x[1], 293.15), x[2], x[3], false);
-        for x in [[8e-6, 1.2e-8, 8e5, 2e5], [2e-6, 1.2e-8, 8e5, 7.8e5], [8e-6, 1.2e-8, 3e5, 2.9995e5]] {
+        for x in
+            [[8e-6, 1.2e-8, 8e5, 2e5], [2e-6, 1.2e-8, 8e5, 7.8e5], [8e-6, 1.2e-8, 3e5, 2.9995e5]]
+        {
             for k in 0..4 {
                 let mut d = x.map(Dual64::from);
                 d[k].eps = 1.0;

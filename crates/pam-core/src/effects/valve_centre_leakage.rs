@@ -1,12 +1,13 @@
 //! `valve_centre_leakage`: flow through the clearance between spool and sleeve around the null.
 //!
-//! `C_l(x) = C_0 exp(-|x|/x_l)` from the supply to the chamber and from the chamber to the ambient at once: with the valve shut the
-//! pressure goes to where both are the same, from either side. M. Belgharbi, S. Sesmat, S. Scavarda & D. Thomasset, "Analytical model
-//! of the flow stage of a pneumatic servo-distributor", 1999; *Energies* 12, 1096 (2019).
+//! `C_l(x) = C_0 exp(-|x|/x_l)` from the supply to the chamber and from the chamber to the ambient
+//! at once: with the valve shut the pressure goes to where both are the same, from either side. M.
+//! Belgharbi, S. Sesmat, S. Scavarda & D. Thomasset, "Analytical model of the flow stage of a
+//! pneumatic servo-distributor", 1999; *Energies* 12, 1096 (2019).
 
 use super::{Effect, EffectInfo, EffectParameter, Extremes, Form, Port};
-use crate::made_by;
 use crate::blocks::gas::Gas;
+use crate::made_by;
 use crate::scalar::Scalar;
 
 /// What it is.
@@ -19,7 +20,9 @@ pub const INFO: EffectInfo = EffectInfo {
     forms: &[Form {
         name: "exponential",
         parameters: &[
-            EffectParameter::new("conductance", "m3/(s Pa)", 0.0, 1e-6, 3e-11).starts(&[3e-11, 5e-10]).off(0.0),
+            EffectParameter::new("conductance", "m3/(s Pa)", 0.0, 1e-6, 3e-11)
+                .starts(&[3e-11, 5e-10])
+                .off(0.0),
             EffectParameter::new("opening", "1", 0.0001, 1000.0, 0.02).starts(&[0.02]),
         ],
         states: &[],
@@ -30,7 +33,8 @@ pub const INFO: EffectInfo = EffectInfo {
     ..EffectInfo::USUAL
 };
 
-/// Discharge area [m2] of either path at a normalised spool position; `opening` is that over which it fades.
+/// Discharge area [m2] of either path at a normalised spool position; `opening` is that over which
+/// it fades.
 #[inline]
 pub fn area<S: Scalar>(gas: &Gas, conductance: S, opening: S, x: S) -> S {
     gas.area_of_conductance(conductance) * (-x.abs() / opening).exp()

@@ -1,9 +1,10 @@
 //! `valve_dead_zone`: positive overlap of the spool.
 //!
-//! `x_e = sgn(x) max(|x| - d, 0)/(1 - d)` in the place of the normalised spool position `x`; one half width `d` for both edges, since
-//! a difference of the edges is a shift of the null voltage. E. Richer & Y. Hurmuzlu, "A high performance pneumatic force actuator
-//! system", ASME J. Dyn. Syst. Meas. Control 122, 2000; A. C. Valdiero et al., "Nonlinear mathematical modeling in pneumatic servo
-//! position applications", Math. Probl. Eng. 2011.
+//! `x_e = sgn(x) max(|x| - d, 0)/(1 - d)` in the place of the normalised spool position `x`; one
+//! half width `d` for both edges, since a difference of the edges is a shift of the null voltage.
+//! E. Richer & Y. Hurmuzlu, "A high performance pneumatic force actuator system", ASME J. Dyn.
+//! Syst. Meas. Control 122, 2000; A. C. Valdiero et al., "Nonlinear mathematical modeling in
+//! pneumatic servo position applications", Math. Probl. Eng. 2011.
 
 use super::{Effect, EffectInfo, EffectParameter, Form, Kink, Port};
 use crate::blocks::gas::Gas;
@@ -24,9 +25,9 @@ pub const INFO: EffectInfo = EffectInfo {
     source: "Valdiero, Ritter, Rios & Rafikov (2011); Richer & Hurmuzlu (2000)",
     forms: &[Form {
         name: "symmetric",
-        parameters: &[
-            EffectParameter::new("half_width", "1", 0.0, 0.9, 0.03).starts(&[0.01, 0.05]).off(0.0),
-        ],
+        parameters: &[EffectParameter::new("half_width", "1", 0.0, 0.9, 0.03)
+            .starts(&[0.01, 0.05])
+            .off(0.0)],
         states: &[],
         integrates: false,
         ports: &[Port::Command],

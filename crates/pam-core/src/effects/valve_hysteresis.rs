@@ -1,10 +1,14 @@
 //! `valve_hysteresis`: play of the spool by the friction of spool and solenoid.
 //!
-//! `y <- min(max(y, x - h), x + h)`: the spool `y` follows the commanded position `x` at a distance `h`. Between steps the recursion is
-//! exact; a data sheet's hysteresis is `2 h` of the stroke. M. Al Janaideh, S. Rakheja & C.-Y. Su, "An analytical generalized
-//! Prandtl-Ishlinskii model inversion for hysteresis compensation", IEEE/ASME Trans. Mechatronics 16, 2011 (play operator).
+//! `y <- min(max(y, x - h), x + h)`: the spool `y` follows the commanded position `x` at a distance
+//! `h`. Between steps the recursion is exact; a data sheet's hysteresis is `2 h` of the stroke. M.
+//! Al Janaideh, S. Rakheja & C.-Y. Su, "An analytical generalized Prandtl-Ishlinskii model
+//! inversion for hysteresis compensation", IEEE/ASME Trans. Mechatronics 16, 2011 (play operator).
 
-use super::{BEGINNING, BEGUN, Effect, EffectInfo, EffectParameter, EffectState, Form, Kink, Port, Role, begun};
+use super::{
+    begun, Effect, EffectInfo, EffectParameter, EffectState, Form, Kink, Port, Role, BEGINNING,
+    BEGUN,
+};
 use crate::blocks::gas::Gas;
 use crate::made_by;
 use crate::scalar::{constant, Scalar};
@@ -23,13 +27,10 @@ pub const INFO: EffectInfo = EffectInfo {
     source: "Al Janaideh, Rakheja & Su (2011), play operator",
     forms: &[Form {
         name: "play",
-        parameters: &[
-            EffectParameter::new("half_width", "1", 0.0, 0.9, 0.004).starts(&[0.003, 0.02]).off(0.0),
-        ],
-        states: &[
-            BEGINNING,
-            EffectState { name: "spool", role: Role::Keeps },
-        ],
+        parameters: &[EffectParameter::new("half_width", "1", 0.0, 0.9, 0.004)
+            .starts(&[0.003, 0.02])
+            .off(0.0)],
+        states: &[BEGINNING, EffectState { name: "spool", role: Role::Keeps }],
         integrates: false,
         ports: &[Port::Command],
         make: made_by!(make),

@@ -1,6 +1,8 @@
-//! `elbow_linear`: one modulus of the bladder, and a branch of its own for each direction of motion.
+//! `elbow_linear`: one modulus of the bladder, and a branch of its own for each direction of
+//! motion.
 //!
-//! Equations (physics reference, section 2, model 7; Robinson 2014, (4.4)-(4.7)), while contracting:
+//! Equations (physics reference, section 2, model 7; Robinson 2014, (4.4)-(4.7)), while
+//! contracting:
 //!
 //! ```text
 //! F  = P (3 L^2 - B^2)/(4 pi N^2) + P (VB/L - t L^2/(2 pi R N^2)) + FL + FT

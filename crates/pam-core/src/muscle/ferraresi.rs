@@ -1,8 +1,8 @@
 //! `ferraresi`: force balance of a cylinder whose wall keeps its thickness.
 //!
-//! Equation (physics reference, section 2, model 4; C. Ferraresi, W. Franco & A. Manuello Bertetto, "Flexible pneumatic
-//! actuators: a comparison between the McKibben and the straight fibres muscles", J. Robotics Mechatronics 13, 2001;
-//! Robinson 2014, (2.8)-(2.11)):
+//! Equation (physics reference, section 2, model 4; C. Ferraresi, W. Franco & A. Manuello Bertetto,
+//! "Flexible pneumatic actuators: a comparison between the McKibben and the straight fibres
+//! muscles", J. Robotics Mechatronics 13, 2001; Robinson 2014, (2.8)-(2.11)):
 //!
 //! ```text
 //! F = P (3 L^2 - B^2)/(4 pi N^2) + s(eps_z) VB/L - s(eps_c) t0 L^2/(2 pi R N^2)

@@ -3,11 +3,14 @@
 //! Equation (physics reference, section 2, model 8; Robinson 2014, (2.36)):
 //!
 //! ```text
-//! F_total = F + d c_F |F|      c_F = max(c0 + c1 P, floor)      d = -1 while contracting, +1 while lengthening
+//! F_total = F + d c_F |F|
+//! c_F = max(c0 + c1 P, floor)
+//! d = -1 while contracting, +1 while lengthening
 //! ```
 //!
-//! Between the directions `d` goes over a presliding distance, rate-independently: it is the mean of the slip elements of
-//! [`super::slip`], so that small reversals make small loops and the integrator sees no jump.
+//! Between the directions `d` goes over a presliding distance, rate-independently: it is the mean
+//! of the slip elements of [`super::slip`], so that small reversals make small loops and the
+//! integrator sees no jump.
 
 use crate::scalar::{constant, Scalar};
 
@@ -54,12 +57,21 @@ mod tests {
 
     #[test]
     fn friction_opposes_the_motion_and_has_a_floor() {
-        let friction =
-            Friction { coefficient: 0.16, pressure_slope: -0.145e-6, floor: 0.01, presliding: 1e-3 };
+        let friction = Friction {
+            coefficient: 0.16,
+            pressure_slope: -0.145e-6,
+            floor: 0.01,
+            presliding: 1e-3,
+        };
         assert_eq!(friction.at(0.0), 0.16);
         assert!((friction.at(5e5_f64) - 0.0875).abs() < 1e-12);
         assert_eq!(friction.at(2e6), 0.01);
-        assert!(friction.applied(100.0, 0.0, 1.0) > 100.0 && friction.applied(100.0, 0.0, -1.0) < 100.0);
-        assert!(friction.applied(-100.0, 0.0, 1.0) > -100.0, "a muscle that is pushed out resists too");
+        assert!(
+            friction.applied(100.0, 0.0, 1.0) > 100.0 && friction.applied(100.0, 0.0, -1.0) < 100.0
+        );
+        assert!(
+            friction.applied(-100.0, 0.0, 1.0) > -100.0,
+            "a muscle that is pushed out resists too"
+        );
     }
 }

@@ -1,6 +1,7 @@
 //! `gaylord`: the gas alone, in a braid around a wall of no thickness.
 //!
-//! Equation (physics reference, section 2, model 1; R. H. Gaylord, US patent 2 844 126, 1958; Robinson 2014, (3.19)):
+//! Equation (physics reference, section 2, model 1; R. H. Gaylord, US patent 2 844 126, 1958;
+//! Robinson 2014, (3.19)):
 //!
 //! ```text
 //! F = P (3 L^2 - B^2)/(4 pi N^2)  =  -P dV/dL  of  V = pi R^2 L,  R = sqrt(B^2 - L^2)/(2 pi N)

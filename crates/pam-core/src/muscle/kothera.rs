@@ -1,10 +1,12 @@
 //! `kothera`: force balance of a cylinder whose wall becomes thinner as it expands.
 //!
-//! Equation (physics reference, section 2, model 5; C. S. Kothera, M. Jangid, J. Sirohi & N. M. Wereley, "Experimental
-//! characterization and static modeling of McKibben actuators", J. Mech. Des. 131, 2009; Robinson 2014, (2.13)-(2.16)):
+//! Equation (physics reference, section 2, model 5; C. S. Kothera, M. Jangid, J. Sirohi & N. M.
+//! Wereley, "Experimental characterization and static modeling of McKibben actuators", J. Mech.
+//! Des. 131, 2009; Robinson 2014, (2.13)-(2.16)):
 //!
 //! ```text
-//! F = P (3 L^2 - B^2)/(4 pi N^2) + P (VB/L - t L^2/(2 pi R N^2)) + s(eps_z) VB/L - s(eps_c) t L^2/(2 pi R N^2)
+//! F = P (3 L^2 - B^2)/(4 pi N^2) + P (VB/L - t L^2/(2 pi R N^2)) + s(eps_z) VB/L
+//!     - s(eps_c) t L^2/(2 pi R N^2)
 //! eps_z = L/L0 - 1     eps_c = (R - t/2)/(R0 - t0/2) - 1     s(eps) = sum_k (m_k P + b_k) eps^k
 //! ```
 

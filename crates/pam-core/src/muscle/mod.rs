@@ -1,8 +1,9 @@
 //! One muscle: its parameters, exact force and geometry, and the compiled table of both.
 //!
-//! Equations: geometry after the physics reference, section 1 (see [`crate::braid`]); force after section 2, one file
-//! for each model (see [`model`]). Radius, thickness, volume and the coefficients of the force depend on the contraction
-//! ratio `e = 1 - L/L0` alone, so they are compiled once to a [`Table`] with a checked error bound.
+//! Equations: geometry after the physics reference, section 1 (see [`crate::braid`]); force after
+//! section 2, one file for each model (see [`model`]). Radius, thickness, volume and the
+//! coefficients of the force depend on the contraction ratio `e = 1 - L/L0` alone, so they are
+//! compiled once to a [`Table`] with a checked error bound.
 
 pub mod chou_hannaford;
 pub mod elbow_linear;
@@ -51,7 +52,13 @@ impl Muscle {
         let geometry = spec.shape()?;
         let contracting = Elasticity::contracting(spec)?;
         let lengthening = contracting.lengthening(spec);
-        Ok(Self { spec: spec.clone(), geometry, contracting, lengthening, friction: spec.friction() })
+        Ok(Self {
+            spec: spec.clone(),
+            geometry,
+            contracting,
+            lengthening,
+            friction: spec.friction(),
+        })
     }
 
     /// The exact shape at contraction ratio `e`.
@@ -84,24 +91,27 @@ impl Muscle {
         Ok(self.contracting.basis(self.geometry.braid(), &self.shape(e)?))
     }
 
-    /// Exact force of one muscle [N] at gauge pressure `pressure` [Pa] and contraction ratio `e`, while contracting,
-    /// without friction.
+    /// Exact force of one muscle [N] at gauge pressure `pressure` [Pa] and contraction ratio `e`,
+    /// while contracting, without friction.
     ///
     /// # Errors
-    /// [`crate::Error::Parameter`] if the pressure is below vacuum or the muscle cannot have that length.
+    /// [`crate::Error::Parameter`] if the pressure is below vacuum or the muscle cannot have that
+    /// length.
     pub fn force(&self, pressure: f64, e: f64) -> Result<f64> {
         check_pressure(pressure)?;
         Ok(self.coefficients(e)?.force(pressure, self.spec.modulus_scale))
     }
 
-    /// Exact force of one muscle [N] in a direction of motion, from -1 (contracting) to +1 (lengthening), with friction.
+    /// Exact force of one muscle [N] in a direction of motion, from -1 (contracting) to +1
+    /// (lengthening), with friction.
     ///
     /// # Errors
     /// As [`Muscle::force`]; [`crate::Error::Parameter`] for a direction outside that range.
     pub fn force_moving(&self, pressure: f64, e: f64, direction: f64) -> Result<f64> {
         check_pressure(pressure)?;
         check_direction(direction)?;
-        let (braid, shape, scale) = (self.geometry.braid(), self.shape(e)?, self.spec.modulus_scale);
+        let (braid, shape, scale) =
+            (self.geometry.braid(), self.shape(e)?, self.spec.modulus_scale);
         let force = |branch: &Elasticity| branch.coefficients(braid, &shape).force(pressure, scale);
         let lengthening = self.lengthening.as_ref().map(force);
         Ok(moving(force(&self.contracting), lengthening, self.friction, pressure, direction))
@@ -131,7 +141,8 @@ impl CompiledMuscle {
         Ok(Self { exact, table, lengthening })
     }
 
-    /// The same tables with other values of what they do not depend on, if that is all that changes.
+    /// The same tables with other values of what they do not depend on, if that is all that
+    /// changes.
     #[must_use]
     pub fn respecified(&self, spec: &MuscleSpec) -> Option<Self> {
         if self.exact.spec.tabulated() != spec.tabulated() {
@@ -153,15 +164,24 @@ impl CompiledMuscle {
         self.exact.spec.friction_presliding
     }
 
-    /// Adds what the direction of motion, -1 to +1, does to the force [N] of the contracting branch.
+    /// Adds what the direction of motion, -1 to +1, does to the force [N] of the contracting
+    /// branch.
     #[inline]
-    pub fn moving<S: Scalar>(&self, force: S, e: S, pressure: S, modulus_scale: S, direction: S) -> S {
-        let lengthening = self.lengthening.as_ref().map(|t| t.eval(e).force(pressure, modulus_scale));
+    pub fn moving<S: Scalar>(
+        &self,
+        force: S,
+        e: S,
+        pressure: S,
+        modulus_scale: S,
+        direction: S,
+    ) -> S {
+        let lengthening =
+            self.lengthening.as_ref().map(|t| t.eval(e).force(pressure, modulus_scale));
         moving(force, lengthening, self.exact.friction, pressure, direction)
     }
 
-    /// Force of one muscle [N] from the table; `direction` as in [`Muscle::force_moving`], none for the contracting
-    /// branch without friction.
+    /// Force of one muscle [N] from the table; `direction` as in [`Muscle::force_moving`], none for
+    /// the contracting branch without friction.
     ///
     /// # Errors
     /// As [`Muscle::force_moving`], for the table's range of contraction.
@@ -281,7 +301,8 @@ pub(crate) mod tests {
     #[test]
     fn unknown_fields_are_refused() {
         let text = r#"{"model": "robinson", "count": 1, "rest_length": 0.2, "rest_diameter": 0.02,
-            "braid_angle": 1.2, "wall_thickness": 0.001, "modulus_slope": [1.0], "modulus_offset": [1e6]"#;
+            "braid_angle": 1.2, "wall_thickness": 0.001, "modulus_slope": [1.0],
+            "modulus_offset": [1e6]"#;
         let spec: MuscleSpec = serde_json::from_str(&format!("{text}}}")).unwrap();
         assert!(spec.validate().is_ok());
         assert!(serde_json::from_str::<MuscleSpec>(&format!("{text}, \"colour\": 1}}")).is_err());

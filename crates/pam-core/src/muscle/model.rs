@@ -1,13 +1,14 @@
 //! The force models, by name, and what all of them have in common.
 //!
-//! Every model of the physics reference's section 2 is linear in gauge pressure and in its elastic parameters:
+//! Every model of the physics reference's section 2 is linear in gauge pressure and in its elastic
+//! parameters:
 //!
 //! ```text
 //! F = P gas(L) + scale sum_j (slope_j P + offset_j) basis_j(L)
 //! ```
 //!
-//! so a muscle at one length comes down to three [`Coefficients`], whichever its model, and one linear least squares
-//! finds its elastic parameters.
+//! so a muscle at one length comes down to three [`Coefficients`], whichever its model, and one
+//! linear least squares finds its elastic parameters.
 
 use super::elbow_linear::{Factors, CONTRACTION};
 use super::spec::MuscleSpec;
@@ -16,7 +17,8 @@ use crate::braid::{Braid, Profile, Shape};
 use crate::error::{named, Result};
 use crate::scalar::{constant, Scalar};
 
-/// Coefficients of the force of one muscle at one length: `F = P a_gas + scale (P a_elastic + b_elastic)`.
+/// Coefficients of the force of one muscle at one length:
+/// `F = P a_gas + scale (P a_elastic + b_elastic)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Coefficients<S = f64> {
     /// Force per gauge pressure of the gas [m2].
@@ -101,7 +103,13 @@ impl ForceModel {
     }
 
     /// Force [N] of elastic parameters [Pa]; linear in them.
-    pub fn elastic<S: Scalar>(self, moduli: &[f64], braid: &Braid, shape: &Shape<S>, factors: Factors) -> S {
+    pub fn elastic<S: Scalar>(
+        self,
+        moduli: &[f64],
+        braid: &Braid,
+        shape: &Shape<S>,
+        factors: Factors,
+    ) -> S {
         match self {
             Self::Gaylord | Self::ChouHannaford => constant(0.0),
             Self::MooneyRivlin => mooney_rivlin::elastic(moduli, braid, shape),

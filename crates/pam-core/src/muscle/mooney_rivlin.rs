@@ -1,19 +1,26 @@
 //! `mooney_rivlin`: the gas of [`super::gaylord`] against a hyperelastic bladder of two constants.
 //!
-//! Equations (physics reference, section 2, model 3; G. K. Klute & B. Hannaford, "Accounting for elastic energy storage in
-//! McKibben artificial muscle actuators", J. Dyn. Sys. Meas. Control 122, 2000; Robinson 2014, (3.20), (3.21)):
+//! Equations (physics reference, section 2, model 3; G. K. Klute & B. Hannaford, "Accounting for
+//! elastic energy storage in McKibben artificial muscle actuators", J. Dyn. Sys. Meas. Control 122,
+//! 2000; Robinson 2014, (3.20), (3.21)):
 //!
 //! ```text
 //! F = P (3 L^2 - B^2)/(4 pi N^2) + VB dW/dL            W = C10 (I1 - 3) + C01 (I2 - 3)
-//! I1 = l1^2 + l2^2 + l3^2    I2 = 1/l1^2 + 1/l2^2 + 1/l3^2    l1 = L/L0   l2 = R/R0   l3 = 1/(l1 l2)
+//! I1 = l1^2 + l2^2 + l3^2
+//! I2 = 1/l1^2 + 1/l2^2 + 1/l3^2
+//! l1 = L/L0
+//! l2 = R/R0
+//! l3 = 1/(l1 l2)
 //! dW/dL = W_1/L0 + W_2/R0 dR/dL                         dR/dL = -L/(4 pi^2 N^2 R)
 //! ```
 //!
-//! The printed sign of the last term is minus: the bladder would then help the gas to shorten the muscle. Virtual work,
-//! `-F dL = P dV - VB dW`, asks for plus with F positive pulling, as in the models of the force balance.
+//! The printed sign of the last term is minus: the bladder would then help the gas to shorten the
+//! muscle. Virtual work, `-F dL = P dV - VB dW`, asks for plus with F positive pulling, as in the
+//! models of the force balance.
 //!
-//! The braid's kinematics give `dR/dL` on every geometry, as in the hoop term of the force balance: on the cylinder the
-//! force is exactly the slope of the stored energy, and nowhere does it jump where the elliptic ends have a kink.
+//! The braid's kinematics give `dR/dL` on every geometry, as in the hoop term of the force balance:
+//! on the cylinder the force is exactly the slope of the stored energy, and nowhere does it jump
+//! where the elliptic ends have a kink.
 
 use std::f64::consts::PI;
 
@@ -30,7 +37,8 @@ pub fn elastic<S: Scalar>(constants: &[f64], braid: &Braid, shape: &Shape<S>) ->
     // Half of dI1/dl and dI2/dl, times l.
     let first = |squared: S| squared - radial_squared;
     let second = |squared: S| constant::<S>(1.0) / radial_squared - constant::<S>(1.0) / squared;
-    let slope = |stretch: S, squared: S| (first(squared) * c10 + second(squared) * c01) * 2.0 / stretch;
+    let slope =
+        |stretch: S, squared: S| (first(squared) * c10 + second(squared) * c01) * 2.0 / stretch;
     let narrowing = -shape.length / (shape.radius * (4.0 * PI * PI * braid.turns * braid.turns));
     let energy_slope = slope(axial, axial_squared) / braid.rest_length
         + slope(hoop, hoop_squared) * narrowing / braid.rest_radius;
@@ -53,7 +61,8 @@ mod tests {
             let shape = geometry.solve(e).unwrap();
             let (a, b) = (shape.length / braid.rest_length, shape.radius / braid.rest_radius);
             let [a, b, c] = [a * a, b * b, 1.0 / (a * a * b * b)];
-            braid.bladder_volume * (c10 * (a + b + c - 3.0) + c01 * (1.0 / a + 1.0 / b + 1.0 / c - 3.0))
+            braid.bladder_volume
+                * (c10 * (a + b + c - 3.0) + c01 * (1.0 / a + 1.0 / b + 1.0 / c - 3.0))
         };
         for e in [0.01, 0.1, 0.2, 0.3] {
             let h = 1e-5;

@@ -1,8 +1,9 @@
 //! Which way a muscle has been moving: Maxwell-slip elements, rate-independent.
 //!
-//! Elements `zeta_i <- clip(zeta_i + dL/d_i, -1, 1)` with `d_i = d (1/8, 1/4, 1/2, 1)` for a presliding distance `d`;
-//! their mean is the direction of motion, +1 after lengthening by `d`, -1 after contracting by `d`. F. Al-Bender,
-//! V. Lampaert & J. Swevers, "The generalized Maxwell-slip model", IEEE Trans. Automatic Control 50, 2005.
+//! Elements `zeta_i <- clip(zeta_i + dL/d_i, -1, 1)` with `d_i = d (1/8, 1/4, 1/2, 1)` for a
+//! presliding distance `d`; their mean is the direction of motion, +1 after lengthening by `d`, -1
+//! after contracting by `d`. F. Al-Bender, V. Lampaert & J. Swevers, "The generalized Maxwell-slip
+//! model", IEEE Trans. Automatic Control 50, 2005.
 
 use crate::scalar::{constant, Scalar};
 

@@ -34,7 +34,8 @@ pub struct MuscleSpec {
     pub braid_angle: f64,
     /// Rest wall thickness of the bladder [m].
     pub wall_thickness: f64,
-    /// `m_k`, change of the k-th modulus with pressure [1], from k = 1 (`ferraresi`, `kothera`, `robinson`).
+    /// `m_k`, change of the k-th modulus with pressure [1], from k = 1 (`ferraresi`, `kothera`,
+    /// `robinson`).
     #[serde(default)]
     pub modulus_slope: Vec<f64>,
     /// `b_k`, the k-th modulus at zero pressure [Pa], from k = 1 (the same models).
@@ -203,8 +204,8 @@ impl MuscleSpec {
     ///
     /// # Errors
     /// [`Error::Parameter`] that names the first parameter that is not (`muscle.braid_angle`),
-    /// [`Error::Choice`] for an unknown model or geometry or an elastic parameter that the model does not have,
-    /// [`Error::Length`] if the two lists of moduli differ in length.
+    /// [`Error::Choice`] for an unknown model or geometry or an elastic parameter that the model
+    /// does not have, [`Error::Length`] if the two lists of moduli differ in length.
     pub fn validate(&self) -> Result<()> {
         let model = self.force_model()?;
         self.profile()?;
@@ -220,7 +221,13 @@ impl MuscleSpec {
             "rad (45 to 89 deg)",
         )?;
         let thickest = 0.45 * self.rest_diameter;
-        check_range("muscle.wall_thickness", self.wall_thickness, 0.0, thickest, "m (0.45 rest diameters)")?;
+        check_range(
+            "muscle.wall_thickness",
+            self.wall_thickness,
+            0.0,
+            thickest,
+            "m (0.45 rest diameters)",
+        )?;
         self.check_elastic(model)?;
         let (low, high, unit) = MODULUS_SCALE;
         check_range("muscle.modulus_scale", self.modulus_scale, low, high, unit)?;
@@ -228,7 +235,13 @@ impl MuscleSpec {
             check_range(&format!("muscle.extension_factors[{name}]"), *factor, -10.0, 10.0, "(1)")?;
         }
         check_range("muscle.friction_coefficient", self.friction_coefficient, -1.0, 1.0, "(1)")?;
-        check_range("muscle.friction_pressure_slope", self.friction_pressure_slope, -1e-4, 1e-4, "1/Pa")?;
+        check_range(
+            "muscle.friction_pressure_slope",
+            self.friction_pressure_slope,
+            -1e-4,
+            1e-4,
+            "1/Pa",
+        )?;
         check_range("muscle.friction_floor", self.friction_floor, 0.0, 1.0, "(1)")?;
         check_range("muscle.friction_presliding", self.friction_presliding, 1e-7, 1.0, "m")?;
         check_range("muscle.k0", self.k0, 0.3, 10.0, "(1)")?;
@@ -241,7 +254,8 @@ impl MuscleSpec {
     fn check_elastic(&self, model: ForceModel) -> Result<()> {
         let orders = self.modulus_slope.len();
         let polynomial = model.is_polynomial();
-        let (mooney_rivlin, elbow) = (model == ForceModel::MooneyRivlin, model == ForceModel::ElbowLinear);
+        let (mooney_rivlin, elbow) =
+            (model == ForceModel::MooneyRivlin, model == ForceModel::ElbowLinear);
         let default = self.extension_factors == default_factors();
         let given = [
             ("modulus_slope", format!("{:?}", self.modulus_slope), polynomial || orders == 0),
@@ -252,7 +266,11 @@ impl MuscleSpec {
             ),
             ("c10", self.c10.to_string(), mooney_rivlin || self.c10 == 0.0),
             ("c01", self.c01.to_string(), mooney_rivlin || self.c01 == 0.0),
-            ("bladder_modulus", self.bladder_modulus.to_string(), elbow || self.bladder_modulus == 0.0),
+            (
+                "bladder_modulus",
+                self.bladder_modulus.to_string(),
+                elbow || self.bladder_modulus == 0.0,
+            ),
             ("extension_factors", format!("{:?}", self.extension_factors), elbow || default),
         ];
         for (name, value, fits) in given {
@@ -261,14 +279,21 @@ impl MuscleSpec {
                 return Err(Error::Choice { name: format!("muscle.{name}"), value, allowed });
             }
         }
-        for (name, value) in [("c10", self.c10), ("c01", self.c01), ("bladder_modulus", self.bladder_modulus)]
+        for (name, value) in
+            [("c10", self.c10), ("c01", self.c01), ("bladder_modulus", self.bladder_modulus)]
         {
             check_range(&format!("muscle.{name}"), value, -1e13, 1e13, "Pa")?;
         }
         if !polynomial {
             return Ok(());
         }
-        check_range("muscle.modulus_slope length", orders as f64, 0.0, HIGHEST_ORDER as f64, "moduli")?;
+        check_range(
+            "muscle.modulus_slope length",
+            orders as f64,
+            0.0,
+            HIGHEST_ORDER as f64,
+            "moduli",
+        )?;
         if self.modulus_offset.len() != orders {
             return Err(Error::Length {
                 name: "muscle.modulus_offset".into(),
@@ -277,7 +302,8 @@ impl MuscleSpec {
                 why: "one for each muscle.modulus_slope".into(),
             });
         }
-        for (k, (slope, offset)) in self.modulus_slope.iter().zip(&self.modulus_offset).enumerate() {
+        for (k, (slope, offset)) in self.modulus_slope.iter().zip(&self.modulus_offset).enumerate()
+        {
             check_range(&format!("muscle.modulus_slope[{k}]"), *slope, -1e6, 1e6, "(1)")?;
             check_range(&format!("muscle.modulus_offset[{k}]"), *offset, -1e13, 1e13, "Pa")?;
         }

@@ -1,7 +1,7 @@
 //! The compiled muscle: force coefficients and air volume as piecewise polynomials of contraction.
 //!
-//! Equations: `F = P a_gas + scale (P a_elastic + b_elastic)` and `V(e)` of the parent modules, each
-//! replaced by polynomials of degree [`DEGREE`] that interpolate the exact solve at the
+//! Equations: `F = P a_gas + scale (P a_elastic + b_elastic)` and `V(e)` of the parent modules,
+//! each replaced by polynomials of degree [`DEGREE`] that interpolate the exact solve at the
 //! Chebyshev-Lobatto points of uniform cells (L. N. Trefethen, *Approximation Theory and
 //! Approximation Practice*, ch. 2-4): continuous across cells, found in constant time. Cells never
 //! cross a kink of the geometry: pieces end exactly at `e = 0` and where the braid becomes taut.
@@ -143,8 +143,9 @@ impl Table {
                 }
                 Assembled::Rough { column, error, .. } => {
                     return Err(Error::Model(format!(
-                        "muscle: the table of {} reaches a relative error of {error:.1e} only, {TOLERANCE:.0e} \
-                         is needed: the geometry of this muscle is not smooth enough between its kinks",
+                        "muscle: the table of {} reaches a relative error of {error:.1e} only, \
+                         {TOLERANCE:.0e} is needed: the geometry of this muscle is not smooth \
+                         enough between its kinks",
                         NAMES[column]
                     )));
                 }
@@ -185,8 +186,8 @@ impl Table {
 
     /// Every column at contraction ratio `e`, with derivatives when `S` carries them.
     ///
-    /// Outside `e_min ..= e_max` the columns go on along straight lines ([`Table::contains`] tells).
-    /// NaN gives NaN.
+    /// Outside `e_min ..= e_max` the columns go on along straight lines ([`Table::contains`]
+    /// tells). NaN gives NaN.
     #[inline]
     pub fn eval<S: Scalar>(&self, e: S) -> TablePoint<S> {
         let at = e.re();
@@ -345,7 +346,12 @@ impl Exact<'_> {
     }
 
     /// Cells of one piece, doubled until the error is below [`AIM`] or no longer falls.
-    fn refine(&self, start: f64, stop: f64, scales: &[f64; COLUMNS]) -> Result<(Vec<Cell>, [f64; COLUMNS])> {
+    fn refine(
+        &self,
+        start: f64,
+        stop: f64,
+        scales: &[f64; COLUMNS],
+    ) -> Result<(Vec<Cell>, [f64; COLUMNS])> {
         let mut best: Option<(Vec<Cell>, [f64; COLUMNS], f64)> = None;
         let mut count = 1;
         loop {
@@ -374,7 +380,9 @@ impl Exact<'_> {
         scales: &[f64; COLUMNS],
     ) -> Result<(Vec<Cell>, [f64; COLUMNS], f64)> {
         let width = (stop - start) / count as f64;
-        let at = |cell: usize, x: f64| (start + (cell as f64 + 0.5 + 0.5 * x) * width).clamp(start, stop);
+        let at = |cell: usize, x: f64| {
+            (start + (cell as f64 + 0.5 + 0.5 * x) * width).clamp(start, stop)
+        };
         let mut cells = Vec::with_capacity(count);
         let mut errors = [0.0_f64; COLUMNS];
         for index in 0..count {
@@ -390,8 +398,11 @@ impl Exact<'_> {
                 let exact = self.columns_and_slope(at(index, x))?;
                 let found: [f64; COLUMNS] = evaluate(&cell, x);
                 for i in 0..COLUMNS {
-                    let scale =
-                        if i == VOLUME { exact[i].abs().max(VOLUME_FLOOR * scales[i]) } else { scales[i] };
+                    let scale = if i == VOLUME {
+                        exact[i].abs().max(VOLUME_FLOOR * scales[i])
+                    } else {
+                        scales[i]
+                    };
                     let error = (found[i] - exact[i]).abs() / scale;
                     // `max` would drop NaN.
                     errors[i] = if error <= errors[i] { errors[i] } else { error };
@@ -458,7 +469,10 @@ mod tests {
     fn muscles() -> Vec<(MuscleSpec, CompiledMuscle)> {
         let mut cylinder = shoulder();
         cylinder.geometry = Some("cylinder".into());
-        [shoulder(), elbow(), thick(), cylinder].into_iter().map(|s| (s.clone(), compiled(&s))).collect()
+        [shoulder(), elbow(), thick(), cylinder]
+            .into_iter()
+            .map(|s| (s.clone(), compiled(&s)))
+            .collect()
     }
 
     #[test]
@@ -491,7 +505,8 @@ mod tests {
             let points: Vec<f64> = (0..=3000)
                 .map(|i| table.e_min + (table.e_max - table.e_min) * f64::from(i) / 3000.0)
                 .collect();
-            let largest = points.iter().map(|e| muscle.exact.coefficients(*e).unwrap().b_elastic.abs());
+            let largest =
+                points.iter().map(|e| muscle.exact.coefficients(*e).unwrap().b_elastic.abs());
             let largest = largest.fold(0.0, f64::max);
             for e in points {
                 let point: TablePoint = table.eval(e);
@@ -547,7 +562,9 @@ mod tests {
             (spec.braid_angle, spec.wall_thickness) = (angle.to_radians(), wall);
             let muscle = compiled(&spec);
             assert!(muscle.table.error_bound() <= TOLERANCE);
-            assert!(muscle.table.e_min >= muscle.exact.geometry.range().0 && muscle.table.contains(0.0));
+            assert!(
+                muscle.table.e_min >= muscle.exact.geometry.range().0 && muscle.table.contains(0.0)
+            );
             let point: TablePoint = muscle.table.eval(muscle.table.e_min - 1e-3);
             assert!(point.volume.is_finite());
         }

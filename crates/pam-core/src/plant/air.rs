@@ -65,7 +65,14 @@ impl<S: Scalar> Plant<'_, S> {
     }
 
     #[inline(never)]
-    fn altered_valve_flow(&self, valve: usize, area: S, upstream: S, downstream: S, venting: bool) -> S {
+    fn altered_valve_flow(
+        &self,
+        valve: usize,
+        area: S,
+        upstream: S,
+        downstream: S,
+        venting: bool,
+    ) -> S {
         let gas = &self.rig.gas;
         match &self.wiring.ports.passage[valve] {
             None => gas.mass_flow(area, upstream, downstream),
@@ -142,12 +149,14 @@ impl<S: Scalar> Plant<'_, S> {
             };
             out[layout.mass(k)] = chamber.inflow - chamber.outflow;
             let fixed = pressure_rate(&chamber, &self.alphas[k], rt);
-            let balance = if self.altered.balances { self.wiring.ports.balance[k].as_ref() } else { None };
+            let balance =
+                if self.altered.balances { self.wiring.ports.balance[k].as_ref() } else { None };
             out[layout.pressure(k)] = match balance {
                 None => fixed,
                 Some(acting) => {
                     let mass = state[layout.mass(k)];
-                    let (rate, more) = self.effect(acting).balance(gas, &chamber, here.wall[k], mass, fixed);
+                    let (rate, more) =
+                        self.effect(acting).balance(gas, &chamber, here.wall[k], mass, fixed);
                     out[layout.mass(k)] += more;
                     rate
                 }
@@ -157,7 +166,8 @@ impl<S: Scalar> Plant<'_, S> {
 }
 
 impl<S: Scalar> Scratch<S> {
-    /// A mass flow along the arrow; what goes against it goes out of its end and into its beginning.
+    /// A mass flow along the arrow; what goes against it goes out of its end and into its
+    /// beginning.
     #[inline]
     pub(super) fn pass(&mut self, from: Node, to: Node, flow: S) {
         let along = flow.re() > 0.0 || (flow.re() == 0.0 && !self.backwards);
@@ -197,7 +207,11 @@ impl Plant<'_, f64> {
         let valves = self.wiring.valves.iter().zip(&self.valves).zip(&controls.spool);
         let valves = valves.map(move |((unit, valve), spool)| {
             let here = state[self.layout.pressure(unit.to)];
-            let other = if *spool > 0.0 { self.pressure_at(unit.from, state) } else { gas.ambient_pressure };
+            let other = if *spool > 0.0 {
+                self.pressure_at(unit.from, state)
+            } else {
+                gas.ambient_pressure
+            };
             let open = valve.area * unit.table.eval(spool.abs()) > 0.0;
             (if open { ratio(here, other) } else { 1.0 }, gas.critical_ratio())
         });
@@ -211,8 +225,8 @@ impl Plant<'_, f64> {
         valves.chain(lines)
     }
 
-    /// Fastest rate of the gas [1/s], and the gas that it is in (none for a supply): a bound by Gershgorin's rows, every
-    /// valve open, next to equal pressures.
+    /// Fastest rate of the gas [1/s], and the gas that it is in (none for a supply): a bound by
+    /// Gershgorin's rows, every valve open, next to equal pressures.
     pub(crate) fn fastest_gas(&self) -> (f64, Option<usize>) {
         let (wiring, gas) = (&self.wiring, &self.rig.gas);
         let rt = gas.gas_constant * gas.temperature;
@@ -272,7 +286,8 @@ impl Plant<'_, f64> {
     /// Largest change of what effects let in or out per pressure of a block [kg/(s Pa)].
     fn steepest_flows(&self, node: Node) -> f64 {
         let wiring = &self.wiring;
-        let valves = wiring.valves.iter().filter(|v| v.from == node || Node::Gas(v.to) == node).count();
+        let valves =
+            wiring.valves.iter().filter(|v| v.from == node || Node::Gas(v.to) == node).count();
         let most = self.extremes(valves);
         let at = |flow: &Flow| matches!(flow, Flow::Leak(n) | Flow::Inflow(n) if *n == node);
         let flows = wiring.ports.flows.iter().filter(|(flow, _)| at(flow));
@@ -285,7 +300,8 @@ impl Plant<'_, f64> {
         Extremes { pressure, ambient, angles: (0.0, 0.0), contraction: 0.0, valves }
     }
 
-    /// Rate at which a gas takes the temperature of its wall [1/s], with the least of it: at ambient pressure.
+    /// Rate at which a gas takes the temperature of its wall [1/s], with the least of it: at
+    /// ambient pressure.
     fn wall_rate(&self, gas: usize, volume: f64, wall: f64) -> f64 {
         let balance = self.wiring.ports.balance[gas].as_ref();
         balance.map_or(0.0, |acting| self.effect(acting).wall_rate(&self.rig.gas, volume, wall))

@@ -75,7 +75,8 @@ impl<S: Scalar> Body<S> {
         !matches!(self, Self::Fixed)
     }
 
-    /// Accelerations under torques (or the pull) of the muscles; NaN where a mass matrix is singular.
+    /// Accelerations under torques (or the pull) of the muscles; NaN where a mass matrix is
+    /// singular.
     #[inline]
     pub fn accelerations(&self, angle: &[S], rate: &[S], torque: &[S], out: &mut [S]) {
         match self {
@@ -175,8 +176,8 @@ impl<S: Scalar> Body<S> {
         }
     }
 
-    /// End of a link: by how much each coordinate moves it, across and up [m], and how it accelerates by their rates alone
-    /// [m/s2].
+    /// End of a link: by how much each coordinate moves it, across and up [m], and how it
+    /// accelerates by their rates alone [m/s2].
     pub fn end(&self, link: usize, angle: &[S], rate: &[S]) -> (Vec<[S; 2]>, [S; 2]) {
         let mut sides = vec![[constant(0.0); 2]; angle.len()];
         let mut own = [constant::<S>(0.0); 2];
@@ -210,8 +211,9 @@ impl<S: Scalar> Body<S> {
 }
 
 impl Body<f64> {
-    /// The body's fastest rates [1/s]: of its damping and of its stops, with damping and stiffness beside its own on each
-    /// coordinate, and a base that a torque on the first one moves by so much [1/(kg m2)].
+    /// The body's fastest rates [1/s]: of its damping and of its stops, with damping and stiffness
+    /// beside its own on each coordinate, and a base that a torque on the first one moves by so
+    /// much [1/(kg m2)].
     pub fn fastest(&self, loads: &[(f64, f64)], base: f64) -> f64 {
         let one = |inertia: f64, damping: f64, stops: Option<Stops>| {
             let (stiffness, stop) = stops.map_or((0.0, 0.0), |s| (s.stiffness, s.damping));
@@ -234,7 +236,8 @@ impl Body<f64> {
         }
     }
 
-    /// How much a force at the end of a link accelerates it at most [1/kg]: a bound over the directions, stretched out.
+    /// How much a force at the end of a link accelerates it at most [1/kg]: a bound over the
+    /// directions, stretched out.
     pub fn end_mobility(&self, link: usize) -> f64 {
         let reach: f64 = (0..=link).map(|k| self.length(k)).sum();
         match self {
@@ -253,13 +256,22 @@ fn vector<S: Scalar, const N: usize>(values: &[S]) -> SVector<S, N> {
     SVector::from_fn(|k, _| values[k])
 }
 
-fn planar_passive<S: Scalar, const N: usize>(arm: &PlanarArm<S, N>, k: usize, angle: S, rate: S) -> S {
+fn planar_passive<S: Scalar, const N: usize>(
+    arm: &PlanarArm<S, N>,
+    k: usize,
+    angle: S,
+    rate: S,
+) -> S {
     let link = &arm.links()[k];
     let friction = link.viscous * rate + link.coulomb * tanh(rate / link.coulomb_speed);
     link.stops.map_or(constant(0.0), |s| s.torque(angle, rate)) - friction
 }
 
-fn planar_response<S: Scalar, const N: usize>(arm: &PlanarArm<S, N>, angle: &[S], torque: &[S]) -> Vec<S> {
+fn planar_response<S: Scalar, const N: usize>(
+    arm: &PlanarArm<S, N>,
+    angle: &[S],
+    torque: &[S],
+) -> Vec<S> {
     match arm.response(&vector(angle), &vector(torque)) {
         Ok(acceleration) => acceleration.as_slice().to_vec(),
         Err(_) => vec![constant(f64::NAN); N],
@@ -303,15 +315,17 @@ fn planar_accelerations<S: Scalar, const N: usize>(
     }
 }
 
-/// Over a grid of poses: the joints' damping and stops against what each pose lets a torque on one joint move.
+/// Over a grid of poses: the joints' damping and stops against what each pose lets a torque on one
+/// joint move.
 fn planar_fastest<const N: usize>(arm: &PlanarArm<f64, N>, loads: &[(f64, f64)], base: f64) -> f64 {
     let mut fastest = 0.0_f64;
     for pose in 0..POSES.pow(N as u32) {
         let angle = SVector::<f64, N>::from_fn(|k, _| {
             let share = (pose / POSES.pow(k as u32) % POSES) as f64 / (POSES - 1) as f64;
-            let (low, high) = arm.links()[k]
-                .stops
-                .map_or((-std::f64::consts::PI, std::f64::consts::PI), |s| (s.min_angle, s.max_angle));
+            let (low, high) =
+                arm.links()[k].stops.map_or((-std::f64::consts::PI, std::f64::consts::PI), |s| {
+                    (s.min_angle, s.max_angle)
+                });
             low + (high - low) * share
         });
         // No inverse: a mass matrix that is singular is refused where the rig is made.

@@ -1,4 +1,5 @@
-//! Commands as the valves and regulators see them, within a step and from one step to the next, and where effects begin.
+//! Commands as the valves and regulators see them, within a step and from one step to the next, and
+//! where effects begin.
 
 use super::ports::{moves, Acting};
 use super::rates::{Controls, Plant};
@@ -14,15 +15,17 @@ impl<S: Scalar> Plant<'_, S> {
         let wiring = &self.wiring;
         let mut regulator = wiring.valves.len();
         let spec = self.rig.spec();
-        let set_pressure = wiring.supplies.iter().zip(&spec.supplies).map(|(unit, supply)| match unit {
-            SupplyUnit::Regulator { .. } => {
-                regulator += 1;
-                self.set_pressure(commands(regulator - 1))
-            }
-            _ => self.set_pressure(supply.initial_pressure),
-        });
+        let set_pressure =
+            wiring.supplies.iter().zip(&spec.supplies).map(|(unit, supply)| match unit {
+                SupplyUnit::Regulator { .. } => {
+                    regulator += 1;
+                    self.set_pressure(commands(regulator - 1))
+                }
+                _ => self.set_pressure(supply.initial_pressure),
+            });
         let set_pressure = set_pressure.collect();
-        let spool = (0..wiring.valves.len()).map(|k| self.opened(k, self.commanded(k, commands(k))));
+        let spool =
+            (0..wiring.valves.len()).map(|k| self.opened(k, self.commanded(k, commands(k))));
         Controls { set_pressure, spool: spool.collect(), time: 0.0 }
     }
 
@@ -35,7 +38,8 @@ impl<S: Scalar> Plant<'_, S> {
         spool_position(command, self.valves[valve].null, self.wiring.valves[valve].half_range)
     }
 
-    /// The position that opens a valve, for the commanded one; where something on the way moves by itself it is left as it is.
+    /// The position that opens a valve, for the commanded one; where something on the way moves by
+    /// itself it is left as it is.
     fn opened(&self, valve: usize, commanded: S) -> S {
         let path = &self.wiring.ports.command[valve];
         if moves(path) {
@@ -49,7 +53,8 @@ impl<S: Scalar> Plant<'_, S> {
         !self.wiring.ports.clock.is_empty()
     }
 
-    /// How late pressures and angles are recorded at a time [s]; negative where their clock is ahead.
+    /// How late pressures and angles are recorded at a time [s]; negative where their clock is
+    /// ahead.
     pub fn skew(&self, time: f64) -> (S, S) {
         let none = (constant(0.0), constant(0.0));
         self.wiring.ports.clock.iter().fold(none, |(pressures, angles), acting| {
@@ -58,7 +63,8 @@ impl<S: Scalar> Plant<'_, S> {
         })
     }
 
-    /// Commands over a step that begins at a time [s], later by a shift [s]; `command` gives those of a sample.
+    /// Commands over a step that begins at a time [s], later by a shift [s]; `command` gives those
+    /// of a sample.
     pub fn skewed_controls(
         &self,
         shift: S,
@@ -85,13 +91,22 @@ impl<S: Scalar> Plant<'_, S> {
         controls
     }
 
-    /// What an instant of a step sees of its controls: `age` after the step began at `time` [s], the state being that of the
-    /// beginning.
-    pub fn stage(&self, state: &[S], controls: &Controls<S>, time: f64, age: f64, out: &mut Controls<S>) {
+    /// What an instant of a step sees of its controls: `age` after the step began at `time` [s],
+    /// the state being that of the beginning.
+    pub fn stage(
+        &self,
+        state: &[S],
+        controls: &Controls<S>,
+        time: f64,
+        age: f64,
+        out: &mut Controls<S>,
+    ) {
         out.set_pressure.clone_from(&controls.set_pressure);
         out.spool.clone_from(&controls.spool);
         out.time = time + age;
-        for (k, path) in self.wiring.ports.command.iter().enumerate().filter(|(_, path)| moves(path)) {
+        for (k, path) in
+            self.wiring.ports.command.iter().enumerate().filter(|(_, path)| moves(path))
+        {
             out.spool[k] = path.iter().fold(out.spool[k], |x, acting| {
                 self.effect(acting).position(self.own(acting, state), x, age)
             });
@@ -99,7 +114,13 @@ impl<S: Scalar> Plant<'_, S> {
     }
 
     /// What effects do between steps: from one state to that a step [s] later, which they complete.
-    pub fn discrete_update(&self, before: &[S], state: &mut [S], controls: &Controls<S>, step: f64) {
+    pub fn discrete_update(
+        &self,
+        before: &[S],
+        state: &mut [S],
+        controls: &Controls<S>,
+        step: f64,
+    ) {
         let ports = &self.wiring.ports;
         for (k, path) in ports.command.iter().enumerate().filter(|(_, path)| moves(path)) {
             let mut position = controls.spool[k];
@@ -116,7 +137,8 @@ impl<S: Scalar> Plant<'_, S> {
         }
     }
 
-    /// What fills a tank may have switched on or off in a step: its gas for the part of the step after that.
+    /// What fills a tank may have switched on or off in a step: its gas for the part of the step
+    /// after that.
     fn switch(&self, supply: usize, acting: &Acting, before: &[S], state: &mut [S], step: f64) {
         let gas = &self.rig.gas;
         let place = self.layout.supply(supply);
@@ -135,14 +157,16 @@ impl<S: Scalar> Plant<'_, S> {
         }
     }
 
-    /// What sensors read at the end of a step [s], written to the state; `ends` are the controls at its beginning and its end.
+    /// What sensors read at the end of a step [s], written to the state; `ends` are the controls at
+    /// its beginning and its end.
     pub fn read(&self, before: &[S], state: &mut [S], ends: [&Controls<S>; 2], step: f64) {
         let (wiring, layout) = (&self.wiring, &self.layout);
         self.read_taps(state, ends[1]);
         for (k, reading) in wiring.ports.reading.iter().enumerate() {
             let Some(acting) = reading else { continue };
             let place = layout.effect(acting.first);
-            let (from, to) = (self.at_sensor(k, before, ends[0]), self.at_sensor(k, state, ends[1]));
+            let (from, to) =
+                (self.at_sensor(k, before, ends[0]), self.at_sensor(k, state, ends[1]));
             state[place] = self.effect(acting).read(before[place], from, to, step);
         }
     }

@@ -8,13 +8,20 @@ use crate::effects::Role;
 /// Number of sums that are kept beside the states: see [`BALANCE`].
 pub const BALANCE_COUNT: usize = 6;
 
-/// Channels of the sums over a simulation, in their order: mass out of the supplies and into the ambient, what
-/// regulators relieve included [kg]; energy `R T m` and exergy `R T ln(p/p_a) m` of what the supplies gave, work of
-/// the muscles, positive work at the joints [J].
-pub const BALANCE: [&str; BALANCE_COUNT] =
-    ["mass_supplied", "mass_vented", "energy_supplied", "exergy_supplied", "muscle_work", "joint_work"];
+/// Channels of the sums over a simulation, in their order: mass out of the supplies and into the
+/// ambient, what regulators relieve included [kg]; energy `R T m` and exergy `R T ln(p/p_a) m` of
+/// what the supplies gave, work of the muscles, positive work at the joints [J].
+pub const BALANCE: [&str; BALANCE_COUNT] = [
+    "mass_supplied",
+    "mass_vented",
+    "energy_supplied",
+    "exergy_supplied",
+    "muscle_work",
+    "joint_work",
+];
 
-/// Places of the states: supplies' pressures, gases' pressures, gases' masses, coordinates, their rates, what effects need.
+/// Places of the states: supplies' pressures, gases' pressures, gases' masses, coordinates, their
+/// rates, what effects need.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Layout {
     /// Supplies.
@@ -194,74 +201,101 @@ impl Names {
     /// The names of a rig.
     pub(crate) fn new(spec: &RigSpec, wiring: &Wiring, layout: &Layout) -> Self {
         let joints = coordinate_names(spec);
-        let load = spec.load.is_some();
-        let (mut channels, mut initial) = (Vec::new(), Vec::new());
-        let of = |kind: &str, name: &str| dotted(kind, name);
-        for (k, supply) in spec.supplies.iter().enumerate() {
-            channels.push((of("supply_pressure", &supply.name), Channel::Supply(k)));
-            initial.push((of("supply_pressure", &supply.name), layout.supply(k)));
-        }
-        let chambers = spec.chambers.iter().map(|c| c.name.as_str());
-        let inlets = wiring.inlets.iter().map(|(line, _)| spec.lines[*line].name.as_str());
-        for (k, name) in chambers.clone().enumerate() {
-            channels.push((of("muscle_pressure", name), Channel::Pressure(k)));
-            initial.push((of("muscle_pressure", name), layout.pressure(k)));
-        }
-        for (k, name) in inlets.clone().enumerate() {
-            let gas = wiring.chambers + k;
-            channels.push((of("line_pressure", name), Channel::Pressure(gas)));
-            initial.push((of("line_pressure", name), layout.pressure(gas)));
-        }
-        for (k, name) in joints.iter().enumerate() {
-            channels.push((of("joint_angle", name), Channel::Angle(k)));
-            initial.push((of("joint_angle", name), layout.angle(k)));
-            initial.push((of("joint_rate", name), layout.rate(k)));
-        }
-        for (k, name) in joints.iter().enumerate() {
-            channels.push((of("joint_rate", name), Channel::Rate(k)));
-        }
-        if load {
-            channels.push(("length".into(), Channel::Length));
-            channels.push(("length_rate".into(), Channel::LengthRate));
-            initial.push(("length".into(), layout.angle(0)));
-            initial.push(("length_rate".into(), layout.rate(0)));
-        }
-        for (k, group) in spec.muscles.iter().enumerate() {
-            channels.push((of("contraction_ratio", &group.name), Channel::Contraction(k)));
-        }
-        for (k, group) in spec.muscles.iter().enumerate() {
-            channels.push((of("muscle_force", &group.name), Channel::Force(k)));
-        }
-        for (k, name) in joints.iter().enumerate() {
-            channels.push((of("joint_torque", name), Channel::Torque(k)));
-        }
-        for (k, name) in chambers.clone().enumerate() {
-            channels.push((of("air_volume", name), Channel::Volume(k)));
-        }
-        for (k, name) in chambers.clone().enumerate() {
-            channels.push((of("temperature", name), Channel::Temperature(k)));
-        }
-        for (k, name) in chambers.clone().enumerate() {
-            channels.push((of("air_mass", name), Channel::Mass(k)));
-        }
-        for (k, name) in inlets.clone().enumerate() {
-            channels.push((of("line_mass", name), Channel::Mass(wiring.chambers + k)));
-        }
-        channels
-            .extend(BALANCE.iter().enumerate().map(|(k, name)| ((*name).to_string(), Channel::Balance(k))));
         let regulators = spec.supplies.iter().filter(|s| s.kind == "regulator");
+        let chambers = spec.chambers.iter().map(|c| dotted("chamber", &c.name));
+        let inlets = wiring.inlets.iter().map(|(line, _)| dotted("line", &spec.lines[*line].name));
         Self {
-            channels,
-            initial,
-            inputs: (spec.valves.iter().map(|v| of("valve_command", &v.name)))
-                .chain(regulators.map(|s| of("supply_command", &s.name)))
+            channels: channels(spec, wiring, &joints),
+            initial: initial(spec, wiring, layout, &joints),
+            inputs: (spec.valves.iter().map(|v| dotted("valve_command", &v.name)))
+                .chain(regulators.map(|s| dotted("supply_command", &s.name)))
                 .collect(),
-            gases: chambers.map(|n| of("chamber", n)).chain(inlets.map(|n| of("line", n))).collect(),
-            coordinates: if load {
+            gases: chambers.chain(inlets).collect(),
+            coordinates: if spec.load.is_some() {
                 vec!["load".into()]
             } else {
-                joints.iter().map(|n| of("joint", n)).collect()
+                joints.iter().map(|n| dotted("joint", n)).collect()
             },
         }
     }
+}
+
+/// Every simulated channel of a rig, in the order of its columns.
+fn channels(spec: &RigSpec, wiring: &Wiring, joints: &[String]) -> Vec<(String, Channel)> {
+    let mut found = Vec::new();
+    let mut add = |kind: &str, name: &str, channel| found.push((dotted(kind, name), channel));
+    let inlets = wiring.inlets.iter().map(|(line, _)| spec.lines[*line].name.as_str());
+    for (k, supply) in spec.supplies.iter().enumerate() {
+        add("supply_pressure", &supply.name, Channel::Supply(k));
+    }
+    for (k, chamber) in spec.chambers.iter().enumerate() {
+        add("muscle_pressure", &chamber.name, Channel::Pressure(k));
+    }
+    for (k, name) in inlets.clone().enumerate() {
+        add("line_pressure", name, Channel::Pressure(wiring.chambers + k));
+    }
+    for (k, name) in joints.iter().enumerate() {
+        add("joint_angle", name, Channel::Angle(k));
+    }
+    for (k, name) in joints.iter().enumerate() {
+        add("joint_rate", name, Channel::Rate(k));
+    }
+    if spec.load.is_some() {
+        add("length", "", Channel::Length);
+        add("length_rate", "", Channel::LengthRate);
+    }
+    for (k, group) in spec.muscles.iter().enumerate() {
+        add("contraction_ratio", &group.name, Channel::Contraction(k));
+    }
+    for (k, group) in spec.muscles.iter().enumerate() {
+        add("muscle_force", &group.name, Channel::Force(k));
+    }
+    for (k, name) in joints.iter().enumerate() {
+        add("joint_torque", name, Channel::Torque(k));
+    }
+    for (k, chamber) in spec.chambers.iter().enumerate() {
+        add("air_volume", &chamber.name, Channel::Volume(k));
+    }
+    for (k, chamber) in spec.chambers.iter().enumerate() {
+        add("temperature", &chamber.name, Channel::Temperature(k));
+    }
+    for (k, chamber) in spec.chambers.iter().enumerate() {
+        add("air_mass", &chamber.name, Channel::Mass(k));
+    }
+    for (k, name) in inlets.enumerate() {
+        add("line_mass", name, Channel::Mass(wiring.chambers + k));
+    }
+    for (k, name) in BALANCE.iter().enumerate() {
+        add(name, "", Channel::Balance(k));
+    }
+    found
+}
+
+/// States that an initial value can be given for, with the place of each.
+fn initial(
+    spec: &RigSpec,
+    wiring: &Wiring,
+    layout: &Layout,
+    joints: &[String],
+) -> Vec<(String, usize)> {
+    let mut found = Vec::new();
+    let mut add = |kind: &str, name: &str, place| found.push((dotted(kind, name), place));
+    for (k, supply) in spec.supplies.iter().enumerate() {
+        add("supply_pressure", &supply.name, layout.supply(k));
+    }
+    for (k, chamber) in spec.chambers.iter().enumerate() {
+        add("muscle_pressure", &chamber.name, layout.pressure(k));
+    }
+    for (k, (line, _)) in wiring.inlets.iter().enumerate() {
+        add("line_pressure", &spec.lines[*line].name, layout.pressure(wiring.chambers + k));
+    }
+    for (k, name) in joints.iter().enumerate() {
+        add("joint_angle", name, layout.angle(k));
+        add("joint_rate", name, layout.rate(k));
+    }
+    if spec.load.is_some() {
+        add("length", "", layout.angle(0));
+        add("length_rate", "", layout.rate(0));
+    }
+    found
 }

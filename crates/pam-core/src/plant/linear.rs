@@ -23,8 +23,8 @@ use crate::scalar::{constant, Scalar};
 use crate::{Error, Result};
 use nalgebra::Const;
 
-/// How far next to its null a valve is [1]: so near that no slope changes by more than 1e-7 of itself,
-/// so far that what flows shows in the last digits of the pressure behind a hose.
+/// How far next to its null a valve is [1]: so near that no slope changes by more than 1e-7 of
+/// itself, so far that what flows shows in the last digits of the pressure behind a hose.
 const BESIDE: f64 = 1e-9;
 /// How far on either side of their values pressures are [1], where the slope is the mean of both.
 const ASIDE: f64 = 1e-9;
@@ -136,30 +136,45 @@ impl Rig {
         let commands = 0..self.wiring.valves.len();
         let opening = moving.iter().filter(|m| m.opens).map(|m| By::State(m.place));
         let opening: Vec<By> = opening.chain(commands.clone().map(By::Command)).collect();
-        let shut: Vec<By> = moving.iter().filter(|m| !m.opens).map(|m| By::State(m.place)).collect();
+        let shut: Vec<By> =
+            moving.iter().filter(|m| !m.opens).map(|m| By::State(m.place)).collect();
         let mut opened = point.mean_slopes(&opening, &side.open())?.into_iter();
         let mut others = point.mean_slopes(&shut, &SHUT)?.into_iter();
-        let mut columns: Vec<Vec<f64>> =
-            moving.iter().filter_map(|m| if m.opens { opened.next() } else { others.next() }).collect();
+        let mut columns: Vec<Vec<f64>> = moving
+            .iter()
+            .filter_map(|m| if m.opens { opened.next() } else { others.next() })
+            .collect();
         self.let_follow(&point, &moving, &mut columns)?;
         let (mut a, mut b) = (Vec::new(), Vec::new());
         let inputs: Vec<Vec<f64>> = opened.collect();
         for row in &moving {
             // (a sum with zero has no negative one)
             a.extend(
-                moving.iter().zip(&columns).map(|(by, column)| row.sign * by.sign * column[row.place] + 0.0),
+                moving
+                    .iter()
+                    .zip(&columns)
+                    .map(|(by, column)| row.sign * by.sign * column[row.place] + 0.0),
             );
             b.extend(inputs.iter().map(|column| row.sign * column[row.place] + 0.0));
             if a.iter().chain(&b).any(|slope| !slope.is_finite()) {
                 let name = &row.name;
-                return Err(Error::Model(format!("the rate of {name} has no finite slope: no linear model")));
+                return Err(Error::Model(format!(
+                    "the rate of {name} has no finite slope: no linear model"
+                )));
             }
         }
         let named = self.names.initial.len();
         let c = (0..named).flat_map(|k| self.reading_of(k, &moving)).collect();
         let inputs = self.names.inputs[commands].to_vec();
         let outputs = self.names.initial.iter().map(|(name, _)| name.clone()).collect();
-        Ok(LinearModel { states: moving.into_iter().map(|m| m.name).collect(), inputs, outputs, a, b, c })
+        Ok(LinearModel {
+            states: moving.into_iter().map(|m| m.name).collect(),
+            inputs,
+            outputs,
+            a,
+            b,
+            c,
+        })
     }
 
     /// The states of the model.
@@ -186,13 +201,18 @@ impl Rig {
                 }
                 StateRole::Effect(Role::Moves | Role::Opens) => {
                     let own = place - layout.effect(0);
-                    let here = |acting: &Acting| (acting.first..acting.first + acting.count).contains(&own);
-                    let acting = ports.all.iter().map(|(_, acting)| acting).find(|acting| here(acting));
+                    let here = |acting: &Acting| {
+                        (acting.first..acting.first + acting.count).contains(&own)
+                    };
+                    let acting =
+                        ports.all.iter().map(|(_, acting)| acting).find(|acting| here(acting));
                     acting.map(|acting| (acting.effect, state.name))
                 }
                 _ => None,
             };
-            extra.extend(found.map(|(effect, name)| (effect, Moving { name, place, sign: 1.0, opens })));
+            extra.extend(
+                found.map(|(effect, name)| (effect, Moving { name, place, sign: 1.0, opens })),
+            );
         }
         extra.sort_by_key(|(effect, _)| *effect);
         named.chain(extra.into_iter().map(|(_, moving)| moving)).collect()
@@ -200,7 +220,12 @@ impl Rig {
 
     /// Let what follows a joint move by its angle: its rate is a slope times the rate of the joint,
     /// and nothing else.
-    fn let_follow(&self, point: &Point<'_>, moving: &[Moving], columns: &mut [Vec<f64>]) -> Result<()> {
+    fn let_follow(
+        &self,
+        point: &Point<'_>,
+        moving: &[Moving],
+        columns: &mut [Vec<f64>],
+    ) -> Result<()> {
         let places = self.state_map().into_iter().enumerate();
         let following: Vec<usize> = places
             .filter(|(_, state)| state.role == StateRole::Effect(Role::Follows))
@@ -210,7 +235,8 @@ impl Rig {
         let slopes = point.mean_slopes(&by, &SHUT)?;
         let at = |place: usize| moving.iter().position(|m| m.place == place);
         for k in 0..self.layout.coordinates {
-            let (Some(angle), Some(rate)) = (at(self.layout.angle(k)), at(self.layout.rate(k))) else {
+            let (Some(angle), Some(rate)) = (at(self.layout.angle(k)), at(self.layout.rate(k)))
+            else {
                 continue;
             };
             for (place, slope) in following.iter().zip(&slopes) {
@@ -260,7 +286,8 @@ impl<'a> Point<'a> {
                 let rates = self.rates(chunk, *beside)?;
                 for (k, rate) in rates.into_iter().enumerate() {
                     let gradient = rate.eps.unwrap_generic(Const::<LANES>, Const::<1>);
-                    for ((by, sum), slope) in chunk.iter().zip(sums.iter_mut()).zip(gradient.iter()) {
+                    for ((by, sum), slope) in chunk.iter().zip(sums.iter_mut()).zip(gradient.iter())
+                    {
                         // A command counts from the null: more of the one is less of the other.
                         let sign = if matches!(by, By::Command(_)) { -1.0 } else { 1.0 };
                         sum[k] += sign * slope / sides.len() as f64;
@@ -297,16 +324,24 @@ impl<'a> Point<'a> {
 
 impl<S: Scalar> Plant<'_, S> {
     /// Rates of all states at the start of a recording, with what effects move in closed form.
-    fn rates_beside(&self, state: &[S], memory: &[Memory<S>], start: &[S], beside: Beside) -> Vec<S> {
+    fn rates_beside(
+        &self,
+        state: &[S],
+        memory: &[Memory<S>],
+        start: &[S],
+        beside: Beside,
+    ) -> Vec<S> {
         let (wiring, layout) = (&self.rig.wiring, &self.layout);
         let mut closed: Vec<(&Acting, S)> = Vec::new();
         let mut controls = self.held();
         for (k, path) in wiring.ports.command.iter().enumerate() {
             let null = self.valves[k].null;
-            let mut spool = spool_position(null.re(), null, wiring.valves[k].half_range) + beside.position;
+            let mut spool =
+                spool_position(null.re(), null, wiring.valves[k].half_range) + beside.position;
             for acting in path {
                 closed.push((acting, spool));
-                spool = self.effect(acting).position(self.own(acting, state), spool, 0.0) + beside.position;
+                spool = self.effect(acting).position(self.own(acting, state), spool, 0.0)
+                    + beside.position;
             }
             controls.spool[k] = spool;
         }

@@ -3,7 +3,8 @@
 use crate::muscle::slip::{Slip, ELEMENTS};
 use crate::scalar::{constant, Scalar};
 
-/// What a muscle by itself remembers of its motion; what effects on it remember is among their states.
+/// What a muscle by itself remembers of its motion; what effects on it remember is among their
+/// states.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Memory<S> {
     /// Elements of the direction of motion that the muscle's own force depends on.

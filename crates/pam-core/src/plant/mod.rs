@@ -61,8 +61,9 @@ impl Rig {
     /// Compile a rig from its description.
     ///
     /// # Errors
-    /// As [`RigSpec::validate`]; [`Error::Model`] for blocks that do not fit together, an unknown effect or effect parameter,
-    /// or a volume too small for its openings; [`Error::Parameter`] for a parameter outside its bounds.
+    /// As [`RigSpec::validate`]; [`Error::Model`] for blocks that do not fit together, an unknown
+    /// effect or effect parameter, or a volume too small for its openings; [`Error::Parameter`] for
+    /// a parameter outside its bounds.
     pub fn new(spec: RigSpec) -> Result<Self> {
         Self::wired(spec, &[], EFFECTS)
     }
@@ -75,10 +76,15 @@ impl Rig {
         Self::wired(spec, &[], effects)
     }
 
-    fn wired(spec: RigSpec, known: &[Group], effects: &'static [&'static EffectInfo]) -> Result<Self> {
+    fn wired(
+        spec: RigSpec,
+        known: &[Group],
+        effects: &'static [&'static EffectInfo],
+    ) -> Result<Self> {
         spec.validate()?;
         let g = &spec.gas;
-        let gas = Gas::new(g.ambient_pressure, g.temperature, g.gas_constant, g.heat_capacity_ratio);
+        let gas =
+            Gas::new(g.ambient_pressure, g.temperature, g.gas_constant, g.heat_capacity_ratio);
         let (wiring, parameters) = Wiring::new(&spec, known, effects)?;
         let layout = Layout {
             supplies: wiring.supplies.len(),
@@ -106,11 +112,12 @@ impl Rig {
         Ok(rig)
     }
 
-    /// The same rig with other values of its parameters, in the order of [`Parameters::names`]: nothing is wired again.
-    /// [`Self::spec`] stays what it was.
+    /// The same rig with other values of its parameters, in the order of [`Parameters::names`]:
+    /// nothing is wired again. [`Self::spec`] stays what it was.
     ///
     /// # Errors
-    /// As [`Parameters::with_values`], and [`Error::Model`] for values that would need too short a step.
+    /// As [`Parameters::with_values`], and [`Error::Model`] for values that would need too short a
+    /// step.
     pub fn with_values(&self, values: &[f64]) -> Result<Self> {
         let mut rig = self.clone();
         rig.parameters = self.parameters.with_values(values)?;
@@ -118,8 +125,8 @@ impl Rig {
         Ok(rig)
     }
 
-    /// Every joint's and load's whole range must be within the reach of the tendons and of the muscles' tables; all that
-    /// are not are named.
+    /// Every joint's and load's whole range must be within the reach of the tendons and of the
+    /// muscles' tables; all that are not are named.
     fn check_reach(&self) -> Result<()> {
         let mut found = Vec::new();
         for (group, spec) in self.wiring.groups.iter().zip(&self.spec.muscles) {
@@ -128,7 +135,9 @@ impl Rig {
         match found.len() {
             0 => Ok(()),
             1 => Err(found.swap_remove(0)),
-            _ => Err(Error::Model(found.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))),
+            _ => Err(Error::Model(
+                found.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "),
+            )),
         }
     }
 
@@ -138,15 +147,19 @@ impl Rig {
             let ends = [("load.min_length", load.min_length), ("load.max_length", load.max_length)];
             let (short, long) =
                 (group.rest_length * (1.0 - table.e_max), group.rest_length * (1.0 - table.e_min));
-            let outside =
-                ends.iter().find(|(_, length)| !table.contains(1.0 - length / group.rest_length))?;
-            let allowed = format!("a length that the muscle can have, from {short:.5} to {long:.5} m");
+            let outside = ends
+                .iter()
+                .find(|(_, length)| !table.contains(1.0 - length / group.rest_length))?;
+            let allowed =
+                format!("a length that the muscle can have, from {short:.5} to {long:.5} m");
             return Some(Error::parameter(outside.0, outside.1, allowed));
         }
         let joint = &self.names.coordinates[group.coordinate];
         let stops = self.wiring.coordinates[group.coordinate].stops?;
-        let of = if name.is_empty() { String::new() } else { format!(" of {}", dotted("muscle", name)) };
-        // The ends first: they are numbers of the file. A joint may leave the muscle's range between them, too.
+        let of =
+            if name.is_empty() { String::new() } else { format!(" of {}", dotted("muscle", name)) };
+        // The ends first: they are numbers of the file. A joint may leave the muscle's range
+        // between them, too.
         let ends = [("min_angle", stops.min_angle), ("max_angle", stops.max_angle)];
         let inside = (1..REACH_POINTS).map(|i| {
             (
@@ -156,7 +169,8 @@ impl Rig {
             )
         });
         for (key, angle) in ends.into_iter().chain(inside) {
-            let full = if key.contains(' ') { format!("{key} {joint}") } else { format!("{joint}.{key}") };
+            let full =
+                if key.contains(' ') { format!("{key} {joint}") } else { format!("{joint}.{key}") };
             if !group.joint.reaches(angle) {
                 let allowed = format!("an angle that the tendon{of} reaches (it is too short)");
                 return Some(Error::parameter(full, angle, allowed));
@@ -164,7 +178,10 @@ impl Rig {
             let contraction = group.joint.eval(angle).shortening / group.rest_length;
             if !table.contains(contraction) {
                 let (low, high) = (table.e_min, table.e_max);
-                let allowed = format!("an angle that keeps the contraction ratio{of} ({contraction:.4} here) from {low:.4} to {high:.4}");
+                let allowed = format!(
+                    "an angle that keeps the contraction ratio{of} \
+                    ({contraction:.4} here) from {low:.4} to {high:.4}"
+                );
                 return Some(Error::parameter(full, angle, allowed));
             }
         }
@@ -175,8 +192,9 @@ impl Rig {
     pub(crate) fn range(&self, group: &Group) -> (f64, f64) {
         let table = &group.muscle.table;
         let (low, high) = self.angles(group);
-        let at =
-            |x: f64| (group.joint.eval(x).shortening / group.rest_length).clamp(table.e_min, table.e_max);
+        let at = |x: f64| {
+            (group.joint.eval(x).shortening / group.rest_length).clamp(table.e_min, table.e_max)
+        };
         let (a, b) = (at(low), at(high));
         (a.min(b), a.max(b))
     }
@@ -186,13 +204,15 @@ impl Rig {
         let coordinate = &self.wiring.coordinates[group.coordinate];
         match (coordinate.stops, &self.spec.load) {
             (Some(stops), _) => (stops.min_angle, stops.max_angle),
-            (None, Some(load)) => (group.rest_length - load.max_length, group.rest_length - load.min_length),
+            (None, Some(load)) => {
+                (group.rest_length - load.max_length, group.rest_length - load.min_length)
+            }
             (None, None) => (coordinate.rest, coordinate.rest),
         }
     }
 
-    /// Highest absolute pressure that is to be reckoned with [Pa]: of the supplies and chambers as they begin, 10 bar at
-    /// least.
+    /// Highest absolute pressure that is to be reckoned with [Pa]: of the supplies and chambers as
+    /// they begin, 10 bar at least.
     pub(crate) fn highest_pressure(&self) -> f64 {
         let supplies = self.spec.supplies.iter().map(|s| s.initial_pressure);
         let chambers = self.spec.chambers.iter().map(|c| c.initial_pressure);
@@ -217,7 +237,9 @@ impl Rig {
         }
         let (air, place) = plant.fastest_gas();
         let needed = |step: f64| {
-            format!("a step of {step:.1e} s would be needed, at least {LEAST_STEP:.0e} s is allowed")
+            format!(
+                "a step of {step:.1e} s would be needed, at least {LEAST_STEP:.0e} s is allowed"
+            )
         };
         if STABLE / body < LEAST_STEP {
             return Err(Error::Model(format!(
@@ -229,19 +251,22 @@ impl Rig {
         if step < LEAST_STEP {
             return Err(Error::Model(match place {
                 Some(k) => format!(
-                    "{} is too small for what flows through it: {}; it needs {:.1} times its volume",
+                    "{} is too small for what flows through it: {}; it needs {:.1} times its \
+                        volume",
                     self.names.gases[k],
                     needed(step),
                     LEAST_STEP / step
                 ),
-                None => format!("a supply answers too fast to what flows out of it: {}", needed(step)),
+                None => {
+                    format!("a supply answers too fast to what flows out of it: {}", needed(step))
+                }
             }));
         }
         Ok((step.min(STABLE / plant.fastest_command()), STABLE / body))
     }
 
-    /// The same rig with other parameter values and effects; a muscle's table is kept when its geometry and moduli are the
-    /// same.
+    /// The same rig with other parameter values and effects; a muscle's table is kept when its
+    /// geometry and moduli are the same.
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -254,8 +279,8 @@ impl Rig {
         &self.spec
     }
 
-    /// Longest Runge-Kutta step [s] that openings next to volumes, stops, springs and friction allow; infinite where nothing
-    /// limits it.
+    /// Longest Runge-Kutta step [s] that openings next to volumes, stops, springs and friction
+    /// allow; infinite where nothing limits it.
     pub fn stable_step(&self) -> f64 {
         self.gas_step.min(self.body_step)
     }
@@ -280,13 +305,18 @@ impl Rig {
         &self.names
     }
 
-    /// What each number of a simulation's state is, in the order of [`crate::simulate::Progress::to_vec`] at the start.
+    /// What each number of a simulation's state is, in the order of
+    /// [`crate::simulate::Progress::to_vec`] at the start.
     pub fn state_map(&self) -> Vec<StatePlace> {
         let (layout, wiring) = (&self.layout, &self.wiring);
         let mut places: Vec<StatePlace> = Vec::new();
         let mut add = |name: &str, role| places.push(StatePlace { name: name.into(), role });
         let named = |place: usize| {
-            self.names.initial.iter().find(|(_, p)| *p == place).map_or("", |(name, _)| name.as_str())
+            self.names
+                .initial
+                .iter()
+                .find(|(_, p)| *p == place)
+                .map_or("", |(name, _)| name.as_str())
         };
         for place in layout.supply(0)..layout.mass(0) {
             add(named(place), StateRole::Pressure);

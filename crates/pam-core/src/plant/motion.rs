@@ -1,4 +1,5 @@
-//! The arm with the effects that act on it: torques of their own, another payload, a cord, a base that gives way.
+//! The arm with the effects that act on it: torques of their own, another payload, a cord, a base
+//! that gives way.
 
 use num_dual::Dual64;
 
@@ -20,7 +21,13 @@ const ARM_POINTS: u32 = 16;
 impl<S: Scalar> Plant<'_, S> {
     /// Accelerations of the coordinates and of what effects move beside them.
     #[inline(never)]
-    pub(super) fn altered_motion(&self, state: &[S], time: f64, here: &mut Scratch<S>, out: &mut [S]) {
+    pub(super) fn altered_motion(
+        &self,
+        state: &[S],
+        time: f64,
+        here: &mut Scratch<S>,
+        out: &mut [S],
+    ) {
         let (layout, ports) = (&self.layout, &self.wiring.ports);
         let (angles, rates) = state[layout.angle(0)..layout.effect(0)].split_at(layout.coordinates);
         let [pose, turn, load, column] = &mut here.arm;
@@ -53,7 +60,8 @@ impl<S: Scalar> Plant<'_, S> {
             if let Some(cord) = self.effect(acting).cord(gravity, self.own(acting, state)) {
                 let mass = self.effect(acting).hanging() * self.payload(*link, time);
                 let moving = [pose, turn, column];
-                let felt = hang(&body, *link, &cord, mass, gravity, moving, &mut out[accelerations]);
+                let felt =
+                    hang(&body, *link, &cord, mass, gravity, moving, &mut out[accelerations]);
                 let rates = [self.own(acting, state)[1], cord.acceleration(felt)];
                 self.own_mut(acting, out).copy_from_slice(&rates);
             }
@@ -73,14 +81,17 @@ impl<S: Scalar> Plant<'_, S> {
             return load;
         }
         let at = self.at_joint(coordinate, state);
-        here.iter().fold(load, |load, acting| load + self.effect(acting).torque(&at, self.own(acting, state)))
+        here.iter().fold(load, |load, acting| {
+            load + self.effect(acting).torque(&at, self.own(acting, state))
+        })
     }
 
     /// Payload at the end of a link [kg] (the mass of a linear load) at a time [s].
     fn payload(&self, link: usize, time: f64) -> S {
         let changes = self.wiring.ports.payload.iter().filter(|(changed, _)| *changed == link);
-        changes
-            .fold(self.body.payload(link), |payload, (_, acting)| payload + self.effect(acting).payload(time))
+        changes.fold(self.body.payload(link), |payload, (_, acting)| {
+            payload + self.effect(acting).payload(time)
+        })
     }
 
     /// The body with the payloads that its links carry rigidly at a time [s].
@@ -98,7 +109,8 @@ impl<S: Scalar> Plant<'_, S> {
     }
 }
 
-/// Hang a mass on the end of a link: correct the accelerations of the body for its pull. What the cord's upper end feels [m/s2].
+/// Hang a mass on the end of a link: correct the accelerations of the body for its pull. What the
+/// cord's upper end feels [m/s2].
 fn hang<S: Scalar>(
     body: &Body<S>,
     link: usize,
@@ -110,7 +122,8 @@ fn hang<S: Scalar>(
 ) -> [S; 2] {
     let (sides, own) = body.end(link, pose, turn);
     let along = |v: &[S; 2]| v[0] * cord.along[0] + v[1] * cord.along[1];
-    // The pull is linear in the accelerations: mass (column . q'') column on the left, the rest on the right.
+    // The pull is linear in the accelerations: mass (column . q'') column on the left, the rest on
+    // the right.
     let steady = along(&[own[0], own[1] + gravity]) - cord.centripetal;
     for (entry, side) in column.iter_mut().zip(&sides) {
         let across = side[0] * cord.across[0] + side[1] * cord.across[1];
@@ -136,7 +149,8 @@ fn hang<S: Scalar>(
 }
 
 impl Plant<'_, f64> {
-    /// Refuse masses that are not possible: an arm without inertia, more taken away from a payload than is there.
+    /// Refuse masses that are not possible: an arm without inertia, more taken away from a payload
+    /// than is there.
     ///
     /// # Errors
     /// [`Error::Parameter`] that names what is too small.
@@ -150,12 +164,18 @@ impl Plant<'_, f64> {
         for (link, acting) in &wiring.ports.payload {
             let now = self.body.payload(*link);
             let changes = wiring.ports.payload.iter().filter(|(changed, _)| changed == link);
-            let taken: f64 = changes.map(|(_, a)| self.effect(a).payload(f64::INFINITY).min(0.0)).sum();
+            let taken: f64 =
+                changes.map(|(_, a)| self.effect(a).payload(f64::INFINITY).min(0.0)).sum();
             if now + taken < least {
                 let effect = &wiring.ports.effects[acting.effect];
                 let name = format!("{}.{}", effect.name, effect.form.parameters[0].name);
-                let allowed = format!("at least {} kg: no more can be taken away than is there", least - now);
-                return Err(Error::parameter(name, self.effect(acting).payload(f64::INFINITY), allowed));
+                let allowed =
+                    format!("at least {} kg: no more can be taken away than is there", least - now);
+                return Err(Error::parameter(
+                    name,
+                    self.effect(acting).payload(f64::INFINITY),
+                    allowed,
+                ));
             }
         }
         Ok(())
@@ -180,31 +200,37 @@ impl Plant<'_, f64> {
         let mut fastest = bodies.iter().map(body).fold(own, f64::max);
         if let Some((link, acting)) = &ports.hanging {
             let effect = self.effect(acting);
-            let heaviest = self.payload(*link, f64::NEG_INFINITY).max(self.payload(*link, f64::INFINITY));
-            let ratio = |b: &Cow<'_, Body<f64>>| effect.hanging() * heaviest * b.end_mobility(*link);
+            let heaviest =
+                self.payload(*link, f64::NEG_INFINITY).max(self.payload(*link, f64::INFINITY));
+            let ratio =
+                |b: &Cow<'_, Body<f64>>| effect.hanging() * heaviest * b.end_mobility(*link);
             let ratio = bodies.iter().map(ratio).fold(0.0, f64::max);
             fastest = fastest.max(effect.swing_rate(self.body.gravity(), ratio));
         }
         fastest.max(self.fastest_effect(|place| matches!(place, Place::Group(_) | Place::Joint(_))))
     }
 
-    /// Largest stiffness [N m/rad] of what pulls on a coordinate, over its range, at the highest pressure.
+    /// Largest stiffness [N m/rad] of what pulls on a coordinate, over its range, at the highest
+    /// pressure.
     fn stiffness(&self, coordinate: usize) -> f64 {
         let wiring = &self.wiring;
         let pressure = self.rig.highest_pressure();
         let gauge = pressure - self.rig.gas.ambient_pressure;
         let mut total = 0.0;
-        for (k, group) in wiring.groups.iter().enumerate().filter(|(_, g)| g.coordinate == coordinate) {
+        for (k, group) in
+            wiring.groups.iter().enumerate().filter(|(_, g)| g.coordinate == coordinate)
+        {
             let (low, high) = self.rig.angles(group);
             let mut most = 0.0_f64;
             for i in 0..=32 {
                 let angle = Dual64::new(low + (high - low) * f64::from(i) / 32.0, 1.0);
                 let point = group.joint.eval(angle);
                 let table = group.muscle.table.eval(point.shortening / group.rest_length);
-                let torque =
-                    table.force(Dual64::from(gauge), Dual64::from(self.scales[k])) * point.torque_arm;
+                let torque = table.force(Dual64::from(gauge), Dual64::from(self.scales[k]))
+                    * point.torque_arm;
                 let arm = point.moment_arm.re.abs();
-                let volume = (self.fixed_volume[group.chamber] + table.volume.re.max(0.0) * group.count)
+                let volume = (self.fixed_volume[group.chamber]
+                    + table.volume.re.max(0.0) * group.count)
                     .max(f64::MIN_POSITIVE);
                 let swept = table.volume_slope.re * arm * group.count / group.rest_length;
                 let air = self.alphas[group.chamber].volume * pressure * swept * swept / volume;
@@ -221,12 +247,14 @@ impl Plant<'_, f64> {
         total
     }
 
-    /// Stiffness of one muscle's friction before it slips [N/m]: every element of the bank still sticks.
+    /// Stiffness of one muscle's friction before it slips [N/m]: every element of the bank still
+    /// sticks.
     fn presliding_stiffness(&self, k: usize, group: &Group, force: f64, gauge: f64) -> f64 {
         let mut total = 0.0;
         if group.direction {
             let spec = &group.muscle.exact.spec;
-            let width = spec.friction_coefficient.abs() + (spec.friction_pressure_slope * gauge).abs();
+            let width =
+                spec.friction_coefficient.abs() + (spec.friction_pressure_slope * gauge).abs();
             total += width.max(spec.friction_floor) * force * STUCK / group.muscle.presliding();
         }
         for acting in &self.wiring.ports.muscles[k].force {
@@ -235,19 +263,25 @@ impl Plant<'_, f64> {
         total
     }
 
-    /// Damping and stiffness that effects add to a coordinate at most, those on its muscles included.
+    /// Damping and stiffness that effects add to a coordinate at most, those on its muscles
+    /// included.
     fn resistance(&self, coordinate: usize) -> (f64, f64) {
         let wiring = &self.wiring;
         let stops = wiring.coordinates[coordinate].stops;
         let angles = stops.map_or((0.0, 0.0), |s| (s.min_angle, s.max_angle));
         let most = self.reach(angles, 0.0);
         let (mut damping, mut stiffness) = self.summed(&wiring.ports.torque[coordinate], &most);
-        for (k, group) in wiring.groups.iter().enumerate().filter(|(_, g)| g.coordinate == coordinate) {
+        for (k, group) in
+            wiring.groups.iter().enumerate().filter(|(_, g)| g.coordinate == coordinate)
+        {
             let (low, high) = self.rig.angles(group);
             let share = |i: u32| low + (high - low) * f64::from(i) / f64::from(ARM_POINTS);
             let points = (0..=ARM_POINTS).map(|i| group.joint.eval(share(i)));
             let (arm, contracted) = points.fold((0.0_f64, 0.0_f64), |(arm, contracted), point| {
-                (arm.max(point.moment_arm.abs()), contracted.max(point.shortening / group.rest_length))
+                (
+                    arm.max(point.moment_arm.abs()),
+                    contracted.max(point.shortening / group.rest_length),
+                )
             });
             let side = group.count * arm * arm;
             let most = self.reach(angles, contracted);

@@ -122,8 +122,8 @@ impl<S: Scalar> Plant<'_, S> {
     /// Contraction ratio of each group at a state.
     pub fn contractions(&self, state: &[S], out: &mut [S]) {
         for (out, group) in out.iter_mut().zip(&self.wiring.groups) {
-            *out =
-                group.joint.eval(state[self.layout.angle(group.coordinate)]).shortening / group.rest_length;
+            *out = group.joint.eval(state[self.layout.angle(group.coordinate)]).shortening
+                / group.rest_length;
         }
     }
 
@@ -132,7 +132,8 @@ impl<S: Scalar> Plant<'_, S> {
         vec![Memory::default(); self.wiring.groups.len()]
     }
 
-    /// Memories, and the states of effects that follow the muscles, after a step that moved these between contraction ratios.
+    /// Memories, and the states of effects that follow the muscles, after a step that moved these
+    /// between contraction ratios.
     pub fn follow_muscles(&self, state: &mut [S], memory: &mut [Memory<S>], from: &[S], to: &[S]) {
         for (k, group) in self.wiring.groups.iter().enumerate() {
             if group.direction {

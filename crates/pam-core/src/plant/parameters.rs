@@ -65,14 +65,16 @@ impl Parameters {
     /// The same parameters with other values, in their order.
     ///
     /// # Errors
-    /// [`Error::Length`] for another number of them, [`Error::Parameter`] for a value outside its bounds.
+    /// [`Error::Length`] for another number of them, [`Error::Parameter`] for a value outside its
+    /// bounds.
     pub fn with_values(&self, values: &[f64]) -> Result<Self> {
         let expected = self.values.len();
         if values.len() != expected {
             let (name, why) = ("values".into(), "one for each parameter".into());
             return Err(Error::Length { name, found: values.len(), expected, why });
         }
-        for (k, value) in values.iter().enumerate().filter(|(k, value)| self.values[*k] != **value) {
+        for (k, value) in values.iter().enumerate().filter(|(k, value)| self.values[*k] != **value)
+        {
             check(&self.table.names[k], *value, self.table.bounds[k])?;
         }
         Ok(Self { table: Arc::clone(&self.table), values: values.to_vec() })

@@ -1,4 +1,5 @@
-//! Which effect acts where: each at the ports of the blocks that it was put on, with its states there.
+//! Which effect acts where: each at the ports of the blocks that it was put on, with its states
+//! there.
 
 use super::parameters::{ParameterId, Parameters};
 use super::units::{BodyUnit, Node, SupplyUnit, Wiring};
@@ -13,7 +14,8 @@ use crate::Result;
 pub(crate) struct Instance {
     pub info: &'static EffectInfo,
     pub form: &'static Form,
-    /// Name in front of its parameters: its id, and the block behind a dot where another of its kind is there.
+    /// Name in front of its parameters: its id, and the block behind a dot where another of its
+    /// kind is there.
     pub name: String,
     pub parameters: Vec<ParameterId>,
 }
@@ -109,7 +111,8 @@ impl Ports {
         self.command.iter().any(|acting| moves(acting))
     }
 
-    /// Controls are not the same at every stage of a step: moving valves, or a time that an effect asks for.
+    /// Controls are not the same at every stage of a step: moving valves, or a time that an effect
+    /// asks for.
     pub fn staged(&self) -> bool {
         let pushed = self.push.iter().any(|acting| !acting.is_empty());
         self.moves_valves() || pushed || !self.payload.is_empty()
@@ -118,7 +121,8 @@ impl Ports {
     /// Something happens between steps.
     pub fn updates(&self) -> bool {
         let switches = self.feed.iter().any(|acting| moves(acting));
-        let reads = self.reading.iter().any(Option::is_some) || self.tap.iter().any(Option::is_some);
+        let reads =
+            self.reading.iter().any(Option::is_some) || self.tap.iter().any(Option::is_some);
         self.moves_valves() || switches || reads
     }
 
@@ -250,18 +254,26 @@ fn instance(
         let Some(value) = effect.parameters.get(key).copied() else {
             return model(format!("effect '{}' lacks its parameter '{key}' [{unit}]", effect.id));
         };
-        let id = table.add(format!("{name}.{key}"), value, (parameter.lower, parameter.upper, unit))?;
+        let id =
+            table.add(format!("{name}.{key}"), value, (parameter.lower, parameter.upper, unit))?;
         table.also(format!("{full}.{key}"), id);
         parameters.push(id);
     }
-    if let Some(unknown) = effect.parameters.keys().find(|k| form.parameters.iter().all(|p| p.name != *k)) {
+    if let Some(unknown) =
+        effect.parameters.keys().find(|k| form.parameters.iter().all(|p| p.name != *k))
+    {
         return model(format!("effect '{}' has no parameter '{unknown}'", effect.id));
     }
     Ok(Instance { info, form, name, parameters })
 }
 
 /// The blocks that an effect acts on.
-fn acted_on(spec: &RigSpec, wiring: &Wiring, effect: &EffectSpec, info: &EffectInfo) -> Result<Vec<Place>> {
+fn acted_on(
+    spec: &RigSpec,
+    wiring: &Wiring,
+    effect: &EffectSpec,
+    info: &EffectInfo,
+) -> Result<Vec<Place>> {
     let names = names(spec, info.at);
     if !has(wiring, info, &names) {
         let place = if info.at.is_empty() || info.block == "arm" { info.block } else { info.at };
@@ -290,7 +302,8 @@ fn acted_on(spec: &RigSpec, wiring: &Wiring, effect: &EffectSpec, info: &EffectI
     // A load has no joint of a name, and an effect on its mass acts there.
     let blocks = names.len().max(usize::from(info.on_loads));
     let chosen = (0..blocks).filter(|k| names.is_empty() || here(k));
-    let fits = |k: &usize| info.supplies.is_empty() || fits_supply(&wiring.supplies[*k], info.supplies);
+    let fits =
+        |k: &usize| info.supplies.is_empty() || fits_supply(&wiring.supplies[*k], info.supplies);
     let places: Vec<Place> =
         chosen.filter(|k| info.at != "supply" || fits(k)).map(|k| place(info.at, k)).collect();
     if places.is_empty() && !effect.at.is_empty() {
@@ -343,14 +356,23 @@ fn names(spec: &RigSpec, kind: &str) -> Vec<String> {
 }
 
 /// One effect must not act on a block twice.
-fn twice(spec: &RigSpec, wiring: &Wiring, effects: &[Instance], places: &[Vec<Place>]) -> Result<()> {
+fn twice(
+    spec: &RigSpec,
+    wiring: &Wiring,
+    effects: &[Instance],
+    places: &[Vec<Place>],
+) -> Result<()> {
     for (k, (one, here)) in effects.iter().zip(places).enumerate() {
-        let others = effects.iter().zip(places).take(k).filter(|(other, _)| other.info.id == one.info.id);
+        let others =
+            effects.iter().zip(places).take(k).filter(|(other, _)| other.info.id == one.info.id);
         for (_, there) in others {
             if let Some(place) = here.iter().find(|place| there.contains(place)) {
                 let (id, block) = (one.info.id, block_name(spec, wiring, *place));
-                let block = dotted(if one.info.at.is_empty() { "rig" } else { one.info.at }, &block);
-                return model(format!("effect '{id}' acts on {block} twice: one of them is needed"));
+                let block =
+                    dotted(if one.info.at.is_empty() { "rig" } else { one.info.at }, &block);
+                return model(format!(
+                    "effect '{id}' acts on {block} twice: one of them is needed"
+                ));
             }
         }
     }
@@ -374,13 +396,21 @@ impl Ports {
                 self.tap[gas] = self.tap[gas].or(Some((k, acting)));
                 self.passage[k].replace(acting)
             }
-            (Port::Clearance, Place::Valve(k)) => push(&mut self.flows, (Flow::Clearance(k), acting)),
-            (Port::Leak, Place::Supply(k)) => push(&mut self.flows, (Flow::Leak(Node::Supply(k)), acting)),
-            (Port::Leak, Place::Gas(k)) => push(&mut self.flows, (Flow::Leak(Node::Gas(k)), acting)),
+            (Port::Clearance, Place::Valve(k)) => {
+                push(&mut self.flows, (Flow::Clearance(k), acting))
+            }
+            (Port::Leak, Place::Supply(k)) => {
+                push(&mut self.flows, (Flow::Leak(Node::Supply(k)), acting))
+            }
+            (Port::Leak, Place::Gas(k)) => {
+                push(&mut self.flows, (Flow::Leak(Node::Gas(k)), acting))
+            }
             (Port::Inflow, Place::Supply(k)) => {
                 push(&mut self.flows, (Flow::Inflow(Node::Supply(k)), acting))
             }
-            (Port::Inflow, Place::Gas(k)) => push(&mut self.flows, (Flow::Inflow(Node::Gas(k)), acting)),
+            (Port::Inflow, Place::Gas(k)) => {
+                push(&mut self.flows, (Flow::Inflow(Node::Gas(k)), acting))
+            }
             (Port::Feed, Place::Supply(k)) => push(&mut self.feed[k], acting),
             (Port::Balance, Place::Gas(k)) => self.balance[k].replace(acting),
             (Port::Reading, Place::Gas(k)) => self.reading[k].replace(acting),
@@ -399,7 +429,9 @@ impl Ports {
             (Port::Torque, Place::Joint(k)) => push(&mut self.torque[k], acting),
             (Port::Push, Place::Joint(k)) => push(&mut self.push[k], acting),
             (Port::Payload, Place::Joint(k)) => push(&mut self.payload, (k, acting)),
-            (Port::Hanging, Place::Joint(k)) => self.hanging.replace((k, acting)).map(|(_, other)| other),
+            (Port::Hanging, Place::Joint(k)) => {
+                self.hanging.replace((k, acting)).map(|(_, other)| other)
+            }
             (Port::Mounting, Place::Whole) => self.mounting.replace(acting),
             (Port::Clock, Place::Whole) => push(&mut self.clock, acting),
             _ => {
@@ -414,7 +446,8 @@ impl Ports {
                 let block = block_name(spec, wiring, place);
                 let place = dotted(self.effects[acting.effect].info.at, &block);
                 model(format!(
-                    "the effects '{other}' and '{one}' cannot both act on {place}: one of them is needed"
+                    "the effects '{other}' and '{one}' cannot both act on {place}: one of them is \
+                        needed"
                 ))
             }
         }

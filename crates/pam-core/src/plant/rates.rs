@@ -1,8 +1,9 @@
 //! The state equation of a rig, composed of its blocks.
 //!
-//! States as in [`Layout`]: absolute pressures of supplies and gases [Pa], gas masses [kg], joint angles [rad] and rates
-//! [rad/s], then what effects need and, where they are kept, the sums of [`super::layout::BALANCE`]. Any of them can be *driven* by a signal
-//! instead of being integrated: that is where the rig is cut.
+//! States as in [`Layout`]: absolute pressures of supplies and gases [Pa], gas masses [kg], joint
+//! angles [rad] and rates [rad/s], then what effects need and, where they are kept, the sums of
+//! [`super::layout::BALANCE`]. Any of them can be *driven* by a signal instead of being integrated:
+//! that is where the rig is cut.
 
 use super::body::Body;
 use super::layout::{Channel, Layout, BALANCE_COUNT};
@@ -131,7 +132,8 @@ pub struct Scratch<S> {
 }
 
 impl<'a, S: Number> Plant<'a, S> {
-    /// Compose a rig with parameter values; `balanced` keeps the sums of [`super::layout::BALANCE`] behind the states.
+    /// Compose a rig with parameter values; `balanced` keeps the sums of [`super::layout::BALANCE`]
+    /// behind the states.
     ///
     /// # Errors
     /// [`crate::Error::Parameter`] for links that cannot be.
@@ -150,7 +152,8 @@ impl<'a, S: Number> Plant<'a, S> {
             }
             Path::Orifice(_) => constant(0.0),
         };
-        let isothermal = Polytropic { inflow: constant(1.0), outflow: constant(1.0), volume: constant(1.0) };
+        let isothermal =
+            Polytropic { inflow: constant(1.0), outflow: constant(1.0), volume: constant(1.0) };
         Ok(Self {
             layout: rig.layout,
             balanced,
@@ -158,13 +161,16 @@ impl<'a, S: Number> Plant<'a, S> {
                 .map(|supply| match supply {
                     SupplyUnit::Tank(volume) => Supply::Tank(values[*volume]),
                     SupplyUnit::Constant => Supply::Constant,
-                    SupplyUnit::Regulator { time_constant, droop } => {
-                        Supply::Regulator { time_constant: values[*time_constant], droop: values[*droop] }
-                    }
+                    SupplyUnit::Regulator { time_constant, droop } => Supply::Regulator {
+                        time_constant: values[*time_constant],
+                        droop: values[*droop],
+                    },
                 })
                 .collect(),
             fixed_volume: (wiring.gases.iter())
-                .map(|gas| gas.tubes.iter().fold(values[gas.volume], |sum, line| sum + half_volume(*line)))
+                .map(|gas| {
+                    gas.tubes.iter().fold(values[gas.volume], |sum, line| sum + half_volume(*line))
+                })
                 .collect(),
             alphas: (wiring.gases.iter())
                 .map(|gas| match gas.alphas {
@@ -278,8 +284,10 @@ impl<'a, S: Scalar> Plant<'a, S> {
             let rate = state[self.layout.rate(group.coordinate)];
             (here.contraction[k], here.force[k]) = (muscle.contraction, muscle.force);
             here.volume[group.chamber] += muscle.table.volume * group.count;
-            here.volume_rate[group.chamber] +=
-                muscle.table.volume_slope * muscle.moment_arm * rate * (group.count / group.rest_length);
+            here.volume_rate[group.chamber] += muscle.table.volume_slope
+                * muscle.moment_arm
+                * rate
+                * (group.count / group.rest_length);
             here.torque[group.coordinate] += muscle.force * muscle.torque_arm;
             if self.balanced {
                 here.muscle_work += muscle.force * muscle.moment_arm * rate;
@@ -308,9 +316,11 @@ impl<'a, S: Scalar> Plant<'a, S> {
         let mut volume = self.fixed_volume[gas];
         for group in self.wiring.groups.iter().filter(|g| g.chamber == gas) {
             let point = group.joint.eval(state[self.layout.angle(group.coordinate)]);
-            volume += group.muscle.table.eval(point.shortening / group.rest_length).volume * group.count;
+            volume +=
+                group.muscle.table.eval(point.shortening / group.rest_length).volume * group.count;
         }
-        state[self.layout.pressure(gas)] * volume / (self.rig.gas.gas_constant * self.rig.gas.temperature)
+        state[self.layout.pressure(gas)] * volume
+            / (self.rig.gas.gas_constant * self.rig.gas.temperature)
     }
 
     /// Mass of a gas [kg] at the start of a recording: at rest temperature plus the initial rise.
@@ -373,7 +383,8 @@ impl<'a, S: Scalar> Plant<'a, S> {
     fn balances(&self, state: &[S], here: &Scratch<S>, out: &mut [S]) {
         let (gas, layout) = (&self.rig.gas, &self.layout);
         let rt = gas.gas_constant * gas.temperature;
-        let (mut drawn, mut exergy, mut vented) = (constant::<S>(0.0), constant::<S>(0.0), here.vented);
+        let (mut drawn, mut exergy, mut vented) =
+            (constant::<S>(0.0), constant::<S>(0.0), here.vented);
         for (k, flow) in here.drawn.iter().enumerate() {
             if flow.re() == 0.0 {
                 continue; // most of the time, and the logarithm is dear
@@ -426,7 +437,8 @@ impl Plant<'_, f64> {
                 Channel::Angle(k) => state[layout.angle(k)] + zero(wiring.coordinates[k].zero),
                 Channel::Rate(k) => state[layout.rate(k)],
                 Channel::Length => {
-                    wiring.groups[0].rest_length - state[layout.angle(0)] + zero(wiring.coordinates[0].zero)
+                    wiring.groups[0].rest_length - state[layout.angle(0)]
+                        + zero(wiring.coordinates[0].zero)
                 }
                 Channel::LengthRate => -state[layout.rate(0)],
                 Channel::Contraction(k) => here.contraction[k],

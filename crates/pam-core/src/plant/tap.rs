@@ -1,11 +1,13 @@
-//! Where the transducer of a gas sits: at the gas, or in front of the tube through which a valve feeds it.
+//! Where the transducer of a gas sits: at the gas, or in front of the tube through which a valve
+//! feeds it.
 
 use super::ports::Acting;
 use super::rates::{Controls, Plant};
 use crate::scalar::{constant, Scalar};
 
 impl<S: Scalar> Plant<'_, S> {
-    /// Gases whose transducers sit at the valve's end of what it feeds them through, with the valves there.
+    /// Gases whose transducers sit at the valve's end of what it feeds them through, with the
+    /// valves there.
     pub fn taps(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
         (0..self.layout.gases).filter_map(|gas| self.tap(gas).map(|(valve, _)| (gas, valve)))
     }
@@ -23,13 +25,15 @@ impl<S: Scalar> Plant<'_, S> {
         acting.map_or(self.layout.pressure(gas), |acting| self.layout.effect(acting.first))
     }
 
-    /// Place of the reading of a sensor that lags, and how far it does [s]; None for one that does not.
+    /// Place of the reading of a sensor that lags, and how far it does [s]; None for one that does
+    /// not.
     pub fn lagging(&self, gas: usize) -> Option<(usize, S)> {
         let acting = self.wiring.ports.reading[gas].as_ref()?;
         Some((self.layout.effect(acting.first), self.effect(acting).lag()))
     }
 
-    /// Write the pressures between valves and tubes, where sensors sit there: those of a state, its commands held.
+    /// Write the pressures between valves and tubes, where sensors sit there: those of a state, its
+    /// commands held.
     pub fn read_taps(&self, state: &mut [S], controls: &Controls<S>) {
         for gas in 0..self.layout.gases {
             if let Some((_, acting)) = self.tap(gas) {
@@ -38,7 +42,8 @@ impl<S: Scalar> Plant<'_, S> {
         }
     }
 
-    /// Absolute pressure where the sensor of a gas sits [Pa]: that of the gas while its valve is shut.
+    /// Absolute pressure where the sensor of a gas sits [Pa]: that of the gas while its valve is
+    /// shut.
     pub fn at_sensor(&self, gas: usize, state: &[S], controls: &Controls<S>) -> S {
         let inside = state[self.layout.pressure(gas)];
         let Some((valve, acting)) = self.tap(gas) else { return inside };
@@ -54,8 +59,9 @@ impl<S: Scalar> Plant<'_, S> {
         }
     }
 
-    /// Absolute pressure of a gas [Pa] whose sensor sits where the pressure is `there`: the valve's flow is known from the
-    /// pressures at its two sides, and the tube passes it to one pressure. At most the highest that the rig can have.
+    /// Absolute pressure of a gas [Pa] whose sensor sits where the pressure is `there`: the valve's
+    /// flow is known from the pressures at its two sides, and the tube passes it to one pressure.
+    /// At most the highest that the rig can have.
     pub fn behind_tube(&self, gas: usize, there: S, state: &[S], spool: S) -> S {
         let Some((valve, acting)) = self.tap(gas) else { return there };
         let (area, filling) = self.opening(valve, spool);

@@ -24,7 +24,8 @@ impl<S: Scalar> Plant<'_, S> {
 
     fn at_supply(&self, supply: usize, state: &[S], spool: &[S]) -> At<S> {
         let mut opening = constant::<S>(0.0);
-        for (_, spool) in self.wiring.valves.iter().zip(spool).filter(|(v, _)| v.from == Node::Supply(supply))
+        for (_, spool) in
+            self.wiring.valves.iter().zip(spool).filter(|(v, _)| v.from == Node::Supply(supply))
         {
             if spool.re() > 0.0 {
                 opening += *spool;
@@ -54,7 +55,8 @@ impl<S: Scalar> Plant<'_, S> {
         let mut pressure = constant::<S>(0.0);
         let mut groups = 0.0;
         for group in self.wiring.groups.iter().filter(|g| g.coordinate == coordinate) {
-            pressure += (state[layout.pressure(group.chamber)] - self.rig.gas.ambient_pressure) / BAR;
+            pressure +=
+                (state[layout.pressure(group.chamber)] - self.rig.gas.ambient_pressure) / BAR;
             groups += 1.0;
         }
         At::Joint {
@@ -68,7 +70,9 @@ impl<S: Scalar> Plant<'_, S> {
     fn at(&self, place: Place, state: &[S], spool: &[S], volume_rate: &[S]) -> At<S> {
         match place {
             Place::Supply(k) => self.at_supply(k, state, spool),
-            Place::Valve(k) => At::Valve { fed: state[self.layout.pressure(self.wiring.valves[k].to)] },
+            Place::Valve(k) => {
+                At::Valve { fed: state[self.layout.pressure(self.wiring.valves[k].to)] }
+            }
             Place::Gas(k) => self.at_chamber(k, state, spool, volume_rate[k]),
             Place::Group(k) => At::Muscle(self.at_group(k, state)),
             Place::Joint(k) => self.at_joint(k, state),
@@ -81,7 +85,13 @@ impl<S: Scalar> Plant<'_, S> {
 
     /// Rates of the states of effects at the air, the muscles and the joints; of the rest zero.
     #[inline(never)]
-    pub(super) fn effect_rates(&self, state: &[S], controls: &Controls<S>, here: &Scratch<S>, out: &mut [S]) {
+    pub(super) fn effect_rates(
+        &self,
+        state: &[S],
+        controls: &Controls<S>,
+        here: &Scratch<S>,
+        out: &mut [S],
+    ) {
         let layout = &self.layout;
         out[layout.effect(0)..layout.states()].fill(constant(0.0));
         for (place, acting) in self.wiring.ports.integrated() {
@@ -90,7 +100,8 @@ impl<S: Scalar> Plant<'_, S> {
         }
     }
 
-    /// What effects remember, where a recording begins: nothing has moved for long, valves are shut.
+    /// What effects remember, where a recording begins: nothing has moved for long, valves are
+    /// shut.
     pub fn start_effects(&self, state: &mut [S]) {
         let wiring = &self.wiring;
         let shut = vec![constant(0.0); wiring.valves.len()];
@@ -101,7 +112,8 @@ impl<S: Scalar> Plant<'_, S> {
         }
     }
 
-    /// Terms of the first sum of terms that acts on a block, at an instant; empty where there is none.
+    /// Terms of the first sum of terms that acts on a block, at an instant; empty where there is
+    /// none.
     pub(crate) fn terms(
         &self,
         place: Place,

@@ -1,8 +1,11 @@
-//! How the air and the effects of a description fit together: ports become indices, numbers become parameters.
+//! How the air and the effects of a description fit together: ports become indices, numbers become
+//! parameters.
 
 use super::parameters::Parameters;
 use super::ports::{switch_on, Ports as EffectPorts};
-use super::units::{Coordinate, GasUnit, Group, LineUnit, Node, Path, SupplyUnit, ValveUnit, Wiring};
+use super::units::{
+    Coordinate, GasUnit, Group, LineUnit, Node, Path, SupplyUnit, ValveUnit, Wiring,
+};
 use super::wiring_motion::{body, coordinate_names, coordinates, groups};
 use crate::blocks::valve::AreaTable;
 use crate::description::{dotted, RigSpec, SupplySpec};
@@ -22,7 +25,8 @@ struct Ports<'a> {
 
 impl<'a> Ports<'a> {
     fn new(spec: &'a RigSpec) -> Self {
-        let own = |(k, line): (usize, &crate::description::LineSpec)| line.from.is_empty().then_some(k);
+        let own =
+            |(k, line): (usize, &crate::description::LineSpec)| line.from.is_empty().then_some(k);
         Self { spec, inlets: spec.lines.iter().enumerate().filter_map(own).collect() }
     }
 
@@ -40,7 +44,11 @@ impl<'a> Ports<'a> {
         if let Some(k) = spec.lines.iter().position(|l| dotted("line", &l.name) == port) {
             return match self.inlets.iter().position(|line| *line == k) {
                 Some(inlet) => Ok(Node::Gas(spec.chambers.len() + inlet)),
-                None => model(format!("{owner} = \"{port}\" is not allowed: that line begins at \"{}\", it has no inlet for valves", spec.lines[k].from)),
+                None => model(format!(
+                    "{owner} = \"{port}\" is not allowed: that line begins at \
+                    \"{}\", it has no inlet for valves",
+                    spec.lines[k].from
+                )),
             };
         }
         if port.is_empty() {
@@ -57,13 +65,18 @@ impl<'a> Ports<'a> {
         let supplies = spec.supplies.iter().map(|s| dotted("supply", &s.name));
         let chambers = spec.chambers.iter().map(|c| dotted("chamber", &c.name));
         let lines = self.inlets.iter().map(|k| dotted("line", &spec.lines[*k].name));
-        supplies.chain(chambers).chain(lines).chain(["ambient".to_string()]).collect::<Vec<_>>().join(", ")
+        supplies
+            .chain(chambers)
+            .chain(lines)
+            .chain(["ambient".to_string()])
+            .collect::<Vec<_>>()
+            .join(", ")
     }
 }
 
 impl Wiring {
-    /// Resolve a description whose words are checked, with the numbers of its blocks; `known` are compiled muscles to use
-    /// again, `effects` all that there are.
+    /// Resolve a description whose words are checked, with the numbers of its blocks; `known` are
+    /// compiled muscles to use again, `effects` all that there are.
     pub fn new(
         spec: &RigSpec,
         known: &[Group],
@@ -76,7 +89,9 @@ impl Wiring {
         let valves = valves(spec, &ports, &mut table)?;
         let (lines, inlets) = lines(spec, &ports, &valves, &mut table)?;
         let mut gases = gases(spec, &inlets, &mut table)?;
-        for (k, line) in lines.iter().enumerate().filter(|(_, l)| matches!(l.path, Path::Tube { .. })) {
+        for (k, line) in
+            lines.iter().enumerate().filter(|(_, l)| matches!(l.path, Path::Tube { .. }))
+        {
             for end in [line.from, line.to] {
                 if let Node::Gas(gas) = end {
                     gases[gas].tubes.push(k);
@@ -133,9 +148,15 @@ fn supplies(spec: &RigSpec, table: &mut Parameters) -> Result<Vec<SupplyUnit>> {
     let mut unit = |supply: &SupplySpec| {
         let name = |key: &str| format!("{}.{key}", dotted("supply", &supply.name));
         Ok(match supply.kind.as_str() {
-            "tank" => SupplyUnit::Tank(table.add(name("volume"), supply.volume, (1e-7, 1e4, "m3"))?),
+            "tank" => {
+                SupplyUnit::Tank(table.add(name("volume"), supply.volume, (1e-7, 1e4, "m3"))?)
+            }
             "regulator" => SupplyUnit::Regulator {
-                time_constant: table.add(name("time_constant"), supply.time_constant, (1e-5, 1e3, "s"))?,
+                time_constant: table.add(
+                    name("time_constant"),
+                    supply.time_constant,
+                    (1e-5, 1e3, "s"),
+                )?,
                 droop: table.add(name("droop"), supply.droop, (0.0, 1e13, "Pa s/kg"))?,
             },
             _ => SupplyUnit::Constant,
@@ -152,7 +173,8 @@ fn valves(spec: &RigSpec, ports: &Ports<'_>, table: &mut Parameters) -> Result<V
         let to = ports.node(&format!("{block}.to"), &valve.to)?;
         let Node::Gas(to) = to else {
             return model(format!(
-                "{block}.to = \"{}\" is not allowed: a valve feeds a chamber or the inlet of a line",
+                "{block}.to = \"{}\" is not allowed: a valve feeds a chamber or the inlet of a \
+                    line",
                 valve.to
             ));
         };
@@ -171,7 +193,11 @@ fn valves(spec: &RigSpec, ports: &Ports<'_>, table: &mut Parameters) -> Result<V
                 valve.discharge_area_max,
                 (0.0, 1.0, "m2"),
             )?,
-            null: table.add(format!("{block}.null_voltage"), valve.null_voltage, (-1e3, 1e3, "V"))?,
+            null: table.add(
+                format!("{block}.null_voltage"),
+                valve.null_voltage,
+                (-1e3, 1e3, "V"),
+            )?,
             half_range: valve.half_range,
         });
     }
@@ -180,7 +206,12 @@ fn valves(spec: &RigSpec, ports: &Ports<'_>, table: &mut Parameters) -> Result<V
 
 type Lines = (Vec<LineUnit>, Vec<(usize, Node)>);
 
-fn lines(spec: &RigSpec, ports: &Ports<'_>, valves: &[ValveUnit], table: &mut Parameters) -> Result<Lines> {
+fn lines(
+    spec: &RigSpec,
+    ports: &Ports<'_>,
+    valves: &[ValveUnit],
+    table: &mut Parameters,
+) -> Result<Lines> {
     let (mut units, mut inlets) = (Vec::new(), Vec::new());
     for (k, line) in spec.lines.iter().enumerate() {
         let block = dotted("line", &line.name);
@@ -190,7 +221,11 @@ fn lines(spec: &RigSpec, ports: &Ports<'_>, valves: &[ValveUnit], table: &mut Pa
             port => ports.node(&format!("{block}.from"), port)?,
         };
         if from == to || from == Node::Ambient {
-            return model(format!("{block}.from = \"{}\" is not allowed: another end than {block}.to, with gas in it, is needed", line.from));
+            return model(format!(
+                "{block}.from = \"{}\" is not allowed: another end than \
+                {block}.to, with gas in it, is needed",
+                line.from
+            ));
         }
         if line.from.is_empty() {
             if !valves.iter().any(|v| Node::Gas(v.to) == from) {
@@ -207,7 +242,11 @@ fn lines(spec: &RigSpec, ports: &Ports<'_>, valves: &[ValveUnit], table: &mut Pa
                 diameter: table.add(name("diameter"), line.diameter, (1e-5, 1.0, "m"))?,
             }
         } else {
-            Path::Orifice(table.add(name("discharge_area"), line.discharge_area, (0.0, 1.0, "m2"))?)
+            Path::Orifice(table.add(
+                name("discharge_area"),
+                line.discharge_area,
+                (0.0, 1.0, "m2"),
+            )?)
         };
         units.push(LineUnit { from, to, path });
     }
@@ -259,7 +298,8 @@ fn sensors(spec: &RigSpec, table: &mut Parameters, gases: &mut [GasUnit]) -> Res
             table.add(name("length_zero"), sensor.length_zero, (-10.0, 10.0, "m"))?;
         }
         let chambers = spec.chambers.iter().map(|c| &c.name);
-        let known = chambers.clone().chain(spec.joints.iter().map(|j| &j.name)).any(|n| *n == sensor.name);
+        let known =
+            chambers.clone().chain(spec.joints.iter().map(|j| &j.name)).any(|n| *n == sensor.name);
         if !sensor.name.is_empty() && !known {
             return model(format!(
                 "[sensors.{}] is not allowed: the rig has no chamber and no joint of that name",

@@ -37,18 +37,24 @@ pub(super) fn coordinates(spec: &RigSpec) -> Result<Vec<Coordinate>> {
     let named = |port: &str| spec.joints.iter().position(|j| dotted("joint", &j.name) == port);
     match &spec.arm {
         None if spec.joints.is_empty() && spec.muscles.is_empty() => Ok(Vec::new()),
-        None if spec.joints.is_empty() => model("a rig with [muscle] needs [joint] and [arm], or [load]"),
+        None if spec.joints.is_empty() => {
+            model("a rig with [muscle] needs [joint] and [arm], or [load]")
+        }
         None => model("a rig with [joint] needs [arm]"),
         Some(_) if spec.joints.is_empty() => model("a rig with [arm] needs [joint]"),
         Some(arm) if arm.kind == "one_link" => match spec.joints.as_slice() {
             [joint] => Ok(vec![coordinate(joint)]),
-            _ => model(format!("a one-link arm has one joint, and the rig has {}", spec.joints.len())),
+            _ => model(format!(
+                "a one-link arm has one joint, and the rig has {}",
+                spec.joints.len()
+            )),
         },
         Some(arm) => {
             let links = arm.links.len();
             if !(1..=MOST_LINKS).contains(&links) || links != spec.joints.len() {
                 return model(format!(
-                    "a planar arm has 1 to {MOST_LINKS} links and as many joints; the rig has {links} links and {} joints",
+                    "a planar arm has 1 to {MOST_LINKS} links and as many joints; the rig has \
+                        {links} links and {} joints",
                     spec.joints.len()
                 ));
             }
@@ -80,7 +86,9 @@ pub(crate) fn coordinate_of(spec: &RigSpec, port: &str) -> Option<usize> {
 pub(crate) fn coordinate_names(spec: &RigSpec) -> Vec<String> {
     match &spec.arm {
         Some(arm) if arm.kind == "planar" => {
-            let bare = |port: &str| port.split_once('.').map_or(String::new(), |(_, name)| name.to_string());
+            let bare = |port: &str| {
+                port.split_once('.').map_or(String::new(), |(_, name)| name.to_string())
+            };
             arm.links.iter().map(|l| bare(&l.joint)).collect()
         }
         _ => spec.joints.iter().map(|j| j.name.clone()).collect(),
@@ -96,11 +104,16 @@ fn load_stops(load: &LoadSpec, rest: f64) -> Option<Stops> {
     })
 }
 
-pub(super) fn groups(spec: &RigSpec, known: &[Group], table: &mut Parameters) -> Result<Vec<Group>> {
+pub(super) fn groups(
+    spec: &RigSpec,
+    known: &[Group],
+    table: &mut Parameters,
+) -> Result<Vec<Group>> {
     let mut units: Vec<Group> = Vec::new();
     for (k, group) in spec.muscles.iter().enumerate() {
         let block = dotted("muscle", &group.name);
-        let chamber = spec.chambers.iter().position(|c| dotted("chamber", &c.name) == group.chamber);
+        let chamber =
+            spec.chambers.iter().position(|c| dotted("chamber", &c.name) == group.chamber);
         let Some(chamber) = chamber else {
             return model(format!(
                 "{block}.chamber = \"{}\" is not allowed: the rig has no such chamber",
@@ -124,9 +137,11 @@ pub(super) fn groups(spec: &RigSpec, known: &[Group], table: &mut Parameters) ->
                     group.joint
                 ));
             };
-            let Some(transmission) = group.transmission.as_ref().or(joint.transmission.as_ref()) else {
+            let Some(transmission) = group.transmission.as_ref().or(joint.transmission.as_ref())
+            else {
                 return model(format!(
-                    "{block} has no transmission: neither [transmission] nor its joint says how it pulls"
+                    "{block} has no transmission: neither [transmission] nor its joint says how it \
+                        pulls"
                 ));
             };
             (coordinate, Joint::new(transmission)?)
@@ -143,7 +158,11 @@ pub(super) fn groups(spec: &RigSpec, known: &[Group], table: &mut Parameters) ->
             chamber,
             coordinate,
             joint,
-            scale: table.add(format!("{block}.modulus_scale"), group.muscle.modulus_scale, MODULUS_SCALE)?,
+            scale: table.add(
+                format!("{block}.modulus_scale"),
+                group.muscle.modulus_scale,
+                MODULUS_SCALE,
+            )?,
             count: f64::from(group.muscle.count),
             rest_length: group.muscle.rest_length,
             direction: muscle.has_direction(),
@@ -172,7 +191,11 @@ pub(super) fn body(spec: &RigSpec, table: &mut Parameters) -> Result<BodyUnit> {
     }
     Ok(BodyUnit::OneLink {
         inertia: table.add("arm.inertia".into(), arm.inertia, (0.0, 1e6, "kg m2"))?,
-        first_moment: table.add("arm.first_moment".into(), arm.first_moment, (-1e6, 1e6, "kg m"))?,
+        first_moment: table.add(
+            "arm.first_moment".into(),
+            arm.first_moment,
+            (-1e6, 1e6, "kg m"),
+        )?,
         payload: table.add("arm.payload".into(), arm.payload, (0.0, 1e6, "kg"))?,
         viscous: table.add("arm.viscous".into(), arm.viscous, (0.0, 1e6, "N m s/rad"))?,
         coulomb: table.add("arm.coulomb".into(), arm.coulomb, (0.0, 1e6, "N m"))?,

@@ -1,7 +1,8 @@
 //! Many plants advanced together, each as if it were alone.
 //!
-//! What happens to a row depends on its own rig, start and commands only: which thread advances it, and beside which others,
-//! changes no bit. A row whose state leaves the model's range stays at its last good sample and says why; the others go on.
+//! What happens to a row depends on its own rig, start and commands only: which thread advances it,
+//! and beside which others, changes no bit. A row whose state leaves the model's range stays at its
+//! last good sample and says why; the others go on.
 
 use std::borrow::Cow;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -14,7 +15,8 @@ use crate::simulate::run::OwnedRun;
 use crate::simulate::{Initial, Progress, Timing, Trajectory};
 use crate::{Error, Result};
 
-/// Rows that one thread advances at a time, at most: small enough that no thread is left with much to do alone.
+/// Rows that one thread advances at a time, at most: small enough that no thread is left with much
+/// to do alone.
 const MOST_ROWS: usize = 64;
 /// RK4 steps that are worth a second thread (some 50 us).
 const WORTH_A_THREAD: usize = 50;
@@ -66,12 +68,18 @@ pub struct Batch {
 }
 
 impl Batch {
-    /// Plants at their start; `rigs` has one entry for each row, `initial` too. At most `threads` advance them.
+    /// Plants at their start; `rigs` has one entry for each row, `initial` too. At most `threads`
+    /// advance them.
     ///
     /// # Errors
-    /// [`Error::Model`] for no row at all, or rigs with other inputs or channels than the first; those of [`Timing::new`] and
-    /// [`Progress::observe`], with the number of the row.
-    pub fn new(rigs: &[Arc<Rig>], timing: Timing, initial: &[Initial], threads: usize) -> Result<Self> {
+    /// [`Error::Model`] for no row at all, or rigs with other inputs or channels than the first;
+    /// those of [`Timing::new`] and [`Progress::observe`], with the number of the row.
+    pub fn new(
+        rigs: &[Arc<Rig>],
+        timing: Timing,
+        initial: &[Initial],
+        threads: usize,
+    ) -> Result<Self> {
         let Some(first) = rigs.first() else {
             return Err(Error::Model("a batch needs one rig at least".into()));
         };
@@ -102,7 +110,15 @@ impl Batch {
             chunks.push(Chunk::new(begin, &rigs[begin..end], timing, &initial[begin..end])?);
         }
         let substeps = distinct.iter().map(|rig| timing.stable(rig).substeps).max().unwrap_or(1);
-        Ok(Self { rigs: distinct, rig_of, defaults, chunks, samples: 0, substeps, team: Team::new(threads) })
+        Ok(Self {
+            rigs: distinct,
+            rig_of,
+            defaults,
+            chunks,
+            samples: 0,
+            substeps,
+            team: Team::new(threads),
+        })
     }
 
     /// Number of plants.
@@ -133,7 +149,8 @@ impl Batch {
         self.each().map(|row| row.progress.to_vec())
     }
 
-    /// The present sample: every channel of all rows, then the next channel. Of a row that has ended its last good one.
+    /// The present sample: every channel of all rows, then the next channel. Of a row that has
+    /// ended its last good one.
     #[must_use]
     pub fn observe(&self) -> Vec<f64> {
         let (n, channels) = (self.rows(), self.rigs[0].names().channels.len());
@@ -153,9 +170,15 @@ impl Batch {
     /// Go on from other numbers of each row.
     ///
     /// # Errors
-    /// As [`Progress::restored`] and [`Progress::observe`], with the number of the row; [`Error::Length`] for another number of
-    /// rows, [`Error::Parameter`] for a row that stands at another sample. Nothing is changed then.
-    pub fn restore(&mut self, samples: u64, states: &[Vec<f64>], failures: &[Option<Failure>]) -> Result<()> {
+    /// As [`Progress::restored`] and [`Progress::observe`], with the number of the row;
+    /// [`Error::Length`] for another number of rows, [`Error::Parameter`] for a row that stands at
+    /// another sample. Nothing is changed then.
+    pub fn restore(
+        &mut self,
+        samples: u64,
+        states: &[Vec<f64>],
+        failures: &[Option<Failure>],
+    ) -> Result<()> {
         let n = self.rows();
         for (name, found) in [("state", states.len()), ("status", failures.len())] {
             if found != n {
@@ -184,12 +207,13 @@ impl Batch {
         Ok(())
     }
 
-    /// Hold commands for some samples: signals by name with one value for each row, as in [`Drive::new`]. A row whose command
-    /// is not possible ends there unless `strict`. `look` is called now and then; its error ends the run at a sample.
+    /// Hold commands for some samples: signals by name with one value for each row, as in
+    /// [`Drive::new`]. A row whose command is not possible ends there unless `strict`. `look` is
+    /// called now and then; its error ends the run at a sample.
     ///
     /// # Errors
-    /// As [`Drive::new`], the index being that of the row, for impossible values only where `strict`; nothing is changed then.
-    /// That of `look`.
+    /// As [`Drive::new`], the index being that of the row, for impossible values only where
+    /// `strict`; nothing is changed then. That of `look`.
     pub fn advance(
         &mut self,
         samples: usize,
@@ -234,7 +258,8 @@ impl Batch {
         Ok(())
     }
 
-    /// Signals of all rows, checked, and the first thing that is wrong with each row that is to end for it.
+    /// Signals of all rows, checked, and the first thing that is wrong with each row that is to end
+    /// for it.
     fn driven<'b>(
         &self,
         defaults: &'b [Option<Vec<f64>>],
@@ -243,21 +268,27 @@ impl Batch {
     ) -> Result<(Drive<'b>, Vec<(usize, Error)>)> {
         let (n, names) = (self.rows(), self.rigs[0].names());
         let (mut commands, mut prescribed, mut bad) = (Vec::new(), Vec::new(), Vec::new());
-        let mut check = |name: &str, values: &[f64], ranges: &dyn Fn(usize) -> (f64, f64, &'static str)| {
-            if values.len() != n {
-                let why = "one for each row".into();
-                return Err(Error::Length { name: name.into(), found: values.len(), expected: n, why });
-            }
-            for (row, value) in values.iter().enumerate() {
-                let (low, high, unit) = ranges(self.rig_of[row]);
-                match check_value(|| format!("{name}[{row}]"), *value, (low, high), unit) {
-                    Err(error) if strict => return Err(error),
-                    Err(error) => bad.push((row, error)),
-                    Ok(()) => {}
+        let mut check =
+            |name: &str, values: &[f64], ranges: &dyn Fn(usize) -> (f64, f64, &'static str)| {
+                if values.len() != n {
+                    let why = "one for each row".into();
+                    return Err(Error::Length {
+                        name: name.into(),
+                        found: values.len(),
+                        expected: n,
+                        why,
+                    });
                 }
-            }
-            Ok(())
-        };
+                for (row, value) in values.iter().enumerate() {
+                    let (low, high, unit) = ranges(self.rig_of[row]);
+                    match check_value(|| format!("{name}[{row}]"), *value, (low, high), unit) {
+                        Err(error) if strict => return Err(error),
+                        Err(error) => bad.push((row, error)),
+                        Ok(()) => {}
+                    }
+                }
+                Ok(())
+            };
         for (input, name) in names.inputs.iter().enumerate() {
             match (signals.iter().find(|(given, _)| given == name), &defaults[input]) {
                 (Some((_, values)), _) => {
@@ -268,8 +299,11 @@ impl Batch {
                 (None, None) => return Err(command_missing(name)),
             }
         }
-        for (name, values) in signals.iter().filter(|(name, _)| !names.inputs.iter().any(|i| i == name)) {
-            let ports = self.rigs.iter().map(|rig| prescribable(rig, name)).collect::<Result<Vec<_>>>()?;
+        for (name, values) in
+            signals.iter().filter(|(name, _)| !names.inputs.iter().any(|i| i == name))
+        {
+            let ports =
+                self.rigs.iter().map(|rig| prescribable(rig, name)).collect::<Result<Vec<_>>>()?;
             check(name, values, &|rig| (ports[rig].1, ports[rig].2, ports[rig].3))?;
             prescribed.push((ports[0].0, Cow::Borrowed(*values)));
         }
@@ -312,14 +346,16 @@ impl Chunk {
                 for left in (0..samples).rev() {
                     let out = if left == 0 { &mut *seen } else { &mut *blind };
                     out.events.clear();
-                    let done = progress.advance_in(run, *timing, drive, own.clone(), out, &mut || Ok(()));
+                    let done =
+                        progress.advance_in(run, *timing, drive, own.clone(), out, &mut || Ok(()));
                     if let Err(error) = done {
                         let time = match error {
                             Error::Integration { time, .. } => time,
                             _ => progress.samples() as f64 * timing.sample_time,
                         };
                         *failure = Some(Failure { time, message: error.to_string() });
-                        // The last good sample is inside the model's range: it was when it was reached.
+                        // The last good sample is inside the model's range: it was when it was
+                        // reached.
                         let _ = progress.observe_in(run, *timing, seen);
                         break;
                     }
@@ -335,7 +371,8 @@ impl Chunk {
 
 /// Every rig of a batch takes the same commands and shows the same channels.
 fn same_ports(first: &Rig, rig: &Rig) -> Result<()> {
-    let channels = |rig: &Rig| rig.names().channels.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>();
+    let channels =
+        |rig: &Rig| rig.names().channels.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>();
     let pairs = [
         ("inputs", first.names().inputs.clone(), rig.names().inputs.clone()),
         ("channels", channels(first), channels(rig)),
@@ -356,11 +393,15 @@ fn same_ports(first: &Rig, rig: &Rig) -> Result<()> {
 pub fn of_row(row: usize, error: Error) -> Error {
     let named = |name: String| format!("row {row}: {name}");
     match error {
-        Error::Parameter { name, value, allowed } => Error::Parameter { name: named(name), value, allowed },
+        Error::Parameter { name, value, allowed } => {
+            Error::Parameter { name: named(name), value, allowed }
+        }
         Error::Length { name, found, expected, why } => {
             Error::Length { name: named(name), found, expected, why }
         }
-        Error::Choice { name, value, allowed } => Error::Choice { name: named(name), value, allowed },
+        Error::Choice { name, value, allowed } => {
+            Error::Choice { name: named(name), value, allowed }
+        }
         Error::Integration { time, name, value, allowed } => {
             Error::Integration { time, name: named(name), value, allowed }
         }

@@ -7,7 +7,8 @@ use crate::description::dotted;
 use crate::plant::Rig;
 use crate::{Error, Result};
 
-/// What drives a simulation: one command per sample and input, and what is prescribed for the end of each sample.
+/// What drives a simulation: one command per sample and input, and what is prescribed for the end
+/// of each sample.
 #[derive(Debug, Clone)]
 pub struct Drive<'a> {
     pub(crate) samples: usize,
@@ -19,12 +20,14 @@ pub struct Drive<'a> {
 pub(crate) const LEAST_PRESSURE: f64 = 1.0;
 
 impl<'a> Drive<'a> {
-    /// A drive over a number of samples from signals by name: the rig's inputs (`valve_command` [V], `supply_command` [Pa,
-    /// gauge]), `length` of a load frame [m], `pressure` of chambers without a valve [Pa, gauge].
+    /// A drive over a number of samples from signals by name: the rig's inputs (`valve_command`
+    /// [V], `supply_command` [Pa, gauge]), `length` of a load frame [m], `pressure` of chambers
+    /// without a valve [Pa, gauge].
     ///
     /// # Errors
-    /// [`Error::Model`] for a signal that is missing or that the rig does not take, [`Error::Length`] for one of another
-    /// length, [`Error::Parameter`] for a value that is not possible.
+    /// [`Error::Model`] for a signal that is missing or that the rig does not take,
+    /// [`Error::Length`] for one of another length, [`Error::Parameter`] for a value that is not
+    /// possible.
     pub fn new(rig: &Rig, samples: usize, signals: &[(&str, &'a [f64])]) -> Result<Self> {
         let (spec, names) = (rig.spec(), &rig.names);
         let find = |name: &str| signals.iter().find(|(n, _)| *n == name).map(|(_, values)| *values);
@@ -66,11 +69,16 @@ impl<'a> Drive<'a> {
         Drive {
             samples,
             commands: self.commands.iter().map(|values| cut(values)).collect(),
-            prescribed: self.prescribed.iter().map(|(place, values)| (*place, cut(values))).collect(),
+            prescribed: self
+                .prescribed
+                .iter()
+                .map(|(place, values)| (*place, cut(values)))
+                .collect(),
         }
     }
 
-    /// A drive of commands in the order of the rig's inputs, and of what is prescribed, by its place, that were checked.
+    /// A drive of commands in the order of the rig's inputs, and of what is prescribed, by its
+    /// place, that were checked.
     pub(crate) fn checked(
         samples: usize,
         commands: Vec<Cow<'a, [f64]>>,
@@ -110,7 +118,8 @@ pub(crate) fn input_range(rig: &Rig, input: usize) -> (f64, f64, &'static str) {
 /// What a regulator is set to that nobody sets [Pa, gauge].
 pub(crate) fn set_pressure(rig: &Rig, input: usize) -> f64 {
     let spec = rig.spec();
-    let supply = spec.supplies.iter().filter(|s| s.kind == "regulator").nth(input - spec.valves.len());
+    let supply =
+        spec.supplies.iter().filter(|s| s.kind == "regulator").nth(input - spec.valves.len());
     supply.map_or(0.0, |s| s.initial_pressure)
 }
 
@@ -122,7 +131,9 @@ pub(crate) fn command_missing(name: &str) -> Error {
 /// A load frame needs a length.
 pub(crate) fn check_frame(rig: &Rig, given: bool) -> Result<()> {
     if rig.spec().load.as_ref().is_some_and(|l| l.is_frame()) && !given {
-        return Err(Error::Model("length is missing: a load frame needs one value per sample [m]".into()));
+        return Err(Error::Model(
+            "length is missing: a load frame needs one value per sample [m]".into(),
+        ));
     }
     Ok(())
 }
@@ -134,7 +145,9 @@ pub(crate) fn prescribable(rig: &Rig, name: &str) -> Result<(usize, f64, f64, &'
         return match spec.load.as_ref().filter(|load| load.is_frame()) {
             Some(load) => Ok((rig.layout.angle(0), load.min_length, load.max_length, "m")),
             None => Err(Error::Model(
-                "length is given, which only a rig with a load frame takes ([load] kind = \"frame\")".into(),
+                "length is given, which only a rig with a load frame takes ([load] kind = \
+                    \"frame\")"
+                    .into(),
             )),
         };
     }
@@ -161,7 +174,12 @@ fn check_signal(
 ) -> Result<()> {
     if values.len() != samples {
         let why = "one for each sample".into();
-        return Err(Error::Length { name: name.into(), found: values.len(), expected: samples, why });
+        return Err(Error::Length {
+            name: name.into(),
+            found: values.len(),
+            expected: samples,
+            why,
+        });
     }
     for (k, value) in values.iter().enumerate() {
         check_value(|| format!("{name}[{k}]"), *value, (low, high), unit)?;

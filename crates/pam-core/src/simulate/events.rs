@@ -42,7 +42,8 @@ pub struct Event {
     pub block: String,
 }
 
-/// Conditions at one instant, for each coordinate (how far beyond its nearest stop, negative inside) and each flow.
+/// Conditions at one instant, for each coordinate (how far beyond its nearest stop, negative
+/// inside) and each flow.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Watch {
     /// Distance beyond the lower and the upper stop.
@@ -58,7 +59,8 @@ impl Watch {
         for (k, coordinate) in rig.wiring.coordinates.iter().enumerate() {
             let x = state[rig.layout.angle(k)];
             let inside = [f64::NEG_INFINITY; 2];
-            self.beyond.push(coordinate.stops.map_or(inside, |s| [s.min_angle - x, x - s.max_angle]));
+            self.beyond
+                .push(coordinate.stops.map_or(inside, |s| [s.min_angle - x, x - s.max_angle]));
         }
         self.choke.clear();
         self.choke.extend(plant.ratios(state, controls).map(|(ratio, critical)| critical - ratio));
@@ -68,8 +70,8 @@ impl Watch {
         self.beyond.iter().flatten().copied().chain(self.choke.iter().copied())
     }
 
-    /// Events of what is true now and was not (or the reverse) by `flags`, which are brought up to date. `before` are the
-    /// conditions a time `dt` earlier.
+    /// Events of what is true now and was not (or the reverse) by `flags`, which are brought up to
+    /// date. `before` are the conditions a time `dt` earlier.
     pub fn report(
         &self,
         rig: &Rig,
@@ -94,7 +96,11 @@ impl Watch {
                     0.0
                 }
             });
-            out.push(Event { time: time - share, kind: self.kind(k, now), block: self.block(rig, k) });
+            out.push(Event {
+                time: time - share,
+                kind: self.kind(k, now),
+                block: self.block(rig, k),
+            });
         }
     }
 

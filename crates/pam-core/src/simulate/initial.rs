@@ -5,8 +5,8 @@ use crate::plant::Rig;
 use crate::simulate::drive::LEAST_PRESSURE;
 use crate::{Error, Result};
 
-/// Initial state as a user states it, by the names of [`crate::plant::Names::initial`]: gauge pressures [Pa], angles [rad],
-/// rates [rad/s], length [m]; true values, not sensor readings.
+/// Initial state as a user states it, by the names of [`crate::plant::Names::initial`]: gauge
+/// pressures [Pa], angles [rad], rates [rad/s], length [m]; true values, not sensor readings.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Initial {
     values: Vec<f64>,
@@ -14,7 +14,8 @@ pub struct Initial {
 }
 
 impl Initial {
-    /// The rig at rest: every pressure its initial one, joints at their rest angle, a loaded muscle at its rest length.
+    /// The rig at rest: every pressure its initial one, joints at their rest angle, a loaded muscle
+    /// at its rest length.
     pub fn rest(rig: &Rig) -> Self {
         let (spec, wiring, layout) = (rig.spec(), &rig.wiring, &rig.layout);
         let of = |place: usize| {
@@ -26,7 +27,9 @@ impl Initial {
                 wiring.groups[0].rest_length
             } else if place < layout.rate(0) {
                 let coordinate = &wiring.coordinates[place - layout.angle(0)];
-                coordinate.stops.map_or(coordinate.rest, |s| coordinate.rest.clamp(s.min_angle, s.max_angle))
+                coordinate
+                    .stops
+                    .map_or(coordinate.rest, |s| coordinate.rest.clamp(s.min_angle, s.max_angle))
             } else {
                 0.0
             }
@@ -38,7 +41,8 @@ impl Initial {
     /// The same with one value more, by its name.
     ///
     /// # Errors
-    /// [`Error::Model`] for a name that the rig does not have, [`Error::Parameter`] for an impossible value.
+    /// [`Error::Model`] for a name that the rig does not have, [`Error::Parameter`] for an
+    /// impossible value.
     pub fn with(mut self, rig: &Rig, name: &str, value: f64) -> Result<Self> {
         let Some(k) = rig.names.initial.iter().position(|(n, _)| n == name) else {
             let names: Vec<_> = rig.names.initial.iter().map(|(n, _)| n.as_str()).collect();
@@ -50,9 +54,21 @@ impl Initial {
         let (layout, place) = (&rig.layout, rig.names.initial[k].1);
         let full = format!("initial.{name}");
         if place < layout.angle(0) {
-            check_range(&full, value, LEAST_PRESSURE - rig.gas.ambient_pressure, 1e8, "Pa (gauge)")?;
+            check_range(
+                &full,
+                value,
+                LEAST_PRESSURE - rig.gas.ambient_pressure,
+                1e8,
+                "Pa (gauge)",
+            )?;
         } else if place >= layout.rate(0) {
-            check_range(&full, value, -1e4, 1e4, if rig.spec().load.is_some() { "m/s" } else { "rad/s" })?;
+            check_range(
+                &full,
+                value,
+                -1e4,
+                1e4,
+                if rig.spec().load.is_some() { "m/s" } else { "rad/s" },
+            )?;
         } else if let Some(load) = &rig.spec().load {
             check_range(&full, value, load.min_length, load.max_length, "m")?;
         } else {
@@ -84,8 +100,12 @@ impl Initial {
         }
         for (k, (_, end)) in wiring.inlets.iter().enumerate() {
             let place = layout.pressure(wiring.chambers + k);
-            let given =
-                rig.names.initial.iter().zip(&self.given).any(|((_, p), given)| *p == place && *given);
+            let given = rig
+                .names
+                .initial
+                .iter()
+                .zip(&self.given)
+                .any(|((_, p), given)| *p == place && *given);
             if let (false, Some(end)) = (given, end.place(layout)) {
                 state[place] = state[end];
             }

@@ -19,10 +19,15 @@ impl<S: Scalar> Rk4<S> {
 
     /// One step in place.
     ///
-    /// `rate(fraction, state, out)` writes the time derivative at `fraction` (0, 1/2 or 1) of the step; it may overwrite
-    /// driven entries of the state that it is given.
+    /// `rate(fraction, state, out)` writes the time derivative at `fraction` (0, 1/2 or 1) of the
+    /// step; it may overwrite driven entries of the state that it is given.
     #[inline]
-    pub fn step(&mut self, state: &mut [S], step: f64, mut rate: impl FnMut(f64, &mut [S], &mut [S])) {
+    pub fn step(
+        &mut self,
+        state: &mut [S],
+        step: f64,
+        mut rate: impl FnMut(f64, &mut [S], &mut [S]),
+    ) {
         self.stage.copy_from_slice(state);
         rate(0.0, &mut self.stage, &mut self.rate);
         self.sum.copy_from_slice(&self.rate);

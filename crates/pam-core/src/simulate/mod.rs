@@ -34,7 +34,8 @@ impl Timing {
     /// Timing from a sample time and a step [s] that divides it.
     ///
     /// # Errors
-    /// [`Error::Parameter`] when either is not positive or the step does not divide the sample time.
+    /// [`Error::Parameter`] when either is not positive or the step does not divide the sample
+    /// time.
     pub fn new(sample_time: f64, step: f64) -> Result<Self> {
         if !(sample_time.is_finite() && sample_time > 0.0) {
             return Err(Error::parameter("sample_time", sample_time, "a finite time > 0 s"));
@@ -43,8 +44,9 @@ impl Timing {
         let rounded = ratio.round();
         let divides = (1.0..=1e7).contains(&rounded) && (ratio - rounded).abs() <= 1e-6 * rounded;
         if !(step.is_finite() && step > 0.0 && divides) {
-            let allowed =
-                format!("a time > 0 s that divides sample_time = {sample_time} s into 1 to 1e7 steps");
+            let allowed = format!(
+                "a time > 0 s that divides sample_time = {sample_time} s into 1 to 1e7 steps"
+            );
             return Err(Error::parameter("step", step, allowed));
         }
         Ok(Self { sample_time, substeps: rounded as usize })
@@ -110,7 +112,8 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         }
     }
 
-    /// Controls as they are at the beginning (0), the middle or the end (2) of the step that began last.
+    /// Controls as they are at the beginning (0), the middle or the end (2) of the step that began
+    /// last.
     pub fn controls<'b>(&'b self, held: &'b Controls<S>, stage: usize) -> &'b Controls<S> {
         self.stages.as_ref().map_or(held, |stages| &stages[stage])
     }
@@ -122,8 +125,8 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         }
     }
 
-    /// One RK4 step from a time [s] on; driven states are written by `drive(plant, controls, fraction, state)`, the controls being
-    /// those of that instant.
+    /// One RK4 step from a time [s] on; driven states are written by
+    /// `drive(plant, controls, fraction, state)`, the controls being those of that instant.
     #[inline]
     #[allow(clippy::too_many_arguments)]
     pub fn step(
@@ -204,15 +207,17 @@ pub(crate) fn check_state<S: Scalar>(plant: &Plant<'_, S>, state: &[S], time: f6
         let contraction = (group.joint.eval(angle).shortening / group.rest_length).re();
         let table = &group.muscle.table;
         if !table.contains(contraction) {
-            let allowed = format!("inside the muscle's range {:.4} to {:.4}", table.e_min, table.e_max);
+            let allowed =
+                format!("inside the muscle's range {:.4} to {:.4}", table.e_min, table.e_max);
             return failure(&dotted("contraction_ratio", &spec.name), contraction, &allowed);
         }
     }
     Ok(())
 }
 
-/// Simulated channels in the order of [`crate::plant::Names::channels`], one row per sample; row 0 is the initial state. SI,
-/// pressures gauge and as the sensors read them (zeros included). And what happened on the way.
+/// Simulated channels in the order of [`crate::plant::Names::channels`], one row per sample; row 0
+/// is the initial state. SI, pressures gauge and as the sensors read them (zeros included). And
+/// what happened on the way.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trajectory {
     /// One vector for each channel.
@@ -246,7 +251,8 @@ pub struct Progress {
     /// Conditions that an event ends, see [`Watch`].
     flags: Vec<bool>,
     samples: u64,
-    /// Commands and pressure readings of the samples before, newest last, as far back as the effect `clock_skew` reaches.
+    /// Commands and pressure readings of the samples before, newest last, as far back as the effect
+    /// `clock_skew` reaches.
     past: Vec<f64>,
     /// How many of them a sample has: all commands and readings, or none.
     kept: usize,
@@ -305,22 +311,30 @@ impl Progress {
     pub fn to_vec(&self) -> Vec<f64> {
         let memory = self.memory.iter().flat_map(Memory::to_array);
         let flags = self.flags.iter().map(|f| f64::from(u8::from(*f)));
-        let numbers = self.state.iter().copied().chain(memory).chain(flags).chain([self.samples as f64]);
+        let numbers =
+            self.state.iter().copied().chain(memory).chain(flags).chain([self.samples as f64]);
         numbers.chain(self.past.iter().copied()).collect()
     }
 
     /// This progress with the numbers of another [`Self::to_vec`] of the same rig.
     ///
     /// # Errors
-    /// [`Error::Length`] for another number of them, [`Error::Parameter`] for one that is not finite.
+    /// [`Error::Length`] for another number of them, [`Error::Parameter`] for one that is not
+    /// finite.
     pub fn restored(&self, numbers: &[f64]) -> Result<Self> {
-        let parts = [self.state.len(), self.memory.len() * Memory::<f64>::NUMBERS, self.flags.len(), 1];
+        let parts =
+            [self.state.len(), self.memory.len() * Memory::<f64>::NUMBERS, self.flags.len(), 1];
         let expected: usize = parts.iter().sum();
         let past = numbers.len().wrapping_sub(expected);
         let whole = past == 0 || (past < numbers.len() && self.kept > 0 && past % self.kept == 0);
         if !whole {
             let why = "as it was read".into();
-            return Err(Error::Length { name: "state".into(), found: numbers.len(), expected, why });
+            return Err(Error::Length {
+                name: "state".into(),
+                found: numbers.len(),
+                expected,
+                why,
+            });
         }
         for (k, value) in numbers.iter().enumerate() {
             check_range(&format!("state[{k}]"), *value, -1e15, 1e15, "(as it was read)")?;
@@ -342,7 +356,8 @@ impl Progress {
     /// The linear model of a rig about this sample, with its valves at their null.
     ///
     /// # Errors
-    /// [`Error::Integration`] when the state has left the model's range, [`Error::Model`] where a derivative is not finite.
+    /// [`Error::Integration`] when the state has left the model's range, [`Error::Model`] where a
+    /// derivative is not finite.
     pub fn linearised(&self, rig: &Rig, side: Side) -> Result<LinearModel> {
         check_state(&Plant::new(rig, rig.parameters().lift::<f64>(), true)?, &self.state, 0.0)?;
         rig.linearised(&self.state, &self.memory, side)
@@ -362,7 +377,12 @@ impl Progress {
     ///
     /// # Errors
     /// As [`Self::observe`].
-    pub fn observe_in(&self, run: &mut Run<'_>, timing: Timing, out: &mut Trajectory) -> Result<()> {
+    pub fn observe_in(
+        &self,
+        run: &mut Run<'_>,
+        timing: Timing,
+        out: &mut Trajectory,
+    ) -> Result<()> {
         self.observed(&run.stepper.plant, &mut run.stepper.scratch, timing, out)
     }
 
@@ -382,7 +402,8 @@ impl Progress {
             for (column, channel) in gauges(plant.rig()).enumerate() {
                 let rows = || self.past.chunks(self.kept).rev();
                 if let Some(reading) = out.channels[channel].last_mut() {
-                    *reading = late(|ago| rows().nth(ago).map(|r| r[first + column]), *reading, later);
+                    *reading =
+                        late(|ago| rows().nth(ago).map(|r| r[first + column]), *reading, later);
                 }
             }
         }
@@ -407,7 +428,8 @@ impl Progress {
         self.past.drain(..self.past.len().saturating_sub(most));
     }
 
-    /// Commands over the step that begins at a time, the newest being those of the present sample: as late as the angles.
+    /// Commands over the step that begins at a time, the newest being those of the present sample:
+    /// as late as the angles.
     fn skewed(&self, plant: &Plant<'_, f64>, time: f64, timing: Timing) -> Controls<f64> {
         let rows = self.past.len() / self.kept;
         let command = |input: usize, sample: i64| {
@@ -418,12 +440,12 @@ impl Progress {
         plant.skewed_controls(shift.max(0.0), time, timing.step(), timing.sample_time, command)
     }
 
-    /// Hold the commands of each sample and append the sample after it. What is prescribed moves evenly to its value for the
-    /// end of each sample.
+    /// Hold the commands of each sample and append the sample after it. What is prescribed moves
+    /// evenly to its value for the end of each sample.
     ///
     /// # Errors
-    /// [`Error::Integration`] when the state leaves the model's range; what was appended before stays, and the progress is
-    /// that of the last good sample.
+    /// [`Error::Integration`] when the state leaves the model's range; what was appended before
+    /// stays, and the progress is that of the last good sample.
     pub fn advance(
         &mut self,
         rig: &Rig,
@@ -434,7 +456,8 @@ impl Progress {
         self.advance_watched(rig, timing, drive, out, &mut || Ok(()))
     }
 
-    /// As [`Self::advance`], with a look outside every few milliseconds: an error of `look` ends the run at the last sample.
+    /// As [`Self::advance`], with a look outside every few milliseconds: an error of `look` ends
+    /// the run at the last sample.
     ///
     /// # Errors
     /// As [`Self::advance`], and that of `look`.
@@ -463,64 +486,61 @@ impl Progress {
         look: &mut dyn FnMut() -> Result<()>,
     ) -> Result<()> {
         run.prescribe(drive);
-        let Run { stepper, simulated, before, after, next, unseen, .. } = run;
-        let rig = stepper.plant.rig();
-        let dt = timing.step();
         for k in samples {
-            let mut controls = stepper.plant.controls(|input| drive.commands[input][k]);
-            next.clone_from(self);
             let happened = out.events.len();
-            let ends = drive.ends(rig, &self.state, k);
-            let began = self.samples as f64 * timing.sample_time;
-            if self.kept > 0 {
-                next.remember(&stepper.plant, &mut stepper.scratch, drive, k, timing);
-                controls = next.skewed(&stepper.plant, began, timing);
-            }
-            stepper.begin(&next.state, &controls, began);
-            before.look(&stepper.plant, &next.state, stepper.controls(&controls, 0));
-            before.report(rig, None, began, &mut next.flags, &mut out.events);
-            for sub in 0..timing.substeps {
-                let from = began + sub as f64 * dt;
-                if self.kept > 0 {
-                    controls = next.skewed(&stepper.plant, from, timing);
-                }
-                let (state, memory) = (&mut next.state, &mut next.memory);
-                stepper.step(state, memory, &controls, from, dt, simulated, |_, _, fraction, y| {
-                    let share = (sub as f64 + fraction) / timing.substeps as f64;
-                    for (place, from, to) in &ends {
-                        y[*place] = from + (to - from) * share;
-                        if *place >= rig.layout.angle(0) {
-                            y[place + rig.layout.coordinates] = (to - from) / timing.sample_time;
-                        }
-                    }
-                });
-                after.look(&stepper.plant, &next.state, stepper.controls(&controls, 2));
-                let time = began + (sub + 1) as f64 * dt;
-                after.report(rig, Some((before, dt)), time, &mut next.flags, &mut out.events);
-                std::mem::swap(before, after);
-                *unseen += 1;
-                if *unseen >= STEPS_UNSEEN {
-                    *unseen = 0;
-                    if let Err(error) = look() {
-                        out.events.truncate(happened);
-                        return Err(error);
-                    }
-                }
-            }
-            for (place, ..) in &ends {
-                held_mass(&stepper.plant, *place, &mut next.state);
-            }
-            // Within a step they were found block by block.
-            if let Some(new) = out.events.get_mut(happened..) {
-                new.sort_by(|a, b| a.time.total_cmp(&b.time));
-            }
-            next.samples += 1;
-            if let Err(error) = next.observed(&stepper.plant, &mut stepper.scratch, timing, out) {
+            if let Err(error) = self.sample(run, timing, drive, k, out, look) {
                 out.events.truncate(happened);
                 return Err(error);
             }
-            std::mem::swap(self, next);
         }
+        Ok(())
+    }
+
+    /// One sample of a drive. Where it fails, this is still where the sample began.
+    #[inline]
+    fn sample(
+        &mut self,
+        run: &mut Run<'_>,
+        timing: Timing,
+        drive: &Drive<'_>,
+        k: usize,
+        out: &mut Trajectory,
+        look: &mut dyn FnMut() -> Result<()>,
+    ) -> Result<()> {
+        let rig = run.stepper.plant.rig();
+        let mut controls = run.stepper.plant.controls(|input| drive.commands[input][k]);
+        run.next.clone_from(self);
+        let happened = out.events.len();
+        let ends = drive.ends(rig, &self.state, k);
+        let began = self.samples as f64 * timing.sample_time;
+        if self.kept > 0 {
+            run.next.remember(&run.stepper.plant, &mut run.stepper.scratch, drive, k, timing);
+            controls = run.next.skewed(&run.stepper.plant, began, timing);
+        }
+        run.begin(&controls, began, &mut out.events);
+        for sub in 0..timing.substeps {
+            if self.kept > 0 {
+                let from = began + sub as f64 * timing.step();
+                controls = run.next.skewed(&run.stepper.plant, from, timing);
+            }
+            run.step(&controls, &ends, timing, began, sub, &mut out.events);
+            run.unseen += 1;
+            if run.unseen >= STEPS_UNSEEN {
+                run.unseen = 0;
+                look()?;
+            }
+        }
+        let Run { stepper, next, .. } = run;
+        for (place, ..) in &ends {
+            held_mass(&stepper.plant, *place, &mut next.state);
+        }
+        // Within a step they were found block by block.
+        if let Some(new) = out.events.get_mut(happened..) {
+            new.sort_by(|a, b| a.time.total_cmp(&b.time));
+        }
+        next.samples += 1;
+        next.observed(&stepper.plant, &mut stepper.scratch, timing, out)?;
+        std::mem::swap(self, next);
         Ok(())
     }
 }
@@ -531,8 +551,8 @@ fn gauges(rig: &Rig) -> impl Iterator<Item = usize> + '_ {
     rig.names.channels.iter().enumerate().filter(move |(_, (_, c))| pressure(c)).map(|(k, _)| k)
 }
 
-/// The gas of a prescribed pressure is at the temperature of the room, and what that takes was supplied from outside (or,
-/// where it is less, vented).
+/// The gas of a prescribed pressure is at the temperature of the room, and what that takes was
+/// supplied from outside (or, where it is less, vented).
 fn held_mass(plant: &Plant<'_, f64>, place: usize, state: &mut [f64]) {
     let layout = plant.rig().layout;
     if place >= layout.mass(0) {

@@ -1,10 +1,10 @@
 //! What the samples of one rig need on the way, kept from one to the next.
 
 use crate::plant::Rig;
-use crate::plant::{Plant, Simulated};
+use crate::plant::{Controls, Plant, Simulated};
 use crate::simulate::drive::Drive;
-use crate::simulate::events::Watch;
-use crate::simulate::{Progress, Stepper};
+use crate::simulate::events::{Event, Watch};
+use crate::simulate::{Progress, Stepper, Timing};
 use crate::Result;
 use self_cell::self_cell;
 use std::sync::Arc;
@@ -46,6 +46,46 @@ impl<'a> Run<'a> {
             self.places = drive.places().collect();
             self.simulated = Simulated::all_but(&self.stepper.plant.rig().layout, &self.places);
         }
+    }
+
+    /// Take the sample that is on its way to its beginning, a time [s].
+    #[inline]
+    pub(crate) fn begin(&mut self, controls: &Controls<f64>, began: f64, events: &mut Vec<Event>) {
+        let Self { stepper, before, next, .. } = self;
+        stepper.begin(&next.state, controls, began);
+        before.look(&stepper.plant, &next.state, stepper.controls(controls, 0));
+        before.report(stepper.plant.rig(), None, began, &mut next.flags, events);
+    }
+
+    /// One integration step of a sample that began at a time [s], and the events within it.
+    #[inline]
+    pub(crate) fn step(
+        &mut self,
+        controls: &Controls<f64>,
+        ends: &[(usize, f64, f64)],
+        timing: Timing,
+        began: f64,
+        sub: usize,
+        events: &mut Vec<Event>,
+    ) {
+        let Self { stepper, simulated, before, after, next, .. } = self;
+        let rig = stepper.plant.rig();
+        let dt = timing.step();
+        let from = began + sub as f64 * dt;
+        let (state, memory) = (&mut next.state, &mut next.memory);
+        stepper.step(state, memory, controls, from, dt, simulated, |_, _, fraction, y| {
+            let share = (sub as f64 + fraction) / timing.substeps as f64;
+            for (place, from, to) in ends {
+                y[*place] = from + (to - from) * share;
+                if *place >= rig.layout.angle(0) {
+                    y[place + rig.layout.coordinates] = (to - from) / timing.sample_time;
+                }
+            }
+        });
+        after.look(&stepper.plant, &next.state, stepper.controls(controls, 2));
+        let time = began + (sub + 1) as f64 * dt;
+        after.report(rig, Some((before, dt)), time, &mut next.flags, events);
+        std::mem::swap(before, after);
     }
 }
 

@@ -39,7 +39,8 @@ pub fn antagonists() -> RigSpec {
         spec.muscles.push(group);
     }
     let joint = &mut spec.joints[0];
-    (joint.transmission, joint.rest_angle, joint.min_angle, joint.max_angle) = (None, 0.0, -0.9, 0.9);
+    (joint.transmission, joint.rest_angle, joint.min_angle, joint.max_angle) =
+        (None, 0.0, -0.9, 0.9);
     let arm = spec.arm.as_mut().unwrap();
     (arm.payload, arm.gravity, arm.coulomb) = (0.5, 0.0, 0.0);
     spec
@@ -48,8 +49,12 @@ pub fn antagonists() -> RigSpec {
 /// Elbow and wrist, a valve, chamber and muscles each.
 pub fn two_joints() -> RigSpec {
     let mut spec = shoulder();
-    let (valve, chamber, muscle, joint) =
-        (spec.valves[0].clone(), spec.chambers[0].clone(), spec.muscles[0].clone(), spec.joints[0].clone());
+    let (valve, chamber, muscle, joint) = (
+        spec.valves[0].clone(),
+        spec.chambers[0].clone(),
+        spec.muscles[0].clone(),
+        spec.joints[0].clone(),
+    );
     (spec.valves, spec.chambers, spec.muscles, spec.joints) = (vec![], vec![], vec![], vec![]);
     let mut links = vec![];
     for (name, count, length, mass) in [("elbow", 6, 0.4, 2.0), ("wrist", 2, 0.2, 0.8)] {
@@ -124,13 +129,21 @@ pub const TYPICAL: &[Typical] = &[
     typical("supply_regulator_deadband", &[("dead_band", 2e4)], &[("dead_band", 0.0)]),
     typical("valve_dead_zone", &[("half_width", 0.03)], &[("half_width", 0.0)]),
     typical("valve_hysteresis", &[("half_width", 0.01)], &[("half_width", 0.0)]),
-    typical("valve_centre_leakage", &[("conductance", 1e-9), ("opening", 0.05)], &[("conductance", 0.0)]),
+    typical(
+        "valve_centre_leakage",
+        &[("conductance", 1e-9), ("opening", 0.05)],
+        &[("conductance", 0.0)],
+    ),
     typical(
         "input_path_lag",
         &[("time_constant", 0.012), ("delay", 0.015)],
         &[("time_constant", 0.0), ("delay", 0.0)],
     ),
-    typical("tube_flow_restriction", &[("conductance", 3e-9), ("tap", 0.25)], &[("conductance", 1.0)]),
+    typical(
+        "tube_flow_restriction",
+        &[("conductance", 3e-9), ("tap", 0.25)],
+        &[("conductance", 1.0)],
+    ),
     typical(
         "leak_muscle",
         &[("conductance", 2e-10), ("laminar_share", 0.4)],
@@ -148,16 +161,30 @@ pub const TYPICAL: &[Typical] = &[
         &[("damping_constant", 0.0), ("damping_pressure", 0.0)],
     ),
     typical("activation_pressure", &[("threshold", 2e4)], &[("threshold", 0.0)]),
-    typical("mullins_softening", &[("softening", 0.3), ("contraction_width", 0.03)], &[("softening", 0.0)]),
+    typical(
+        "mullins_softening",
+        &[("softening", 0.3), ("contraction_width", 0.03)],
+        &[("softening", 0.0)],
+    ),
     typical(
         "pam_crowding_contact",
         &[("contact_area", 2e-3), ("onset_contraction", 0.05), ("exponent", 1.3), ("rubbing", 0.1)],
         &[("contact_area", 0.0)],
     ),
-    typical("joint_coulomb_stribeck", &[("stiction", 3.0), ("stribeck_speed", 0.08)], &[("stiction", 0.0)]),
+    typical(
+        "joint_coulomb_stribeck",
+        &[("stiction", 3.0), ("stribeck_speed", 0.08)],
+        &[("stiction", 0.0)],
+    ),
     typical(
         "joint_end_stop",
-        &[("stiffness", 800.0), ("angle", 0.95), ("dissipation", 0.3), ("exponent", 1.7), ("side", 0.5)],
+        &[
+            ("stiffness", 800.0),
+            ("angle", 0.95),
+            ("dissipation", 0.3),
+            ("exponent", 1.7),
+            ("side", 0.5),
+        ],
         &[("stiffness", 0.0)],
     ),
     typical(

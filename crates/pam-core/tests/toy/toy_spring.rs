@@ -1,10 +1,11 @@
 //! `toy_joint_spring`: a torsion spring at the joint that begins at an angle and relaxes.
 //!
-//! `tau = -k (s(d) - 0.8 z)`, `z' = (s(d) - z)/T`, `d` the depth beyond the spring's angle, the corner rounded over
-//! 1 deg. Form `linear`: `s = d`; form `cubic`: `s = d^3/d_0^2`, so that `k` is the secant stiffness at `d_0` =
-//! 0.5 rad. One state at each joint, the deflection `z` that has relaxed [rad]; at the start it is that of rest. A
-//! standard linear solid with a corner: W. N. Findley, J. S. Lai & K. Onaran, *Creep and Relaxation of Nonlinear
-//! Viscoelastic Materials* (1976). An example of what a new effect takes.
+//! `tau = -k (s(d) - 0.8 z)`, `z' = (s(d) - z)/T`, `d` the depth beyond the spring's angle, the
+//! corner rounded over 1 deg. Form `linear`: `s = d`; form `cubic`: `s = d^3/d_0^2`, so that `k` is
+//! the secant stiffness at `d_0` = 0.5 rad. One state at each joint, the deflection `z` that has
+//! relaxed [rad]; at the start it is that of rest. A standard linear solid with a corner: W. N.
+//! Findley, J. S. Lai & K. Onaran, *Creep and Relaxation of Nonlinear Viscoelastic Materials*
+//! (1976). An example of what a new effect takes.
 
 use crate::blocks::gas::Gas;
 use crate::effects::{

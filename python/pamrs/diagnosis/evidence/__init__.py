@@ -1,14 +1,24 @@
 """Hypotheses, what speaks for each, and the verdict of each group of blocks.
 
-Public: `Candidate`, `Group`, `Attempts`, `significant`, `colour_of`, `without_colour`, `parts_of`, `start_of` (hypotheses and their
-fits); `weigh`, `explains`, `share_left`, `same_recordings`, `most_believed`, `believed`, `doubt`, `price`, `stands`, `unlikely`,
-`visited`, `Ranges` (their weights); `Judged`, `judge`, `case_verdict`, `case_probabilities`, `case_ambiguity`, `is_parameter`,
-`symptoms_of` (verdicts).
+Public: `Candidate`, `Group`, `Attempts`, `significant`, `autocorrelation_of`,
+`without_autocorrelation`, `parts_of`, `start_of` (hypotheses and their fits); `weigh`, `explains`,
+`share_left`, `same_recordings`, `probability_cap`, `capped`, `penalty`, `price`, `stands`,
+`unlikely`, `visited`, `Ranges` (their weights); `Judged`, `judge`, `case_verdict`,
+`case_probabilities`, `case_ambiguity`, `is_parameter`, `symptoms_of` (verdicts).
 """
 
 from __future__ import annotations
 
-from pamrs.diagnosis.evidence._candidates import Attempts, Candidate, Group, colour_of, parts_of, significant, start_of, without_colour
+from pamrs.diagnosis.evidence._candidates import (
+    Attempts,
+    Candidate,
+    Group,
+    autocorrelation_of,
+    parts_of,
+    significant,
+    start_of,
+    without_autocorrelation,
+)
 from pamrs.diagnosis.evidence._verdicts import (
     Judged,
     case_ambiguity,
@@ -20,11 +30,11 @@ from pamrs.diagnosis.evidence._verdicts import (
 )
 from pamrs.diagnosis.evidence._weighing import (
     Ranges,
-    believed,
-    doubt,
+    capped,
     explains,
-    most_believed,
+    penalty,
     price,
+    probability_cap,
     same_recordings,
     share_left,
     stands,
@@ -39,18 +49,18 @@ __all__ = [
     "Group",
     "Judged",
     "Ranges",
-    "believed",
+    "autocorrelation_of",
+    "capped",
     "case_ambiguity",
     "case_probabilities",
     "case_verdict",
-    "colour_of",
-    "doubt",
     "explains",
     "is_parameter",
     "judge",
-    "most_believed",
     "parts_of",
+    "penalty",
     "price",
+    "probability_cap",
     "same_recordings",
     "share_left",
     "significant",
@@ -60,5 +70,5 @@ __all__ = [
     "unlikely",
     "visited",
     "weigh",
-    "without_colour",
+    "without_autocorrelation",
 ]

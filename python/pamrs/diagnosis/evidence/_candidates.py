@@ -1,4 +1,6 @@
-"""Sets of effects that are tried: what each is, how it is fitted, and how it is judged on held-out recordings."""
+"""Sets of effects that are tried: what each is, how it is fitted, and how it is judged on held-out
+recordings.
+"""
 
 from __future__ import annotations
 
@@ -6,8 +8,18 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
-from pamrs.diagnosis.fit import Fit, Key, Problem, Start, acts_in, fit, fit_events, look_for_events, residuals
-from pamrs.diagnosis.noise import Excess, Floor, excess, inflation
+from pamrs.diagnosis.fit import (
+    Fit,
+    Key,
+    Problem,
+    Start,
+    acts_in,
+    fit,
+    fit_events,
+    look_for_events,
+    residuals,
+)
+from pamrs.diagnosis.noise import Excess, NoiseLevel, excess, inflation
 from pamrs.diagnosis.prepare import Block, Residual
 from pamrs.diagnosis.screen import left_out
 from pamrs.diagnosis.settings import DiagnosisSettings
@@ -15,7 +27,7 @@ from pamrs.effects import EFFECTS, find_parameter
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 
-__all__ = ["Attempts", "Candidate", "Group", "significant", "start_of", "without_colour"]
+__all__ = ["Attempts", "Candidate", "Group", "significant", "start_of", "without_autocorrelation"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +49,7 @@ class Candidate:
     scatter : float
         Relative scatter of its size between recordings, beyond its uncertainty.
     gain : float
-        Gain in chi-square that the screen promised of a single effect.
+        Gain in chi-square that the screen predicted for a single effect.
     wrong : tuple of str
         Dotted names of the parameters that were freed from their tolerance.
     """
@@ -62,13 +74,19 @@ class Candidate:
         return "+".join(self.names)
 
     def outside(self, walls: float) -> float:
-        """How far outside its tolerances what is wrong is: the logarithm of how many times the walls, of each parameter."""
+        """How far outside its tolerances what is wrong is: the logarithm of how many times the
+        walls, of each parameter.
+        """
         return sum(math.log(max(1.0, abs(self.fit.moved[name]) / walls)) for name in self.wrong)
 
     @property
     def misfit(self) -> float:
-        """Sum over the blocks of the residual in units of its noise, squared, on the recordings to fit."""
-        return sum(float(((r.value[r.rows] / r.noise) ** 2).sum()) for r in self.fit.residuals.values())
+        """Sum over the blocks of the residual in units of its noise, squared, on the recordings to
+        fit.
+        """
+        return sum(
+            float(((r.value[r.rows] / r.noise) ** 2).sum()) for r in self.fit.residuals.values()
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,27 +102,30 @@ class Group:
     candidates : list of Candidate
         The baseline first, then every set of effects tried.
     probabilities : dict of str to float
-        Over the hypotheses (names joined by ``+``: ids of effects, dotted names of wrong parameters), ``unlisted`` and ``""``
-        (nothing missing here, or parameters that are off inside their tolerances).
+        Over the hypotheses (names joined by ``+``: ids of effects, dotted names of wrong
+        parameters), ``unlisted`` and ``""`` (nothing missing here, or parameters that are off
+        inside their tolerances).
     mismatch : Block or None
         The block with the largest significant excess after the refit.
-    floor : dict
-        Noise floors.
+    noise_level : dict
+        Noise levels.
     suspects : list of Block
         Blocks that keep an excess.
     closure : Candidate or None
-        Where no name is likely: a form of what is missing that predicts held-out recordings better than the baseline.
+        Where no name is likely: a form of what is missing that predicts held-out recordings better
+        than the baseline.
     sought : bool
         Whether one was looked for.
-    faint : bool
-        Whether no block keeps an excess, and an effect was found by its signature, or by a parameter that it lets go back:
-        ``mismatch`` (and the only suspect) is then the block in which it acts.
+    below_noise : bool
+        Whether no block keeps an excess, and an effect was found by its signature, or by a
+        parameter that it lets go back: ``mismatch`` (and the only suspect) is then the block in
+        which it acts.
     instead : tuple of str
         Parameters that would have to be far from their nominal values instead of it.
     inclusion : dict of str to float
-        Share of resampled recordings in which the screen would have taken each lasting effect.
-    promised : dict of str to float
-        Share of the mismatch that each effect that was asked could take by its signature alone.
+        Share of resampled recordings in which the screen would have taken each persistent effect.
+    predicted_gain : dict of str to float
+        Share of the mismatch that each tested effect could take by its signature alone.
     """
 
     blocks: list[Block]
@@ -113,14 +134,14 @@ class Group:
     candidates: list[Candidate]
     probabilities: dict[str, float]
     mismatch: Block | None
-    floor: dict[Key, Floor]
+    noise_level: dict[Key, NoiseLevel]
     suspects: list[Block]
     closure: Candidate | None = None
     sought: bool = False
-    faint: bool = False
+    below_noise: bool = False
     instead: tuple[str, ...] = ()
     inclusion: dict[str, float] = field(default_factory=dict)
-    promised: dict[str, float] = field(default_factory=dict)
+    predicted_gain: dict[str, float] = field(default_factory=dict)
 
     @property
     def best(self) -> Candidate:
@@ -132,18 +153,22 @@ class Group:
 
 
 def significant(found: Excess, ratio: float = 1.0) -> bool:
-    """Whether a block keeps more than its noise, and so many times its floor at least."""
+    """Whether a block's residual is significantly above the noise, and at least so many times its
+    noise level.
+    """
     return found.ratio > max(ratio, found.limit)
 
 
 @dataclass(frozen=True, eq=False)
 class Attempts:
-    """What every attempt at an explanation needs: recordings to fit and held out, model, floors, blocks that keep an excess."""
+    """What every attempt at an explanation needs: recordings to fit and held out, model, noise
+    levels, blocks with an excess.
+    """
 
     inner: Problem
     outer: Problem
     nominal: Rig
-    floor: dict[Key, Floor]
+    noise_level: dict[Key, NoiseLevel]
     out: dict[str, Excess]
     suspects: list[Block]
 
@@ -154,30 +179,32 @@ class Attempts:
 
     @property
     def white(self) -> dict[str, float]:
-        """Weights of noise without colour."""
-        return without_colour(self.inner.blocks)
+        """Weights of noise without autocorrelation."""
+        return without_autocorrelation(self.inner.blocks)
 
     @property
     def same(self) -> bool:
         """Whether there is no held-out recording."""
         return self.outer.recordings is self.inner.recordings
 
-    def colour(self, found: Fit) -> dict[str, float]:
-        """Weights of the colour that a fit leaves."""
-        return colour_of(self.inner, found)
+    def autocorrelation(self, found: Fit) -> dict[str, float]:
+        """Weights of the autocorrelation that a fit leaves."""
+        return autocorrelation_of(self.inner, found)
 
     def start_of(self, found: Fit, effect: str) -> Start:
         """Where another fit goes on from an effect as it was fitted."""
         return start_of(found, effect, self.settings.fit.least_start)
 
-    def eventful(self, effect: str, beside: Candidate) -> Candidate | None:
-        """An effect with times of its own in every recording, held-out ones included, beside the effects of a candidate."""
+    def transient(self, effect: str, beside: Candidate) -> Candidate | None:
+        """An effect with times of its own in every recording, held-out ones included, beside the
+        effects of a candidate.
+        """
         try:
-            return self._eventful(effect, beside)
+            return self._transient(effect, beside)
         except SimulationError:
             return None  # it leaves the range in which the model holds
 
-    def _eventful(self, effect: str, beside: Candidate) -> Candidate | None:
+    def _transient(self, effect: str, beside: Candidate) -> Candidate | None:
         white = self.white
         model = self.nominal
         for entry in beside.fit.rig.effects:
@@ -198,22 +225,30 @@ class Attempts:
         if events is None:
             return self.judged(effects, found, quiet)
         everywhere = replace(
-            found, events=replace(events, values=found.events.values | events.values if found.events else events.values)
+            found,
+            events=replace(
+                events,
+                values=found.events.values | events.values if found.events else events.values,
+            ),
         )
         return self.judged(effects, everywhere, residuals(self.outer, bare, events=events))
 
-    def _beside(self, found: Fit, beside: Candidate, colour: dict[str, float]) -> Fit:
-        """The lasting effects of a candidate fitted again, with the events that were found beside them held."""
+    def _beside(self, found: Fit, beside: Candidate, autocorrelation: dict[str, float]) -> Fit:
+        """The persistent effects of a candidate fitted again, with the events that were found
+        beside them held.
+        """
         assert found.events is not None
         effect = found.events.effect
         own, kept = parts_of([self.start_of(beside.fit, e) for e in beside.effects])
-        warm = replace(beside.fit, values=beside.fit.values | {n: found.values[n] for n in beside.fit.moved})
+        warm = replace(
+            beside.fit, values=beside.fit.values | {n: found.values[n] for n in beside.fit.moved}
+        )
         again = fit(
             self.inner,
             self.nominal,
             beside.effects,
             own,
-            colour,
+            autocorrelation,
             fixed=kept,
             warm=warm,
             frozen=True,
@@ -221,7 +256,11 @@ class Attempts:
             evaluations=self.settings.transients.evaluations_beside,
         )
         happened = next(iter(found.events.values.values()))
-        parts = {n: (found.values[n], found.std[n]) for n in found.values if n.partition(".")[0] == effect}
+        parts = {
+            n: (found.values[n], found.std[n])
+            for n in found.values
+            if n.partition(".")[0] == effect
+        }
         return replace(
             again,
             effects=(*beside.effects, effect),
@@ -232,23 +271,42 @@ class Attempts:
 
     def excess(self, block: Block, problem: Problem, found: dict[Key, Residual]) -> Excess:
         """What a block keeps of some recordings."""
-        return excess(block, problem.recordings, found, self.floor, self.settings.noise)
+        return excess(block, problem.recordings, found, self.noise_level, self.settings.noise)
 
-    def judged(self, effects: tuple[str, ...], found: Fit, outside: dict[Key, Residual] | None = None) -> Candidate:
-        """A fitted set on the held-out recordings, or on each recording as the others predict it."""
+    def judged(
+        self, effects: tuple[str, ...], found: Fit, outside: dict[Key, Residual] | None = None
+    ) -> Candidate:
+        """A fitted set on the held-out recordings, or on each recording as the others predict
+        it.
+        """
         if outside is None:
-            outside = left_out(self.inner, found, self.colour(found)) if self.same else residuals(self.outer, found.rig)
+            outside = (
+                left_out(self.inner, found, self.autocorrelation(found))
+                if self.same
+                else residuals(self.outer, found.rig)
+            )
         after = {b.name: self.excess(b, self.outer, outside) for b in self.inner.blocks}
         inside = {b.name: self.excess(b, self.inner, found.residuals) for b in self.inner.blocks}
-        gaps = [(self.out[b.name].ratio - 1.0, max(0.0, after[b.name].ratio - 1.0)) for b in self.suspects]
+        gaps = [
+            (self.out[b.name].ratio - 1.0, max(0.0, after[b.name].ratio - 1.0))
+            for b in self.suspects
+        ]
         total = sum(math.sqrt(max(0.0, g)) for g, _ in gaps)
         gap = 1.0 - sum(math.sqrt(a) for _, a in gaps) / total if total > 0 else 0.0
         return Candidate(effects, found, after, inside, gap, _scatter(effects, self.inner, found))
 
-    def fitted(self, starts: list[Start], warm: Fit, colour: dict[str, float], share: float | None = None) -> Candidate | None:
-        """A set of effects fitted from one start of each, residuals weighted by their own colour; None where it cannot be run.
+    def fitted(
+        self,
+        starts: list[Start],
+        warm: Fit,
+        autocorrelation: dict[str, float],
+        share: float | None = None,
+    ) -> Candidate | None:
+        """A set of effects fitted from one start of each, residuals weighted by their own
+        autocorrelation; None where it cannot be run.
 
-        ``share`` is another share of the sum of squares than that of the settings below which a step is not worth it.
+        ``share`` is another share of the sum of squares than that of the settings below which a
+        step is not worth it.
         """
         effects = tuple(start.effect for start in starts)
         free, held = parts_of(starts)
@@ -256,33 +314,56 @@ class Attempts:
         limit = settings.sealed_evaluations if sealed else settings.effect_evaluations
         try:
             best = fit(
-                self.inner, self.nominal, effects, free, colour, fixed=held, warm=warm, frozen=True, evaluations=limit, share=share
+                self.inner,
+                self.nominal,
+                effects,
+                free,
+                autocorrelation,
+                fixed=held,
+                warm=warm,
+                frozen=True,
+                evaluations=limit,
+                share=share,
             )
-            colour = self.colour(best)
-            if max(colour.values()) > self.settings.noise.correlated_variance:
-                again = {n: _off_zero(n, v, settings.least_start) for n, v in best.values.items() if n.partition(".")[0] in EFFECTS}
+            autocorrelation = self.autocorrelation(best)
+            if max(autocorrelation.values()) > self.settings.noise.correlated_variance:
+                again = {
+                    n: _off_zero(n, v, settings.least_start)
+                    for n, v in best.values.items()
+                    if n.partition(".")[0] in EFFECTS
+                }
                 best = fit(
-                    self.inner, self.nominal, effects, again, colour, fixed=held, warm=best, frozen=True, evaluations=limit, share=share
+                    self.inner,
+                    self.nominal,
+                    effects,
+                    again,
+                    autocorrelation,
+                    fixed=held,
+                    warm=best,
+                    frozen=True,
+                    evaluations=limit,
+                    share=share,
                 )
             return self.judged(effects, best)
         except SimulationError:
             return None  # it leaves the range in which the model holds
 
     def freed(self, names: tuple[str, ...], baseline: Fit) -> Candidate | None:
-        """The baseline with some parameters freed from their tolerance, fitted to its end; None where it cannot be run.
+        """The baseline with some parameters freed from their tolerance, fitted to its end; None
+        where it cannot be run.
 
-        It begins at the nominal values, where the other parameters belong if these are the wrong ones; and, where that leaves more than
-        noise, at those that the baseline was moved to.
+        It begins at the nominal values, where the other parameters belong if these are the wrong
+        ones; and, where that leaves more than noise, at those that the baseline was moved to.
         """
         settings = self.settings
 
-        def found(colour: dict[str, float], begun: Fit | None) -> Fit:
+        def found(autocorrelation: dict[str, float], begun: Fit | None) -> Fit:
             return fit(
                 self.inner,
                 self.nominal,
                 (),
                 {},
-                colour,
+                autocorrelation,
                 warm=begun,
                 freed=names,
                 evaluations=settings.fit.baseline_evaluations,
@@ -293,9 +374,9 @@ class Attempts:
         for begin in (None, baseline):
             try:
                 first = found(self.white, begin)
-                colour = self.colour(first)
-                correlated = max(colour.values()) > settings.noise.correlated_variance
-                judged = self.judged((), found(colour, first) if correlated else first)
+                autocorrelation = self.autocorrelation(first)
+                correlated = max(autocorrelation.values()) > settings.noise.correlated_variance
+                judged = self.judged((), found(autocorrelation, first) if correlated else first)
             except SimulationError:
                 continue  # it leaves the range in which the model holds
             if best is None or judged.misfit < best.misfit:
@@ -305,37 +386,57 @@ class Attempts:
         return best
 
     def united(self, candidates: list[Candidate]) -> Fit | None:
-        """One fit with everything that some hypotheses name, each for a block of its own; None where it cannot be run."""
+        """One fit with everything that some hypotheses name, each for a block of its own; None
+        where it cannot be run.
+        """
         if any(c.fit.events is not None for c in candidates):
             return None
         effects = tuple(effect for c in candidates for effect in c.effects)
-        free, held = parts_of(self.start_of(c.fit, effect) for c in candidates for effect in c.effects)
+        free, held = parts_of(
+            self.start_of(c.fit, effect) for c in candidates for effect in c.effects
+        )
         wrong = [name for c in candidates for name in c.wrong]
-        warm = replace(candidates[0].fit, values=candidates[0].fit.values | {n: c.fit.values[n] for c in candidates for n in c.wrong})
+        warm = replace(
+            candidates[0].fit,
+            values=candidates[0].fit.values
+            | {n: c.fit.values[n] for c in candidates for n in c.wrong},
+        )
         share = self.settings.fit.final_step_share
         try:
-            return fit(self.inner, self.nominal, effects, free, self.white, fixed=held, warm=warm, freed=wrong, share=share)
+            return fit(
+                self.inner,
+                self.nominal,
+                effects,
+                free,
+                self.white,
+                fixed=held,
+                warm=warm,
+                freed=wrong,
+                share=share,
+            )
         except SimulationError:
             return None
 
     def polished(self, candidate: Candidate) -> Candidate:
-        """A fitted set of lasting effects, fitted on with the sensitivities of every parameter where it is.
+        """A fitted set of persistent effects, fitted on with the sensitivities of every parameter
+        where it is.
 
-        The first fit keeps the baseline's sensitivities as they were without the effects and ends where little is to be gained; of sets
-        that nearly say the same the one that was left further from its end would lose.
+        The first fit keeps the baseline's sensitivities as they were without the effects and ends
+        where little is to be gained; of sets that nearly say the same the one that was left further
+        from its end would lose.
         """
         found = candidate.fit
         if found.events is not None or not candidate.effects:
             return candidate
         free, held = parts_of([self.start_of(found, effect) for effect in candidate.effects])
-        colour = self.colour(found)
+        autocorrelation = self.autocorrelation(found)
         try:
             best = fit(
                 self.inner,
                 self.nominal,
                 candidate.effects,
                 free,
-                colour,
+                autocorrelation,
                 fixed=held,
                 warm=found,
                 evaluations=self.settings.fit.polish_evaluations,
@@ -346,15 +447,17 @@ class Attempts:
             return candidate
 
 
-def without_colour(blocks: Iterable[Block]) -> dict[str, float]:
+def without_autocorrelation(blocks: Iterable[Block]) -> dict[str, float]:
     """Weights of blocks whose noise is white."""
     return dict.fromkeys((b.name for b in blocks), 1.0)
 
 
-def colour_of(problem: Problem, found: Fit) -> dict[str, float]:
-    """Weights of the colour that a fit leaves in each block."""
+def autocorrelation_of(problem: Problem, found: Fit) -> dict[str, float]:
+    """Weights of the autocorrelation that a fit leaves in each block."""
     width = problem.settings.noise.fit_bin_time
-    return {b.name: inflation(b, problem.recordings, found.residuals, width) for b in problem.blocks}
+    return {
+        b.name: inflation(b, problem.recordings, found.residuals, width) for b in problem.blocks
+    }
 
 
 def parts_of(starts: Iterable[Start]) -> tuple[dict[str, float], dict[str, float]]:
@@ -372,9 +475,17 @@ def start_of(found: Fit, effect: str, least: float) -> Start:
 
     ``least`` is the share of a typical size that a parameter has at the least.
     """
-    own = {name: _off_zero(name, value, least) for name, value in found.values.items() if name.partition(".")[0] == effect}
+    own = {
+        name: _off_zero(name, value, least)
+        for name, value in found.values.items()
+        if name.partition(".")[0] == effect
+    }
     entry = next(e for e in found.rig.effects if e["id"] == effect)
-    held = {f"{effect}.{n}": v for n, v in entry["parameters"].items() if f"{effect}.{n}" not in found.values}
+    held = {
+        f"{effect}.{n}": v
+        for n, v in entry["parameters"].items()
+        if f"{effect}.{n}" not in found.values
+    }
     return Start(effect, own, held, (), False)
 
 
@@ -387,14 +498,16 @@ def _off_zero(name: str, value: float, share: float) -> float:
 def _typical(name: str) -> float:
     """A typical size of an effect's parameter, at least its lower bound."""
     parameter = find_parameter(name)
-    return max(parameter.default or parameter.starts[-1], parameter.lower, 1e-3 * parameter.starts[0])
+    return max(
+        parameter.default or parameter.starts[-1], parameter.lower, 1e-3 * parameter.starts[0]
+    )
 
 
 def _scatter(effects: tuple[str, ...], problem: Problem, best: Fit) -> float:
     """Relative scatter of a single effect's size between recordings, beyond its uncertainty.
 
-    One Gauss-Newton step of the effect's leading parameter alone in each recording: a wrong effect needs another size in
-    every regime.
+    One Gauss-Newton step of the effect's leading parameter alone in each recording: a wrong effect
+    needs another size in every regime.
     """
     if len(effects) != 1 or len(problem.recordings) < 2:
         return 0.0
@@ -420,5 +533,7 @@ def _scatter(effects: tuple[str, ...], problem: Problem, best: Fit) -> float:
             errors.append(1.0 / math.sqrt(den) / best.values[leading])
     if len(steps) < 2:
         return 0.0
-    beyond = [max(0.0, abs(s) - settings.fit.scatter_stds * e) for s, e in zip(steps, errors, strict=True)]
+    beyond = [
+        max(0.0, abs(s) - settings.fit.scatter_stds * e) for s, e in zip(steps, errors, strict=True)
+    ]
     return float(max(beyond))

@@ -1,7 +1,8 @@
 """What each group of blocks says, beside what the others say, and what the case comes to.
 
-Groups of blocks are judged by themselves: what one keeps without a name says nothing of what another one has. Only an effect that acts
-in two groups ties them: it is one effect, so that its evidence in both counts together.
+Groups of blocks are judged by themselves: what one keeps without a name says nothing of what
+another one has. Only an effect that acts in two groups ties them: it is one effect, so that its
+evidence in both counts together.
 """
 
 from __future__ import annotations
@@ -14,7 +15,15 @@ from dataclasses import dataclass
 from pamrs.diagnosis.evidence._candidates import Candidate, Group, significant
 from pamrs.diagnosis.settings import DiagnosisSettings, VerdictSettings
 
-__all__ = ["Judged", "case_ambiguity", "case_probabilities", "case_verdict", "is_parameter", "judge", "symptoms_of"]
+__all__ = [
+    "Judged",
+    "case_ambiguity",
+    "case_probabilities",
+    "case_verdict",
+    "is_parameter",
+    "judge",
+    "symptoms_of",
+]
 
 HEALTHY = ("none", "parameters")
 WITHOUT_NAME = (*HEALTHY, "unlisted")
@@ -32,8 +41,8 @@ class Judged:
     verdict : str
         ``none``, ``parameters``, ``effects`` or ``unlisted``.
     probabilities : dict of str to float
-        Over ``none``, ``parameters``, ``unlisted``, sets of effects and wrong parameters (names joined by ``+``), the most probable
-        first.
+        Over ``none``, ``parameters``, ``unlisted``, sets of effects and wrong parameters (names
+        joined by ``+``), the most probable first.
     ambiguity : list of list of str
         Hypotheses that are left, each as its names; empty when settled.
     chosen : Candidate
@@ -62,24 +71,34 @@ class Judged:
 
 
 def is_parameter(name: str) -> bool:
-    """Whether a name in a hypothesis is that of a parameter of the rig file: ``chamber.dead_volume``."""
+    """Whether a name in a hypothesis is that of a parameter of the rig file:
+    ``chamber.dead_volume``.
+    """
     return "." in name
 
 
 def symptoms_of(group: Group, settings: DiagnosisSettings) -> dict[str, float]:
     """Parameters that the refit without effects moved to their wall, and how far [tolerances]."""
     wall = settings.wrong_parameters.wall_tolerances
-    return {name: moved for name, moved in group.candidates[0].fit.moved.items() if abs(moved) >= wall}
+    return {
+        name: moved for name, moved in group.candidates[0].fit.moved.items() if abs(moved) >= wall
+    }
 
 
 def _own(group: Group, settings: DiagnosisSettings) -> dict[str, float]:
-    """Probabilities of one group by itself; what stands under ``""`` is shared out between nothing and parameters that moved."""
+    """Probabilities of one group by itself; what stands under ``""`` is shared out between nothing
+    and parameters that moved.
+    """
     found = {key: p for key, p in group.probabilities.items() if key}
     unchanged = group.probabilities.get("", 0.0)
     shifted = bool(group.instead) or any(significant(e) for e in group.nominal.values())
     explained = any(c.wrong for c in group.candidates)
     own = settings.verdict
-    quiet = {"parameters": own.quiet_likely, "none": own.quiet_other, "unlisted": own.quiet_unlisted}
+    quiet = {
+        "parameters": own.quiet_likely,
+        "none": own.quiet_other,
+        "unlisted": own.quiet_unlisted,
+    }
     if symptoms_of(group, settings) and group.mismatch is None and not explained:
         quiet = {"parameters": own.strained_parameters, "unlisted": own.strained_unlisted}
     elif not shifted:
@@ -103,10 +122,15 @@ def judge(groups: Sequence[Group], settings: DiagnosisSettings) -> list[Judged]:
     beside: list[dict[str, float]] = [{} for _ in groups]
     for choice in itertools.product(*(p.items() for p in own)):
         effects = [n for key, _ in choice for n in key.split("+") if n not in WITHOUT_NAME]
-        weight = math.prod(p for _, p in choice) * settings.verdict.shared_odds ** (len(effects) - len(set(effects)))
+        weight = math.prod(p for _, p in choice) * settings.verdict.shared_odds ** (
+            len(effects) - len(set(effects))
+        )
         for found, (key, _) in zip(beside, choice, strict=True):
             found[key] = found.get(key, 0.0) + weight
-    return [_judged(group, _normalised(found), settings.verdict) for group, found in zip(groups, beside, strict=True)]
+    return [
+        _judged(group, _normalised(found), settings.verdict)
+        for group, found in zip(groups, beside, strict=True)
+    ]
 
 
 def _normalised(weights: dict[str, float]) -> dict[str, float]:
@@ -115,7 +139,9 @@ def _normalised(weights: dict[str, float]) -> dict[str, float]:
 
 
 def _judged(group: Group, probabilities: dict[str, float], settings: VerdictSettings) -> Judged:
-    """The verdict: that of the most probable hypothesis; without a name only if no single name is more probable than not."""
+    """The verdict: that of the most probable hypothesis; without a name only if no single name is
+    more probable than not.
+    """
     start = group.candidates[0]
     names = {key: p for key, p in probabilities.items() if key not in WITHOUT_NAME}
     healthy = max(HEALTHY, key=lambda key: probabilities.get(key, 0.0))
@@ -124,15 +150,21 @@ def _judged(group: Group, probabilities: dict[str, float], settings: VerdictSett
     ambiguity = _sets(probabilities, settings)
     if probabilities.get(healthy, 0.0) >= max(without, names.get(best, 0.0)):
         return Judged(group, healthy, probabilities, ambiguity, start)
-    marginal = {name: sum(p for key, p in names.items() if name in key.split("+")) for name in _names(names)}
+    marginal = {
+        name: sum(p for key, p in names.items() if name in key.split("+")) for name in _names(names)
+    }
     if names.get(best, 0.0) <= without and max(marginal.values(), default=0.0) <= settings.named:
         return Judged(group, "unlisted", probabilities, ambiguity, start)
     chosen = next(c for c in group.candidates if c.key == best)
-    return Judged(group, "effects" if chosen.effects else "parameters", probabilities, ambiguity, chosen)
+    return Judged(
+        group, "effects" if chosen.effects else "parameters", probabilities, ambiguity, chosen
+    )
 
 
 def _sets(probabilities: dict[str, float], settings: VerdictSettings) -> list[list[str]]:
-    """Hypotheses that are left, the most probable first; none where one is settled, ``none`` and ``parameters`` being one answer."""
+    """Hypotheses that are left, the most probable first; none where one is settled, ``none`` and
+    ``parameters`` being one answer.
+    """
     healthy = sum(probabilities.get(key, 0.0) for key in HEALTHY)
     others = [p for key, p in probabilities.items() if key not in HEALTHY]
     if max(healthy, *others, 0.0) >= settings.settled:
@@ -142,7 +174,9 @@ def _sets(probabilities: dict[str, float], settings: VerdictSettings) -> list[li
 
 
 def case_verdict(judged: Sequence[Judged]) -> str:
-    """The verdict of a case: a name wherever a block has one, what is missing without a name only where there is none."""
+    """The verdict of a case: a name wherever a block has one, what is missing without a name only
+    where there is none.
+    """
     found = [j.verdict for j in judged]
     if "effects" in found or any(j.wrong for j in judged):
         return "effects" if "effects" in found else "parameters"
@@ -152,8 +186,8 @@ def case_verdict(judged: Sequence[Judged]) -> str:
 def case_probabilities(judged: Sequence[Judged], settings: VerdictSettings) -> dict[str, float]:
     """Probabilities of what a case may be told to have: the names of all its blocks together.
 
-    ``unlisted`` is that something is missing and nothing has a name. What one block keeps without a name takes nothing from a name in
-    another.
+    ``unlisted`` is that something is missing and nothing has a name. What one block keeps without a
+    name takes nothing from a name in another.
     """
     found = dict.fromkeys(WITHOUT_NAME, 0.0)
     for choice in itertools.product(*(j.probabilities.items() for j in judged)):
@@ -162,11 +196,15 @@ def case_probabilities(judged: Sequence[Judged], settings: VerdictSettings) -> d
         rest = next((key for key in ("unlisted", "parameters") if key in keys), "none")
         key = "+".join(names) or rest
         found[key] = found.get(key, 0.0) + math.prod(p for _, p in choice)
-    return _normalised({key: p for key, p in found.items() if p >= settings.listed or key in WITHOUT_NAME})
+    return _normalised(
+        {key: p for key, p in found.items() if p >= settings.listed or key in WITHOUT_NAME}
+    )
 
 
 def case_ambiguity(judged: Sequence[Judged], settings: VerdictSettings) -> list[list[str]]:
-    """Sets of names that a case leaves open: the open sets of its blocks, each beside what is settled in the others."""
+    """Sets of names that a case leaves open: the open sets of its blocks, each beside what is
+    settled in the others.
+    """
     if not any(j.ambiguity for j in judged):
         return []
     # what a block is settled to keep without a name is no part of the question
@@ -176,7 +214,10 @@ def case_ambiguity(judged: Sequence[Judged], settings: VerdictSettings) -> list[
         flat = [name for names in choice for name in names]
         rest = next((word for word in reversed(WITHOUT_NAME) if word in flat), None)
         # nothing else counts beside a name but that something else is missing
-        entry = [*_names(flat), *([rest] if rest == "unlisted" or (rest and not _names(flat)) else [])]
+        entry = [
+            *_names(flat),
+            *([rest] if rest == "unlisted" or (rest and not _names(flat)) else []),
+        ]
         if entry and entry not in found:
             found.append(entry)
     return found[: settings.most_sets] if len(found) > 1 else []

@@ -16,11 +16,11 @@ from pamrs.diagnosis.settings import DiagnosisSettings, EvidenceSettings
 from pamrs.effects import EFFECTS, SameData, find_parameter
 
 __all__ = [
-    "believed",
-    "doubt",
+    "capped",
     "explains",
-    "most_believed",
+    "penalty",
     "price",
+    "probability_cap",
     "same_recordings",
     "share_left",
     "stands",
@@ -35,7 +35,9 @@ Ranges = dict[str, tuple[float, float]]
 
 
 def visited(problem: Problem) -> Ranges:
-    """Range of each kind of channel that is the output of one block alone: the angle of a rig's only joint."""
+    """Range of each kind of channel that is the output of one block alone: the angle of a rig's
+    only joint.
+    """
     channels: dict[str, list[str]] = {}
     for block in problem.blocks:
         channels.setdefault(channel_of(block.channel), []).append(block.channel)
@@ -47,11 +49,12 @@ def visited(problem: Problem) -> Ranges:
     return found
 
 
-def most_believed(fitted: Problem, mismatch: Block, left: float, *, same: bool) -> float:
-    """How far any name is believed at most, which is less where the proof is weak.
+def probability_cap(fitted: Problem, mismatch: Block, left: float, *, same: bool) -> float:
+    """Largest probability that any name can get, which is less where the proof is weak.
 
-    A slow drift of less than two percent of the pressure, with no held-out recording, may as well be the bench's own loss,
-    creep of a wall or the transducer's drift. ``same`` says that nothing is held out, ``left`` what the refit leaves of the channel.
+    A slow drift of less than two percent of the pressure, with no held-out recording, may as well
+    be the bench's own loss, creep of a wall or the transducer's drift. ``same`` says that nothing
+    is held out, ``left`` what the refit leaves of the channel.
     """
     settings = fitted.settings.evidence
     if not same or mismatch.channel != "muscle_pressure":
@@ -61,33 +64,49 @@ def most_believed(fitted: Problem, mismatch: Block, left: float, *, same: bool) 
     return settings.drift_probability if drifts else settings.most_probability
 
 
-def share_left(candidate: Candidate, baseline: Candidate, suspects: list[Block], settings: EvidenceSettings) -> float:
-    """Share of the baseline's excess variance that a set of effects leaves, the larger of fitted and held-out recordings.
+def share_left(
+    candidate: Candidate, baseline: Candidate, suspects: list[Block], settings: EvidenceSettings
+) -> float:
+    """Share of the baseline's excess variance that a set of effects leaves, the larger of fitted
+    and held-out recordings.
 
-    Recordings that hardly show the mismatch cannot say how much of it is left; what an effect brings into them, beyond what noise
-    may, counts beside the mismatch of the others.
+    Recordings that hardly show the mismatch cannot say how much of it is left; what an effect
+    brings into them, beyond what noise may, counts beside the mismatch of the others.
     """
     found = _excesses(candidate, baseline, suspects)
     most = max(before for before, _ in found)
     telling = settings.telling_excess
-    asked = min(telling, settings.telling_share * most)
-    shares = [after / before for before, after in found if before > asked]
-    shares += [(after - telling) / max(most, telling) for before, after in found if before <= asked and after > telling]
+    threshold = min(telling, settings.telling_share * most)
+    shares = [after / before for before, after in found if before > threshold]
+    shares += [
+        (after - telling) / max(most, telling)
+        for before, after in found
+        if before <= threshold and after > telling
+    ]
     return max(shares, default=1.0)
 
 
-def _excesses(candidate: Candidate, baseline: Candidate, suspects: list[Block]) -> list[tuple[float, float]]:
+def _excesses(
+    candidate: Candidate, baseline: Candidate, suspects: list[Block]
+) -> list[tuple[float, float]]:
     """Excess variance that the baseline and a set leave, on fitted and on held-out recordings."""
 
     def over(found: dict[str, Excess]) -> float:
         return sum(max(0.0, found[b.name].ratio - 1.0) for b in suspects)
 
-    return [(over(baseline.fitted), over(candidate.fitted)), (over(baseline.held_out), over(candidate.held_out))]
+    return [
+        (over(baseline.fitted), over(candidate.fitted)),
+        (over(baseline.held_out), over(candidate.held_out)),
+    ]
 
 
-def explains(candidate: Candidate, baseline: Candidate, suspects: list[Block], settings: EvidenceSettings) -> bool:
+def explains(
+    candidate: Candidate, baseline: Candidate, suspects: list[Block], settings: EvidenceSettings
+) -> bool:
     """Whether only noise is left, fitted and held out, where there was clearly more."""
-    quiet = not any(significant(e[b.name]) for b in suspects for e in (candidate.fitted, candidate.held_out))
+    quiet = not any(
+        significant(e[b.name]) for b in suspects for e in (candidate.fitted, candidate.held_out)
+    )
     before, after = max(_excesses(candidate, baseline, suspects))
     return quiet and after < settings.clear_share * before
 
@@ -103,24 +122,31 @@ def weigh(
 ) -> dict[str, float]:
     """Probabilities over sets of effects and ``unlisted``.
 
-    Between sets: the logarithm of what each leaves of the mismatch, fitted and held out, on a nominal number of independent looks;
-    what the form of an equation may leave (``form_share`` of the settings) is granted to all of them, so that no second effect is
-    asked for to mend the form of the first; among sets of as many effects less is granted (``form_share_alike``). What is left of a
-    faint mismatch counts by what noise could leave of it. Each parameter and each further effect has its price, and so have a clock
-    that does not drift and values that an effect hardly has (:func:`unlikely`). Against ``unlisted``: the share of the mismatch that
-    the set explains where it explains least, and whether its size is the same in all recordings; sets that are not believed
-    themselves say nothing against one that is. The constants are those under which the stated probabilities came true in a trial
-    with other seeds than the published one (docs/decisions/0014).
+    Between sets: the logarithm of what each leaves of the mismatch, fitted and held out, on a
+    nominal number of independent looks; what the form of an equation may leave (``form_share`` of
+    the settings) is granted to all of them, so that no second effect is asked for to mend the form
+    of the first; among sets of as many effects less is granted (``form_share_alike``). What is left
+    of a mismatch near the noise counts by what noise could leave of it. Each parameter and each
+    further effect has its price, and so have a clock that does not drift and values that an effect
+    hardly has (:func:`unlikely`). Against ``unlisted``: the share of the mismatch that the set
+    explains where it explains least, and whether its size is the same in all recordings; improbable
+    sets themselves say nothing against one that is. The constants are those under which the stated
+    probabilities came true in a trial with other seeds than the published one
+    (docs/decisions/0014).
 
-    ``seconds`` is the length of the longest recording that was fitted, ``ranging`` what was visited in them,
-    ``own`` the blocks in which each set is judged against ``unlisted``, where these are not all the suspects.
+    ``seconds`` is the length of the longest recording that was fitted, ``ranging`` what was visited
+    in them, ``own`` the blocks in which each set is judged against ``unlisted``, where these are
+    not all the suspects.
     """
     named = [c for c in candidates if c.names]
     if not named:
         return {"unlisted": 1.0}
     start = candidates[0]
     evidence = settings.evidence
-    trusted = {c: _trusted(c, start, suspects if own is None else own[c], most, seconds, evidence) for c in named}
+    trusted = {
+        c: _trusted(c, start, suspects if own is None else own[c], most, seconds, evidence)
+        for c in named
+    }
 
     def weights_of(granted: float) -> dict[Candidate, float]:
         scores = {
@@ -170,34 +196,56 @@ def _shared_out(
             left, beside = (share_left(c, start, suspects, settings) for c in (one, other))
             if left > beside + settings.form_share_alike:
                 continue
-            both, odds = out.get(one.key, 0.0) + out.get(other.key, 0.0), math.exp(settings.standing_price)
+            both, odds = (
+                out.get(one.key, 0.0) + out.get(other.key, 0.0),
+                math.exp(settings.standing_price),
+            )
             out[one.key], out[other.key] = both / (1.0 + odds), both * odds / (1.0 + odds)
 
 
-def same_recordings(candidate: Candidate, effect: str, seconds: float, settings: EvidenceSettings) -> bool:
-    """Whether an effect of a set leaves the very recordings that another effect of the catalogue would leave."""
+def same_recordings(
+    candidate: Candidate, effect: str, seconds: float, settings: EvidenceSettings
+) -> bool:
+    """Whether an effect of a set leaves the very recordings that another effect of the catalogue
+    would leave.
+    """
     same = EFFECTS[effect].same_data
     if same is None:
         return False
-    own: dict[str, float] = next((e["parameters"] for e in candidate.fit.rig.effects if e["id"] == effect), {})
+    own: dict[str, float] = next(
+        (e["parameters"] for e in candidate.fit.rig.effects if e["id"] == effect), {}
+    )
     if not own:
         return False
-    telling, spread = own[same.without] * seconds, candidate.fit.std.get(f"{effect}.{same.without}", 0.0) * seconds
-    at_rest = abs(telling) < max(settings.same_share * abs(own[same.size]), settings.same_stds * spread)
-    return bool(own[same.size] > 0.0 and at_rest and all(own[name] == value for name, value in same.held))
+    telling, spread = (
+        own[same.without] * seconds,
+        candidate.fit.std.get(f"{effect}.{same.without}", 0.0) * seconds,
+    )
+    at_rest = abs(telling) < max(
+        settings.same_share * abs(own[same.size]), settings.same_stds * spread
+    )
+    return bool(
+        own[same.size] > 0.0 and at_rest and all(own[name] == value for name, value in same.held)
+    )
 
 
-def _beside_values(scores: dict[Candidate, float], settings: EvidenceSettings) -> dict[Candidate, float]:
-    """Scores of effects and of wrong values made comparable: what the priors of the other parameters lose counts between the two.
+def _beside_values(
+    scores: dict[Candidate, float], settings: EvidenceSettings
+) -> dict[Candidate, float]:
+    """Scores of effects and of wrong values made comparable: what the priors of the other
+    parameters lose counts between the two.
 
-    A value that is wrong lets the others go back to where they were expected; sets of effects keep their order among each other,
-    since what moves beside them is the form of their equations as well.
+    A value that is wrong lets the others go back to where they were expected; sets of effects keep
+    their order among each other, since what moves beside them is the form of their equations as
+    well.
     """
     if not any(c.wrong for c in scores):
         return scores
     effects = [c for c in scores if not c.wrong]
     shared = strained(max(effects, key=lambda c: scores[c]), settings) if effects else 0.0
-    return {c: score - (strained(c, settings) if c.wrong else shared) for c, score in scores.items()}
+    return {
+        c: score - (strained(c, settings) if c.wrong else shared) for c, score in scores.items()
+    }
 
 
 def strained(candidate: Candidate, settings: EvidenceSettings) -> float:
@@ -215,27 +263,35 @@ def _trusted(
 ) -> float:
     """Probability of a set against ``unlisted``."""
     left = min(max(share_left(candidate, baseline, suspects, settings), 1e-6), 1.0 - 1e-6)
-    even = settings.log_odds_explained_pliable if _pliable(candidate) else settings.log_odds_explained
+    even = (
+        settings.log_odds_explained_pliable if _pliable(candidate) else settings.log_odds_explained
+    )
     odds = (math.log((1.0 - left) / left) - even) / settings.softness
     if explains(candidate, baseline, suspects, settings):
         odds = max(odds, settings.log_odds_noise_left)
-    return believed(odds - doubt(candidate, seconds, settings), most)
+    return capped(odds - penalty(candidate, seconds, settings), most)
 
 
 def _pliable(candidate: Candidate) -> bool:
-    """Whether it takes up a good part of anything: values of the baseline, and what happens differently in every recording."""
+    """Whether it takes up a good part of anything: values of the baseline, and what happens
+    differently in every recording.
+    """
     free = (EFFECTS[effect] for effect in candidate.effects if EFFECTS[effect].transient)
     return bool(candidate.wrong) or any(not info.leading.same_everywhere for info in free)
 
 
-def believed(odds: float, most: float) -> float:
+def capped(odds: float, most: float) -> float:
     """Probability of logarithmic odds, at most so much."""
     return most / (1.0 + math.exp(-min(60.0, max(-60.0, odds))))
 
 
-def doubt(candidate: Candidate, seconds: float, settings: EvidenceSettings) -> float:
-    """What a set's values take from the logarithm of its odds: a size that scatters between recordings, a time that was not seen."""
-    times = (value for name, value in _effect_values(candidate) if find_parameter(name).time_constant)
+def penalty(candidate: Candidate, seconds: float, settings: EvidenceSettings) -> float:
+    """What a set's values take from the logarithm of its odds: a size that scatters between
+    recordings, a time that was not seen.
+    """
+    times = (
+        value for name, value in _effect_values(candidate) if find_parameter(name).time_constant
+    )
     unseen = any(value > settings.unseen_lengths * seconds for value in times)
     scatter = max(0.0, candidate.scatter - settings.scatter) / settings.scatter_width
     return scatter + (settings.unseen_price if unseen else 0.0)
@@ -247,10 +303,14 @@ def _effect_values(candidate: Candidate) -> list[tuple[str, float]]:
 
 
 def stands(candidate: Candidate, seconds: float) -> bool:
-    """Whether a clock of a set does not drift: two free clocks do, and what is late by the same time always is a lag or a delay."""
+    """Whether a clock of a set does not drift: two free clocks do, and what is late by the same
+    time always is a lag or a delay.
+    """
 
     def at_rest(effect: str, same: SameData) -> bool:
-        size, telling = (candidate.fit.values.get(f"{effect}.{name}", 0.0) for name in (same.size, same.without))
+        size, telling = (
+            candidate.fit.values.get(f"{effect}.{name}", 0.0) for name in (same.size, same.without)
+        )
         return abs(telling) * seconds < abs(size)
 
     known = ((effect, EFFECTS[effect].same_data) for effect in candidate.effects)
@@ -260,8 +320,9 @@ def stands(candidate: Candidate, seconds: float) -> bool:
 def unlikely(candidate: Candidate, ranging: Ranges, settings: EvidenceSettings) -> float:
     """What a set loses by values that its physics hardly has.
 
-    A parameter with a prior loses by its distance from it; a contact is met near an end of the motion, and what acts over most of the
-    range is none; other parameters lose by how many times they are outside the range of usual values, for certain.
+    A parameter with a prior loses by its distance from it; a contact is met near an end of the
+    motion, and what acts over most of the range is none; other parameters lose by how many times
+    they are outside the range of usual values, for certain.
     """
     lost = 0.0
     for name, value in _effect_values(candidate):
@@ -280,7 +341,9 @@ def unlikely(candidate: Candidate, ranging: Ranges, settings: EvidenceSettings) 
     return lost
 
 
-def _contact_price(effect: str, values: Mapping[str, float], ranging: Ranges, settings: EvidenceSettings) -> float:
+def _contact_price(
+    effect: str, values: Mapping[str, float], ranging: Ranges, settings: EvidenceSettings
+) -> float:
     """What an effect loses by a contact that is met in the middle of the motion."""
     lost = 0.0
     for place in EFFECTS[effect].with_role("place"):
@@ -301,21 +364,30 @@ def _score(
     share: float,
     settings: DiagnosisSettings,
 ) -> float:
-    """Logarithm of the weight of a set of effects, up to a constant; ``share`` of the mismatch is granted to the forms of equations."""
+    """Logarithm of the weight of a set of effects, up to a constant; ``share`` of the mismatch is
+    granted to the forms of equations.
+    """
     total, evidence = 0.0, settings.evidence
     once = candidate.fitted == candidate.held_out  # the same recordings twice
     for was, now in ((baseline.fitted, candidate.fitted), (baseline.held_out, candidate.held_out)):
         for block in suspects:
             excess, left = (max(0.0, e[block.name].ratio - 1.0) for e in (was, now))
             total -= 0.25 * evidence.looks * math.log(1.0 + left + share * excess)
-            # of a faint mismatch the noise says how much may be left, of a strong one the forms
-            spread = math.hypot(now[block.name].scatter, evidence.form_error * excess, evidence.noise_error)
+            # of a mismatch near the noise the noise says how much may be left, of a strong one the
+            # forms
+            spread = math.hypot(
+                now[block.name].scatter, evidence.form_error * excess, evidence.noise_error
+            )
             total -= min(0.5 * (left / spread) ** 2, evidence.decided) * (0.5 if once else 1.0)
     return total - price(candidate, settings) - evidence.further_price * (len(candidate.names) - 1)
 
 
 def price(candidate: Candidate, settings: DiagnosisSettings) -> float:
-    """What a set pays for the parameters of its effects (of events of one kind only the first counts) and for a file that is wrong."""
-    own = settings.evidence.wrong_price * len(candidate.wrong) + candidate.outside(settings.fit.most_tolerances)
+    """What a set pays for the parameters of its effects (of events of one kind only the first
+    counts) and for a file that is wrong.
+    """
+    own = settings.evidence.wrong_price * len(candidate.wrong) + candidate.outside(
+        settings.fit.most_tolerances
+    )
     counted = [n for n, _ in _effect_values(candidate) if not find_parameter(n).repeats]
     return own + settings.evidence.parameter_price * len(counted)

@@ -14,10 +14,10 @@ from pamrs.diagnosis.evidence import (
     Candidate,
     Group,
     Judged,
+    autocorrelation_of,
     case_ambiguity,
     case_probabilities,
     case_verdict,
-    colour_of,
     is_parameter,
     judge,
     parts_of,
@@ -31,14 +31,13 @@ from pamrs.diagnosis.explain._closure_words import describe_closure
 from pamrs.diagnosis.explain._conditions import Picture, describe
 from pamrs.diagnosis.fit import CHOSEN, Events, Key, Problem, events_of, fit, residuals
 from pamrs.diagnosis.next_experiment import propose
-from pamrs.diagnosis.noise import Floor
+from pamrs.diagnosis.noise import NoiseLevel
 from pamrs.diagnosis.prepare import Residual
 from pamrs.diagnosis.result import Diagnosis
 from pamrs.diagnosis.settings import DiagnosisSettings, EvidenceSettings
 from pamrs.effects import CATALOGUE, EFFECTS
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError
 from pamrs.findings import (
-    Asked,
     BlockResidual,
     ChannelError,
     EffectFound,
@@ -47,6 +46,7 @@ from pamrs.findings import (
     NextExperiment,
     ParameterFound,
     StageError,
+    Tested,
     Trace,
     Tried,
     WrongParameter,
@@ -75,20 +75,26 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
     ambiguity = case_ambiguity(judged, settings.verdict)
     models = _models(nominal, fitted, judged, verdict)
     judged = models.judged
-    floor = {k: v for g in groups for k, v in g.floor.items()}
+    noise_level = {k: v for g in groups for k, v in g.noise_level.items()}
     fit_found = models.residuals(fitted)
     out_found = fit_found if held is fitted else models.residuals(held)
     located = _located(judged, settings)
     picture = Picture()
     if located is not None:
         block = next(b for b in fitted.blocks if b.name == located)
-        picture = describe(block, fitted.recordings, nominal, fit_found["refit"], fit_found["after"], floor)
-    fit_table = _table(fitted, fit_found, floor)
-    held_table = _table(held, out_found, floor) if held is not fitted else {}
+        picture = describe(
+            block, fitted.recordings, nominal, fit_found["refit"], fit_found["after"], noise_level
+        )
+    fit_table = _table(fitted, fit_found, noise_level)
+    held_table = _table(held, out_found, noise_level) if held is not fitted else {}
     table = held_table or fit_table
     named = any(j.named or j.wrong for j in judged)
-    gap = _gap(table, settings.verdict.least_gap) if models.final.effects or any(j.wrong for j in judged) else None
-    blocks = block_entries(judged, fitted, fit_found, held, out_found, floor)
+    gap = (
+        _gap(table, settings.verdict.least_gap)
+        if models.final.effects or any(j.wrong for j in judged)
+        else None
+    )
+    blocks = block_entries(judged, fitted, fit_found, held, out_found, noise_level)
     diagnosis = Diagnosis(
         case=case.name,
         verdict=verdict,
@@ -96,7 +102,9 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
         effects=_effects(judged, verdict, settings.verdict.in_set),
         ambiguity=ambiguity,
         probabilities=probabilities,
-        parameters=_parameters(nominal, models.chosen if named else models.starts, settings.fit.known_share),
+        parameters=_parameters(
+            nominal, models.chosen if named else models.starts, settings.fit.known_share
+        ),
         fit=FitErrors(fit_table, held_table, gap),
         next_experiment=_next(verdict, probabilities, ambiguity, nominal, judged, fitted, held),
         warnings=_warnings(case, models, table, settings, same=held is fitted),
@@ -108,7 +116,7 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
         residuals=_block_table(groups),
         condition_map=picture.map,
         tried=_tried(groups),
-        asked=_asked(groups, settings.evidence),
+        tested=_tested(groups, settings.evidence),
         settings=settings,
     )
     missing = [j.group for j in judged if j.verdict == "unlisted"]
@@ -118,7 +126,9 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
         if g.closure is not None
     ]
     sought = any(g.sought for g in missing)
-    return replace(diagnosis, text=words.verdict(diagnosis, case, gap, forms, settings.warnings, sought=sought))
+    return replace(
+        diagnosis, text=words.verdict(diagnosis, case, gap, forms, settings.warnings, sought=sought)
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,36 +168,56 @@ def _models(nominal: Rig, fitted: Problem, judged: list[Judged], verdict: str) -
     starts = _settled(nominal, fitted, judged, [j.group.candidates[0] for j in judged])
     baseline = _merged(nominal, starts)
     if verdict not in ("effects", "unlisted") and not any(j.wrong for j in judged):
-        return _Models(judged, starts, starts, nominal, baseline, nominal if verdict == "none" else baseline)
+        return _Models(
+            judged, starts, starts, nominal, baseline, nominal if verdict == "none" else baseline
+        )
     wanted = [_model_of(j, start) for j, start in zip(judged, starts, strict=True)]
     chosen = _settled(nominal, fitted, judged, wanted)
-    judged = [replace(j, chosen=c) if j.named or j.wrong else j for j, c in zip(judged, chosen, strict=True)]
+    judged = [
+        replace(j, chosen=c) if j.named or j.wrong else j
+        for j, c in zip(judged, chosen, strict=True)
+    ]
     return _Models(judged, starts, chosen, nominal, baseline, _merged(nominal, chosen))
 
 
 def _warnings(
-    case: Case, models: _Models, table: dict[str, ChannelError], settings: DiagnosisSettings, *, same: bool
+    case: Case,
+    models: _Models,
+    table: dict[str, ChannelError],
+    settings: DiagnosisSettings,
+    *,
+    same: bool,
 ) -> list[str]:
     """What a reader should know before trusting the rest."""
     named = any(j.named or j.wrong for j in models.judged)
     return [
         *words.absolute(case, settings.warnings),
-        *(words.reservations(models.judged, models.chosen, table, settings.warnings) if named else []),
+        *(
+            words.reservations(models.judged, models.chosen, table, settings.warnings)
+            if named
+            else []
+        ),
         *(words.worse(table, settings.warnings) if models.final.effects else []),
         *words.warnings(case, models.judged, same, settings),
     ]
 
 
 def _model_of(judged: Judged, start: Candidate) -> Candidate:
-    """What of a group goes into the model: what is named, or a form of what has no name, or parameters alone."""
+    """What of a group goes into the model: what is named, or a form of what has no name, or
+    parameters alone.
+    """
     if judged.named or judged.wrong:
         return judged.chosen
     return (judged.group.closure if judged.verdict == "unlisted" else None) or start
 
 
 def _run(problem: Problem, rig: Rig, events: Events | None) -> dict[Key, Residual]:
-    """Residuals of a model; what happened in single recordings in the place of what its file says."""
-    return residuals(problem, rig if events is None else rig.without_effect(events.effect), (), events)
+    """Residuals of a model; what happened in single recordings in the place of what its file
+    says.
+    """
+    return residuals(
+        problem, rig if events is None else rig.without_effect(events.effect), (), events
+    )
 
 
 def _tried(groups: list[Group]) -> list[Tried]:
@@ -201,7 +231,9 @@ def _tried(groups: list[Group]) -> list[Tried]:
             held_out={b: e.ratio for b, e in candidate.held_out.items()},
             gap_closed=candidate.gap_closed,
             scatter=candidate.scatter,
-            fitted_values={n: v for n, v in candidate.fit.values.items() if n.partition(".")[0] in EFFECTS},
+            fitted_values={
+                n: v for n, v in candidate.fit.values.items() if n.partition(".")[0] in EFFECTS
+            },
             std={n: v for n, v in candidate.fit.std.items() if n.partition(".")[0] in EFFECTS},
             prior=sum(v * v for v in candidate.fit.moved.values()),
             suspects=[b.name for b in group.suspects],
@@ -212,16 +244,22 @@ def _tried(groups: list[Group]) -> list[Tried]:
     ]
 
 
-def _asked(groups: list[Group], settings: EvidenceSettings) -> list[Asked]:
-    """Every lasting effect that acts where a mismatch is, what it promised and what it leaves alone, the best first."""
+def _tested(groups: list[Group], settings: EvidenceSettings) -> list[Tested]:
+    """Every persistent effect that acts where a mismatch is, its predicted gain and what it leaves
+    alone, the best first.
+    """
     found = []
     for group in groups:
-        for effect, promised in group.promised.items():
+        for effect, predicted_gain in group.predicted_gain.items():
             singles = [c for c in group.candidates if c.effects == (effect,)]
             alone = [share_left(c, group.candidates[0], group.suspects, settings) for c in singles]
             blocks = [b.name for b in group.suspects]
-            found.append(Asked(effect, blocks, min(1.0, max(0.0, promised)), min(alone, default=None)))
-    return sorted(found, key=lambda a: (a.left is None, a.left if a.left is not None else -a.promised))
+            found.append(
+                Tested(effect, blocks, min(1.0, max(0.0, predicted_gain)), min(alone, default=None))
+            )
+    return sorted(
+        found, key=lambda a: (a.left is None, a.left if a.left is not None else -a.predicted_gain)
+    )
 
 
 def _next(
@@ -233,23 +271,36 @@ def _next(
     fitted: Problem,
     held: Problem,
 ) -> NextExperiment:
-    """What to record next: simulated with every hypothesis that has a model, where two or more are left; else in words."""
+    """What to record next: simulated with every hypothesis that has a model, where two or more are
+    left; else in words.
+    """
     settings = fitted.settings
     left = _hypotheses(judged, probabilities, nominal, settings.next_experiment.simulated_from)
     recordings = [*fitted.recordings, *(held.recordings if held is not fitted else [])]
     if ambiguity and len(left) > 1 and not words.same_data(ambiguity):
         common = set.intersection(*(set(p.noise) for p in recordings))
-        noise = {channel: float(np.median([p.noise[channel] for p in recordings])) for channel in sorted(common)}
-        with contextlib.suppress(DiagnosisError, ParameterError, SimulationError):  # a rig that no experiment of the library suits
+        noise = {
+            channel: float(np.median([p.noise[channel] for p in recordings]))
+            for channel in sorted(common)
+        }
+        with contextlib.suppress(
+            DiagnosisError, ParameterError, SimulationError
+        ):  # a rig that no experiment of the library suits
             return propose(nominal, left, noise, recordings, settings=settings)
-    missing = [j.group.mismatch.name for j in judged if j.verdict == "unlisted" and j.group.mismatch is not None]
+    missing = [
+        j.group.mismatch.name
+        for j in judged
+        if j.verdict == "unlisted" and j.group.mismatch is not None
+    ]
     return words.next_experiment(verdict, probabilities, ambiguity, nominal, missing)
 
 
 def _hypotheses(
     judged: list[Judged], probabilities: dict[str, float], nominal: Rig, least: float
 ) -> list[tuple[str, Rig, float]]:
-    """The likely hypotheses that have a model, as fitted; those of an effect with times of its own can predict no other recording."""
+    """The likely hypotheses that have a model, as fitted; those of an effect with times of its own
+    can predict no other recording.
+    """
     found = []
     for key, p in probabilities.items():
         wanted = frozenset(key.split("+"))
@@ -264,16 +315,21 @@ def _hypotheses(
 
 
 def _inside(group: Group, wanted: frozenset[str]) -> Candidate:
-    """The most probable hypothesis of a group that names nothing else than what is wanted; the baseline where there is none."""
+    """The most probable hypothesis of a group that names nothing else than what is wanted; the
+    baseline where there is none.
+    """
     named = [c for c in group.candidates if c.names and set(c.names) <= wanted]
-    return max(named, key=lambda c: group.probabilities.get(c.key, 0.0), default=group.candidates[0])
+    return max(
+        named, key=lambda c: group.probabilities.get(c.key, 0.0), default=group.candidates[0]
+    )
 
 
 def _owners(candidates: list[Candidate]) -> dict[str, int]:
-    """The group that tells most of each parameter that several have (sensors' zeros): the one with the least standard deviation.
+    """The group that tells most of each parameter that several have (sensors' zeros): the one with
+    the least standard deviation.
 
-    What a group leaves without a name is in its colour, and so in its standard deviations. Events are fitted with the values beside
-    them, which stay.
+    What a group leaves without a name is in its autocorrelation, and so in its standard deviations.
+    Events are fitted with the values beside them, which stay.
     """
 
     def spread(k: int, name: str) -> float:
@@ -288,31 +344,40 @@ def _owners(candidates: list[Candidate]) -> dict[str, int]:
     return found
 
 
-def _settled(nominal: Rig, problem: Problem, judged: list[Judged], chosen: list[Candidate]) -> list[Candidate]:
-    """The fits of the groups again, with what another group knows better (the sensors' zeros) held, where theirs are others.
+def _settled(
+    nominal: Rig, problem: Problem, judged: list[Judged], chosen: list[Candidate]
+) -> list[Candidate]:
+    """The fits of the groups again, with what another group knows better (the sensors' zeros) held,
+    where theirs are others.
 
     A rig has one zero of a sensor; the other values of a fit are right beside its own only.
     """
     owners = _owners(chosen)
     found = list(chosen)
     for k, candidate in enumerate(chosen):
-        common = {n: chosen[owners[n]].fit for n in candidate.fit.moved if owners[n] != k and n.startswith("sensors.")}
+        common = {
+            n: chosen[owners[n]].fit
+            for n in candidate.fit.moved
+            if owners[n] != k and n.startswith("sensors.")
+        }
         settings = problem.settings.fit
         differences = [abs(candidate.fit.moved[n] - other.moved[n]) for n, other in common.items()]
         apart = any(difference > settings.zero_difference for difference in differences)
         if apart and candidate.fit.events is None:
             own = replace(problem, blocks=judged[k].group.blocks)
             effects = candidate.fit.effects
-            free, fixed = parts_of(start_of(candidate.fit, effect, settings.least_start) for effect in effects)
+            free, fixed = parts_of(
+                start_of(candidate.fit, effect, settings.least_start) for effect in effects
+            )
             settled = {n: other.values[n] for n, other in common.items()}
-            colour = colour_of(own, candidate.fit)
+            autocorrelation = autocorrelation_of(own, candidate.fit)
             with contextlib.suppress(SimulationError):  # it then stays as it was fitted
                 again = fit(
                     own,
                     nominal,
                     effects,
                     free,
-                    colour,
+                    autocorrelation,
                     fixed=fixed,
                     warm=candidate.fit,
                     share=settings.final_step_share,
@@ -324,29 +389,41 @@ def _settled(nominal: Rig, problem: Problem, judged: list[Judged], chosen: list[
 
 
 def _merged(nominal: Rig, candidates: list[Candidate]) -> Rig:
-    """One rig from the groups' fits; where two have a value of their own, that of the group that knows it best."""
+    """One rig from the groups' fits; where two have a value of their own, that of the group that
+    knows it best.
+    """
     rig = nominal
     for candidate in candidates:
         for effect in candidate.fit.rig.effects:
             rig = rig.with_effect(effect["id"], effect["parameters"])
-    return rig.with_parameters({name: candidates[k].fit.values[name] for name, k in _owners(candidates).items()})
+    return rig.with_parameters(
+        {name: candidates[k].fit.values[name] for name, k in _owners(candidates).items()}
+    )
 
 
 def _with_std(rig: Rig, candidates: list[Candidate]) -> Rig:
     for candidate in candidates:
         for effect in candidate.fit.rig.effects:
             own = effect["id"] + "."
-            std = {n.removeprefix(own): s for n, s in candidate.fit.std.items() if n.startswith(own)}
+            std = {
+                n.removeprefix(own): s for n, s in candidate.fit.std.items() if n.startswith(own)
+            }
             rig = rig.with_effect(effect["id"], effect["parameters"], std=std)
     return rig
 
 
 def _located(judged: list[Judged], settings: DiagnosisSettings) -> str | None:
-    """The block that the answer is about: of those with a name first, else of those that keep something, else one at a wall."""
+    """The block that the answer is about: of those with a name first, else of those that keep
+    something, else one at a wall.
+    """
     named = [j.group for j in judged if j.named or j.wrong]
     missing = [j.group for j in judged if j.verdict == "unlisted"]
     for groups in (named, missing, [j.group for j in judged]):
-        found = [(g.candidates[0].held_out[g.mismatch.name].ratio, g.mismatch.name) for g in groups if g.mismatch]
+        found = [
+            (g.candidates[0].held_out[g.mismatch.name].ratio, g.mismatch.name)
+            for g in groups
+            if g.mismatch
+        ]
         if found:
             return max(found)[1]
     for j in sorted(judged, key=lambda j: not j.wrong):
@@ -358,15 +435,19 @@ def _located(judged: list[Judged], settings: DiagnosisSettings) -> str | None:
     return None
 
 
-def _table(problem: Problem, found: dict[str, dict[Key, Residual]], floor: dict[Key, Floor]) -> dict[str, ChannelError]:
+def _table(
+    problem: Problem, found: dict[str, dict[Key, Residual]], noise_level: dict[Key, NoiseLevel]
+) -> dict[str, ChannelError]:
     """Error of every channel at every stage."""
     out = {}
     for block in problem.blocks:
         errors = {}
         noise, weights = [], []
         for prepared in problem.recordings:
-            noise.append(floor[block.name, prepared.recording.name].sample ** 2)
-            weights.append(max(1, int(found["refit"][block.name, prepared.recording.name].rows.sum())))
+            noise.append(noise_level[block.name, prepared.recording.name].sample ** 2)
+            weights.append(
+                max(1, int(found["refit"][block.name, prepared.recording.name].rows.sum()))
+            )
         level = math.sqrt(float(np.average(noise, weights=weights)))
         for stage in ("before", "refit", "after"):
             squares = []
@@ -387,24 +468,33 @@ def _gap(table: dict[str, ChannelError], least: float) -> float | None:
 
 
 def _effects(judged: list[Judged], verdict: str, in_set: float) -> list[EffectFound]:
-    """The effects that are named, the most probable first; without a name those that come closest."""
+    """The effects that are named, the most probable first; without a name those that come
+    closest.
+    """
     found: dict[str, tuple[float, Candidate]] = {}
     for j in judged:
         names = {effect for c in j.group.candidates for effect in c.effects}
         for effect in j.named if verdict == "effects" else names & set(CATALOGUE):
             p = j.probability(effect)
             if verdict == "effects":
-                # of one effect in two groups the model has the parameters of the group that comes last
+                # of one effect in two groups the model has the parameters of the group that comes
+                # last
                 found[effect] = max(p, found[effect][0] if effect in found else 0.0), j.chosen
             elif p >= in_set:
                 own = [c for c in j.group.candidates if effect in c.effects]
-                found[effect] = p, max(own, key=lambda c: (j.group.probabilities.get(c.key, 0.0), c.gap_closed))
+                found[effect] = (
+                    p,
+                    max(own, key=lambda c: (j.group.probabilities.get(c.key, 0.0), c.gap_closed)),
+                )
     return [
         EffectFound(
             id=effect,
             name=EFFECTS[effect].name,
             probability=p,
-            inclusion=max((j.group.inclusion[effect] for j in judged if effect in j.group.inclusion), default=None),
+            inclusion=max(
+                (j.group.inclusion[effect] for j in judged if effect in j.group.inclusion),
+                default=None,
+            ),
             parameters=_effect_parameters(effect, candidate),
             events=_events(effect, candidate),
         )
@@ -412,15 +502,27 @@ def _effects(judged: list[Judged], verdict: str, in_set: float) -> list[EffectFo
     ]
 
 
-def _wrong(nominal: Rig, judged: list[Judged], problem: Problem, table: dict[str, ChannelError]) -> list[WrongParameter]:
-    """Parameters that the rig file is wrong about: its value, the one that the recordings ask for, and what the error becomes."""
+def _wrong(
+    nominal: Rig, judged: list[Judged], problem: Problem, table: dict[str, ChannelError]
+) -> list[WrongParameter]:
+    """Parameters that the rig file is wrong about: its value, the one that the recordings ask for,
+    and what the error becomes.
+    """
     found = []
     owners = _owners([j.chosen for j in judged])
     for name in dict.fromkeys(name for j in judged for name in j.wrong):
         # of a zero that two groups name, the value is that of the group that knows it best
         j, naming = judged[owners[name]], [j for j in judged if name in j.wrong]
-        known, value, std = nominal.parameter(name), j.chosen.fit.values[name], j.chosen.fit.std[name]
-        told = [b for b in problem.blocks if name in b.parameters and any(b in j.group.blocks for j in naming)]
+        known, value, std = (
+            nominal.parameter(name),
+            j.chosen.fit.values[name],
+            j.chosen.fit.std[name],
+        )
+        told = [
+            b
+            for b in problem.blocks
+            if name in b.parameters and any(b in j.group.blocks for j in naming)
+        ]
         errors = {b.channel: table[b.channel] for b in told}
         found.append(
             WrongParameter(
@@ -434,7 +536,9 @@ def _wrong(nominal: Rig, judged: list[Judged], problem: Problem, table: dict[str
                 unit=known.unit,
                 moved_sigmas=j.chosen.fit.moved[name],
                 probability=max(j.probability(name) for j in naming),
-                held_out={channel: StageError(e.before, e.refit, e.after) for channel, e in errors.items()},
+                held_out={
+                    channel: StageError(e.before, e.refit, e.after) for channel, e in errors.items()
+                },
             )
         )
     return found
@@ -451,7 +555,9 @@ def _events(effect: str, candidate: Candidate) -> list[dict[str, Any]]:
         for parameters in events_of(effect):
             own = {p.repeats or p.name: values[p.name] for p in parameters if p.name in values}
             if own:
-                found.append({"recording": recording, **own, **{n: values[n] for n in rises if n in values}})
+                found.append(
+                    {"recording": recording, **own, **{n: values[n] for n in rises if n in values}}
+                )
     return found
 
 
@@ -469,8 +575,18 @@ def _effect_parameters(effect: str, candidate: Candidate) -> dict[str, EffectPar
         if name not in candidate.fit.values:
             continue
         value, std = candidate.fit.values[name], candidate.fit.std[name]
-        out[parameter.name] = _entry(value, std, parameter.unit, not unknown_volume and std < max(abs(value), 1e-300), parameter.lower)
-    if EFFECTS[effect].block == "chamber" and rig.model["valve"] is None and "" in rig.tables("chamber"):
+        out[parameter.name] = _entry(
+            value,
+            std,
+            parameter.unit,
+            not unknown_volume and std < max(abs(value), 1e-300),
+            parameter.lower,
+        )
+    if (
+        EFFECTS[effect].block == "chamber"
+        and rig.model["valve"] is None
+        and "" in rig.tables("chamber")
+    ):
         out |= _emptying(effect, candidate)
     return out
 
@@ -480,7 +596,9 @@ _REFERENCE_DENSITY = 1.185
 
 
 def _emptying(effect: str, candidate: Candidate) -> dict[str, EffectParameterFound]:
-    """How fast a conductance empties a sealed chamber, and what of it does not depend on the chamber's volume."""
+    """How fast a conductance empties a sealed chamber, and what of it does not depend on the
+    chamber's volume.
+    """
     gas, chamber = candidate.fit.rig.model["gas"], candidate.fit.rig.model["chamber"]
     out: dict[str, EffectParameterFound] = {}
     for parameter in EFFECTS[effect].parameters:
@@ -492,11 +610,15 @@ def _emptying(effect: str, candidate: Candidate) -> dict[str, EffectParameterFou
         rt = gas["gas_constant"] * gas["temperature"]
         tau = volume / (value * _REFERENCE_DENSITY * rt * chamber["alpha_out"])
         out["time_constant"] = _entry(tau, tau * std / value, "s", std < value)
-        out["conductance_per_volume"] = _entry(value / volume, std / volume, "1/(s Pa)", std < value)
+        out["conductance_per_volume"] = _entry(
+            value / volume, std / volume, "1/(s Pa)", std < value
+        )
     return out
 
 
-def _entry(value: float, std: float, unit: str, identifiable: bool, lower: float = 0.0) -> EffectParameterFound:
+def _entry(
+    value: float, std: float, unit: str, identifiable: bool, lower: float = 0.0
+) -> EffectParameterFound:
     """A fitted parameter with its interval of 95 %."""
     return EffectParameterFound(value, std, unit, _interval(value, std, lower), identifiable)
 
@@ -506,7 +628,9 @@ def _interval(value: float, std: float, lower: float) -> list[float]:
     return [max(lower, value - 1.96 * std), value + 1.96 * std]
 
 
-def _parameters(nominal: Rig, candidates: list[Candidate], known: float) -> dict[str, ParameterFound]:
+def _parameters(
+    nominal: Rig, candidates: list[Candidate], known: float
+) -> dict[str, ParameterFound]:
     """Parameters of the baseline, each as the group has it that knows it best."""
     out: dict[str, ParameterFound] = {}
     for name, k in _owners(candidates).items():
@@ -528,17 +652,24 @@ def _block_table(groups: list[Group]) -> dict[str, BlockResidual]:
     for group in groups:
         for block in group.blocks:
             found = group.baseline[block.name]
-            out[block.name] = BlockResidual(found.rms, found.noise, found.systematic, found.p_value, block.channel)
+            out[block.name] = BlockResidual(
+                found.rms, found.noise, found.systematic, found.p_value, block.channel
+            )
     return out
 
 
-def _traces(fitted: Problem, held: Problem, inner: dict[str, Any], outer: dict[str, Any]) -> list[Trace]:
+def _traces(
+    fitted: Problem, held: Problem, inner: dict[str, Any], outer: dict[str, Any]
+) -> list[Trace]:
     traces = []
     stock = [(fitted, inner)] if held is fitted else [(fitted, inner), (held, outer)]
     for problem, found in stock:
         for prepared in problem.recordings:
             for block in problem.blocks:
-                stages = {s: found[s][block.name, prepared.recording.name] for s in ("before", "refit", "after")}
+                stages = {
+                    s: found[s][block.name, prepared.recording.name]
+                    for s in ("before", "refit", "after")
+                }
                 shown = {s: np.where(r.rows, r.prediction, np.nan) for s, r in stages.items()}
                 recording = prepared.recording
                 traces.append(

@@ -1,4 +1,6 @@
-"""Under which conditions a residual is large: shares, intervals in time, and a map over two conditions."""
+"""Under which conditions a residual is large: shares, intervals in time, and a map over two
+conditions.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,7 @@ from numpy.typing import NDArray
 
 from pamrs.channels import channel_of, dotted
 from pamrs.diagnosis.fit import Key
-from pamrs.diagnosis.noise import Floor, bins_of
+from pamrs.diagnosis.noise import NoiseLevel, bins_of
 from pamrs.diagnosis.prepare import Block, Prepared, binned
 from pamrs.findings import Condition, ConditionMap
 from pamrs.rig import Rig
@@ -59,13 +61,23 @@ def _conditions(block: Block, prepared: Prepared, rig: Rig, width: int) -> dict[
     all_rows = np.ones(prepared.n, dtype=bool)
     out = {}
     involved = (block.channel, *block.drives)
-    pressures = [name for name in prepared.signals if channel_of(name) == "muscle_pressure" and name in involved]
-    for name in pressures or [name for name in prepared.signals if channel_of(name) == "muscle_pressure"]:
-        out[_named("muscle pressure", name, "bar")] = _binned(prepared.signals[name][0], all_rows, width) / 1e5
+    pressures = [
+        name
+        for name in prepared.signals
+        if channel_of(name) == "muscle_pressure" and name in involved
+    ]
+    for name in pressures or [
+        name for name in prepared.signals if channel_of(name) == "muscle_pressure"
+    ]:
+        out[_named("muscle pressure", name, "bar")] = (
+            _binned(prepared.signals[name][0], all_rows, width) / 1e5
+        )
     for valve, table in rig.tables("valve").items():
         name = dotted("valve_command", valve)
         if name in prepared.recording.channels and (name in involved or block.kind == "arm"):
-            opening = np.clip((prepared.commands[name] - table["null_voltage"]) / table["half_range"], -1, 1)
+            opening = np.clip(
+                (prepared.commands[name] - table["null_voltage"]) / table["half_range"], -1, 1
+            )
             out[_named("valve opening", name, "1")] = _binned(opening, all_rows, width)
     for name, (angle, rate) in prepared.signals.items():
         if channel_of(name) == "joint_angle":
@@ -86,17 +98,36 @@ def _regimes(c: dict[str, Array]) -> dict[str, NDArray[np.bool_]]:
         of = " of" + quantity.partition(" of")[2] if " of " in quantity else ""
         if quantity.startswith("valve opening"):
             shut = np.abs(values) < 0.01
-            out |= {f"valve{of} closed": shut, f"valve{of} filling": values >= 0.01, f"valve{of} venting": values <= -0.01}
+            out |= {
+                f"valve{of} closed": shut,
+                f"valve{of} filling": values >= 0.01,
+                f"valve{of} venting": values <= -0.01,
+            }
         elif quantity.startswith("joint rate"):
             still = np.abs(values) < 0.5
-            words = ("muscle contracting", "muscle extending") if not of else (f"joint{of} rising", f"joint{of} falling")
-            out |= {f"joint{of} at rest": still, words[0]: ~still & (values > 0), words[1]: ~still & (values < 0)}
+            words = (
+                ("muscle contracting", "muscle extending")
+                if not of
+                else (f"joint{of} rising", f"joint{of} falling")
+            )
+            out |= {
+                f"joint{of} at rest": still,
+                words[0]: ~still & (values > 0),
+                words[1]: ~still & (values < 0),
+            }
         elif quantity == "muscle rate":
-            out |= {"load at rest": np.abs(values) < 1.0, "muscle contracting": values <= -1.0, "muscle extending": values >= 1.0}
+            out |= {
+                "load at rest": np.abs(values) < 1.0,
+                "muscle contracting": values <= -1.0,
+                "muscle extending": values >= 1.0,
+            }
         elif quantity.startswith("muscle pressure"):
             low, high = np.quantile(values, [1 / 3, 2 / 3])
             if high - low > 0.05:
-                out |= {f"pressure{of} below {low:.2g} bar": values < low, f"pressure{of} above {high:.2g} bar": values > high}
+                out |= {
+                    f"pressure{of} below {low:.2g} bar": values < low,
+                    f"pressure{of} above {high:.2g} bar": values > high,
+                }
     return out
 
 
@@ -106,7 +137,7 @@ def describe(
     rig: Rig,
     before: dict[Key, Any],
     after: dict[Key, Any] | None,
-    floor: dict[Key, Floor],
+    noise_level: dict[Key, NoiseLevel],
 ) -> Picture:
     """Shares of the excess by condition, intervals in the worst recording, and the conditions map.
 
@@ -120,8 +151,8 @@ def describe(
         Nominal model, for the valve's null.
     before, after : dict
         Residuals of the refitted baseline and of the final model.
-    floor : dict
-        Noise floors.
+    noise_level : dict
+        Noise levels.
     """
     columns: dict[str, list[Array]] = {}
     scaled, scaled_after, worst, picture = [], [], -1.0, Picture()
@@ -131,23 +162,35 @@ def describe(
         means, counts = binned(before[key].value, before[key].rows, width)
         ok = counts > 0
         # inside a window the residual is an integral: its change says where the cause acts
-        score = means / floor[key].binned
-        cause = score if block.window is None else _change(before[key].value, before[key].rows, width) / floor[key].binned
+        score = means / noise_level[key].binned
+        cause = (
+            score
+            if block.window is None
+            else _change(before[key].value, before[key].rows, width) / noise_level[key].binned
+        )
         conditions = _conditions(block, prepared, rig, width)
         for name, values in conditions.items():
             columns.setdefault(name, []).append(values[ok])
         scaled.append(cause[ok])
         if after is not None:
             a = after[key]
-            rest = binned(a.value, a.rows, width)[0] if block.window is None else _change(a.value, a.rows, width)
-            scaled_after.append((rest / floor[key].binned)[ok])
+            rest = (
+                binned(a.value, a.rows, width)[0]
+                if block.window is None
+                else _change(a.value, a.rows, width)
+            )
+            scaled_after.append((rest / noise_level[key].binned)[ok])
         power = float(np.mean(score[ok] ** 2)) if ok.any() else 0.0
         if power > worst:
             worst = power
             picture.recording = prepared.recording.name
             picture.intervals = _intervals(np.abs(score) > 3.0, width * prepared.dt)
     # a channel that one of the recordings lacks is no condition of them all
-    joined = {name: np.concatenate(parts) for name, parts in columns.items() if len(parts) == len(recordings)}
+    joined = {
+        name: np.concatenate(parts)
+        for name, parts in columns.items()
+        if len(parts) == len(recordings)
+    }
     z = np.concatenate(scaled)
     total = float(np.sum(np.maximum(z**2 - 1.0, 0.0)))
     for name, mask in _regimes(joined).items():
@@ -156,7 +199,10 @@ def describe(
         share = float(np.sum(np.maximum(z[mask] ** 2 - 1.0, 0.0))) / total
         time = float(mask.mean())
         mean = float(z[mask].mean())
-        text = f"{name}: {100 * share:.0f} % of the excess in {100 * time:.0f} % of the time, mean {mean:+.2g} noise units"
+        text = (
+            f"{name}: {100 * share:.0f} % of the excess in {100 * time:.0f} % of the time, mean "
+            f"{mean:+.2g} noise units"
+        )
         picture.conditions.append(Condition(name, share, time, mean, text))
     picture.conditions.sort(key=lambda c: -c.share / max(0.02, c.time) * c.share)
     picture.map = _map(joined, z, np.concatenate(scaled_after) if scaled_after else None, block)
@@ -177,15 +223,21 @@ def _intervals(flags: NDArray[np.bool_], bin_time: float, most: int = 12) -> lis
     bridged[1:-1] |= flags[:-2] & flags[2:]
     edges = np.flatnonzero(np.diff(np.concatenate([[0], bridged.astype(int), [0]])))
     spans = sorted(zip(edges[::2], edges[1::2], strict=True), key=lambda s: s[0] - s[1])[:most]
-    return [[round(float(a * bin_time), 3), round(float(b * bin_time), 3)] for a, b in sorted(spans)]
+    return [
+        [round(float(a * bin_time), 3), round(float(b * bin_time), 3)] for a, b in sorted(spans)
+    ]
 
 
-def _map(columns: dict[str, Array], z: Array, after: Array | None, block: Block) -> ConditionMap | None:
+def _map(
+    columns: dict[str, Array], z: Array, after: Array | None, block: Block
+) -> ConditionMap | None:
     """Mean residual over the two conditions that tell most of it apart."""
     names = [n for n, v in columns.items() if np.ptp(v) > 1e-9]
     if len(names) < 2:
         return None
-    edges = {n: np.unique(np.quantile(columns[n], np.linspace(0, 1, _MAP_CELLS + 1))) for n in names}
+    edges = {
+        n: np.unique(np.quantile(columns[n], np.linspace(0, 1, _MAP_CELLS + 1))) for n in names
+    }
     names = [n for n in names if edges[n].size >= 3]
     if len(names) < 2:
         return None
@@ -197,9 +249,13 @@ def _map(columns: dict[str, Array], z: Array, after: Array | None, block: Block)
         mean, count = _cells(columns[a], columns[b], edges[a], edges[b], z)
         return float(np.nansum(count * np.nan_to_num(mean) ** 2))
 
-    x, y = max(((a, b) for i, a in enumerate(names) for b in names[i + 1 :]), key=lambda ab: explained(*ab))
+    x, y = max(
+        ((a, b) for i, a in enumerate(names) for b in names[i + 1 :]), key=lambda ab: explained(*ab)
+    )
     grid = _cells(columns[x], columns[y], edges[x], edges[y], z)[0]
-    rest = _cells(columns[x], columns[y], edges[x], edges[y], after)[0] if after is not None else None
+    rest = (
+        _cells(columns[x], columns[y], edges[x], edges[y], after)[0] if after is not None else None
+    )
     return ConditionMap(
         x_label=x,
         y_label=y,

@@ -20,7 +20,17 @@ from pamrs.report.text import display_unit, format_number, kept_sentence, senten
 from pamrs.rig import Rig
 from pamrs.rig.schema import qualified
 
-__all__ = ["absolute", "next_experiment", "reservations", "same_data", "unknown_volumes", "verdict", "warnings", "where", "worse"]
+__all__ = [
+    "absolute",
+    "next_experiment",
+    "reservations",
+    "same_data",
+    "unknown_volumes",
+    "verdict",
+    "warnings",
+    "where",
+    "worse",
+]
 
 
 def unknown_volumes(rig: Rig) -> list[str]:
@@ -34,55 +44,64 @@ def where(located: str | None, problem: Problem, judged: list[Judged], picture: 
     settings = problem.settings.warnings
     groups = [j.group for j in judged]
     if located is None:
-        text = "No block keeps more than its noise after the refit."
+        text = "After the refit, no block's residual is above the noise level."
         return Where(text=text)
     block = next(b for b in problem.blocks if b.name == located)
     found = next(g.baseline[located] for g in groups if located in g.baseline)
     parts = "" if block.covers == located else f" ({block.covers})"
     text = (
-        f"The mismatch lies in the {located} block{parts}: with its neighbours' measured signals as inputs, the refitted "
-        f"model still misses {block.channel.replace('_', ' ')} by {found.systematic:.2g} times its noise."
+        f"The mismatch lies in the {located} block{parts}. With the measured signals of its "
+        f"neighbours as inputs, the refitted model misses {block.channel.replace('_', ' ')} by "
+        f"{found.systematic:.2g} times the noise level."
     )
     group = next((g for g in groups if g.mismatch is not None and g.mismatch.name == located), None)
     wrong = next((j.wrong for j in judged if block in j.group.blocks), ())
-    faint = group is not None and group.faint
-    mistaken = bool(wrong) and (group is None or faint)
+    below_noise = group is not None and group.below_noise
+    mistaken = bool(wrong) and (group is None or below_noise)
     if mistaken:
         text = (
-            f"Inside its tolerances the {located} block{parts} fits to its noise, but only with parameters at their ends; with another "
-            f"value of {' and '.join(wrong)} they come back."
+            f"The {located} block{parts} fits down to the noise level, but only with parameters at "
+            f"the ends of their tolerances. With another value of {' and '.join(wrong)} they "
+            "return to their nominal values."
         )
     elif group is not None and group.instead:
-        moved = ", ".join(f"{n} by {group.candidates[0].fit.moved[n]:+.1f} tolerances" for n in group.instead)
-        text = (
-            f"No block keeps more than its noise, but for that the refit of the {located} block{parts} had to move {moved}, and an "
-            "effect does the same without."
+        moved = ", ".join(
+            f"{n} by {group.candidates[0].fit.moved[n]:+.1f} tolerances" for n in group.instead
         )
-    elif faint:
         text = (
-            f"No block keeps more than its noise, but the residual of the {located} block{parts} has the signature of an effect in it, "
-            "in held-out recordings too."
+            f"No block's residual is above the noise level, but the refit of the {located} "
+            f"block{parts} had to move {moved}. An effect explains the same data without that."
         )
-    elif group is not None and group.probabilities.get("", 0.0) > settings.doubted_probability:
+    elif below_noise:
         text = (
-            f"The {located} block{parts} keeps hardly more than its noise ({found.systematic:.2g} times it in "
-            f"{block.channel.replace('_', ' ')}): its floor may as well have been taken too low."
+            f"No block's residual is above the noise level, but the residual of the {located} "
+            f"block{parts} contains the signature of an effect, in held-out recordings too."
+        )
+    elif group is not None and group.probabilities.get("", 0.0) > settings.no_mismatch_probability:
+        text = (
+            f"The residual of the {located} block{parts} is barely above the noise level "
+            f"({found.systematic:.2g} times it in {block.channel.replace('_', ' ')}). "
+            "The noise level may have been estimated too low."
         )
     elif all(g.mismatch is None for g in groups):
         text = (
-            f"Every block fits to its noise, but the {located} block only with a parameter far outside its tolerance "
-            "(see the warnings)."
+            f"Every block fits down to the noise level, but the {located} block only with a "
+            "parameter far outside its tolerance (see the warnings)."
         )
-    telling = [] if faint else [c for c in picture.conditions if c.share > settings.telling_condition * c.time][:2]
+    telling = (
+        []
+        if below_noise
+        else [c for c in picture.conditions if c.share > settings.telling_condition * c.time][:2]
+    )
     if telling:
         text += " It is largest under: " + "; ".join(c.text for c in telling) + "."
-    if picture.intervals and not faint:
+    if picture.intervals and not below_noise:
         text += f" The intervals are those of recording {picture.recording}."
     return Where(
         block=located,
         channel=block.channel,
-        intervals=[] if faint else picture.intervals,
-        conditions=[] if faint else picture.conditions[:6],
+        intervals=[] if below_noise else picture.intervals,
+        conditions=[] if below_noise else picture.conditions[:6],
         text=text,
         recording=picture.recording,
     )
@@ -97,74 +116,111 @@ def verdict(
     *,
     sought: bool,
 ) -> str:
-    """The verdict in a few sentences; ``forms`` say what a mismatch without a name is a function of, if that was ``sought``."""
+    """The verdict in a few sentences; ``forms`` say what a mismatch without a name is a function
+    of, if that was ``sought``.
+    """
     kind = diagnosis.verdict
     missing = [b for b in diagnosis.blocks if b.verdict == "unlisted"]
     if kind == "none":
-        text = "Nothing is missing that these recordings could show: the nominal model predicts every block to its noise."
+        text = (
+            "These recordings show no missing physics: the nominal model predicts every block down "
+            "to the noise level."
+        )
         return text + _unsettled(diagnosis)
     if kind == "parameters" and diagnosis.wrong_parameters:
-        return _mistaken(diagnosis, case, gap, settings) + _beside(diagnosis, missing, forms, sought=sought)
+        return _mistaken(diagnosis, case, gap, settings) + _beside(
+            diagnosis, missing, forms, sought=sought
+        )
     if kind == "parameters":
         shifted = sorted(diagnosis.parameters.items(), key=lambda kv: -abs(kv[1].moved_sigmas))[:3]
         moved = ", ".join(f"{n} by {p.moved_sigmas:+.1f} tolerances" for n, p in shifted)
         return (
-            "No physics is missing that these recordings could show, but parameters differ from the nominal ones: with values "
-            f"inside their tolerances the model predicts every block to its noise. Moved most: {moved}." + _unsettled(diagnosis)
+            "These recordings show no missing physics, but parameters differ from their nominal "
+            "values. With values inside their tolerances the model predicts every block down to "
+            f"the noise level. Moved most: {moved}." + _unsettled(diagnosis)
         )
     place = diagnosis.where.text
     if kind == "unlisted":
         tried = ", ".join(f"{e.id} ({e.probability:.0%})" for e in diagnosis.effects)
         text = (
-            f"Physics is missing that is not in the catalogue, or no effect of the catalogue explains the data well enough to be "
-            f"named. {place}" + (f" Closest: {tried}." if tried else "")
+            "Physics is missing. Either it is not in the catalogue, or no effect of the catalogue "
+            f"explains the data well enough to be named. {place}"
+            + (f" Closest: {tried}." if tried else "")
         )
         if not forms and not sought:
-            return text + (" No form of it was looked for: a load has none in the simulator yet." if case.rig.model["load"] else "")
+            return text + (
+                " No form of it was searched for: the simulator has none for a load yet."
+                if case.rig.model["load"]
+                else ""
+            )
         if not forms:
-            return text + " No form of it was found that carries over to other recordings: the model stays the refitted one."
-        closes = "" if gap is None else f" With it in the model, {100 * gap:.0f} % of the gap between refitted model and noise closes."
+            return text + (
+                " No form of it carries over to other recordings, so the model stays the "
+                "refitted one."
+            )
+        closes = (
+            ""
+            if gap is None
+            else (
+                f" With it in the model, {100 * gap:.0f} % of the gap between refitted model and "
+                "noise closes."
+            )
+        )
         return text + "\n\nWhat is missing, as a form without a name. " + " ".join(forms) + closes
-    names = " and ".join(f"{e.name} ({e.id}, probability {e.probability:.2f})" for e in diagnosis.effects)
+    names = " and ".join(
+        f"{e.name} ({e.id}, probability {e.probability:.2f})" for e in diagnosis.effects
+    )
     text = f"The model leaves out: {names}. {place}"
     if gap is not None:
         it = "it" if len(diagnosis.effects) == 1 else "them"
         text += (
-            f" With {it}, {100 * gap:.0f} % of the gap between refitted model and noise closes, over all channels, on {_proof(case)}."
+            f" With {it}, {100 * gap:.0f} % of the gap between refitted model and noise closes, "
+            f"over all channels, on {_proof(case)}."
         )
     if diagnosis.wrong_parameters:
         text += " " + _mistaken(diagnosis, case, None, settings)
     if unknown_volumes(case.rig):
         text += (
-            " The chamber's volume is not known: what the recording fixes is the time constant (and the conductance per volume); "
-            "the conductance itself holds for the placeholder volume of the rig file only."
+            " The chamber's volume is not known. The recording determines the time constant and "
+            "the conductance per volume; the conductance itself holds only for the placeholder "
+            "volume of the rig file."
         )
     return text + _beside(diagnosis, missing, forms, sought=sought)
 
 
 def _proof(case: Case) -> str:
-    return "held-out recordings" if case.held_out and case.fit else "the fitted recording (no other was given)"
+    return (
+        "held-out recordings"
+        if case.held_out and case.fit
+        else "the fitted recording (no other was given)"
+    )
 
 
 def _mistaken(diagnosis: Findings, case: Case, gap: float | None, settings: WarningSettings) -> str:
     """Which values of the rig file are wrong, and what that does to the error."""
     told = []
     for wrong in diagnosis.wrong_parameters:
-        mended = {channel: e for channel, e in wrong.held_out.items() if e.after < settings.mended * e.refit}
+        mended = {
+            channel: e
+            for channel, e in wrong.held_out.items()
+            if e.after < settings.mended * e.refit
+        }
         told_by = mended or wrong.held_out
         errors = "; ".join(
-            f"the {channel.replace('_', ' ')} is then missed by {_instead(e.after, e.refit, unit_of(channel))}, which values "
-            "inside the tolerances leave"
+            f"the {channel.replace('_', ' ')} is then missed by "
+            f"{_instead(e.after, e.refit, unit_of(channel))}, which values inside the tolerances "
+            "leave"
             for channel, e in told_by.items()
         )
         told.append(
-            f"{sentence_of(wrong)} (probability {wrong.probability:.2f}, {abs(wrong.moved_sigmas):.0f} tolerances away); "
-            f"on {_proof(case)} {errors}."
+            f"{sentence_of(wrong)} (probability {wrong.probability:.2f}, "
+            f"{abs(wrong.moved_sigmas):.0f} tolerances away); on {_proof(case)} {errors}."
         )
     text = "The rig file is wrong: " + " ".join(told)
     if gap is not None:
         text += (
-            f" Over all channels, {100 * gap:.0f} % of the gap between the model refitted inside its tolerances and the noise closes."
+            f" Over all channels, {100 * gap:.0f} % of the gap between the model refitted inside "
+            "its tolerances and the noise closes."
         )
     return text
 
@@ -176,19 +232,27 @@ def _instead(value: float, before: float, unit: str) -> str:
     return f"{now} {shown} instead of {was} {shown}".replace("°", "deg")
 
 
-def _beside(diagnosis: Findings, missing: list[BlockVerdict], forms: list[str], *, sought: bool) -> str:
-    """What stays open beside a name: sets that are left, and blocks that keep a mismatch without one."""
+def _beside(
+    diagnosis: Findings, missing: list[BlockVerdict], forms: list[str], *, sought: bool
+) -> str:
+    """What stays unexplained beside a name: sets that are left, and blocks with a mismatch without
+    a name.
+    """
     text = _unsettled(diagnosis)
     if not missing:
         return text
     kept = [u for u in diagnosis.unexplained if u.verdict == "unlisted"]
     blocks = " and ".join(name for b in missing for name in b.blocks)
-    said = [_capital(kept_sentence(u)) + "." for u in kept] or [f"Something acts in {blocks} that no listed effect explains."]
-    text += "\n\nWhat stays open. " + " ".join(said)
+    said = [_capital(kept_sentence(u)) + "." for u in kept] or [
+        f"No listed effect explains the residual in {blocks}."
+    ]
+    text += "\n\nWhat stays unexplained. " + " ".join(said)
     if forms:
-        text += " As a form without a name, which is in the model: " + " ".join(forms)
+        text += " The model contains it as a form without a name: " + " ".join(forms)
     else:
-        text += " No form of it " + ("was found that carries over to other recordings." if sought else "was looked for.")
+        text += " No form of it " + (
+            "carries over to other recordings." if sought else "was searched for."
+        )
     return text
 
 
@@ -199,20 +263,24 @@ def _unsettled(diagnosis: Findings) -> str:
 
 
 _SCALED = (
-    "Repeat the excitation under which the excess is largest at two speeds and at two payloads: what scales with speed, with "
-    "load or with neither tells the class of the missing effect."
+    "Repeat the excitation under which the excess is largest at two speeds and at two payloads: "
+    "what scales with speed, with load or with neither shows the class of the missing effect."
 )
 _SCALED_EXCITATION: dict[str, Any] = {"kind": "repeat_scaled", "speed_ratio": 10.0, "payloads": 2}
 """What to record of a mismatch without a name."""
 
 
 def _separating(names: Sequence[str]) -> tuple[str, dict[str, Any]]:
-    """What to record for the first of some hypotheses that says it; for what has no name where none does."""
+    """What to record for the first of some hypotheses that says it; for what has no name where none
+    does.
+    """
     told = (EFFECTS[name] for name in names if name in EFFECTS and EFFECTS[name].experiment)
     info = next(told, None)
     if info is None or ("unlisted" in names and names.index("unlisted") < names.index(info.id)):
         return _SCALED, _SCALED_EXCITATION
-    return info.experiment, {key: list(value) if isinstance(value, tuple) else value for key, value in info.excitation}
+    return info.experiment, {
+        key: list(value) if isinstance(value, tuple) else value for key, value in info.excitation
+    }
 
 
 def _capital(text: str) -> str:
@@ -224,7 +292,9 @@ def _sentence(text: str) -> str:
 
 
 def same_data(ambiguity: list[list[str]]) -> str:
-    """What tells the two most probable sets apart where they are the same data; empty where they are not."""
+    """What tells the two most probable sets apart where they are the same data; empty where they
+    are not.
+    """
     for one, other in itertools.permutations([set(s) for s in ambiguity[:2]], 2):
         for effect in one:
             same = EFFECTS[effect].same_data if effect in EFFECTS else None
@@ -234,16 +304,24 @@ def same_data(ambiguity: list[list[str]]) -> str:
 
 
 def next_experiment(
-    kind: str, probabilities: dict[str, float], ambiguity: list[list[str]], rig: Rig, missing: Sequence[str] = ()
+    kind: str,
+    probabilities: dict[str, float],
+    ambiguity: list[list[str]],
+    rig: Rig,
+    missing: Sequence[str] = (),
 ) -> NextExperiment:
-    """What to record next: the experiment that separates the leading hypotheses, or tells of blocks that keep something without a name.
+    """What to record next: the experiment that separates the leading hypotheses, or describes
+    blocks with a mismatch that has no name.
 
     It is not simulated, so that nothing is said of how much it would tell.
     """
     leading = max(probabilities, key=lambda k: probabilities[k])
     if not ambiguity and kind != "unlisted" and missing:
         text, excitation = _SCALED, _SCALED_EXCITATION
-        text = f"The name is settled. For what the {' and '.join(missing)} keeps: {text[:1].lower()}{text[1:]}"
+        text = (
+            f"The name is settled. For the rest of the residual in the {' and '.join(missing)}: "
+            f"{text[:1].lower()}{text[1:]}"
+        )
         return NextExperiment(text, excitation)
     if not ambiguity and kind != "unlisted":
         text = "The name is settled by these recordings; no further one is needed for it."
@@ -251,30 +329,38 @@ def next_experiment(
     same = same_data(ambiguity)
     if same:
         return NextExperiment(same)
-    doubted = [k for s in ambiguity for k in s if k in EFFECTS and not EFFECTS[k].experiment]
+    untold = [k for s in ambiguity for k in s if k in EFFECTS and not EFFECTS[k].experiment]
     parameters = [k for s in ambiguity for k in s if k == "parameters" or is_parameter(k)]
-    if parameters and doubted:
-        return NextExperiment(_sentence(EFFECTS[doubted[0]].separates))
+    if parameters and untold:
+        return NextExperiment(_sentence(EFFECTS[untold[0]].separates))
     measurable = [k for k in parameters if is_parameter(k)]
     if measurable:
-        text = f"Measure {' or '.join(measurable)} by itself (scale, ruler, known volume): these recordings cannot tell which is wrong."
+        text = (
+            f"Measure {' or '.join(measurable)} by itself (scale, ruler, known volume): these "
+            "recordings cannot tell which is wrong."
+        )
         return NextExperiment(text)
     text, excitation = _separating([k for s in [leading.split("+"), *ambiguity] for k in s])
     if not (rig.tables("valve") or rig.tables("muscle")):
         text = (
-            "Repeat the hold at a third of the pressure and with the chamber removed (transducer and fittings alone): a leak of the "
-            "chamber scales with absolute pressure and goes with it; cooling, the bench's own loss and the transducer's drift stay."
+            "Repeat the hold at a third of the pressure and with the chamber removed (transducer "
+            "and fittings alone): a leak of the chamber scales with absolute pressure and goes "
+            "with it; cooling, the bench's own loss and the transducer's drift stay."
         )
         excitation = {"kind": "sealed_hold", "levels_bar": [2.5, 7.5], "hold_s": 600.0}
     return NextExperiment(text, excitation)
 
 
-def warnings(case: Case, judged: list[Judged], no_held_out: bool, settings: DiagnosisSettings) -> list[str]:
+def warnings(
+    case: Case, judged: list[Judged], no_held_out: bool, settings: DiagnosisSettings
+) -> list[str]:
     """What a reader should know about the data and the fit."""
     out = []
     groups = [j.group for j in judged]
     mistaken = any(j.wrong for j in judged)
-    symptoms = {n: v for j in judged if not j.wrong for n, v in symptoms_of(j.group, settings).items()}
+    symptoms = {
+        n: v for j in judged if not j.wrong for n, v in symptoms_of(j.group, settings).items()
+    }
     for recording in case.recordings:
         for issue in recording.issues[:8]:
             when = f"{issue.start:g} to {issue.stop:g} s"
@@ -283,26 +369,47 @@ def warnings(case: Case, judged: list[Judged], no_held_out: bool, settings: Diag
             out.append(f"{recording.name}: {len(recording.issues) - 8} more issues of this kind")
     for recording in case.recordings:
         for channel, values in recording.channels.items():
-            if channel_of(channel) not in ("muscle_pressure", "supply_pressure") or not recording.mask[channel].any():
+            if (
+                channel_of(channel) not in ("muscle_pressure", "supply_pressure")
+                or not recording.mask[channel].any()
+            ):
                 continue
             largest = float(np.nanmax(np.abs(values[recording.mask[channel]])))
             if largest < settings.warnings.least_pressure:
                 out.append(
-                    f"{recording.name}: {channel} never exceeds {largest:.3g} Pa gauge, next to nothing for a muscle or a tank: is "
-                    "the unit in its header the one its values are in?"
+                    f"{recording.name}: {channel} never exceeds {largest:.3g} Pa gauge, next to "
+                    "nothing for a muscle or a tank: is the unit in its header the one its values "
+                    "are in?"
                 )
     for name, value in sorted(symptoms.items(), key=lambda kv: -abs(kv[1])):
-        what = "a symptom of a wrong value beside it or of missing physics" if mistaken else "a symptom of missing physics"
-        out.append(f"the refit without effects moves {name} by {value:+.1f} tolerances: {what}, not a result")
+        what = (
+            "a symptom of a wrong value beside it or of missing physics"
+            if mistaken
+            else "a symptom of missing physics"
+        )
+        out.append(
+            f"the refit without effects moves {name} by {value:+.1f} tolerances: {what}, not a "
+            "result"
+        )
     if no_held_out:
-        how = "; names are judged by how the other recordings predict each" if len(case.recordings) > 1 else ""
-        out.append(f"there is no held-out recording: the proof is on the fitted data and counts less{how}")
+        how = (
+            "; names are judged by how the other recordings predict each"
+            if len(case.recordings) > 1
+            else ""
+        )
+        out.append(
+            f"there is no held-out recording: the proof is on the fitted data and counts less{how}"
+        )
     for group in groups:
         best = group.best
         if best.effects and best.scatter > settings.warnings.scatter:
-            out.append(f"the size of {best.key} scatters by {100 * best.scatter:.0f} % between recordings")
+            out.append(
+                f"the size of {best.key} scatters by {100 * best.scatter:.0f} % between recordings"
+            )
     for name in unknown_volumes(case.rig):
-        out.append(f"{name} is marked unknown: values that scale with it hold for the placeholder only")
+        out.append(
+            f"{name} is marked unknown: values that scale with it hold for the placeholder only"
+        )
     return out
 
 
@@ -316,15 +423,18 @@ def absolute(case: Case, settings: WarningSettings) -> list[str]:
             if channel_of(channel) == "muscle_pressure" and rows.any():
                 firsts.setdefault(channel, []).append(float(values[rows][0]))
     return [
-        f"{channel} begins at {np.mean(begun):.4g} Pa in every recording, one atmosphere (gas.ambient_pressure = {ambient:g} Pa): are "
-        "these absolute pressures? Gauge pressures are needed; what is found below may be no more than the difference"
+        f"{channel} begins at {np.mean(begun):.4g} Pa in every recording, one atmosphere "
+        f"(gas.ambient_pressure = {ambient:g} Pa): are these absolute pressures? Gauge pressures "
+        "are needed; what is found below may be no more than the difference"
         for channel, begun in firsts.items()
         if all(abs(first - ambient) < settings.ambient_share * ambient for first in begun)
     ]
 
 
 def worse(table: dict[str, ChannelError], settings: WarningSettings) -> list[str]:
-    """Channels that the model with what was added predicts worse than the nominal one did, or the refitted one."""
+    """Channels that the model with what was added predicts worse than the nominal one did, or the
+    refitted one.
+    """
     out = []
     for channel, error in table.items():
         better, which = min((error.before, "nominal"), (error.refit, "refitted"))
@@ -332,16 +442,21 @@ def worse(table: dict[str, ChannelError], settings: WarningSettings) -> list[str
             unit, factor = display_unit(unit_of(channel), error.after)
             now, was = (format_number(v * factor, 3, unicode=False) for v in (error.after, better))
             out.append(
-                f"the new model misses {channel.replace('_', ' ')} by {now} {unit}, the {which} one by {was} {unit}: what was added "
-                "spoils this channel".replace("°", "deg")
+                f"the new model misses {channel.replace('_', ' ')} by {now} {unit}, the {which} "
+                f"one by {was} {unit}: what was added spoils this channel".replace("°", "deg")
             )
     return out
 
 
 def reservations(
-    judged: list[Judged], chosen: list[Candidate], table: dict[str, ChannelError], settings: WarningSettings
+    judged: list[Judged],
+    chosen: list[Candidate],
+    table: dict[str, ChannelError],
+    settings: WarningSettings,
 ) -> list[str]:
-    """What a reader should know of a model with a name: what it still misses where it acts, and values that it had to move far."""
+    """What a reader should know of a model with a name: what it still misses where it acts, and
+    values that it had to move far.
+    """
     out = []
     for j in judged:
         if not (j.named or j.wrong):
@@ -355,11 +470,18 @@ def reservations(
             why = "its equation is not the whole truth" if j.named else "something acts beside it"
             name = "" if j.ambiguity else "the name stands, "
             out.append(
-                f"with {what} the model still misses {channel.replace('_', ' ')} by {times:.2g} times its noise: {name}{why}, and "
-                "standard deviations hold only as far as that matters little"
+                f"with {what} the model still misses {channel.replace('_', ' ')} by {times:.2g} "
+                f"times the noise level: {name}{why}, and standard deviations hold only as far as "
+                "that matters little"
             )
     named = [c for c in chosen if any(effect in CATALOGUE for effect in c.effects)]
     far = settings.moved_tolerances
     moved = {n: v for c in named for n, v in c.fit.held_by_prior.items() if abs(v) > far}
-    out += [f"with the effect the fit moves {n} by {v:+.1f} tolerances: it may make up for the effect's form" for n, v in moved.items()]
+    out += [
+        (
+            f"with the effect the fit moves {n} by {v:+.1f} tolerances: it may compensate for the "
+            "effect's form"
+        )
+        for n, v in moved.items()
+    ]
     return out

@@ -1,8 +1,10 @@
-"""Models fitted to all blocks and recordings together: parameters inside their tolerances, effects from several starts.
+"""Models fitted to all blocks and recordings together: parameters inside their tolerances, effects
+from several starts.
 
-Public: `Problem`, `Fit`, `Scaling`, `fit`, `residuals`, `changes`, `stacked`, `with_priors`, `free_baseline`, `bin_width`, `Key`;
-`levenberg_marquardt`; `Start`, `starts_of`, `CHOSEN` (where the fit of an effect begins); `Events`, `events_of`, `fit_events`,
-`look_for_events` (transient effects); `ACTS`, `acts_in`, `depends`, `fits` (where effects act).
+Public: `Problem`, `Fit`, `Scaling`, `fit`, `residuals`, `changes`, `stacked`, `with_priors`,
+`free_baseline`, `bin_width`, `Key`; `levenberg_marquardt`; `Start`, `starts_of`, `CHOSEN` (where
+the fit of an effect begins); `Events`, `events_of`, `fit_events`, `look_for_events` (transient
+effects); `ACTS`, `acts_in`, `depends`, `fits` (where effects act).
 """
 
 from __future__ import annotations

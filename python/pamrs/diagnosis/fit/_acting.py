@@ -17,11 +17,13 @@ ACTS: dict[str, tuple[str, ...]] = {
     "joint": ("arm",),
     "arm": ("arm",),
 }
-"""Kinds of block of the cut rig in which the effects of a block of the rig act, unless they say others themselves.
+"""Kinds of block of the cut rig in which the effects of a block of the rig act, unless they say
+others themselves.
 
-Of several tanks, chambers or joints an effect acts on every one, with the same parameters: so the core has it where the effect has no
-``at``, and one parameter that all recordings and blocks share is what they can decide. An effect of one muscle alone shows as a block
-that keeps its mismatch while its neighbours lose theirs; ``Rig.with_effect(..., at="flexor")`` then has it.
+Of several tanks, chambers or joints an effect acts on every one, with the same parameters: so the
+core has it where the effect has no ``at``, and one parameter that all recordings and blocks share
+is what they can decide. An effect of one muscle alone shows as a block that keeps its mismatch
+while its neighbours lose theirs; ``Rig.with_effect(..., at="flexor")`` then has it.
 """
 
 
@@ -44,5 +46,7 @@ def fits(rig: Rig, effect: str) -> bool:
     info = EFFECTS[effect]
     usual = info.at or ("joint" if info.block == "arm" else "chamber")
     return any(
-        kind in ("", table.get("kind", "")) for block, kind in info.needs or ((usual, ""),) for table in rig.tables(block).values()
+        kind in ("", table.get("kind", ""))
+        for block, kind in info.needs or ((usual, ""),)
+        for table in rig.tables(block).values()
     )

@@ -1,4 +1,6 @@
-"""Joint fit of all blocks to all recordings: parameters inside their tolerances, effects from several starts."""
+"""Joint fit of all blocks to all recordings: parameters inside their tolerances, effects from
+several starts.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,17 @@ from pamrs.errors import ParameterError, RigError, SimulationError
 from pamrs.rig import Parameter, Rig
 from pamrs.simulation import core_rig
 
-__all__ = ["Events", "Fit", "Problem", "Scaling", "changes", "fit", "residuals", "stacked", "with_priors"]
+__all__ = [
+    "Events",
+    "Fit",
+    "Problem",
+    "Scaling",
+    "changes",
+    "fit",
+    "residuals",
+    "stacked",
+    "with_priors",
+]
 
 Array = NDArray[np.float64]
 Key = tuple[str, str]
@@ -34,6 +46,8 @@ LOGARITHMIC = frozenset(
     if parameter.neutral != 0.0 and parameter.lower > 0.0
 )
 """Shapes that are positive: fitted by their logarithm."""
+
+
 @dataclass(frozen=True, eq=False)
 class Problem:
     """Blocks and recordings to be explained together.
@@ -126,8 +140,11 @@ class Fit:
         return sum(moved * moved for moved in self.held_by_prior.values())
 
 
-def residuals(problem: Problem, rig: Rig, names: Sequence[str] = (), events: Events | None = None) -> dict[Key, Residual]:
-    """Residuals of a model for every block and recording; jacobians for the names that a block depends on.
+def residuals(
+    problem: Problem, rig: Rig, names: Sequence[str] = (), events: Events | None = None
+) -> dict[Key, Residual]:
+    """Residuals of a model for every block and recording; jacobians for the names that a block
+    depends on.
 
     Parameters
     ----------
@@ -151,7 +168,9 @@ def residuals(problem: Problem, rig: Rig, names: Sequence[str] = (), events: Eve
     def one(task: tuple[Block, Prepared]) -> Residual:
         block, prepared = task
         relevant = [name for name in names if depends(block, name)]
-        if events is not None and prepared.recording.name not in own:  # nothing happens here that could be differentiated
+        if (
+            events is not None and prepared.recording.name not in own
+        ):  # nothing happens here that could be differentiated
             relevant = [name for name in relevant if name.partition(".")[0] != events.effect]
         found = residual(block, own.get(prepared.recording.name, core), prepared, relevant)
         if len(relevant) == len(names):
@@ -169,7 +188,9 @@ def residuals(problem: Problem, rig: Rig, names: Sequence[str] = (), events: Eve
 
 @contextmanager
 def _inside_range() -> Iterator[None]:
-    """A trial model that cannot be (more payload taken away than there is, next to no inertia) is outside the model's range."""
+    """A trial model that cannot be (more payload taken away than there is, next to no inertia) is
+    outside the model's range.
+    """
     try:
         yield
     except (ParameterError, RigError) as error:
@@ -183,7 +204,10 @@ def _compiled(problem: Problem, rig: Rig) -> _core.Rig:
     settings = problem.settings.fit
     least = min(settings.least_step, settings.least_step_share * problem.core.stable_step)
     if core.stable_step < least:
-        raise SimulationError(f"the model needs steps of {core.stable_step:.1e} s; to be fitted it may need {least:.1e} s at the least")
+        raise SimulationError(
+            f"the model needs steps of {core.stable_step:.1e} s; to be fitted it may need "
+            f"{least:.1e} s at the least"
+        )
     return core
 
 
@@ -193,12 +217,16 @@ def free_baseline(problem: Problem, nominal: Rig) -> list[str]:
     return [
         name
         for name, parameter in nominal.parameters.items()
-        if name in differentiable and 0.0 < parameter.tol < math.inf and any(name in block.parameters for block in problem.blocks)
+        if name in differentiable
+        and 0.0 < parameter.tol < math.inf
+        and any(name in block.parameters for block in problem.blocks)
     ]
 
 
 class Scaling:
-    """Free parameters as numbers of order one: tolerances for the baseline, starts or logarithms for effects."""
+    """Free parameters as numbers of order one: tolerances for the baseline, starts or logarithms
+    for effects.
+    """
 
     def __init__(
         self,
@@ -215,8 +243,14 @@ class Scaling:
         self.centre = {n: known[n].value for n in baseline}
         walls = {n: settings.most_tolerances * known[n].tol for n in baseline}
         reach = {n: _reach(known[n], settings) if n in freed else walls[n] for n in baseline}
-        lower = [(max(known[n].lower, self.centre[n] - reach[n]) - self.centre[n]) / self.scale[n] for n in baseline]
-        upper = [(min(known[n].upper, self.centre[n] + reach[n]) - self.centre[n]) / self.scale[n] for n in baseline]
+        lower = [
+            (max(known[n].lower, self.centre[n] - reach[n]) - self.centre[n]) / self.scale[n]
+            for n in baseline
+        ]
+        upper = [
+            (min(known[n].upper, self.centre[n] + reach[n]) - self.centre[n]) / self.scale[n]
+            for n in baseline
+        ]
         for name, start in starts.items():
             info = find_parameter(name)
             if name in LOGARITHMIC:
@@ -229,7 +263,10 @@ class Scaling:
                 lower.append(info.lower / self.scale[name])
                 upper.append(info.upper / self.scale[name])
         self.bounds = (np.array(lower), np.array(upper))
-        self.start = np.array([0.0] * len(self.baseline) + [0.0 if n in LOGARITHMIC else s / self.scale[n] for n, s in starts.items()])
+        self.start = np.array(
+            [0.0] * len(self.baseline)
+            + [0.0 if n in LOGARITHMIC else s / self.scale[n] for n, s in starts.items()]
+        )
 
     def value(self, name: str, x: float) -> float:
         """A parameter [SI] from its scaled number."""
@@ -266,8 +303,11 @@ def bin_width(prepared: Prepared, seconds: float) -> int:
     return max(1, round(seconds / prepared.dt))
 
 
-def stacked(problem: Problem, found: dict[Key, Residual], inflation: dict[str, float]) -> tuple[Array, Array | None]:
-    """Residuals of all blocks and recordings as one vector of bin means in units of their standard deviation.
+def stacked(
+    problem: Problem, found: dict[Key, Residual], inflation: dict[str, float]
+) -> tuple[Array, Array | None]:
+    """Residuals of all blocks and recordings as one vector of bin means in units of their standard
+    deviation.
 
     Parameters
     ----------
@@ -304,8 +344,11 @@ def with_priors(problem: Problem, found: Fit, inflation: dict[str, float]) -> fl
     return float(rows @ rows) + found.strain
 
 
-def changes(problem: Problem, rig: Rig, base: dict[Key, Residual], effect: str) -> dict[Key, Residual]:
-    """Residuals of a model near to another whose residuals (with the starts of their windows) are known; values alone.
+def changes(
+    problem: Problem, rig: Rig, base: dict[Key, Residual], effect: str
+) -> dict[Key, Residual]:
+    """Residuals of a model near to another whose residuals (with the starts of their windows) are
+    known; values alone.
 
     Only blocks in which the effect that makes the difference acts are predicted again.
 
@@ -322,7 +365,9 @@ def changes(problem: Problem, rig: Rig, base: dict[Key, Residual], effect: str) 
         key = (block.name, prepared.recording.name)
         if not acts_in(effect, block):
             return key, replace(base[key], jacobian=None)
-        return key, replace(base[key], value=change(block, core, prepared, base[key]), jacobian=None)
+        return key, replace(
+            base[key], value=change(block, core, prepared, base[key]), jacobian=None
+        )
 
     with _inside_range(), ThreadPoolExecutor(max_workers=2) as pool:
         return dict(pool.map(one, tasks))
@@ -357,13 +402,15 @@ def fit(
     starts : dict of str to float
         Dotted effect parameters that are free, with their starts.
     inflation : dict of str to float
-        Variance of each block's binned residual relative to white sample noise (coloured residuals count less).
+        Variance of each block's binned residual relative to white sample noise (autocorrelated
+        residuals count less).
     fixed : dict of str to float, optional
         Effect parameters that are held.
     warm : Fit, optional
         A fit of the same problem from whose baseline values to start.
     frozen : bool, optional
-        Take the sensitivities of the baseline parameters from ``warm`` and compute those of the effects alone.
+        Take the sensitivities of the baseline parameters from ``warm`` and compute those of the
+        effects alone.
     events : Events, optional
         What happens in single recordings, held.
     evaluations : int, optional
@@ -387,16 +434,20 @@ def fit(
     count = len(baseline)
     bound = np.array([0.0 if name in freed else 1.0 for name in baseline])
     kept = _jacobian_of(warm, baseline) if frozen and warm is not None else None
-    asked = scaling.names if kept is None else list(starts)
+    wanted = scaling.names if kept is None else list(starts)
     prior = np.zeros((count, len(scaling.names)))
     prior[:, :count] = np.diag(bound)
 
     def evaluate(x: Array) -> tuple[Array, Array, dict[Key, Residual]]:
-        found = residuals(problem, scaling.rig(x, fixed or {}), asked, events)
+        found = residuals(problem, scaling.rig(x, fixed or {}), wanted, events)
         if kept is not None:
-            found = {key: replace(r, jacobian=_beside(kept[key], r.jacobian)) for key, r in found.items()}
+            found = {
+                key: replace(r, jacobian=_beside(kept[key], r.jacobian)) for key, r in found.items()
+            }
         rows, slope = stacked(problem, found, inflation)
-        slopes = np.array([scaling.slope(n, float(v)) for n, v in zip(scaling.names, x, strict=True)])
+        slopes = np.array(
+            [scaling.slope(n, float(v)) for n, v in zip(scaling.names, x, strict=True)]
+        )
         jacobian = np.zeros((rows.size, 0)) if slope is None else slope * slopes
         return np.concatenate([rows, bound * x[:count]]), np.concatenate([jacobian, prior]), found
 
@@ -405,10 +456,14 @@ def fit(
         if warm is not None and name in warm.values:
             start[index] = (warm.values[name] - scaling.centre[name]) / scaling.scale[name]
     limit = own.evaluations if evaluations is None else evaluations
-    x, (values, jacobian, found), spent = levenberg_marquardt(evaluate, start, scaling.bounds, limit, own, share)
+    x, (values, jacobian, found), spent = levenberg_marquardt(
+        evaluate, start, scaling.bounds, limit, own, share
+    )
     covariance: Array = np.zeros((0, 0))
     if x.size:
-        covariance = np.asarray(np.linalg.pinv(jacobian.T @ jacobian, hermitian=True), dtype=np.float64)
+        covariance = np.asarray(
+            np.linalg.pinv(jacobian.T @ jacobian, hermitian=True), dtype=np.float64
+        )
     spread = np.sqrt(np.clip(np.diag(covariance), 0.0, None))
     named = {n: scaling.value(n, float(v)) for n, v in zip(scaling.names, x, strict=True)}
     scales = {n: scaling.slope(n, float(v)) for n, v in zip(scaling.names, x, strict=True)}
@@ -416,13 +471,29 @@ def fit(
     moved = {n: float(v) for n, v in zip(baseline, x[:count], strict=True)}
     rig = scaling.rig(x, fixed or {})
     loose = tuple(name for name in baseline if name in freed)
-    return Fit(effects, rig, named, std, covariance, 0.5 * float(values @ values), found, moved, spent, scales, events, loose)
+    return Fit(
+        effects,
+        rig,
+        named,
+        std,
+        covariance,
+        0.5 * float(values @ values),
+        found,
+        moved,
+        spent,
+        scales,
+        events,
+        loose,
+    )
 
 
 def _jacobian_of(fitted: Fit, names: Sequence[str]) -> dict[Key, Array]:
     """Sensitivities that a fit ended with, for some of its parameters."""
     columns = [list(fitted.values).index(name) for name in names]
-    return {key: np.zeros((r.value.size, 0)) if r.jacobian is None else r.jacobian[:, columns] for key, r in fitted.residuals.items()}
+    return {
+        key: np.zeros((r.value.size, 0)) if r.jacobian is None else r.jacobian[:, columns]
+        for key, r in fitted.residuals.items()
+    }
 
 
 def _beside(left: Array, right: Array | None) -> Array:

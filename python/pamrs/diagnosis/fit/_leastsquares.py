@@ -1,9 +1,10 @@
 """Bounded least squares by Levenberg and Marquardt on the normal equations.
 
-The residuals of a diagnosis are tens of thousands of rows of a dozen parameters, one evaluation gives rows and sensitivities
-together, and a gain that the noise could have made is worth no further evaluation. SciPy's `least_squares` decomposes the tall
-matrix at every step, evaluates rows and sensitivities apart, and its tolerances are relative: it took four times as long to the
-same end (docs/decisions/0014).
+The residuals of a diagnosis are tens of thousands of rows of a dozen parameters, one evaluation
+gives rows and sensitivities together, and a gain that the noise could have made is worth no further
+evaluation. SciPy's `least_squares` decomposes the tall matrix at every step, evaluates rows and
+sensitivities apart, and its tolerances are relative: it took four times as long to the same end
+(docs/decisions/0014).
 """
 
 from __future__ import annotations
@@ -36,8 +37,8 @@ def levenberg_marquardt(
     Parameters
     ----------
     evaluate : callable
-        Rows (n,), their sensitivities (n, k) and whatever else is wanted of the best point. A `SimulationError` after the first
-        evaluation is a step that is taken back.
+        Rows (n,), their sensitivities (n, k) and whatever else is wanted of the best point. A
+        `SimulationError` after the first evaluation is a step that is taken back.
     start : (k,) array
         Where to begin; moved into the box.
     bounds : (k,) arrays
@@ -45,7 +46,7 @@ def levenberg_marquardt(
     evaluations : int
         Limit, the first included.
     settings : FitSettings
-        Gain and share of the sum of squares that a step has to promise, damping.
+        Least predicted gain of a step, the same as a share of the sum of squares, damping.
     share : float, optional
         Another share; 0 where the last few units of chi-square count.
 
@@ -95,7 +96,11 @@ def levenberg_marquardt(
         gained = float(rows @ rows - found[0] @ found[0])
         if gained > 0.0:
             x, best = tried, found
-            damping = damping * 0.1 if gained > 0.5 * gain else damping * (2.0 if gained < 0.1 * gain else 1.0)
+            damping = (
+                damping * 0.1
+                if gained > 0.5 * gain
+                else damping * (2.0 if gained < 0.1 * gain else 1.0)
+            )
             damping = max(damping, 1e-9)
         else:
             damping = max(10.0 * hard, 1e-2)
@@ -105,12 +110,16 @@ def levenberg_marquardt(
 
 
 def _promise(step: Array, gradient: Array, normal: Array) -> float:
-    """Gain in the sum of squares that a step promises."""
+    """Predicted gain of a step in the sum of squares."""
     return -2.0 * float(gradient @ step) - float(step @ normal @ step)
 
 
-def _step(x: Array, gradient: Array, normal: Array, damping: float, low: Array, high: Array) -> Array:
-    """Damped step of the free parameters; those that would leave the box go to its wall, and the others are solved again."""
+def _step(
+    x: Array, gradient: Array, normal: Array, damping: float, low: Array, high: Array
+) -> Array:
+    """Damped step of the free parameters; those that would leave the box go to its wall, and the
+    others are solved again.
+    """
     step = np.zeros_like(x)
     free = ~(((x <= low) & (gradient > 0.0)) | ((x >= high) & (gradient < 0.0)))
     scale = np.diag(normal).copy()

@@ -1,4 +1,6 @@
-"""Where the fit of an effect begins: sizes that scale, shapes that are tried one by one, choices that are held."""
+"""Where the fit of an effect begins: sizes that scale, shapes that are tried one by one, choices
+that are held.
+"""
 
 from __future__ import annotations
 
@@ -50,14 +52,19 @@ class Start:
         return rig.with_effect(self.effect, values)
 
     def scaled(self, size: float) -> Start:
-        """The same start with its sizes multiplied (a restriction divided by the root), inside their bounds."""
+        """The same start with its sizes multiplied (a restriction divided by the root), inside
+        their bounds.
+        """
         bounds = {f"{self.effect}.{p.name}": p for p in EFFECTS[self.effect].parameters}
 
         def sized(name: str, value: float) -> float:
             moved = value / math.sqrt(size) if bounds[name].restricts else value * size
             return min(max(moved, bounds[name].lower), bounds[name].upper)
 
-        free = {name: sized(name, value) if name in self.sizes else value for name, value in self.free.items()}
+        free = {
+            name: sized(name, value) if name in self.sizes else value
+            for name, value in self.free.items()
+        }
         return replace(self, free=free)
 
 
@@ -84,7 +91,9 @@ def starts_of(effect: str, *, sealed: bool) -> list[Start]:
         name = f"{effect}.{parameter.name}"
         role = parameter.role_in(sealed=sealed)
         if role == "size":
-            sizes[name] = next((value for value in parameter.starts if value != 0.0), parameter.default)
+            sizes[name] = next(
+                (value for value in parameter.starts if value != 0.0), parameter.default
+            )
             signed = signed or parameter.lower < 0.0
         elif role in _TRIED:
             shapes.append([(name, value) for value in parameter.starts])

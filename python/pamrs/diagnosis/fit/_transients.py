@@ -1,9 +1,11 @@
-"""Effects that happen at times of their own in every recording: pushes from outside, a payload that changes.
+"""Effects that happen at times of their own in every recording: pushes from outside, a payload that
+changes.
 
-No parameter that all recordings share can describe them. In each recording a pulse or a step of a typical size is moved through
-time; where its signature takes most of the residual a fit begins. On a held-out recording the times are looked for again, since
-nothing can predict them; what the event is (a mass) is not. Pushes have no property that carries over, so that they are believed
-only if little is left.
+No parameter that all recordings share can describe them. In each recording a pulse or a step of a
+typical size is moved through time; where its signature takes most of the residual a fit begins. On
+a held-out recording the times are looked for again, since nothing can predict them; what the event
+is (a mass) is not. Pushes have no property that carries over, so they are accepted only if little
+is left.
 """
 
 from __future__ import annotations
@@ -16,7 +18,16 @@ from threading import Event
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.diagnosis.fit._fitting import Events, Fit, Key, Problem, Scaling, changes, residuals, stacked
+from pamrs.diagnosis.fit._fitting import (
+    Events,
+    Fit,
+    Key,
+    Problem,
+    Scaling,
+    changes,
+    residuals,
+    stacked,
+)
 from pamrs.diagnosis.fit._leastsquares import levenberg_marquardt
 from pamrs.diagnosis.prepare import Prepared, Residual
 from pamrs.diagnosis.settings import TransientSettings
@@ -30,7 +41,8 @@ Array = NDArray[np.float64]
 
 
 def events_of(effect: str) -> list[list[EffectParameter]]:
-    """Parameters (size, time, duration) of each event that one recording can have, the first event's first.
+    """Parameters (size, time, duration) of each event that one recording can have, the first
+    event's first.
 
     Parameters
     ----------
@@ -56,12 +68,17 @@ def _first_of(effect: str, parameter: str) -> EffectParameter:
 
 def _scale(effect: str, parameter: str, settings: TransientSettings) -> float:
     """Scale of an event's parameter in a fit [SI]."""
-    scales = {"time": settings.time_scale, "duration": settings.duration_scale, "rise": settings.rise_scale}
+    scales = {
+        "time": settings.time_scale,
+        "duration": settings.duration_scale,
+        "rise": settings.rise_scale,
+    }
     return scales.get(_first_of(effect, parameter).role, _tried(EFFECTS[effect].leading))
 
 
-
-def fit_events(effect: str, problem: Problem, nominal: Rig, baseline: Fit, inflation: dict[str, float]) -> Fit | None:
+def fit_events(
+    effect: str, problem: Problem, nominal: Rig, baseline: Fit, inflation: dict[str, float]
+) -> Fit | None:
     """Find the events of an effect in every recording and refit the baseline beside them.
 
     Parameters
@@ -80,7 +97,8 @@ def fit_events(effect: str, problem: Problem, nominal: Rig, baseline: Fit, infla
     Returns
     -------
     Fit or None
-        With ``events``; its ``values`` hold the parameters of the first recording that has one. None where nothing was found.
+        With ``events``; its ``values`` hold the parameters of the first recording that has one.
+        None where nothing was found.
     """
     found = look_for_events(effect, problem, baseline.rig, baseline.residuals, inflation)
     if found is None:
@@ -99,7 +117,12 @@ def fit_events(effect: str, problem: Problem, nominal: Rig, baseline: Fit, infla
 
 
 def look_for_events(
-    effect: str, problem: Problem, rig: Rig, base: dict[Key, Residual], inflation: dict[str, float], size: float | None = None
+    effect: str,
+    problem: Problem,
+    rig: Rig,
+    base: dict[Key, Residual],
+    inflation: dict[str, float],
+    size: float | None = None,
 ) -> Events | None:
     """The events of an effect in each recording, at a model that stays.
 
@@ -128,7 +151,11 @@ def look_for_events(
         alone = replace(problem, recordings=[prepared])
         own = {key: r for key, r in base.items() if key[1] == prepared.recording.name}
         started = _scan(effect, alone, prepared, rig, own, inflation, size, stopped)
-        return _fitted(effect, started, alone, prepared, rig, inflation, size is not None, stopped) if started else None
+        return (
+            _fitted(effect, started, alone, prepared, rig, inflation, size is not None, stopped)
+            if started
+            else None
+        )
 
     stopped = Event()
     with ThreadPoolExecutor(max_workers=2) as pool:
@@ -137,7 +164,11 @@ def look_for_events(
         except BaseException:  # an interrupt is not to wait for two whole searches
             stopped.set()
             raise
-    values = {p.recording.name: own for p, own in zip(problem.recordings, found, strict=True) if own is not None}
+    values = {
+        p.recording.name: own
+        for p, own in zip(problem.recordings, found, strict=True)
+        if own is not None
+    }
     return Events(effect, values) if values else None
 
 
@@ -151,7 +182,9 @@ def _scan(
     size: float | None,
     stopped: Event,
 ) -> dict[str, float]:
-    """Where the events of one recording begin, the most telling first; empty where none is worth it."""
+    """Where the events of one recording begin, the most telling first; empty where none is worth
+    it.
+    """
     settings, slots = problem.settings.transients, len(events_of(effect))
     typical = _tried(EFFECTS[effect].leading)
     length = prepared.n * prepared.dt
@@ -163,11 +196,18 @@ def _scan(
             return {}
         values = _numbered([(typical if size is None else size, float(t)) for t in group], effect)
         try:
-            moved, _ = stacked(problem, changes(problem, rig.with_effect(effect, values), base, effect), inflation)
+            moved, _ = stacked(
+                problem, changes(problem, rig.with_effect(effect, values), base, effect), inflation
+            )
         except SimulationError:
             continue
         change = moved - rows
-        share = np.arange(rows.size) % max(1, rows.size // len(problem.blocks)) / max(1, rows.size // len(problem.blocks)) * length
+        share = (
+            np.arange(rows.size)
+            % max(1, rows.size // len(problem.blocks))
+            / max(1, rows.size // len(problem.blocks))
+            * length
+        )
         for place, t in enumerate(group):
             end = group[place + 1] if place + 1 < len(group) else np.inf
             begins, ends = share >= t - settings.early, share < end - settings.early
@@ -182,17 +222,25 @@ def _scan(
             if all(abs(t - s) >= settings.least_distance for s in chosen)
         }
         best = max(gains, key=lambda t: gains[t], default=0.0)
-        if gains.get(best, 0.0) < max(settings.least_gain, settings.least_share * float(rows @ rows)):
+        if gains.get(best, 0.0) < max(
+            settings.least_gain, settings.least_share * float(rows @ rows)
+        ):
             break
         chosen.append(best)
         columns = np.stack([signatures[t] for t in chosen], axis=1)
         if size is None:
             # what the events that were found can still do is no gain of another one
-            span, sizes = np.linalg.qr(columns)[0], np.asarray(np.linalg.lstsq(columns, -rows, rcond=None)[0])
+            span, sizes = (
+                np.linalg.qr(columns)[0],
+                np.asarray(np.linalg.lstsq(columns, -rows, rcond=None)[0]),
+            )
         else:
             sizes = np.ones(len(chosen))
         left = rows + columns @ sizes
-    events = [(float(factor) * (typical if size is None else size), t) for factor, t in zip(sizes, chosen, strict=True)]
+    events = [
+        (float(factor) * (typical if size is None else size), t)
+        for factor, t in zip(sizes, chosen, strict=True)
+    ]
     return _numbered(sorted(events, key=lambda c: c[1]), effect) if events else {}
 
 
@@ -234,7 +282,9 @@ def _fitted(
     keep_size: bool,
     stopped: Event,
 ) -> dict[str, float] | None:
-    """Events of one recording fitted alone, at a model that stays; None where the model leaves its range."""
+    """Events of one recording fitted alone, at a model that stays; None where the model leaves its
+    range.
+    """
     settings, leading = alone.settings, EFFECTS[effect].leading
     free = [p for p in start if not (keep_size and _first_of(effect, p) is leading)]
     scale = np.array([_scale(effect, p, settings.transients) for p in free])
@@ -254,14 +304,19 @@ def _fitted(
         return rows, slope * scale, None
 
     try:
-        begun, most = np.array([start[p] for p in free]) / scale, settings.transients.evaluations_alone
+        begun, most = (
+            np.array([start[p] for p in free]) / scale,
+            settings.transients.evaluations_alone,
+        )
         x, _, _ = levenberg_marquardt(evaluate, begun, (low, high), most, settings.fit)
     except SimulationError:
         return None
     return told(x)
 
 
-def _limits(effect: str, parameter: str, prepared: Prepared, settings: TransientSettings) -> tuple[float, float]:
+def _limits(
+    effect: str, parameter: str, prepared: Prepared, settings: TransientSettings
+) -> tuple[float, float]:
     """Smallest and largest value of an event's parameter [SI]."""
     info = find_parameter(f"{effect}.{parameter}")
     limits = {
@@ -273,10 +328,14 @@ def _limits(effect: str, parameter: str, prepared: Prepared, settings: Transient
     return limits.get(_first_of(effect, parameter).role, size)
 
 
-def _jointly(events: Events, problem: Problem, nominal: Rig, baseline: Fit, inflation: dict[str, float]) -> Fit | None:
-    """Baseline and events of every recording in one fit, a changed mass the same in all; None where the model leaves its range.
+def _jointly(
+    events: Events, problem: Problem, nominal: Rig, baseline: Fit, inflation: dict[str, float]
+) -> Fit | None:
+    """Baseline and events of every recording in one fit, a changed mass the same in all; None where
+    the model leaves its range.
 
-    One after the other would creep: a baseline that was fitted without the events holds half of what a mass does.
+    One after the other would creep: a baseline that was fitted without the events holds half of
+    what a mass does.
     """
     joint = _Joint.of(events, problem, nominal, baseline, inflation)
     settings, count = problem.settings, len(joint.names)
@@ -290,17 +349,24 @@ def _jointly(events: Events, problem: Problem, nominal: Rig, baseline: Fit, infl
         )
     except SimulationError:
         return None
-    spread = np.sqrt(np.clip(np.diag(np.linalg.pinv(jacobian.T @ jacobian, hermitian=True)), 0.0, None))
-    told_std = {place: float(s) for place, s in zip(joint.places, spread[count:] * joint.scale, strict=True)}
+    spread = np.sqrt(
+        np.clip(np.diag(np.linalg.pinv(jacobian.T @ jacobian, hermitian=True)), 0.0, None)
+    )
+    told_std = {
+        place: float(s) for place, s in zip(joint.places, spread[count:] * joint.scale, strict=True)
+    }
     first = next(iter(events.values))
-    own_std = {p: told_std.get((first, p), told_std.get(("", p), math.nan)) for p in events.values[first]}
+    own_std = {
+        p: told_std.get((first, p), told_std.get(("", p), math.nan)) for p in events.values[first]
+    }
     names, scaling = joint.names, joint.scaling
     return replace(
         baseline,
         effects=(events.effect,),
         rig=scaling.rig(x[:count], {}),
         values={n: scaling.value(n, float(v)) for n, v in zip(names, x[:count], strict=True)},
-        std={n: baseline.std[n] for n in names} | {f"{events.effect}.{p}": s for p, s in own_std.items()},
+        std={n: baseline.std[n] for n in names}
+        | {f"{events.effect}.{p}": s for p, s in own_std.items()},
         cost=0.5 * float(values @ values),
         residuals=found,
         moved={n: float(v) for n, v in zip(names, x[:count], strict=True)},
@@ -330,7 +396,8 @@ class _Joint:
     scale : (k,) array
         Scale of each of these [SI].
     kept : list of array
-        Sensitivities to the baseline parameters in each recording, which stay as they were without the events.
+        Sensitivities to the baseline parameters in each recording, which stay as they were without
+        the events.
     """
 
     events: Events
@@ -343,17 +410,26 @@ class _Joint:
     kept: list[Array]
 
     @staticmethod
-    def of(events: Events, problem: Problem, nominal: Rig, baseline: Fit, inflation: dict[str, float]) -> _Joint:
+    def of(
+        events: Events, problem: Problem, nominal: Rig, baseline: Fit, inflation: dict[str, float]
+    ) -> _Joint:
         """The vector of a problem."""
         effect, settings = events.effect, problem.settings
         leading, shared = EFFECTS[effect].leading.name, EFFECTS[effect].leading.same_everywhere
         names = list(baseline.moved)
-        places = [(name, p) for name, values in events.values.items() for p in values if not (shared and p == leading)]
+        places = [
+            (name, p)
+            for name, values in events.values.items()
+            for p in values
+            if not (shared and p == leading)
+        ]
         places = ([("", leading)] if shared else []) + places
         scale = np.array([_scale(effect, p, settings.transients) for _, p in places])
         kept = []
         for prepared in problem.recordings:
-            rows, slope = stacked(replace(problem, recordings=[prepared]), baseline.residuals, inflation)
+            rows, slope = stacked(
+                replace(problem, recordings=[prepared]), baseline.residuals, inflation
+            )
             kept.append(np.zeros((rows.size, 0)) if slope is None else slope[:, : len(names)])
         scaling = Scaling(nominal, names, {}, settings.fit)
         return _Joint(events, problem, inflation, names, scaling, places, scale, kept)
@@ -367,15 +443,21 @@ class _Joint:
         return Events(self.events.effect, values)
 
     def evaluate(self, x: Array) -> tuple[Array, Array, dict[Key, Residual]]:
-        """Stacked residuals and priors, their sensitivities, and the residuals by block and recording."""
+        """Stacked residuals and priors, their sensitivities, and the residuals by block and
+        recording.
+        """
         effect, count = self.events.effect, len(self.names)
         wanted = sorted({p for own in self.events.values.values() for p in own})
         names = [f"{effect}.{p}" for p in wanted]
         found = residuals(self.problem, self.scaling.rig(x[:count], {}), names, self.told(x))
-        slopes = np.array([self.scaling.slope(n, float(v)) for n, v in zip(self.names, x[:count], strict=True)])
+        slopes = np.array(
+            [self.scaling.slope(n, float(v)) for n, v in zip(self.names, x[:count], strict=True)]
+        )
         parts, columns = [], []
         for prepared, fixed in zip(self.problem.recordings, self.kept, strict=True):
-            rows, slope = stacked(replace(self.problem, recordings=[prepared]), found, self.inflation)
+            rows, slope = stacked(
+                replace(self.problem, recordings=[prepared]), found, self.inflation
+            )
             assert slope is not None
             own = self.events.values.get(prepared.recording.name, {})
             block = np.zeros((rows.size, len(self.places)))
@@ -390,7 +472,10 @@ class _Joint:
     def begin(self, baseline: Fit) -> Array:
         """Where the fit begins: the baseline as it was, each event where it was found."""
         leading = EFFECTS[self.events.effect].leading.name
-        start = [(baseline.values[n] - self.scaling.centre[n]) / self.scaling.scale[n] for n in self.names]
+        start = [
+            (baseline.values[n] - self.scaling.centre[n]) / self.scaling.scale[n]
+            for n in self.names
+        ]
         sizes = [own[leading] for own in self.events.values.values()]
         median = float(np.median(sizes))
         begun = [median if name == "" else self.events.values[name][p] for name, p in self.places]
@@ -401,7 +486,13 @@ class _Joint:
         by_name = {p.recording.name: p for p in self.problem.recordings}
         own = [by_name[name] if name else self.problem.recordings[0] for name, _ in self.places]
         effect, settings = self.events.effect, self.problem.settings.transients
-        limits = [_limits(effect, p, r, settings) for (_, p), r in zip(self.places, own, strict=True)]
-        low = np.concatenate([self.scaling.bounds[0], np.array([limit[0] for limit in limits]) / self.scale])
-        high = np.concatenate([self.scaling.bounds[1], np.array([limit[1] for limit in limits]) / self.scale])
+        limits = [
+            _limits(effect, p, r, settings) for (_, p), r in zip(self.places, own, strict=True)
+        ]
+        low = np.concatenate(
+            [self.scaling.bounds[0], np.array([limit[0] for limit in limits]) / self.scale]
+        )
+        high = np.concatenate(
+            [self.scaling.bounds[1], np.array([limit[1] for limit in limits]) / self.scale]
+        )
         return low, high

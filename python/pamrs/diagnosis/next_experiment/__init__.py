@@ -1,14 +1,23 @@
 """What to record next, and what some channels could tell before anything is recorded.
 
-Public: `propose`, `Outcome`, `Hypothesis`, `outcome_of`, `ranked`, `information`, `entropy` (experiments compared); `Experiment`,
-`Range`, `library`, `pressure_range`, `trial_of` (what a person can record); `Plan`, `Sight`, `Addition`, `plan_diagnosis` (before
-there are data); `MEASURABLE`, `Left`, `Linear`, `checked_channels`, `difference`, `linear`, `misfit`, `problem_of`, `taken`,
-`usual_noise`, `weights_of` (how far two models differ).
+Public: `propose`, `Outcome`, `Hypothesis`, `outcome_of`, `ranked`, `information`, `entropy`
+(experiments compared); `Experiment`, `Range`, `library`, `pressure_range`, `trial_of` (what a
+person can record); `Plan`, `Sight`, `Addition`, `plan_diagnosis` (before there are data);
+`MEASURABLE`, `Left`, `Linear`, `checked_channels`, `difference`, `linear`, `misfit`, `problem_of`,
+`taken`, `usual_noise`, `weights_of` (how far two models differ).
 """
 
 from __future__ import annotations
 
-from pamrs.diagnosis.next_experiment._choice import Hypothesis, Outcome, entropy, information, outcome_of, propose, ranked
+from pamrs.diagnosis.next_experiment._choice import (
+    Hypothesis,
+    Outcome,
+    entropy,
+    information,
+    outcome_of,
+    propose,
+    ranked,
+)
 from pamrs.diagnosis.next_experiment._differences import (
     MEASURABLE,
     Left,
@@ -24,7 +33,13 @@ from pamrs.diagnosis.next_experiment._differences import (
 )
 from pamrs.diagnosis.next_experiment._plan import Addition, Plan, Sight
 from pamrs.diagnosis.next_experiment._planning import plan_diagnosis
-from pamrs.diagnosis.next_experiment._protocols import Experiment, Range, library, pressure_range, trial_of
+from pamrs.diagnosis.next_experiment._protocols import (
+    Experiment,
+    Range,
+    library,
+    pressure_range,
+    trial_of,
+)
 
 __all__ = [
     "MEASURABLE",

@@ -1,8 +1,10 @@
-"""The next experiment: each one that the rig can do, simulated with every hypothesis that survives, and what it would tell.
+"""The next experiment: each one that the rig can do, simulated with every hypothesis that survives,
+and what it would tell.
 
-Every hypothesis answers to the same commands. Its answer becomes a recording without noise, and every other hypothesis is asked to
-explain it through the cut chain, its own parameters and the baseline's free to move inside what is known. What it cannot explain is
-a distance, and the distances of all pairs say how much of the present doubt the experiment takes away.
+Every hypothesis answers to the same commands. Its answer becomes a recording without noise, and
+every other hypothesis has to explain it through the cut chain, its own parameters and the
+baseline's free to move inside what is known. What it cannot explain is a distance, and the
+distances of all pairs say how much of the present uncertainty the experiment removes.
 """
 
 from __future__ import annotations
@@ -52,15 +54,17 @@ def entropy(probabilities: Sequence[float]) -> float:
 def information(probabilities: Sequence[float], distance: Array) -> float:
     """Mutual information between hypothesis and outcome, from the distances of all pairs.
 
-    Every hypothesis predicts a Gaussian outcome of the same spread; the lower bound of Kolchinsky & Tracey (2017) by Bhattacharyya
-    distances, ``-sum_i p_i log2 sum_j p_j exp(-D_ij/8)``, lies between 0 and the entropy of the hypotheses.
+    Every hypothesis predicts a Gaussian outcome of the same spread; the lower bound of Kolchinsky &
+    Tracey (2017) by Bhattacharyya distances, ``-sum_i p_i log2 sum_j p_j exp(-D_ij/8)``, lies
+    between 0 and the entropy of the hypotheses.
 
     Parameters
     ----------
     probabilities : sequence of float, length h
         Of the hypotheses; need not add to one.
     distance : (h, h) array
-        Squared distance, on the effective number of samples, that hypothesis j keeps from the outcome of hypothesis i.
+        Squared distance, on the effective number of samples, that hypothesis j keeps from the
+        outcome of hypothesis i.
 
     Returns
     -------
@@ -112,9 +116,13 @@ class Outcome:
 
 
 def _telling(problem: Problem, rigs: Sequence[Rig]) -> Problem:
-    """The blocks in which hypotheses differ: those where an effect acts that not all of them have; all where none does."""
+    """The blocks in which hypotheses differ: those where an effect acts that not all of them have;
+    all where none does.
+    """
     sets = [{effect["id"] for effect in rig.effects} for rig in rigs]
-    disputed = set.union(*sets) - (set.intersection(*sets) if len({frozenset(s) for s in sets}) > 1 else set())
+    disputed = set.union(*sets) - (
+        set.intersection(*sets) if len({frozenset(s) for s in sets}) > 1 else set()
+    )
     blocks = [b for b in problem.blocks if any(acts_in(effect, b) for effect in disputed)]
     return replace(problem, blocks=blocks or problem.blocks)
 
@@ -156,12 +164,20 @@ def outcome_of(
     measured = (*channels, *((sensor,) if sensor else ()))
     heard = {c: v for c, v in noise.items() if c in measured}
     problems = [
-        _telling(problem_of(rig, [taken(run, rig, experiment.name, heard, settings)], measured, settings), rigs)
+        _telling(
+            problem_of(
+                rig, [taken(run, rig, experiment.name, heard, settings)], measured, settings
+            ),
+            rigs,
+        )
         for rig, run in zip(rigs, runs, strict=True)
     ]
     weights = weights_of(problems[0], rigs[0])
     own = [residuals(problem, rig) for problem, rig in zip(problems, rigs, strict=True)]
-    left = {(i, j): difference(problems[i], own[i], rigs[j], weights) for i, j in itertools.permutations(range(len(rigs)), 2)}
+    left = {
+        (i, j): difference(problems[i], own[i], rigs[j], weights)
+        for i, j in itertools.permutations(range(len(rigs)), 2)
+    }
     distance = np.zeros((len(rigs), len(rigs)))
     for pair, found in left.items():
         distance[pair] = found.total
@@ -170,8 +186,11 @@ def outcome_of(
     return Outcome(experiment, sensor, bits, runs, left, distance, problems[0], weights, effort)
 
 
-def ranked(outcomes: Sequence[Outcome], probabilities: Sequence[float], resolution: float) -> list[Outcome]:
-    """Outcomes by what they tell, the most telling first; of those that tell the same, the cheapest.
+def ranked(
+    outcomes: Sequence[Outcome], probabilities: Sequence[float], resolution: float
+) -> list[Outcome]:
+    """Outcomes by what they tell, the most telling first; of those that tell the same, the
+    cheapest.
 
     Parameters
     ----------
@@ -182,7 +201,10 @@ def ranked(outcomes: Sequence[Outcome], probabilities: Sequence[float], resoluti
     resolution : float
         Difference of information that counts [bit].
     """
-    return sorted(outcomes, key=lambda o: (-round(information(probabilities, o.distance) / resolution), o.effort))
+    return sorted(
+        outcomes,
+        key=lambda o: (-round(information(probabilities, o.distance) / resolution), o.effort),
+    )
 
 
 def propose(
@@ -202,12 +224,14 @@ def propose(
     nominal : Rig
         The nominal model, without effects; what it can do decides which experiments there are.
     hypotheses : sequence of (label, rig, probability)
-        What is left: rigs as fitted, with their effects (``Rig.effect_std`` says how well their parameters are known, half of the
-        value where it does not). What has no model, ``unlisted``, cannot be simulated and is left out by the caller.
+        What is left: rigs as fitted, with their effects (``Rig.effect_std`` says how well their
+        parameters are known, half of the value where it does not). What has no model, ``unlisted``,
+        cannot be simulated and is left out by the caller.
     noise : mapping of str to float, optional
         Sample noise by channel [SI]; typical transducers where it is missing.
     recordings : sequence of Recording or Prepared, optional
-        What there is already: its channels, its sample time and its highest pressure hold for what comes.
+        What there is already: its channels, its sample time and its highest pressure hold for what
+        comes.
     channels : tuple of str, optional
         Channels that can be measured; those of the recordings, or all that the rig has, by default.
     experiments : sequence of Experiment, optional
@@ -218,9 +242,11 @@ def propose(
     Returns
     -------
     NextExperiment
-        ``text`` (what to do and why), ``excitation`` (kind and numbers), ``expected_information_bits`` (at most the entropy of the
-        hypotheses), ``ranking`` (the best few: ``name``, ``text``, ``sensor``, ``bits``, ``effort_s``) and ``curves`` (what
-        :func:`pamrs.report.figures.separating_curves` draws; None when there is nothing to tell apart).
+        ``text`` (what to do and why), ``excitation`` (kind and numbers),
+        ``expected_information_bits`` (at most the entropy of the hypotheses), ``ranking`` (the best
+        few: ``name``, ``text``, ``sensor``, ``bits``, ``effort_s``) and ``curves`` (what
+        :func:`pamrs.report.figures.separating_curves` draws; None when there is nothing to tell
+        apart).
 
     Raises
     ------
@@ -245,8 +271,8 @@ def propose(
     sound = {**usual, **(noise or {})}
     records = [r.recording if isinstance(r, Prepared) else r for r in recordings]
     own = _channels(nominal, records, channels)
-    doubt = entropy([p for _, _, p in chosen])
-    if len(chosen) < 2 or doubt < own_settings.settled_entropy:
+    uncertainty = entropy([p for _, _, p in chosen])
+    if len(chosen) < 2 or uncertainty < own_settings.settled_entropy:
         text = "One hypothesis is left; no experiment can add to that."
         return NextExperiment(text, {}, 0.0)
     pool = _library(nominal, records, own_settings) if experiments is None else list(experiments)
@@ -254,51 +280,73 @@ def propose(
     for sensor in ("", *_missing(nominal, own, usual)):
         for experiment in sorted(pool, key=lambda e: e.effort):
             enough = len(found) >= own_settings.most_shown
-            if enough and max(o.bits for o in found) > doubt - 0.5 * own_settings.resolution:
+            if enough and max(o.bits for o in found) > uncertainty - 0.5 * own_settings.resolution:
                 break  # what is left costs more and cannot tell more
             try:
                 found.append(outcome_of(experiment, chosen, sound, own, settings, sensor))
             except (SimulationError, DiagnosisError):
-                continue  # a hypothesis cannot be run there, or nothing is measured on both sides of a block
+                # a hypothesis cannot be run there, or nothing is measured on both sides of a block
+                continue
     if not found:
         raise DiagnosisError(
-            f"no experiment of rig {nominal.name!r} can be simulated with all of {', '.join(label for label, _, _ in chosen)} and "
-            f"measured by {', '.join(own) or 'no channel'}"
+            f"no experiment of rig {nominal.name!r} can be simulated with all of "
+            f"{', '.join(label for label, _, _ in chosen)} and measured by "
+            f"{', '.join(own) or 'no channel'}"
         )
     best_first = ranked(found, [p for _, _, p in chosen], own_settings.resolution)
     best = best_first[0]
     return NextExperiment(
-        text=_text(best, chosen, doubt, own_settings.hopeless_share),
-        excitation={**best.experiment.excitation, **({"sensor": best.sensor} if best.sensor else {})},
+        text=_text(best, chosen, uncertainty, own_settings.hopeless_share),
+        excitation={
+            **best.experiment.excitation,
+            **({"sensor": best.sensor} if best.sensor else {}),
+        },
         expected_information_bits=round(best.bits, 3),
         ranking=[
-            RankedExperiment(o.experiment.name, o.experiment.text, o.sensor, round(o.bits, 3), round(o.effort, 1))
+            RankedExperiment(
+                o.experiment.name, o.experiment.text, o.sensor, round(o.bits, 3), round(o.effort, 1)
+            )
             for o in best_first[: own_settings.most_shown]
         ],
         curves=_curves(best, chosen),
     )
 
 
-def _checked(hypotheses: Sequence[Hypothesis], settings: NextExperimentSettings) -> list[Hypothesis]:
+def _checked(
+    hypotheses: Sequence[Hypothesis], settings: NextExperimentSettings
+) -> list[Hypothesis]:
     """The hypotheses that count, the most probable first."""
     if not hypotheses:
-        raise ParameterError("hypotheses is empty; at least one (label, rig, probability) is needed")
+        raise ParameterError(
+            "hypotheses is empty; at least one (label, rig, probability) is needed"
+        )
     for label, rig, probability in hypotheses:
         if not isinstance(rig, Rig):
-            raise ParameterError(f"hypotheses: the rig of {label!r} is a {type(rig).__name__}; a Rig is needed")
+            raise ParameterError(
+                f"hypotheses: the rig of {label!r} is a {type(rig).__name__}; a Rig is needed"
+            )
         if not (math.isfinite(probability) and 0.0 <= probability <= 1.0):
-            raise ParameterError(f"hypotheses: the probability of {label!r} is {probability}, which is not allowed: from 0 to 1")
+            raise ParameterError(
+                f"hypotheses: the probability of {label!r} is {probability}, which is not allowed: "
+                "from 0 to 1"
+            )
     ranked = sorted(hypotheses, key=lambda h: -h[2])
     likely = [h for h in ranked if h[2] >= settings.least_probability]
     return likely[: settings.most_hypotheses] or ranked[:1]
 
 
-def _channels(rig: Rig, records: Sequence[Recording], channels: tuple[str, ...] | None) -> tuple[str, ...]:
+def _channels(
+    rig: Rig, records: Sequence[Recording], channels: tuple[str, ...] | None
+) -> tuple[str, ...]:
     if channels is not None:
         checked_channels(rig, channels)
         return tuple(channels)
     has = {*core_rig(rig).inputs, *core_rig(rig).channels}
-    return tuple(name for name in MEASURABLE if name in has and all(name in record.channels for record in records))
+    return tuple(
+        name
+        for name in MEASURABLE
+        if name in has and all(name in record.channels for record in records)
+    )
 
 
 def _missing(rig: Rig, own: tuple[str, ...], sensors: Mapping[str, float]) -> list[str]:
@@ -307,8 +355,12 @@ def _missing(rig: Rig, own: tuple[str, ...], sensors: Mapping[str, float]) -> li
     return [name for name in sensors if name in has and name not in own]
 
 
-def _library(rig: Rig, records: Sequence[Recording], settings: NextExperimentSettings) -> list[Experiment]:
-    """The experiments of the rig, at the sample time and up to the pressures of what was recorded."""
+def _library(
+    rig: Rig, records: Sequence[Recording], settings: NextExperimentSettings
+) -> list[Experiment]:
+    """The experiments of the rig, at the sample time and up to the pressures of what was
+    recorded.
+    """
     if not records:
         return library(rig, settings)
     usual, least, most = settings.sample_time, settings.least_sample_time, settings.most_sample_time
@@ -322,16 +374,23 @@ def _library(rig: Rig, records: Sequence[Recording], settings: NextExperimentSet
         if "muscle_pressure" in r.channels and np.isfinite(r.channels["muscle_pressure"]).any()
     ]
     highest = max(peaks, default=0.0)
-    return library(rig, settings, sample_time=step, highest=1.05 * highest if highest > 2e4 else None)
+    return library(
+        rig, settings, sample_time=step, highest=1.05 * highest if highest > 2e4 else None
+    )
 
 
 def _spoken(label: str) -> str:
     """A hypothesis in words."""
-    names = [EFFECTS[part].name if part in EFFECTS else f"another value of {part}" for part in label.split("+")]
+    names = [
+        EFFECTS[part].name if part in EFFECTS else f"another value of {part}"
+        for part in label.split("+")
+    ]
     return " with ".join(names)
 
 
-def _text(best: Outcome, hypotheses: Sequence[Hypothesis], doubt: float, hopeless: float) -> str:
+def _text(
+    best: Outcome, hypotheses: Sequence[Hypothesis], uncertainty: float, hopeless: float
+) -> str:
     said = best.experiment.text[:1].upper() + best.experiment.text[1:]
     if best.sensor:
         said += f", with one more channel: {best.sensor.replace('_', ' ')}"
@@ -340,16 +399,19 @@ def _text(best: Outcome, hypotheses: Sequence[Hypothesis], doubt: float, hopeles
     key, size = best.left[0, j].largest
     channel = next(b.channel for b in best.problem.blocks if b.name == key[0]).replace("_", " ")
     said += (
-        f". If it is {_spoken(hypotheses[0][0])}, a model with {_spoken(hypotheses[j][0])} then misses the {channel} by "
-        f"{size:.2g} times its noise, whatever its parameters; expected to give {best.bits:.2f} of the {doubt:.2f} bit of doubt."
+        f". If it is {_spoken(hypotheses[0][0])}, a model with {_spoken(hypotheses[j][0])} then "
+        f"misses the {channel} by {size:.2g} times the noise level, whatever its parameters. The "
+        f"expected information is {best.bits:.2f} of the {uncertainty:.2f} bit of uncertainty."
     )
-    if best.bits < hopeless * doubt:
-        said += " No standard experiment does better with these channels: think of another sensor."
+    if best.bits < hopeless * uncertainty:
+        said += " No standard experiment does better with these channels: consider another sensor."
     return said
 
 
 def _curves(best: Outcome, hypotheses: Sequence[Hypothesis]) -> Curves:
-    """The channel that separates most: as each hypothesis predicts it, and what each leaves of the leading one's outcome."""
+    """The channel that separates most: as each hypothesis predicts it, and what each leaves of the
+    leading one's outcome.
+    """
     others = range(1, len(hypotheses))
     key = max(best.left[0, 1].rms, key=lambda k: max(best.left[0, j].rms[k] for j in others))
     channel = next(b.channel for b in best.problem.blocks if b.name == key[0])
@@ -365,7 +427,9 @@ def _curves(best: Outcome, hypotheses: Sequence[Hypothesis]) -> Curves:
         time=best.runs[0].time,
         predicted={label: run[channel] for label, run in zip(labels, best.runs, strict=True)},
         leading=labels[0],
-        bin_time=np.asarray((np.arange(prepared.n // width) + 0.5) * width * prepared.dt, dtype=np.float64),
+        bin_time=np.asarray(
+            (np.arange(prepared.n // width) + 0.5) * width * prepared.dt, dtype=np.float64
+        ),
         left={labels[j]: best.left[0, j].rows[key] for j in others},
         noise=prepared.noise[channel] / math.sqrt(width) * best.weights[key],
         command=best.experiment.command,

@@ -1,9 +1,11 @@
-"""What a change of the model leaves in the cut chain when everything else that is free has been fitted again.
+"""What a change of the model leaves in the cut chain when everything else that is free has been
+fitted again.
 
-Residuals are counted in bins of 0.1 s in units of the floor that the noise of the sensors (output and drives) leaves there, and a
-recording as a modest number of independent ones: errors of a model are coloured, and a recording of 6000 samples does not know a
-difference of a thousandth of its noise. Baseline parameters move inside their tolerances, an effect's own parameters inside what
-is known of them.
+Residuals are counted in bins of 0.1 s in units of the noise level that the noise of the sensors
+(output and drives) leaves there, and a recording as a modest number of independent ones: errors of
+a model are autocorrelated, and a recording of 6000 samples does not know a difference of a
+thousandth of its noise. Baseline parameters move inside their tolerances, an effect's own
+parameters inside what is known of them.
 """
 
 from __future__ import annotations
@@ -16,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs.diagnosis.fit import Key, Problem, bin_width, free_baseline, residuals
-from pamrs.diagnosis.noise import bins_of, floors
+from pamrs.diagnosis.noise import bins_of, noise_levels
 from pamrs.diagnosis.prepare import Prepared, Residual, available_blocks, binned, prepare
 from pamrs.diagnosis.settings import DiagnosisSettings, NextExperimentSettings
 from pamrs.effects import EFFECTS
@@ -70,7 +72,10 @@ def checked_channels(rig: Rig, channels: tuple[str, ...]) -> tuple[str, ...]:
     own = [name for name in MEASURABLE if name in has]
     for name in channels:
         if name not in own:
-            raise ParameterError(f"channels has {name!r}, which is not allowed: of rig {rig.name!r} one of {', '.join(own)}")
+            raise ParameterError(
+                f"channels has {name!r}, which is not allowed: of rig {rig.name!r} one of "
+                f"{', '.join(own)}"
+            )
     return tuple(name for name in own if name in channels)
 
 
@@ -103,7 +108,10 @@ def taken(
     names = [c for c in MEASURABLE if c in run and (c == "valve_command" or c in noise)]
     channels = {c: np.asarray(run[c], dtype=np.float64) for c in names}
     if rng is not None:
-        channels = {c: v + rng.normal(0.0, noise[c], v.size) if c in noise else v for c, v in channels.items()}
+        channels = {
+            c: v + rng.normal(0.0, noise[c], v.size) if c in noise else v
+            for c, v in channels.items()
+        }
     mask = {c: np.ones(v.size, dtype=bool) for c, v in channels.items()}
     time = np.asarray(run.time, dtype=np.float64)
     recording = Recording(name, "fit", time, float(time[1] - time[0]), channels, mask, [], {})
@@ -111,7 +119,9 @@ def taken(
     return replace(prepared, noise={c: float(noise[c]) for c in prepared.noise})
 
 
-def problem_of(rig: Rig, recordings: list[Prepared], channels: tuple[str, ...], settings: DiagnosisSettings) -> Problem:
+def problem_of(
+    rig: Rig, recordings: list[Prepared], channels: tuple[str, ...], settings: DiagnosisSettings
+) -> Problem:
     """Blocks that channels can tell apart, with recordings.
 
     Parameters
@@ -133,8 +143,9 @@ def problem_of(rig: Rig, recordings: list[Prepared], channels: tuple[str, ...], 
     blocks = available_blocks(rig, channels, settings.prepare)
     if not blocks:
         raise DiagnosisError(
-            f"channels = {', '.join(channels) or 'none'} do not surround any block of rig {rig.name!r} ({', '.join(rig.blocks)}); "
-            "measure muscle_pressure, and supply_pressure and joint_angle where the rig has them"
+            f"channels = {', '.join(channels) or 'none'} do not surround any block of rig "
+            f"{rig.name!r} ({', '.join(rig.blocks)}); measure muscle_pressure, and supply_pressure "
+            "and joint_angle where the rig has them"
         )
     return Problem(blocks, recordings, core_rig(rig), settings)
 
@@ -146,7 +157,7 @@ class Left:
     Attributes
     ----------
     rms : dict
-        By block and recording: root mean square of bin means [floors].
+        By block and recording: root mean square of bin means [noise levels].
     rows : dict
         By block and recording: the difference in each bin of the fit [channel's unit].
     total : float
@@ -159,14 +170,16 @@ class Left:
 
     @property
     def largest(self) -> tuple[Key, float]:
-        """Where it is largest, and how large [floors]."""
+        """Where it is largest, and how large [noise levels]."""
         key = max(self.rms, key=lambda k: self.rms[k])
         return key, self.rms[key]
 
 
 def weights_of(problem: Problem, rig: Rig) -> dict[Key, float]:
-    """Floor of a block's bin means over a recording, as a multiple of its white part: what drives' noise adds (>= 1)."""
-    found = floors(problem, core_rig(rig))
+    """Noise level of a block's bin means over a recording, as a multiple of its white part: what
+    drives' noise adds (>= 1).
+    """
+    found = noise_levels(problem, core_rig(rig))
     out = {}
     for prepared in problem.recordings:
         for block in problem.blocks:
@@ -221,7 +234,9 @@ def misfit(problem: Problem, model: Linear, weights: Mapping[Key, float]) -> Lef
     return _left(problem, {key: r.value for key, r in model.found.items()}, model, weights)
 
 
-def difference(problem: Problem, truth: Mapping[Key, Residual], other: Rig, weights: Mapping[Key, float]) -> Left:
+def difference(
+    problem: Problem, truth: Mapping[Key, Residual], other: Rig, weights: Mapping[Key, float]
+) -> Left:
     """What a model leaves of the recordings that another one makes.
 
     Parameters
@@ -229,17 +244,22 @@ def difference(problem: Problem, truth: Mapping[Key, Residual], other: Rig, weig
     problem : Problem
         Blocks, and recordings without noise.
     truth : mapping
-        Residuals of the model that makes them; what it leaves itself (smoothing and the longer step of the cut chain) is taken off.
+        Residuals of the model that makes them; what it leaves itself (smoothing and the longer step
+        of the cut chain) is taken off.
     other : Rig
         The model that is to explain them.
     weights : mapping
         As :func:`weights_of`.
     """
     model = linear(problem, other)
-    return _left(problem, {key: r.value - truth[key].value for key, r in model.found.items()}, model, weights)
+    return _left(
+        problem, {key: r.value - truth[key].value for key, r in model.found.items()}, model, weights
+    )
 
 
-def _left(problem: Problem, values: Mapping[Key, Array], model: Linear, weights: Mapping[Key, float]) -> Left:
+def _left(
+    problem: Problem, values: Mapping[Key, Array], model: Linear, weights: Mapping[Key, float]
+) -> Left:
     spread = np.array(list(model.free.values()))
     effective = problem.settings.next_experiment.effective_samples
     rows, slopes, scales = [], [], []
@@ -250,10 +270,15 @@ def _left(problem: Problem, values: Mapping[Key, Array], model: Linear, weights:
             key = (block.name, prepared.recording.name)
             r = model.found[key]
             mean, counts = binned(np.where(r.rows, values[key], 0.0), r.rows, width)
-            slope, _ = binned(np.zeros((values[key].size, 0)) if r.jacobian is None else r.jacobian, r.rows, width)
-            floor = weights[key] * prepared.noise[block.channel] / math.sqrt(bins_of(prepared))
-            # what differs is smooth over a bin of 0.1 s: its mean square in fine bins is that in coarse ones
-            scale = math.sqrt(effective / max(1, int((counts > 0).sum()))) / floor
+            slope, _ = binned(
+                np.zeros((values[key].size, 0)) if r.jacobian is None else r.jacobian, r.rows, width
+            )
+            noise_level = (
+                weights[key] * prepared.noise[block.channel] / math.sqrt(bins_of(prepared))
+            )
+            # what differs is smooth over a bin of 0.1 s: its mean square in fine bins is that in
+            # coarse ones
+            scale = math.sqrt(effective / max(1, int((counts > 0).sum()))) / noise_level
             rows.append(mean * scale)
             slopes.append(-slope * spread * scale)
             scales.append(scale)

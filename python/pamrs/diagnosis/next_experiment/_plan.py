@@ -22,14 +22,15 @@ class Sight:
     effect : str
         Its id.
     left : float
-        What is left of its signature, root mean square over the recording where that is largest [noise units].
+        What is left of its signature, root mean square over the recording where that is largest
+        [noise units].
     block, recording : str
         Where; empty when it acts in no block that the channels surround.
     size : str
         Dotted name of the parameter that scales it; empty where no number does.
     typical, smallest : float
-        Typical value of that parameter and the smallest one (of a restriction's conductance, the largest) that leaves three noise
-        units [SI]; NaN without one.
+        Typical value of that parameter and the smallest one (of a restriction's conductance, the
+        largest) that leaves three noise units [SI]; NaN without one.
     verdict : str
         ``seen``, ``faint`` or ``hidden`` at the typical size.
     """
@@ -57,7 +58,8 @@ class Addition:
     separated : tuple of (str, str)
         Pairs that are told apart only with it.
     bits : float
-        Gain of half the logarithm of the determinant of the effects' information at their typical sizes [bit].
+        Gain of half the logarithm of the determinant of the effects' information at their typical
+        sizes [bit].
     """
 
     kind: str
@@ -132,11 +134,15 @@ class Plan:
         """
         found = next((s for s in self.sights if s.effect == effect), None)
         if found is None:
-            raise ParameterError(f"effect = {effect!r} is not allowed: one of {', '.join(s.effect for s in self.sights)}")
+            raise ParameterError(
+                f"effect = {effect!r} is not allowed: one of "
+                f"{', '.join(s.effect for s in self.sights)}"
+            )
         return found
 
     def separable(self, first: str, second: str) -> bool:
-        """Whether two effects that are seen would be told apart; False when one of them is not seen.
+        """Whether two effects that are seen would be told apart; False when one of them is not
+        seen.
 
         Parameters
         ----------
@@ -152,7 +158,9 @@ class Plan:
 
     @property
     def not_asked(self) -> tuple[str, ...]:
-        """Effects of the catalogue that have no place in this rig, or none that these channels surround."""
+        """Effects of the catalogue that have no place in this rig, or none that these channels
+        surround.
+        """
         return tuple(e for e in CATALOGUE if e not in {sight.effect for sight in self.sights})
 
     def to_dict(self) -> dict[str, Any]:
@@ -200,44 +208,89 @@ class Plan:
 
     def text(self) -> str:
         """The plan as a page for a terminal."""
-        lines = [f"Plan of a diagnosis of {self.rig}, with {', '.join(self.channels) or 'no channel'}", ""]
+        lines = [
+            f"Plan of a diagnosis of {self.rig}, with {', '.join(self.channels) or 'no channel'}",
+            "",
+        ]
         lines += ["Blocks that these channels tell apart"]
         for block in self.blocks:
-            lines.append(f"  {block['name']:<8} {', '.join(block['drives']) or '(its start)'} -> {block['channel']}")
-            lines += _wrapped(f"lumps {block['covers']}: {block['why']}" if block["why"] else block["covers"], 11)
+            lines.append(
+                f"  {block['name']:<8} {', '.join(block['drives']) or '(its start)'} -> "
+                f"{block['channel']}"
+            )
+            lines += _wrapped(
+                f"lumps {block['covers']}: {block['why']}" if block["why"] else block["covers"], 11
+            )
         lines += [] if self.blocks else ["  none"]
         for block in self.missing:
             needs = ", ".join(block["needs"])
-            lines += _wrapped(f"not {block['name']} ({block['covers']}): without {needs} nothing drives or shows it", 2)
+            lines += _wrapped(
+                (
+                    f"not {block['name']} ({block['covers']}): without {needs} nothing drives or "
+                    "shows it"
+                ),
+                2,
+            )
         if self.experiments:
             lines += ["", "Experiments assumed"]
             for experiment in self.experiments:
-                lines += _wrapped(f"{experiment['name']}: {experiment['text']} ({experiment['duration']:.0f} s)", 2)
-        return "\n".join([*lines, *(self._effects() if self.blocks else ["", "No effect can be seen"]), *self._gains()])
+                lines += _wrapped(
+                    f"{experiment['name']}: {experiment['text']} ({experiment['duration']:.0f} s)",
+                    2,
+                )
+        return "\n".join(
+            [
+                *lines,
+                *(self._effects() if self.blocks else ["", "No effect can be seen"]),
+                *self._gains(),
+            ]
+        )
 
     def _effects(self) -> list[str]:
         """The table of the effects, and what is not told apart."""
-        lines = ["", "Effects of a small but usual size, after the baseline has moved inside its tolerances (noise units of 0.1 s)"]
+        lines = [
+            "",
+            (
+                "Effects of a small but usual size, after the baseline has moved inside its "
+                "tolerances (noise units of 0.1 s)"
+            ),
+        ]
         lines += [
-            f"  {'effect':<25}{'':<8}{'left':>7}  {'in':<9}{'recording':<17}{'at size':>10}{'seen from':>11}  {'unit':<13}taken for"
+            f"  {'effect':<25}{'':<8}{'left':>7}  "
+            f"{'in':<9}{'recording':<17}{'at size':>10}{'seen from':>11}  {'unit':<13}taken for"
         ]
         for sight in self.sights:
-            rivals = [b if a == sight.effect else a for a, b, _ in self.pairs if sight.effect in (a, b)]
+            rivals = [
+                b if a == sight.effect else a for a, b, _ in self.pairs if sight.effect in (a, b)
+            ]
             unit = find_parameter(sight.size).unit if sight.size else ""
             typical = f"{sight.typical:.3g}" if math.isfinite(sight.typical) else ""
             smallest = f"{sight.smallest:.2g}" if math.isfinite(sight.smallest) else ""
             where = f"{sight.block or '-':<9}{sight.recording or '-':<17}"
             if sight.verdict == "hidden":
-                rivals += ["the parameters inside their tolerances, or noise" if sight.block else "(nothing here shows it)"]
+                rivals += [
+                    "the parameters inside their tolerances, or noise"
+                    if sight.block
+                    else "(nothing here shows it)"
+                ]
             lines.append(
                 f"  {sight.effect:<25}{sight.verdict:<8}{sight.left:>7.2g}  {where}{typical:>10}"
                 f"{smallest:>11}  {'' if unit == '1' else unit:<13}{', '.join(rivals)}".rstrip()
             )
         return [
             *lines,
-            *(["", f"Not asked of this rig and these channels: {', '.join(self.not_asked)}"] if self.not_asked else []),
+            *(
+                ["", f"Not tested with this rig and these channels: {', '.join(self.not_asked)}"]
+                if self.not_asked
+                else []
+            ),
             "",
-            "Not told apart: " + ("; ".join(", ".join(g) for g in self.groups) if self.groups else "none of those seen"),
+            "Not told apart: "
+            + (
+                "; ".join(", ".join(g) for g in self.groups)
+                if self.groups
+                else "none of those seen"
+            ),
         ]
 
     def _gains(self) -> list[str]:
@@ -247,17 +300,29 @@ class Plan:
             lines += ["", "What would add most"]
             for addition in self.additions:
                 gains = [f"shows {', '.join(addition.seen)}"] if addition.seen else []
-                gains += [f"tells {', '.join(f'{a} from {b}' for a, b in addition.separated)}"] if addition.separated else []
+                gains += (
+                    [f"tells {', '.join(f'{a} from {b}' for a, b in addition.separated)}"]
+                    if addition.separated
+                    else []
+                )
                 gains += [] if gains else ["sharper, nothing new"]
-                lines += _wrapped(f"{addition.kind} {addition.name}: {'; '.join(gains)} (+{addition.bits:.0f} bit)", 2)
+                lines += _wrapped(
+                    (
+                        f"{addition.kind} {addition.name}: {'; '.join(gains)} "
+                        f"(+{addition.bits:.0f} bit)"
+                    ),
+                    2,
+                )
         return lines
 
     def __repr__(self) -> str:
         return (
-            f"Plan({self.rig}: {len(self.blocks)} blocks, {len(self.seen)} of {len(self.sights)} effects seen, "
-            f"{len(self.groups)} groups not told apart)"
+            f"Plan({self.rig}: {len(self.blocks)} blocks, {len(self.seen)} of {len(self.sights)} "
+            f"effects seen, {len(self.groups)} groups not told apart)"
         )
 
 
 def _wrapped(text: str, indent: int) -> list[str]:
-    return textwrap.wrap(text, 130, initial_indent=" " * indent, subsequent_indent=" " * (indent + 2))
+    return textwrap.wrap(
+        text, 130, initial_indent=" " * indent, subsequent_indent=" " * (indent + 2)
+    )

@@ -1,9 +1,12 @@
-"""Before any data: which blocks some channels tell apart, which effects they show, and which they cannot tell from each other.
+"""Before any data: which blocks some channels tell apart, which effects they show, and which they
+cannot tell from each other.
 
-The rig is simulated under a few standard experiments. Each effect of the catalogue, at a typical size, changes the residuals of the
-cut chain by a signature; what the baseline can do inside its tolerances, and the starts of the windows, are taken off it. What is
-left, in units of the noise, says whether the effect would be seen, and the angle between what is left of two effects whether one
-would be taken for the other (Ding, Model-Based Fault Diagnosis Techniques, 2013, isolability by projected signatures).
+The rig is simulated under a few standard experiments. Each effect of the catalogue, at a typical
+size, changes the residuals of the cut chain by a signature; what the baseline can do inside its
+tolerances, and the starts of the windows, are taken off it. What is left, in units of the noise,
+says whether the effect would be seen, and the angle between what is left of two effects whether one
+would be taken for the other (Ding, Model-Based Fault Diagnosis Techniques, 2013, isolability by
+projected signatures).
 """
 
 from __future__ import annotations
@@ -17,8 +20,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.diagnosis.fit import Key, Problem, Start, acts_in, bin_width, changes, fits, free_baseline, residuals, starts_of
-from pamrs.diagnosis.next_experiment._differences import MEASURABLE, checked_channels, taken, usual_noise, weights_of
+from pamrs.diagnosis.fit import (
+    Key,
+    Problem,
+    Start,
+    acts_in,
+    bin_width,
+    changes,
+    fits,
+    free_baseline,
+    residuals,
+    starts_of,
+)
+from pamrs.diagnosis.next_experiment._differences import (
+    MEASURABLE,
+    checked_channels,
+    taken,
+    usual_noise,
+    weights_of,
+)
 from pamrs.diagnosis.next_experiment._plan import Addition, Plan, Sight
 from pamrs.diagnosis.next_experiment._protocols import Experiment, library
 from pamrs.diagnosis.noise import bins_of
@@ -36,15 +56,22 @@ Array = NDArray[np.float64]
 BASIC = ("multisine", "sealed_hold", "slow_triangle", "step_and_shut", "hold_low", "hold_high")
 """Experiments that a plan assumes by default, those of them that the rig can do."""
 _LUMPED = {
-    "supply": "what leaves the tank by itself and what the valve takes are one sum in its pressure; only that follows the command",
-    "chamber": "no pressure is measured between the valve's outlet and the muscle, nor the temperature of the gas",
+    ("supply"): (
+        "what leaves the tank by itself and what the valve takes are one sum in its pressure; only "
+        "that follows the command"
+    ),
+    ("chamber"): (
+        "no pressure is measured between the valve's outlet and the muscle, nor the temperature of "
+        "the gas"
+    ),
     "arm": "neither force nor torque is measured between the muscle and the arm",
 }
 
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """What one block over one experiment says: products of baseline sensitivities and signatures, which add up.
+    """What one block over one experiment says: products of baseline sensitivities and signatures,
+    which add up.
 
     Attributes
     ----------
@@ -85,13 +112,17 @@ def plan_diagnosis(
     Parameters
     ----------
     rig : Rig
-        Nominal model, one that can be diagnosed: a tank or a constant supply, valve, chamber and arm without names, or a part.
+        Nominal model, one that can be diagnosed: a tank or a constant supply, valve, chamber and
+        arm without names, or a part.
     channels : iterable of str
-        Channels at hand, of ``valve_command``, ``supply_pressure``, ``muscle_pressure`` and ``joint_angle``.
+        Channels at hand, of ``valve_command``, ``supply_pressure``, ``muscle_pressure`` and
+        ``joint_angle``.
     noise : mapping of str to float, optional
-        Sample noise by channel [SI]; that of typical transducers by default (``next_experiment`` of the settings).
+        Sample noise by channel [SI]; that of typical transducers by default (``next_experiment`` of
+        the settings).
     experiments : sequence of str, optional
-        Names of the experiments that will be made; multisine, sealed holds, slow triangle and steps by default.
+        Names of the experiments that will be made; multisine, sealed holds, slow triangle and steps
+        by default.
     settings : DiagnosisSettings, optional
         From where on an effect counts as seen, and two as apart; the published ones by default.
     progress : callable, optional
@@ -127,12 +158,23 @@ def plan_diagnosis(
     chosen = [name for name in BASIC if name in pool] if experiments is None else list(experiments)
     for name in chosen:
         if name not in pool:
-            raise ParameterError(f"experiments has {name!r}, which is not allowed: of rig {rig.name!r} one of {', '.join(pool)}")
-    starts = [s for e in CATALOGUE if _applies(rig, e, whole) for s in starts_of(e, sealed=rig.model["valve"] is None)]
+            raise ParameterError(
+                f"experiments has {name!r}, which is not allowed: of rig {rig.name!r} one of "
+                f"{', '.join(pool)}"
+            )
+    starts = [
+        s
+        for e in CATALOGUE
+        if _applies(rig, e, whole)
+        for s in starts_of(e, sealed=rig.model["valve"] is None)
+    ]
     parts: dict[Key, _Part] = {}
     usable = {}
     for name, experiment in pool.items():
-        say(f"{name}: {experiment.duration:.0f} s with {len(starts)} starts of {len({s.effect for s in starts})} effects")
+        say(
+            f"{name}: {experiment.duration:.0f} s with {len(starts)} starts of "
+            f"{len({s.effect for s in starts})} effects"
+        )
         try:
             parts |= _parts(rig, whole, experiment, starts, sound, settings)
             usable[name] = experiment
@@ -155,7 +197,9 @@ def plan_diagnosis(
             for b in whole
             if b.name not in {own_block.name for own_block in blocks}
         ],
-        experiments=[{"name": n, "text": usable[n].text, "duration": usable[n].duration} for n in chosen],
+        experiments=[
+            {"name": n, "text": usable[n].text, "duration": usable[n].duration} for n in chosen
+        ],
         sights=[now.sights[e] for e in order],
         pairs=pairs,
         groups=_joined([(a, b) for a, b, _ in pairs], order),
@@ -165,7 +209,9 @@ def plan_diagnosis(
 
 @dataclass(frozen=True, eq=False)
 class _Assumed:
-    """What every block shows over every experiment, to be looked at with some channels and some experiments."""
+    """What every block shows over every experiment, to be looked at with some channels and some
+    experiments.
+    """
 
     rig: Rig
     parts: dict[Key, _Part]
@@ -174,7 +220,9 @@ class _Assumed:
 
     def blocks(self, channels: tuple[str, ...]) -> list[Block]:
         """Blocks that some channels tell apart."""
-        return available_blocks(self.rig, checked_channels(self.rig, channels), self.settings.prepare)
+        return available_blocks(
+            self.rig, checked_channels(self.rig, channels), self.settings.prepare
+        )
 
     def picture(self, blocks: list[Block], experiments: Sequence[str]) -> _Picture:
         """What some blocks over some experiments show."""
@@ -190,9 +238,15 @@ class _Assumed:
         return lacking
 
     def additions(
-        self, own: tuple[str, ...], every: tuple[str, ...], chosen: list[str], usable: Mapping[str, Experiment]
+        self,
+        own: tuple[str, ...],
+        every: tuple[str, ...],
+        chosen: list[str],
+        usable: Mapping[str, Experiment],
     ) -> list[Addition]:
-        """What each further channel (two of them where one surrounds no block) and each further experiment would add."""
+        """What each further channel (two of them where one surrounds no block) and each further
+        experiment would add.
+        """
         blocks = self.blocks(own)
         now = self.picture(blocks, chosen)
         lacking = [c for c in every if c not in own]
@@ -213,13 +267,27 @@ class _Assumed:
 def _check_rig(rig: Rig) -> None:
     """Refuse rigs that no experiment is made for."""
     if not isinstance(rig, Rig):
-        raise ParameterError(f"rig is a {type(rig).__name__}; a Rig is needed: pamrs.rigs.shoulder(), pamrs.load_rig(path)")
+        raise ParameterError(
+            f"rig is a {type(rig).__name__}; a Rig is needed: pamrs.rigs.shoulder(), "
+            "pamrs.load_rig(path)"
+        )
     several = [block for block in rig.blocks if "" not in rig.tables(block)]
     reasons = {
-        f"it already has the effect {rig.effects[0]['id']!r}; plan with a rig without effects" if rig.effects else "",
-        f"it has named blocks ({', '.join(several)}); rigs of one chain can be planned, without names" if several else "",
-        "it is fed by a regulator; rigs fed by a tank or a constant supply can be planned" if regulators_of(rig) else "",
-        "its load is a frame; a mass, [joint] and [arm], or no muscle can be planned" if has_frame(rig) else "",
+        f"it already has the effect {rig.effects[0]['id']!r}; plan with a rig without effects"
+        if rig.effects
+        else "",
+        (
+            f"it has named blocks ({', '.join(several)}); rigs of one chain can be planned, "
+            "without names"
+        )
+        if several
+        else "",
+        "it is fed by a regulator; rigs fed by a tank or a constant supply can be planned"
+        if regulators_of(rig)
+        else "",
+        "its load is a frame; a mass, [joint] and [arm], or no muscle can be planned"
+        if has_frame(rig)
+        else "",
     } - {""}
     if reasons:
         raise DiagnosisError(f"rig {rig.name!r}: {'; '.join(sorted(reasons))}")
@@ -230,14 +298,20 @@ def _noise(given: Mapping[str, float] | None, settings: DiagnosisSettings) -> di
     usual = usual_noise(settings.next_experiment)
     for name, value in (given or {}).items():
         if name not in usual:
-            raise ParameterError(f"noise has {name!r}, which is not allowed: one of {', '.join(usual)}")
+            raise ParameterError(
+                f"noise has {name!r}, which is not allowed: one of {', '.join(usual)}"
+            )
         if not (math.isfinite(value) and value > 0.0):
-            raise ParameterError(f"noise of {name} = {value} is not allowed: a finite number > 0 is needed")
+            raise ParameterError(
+                f"noise of {name} = {value} is not allowed: a finite number > 0 is needed"
+            )
     return {**usual, **{name: float(value) for name, value in (given or {}).items()}}
 
 
 def _applies(rig: Rig, effect: str, blocks: list[Block]) -> bool:
-    """Whether a rig has what an effect acts on, and a block of the cut chain in which it could show."""
+    """Whether a rig has what an effect acts on, and a block of the cut chain in which it could
+    show.
+    """
     return fits(rig, effect) and any(acts_in(effect, block) for block in blocks)
 
 
@@ -268,27 +342,37 @@ def _parts(
     base = residuals(problem, stands, baseline)
     weights = weights_of(problem, stands)
     spread = np.array([stands.parameter(name).tol for name in baseline])
-    width, effective = bin_width(prepared, settings.noise.fit_bin_time), settings.next_experiment.effective_samples
+    width, effective = (
+        bin_width(prepared, settings.noise.fit_bin_time),
+        settings.next_experiment.effective_samples,
+    )
     scale, slopes, moved = {}, {}, {}
     for block in blocks:
         key = (block.name, experiment.name)
         r = base[key]
-        slope, counts = binned(np.zeros((r.value.size, 0)) if r.jacobian is None else r.jacobian, r.rows, width)
-        floor = weights[key] * noise[block.channel] / math.sqrt(bins_of(prepared))
-        scale[key] = math.sqrt(effective / max(1, int((counts > 0).sum()))) / floor
+        slope, counts = binned(
+            np.zeros((r.value.size, 0)) if r.jacobian is None else r.jacobian, r.rows, width
+        )
+        noise_level = weights[key] * noise[block.channel] / math.sqrt(bins_of(prepared))
+        scale[key] = math.sqrt(effective / max(1, int((counts > 0).sum()))) / noise_level
         slopes[key] = slope * spread * scale[key]
         moved[key] = np.zeros((slope.shape[0], len(starts)))
     for index, start in enumerate(starts):
         acting = [b for b in blocks if acts_in(start.effect, b)]
         try:
-            found = changes(replace(problem, blocks=acting), start.applied(stands), base, start.effect)
+            found = changes(
+                replace(problem, blocks=acting), start.applied(stands), base, start.effect
+            )
         except SimulationError:
             continue  # this size leaves the range in which the model holds
         for block in acting:
             key = (block.name, experiment.name)
             mean, _ = binned(found[key].value - base[key].value, base[key].rows, width)
             moved[key][:, index] = mean * scale[key]
-    return {k: _Part(slopes[k].T @ slopes[k], slopes[k].T @ moved[k], moved[k].T @ moved[k]) for k in slopes}
+    return {
+        k: _Part(slopes[k].T @ slopes[k], slopes[k].T @ moved[k], moved[k].T @ moved[k])
+        for k in slopes
+    }
 
 
 def _picture(
@@ -299,12 +383,17 @@ def _picture(
     settings: DiagnosisSettings,
 ) -> _Picture:
     """What some blocks over some experiments show."""
-    used = {key: part for key, part in parts.items() if key[0] in {b.name for b in blocks} and key[1] in experiments}
+    used = {
+        key: part
+        for key, part in parts.items()
+        if key[0] in {b.name for b in blocks} and key[1] in experiments
+    }
     effects = list(dict.fromkeys(s.effect for s in starts))
     own_settings = settings.plan
     if not used:
         return _Picture({e: Sight(e, 0.0) for e in effects}, {}, frozenset(), 0.0)
-    total = _Part(sum(p.baseline for p in used.values()), sum(p.mixed for p in used.values()), sum(p.signatures for p in used.values()))  # type: ignore[arg-type]
+    shares = [(p.baseline, p.mixed, p.signatures) for p in used.values()]
+    total = _Part(*(np.asarray(sum(share)) for share in zip(*shares, strict=True)))
     freed = np.linalg.solve(total.baseline + np.eye(len(total.baseline)), total.mixed)
     gram = total.signatures - total.mixed.T @ freed
     sizes = {
@@ -326,7 +415,10 @@ def _picture(
     best: dict[str, int] = {}
     for effect in effects:
         own = [k for k, s in enumerate(starts) if s.effect == effect]
-        index, key = max(((k, key) for k in own for key in sizes), key=lambda pair: float(sizes[pair[1]][pair[0]]))
+        index, key = max(
+            ((k, key) for k in own for key in sizes),
+            key=lambda pair: float(sizes[pair[1]][pair[0]]),
+        )
         best[effect] = index
         sights[effect] = _sight(starts[index], float(sizes[key][index]), key, own_settings)
     cosine, unseparated = {}, set()
@@ -337,7 +429,8 @@ def _picture(
         backward = float(max(cosines[theirs, k] for k in shapes[first]))
         cosine[first, second] = min(1.0, max(forward, backward))
         left = min(
-            sights[first].left * math.sqrt(max(0.0, 1.0 - forward**2)), sights[second].left * math.sqrt(max(0.0, 1.0 - backward**2))
+            sights[first].left * math.sqrt(max(0.0, 1.0 - forward**2)),
+            sights[second].left * math.sqrt(max(0.0, 1.0 - backward**2)),
         )
         seen = min(sights[first].left, sights[second].left) >= own_settings.seen
         alike = cosine[first, second] > own_settings.same_cosine or left < own_settings.apart
@@ -365,7 +458,9 @@ def _sight(start: Start, left: float, key: Key, settings: PlanSettings) -> Sight
 
 
 def _addition(kind: str, name: str, text: str, now: _Picture, then: _Picture) -> Addition:
-    seen = tuple(e for e, s in then.sights.items() if s.verdict == "seen" and now.sights[e].verdict != "seen")
+    seen = tuple(
+        e for e, s in then.sights.items() if s.verdict == "seen" and now.sights[e].verdict != "seen"
+    )
     separated = tuple(sorted(now.unseparated - then.unseparated))
     return Addition(kind, name, text, seen, separated, then.bits - now.bits)
 
@@ -376,4 +471,6 @@ def _joined(pairs: list[tuple[str, str]], order: list[str]) -> list[tuple[str, .
     for pair in pairs:
         touching = [g for g in groups if g & set(pair)]
         groups = [g for g in groups if g not in touching] + [set(pair).union(*touching)]
-    return sorted((tuple(sorted(g, key=order.index)) for g in groups), key=lambda g: order.index(g[0]))
+    return sorted(
+        (tuple(sorted(g, key=order.index)) for g in groups), key=lambda g: order.index(g[0])
+    )

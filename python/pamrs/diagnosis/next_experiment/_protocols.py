@@ -1,8 +1,10 @@
-"""Standard experiments that a rig can do, each as the commands that a person sends, with its numbers in words.
+"""Standard experiments that a rig can do, each as the commands that a person sends, with its
+numbers in words.
 
-The levels follow from the rig: the lowest pressure at which its arm leaves the stop and the highest that keeps it off the other
-one. Commands are found on the model by a loop over its muscle pressure that inverts the valve, and then sent as they are, so that
-every hypothesis answers to the same ones.
+The levels follow from the rig: the lowest pressure at which its arm leaves the stop and the highest
+that keeps it off the other one. Commands are found on the model by a loop over its muscle pressure
+that inverts the valve, and then sent as they are, so that every hypothesis answers to the same
+ones.
 """
 
 from __future__ import annotations
@@ -101,10 +103,18 @@ class Experiment:
             If the state leaves the range in which the model holds.
         """
         length = {"duration": self.duration} if self.command is None else {}
-        return simulate(self.changed(rig), self.command, sample_time=self.sample_time, initial=self.initial, **length)
+        return simulate(
+            self.changed(rig),
+            self.command,
+            sample_time=self.sample_time,
+            initial=self.initial,
+            **length,
+        )
 
 
-def trial_of(rig: Rig, reference: Array, *, sample_time: float, bandwidth: float, **options: Any) -> Array:
+def trial_of(
+    rig: Rig, reference: Array, *, sample_time: float, bandwidth: float, **options: Any
+) -> Array:
     """Valve commands that make the muscle pressure of a rig follow a reference.
 
     Parameters
@@ -118,8 +128,8 @@ def trial_of(rig: Rig, reference: Array, *, sample_time: float, bandwidth: float
     bandwidth : float
         Of the loop [rad/s].
     **options
-        ``shut`` ((n,) bool array: samples at which the command is the null voltage), ``dither`` ((n,) array added to the
-        command [V]), ``initial`` (as for :func:`pamrs.simulate`).
+        ``shut`` ((n,) bool array: samples at which the command is the null voltage), ``dither``
+        ((n,) array added to the command [V]), ``initial`` (as for :func:`pamrs.simulate`).
 
     Returns
     -------
@@ -146,9 +156,17 @@ def trial_of(rig: Rig, reference: Array, *, sample_time: float, bandwidth: float
         inside, supply = sample["muscle_pressure"] + ambient, sample["supply_pressure"] + ambient
         up, down = (supply, inside) if mass > 0.0 else (inside, ambient)
         ratio = min(down / up, 0.999)
-        share = 1.0 if ratio <= _CRITICAL else math.sqrt(max(0.02, 1.0 - ((ratio - _CRITICAL) / (1.0 - _CRITICAL)) ** 2))
+        share = (
+            1.0
+            if ratio <= _CRITICAL
+            else math.sqrt(max(0.02, 1.0 - ((ratio - _CRITICAL) / (1.0 - _CRITICAL)) ** 2))
+        )
         opening = float(np.interp(abs(mass) / (flow * up * share), fractions, openings))
-        return float(np.clip(null + math.copysign(half * opening, mass) + dither[k], null - half, null + half))
+        return float(
+            np.clip(
+                null + math.copysign(half * opening, mass) + dither[k], null - half, null + half
+            )
+        )
 
     simulator = Simulator(rig, sample_time=sample_time, initial=options.get("initial"))
     every = max(1, round(0.01 / sample_time))
@@ -157,7 +175,9 @@ def trial_of(rig: Rig, reference: Array, *, sample_time: float, bandwidth: float
     return np.ascontiguousarray(found["valve_command"][:n])
 
 
-def pressure_range(rig: Rig, settings: NextExperimentSettings, *, highest: float | None = None) -> Range:
+def pressure_range(
+    rig: Rig, settings: NextExperimentSettings, *, highest: float | None = None
+) -> Range:
     """Pressures between which a rig is worth exciting.
 
     Parameters
@@ -172,8 +192,8 @@ def pressure_range(rig: Rig, settings: NextExperimentSettings, *, highest: float
     Returns
     -------
     Range
-        With an arm or a load, from where it has moved by a twentieth of its range to nine tenths of it; without one, from a tenth to
-        six tenths of the supply's pressure.
+        With an arm or a load, from where it has moved by a twentieth of its range to nine tenths of
+        it; without one, from a tenth to six tenths of the supply's pressure.
     """
     model = rig.model
     if model["valve"] is None:
@@ -187,7 +207,9 @@ def pressure_range(rig: Rig, settings: NextExperimentSettings, *, highest: float
     command = trial_of(rig, ramp, sample_time=0.01, bandwidth=settings.bandwidth)
     found = simulate(rig, command, sample_time=0.01)
     if load is None:
-        share = (found["joint_angle"] - joint["rest_angle"]) / (joint["max_angle"] - joint["rest_angle"])
+        share = (found["joint_angle"] - joint["rest_angle"]) / (
+            joint["max_angle"] - joint["rest_angle"]
+        )
     else:
         share = (found["length"][0] - found["length"]) / (found["length"][0] - load["min_length"])
     pressure = np.maximum.accumulate(found["muscle_pressure"])
@@ -200,7 +222,9 @@ def _through(points: Points, sample_time: float) -> Array:
     """Straight lines through (time, value) points."""
     end = points[-1][0]
     time = np.arange(round(end / sample_time) + 1) * sample_time
-    return np.asarray(np.interp(time, [p[0] for p in points], [p[1] for p in points]), dtype=np.float64)
+    return np.asarray(
+        np.interp(time, [p[0] for p in points], [p[1] for p in points]), dtype=np.float64
+    )
 
 
 def _then(points: Points, *legs: tuple[float, float]) -> Points:
@@ -221,18 +245,26 @@ class _Maker:
     def __init__(self, rig: Rig, sample_time: float, span: Range, bandwidth: float) -> None:
         self.rig, self.dt, self.span, self.bandwidth = rig, sample_time, span, bandwidth
 
-    def driven(self, name: str, text: str, excitation: dict[str, Any], reference: Array, **options: Any) -> Experiment:
+    def driven(
+        self, name: str, text: str, excitation: dict[str, Any], reference: Array, **options: Any
+    ) -> Experiment:
         changes, initial = options.pop("changes", {}), options.pop("initial", {})
         extra, bandwidth = options.pop("extra", 0.0), options.pop("bandwidth", self.bandwidth)
         rig = self.rig.with_parameters(changes) if changes else self.rig
-        command = trial_of(rig, reference, sample_time=self.dt, bandwidth=bandwidth, initial=initial, **options)
+        command = trial_of(
+            rig, reference, sample_time=self.dt, bandwidth=bandwidth, initial=initial, **options
+        )
         seconds = (reference.size - 1) * self.dt
         done = {"kind": name, **excitation, "duration_s": round(seconds, 1)}
-        return Experiment(name, text, done, command, reference.size, self.dt, initial, changes, seconds + extra)
+        return Experiment(
+            name, text, done, command, reference.size, self.dt, initial, changes, seconds + extra
+        )
 
     def levels(self, *shares: float) -> tuple[list[float], str]:
         pressures = [self.span.at(s) for s in shares]
-        return pressures, ", ".join(f"{_bar(p):g}" for p in pressures[:-1]) + f" and {_bar(pressures[-1]):g} bar"
+        return pressures, ", ".join(
+            f"{_bar(p):g}" for p in pressures[:-1]
+        ) + f" and {_bar(pressures[-1]):g} bar"
 
     def triangle(self, name: str, period: float, cycles: int, **options: Any) -> Experiment:
         low, high = self.span.at(0.05), self.span.at(0.95)
@@ -240,28 +272,45 @@ class _Maker:
         for _ in range(cycles):
             points = _then(points, (0.5 * period, high), (0.5 * period, low))
         text = options.pop("text", "") + (
-            f"drive the muscle pressure as a triangle between {_bar(low):g} and {_bar(high):g} bar with a period of {period:g} s, "
-            f"{cycles} cycles, the first one kept"
+            f"drive the muscle pressure as a triangle between {_bar(low):g} and {_bar(high):g} bar "
+            f"with a period of {period:g} s, {cycles} cycles, the first one kept"
         )
-        excitation = {"levels_bar": [_bar(low), _bar(high)], "period_s": period, "cycles": cycles, **options.pop("also", {})}
+        excitation = {
+            "levels_bar": [_bar(low), _bar(high)],
+            "period_s": period,
+            "cycles": cycles,
+            **options.pop("also", {}),
+        }
         return self.driven(name, text, excitation, _through(points, self.dt), **options)
 
     def sealed(self, hold: float = 16.0) -> Experiment:
         pressures, words = self.levels(0.15, 0.55, 0.95)
-        return self._holds("sealed_hold", pressures, hold, f"fill to {words}, shut the valve at each and hold it for {hold:g} s")
+        return self._holds(
+            "sealed_hold",
+            pressures,
+            hold,
+            f"fill to {words}, shut the valve at each and hold it for {hold:g} s",
+        )
 
     def both_sides(self, hold: float = 16.0) -> Experiment:
-        """Holds above and below the pressure at which equal leaks from the supply and to the ambient balance."""
+        """Holds above and below the pressure at which equal leaks from the supply and to the
+        ambient balance.
+        """
         ambient = self.rig.model["gas"]["ambient_pressure"]
         middle = self.span.at(0.5) + ambient
-        supply = max(middle / 0.8 - ambient, 1.15 * self.span.at(0.8))  # x = psi(x) of ISO 6358: 0.76 to 0.81
+        supply = max(
+            middle / 0.8 - ambient, 1.15 * self.span.at(0.8)
+        )  # x = psi(x) of ISO 6358: 0.76 to 0.81
         pressures, words = self.levels(0.1, 0.8)
         text = (
-            f"turn the supply down to {_bar(supply):g} bar, so that leaks through the valve's centre would balance near "
-            f"{_bar(middle - ambient):g} bar; fill to {words}, on both sides of it, shut the valve at each and hold it for {hold:g} s"
+            f"turn the supply down to {_bar(supply):g} bar, so that leaks through the valve's "
+            f"centre would balance near {_bar(middle - ambient):g} bar; fill to {words}, on both "
+            f"sides of it, shut the valve at each and hold it for {hold:g} s"
         )
         also = {"supply_bar": _bar(supply), "balance_bar": _bar(middle - ambient)}
-        return self._holds("holds_both_sides", pressures, hold, text, also, {"supply_pressure": supply}, extra=60.0)
+        return self._holds(
+            "holds_both_sides", pressures, hold, text, also, {"supply_pressure": supply}, extra=60.0
+        )
 
     def _holds(
         self,
@@ -285,20 +334,32 @@ class _Maker:
         for a, b in closed:
             shut |= (time >= a) & (time < b)
         excitation = {"levels_bar": [_bar(p) for p in pressures], "hold_s": hold, **(also or {})}
-        return self.driven(name, text, excitation, reference, shut=shut, initial=initial or {}, extra=extra)
+        return self.driven(
+            name, text, excitation, reference, shut=shut, initial=initial or {}, extra=extra
+        )
 
     def multisine(self) -> Experiment:
         frequencies = [0.1, 0.23, 0.41, 0.73, 1.13, 1.9, 3.1]
         time = np.arange(round(30.0 / self.dt) + 1) * self.dt
         size = 1.0 / np.sqrt(1.0 + (np.array(frequencies) / 0.6) ** 2)
-        phase = -np.pi * np.arange(len(frequencies)) * np.arange(1, len(frequencies) + 1) / len(frequencies)
-        wave = (size[:, None] * np.sin(2 * np.pi * np.array(frequencies)[:, None] * time + phase[:, None])).sum(axis=0)
+        phase = (
+            -np.pi
+            * np.arange(len(frequencies))
+            * np.arange(1, len(frequencies) + 1)
+            / len(frequencies)
+        )
+        wave = (
+            size[:, None]
+            * np.sin(2 * np.pi * np.array(frequencies)[:, None] * time + phase[:, None])
+        ).sum(axis=0)
         wave *= 0.4 / np.abs(wave).max()
-        reference = np.clip(time / 3.0, 0.0, 1.0) * (self.span.at(0.5) + wave * (self.span.high - self.span.low))
+        reference = np.clip(time / 3.0, 0.0, 1.0) * (
+            self.span.at(0.5) + wave * (self.span.high - self.span.low)
+        )
         low, high = self.span.at(0.1), self.span.at(0.9)
         text = (
-            f"drive the muscle pressure as a multisine of {frequencies[0]:g} to {frequencies[-1]:g} Hz between {_bar(low):g} and "
-            f"{_bar(high):g} bar for 30 s"
+            f"drive the muscle pressure as a multisine of {frequencies[0]:g} to "
+            f"{frequencies[-1]:g} Hz between {_bar(low):g} and {_bar(high):g} bar for 30 s"
         )
         excitation = {"frequencies_hz": frequencies, "levels_bar": [_bar(low), _bar(high)]}
         return self.driven("multisine", text, excitation, reference)
@@ -309,14 +370,27 @@ class _Maker:
         for share in shares:
             points = _then(points, (0.5, self.span.at(share)), (4.5, self.span.at(share)))
         _, words = self.levels(*shares[:4])
-        text = f"climb to {words} and down again, with the pressure regulated and held for 4.5 s at each step"
+        text = (
+            f"climb to {words} and down again, with the pressure regulated and held for 4.5 s at "
+            "each step"
+        )
         excitation = {"levels_bar": [_bar(self.span.at(s)) for s in shares], "hold_s": 4.5}
         return self.driven("staircase", text, excitation, _through(points, self.dt))
 
     def long_hold(self) -> Experiment:
         up, back = self.span.at(0.9), self.span.at(0.45)
-        points = _then([(0.0, 0.0)], (2.0, self.span.at(0.05)), (0.3, up), (25.0, up), (0.3, back), (25.0, back))
-        text = f"step to {_bar(up):g} bar, then back to {_bar(back):g} bar, and keep the pressure regulated for 25 s after each"
+        points = _then(
+            [(0.0, 0.0)],
+            (2.0, self.span.at(0.05)),
+            (0.3, up),
+            (25.0, up),
+            (0.3, back),
+            (25.0, back),
+        )
+        text = (
+            f"step to {_bar(up):g} bar, then back to {_bar(back):g} bar, and keep the pressure "
+            "regulated for 25 s after each"
+        )
         excitation = {"levels_bar": [_bar(up), _bar(back)], "hold_s": 25.0}
         return self.driven("long_hold", text, excitation, _through(points, self.dt))
 
@@ -334,8 +408,9 @@ class _Maker:
         for a, b in closed:
             shut |= (time >= a) & (time < b)
         text = (
-            f"step from {_bar(base):g} bar to {_bar(small):g} bar and back, then to {_bar(large):g} bar and back (sizes 1:3), with the "
-            "valve far open, shut it 0.35 s after each step and watch for 4 s"
+            f"step from {_bar(base):g} bar to {_bar(small):g} bar and back, then to "
+            f"{_bar(large):g} bar and back (sizes 1:3), with the valve far open, shut it 0.35 s "
+            "after each step and watch for 4 s"
         )
         excitation = {"levels_bar": [_bar(base), _bar(small), _bar(large)], "watch_s": 4.0}
         return self.driven("step_and_shut", text, excitation, reference, shut=shut, bandwidth=30.0)
@@ -346,14 +421,21 @@ class _Maker:
         for period in (12.0, 1.2):
             for share in (1.0, 0.6, 0.3):
                 points = _then(
-                    points, (0.25 * period, middle + share * reach), (0.5 * period, middle - share * reach), (0.25 * period, middle)
+                    points,
+                    (0.25 * period, middle + share * reach),
+                    (0.5 * period, middle - share * reach),
+                    (0.25 * period, middle),
                 )
         text = (
-            f"drive nested triangles around {_bar(middle):g} bar, of ±{_bar(reach):g}, ±{_bar(0.6 * reach):g} and "
-            f"±{_bar(0.3 * reach):g} bar, "
-            "first with a period of 12 s, then of 1.2 s"
+            f"drive nested triangles around {_bar(middle):g} bar, of ±{_bar(reach):g}, "
+            f"±{_bar(0.6 * reach):g} and ±{_bar(0.3 * reach):g} bar, first with a period of 12 s, "
+            "then of 1.2 s"
         )
-        excitation = {"middle_bar": _bar(middle), "reach_bar": [_bar(s * reach) for s in (1.0, 0.6, 0.3)], "periods_s": [12.0, 1.2]}
+        excitation = {
+            "middle_bar": _bar(middle),
+            "reach_bar": [_bar(s * reach) for s in (1.0, 0.6, 0.3)],
+            "periods_s": [12.0, 1.2],
+        }
         return self.driven("nested_triangles", text, excitation, _through(points, self.dt))
 
     def null_ramp(self) -> Experiment:
@@ -365,8 +447,9 @@ class _Maker:
         dither = reach * (1.0 - 4.0 * np.abs(((phase + 0.25) % 1.0) - 0.5)) * (time >= 2.0)
         reference = np.clip(time / 2.0, 0.0, 1.0) * middle
         text = (
-            f"hold {_bar(middle):g} bar by slow corrections and ramp the valve command through its null by "
-            f"±{1e3 * reach:.0f} mV in both directions, period {period:g} s, for {seconds:g} s"
+            f"hold {_bar(middle):g} bar by slow corrections and ramp the valve command through its "
+            f"null by ±{1e3 * reach:.0f} mV in both directions, period {period:g} s, for "
+            f"{seconds:g} s"
         )
         excitation = {"level_bar": _bar(middle), "reach_v": round(reach, 4), "period_s": period}
         return self.driven("null_ramp", text, excitation, reference, dither=dither, bandwidth=1.5)
@@ -379,16 +462,21 @@ class _Maker:
         slow = _through([(0.0, 0.0), (3.0, pressure), (6.0, pressure)], 0.01)
         command = trial_of(self.rig, slow, sample_time=0.01, bandwidth=self.bandwidth)
         rest = simulate(self.rig, command, sample_time=0.01)["joint_angle"][-1]
-        turned = min(float(rest) + 0.15 * (joint["max_angle"] - joint["min_angle"]), joint["max_angle"] - 0.05)
+        turned = min(
+            float(rest) + 0.15 * (joint["max_angle"] - joint["min_angle"]),
+            joint["max_angle"] - 0.05,
+        )
         shown = round(math.degrees(turned - float(rest)), 0)
         initial = {"muscle_pressure": pressure, "joint_angle": turned}
         text = (
-            f"at {_bar(pressure):g} bar with the valve shut, lift the arm by hand by {shown:g} deg, let it go and record 8 s from "
-            "the release"
+            f"at {_bar(pressure):g} bar with the valve shut, lift the arm by hand by {shown:g} "
+            "deg, let it go and record 8 s from the release"
         )
         excitation = {"level_bar": _bar(pressure), "deflection_deg": shown}
         try:
-            return self.driven("free_decay", text, excitation, reference, shut=shut, initial=initial, extra=30.0)
+            return self.driven(
+                "free_decay", text, excitation, reference, shut=shut, initial=initial, extra=30.0
+            )
         except SimulationError:
             return None
 
@@ -397,7 +485,9 @@ class _Maker:
         other = 0.5 * self.rig.parameters[name].value
         text = f"change the payload to {other:.3g} kg and "
         also = {"payload_kg": round(other, 3)}
-        return self.triangle("other_payload", 12.0, 2, text=text, also=also, changes={name: other}, extra=90.0)
+        return self.triangle(
+            "other_payload", 12.0, 2, text=text, also=also, changes={name: other}, extra=90.0
+        )
 
 
 def _sealed_library(rig: Rig, sample_time: float, span: Range) -> list[Experiment]:
@@ -408,10 +498,25 @@ def _sealed_library(rig: Rig, sample_time: float, span: Range) -> list[Experimen
         ("hold_short", span.high, 120.0),
         ("hold_long", span.high, 1800.0),
     ):
-        text = f"fill the chamber to {_bar(pressure):g} bar, shut it off and record {seconds:g} s from that moment"
+        text = (
+            f"fill the chamber to {_bar(pressure):g} bar, shut it off and record {seconds:g} s "
+            "from that moment"
+        )
         excitation = {"kind": name, "levels_bar": [_bar(pressure)], "duration_s": seconds}
         rows = round(seconds / sample_time) + 1
-        out.append(Experiment(name, text, excitation, None, rows, sample_time, {"muscle_pressure": pressure}, {}, seconds))
+        out.append(
+            Experiment(
+                name,
+                text,
+                excitation,
+                None,
+                rows,
+                sample_time,
+                {"muscle_pressure": pressure},
+                {},
+                seconds,
+            )
+        )
     return out
 
 
@@ -428,7 +533,8 @@ def library(
     Parameters
     ----------
     rig : Rig
-        A rig of one chain: with a valve and an arm or a hanging load, with a valve alone, or a sealed chamber.
+        A rig of one chain: with a valve and an arm or a hanging load, with a valve alone, or a
+        sealed chamber.
     settings : NextExperimentSettings
         Sample time where none is given, and bandwidth of the pressure loop.
     sample_time : float, optional
@@ -445,14 +551,24 @@ def library(
     """
     several = [block for block in rig.blocks if "" not in rig.tables(block)]
     if several:
-        raise DiagnosisError(f"rig {rig.name!r} has named blocks ({', '.join(several)}); experiments are made for rigs of one chain")
+        raise DiagnosisError(
+            f"rig {rig.name!r} has named blocks ({', '.join(several)}); experiments are made for "
+            "rigs of one chain"
+        )
     if not rig.tables("valve") and (rig.tables("supply") or rig.tables("muscle")):
-        raise DiagnosisError(f"rig {rig.name!r} has no valve that a person could command; experiments need one, or a sealed chamber")
+        raise DiagnosisError(
+            f"rig {rig.name!r} has no valve that a person could command; experiments need one, or "
+            "a sealed chamber"
+        )
     span = pressure_range(rig, settings, highest=highest)
     if rig.model["valve"] is None:
-        sealed = _sealed_library(rig, settings.sealed_sample_time if sample_time is None else sample_time, span)
+        sealed = _sealed_library(
+            rig, settings.sealed_sample_time if sample_time is None else sample_time, span
+        )
         return [e for e in sealed if only is None or e.name in only]
-    make = _Maker(rig, settings.sample_time if sample_time is None else sample_time, span, settings.bandwidth)
+    make = _Maker(
+        rig, settings.sample_time if sample_time is None else sample_time, span, settings.bandwidth
+    )
     makers: dict[str, Callable[[], Experiment | None]] = {
         "multisine": make.multisine,
         "sealed_hold": make.sealed,

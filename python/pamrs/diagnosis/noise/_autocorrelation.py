@@ -14,7 +14,9 @@ Array = NDArray[np.float64]
 
 
 def correlation_time(values: Array) -> float:
-    """Integrated autocorrelation time of a series in samples (at least 1), by the first negative lag."""
+    """Integrated autocorrelation time of a series in samples (at least 1), by the first negative
+    lag.
+    """
     centred = values - values.mean()
     power = float(centred @ centred)
     if values.size < 4 or power <= 0:
@@ -26,8 +28,12 @@ def correlation_time(values: Array) -> float:
     return max(1.0, 1.0 + 2.0 * float(rho[1:stop].sum()))
 
 
-def inflation(block: Block, recordings: list[Prepared], found: dict[Key, Residual], width: float) -> float:
-    """Variance of a block's bin means relative to white sample noise, times their correlation time (>= 1)."""
+def inflation(
+    block: Block, recordings: list[Prepared], found: dict[Key, Residual], width: float
+) -> float:
+    """Variance of a block's bin means relative to white sample noise, times their correlation time
+    (>= 1).
+    """
     values = []
     for prepared in recordings:
         r = found[block.name, prepared.recording.name]

@@ -1,4 +1,6 @@
-"""How much of a block's residual is more than noise: floors, excess, coloured-residual statistics."""
+"""How much of a block's residual is more than noise: noise levels, excess, statistics of
+autocorrelated residuals.
+"""
 
 from __future__ import annotations
 
@@ -18,13 +20,13 @@ from pamrs.diagnosis.prepare import Block, Prepared, Residual, binned, change, r
 from pamrs.diagnosis.settings import NoiseSettings
 from pamrs.errors import SimulationError
 
-__all__ = ["Excess", "Floor", "excess", "bins_of", "floors"]
+__all__ = ["Excess", "NoiseLevel", "bins_of", "excess", "noise_levels"]
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Floor:
+class NoiseLevel:
     """What noise alone leaves in a block's residual over one recording.
 
     Attributes
@@ -34,7 +36,8 @@ class Floor:
     binned : float
         Standard deviation of bin means.
     scatter : float
-        Standard deviation, from one realisation of the noise to another, of the logarithm of the mean square of the bin means.
+        Standard deviation, from one realisation of the noise to another, of the logarithm of the
+        mean square of the bin means.
     """
 
     sample: float
@@ -44,22 +47,24 @@ class Floor:
 
 @dataclass(frozen=True)
 class Excess:
-    """Residual of a block against its floor, pooled over recordings.
+    """Residual of a block against its noise level, pooled over recordings.
 
     Attributes
     ----------
     ratio : float
-        Variance of bin means over that of the floor; 1 when only noise is left.
+        Variance of bin means over that of the noise level; 1 when only noise is left.
     systematic : float
         Standard deviation of what is not noise, in units of the noise.
     p_value : float
-        Chance of such a ratio (above the margin) from noise, by the scatter of the floors.
+        Chance of such a ratio (above the margin) from noise, by the scatter of the noise levels.
     limit : float
-        Ratio that noise exceeds with the chance ``noise.chance`` of the settings, at most ``noise.most_limit``.
+        Ratio that noise exceeds with the chance ``noise.chance`` of the settings, at most
+        ``noise.most_limit``.
     scatter : float
-        Standard deviation of the ratio's logarithm from noise and from what floors are known to.
+        Standard deviation of the ratio's logarithm from noise and from what noise levels are known
+        to.
     rms, noise : float
-        Residual and floor of single samples, in the channel's unit.
+        Residual and noise level of single samples, in the channel's unit.
     """
 
     ratio: float
@@ -77,8 +82,9 @@ def bins_of(prepared: Prepared) -> int:
     return max(settings.least_bin_samples, bin_width(prepared, settings.bin_time))
 
 
-def floors(problem: Problem, core: _core.Rig) -> dict[Key, Floor]:
-    """Floors of all blocks and recordings, the drives' noise carried through the model by simulation.
+def noise_levels(problem: Problem, core: _core.Rig) -> dict[Key, NoiseLevel]:
+    """Floors of all blocks and recordings, the drives' noise carried through the model by
+    simulation.
 
     Parameters
     ----------
@@ -101,18 +107,30 @@ def floors(problem: Problem, core: _core.Rig) -> dict[Key, Floor]:
             seen = counts > 0
             for _ in range(settings.noise.replicates if seen.any() else 0):
                 shaken = np.zeros(prepared.n)
-                with contextlib.suppress(SimulationError):  # a realisation that leaves the model's range tells nothing of the others
-                    shaken = change(block, core, _shaken(prepared, noisy, rng), base) - base.value if noisy else shaken
+                with contextlib.suppress(
+                    SimulationError
+                ):  # a realisation that leaves the model's range tells nothing of the others
+                    shaken = (
+                        change(block, core, _shaken(prepared, noisy, rng), base) - base.value
+                        if noisy
+                        else shaken
+                    )
                 means, _ = binned(shaken, rows, width)
                 own = rng.normal(0.0, base.noise, int(seen.sum())) / np.sqrt(counts[seen])
-                squares = [float(np.mean(v**2)) for v in (shaken[rows], means[seen], means[seen] + own)]
+                squares = [
+                    float(np.mean(v**2)) for v in (shaken[rows], means[seen], means[seen] + own)
+                ]
                 powers.append(squares)
             sample, drives, _ = np.mean(powers, axis=0) if powers else (0.0, 0.0, 0.0)
             white = float(np.mean(1.0 / counts[seen])) if seen.any() else 1.0
             # mean squares of few modes are skew, their logarithms hardly
-            scatter = float(np.std(np.log([both for *_, both in powers]), ddof=1)) if powers else 0.0
-            found[block.name, prepared.recording.name] = Floor(
-                math.sqrt(base.noise**2 + sample), math.sqrt(base.noise**2 * white + drives), scatter
+            scatter = (
+                float(np.std(np.log([both for *_, both in powers]), ddof=1)) if powers else 0.0
+            )
+            found[block.name, prepared.recording.name] = NoiseLevel(
+                math.sqrt(base.noise**2 + sample),
+                math.sqrt(base.noise**2 * white + drives),
+                scatter,
             )
     return found
 
@@ -132,10 +150,10 @@ def excess(
     block: Block,
     recordings: list[Prepared],
     found: dict[Key, Residual],
-    floor: dict[Key, Floor],
+    noise_level: dict[Key, NoiseLevel],
     settings: NoiseSettings,
 ) -> Excess:
-    """Pool a block's residual over recordings and compare it with its floor."""
+    """Pool a block's residual over recordings and compare it with its noise level."""
     keys: list[Key] = []
     ratios, weights, squares, noises = [], [], [], []
     for prepared in recordings:
@@ -146,17 +164,19 @@ def excess(
         if means.size == 0:
             continue
         keys.append(key)
-        ratios.append(float(np.mean(means**2)) / floor[key].binned ** 2)
+        ratios.append(float(np.mean(means**2)) / noise_level[key].binned ** 2)
         weights.append(means.size)
         squares.append(float(np.mean(r.value[r.rows] ** 2)))
-        noises.append(floor[key].sample ** 2)
+        noises.append(noise_level[key].sample ** 2)
     if not ratios:
         return Excess(1.0, 0.0, 1.0, float("nan"), float("nan"), settings.margin)
     ratio = float(np.average(ratios, weights=weights))
-    share = float(np.mean([floor[key].binned ** 2 / floor[key].sample ** 2 for key in keys]))
+    share = float(
+        np.mean([noise_level[key].binned ** 2 / noise_level[key].sample ** 2 for key in keys])
+    )
     shares = np.array(weights) / sum(weights)
-    # floors are means of as many realisations, and their scatter is known from no more
-    pooled = math.sqrt(float(np.sum((shares * [floor[key].scatter for key in keys]) ** 2)))
+    # noise levels are means of as many realisations, and their scatter is known from no more
+    pooled = math.sqrt(float(np.sum((shares * [noise_level[key].scatter for key in keys]) ** 2)))
     scatter = max(1e-6, pooled * math.sqrt(1.0 + 1.0 / settings.replicates))
     chance = t(len(keys) * (settings.replicates - 1))
     beyond = min(settings.most_log_limit, float(chance.isf(settings.chance)) * scatter)

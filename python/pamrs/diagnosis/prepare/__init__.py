@@ -1,12 +1,22 @@
-"""Recordings made ready for the cut chain: checked, smoothed, cut into blocks that are predicted from their measured neighbours.
+"""Recordings made ready for the cut chain: checked, smoothed, cut into blocks that are predicted
+from their measured neighbours.
 
-Public: `check_plausible`, `check_sense`, `implausible` (what recordings cannot be), `prepare`, `Prepared`, `binned`, `noise_level`,
-`smoothed` (signals), `Block`, `Residual`, `available_blocks`, `begun`, `change`, `predicted`, `residual` (blocks and their residuals).
+Public: `check_plausible`, `check_sense`, `implausible` (what recordings cannot be), `prepare`,
+`Prepared`, `binned`, `noise_level`, `smoothed` (signals), `Block`, `Residual`, `available_blocks`,
+`begun`, `change`, `predicted`, `residual` (blocks and their residuals).
 """
 
 from __future__ import annotations
 
-from pamrs.diagnosis.prepare._blocks import Block, Residual, available_blocks, begun, change, predicted, residual
+from pamrs.diagnosis.prepare._blocks import (
+    Block,
+    Residual,
+    available_blocks,
+    begun,
+    change,
+    predicted,
+    residual,
+)
 from pamrs.diagnosis.prepare._plausible import check_plausible, check_sense, implausible
 from pamrs.diagnosis.prepare._signals import Prepared, binned, noise_level, prepare, smoothed
 

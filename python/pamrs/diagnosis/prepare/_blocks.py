@@ -1,4 +1,6 @@
-"""The blocks of a rig between measured channels, and the residual of each with exact sensitivities."""
+"""The blocks of a rig between measured channels, and the residual of each with exact
+sensitivities.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +30,8 @@ class Block:
     Attributes
     ----------
     name, channel : str
-        Name of the block as the core has it (``chamber``, ``chamber.flexor``, ``arm.elbow``) and of the channel that it predicts.
+        Name of the block as the core has it (``chamber``, ``chamber.flexor``, ``arm.elbow``) and of
+        the channel that it predicts.
     drives : tuple of str
         Measured channels that drive it.
     window : float or None
@@ -51,7 +54,9 @@ class Block:
 
     @property
     def kind(self) -> str:
-        """``supply``, ``chamber`` or ``arm`` (of a hanging load too): its name without that of the tank, chamber or joint."""
+        """``supply``, ``chamber`` or ``arm`` (of a hanging load too): its name without that of the
+        tank, chamber or joint.
+        """
         kind = self.name.partition(".")[0]
         return "arm" if kind == "load" else kind
 
@@ -68,7 +73,9 @@ _LINK = ("length", "mass", "centre", "inertia", "payload", "viscous", "coulomb")
 
 @dataclass(frozen=True)
 class _Way:
-    """A valve or a line: its own full name, what it leads from and to (chambers and supplies in full), the command that opens it."""
+    """A valve or a line: its own full name, what it leads from and to (chambers and supplies in
+    full), the command that opens it.
+    """
 
     name: str
     ends: tuple[str, str]
@@ -84,8 +91,19 @@ def _ways(rig: Rig) -> list[_Way]:
     for name, ends in valves.items():
         line = (ends["to"],) if ends["to"] in behind else ()
         end = behind.get(ends["to"], ends["to"])
-        found.append(_Way(qualified("valve", name), (ends["from"], end), (dotted("valve_command", name),), line))
-    found += [_Way(qualified("line", name), (ends["from"], ends["to"]), (), ()) for name, ends in lines.items() if ends["from"]]
+        found.append(
+            _Way(
+                qualified("valve", name),
+                (ends["from"], end),
+                (dotted("valve_command", name),),
+                line,
+            )
+        )
+    found += [
+        _Way(qualified("line", name), (ends["from"], ends["to"]), (), ())
+        for name, ends in lines.items()
+        if ends["from"]
+    ]
     return found
 
 
@@ -95,9 +113,17 @@ class _Map:
     def __init__(self, rig: Rig, channels: tuple[str, ...], settings: PrepareSettings) -> None:
         self.settings = settings
         self.rig, self.has, self.ways = rig, frozenset(channels), _ways(rig)
-        self.angles = ("length",) if rig.model["load"] else tuple(dotted("joint_angle", name) for name in rig.tables("joint"))
-        self.pulling = {name: ends["chamber"].partition(".")[2] for name, ends in rig.ports("muscle").items()}
-        self.joint_of = {name: ends["joint"].partition(".")[2] for name, ends in rig.ports("muscle").items()}
+        self.angles = (
+            ("length",)
+            if rig.model["load"]
+            else tuple(dotted("joint_angle", name) for name in rig.tables("joint"))
+        )
+        self.pulling = {
+            name: ends["chamber"].partition(".")[2] for name, ends in rig.ports("muscle").items()
+        }
+        self.joint_of = {
+            name: ends["joint"].partition(".")[2] for name, ends in rig.ports("muscle").items()
+        }
 
     def pressure(self, block: str) -> str:
         """Channel of a supply's or chamber's pressure by its full name."""
@@ -109,10 +135,20 @@ class _Map:
         return [way for way in self.ways if block in way.ends]
 
     def neighbours(self, block: str) -> tuple[str, ...]:
-        """Channels of the pressures next to a block; that of a constant supply is known without measuring it."""
-        others = [end for way in self.around(block) for end in way.ends if end not in (block, "ambient")]
-        inlets = [dotted("line_pressure", name.partition(".")[2]) for way in self.around(block) for name in way.between]
-        known = [end for end in others if self._constant(end) and self.pressure(end) not in self.has]
+        """Channels of the pressures next to a block; that of a constant supply is known without
+        measuring it.
+        """
+        others = [
+            end for way in self.around(block) for end in way.ends if end not in (block, "ambient")
+        ]
+        inlets = [
+            dotted("line_pressure", name.partition(".")[2])
+            for way in self.around(block)
+            for name in way.between
+        ]
+        known = [
+            end for end in others if self._constant(end) and self.pressure(end) not in self.has
+        ]
         wanted = [self.pressure(end) for end in others if end not in known]
         return tuple(dict.fromkeys([*wanted, *(name for name in inlets if name in self.has)]))
 
@@ -122,7 +158,9 @@ class _Map:
 
     def commands(self, block: str) -> tuple[str, ...]:
         """Commands of the valves at a block."""
-        return tuple(dict.fromkeys(command for way in self.around(block) for command in way.command))
+        return tuple(
+            dict.fromkeys(command for way in self.around(block) for command in way.command)
+        )
 
     def zero(self, key: str, name: str) -> str:
         """Dotted name of the zero of a block's sensor, its own or the common one."""
@@ -131,7 +169,11 @@ class _Map:
 
     def zeros(self, chambers: Iterable[str], joints: Iterable[str]) -> set[str]:
         """Those of the sensors of some chambers and joints."""
-        moving = {"sensors.length_zero"} if self.rig.model["load"] else {self.zero("angle_zero", j) for j in joints}
+        moving = (
+            {"sensors.length_zero"}
+            if self.rig.model["load"]
+            else {self.zero("angle_zero", j) for j in joints}
+        )
         return {self.zero("pressure_zero", c) for c in chambers} | moving
 
     def of_ways(self, block: str) -> set[str]:
@@ -139,7 +181,10 @@ class _Map:
         names: set[str] = set()
         for way in self.around(block):
             for full in (way.name, *way.between):
-                names |= {f"{full}.{key}" for key in (_VALVE if full.partition(".")[0] == "valve" else _LINE)}
+                names |= {
+                    f"{full}.{key}"
+                    for key in (_VALVE if full.partition(".")[0] == "valve" else _LINE)
+                }
         return names
 
     def chambers_at(self, block: str) -> set[str]:
@@ -150,51 +195,108 @@ class _Map:
     def supply(self, name: str) -> Block | None:
         """The block of one supply."""
         full, table = qualified("supply", name), self.rig.tables("supply")[name]
-        commands = (*self.commands(full), *((dotted("supply_command", name),) if table["kind"] == "regulator" else ()))
+        commands = (
+            *self.commands(full),
+            *((dotted("supply_command", name),) if table["kind"] == "regulator" else ()),
+        )
         drives = (*self.neighbours(full), *commands)
         if not self.around(full) or not {self.pressure(full), *drives, *self.angles} <= self.has:
             return None
-        names = self.of_ways(full) | {f"{full}.{key}" for key in _SUPPLY} | self.zeros(self.chambers_at(full), ())
+        names = (
+            self.of_ways(full)
+            | {f"{full}.{key}" for key in _SUPPLY}
+            | self.zeros(self.chambers_at(full), ())
+        )
         covers = "regulator" if table["kind"] == "regulator" else "supply"
-        covers += " and valve" if self.commands(full) else (" and line" if table["kind"] != "regulator" else "")
+        covers += (
+            " and valve"
+            if self.commands(full)
+            else (" and line" if table["kind"] != "regulator" else "")
+        )
         window, step = self.settings.supply_window, self.settings.gas_step
-        return Block(full, self.pressure(full), drives, window, frozenset(names), step, covers + _called(name))
+        return Block(
+            full,
+            self.pressure(full),
+            drives,
+            window,
+            frozenset(names),
+            step,
+            covers + _called(name),
+        )
 
     def chamber(self, name: str) -> Block | None:
-        """The block of one chamber; none where nothing feeds it although it moves a joint: its pressure is then what is given."""
+        """The block of one chamber; none where nothing feeds it although it moves a joint: its
+        pressure is then what is given.
+        """
         full = qualified("chamber", name)
         fed = bool(self.neighbours(full) or self.commands(full))
-        joints = tuple(dict.fromkeys(self.joint_of[m] for m, chamber in self.pulling.items() if chamber == name))
+        joints = tuple(
+            dict.fromkeys(
+                self.joint_of[m] for m, chamber in self.pulling.items() if chamber == name
+            )
+        )
         if self.angles and not self.rig.tables("valve") and not self.rig.tables("supply"):
             return None
-        drives = (*self.neighbours(full), *self.commands(full), *(a for a in self.angles if a.partition(".")[2] in joints))
+        drives = (
+            *self.neighbours(full),
+            *self.commands(full),
+            *(a for a in self.angles if a.partition(".")[2] in joints),
+        )
         if not {self.pressure(full), *drives, *self.angles} <= self.has:
             return None
-        names = self.of_ways(full) | {f"{full}.{key}" for key in _CHAMBER} | self.zeros(self.chambers_at(full), joints or [""])
-        covers = ("valve, line and chamber" if self.commands(full) else "line and chamber") if fed else "chamber"
+        names = (
+            self.of_ways(full)
+            | {f"{full}.{key}" for key in _CHAMBER}
+            | self.zeros(self.chambers_at(full), joints or [""])
+        )
+        covers = (
+            ("valve, line and chamber" if self.commands(full) else "line and chamber")
+            if fed
+            else "chamber"
+        )
         step = self.settings.gas_step if fed else self.settings.sealed_step
         window = self.settings.chamber_window if fed else None
-        return Block(full, self.pressure(full), drives, window, frozenset(names), step, covers + _called(name))
+        return Block(
+            full,
+            self.pressure(full),
+            drives,
+            window,
+            frozenset(names),
+            step,
+            covers + _called(name),
+        )
 
     def arm(self, joint: str) -> Block | None:
         """The block of one joint: muscles' pressures to its angle."""
-        drives = tuple(dict.fromkeys(dotted("muscle_pressure", chamber) for chamber in self.pulling.values()))
+        drives = tuple(
+            dict.fromkeys(dotted("muscle_pressure", chamber) for chamber in self.pulling.values())
+        )
         if not {*drives, *self.angles} <= self.has:
             return None
-        names = {f"arm.{key}" for key in _ARM} | {f"{qualified('muscle', m)}.{key}" for m in self.pulling for key in _MUSCLE}
-        names |= {f"{qualified('link', link)}.{key}" for link in self.rig.tables("link") for key in _LINK}
+        names = {f"arm.{key}" for key in _ARM} | {
+            f"{qualified('muscle', m)}.{key}" for m in self.pulling for key in _MUSCLE
+        }
+        names |= {
+            f"{qualified('link', link)}.{key}" for link in self.rig.tables("link") for key in _LINK
+        }
         names |= self.zeros(self.pulling.values(), self.rig.tables("joint"))
         name = qualified("arm", joint)
         covers = "muscle, joint and arm" + _called(joint)
         window, step = self.settings.arm_window, self.settings.arm_step
-        return Block(name, dotted("joint_angle", joint), drives, window, frozenset(names), step, covers)
+        return Block(
+            name, dotted("joint_angle", joint), drives, window, frozenset(names), step, covers
+        )
 
     def load(self) -> Block | None:
         """The block of a hanging load: muscles' pressures to their length."""
-        drives = tuple(dict.fromkeys(dotted("muscle_pressure", chamber) for chamber in self.pulling.values()))
+        drives = tuple(
+            dict.fromkeys(dotted("muscle_pressure", chamber) for chamber in self.pulling.values())
+        )
         if not {*drives, *self.angles} <= self.has:
             return None
-        names = {f"load.{key}" for key in _LOAD} | {f"{qualified('muscle', m)}.{key}" for m in self.pulling for key in _MUSCLE}
+        names = {f"load.{key}" for key in _LOAD} | {
+            f"{qualified('muscle', m)}.{key}" for m in self.pulling for key in _MUSCLE
+        }
         names |= self.zeros(self.pulling.values(), ())
         window, step = self.settings.arm_window, self.settings.arm_step
         return Block("load", "length", drives, window, frozenset(names), step, "muscle and load")
@@ -205,11 +307,13 @@ def _called(name: str) -> str:
 
 
 def available_blocks(rig: Rig, channels: tuple[str, ...], settings: PrepareSettings) -> list[Block]:
-    """The blocks that these channels can tell apart: supplies, chambers, then joints or the load, each in the order of the rig file.
+    """The blocks that these channels can tell apart: supplies, chambers, then joints or the load,
+    each in the order of the rig file.
 
-    Every tank (or regulator), chamber, joint and hanging load is a block of its own, driven by the measured channels next to it, with
-    the baseline parameters of what it stands for. A rig with joints or a load and without valves and supplies is driven by the
-    pressures of its muscles: these are given, and only what they move is judged.
+    Every tank (or regulator), chamber, joint and hanging load is a block of its own, driven by the
+    measured channels next to it, with the baseline parameters of what it stands for. A rig with
+    joints or a load and without valves and supplies is driven by the pressures of its muscles:
+    these are given, and only what they move is judged.
 
     Parameters
     ----------
@@ -234,7 +338,8 @@ def available_blocks(rig: Rig, channels: tuple[str, ...], settings: PrepareSetti
 
 @dataclass(frozen=True, eq=False)
 class Residual:
-    """Measured minus predicted output of one block over one recording, with the window's start projected out.
+    """Measured minus predicted output of one block over one recording, with the window's start
+    projected out.
 
     Attributes
     ----------
@@ -249,7 +354,8 @@ class Residual:
     noise : float
         Noise of the channel.
     starts : list of (a, b, q)
-        Windows with an orthonormal basis of what their start can do; what a residual without a jacobian is freed of.
+        Windows with an orthonormal basis of what their start can do; what a residual without a
+        jacobian is freed of.
     """
 
     value: Array
@@ -261,7 +367,8 @@ class Residual:
 
 
 def change(block: Block, core: _core.Rig, prepared: Prepared, base: Residual) -> Array:
-    """Residual under another model, freed of the same starts as one that was computed with its sensitivities.
+    """Residual under another model, freed of the same starts as one that was computed with its
+    sensitivities.
 
     Parameters
     ----------
@@ -280,7 +387,9 @@ def change(block: Block, core: _core.Rig, prepared: Prepared, base: Residual) ->
         In the channel's unit; 0 in unusable rows.
     """
     prediction = predicted(block, core, prepared)
-    measured = np.where(prepared.recording.mask[block.channel], prepared.recording.channels[block.channel], 0.0)
+    measured = np.where(
+        prepared.recording.mask[block.channel], prepared.recording.channels[block.channel], 0.0
+    )
     value = np.where(base.rows, measured - prediction, 0.0)
     for a, b, q in base.starts:
         value[a:b] -= q @ (q.T @ value[a:b])
@@ -288,8 +397,14 @@ def change(block: Block, core: _core.Rig, prepared: Prepared, base: Residual) ->
 
 
 def begun(block: Block, prepared: Prepared, starts: list[int]) -> dict[str, tuple[Array, Array]]:
-    """The smoothed channels, with the best that can be told where windows start of what a block integrates (an arm: all joints)."""
-    state = [n for n in prepared.signals if n == block.channel or (block.kind == "arm" and channel_of(n) == "joint_angle")]
+    """The smoothed channels, with the best that can be told where windows start of what a block
+    integrates (an arm: all joints).
+    """
+    state = [
+        n
+        for n in prepared.signals
+        if n == block.channel or (block.kind == "arm" and channel_of(n) == "joint_angle")
+    ]
     return prepared.signals | {name: prepared.begun(name, starts) for name in state}
 
 
@@ -340,8 +455,14 @@ def residual(block: Block, core: _core.Rig, prepared: Prepared, parameters: list
     """
     starts = prepared.starts(block.window, block.drives)
     least = prepared.settings.prepare.window_samples_per_state
-    # without parameters a free null direction is still wanted for the window's start: ask for one parameter
-    names = parameters or [next((n for n in core.parameter_names if n.endswith("pressure_zero")), core.parameter_names[0])]
+    # without parameters a free null direction is still wanted for the window's start: ask for one
+    # parameter
+    names = parameters or [
+        next(
+            (n for n in core.parameter_names if n.endswith("pressure_zero")),
+            core.parameter_names[0],
+        )
+    ]
     prediction, jacobian = core.predict(
         block.name,
         prepared.commands,
@@ -354,7 +475,9 @@ def residual(block: Block, core: _core.Rig, prepared: Prepared, parameters: list
     )
     if jacobian is None:
         raise AssertionError("the core returns a jacobian when parameters are named")
-    measured = np.where(prepared.recording.mask[block.channel], prepared.recording.channels[block.channel], 0.0)
+    measured = np.where(
+        prepared.recording.mask[block.channel], prepared.recording.channels[block.channel], 0.0
+    )
     rows = prepared.usable(block.channel, block.drives, starts)
     value = np.where(rows, measured - prediction, 0.0)
     shifted = prediction.copy()

@@ -1,8 +1,10 @@
-"""What a recording cannot be: units, swapped columns and dead sensors that are seen before anything is fitted.
+"""What a recording cannot be: units, swapped columns and dead sensors that are seen before anything
+is fitted.
 
-A mismatch that a wrong heading makes is not physics. What is looked at needs no fit: sizes against the rig file, the order
-of pressures, the range of joints, the sense in which a pressure follows its valve and an angle its pressures. Each finding says what
-was found and what is allowed; nothing is repaired.
+A mismatch that a wrong heading makes is not physics. What is looked at needs no fit: sizes against
+the rig file, the order of pressures, the range of joints, the sense in which a pressure follows its
+valve and an angle its pressures. Each finding says what was found and what is allowed; nothing is
+repaired.
 """
 
 from __future__ import annotations
@@ -33,7 +35,9 @@ _TOLD = 12
 """Findings that a message lists."""
 
 
-def check_plausible(recordings: Sequence[Recording], rig: Rig, case: str, settings: PlausibilitySettings) -> None:
+def check_plausible(
+    recordings: Sequence[Recording], rig: Rig, case: str, settings: PlausibilitySettings
+) -> None:
     """Refuse recordings whose units or columns cannot be right.
 
     Parameters
@@ -52,15 +56,23 @@ def check_plausible(recordings: Sequence[Recording], rig: Rig, case: str, settin
     DiagnosisError
         With every finding: recording, channel, what was found, what is allowed.
     """
-    found = [f"recording {r.name!r}: {text}" for r in recordings for text in implausible(r, rig, settings)]
+    found = [
+        f"recording {r.name!r}: {text}"
+        for r in recordings
+        for text in implausible(r, rig, settings)
+    ]
     _refuse(case, found)
 
 
 def _refuse(case: str, found: list[str]) -> None:
     if not found:
         return
-    told = found[:_TOLD] + ([f"and {len(found) - _TOLD} more of this kind"] if len(found) > _TOLD else [])
-    raise DiagnosisError(joined(f"case {case!r}: these recordings cannot be of this rig; nothing was fitted", told))
+    told = found[:_TOLD] + (
+        [f"and {len(found) - _TOLD} more of this kind"] if len(found) > _TOLD else []
+    )
+    raise DiagnosisError(
+        joined(f"case {case!r}: these recordings cannot be of this rig; nothing was fitted", told)
+    )
 
 
 def implausible(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> list[str]:
@@ -103,36 +115,50 @@ def _clock(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> It
     if _moving(rig, settings) and recording.sample_time > longest:
         what = "a joint" if rig.tables("joint") else "a load"
         yield (
-            f"a sample every {recording.sample_time:g} s is too slow for {what}: at most {longest:g} s; is the unit of "
-            "'time' (ms, us) the one its values are in?"
+            f"a sample every {recording.sample_time:g} s is too slow for {what}: at most "
+            f"{longest:g} s; is the unit of 'time' (ms, us) the one its values are in?"
         )
 
 
 def _pressures(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> Iterator[str]:
     """Sizes of pressures, by themselves and beside the rig file."""
-    rated = {dotted("supply_pressure", name): float(table["initial_pressure"]) for name, table in rig.tables("supply").items()}
-    largest = max([*rated.values(), *(float(t["initial_pressure"]) for t in rig.tables("chamber").values())], default=0.0)
-    low, top = settings.least_pressure, max(settings.most_pressure, settings.most_rated_multiple * largest)
+    rated = {
+        dotted("supply_pressure", name): float(table["initial_pressure"])
+        for name, table in rig.tables("supply").items()
+    }
+    largest = max(
+        [*rated.values(), *(float(t["initial_pressure"]) for t in rig.tables("chamber").values())],
+        default=0.0,
+    )
+    low, top = (
+        settings.least_pressure,
+        max(settings.most_pressure, settings.most_rated_multiple * largest),
+    )
     least, most = settings.supply_least_share, settings.supply_most_share
     for name in recording.channels:
         values = _values(recording, name)
-        if channel_of(name) not in ("supply_pressure", "line_pressure", "muscle_pressure") or values.size < 3:
+        if (
+            channel_of(name) not in ("supply_pressure", "line_pressure", "muscle_pressure")
+            or values.size < 3
+        ):
             continue
         high = float(np.quantile(np.abs(values), 0.995))
         if 0.0 < high < low and np.ptp(values) > 0.0:
             yield (
-                f"{name} never exceeds {high:.3g} Pa gauge; a pressure of air exceeds {low:g} Pa somewhere: are its "
-                "values in bar (or is it another column, an angle or a voltage) under a heading in Pa?"
+                f"{name} never exceeds {high:.3g} Pa gauge; a pressure of air exceeds {low:g} Pa "
+                "somewhere: are its values in bar (or is it another column, an angle or a voltage) "
+                "under a heading in Pa?"
             )
         elif high > top:
             yield (
-                f"{name} reaches {high:.3g} Pa gauge; at most {top:.3g} Pa is allowed: are its values in Pa, kPa or psi under a "
-                "heading in bar?"
+                f"{name} reaches {high:.3g} Pa gauge; at most {top:.3g} Pa is allowed: are its "
+                "values in Pa, kPa or psi under a heading in bar?"
             )
         elif name in rated and rated[name] > 0.0 and not least <= high / rated[name] <= most:
             yield (
                 f"{name} is at most {high:.3g} Pa and the rig file has {rated[name]:.3g} Pa; "
-                f"{least * rated[name]:.3g} to {most * rated[name]:.3g} Pa is allowed: right column and unit?"
+                f"{least * rated[name]:.3g} to {most * rated[name]:.3g} Pa is allowed: right "
+                "column and unit?"
             )
 
 
@@ -141,13 +167,21 @@ def _frozen_tanks(recording: Recording, rig: Rig, settings: PlausibilitySettings
     valves = rig.ports("valve")
     for supply, table in rig.tables("supply").items():
         name = dotted("supply_pressure", supply)
-        values, drawn = _values(recording, name), any(ends["from"] == dotted("supply", supply) for ends in valves.values())
+        values, drawn = (
+            _values(recording, name),
+            any(ends["from"] == dotted("supply", supply) for ends in valves.values()),
+        )
         if table["kind"] != "tank" or not drawn or values.size < 16 or np.ptp(values) > 0.0:
             continue
-        moved = [v for c in rig.tables("chamber") if (v := _values(recording, dotted("muscle_pressure", c))).size]
+        moved = [
+            v
+            for c in rig.tables("chamber")
+            if (v := _values(recording, dotted("muscle_pressure", c))).size
+        ]
         if any(float(np.ptp(v)) > settings.frozen_tank_change for v in moved):
             yield (
-                f"{name} has the one value {values[0]:.6g} Pa throughout although its tank is drawn from: a frozen transducer; leave "
+                f"{name} has the one value {values[0]:.6g} Pa throughout although its tank is "
+                "drawn from: a frozen transducer; leave "
                 'the column out, or say [supply] kind = "constant" if it is one'
             )
 
@@ -181,7 +215,9 @@ def _order(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> It
                 rows = recording.mask[name]
                 source, limit = (
                     f"{full} of the rig file",
-                    np.full(int(rows.sum()), float(rig.tables("supply")[supply]["initial_pressure"])),
+                    np.full(
+                        int(rows.sum()), float(rig.tables("supply")[supply]["initial_pressure"])
+                    ),
                 )
             if rows.sum() < 16:
                 continue
@@ -191,14 +227,18 @@ def _order(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> It
             if share > settings.order_time_share:
                 yield (
                     f"{name} is above {source} for {100 * share:.0f} % of the time (medians "
-                    f"{float(np.median(recording.channels[name][rows])):.3g} and {float(np.median(limit)):.3g} Pa); at most "
-                    f"{100 * settings.order_time_share:.0f} % is allowed: are the two columns swapped, or one of their units wrong?"
+                    f"{float(np.median(recording.channels[name][rows])):.3g} and "
+                    f"{float(np.median(limit)):.3g} Pa); at most "
+                    f"{100 * settings.order_time_share:.0f} % is allowed: are the two columns "
+                    "swapped, or one of their units wrong?"
                 )
 
 
 @dataclass(frozen=True)
 class _Moving:
-    """What muscles move: its channel, unit and range, how far and fast it may be, and the chambers of its muscles."""
+    """What muscles move: its channel, unit and range, how far and fast it may be, and the chambers
+    of its muscles.
+    """
 
     channel: str
     unit: str
@@ -215,9 +255,21 @@ def _moving(rig: Rig, settings: PlausibilitySettings) -> list[_Moving]:
     found = []
     for joint, table in rig.tables("joint").items():
         low, high = float(table["min_angle"]), float(table["max_angle"])
-        pulled = tuple(e["chamber"].partition(".")[2] for e in ends if e["joint"] == dotted("joint", joint))
+        pulled = tuple(
+            e["chamber"].partition(".")[2] for e in ends if e["joint"] == dotted("joint", joint)
+        )
         margin = max(settings.least_angle_margin, settings.range_margin * (high - low))
-        found.append(_Moving(dotted("joint_angle", joint), "rad", low, high, margin, settings.fastest_joint, pulled))
+        found.append(
+            _Moving(
+                dotted("joint_angle", joint),
+                "rad",
+                low,
+                high,
+                margin,
+                settings.fastest_joint,
+                pulled,
+            )
+        )
     load = rig.model["load"]
     if load and load["kind"] == "mass":
         low, high = float(load["min_length"]), float(load["max_length"])
@@ -234,33 +286,52 @@ def _motion(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> I
         values = _values(recording, name)
         if values.size < 3:
             continue
-        share = float(np.mean((values < moving.low - moving.margin) | (values > moving.high + moving.margin)))
+        share = float(
+            np.mean((values < moving.low - moving.margin) | (values > moving.high + moving.margin))
+        )
         if share > settings.range_time_share:
-            whose, units = ("its joint's range", "deg or rad") if unit == "rad" else ("its load's range", "mm or m")
+            whose, units = (
+                ("its joint's range", "deg or rad")
+                if unit == "rad"
+                else ("its load's range", "mm or m")
+            )
             yield (
-                f"{name} is outside {whose} for {100 * share:.0f} % of the time: from {values.min():.3g} to "
-                f"{values.max():.3g} {unit}, where {moving.low:.3g} to {moving.high:.3g} {unit} are possible: right column, unit "
-                f"({units}) and sign?"
+                f"{name} is outside {whose} for {100 * share:.0f} % of the time: from "
+                f"{values.min():.3g} to {values.max():.3g} {unit}, where {moving.low:.3g} to "
+                f"{moving.high:.3g} {unit} are possible: right column, unit ({units}) and sign?"
             )
         rows = recording.mask[name]
-        steps = np.abs(np.diff(recording.channels[name]))[rows[1:] & rows[:-1]] / recording.sample_time
+        steps = (
+            np.abs(np.diff(recording.channels[name]))[rows[1:] & rows[:-1]] / recording.sample_time
+        )
         fast = float(np.quantile(steps, 0.99)) if steps.size >= 16 else 0.0
         if fast > moving.fastest:
             yield (
-                f"{name} {'turns' if unit == 'rad' else 'moves'} with {fast:.3g} {unit}/s, one sample in a hundred faster; at most "
-                f"{moving.fastest:g} {unit}/s is allowed: are the units of 'time' (s, ms, us) and of the "
+                f"{name} {'turns' if unit == 'rad' else 'moves'} with {fast:.3g} {unit}/s, one "
+                f"sample in a hundred faster; at most {moving.fastest:g} {unit}/s is allowed: are "
+                "the units of 'time' (s, ms, us) and of the "
                 f"{'angle' if unit == 'rad' else 'length'} those that their values are in?"
             )
-        pressures = [v for c in moving.pulled if (v := _values(recording, dotted("muscle_pressure", c))).size]
+        pressures = [
+            v for c in moving.pulled if (v := _values(recording, dotted("muscle_pressure", c))).size
+        ]
         if (
             values.size >= 16
             and np.ptp(values) == 0.0
-            and any(float(np.ptp(v)) > settings.frozen_motion_share * float(np.abs(v).max()) > 1e3 for v in pressures)
+            and any(
+                float(np.ptp(v)) > settings.frozen_motion_share * float(np.abs(v).max()) > 1e3
+                for v in pressures
+            )
         ):
-            what = "a frozen encoder and a joint that is held" if unit == "rad" else "a frozen transducer and a load that is held"
+            what = (
+                "a frozen encoder and a joint that is held"
+                if unit == "rad"
+                else "a frozen transducer and a load that is held"
+            )
             yield (
-                f"{name} has the one value {values[0]:.4g} {unit} throughout while its muscles' pressures change: {what} cannot be "
-                "told apart, and neither is in the model; leave the recording out"
+                f"{name} has the one value {values[0]:.4g} {unit} throughout while its muscles' "
+                f"pressures change: {what} cannot be told apart, and neither is in the model; "
+                "leave the recording out"
             )
 
 
@@ -281,9 +352,10 @@ def _valves(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> I
         beyond = float(np.mean(np.abs(opening[both]) > settings.command_span))
         if beyond > settings.command_time_share:
             yield (
-                f"{name} is beyond twice its valve's range for {100 * beyond:.0f} % of the time (median "
-                f"{float(np.median(recording.channels[name][both])):.3g} V); {table['null_voltage']:g} +- {table['half_range']:g} V is "
-                "the range: right column and unit?"
+                f"{name} is beyond twice its valve's range for {100 * beyond:.0f} % of the time "
+                f"(median {float(np.median(recording.channels[name][both])):.3g} V); "
+                f"{table['null_voltage']:g} +- {table['half_range']:g} V is the range: right "
+                "column and unit?"
             )
             continue
         if sum(e["to"] == ends["to"] for e in rig.ports("valve").values()) > 1:
@@ -291,23 +363,40 @@ def _valves(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> I
         width = max(2, round(settings.sense_time / recording.sample_time))
         rows = np.flatnonzero(both[:-width] & both[width // 2 : -width + width // 2] & both[width:])
         # what swings moves the pressure by its volume, whatever the valve does
-        for place, still in ((v, still_by[channel_of(c)]) for c, v in recording.channels.items() if channel_of(c) in still_by):
+        for place, still in (
+            (v, still_by[channel_of(c)])
+            for c, v in recording.channels.items()
+            if channel_of(c) in still_by
+        ):
             rows = rows[~(np.abs(place[rows + width] - place[rows]) > still)]
         change = recording.channels[pressure][rows + width] - recording.channels[pressure][rows]
-        towards, moved = opening[rows + width // 2], float(np.ptp(recording.channels[pressure][both]))
-        if rows.size < 32 or moved < settings.sense_least_change or not np.ptp(towards) > 0.0 or not np.ptp(change) > 0.0:
+        towards, moved = (
+            opening[rows + width // 2],
+            float(np.ptp(recording.channels[pressure][both])),
+        )
+        if (
+            rows.size < 32
+            or moved < settings.sense_least_change
+            or not np.ptp(towards) > 0.0
+            or not np.ptp(change) > 0.0
+        ):
             continue
         against = float(np.abs(change)[towards * change < 0.0].sum() / np.abs(change).sum())
         correlation = float(np.corrcoef(towards, change)[0, 1])
         if against > settings.opposed_share and correlation < settings.opposed_correlation:
             yield (
-                f"{100 * against:.0f} % of the change of {pressure} goes against {name} (rises while it says vent, falls while it says "
-                f"fill); at most {100 * settings.opposed_share:.0f} % is allowed: is the command's sign, unit or column right?"
+                f"{100 * against:.0f} % of the change of {pressure} goes against {name} (rises "
+                "while it says vent, falls while it says fill); at most "
+                f"{100 * settings.opposed_share:.0f} % is allowed: is the command's sign, unit or "
+                "column right?"
             )
 
 
-def check_sense(blocks: Sequence[Block], recordings: Sequence[Prepared], core: _core.Rig, case: str) -> None:
-    """Refuse joint angles that are the model's own in another unit, or that go the opposite way throughout.
+def check_sense(
+    blocks: Sequence[Block], recordings: Sequence[Prepared], core: _core.Rig, case: str
+) -> None:
+    """Refuse joint angles that are the model's own in another unit, or that go the opposite way
+    throughout.
 
     Parameters
     ----------
@@ -340,21 +429,48 @@ def check_sense(blocks: Sequence[Block], recordings: Sequence[Prepared], core: _
         _refuse(case, found)
 
 
-def _sense(block: Block, core: _core.Rig, prepared: Prepared, settings: PlausibilitySettings) -> str | None:
-    """What would make the model's angle that of the recording: another unit, the other sign, two pressures in each other's place."""
+def _sense(
+    block: Block, core: _core.Rig, prepared: Prepared, settings: PlausibilitySettings
+) -> str | None:
+    """What would make the model's angle that of the recording: another unit, the other sign, two
+    pressures in each other's place.
+    """
     rows = prepared.usable(block.channel, block.drives, [0])
-    measured, model = prepared.recording.channels[block.channel][rows], predicted(block, core, prepared)[rows]
+    measured, model = (
+        prepared.recording.channels[block.channel][rows],
+        predicted(block, core, prepared)[rows],
+    )
     quiet = float(np.std(measured)) < settings.sense_least_noises * prepared.noise[block.channel]
     if rows.sum() < 64 or quiet or _misfit(measured, model) < settings.sense_wrong:
         return None
     signals, name = prepared.signals, block.channel
     value, slope = signals[name]
-    shown = f"{name} goes from {measured.min():.3g} to {measured.max():.3g} rad, not as the model says"
+    shown = (
+        f"{name} goes from {measured.min():.3g} to {measured.max():.3g} rad, not as the model says"
+    )
     turned = float(np.median(measured + model))
     others: list[tuple[float, float, dict[str, tuple[Array, Array]], str]] = [
-        (_DEGREES, 0.0, {}, f"{_DEGREES:.3g} times that would: are its values in rad under a heading in deg?"),
-        (1.0 / _DEGREES, 0.0, {}, f"{1.0 / _DEGREES:.3g} times that would: are its values in deg under a heading in rad?"),
-        (-1.0, turned, {}, "it moves opposite to the model throughout: is its sign that of the rig, or are two muscles swapped?"),
+        (
+            _DEGREES,
+            0.0,
+            {},
+            f"{_DEGREES:.3g} times that would: are its values in rad under a heading in deg?",
+        ),
+        (
+            1.0 / _DEGREES,
+            0.0,
+            {},
+            f"{1.0 / _DEGREES:.3g} times that would: are its values in deg under a heading in rad?",
+        ),
+        (
+            -1.0,
+            turned,
+            {},
+            (
+                "it moves opposite to the model throughout: is its sign that of the rig, or are "
+                "two muscles swapped?"
+            ),
+        ),
     ]
     for one, two in itertools.combinations([d for d in block.drives if d in signals], 2):
         text = f"with {one} and {two} in each other's place it would: are these columns swapped?"
@@ -364,7 +480,9 @@ def _sense(block: Block, core: _core.Rig, prepared: Prepared, settings: Plausibi
         raw = prepared.raw | {name: offset + factor * prepared.raw[name]}
         noise = prepared.noise | {name: abs(factor) * prepared.noise[name]}
         shown_as = {**signals, **swapped, name: (offset + factor * value, factor * slope)}
-        other = Prepared(prepared.recording, prepared.commands, shown_as, raw, noise, prepared.settings)
+        other = Prepared(
+            prepared.recording, prepared.commands, shown_as, raw, noise, prepared.settings
+        )
         try:
             model = predicted(block, core, other)[rows]
         except SimulationError:

@@ -1,4 +1,4 @@
-"""Recordings made ready for the cut chain: smoothed drive signals, noise floors, windows."""
+"""Recordings made ready for the cut chain: smoothed drive signals, noise levels, windows."""
 
 from __future__ import annotations
 
@@ -35,10 +35,12 @@ class Prepared:
     recording : Recording
         As loaded.
     commands : dict of str to (n,) array
-        Commands by the names of the core, of valves [V] and regulators [Pa], holes filled with the last value; a command that was
-        not recorded stays at rest, and no block that it drives is judged.
+        Commands by the names of the core, of valves [V] and regulators [Pa], holes filled with the
+        last value; a command that was not recorded stays at rest, and no block that it drives is
+        judged.
     signals : dict of str to (value, slope)
-        Smoothed channels and their time derivatives, holes bridged, by the names of the core (``muscle_pressure.flexor``).
+        Smoothed channels and their time derivatives, holes bridged, by the names of the core
+        (``muscle_pressure.flexor``).
     raw : dict of str to (n,) array
         The same channels as measured, holes bridged.
     noise : dict of str to float
@@ -53,7 +55,9 @@ class Prepared:
     raw: dict[str, Array]
     noise: dict[str, float]
     settings: DiagnosisSettings
-    _begun: dict[tuple[str, tuple[int, ...]], tuple[Array, Array]] = field(repr=False, default_factory=dict)
+    _begun: dict[tuple[str, tuple[int, ...]], tuple[Array, Array]] = field(
+        repr=False, default_factory=dict
+    )
 
     @property
     def n(self) -> int:
@@ -66,18 +70,22 @@ class Prepared:
         return self.recording.sample_time
 
     def clear(self, drives: tuple[str, ...]) -> Mask:
-        """Rows at which every drive was measured: holes of up to three samples are bridged, longer ones are cut out
-        together with what the smoothing carries over their edges.
+        """Rows at which every drive was measured: holes of up to three samples are bridged, longer
+        ones are cut out together with what the smoothing carries over their edges.
         """
         settings = self.settings.prepare
         reach = round(0.5 * settings.smoothing_time / self.dt)
         out = np.ones(self.n, dtype=bool)
-        for a, b in _long_holes(self.recording.valid(*drives), settings.bridged_samples) if drives else []:
+        for a, b in (
+            _long_holes(self.recording.valid(*drives), settings.bridged_samples) if drives else []
+        ):
             out[max(0, a - reach) : b + reach] = False
         return out
 
     def starts(self, window: float | None, drives: tuple[str, ...]) -> list[int]:
-        """Samples at which windows begin: every ``window`` seconds (None: once) and after each hole in the drives."""
+        """Samples at which windows begin: every ``window`` seconds (None: once) and after each hole
+        in the drives.
+        """
         starts = {0}
         if window is not None:
             starts |= set(range(0, self.n, max(8, round(window / self.dt))))
@@ -86,29 +94,42 @@ class Prepared:
         return sorted(starts)
 
     def begun(self, channel: str, starts: list[int]) -> tuple[Array, Array]:
-        """A smoothed channel and its derivative, with the best that can be told of both where windows start.
+        """A smoothed channel and its derivative, with the best that can be told of both where
+        windows start.
 
-        At the edge of a recording the filter's derivative is ten times as noisy as inside, and a joint that is given a speed that it
-        did not have slides from where it stood. At a start the longest stretch counts to which a cubic still fits but for the noise.
+        At the edge of a recording the filter's derivative is ten times as noisy as inside, and a
+        joint that is given a speed that it did not have slides from where it stood. At a start the
+        longest stretch counts to which a cubic still fits but for the noise.
         """
         key = (channel, tuple(starts))
         settings = self.settings.prepare
         if key not in self._begun:
             value, slope = (array.copy() for array in self.signals[channel])
             for at in starts:
-                state = _state(self.raw[channel], self.recording.mask[channel], self.noise[channel], self.dt, at, settings)
+                state = _state(
+                    self.raw[channel],
+                    self.recording.mask[channel],
+                    self.noise[channel],
+                    self.dt,
+                    at,
+                    settings,
+                )
                 if state is not None:
                     value[at], slope[at] = state
             self._begun[key] = value, slope
         return self._begun[key]
 
     def shaken(self, shaken: dict[str, tuple[Array, Array]]) -> Prepared:
-        """The same recording with other smoothed channels; what the others begin from is not looked for again."""
+        """The same recording with other smoothed channels; what the others begin from is not looked
+        for again.
+        """
         kept = {key: state for key, state in self._begun.items() if key[0] not in shaken}
         return replace(self, signals=self.signals | shaken, _begun=kept)
 
     def usable(self, output: str, drives: tuple[str, ...], starts: list[int]) -> Mask:
-        """Rows whose prediction rests on measured drives since their window began, and whose output was measured."""
+        """Rows whose prediction rests on measured drives since their window began, and whose output
+        was measured.
+        """
         bad = ~self.clear(drives)
         rows = np.zeros(self.n, dtype=bool)
         for a, b in zip(starts, [*starts[1:], self.n], strict=True):
@@ -118,7 +139,8 @@ class Prepared:
 
 
 def noise_level(values: Array, mask: Mask, *, seed: int) -> float:
-    """Standard deviation of white sample noise, from third differences, robust; at least that of quantisation.
+    """Standard deviation of white sample noise, from third differences, robust; at least that of
+    quantisation.
 
     Parameters
     ----------
@@ -140,7 +162,8 @@ def noise_level(values: Array, mask: Mask, *, seed: int) -> float:
     steps = np.abs(np.diff(values[mask]))
     steps = steps[steps > 1e-12 * max(1e-12, float(np.abs(values[mask]).max()))]
     lattice = float(steps.min()) if steps.size else 0.0
-    # the median of differences of whole steps moves by whole steps: as much noise as the lattice brings smears them, and is taken off
+    # the median of differences of whole steps moves by whole steps: as much noise as the lattice
+    # brings smears them, and is taken off
     dithered = values + np.random.default_rng(seed).uniform(-0.5, 0.5, values.size) * lattice
     sigma = 1.4826 * float(np.median(np.abs(np.diff(dithered, 3)[ok]))) / np.sqrt(20.0)
     return float(np.sqrt(max(sigma**2 - lattice**2 / 12.0, lattice**2 / 12.0)))
@@ -162,16 +185,20 @@ def smoothed(values: Array, dt: float, settings: PrepareSettings) -> tuple[Array
 def _long_holes(mask: Mask, bridged: int) -> list[tuple[int, int]]:
     """First sample of each hole that is not bridged, and the first after it."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], (~mask).astype(np.int8), [0]])))
-    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a > bridged]
+    return [
+        (int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a > bridged
+    ]
 
 
 def _state(
     values: Array, mask: Mask, noise: float, dt: float, at: int, settings: PrepareSettings
 ) -> tuple[float, float] | None:
-    """Value and slope at a sample by the longest stretch around it, free of long holes, that a cubic fits but for the noise.
+    """Value and slope at a sample by the longest stretch around it, free of long holes, that a
+    cubic fits but for the noise.
 
-    From the shortest on, as long as the slope stays within what the shorter one leaves open (Lepski 1991): at the edge of a recording
-    a cubic that hardly misses the samples may miss the slope by far. None where no cubic fits.
+    From the shortest on, as long as the slope stays within what the shorter one leaves open (Lepski
+    1991): at the edge of a recording a cubic that hardly misses the samples may miss the slope by
+    far. None where no cubic fits.
     """
     holes, least = _long_holes(mask, settings.bridged_samples), settings.start_least_samples
     first = max((b for _, b in holes if b <= at), default=0)
@@ -180,7 +207,10 @@ def _state(
     for reach in sorted({max(round(s / dt), least // 2) for s in settings.start_reaches}):
         # a side that is cut off makes the other longer
         low, high = max(first, at - reach), min(last, at + reach + 1)
-        low, high = max(first, min(low, high - 2 * reach - 1)), min(last, max(high, low + 2 * reach + 1))
+        low, high = (
+            max(first, min(low, high - 2 * reach - 1)),
+            min(last, max(high, low + 2 * reach + 1)),
+        )
         rows = low + np.flatnonzero(mask[low:high])
         count = rows.size
         if count < least:
@@ -193,10 +223,15 @@ def _state(
         scatters = settings.start_longer_stds if state is not None else settings.start_first_stds
         most = settings.start_misfit + scatters * math.sqrt(2.0 / (count - 4))
         rough = float(left @ left) > most * (count - 4) * noise**2
-        if state is not None and (rough or abs(slope - state[1]) > settings.start_slope_stds * spread):
+        if state is not None and (
+            rough or abs(slope - state[1]) > settings.start_slope_stds * spread
+        ):
             break
         if not rough:
-            state, spread = (float(found[0]), slope), noise * math.sqrt(inverse[1, 1]) / (count * dt)
+            state, spread = (
+                (float(found[0]), slope),
+                noise * math.sqrt(inverse[1, 1]) / (count * dt),
+            )
     return state
 
 
@@ -225,14 +260,15 @@ def prepare(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Prep
     wanted = [dotted("muscle_pressure", name) for name in rig.tables("chamber")]
     if not set(wanted) & set(recording.channels):
         raise DiagnosisError(
-            f"recording {recording.name!r} has no channel {' or '.join(wanted)}, without which no block can be cut out; "
-            f"it has: {', '.join(recording.channels)}"
+            f"recording {recording.name!r} has no channel {' or '.join(wanted)}, without which no "
+            f"block can be cut out; it has: {', '.join(recording.channels)}"
         )
     own = settings.prepare
     length = max(own.least_samples, filter_length(recording.sample_time, own))
     if len(recording) < length:
         raise DiagnosisError(
-            f"recording {recording.name!r} has {len(recording)} samples; at least {length} are needed for a diagnosis"
+            f"recording {recording.name!r} has {len(recording)} samples; at least {length} are "
+            "needed for a diagnosis"
         )
     core = core_rig(rig)
     _check_commands(recording, rig, core.inputs)
@@ -242,7 +278,10 @@ def prepare(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Prep
             continue  # what is measured of a block that the rig does not have is left alone
         mask = recording.mask[name]
         if mask.sum() < max(own.least_channel_samples, own.least_channel_share * mask.size):
-            raise DiagnosisError(f"recording {recording.name!r}: only {int(mask.sum())} of {mask.size} samples of {name} are usable")
+            raise DiagnosisError(
+                f"recording {recording.name!r}: only {int(mask.sum())} of {mask.size} samples of "
+                f"{name} are usable"
+            )
         raw[name] = filled = _bridged(recording.channels[name], mask)
         signals[name] = smoothed(filled, recording.sample_time, own)
         noise[name] = noise_level(recording.channels[name], mask, seed=settings.seed)
@@ -253,10 +292,19 @@ def prepare(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Prep
 
 
 def _check_commands(recording: Recording, rig: Rig, inputs: list[str]) -> None:
-    """Refuse a recording without a command, unless what moves a joint or load was measured past the valves."""
+    """Refuse a recording without a command, unless what moves a joint or load was measured past the
+    valves.
+    """
     missing = [name for name in inputs if name not in recording.channels]
-    joints = ["length"] if rig.model["load"] else [dotted("joint_angle", name) for name in rig.tables("joint")]
-    pulling = [dotted("muscle_pressure", ends["chamber"].partition(".")[2]) for ends in rig.ports("muscle").values()]
+    joints = (
+        ["length"]
+        if rig.model["load"]
+        else [dotted("joint_angle", name) for name in rig.tables("joint")]
+    )
+    pulling = [
+        dotted("muscle_pressure", ends["chamber"].partition(".")[2])
+        for ends in rig.ports("muscle").values()
+    ]
     if missing and not (joints and {*joints, *pulling} <= set(recording.channels)):
         what = "valve" if channel_of(missing[0]) == "valve_command" else "regulator"
         raise DiagnosisError(
@@ -269,7 +317,11 @@ def _command(recording: Recording, rig: Rig, name: str) -> Array:
     """A command with its holes filled; at rest where it was not recorded."""
     channel, _, block = name.partition(".")
     if name not in recording.channels:
-        table, key = ("valve", "null_voltage") if channel == "valve_command" else ("supply", "initial_pressure")
+        table, key = (
+            ("valve", "null_voltage")
+            if channel == "valve_command"
+            else ("supply", "initial_pressure")
+        )
         return np.full(len(recording), float(rig.tables(table)[block][key]))
     mask = recording.mask[name]
     if not mask.any():

@@ -1,9 +1,12 @@
-"""How often resampled recordings would have led to the same effects: bootstrap inclusion frequencies.
+"""How often resampled recordings would have led to the same effects: bootstrap inclusion
+frequencies.
 
-A single screen says which effect tells most, not whether another few minutes of the same recordings would say so too. Segments of all
-recordings, longer than the residual remembers, are drawn anew with replacement (H. R. Kuensch, "The jackknife and the bootstrap for
-general stationary observations", Annals of Statistics 17, 1989), and forward selection by the score test is done again: the effect that
-tells most, then the one that tells most beside it. Signatures and sensitivities stay those of the whole, so a draw is cheap.
+A single screen says which effect tells most, not whether another few minutes of the same recordings
+would say so too. Segments of all recordings, longer than the residual remembers, are drawn anew
+with replacement (H. R. Kuensch, "The jackknife and the bootstrap for general stationary
+observations", Annals of Statistics 17, 1989), and forward selection by the score test is done
+again: the effect that tells most, then the one that tells most beside it. Signatures and
+sensitivities stay those of the whole, so a draw is cheap.
 """
 
 from __future__ import annotations
@@ -21,7 +24,9 @@ __all__ = ["inclusion"]
 Array = NDArray[np.float64]
 
 
-def inclusion(screened: Screen, least: float, partner: float, settings: DiagnosisSettings) -> dict[str, float]:
+def inclusion(
+    screened: Screen, least: float, partner: float, settings: DiagnosisSettings
+) -> dict[str, float]:
     """Share of resamples in which forward selection takes an effect.
 
     Parameters
@@ -31,7 +36,8 @@ def inclusion(screened: Screen, least: float, partner: float, settings: Diagnosi
     least : float
         Gain in chi-square from which an effect is taken.
     partner : float
-        Share of the resample's sum of squares from which a second one is taken beside the first (1 or more: none).
+        Share of the resample's sum of squares from which a second one is taken beside the first (1
+        or more: none).
     settings : DiagnosisSettings
         Number and length of the resampled segments, width of the bins, seed.
 
@@ -43,7 +49,9 @@ def inclusion(screened: Screen, least: float, partner: float, settings: Diagnosi
     stand = screened.stand
     if not screened.signatures or stand.rows.size == 0:
         return {}
-    columns = np.column_stack([stand.rows, stand.jacobian, *(signature for _, _, signature in screened.signatures)])
+    columns = np.column_stack(
+        [stand.rows, stand.jacobian, *(signature for _, _, signature in screened.signatures)]
+    )
     length = round(settings.screen.resample_time / settings.noise.fit_bin_time)
     count = -(-columns.shape[0] // length)
     parts = [columns[k * length : (k + 1) * length] for k in range(count)]
@@ -52,12 +60,18 @@ def inclusion(screened: Screen, least: float, partner: float, settings: Diagnosi
     draws = settings.screen.resamples
     taken: Counter[str] = Counter()
     for weights in rng.multinomial(count, np.full(count, 1.0 / count), draws):
-        taken.update(_selected(screened, np.tensordot(weights.astype(np.float64), products, 1), least, partner))
+        taken.update(
+            _selected(
+                screened, np.tensordot(weights.astype(np.float64), products, 1), least, partner
+            )
+        )
     return {effect: number / draws for effect, number in taken.most_common()}
 
 
 def _selected(screened: Screen, products: Array, least: float, partner: float) -> list[str]:
-    """Effects that forward selection takes, from the products of residual, sensitivities and signatures with each other."""
+    """Effects that forward selection takes, from the products of residual, sensitivities and
+    signatures with each other.
+    """
     stand, settings = screened.stand, screened.settings
     first = 1 + stand.moved.size
     base, prior, pull = list(range(1, first)), stand.free, stand.moved * stand.free
@@ -72,7 +86,9 @@ def _selected(screened: Screen, products: Array, least: float, partner: float) -
         alongs = products[0, columns] - (products[base, 0] + pull) @ solved
         gains = [
             (best_size(float(along), float(power), start, settings)[1], effect, column)
-            for column, (effect, start, _), along, power in zip(columns, screened.signatures, alongs, powers, strict=True)
+            for column, (effect, start, _), along, power in zip(
+                columns, screened.signatures, alongs, powers, strict=True
+            )
             if effect not in chosen
         ]
         gain, effect, column = max(gains, default=(0.0, "", 0))

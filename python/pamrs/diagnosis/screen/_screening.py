@@ -1,9 +1,10 @@
 """Which effects are worth a fit: the score of each, the baseline's own freedom taken away first.
 
-An effect at a typical size changes the residuals by a signature. What the baseline parameters (inside their tolerances) and the starts
-of the windows can do is projected out of the signature and of the residual; what is left of the residual along what is left of the
-signature is the gain in chi-square that the effect would bring (a score test, Rao 1948, with a finite change in the place
-of the derivative, since many effects have none at zero).
+An effect at a typical size changes the residuals by a signature. What the baseline parameters
+(inside their tolerances) and the starts of the windows can do is projected out of the signature and
+of the residual; what is left of the residual along what is left of the signature is the gain in
+chi-square that the effect would bring (a score test, Rao 1948, with a finite change in the place of
+the derivative, since many effects have none at zero).
 """
 
 from __future__ import annotations
@@ -66,14 +67,16 @@ class Stand:
     rows : (n,) array
         Stacked residuals.
     left : (n,) array
-        What of them the free parameters leave, the pull of their priors included: where an effect would let a parameter go back to
-        its nominal value, that counts for the effect.
+        What of them the free parameters leave, the pull of their priors included: where an effect
+        would let a parameter go back to its nominal value, that counts for the effect.
     jacobian : (n, k) array
-        Change of the rows with each free parameter that is not at the end of its range, in tolerances or its own scale.
+        Change of the rows with each free parameter that is not at the end of its range, in
+        tolerances or its own scale.
     moved, free : (k,) array
         How far each is from its nominal value, and 1 where a prior holds it, 0 where none does.
     basis : (n, k) array
-        Basis of what the free parameters can do, each column as long as the priors let it: its product with its transpose projects.
+        Basis of what the free parameters can do, each column as long as the priors let it: its
+        product with its transpose projects.
     """
 
     rows: Array
@@ -134,10 +137,14 @@ class Screen:
         return sorted(found, key=lambda s: -s.gain)
 
 
-def best_size(along: float, power: float, start: Start, settings: ScreenSettings) -> tuple[float, float]:
-    """Multiple of a start's size at which its signature gains most, inside what is believed, and that gain in chi-square.
+def best_size(
+    along: float, power: float, start: Start, settings: ScreenSettings
+) -> tuple[float, float]:
+    """Multiple of a start's size at which its signature gains most, inside its plausible range, and
+    that gain in chi-square.
 
-    ``along`` is the product of what is left of the residual with the signature, ``power`` that of the signature with itself.
+    ``along`` is the product of what is left of the residual with the signature, ``power`` that of
+    the signature with itself.
     """
     if power < settings.invisible:
         return 0.0, 0.0
@@ -157,7 +164,8 @@ def by_effect(scores: list[Score]) -> dict[str, list[Score]]:
 def stand_of(fitted: Fit, problem: Problem, inflation: dict[str, float]) -> Stand:
     """Stacked residuals of a fit, and what its free parameters can do.
 
-    The priors enter as rows of their own, so that a parameter that its tolerance holds cannot explain anything away.
+    The priors enter as rows of their own, so that a parameter that its tolerance holds cannot
+    explain anything away.
     """
     rows, jacobian = stacked(problem, fitted.residuals, inflation)
     if jacobian is None or jacobian.shape[1] == 0:
@@ -169,7 +177,8 @@ def stand_of(fitted: Fit, problem: Problem, inflation: dict[str, float]) -> Stan
     scales = np.array([fitted.scales[name] for name in names])
     scaled = jacobian[:, [list(fitted.values).index(name) for name in names]] * scales
     free = np.array([name in fitted.held_by_prior for name in names], dtype=np.float64)
-    # J (J'J + prior)^-1 J' is the projector that a prior leaves; its square root's columns are the basis
+    # J (J'J + prior)^-1 J' is the projector that a prior leaves; its square root's columns are the
+    # basis
     values, vectors = np.linalg.eigh(scaled.T @ scaled)
     keep = values > 1e-10 * max(float(values[-1]), 1e-300)
     u = scaled @ vectors[:, keep] / np.sqrt(values[keep])
@@ -183,7 +192,9 @@ def stand_of(fitted: Fit, problem: Problem, inflation: dict[str, float]) -> Stan
     return Stand(rows, rows - basis @ (basis.T @ rows) - pull, scaled, moved, free, basis)
 
 
-def screen(problem: Problem, fitted: Fit, effects: list[str], inflation: dict[str, float], *, sealed: bool) -> Screen:
+def screen(
+    problem: Problem, fitted: Fit, effects: list[str], inflation: dict[str, float], *, sealed: bool
+) -> Screen:
     """Signatures of effects at a fitted model.
 
     Parameters
@@ -218,7 +229,8 @@ def screen(problem: Problem, fitted: Fit, effects: list[str], inflation: dict[st
                 break
             if settings.repeat_below <= abs(score.size) < settings.most_size:
                 break
-            # what a stop or a threshold does is not in proportion to its size: it is looked at where it would be
+            # what a stop or a threshold does is not in proportion to its size: it is looked at
+            # where it would be
             wanted = tried.scaled(abs(score.size))
             if wanted == tried:
                 break  # its bounds hold it
@@ -245,12 +257,19 @@ def screen(problem: Problem, fitted: Fit, effects: list[str], inflation: dict[st
 
 def _seen(problem: Problem, channel: str) -> Array | None:
     """Everything that was measured of the channels of one kind; None where there is none."""
-    seen = [p.signals[name][0] for p in problem.recordings for name in p.signals if channel_of(name) == channel]
+    seen = [
+        p.signals[name][0]
+        for p in problem.recordings
+        for name in p.signals
+        if channel_of(name) == channel
+    ]
     return np.concatenate(seen) if seen else None
 
 
 def _placed(starts: list[Start], problem: Problem, rig: Rig) -> list[Start]:
-    """Starts moved to where they act: a contact to places that were reached, a restriction to the size of what it stands beside."""
+    """Starts moved to where they act: a contact to places that were reached, a restriction to the
+    size of what it stands beside.
+    """
     info = EFFECTS[starts[0].effect]
     beside = next((p for p in info.parameters if p.like), None)
     if beside is not None:
@@ -269,10 +288,14 @@ def _placed(starts: list[Start], problem: Problem, rig: Rig) -> list[Start]:
     return [at(start, share) for start in starts for share in problem.settings.screen.place_shares]
 
 
-def _nearest(start: Start, try_: Callable[[Start], float], signatures: list[Signature]) -> list[Start]:
-    """The values that tell most among many: what swings long has to be met within a few percent of its frequency.
+def _nearest(
+    start: Start, try_: Callable[[Start], float], signatures: list[Signature]
+) -> list[Start]:
+    """The values that tell most among many: what swings long has to be met within a few percent of
+    its frequency.
 
-    They are tried with more damping than the effect has, which makes the resonance broader than the distance between two values.
+    They are tried with more damping than the effect has, which makes the resonance broader than the
+    distance between two values.
     """
     parameters = EFFECTS[start.effect].parameters
     scanned = next(p for p in parameters if p.scan)
@@ -280,7 +303,10 @@ def _nearest(start: Start, try_: Callable[[Start], float], signatures: list[Sign
     broad = {f"{start.effect}.{p.name}": p.tried for p in parameters if p.tried is not None}
     before = len(signatures)
     name = f"{start.effect}.{scanned.name}"
-    tried = [replace(start, free=start.free | {name: float(x)} | broad) for x in np.geomspace(*scanned.scan)]
+    tried = [
+        replace(start, free=start.free | {name: float(x)} | broad)
+        for x in np.geomspace(*scanned.scan)
+    ]
     gains = [try_(one) for one in tried]
     del signatures[before:]
     order = sorted(range(len(tried)), key=lambda k: -gains[k])
@@ -289,11 +315,17 @@ def _nearest(start: Start, try_: Callable[[Start], float], signatures: list[Sign
     return [tried[k] for k in (order[0], *far[:1])]
 
 
-def _beside(starts: list[Start], parameter: EffectParameter, problem: Problem, rig: Rig) -> list[Start]:
-    """Restrictions in parts of the conductance of the largest opening that they stand beside, where a block could show them."""
+def _beside(
+    starts: list[Start], parameter: EffectParameter, problem: Problem, rig: Rig
+) -> list[Start]:
+    """Restrictions in parts of the conductance of the largest opening that they stand beside, where
+    a block could show them.
+    """
     kind, _, area = parameter.like.partition(".")
     areas = [rig.parameter(f"{qualified(kind, name)}.{area}").value for name in rig.tables(kind)]
-    unit = _core.Gas(*(rig.model["gas"][key.name] for key in BLOCKS["gas"])).area_of_conductance(1.0)
+    unit = _core.Gas(*(rig.model["gas"][key.name] for key in BLOCKS["gas"])).area_of_conductance(
+        1.0
+    )
     name = f"{starts[0].effect}.{parameter.name}"
     return [
         replace(start, free=start.free | {name: part * max(areas) / unit})
@@ -307,11 +339,14 @@ def _shows(start: Start, block: Block) -> bool:
     """Whether an effect acts in a block with the choices that a start holds."""
     values = start.free | start.held
     parameters = [p for p in EFFECTS[start.effect].parameters if block.kind in p.needed_in]
-    return acts_in(start.effect, block) and all(values[f"{start.effect}.{p.name}"] for p in parameters)
+    return acts_in(start.effect, block) and all(
+        values[f"{start.effect}.{p.name}"] for p in parameters
+    )
 
 
 def _switched(start: Start, problem: Problem, try_: Callable[[Start], float]) -> Start | None:
-    """The levels of a channel between which something switches: over the range that was seen, then closer and closer.
+    """The levels of a channel between which something switches: over the range that was seen, then
+    closer and closer.
 
     A relay that is asked once a step has no slope in its thresholds, so that no fit can move them.
     """
@@ -326,10 +361,18 @@ def _switched(start: Start, problem: Problem, try_: Callable[[Start], float]) ->
 
     def at(switch_on: float, switch_off: float) -> Start:
         own = {f"{start.effect}.{on.name}": switch_on, f"{start.effect}.{off.name}": switch_off}
-        return replace(start, free={n: v for n, v in start.free.items() if n not in own}, held=start.held | own)
+        return replace(
+            start, free={n: v for n, v in start.free.items() if n not in own}, held=start.held | own
+        )
 
     levels = [low + (k + 0.5) * step for k in range(settings.threshold_levels)]
-    tried = [(try_(s), a, b, s) for a in levels for b in (*levels, high + step) if b > a for s in [at(a, b)]]
+    tried = [
+        (try_(s), a, b, s)
+        for a in levels
+        for b in (*levels, high + step)
+        if b > a
+        for s in [at(a, b)]
+    ]
     best = max(tried, key=lambda t: t[0])
     while step > settings.threshold_precision * (high - low):
         step *= 0.5

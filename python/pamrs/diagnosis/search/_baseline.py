@@ -4,21 +4,25 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from pamrs.diagnosis.evidence import colour_of
+from pamrs.diagnosis.evidence import autocorrelation_of
 from pamrs.diagnosis.fit import Fit, Key, Problem, bin_width, fit
 from pamrs.diagnosis.prepare import Prepared, Residual
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 
-__all__ = ["coloured", "refitted", "thorough"]
+__all__ = ["refitted", "thorough", "with_autocorrelation"]
 
 
-def coloured(problem: Problem, nominal: Rig, first: Fit) -> tuple[Fit, dict[str, float]]:
-    """The refitted baseline fitted on with the colour that it leaves as weights, where it leaves much, and that colour."""
-    colour = colour_of(problem, first)
-    if max(colour.values()) <= problem.settings.noise.correlated_variance:
-        return first, colour
-    return thorough(problem, nominal, colour, first), colour
+def with_autocorrelation(
+    problem: Problem, nominal: Rig, first: Fit
+) -> tuple[Fit, dict[str, float]]:
+    """The refitted baseline, fitted on with the autocorrelation that it leaves as weights where
+    that is large, and the weights.
+    """
+    autocorrelation = autocorrelation_of(problem, first)
+    if max(autocorrelation.values()) <= problem.settings.noise.correlated_variance:
+        return first, autocorrelation
+    return thorough(problem, nominal, autocorrelation, first), autocorrelation
 
 
 def thorough(problem: Problem, nominal: Rig, inflation: dict[str, float], warm: Fit | None) -> Fit:
@@ -29,7 +33,9 @@ def thorough(problem: Problem, nominal: Rig, inflation: dict[str, float], warm: 
 
 
 def refitted(problem: Problem, nominal: Rig, inflation: dict[str, float]) -> Fit:
-    """The baseline refitted from the nominal values and, where that leaves more than noise could, from the other side of them."""
+    """The baseline refitted from the nominal values and, where that leaves more than noise could,
+    from the other side of them.
+    """
     settings = problem.settings.noise
     first = thorough(problem, nominal, inflation, None)
     rows = sum(

@@ -1,9 +1,12 @@
-"""What a mismatch is a function of, where no catalogue entry explains it: a sparse closure at the located cut.
+"""What a mismatch is a function of, where no catalogue entry explains it: a sparse closure at the
+located cut.
 
-A closure is linear in its coefficients, so that at zero (where it changes nothing) one evaluation gives what every term of its
-dictionary would do to the residuals, and a few more what those with memory would do at other memory times and angles. Terms are
-then chosen by orthogonal forward selection (Chen, Billings & Luo 1989) with the freedom of the baseline taken away, and only the
-chosen ones are fitted in the nonlinear model. Linearising again at that fit corrects a choice that was made far from it.
+A closure is linear in its coefficients, so that at zero (where it changes nothing) one evaluation
+gives what every term of its dictionary would do to the residuals, and a few more what those with
+memory would do at other memory times and angles. Terms are then chosen by orthogonal forward
+selection (Chen, Billings & Luo 1989) with the freedom of the baseline taken away, and only the
+chosen ones are fitted in the nonlinear model. Linearising again at that fit corrects a choice that
+was made far from it.
 """
 
 from __future__ import annotations
@@ -15,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.diagnosis.evidence import colour_of
+from pamrs.diagnosis.evidence import autocorrelation_of
 from pamrs.diagnosis.fit import Fit, Problem, fit, residuals, stacked, with_priors
 from pamrs.diagnosis.noise import correlation_time
 from pamrs.diagnosis.prepare import Block
@@ -67,16 +70,23 @@ class _Choice:
 
 
 def find_closure(
-    problem: Problem, nominal: Rig, baseline: Fit, inflation: dict[str, float], blocks: list[Block], say: Callable[[str], None]
+    problem: Problem,
+    nominal: Rig,
+    baseline: Fit,
+    inflation: dict[str, float],
+    blocks: list[Block],
+    say: Callable[[str], None],
 ) -> Fit | None:
     """Fit a sparse closure where blocks keep an excess.
 
-    Sensitivities at zero coefficients are taken at four memory times and angles (the first evaluation with all terms, the others
-    with those that remember); all chosen terms of a closure share one memory time and one memory angle, which the fit then refines.
-    A term is taken while the logarithm of the misfit falls by more than its price, counted on independent samples of what is left,
-    and while recordings left out are predicted better with it (with one recording only the price decides). The choice is made a
-    second time at the fit, residuals weighted by the colour that they have there, and the best of the fits and the baseline is
-    kept. This takes ten to fifteen evaluations of the problem.
+    Sensitivities at zero coefficients are taken at four memory times and angles (the first
+    evaluation with all terms, the others with those that remember); all chosen terms of a closure
+    share one memory time and one memory angle, which the fit then refines. A term is taken while
+    the logarithm of the misfit falls by more than its price, counted on independent samples of what
+    is left, and while recordings left out are predicted better with it (with one recording only the
+    price decides). The choice is made a second time at the fit, residuals weighted by the
+    autocorrelation that they have there, and the best of the fits and the baseline is kept. This
+    takes ten to fifteen evaluations of the problem.
 
     Parameters
     ----------
@@ -87,7 +97,8 @@ def find_closure(
     baseline : Fit
         Its fit to the problem without effects, with sensitivities.
     inflation : dict of str to float
-        Variance of each block's binned residual relative to white sample noise, as in :func:`pamrs.diagnosis.fit.fit`.
+        Variance of each block's binned residual relative to white sample noise, as in
+        :func:`pamrs.diagnosis.fit.fit`.
     blocks : list of Block
         Blocks of the problem that keep an excess: ``supply``, ``chamber``, ``arm``.
     say : callable
@@ -96,7 +107,8 @@ def find_closure(
     Returns
     -------
     Fit or None
-        Model with the closure (effects ``closure_*``), baseline refitted beside it; None where no term is worth its price.
+        Model with the closure (effects ``closure_*``), baseline refitted beside it; None where no
+        term is worth its price.
 
     Raises
     ------
@@ -105,28 +117,46 @@ def find_closure(
     """
     if baseline.effects:
         raise DiagnosisError(
-            f"baseline.effects = {', '.join(baseline.effects)} is not allowed: a closure needs the fit without effects"
+            f"baseline.effects = {', '.join(baseline.effects)} is not allowed: a closure needs the "
+            "fit without effects"
         )
     closures = _closures(blocks)
     say(f"{' and '.join(b.name for b in blocks)}: looking for a form of what is missing")
     settings = problem.settings.closures
     candidates, columns = _at_zero(problem, baseline, inflation, blocks, closures)
-    chosen = _select(_Frame.of(problem, baseline, baseline, inflation), candidates, columns, {}, settings)
+    chosen = _select(
+        _Frame.of(problem, baseline, baseline, inflation), candidates, columns, {}, settings
+    )
     found = None if chosen is None else _fitted(problem, nominal, baseline, inflation, chosen, say)
     if found is None:
         return None
-    colour = colour_of(problem, found)
-    candidates, columns, warm = _again(problem, baseline, found, colour, blocks, closures)
-    second = _select(_Frame.of(problem, warm, found, colour), candidates, columns, found.values, settings)
-    other = None if second is None else _fitted(problem, nominal, warm, colour, second, say)
-    return _better([baseline, found, *([] if other is None else [other])], problem, colour, len(candidates))
+    autocorrelation = autocorrelation_of(problem, found)
+    candidates, columns, warm = _again(problem, baseline, found, autocorrelation, blocks, closures)
+    second = _select(
+        _Frame.of(problem, warm, found, autocorrelation),
+        candidates,
+        columns,
+        found.values,
+        settings,
+    )
+    other = (
+        None if second is None else _fitted(problem, nominal, warm, autocorrelation, second, say)
+    )
+    return _better(
+        [baseline, found, *([] if other is None else [other])],
+        problem,
+        autocorrelation,
+        len(candidates),
+    )
 
 
 def _closures(blocks: Sequence[Block]) -> dict[str, str]:
     """Closures by the block that each acts in."""
     unknown = [b.name for b in blocks if b.kind not in CLOSURE_OF]
     if unknown or not blocks:
-        raise DiagnosisError(f"blocks = {unknown} is not allowed: one or more of {', '.join(CLOSURE_OF)}")
+        raise DiagnosisError(
+            f"blocks = {unknown} is not allowed: one or more of {', '.join(CLOSURE_OF)}"
+        )
     return {b.name: CLOSURE_OF[b.kind] for b in blocks}
 
 
@@ -135,19 +165,37 @@ def _shapes(closure: str) -> dict[str, tuple[float, ...]]:
     return {p.name: p.starts for p in EFFECTS[closure].parameters if p.neutral is None}
 
 
-def _columns(problem: Problem, base: Fit, rig: Rig, names: list[str], inflation: dict[str, float], blocks: list[Block]) -> Array:
-    """Derivative of the stacked residuals of the whole problem with respect to coefficients that act in some of its blocks."""
+def _columns(
+    problem: Problem,
+    base: Fit,
+    rig: Rig,
+    names: list[str],
+    inflation: dict[str, float],
+    blocks: list[Block],
+) -> Array:
+    """Derivative of the stacked residuals of the whole problem with respect to coefficients that
+    act in some of its blocks.
+    """
     found = residuals(replace(problem, blocks=blocks), rig, names)
-    full = {key: replace(r, jacobian=np.zeros((r.value.size, len(names)))) for key, r in base.residuals.items()}
+    full = {
+        key: replace(r, jacobian=np.zeros((r.value.size, len(names))))
+        for key, r in base.residuals.items()
+    }
     _, columns = stacked(problem, full | found, inflation)
     assert columns is not None
     return columns
 
 
 def _at_zero(
-    problem: Problem, baseline: Fit, inflation: dict[str, float], blocks: list[Block], closures: dict[str, str]
+    problem: Problem,
+    baseline: Fit,
+    inflation: dict[str, float],
+    blocks: list[Block],
+    closures: dict[str, str],
 ) -> tuple[list[_Candidate], Array]:
-    """Every term at every shape of its memory, and what each does to the stacked residuals per unit of its coefficient (n, m)."""
+    """Every term at every shape of its memory, and what each does to the stacked residuals per unit
+    of its coefficient (n, m).
+    """
     tried = {closure: _shapes(closure) for closure in closures.values()}
     rounds = max(len(values) for shapes in tried.values() for values in shapes.values())
     candidates: list[_Candidate] = []
@@ -168,24 +216,42 @@ def _at_zero(
 
 
 def _again(
-    problem: Problem, baseline: Fit, found: Fit, inflation: dict[str, float], blocks: list[Block], closures: dict[str, str]
+    problem: Problem,
+    baseline: Fit,
+    found: Fit,
+    inflation: dict[str, float],
+    blocks: list[Block],
+    closures: dict[str, str],
 ) -> tuple[list[_Candidate], Array, Fit]:
-    """The same at a fitted closure, every memory as it is there; and the baseline there, with sensitivities beside the closure."""
+    """The same at a fitted closure, every memory as it is there; and the baseline there, with
+    sensitivities beside the closure.
+    """
     rig = found.rig
     for closure in closures.values():
         if closure not in found.effects:
             rig = rig.with_effect(closure)
     shapes = {e["id"]: e["parameters"] for e in rig.effects}
     candidates = [
-        _Candidate(closure, term, shapes[closure][MEMORY_OF[term.kind]] if term.kind in MEMORY_OF else None)
+        _Candidate(
+            closure, term, shapes[closure][MEMORY_OF[term.kind]] if term.kind in MEMORY_OF else None
+        )
         for closure in closures.values()
         for term in TERMS[closure]
     ]
     names = list(baseline.values)
     evaluated = residuals(problem, rig, [*names, *(c.name for c in candidates)])
-    own = {key: replace(r, jacobian=None if r.jacobian is None else r.jacobian[:, : len(names)]) for key, r in evaluated.items()}
+    own = {
+        key: replace(r, jacobian=None if r.jacobian is None else r.jacobian[:, : len(names)])
+        for key, r in evaluated.items()
+    }
     values = {name: found.values[name] for name in names}
-    warm = replace(baseline, rig=found.rig, values=values, residuals=own, moved={name: found.moved[name] for name in names})
+    warm = replace(
+        baseline,
+        rig=found.rig,
+        values=values,
+        residuals=own,
+        moved={name: found.moved[name] for name in names},
+    )
     _, every = stacked(problem, evaluated, inflation)
     assert every is not None
     return candidates, every[:, len(names) :], warm
@@ -227,25 +293,46 @@ class _Frame:
         for k, prepared in enumerate(problem.recordings):
             for block in problem.blocks:
                 key = (block.name, prepared.recording.name)
-                size = stacked(replace(problem, blocks=[block], recordings=[prepared]), {key: found.residuals[key]}, inflation)[0].size
+                size = stacked(
+                    replace(problem, blocks=[block], recordings=[prepared]),
+                    {key: found.residuals[key]},
+                    inflation,
+                )[0].size
                 series.append(slice(start, start + size))
                 recording.append(np.full(size, k))
                 start += size
-        return _Frame(rows, freedom, np.array([found.moved[name] for name in names]), np.concatenate(recording), series)
+        return _Frame(
+            rows,
+            freedom,
+            np.array([found.moved[name] for name in names]),
+            np.concatenate(recording),
+            series,
+        )
 
     def independent(self, rows: Array) -> float:
         """Number of independent samples among residuals: rows over their correlation time."""
-        return max(4.0, sum(float(s.stop - s.start) / correlation_time(rows[s]) for s in self.series if s.stop - s.start >= 4))
+        return max(
+            4.0,
+            sum(
+                float(s.stop - s.start) / correlation_time(rows[s])
+                for s in self.series
+                if s.stop - s.start >= 4
+            ),
+        )
 
 
 def _price(samples: float, among: int) -> float:
-    """Chi-square that a term must gain: BIC on independent samples, and risk inflation, the best of so many (Foster & George 1994)."""
+    """Chi-square that a term must gain: BIC on independent samples, and risk inflation, the best of
+    so many (Foster & George 1994).
+    """
     return math.log(samples) + 2.0 * math.log(among)
 
 
-def _better(models: list[Fit], problem: Problem, inflation: dict[str, float], among: int) -> Fit | None:
-    """The model that is worth most by misfit and price, all on the independent samples of that with the least misfit; None for the
-    first.
+def _better(
+    models: list[Fit], problem: Problem, inflation: dict[str, float], among: int
+) -> Fit | None:
+    """The model that is worth most by misfit and price, all on the independent samples of that with
+    the least misfit; None for the first.
 
     Parameters
     ----------
@@ -263,21 +350,31 @@ def _better(models: list[Fit], problem: Problem, inflation: dict[str, float], am
     frame = _Frame.of(problem, models[0], least, inflation)
     samples = frame.independent(frame.rows)
     terms = [sum(1 for name in model.values if name.partition(".")[0] in TERMS) for model in models]
-    worth = [-samples * math.log(m) - k * _price(samples, among) for m, k in zip(misfits, terms, strict=True)]
+    worth = [
+        -samples * math.log(m) - k * _price(samples, among)
+        for m, k in zip(misfits, terms, strict=True)
+    ]
     best = int(np.argmax(worth))
     most = problem.settings.closures.most_misfit_share * misfits[0]
     return models[best] if best and misfits[best] < most else None
 
 
 def _select(
-    frame: _Frame, candidates: list[_Candidate], columns: Array, present: dict[str, float], settings: ClosureSettings
+    frame: _Frame,
+    candidates: list[_Candidate],
+    columns: Array,
+    present: dict[str, float],
+    settings: ClosureSettings,
 ) -> _Choice | None:
-    """Orthogonal forward selection of terms against the stacked residuals, the closure that is in them taken out.
+    """Orthogonal forward selection of terms against the stacked residuals, the closure that is in
+    them taken out.
 
-    The misfit is that of rows and priors together, the baseline moving freely inside its tolerances: both are orthogonalised
-    against the baseline first. A term that is not worth its price alone is still looked behind: the way goes on to `most_terms`,
-    and as many of them are taken as pay for themselves together; then those are dropped that the others have made needless. A gain
-    that the recordings left out confirm at the full price need only be worth BIC's in the recordings themselves.
+    The misfit is that of rows and priors together, the baseline moving freely inside its
+    tolerances: both are orthogonalised against the baseline first. A term that is not worth its
+    price alone is still looked behind: the way goes on to `most_terms`, and as many of them are
+    taken as pay for themselves together; then those are dropped that the others have made needless.
+    A gain that the recordings left out confirm at the full price need only be worth BIC's in the
+    recordings themselves.
 
     Parameters
     ----------
@@ -309,54 +406,109 @@ def _select(
         target = target - q @ (q.T @ target)
         wide = wide - q @ (q.T @ wide)
     crossed = _Crossed.of(frame, rows, unit)
-    left, free = target.copy(), wide.copy()
-    order: list[int] = []
-    locked: dict[str, float | None] = {}
-
-    def take(k: int) -> None:
-        """Add a term, and take what it explains out of everything."""
-        nonlocal left, free
-        order.append(k)
-        if candidates[k].memory:
-            locked.setdefault(candidates[k].memory, candidates[k].shape)
-        direction = free[:, k] / max(float(np.linalg.norm(free[:, k])), 1e-150)
-        left = left - direction * float(direction @ left)
-        free = free - np.outer(direction, direction @ free)
-
+    chosen = _Selection(candidates, target, wide, settings.least_power)
     for k, candidate in enumerate(candidates):
-        if candidate.name in present and usable[k] and float(free[:, k] @ free[:, k]) > settings.least_power:
-            take(k)
-    taken, misfit, proof = len(order), float(left @ left), crossed.left_out(order)
-    samples = frame.independent(left[: rows.size])
+        if candidate.name in present and usable[k] and chosen.power(k) > settings.least_power:
+            chosen.take(k)
+    order = chosen.order
+    taken, misfit, proof = len(order), chosen.misfit, crossed.left_out(order)
+    samples = frame.independent(chosen.left[: rows.size])
     while len(order) < settings.most_terms:
-        power = (free**2).sum(axis=0)
-        open_ = usable & (power > settings.least_power)
-        open_ &= np.array([c.memory not in locked or locked[c.memory] == c.shape for c in candidates])
-        open_[order] = False
-        if not open_.any():
+        telling = chosen.most_telling(usable)
+        if telling is None:
             break
-        take(int(np.argmax(np.where(open_, (free.T @ left) ** 2 / np.where(open_, power, 1.0), -1.0))))
-        now, outside = float(left @ left), crossed.left_out(order)
-        here = frame.independent(left[: rows.size])
-        inner, outer = here * math.log(misfit / max(now, 1e-300)), here * math.log(proof / max(outside, 1e-300))
+        chosen.take(telling)
+        now, outside = chosen.misfit, crossed.left_out(order)
+        here = frame.independent(chosen.left[: rows.size])
+        inner = here * math.log(misfit / max(now, 1e-300))
+        outer = here * math.log(proof / max(outside, 1e-300))
         new = len(order) - taken
         price = new * _price(here, len(candidates))
         if outer > 0.0 and (inner > price or (outer > price and inner > new * math.log(here))):
             taken, misfit, proof, samples = len(order), now, outside, here
     kept = _pruned(target, wide, order[:taken], misfit, samples, _price(samples, len(candidates)))
-    if not kept:
-        return None
-    design = np.concatenate(
-        [np.concatenate([frame.freedom, np.eye(b)]), np.concatenate([unit[:, kept], np.zeros((b, len(kept)))])], axis=1
-    )
+    return _solved(frame, candidates, rows, unit, size, kept) if kept else None
+
+
+class _Selection:
+    """Terms taken one after the other; what each explains is taken out of everything that is
+    left.
+    """
+
+    def __init__(
+        self, candidates: list[_Candidate], target: Array, wide: Array, least_power: float
+    ) -> None:
+        self.left, self._free = target.copy(), wide.copy()
+        self.order: list[int] = []
+        self._candidates, self._least_power = candidates, least_power
+        self._shapes: dict[str, float | None] = {}
+
+    @property
+    def misfit(self) -> float:
+        """Sum of squares that is left."""
+        return float(self.left @ self.left)
+
+    def power(self, k: int) -> float:
+        """How much of a term is not yet explained by those taken."""
+        return float(self._free[:, k] @ self._free[:, k])
+
+    def take(self, k: int) -> None:
+        """Add a term."""
+        self.order.append(k)
+        candidate = self._candidates[k]
+        if candidate.memory:
+            self._shapes.setdefault(candidate.memory, candidate.shape)
+        direction = self._free[:, k] / max(float(np.linalg.norm(self._free[:, k])), 1e-150)
+        self.left = self.left - direction * float(direction @ self.left)
+        self._free = self._free - np.outer(direction, direction @ self._free)
+
+    def most_telling(self, usable: NDArray[np.bool_]) -> int | None:
+        """The term that explains most of what is left; memories keep the shape that the first of
+        them has.
+        """
+        shapes = self._shapes
+        power = (self._free**2).sum(axis=0)
+        open_ = usable & (power > self._least_power)
+        open_ &= np.array(
+            [c.memory not in shapes or shapes[c.memory] == c.shape for c in self._candidates]
+        )
+        open_[self.order] = False
+        if not open_.any():
+            return None
+        explained = (self._free.T @ self.left) ** 2 / np.where(open_, power, 1.0)
+        return int(np.argmax(np.where(open_, explained, -1.0)))
+
+
+def _solved(
+    frame: _Frame,
+    candidates: list[_Candidate],
+    rows: Array,
+    unit: Array,
+    size: Array,
+    kept: list[int],
+) -> _Choice:
+    """Coefficients of the terms that are kept, the baseline moving freely inside its tolerances."""
+    b = frame.freedom.shape[1]
+    baseline = np.concatenate([frame.freedom, np.eye(b)])
+    terms = np.concatenate([unit[:, kept], np.zeros((b, len(kept)))])
+    design = np.concatenate([baseline, terms], axis=1)
     solution, *_ = np.linalg.lstsq(design, -np.concatenate([rows, frame.moved]), rcond=1e-10)
-    values = {candidates[k].name: float(v) / float(size[k]) for k, v in zip(kept, solution[b:], strict=True)}
-    shapes = {c.memory: c.shape for c in (candidates[k] for k in kept) if c.memory and c.shape is not None}
+    values = {
+        candidates[k].name: float(v) / float(size[k])
+        for k, v in zip(kept, solution[b:], strict=True)
+    }
+    shapes = {
+        c.memory: c.shape for c in (candidates[k] for k in kept) if c.memory and c.shape is not None
+    }
     return _Choice(values, shapes, solution[:b])
 
 
-def _pruned(target: Array, wide: Array, kept: list[int], misfit: float, samples: float, price: float) -> list[int]:
-    """Terms without those that others have made needless: backward, the cheapest first, while its loss is less than its price."""
+def _pruned(
+    target: Array, wide: Array, kept: list[int], misfit: float, samples: float, price: float
+) -> list[int]:
+    """Terms without those that others have made needless: backward, the cheapest first, while its
+    loss is less than its price.
+    """
 
     def without(k: int) -> float:
         others = wide[:, [j for j in kept if j != k]]
@@ -394,7 +546,9 @@ class _Crossed:
         return _Crossed(np.array([part.T @ part for part in parts]), frame.moved)
 
     def left_out(self, terms: Sequence[int]) -> float:
-        """Misfit of each recording by the baseline and terms that the others ask for, summed; with one recording the misfit itself."""
+        """Misfit of each recording by the baseline and terms that the others ask for, summed; with
+        one recording the misfit itself.
+        """
         b = self.prior.size
         index = np.array([*range(b), *(b + t for t in terms)], dtype=np.int64)
         total = self.grams.sum(axis=0)
@@ -406,21 +560,38 @@ class _Crossed:
             normal[np.arange(b), np.arange(b)] += 1.0
             right[:b] -= self.prior
             solution = np.linalg.lstsq(normal, right, rcond=1e-12)[0]
-            misfit += float(own[-1, -1] + 2.0 * solution @ own[index, -1] + solution @ own[np.ix_(index, index)] @ solution)
+            misfit += float(
+                own[-1, -1]
+                + 2.0 * solution @ own[index, -1]
+                + solution @ own[np.ix_(index, index)] @ solution
+            )
         return misfit
 
 
 def _fitted(
-    problem: Problem, nominal: Rig, warm: Fit, inflation: dict[str, float], chosen: _Choice, say: Callable[[str], None]
+    problem: Problem,
+    nominal: Rig,
+    warm: Fit,
+    inflation: dict[str, float],
+    chosen: _Choice,
+    say: Callable[[str], None],
 ) -> Fit | None:
-    """The chosen terms and the shapes of their memories in the nonlinear model; None where it cannot be run."""
+    """The chosen terms and the shapes of their memories in the nonlinear model; None where it
+    cannot be run.
+    """
     effects = tuple(dict.fromkeys(name.partition(".")[0] for name in chosen.values))
     every = {
         name: parameter
         for effect in effects
-        for name, parameter in zip(EFFECTS[effect].dotted(), EFFECTS[effect].parameters, strict=True)
+        for name, parameter in zip(
+            EFFECTS[effect].dotted(), EFFECTS[effect].parameters, strict=True
+        )
     }
-    held = {n: 0.0 if p.neutral == 0.0 else p.default for n, p in every.items() if n not in chosen.values and n not in chosen.shapes}
+    held = {
+        n: 0.0 if p.neutral == 0.0 else p.default
+        for n, p in every.items()
+        if n not in chosen.values and n not in chosen.shapes
+    }
     say(f"trying {' + '.join(name for name in chosen.values)}")
     names = list(warm.values)
     best: Fit | None = None
@@ -428,12 +599,22 @@ def _fitted(
     shrunk = ((1.0, settings.evaluations), (settings.shrunk_share, settings.shrunk_evaluations))
     for share, evaluations in shrunk:
         starts = {name: share * value for name, value in chosen.values.items()} | chosen.shapes
-        shifted = {n: warm.values[n] + share * float(x) * warm.scales[n] for n, x in zip(names, chosen.shift, strict=True)}
+        shifted = {
+            n: warm.values[n] + share * float(x) * warm.scales[n]
+            for n, x in zip(names, chosen.shift, strict=True)
+        }
         try:
             tried = fit(
-                problem, nominal, effects, starts, inflation,
-                fixed=held, warm=replace(warm, values=shifted), frozen=True, evaluations=evaluations,
-            )  # fmt: skip
+                problem,
+                nominal,
+                effects,
+                starts,
+                inflation,
+                fixed=held,
+                warm=replace(warm, values=shifted),
+                frozen=True,
+                evaluations=evaluations,
+            )
         except SimulationError:
             continue
         if best is None or tried.cost < best.cost:

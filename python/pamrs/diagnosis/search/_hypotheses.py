@@ -1,4 +1,6 @@
-"""Competing explanations of a located mismatch, fitted side by side and judged on held-out recordings."""
+"""Competing explanations of a located mismatch, fitted side by side and judged on held-out
+recordings.
+"""
 
 from __future__ import annotations
 
@@ -11,21 +13,21 @@ from pamrs.diagnosis.evidence import (
     Group,
     Ranges,
     explains,
-    most_believed,
+    probability_cap,
     same_recordings,
     share_left,
     significant,
     visited,
     weigh,
-    without_colour,
+    without_autocorrelation,
 )
 from pamrs.diagnosis.fit import Fit, Key, Problem, Start, acts_in, fits, residuals
-from pamrs.diagnosis.noise import Excess, excess, floors
+from pamrs.diagnosis.noise import Excess, excess, noise_levels
 from pamrs.diagnosis.prepare import Block, Residual
 from pamrs.diagnosis.screen import Screen, by_effect, inclusion, left_out, screen, stand_of
-from pamrs.diagnosis.search._baseline import coloured, refitted, thorough
+from pamrs.diagnosis.search._baseline import refitted, thorough, with_autocorrelation
+from pamrs.diagnosis.search._below_noise import below_noise
 from pamrs.diagnosis.search._closure import find_closure
-from pamrs.diagnosis.search._faint import faint
 from pamrs.diagnosis.search._wrong_parameters import beside_quiet, freed
 from pamrs.effects import CATALOGUE, EFFECTS, EffectInfo, SameData
 from pamrs.errors import SimulationError
@@ -37,11 +39,13 @@ __all__ = ["examine"]
 Say = Callable[[str], None]
 
 
-def examine(fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], say: Say) -> list[Group]:
+def examine(
+    fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], say: Say
+) -> list[Group]:
     """Refit the baseline of some blocks, locate what is left, and try every effect that acts there.
 
-    The blocks are one group, unless no name explains all of them and one does explain a block in which alone it acts: then that block
-    is a group of its own.
+    The blocks are one group, unless no name explains all of them and one does explain a block in
+    which alone it acts: then that block is a group of its own.
 
     Parameters
     ----------
@@ -83,8 +87,8 @@ class _Refit:
         Recordings, model, noise levels, and the blocks that keep an excess.
     first : Fit
         The refit with white noise.
-    colour : dict of str to float
-        Weights of the colour that it leaves.
+    autocorrelation : dict of str to float
+        Weights of the autocorrelation that it leaves.
     was : dict of str to Excess
         What the nominal model leaves of the recordings to fit, by block.
     start : Candidate
@@ -95,40 +99,59 @@ class _Refit:
 
     trial: Attempts
     first: Fit
-    colour: dict[str, float]
+    autocorrelation: dict[str, float]
     was: dict[str, Excess]
     start: Candidate
     apart: list[Block]
 
-    def group(self, candidates: list[Candidate], probabilities: dict[str, float], mismatch: Block | None) -> Group:
+    def group(
+        self, candidates: list[Candidate], probabilities: dict[str, float], mismatch: Block | None
+    ) -> Group:
         """The blocks as a group, with hypotheses and their probabilities."""
         trial = self.trial
         blocks, kept = trial.inner.blocks, candidates[0].fitted
-        return Group(blocks, self.was, kept, candidates, probabilities, mismatch, trial.floor, trial.suspects)
+        return Group(
+            blocks,
+            self.was,
+            kept,
+            candidates,
+            probabilities,
+            mismatch,
+            trial.noise_level,
+            trial.suspects,
+        )
 
 
 def _refit(inner: Problem, outer: Problem, nominal: Rig, *, same: bool) -> _Refit:
     """Fit parameters inside their tolerances, and see what each block keeps."""
     blocks, settings = inner.blocks, inner.settings
     before = residuals(inner, nominal)
-    first = refitted(inner, nominal, without_colour(blocks))
-    floor = floors(inner, core_rig(first.rig, inner.core))
+    first = refitted(inner, nominal, without_autocorrelation(blocks))
+    noise_level = noise_levels(inner, core_rig(first.rig, inner.core))
     if not same:
-        floor |= floors(outer, core_rig(first.rig, outer.core))
-    baseline, colour = coloured(inner, nominal, first)
+        noise_level |= noise_levels(outer, core_rig(first.rig, outer.core))
+    baseline, autocorrelation = with_autocorrelation(inner, nominal, first)
 
     def kept(problem: Problem, found: dict[Key, Residual]) -> dict[str, Excess]:
-        return {b.name: excess(b, problem.recordings, found, floor, settings.noise) for b in blocks}
+        return {
+            b.name: excess(b, problem.recordings, found, noise_level, settings.noise)
+            for b in blocks
+        }
 
     was, now = kept(inner, before), kept(inner, baseline.residuals)
-    outside = left_out(inner, baseline, colour) if same else residuals(outer, baseline.rig)
+    outside = left_out(inner, baseline, autocorrelation) if same else residuals(outer, baseline.rig)
     out = kept(outer, outside)
-    # what parameters could not be told from the fitted recordings shows in the others alone, and is no mismatch
+    # what parameters could not be told from the fitted recordings shows in the others alone, and is
+    # no mismatch
     least, hint = settings.search.held_out_ratio, settings.search.fitted_hint
-    apart = [b for b in blocks if significant(out[b.name], least) and now[b.name].ratio > hint and not same]
+    apart = [
+        b
+        for b in blocks
+        if significant(out[b.name], least) and now[b.name].ratio > hint and not same
+    ]
     suspects = [b for b in blocks if significant(now[b.name]) or b in apart]
-    trial = Attempts(inner, outer, nominal, floor, out, suspects)
-    return _Refit(trial, first, colour, was, Candidate((), baseline, out, now, 0.0), apart)
+    trial = Attempts(inner, outer, nominal, noise_level, out, suspects)
+    return _Refit(trial, first, autocorrelation, was, Candidate((), baseline, out, now, 0.0), apart)
 
 
 def _healthy(refit: _Refit, common: Candidate) -> Group:
@@ -149,20 +172,27 @@ def _acting(trial: Attempts, blocks: list[Block]) -> list[str]:
 
 
 def _quiet(refit: _Refit, say: Say, tell: Say) -> Group:
-    """A group that keeps only noise: an effect below it, or a parameter at the end of its plausible range, may still show."""
+    """A group that keeps only noise: an effect below it, or a parameter at the end of its plausible
+    range, may still show.
+    """
     nothing = refit.group([refit.start], {"": 1.0}, None)
     blocks = refit.trial.inner.blocks
     persistent = [e for e in _acting(refit.trial, blocks) if not EFFECTS[e].transient]
     trial = replace(refit.trial, suspects=blocks)
-    return beside_quiet(trial, faint(trial, nothing, persistent, say) or nothing, tell)
+    return beside_quiet(trial, below_noise(trial, nothing, persistent, say) or nothing, tell)
 
 
 def _explained(refit: _Refit, say: Say, tell: Say) -> list[Group]:
-    """A group that keeps a mismatch, with every hypothesis that was tried for it; in parts where names explain parts of it."""
+    """A group that keeps a mismatch, with every hypothesis that was tried for it; in parts where
+    names explain parts of it.
+    """
     trial, start = refit.trial, refit.start
     suspects, now, settings = trial.suspects, start.fitted, trial.settings
     mismatch = max(suspects, key=lambda b: trial.out[b.name].ratio + now[b.name].ratio)
-    tell(f"{mismatch.name} keeps {now[mismatch.name].systematic:.2g} noise units after the refit")
+    tell(
+        f"after the refit the residual of {mismatch.name} is {now[mismatch.name].systematic:.2g} "
+        "noise units"
+    )
     marginal = _marginal(refit)
     acting = _acting(trial, suspects)
     # events of free times would always mend a noise level that was estimated too low
@@ -172,7 +202,7 @@ def _explained(refit: _Refit, say: Say, tell: Say) -> list[Group]:
     sealed = trial.nominal.model["valve"] is None
     screened = screen(trial.inner, start.fit, persistent, trial.white, sealed=sealed)
     terms = _Terms(
-        most_believed(trial.inner, mismatch, now[mismatch.name].rms, same=trial.same),
+        probability_cap(trial.inner, mismatch, now[mismatch.name].rms, same=trial.same),
         max(p.n * p.dt for p in trial.inner.recordings),
         visited(trial.inner),
     )
@@ -183,8 +213,12 @@ def _explained(refit: _Refit, say: Say, tell: Say) -> list[Group]:
         weighed |= {"": none * weighed["unlisted"], "unlisted": (1.0 - none) * weighed["unlisted"]}
     group = replace(
         refit.group(candidates, weighed, mismatch),
-        inclusion=inclusion(screened, settings.search.least_gain, settings.search.partner_share, settings),
-        promised=_promised(screened, now[mismatch.name], settings.search.marginal_excess),
+        inclusion=inclusion(
+            screened, settings.search.least_gain, settings.search.partner_share, settings
+        ),
+        predicted_gain=_predicted_gain(
+            screened, now[mismatch.name], settings.search.marginal_excess
+        ),
     )
     parts = _apart(group, trial, terms) if weighed["unlisted"] > settings.search.split_from else []
     return parts or [_with_form(group, refit, say, tell)]
@@ -220,30 +254,40 @@ def _marginal(refit: _Refit) -> bool:
 
 
 def _hypotheses(
-    refit: _Refit, screened: Screen, mistaken: list[Candidate], transient: list[str], seconds: float, tell: Say
+    refit: _Refit,
+    screened: Screen,
+    mistaken: list[Candidate],
+    transient: list[str],
+    seconds: float,
+    tell: Say,
 ) -> list[Candidate]:
-    """The baseline, single effects, pairs where no single one explains the mismatch, and values that are wrong."""
+    """The baseline, single effects, pairs where no single one explains the mismatch, and values
+    that are wrong.
+    """
     trial, start, evidence = refit.trial, refit.start, refit.trial.settings.evidence
     singles = _singles(trial, screened, start.fit, tell)
     singles = _with_same_data(trial, start, singles, seconds)
     least = trial.settings.search.transient_from
-    if transient and all(share_left(c, start, trial.suspects, evidence) > least for c in (*singles, *mistaken)):
+    if transient and all(
+        share_left(c, start, trial.suspects, evidence) > least for c in (*singles, *mistaken)
+    ):
         tell(f"looking for what happens at times of its own ({', '.join(transient)})")
-        singles += [c for e in transient if (c := trial.eventful(e, start)) is not None]
+        singles += [c for e in transient if (c := trial.transient(e, start)) is not None]
     if any(_settles(c, trial, start) for c in (*singles, *mistaken)):
         return [start, *singles, *mistaken]
     pairs = _pairs(trial, screened, start, singles, tell)
     for effect, beside in _beside(trial, screened, start, singles, transient):
         tell(f"looking for {effect} beside {beside.effects[0]}")
-        found = trial.eventful(effect, beside)
+        found = trial.transient(effect, beside)
         pairs += [] if found is None else [found]
     return [start, *singles, *pairs, *mistaken]
 
 
 def _settles(candidate: Candidate, trial: Attempts, start: Candidate) -> bool:
-    """Whether a hypothesis leaves so little that no pair can be asked for.
+    """Whether a hypothesis leaves so little that no pair can be called for.
 
-    What a single effect leaves may be no more than the difference between its equation and the truth.
+    What a single effect leaves may be no more than the difference between its equation and the
+    truth.
     """
     evidence = trial.settings.evidence
     if explains(candidate, start, trial.suspects, evidence):
@@ -264,14 +308,16 @@ def _weighed(
     found = weights(candidates)
     likely = [c for c in candidates[1:] if _odds(found, c) > settings.search.polish_from]
     close = sorted(likely, key=lambda c: -_odds(found, c))[: settings.search.most_polished]
-    if len(close) > 1 or (close and not explains(close[0], start, trial.suspects, settings.evidence)):
+    if len(close) > 1 or (
+        close and not explains(close[0], start, trial.suspects, settings.evidence)
+    ):
         tell("fitting to the end " + ", ".join(c.key for c in close))
         candidates = [trial.polished(c) if c in close else c for c in candidates]
         found = weights(candidates)
     return candidates, found
 
 
-def _promised(screened: Screen, kept: Excess, least: float) -> dict[str, float]:
+def _predicted_gain(screened: Screen, kept: Excess, least: float) -> dict[str, float]:
     """Share of the mismatch that each effect could take by its signature alone."""
     # of the chi-square that is left noise has its part
     missing = screened.stand.power_left * (1.0 - 1.0 / max(kept.ratio, 1.0 + least))
@@ -279,16 +325,24 @@ def _promised(screened: Screen, kept: Excess, least: float) -> dict[str, float]:
 
 
 def _with_form(group: Group, refit: _Refit, say: Say, tell: Say) -> Group:
-    """A group with a form of what is missing, where no name is likely and one is found that carries over."""
+    """A group with a form of what is missing, where no name is likely and one is found that carries
+    over.
+    """
     trial, start, suspects = refit.trial, refit.start, refit.trial.suspects
     settings = trial.settings.closures
-    if group.probabilities["unlisted"] < settings.from_probability or len({b.kind for b in suspects}) < len(suspects):
+    if group.probabilities["unlisted"] < settings.from_probability or len(
+        {b.kind for b in suspects}
+    ) < len(suspects):
         return group  # of two chambers one form would have to serve both
     if any(b.name == "load" for b in suspects):
-        tell("no form of what is missing is looked for, since that of a load is not in the simulator")
+        tell(
+            "no form of what is missing is looked for, since that of a load is not in the simulator"
+        )
         return group
     group = replace(group, sought=True)
-    closed = find_closure(trial.inner, trial.nominal, start.fit, refit.colour, suspects, say)
+    closed = find_closure(
+        trial.inner, trial.nominal, start.fit, refit.autocorrelation, suspects, say
+    )
     if closed is None:
         return group
     try:
@@ -304,8 +358,8 @@ def _with_form(group: Group, refit: _Refit, say: Say, tell: Say) -> Group:
 def _apart(group: Group, trial: Attempts, terms: _Terms) -> list[Group]:
     """A group in parts, where a name explains a block in which alone it acts; else nothing.
 
-    A leak of the tank is seen in the tank's pressure, whatever the chamber behind the valve keeps without a name, or with one of its
-    own. All parts have one fit, with everything that they name.
+    A leak of the tank is seen in the tank's pressure, whatever the chamber behind the valve keeps
+    without a name, or with one of its own. All parts have one fit, with everything that they name.
     """
     start = group.candidates[0]
     settings = trial.settings
@@ -313,15 +367,24 @@ def _apart(group: Group, trial: Attempts, terms: _Terms) -> list[Group]:
 
     def weighed(blocks: list[Block]) -> dict[str, float]:
         there = [c for c in acting if any(b in blocks for b in acting[c])]
-        return weigh([start, *there], blocks, terms.most, terms.seconds, settings, terms.ranging, acting)
+        return weigh(
+            [start, *there], blocks, terms.most, terms.seconds, settings, terms.ranging, acting
+        )
 
-    own = {b.name: weighed([b]) for b in group.suspects if any(found == [b] for found in acting.values())}
+    own = {
+        b.name: weighed([b])
+        for b in group.suspects
+        if any(found == [b] for found in acting.values())
+    }
     least = settings.search.split_from
     named = [b for b in group.suspects if own.get(b.name, {"unlisted": 1.0})["unlisted"] < least]
     rest = [b for b in group.suspects if b not in named]
     if not named:
         return []
-    best = [max((c for c in acting if c.key in own[b.name]), key=lambda c: own[b.name][c.key]) for b in named]
+    best = [
+        max((c for c in acting if c.key in own[b.name]), key=lambda c: own[b.name][c.key])
+        for b in named
+    ]
     common = best[0].fit if len(best) == 1 else trial.united(best)
     if common is None:
         return []
@@ -331,11 +394,24 @@ def _apart(group: Group, trial: Attempts, terms: _Terms) -> list[Group]:
         return replace(
             group,
             blocks=blocks,
-            candidates=[start, *(replace(c, fit=common) if c in best else c for c in acting if c.key in probabilities)],
+            candidates=[
+                start,
+                *(
+                    replace(c, fit=common) if c in best else c
+                    for c in acting
+                    if c.key in probabilities
+                ),
+            ],
             probabilities=probabilities,
-            mismatch=max(suspects, key=lambda b: start.held_out[b.name].ratio + start.fitted[b.name].ratio),
+            mismatch=max(
+                suspects, key=lambda b: start.held_out[b.name].ratio + start.fitted[b.name].ratio
+            ),
             suspects=suspects,
-            promised={e: p for e, p in group.promised.items() if any(acts_in(e, b) for b in suspects)},
+            predicted_gain={
+                e: p
+                for e, p in group.predicted_gain.items()
+                if any(acts_in(e, b) for b in suspects)
+            },
         )
 
     parts = [part([b], [b], own[b.name]) for b in named]
@@ -348,7 +424,9 @@ def _apart(group: Group, trial: Attempts, terms: _Terms) -> list[Group]:
 
 def _acts(candidate: Candidate, block: Block) -> bool:
     """Whether what a hypothesis names acts in a block."""
-    return any(acts_in(e, block) for e in candidate.effects) or any(name in block.parameters for name in candidate.wrong)
+    return any(acts_in(e, block) for e in candidate.effects) or any(
+        name in block.parameters for name in candidate.wrong
+    )
 
 
 def _odds(weighed: dict[str, float], candidate: Candidate) -> float:
@@ -357,14 +435,19 @@ def _odds(weighed: dict[str, float], candidate: Candidate) -> float:
 
 
 def _together(trial: Attempts, start: Candidate) -> Candidate | None:
-    """One baseline inside its tolerances that leaves only noise in fitted and held-out recordings, taken together, if there is one."""
+    """One baseline inside its tolerances that leaves only noise in fitted and held-out recordings,
+    taken together, if there is one.
+    """
     inner, outer = trial.inner, trial.outer
     both = replace(inner, recordings=[*inner.recordings, *outer.recordings])
     try:
         found = thorough(both, trial.nominal, trial.white, start.fit)
     except SimulationError:
         return None
-    fitted, held = ({b.name: trial.excess(b, part, found.residuals) for b in inner.blocks} for part in (inner, outer))
+    fitted, held = (
+        {b.name: trial.excess(b, part, found.residuals) for b in inner.blocks}
+        for part in (inner, outer)
+    )
     if any(significant(e[b.name]) for b in inner.blocks for e in (fitted, held)):
         return None
     return Candidate((), found, held, fitted, 0.0)
@@ -378,7 +461,13 @@ def _singles(trial: Attempts, screened: Screen, baseline: Fit, tell: Say) -> lis
     most = max(gains.values(), default=0.0)
     least = max(settings.least_gain, settings.least_gain_share * most)
     chosen = [e for e, gain in gains.items() if gain > least][: settings.most_singles]
-    tell("screened: " + (", ".join(f"{e} {gain:.3g}" for e, gain in list(gains.items())[:8]) or "no effect acts here"))
+    tell(
+        "screened: "
+        + (
+            ", ".join(f"{e} {gain:.3g}" for e, gain in list(gains.items())[:8])
+            or "no effect acts here"
+        )
+    )
     white = trial.white
     found = []
     for place, effect in enumerate(chosen):
@@ -391,8 +480,12 @@ def _singles(trial: Attempts, screened: Screen, baseline: Fit, tell: Say) -> lis
     return found
 
 
-def _with_same_data(trial: Attempts, start: Candidate, singles: list[Candidate], seconds: float) -> list[Candidate]:
-    """The singles, and beside each that may be the same data as another effect (a late clock and a dead time) that other one."""
+def _with_same_data(
+    trial: Attempts, start: Candidate, singles: list[Candidate], seconds: float
+) -> list[Candidate]:
+    """The singles, and beside each that may be the same data as another effect (a late clock and a
+    dead time) that other one.
+    """
     there = {c.effects for c in singles}
     found: list[Candidate] = []
     others: list[Candidate | None] = []
@@ -404,13 +497,17 @@ def _with_same_data(trial: Attempts, start: Candidate, singles: list[Candidate],
         alike = same_recordings(own, effect, seconds, trial.settings.evidence)
         if same is not None and alike and (same.effect,) not in there:
             others.append(_as_other(trial, start, own, same))
-        twins = [i for i in EFFECTS.values() if i.same_data is not None and i.same_data.effect == effect]
+        twins = [
+            i for i in EFFECTS.values() if i.same_data is not None and i.same_data.effect == effect
+        ]
         others += [_as_twin(trial, start, own, twin) for twin in twins if (twin.id,) not in there]
     return [*found, *(c for c in others if c is not None)]
 
 
 def _in_shape(trial: Attempts, start: Candidate, single: Candidate, same: SameData) -> Candidate:
-    """An effect in the shape in which it is the same data as another one, where it explains as much in it."""
+    """An effect in the shape in which it is the same data as another one, where it explains as much
+    in it.
+    """
     own = trial.start_of(single.fit, single.effects[0])
     held = {f"{own.effect}.{name}": value for name, value in same.held}
     if all(own.held[name] == value for name, value in held.items()):
@@ -423,14 +520,18 @@ def _in_shape(trial: Attempts, start: Candidate, single: Candidate, same: SameDa
     return single if shaped > free + evidence.form_share_alike else replace(alike, gain=single.gain)
 
 
-def _as_other(trial: Attempts, start: Candidate, single: Candidate, same: SameData) -> Candidate | None:
+def _as_other(
+    trial: Attempts, start: Candidate, single: Candidate, same: SameData
+) -> Candidate | None:
     """The other effect, as large as this one, where the two leave the same recordings."""
     usual = {f"{same.effect}.{p.name}": p.default for p in EFFECTS[same.effect].parameters}
     usual[f"{same.effect}.{same.parameter}"] = single.fit.values[f"{single.effects[0]}.{same.size}"]
     return trial.fitted([Start(same.effect, usual, {}, (), False)], start.fit, trial.white)
 
 
-def _as_twin(trial: Attempts, start: Candidate, single: Candidate, twin: EffectInfo) -> Candidate | None:
+def _as_twin(
+    trial: Attempts, start: Candidate, single: Candidate, twin: EffectInfo
+) -> Candidate | None:
     """The effect that leaves the same recordings as this one, where this one has a size."""
     same = twin.same_data
     assert same is not None
@@ -443,12 +544,16 @@ def _as_twin(trial: Attempts, start: Candidate, single: Candidate, twin: EffectI
 
 
 def _beside(
-    trial: Attempts, screened: Screen, start: Candidate, singles: list[Candidate], happening: list[str]
+    trial: Attempts,
+    screened: Screen,
+    start: Candidate,
+    singles: list[Candidate],
+    happening: list[str],
 ) -> list[tuple[str, Candidate]]:
-    """Effects with times of their own, each with a lasting one that it may have happened beside.
+    """Effects with times of their own, each with a persistent one that it may have happened beside.
 
-    That is the lasting effect that leaves least, if it leaves much; and, of those that were fitted, the one whose signature
-    is in what the events leave.
+    That is the persistent effect that leaves least, if it leaves much; and, of those that were
+    fitted, the one whose signature is in what the events leave.
     """
     settings, evidence = trial.settings.search, trial.settings.evidence
 
@@ -457,17 +562,25 @@ def _beside(
 
     steady = [c for c in singles if c.fit.events is None]
     best = min(steady, key=left_by, default=start)
-    found = [(e, best) for e in happening] if settings.transient_beside < left_by(best) < settings.much_left else []
+    found = (
+        [(e, best) for e in happening]
+        if settings.transient_beside < left_by(best) < settings.much_left
+        else []
+    )
     mismatch = float(screened.stand.rows @ screened.stand.rows)
     for single in singles:
         if single.fit.events is None or left_by(single) > settings.much_left:
             continue
         # what the baseline can do is taken as without the events
         kept = start.fit.residuals
-        left = {key: replace(r, jacobian=kept[key].jacobian) for key, r in single.fit.residuals.items()}
+        left = {
+            key: replace(r, jacobian=kept[key].jacobian) for key, r in single.fit.residuals.items()
+        }
         beside = replace(start.fit, residuals=left, moved=single.fit.moved)
         least = max(settings.least_gain, settings.partner_share * mismatch)
-        told = [s for s in screened.scores(stand_of(beside, trial.inner, trial.white)) if s.gain > least]
+        told = [
+            s for s in screened.scores(stand_of(beside, trial.inner, trial.white)) if s.gain > least
+        ]
         partner = next((c for s in told for c in steady if c.effects == (s.effect,)), None)
         if partner is not None and (single.effects[0], partner) not in found:
             found.append((single.effects[0], partner))
@@ -475,35 +588,52 @@ def _beside(
 
 
 def _untouched(candidate: Candidate, start: Candidate, trial: Attempts) -> list[Block]:
-    """Blocks in which a set leaves most of what was too much there, in recordings that were fitted or held out."""
+    """Blocks in which a set leaves most of what was too much there, in recordings that were fitted
+    or held out.
+    """
     much = trial.settings.search.much_left
     stages = ((start.fitted, candidate.fitted), (start.held_out, candidate.held_out))
     return [
         b
         for b in trial.suspects
-        if any(significant(now[b.name]) and now[b.name].ratio - 1.0 > much * (was[b.name].ratio - 1.0) for was, now in stages)
+        if any(
+            significant(now[b.name]) and now[b.name].ratio - 1.0 > much * (was[b.name].ratio - 1.0)
+            for was, now in stages
+        )
     ]
 
 
 def _pairs(
     trial: Attempts, screened: Screen, start: Candidate, singles: list[Candidate], tell: Say
 ) -> list[Candidate]:
-    """For the best singles that leave something: the effects that would take most of it, fitted together with them."""
+    """For the best singles that leave something: the effects that would take most of it, fitted
+    together with them.
+    """
     settings = trial.settings.search
-    lasting = [c for c in singles if c.fit.events is None]
-    ranked = sorted(lasting, key=lambda c: sum(c.held_out[b.name].ratio for b in trial.suspects))[: settings.most_paired]
+    persistent = [c for c in singles if c.fit.events is None]
+    ranked = sorted(
+        persistent, key=lambda c: sum(c.held_out[b.name].ratio for b in trial.suspects)
+    )[: settings.most_paired]
     white = trial.white
     mismatch = float(screened.stand.rows @ screened.stand.rows)
     tried: set[frozenset[str]] = set()
     found = []
     for single in ranked:
         stand = stand_of(single.fit, trial.inner, white)
-        partners = [scores[0] for scores in by_effect(screened.scores(stand, without=single.effects)).values()]
+        partners = [
+            scores[0]
+            for scores in by_effect(screened.scores(stand, without=single.effects)).values()
+        ]
         least = max(settings.least_gain, settings.partner_share * mismatch)
         best = [score for score in partners if score.gain > least][: settings.most_partners]
-        # what one block keeps may be little beside what another one had: an effect of that block alone is asked for by itself
+        # what is left in one block may be little beside what another one had: an effect of that
+        # block alone is tested by itself
         for block in _untouched(single, start, trial):
-            there = [s for s in partners if [b for b in trial.suspects if acts_in(s.effect, b)] == [block]]
+            there = [
+                s
+                for s in partners
+                if [b for b in trial.suspects if acts_in(s.effect, b)] == [block]
+            ]
             own = [s for s in there if s.gain > settings.least_gain]
             best += [score for score in own[:1] if score not in best]
         for score in best:
@@ -512,7 +642,11 @@ def _pairs(
                 continue
             tried.add(both)
             tell(f"trying {' + '.join(sorted(both))}")
-            candidate = trial.fitted([trial.start_of(single.fit, single.effects[0]), score.start.scaled(score.size)], single.fit, white)
+            candidate = trial.fitted(
+                [trial.start_of(single.fit, single.effects[0]), score.start.scaled(score.size)],
+                single.fit,
+                white,
+            )
             if candidate is not None:
                 found.append(candidate)
     return found

@@ -1,8 +1,9 @@
-"""Values of the rig file that are wrong: parameters freed from their tolerance, as rivals of the effects.
+"""Values of the rig file that are wrong: parameters freed from their tolerance, as rivals of the
+effects.
 
-The baseline moves inside three tolerances. A parameter that ends at that wall may stand for physics that is missing, or the file may be
-wrong about it. Which of the two is decided as between effects: the parameter is freed, everything is fitted again, and held-out
-recordings judge.
+The baseline moves inside three tolerances. A parameter that ends at that wall may stand for physics
+that is missing, or the file may be wrong about it. Which of the two is decided as between effects:
+the parameter is freed, everything is fitted again, and held-out recordings judge.
 """
 
 from __future__ import annotations
@@ -26,7 +27,9 @@ __all__ = ["beside_quiet", "freed", "suspected"]
 Array = NDArray[np.float64]
 
 
-def suspected(fitted: Fit, blocks: list[Block], settings: WrongParameterSettings) -> list[tuple[str, ...]]:
+def suspected(
+    fitted: Fit, blocks: list[Block], settings: WrongParameterSettings
+) -> list[tuple[str, ...]]:
     """Parameters at their wall, alone and in pairs that one mistake makes wrong together.
 
     Parameters
@@ -43,18 +46,31 @@ def suspected(fitted: Fit, blocks: list[Block], settings: WrongParameterSettings
     list of tuple of str
         Dotted names.
     """
-    at_wall = [name for name, moved in fitted.moved.items() if abs(moved) >= settings.wall_tolerances]
+    at_wall = [
+        name for name, moved in fitted.moved.items() if abs(moved) >= settings.wall_tolerances
+    ]
     found: list[tuple[str, ...]] = [(name,) for name in at_wall]
     for one, other in itertools.permutations(fitted.moved, 2):
-        together = any({one, other} <= block.parameters for block in blocks) and _same_owner(one, other)
-        if (_kind(one), _kind(other)) in settings.wrong_together and together and not {one, other}.isdisjoint(at_wall):
+        together = any({one, other} <= block.parameters for block in blocks) and _same_owner(
+            one, other
+        )
+        if (
+            (_kind(one), _kind(other)) in settings.wrong_together
+            and together
+            and not {one, other}.isdisjoint(at_wall)
+        ):
             found.append((one, other))
     return found
 
 
 def _same_owner(one: str, other: str) -> bool:
-    """Whether two parameters may belong to one mistake: of blocks of one kind they have to belong to the same block."""
-    return one.partition(".")[0] != other.partition(".")[0] or one.rpartition(".")[0] == other.rpartition(".")[0]
+    """Whether two parameters may belong to one mistake: of blocks of one kind they have to belong
+    to the same block.
+    """
+    return (
+        one.partition(".")[0] != other.partition(".")[0]
+        or one.rpartition(".")[0] == other.rpartition(".")[0]
+    )
 
 
 def _kind(name: str) -> str:
@@ -62,16 +78,20 @@ def _kind(name: str) -> str:
     return f"{name.partition('.')[0]}.{name.rpartition('.')[2]}"
 
 
-def freed(trial: Attempts, baseline: Fit, first: Fit, say: Callable[[str], None]) -> list[Candidate]:
-    """The suspected parameters, each freed and fitted, and the pairs that promise most by the linear model.
+def freed(
+    trial: Attempts, baseline: Fit, first: Fit, say: Callable[[str], None]
+) -> list[Candidate]:
+    """The suspected parameters, each freed and fitted, and the pairs of the largest gain predicted
+    by the linear model.
 
-    Where the mismatch is large its colour leaves little weight to the recordings, so that the priors hold what a fit with
-    white noise moved to its wall: parameters at their wall in either fit are suspects.
+    Where the mismatch is large its autocorrelation leaves little weight to the recordings, so that
+    the priors hold what a fit with white noise moved to its wall: parameters at their wall in
+    either fit are suspects.
 
     Parameters
     ----------
     trial : Attempts
-        Recordings, model, floors.
+        Recordings, model, noise levels.
     baseline : Fit
         The refitted baseline, with sensitivities.
     first : Fit
@@ -80,25 +100,45 @@ def freed(trial: Attempts, baseline: Fit, first: Fit, say: Callable[[str], None]
         Receives progress.
     """
     settings, walls = trial.settings.wrong_parameters, trial.settings.fit.most_tolerances
-    suspects = [names for found in (baseline, first) for names in suspected(found, trial.inner.blocks, settings)]
-    gains = _promised(trial.inner, trial.nominal, baseline, list(dict.fromkeys(suspects)), trial.white)
-    ranked = sorted((n for n, gain in gains.items() if gain > settings.least_promise), key=lambda n: -gains[n])
-    # the linear model says little of what is far away: each parameter at its wall is fitted, whatever it promises beside others
+    suspects = [
+        names
+        for found in (baseline, first)
+        for names in suspected(found, trial.inner.blocks, settings)
+    ]
+    gains = _predicted_gain(
+        trial.inner, trial.nominal, baseline, list(dict.fromkeys(suspects)), trial.white
+    )
+    ranked = sorted(
+        (n for n, gain in gains.items() if gain > settings.least_predicted_gain),
+        key=lambda n: -gains[n],
+    )
+    # the linear model says little of what is far away: each parameter at its wall is fitted,
+    # whatever its predicted gain beside others
     least = settings.pair_share * max(gains.values(), default=0.0)
-    pairs = [names for names in ranked if len(names) > 1 and gains[names] > least][: settings.most_pairs]
+    pairs = [names for names in ranked if len(names) > 1 and gains[names] > least][
+        : settings.most_pairs
+    ]
     found = []
     for names in [n for n in ranked if len(n) == 1 or n in pairs]:
         say(f"trying another value of {' and '.join(names)}")
         candidate = trial.freed(names, baseline)
-        if candidate is not None and all(abs(candidate.fit.moved[name]) > walls for name in names):  # else it is not wrong
+        if candidate is not None and all(
+            abs(candidate.fit.moved[name]) > walls for name in names
+        ):  # else it is not wrong
             found.append(replace(candidate, gain=gains[names]))
     return found
 
 
-def _promised(
-    problem: Problem, nominal: Rig, baseline: Fit, suspects: list[tuple[str, ...]], inflation: dict[str, float]
+def _predicted_gain(
+    problem: Problem,
+    nominal: Rig,
+    baseline: Fit,
+    suspects: list[tuple[str, ...]],
+    inflation: dict[str, float],
 ) -> dict[tuple[str, ...], float]:
-    """Gain in chi-square, priors included, that freeing parameters brings by the sensitivities at the baseline."""
+    """Gain in chi-square, priors included, that freeing parameters brings by the sensitivities at
+    the baseline.
+    """
     if not suspects:
         return {}
     settings = problem.settings.fit
@@ -106,13 +146,18 @@ def _promised(
     rows, jacobian = stacked(problem, baseline.residuals, inflation)
     if jacobian is None:
         return {}
-    scaled = jacobian[:, [list(baseline.values).index(n) for n in names]] * [baseline.scales[n] for n in names]
+    scaled = jacobian[:, [list(baseline.values).index(n) for n in names]] * [
+        baseline.scales[n] for n in names
+    ]
     # the triangle of a QR decomposition has the same sums of squares in a few rows
     triangle: Array = np.asarray(np.linalg.qr(np.column_stack([scaled, rows]), mode="r"))
     slopes, left = triangle[:, :-1], triangle[:, -1]
     begin = np.array([baseline.moved[n] for n in names])
     known = nominal.parameters
-    low, high = (np.array([(getattr(known[n], end) - known[n].value) / known[n].tol for n in names]) for end in ("lower", "upper"))
+    low, high = (
+        np.array([(getattr(known[n], end) - known[n].value) / known[n].tol for n in names])
+        for end in ("lower", "upper")
+    )
 
     def cost(loose: tuple[str, ...]) -> float:
         bound = np.array([n not in loose for n in names], dtype=np.float64)
@@ -120,11 +165,15 @@ def _promised(
         prior = np.diag(bound)
 
         def evaluate(x: Array) -> tuple[Array, Array, None]:
-            return np.concatenate([left + slopes @ (x - begin), bound * x]), np.concatenate([slopes, prior]), None
+            return (
+                np.concatenate([left + slopes @ (x - begin), bound * x]),
+                np.concatenate([slopes, prior]),
+                None,
+            )
 
         limits = (np.maximum(low, -wall), np.minimum(high, wall))
         _, (values, _, _), _ = levenberg_marquardt(
-            evaluate, begin, limits, settings.promise_evaluations, settings, 0.0
+            evaluate, begin, limits, settings.predicted_gain_evaluations, settings, 0.0
         )
         return float(values @ values)
 
@@ -133,29 +182,42 @@ def _promised(
 
 
 def beside_quiet(trial: Attempts, quiet: Group, say: Callable[[str], None]) -> Group:
-    """A group whose baseline leaves only noise, but needs a parameter at its wall for it: which one the file is wrong about.
+    """A group whose baseline leaves only noise, but needs a parameter at its wall for it: which one
+    the file is wrong about.
 
-    Each parameter at its wall is freed. What speaks for it is what misfit and priors lose together, weighed against the odds of a file
-    that is so wrong, beside faint effects that the group found, by what they lose.
+    Each parameter at its wall is freed. What speaks for it is what misfit and priors lose together,
+    weighed against the odds of a file that is so wrong, beside effects below the noise that the
+    group found, by what they lose.
     """
     start = quiet.candidates[0]
     found = freed(trial, start.fit, start.fit, say)
-    shown = [c for c in found if not any(significant(e) for e in c.fitted.values()) and _carries_over(c, start)]
+    shown = [
+        c
+        for c in found
+        if not any(significant(e) for e in c.fitted.values()) and _carries_over(c, start)
+    ]
     if not shown:
         return quiet
-    colour = trial.colour(start.fit)
-    before = with_priors(trial.inner, start.fit, colour)
-    effects = [c for c in quiet.candidates if c.effects and quiet.probabilities.get(c.key, 0.0) > 0.0]
+    autocorrelation = trial.autocorrelation(start.fit)
+    before = with_priors(trial.inner, start.fit, autocorrelation)
+    effects = [
+        c for c in quiet.candidates if c.effects and quiet.probabilities.get(c.key, 0.0) > 0.0
+    ]
     # a file that is further outside its tolerances is rarer, but less and less so
     settings, walls = trial.settings.wrong_parameters, trial.settings.fit.most_tolerances
     against = {c: settings.file_log_odds * len(c.wrong) + c.outside(walls) for c in shown}
     against |= dict.fromkeys(effects, settings.effect_log_odds)
-    scores = {c: 0.5 * (before - with_priors(trial.inner, c.fit, colour)) - odds for c, odds in against.items()}
+    scores = {
+        c: 0.5 * (before - with_priors(trial.inner, c.fit, autocorrelation)) - odds
+        for c, odds in against.items()
+    }
     top = max(0.0, *scores.values())
     weights = {c: math.exp(max(-60.0, score - top)) for c, score in scores.items()}
     total = math.exp(-top) + sum(weights.values())
     share = {c.key: weights[c] / total for c in shown}
-    probabilities = {key: p * (1.0 - sum(share.values())) for key, p in quiet.probabilities.items()} | share
+    probabilities = {
+        key: p * (1.0 - sum(share.values())) for key, p in quiet.probabilities.items()
+    } | share
     return replace(quiet, candidates=[*quiet.candidates, *shown], probabilities=probabilities)
 
 

@@ -20,15 +20,19 @@ from pamrs.diagnosis.settings._models import (
     ScreenSettings,
     TransientSettings,
 )
-from pamrs.diagnosis.settings._search import FaintSettings, SearchSettings, WrongParameterSettings
+from pamrs.diagnosis.settings._search import (
+    BelowNoiseSettings,
+    SearchSettings,
+    WrongParameterSettings,
+)
 from pamrs.diagnosis.settings._setting import SettingsGroup
 from pamrs.errors import ParameterError
 
 __all__ = [
+    "BelowNoiseSettings",
     "ClosureSettings",
     "DiagnosisSettings",
     "EvidenceSettings",
-    "FaintSettings",
     "FitSettings",
     "NextExperimentSettings",
     "NoiseSettings",
@@ -67,7 +71,7 @@ class DiagnosisSettings:
         Scores of effects before any fit.
     search : SearchSettings
         Hypotheses that are fitted.
-    faint : FaintSettings
+    below_noise : BelowNoiseSettings
         Effects below the noise.
     wrong_parameters : WrongParameterSettings
         Values of the rig file that are wrong.
@@ -106,7 +110,7 @@ class DiagnosisSettings:
     transients: TransientSettings = field(default_factory=TransientSettings)
     screen: ScreenSettings = field(default_factory=ScreenSettings)
     search: SearchSettings = field(default_factory=SearchSettings)
-    faint: FaintSettings = field(default_factory=FaintSettings)
+    below_noise: BelowNoiseSettings = field(default_factory=BelowNoiseSettings)
     wrong_parameters: WrongParameterSettings = field(default_factory=WrongParameterSettings)
     evidence: EvidenceSettings = field(default_factory=EvidenceSettings)
     closures: ClosureSettings = field(default_factory=ClosureSettings)
@@ -121,8 +125,8 @@ class DiagnosisSettings:
             value = getattr(self, name)
             if not isinstance(value, group):
                 raise ParameterError(
-                    f"DiagnosisSettings.{name} is a {type(value).__name__}; "
-                    f"a {group.__name__} is needed"
+                    f"DiagnosisSettings.{name} is a {type(value).__name__}; a {group.__name__} is "
+                    "needed"
                 )
         seed = self.seed
         if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
@@ -153,8 +157,8 @@ class DiagnosisSettings:
         for name, value in values.items():
             if name != "seed" and name not in _GROUPS:
                 raise ParameterError(
-                    f"settings has {name!r}, which is not allowed: one of "
-                    f"{', '.join(_GROUPS)}, seed"
+                    f"settings has {name!r}, which is not allowed: one of {', '.join(_GROUPS)}, "
+                    "seed"
                 )
             if name != "seed" and not isinstance(value, Mapping):
                 raise ParameterError(
@@ -197,7 +201,7 @@ _GROUPS: dict[str, type[SettingsGroup]] = {
     "transients": TransientSettings,
     "screen": ScreenSettings,
     "search": SearchSettings,
-    "faint": FaintSettings,
+    "below_noise": BelowNoiseSettings,
     "wrong_parameters": WrongParameterSettings,
     "evidence": EvidenceSettings,
     "closures": ClosureSettings,

@@ -41,7 +41,7 @@ class NextExperimentSettings(SettingsGroup):
         0.01,
         unit="bit",
         least=0.0,
-        reason="doubt below which no experiment can add to the answer",
+        reason="uncertainty below which no experiment can add to the answer",
         origin="judgement",
     )
     effective_samples: float = setting(
@@ -80,7 +80,7 @@ class NextExperimentSettings(SettingsGroup):
         0.1,
         unit="1",
         least=0.0,
-        reason="share of the doubt below which the text asks for another sensor",
+        reason="share of the uncertainty below which the text suggests another sensor",
         origin="judgement",
     )
     pressure_noise: float = setting(
@@ -224,18 +224,20 @@ class WarningSettings(SettingsGroup):
         0.01,
         unit="1",
         above=0.0,
-        reason="share of the ambient pressure within which a recording that begins at it may hold "
-        "absolute pressures",
+        reason=(
+            "share of the ambient pressure within which a recording that begins at it may hold "
+            "absolute pressures"
+        ),
         origin="judgement",
     )
     least_pressure: float = setting(
         1e4,
         unit="Pa",
         above=0.0,
-        reason="gauge pressure that a channel never exceeds, from which its unit is doubted",
+        reason="gauge pressure that a channel never exceeds, below which its unit is questioned",
         origin="judgement",
     )
-    doubted_probability: float = setting(
+    no_mismatch_probability: float = setting(
         0.1,
         unit="1",
         least=0.0,

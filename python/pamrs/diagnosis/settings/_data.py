@@ -40,8 +40,10 @@ class PrepareSettings(SettingsGroup):
         2.0,
         unit="1",
         least=0.0,
-        reason="standard deviations of that variance that are allowed beside it for the shortest "
-        "stretch",
+        reason=(
+            "standard deviations of that variance that are allowed beside it for the shortest "
+            "stretch"
+        ),
         origin="docs/decisions/0022",
     )
     start_longer_stds: float = setting(
@@ -55,7 +57,9 @@ class PrepareSettings(SettingsGroup):
         2.0,
         unit="1",
         least=0.0,
-        reason="standard deviations by which the slopes of a shorter and a longer stretch may differ",
+        reason=(
+            "standard deviations by which the slopes of a shorter and a longer stretch may differ"
+        ),
         origin="Lepski (1991), docs/decisions/0022",
     )
     start_least_samples: int = setting(
@@ -106,8 +110,10 @@ class PrepareSettings(SettingsGroup):
         3.0,
         unit="standard deviations",
         above=0.0,
-        reason="how far the noise of two measured pressures may move a regulator's droop before "
-        "its block is left out",
+        reason=(
+            "how far the noise of two measured pressures may move a regulator's droop before its "
+            "block is left out"
+        ),
         origin="judgement",
     )
     arm_window: float = setting(
@@ -133,8 +139,10 @@ class PrepareSettings(SettingsGroup):
         4,
         unit="count",
         least=1,
-        reason="usable samples of a window for each state whose start is projected out; a window "
-        "with fewer is not used",
+        reason=(
+            "usable samples of a window for each state whose start is projected out; a window with "
+            "fewer is not used"
+        ),
         origin="judgement",
     )
     arm_step: float = setting(
@@ -263,16 +271,20 @@ class PlausibilitySettings(SettingsGroup):
         2e4,
         unit="Pa",
         above=0.0,
-        reason="change of a muscle's pressure during which the tank that feeds it cannot read one "
-        "and the same value",
+        reason=(
+            "change of a muscle's pressure during which the tank that feeds it cannot read one and "
+            "the same value"
+        ),
         origin="judgement",
     )
     frozen_motion_share: float = setting(
         0.1,
         unit="1",
         above=0.0,
-        reason="relative change of the muscles' pressure during which what they move cannot read "
-        "one and the same value",
+        reason=(
+            "relative change of the muscles' pressure during which what they move cannot read one "
+            "and the same value"
+        ),
         origin="judgement",
     )
     opposed_share: float = setting(
@@ -295,7 +307,9 @@ class PlausibilitySettings(SettingsGroup):
         0.02,
         unit="rad",
         above=0.0,
-        reason="change of a joint's angle up to which the muscles' volume hardly moves their pressure",
+        reason=(
+            "change of a joint's angle up to which the muscles' volume hardly moves their pressure"
+        ),
         origin="judgement",
     )
     still_length: float = setting(
@@ -327,14 +341,14 @@ class PlausibilitySettings(SettingsGroup):
         2e4,
         unit="Pa",
         above=0.0,
-        reason="range of a muscle's pressure below which its sense is not asked",
+        reason="range of a muscle's pressure below which its sense is not tested",
         origin="judgement",
     )
     sense_least_noises: float = setting(
         3.0,
         unit="noises",
         above=0.0,
-        reason="standard deviation of an angle below which its unit and sign are not asked",
+        reason="standard deviation of an angle below which its unit and sign are not tested",
         origin="judgement",
     )
     sense_wrong: float = setting(
@@ -386,8 +400,10 @@ class NoiseSettings(SettingsGroup):
         1.1,
         unit="1",
         least=1.0,
-        reason="factor by which the variance must exceed its noise level before it counts: noise "
-        "levels are estimates",
+        reason=(
+            "factor by which the variance must exceed its noise level before it counts: noise "
+            "levels are estimates"
+        ),
         origin="docs/decisions/0022, 55 healthy cases",
     )
     chance: float = setting(
@@ -402,8 +418,10 @@ class NoiseSettings(SettingsGroup):
         2.5,
         unit="1",
         least=1.0,
-        reason="variance over that of the noise which is a mismatch however much the noise level "
-        "scatters",
+        reason=(
+            "variance over that of the noise which is a mismatch however much the noise level "
+            "scatters"
+        ),
         origin="docs/decisions/0022",
     )
     most_log_limit: float = setting(

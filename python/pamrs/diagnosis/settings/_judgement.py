@@ -83,8 +83,10 @@ class EvidenceSettings(SettingsGroup):
         0.5,
         unit="1",
         least=0.0,
-        reason="excess variance over that of the noise from which recordings are asked how much an "
-        "effect leaves",
+        reason=(
+            "excess variance over that of the noise from which recordings are tested for how much "
+            "an effect leaves"
+        ),
         origin="docs/decisions/0014",
     )
     telling_share: float = setting(

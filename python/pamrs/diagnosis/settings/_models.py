@@ -17,8 +17,10 @@ class FitSettings(SettingsGroup):
         3.0,
         unit="tolerances",
         above=0.0,
-        reason="how far a baseline parameter may move: farther out it would stand for missing "
-        "physics, or for a wrong rig file",
+        reason=(
+            "how far a baseline parameter may move: farther out it would stand for missing "
+            "physics, or for a wrong rig file"
+        ),
         origin="docs/decisions/0014: with six, an inertia far out hid a mounting that gives way",
     )
     freed_multiple: float = setting(
@@ -33,7 +35,9 @@ class FitSettings(SettingsGroup):
         0.01,
         unit="1",
         above=0.0,
-        reason="share of an effect parameter's usual start that its scale in a fit has at the least",
+        reason=(
+            "share of an effect parameter's usual start that its scale in a fit has at the least"
+        ),
         origin="judgement",
     )
     least_start: float = setting(
@@ -61,14 +65,14 @@ class FitSettings(SettingsGroup):
         0.2,
         unit="chi-square",
         least=0.0,
-        reason="gain that a step has to promise, or the fit ends: noise makes as much",
+        reason="least predicted gain of a step, or the fit ends: noise makes as much",
         origin="judgement, docs/decisions/0014",
     )
     step_share: float = setting(
         2e-3,
         unit="1",
         least=0.0,
-        reason="share of the sum of squares that a step has to promise in a first fit",
+        reason="least predicted gain of a step in a first fit, as a share of the sum of squares",
         origin="docs/decisions/0014",
     )
     final_step_share: float = setting(
@@ -85,8 +89,10 @@ class FitSettings(SettingsGroup):
         30,
         unit="count",
         least=1,
-        reason="the same of a fit of baseline parameters alone: what it leaves undone looks like "
-        "missing physics",
+        reason=(
+            "the same of a fit of baseline parameters alone: what it leaves undone looks like "
+            "missing physics"
+        ),
         origin="docs/decisions/0022",
     )
     effect_evaluations: int = setting(
@@ -106,11 +112,11 @@ class FitSettings(SettingsGroup):
         reason="the same for the last stretch of a fit",
         origin="docs/decisions/0022",
     )
-    promise_evaluations: int = setting(
+    predicted_gain_evaluations: int = setting(
         50,
         unit="count",
         least=1,
-        reason="the same of the linear model that tells what freeing a parameter promises",
+        reason="the same of the linear model that predicts the gain of freeing a parameter",
         origin="judgement: to its end",
     )
     first_damping: float = setting(
@@ -131,8 +137,10 @@ class FitSettings(SettingsGroup):
         0.1,
         unit="tolerances",
         least=0.0,
-        reason="difference of two groups about one sensor's zero from which the group that knows "
-        "it less well is fitted again",
+        reason=(
+            "difference of two groups about one sensor's zero from which the group that knows it "
+            "less well is fitted again"
+        ),
         origin="docs/decisions/0022",
     )
     known_share: float = setting(
@@ -268,8 +276,10 @@ class ScreenSettings(SettingsGroup):
         0.002,
         unit="typical sizes",
         above=0.0,
-        reason="smallest size from which a fit starts: a compressor's delivery may be 500 times "
-        "smaller than typical",
+        reason=(
+            "smallest size from which a fit starts: a compressor's delivery may be 500 times "
+            "smaller than typical"
+        ),
         origin="docs/decisions/0020",
     )
     repeat_below: float = setting(
@@ -283,7 +293,7 @@ class ScreenSettings(SettingsGroup):
         3,
         unit="count",
         least=1,
-        reason="signatures of one start at the most, each at the size that the last one asked for",
+        reason="signatures of one start at the most, each at the size that the last one suggested",
         origin="judgement",
     )
     invisible: float = setting(
@@ -313,8 +323,10 @@ class ScreenSettings(SettingsGroup):
         unit="1",
         least=0.0,
         most=1.0,
-        reason="quantiles of a channel at which a place of contact is tried; one that is met from "
-        "above at the others",
+        reason=(
+            "quantiles of a channel at which a place of contact is tried; one that is met from "
+            "above at the others"
+        ),
         origin="judgement",
     )
     opening_shares: tuple[float, ...] = setting(
@@ -356,16 +368,20 @@ class ClosureSettings(SettingsGroup):
         0.8,
         unit="1",
         least=0.0,
-        reason="share of the mismatch that it may leave, held-out recordings included: what does "
-        "not carry over is no form of anything",
+        reason=(
+            "share of the mismatch that it may leave, held-out recordings included: what does not "
+            "carry over is no form of anything"
+        ),
         origin="judgement",
     )
     most_misfit_share: float = setting(
         0.75,
         unit="1",
         above=0.0,
-        reason="share of the misfit that it may leave: with less gain it mends what the smoothing "
-        "of the drives does",
+        reason=(
+            "share of the misfit that it may leave: with less gain it mends what the smoothing of "
+            "the drives does"
+        ),
         origin="judgement",
     )
     most_terms: int = setting(
@@ -379,8 +395,10 @@ class ClosureSettings(SettingsGroup):
         1e-6,
         unit="1",
         above=0.0,
-        reason="share of a term's effect on the residuals that must be left beside the baseline "
-        "and the terms before it",
+        reason=(
+            "share of a term's effect on the residuals that must be left beside the baseline and "
+            "the terms before it"
+        ),
         origin="judgement: rounding",
     )
     evaluations: int = setting(
@@ -395,8 +413,10 @@ class ClosureSettings(SettingsGroup):
         unit="1",
         above=0.0,
         most=1.0,
-        reason="share of the linear estimate from which the fit is tried where the whole of it "
-        "gains nothing",
+        reason=(
+            "share of the linear estimate from which the fit is tried where the whole of it gains "
+            "nothing"
+        ),
         origin="judgement",
     )
     shrunk_evaluations: int = setting(

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from pamrs.diagnosis.settings._setting import SettingsGroup, setting
 
-__all__ = ["FaintSettings", "SearchSettings", "WrongParameterSettings"]
+__all__ = ["BelowNoiseSettings", "SearchSettings", "WrongParameterSettings"]
 
 
 @dataclass(frozen=True)
@@ -17,8 +17,10 @@ class SearchSettings(SettingsGroup):
         2.0,
         unit="1",
         least=1.0,
-        reason="variance over that of the noise from which held-out recordings show a mismatch "
-        "that the fitted ones hardly show",
+        reason=(
+            "variance over that of the noise from which held-out recordings show a mismatch that "
+            "the fitted ones hardly show"
+        ),
         origin="docs/decisions/0020",
     )
     fitted_hint: float = setting(
@@ -76,7 +78,11 @@ class SearchSettings(SettingsGroup):
         origin="judgement; docs/decisions/0013",
     )
     most_singles: int = setting(
-        5, unit="count", least=1, reason="single effects that are fitted", origin="docs/decisions/0013"
+        5,
+        unit="count",
+        least=1,
+        reason="single effects that are fitted",
+        origin="docs/decisions/0013",
     )
     near_start: float = setting(
         0.6,
@@ -87,7 +93,11 @@ class SearchSettings(SettingsGroup):
         origin="judgement; docs/decisions/0013",
     )
     most_starts: int = setting(
-        2, unit="count", least=1, reason="starts of an effect that are fitted", origin="docs/decisions/0013"
+        2,
+        unit="count",
+        least=1,
+        reason="starts of an effect that are fitted",
+        origin="docs/decisions/0013",
     )
     effects_with_starts: int = setting(
         3,
@@ -110,23 +120,27 @@ class SearchSettings(SettingsGroup):
         0.01,
         unit="1",
         least=0.0,
-        reason="share of the mismatch that a partner has to promise",
+        reason="least predicted gain of a partner, as a share of the mismatch",
         origin="judgement; docs/decisions/0013",
     )
     transient_from: float = setting(
         0.15,
         unit="1",
         least=0.0,
-        reason="share of the mismatch that every persistent effect leaves, from which transient "
-        "ones are looked for",
+        reason=(
+            "share of the mismatch that every persistent effect leaves, from which transient ones "
+            "are looked for"
+        ),
         origin="judgement",
     )
     transient_beside: float = setting(
         0.08,
         unit="1",
         least=0.0,
-        reason="share that the best persistent effect leaves, from which transient ones are looked "
-        "for beside it",
+        reason=(
+            "share that the best persistent effect leaves, from which transient ones are looked "
+            "for beside it"
+        ),
         origin="docs/decisions/0020",
     )
     much_left: float = setting(
@@ -154,7 +168,7 @@ class SearchSettings(SettingsGroup):
 
 
 @dataclass(frozen=True)
-class FaintSettings(SettingsGroup):
+class BelowNoiseSettings(SettingsGroup):
     """How effects below the noise are looked for and weighed."""
 
     least_gain: float = setting(
@@ -194,7 +208,7 @@ class FaintSettings(SettingsGroup):
     log_odds: float = setting(
         6.0,
         unit="log odds",
-        reason="for a faint effect against unlisted where nothing speaks against it",
+        reason="for an effect below the noise against unlisted where nothing speaks against it",
         origin="docs/decisions/0020",
     )
     most_probability: float = setting(
@@ -202,15 +216,15 @@ class FaintSettings(SettingsGroup):
         unit="1",
         above=0.0,
         most=1.0,
-        reason="largest probability of a faint effect",
+        reason="largest probability of an effect below the noise",
         origin="docs/decisions/0020",
     )
     moved_tolerances: float = setting(
         1.75,
         unit="tolerances",
         above=0.0,
-        reason="movement of a parameter from which effects that do the same are asked whether it "
-        "could go back; no parameter of 91 healthy cases moved its zero by more than 1.2",
+        reason="movement of a parameter from which effects that do the same are tested for whether "
+        "it could go back; no parameter of 91 healthy cases moved its zero by more than 1.2",
         origin="docs/decisions/0021",
     )
     same_cosine: float = setting(
@@ -263,10 +277,10 @@ class WrongParameterSettings(SettingsGroup):
     effect_log_odds: float = setting(
         6.0,
         unit="log odds",
-        reason="against a faint effect beside it",
+        reason="against an effect below the noise beside it",
         origin="docs/decisions/0025",
     )
-    least_promise: float = setting(
+    least_predicted_gain: float = setting(
         9.2,
         unit="chi-square",
         least=0.0,
@@ -274,13 +288,17 @@ class WrongParameterSettings(SettingsGroup):
         origin="docs/decisions/0025",
     )
     most_pairs: int = setting(
-        2, unit="count", least=0, reason="pairs of parameters that are fitted", origin="docs/decisions/0025"
+        2,
+        unit="count",
+        least=0,
+        reason="pairs of parameters that are fitted",
+        origin="docs/decisions/0025",
     )
     pair_share: float = setting(
         0.08,
         unit="1",
         least=0.0,
-        reason="share of the largest promise from which a pair is fitted",
+        reason="share of the largest predicted gain from which a pair is fitted",
         origin="docs/decisions/0025",
     )
     wrong_together: tuple[tuple[str, str], ...] = setting(
@@ -292,7 +310,9 @@ class WrongParameterSettings(SettingsGroup):
             ("link.inertia", "link.mass"),
         ),
         unit="parameters",
-        reason="pairs that one mistake makes wrong together: another valve and fittings, another "
-        "load, another arm",
+        reason=(
+            "pairs that one mistake makes wrong together: another valve and fittings, another "
+            "load, another arm"
+        ),
         origin="docs/decisions/0025",
     )

@@ -1,9 +1,10 @@
-"""Strokes of a friction recording: where the motion turns, friction from pairs of strokes, and the onset of motion.
+"""Strokes of a friction recording: where the motion turns, friction from pairs of strokes, and the
+onset of motion.
 
-With the gas force ``A p`` and a force zero ``z`` the pull is ``z + A p + F`` while the piston moves against the gas
-and ``z + A p - F`` while it gives way. Half the difference of the two directions at the same position is friction,
-``F = half_force - A half_pressure``; half the sum is ``z + A p``. A difference between the frictions of the two
-directions is not separable from ``A`` and ``z``.
+With the gas force ``A p`` and a force zero ``z`` the pull is ``z + A p + F`` while the piston moves
+against the gas and ``z + A p - F`` while it gives way. Half the difference of the two directions at
+the same position is friction, ``F = half_force - A half_pressure``; half the sum is ``z + A p``. A
+difference between the frictions of the two directions is not separable from ``A`` and ``z``.
 """
 
 from __future__ import annotations
@@ -17,7 +18,15 @@ from numpy.typing import NDArray
 from pamrs.errors import ParameterError, RecordingError
 from pamrs.fit.cylinder.record import FrictionRecord
 
-__all__ = ["Onset", "Stroke", "StrokePairs", "find_strokes", "onset_at_rest", "pair_strokes", "reversal_onsets"]
+__all__ = [
+    "Onset",
+    "Stroke",
+    "StrokePairs",
+    "find_strokes",
+    "onset_at_rest",
+    "pair_strokes",
+    "reversal_onsets",
+]
 
 Array = NDArray[np.float64]
 
@@ -33,7 +42,9 @@ _MOVING: Final = 0.5  # of the sliding speed: a record that begins faster does n
 
 @dataclass(frozen=True, slots=True)
 class Stroke:
-    """One stroke: used rows ``start`` to ``stop`` (excluded), ``direction`` +1 while the position grows."""
+    """One stroke: used rows ``start`` to ``stop`` (excluded), ``direction`` +1 while the position
+    grows.
+    """
 
     direction: int
     start: int
@@ -57,8 +68,9 @@ class Onset:
     travel : float
         Distance moved by then [m].
     status : str
-        ``seen`` (no gap of the logger); ``at least`` (a gap, but a peak was sampled: the true one may be higher);
-        ``missed`` (a gap, and no peak was sampled); ``in motion`` (the record does not begin at rest).
+        ``seen`` (no gap of the logger); ``at least`` (a gap, but a peak was sampled: the true one
+        may be higher); ``missed`` (a gap, and no peak was sampled); ``in motion`` (the record does
+        not begin at rest).
     """
 
     peak: float
@@ -82,7 +94,8 @@ class StrokePairs:
     window : (float, float)
         Positions between which steady sliding is taken [m].
     half_force, half_pressure : (n,) array
-        Half of (against the gas minus giving way): force [N], pressure [Pa], averaged over the window.
+        Half of (against the gas minus giving way): force [N], pressure [Pa], averaged over the
+        window.
     mid_force, mid_pressure : (n,) array
         Half of the sums.
     speed_against, speed_giving : (n,) array
@@ -156,7 +169,9 @@ def find_strokes(record: FrictionRecord) -> list[Stroke]:
             way, extreme, at = -way, here, row
     turns.append(at)
     if len(turns) < 3:
-        raise RecordingError(f"{record.name}: the motion never reverses; friction needs both directions of motion")
+        raise RecordingError(
+            f"{record.name}: the motion never reverses; friction needs both directions of motion"
+        )
     strokes = []
     for start, stop in zip(turns[:-1], turns[1:], strict=True):
         strokes.append(Stroke(1 if position[stop] > position[start] else -1, start, stop))
@@ -171,7 +186,8 @@ def pair_strokes(record: FrictionRecord, *, margin: float = 0.25) -> StrokePairs
     record : FrictionRecord
         One run with at least three strokes to and fro.
     margin : float
-        Share of the common travel left out at each end, where the motion starts and stops; 0 to 0.45.
+        Share of the common travel left out at each end, where the motion starts and stops; 0 to
+        0.45.
 
     Returns
     -------
@@ -194,7 +210,9 @@ def pair_strokes(record: FrictionRecord, *, margin: float = 0.25) -> StrokePairs
     low, high = float(np.max(ends[full, 0])), float(np.min(ends[full, 1]))
     window = (low + margin * (high - low), high - margin * (high - low))
     grid = np.linspace(*window, _GRID)
-    issues = [f"{record.name}: stroke {k + 1} is cut short: left out" for k in np.flatnonzero(~full)]
+    issues = [
+        f"{record.name}: stroke {k + 1} is cut short: left out" for k in np.flatnonzero(~full)
+    ]
     rows: list[tuple[float, ...]] = []
     members: list[tuple[int, int]] = []
     k = 0
@@ -202,10 +220,16 @@ def pair_strokes(record: FrictionRecord, *, margin: float = 0.25) -> StrokePairs
         if not (full[k] and full[k + 1]):
             k += 1
             continue
-        laid = [_onto(grid, stroke, position, force, pressure, _HOLE * (high - low)) for stroke in strokes[k : k + 2]]
+        laid = [
+            _onto(grid, stroke, position, force, pressure, _HOLE * (high - low))
+            for stroke in strokes[k : k + 2]
+        ]
         both = laid[0][2] & laid[1][2]
         if both.mean() < 0.5:
-            issues.append(f"{record.name}: strokes {k + 1} and {k + 2} share less than half of the window with samples: left out")
+            issues.append(
+                f"{record.name}: strokes {k + 1} and {k + 2} share less than half of the window "
+                "with samples: left out"
+            )
         else:
             against = 0 if strokes[k].direction > 0 else 1
             (f1, p1, _), (f0, p0, _) = laid[against], laid[1 - against]
@@ -216,7 +240,8 @@ def pair_strokes(record: FrictionRecord, *, margin: float = 0.25) -> StrokePairs
         k += 2
     if len(rows) < _FEWEST:
         raise RecordingError(
-            f"{record.name}: {len(rows)} complete pairs of strokes; {_FEWEST} at least are needed for a standard error"
+            f"{record.name}: {len(rows)} complete pairs of strokes; {_FEWEST} at least are needed "
+            "for a standard error"
         )
     table = np.array(rows)
     sign = 1 if np.median(table[:, 0]) >= 0.0 else -1
@@ -262,12 +287,19 @@ def onset_at_rest(pairs: StrokePairs, area: float) -> Onset | None:
     ratio, row, ripple = _peak(pairs, stroke, middle, area, onset=_BREAKAWAY)
     peak, moved = ratio * middle[1], abs(float(position[row] - position[stroke.start]))
     travel = float(np.ptp(position))
-    begin = stroke.start + int(np.argmax(np.abs(position[stroke.start : stroke.stop] - position[stroke.start]) > _BREAKAWAY * travel))
+    begin = stroke.start + int(
+        np.argmax(
+            np.abs(position[stroke.start : stroke.stop] - position[stroke.start])
+            > _BREAKAWAY * travel
+        )
+    )
     steps = np.diff(time[stroke.start : begin + 1])
     usual = float(np.median(np.diff(time)))
     head = slice(stroke.start, stroke.start + 4)
     if np.all(np.diff(time[head]) < 2.0 * usual):
-        early = abs(float(position[head][-1] - position[head][0])) / float(time[head][-1] - time[head][0])
+        early = abs(float(position[head][-1] - position[head][0])) / float(
+            time[head][-1] - time[head][0]
+        )
         if early > _MOVING * _speed(stroke, time, position, pairs.window):
             return Onset(peak, ratio, ripple, row, moved, "in motion")
     cut = bool(np.max(steps, initial=0.0) > 5.0 * usual)
@@ -324,21 +356,34 @@ def _speed(stroke: Stroke, time: Array, position: Array, window: tuple[float, fl
 
 
 def _middle(pairs: StrokePairs, first: int, second: int, area: float) -> tuple[Array, float]:
-    """Half-sum of ``force - area pressure`` of two strokes as a straight line over the position, and half their difference."""
+    """Half-sum of ``force - area pressure`` of two strokes as a straight line over the position,
+    and half their difference.
+    """
     _, position, pressure, force = pairs.record.rows()
     grid = np.linspace(*pairs.window, _GRID)
     net = force - area * pressure
-    a, b = (_onto(grid, pairs.strokes[k], position, net, pressure, np.inf)[0] for k in (first, second))
+    a, b = (
+        _onto(grid, pairs.strokes[k], position, net, pressure, np.inf)[0] for k in (first, second)
+    )
     return np.polyfit(grid, 0.5 * (a + b), 1), 0.5 * abs(float(np.mean(a - b)))
 
 
-def _peak(pairs: StrokePairs, stroke: Stroke, middle: tuple[Array, float], area: float, *, onset: float) -> tuple[float, int, float]:
-    """Largest friction at a stroke's onset over its sliding friction, its row, and the same of stretches in the middle."""
+def _peak(
+    pairs: StrokePairs, stroke: Stroke, middle: tuple[Array, float], area: float, *, onset: float
+) -> tuple[float, int, float]:
+    """Largest friction at a stroke's onset over its sliding friction, its row, and the same of
+    stretches in the middle.
+    """
     _, position, pressure, force = pairs.record.rows()
     rows = np.arange(stroke.start, stroke.stop + 1)
     line, friction = middle
     x = position[rows]
-    excess = pairs.sign * stroke.direction * (force[rows] - area * pressure[rows] - np.polyval(line, x)) / friction
+    excess = (
+        pairs.sign
+        * stroke.direction
+        * (force[rows] - area * pressure[rows] - np.polyval(line, x))
+        / friction
+    )
     moved = np.abs(x - x[0])
     early = np.flatnonzero(moved <= onset * float(np.ptp(position)))
     top = int(early[np.argmax(excess[early])])

@@ -1,9 +1,12 @@
-"""What a cylinder's friction depends on: laws of pressure and of speed side by side, with probabilities.
+"""What a cylinder's friction depends on: laws of pressure and of speed side by side, with
+probabilities.
 
-Every law is ``F = f0 + f1 p + fv v + fs exp(-v / vs)`` with some of its terms, each of them friction, so that none is negative.
-The observations are the pressures (levels), each a mean over its pairs of strokes; they scatter about the law by that mean's error
-and by what differs from run to run. Coefficients, speed scale and scatter are integrated over wide priors of the size of the
-friction itself (Kass & Raftery 1995), and each level is predicted from the others, which asks for no such prior's height.
+Every law is ``F = f0 + f1 p + fv v + fs exp(-v / vs)`` with some of its terms, each of them
+friction, so that none is negative. The observations are the pressures (levels), each a mean over
+its pairs of strokes; they scatter about the law by that mean's error and by what differs from run
+to run. Coefficients, speed scale and scatter are integrated over wide priors of the size of the
+friction itself (Kass & Raftery 1995), and each level is predicted from the others, which asks for
+no such prior's height.
 """
 
 from __future__ import annotations
@@ -53,10 +56,11 @@ class LawComparison:
     probabilities : dict of str to float
         Of each law, all being equally likely beforehand; they add up to 1.
     held_out : dict of str to float
-        Sum over the levels of the logarithm of the density that the law fitted to the others gives them; larger is better.
+        Sum over the levels of the logarithm of the density that the law fitted to the others gives
+        them; larger is better.
     range : (float, float)
-        Lowest and highest probability that friction depends on pressure, with priors a third and three times as wide, and without
-        each of the levels in turn.
+        Lowest and highest probability that friction depends on pressure, with priors a third and
+        three times as wide, and without each of the levels in turn.
     speed_correlation : float
         Of speed and pressure over the levels.
     levels : list of LevelFriction
@@ -77,7 +81,9 @@ class LawComparison:
 
     @property
     def settled(self) -> bool:
-        """Whether pressure is named: by the probability under every prior and subset, and by the levels predicted from the others."""
+        """Whether pressure is named: by the probability under every prior and subset, and by the
+        levels predicted from the others.
+        """
         best = max(self.held_out, key=lambda law: self.held_out[law])
         return self.range[0] >= _TOLD and "p" in COMPARED[best]
 
@@ -85,16 +91,24 @@ class LawComparison:
         """The result in words, and what cannot be told apart."""
         low, high = self.range
         best = max(self.probabilities, key=lambda law: self.probabilities[law])
-        said = "depends on pressure" if self.settled else "is not settled: it may depend on pressure or on speed alone"
+        said = (
+            "depends on pressure"
+            if self.settled
+            else "is not settled: it may depend on pressure or on speed alone"
+        )
         text = (
-            f"{self.name}: friction {said} (probability {self.pressure:.3f}, {low:.2f} to {high:.2f} over priors and subsets); "
-            f"most probable {best} ({self.probabilities[best]:.2f})"
+            f"{self.name}: friction {said} (probability {self.pressure:.3f}, {low:.2f} to "
+            f"{high:.2f} over priors and subsets); most probable {best} "
+            f"({self.probabilities[best]:.2f})"
         )
         near = [law for law, p in self.probabilities.items() if law != best and p > 0.05]
         if near:
             text += f", not separable from {' and '.join(near)}"
         if abs(self.speed_correlation) > _COLLINEAR:
-            text += f"; speed goes with pressure (correlation {self.speed_correlation:.2f}), so that a share of it may be the speed's"
+            text += (
+                f"; speed goes with pressure (correlation {self.speed_correlation:.2f}), so that a "
+                "share of it may be the speed's"
+            )
         return text
 
 
@@ -120,26 +134,46 @@ def compare_friction_laws(records: Sequence[FrictionRecord], *, name: str = "") 
     fitted = fit_cylinder_friction(records, law="linear")
     levels = fitted.levels
     if len(levels) < _FEWEST:
-        raise RecordingError(f"{fitted.name}: {len(levels)} pressures; at least {_FEWEST} are needed to compare laws")
+        raise RecordingError(
+            f"{fitted.name}: {len(levels)} pressures; at least {_FEWEST} are needed to compare laws"
+        )
     everything = np.ones(len(levels), dtype=bool)
     likelihoods = {law: _log_likelihoods(law, levels, 1.0) for law in COMPARED}
     total = {law: _evidence(rows, everything) for law, rows in likelihoods.items()}
-    without = [{law: _evidence(rows, np.arange(len(levels)) != k) for law, rows in likelihoods.items()} for k in range(len(levels))]
+    without = [
+        {law: _evidence(rows, np.arange(len(levels)) != k) for law, rows in likelihoods.items()}
+        for k in range(len(levels))
+    ]
     held = {law: sum(total[law] - part[law] for part in without) for law in COMPARED}
     tried = [total, *(without if len(levels) > _FEWEST else [])]
-    tried += [{law: _evidence(_log_likelihoods(law, levels, width), everything) for law in COMPARED} for width in (1 / 3, 3.0)]
-    shares = [sum(p for law, p in _shares(found).items() if "p" in COMPARED[law]) for found in tried]
-    return LawComparison(name or fitted.name, _shares(total), held, (min(shares), max(shares)), fitted.speed_correlation, levels)
+    tried += [
+        {law: _evidence(_log_likelihoods(law, levels, width), everything) for law in COMPARED}
+        for width in (1 / 3, 3.0)
+    ]
+    shares = [
+        sum(p for law, p in _shares(found).items() if "p" in COMPARED[law]) for found in tried
+    ]
+    return LawComparison(
+        name or fitted.name,
+        _shares(total),
+        held,
+        (min(shares), max(shares)),
+        fitted.speed_correlation,
+        levels,
+    )
 
 
 def _log_likelihoods(law: str, levels: Sequence[LevelFriction], width: float) -> Array:
     """Logarithm of each level's density (columns) under draws from the law's prior (rows)."""
     friction, error, pressure, speed = (
-        np.array([getattr(level, key) for level in levels]) for key in ("friction", "stderr", "pressure", "speed")
+        np.array([getattr(level, key) for level in levels])
+        for key in ("friction", "stderr", "pressure", "speed")
     )
     size = float(np.mean(np.abs(friction)))
     draws = qmc.Sobol(6, scramble=True, seed=1).random(_DRAWS)
-    weight = width * size * norm.ppf(0.5 + 0.5 * np.clip(draws[:, :4], 1e-9, 1.0 - 1e-9))  # no friction is negative
+    weight = (
+        width * size * norm.ppf(0.5 + 0.5 * np.clip(draws[:, :4], 1e-9, 1.0 - 1e-9))
+    )  # no friction is negative
     scatter = size * _SCATTER[0] * (_SCATTER[1] / _SCATTER[0]) ** draws[:, 4]
     scale = speed.mean() * _SPEEDS[0] * (_SPEEDS[1] / _SPEEDS[0]) ** draws[:, 5]
     falling = np.exp(-speed / scale[:, None])
@@ -150,7 +184,9 @@ def _log_likelihoods(law: str, levels: Sequence[LevelFriction], width: float) ->
         "s": weight[:, 3:4] * falling / np.exp(-speed.mean() / scale)[:, None],
     }
     model = np.sum([terms[term] for term in COMPARED[law]], axis=0)
-    return np.asarray(norm.logpdf(friction, model, np.hypot(scatter[:, None], error)), dtype=np.float64)
+    return np.asarray(
+        norm.logpdf(friction, model, np.hypot(scatter[:, None], error)), dtype=np.float64
+    )
 
 
 def _evidence(rows: Array, used: NDArray[np.bool_]) -> float:

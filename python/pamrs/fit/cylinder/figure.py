@@ -57,7 +57,13 @@ def plot_cylinders(fits: Sequence[CylinderFriction], *, loop: str | None = None)
             axes.set_ylabel("friction [N]")
     levels = [level for fit in fits for level in (*fit.levels, *fit.held_out_levels)]
     first.set_ylim(0.0, 1.08 * max(level.breakaway or level.friction for level in levels))
-    figure.legend(*first.get_legend_handles_labels(), fontsize=8, loc="outside upper center", ncols=6, frameon=False)
+    figure.legend(
+        *first.get_legend_handles_labels(),
+        fontsize=8,
+        loc="outside upper center",
+        ncols=6,
+        frameon=False,
+    )
     _loop(figure.add_subplot(spec[1, :columns]), owner, run)
     _start(figure.add_subplot(spec[1, columns:]), owner, run)
     return figure
@@ -69,7 +75,11 @@ def _loop_of(fits: Sequence[CylinderFriction], loop: str | None) -> tuple[Cylind
         if loop not in runs:
             raise ParameterError(f"loop = {loop!r} is no run of these cylinders: {', '.join(runs)}")
         return runs[loop], loop
-    peaks = {level.name: level.breakaway or 0.0 for fit in fits for level in (*fit.levels, *fit.held_out_levels)}
+    peaks = {
+        level.name: level.breakaway or 0.0
+        for fit in fits
+        for level in (*fit.levels, *fit.held_out_levels)
+    }
     best = max(peaks, key=lambda name: peaks[name])
     return runs[best], best
 
@@ -88,20 +98,44 @@ def _law(axes: Any, fit: CylinderFriction) -> None:
             spread = np.sqrt(np.einsum("ij,jk,ik->i", design, fit.covar, design) + fit.between**2)
             factor = float(t.ppf(0.84134, fit.nfree))
             axes.fill_between(
-                p / 1e5, law - factor * spread, law + factor * spread, color=_BLUE, alpha=0.13, lw=0, label="68 % for a new run"
+                p / 1e5,
+                law - factor * spread,
+                law + factor * spread,
+                color=_BLUE,
+                alpha=0.13,
+                lw=0,
+                label="68 % for a new run",
             )
     marks: dict[str, Any] = {"ls": "none", "ms": 6, "capsize": 2}
     for levels, style, label in (
         (fit.levels, {"marker": "o", "color": _BLUE}, "fitted on"),
-        (fit.held_out_levels, {"marker": "o", "color": _RED, "mfc": "white", "mew": 1.6}, "held out"),
+        (
+            fit.held_out_levels,
+            {"marker": "o", "color": _RED, "mfc": "white", "mew": 1.6},
+            "held out",
+        ),
     ):
         if levels:
             x = [level.pressure / 1e5 for level in levels]
             y = [level.friction for level in levels]
             axes.errorbar(x, y, [level.stderr for level in levels], label=label, **style, **marks)
-    for status, marker, label in (("seen", "v", "breakaway from rest"), ("at least", "^", "breakaway, at least")):
-        found = [(x.pressure / 1e5, x.breakaway) for x in everything if x.rest is not None and x.rest.status == status]
-        axes.plot(*(zip(*found, strict=True) if found else ([], [])), marker, color=_GREEN, ms=6, mfc="none", label=label)
+    for status, marker, label in (
+        ("seen", "v", "breakaway from rest"),
+        ("at least", "^", "breakaway, at least"),
+    ):
+        found = [
+            (x.pressure / 1e5, x.breakaway)
+            for x in everything
+            if x.rest is not None and x.rest.status == status
+        ]
+        axes.plot(
+            *(zip(*found, strict=True) if found else ([], [])),
+            marker,
+            color=_GREEN,
+            ms=6,
+            mfc="none",
+            label=label,
+        )
     axes.set_title(fit.name, fontsize=10)
     axes.set_xlabel("pressure [bar]")
     axes.set_xlim(0.0, 1.06 * high / 1e5)
@@ -111,22 +145,49 @@ def _law(axes: Any, fit: CylinderFriction) -> None:
 def _loop(axes: Any, fit: CylinderFriction, run: str) -> None:
     pairs = fit.pairs[run]
     _, position, pressure, force = pairs.record.rows()
-    net = force - fit.area * pressure - (fit.params["force_zero"].value if "force_zero" in fit.params else 0.0)
-    axes.axvspan(pairs.window[0] * 1e3, pairs.window[1] * 1e3, color=_GREY, alpha=0.13, lw=0, label="steady window")
-    for way, color, label in ((pairs.sign, _BLUE, "against the gas"), (-pairs.sign, _RED, "giving way")):
+    net = (
+        force
+        - fit.area * pressure
+        - (fit.params["force_zero"].value if "force_zero" in fit.params else 0.0)
+    )
+    axes.axvspan(
+        pairs.window[0] * 1e3,
+        pairs.window[1] * 1e3,
+        color=_GREY,
+        alpha=0.13,
+        lw=0,
+        label="steady window",
+    )
+    for way, color, label in (
+        (pairs.sign, _BLUE, "against the gas"),
+        (-pairs.sign, _RED, "giving way"),
+    ):
         for stroke in pairs.strokes:
             if stroke.direction == way:
                 rows = slice(stroke.start, stroke.stop + 1)
-                axes.plot(position[rows] * 1e3, net[rows], color=color, lw=0.6, alpha=0.7, label=label)
+                axes.plot(
+                    position[rows] * 1e3, net[rows], color=color, lw=0.6, alpha=0.7, label=label
+                )
                 label = "_"
     turns = [stroke.start for stroke in pairs.strokes[1:]]
     axes.plot(position[turns] * 1e3, net[turns], ".", color="k", ms=5, label="reversals")
     level = next(level for level in (*fit.levels, *fit.held_out_levels) if level.name == run)
     if level.rest is not None and level.breakaway is not None:
         row = level.rest.row
-        axes.plot(position[row] * 1e3, net[row], "v", color=_GREEN, ms=9, mfc="none", mew=1.6, label="breakaway from rest")
+        axes.plot(
+            position[row] * 1e3,
+            net[row],
+            "v",
+            color=_GREEN,
+            ms=9,
+            mfc="none",
+            mew=1.6,
+            label="breakaway from rest",
+        )
     axes.margins(y=0.12)
-    axes.set_title(f"{run}: loop of {len(pairs.strokes)} strokes, {level.pressure / 1e5:.1f} bar", fontsize=10)
+    axes.set_title(
+        f"{run}: loop of {len(pairs.strokes)} strokes, {level.pressure / 1e5:.1f} bar", fontsize=10
+    )
     axes.set_xlabel("position [mm]")
     axes.set_ylabel("force - A p - zero [N]")
     axes.legend(fontsize=7.5, loc="center", frameon=False)
@@ -136,11 +197,17 @@ def _loop(axes: Any, fit: CylinderFriction, run: str) -> None:
 def _start(axes: Any, fit: CylinderFriction, run: str) -> None:
     pairs = fit.pairs[run]
     time, position, pressure, force = pairs.record.rows()
-    net = force - fit.area * pressure - (fit.params["force_zero"].value if "force_zero" in fit.params else 0.0)
+    net = (
+        force
+        - fit.area * pressure
+        - (fit.params["force_zero"].value if "force_zero" in fit.params else 0.0)
+    )
     moved = np.abs(position - position[0])
     begin = float(time[int(np.argmax(moved > 1e-4))])
     rows = (time >= begin - _BEFORE_REST) & (time <= begin + _AFTER_REST)
-    axes.plot(time[rows] - begin, net[rows], ".-", color=_BLUE, lw=0.8, ms=4, label="force - A p - zero")
+    axes.plot(
+        time[rows] - begin, net[rows], ".-", color=_BLUE, lw=0.8, ms=4, label="force - A p - zero"
+    )
     label = "logger paused"
     for start, stop in pairs.record.gaps:
         if start < begin + _AFTER_REST and stop > begin - _BEFORE_REST:
@@ -149,7 +216,16 @@ def _start(axes: Any, fit: CylinderFriction, run: str) -> None:
     level = next(level for level in (*fit.levels, *fit.held_out_levels) if level.name == run)
     if level.rest is not None and level.breakaway is not None:
         row = level.rest.row
-        axes.plot(time[row] - begin, net[row], "v", color=_GREEN, ms=9, mfc="none", mew=1.6, label=f"{level.breakaway:.1f} N")
+        axes.plot(
+            time[row] - begin,
+            net[row],
+            "v",
+            color=_GREEN,
+            ms=9,
+            mfc="none",
+            mew=1.6,
+            label=f"{level.breakaway:.1f} N",
+        )
     axes.margins(y=0.12)
     axes.set_xlabel("time since the motion began [s]")
     axes.set_ylabel("force - A p - zero [N]")
@@ -158,5 +234,7 @@ def _start(axes: Any, fit: CylinderFriction, run: str) -> None:
     other.plot(time[rows] - begin, moved[rows] * 1e3, color=_GREY, lw=1.0, ls="--", label="travel")
     other.set_ylabel("travel [mm]", color=_GREY)
     lines = [*axes.get_legend_handles_labels()[0], *other.get_legend_handles_labels()[0]]
-    axes.legend(lines, [line.get_label() for line in lines], fontsize=7.5, loc="lower right", frameon=False)
+    axes.legend(
+        lines, [line.get_label() for line in lines], fontsize=7.5, loc="lower right", frameon=False
+    )
     axes.grid(alpha=0.25)

@@ -1,8 +1,9 @@
-"""Pressure-dependent friction of a pneumatic cylinder, fitted on some pressures and predicted on others.
+"""Pressure-dependent friction of a pneumatic cylinder, fitted on some pressures and predicted on
+others.
 
-Sliding friction ``F_c = f0 + f1 p`` and its neighbours (constant, proportional, quadratic, with a speed term), and the
-breakaway from rest ``F_b = ratio F_c``. Pairs of strokes are the repeats within a pressure, pressures the independent
-observations of the law.
+Sliding friction ``F_c = f0 + f1 p`` and its neighbours (constant, proportional, quadratic, with a
+speed term), and the breakaway from rest ``F_b = ratio F_c``. Pairs of strokes are the repeats
+within a pressure, pressures the independent observations of the law.
 """
 
 from __future__ import annotations
@@ -17,7 +18,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from pamrs.errors import ParameterError, RecordingError
 from pamrs.fit._level_line import LawParameter, fit_levels, mean_of_series
-from pamrs.fit.cylinder._strokes import Onset, StrokePairs, onset_at_rest, pair_strokes, reversal_onsets
+from pamrs.fit.cylinder._strokes import (
+    Onset,
+    StrokePairs,
+    onset_at_rest,
+    pair_strokes,
+    reversal_onsets,
+)
 from pamrs.fit.cylinder.record import FrictionRecord
 
 if TYPE_CHECKING:
@@ -61,8 +68,8 @@ class LevelFriction:
     rest : Onset or None
         The breakaway from rest; None if the first stroke is not usable.
     reversal_ratio, reversal_stderr, reversal_ripple : float
-        Largest friction in the first tenth of a stroke after a reversal over the sliding friction: mean over strokes, its
-        standard error, and the same of equally long stretches in the middle.
+        Largest friction in the first tenth of a stroke after a reversal over the sliding friction:
+        mean over strokes, its standard error, and the same of equally long stretches in the middle.
     """
 
     name: str
@@ -133,7 +140,8 @@ class CylinderFriction:
     name, law : str
         The cylinder, and the key of :data:`LAWS`.
     params : dict of str to LawParameter
-        ``f0`` [N], ``f1`` [N/Pa] and so on, ``breakaway_ratio`` [1] where a peak was sampled, ``area`` [m2], ``force_zero`` [N].
+        ``f0`` [N], ``f1`` [N/Pa] and so on, ``breakaway_ratio`` [1] where a peak was sampled,
+        ``area`` [m2], ``force_zero`` [N].
     levels, held_out_levels : list of LevelFriction
         Pressures of the fit, by rising pressure, and those left out.
     best_fit, residual : (m,) array
@@ -143,7 +151,8 @@ class CylinderFriction:
     redchi : float
         Reduced chi-square with the scatter of the strokes alone; NaN without a spare level.
     between : float
-        Scatter of the levels about the law beyond that of their strokes [N]; NaN without a spare level.
+        Scatter of the levels about the law beyond that of their strokes [N]; NaN without a spare
+        level.
     covar : (k, k) array
         Covariance of the law's coefficients.
     pairs : dict of str to StrokePairs
@@ -180,7 +189,9 @@ class CylinderFriction:
 
     @property
     def speed_correlation(self) -> float:
-        """Correlation of sliding speed and pressure over the levels of the fit; NaN with fewer than three."""
+        """Correlation of sliding speed and pressure over the levels of the fit; NaN with fewer than
+        three.
+        """
         return _correlation(self.levels)
 
     def predict(self, pressure: ArrayLike, velocity: ArrayLike | None = None) -> Array:
@@ -191,8 +202,8 @@ class CylinderFriction:
         pressure : array_like
             Gauge pressure [Pa].
         velocity : array_like, optional
-            Velocity [m/s], broadcast against ``pressure``; with it the friction has the sign of the velocity and is 0 at rest.
-            The law ``linear_speed`` needs it.
+            Velocity [m/s], broadcast against ``pressure``; with it the friction has the sign of the
+            velocity and is 0 at rest. The law ``linear_speed`` needs it.
 
         Returns
         -------
@@ -233,7 +244,9 @@ class CylinderFriction:
             If no breakaway peak was sampled at the pressures of the fit.
         """
         if "breakaway_ratio" not in self.params:
-            raise ParameterError(f"{self.name}: no breakaway peak was sampled at the pressures of the fit")
+            raise ParameterError(
+                f"{self.name}: no breakaway peak was sampled at the pressures of the fit"
+            )
         return np.asarray(self.params["breakaway_ratio"].value * self.predict(pressure))
 
     def held_out(self) -> list[HeldOut]:
@@ -286,7 +299,9 @@ class CylinderFriction:
         value = float(row @ self._coefficients())
         ratio = self.params.get("breakaway_ratio")
         outside = not self.pressures.min() <= level.pressure <= self.pressures.max()
-        return HeldOut(level, value, stderr, None if ratio is None else ratio.value * value, outside)
+        return HeldOut(
+            level, value, stderr, None if ratio is None else ratio.value * value, outside
+        )
 
 
 def fit_cylinder_friction(
@@ -308,7 +323,8 @@ def fit_cylinder_friction(
     law : str
         A key of :data:`LAWS`.
     area : float, optional
-        Piston area [m2]; by default the slope of the mean pull of both directions over the pressures of the fit.
+        Piston area [m2]; by default the slope of the mean pull of both directions over the
+        pressures of the fit.
     margin : float
         Share of the travel left out at each end of the strokes.
 
@@ -321,7 +337,8 @@ def fit_cylinder_friction(
     ParameterError
         If an argument is not possible, or no run has a pressure of ``fit_on``.
     RecordingError
-        If a run has no reversal or too few strokes, or the pressures do not determine the law or the area.
+        If a run has no reversal or too few strokes, or the pressures do not determine the law or
+        the area.
     """
     if law not in LAWS:
         raise ParameterError(f"law = {law!r} is not allowed: {', '.join(LAWS)}")
@@ -331,12 +348,18 @@ def fit_cylinder_friction(
         raise ParameterError("records is empty: one run at least is needed")
     owners = sorted({record.cylinder for record in records})
     if len(owners) > 1:
-        raise ParameterError(f"records belong to {len(owners)} cylinders ({', '.join(owners)}): fit one at a time")
+        raise ParameterError(
+            f"records belong to {len(owners)} cylinders ({', '.join(owners)}): fit one at a time"
+        )
     names = [record.name for record in records]
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
-        raise ParameterError(f"records: {twice[0]!r} is there twice; every run needs a name of its own")
-    pairs = sorted((pair_strokes(record, margin=margin) for record in records), key=lambda item: item.pressure)
+        raise ParameterError(
+            f"records: {twice[0]!r} is there twice; every run needs a name of its own"
+        )
+    pairs = sorted(
+        (pair_strokes(record, margin=margin) for record in records), key=lambda item: item.pressure
+    )
     chosen = _chosen(pairs, fit_on)
     rest = [item for item in pairs if item not in chosen]
     return _fit(owners[0], chosen, rest, law, area)
@@ -350,25 +373,45 @@ def _chosen(pairs: list[StrokePairs], fit_on: Sequence[float] | None) -> list[St
         near = [item for item in pairs if abs(item.pressure - pressure) <= _SAME * abs(pressure)]
         if not near:
             have = ", ".join(f"{item.pressure / 1e3:.0f}" for item in pairs)
-            raise ParameterError(f"fit_on: no run at {pressure / 1e3:g} kPa; there are runs at {have} kPa")
+            raise ParameterError(
+                f"fit_on: no run at {pressure / 1e3:g} kPa; there are runs at {have} kPa"
+            )
         found += [item for item in near if item not in found]
     return sorted(found, key=lambda item: item.pressure)
 
 
-def _fit(name: str, chosen: list[StrokePairs], rest: list[StrokePairs], law: str, area: float | None) -> CylinderFriction:
+def _fit(
+    name: str, chosen: list[StrokePairs], rest: list[StrokePairs], law: str, area: float | None
+) -> CylinderFriction:
     terms = LAWS[law]
-    distinct = 1 + sum(b.pressure - a.pressure > _SAME * b.pressure for a, b in zip(chosen[:-1], chosen[1:], strict=True))
+    distinct = 1 + sum(
+        b.pressure - a.pressure > _SAME * b.pressure
+        for a, b in zip(chosen[:-1], chosen[1:], strict=True)
+    )
     if distinct < len(terms):
         have = ", ".join(f"{item.pressure / 1e3:.0f}" for item in chosen)
-        what = "the slope f1 of friction over pressure is" if distinct == 1 else f"the {len(terms)} coefficients of the law {law!r} are"
-        raise RecordingError(f"{name}: {distinct} pressure{'s' if distinct > 1 else ''} ({have} kPa): {what} not determinable")
+        what = (
+            "the slope f1 of friction over pressure is"
+            if distinct == 1
+            else f"the {len(terms)} coefficients of the law {law!r} are"
+        )
+        raise RecordingError(
+            f"{name}: {distinct} pressure{'s' if distinct > 1 else ''} ({have} kPa): {what} not "
+            "determinable"
+        )
     issues = [issue for item in [*chosen, *rest] for issue in (*item.record.issues, *item.issues)]
     extent = _area(name, chosen, area)
-    levels, left = ([_level(item, extent["area"].value) for item in part] for part in (chosen, rest))
-    pressure, friction, stderr, speed = (np.array([getattr(x, k) for x in levels]) for k in ("pressure", "friction", "stderr", "speed"))
+    levels, left = (
+        [_level(item, extent["area"].value) for item in part] for part in (chosen, rest)
+    )
+    pressure, friction, stderr, speed = (
+        np.array([getattr(x, k) for x in levels])
+        for k in ("pressure", "friction", "stderr", "speed")
+    )
     if law == "linear_speed" and abs(_correlation(levels)) > _COLLINEAR:
         raise RecordingError(
-            f"{name}: speed and pressure have a correlation of {_correlation(levels):.2f} over the runs: they are not told apart"
+            f"{name}: speed and pressure have a correlation of {_correlation(levels):.2f} over the "
+            "runs: they are not told apart"
         )
     design = _design(law, pressure, speed)
     line = fit_levels(design, friction, stderr)
@@ -392,7 +435,10 @@ def _fit(name: str, chosen: list[StrokePairs], rest: list[StrokePairs], law: str
         redchi=line.redchi,
         between=line.between,
         covar=line.covar,
-        pairs={item.record.name: item for item in sorted([*chosen, *rest], key=lambda item: item.pressure)},
+        pairs={
+            item.record.name: item
+            for item in sorted([*chosen, *rest], key=lambda item: item.pressure)
+        },
         issues=issues,
     )
 
@@ -403,7 +449,9 @@ def _area(name: str, pairs: list[StrokePairs], area: float | None) -> dict[str, 
         return {"area": LawParameter("area", area, math.nan, "m2")}
     pressure = np.array([item.pressure for item in pairs])
     if len(pairs) < 2 or np.ptp(pressure) <= _SAME * pressure.max():
-        raise RecordingError(f"{name}: the piston area is not determinable from one pressure; give area")
+        raise RecordingError(
+            f"{name}: the piston area is not determinable from one pressure; give area"
+        )
     pull = np.array([float(np.mean(item.mid_force)) for item in pairs])
     design = np.column_stack([np.ones_like(pressure), pressure])
     line = fit_levels(design, pull, np.zeros_like(pull))
@@ -419,7 +467,8 @@ def _level(pairs: StrokePairs, area: float) -> LevelFriction:
     friction, stderr = mean_of_series(values)
     if friction <= 0.0:
         raise RecordingError(
-            f"{pairs.record.name}: friction comes out as {friction:.3g} N with area = {area:.4g} m2; right area and units?"
+            f"{pairs.record.name}: friction comes out as {friction:.3g} N with area = {area:.4g} "
+            "m2; right area and units?"
         )
     onsets = reversal_onsets(pairs, area)
     ratio, ratio_error = mean_of_series(np.array([onset.ratio for onset in onsets]))
@@ -440,8 +489,12 @@ def _level(pairs: StrokePairs, area: float) -> LevelFriction:
 
 
 def _breakaway(levels: list[LevelFriction]) -> dict[str, LawParameter]:
-    """Mean ratio of the sampled breakaway peaks to the sliding friction; its error from their scatter, NaN for one alone."""
-    ratios = np.array([level.breakaway / level.friction for level in levels if level.breakaway is not None])
+    """Mean ratio of the sampled breakaway peaks to the sliding friction; its error from their
+    scatter, NaN for one alone.
+    """
+    ratios = np.array(
+        [level.breakaway / level.friction for level in levels if level.breakaway is not None]
+    )
     if not len(ratios):
         return {}
     error = float(np.std(ratios, ddof=1) / math.sqrt(len(ratios))) if len(ratios) > 1 else math.nan
@@ -456,7 +509,10 @@ def _design(law: str, pressure: Array, speed: Array) -> Array:
 def _correlation(levels: Sequence[LevelFriction]) -> float:
     if len(levels) < 3:
         return math.nan
-    pressure, speed = np.array([level.pressure for level in levels]), np.array([level.speed for level in levels])
+    pressure, speed = (
+        np.array([level.pressure for level in levels]),
+        np.array([level.speed for level in levels]),
+    )
     if np.ptp(speed) == 0.0:
         return 0.0
     return float(np.corrcoef(pressure, speed)[0, 1])

@@ -1,7 +1,8 @@
 """Friction recordings of pneumatic cylinders: a piston pulled to and fro at constant pressure.
 
-The files are read as they are, without smoothing or a common time grid: a breakaway peak is one or two samples
-high and must not be taken for a spike. Rows that cannot be used are flagged with their reason.
+The files are read as they are, without smoothing or a common time grid: a breakaway peak is one or
+two samples high and must not be taken for a spike. Rows that cannot be used are flagged with their
+reason.
 """
 
 from __future__ import annotations
@@ -94,15 +95,24 @@ class FrictionRecord:
         Raises
         ------
         RecordingError
-            If the columns differ in length, look like another unit, or fewer than 20 rows are usable.
+            If the columns differ in length, look like another unit, or fewer than 20 rows are
+            usable.
         """
         columns = {
             word: np.asarray(values, dtype=np.float64).ravel()
-            for word, values in (("time", time), ("position", position), ("pressure", pressure), ("force", force))
+            for word, values in (
+                ("time", time),
+                ("position", position),
+                ("pressure", pressure),
+                ("force", force),
+            )
         }
         sizes = [len(values) for values in columns.values()]
         if len(set(sizes)) != 1:
-            raise RecordingError(f"{name}: time, position, pressure and force have {sizes} rows; the same number is needed")
+            raise RecordingError(
+                f"{name}: time, position, pressure and force have {sizes} rows; the same number is "
+                "needed"
+            )
         reason = np.full(sizes[0], "", dtype=object)
         finite = np.logical_and.reduce([np.isfinite(values) for values in columns.values()])
         reason[~finite] = "not a number"
@@ -112,16 +122,23 @@ class FrictionRecord:
             if beyond.sum() > 0.5 * max(1, int(finite.sum())):
                 worst = float(values[beyond][0])
                 raise RecordingError(
-                    f"{name}: {word} = {worst:.6g} {_SI[word]} is outside {low:g} to {high:g} {_SI[word]}; right unit?"
+                    f"{name}: {word} = {worst:.6g} {_SI[word]} is outside {low:g} to {high:g} "
+                    f"{_SI[word]}; right unit?"
                 )
             reason[beyond & (reason == "")] = f"{word} out of range"
         stamps = columns["time"]
         latest = np.maximum.accumulate(np.where(reason == "", stamps, -np.inf))
-        late = np.concatenate([[False], stamps[1:] <= latest[:-1]]) if len(stamps) else np.zeros(0, dtype=bool)
+        late = (
+            np.concatenate([[False], stamps[1:] <= latest[:-1]])
+            if len(stamps)
+            else np.zeros(0, dtype=bool)
+        )
         reason[late & (reason == "")] = "time does not advance"
         used = np.asarray(reason == "", dtype=bool)
         if used.sum() < 20:
-            raise RecordingError(f"{name}: {int(used.sum())} usable rows of {sizes[0]}; 20 at least are needed")
+            raise RecordingError(
+                f"{name}: {int(used.sum())} usable rows of {sizes[0]}; 20 at least are needed"
+            )
         kept = stamps[used]
         steps = np.diff(kept)
         holes = np.flatnonzero(steps > _GAP * float(np.median(steps)))
@@ -143,7 +160,10 @@ class FrictionRecord:
         return len(self.time)
 
     def __repr__(self) -> str:
-        return f"FrictionRecord({self.name!r}, {int(self.used.sum())} of {len(self)} rows used, {len(self.gaps)} gaps)"
+        return (
+            f"FrictionRecord({self.name!r}, {int(self.used.sum())} of {len(self)} rows used, "
+            f"{len(self.gaps)} gaps)"
+        )
 
     def rows(self) -> tuple[Array, Array, Array, Array]:
         """Time, position, pressure and force of the used rows, in order."""
@@ -154,12 +174,15 @@ class FrictionRecord:
     def issues(self) -> list[str]:
         """What was found, in words."""
         counts = Counter(why for why in self.reason if why)
-        found = [f"{self.name}: {n} {'rows' if n > 1 else 'row'} of {len(self)} not used: {why}" for why, n in counts.items()]
+        found = [
+            f"{self.name}: {n} {'rows' if n > 1 else 'row'} of {len(self)} not used: {why}"
+            for why, n in counts.items()
+        ]
         if self.gaps:
             longest = max(self.gaps, key=lambda gap: gap[1] - gap[0])
             found.append(
-                f"{self.name}: {len(self.gaps)} gap{'s' if len(self.gaps) > 1 else ''} without samples, "
-                f"the longest {longest[1] - longest[0]:.3g} s at {longest[0]:.3g} s"
+                f"{self.name}: {len(self.gaps)} gap{'s' if len(self.gaps) > 1 else ''} without "
+                f"samples, the longest {longest[1] - longest[0]:.3g} s at {longest[0]:.3g} s"
             )
         return found
 
@@ -183,7 +206,15 @@ class CylinderFolder:
     def issues(self) -> list[str]:
         """What was found, in words."""
         found = [f"{gone} equals {kept} byte for byte: left out" for gone, kept in self.duplicates]
-        return [*found, *(issue for records in self.cylinders.values() for record in records for issue in record.issues)]
+        return [
+            *found,
+            *(
+                issue
+                for records in self.cylinders.values()
+                for record in records
+                for issue in record.issues
+            ),
+        ]
 
 
 def load_friction_record(
@@ -196,7 +227,8 @@ def load_friction_record(
     path : path-like
         The file; ``NAME_3bar.csv`` belongs to the cylinder ``NAME``.
     columns : sequence of str
-        ``"name [unit]"`` of each column, ``""`` to leave one out; time, position, pressure and force are needed.
+        ``"name [unit]"`` of each column, ``""`` to leave one out; time, position, pressure and
+        force are needed.
     cylinder : str, optional
         Name of the cylinder, if the file's name does not tell.
 
@@ -207,13 +239,17 @@ def load_friction_record(
     Raises
     ------
     RecordingError
-        If the file cannot be read, a column is missing, or :meth:`FrictionRecord.from_arrays` refuses it.
+        If the file cannot be read, a column is missing, or :meth:`FrictionRecord.from_arrays`
+        refuses it.
     """
     file = Path(path)
     source = str(file)
     table = read_table(file, delimiter=" ", header=False)
     if len(table.cells) != len(columns):
-        raise RecordingError(f"{source}: columns lists {len(columns)} names, but there are {len(table.cells)} columns")
+        raise RecordingError(
+            f"{source}: columns lists {len(columns)} names, but there are {len(table.cells)} "
+            "columns"
+        )
     values: dict[str, Array] = {}
     for index, heading in enumerate(columns):
         match = re.fullmatch(r"\s*(\w+)\s*\[(.+)\]\s*", heading)
@@ -221,7 +257,8 @@ def load_friction_record(
             continue
         if match is None or match[1] not in _SI:
             raise RecordingError(
-                f"{source}: column {heading!r} is not understood: 'time [s]', 'position [m]', 'pressure [Pa]' or 'force [N]'"
+                f"{source}: column {heading!r} is not understood: 'time [s]', 'position [m]', "
+                "'pressure [Pa]' or 'force [N]'"
             )
         numbers = table.numbers(index, heading, source, None, ".")
         values[match[1]] = numbers * to_si(1.0, match[2].strip(), _SI[match[1]])
@@ -235,7 +272,8 @@ def load_friction_record(
 
 
 def load_friction_folder(path: str | os.PathLike[str]) -> CylinderFolder:
-    """Read every ``NAME_Nbar.csv`` of a folder; a file that equals an earlier one byte for byte is left out.
+    """Read every ``NAME_Nbar.csv`` of a folder; a file that equals an earlier one byte for byte is
+    left out.
 
     Parameters
     ----------

@@ -35,18 +35,31 @@ def report_text(fit: CylinderFriction) -> str:
     str
         Lines of plain text.
     """
-    lines = [f"{fit.name}: friction law {fit.law!r}, {fit.ndata} pressures, {fit.nvarys} coefficients, {fit.nfree} to spare"]
+    lines = [
+        f"{fit.name}: friction law {fit.law!r}, {fit.ndata} pressures, {fit.nvarys} coefficients, "
+        f"{fit.nfree} to spare"
+    ]
     lines += [f"  {_coefficient(parameter)}" for parameter in fit.params.values()]
     if fit.nfree:
         lines.append(
-            f"  scatter of the pressures about the law beyond that of their strokes {fit.between:.2f} N "
-            f"(reduced chi-square {fit.redchi:.1f} with the strokes' scatter alone)"
+            "  scatter of the pressures about the law beyond that of their strokes "
+            f"{fit.between:.2f} N (reduced chi-square {fit.redchi:.1f} with the strokes' scatter "
+            "alone)"
         )
     else:
-        lines.append("  as many coefficients as pressures: the law cannot be tested, the errors are those of the strokes alone")
-    lines.append("  pressure   friction +- s.e. [N]   law [N]  pairs  drift   speeds [mm/s]  after reversal (ripple)  from rest")
+        lines.append(
+            "  as many coefficients as pressures: the law cannot be tested, the errors are those "
+            "of the strokes alone"
+        )
+    lines.append(
+        "  pressure   friction +- s.e. [N]   law [N]  pairs  drift   speeds [mm/s]  after reversal "
+        "(ripple)  from rest"
+    )
     held_out = fit.held_out()
-    rows = [*zip(fit.levels, fit.best_fit.tolist(), strict=True), *((item.level, item.predicted) for item in held_out)]
+    rows = [
+        *zip(fit.levels, fit.best_fit.tolist(), strict=True),
+        *((item.level, item.predicted) for item in held_out),
+    ]
     for level, law in rows:
         before, after = _level(level)
         lines.append(f"  {before}{law:9.2f}{after}{'' if level in fit.levels else '  (held out)'}")
@@ -72,14 +85,17 @@ def held_out_lines(found: list[HeldOut]) -> list[str]:
     for item in found:
         level = item.level
         text = (
-            f"  predicted {level.pressure / 1e5:.2f} bar: {item.predicted:.2f} +- {item.stderr:.2f} N, "
-            f"measured {level.friction:.2f} N, "
-            f"error {item.error:+.2f} N ({100.0 * item.relative_error:+.1f} %)"
+            f"  predicted {level.pressure / 1e5:.2f} bar: {item.predicted:.2f} +- "
+            f"{item.stderr:.2f} N, measured {level.friction:.2f} N, error {item.error:+.2f} N "
+            f"({100.0 * item.relative_error:+.1f} %)"
         )
         if item.extrapolated:
             text += ", extrapolated"
         if item.breakaway is not None and level.breakaway is not None:
-            text += f"; breakaway {item.breakaway:.1f} N, measured {_bound(level)}{level.breakaway:.1f} N"
+            text += (
+                f"; breakaway {item.breakaway:.1f} N, measured "
+                f"{_bound(level)}{level.breakaway:.1f} N"
+            )
         lines.append(text)
     return lines
 
@@ -91,7 +107,9 @@ def _bound(level: LevelFriction) -> str:
 def _coefficient(parameter: LawParameter) -> str:
     factor, unit = _PRINTED.get(parameter.unit, (1.0, parameter.unit))
     error = "" if math.isnan(parameter.stderr) else f" +- {parameter.stderr * factor:.2g}"
-    return f"{parameter.name} = {parameter.value * factor:.4g}{error}" + ("" if unit == "1" else f" {unit}")
+    return f"{parameter.name} = {parameter.value * factor:.4g}{error}" + (
+        "" if unit == "1" else f" {unit}"
+    )
 
 
 def _level(level: LevelFriction) -> tuple[str, str]:
@@ -103,26 +121,39 @@ def _level(level: LevelFriction) -> tuple[str, str]:
         rest = peak + _REST[level.rest.status]
     before = f"{level.pressure / 1e5:5.2f} bar{level.friction:12.2f} +- {level.stderr:.2f}    "
     after = (
-        f"{level.pairs:6d}{100.0 * level.drift:+7.0f} %{level.speed_against * 1e3:8.1f} {level.speed_giving * 1e3:5.1f}"
-        f"{level.reversal_ratio:11.2f} +- {level.reversal_stderr:.2f} ({level.reversal_ripple:.2f})    {rest}"
+        f"{level.pairs:6d}{100.0 * level.drift:+7.0f} %{level.speed_against * 1e3:8.1f} "
+        f"{level.speed_giving * 1e3:5.1f}{level.reversal_ratio:11.2f} +- "
+        f"{level.reversal_stderr:.2f} ({level.reversal_ripple:.2f})    {rest}"
     )
     return before, after
 
 
 def _limits(fit: CylinderFriction) -> list[str]:
     """What the runs do not tell."""
-    said = ["a difference between the frictions of the two directions is not separable from the area and the force zero"]
+    said = [
+        "a difference between the frictions of the two directions is not separable from the area "
+        "and the force zero"
+    ]
     r = fit.speed_correlation
     if abs(r) > 0.8:
-        said.append(f"speed follows pressure (correlation {r:.2f}): a speed dependence is not separable from the pressure's")
+        said.append(
+            f"speed follows pressure (correlation {r:.2f}): a speed dependence is not separable "
+            "from the pressure's"
+        )
     drifting = [level for level in fit.levels if abs(level.drift) > 0.05]
     if drifting:
         most = max(drifting, key=lambda level: abs(level.drift))
         said.append(
-            f"friction drifts within {len(drifting)} of {fit.ndata} runs, most by {100.0 * most.drift:+.0f} % in {most.name}: "
-            "the strokes are no independent repeats, and count as fewer"
+            f"friction drifts within {len(drifting)} of {fit.ndata} runs, most by "
+            f"{100.0 * most.drift:+.0f} % in {most.name}: the strokes are no independent repeats, "
+            "and count as fewer"
         )
-    unsure = [level for level in fit.levels if level.rest is not None and level.rest.status == "at least"]
+    unsure = [
+        level for level in fit.levels if level.rest is not None and level.rest.status == "at least"
+    ]
     if unsure and "breakaway_ratio" in fit.params:
-        said.append(f"breakaway_ratio is a lower bound: the logger paused at the start of {len(unsure)} of the runs it comes from")
+        said.append(
+            f"breakaway_ratio is a lower bound: the logger paused at the start of {len(unsure)} of "
+            "the runs it comes from"
+        )
     return said

@@ -1,7 +1,8 @@
 //! Linear loads: a muscle pulls a hanging mass, or a load frame holds its length.
 //!
-//! `m x'' = F - m g - c x' - f tanh(x'/w) + F_stop`, `x` the shortening of the muscle, `F` the pull of all muscles; stops as of
-//! the one-link arm, in metres. A frame prescribes `x` (dissertation ch. 2: length cycled slowly at held pressure).
+//! `m x'' = F - m g - c x' - f tanh(x'/w) + F_stop`, `x` the shortening of the muscle, `F` the pull
+//! of all muscles; stops as of the one-link arm, in metres. A frame prescribes `x` (dissertation
+//! ch. 2: length cycled slowly at held pressure).
 
 use crate::scalar::{tanh, Scalar};
 
@@ -40,10 +41,18 @@ mod tests {
 
     #[test]
     fn a_pull_of_the_weight_keeps_the_mass() {
-        let load =
-            HangingMass { mass: 10.0, viscous: 5.0, coulomb: 1.0, coulomb_speed: 0.01, gravity: 9.80665 };
+        let load = HangingMass {
+            mass: 10.0,
+            viscous: 5.0,
+            coulomb: 1.0,
+            coulomb_speed: 0.01,
+            gravity: 9.80665,
+        };
         assert!(load.acceleration(0.0_f64, 98.0665, 0.0).abs() < 1e-14);
-        assert!(load.acceleration(0.1, 98.0665, 0.0) < 0.0 && load.acceleration(-0.1, 98.0665, 0.0) > 0.0);
+        assert!(
+            load.acceleration(0.1, 98.0665, 0.0) < 0.0
+                && load.acceleration(-0.1, 98.0665, 0.0) > 0.0
+        );
         assert!((load.acceleration(0.0_f64, 0.0, 0.0) + 9.80665).abs() < 1e-12);
     }
 }

@@ -1,7 +1,8 @@
 //! One-link arm with payload, friction and elastic stops.
 //!
-//! `(Iz + mp l^2) theta'' = tau - c theta' - f tanh(theta'/w) - (m lc + mp l) g sin(theta) + tau_stop`, angle from the gravity
-//! vector (physics of dissertation ch. 5; stops as one-sided spring and damper).
+//! `(Iz + mp l^2) theta'' = tau - c theta' - f tanh(theta'/w) - (m lc + mp l) g sin(theta) +
+//! tau_stop`, angle from the gravity vector (physics of dissertation ch. 5; stops as one-sided
+//! spring and damper).
 
 use crate::scalar::{constant, tanh, Scalar};
 

@@ -1,20 +1,22 @@
 //! Planar arm of `N` links in series, with payloads, friction and elastic stops.
 //!
-//! `H(q) q'' + C(q, q') q' + G(q) = tau - c q' - f tanh(q'/w) + tau_stop` (Spong, Hutchinson & Vidyasagar,
-//! *Robot Modeling and Control*, ch. 7). `q_1` is measured from the gravity vector, as in the one-link arm,
-//! `q_k` from the link before; positive torque raises `q`. In the links' directions
-//! `phi_i = q_1 + ... + q_i`, with `mu_i` all mass carried at the end of link `i` (its payload and every link
-//! beyond),
+//! `H(q) q'' + C(q, q') q' + G(q) = tau - c q' - f tanh(q'/w) + tau_stop` (Spong, Hutchinson &
+//! Vidyasagar, *Robot Modeling and Control*, ch. 7). `q_1` is measured from the gravity vector, as
+//! in the one-link arm, `q_k` from the link before; positive torque raises `q`. In the links'
+//! directions `phi_i = q_1 + ... + q_i`, with `mu_i` all mass carried at the end of link `i` (its
+//! payload and every link beyond),
 //!
-//! - `A_ii = I_i + m_i c_i^2 + mu_i l_i^2`, `B_i = m_i c_i + mu_i l_i`, `A_ij = l_i B_j` for `i < j`;
-//! - kinetic energy `1/2 sum A_ij cos(phi_i - phi_j) phi_i' phi_j'`, potential energy `-g sum B_i cos phi_i`;
+//! - `A_ii = I_i + m_i c_i^2 + mu_i l_i^2`, `B_i = m_i c_i + mu_i l_i`, `A_ij = l_i B_j` for
+//!   `i < j`;
+//! - kinetic energy `1/2 sum A_ij cos(phi_i - phi_j) phi_i' phi_j'`, potential energy
+//!   `-g sum B_i cos phi_i`;
 //! - Christoffel symbols leave `C_ij = A_ij sin(phi_i - phi_j) phi_j'`, so that `H' - 2C` is skew.
 //!
-//! `phi` is linear in `q` with ones, so that `H_ab` and `C_ab` in `q` are sums of those in `phi` over all
-//! `i >= a`, `j >= b`, the Christoffel property included. Everything has fixed size: nothing allocates.
-//! Accelerations are solved for in `phi`, where no sum cancels, by Cholesky's method without square roots
-//! (`L D L^T`), written here because nalgebra's asks for more of a number than [`Scalar`] does; for one link
-//! it is the division of [`super::one_link::OneLink`].
+//! `phi` is linear in `q` with ones, so that `H_ab` and `C_ab` in `q` are sums of those in `phi`
+//! over all `i >= a`, `j >= b`, the Christoffel property included. Everything has fixed size:
+//! nothing allocates. Accelerations are solved for in `phi`, where no sum cancels, by Cholesky's
+//! method without square roots (`L D L^T`), written here because nalgebra's asks for more of a
+//! number than [`Scalar`] does; for one link it is the division of [`super::one_link::OneLink`].
 
 pub use super::one_link::Stops;
 use crate::error::{check_range, Error, Result};
@@ -85,8 +87,8 @@ impl<S: Scalar, const N: usize> PlanarArm<S, N> {
     /// An arm from its links, base first, under gravity [m/s2].
     ///
     /// # Errors
-    /// [`Error::Parameter`] with the argument's name for a value that is not finite or outside its range,
-    /// [`Error::Length`] for no link.
+    /// [`Error::Parameter`] with the argument's name for a value that is not finite or outside its
+    /// range, [`Error::Length`] for no link.
     pub fn new(links: [Link<S>; N], gravity: f64) -> Result<Self> {
         if N == 0 {
             let why = "an arm has at least one".into();
@@ -99,7 +101,8 @@ impl<S: Scalar, const N: usize> PlanarArm<S, N> {
         Ok(Self::assembled(links, gravity))
     }
 
-    /// The same with another payload at the end of a link; one that cannot be shows in the mass matrix.
+    /// The same with another payload at the end of a link; one that cannot be shows in the mass
+    /// matrix.
     #[must_use]
     pub fn with_payload(&self, link: usize, payload: S) -> Self {
         let mut links = self.links;
@@ -143,7 +146,8 @@ impl<S: Scalar, const N: usize> PlanarArm<S, N> {
         mass
     }
 
-    /// Coriolis matrix `C` [kg m2/s] of the Christoffel symbols, at joint angles [rad] and rates [rad/s].
+    /// Coriolis matrix `C` [kg m2/s] of the Christoffel symbols, at joint angles [rad] and rates
+    /// [rad/s].
     pub fn coriolis_matrix(&self, angle: &SVector<S, N>, rate: &SVector<S, N>) -> SMatrix<S, N, N> {
         let (pose, turn) = (Pose::new(angle), running_sum(rate));
         let mut c = SMatrix::from_element(constant(0.0));
@@ -191,15 +195,16 @@ impl<S: Scalar, const N: usize> PlanarArm<S, N> {
         twice * 0.5
     }
 
-    /// Potential energy of gravity [J], zero with every mass at the height of the first joint; without the
-    /// stops'.
+    /// Potential energy of gravity [J], zero with every mass at the height of the first joint;
+    /// without the stops'.
     pub fn potential_energy(&self, angle: &SVector<S, N>) -> S {
         let pose = Pose::new(angle);
         (0..N).fold(constant(0.0), |sum, i| sum - self.moment[i] * self.gravity * pose.cos[i])
     }
 
-    /// Ends of the links [m], the first joint at the origin: column `k` is the place of joint `k + 1`, both
-    /// counted from 0, the last column the tip. Rows: across (where positive angles point) and up.
+    /// Ends of the links [m], the first joint at the origin: column `k` is the place of joint
+    /// `k + 1`, both counted from 0, the last column the tip. Rows: across (where positive angles
+    /// point) and up.
     pub fn positions(&self, angle: &SVector<S, N>) -> SMatrix<S, 2, N> {
         let pose = Pose::new(angle);
         let (mut across, mut up) = (constant::<S>(0.0), constant::<S>(0.0));
@@ -212,12 +217,12 @@ impl<S: Scalar, const N: usize> PlanarArm<S, N> {
         ends
     }
 
-    /// Angular accelerations [rad/s2] of the joints under joint torques [N m]; friction and stops are added
-    /// here.
+    /// Angular accelerations [rad/s2] of the joints under joint torques [N m]; friction and stops
+    /// are added here.
     ///
     /// # Errors
-    /// [`Error::Parameter`] that names the argument that is not finite, or the pivot of a mass matrix that is
-    /// not positive definite (a link without inertia).
+    /// [`Error::Parameter`] that names the argument that is not finite, or the pivot of a mass
+    /// matrix that is not positive definite (a link without inertia).
     pub fn acceleration(
         &self,
         angle: &SVector<S, N>,
@@ -229,14 +234,18 @@ impl<S: Scalar, const N: usize> PlanarArm<S, N> {
         let (velocity, weight) = (self.velocity_on_links(&pose, rate), self.weight_on_links(&pose));
         let (drive, stop) = (reactions(torque.zip_map(&friction, |t, f| t - f)), reactions(stop));
         let net = SVector::from_fn(|i, _| drive[i] - velocity[i] - weight[i] + stop[i]);
-        let turn = solve(&self.mass_of_links(&pose), net).map_err(|e| named(e, angle, rate, torque))?;
-        let result = SVector::<S, N>::from_fn(|i, _| if i > 0 { turn[i] - turn[i - 1] } else { turn[i] });
+        let turn =
+            solve(&self.mass_of_links(&pose), net).map_err(|e| named(e, angle, rate, torque))?;
+        let result =
+            SVector::<S, N>::from_fn(|i, _| if i > 0 { turn[i] - turn[i - 1] } else { turn[i] });
         let Some(k) = result.iter().position(|a| !a.re().is_finite()) else { return Ok(result) };
-        let error = Error::parameter(format!("acceleration[{k}]"), result[k].re(), "a finite number");
+        let error =
+            Error::parameter(format!("acceleration[{k}]"), result[k].re(), "a finite number");
         Err(named(error, angle, rate, torque))
     }
 
-    /// Angular accelerations [rad/s2] of the joints by joint torques [N m] alone, without weight, motion, friction and stops.
+    /// Angular accelerations [rad/s2] of the joints by joint torques [N m] alone, without weight,
+    /// motion, friction and stops.
     ///
     /// # Errors
     /// As [`Self::acceleration`].
@@ -257,7 +266,9 @@ impl<S: Scalar, const N: usize> PlanarArm<S, N> {
         let (velocity, weight) = (self.velocity_on_links(&pose, rate), self.weight_on_links(&pose));
         let (mass, turn) = (self.mass_of_links(&pose), running_sum(acceleration));
         let joints: SVector<S, N> = outward_sum(SVector::from_fn(|i, _| {
-            (0..N).fold(constant::<S>(0.0), |sum, j| sum + mass[(i, j)] * turn[j]) + velocity[i] + weight[i]
+            (0..N).fold(constant::<S>(0.0), |sum, j| sum + mass[(i, j)] * turn[j])
+                + velocity[i]
+                + weight[i]
         }));
         SVector::from_fn(|i, _| joints[i] + friction[i] - stop[i])
     }
@@ -297,8 +308,9 @@ impl<S: Scalar> Link<S> {
     fn check(&self, index: usize) -> Result<()> {
         // The full name is only made when there is something wrong.
         let range = |field: &str, value: f64, low: f64, high: f64, unit: &str| {
-            check_range(field, value, low, high, unit)
-                .or_else(|_| check_range(&format!("arm.links[{index}].{field}"), value, low, high, unit))
+            check_range(field, value, low, high, unit).or_else(|_| {
+                check_range(&format!("arm.links[{index}].{field}"), value, low, high, unit)
+            })
         };
         range("length", self.length.re(), 0.0, 1e3, "m")?;
         range("mass", self.mass.re(), 0.0, 1e6, "kg")?;
@@ -367,7 +379,10 @@ fn outward_sums<S: Scalar, const N: usize>(mut matrix: SMatrix<S, N, N>) -> SMat
 
 /// `h^-1 b` by `L D L^T`.
 #[inline]
-fn solve<S: Scalar, const N: usize>(h: &SMatrix<S, N, N>, mut b: SVector<S, N>) -> Result<SVector<S, N>> {
+fn solve<S: Scalar, const N: usize>(
+    h: &SMatrix<S, N, N>,
+    mut b: SVector<S, N>,
+) -> Result<SVector<S, N>> {
     let (mut lower, mut pivot) = (*h, zeros::<S, N>());
     for j in 0..N {
         let mut d = h[(j, j)];
@@ -377,8 +392,13 @@ fn solve<S: Scalar, const N: usize>(h: &SMatrix<S, N, N>, mut b: SVector<S, N>) 
         // Less than rounding leaves of the diagonal is zero; NaN fails too.
         let positive = d.re() > h[(j, j)].re() * (4.0 * N as f64 * f64::EPSILON);
         if !positive {
-            let allowed = "> 0 kg m2 (the mass matrix is not positive definite: a link without inertia)";
-            return Err(Error::parameter(format!("pivot {j} of the arm's mass matrix"), d.re(), allowed));
+            let allowed =
+                "> 0 kg m2 (the mass matrix is not positive definite: a link without inertia)";
+            return Err(Error::parameter(
+                format!("pivot {j} of the arm's mass matrix"),
+                d.re(),
+                allowed,
+            ));
         }
         pivot[j] = d;
         for i in j + 1..N {

@@ -1,8 +1,8 @@
 //! Joints: how a muscle's shortening turns a link.
 //!
-//! Every joint gives the muscle's shortening `d(theta)` and its slope, the moment arm `dd/dtheta`; the torque of a pull `F` is
-//! `F dd/dtheta`, so that `tau dtheta = F dd`: what the muscle gives, the link gets. Only the printed tendon joint
-//! ([`tendon::Torque::Published`]) gives less.
+//! Every joint gives the muscle's shortening `d(theta)` and its slope, the moment arm `dd/dtheta`;
+//! the torque of a pull `F` is `F dd/dtheta`, so that `tau dtheta = F dd`: what the muscle gives,
+//! the link gets. Only the printed tendon joint ([`tendon::Torque::Published`]) gives less.
 
 pub mod polynomial;
 pub mod pulley;
@@ -51,8 +51,11 @@ impl Joint {
         let rest = spec.rest_angle;
         match spec.kind.as_str() {
             "tendon" | "published" => {
-                let torque =
-                    if spec.kind == "tendon" { tendon::Torque::Power } else { tendon::Torque::Published };
+                let torque = if spec.kind == "tendon" {
+                    tendon::Torque::Power
+                } else {
+                    tendon::Torque::Published
+                };
                 let [upper_axial, upper_offset, lower_axial, lower_offset] = [
                     ("joint.upper_axial", spec.upper_axial),
                     ("joint.upper_offset", spec.upper_offset),
@@ -60,7 +63,13 @@ impl Joint {
                     ("joint.lower_offset", spec.lower_offset),
                 ]
                 .map(|(name, value)| check_range(name, value, -10.0, 10.0, "m"));
-                let joint = TendonJoint::new(upper_axial?, upper_offset?, lower_axial?, lower_offset?, rest)?;
+                let joint = TendonJoint::new(
+                    upper_axial?,
+                    upper_offset?,
+                    lower_axial?,
+                    lower_offset?,
+                    rest,
+                )?;
                 Ok(Self::Tendon(joint.with_torque(torque)))
             }
             "pulley" => Ok(Self::Pulley(Pulley::new(spec.radius, rest)?)),

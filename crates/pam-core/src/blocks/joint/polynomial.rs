@@ -20,7 +20,8 @@ impl Polynomial {
     /// A joint with `c_k` [m/rad^k] from k = 1, its muscle at rest length at an angle [rad].
     ///
     /// # Errors
-    /// [`Error::Parameter`] for a coefficient that is not finite, [`Error::Length`] for none or too many.
+    /// [`Error::Parameter`] for a coefficient that is not finite, [`Error::Length`] for none or too
+    /// many.
     pub fn new(coefficients: &[f64], rest_angle: f64) -> Result<Self> {
         if coefficients.is_empty() || coefficients.len() > HIGHEST_DEGREE {
             return Err(Error::Length {

@@ -1,6 +1,7 @@
 //! `pulley`: a tendon over a wheel.
 //!
-//! `d = r (theta - theta_0)`, moment arm `r`; a negative radius is a muscle on the other side (the antagonist).
+//! `d = r (theta - theta_0)`, moment arm `r`; a negative radius is a muscle on the other side (the
+//! antagonist).
 
 use super::JointPoint;
 use crate::error::{check_range, Result};
@@ -26,6 +27,10 @@ impl Pulley {
     #[inline]
     pub fn eval<S: Scalar>(&self, angle: S) -> JointPoint<S> {
         let moment_arm = constant(self.radius);
-        JointPoint { shortening: (angle - self.rest_angle) * self.radius, moment_arm, torque_arm: moment_arm }
+        JointPoint {
+            shortening: (angle - self.rest_angle) * self.radius,
+            moment_arm,
+            torque_arm: moment_arm,
+        }
     }
 }

@@ -1,9 +1,11 @@
 //! Four-parameter tendon joint (dissertation ch. 3, Table 3.5), power conserving.
 //!
-//! With `phi = pi - theta - atan2(rl, ll)`, `BO = hypot(ll, rl)`, `(Bx, By) = BO (cos phi, sin phi)` and
-//! `s = sqrt(lT^2 - (ru - By)^2)`: shortening `d = Bx + s - lu`, moment arm `dd/dtheta = By - (ru - By) Bx/s`. The tendon
-//! length `lT` follows from `d = 0` at the rest angle. The torque of a pull `F` is `F dd/dtheta`; (3.6)-(3.8) as printed
-//! multiply by `cos^2` of the tendon's angle, `(s/lT)^2`, too much: [`Torque::Published`] keeps them for comparison.
+//! With `phi = pi - theta - atan2(rl, ll)`, `BO = hypot(ll, rl)`,
+//! `(Bx, By) = BO (cos phi, sin phi)` and `s = sqrt(lT^2 - (ru - By)^2)`: shortening
+//! `d = Bx + s - lu`, moment arm `dd/dtheta = By - (ru - By) Bx/s`. The tendon length `lT` follows
+//! from `d = 0` at the rest angle. The torque of a pull `F` is `F dd/dtheta`; (3.6)-(3.8) as
+//! printed multiply by `cos^2` of the tendon's angle, `(s/lT)^2`, too much: [`Torque::Published`]
+//! keeps them for comparison.
 
 use super::JointPoint;
 use crate::error::{Error, Result};
@@ -30,7 +32,8 @@ pub enum Torque {
 }
 
 impl TendonJoint {
-    /// A joint from its four lengths [m] and the angle [rad] at which the muscles are at rest length.
+    /// A joint from its four lengths [m] and the angle [rad] at which the muscles are at rest
+    /// length.
     ///
     /// # Errors
     /// [`Error::Parameter`] when a length is not positive.
@@ -41,17 +44,21 @@ impl TendonJoint {
         lower_offset: f64,
         rest_angle: f64,
     ) -> Result<Self> {
-        for (name, value) in [("joint.upper_axial", upper_axial), ("joint.lower_axial", lower_axial)] {
+        for (name, value) in
+            [("joint.upper_axial", upper_axial), ("joint.lower_axial", lower_axial)]
+        {
             if !(value.is_finite() && value > 0.0) {
                 return Err(Error::parameter(name, value, "a length > 0 m"));
             }
         }
-        let (lower_angle, lower_radius) = (lower_offset.atan2(lower_axial), lower_axial.hypot(lower_offset));
+        let (lower_angle, lower_radius) =
+            (lower_offset.atan2(lower_axial), lower_axial.hypot(lower_offset));
         let phi = std::f64::consts::PI - rest_angle - lower_angle;
         let (bx, by) = (lower_radius * phi.cos(), lower_radius * phi.sin());
         let tendon_squared = (upper_axial - bx).powi(2) + (upper_offset - by).powi(2);
         if bx > upper_axial {
-            let allowed = format!("at least {bx:.5} m at this rest angle: the tendon would be folded over");
+            let allowed =
+                format!("at least {bx:.5} m at this rest angle: the tendon would be folded over");
             return Err(Error::parameter("joint.upper_axial", upper_axial, allowed));
         }
         let torque = Torque::Power;
@@ -98,13 +105,15 @@ mod tests {
 
     #[test]
     fn moment_arm_is_the_derivative_of_the_shortening() {
-        let joint = TendonJoint::new(0.0254, 0.027432, 0.027432, 0.004826, 15f64.to_radians()).unwrap();
+        let joint =
+            TendonJoint::new(0.0254, 0.027432, 0.027432, 0.004826, 15f64.to_radians()).unwrap();
         assert!(joint.eval(15f64.to_radians()).shortening.abs() < 1e-15);
         for degrees in [15.0, 40.0, 90.0, 119.0f64] {
             let angle = DualSVec64::<1>::from_re(degrees.to_radians()).derivative(0);
             let point = joint.eval(angle);
             assert!(
-                (point.shortening.eps.unwrap_generic(nalgebra::Const::<1>, nalgebra::Const::<1>)[0]
+                (point.shortening.eps.unwrap_generic(nalgebra::Const::<1>, nalgebra::Const::<1>)
+                    [0]
                     - point.moment_arm.re())
                 .abs()
                     < 1e-14

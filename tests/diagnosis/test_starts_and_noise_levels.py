@@ -1,4 +1,6 @@
-"""What is not physics does not look like it: where windows start from, what noise leaves, how far it scatters."""
+"""What is not physics does not look like it: where windows start from, what noise leaves, how far
+it scatters.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,7 @@ import pamrs
 from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.evidence import Candidate, significant, weigh
 from pamrs.diagnosis.fit import Fit, Problem, residuals
-from pamrs.diagnosis.noise import Excess, excess, floors
+from pamrs.diagnosis.noise import Excess, excess, noise_levels
 from pamrs.diagnosis.prepare import Prepared, available_blocks, begun, noise_level, prepare
 from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
@@ -19,25 +21,44 @@ from pamrs.simulation import core_rig
 SETTINGS = DiagnosisSettings()
 
 DT, ROWS = 0.005, 1600
-NOISE = {"valve_command": 0.0, "supply_pressure": 300.0, "muscle_pressure": 300.0, "joint_angle": 4e-4}
+NOISE = {
+    "valve_command": 0.0,
+    "supply_pressure": 300.0,
+    "muscle_pressure": 300.0,
+    "joint_angle": 4e-4,
+}
 RIG = pamrs.rigs.shoulder()
 
 
 def recorded(seed: int, angle: np.ndarray | None = None) -> Prepared:
-    """The nominal arm driven slowly from where it stands, with noise; or with another angle in its place."""
+    """The nominal arm driven slowly from where it stands, with noise; or with another angle in its
+    place.
+    """
     time = DT * np.arange(ROWS)
     run = pamrs.simulate(RIG, 5.0 + 0.1 * np.sin(0.5 * time) ** 2, sample_time=DT)
     rng = np.random.default_rng(seed)
-    channels = {n: (angle if n == "joint_angle" and angle is not None else run[n]) + rng.normal(0.0, s, ROWS) for n, s in NOISE.items()}
+    channels = {
+        n: (angle if n == "joint_angle" and angle is not None else run[n])
+        + rng.normal(0.0, s, ROWS)
+        for n, s in NOISE.items()
+    }
     mask = {n: np.ones(ROWS, dtype=bool) for n in channels}
-    return prepare(Recording(f"slow{seed}", "fit", time, DT, channels, mask, [], dict.fromkeys(channels, "SI")), RIG, SETTINGS)
+    return prepare(
+        Recording(
+            f"slow{seed}", "fit", time, DT, channels, mask, [], dict.fromkeys(channels, "SI")
+        ),
+        RIG,
+        SETTINGS,
+    )
 
 
 def test_a_joint_at_rest_is_not_thrown_off() -> None:
     errors = []
     for seed in range(12):
         prepared = recorded(seed, np.full(ROWS, 0.7))
-        errors.append((prepared.signals["joint_angle"][1][0], prepared.begun("joint_angle", [0])[1][0]))
+        errors.append(
+            (prepared.signals["joint_angle"][1][0], prepared.begun("joint_angle", [0])[1][0])
+        )
     filtered, begun = np.sqrt(np.mean(np.square(errors), axis=0))
     assert begun < 0.3 * filtered
     assert begun < 0.02  # rad/s, which friction stops at once
@@ -51,7 +72,9 @@ def test_a_start_in_smooth_motion_is_that_of_the_motion(at: int) -> None:
     assert value == pytest.approx(0.8 + 0.4 * np.sin(2.0 * time[at]), abs=5e-4)
     assert slope == pytest.approx(0.8 * np.cos(2.0 * time[at]), abs=0.03)
     others = np.arange(ROWS) != at
-    np.testing.assert_array_equal(prepared.begun("joint_angle", [at])[0][others], prepared.signals["joint_angle"][0][others])
+    np.testing.assert_array_equal(
+        prepared.begun("joint_angle", [at])[0][others], prepared.signals["joint_angle"][0][others]
+    )
 
 
 def test_a_start_that_no_cubic_fits_is_the_filters() -> None:
@@ -74,10 +97,10 @@ def test_noise_stays_inside_its_limit_and_the_scatter_is_that_of_the_noise() -> 
     core = core_rig(RIG)
     blocks = available_blocks(RIG, tuple(NOISE), SETTINGS.prepare)
     problem = Problem(blocks, [recorded(seed) for seed in range(12)], core, SETTINGS)
-    floor, found = floors(problem, core), residuals(problem, RIG)
+    noise_level, found = noise_levels(problem, core), residuals(problem, RIG)
     for block in blocks:
-        each = [excess(block, [p], found, floor, SETTINGS.noise) for p in problem.recordings]
-        together = excess(block, problem.recordings, found, floor, SETTINGS.noise)
+        each = [excess(block, [p], found, noise_level, SETTINGS.noise) for p in problem.recordings]
+        together = excess(block, problem.recordings, found, noise_level, SETTINGS.noise)
         assert not significant(together)
         assert 0.8 < together.ratio < 1.2
         assert sum(significant(e) for e in each) <= 1
@@ -86,27 +109,41 @@ def test_noise_stays_inside_its_limit_and_the_scatter_is_that_of_the_noise() -> 
         assert together.limit < min(e.limit for e in each)
 
 
-def named(effects: tuple[str, ...], ratio: float, values: dict[str, float], scatter: float = 0.05) -> Candidate:
-    """A set of effects that leaves so many times the floor."""
-    left = {"arm": Excess(ratio, 0.0, 0.5, 1.0, 1.0, min(2.5, 1.1 * np.exp(2.6 * scatter)), scatter)}
+def named(
+    effects: tuple[str, ...], ratio: float, values: dict[str, float], scatter: float = 0.05
+) -> Candidate:
+    """A set of effects that leaves so many times the noise level."""
+    left = {
+        "arm": Excess(ratio, 0.0, 0.5, 1.0, 1.0, min(2.5, 1.1 * np.exp(2.6 * scatter)), scatter)
+    }
     fit = Fit(effects, RIG, values, {}, np.zeros((0, 0)), 0.0, {}, {}, 1, {}, None)
     return Candidate(effects, fit, left, left, 0.0)
 
 
-def test_of_a_faint_mismatch_the_noise_says_how_much_may_be_left() -> None:
+def test_of_a_mismatch_near_the_noise_the_noise_says_how_much_may_be_left() -> None:
     blocks = [b for b in available_blocks(RIG, tuple(NOISE), SETTINGS.prepare) if b.name == "arm"]
-    start, right, wrong = named((), 1.4, {}), named(("leak_muscle",), 1.0, {}), named(("supply_leak",), 1.25, {})
+    start, right, wrong = (
+        named((), 1.4, {}),
+        named(("leak_muscle",), 1.0, {}),
+        named(("supply_leak",), 1.25, {}),
+    )
     odds = weigh([start, right, wrong], blocks, 0.985, 30.0, SETTINGS)
     assert odds["leak_muscle"] > 20.0 * odds["supply_leak"]
     # where the noise scatters as much, it says nothing
-    noisy = [named(c.effects, c.fitted["arm"].ratio, {}, scatter=0.5) for c in (start, right, wrong)]
+    noisy = [
+        named(c.effects, c.fitted["arm"].ratio, {}, scatter=0.5) for c in (start, right, wrong)
+    ]
     odds = weigh(noisy, blocks, 0.985, 30.0, SETTINGS)
     assert odds["leak_muscle"] < 6.0 * odds["supply_leak"]
 
 
 def test_what_is_still_more_than_noise_is_not_explained() -> None:
     blocks = [b for b in available_blocks(RIG, tuple(NOISE), SETTINGS.prepare) if b.name == "arm"]
-    start, little, most = named((), 1.4, {}, 0.03), named(("leak_muscle",), 1.27, {}, 0.03), named(("leak_muscle",), 1.1, {}, 0.03)
+    start, little, most = (
+        named((), 1.4, {}, 0.03),
+        named(("leak_muscle",), 1.27, {}, 0.03),
+        named(("leak_muscle",), 1.1, {}, 0.03),
+    )
     assert weigh([start, little], blocks, 0.985, 30.0, SETTINGS)["unlisted"] > 0.8
     assert weigh([start, most], blocks, 0.985, 30.0, SETTINGS)["unlisted"] < 0.2
 
@@ -114,14 +151,30 @@ def test_what_is_still_more_than_noise_is_not_explained() -> None:
 def test_every_joint_of_an_arm_starts_where_it_was() -> None:
     rig = pamrs.rigs.two_joint_arm()
     channels = {
-        n: np.zeros(ROWS) for n in core_rig(rig).channels if n.startswith(("joint_angle", "muscle_pressure", "supply_pressure"))
+        n: np.zeros(ROWS)
+        for n in core_rig(rig).channels
+        if n.startswith(("joint_angle", "muscle_pressure", "supply_pressure"))
     }
     channels |= {n: np.full(ROWS, 5.0) for n in core_rig(rig).inputs}
     rng = np.random.default_rng(0)
-    channels = {n: v + rng.normal(0.0, 4e-4 if n.startswith("joint") else 100.0, ROWS) for n, v in channels.items()}
+    channels = {
+        n: v + rng.normal(0.0, 4e-4 if n.startswith("joint") else 100.0, ROWS)
+        for n, v in channels.items()
+    }
     mask = {n: np.ones(ROWS, dtype=bool) for n in channels}
     prepared = prepare(
-        Recording("rest", "fit", DT * np.arange(ROWS), DT, channels, mask, [], dict.fromkeys(channels, "SI")), rig, SETTINGS
+        Recording(
+            "rest",
+            "fit",
+            DT * np.arange(ROWS),
+            DT,
+            channels,
+            mask,
+            [],
+            dict.fromkeys(channels, "SI"),
+        ),
+        rig,
+        SETTINGS,
     )
     arms = [b for b in available_blocks(rig, tuple(channels), SETTINGS.prepare) if b.kind == "arm"]
     assert len(arms) == 2
@@ -143,9 +196,18 @@ def test_the_noise_of_a_quantised_channel_is_that_of_noise_and_lattice(steps: fl
 
 def test_a_value_that_nobody_has_published_costs_odds() -> None:
     blocks = [b for b in available_blocks(RIG, tuple(NOISE), SETTINGS.prepare) if b.name == "arm"]
-    start, rival = named((), 3.0, {}), named(("base_flexibility",), 1.0, {"base_flexibility.natural_frequency": 7.0})
+    start, rival = (
+        named((), 3.0, {}),
+        named(("base_flexibility",), 1.0, {"base_flexibility.natural_frequency": 7.0}),
+    )
     for length, least, most in ((0.3, 0.5, 2.0), (0.005, 10.0, 60.0)):
-        odds = weigh([start, rival, named(("payload_swing",), 1.0, {"payload_swing.length": length})], blocks, 0.985, 30.0, SETTINGS)
+        odds = weigh(
+            [start, rival, named(("payload_swing",), 1.0, {"payload_swing.length": length})],
+            blocks,
+            0.985,
+            30.0,
+            SETTINGS,
+        )
         assert least < odds["base_flexibility"] / odds["payload_swing"] < most
 
 
@@ -157,7 +219,9 @@ def test_what_acts_over_most_of_the_motion_is_no_end_stop() -> None:
         rig = RIG.with_effect("joint_end_stop", {"angle": angle})
         stop = named(("joint_end_stop",), 1.0, {})
         stop = replace(stop, fit=replace(stop.fit, rig=rig))
-        found = weigh([start, rival, stop], blocks, 0.985, 30.0, SETTINGS, {"joint_angle": (0.3, 1.4)})
+        found = weigh(
+            [start, rival, stop], blocks, 0.985, 30.0, SETTINGS, {"joint_angle": (0.3, 1.4)}
+        )
         odds.append(found["joint_end_stop"] / found["muscle_creep"])
     assert odds[0] == pytest.approx(1.0)
     assert odds[1] < 0.1
