@@ -22,6 +22,7 @@ SETTINGS = DiagnosisSettings()
 
 NOISE = {"supply_pressure": 400.0, "muscle_pressure": 400.0, "joint_angle": 3e-4}
 SECONDS = 15.0
+LIMIT = 1.1  # of the excess that noise has
 
 
 def shoulder_case(truth: pamrs.Rig, fitted: int = 2, speed: float = 1.0) -> pamrs.Case:
@@ -127,7 +128,7 @@ def test_a_payload_on_a_cord_is_named_with_its_length() -> None:
 def candidate(effects: tuple[str, ...], left: float, **values: float) -> Candidate:
     """A made-up set that leaves an excess of a block, fitted and held out."""
     fit = Fit(effects, pamrs.rigs.shoulder(), values, {}, np.zeros((0, 0)), 0.0, {})
-    ratio = {"chamber": Excess(1.0 + left, 0.0, 0.0, 1.0, 1.0, 1.1)}
+    ratio = {"chamber": Excess(1.0 + left, 0.0, 0.0, 1.0, 1.0, LIMIT)}
     return Candidate(effects, fit, ratio, ratio, 0.0)
 
 
@@ -152,14 +153,18 @@ def weighed(*sets: Candidate, start: Candidate | None = None) -> dict[str, float
 
 def test_a_set_that_explains_nothing_says_nothing_against_one_that_does() -> None:
     right = candidate(
-        ("leak_muscle",),
+        ("heat_transfer",),
         0.0,
-        **{"leak_muscle.conductance": 1e-12, "leak_muscle.laminar_share": 0.5},
+        **{
+            "heat_transfer.heat_transfer_coefficient": 50.0,
+            "heat_transfer.initial_temperature_rise": 1.0,
+            "heat_transfer.share": 0.5,
+        },
     )
     wrong = candidate(("pressure_lag",), 9.0, **{"pressure_lag.time_constant": 1e-3})
     alone, both = weighed(right), weighed(right, wrong)
-    assert alone["leak_muscle"] > 0.98
-    assert abs(both["leak_muscle"] - alone["leak_muscle"]) < 0.01
+    assert alone["heat_transfer"] > 0.98
+    assert abs(both["heat_transfer"] - alone["heat_transfer"]) < 0.01
 
 
 def test_a_smaller_rest_tells_among_single_effects_and_asks_for_no_second() -> None:
@@ -215,7 +220,7 @@ def test_creep_slower_than_any_recording_gets_a_penalty() -> None:
 def test_held_out_recordings_that_hardly_show_a_mismatch_do_not_veto_its_effect() -> None:
     def uneven(effects: tuple[str, ...], fitted: float, held: float, **values: float) -> Candidate:
         ratio = {
-            left: {"chamber": Excess(1.0 + left, 0.0, 0.0, 1.0, 1.0, 1.1)}
+            left: {"chamber": Excess(1.0 + left, 0.0, 0.0, 1.0, 1.0, LIMIT)}
             for left in (fitted, held)
         }
         return replace(
@@ -244,14 +249,14 @@ def test_a_tube_is_named_with_the_place_of_the_transducer() -> None:
 
 
 def test_a_parameter_that_only_held_out_recordings_show_is_a_parameter() -> None:
-    sharp = SETTINGS.with_values({"search.fitted_hint": 0.0, "search.held_out_ratio": 1.3})
+    search = replace(SETTINGS.search, fitted_hint=0.0, held_out_ratio=1.3)
     said: list[str] = []
     nominal = pamrs.rigs.shoulder()
     known = nominal.parameter("arm.viscous")
     truth = nominal.with_parameters({"arm.viscous": known.value + 2.0 * known.tol})
     slow, fast = shoulder_case(truth, speed=0.02), shoulder_case(truth, speed=2.0)
     case = pamrs.Case("unseen", nominal, [*slow.recordings[:2], fast.recordings[2]], Path())
-    found = pamrs.diagnose(case, settings=sharp, progress=said.append)
+    found = pamrs.diagnose(case, settings=replace(SETTINGS, search=search), progress=said.append)
     assert "arm: one baseline leaves noise in all recordings" in said
     assert found.verdict == "parameters"
     assert abs(found.parameters["arm.viscous"]["moved_sigmas"] - 2.0) < 0.2

@@ -74,10 +74,10 @@ def test_a_leak_is_named_with_its_size(laminar: float) -> None:
     assert found.fit["gap_closed"] > 0.95
     jsonschema.validate(json.loads(found.to_json()), schema())
     assert "leak_muscle" in found.model
-    asked = {a["id"]: a for a in found.asked}
-    assert {"leak_muscle", "heat_transfer"} <= set(asked)
-    assert found.asked[0]["left"] < 0.05
-    assert asked["leak_muscle"]["promised"] > 0.5
+    tested = {a["id"]: a for a in found.tested}
+    assert {"leak_muscle", "heat_transfer"} <= set(tested)
+    assert found.tested[0]["left"] < 0.05
+    assert tested["leak_muscle"]["predicted_gain"] > 0.5
 
 
 def test_a_tight_chamber_is_tight() -> None:
