@@ -30,7 +30,14 @@ if TYPE_CHECKING:
     )
     from pamrs.recordings import Case, Issue, Recording, load_case, load_recording
     from pamrs.rig import Joint, Muscle, Parameter, Rig, load_rig
-    from pamrs.simulation import Batch, BatchRun, Simulation, Simulator, simulate
+    from pamrs.simulation import (
+        Batch,
+        BatchRun,
+        Simulation,
+        Simulator,
+        simulate,
+        simulate_batch,
+    )
 
     __version__: str
 
@@ -69,6 +76,7 @@ __all__ = [
     "plan_diagnosis",
     "rigs",
     "simulate",
+    "simulate_batch",
     "sizing",
 ]
 
@@ -106,6 +114,7 @@ _HOMES: Final[dict[str, str]] = {
     "load_rig": "pamrs.rig",
     "plan_diagnosis": "pamrs.diagnosis.next_experiment",
     "simulate": "pamrs.simulation",
+    "simulate_batch": "pamrs.simulation",
 }
 
 

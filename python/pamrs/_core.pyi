@@ -5,7 +5,17 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Batch", "Gas", "Joint", "Muscle", "Rig", "Simulator", "__version__", "effects"]
+__all__ = [
+    "Batch",
+    "Gas",
+    "Joint",
+    "Muscle",
+    "Rig",
+    "Simulator",
+    "__version__",
+    "effects",
+    "side_by_side",
+]
 
 __version__: str
 
@@ -155,3 +165,17 @@ class Simulator:
     def samples(self) -> int: ...
 
 def effects() -> str: ...
+def side_by_side(
+    rig: Rig,
+    plants: int,
+    rows: int,
+    signals: dict[str, _Array],
+    sample_time: float,
+    step: float,
+    parameters: dict[str, _Array],
+    initial: dict[str, _Array],
+    record: list[str],
+    every: int,
+    reduce: list[tuple[str, str, list[float]]],
+    threads: int,
+) -> tuple[list[_Array], list[_Array], list[tuple[float, str] | None]]: ...

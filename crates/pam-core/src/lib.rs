@@ -14,10 +14,12 @@
 
 pub mod blocks;
 pub mod braid;
+mod chebyshev;
 pub mod cut_chain;
 pub mod description;
 pub mod effects;
 pub mod error;
+pub mod lanes;
 pub mod muscle;
 pub mod plant;
 pub mod scalar;

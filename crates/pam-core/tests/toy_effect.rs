@@ -36,7 +36,7 @@ fn with(spec: RigSpec, effects: Vec<EffectSpec>) -> Rig {
 /// Commands that fill and vent.
 fn commands(rig: &Rig) -> Vec<(String, Vec<f64>)> {
     let volts = |k: usize| {
-        let edge = if (k / 16) % 2 == 0 { 0.12 } else { -0.2 };
+        let edge = if (k / 16).is_multiple_of(2) { 0.12 } else { -0.2 };
         5.15 + edge + 0.35 * (9.0 * k as f64 * DT).sin()
     };
     let values: Vec<f64> = (0..ROWS).map(volts).collect();

@@ -4,6 +4,7 @@ mod batch;
 mod convert;
 mod gas;
 mod joint;
+mod lanes;
 mod muscle;
 mod rig;
 mod simulator;
@@ -21,5 +22,6 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<simulator::Simulator>()?;
     m.add_class::<batch::Batch>()?;
     m.add_function(wrap_pyfunction!(rig::effects, m)?)?;
+    m.add_function(wrap_pyfunction!(lanes::side_by_side, m)?)?;
     Ok(())
 }

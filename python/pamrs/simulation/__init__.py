@@ -1,7 +1,8 @@
 """Run a rig: once, sample by sample, many at once, or driven by a recording.
 
 :func:`simulate` returns a :class:`Simulation`; :class:`Simulator` goes from sample to sample,
-:class:`Batch` runs many rigs on all processors, :func:`replay` gives a rig the inputs of a
+:class:`Batch` does so with many rigs on all processors, :func:`simulate_batch` runs many plants of
+one rig side by side, :func:`replay` gives a rig the inputs of a
 recording.
 """
 
@@ -10,6 +11,7 @@ from __future__ import annotations
 from pamrs.simulation._batch import Batch, BatchRun, Failure
 from pamrs.simulation._driving import has_frame, regulators_of
 from pamrs.simulation._replay import differences, replay
+from pamrs.simulation._side_by_side import simulate_batch
 from pamrs.simulation._simulation import (
     Balance,
     Event,
@@ -36,5 +38,6 @@ __all__ = [
     "regulators_of",
     "replay",
     "simulate",
+    "simulate_batch",
     "whole_samples",
 ]

@@ -4,9 +4,8 @@ environments.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,6 +15,7 @@ from pamrs import _core
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
 from pamrs.simulation._driving import Inputs, initial_values, keywords
+from pamrs.simulation._plants import plants_of, rowwise, thread_count
 from pamrs.simulation._simulation import (
     MOST_NUMBERS,
     check_run,
@@ -27,7 +27,6 @@ from pamrs.simulation._simulation import (
 __all__ = ["Batch", "BatchRun", "Failure"]
 
 Array = NDArray[np.float64]
-_MOST_THREADS = 256
 #: What is made from the rest, and not pickled.
 _MADE = ("_core", "_first", "_inputs", "_channels", "_commands")
 
@@ -49,7 +48,8 @@ class Failure(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class BatchRun(Mapping[str, Array]):
-    """What :meth:`Batch.control` recorded; ``run["joint_angle"]`` has the shape (n, rows).
+    """What :meth:`Batch.control` or :func:`pamrs.simulate_batch` recorded; ``run["joint_angle"]``
+    has the shape (n, rows).
 
     Attributes
     ----------
@@ -61,11 +61,14 @@ class BatchRun(Mapping[str, Array]):
     status : tuple of Failure or None
         Why and when each plant ended, None for those that did not. A plant that ended stays at its
         last good sample.
+    reduced : dict of str to ndarray, shape (n,)
+        Numbers of whole runs that were asked for (``reduce``), NaN for plants that ended.
     """
 
     time: Array
     channels: dict[str, Array]
     status: tuple[Failure | None, ...]
+    reduced: dict[str, Array] = field(default_factory=dict)
 
     @property
     def failed(self) -> NDArray[np.bool_]:
@@ -150,7 +153,8 @@ class Batch:
             raise ParameterError("rig is an empty sequence; one Rig at least is needed")
         for each in {id(each): each for each in given}.values():
             check_run(each, sample_time)
-        count = _plants(n, len(given) if many else None, initial)
+        starts = {f"initial {name}": values for name, values in (initial or {}).items()}
+        count = plants_of(n, len(given) if many else None, starts)
         channels = len(core_rig(given[0]).channels)
         if count * channels > MOST_NUMBERS:
             raise ParameterError(
@@ -161,7 +165,7 @@ class Batch:
         """The rig of each plant."""
         self.sample_time = float(sample_time)
         self._step = chosen_step(self.sample_time, step)
-        self._threads = _threads(threads)
+        self._threads = thread_count(threads)
         self._prepare()
         self._begin(self._starting(initial))
 
@@ -182,7 +186,7 @@ class Batch:
     def _starting(self, initial: Mapping[str, ArrayLike] | None) -> dict[str, Array]:
         names = initial_values(dict.fromkeys(initial or {}, 0.0), self.rigs[0])
         return {
-            name: _rowwise(f"initial {name}", (initial or {})[name], len(self)) for name in names
+            name: rowwise(f"initial {name}", (initial or {})[name], len(self)) for name in names
         }
 
     def _started(self, initial: Mapping[str, Array]) -> _core.Batch:
@@ -467,73 +471,3 @@ class _Book(NamedTuple):
             values = sample.get(name, signals.get(name))
             if values is not None:
                 rows[row] = values
-
-
-def _plants(n: int | None, rigs: int | None, initial: Mapping[str, ArrayLike] | None) -> int:
-    """Number of plants from what says it."""
-    sizes = {
-        f"initial {name}": int(np.size(values))
-        for name, values in (initial or {}).items()
-        if np.ndim(values) > 0
-    }
-    if n is not None:
-        if isinstance(n, bool) or not isinstance(n, (int, np.integer)) or n < 1:
-            raise ParameterError(
-                f"n = {n!r} is not allowed: a whole number of plants, 1 at least, is needed"
-            )
-        sizes = {"n": int(n), **sizes}
-    if rigs is not None:
-        sizes = {"rig": rigs, **sizes}
-    if not sizes:
-        raise ParameterError(
-            "n is missing: the number of plants (or a sequence of rigs, or an array of initial "
-            "values)"
-        )
-    first, count = next(iter(sizes.items()))
-    for name, size in sizes.items():
-        if size != count or size < 1:
-            raise ParameterError(
-                f"{name} is for {size} plants, {first} for {count}; one number of plants, 1 at "
-                "least, is needed"
-            )
-    return count
-
-
-def _rowwise(name: str, values: ArrayLike, n: int) -> Array:
-    """A number for each plant."""
-    try:
-        array = np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise ParameterError(f"{name} = {values!r} is not allowed: numbers are needed") from None
-    if array.ndim == 0:
-        array = np.full(n, float(array))
-    if array.shape != (n,):
-        raise ParameterError(
-            f"{name} has the shape {array.shape}; ({n},) is needed, one value for each plant"
-        )
-    for row in np.flatnonzero(~np.isfinite(array))[:1]:
-        raise ParameterError(
-            f"{name}[{row}] = {array[row]} is not allowed: a finite number is needed"
-        )
-    return np.ascontiguousarray(array)
-
-
-def _threads(threads: int | None) -> int:
-    """How many threads may work."""
-    if threads is None:
-        has = (
-            os.sched_getaffinity(0)
-            if hasattr(os, "sched_getaffinity")
-            else range(os.cpu_count() or 1)
-        )
-        return min(len(has), _MOST_THREADS)
-    if (
-        isinstance(threads, bool)
-        or not isinstance(threads, (int, np.integer))
-        or not 1 <= threads <= _MOST_THREADS
-    ):
-        raise ParameterError(
-            f"threads = {threads!r} is not allowed: a whole number from 1 to {_MOST_THREADS} is "
-            "needed"
-        )
-    return int(threads)

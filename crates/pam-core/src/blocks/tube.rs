@@ -48,6 +48,12 @@ impl<S: Scalar> Tube<S> {
         Tube { flow_factor: self.flow_factor.re(), critical_ratio: self.critical_ratio.re() }
     }
 
+    /// Choked mass flow per upstream pressure [kg/(s Pa)].
+    #[inline]
+    pub fn flow_factor(&self) -> f64 {
+        self.flow_factor.re()
+    }
+
     /// Critical pressure ratio [1]: the flow is choked below.
     #[inline]
     pub fn critical_ratio(&self) -> f64 {

@@ -18,6 +18,7 @@ use num_dual::Dual64;
 
 use super::model::Elasticity;
 use crate::braid::MuscleGeometry;
+use crate::chebyshev::{interpolate, lobatto};
 use crate::error::{Error, Result};
 use crate::scalar::{constant, Scalar};
 
@@ -388,7 +389,7 @@ impl Exact<'_> {
         for index in 0..count {
             let mut values = [[0.0; COLUMNS]; NODES];
             for (j, value) in values.iter_mut().enumerate() {
-                *value = self.columns(at(index, lobatto(j)))?;
+                *value = self.columns(at(index, lobatto(j, DEGREE)))?;
             }
             let mut cell = interpolate(&values);
             for power in 0..DEGREE {
@@ -418,44 +419,6 @@ impl Exact<'_> {
     }
 }
 
-/// The j-th Chebyshev-Lobatto point, from 1 down to -1.
-fn lobatto(j: usize) -> f64 {
-    (std::f64::consts::PI * j as f64 / DEGREE as f64).cos()
-}
-
-/// Monomial coefficients of the interpolant through values at the Chebyshev-Lobatto points.
-fn interpolate(values: &[[f64; COLUMNS]; NODES]) -> Cell {
-    let half_at_ends = |j: usize| if j == 0 || j == DEGREE { 0.5 } else { 1.0 };
-    let mut cell = [[0.0; COLUMNS]; NODES];
-    // Chebyshev polynomials T_k in powers of x, by their recurrence.
-    let (mut before, mut current) = ([0.0; NODES], [0.0; NODES]);
-    current[0] = 1.0;
-    for k in 0..NODES {
-        for i in 0..COLUMNS {
-            let sum: f64 = (0..NODES)
-                .map(|j| {
-                    // The angle reduced first: exact zeros and signs of the cosine.
-                    let angle = (j * k) % (2 * DEGREE);
-                    half_at_ends(j) * values[j][i] * lobatto(angle)
-                })
-                .sum();
-            let chebyshev = sum * half_at_ends(k) * 2.0 / DEGREE as f64;
-            for power in 0..=k {
-                cell[power][i] += chebyshev * current[power];
-            }
-        }
-        let factor = if k == 0 { 1.0 } else { 2.0 };
-        let mut next = [0.0; NODES];
-        for power in 0..NODES {
-            let shifted = if power == 0 { 0.0 } else { current[power - 1] };
-            next[power] = factor * shifted - before[power];
-        }
-        before = current;
-        current = next;
-    }
-    cell
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -480,7 +443,7 @@ mod tests {
         let p = |x: f64| 1.0 - 2.0 * x + 0.5 * x.powi(5) - 0.25 * x.powi(9);
         let mut values = [[0.0; COLUMNS]; NODES];
         for (j, v) in values.iter_mut().enumerate() {
-            v[0] = p(lobatto(j));
+            v[0] = p(lobatto(j, DEGREE));
         }
         let cell = interpolate(&values);
         for x in [-1.0, -0.3, 0.0, 0.77, 1.0] {

@@ -17,21 +17,25 @@ mod views;
 mod wiring;
 mod wiring_motion;
 
+pub(crate) use body::Body as OneBody;
+pub(crate) use layout::BALANCE_COUNT;
 pub use layout::{Channel, Layout, Names, StatePlace, StateRole, BALANCE};
 pub use linear::{LinearModel, Side};
 pub use memory::Memory;
 pub use parameters::{ParameterId, Parameters, Values};
 pub(crate) use ports::{moves, Place};
-pub(crate) use rates::{Controls, Plant, Scratch, Simulated};
+pub(crate) use rates::{Controls, Line, Plant, Scratch, Simulated};
+pub(crate) use units::{BodyUnit, Group, Node, Path};
 
-use self::units::{Group, Wiring};
+use self::units::Wiring;
 use crate::blocks::gas::Gas;
 use crate::blocks::joint::Joint;
 use crate::description::{dotted, RigSpec};
 use crate::effects::{EffectInfo, EFFECTS};
+use crate::lanes::Plan;
 use crate::muscle::CompiledMuscle;
 use crate::{Error, Result};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// Of the 2.78 that the Runge-Kutta method bears on the negative real axis.
 const STABLE: f64 = 2.0;
@@ -55,6 +59,8 @@ pub struct Rig {
     effects: &'static [&'static EffectInfo],
     gas_step: f64,
     body_step: f64,
+    /// How it runs in lanes, found when it is first asked for.
+    lanes: Arc<OnceLock<Option<Plan>>>,
 }
 
 impl Rig {
@@ -105,6 +111,7 @@ impl Rig {
             effects,
             gas_step: endless,
             body_step: endless,
+            lanes: Arc::default(),
             spec,
         };
         rig.check_reach()?;
@@ -277,6 +284,11 @@ impl Rig {
     /// The description it was made from.
     pub fn spec(&self) -> &RigSpec {
         &self.spec
+    }
+
+    /// How the rig runs in lanes, None where it cannot; whatever the values of its parameters.
+    pub(crate) fn lanes(&self) -> Option<&Plan> {
+        self.lanes.get_or_init(|| Plan::new(self)).as_ref()
     }
 
     /// Longest Runge-Kutta step [s] that openings next to volumes, stops, springs and friction

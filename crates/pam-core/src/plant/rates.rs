@@ -65,13 +65,13 @@ pub struct Controls<S> {
 }
 
 #[derive(Debug, Clone)]
-pub(super) struct Valve<S> {
+pub(crate) struct Valve<S> {
     pub area: S,
     pub null: S,
 }
 
 #[derive(Debug, Clone)]
-pub(super) enum Line<S> {
+pub(crate) enum Line<S> {
     Orifice(S),
     Tube(Tube<S>),
 }
@@ -82,16 +82,16 @@ pub struct Plant<'a, S> {
     pub(super) rig: &'a Rig,
     pub(super) wiring: &'a Wiring,
     pub(super) layout: Layout,
-    pub(super) values: Values<S>,
+    pub(crate) values: Values<S>,
     balanced: bool,
-    pub(super) supplies: Vec<Supply<S>>,
+    pub(crate) supplies: Vec<Supply<S>>,
     /// Fixed volume of each gas, halves of tubes included [m3].
-    pub(super) fixed_volume: Vec<S>,
-    pub(super) alphas: Vec<Polytropic<S>>,
-    pub(super) valves: Vec<Valve<S>>,
-    pub(super) lines: Vec<Line<S>>,
-    pub(super) scales: Vec<S>,
-    pub(super) body: Body<S>,
+    pub(crate) fixed_volume: Vec<S>,
+    pub(crate) alphas: Vec<Polytropic<S>>,
+    pub(crate) valves: Vec<Valve<S>>,
+    pub(crate) lines: Vec<Line<S>>,
+    pub(crate) scales: Vec<S>,
+    pub(crate) body: Body<S>,
     /// Effects that are switched on.
     effects: Vec<Box<dyn Effect<S>>>,
     pub(super) altered: Altered,

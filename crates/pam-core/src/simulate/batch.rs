@@ -5,13 +5,14 @@
 //! last good sample and says why; the others go on.
 
 use std::borrow::Cow;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use crate::plant::Rig;
 use crate::simulate::drive::{
     check_frame, check_value, command_missing, input_range, prescribable, set_pressure, Drive,
 };
 use crate::simulate::run::OwnedRun;
+use crate::simulate::team::Team;
 use crate::simulate::{Initial, Progress, Timing, Trajectory};
 use crate::{Error, Result};
 
@@ -406,57 +407,5 @@ pub fn of_row(row: usize, error: Error) -> Error {
             Error::Integration { time, name: named(name), value, allowed }
         }
         Error::Model(message) => Error::Model(named(message)),
-    }
-}
-
-/// Threads that wait for work, and the caller's.
-struct Team {
-    threads: usize,
-    /// The others, and the process that they live in: a fork takes none of them along.
-    pool: Option<(u32, rayon::ThreadPool)>,
-}
-
-impl Team {
-    fn new(threads: usize) -> Self {
-        Self { threads: threads.max(1), pool: None }
-    }
-
-    /// Do something with every chunk, by the caller alone where it is not worth more.
-    fn share(&mut self, chunks: &mut [Chunk], worth: bool, work: impl Fn(&mut Chunk) + Sync) {
-        let helpers = self.threads.min(chunks.len()).saturating_sub(1);
-        if !worth || helpers == 0 {
-            chunks.iter_mut().for_each(work);
-            return;
-        }
-        let here = std::process::id();
-        if let Some((there, pool)) = self.pool.take() {
-            if there == here {
-                self.pool = Some((here, pool));
-            } else {
-                // Its threads are those of the parent: there is nobody to tell that it ends.
-                std::mem::forget(pool);
-            }
-        }
-        if self.pool.is_none() {
-            let built = rayon::ThreadPoolBuilder::new().num_threads(self.threads - 1).build();
-            self.pool = built.ok().map(|pool| (here, pool));
-        }
-        let Some((_, pool)) = &self.pool else {
-            chunks.iter_mut().for_each(work); // the system gives no more threads
-            return;
-        };
-        let queue = Mutex::new(chunks.iter_mut());
-        let next = || queue.lock().unwrap_or_else(PoisonError::into_inner).next();
-        let all = || {
-            while let Some(chunk) = next() {
-                work(chunk);
-            }
-        };
-        pool.in_place_scope(|scope| {
-            for _ in 0..helpers {
-                scope.spawn(|_| all());
-            }
-            all();
-        });
     }
 }

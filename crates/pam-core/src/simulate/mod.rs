@@ -6,6 +6,7 @@ pub mod events;
 mod initial;
 pub mod integrate;
 pub mod run;
+pub(crate) mod team;
 
 use self::drive::Drive;
 use self::events::Event;
@@ -326,7 +327,8 @@ impl Progress {
             [self.state.len(), self.memory.len() * Memory::<f64>::NUMBERS, self.flags.len(), 1];
         let expected: usize = parts.iter().sum();
         let past = numbers.len().wrapping_sub(expected);
-        let whole = past == 0 || (past < numbers.len() && self.kept > 0 && past % self.kept == 0);
+        let whole =
+            past == 0 || (past < numbers.len() && self.kept > 0 && past.is_multiple_of(self.kept));
         if !whole {
             let why = "as it was read".into();
             return Err(Error::Length {

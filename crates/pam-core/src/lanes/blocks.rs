@@ -1,0 +1,156 @@
+//! The blocks of several plants side by side: the equations of [`crate::blocks`] without branches.
+//! A test holds each rig's rates against those of [`crate::plant`].
+
+use super::num::{Mask, Num};
+use crate::blocks::arm::one_link::Stops;
+use crate::blocks::gas::{Gas, LAMINAR_RATIO};
+use crate::chebyshev::{interpolate, lobatto};
+use pulp::Simd;
+
+const NODES: usize = 19;
+
+/// Flow through orifices of one gas, `r^(1/gamma)` as a polynomial over the subsonic ratios.
+#[derive(Debug, Clone)]
+pub(super) struct Orifice {
+    critical_ratio: f64,
+    middle: f64,
+    per_half_width: f64,
+    power: [f64; NODES],
+    exponent: f64,
+    choked: f64,
+    laminar: f64,
+    factor: f64,
+}
+
+impl Orifice {
+    pub fn new(gas: &Gas) -> Self {
+        let low = gas.critical_ratio();
+        let (middle, half) = (0.5 * (LAMINAR_RATIO + low), 0.5 * (LAMINAR_RATIO - low));
+        let node = |j: usize| [(middle + half * lobatto(j, NODES - 1)).powf(1.0 / gas.gamma)];
+        let power = interpolate(&std::array::from_fn::<_, NODES, _>(node)).map(|[c]| c);
+        Self {
+            critical_ratio: low,
+            middle,
+            per_half_width: 1.0 / half,
+            power,
+            exponent: gas.gamma / (gas.gamma - 1.0),
+            choked: gas.psi(0.0),
+            laminar: gas.psi(LAMINAR_RATIO) / (1.0 - LAMINAR_RATIO),
+            factor: gas.choked_flow(1.0, 1.0) / gas.psi(0.0),
+        }
+    }
+
+    /// Mass flow [kg/s] from `upstream` to `downstream`, as [`Gas::mass_flow`].
+    #[inline(always)]
+    pub fn mass_flow<S: Simd>(&self, area: Num<S>, upstream: Num<S>, downstream: Num<S>) -> Num<S> {
+        let high = upstream.or_above(downstream);
+        let ratio = upstream.or_below(downstream) / high;
+        let flow = area * high * self.psi(ratio) * self.factor;
+        downstream.at_most(upstream).select(flow, -flow)
+    }
+
+    #[inline(always)]
+    fn psi<S: Simd>(&self, ratio: Num<S>) -> Num<S> {
+        let subsonic = ratio
+            .or_above(ratio.constant(self.critical_ratio))
+            .or_below(ratio.constant(LAMINAR_RATIO));
+        let s = ((subsonic - self.middle) * self.per_half_width).polynomial(&self.power);
+        let curved = (s * (s - subsonic) * self.exponent).sqrt();
+        let straight = (-ratio + 1.0) * self.laminar;
+        let open = ratio.at_most(ratio.constant(LAMINAR_RATIO)).select(curved, straight);
+        ratio.at_most(ratio.constant(self.critical_ratio)).select(ratio.constant(self.choked), open)
+    }
+}
+
+/// A tube, as [`crate::blocks::tube::Tube`].
+#[derive(Clone, Copy)]
+pub(super) struct Tube<S: Simd> {
+    pub flow_factor: Num<S>,
+    pub critical_ratio: Num<S>,
+}
+
+impl<S: Simd> Tube<S> {
+    #[inline(always)]
+    pub fn mass_flow(&self, upstream: Num<S>, downstream: Num<S>) -> Num<S> {
+        let high = upstream.or_above(downstream);
+        let ratio = upstream.or_below(downstream) / high;
+        let flow = self.flow_factor * high * self.psi(ratio);
+        downstream.at_most(upstream).select(flow, -flow)
+    }
+
+    #[inline(always)]
+    fn psi(&self, ratio: Num<S>) -> Num<S> {
+        let edge = ratio.constant(LAMINAR_RATIO);
+        let curved = ratio.or_above(self.critical_ratio).or_below(edge);
+        let x = (curved - self.critical_ratio) / (-self.critical_ratio + 1.0);
+        let ellipse = (-(x * x) + 1.0).sqrt();
+        // Beyond the edge the ellipse stands at its value there.
+        let straight = ellipse * (-ratio + 1.0) / (1.0 - LAMINAR_RATIO);
+        ratio.at_most(edge).select(ellipse, straight)
+    }
+}
+
+/// Where the air comes from, as [`crate::blocks::supply::Supply`].
+#[derive(Clone, Copy)]
+pub(super) enum Supply<S: Simd> {
+    Tank(Num<S>),
+    Constant,
+    Regulator { time_constant: Num<S>, droop: Num<S> },
+}
+
+impl<S: Simd> Supply<S> {
+    #[inline(always)]
+    pub fn pressure_rate(&self, pressure: Num<S>, outflow: Num<S>, rt: f64, set: Num<S>) -> Num<S> {
+        match self {
+            Self::Tank(volume) => -(outflow * rt) / *volume,
+            Self::Constant => pressure.constant(0.0),
+            Self::Regulator { time_constant, droop } => {
+                (set - pressure - *droop * outflow) / *time_constant
+            }
+        }
+    }
+}
+
+/// What moves: an arm of one link, or a mass that hangs from the muscle (without inertia of its
+/// own, and always pulled straight down).
+#[derive(Clone, Copy)]
+pub(super) struct Body<S: Simd> {
+    pub inertia: Num<S>,
+    /// Torque of the weight where it pulls across [N m], or the weight itself [N].
+    pub weight: Num<S>,
+    /// The weight follows the sine of the angle.
+    pub turns: bool,
+    pub viscous: Num<S>,
+    pub coulomb: Num<S>,
+    /// Some lane has Coulomb friction.
+    pub rubs: bool,
+    pub coulomb_speed: f64,
+    pub stops: Option<Stops>,
+}
+
+impl<S: Simd> Body<S> {
+    #[inline(always)]
+    pub fn acceleration(&self, angle: Num<S>, rate: Num<S>, torque: Num<S>) -> Num<S> {
+        let mut sum = torque - self.viscous * rate;
+        if self.rubs {
+            sum = sum - self.coulomb * (rate / self.coulomb_speed).tanh();
+        }
+        sum = if self.turns { sum - self.weight * angle.sin() } else { sum - self.weight };
+        if let Some(stops) = &self.stops {
+            sum += stop_torque(stops, angle, rate);
+        }
+        sum / self.inertia
+    }
+}
+
+/// Torque of the stops [N m], which never pull.
+#[inline(always)]
+fn stop_torque<S: Simd>(stops: &Stops, angle: Num<S>, rate: Num<S>) -> Num<S> {
+    let zero = angle.constant(0.0);
+    let (low, high) = (angle.constant(stops.min_angle), angle.constant(stops.max_angle));
+    let damping = rate * stops.damping;
+    let up = ((low - angle) * stops.stiffness - damping).or_above(zero);
+    let down = ((angle - high) * stops.stiffness + damping).or_above(zero);
+    let above: Mask<S> = high.less(angle);
+    angle.less(low).select(up, above.select(-down, zero))
+}

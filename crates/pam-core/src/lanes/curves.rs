@@ -1,0 +1,245 @@
+//! What a group of muscles does to its joint and its chamber, as polynomials of the angle.
+//!
+//! A lane has no time to find the tendon's length and then the muscle's table cell by cell. Joint,
+//! table and count are functions of the angle alone; their products are interpolated over uniform
+//! cells, refined until they agree with [`crate::blocks::joint::Joint::eval`] and
+//! [`crate::muscle::Table::eval`] at points off the nodes. No cell crosses a kink of the muscle.
+
+use super::num::{Num, WHOLE};
+use crate::chebyshev::{interpolate, lobatto};
+use crate::plant::Group;
+use pulp::Simd;
+
+/// Torque per gauge pressure of braid and wall [m3], of the moduli's slopes for scale 1 [m3],
+/// torque of their offsets for scale 1 [N m]; air volume [m3] and its slope [m3/rad]; then the
+/// first three again for the power of the muscles, which a printed joint does not pass on whole.
+pub(super) const COLUMNS: usize = 8;
+const DEGREE: usize = 5;
+const NODES: usize = DEGREE + 1;
+const VOLUME: usize = 3;
+const SLOPE: usize = 4;
+/// Numbers of a cell: its powers one after the other, all columns of each.
+const STRIDE: usize = NODES * COLUMNS;
+/// Largest error, relative to the largest magnitude of each column.
+pub(super) const TOLERANCE: f64 = 1e-9;
+/// Cells are halved until the error is below this.
+const AIM: f64 = 2e-10;
+const MOST_CELLS: usize = 1024;
+/// Check points in a cell, in units of its half-width; none is a node.
+const CHECKS: [f64; 5] = [-0.93, -0.55, 0.07, 0.62, 0.95];
+/// Points at which kinks are looked for.
+const SCAN: usize = 512;
+/// Lanes at most.
+pub(super) const MOST_LANES: usize = 8;
+
+/// Uniform cells between two kinks.
+#[derive(Debug, Clone, Copy)]
+struct Piece {
+    start: f64,
+    cells_per_unit: f64,
+    first: f64,
+    last: f64,
+}
+
+/// All columns of one group over a range of its coordinate.
+#[derive(Debug, Clone)]
+pub(super) struct Curves {
+    pub low: f64,
+    pub high: f64,
+    pieces: Vec<Piece>,
+    cells: Vec<f64>,
+}
+
+impl Curves {
+    /// Curves over a range [rad, or m of shortening] in which the muscle's table and the joint
+    /// hold; none where they are not smooth enough.
+    pub fn new(group: &Group, low: f64, high: f64) -> Option<Self> {
+        let mut ends = vec![low];
+        ends.extend(kinks(group, low, high));
+        ends.push(high);
+        let scales = scales(group, low, high);
+        let (mut pieces, mut cells) = (Vec::new(), Vec::new());
+        for pair in ends.windows(2) {
+            let fitted = refined(group, pair[0], pair[1], &scales)?;
+            let count = fitted.len() / STRIDE;
+            pieces.push(Piece {
+                start: pair[0],
+                cells_per_unit: count as f64 / (pair[1] - pair[0]),
+                first: (cells.len() / STRIDE) as f64,
+                last: (count - 1) as f64,
+            });
+            cells.extend(fitted);
+        }
+        Some(Self { low, high, pieces, cells })
+    }
+
+    /// Every column at an angle of each lane; beyond the range its end.
+    #[inline(always)]
+    pub fn eval<S: Simd>(&self, simd: S, at: Num<S>) -> [Num<S>; COLUMNS] {
+        let at = at.or_above(at.constant(self.low)).or_below(at.constant(self.high));
+        let (cell, x) = self.place(at);
+        let mut rows = [0.0; COLUMNS * MOST_LANES];
+        let lanes = S::F64_LANES;
+        let per_row = COLUMNS / lanes;
+        let last = self.cells.len() / STRIDE - 1;
+        for (lane, row) in rows.chunks_exact_mut(COLUMNS).take(lanes).enumerate() {
+            let cell = (cell.numbers()[lane].to_bits() as u32 as usize).min(last);
+            let powers = S::as_simd_f64s(&self.cells[cell * STRIDE..(cell + 1) * STRIDE]).0;
+            let x = simd.splat_f64s(x.numbers()[lane]);
+            for (k, out) in S::as_mut_simd_f64s(row).0.iter_mut().enumerate() {
+                let mut sum = powers[DEGREE * per_row + k];
+                for power in (0..DEGREE).rev() {
+                    sum = simd.add_f64s(simd.mul_f64s(sum, x), powers[power * per_row + k]);
+                }
+                *out = sum;
+            }
+        }
+        let mut columns = [at; COLUMNS];
+        for (column, values) in columns.iter_mut().enumerate() {
+            for (lane, value) in values.numbers_mut().iter_mut().enumerate() {
+                *value = rows[lane * COLUMNS + column];
+            }
+        }
+        columns
+    }
+
+    /// Cell of each lane, in the last digits of a number, and the place in it from -1 to 1.
+    #[inline(always)]
+    fn place<S: Simd>(&self, at: Num<S>) -> (Num<S>, Num<S>) {
+        let first = &self.pieces[0];
+        let (mut start, mut scale) = (at.constant(first.start), at.constant(first.cells_per_unit));
+        let (mut begin, mut last) = (at.constant(first.first), at.constant(first.last));
+        for piece in &self.pieces[1..] {
+            let here = at.constant(piece.start).at_most(at);
+            start = here.select(at.constant(piece.start), start);
+            scale = here.select(at.constant(piece.cells_per_unit), scale);
+            begin = here.select(at.constant(piece.first), begin);
+            last = here.select(at.constant(piece.last), last);
+        }
+        let position = (at - start) * scale - 0.5;
+        let cell = position.round().or_above(at.constant(0.0)).or_below(last);
+        ((begin + cell) + WHOLE, (position - cell) * 2.0)
+    }
+}
+
+/// The columns at an angle, the slope (zero here) left to the volume's polynomial.
+fn exact(group: &Group, angle: f64) -> [f64; COLUMNS] {
+    let point = group.joint.eval(angle);
+    let table = group.muscle.table.eval(point.shortening / group.rest_length);
+    let (turn, shorten) = (point.torque_arm * group.count, point.moment_arm * group.count);
+    let forces = [table.a_gas, table.a_elastic, table.b_elastic];
+    let mut columns = [0.0; COLUMNS];
+    for (k, force) in forces.into_iter().enumerate() {
+        columns[k] = force * turn;
+        columns[SLOPE + 1 + k] = force * shorten;
+    }
+    columns[VOLUME] = table.volume * group.count;
+    columns
+}
+
+fn with_slope(group: &Group, angle: f64) -> [f64; COLUMNS] {
+    let point = group.joint.eval(angle);
+    let table = group.muscle.table.eval(point.shortening / group.rest_length);
+    let mut columns = exact(group, angle);
+    columns[SLOPE] = table.volume_slope * point.moment_arm * (group.count / group.rest_length);
+    columns
+}
+
+/// Angles inside a range at which the muscle passes from one smooth piece to the next.
+fn kinks(group: &Group, low: f64, high: f64) -> Vec<f64> {
+    let contraction = |angle: f64| group.joint.eval(angle).shortening / group.rest_length;
+    let at = |k: usize| low + (high - low) * k as f64 / SCAN as f64;
+    let mut found = Vec::new();
+    for ratio in group.muscle.table.breakpoints() {
+        for k in 0..SCAN {
+            let (mut a, mut b) = (at(k), at(k + 1));
+            let below = contraction(a) < ratio;
+            if below == (contraction(b) < ratio) {
+                continue;
+            }
+            for _ in 0..60 {
+                let middle = 0.5 * (a + b);
+                if (contraction(middle) < ratio) == below {
+                    a = middle;
+                } else {
+                    b = middle;
+                }
+            }
+            // A muscle at rest stands on a kink: on the side that its own table takes.
+            found.push(if below { a } else { b });
+        }
+    }
+    // Pieces have a width.
+    let least = 1e-6 * (high - low);
+    found.retain(|x| *x > low + least && *x < high - least);
+    found.sort_by(f64::total_cmp);
+    found.dedup_by(|a, b| *a - *b < least);
+    found
+}
+
+/// Largest magnitude of each column.
+fn scales(group: &Group, low: f64, high: f64) -> [f64; COLUMNS] {
+    let mut scales = [f64::MIN_POSITIVE; COLUMNS];
+    for k in 0..=64 {
+        let here = with_slope(group, low + (high - low) * f64::from(k) / 64.0);
+        for (scale, value) in scales.iter_mut().zip(here) {
+            *scale = scale.max(value.abs());
+        }
+    }
+    scales
+}
+
+/// Cells of one piece, doubled until they are as good as they get.
+fn refined(group: &Group, start: f64, stop: f64, scales: &[f64; COLUMNS]) -> Option<Vec<f64>> {
+    let mut best: Option<(Vec<f64>, f64)> = None;
+    let mut count = 1;
+    while count <= MOST_CELLS {
+        let (cells, error) = fitted(group, start, stop, count, scales);
+        if best.as_ref().is_some_and(|(_, least)| *least <= TOLERANCE && error > 0.5 * least) {
+            break;
+        }
+        best = Some((cells, error));
+        if error <= AIM {
+            break;
+        }
+        count *= 2;
+    }
+    best.filter(|(_, error)| *error <= TOLERANCE).map(|(cells, _)| cells)
+}
+
+/// Cells of equal width over a piece and their largest error; the rest is left out behind a cell
+/// that is far off.
+fn fitted(
+    group: &Group,
+    start: f64,
+    stop: f64,
+    count: usize,
+    scales: &[f64; COLUMNS],
+) -> (Vec<f64>, f64) {
+    let width = (stop - start) / count as f64;
+    let at =
+        |cell: usize, x: f64| (start + (cell as f64 + 0.5 + 0.5 * x) * width).clamp(start, stop);
+    let (mut cells, mut worst) = (Vec::with_capacity(count * STRIDE), 0.0_f64);
+    for index in 0..count {
+        let values: [[f64; COLUMNS]; NODES] =
+            std::array::from_fn(|j| exact(group, at(index, lobatto(j, DEGREE))));
+        let mut cell = interpolate(&values);
+        for power in 0..DEGREE {
+            cell[power][SLOPE] = cell[power + 1][VOLUME] * (power + 1) as f64 * 2.0 / width;
+        }
+        for x in CHECKS {
+            let wanted = with_slope(group, at(index, x));
+            for (column, wanted) in wanted.iter().enumerate() {
+                let found = cell.iter().rev().fold(0.0, |sum, power| sum * x + power[column]);
+                let error = (found - wanted).abs() / scales[column];
+                // `max` would drop NaN.
+                worst = if error <= worst { worst } else { error };
+            }
+        }
+        cells.extend(cell.iter().flatten());
+        if worst.is_nan() || worst > 1e3 * TOLERANCE {
+            return (cells, f64::INFINITY);
+        }
+    }
+    (cells, worst)
+}

@@ -1,0 +1,84 @@
+//! Many plants of one structure, side by side in the vector lanes of the processor.
+//!
+//! Rigs without effects whose arm is one link or a hanging mass run in lanes ([`Plan`]): one plant
+//! in each, 8, 4, 2 or 1 of them as the processor has room for, chosen when the program runs. All
+//! other rigs, and plants that leave the range of the lanes' curves, run one by one as in
+//! [`crate::simulate`]. What happens to a row depends on its own numbers only: neighbours, threads
+//! and the number of lanes change no bit.
+
+mod blocks;
+mod curves;
+mod num;
+mod rates;
+mod reduce;
+mod request;
+mod run;
+mod steps;
+
+pub use reduce::{Reduce, Reduction};
+pub use request::{Outcome, Request, Signal};
+pub use run::simulate;
+
+use self::blocks::Orifice;
+use self::curves::Curves;
+use crate::plant::{BodyUnit, Group, Rig};
+
+/// How far beyond its stops a coordinate may go in lanes, in ranges of it.
+const BEYOND: f64 = 0.25;
+/// The same, where the curves end before that.
+const LESS_BEYOND: [f64; 4] = [BEYOND, 0.1, 0.04, 0.01];
+
+/// What lanes need to know of a rig beside the values of its parameters.
+#[derive(Debug, Clone)]
+pub struct Plan {
+    orifice: Orifice,
+    curves: Vec<Curves>,
+}
+
+impl Plan {
+    /// The plan of a rig that can run in lanes; none for another.
+    #[must_use]
+    pub(crate) fn new(rig: &Rig) -> Option<Self> {
+        let wiring = &rig.wiring;
+        let body = matches!(wiring.body, BodyUnit::OneLink { .. } | BodyUnit::Mass { .. });
+        let plain = wiring.ports.effects.is_empty() && wiring.groups.iter().all(|g| !g.direction);
+        let valves = wiring.groups.iter().all(|g| g.coordinate == 0);
+        if !(body && plain && valves) {
+            return None;
+        }
+        let curves = wiring.groups.iter().map(|group| curves(rig, group));
+        Some(Self { orifice: Orifice::new(&rig.gas), curves: curves.collect::<Option<_>>()? })
+    }
+
+    /// Whether a coordinate is inside all curves.
+    fn contains(&self, angle: f64) -> bool {
+        self.curves.iter().all(|curves| curves.low <= angle && angle <= curves.high)
+    }
+}
+
+/// Curves of a group over the range of its coordinate and somewhat more.
+fn curves(rig: &Rig, group: &Group) -> Option<Curves> {
+    let (low, high) = rig.angles(group);
+    let holds = |angle: f64| {
+        group.joint.reaches(angle)
+            && group.muscle.table.contains(group.joint.eval(angle).shortening / group.rest_length)
+    };
+    LESS_BEYOND.iter().find_map(|share| {
+        let more = share * (high - low);
+        Curves::new(group, edge(&holds, low, low - more), edge(&holds, high, high + more))
+    })
+}
+
+/// As far from a place towards another as something holds.
+fn edge(holds: &dyn Fn(f64) -> bool, from: f64, to: f64) -> f64 {
+    const STEPS: u32 = 64;
+    let mut good = from;
+    for k in 1..=STEPS {
+        let next = from + (to - from) * f64::from(k) / f64::from(STEPS);
+        if !holds(next) {
+            break;
+        }
+        good = next;
+    }
+    good
+}

@@ -1,0 +1,81 @@
+"""Arguments of many plants: how many there are, a number for each, how many threads."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pamrs.errors import ParameterError
+
+__all__ = ["plants_of", "rowwise", "thread_count"]
+
+Array = NDArray[np.float64]
+_MOST_THREADS = 256
+
+
+def plants_of(n: int | None, rigs: int | None, given: Mapping[str, ArrayLike]) -> int:
+    """Number of plants from what says it: a number, a sequence of rigs, arrays by their name."""
+    sizes = {name: int(np.size(values)) for name, values in given.items() if np.ndim(values)}
+    if n is not None:
+        if isinstance(n, bool) or not isinstance(n, (int, np.integer)) or n < 1:
+            raise ParameterError(
+                f"n = {n!r} is not allowed: a whole number of plants, 1 at least, is needed"
+            )
+        sizes = {"n": int(n), **sizes}
+    if rigs is not None:
+        sizes = {"rig": rigs, **sizes}
+    if not sizes:
+        raise ParameterError(
+            "n is missing: the number of plants (or an array with a value for each of them)"
+        )
+    first, count = next(iter(sizes.items()))
+    for name, size in sizes.items():
+        if size != count or size < 1:
+            raise ParameterError(
+                f"{name} is for {size} plants, {first} for {count}; one number of plants, 1 at "
+                "least, is needed"
+            )
+    return count
+
+
+def rowwise(name: str, values: ArrayLike, n: int) -> Array:
+    """A number for each plant."""
+    try:
+        array = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ParameterError(f"{name} = {values!r} is not allowed: numbers are needed") from None
+    if array.ndim == 0:
+        array = np.full(n, float(array))
+    if array.shape != (n,):
+        raise ParameterError(
+            f"{name} has the shape {array.shape}; ({n},) is needed, one value for each plant"
+        )
+    for row in np.flatnonzero(~np.isfinite(array))[:1]:
+        raise ParameterError(
+            f"{name}[{row}] = {array[row]} is not allowed: a finite number is needed"
+        )
+    return np.ascontiguousarray(array)
+
+
+def thread_count(threads: int | None) -> int:
+    """How many threads may work."""
+    if threads is None:
+        has = (
+            os.sched_getaffinity(0)
+            if hasattr(os, "sched_getaffinity")
+            else range(os.cpu_count() or 1)
+        )
+        return min(len(has), _MOST_THREADS)
+    if (
+        isinstance(threads, bool)
+        or not isinstance(threads, (int, np.integer))
+        or not 1 <= threads <= _MOST_THREADS
+    ):
+        raise ParameterError(
+            f"threads = {threads!r} is not allowed: a whole number from 1 to {_MOST_THREADS} is "
+            "needed"
+        )
+    return int(threads)

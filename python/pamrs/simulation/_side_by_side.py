@@ -1,0 +1,271 @@
+"""Many plants of one rig, side by side in the vector lanes of the processor."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pamrs import _core
+from pamrs.errors import ParameterError
+from pamrs.rig import Rig
+from pamrs.simulation._batch import BatchRun, Failure
+from pamrs.simulation._driving import Inputs, initial_values
+from pamrs.simulation._plants import plants_of, rowwise, thread_count
+from pamrs.simulation._simulation import MOST_NUMBERS, check_run, chosen_step, core_rig
+
+__all__ = ["REDUCTIONS", "simulate_batch"]
+
+Array = NDArray[np.float64]
+#: What a run can be reduced to.
+REDUCTIONS = ("final", "min", "max", "peak", "mean", "squared_error")
+#: Reduction and channel, and for the squared error a reference.
+Reduction = tuple[str, str] | tuple[str, str, ArrayLike]
+
+
+def simulate_batch(
+    rig: Rig,
+    valve_command: Any = None,
+    *,
+    sample_time: float,
+    n: int | None = None,
+    parameters: Mapping[str, ArrayLike] | None = None,
+    initial: Mapping[str, ArrayLike] | None = None,
+    step: float | None = None,
+    duration: float | None = None,
+    supply_command: Any = None,
+    length: ArrayLike | None = None,
+    pressure: Any = None,
+    record: Sequence[str] = (),
+    every: int = 1,
+    reduce: Mapping[str, Reduction] | None = None,
+    threads: int | None = None,
+) -> BatchRun:
+    """Simulate many plants of one rig that differ in parameters, starts or commands.
+
+    Each plant runs as with :func:`pamrs.simulate`. Rigs without effects whose arm is one link or a
+    hanging mass run side by side in the vector lanes of the processor; their channels agree with
+    :func:`pamrs.simulate` to about 1e-9 of their size. All others run one by one. What stands
+    beside a plant, and the number of threads, change no bit of it.
+
+    Parameters
+    ----------
+    rig : Rig
+        The model of all plants.
+    valve_command : array_like, shape (rows,) or (n, rows), or mapping of str to it, optional
+        Commands [V] as of :func:`pamrs.simulate`, common ones or a line for each plant.
+    sample_time : float
+        Time between rows [s].
+    n : int, optional
+        Number of plants, where no array says it.
+    parameters : mapping of str to float or array_like, shape (n,), optional
+        Parameters of the rig by name in SI units, ``arm.payload``, with a value for each plant.
+    initial : mapping of str to float or array_like, shape (n,), optional
+        Initial values as of :func:`pamrs.simulate`.
+    step : float, optional
+        RK4 step [s] as of :func:`pamrs.simulate`; each plant takes the one that it needs.
+    duration : float, optional
+        Simulated time [s], where no signal has a length.
+    supply_command : array_like, shape (rows,) or (n, rows), or mapping of str to it, optional
+        Set pressures of regulators [Pa, gauge], in the same way.
+    length : array_like, shape (rows,) or (n, rows), optional
+        What a load frame prescribes [m], in the same way.
+    pressure : array_like, shape (rows,) or (n, rows), or mapping of str to it, optional
+        Pressures of chambers without a valve [Pa, gauge], in the same way.
+    record : sequence of str, optional
+        Channels to be kept, nothing by default.
+    every : int, optional
+        Keep each ``every``-th row.
+    reduce : mapping of str to (reduction, channel) or (reduction, channel, reference), optional
+        Numbers of the whole run by a name of yours: ``("final", "joint_angle")``; reductions are
+        ``final``, ``min``, ``max``, ``peak`` (largest magnitude), ``mean`` and ``squared_error``
+        (time integral of the squared difference from ``reference``, a number or an array of shape
+        (rows,), in the channel's unit). No trajectory is kept for them.
+    threads : int, optional
+        Most threads that work; by default one for each processor that this process may use.
+
+    Returns
+    -------
+    BatchRun
+        ``run["joint_angle"]`` of shape (n, kept rows), ``run.reduced["name"]`` of shape (n,),
+        ``run.status``. A plant whose state leaves the range in which the model holds stays at its
+        last good sample, and its reduced numbers are NaN.
+
+    Raises
+    ------
+    ParameterError
+        If an argument is not finite, outside its range or of another shape; the message names it.
+    RigError
+        If a parameter or channel is unknown, or a signal is missing.
+
+    Examples
+    --------
+    >>> import numpy as np, pamrs
+    >>> run = pamrs.simulate_batch(
+    ...     pamrs.rigs.shoulder(), np.full(201, 6.0), sample_time=0.005,
+    ...     parameters={"arm.payload": np.linspace(0.0, 20.0, 500)},
+    ...     reduce={"end": ("final", "joint_angle")},
+    ... )
+    >>> run.reduced["end"].shape, bool(run.reduced["end"][0] > run.reduced["end"][-1])
+    ((500,), True)
+    """
+    check_run(rig, sample_time)
+    given = Inputs(rig).named(
+        valve_command=valve_command, supply_command=supply_command, length=length, pressure=pressure
+    )
+    signals = {name: _numbers(name, values) for name, values in given.items()}
+    rows = _row_count(signals, duration, sample_time)
+    starts = initial_values(dict.fromkeys(initial or {}, 0.0), rig)
+    per_plant = {
+        **{name: _numbers(name, values) for name, values in (parameters or {}).items()},
+        **{f"initial {name}": _numbers(name, (initial or {})[name]) for name in starts},
+        **{name: values[:, 0] for name, values in signals.items() if values.ndim == 2},
+    }
+    count = plants_of(n, None, per_plant)
+    reduced = dict(reduce or {})
+    kept = -(-rows // _checked_every(every))
+    _check_size(count, kept, record, reduced)
+    begin = {name: rowwise(f"initial {name}", (initial or {})[name], count) for name in starts}
+    core = core_rig(rig)
+    recorded, numbers, ended = _core.side_by_side(
+        core,
+        count,
+        rows,
+        _driven(signals, begin, count, rows),
+        sample_time,
+        chosen_step(sample_time, step),
+        {name: rowwise(name, values, count) for name, values in (parameters or {}).items()},
+        begin,
+        _channels(record),
+        every,
+        [_reduction(name, asked, rows) for name, asked in reduced.items()],
+        thread_count(threads),
+    )
+    return BatchRun(
+        time=np.asarray(np.arange(kept) * every * sample_time, dtype=np.float64),
+        channels=dict(zip(record, recorded, strict=True)),
+        status=tuple(None if why is None else Failure(*why) for why in ended),
+        reduced=dict(zip(reduced, numbers, strict=True)),
+    )
+
+
+def _numbers(name: str, values: ArrayLike) -> Array:
+    try:
+        array = np.asarray(values, dtype=np.float64, order="C")
+    except (TypeError, ValueError):
+        raise ParameterError(f"{name} is not allowed: numbers are needed") from None
+    if array.ndim > 2 or array.size == 0:
+        raise ParameterError(
+            f"{name} has the shape {array.shape}; (rows,) or (n, rows) is needed, of one value at "
+            "least"
+        )
+    return array
+
+
+def _row_count(signals: Mapping[str, Array], duration: float | None, sample_time: float) -> int:
+    """Rows of time, from the signals or the duration."""
+    sizes = {name: values.shape[-1] for name, values in signals.items() if values.ndim}
+    if duration is not None:
+        if sizes:
+            raise ParameterError(
+                f"duration = {duration} is not allowed together with a signal that sets it "
+                f"({next(iter(sizes))})"
+            )
+        if not (isinstance(duration, (int, float, np.number)) and 0 <= duration < np.inf):
+            raise ParameterError(
+                f"duration = {duration} is not allowed: a finite time >= 0 s is needed"
+            )
+        return round(duration / sample_time) + 1
+    if not sizes:
+        raise ParameterError(
+            "duration is missing: a finite time >= 0 s is needed (or give valve_command an array)"
+        )
+    first, rows = next(iter(sizes.items()))
+    for name, size in sizes.items():
+        if size != rows:
+            raise ParameterError(
+                f"{name} has {size} values in time, {first} has {rows}; one number of rows is "
+                "needed"
+            )
+    return int(rows)
+
+
+def _driven(
+    signals: Mapping[str, Array], begin: dict[str, Array], plants: int, rows: int
+) -> dict[str, Array]:
+    """Signals as the core takes them: what is prescribed is for the end of each sample, and its
+    first value is where the plants begin (written to ``begin``).
+    """
+    driven: dict[str, Array] = {}
+    for name, values in signals.items():
+        signal = np.full(rows, float(values)) if values.ndim == 0 else values
+        if name.startswith(("valve_command", "supply_command")):
+            driven[name] = signal
+            continue
+        first = name.replace("pressure", "muscle_pressure", 1)
+        starts = np.ascontiguousarray(np.broadcast_to(signal[..., 0], (plants,)))
+        if not np.array_equal(begin.setdefault(first, starts), starts):
+            raise ParameterError(
+                f"initial {first} does not go with the first value of {name}: leave one out"
+            )
+        driven[name] = np.ascontiguousarray(
+            np.concatenate([signal[..., 1:], signal[..., -1:]], axis=-1)
+        )
+    return driven
+
+
+def _checked_every(every: int) -> int:
+    if isinstance(every, bool) or not isinstance(every, (int, np.integer)) or every < 1:
+        raise ParameterError(
+            f"every = {every!r} is not allowed: a whole number from 1 on is needed"
+        )
+    return int(every)
+
+
+def _channels(record: Iterable[str]) -> list[str]:
+    if isinstance(record, str):
+        raise ParameterError(f"record = {record!r} is not allowed: a sequence of names is needed")
+    return [str(name) for name in record]
+
+
+def _check_size(
+    plants: int, kept: int, record: Sequence[str], reduced: Mapping[str, Reduction]
+) -> None:
+    """Refuse results that would not fit in memory, before anything runs."""
+    numbers = plants * (kept * len(_channels(record)) + len(reduced))
+    if numbers > MOST_NUMBERS:
+        raise ParameterError(
+            f"{plants} plants with {kept} rows of {len(record)} channels are not allowed: at most "
+            f"{MOST_NUMBERS} numbers (2 GB); raise every, or ask for numbers of whole runs "
+            "(reduce)"
+        )
+
+
+def _reduction(name: str, asked: Reduction, rows: int) -> tuple[str, str, list[float]]:
+    """A reduction as the core takes it: channel, kind and reference."""
+    if isinstance(asked, str) or not isinstance(asked, Sequence) or len(asked) not in (2, 3):
+        raise ParameterError(
+            f"reduce[{name!r}] = {asked!r} is not allowed: (reduction, channel) or "
+            '("squared_error", channel, reference) is needed'
+        )
+    kind, channel, *more = asked
+    if kind not in REDUCTIONS:
+        raise ParameterError(
+            f"reduce[{name!r}] asks for {kind!r}, which is not allowed: one of "
+            f"{', '.join(REDUCTIONS)} is needed"
+        )
+    if not more:
+        return str(channel), str(kind), []
+    if kind != "squared_error":
+        raise ParameterError(f"reduce[{name!r}] has a reference, which only squared_error takes")
+    reference = _numbers(f"reduce[{name!r}] reference", more[0])
+    if reference.ndim == 0:
+        reference = np.full(rows, float(reference))
+    if reference.shape != (rows,) or not np.isfinite(reference).all():
+        raise ParameterError(
+            f"reduce[{name!r}] has a reference of shape {reference.shape}; a finite number or "
+            f"({rows},) of them is needed"
+        )
+    return str(channel), str(kind), reference.tolist()
