@@ -56,6 +56,11 @@ $(VENV)/.installed: requirements-dev.lock $(VENV)/.created
 	$(BIN)/python -m pip install --quiet --requirement requirements-dev.lock
 	@touch $@
 
+# The peers of the benchmarks are large, and nothing else needs them.
+$(VENV)/.bench: requirements-bench.lock $(VENV)/.installed
+	$(BIN)/python -m pip install --quiet --requirement requirements-bench.lock --constraint requirements-dev.lock
+	@touch $@
+
 # Other flags are another library.
 $(VENV)/.flags: $(VENV)/.created FORCE
 	@printf '%s\n' '$(RUSTFLAGS)' | cmp -s - $@ || printf '%s\n' '$(RUSTFLAGS)' > $@
@@ -126,9 +131,9 @@ format:  ## rewrite the sources in the house's layout
 	$(BIN)/ruff check --quiet --fix $(PYTHON_SOURCES)
 	$(BIN)/ruff format $(PYTHON_SOURCES)
 
-bench: build  ## this package and its reference side by side
+bench: build $(VENV)/.bench  ## this package beside Numba, JAX, SciPy and its reference, to docs/benchmarks.md
 	$(CARGO) bench --quiet --package pam-core $(LOCKED)
-	$(BIN)/python -m benchmarks.bench
+	$(BIN)/python -m benchmarks.report --command "make bench"
 
 convergence: build  ## order, stability and error of every packaged rig
 	$(BIN)/python -m benchmarks.convergence docs
@@ -141,9 +146,11 @@ golden: build  ## the published golden values against this build
 
 lock:  ## pin the newest versions that pyproject.toml allows
 	rm -rf $(VENV)/lock && "$(PYTHON)" -m venv $(VENV)/lock
-	$(VENV)/lock/bin/python -c 'import tomllib; p = tomllib.load(open("pyproject.toml", "rb"))["project"]; o = p["optional-dependencies"]; print("\n".join(r for r in p["dependencies"] + sum(o.values(), []) if not r.startswith("pamrs")))' > $(VENV)/lock/wanted.txt
+	$(VENV)/lock/bin/python -c 'import tomllib; p = tomllib.load(open("pyproject.toml", "rb"))["project"]; o = p["optional-dependencies"]; b = o.pop("bench"); w = lambda name, some: open("$(VENV)/lock/" + name, "w").write("".join(r + "\n" for r in some if not r.startswith("pamrs"))); w("wanted.txt", p["dependencies"] + sum(o.values(), [])); w("bench.txt", b)'
 	$(VENV)/lock/bin/python -m pip install --quiet --requirement $(VENV)/lock/wanted.txt
 	{ head -1 requirements-dev.lock; $(VENV)/lock/bin/python -m pip freeze; } > $(VENV)/lock/new && mv $(VENV)/lock/new requirements-dev.lock
+	$(VENV)/lock/bin/python -m pip install --quiet --requirement $(VENV)/lock/bench.txt --constraint requirements-dev.lock
+	{ head -1 requirements-bench.lock; $(VENV)/lock/bin/python -m pip freeze | grep -vxFf requirements-dev.lock; } > $(VENV)/lock/new && mv $(VENV)/lock/new requirements-bench.lock
 
 clean:  ## remove everything that was built
 	rm -rf $(VENV) target out .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -3,8 +3,8 @@ other.
 
 The reference is written for clarity, point by point in Python; it is a yardstick, not a rival.
 Ratios carry from machine to machine, seconds do not. Every line also says how far the two results
-are apart, since a fast wrong answer is worth nothing. Run with ``make bench``; names as arguments
-choose some of the lines.
+are apart, since a fast wrong answer is worth nothing. Rivals are in ``benchmarks.peers``; ``make
+bench`` runs both. Names as arguments choose some of the lines.
 """
 
 from __future__ import annotations

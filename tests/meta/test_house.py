@@ -138,17 +138,24 @@ def test_functions_can_be_read_in_one_sitting():
     assert {key for key, _ in found} >= LONGER, "a function that may be longer does not exist"
 
 
-def test_lock_pins_every_dependency():
+def plain(name):
+    return re.sub(r"[-_.]+", "-", name).lower()
+
+
+def pinned(lock):
+    text = (ROOT / lock).read_text(encoding="utf-8")
+    return {plain(name) for name in re.findall(r"^([\w.-]+)==", text, re.MULTILINE)}
+
+
+def test_locks_pin_every_dependency():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    lock = (ROOT / "requirements-dev.lock").read_text(encoding="utf-8")
-    wanted = [
-        *project["dependencies"],
-        *chain.from_iterable(project["optional-dependencies"].values()),
-    ]
+    extras = dict(project["optional-dependencies"])
+    peers = extras.pop("bench")
 
-    def plain(name):
-        return re.sub(r"[-_.]+", "-", name).lower()
+    def names(wanted):
+        return {plain(re.split(r"[\s<>=!~\[;]", requirement)[0]) for requirement in wanted}
 
-    pinned = {plain(name) for name in re.findall(r"^([\w.-]+)==", lock, re.MULTILINE)}
-    names = {plain(re.split(r"[\s<>=!~\[;]", requirement)[0]) for requirement in wanted}
-    assert names - {"pamrs"} <= pinned
+    wanted = [*project["dependencies"], *chain.from_iterable(extras.values())]
+    assert names(wanted) - {"pamrs"} <= pinned("requirements-dev.lock")
+    assert names(peers) <= pinned("requirements-bench.lock")
+    assert not pinned("requirements-dev.lock") & pinned("requirements-bench.lock")
