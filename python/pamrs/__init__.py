@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 from pamrs import _moved
 
 if TYPE_CHECKING:
-    from pamrs import fit, library, rigs
+    from pamrs import fit, library, rigs, sweeps
     from pamrs.design import Lift, lift, sizing
     from pamrs.diagnosis import diagnose
     from pamrs.diagnosis.next_experiment import Plan, plan_diagnosis
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from pamrs.recordings import Case, Issue, Recording, load_case, load_recording
     from pamrs.rig import Joint, Muscle, Parameter, Rig, load_rig
     from pamrs.simulation import Batch, BatchRun, Simulation, Simulator, simulate
+    from pamrs.sweeps import sweep
 
     __version__: str
 
@@ -70,9 +71,11 @@ __all__ = [
     "rigs",
     "simulate",
     "sizing",
+    "sweep",
+    "sweeps",
 ]
 
-_MODULES: Final = {name: f"pamrs.{name}" for name in ("fit", "library", "rigs")} | {
+_MODULES: Final = {name: f"pamrs.{name}" for name in ("fit", "library", "rigs", "sweeps")} | {
     "sizing": "pamrs.design.sizing"
 }
 _HOMES: Final[dict[str, str]] = {
@@ -106,6 +109,7 @@ _HOMES: Final[dict[str, str]] = {
     "load_rig": "pamrs.rig",
     "plan_diagnosis": "pamrs.diagnosis.next_experiment",
     "simulate": "pamrs.simulation",
+    "sweep": "pamrs.sweeps",
 }
 
 
