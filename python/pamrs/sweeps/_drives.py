@@ -184,6 +184,8 @@ class OpenLoop(Drive):
         [s]
     step : float or None
         RK4 step [s].
+    duration : float or None
+        [s], where no signal has a length.
     signals : dict
         ``valve_command`` and so on as :func:`pamrs.simulate` takes them.
     initial : dict of str to float
@@ -192,6 +194,7 @@ class OpenLoop(Drive):
     metrics: dict[str, Metric]
     sample_time: float
     step: float | None = None
+    duration: float | None = None
     signals: dict[str, Any] = field(default_factory=dict)
     initial: dict[str, float] = field(default_factory=dict)
 
@@ -199,7 +202,7 @@ class OpenLoop(Drive):
         return {name: metric.unit for name, metric in self.metrics.items()}
 
     def describe(self) -> dict[str, str]:
-        found = {"sample_time": repr(self.sample_time), "step": repr(self.step)}
+        found = {name: repr(getattr(self, name)) for name in ("sample_time", "step", "duration")}
         found |= {name: _signal_words(signal) for name, signal in self.signals.items()}
         found |= {f"initial {name}": repr(value) for name, value in self.initial.items()}
         return found | {
@@ -235,6 +238,7 @@ class OpenLoop(Drive):
             n=n,
             sample_time=self.sample_time,
             step=self.step,
+            duration=self.duration,
             initial=fixed | starts or None,
             parameters=numbers or None,
             reduce={name: metric.given() for name, metric in self.metrics.items()},
@@ -248,6 +252,8 @@ class OpenLoop(Drive):
 def _signal_words(signal: Any) -> str:
     if isinstance(signal, Mapping):
         return "; ".join(f"{name}: {_signal_words(signal[name])}" for name in sorted(signal))
+    if np.ndim(signal) == 0:
+        return repr(signal)
     digest = hashlib.sha256(np.ascontiguousarray(signal).tobytes()).hexdigest()
     return f"{np.shape(signal)}, {digest}"
 

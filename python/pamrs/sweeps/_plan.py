@@ -17,7 +17,7 @@ from pamrs.sweeps._drives import Drive, Task
 __all__ = ["SCHEMA", "Plan", "differences"]
 
 SCHEMA: Final = "pamrs.sweep/1"
-_FEWEST, _MOST, _PARTS = 256, 65_536, 256
+_FEWEST, _MOST, _PARTS = 1024, 65_536, 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +45,7 @@ class Plan:
 
     @classmethod
     def of(cls, rig: Rig, axes: Axes, drive: Drive, chunk: int | None) -> Plan:
-        """A plan; by default some 256 chunks, of 256 to 65 536 runs."""
+        """A plan; by default some 64 chunks, of 1024 to 65 536 runs."""
         size = min(max(len(axes) // _PARTS, _FEWEST), _MOST) if chunk is None else chunk
         return cls(rig.to_toml_text(), rig.name, axes, drive, size)
 

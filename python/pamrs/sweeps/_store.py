@@ -137,8 +137,9 @@ class Store:
         file = self.path / _FOLDER / _JOURNAL
         self.entries, size = read_journal(file)
         self._journal = file.open("r+b", buffering=0)
-        self._journal.truncate(size)
-        self._journal.seek(size)
+        if self._journal.seek(0, os.SEEK_END) != size:
+            self._journal.truncate(size)
+            self._journal.seek(size)
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -160,8 +161,10 @@ class Store:
         places = tuple(part.start // size for part, size in zip(region, blocks.block, strict=True))
         for name, values in columns.items():
             array = self._arrays[name]
+            file = self.path / name / array.metadata.encode_chunk_key(places)
+            file.unlink(missing_ok=True)  # it may be half of one: then nobody reads it
             array[region] = np.asarray(values, dtype=np.float64).reshape(shape)
-            _to_disk(self.path / name / array.metadata.encode_chunk_key(places))
+            _to_disk(file)
         first = None if done.first is None else (start + done.first[0], done.first[1])
         ended = int(np.isfinite(done.ended_at).sum())
         entry = Entry(chunk, stop - start, ended, first)

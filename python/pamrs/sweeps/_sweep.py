@@ -36,6 +36,7 @@ def sweep(
     length: ArrayLike | None = None,
     pressure: ArrayLike | Mapping[str, ArrayLike] | None = None,
     initial: Mapping[str, float] | None = None,
+    duration: float | None = None,
     step: float | None = None,
     store: str | os.PathLike[str] = "out.zarr",
     executor: Any = None,
@@ -67,9 +68,12 @@ def sweep(
     sample_time : float
         Time between samples [s].
     valve_command, supply_command, length, pressure
-        As for :func:`pamrs.simulate`, with one value for each sample, the same for all runs.
+        As for :func:`pamrs.simulate`, with one value for each sample, the same for all runs; with
+        ``duration`` a number that stays.
     initial : mapping of str to float, optional
         Initial values of all runs, as for :func:`pamrs.simulate`.
+    duration : float, optional
+        Simulated time [s], where no signal has a length.
     step : float, optional
         RK4 step [s], as for :func:`pamrs.simulate`.
     store : path-like
@@ -77,7 +81,7 @@ def sweep(
     executor : concurrent.futures.Executor or dask.distributed.Client, optional
         Where chunks are worked out; by default in this process on ``threads`` threads.
     chunk : int, optional
-        Runs of a chunk at most; by default some 256 chunks, of 256 to 65 536 runs.
+        Runs of a chunk at most; by default some 64 chunks, of 1024 to 65 536 runs.
     threads : int, optional
         Most threads of one chunk; by default one for each processor in this process, 1 with an
         executor.
@@ -121,10 +125,11 @@ def sweep(
     }
     drive = OpenLoop(
         {str(name): metric_of(name, given) for name, given in metrics.items()},
-        float(sample_time),
-        None if step is None else float(step),
+        _number("sample_time", sample_time),
+        None if step is None else _number("step", step),
+        None if duration is None else _number("duration", duration),
         {name: _signal(name, given) for name, given in signals.items() if given is not None},
-        {name: float(value) for name, value in (initial or {}).items()},
+        {name: _number(f"initial {name}", value) for name, value in (initial or {}).items()},
     )
     return run_plan(
         rig,
@@ -146,12 +151,19 @@ def _signal(name: str, given: Any) -> Any:
         signal = np.array(given, dtype=np.float64)
     except (TypeError, ValueError):
         raise ParameterError(f"{name} is not allowed: numbers are needed") from None
-    if signal.ndim != 1 or signal.size == 0:
+    if signal.ndim > 1 or signal.size == 0:
         raise ParameterError(
             f"{name} has the shape {signal.shape}; (n,) with n >= 1 is needed, one value for each "
-            "sample"
+            "sample, the same for all runs"
         )
-    return signal
+    return signal if signal.ndim else float(signal)
+
+
+def _number(name: str, given: Any) -> float:
+    try:
+        return float(given)
+    except (TypeError, ValueError):
+        raise ParameterError(f"{name} = {given!r} is not allowed: a number is needed") from None
 
 
 def run_plan(
