@@ -26,6 +26,7 @@ pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="processes as on
 SCRIPT = """
 import json, os, signal, sys
 from pathlib import Path
+import xarray, zarr  # once, for all that are forked
 from pamrs.sweeps import _running, _store
 from tests.sweeps.helpers import METRICS, small
 
@@ -49,9 +50,9 @@ def noting(notes, fatal):
 
 def dying_in_write(fatal):
     to_disk, line, write, seen = _store._to_disk, _store.Entry.line, _store.Store.write, [0]
-    def written(self, chunk, done):
+    def written(self, chunk, values, done):
         seen[0] += 1
-        entry = write(self, chunk, done)
+        entry = write(self, chunk, values, done)
         if fatal == [seen[0], "after its line"]:
             die()
         return entry

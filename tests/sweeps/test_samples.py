@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -50,6 +51,18 @@ def test_samples_have_the_distribution_that_is_asked_for():
         assert values.mean() == pytest.approx(known.value, abs=0.01 * known.tol), name
         assert values.std() == pytest.approx(0.9866 * known.tol, rel=1e-2), name
         assert np.abs(values - known.value).max() <= 3.0 * known.tol * (1 + 1e-9), name
+
+
+def test_a_sweep_draws_every_sample_once(tmp_path, monkeypatch):
+    """However many chunks are in flight: going back would pass over all samples before."""
+    made, engine = [], sweeps.DrawnSamples._engine
+    monkeypatch.setattr(
+        sweeps.DrawnSamples, "_engine", lambda self: [made.append(self), engine(self)][1]
+    )
+    drawn = sweeps.samples(RIG, ["arm.payload", "chamber.dead_volume"], 24, 1)
+    with ThreadPoolExecutor(2) as pool:
+        small(tmp_path / "out.zarr", drawn, chunk=2, executor=pool)
+    assert len(made) == 2  # for the run that tries the arguments, and for all chunks
 
 
 def test_a_sweep_over_samples_is_cut_and_resumed_like_any(tmp_path):

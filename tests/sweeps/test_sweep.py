@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from multiprocessing import get_context
 from typing import Any
@@ -312,3 +313,10 @@ def test_a_damaged_store_says_so(tmp_path):
     (path / ".pamrs" / "plan.json").write_text("[1]")
     with pytest.raises(pamrs.ParameterError, match="is not a sweep"):
         small(path)
+
+
+@pytest.mark.parametrize("name", ["zarr", "xarray"])
+def test_a_missing_package_is_named_with_its_extra(tmp_path, store, monkeypatch, name):
+    monkeypatch.setitem(sys.modules, name, None)
+    with pytest.raises(ImportError, match=rf"needs {name}, .* pip install pamrs\[sweep\]"):
+        pamrs.sweeps.open_sweep(store)

@@ -84,28 +84,28 @@ def run_missing(
     """
     tasks = ((chunk, store.plan.task(chunk, threads)) for chunk in store.missing())
     done = _here(tasks) if executor is None else _there(tasks, executor, most)
-    for chunk, result in done:
-        entry = store.write(chunk, result)
+    for chunk, task, result in done:
+        entry = store.write(chunk, task.values, result)
         progress.add(entry.runs, entry.ended)
 
 
-def _here(tasks: Iterator[tuple[int, Task]]) -> Iterator[tuple[int, Done]]:
+def _here(tasks: Iterator[tuple[int, Task]]) -> Iterator[tuple[int, Task, Done]]:
     for chunk, task in tasks:
-        yield chunk, run_chunk(task)
+        yield chunk, task, run_chunk(task)
 
 
 def _there(
     tasks: Iterator[tuple[int, Task]], executor: Executor, most: int
-) -> Iterator[tuple[int, Done]]:
-    flying: dict[Future[Done], int] = {}
+) -> Iterator[tuple[int, Task, Done]]:
+    flying: dict[Future[Done], tuple[int, Task]] = {}
     try:
         while True:
             for chunk, task in islice(tasks, most - len(flying)):
-                flying[executor.submit(run_chunk, task)] = chunk
+                flying[executor.submit(run_chunk, task)] = chunk, task
             if not flying:
                 return
             for future in wait(flying, return_when=FIRST_COMPLETED).done:
-                yield flying.pop(future), future.result()
+                yield *flying.pop(future), future.result()
     except BrokenExecutor as error:
         raise SimulationError(
             f"the executor lost its workers ({error}); the chunks that are done are kept: call "

@@ -12,12 +12,13 @@ import os
 import shutil
 import warnings
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pamrs._writing import write_atomically
 from pamrs.errors import ParameterError, joined, missing_package
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
 
 __all__ = ["ENDED_AT", "Entry", "Store", "open_sweep", "read_journal"]
 
+Array = NDArray[np.float64]
 #: The array that says when a run ended [s]; NaN where it reached the end.
 ENDED_AT: Final = "ended_at"
 _FOLDER, _PLAN, _JOURNAL, _LOCK = ".pamrs", "plan.json", "journal", "lock"
@@ -150,20 +152,22 @@ class Store:
         """Chunks that are not done, in order."""
         return (chunk for chunk in range(len(self.plan.blocks)) if chunk not in self.entries)
 
-    def write(self, chunk: int, done: Done) -> Entry:
-        """Keep a chunk: its arrays to the disk first, then its line in the journal."""
+    def write(self, chunk: int, values: Mapping[str, Array], done: Done) -> Entry:
+        """Keep a chunk with its values: its arrays to the disk first, then its line in the
+        journal.
+        """
         blocks, axes = self.plan.blocks, self.plan.axes
         region, (start, stop) = blocks.region(chunk), blocks.runs(chunk)
         shape = tuple(part.stop - part.start for part in region)
         columns = {**done.metrics, ENDED_AT: done.ended_at}
         if not isinstance(axes, Grid):
-            columns = {**axes.rows(start, stop), **columns}
+            columns = {**values, **columns}
         places = tuple(part.start // size for part, size in zip(region, blocks.block, strict=True))
-        for name, values in columns.items():
+        for name, column in columns.items():
             array = self._arrays[name]
             file = self.path / name / array.metadata.encode_chunk_key(places)
             file.unlink(missing_ok=True)  # it may be half of one: then nobody reads it
-            array[region] = np.asarray(values, dtype=np.float64).reshape(shape)
+            array[region] = np.asarray(column, dtype=np.float64).reshape(shape)
             _to_disk(file)
         first = None if done.first is None else (start + done.first[0], done.first[1])
         ended = int(np.isfinite(done.ended_at).sum())
