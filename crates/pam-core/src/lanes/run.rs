@@ -13,10 +13,12 @@ use crate::simulate::run::Run;
 use crate::simulate::team::Team;
 use crate::simulate::{Progress, Timing, Trajectory};
 use crate::{Error, Result};
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Arch, Scalar, Simd, WithSimd};
 
 /// Rows of a block: some milliseconds of work.
 const BLOCK: usize = 64;
+/// Rows that run faster two by two than in wide registers.
+const FEW: usize = 4;
 /// RK4 steps of all rows between two looks outside.
 const STEPS_UNSEEN: usize = 4_000_000;
 /// RK4 steps that are worth a second thread.
@@ -120,7 +122,12 @@ impl Work<'_, '_> {
                 left = others;
                 let same: Vec<usize> = same;
                 let group = Group { work: self, plan, steps, rows: &same, block };
-                alone.extend(self.arch.dispatch(group)?);
+                // A few rows have no use for wide registers.
+                alone.extend(if group.rows.len() <= FEW {
+                    group.with_simd(Scalar)?
+                } else {
+                    self.arch.dispatch(group)?
+                });
             }
             left = alone;
         }
