@@ -416,13 +416,7 @@ impl Ports {
         wiring: &Wiring,
         spec: &RigSpec,
     ) -> Result<()> {
-        let id = self.effects[acting.effect].info.id;
-        if let Some(needed) = port.states().filter(|needed| *needed != acting.count) {
-            return model(format!(
-                "effect '{id}' has {} states, and what acts at the port {port:?} has {needed}",
-                acting.count
-            ));
-        }
+        self.needs_states(port, acting)?;
         let taken = match (port, place) {
             (Port::Command, Place::Valve(k)) => push(&mut self.command[k], acting),
             (Port::Passage, Place::Valve(k)) => {
@@ -463,19 +457,11 @@ impl Ports {
             (Port::Torque, Place::Joint(k)) => push(&mut self.torque[k], acting),
             (Port::Push, Place::Joint(k)) => push(&mut self.push[k], acting),
             (Port::Payload, Place::Joint(k)) => push(&mut self.payload, (k, acting)),
-            (Port::Hanging, Place::Joint(k)) => {
-                if let Some((link, other)) = self.hanging.replace((k, acting)) {
-                    let one = self.hung(other, Place::Joint(link), wiring, spec);
-                    let two = self.hung(acting, place, wiring, spec);
-                    return model(format!(
-                        "only one mass of an arm can hang, and {one} and {two} make two"
-                    ));
-                }
-                None
-            }
+            (Port::Hanging, Place::Joint(k)) => self.hang(k, acting, wiring, spec)?,
             (Port::Mounting, Place::Whole) => self.mounting.replace(acting),
             (Port::Clock, Place::Whole) => push(&mut self.clock, acting),
             _ => {
+                let id = self.effects[acting.effect].info.id;
                 return model(format!("effect '{id}' acts at a port that its block does not have"));
             }
         };
@@ -493,10 +479,31 @@ impl Ports {
         }
     }
 
-    /// An effect with the joint at which its mass hangs.
-    fn hung(&self, acting: Acting, place: Place, wiring: &Wiring, spec: &RigSpec) -> String {
-        let joint = dotted("joint", &block_name(spec, wiring, place));
-        format!("'{}' at {joint}", self.effects[acting.effect].info.id)
+    /// A port may need a certain number of states.
+    fn needs_states(&self, port: Port, acting: Acting) -> Result<()> {
+        match port.states() {
+            Some(needed) if needed != acting.count => model(format!(
+                "effect '{}' has {} states, and what acts at the port {port:?} has {needed}",
+                self.effects[acting.effect].info.id, acting.count
+            )),
+            _ => Ok(()),
+        }
+    }
+
+    /// Hang a mass on a link; an error that names both joints where one hangs already.
+    fn hang(
+        &mut self,
+        link: usize,
+        acting: Acting,
+        wiring: &Wiring,
+        spec: &RigSpec,
+    ) -> Result<Option<Acting>> {
+        let Some(other) = self.hanging.replace((link, acting)) else { return Ok(None) };
+        let [one, two] = [other, (link, acting)].map(|(link, acting)| {
+            let joint = dotted("joint", &block_name(spec, wiring, Place::Joint(link)));
+            format!("'{}' at {joint}", self.effects[acting.effect].info.id)
+        });
+        model(format!("only one mass of an arm can hang, and {one} and {two} make two"))
     }
 }
 
