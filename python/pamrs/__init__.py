@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 from pamrs import _moved
 
 if TYPE_CHECKING:
-    from pamrs import fit, library, rigs
+    from pamrs import fit, library, rigs, sweeps
     from pamrs.design import Lift, lift, sizing
     from pamrs.diagnosis import diagnose
     from pamrs.diagnosis.next_experiment import Plan, plan_diagnosis
@@ -38,6 +38,7 @@ if TYPE_CHECKING:
         simulate,
         simulate_batch,
     )
+    from pamrs.sweeps import sweep
 
     __version__: str
 
@@ -78,9 +79,11 @@ __all__ = [
     "simulate",
     "simulate_batch",
     "sizing",
+    "sweep",
+    "sweeps",
 ]
 
-_MODULES: Final = {name: f"pamrs.{name}" for name in ("fit", "library", "rigs")} | {
+_MODULES: Final = {name: f"pamrs.{name}" for name in ("fit", "library", "rigs", "sweeps")} | {
     "sizing": "pamrs.design.sizing"
 }
 _HOMES: Final[dict[str, str]] = {
@@ -115,6 +118,7 @@ _HOMES: Final[dict[str, str]] = {
     "plan_diagnosis": "pamrs.diagnosis.next_experiment",
     "simulate": "pamrs.simulation",
     "simulate_batch": "pamrs.simulation",
+    "sweep": "pamrs.sweeps",
 }
 
 

@@ -22,6 +22,7 @@ LAYERS = (
     ("report",),
     ("fit", "library"),
     ("control", "design"),
+    ("sweeps",),
     ("diagnosis",),
     ("reproduce",),
     ("cli",),

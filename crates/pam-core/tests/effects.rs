@@ -30,10 +30,10 @@ fn spec_for(id: &str) -> RigSpec {
 fn signals(rig: &Rig, rows: usize) -> Vec<(String, Vec<f64>)> {
     let valve = |k: usize| {
         let t = k as f64 * DT;
-        let edge = if (k / 16) % 2 == 0 { 0.12 } else { -0.2 };
+        let edge = if (k / 16).is_multiple_of(2) { 0.12 } else { -0.2 };
         5.15 + edge + 0.35 * (9.0 * t).sin()
     };
-    let pressure = |k: usize| if (k / 25) % 2 == 0 { 6.0e5 } else { 6.6e5 };
+    let pressure = |k: usize| if (k / 25).is_multiple_of(2) { 6.0e5 } else { 6.6e5 };
     let values = |name: &str| -> Vec<f64> {
         (0..rows).map(|k| if name.starts_with("valve") { valve(k) } else { pressure(k) }).collect()
     };

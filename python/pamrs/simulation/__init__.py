@@ -11,7 +11,7 @@ from __future__ import annotations
 from pamrs.simulation._batch import Batch, BatchRun, Failure
 from pamrs.simulation._driving import has_frame, regulators_of
 from pamrs.simulation._replay import differences, replay
-from pamrs.simulation._side_by_side import simulate_batch
+from pamrs.simulation._side_by_side import REDUCTIONS, simulate_batch
 from pamrs.simulation._simulation import (
     Balance,
     Event,
@@ -24,6 +24,7 @@ from pamrs.simulation._simulation import (
 from pamrs.simulation._simulator import Simulator
 
 __all__ = [
+    "REDUCTIONS",
     "Balance",
     "Batch",
     "BatchRun",

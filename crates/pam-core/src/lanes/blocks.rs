@@ -51,6 +51,10 @@ impl Orifice {
 
     #[inline(always)]
     fn psi<S: Simd>(&self, ratio: Num<S>) -> Num<S> {
+        let choked = ratio.constant(self.choked);
+        if ratio.constant(self.critical_ratio).less(ratio).nowhere() {
+            return choked;
+        }
         let subsonic = ratio
             .or_above(ratio.constant(self.critical_ratio))
             .or_below(ratio.constant(LAMINAR_RATIO));
@@ -58,7 +62,7 @@ impl Orifice {
         let curved = (s * (s - subsonic) * self.exponent).sqrt();
         let straight = (-ratio + 1.0) * self.laminar;
         let open = ratio.at_most(ratio.constant(LAMINAR_RATIO)).select(curved, straight);
-        ratio.at_most(ratio.constant(self.critical_ratio)).select(ratio.constant(self.choked), open)
+        ratio.at_most(ratio.constant(self.critical_ratio)).select(choked, open)
     }
 }
 
@@ -93,16 +97,20 @@ impl<S: Simd> Tube<S> {
 /// Where the air comes from, as [`crate::blocks::supply::Supply`].
 #[derive(Clone, Copy)]
 pub(super) enum Supply<S: Simd> {
+    /// Fall of the pressure per mass that leaves [Pa/kg].
     Tank(Num<S>),
     Constant,
-    Regulator { time_constant: Num<S>, droop: Num<S> },
+    Regulator {
+        time_constant: Num<S>,
+        droop: Num<S>,
+    },
 }
 
 impl<S: Simd> Supply<S> {
     #[inline(always)]
-    pub fn pressure_rate(&self, pressure: Num<S>, outflow: Num<S>, rt: f64, set: Num<S>) -> Num<S> {
+    pub fn pressure_rate(&self, pressure: Num<S>, outflow: Num<S>, set: Num<S>) -> Num<S> {
         match self {
-            Self::Tank(volume) => -(outflow * rt) / *volume,
+            Self::Tank(stiffness) => -(outflow * *stiffness),
             Self::Constant => pressure.constant(0.0),
             Self::Regulator { time_constant, droop } => {
                 (set - pressure - *droop * outflow) / *time_constant
@@ -115,7 +123,8 @@ impl<S: Simd> Supply<S> {
 /// own, and always pulled straight down).
 #[derive(Clone, Copy)]
 pub(super) struct Body<S: Simd> {
-    pub inertia: Num<S>,
+    /// One over the inertia [1/(kg m2)], or over the mass [1/kg].
+    pub mobility: Num<S>,
     /// Torque of the weight where it pulls across [N m], or the weight itself [N].
     pub weight: Num<S>,
     /// The weight follows the sine of the angle.
@@ -124,7 +133,8 @@ pub(super) struct Body<S: Simd> {
     pub coulomb: Num<S>,
     /// Some lane has Coulomb friction.
     pub rubs: bool,
-    pub coulomb_speed: f64,
+    /// One over the speed that Coulomb friction takes to turn [s/rad].
+    pub coulomb_slope: f64,
     pub stops: Option<Stops>,
 }
 
@@ -133,13 +143,13 @@ impl<S: Simd> Body<S> {
     pub fn acceleration(&self, angle: Num<S>, rate: Num<S>, torque: Num<S>) -> Num<S> {
         let mut sum = torque - self.viscous * rate;
         if self.rubs {
-            sum = sum - self.coulomb * (rate / self.coulomb_speed).tanh();
+            sum = sum - self.coulomb * (rate * self.coulomb_slope).tanh();
         }
         sum = if self.turns { sum - self.weight * angle.sin() } else { sum - self.weight };
         if let Some(stops) = &self.stops {
             sum += stop_torque(stops, angle, rate);
         }
-        sum / self.inertia
+        sum * self.mobility
     }
 }
 

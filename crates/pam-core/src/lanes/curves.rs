@@ -5,7 +5,7 @@
 //! cells, refined until they agree with [`crate::blocks::joint::Joint::eval`] and
 //! [`crate::muscle::Table::eval`] at points off the nodes. No cell crosses a kink of the muscle.
 
-use super::num::{Num, WHOLE};
+use super::num::{side_by_side, Num, MOST_LANES, WHOLE};
 use crate::chebyshev::{interpolate, lobatto};
 use crate::plant::Group;
 use pulp::Simd;
@@ -29,8 +29,6 @@ const MOST_CELLS: usize = 1024;
 const CHECKS: [f64; 5] = [-0.93, -0.55, 0.07, 0.62, 0.95];
 /// Points at which kinks are looked for.
 const SCAN: usize = 512;
-/// Lanes at most.
-pub(super) const MOST_LANES: usize = 8;
 
 /// Uniform cells between two kinks.
 #[derive(Debug, Clone, Copy)]
@@ -73,16 +71,16 @@ impl Curves {
         Some(Self { low, high, pieces, cells })
     }
 
-    /// Every column at an angle of each lane; beyond the range its end.
+    /// The columns at an angle of each lane, those for the power only where they are asked for;
+    /// beyond the range its end.
     #[inline(always)]
-    pub fn eval<S: Simd>(&self, simd: S, at: Num<S>) -> [Num<S>; COLUMNS] {
+    pub fn eval<S: Simd>(&self, simd: S, at: Num<S>, power: bool) -> [Num<S>; COLUMNS] {
         let at = at.or_above(at.constant(self.low)).or_below(at.constant(self.high));
         let (cell, x) = self.place(at);
         let mut rows = [0.0; COLUMNS * MOST_LANES];
-        let lanes = S::F64_LANES;
-        let per_row = COLUMNS / lanes;
+        let per_row = COLUMNS / S::F64_LANES;
         let last = self.cells.len() / STRIDE - 1;
-        for (lane, row) in rows.chunks_exact_mut(COLUMNS).take(lanes).enumerate() {
+        for (lane, row) in rows.chunks_exact_mut(COLUMNS).take(side_by_side::<S>()).enumerate() {
             let cell = (cell.numbers()[lane].to_bits() as u32 as usize).min(last);
             let powers = S::as_simd_f64s(&self.cells[cell * STRIDE..(cell + 1) * STRIDE]).0;
             let x = simd.splat_f64s(x.numbers()[lane]);
@@ -95,7 +93,8 @@ impl Curves {
             }
         }
         let mut columns = [at; COLUMNS];
-        for (column, values) in columns.iter_mut().enumerate() {
+        let wanted = if power { COLUMNS } else { SLOPE + 1 };
+        for (column, values) in columns.iter_mut().enumerate().take(wanted) {
             for (lane, value) in values.numbers_mut().iter_mut().enumerate() {
                 *value = rows[lane * COLUMNS + column];
             }

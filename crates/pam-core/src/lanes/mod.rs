@@ -1,7 +1,7 @@
 //! Many plants of one structure, side by side in the vector lanes of the processor.
 //!
 //! Rigs without effects whose arm is one link or a hanging mass run in lanes ([`Plan`]): one plant
-//! in each, 8, 4, 2 or 1 of them as the processor has room for, chosen when the program runs. All
+//! in each, two registers of 8, 4, 2 or 1 as the processor has, chosen when the program runs. All
 //! other rigs, and plants that leave the range of the lanes' curves, run one by one as in
 //! [`crate::simulate`]. What happens to a row depends on its own numbers only: neighbours, threads
 //! and the number of lanes change no bit.

@@ -2,7 +2,7 @@
 //! without effects.
 
 use super::blocks::{Body, Supply, Tube};
-use super::num::{Mask, Num};
+use super::num::{side_by_side, Mask, Num, MOST_LANES};
 use super::Plan;
 use crate::blocks::supply::Supply as OneSupply;
 use crate::plant::{Layout, Line, Node, OneBody, Plant, Rig, BALANCE_COUNT};
@@ -59,11 +59,11 @@ impl<'a, S: Simd> Lanes<'a, S> {
         let rig = first.rig();
         let zero = Num::splat(simd, 0.0);
         let each = |of: &dyn Fn(&Plant<'a, f64>) -> f64| {
-            let mut values = [0.0; super::curves::MOST_LANES];
+            let mut values = [0.0; MOST_LANES];
             for (value, plant) in values.iter_mut().zip(plants) {
                 *value = of(plant);
             }
-            Num::load(simd, &values[..S::F64_LANES])
+            Num::load(simd, &values[..side_by_side::<S>()])
         };
         let supplies = (0..first.supplies.len()).map(|k| supply(k, first, &each)).collect();
         let lines = (0..first.lines.len()).map(|k| passage(k, first, &each)).collect();
@@ -164,7 +164,7 @@ impl<'a, S: Simd> Lanes<'a, S> {
             let gauge = state[self.layout.pressure(group.chamber)] - ambient;
             let scale = self.scales[k];
             let [gas, elastic, offset, volume, slope, gas_work, elastic_work, offset_work] =
-                curves.eval(self.simd, angle);
+                curves.eval(self.simd, angle, self.sums);
             self.torque[group.coordinate] += gauge * gas + scale * (gauge * elastic + offset);
             self.volume[group.chamber] += volume;
             self.volume_rate[group.chamber] += slope * rate;
@@ -236,7 +236,7 @@ impl<'a, S: Simd> Lanes<'a, S> {
         for (k, supply) in self.supplies.iter().enumerate() {
             let pressure = state[layout.supply(k)];
             out[layout.supply(k)] =
-                supply.pressure_rate(pressure, self.drawn[k], rt, self.set_pressure[k]);
+                supply.pressure_rate(pressure, self.drawn[k], self.set_pressure[k]);
         }
         for k in 0..layout.gases {
             let [inflow, outflow, volume] = self.alphas[k];
@@ -280,10 +280,12 @@ fn supply<'a, S: Simd>(k: usize, first: &Plant<'a, f64>, each: Each<'_, 'a, S>) 
     let of = |number: fn(&OneSupply<f64>) -> f64| each(&|p| number(&p.supplies[k]));
     match first.supplies[k] {
         OneSupply::Constant => Supply::Constant,
-        OneSupply::Tank(_) => Supply::Tank(of(|s| match s {
-            OneSupply::Tank(volume) => *volume,
-            _ => f64::NAN,
-        })),
+        OneSupply::Tank(_) => Supply::Tank(
+            of(|s| match s {
+                OneSupply::Tank(volume) => 1.0 / *volume,
+                _ => f64::NAN,
+            }) * (first.rig().gas.gas_constant * first.rig().gas.temperature),
+        ),
         OneSupply::Regulator { .. } => Supply::Regulator {
             time_constant: of(|s| match s {
                 OneSupply::Regulator { time_constant, .. } => *time_constant,
@@ -328,20 +330,20 @@ fn body<'a, S: Simd>(first: &Plant<'a, f64>, each: Each<'_, 'a, S>) -> Option<Bo
     let numbers = |body: &OneBody<f64>| match body {
         OneBody::OneLink(arm, _) => {
             let weight = (arm.first_moment + arm.payload * arm.length) * arm.gravity;
-            [arm.total_inertia(), weight, arm.viscous, arm.coulomb]
+            [1.0 / arm.total_inertia(), weight, arm.viscous, arm.coulomb]
         }
         OneBody::Mass(load, _) => [load.mass, load.mass * load.gravity, load.viscous, load.coulomb],
         _ => [f64::NAN; 4],
     };
     let coulomb = of(numbers, 3);
     Some(Body {
-        inertia: of(numbers, 0),
+        mobility: of(numbers, 0),
         weight: of(numbers, 1),
         turns,
         viscous: of(numbers, 2),
         coulomb,
         rubs: coulomb.numbers().iter().any(|c| *c != 0.0),
-        coulomb_speed,
+        coulomb_slope: 1.0 / coulomb_speed,
         stops,
     })
 }

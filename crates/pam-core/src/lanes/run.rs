@@ -1,6 +1,6 @@
 //! Runs: blocks of rows over threads, rows of a block in lanes, each sample read as it comes.
 
-use super::num::Num;
+use super::num::{side_by_side, Num, MOST_LANES};
 use super::rates::Lanes;
 use super::request::{resting, Checked, Outcome, Request, Signal};
 use super::steps::Steps;
@@ -217,7 +217,7 @@ impl WithSimd for Group<'_, '_, '_, '_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
         let mut alone = Vec::new();
-        for rows in self.rows.chunks(S::F64_LANES) {
+        for rows in self.rows.chunks(side_by_side::<S>()) {
             match Flight::new(simd, self.work, self.plan, self.steps, rows, self.block)? {
                 Some(mut flight) => alone.extend(flight.fly(self.block)),
                 None => alone.extend(rows),
@@ -274,7 +274,7 @@ impl<'a, 'w, 'r, S: Simd> Flight<'a, 'w, 'r, S> {
         // The lanes that are left over run as the last row does.
         let row_of = |lane: usize| first + rows[lane.min(rows.len() - 1)];
         let (mut plants, mut starts) = (Vec::new(), Vec::new());
-        for lane in 0..S::F64_LANES {
+        for lane in 0..side_by_side::<S>() {
             let values = checked.rig.parameters().with_values(&checked.values(row_of(lane)))?;
             let plant = Plant::new(checked.rig, values.lift(), sums)?;
             let mut start = checked.initial(row_of(lane))?.state(checked.rig, plant.states());
@@ -297,7 +297,7 @@ impl<'a, 'w, 'r, S: Simd> Flight<'a, 'w, 'r, S> {
             (scratches, vec![Vec::new(); checked.rig.names().channels.len()])
         });
         let step = request.timing.sample_time / steps as f64;
-        let gone = vec![false; S::F64_LANES];
+        let gone = vec![false; side_by_side::<S>()];
         Ok(Some(Self {
             simd,
             work,
@@ -320,7 +320,7 @@ impl<'a, 'w, 'r, S: Simd> Flight<'a, 'w, 'r, S> {
     fn fly(&mut self, block: &mut Block<'_>) -> Vec<usize> {
         let request = self.work.checked.request;
         let mut sums: Vec<Vec<f64>> =
-            request.reduce.iter().map(|r| vec![r.start(); S::F64_LANES]).collect();
+            request.reduce.iter().map(|r| vec![r.start(); side_by_side::<S>()]).collect();
         let mut room = Rk4::new(&self.state);
         for row in 0..request.rows {
             if row > 0 {
@@ -350,8 +350,8 @@ impl<'a, 'w, 'r, S: Simd> Flight<'a, 'w, 'r, S> {
         let (checked, rows) = (self.work.checked, self.work.checked.request.rows);
         let rig = checked.rig;
         let row_of = |lane: usize| self.first + self.rows[lane.min(self.rows.len() - 1)];
-        let mut values = [0.0; super::curves::MOST_LANES];
-        let values = &mut values[..S::F64_LANES];
+        let mut values = [0.0; MOST_LANES];
+        let values = &mut values[..side_by_side::<S>()];
         for (k, unit) in rig.wiring.valves.iter().enumerate() {
             for (lane, value) in values.iter_mut().enumerate() {
                 let command = checked.commands[k].of(row_of(lane), rows)[sample];
@@ -420,12 +420,12 @@ impl<'a, 'w, 'r, S: Simd> Flight<'a, 'w, 'r, S> {
 
     /// Every wanted channel of each lane: those that are kept, then those that are reduced.
     #[inline(always)]
-    fn values(&mut self) -> Vec<[f64; super::curves::MOST_LANES]> {
-        let mut out = vec![[0.0; super::curves::MOST_LANES]; self.reads.len()];
+    fn values(&mut self) -> Vec<[f64; MOST_LANES]> {
+        let mut out = vec![[0.0; MOST_LANES]; self.reads.len()];
         for (out, read) in out.iter_mut().zip(&self.reads) {
             if let Read::State { place, sign, more } = read {
                 let state = self.state[*place].numbers();
-                for (lane, value) in out.iter_mut().enumerate().take(S::F64_LANES) {
+                for (lane, value) in out.iter_mut().enumerate().take(side_by_side::<S>()) {
                     *value = sign * state[lane] + more[lane];
                 }
             }

@@ -1,0 +1,240 @@
+"""Runs of one rig with other parameters, by the million: chunks that are kept as they are done."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pamrs.errors import ParameterError
+from pamrs.rig import Rig
+from pamrs.sweeps._axes import INITIAL, Axes, Grid
+from pamrs.sweeps._draws import whole_number
+from pamrs.sweeps._drives import Drive, OpenLoop, metric_of, run_chunk
+from pamrs.sweeps._plan import Plan
+from pamrs.sweeps._progress import Progress
+from pamrs.sweeps._running import executor_of, in_flight_of, run_missing
+from pamrs.sweeps._store import ENDED_AT, Store, open_sweep
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["run_plan", "sweep"]
+
+
+def sweep(
+    rig: Rig,
+    over: Mapping[str, ArrayLike] | Axes,
+    metrics: Mapping[str, tuple[Any, ...]],
+    *,
+    sample_time: float,
+    valve_command: ArrayLike | Mapping[str, ArrayLike] | None = None,
+    supply_command: ArrayLike | Mapping[str, ArrayLike] | None = None,
+    length: ArrayLike | None = None,
+    pressure: ArrayLike | Mapping[str, ArrayLike] | None = None,
+    initial: Mapping[str, float] | None = None,
+    duration: float | None = None,
+    step: float | None = None,
+    store: str | os.PathLike[str] = "out.zarr",
+    executor: Any = None,
+    chunk: int | None = None,
+    threads: int | None = None,
+    in_flight: int | None = None,
+    progress: bool = True,
+) -> xr.Dataset:
+    """Run a rig over a grid or over samples of its parameters, and keep a few numbers of each run.
+
+    The runs are cut into chunks. A chunk that is done is kept in the store, whatever happens then:
+    the same call goes on where the last one ended, also after ``kill -9``. A run that leaves the
+    range in which the model holds has ended: its metrics are NaN, and it is counted.
+
+    Parameters
+    ----------
+    rig : Rig
+        The model.
+    over : mapping of str to array_like, shape (k,), or Samples or DrawnSamples
+        A grid: name -> values [SI], all combinations. Names are parameters of the rig
+        (``arm.payload``) and of its effects (``leak_muscle.conductance``), and initial values
+        (``initial.joint_angle``). Or samples: :func:`pamrs.sweeps.samples`,
+        :class:`pamrs.sweeps.Samples`. Parameters of which the wiring depends (lengths of joints and
+        muscles, stops, gas) need a rig of their own for each value, which takes longer.
+    metrics : mapping of str to tuple
+        Name -> ``(reduction, channel)`` with the reductions ``final``, ``min``, ``max``, ``peak``
+        (the largest magnitude) and ``mean``, or ``("squared_error", channel, reference)``, the time
+        integral of the squared difference from a number or from one for each sample.
+    sample_time : float
+        Time between samples [s].
+    valve_command, supply_command, length, pressure
+        As for :func:`pamrs.simulate`, with one value for each sample, the same for all runs; with
+        ``duration`` a number that stays.
+    initial : mapping of str to float, optional
+        Initial values of all runs, as for :func:`pamrs.simulate`.
+    duration : float, optional
+        Simulated time [s], where no signal has a length.
+    step : float, optional
+        RK4 step [s], as for :func:`pamrs.simulate`.
+    store : path-like
+        Folder of the result, a Zarr group. One that is there must be of the same sweep.
+    executor : concurrent.futures.Executor or dask.distributed.Client, optional
+        Where chunks are worked out; by default in this process on ``threads`` threads.
+    chunk : int, optional
+        Runs of a chunk at most; by default some 64 chunks, of 1024 to 65 536 runs.
+    threads : int, optional
+        Most threads of one chunk; by default one for each processor in this process, 1 with an
+        executor.
+    in_flight : int, optional
+        Chunks that an executor has at once; by default two for each worker.
+    progress : bool
+        Whether to write to stderr how far it is.
+
+    Returns
+    -------
+    xarray.Dataset
+        As of :func:`pamrs.sweeps.open_sweep`: read from the store when it is needed.
+
+    Raises
+    ------
+    ParameterError
+        If an argument is unknown or outside its range, or the store is that of another sweep; the
+        message names it.
+    SimulationError
+        If an executor lost its workers; what is done is kept.
+    MissingPackageError
+        If zarr or xarray is not installed.
+
+    Examples
+    --------
+    >>> import numpy as np, pamrs
+    >>> grid = {"arm.payload": [2.0, 9.0], "initial.joint_angle": [0.4, 0.6, 0.8]}
+    >>> metrics = {"end": ("final", "joint_angle"), "most": ("max", "muscle_pressure")}
+    >>> map_ = pamrs.sweep(pamrs.rigs.shoulder(), grid, metrics, sample_time=0.005,
+    ...                    valve_command=np.full(21, 6.0), store="map.zarr", progress=False)
+    >>> dict(map_["end"].sizes), map_["end"].attrs["units"], map_.attrs["runs_ended"]
+    ({'arm.payload': 2, 'initial.joint_angle': 3}, 'rad', 0)
+    """
+    if not isinstance(metrics, Mapping) or not metrics:
+        raise ParameterError("metrics is empty; {'end': ('final', 'joint_angle')} is one")
+    signals = {
+        "valve_command": valve_command,
+        "supply_command": supply_command,
+        "length": length,
+        "pressure": pressure,
+    }
+    drive = OpenLoop(
+        {str(name): metric_of(name, given) for name, given in metrics.items()},
+        _number("sample_time", sample_time),
+        None if step is None else _number("step", step),
+        None if duration is None else _number("duration", duration),
+        {name: _signal(name, given) for name, given in signals.items() if given is not None},
+        {name: _number(f"initial {name}", value) for name, value in (initial or {}).items()},
+    )
+    return run_plan(
+        rig,
+        over,
+        drive,
+        store=store,
+        executor=executor,
+        chunk=chunk,
+        threads=threads,
+        in_flight=in_flight,
+        progress=progress,
+    )
+
+
+def _signal(name: str, given: Any) -> Any:
+    if isinstance(given, Mapping):
+        return {key: _signal(f"{name}.{key}", values) for key, values in given.items()}
+    try:
+        signal = np.array(given, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ParameterError(f"{name} is not allowed: numbers are needed") from None
+    if signal.ndim > 1 or signal.size == 0:
+        raise ParameterError(
+            f"{name} has the shape {signal.shape}; (n,) with n >= 1 is needed, one value for each "
+            "sample, the same for all runs"
+        )
+    return signal if signal.ndim else float(signal)
+
+
+def _number(name: str, given: Any) -> float:
+    try:
+        return float(given)
+    except (TypeError, ValueError):
+        raise ParameterError(f"{name} = {given!r} is not allowed: a number is needed") from None
+
+
+def run_plan(
+    rig: Rig,
+    over: Mapping[str, ArrayLike] | Axes,
+    drive: Drive,
+    *,
+    store: str | os.PathLike[str],
+    executor: Any = None,
+    chunk: int | None = None,
+    threads: int | None = None,
+    in_flight: int | None = None,
+    progress: bool = True,
+) -> xr.Dataset:
+    """Run what a drive says over axes; other arguments, result and errors as of :func:`sweep`."""
+    if not isinstance(rig, Rig):
+        raise ParameterError(
+            f"rig is a {type(rig).__name__}; a Rig is needed: pamrs.rigs.shoulder(), "
+            "pamrs.load_rig(path)"
+        )
+    axes = over if isinstance(over, Axes) else Grid(over)
+    axes.check(lambda name: drive.quantity(rig, name))
+    _check_names(axes, drive)
+    if chunk is not None:
+        whole_number("chunk", chunk, 1)
+    if threads is not None:
+        whole_number("threads", threads, 1, 256)
+    workers = executor_of(executor)
+    most = in_flight_of(workers) if in_flight is None else whole_number("in_flight", in_flight, 1)
+    if workers is not None and threads is None:
+        threads = 1
+    plan = Plan.of(rig, axes, drive, chunk)
+    _try_one(plan)
+    with Store(store, plan, rig) as kept:
+        entries = kept.entries.values()
+        shown = Progress(
+            str(kept.path),
+            runs=len(axes),
+            chunks=len(plan.blocks),
+            done=sum(entry.runs for entry in entries),
+            ended=sum(entry.ended for entry in entries),
+            chunks_done=len(entries),
+            shown=progress,
+        )
+        run_missing(kept, workers, shown, threads=threads, most=most)
+    return open_sweep(store)
+
+
+def _check_names(axes: Axes, drive: Drive) -> None:
+    taken = {*axes.names, *axes.dims, ENDED_AT}
+    for name in drive.metric_units():
+        if name in taken or not name or name.startswith((".", "__")) or "/" in name:
+            raise ParameterError(
+                f"metrics has the name {name!r}, which is not allowed: a name without '/' that is "
+                f"none of {', '.join(sorted(taken))}"
+            )
+    doubled = [
+        name
+        for name in axes.names
+        if isinstance(drive, OpenLoop)
+        and name.removeprefix(INITIAL) in drive.initial
+        and name.startswith(INITIAL)
+    ]
+    if doubled:
+        raise ParameterError(
+            f"initial has {doubled[0].removeprefix(INITIAL)!r}, which varies; leave it out"
+        )
+
+
+def _try_one(plan: Plan) -> None:
+    """The first run, so that arguments that are not allowed are found before there is a store."""
+    task = plan.task(0, 1)
+    first = {name: values[:1] for name, values in task.values.items()}
+    run_chunk(type(task)(task.rig, task.drive, first, 1))

@@ -1,0 +1,187 @@
+"""Samples by low-discrepancy sequences, and the sensitivities that stand on them."""
+
+from __future__ import annotations
+
+import pickle
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+
+import pamrs
+from pamrs import sweeps
+from tests.sweeps.helpers import same, small
+
+RIG = pamrs.rigs.shoulder()
+
+
+@pytest.mark.parametrize("sequence", ["sobol", "halton"])
+def test_any_piece_of_the_samples_is_that_of_the_whole(sequence):
+    names = ["arm.payload", "arm.viscous", "initial.joint_angle"]
+
+    def drawn():
+        return sweeps.samples(
+            RIG, names, 100, 3, within={"initial.joint_angle": (0.3, 0.9)}, sequence=sequence
+        )
+
+    whole, parts = drawn().rows(0, 100), drawn()
+    for start, stop in ((40, 60), (0, 7), (7, 8), (99, 100), (0, 100)):
+        for source in (parts, pickle.loads(pickle.dumps(parts))):
+            piece = source.rows(start, stop)
+            assert all((piece[name] == whole[name][start:stop]).all() for name in names)
+    other = sweeps.samples(
+        RIG, names, 100, 4, within={"initial.joint_angle": (0.3, 0.9)}, sequence=sequence
+    )
+    assert (other.rows(0, 9)["arm.payload"] != whole["arm.payload"][:9]).any()
+
+
+def test_samples_have_the_distribution_that_is_asked_for():
+    drawn = sweeps.samples(RIG, n=4096, within={"arm.length": (0.5, 0.9)}, parameters=None)
+    assert drawn.names == ("arm.length",)
+    values = drawn.rows(0, 4096)["arm.length"]
+    assert values.min() >= 0.5
+    assert values.max() <= 0.9
+    assert values.mean() == pytest.approx(0.7, abs=1e-3)
+    assert values.std() == pytest.approx(0.4 / np.sqrt(12), rel=1e-2)
+    drawn = sweeps.samples(RIG, n=4096)
+    assert set(drawn.names) == {n for n, p in RIG.parameters.items() if p.tol > 0.0}
+    for name, values in drawn.rows(0, 4096).items():
+        known = RIG.parameters[name]
+        # The normal distribution cut at three standard deviations has 0.9866 of them left.
+        assert values.mean() == pytest.approx(known.value, abs=0.01 * known.tol), name
+        assert values.std() == pytest.approx(0.9866 * known.tol, rel=1e-2), name
+        assert np.abs(values - known.value).max() <= 3.0 * known.tol * (1 + 1e-9), name
+
+
+def test_a_sweep_draws_every_sample_once(tmp_path, monkeypatch):
+    """However many chunks are in flight: going back would pass over all samples before."""
+    made, engine = [], sweeps.DrawnSamples._engine
+    monkeypatch.setattr(
+        sweeps.DrawnSamples, "_engine", lambda self: [made.append(self), engine(self)][1]
+    )
+    drawn = sweeps.samples(RIG, ["arm.payload", "chamber.dead_volume"], 24, 1)
+    with ThreadPoolExecutor(2) as pool:
+        small(tmp_path / "out.zarr", drawn, chunk=2, executor=pool)
+    assert len(made) == 2  # for the run that tries the arguments, and for all chunks
+
+
+def test_a_sweep_over_samples_is_cut_and_resumed_like_any(tmp_path):
+    drawn = sweeps.samples(RIG, ["arm.payload", "chamber.dead_volume"], 23, 1)
+    data = small(tmp_path / "a.zarr", drawn, chunk=5)
+    rows = drawn.rows(0, 23)
+    assert data["arm.payload"].values.tolist() == rows["arm.payload"].tolist()
+    assert data["arm.payload"].attrs["units"] == "kg"
+    # The same runs as a table are another plan with the same numbers.
+    table = small(tmp_path / "b.zarr", sweeps.Samples(rows), chunk=23)
+    same(data, table)
+    again = sweeps.samples(RIG, ["arm.payload", "chamber.dead_volume"], 23, 2)
+    with pytest.raises(pamrs.ParameterError, match="seed 1 in the store, .*seed 2 now"):
+        small(tmp_path / "a.zarr", again, chunk=5)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"n": 0}, "n = 0 is not allowed: a whole number from 1 to"),
+        ({"seed": -1}, "seed = -1"),
+        ({"sequence": "random"}, "sequence = 'random' is not allowed"),
+        ({"within": "bounds"}, "within = 'bounds' is not allowed"),
+        ({"within": {"arm.payload": (9.0, 5.0)}}, r"within\['arm.payload'\] = \(9, 5\)"),
+        ({"within": {"arm.payload": (-1.0, 5.0)}}, "the lower end first, from 0 to"),
+        ({"within": {"arm.payload": 5.0}}, r"within\['arm.payload'\] = 5.0 is not allowed"),
+        ({"within": {"arm.mass": (1.0, 2.0)}}, "'arm.mass' is no parameter"),
+        ({"parameters": ["arm.length"]}, "arm.length has no tolerance in the rig"),
+        ({"parameters": ["initial.joint_angle"]}, "initial.joint_angle has no tolerance"),
+        (
+            {"parameters": ["arm.viscous"], "within": {"arm.payload": (1.0, 2.0)}},
+            "within has 'arm.payload', which is not one of parameters",
+        ),
+    ],
+)
+def test_samples_that_cannot_be_say_why(arguments, message):
+    with pytest.raises(pamrs.ParameterError, match=message):
+        sweeps.samples(RIG, **arguments)
+
+
+def test_columns_have_one_length():
+    with pytest.raises(pamrs.ParameterError, match="arm.payload has 2, arm.viscous has 1"):
+        sweeps.Samples({"arm.payload": [1.0, 2.0], "arm.viscous": [1.0]})
+
+
+SEALED = pamrs.rigs.named("sealed_chamber")
+SUM = {"initial.muscle_pressure": (1e5, 1.3e5), "sensors.pressure_zero": (-1e4, 1e4)}
+
+
+def shares(tmp_path, method, n, **changes):
+    """A sealed chamber reads its first pressure and its sensor's zero: a sum of two numbers."""
+    pytest.importorskip("SALib")
+    arguments = {
+        "metrics": {"p": ("final", "muscle_pressure"), "joint": ("final", "air_volume")},
+        "within": SUM,
+        "sample_time": 0.01,
+        "duration": 0.02,
+        "progress": False,
+        **changes,
+    }
+    return sweeps.sensitivity(SEALED, method=method, n=n, store=tmp_path / "out.zarr", **arguments)
+
+
+def test_the_indices_of_a_sum_are_the_shares_of_its_variance(tmp_path):
+    found = shares(tmp_path, "sobol", 512)
+    assert found["parameter"].values.tolist() == list(SUM)
+    widths = {name: high - low for name, (low, high) in SUM.items()}
+    total = sum(width**2 for width in widths.values())
+    expected = [width**2 / total for width in widths.values()]
+    assert found["p.S1"].values == pytest.approx(expected, abs=0.03)
+    assert found["p.ST"].values == pytest.approx(expected, abs=0.03)
+    assert np.isnan(found["joint.ST"].values).all()  # the volume of a chamber stays
+    assert found.attrs["runs"] == 512 * 4
+    assert found.attrs["groups_used"] == 512
+    assert found["p.ST"].attrs["units"] == "1"
+
+
+def test_elementary_effects_of_a_sum_are_its_ranges(tmp_path):
+    found = shares(tmp_path, "morris", 6)
+    widths = [high - low for low, high in SUM.values()]
+    assert found["p.mu"].values == pytest.approx(widths, rel=1e-6)
+    assert found["p.mu_star"].values == pytest.approx(widths, rel=1e-6)
+    assert found["p.sigma"].values == pytest.approx([0.0, 0.0], abs=1e-3)
+    assert found["p.mu"].attrs["units"] == "Pa"
+
+
+def test_groups_with_a_run_that_ended_are_left_out(tmp_path):
+    pytest.importorskip("SALib")
+    rig = pamrs.rigs.shoulder()
+    arguments = {
+        "metrics": {"end": ("final", "joint_angle")},
+        "method": "sobol",
+        "sample_time": 0.005,
+        "valve_command": np.full(11, 5.5),
+        "progress": False,
+    }
+    within = {"initial.joint_rate": (-50.0, 0.0), "arm.payload": (5.0, 9.0)}
+    found = sweeps.sensitivity(rig, within=within, n=16, store=tmp_path / "some.zarr", **arguments)
+    assert found.attrs["runs_ended"] > 0
+    assert 8 < found.attrs["groups_used"] < 16
+    assert np.isfinite(found["end.ST"].values).all()
+    within["initial.joint_rate"] = (-90.0, -60.0)
+    with pytest.raises(pamrs.ParameterError, match="of 4 groups have a run that ended"):
+        sweeps.sensitivity(rig, within=within, n=4, store=tmp_path / "all.zarr", **arguments)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"method": "fast"}, "method = 'fast' is not allowed"),
+        ({"n": 1}, "n = 1 is not allowed"),
+        ({"n": 100}, "n = 100 is not allowed: a power of two"),
+        ({"seed": 0.5}, "seed = 0.5"),
+    ],
+)
+def test_a_sensitivity_that_cannot_be_says_why(tmp_path, arguments, message):
+    with pytest.raises(pamrs.ParameterError, match=message):
+        sweeps.sensitivity(
+            SEALED,
+            {"p": ("final", "muscle_pressure")},
+            **{"within": SUM, "store": tmp_path / "out.zarr", **arguments},
+        )
