@@ -10,7 +10,7 @@ import pytest
 
 import pamrs
 from pamrs import _core
-from pamrs._numbers import checked_number
+from pamrs._checks import checked_number
 from pamrs.effects import EFFECTS
 from pamrs.errors import ParameterError, RigError
 from pamrs.rig import parse_rig

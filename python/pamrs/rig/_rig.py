@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pamrs._numbers import checked_number, checked_table
+from pamrs._checks import checked_number, checked_table
 from pamrs.errors import ParameterError, RigError, joined
 from pamrs.rig._ports import Ports, connect, wiring
 from pamrs.rig._reader import Content, read_model

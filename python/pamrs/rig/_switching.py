@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from pamrs._numbers import checked_number, checked_table
+from pamrs._checks import checked_number, checked_table
 from pamrs.errors import ParameterError, joined
 from pamrs.rig._ports import bare, effect_problem, hanging_problem, near_name
 from pamrs.rig.schema import qualified

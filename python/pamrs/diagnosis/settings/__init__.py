@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from pamrs._numbers import checked_table
+from pamrs._checks import checked_table
 from pamrs.diagnosis.settings._after import NextExperimentSettings, PlanSettings, WarningSettings
 from pamrs.diagnosis.settings._data import NoiseSettings, PlausibilitySettings, PrepareSettings
 from pamrs.diagnosis.settings._judgement import EvidenceSettings, VerdictSettings

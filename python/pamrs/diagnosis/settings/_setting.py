@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping
 from typing import Any, Self
 
-from pamrs._numbers import checked_table
+from pamrs._checks import checked_table
 from pamrs.errors import ParameterError
 
 __all__ = ["SettingsGroup", "setting"]
