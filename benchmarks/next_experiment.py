@@ -216,7 +216,9 @@ def explained(question: Question, nominal: Rig, problem: Problem) -> tuple[list[
             continue
         entry = next(e for e in found.rig.effects if e["id"] == effect)
         std = {
-            n.partition(".")[2]: s for n, s in found.std.items() if n.partition(".")[0] == effect
+            n.partition(".")[2]: s
+            for n, s in found.std.items()
+            if n.partition(".")[0] == effect and np.isfinite(s)
         }
         fits.append((effect, found.rig.with_effect(effect, entry["parameters"], std=std)))
         logs.append(-found.cost)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from typing import Any
 
 from pamrs.errors import ParameterError
 
-__all__ = ["positive"]
+__all__ = ["checked_number", "checked_table", "positive"]
 
 
 def positive(name: str, value: float, *, zero: bool = False) -> float:
@@ -38,3 +40,76 @@ def positive(name: str, value: float, *, zero: bool = False) -> float:
     if not (math.isfinite(number) and (number > 0.0 or (zero and number == 0.0))):
         raise ParameterError(f"{name} = {value} is not allowed: {allowed}")
     return number
+
+
+def checked_number(
+    name: str, value: Any, lower: float, upper: float, unit: str = "", *, whole: bool = False
+) -> float:
+    """A finite number between two bounds.
+
+    Parameters
+    ----------
+    name : str
+        What it is, for the message.
+    value : object
+        What was given.
+    lower, upper : float
+        Bounds; ``upper`` may be infinite.
+    unit : str, optional
+        Its unit.
+    whole : bool, optional
+        Only a whole number is allowed.
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    ParameterError
+        With name, value and what is allowed.
+    """
+    last = f" {unit}" if unit else ""
+    allowed = f"from {lower:g} to {upper:g}{last}"
+    if math.isinf(upper):
+        allowed = f"a finite number of {lower:g}{last} or more"
+    try:
+        if isinstance(value, (str, bytes, bytearray)):
+            raise TypeError
+        number = float(value)
+    except (TypeError, ValueError, OverflowError):
+        raise ParameterError(
+            f"{name} = {value!r} is not allowed: a number is needed, {allowed}"
+        ) from None
+    if not (math.isfinite(number) and lower <= number <= upper):
+        raise ParameterError(f"{name} = {number:g}{last} is not allowed: {allowed}")
+    if whole and not number.is_integer():
+        raise ParameterError(f"{name} = {number:g} is not allowed: a whole number is needed")
+    return number
+
+
+def checked_table(name: str, values: Any) -> dict[str, Any]:
+    """A copy of a mapping whose keys are names.
+
+    Parameters
+    ----------
+    name : str
+        What it is, for the message.
+    values : object
+        What was given.
+
+    Returns
+    -------
+    dict
+
+    Raises
+    ------
+    ParameterError
+        If it is no mapping, or a key is no text.
+    """
+    if not isinstance(values, Mapping):
+        raise ParameterError(f"{name} = {values!r} is not allowed: a mapping of names is needed")
+    for key in values:
+        if not isinstance(key, str):
+            raise ParameterError(f"{name} has the key {key!r}, which is not allowed: a name is one")
+    return dict(values)

@@ -18,6 +18,7 @@ __all__ = ["PACKAGES", "module", "register"]
 PACKAGES: Final[dict[str, str]] = {
     "batch": "pamrs.simulation",
     "case": "pamrs.recordings",
+    "effects_table": "pamrs.effects",
     "joint": "pamrs.rig",
     "lifting": "pamrs.design",
     "muscle": "pamrs.rig",

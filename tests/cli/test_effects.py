@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import pytest
 
-from pamrs import cli
-from pamrs.effects import EFFECTS, text
+from pamrs import cli, rigs
+from pamrs.effects import CATALOGUE, EFFECTS, Form, text
 from pamrs.errors import ParameterError
 from pamrs.rig import parse_rig
 from tests.effects.test_effects import rig_for
@@ -61,6 +63,57 @@ def test_a_snippet_takes_values():
     assert 'conductance   = { value = 2e-11, unit = "m3/(s Pa)" }' in text.snippet(
         "leak_muscle", {"conductance": 2e-11}
     )
+
+
+def two_forms(monkeypatch):
+    """The leak with a second form."""
+    leak = EFFECTS["leak_muscle"]
+    second = Form("porous", leak.parameters[:1], (), ("leak",))
+    grown = dataclasses.replace(leak, forms=(*leak.forms, second))
+    monkeypatch.setitem(CATALOGUE, "leak_muscle", grown)
+    return grown
+
+
+def test_each_form_is_shown_with_its_parameters(monkeypatch):
+    first = two_forms(monkeypatch).forms[0].name
+    shown = text.description("leak_muscle")
+    head, _, rest = shown.partition("form porous, parameters:")
+    assert f"form {first} (the usual one), parameters:" in head
+    assert "laminar_share" in head
+    assert "laminar_share" not in rest.partition("in a rig file\n")[0]
+    assert 'form = "porous"' in rest.partition("in a rig file, form porous")[2]
+    assert text.snippet("leak_muscle", form=first) == text.snippet("leak_muscle")
+    with pytest.raises(ParameterError, match=f"leak_muscle has '{first}', 'porous'"):
+        text.snippet("leak_muscle", form="other")
+
+
+def test_two_at_blocks_of_their_own_are_shown():
+    shown = text.description("leak_muscle")
+    head, _, rest = shown.partition("in a rig with several chambers, by their names")
+    assert "at =" not in head
+    assert rest.count("[[effects]]") == 2
+    assert 'at = "chamber_a"' in rest
+    assert 'at = "chamber_b"' in rest
+    assert "several supplies" in text.description("supply_leak")
+    assert "several" not in text.description("clock_skew")
+    assert text.description("payload_swing").partition("several joints")[2].count("at =") == 1
+
+
+def test_a_snippet_takes_a_block():
+    rig = rigs.named("antagonistic_joint")
+    read = parse_rig(f"{rig.to_toml_text()}\n{text.snippet('leak_muscle', at='flexor')}\n")
+    assert read.effects == rig.with_effect("leak_muscle", at="flexor").effects
+    with pytest.raises(ParameterError, match="at = 'a' is not allowed: clock_skew acts on the"):
+        text.snippet("clock_skew", at="a")
+    with pytest.raises(ParameterError, match="leak_muscle has no parameter 'width'"):
+        text.snippet("leak_muscle", {"width": 1.0})
+
+
+def test_an_effect_of_an_unknown_block_is_not_dropped(monkeypatch):
+    other = dataclasses.replace(EFFECTS["leak_muscle"], block="wheel")
+    monkeypatch.setitem(CATALOGUE, "leak_muscle", other)
+    with pytest.raises(ValueError, match="leak_muscle is in the block 'wheel'; there are: supply"):
+        text.catalogue()
 
 
 @pytest.mark.parametrize(

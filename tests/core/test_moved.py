@@ -12,6 +12,13 @@ from pamrs._moved import PACKAGES
 NAMES = {
     "batch": ("Batch", "BatchRun", "Failure"),
     "case": ("Case", "load_case"),
+    "effects_table": (
+        "CATALOGUE",
+        "EFFECTS",
+        "EffectInfo",
+        "EffectParameter",
+        "find_parameter",
+    ),
     "joint": ("Joint",),
     "lifting": ("Lift", "lift"),
     "muscle": ("Muscle",),

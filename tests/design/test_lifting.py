@@ -150,6 +150,36 @@ def test_friction_narrows_what_is_lifted_and_widens_what_is_held(elbow):
     np.testing.assert_allclose(change, -6 * (10.0 + 8.0) * arm, rtol=1e-8, atol=1e-9)
 
 
+def test_each_muscle_has_the_friction_that_acts_on_it():
+    plain = rigs.named("antagonistic_joint")
+    pressure = 2e5
+
+    def lost(*effects):
+        rig = plain
+        for at, constant in effects:
+            values = {"friction_constant": constant, "friction_pressure": 0.0, "presliding": 1e-3}
+            rig = rig.with_effect("muscle_hysteresis", values, at=at)
+        return lift(plain, pressure=pressure).torque - lift(rig, pressure=pressure).torque
+
+    one, other = lost(("flexor", 10.0)), lost(("extensor", 4.0))
+    assert np.abs(one).max() > 0.0
+    assert np.abs(other).max() > 0.0
+    for pair in ((("flexor", 10.0), ("extensor", 4.0)), (("extensor", 4.0), ("flexor", 10.0))):
+        np.testing.assert_allclose(lost(*pair), one + other, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(
+        lost(("", 10.0)), lost(("flexor", 10.0), ("extensor", 10.0)), rtol=1e-9, atol=1e-9
+    )
+
+
+def test_only_what_changes_a_torque_is_left_out(elbow):
+    rig = elbow
+    for effect in ("leak_muscle", "heat_transfer", "pressure_lag", "clock_skew"):
+        rig = rig.with_effect(effect)
+    assert lift(rig, pressure=FULL).left_out == ()
+    rig = rig.with_effect("muscle_creep").with_effect("joint_end_stop")
+    assert lift(rig, pressure=FULL).left_out == ("muscle_creep", "joint_end_stop")
+
+
 def test_more_pressure_lifts_more_and_none_lifts_nothing(elbow):
     reached = [lift(elbow, pressure=p * PSI).reached for p in (0.0, 20.0, 60.0, 100.0, 150.0)]
     assert reached[0] == reached[1] == elbow.model["joint"]["min_angle"]

@@ -194,6 +194,10 @@ def test_groups_are_checked_as_a_whole() -> None:
         DiagnosisSettings.from_dict({"evidences": {}})
     with pytest.raises(pamrs.ParameterError, match=r"settings.evidence is a list"):
         DiagnosisSettings.from_dict({"evidence": []})
+    with pytest.raises(pamrs.ParameterError, match="settings = 5 is not allowed"):
+        DiagnosisSettings.from_dict(5)  # type: ignore[arg-type]
+    with pytest.raises(pamrs.ParameterError, match="values has the key 3"):
+        DiagnosisSettings().with_values({3: 1})  # type: ignore[dict-item]
     with pytest.raises(pamrs.ParameterError, match="EvidenceSettings has no 'soft'"):
         EvidenceSettings.from_dict({"soft": 1.0})
 

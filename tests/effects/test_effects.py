@@ -79,7 +79,8 @@ def test_a_simulator_goes_on_bit_for_bit(effect: str) -> None:
 def test_all_at_once_run_and_restart() -> None:
     rig = pamrs.rigs.shoulder()
     for effect in EFFECTS:
-        rig = rig.with_effect(effect)
+        if effect != "supply_regulator_deadband":  # the shoulder has a tank
+            rig = rig.with_effect(effect)
     whole, first = (pamrs.Simulator(rig, sample_time=0.01, initial=START) for _ in range(2))
     expected = whole.run(COMMAND)
     first.run(COMMAND[:17])
@@ -174,11 +175,11 @@ def test_an_effect_on_what_is_not_there_is_refused() -> None:
     for effect, word in (
         ("valve_dead_zone", "valve"),
         ("muscle_creep", "muscle"),
-        ("payload_swing", "arm"),
+        ("payload_swing", "joint"),
         ("supply_leak", "supply"),
     ):
-        with pytest.raises(RigError, match=word):
-            pamrs.simulate(sealed.with_effect(effect), duration=1.0, sample_time=0.1)
+        with pytest.raises(ParameterError, match=word):
+            sealed.with_effect(effect)
 
 
 def test_a_lagging_sensor_is_inverted_where_it_drives() -> None:

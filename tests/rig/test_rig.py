@@ -18,6 +18,7 @@ from pamrs.effects import EFFECTS
 from pamrs.errors import ParameterError, RigError
 from pamrs.rig import Rig, load_rig, parse_rig
 from pamrs.rig.schema import BLOCKS
+from tests.effects.test_effects import rig_for
 
 CONCEALED = Path(__file__).parents[2] / ".." / "shared" / "concealed"
 SHOULDER = (Path(pamrs.__file__).parent / "rigs" / "shoulder.toml").read_text(encoding="utf-8")
@@ -299,7 +300,7 @@ def test_parameters_of_absent_blocks_are_not_there() -> None:
 @pytest.mark.parametrize("effect", sorted(EFFECTS))
 def test_effects_round_trip(effect: str) -> None:
     first = EFFECTS[effect].parameters[0]
-    rig = pamrs.rigs.shoulder().with_effect(
+    rig = rig_for(effect).with_effect(
         effect, {first.name: first.upper}, std={first.name: 0.1 * first.upper}
     )
     assert rig.effects[0]["id"] == effect

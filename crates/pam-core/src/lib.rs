@@ -15,6 +15,7 @@
 pub mod blocks;
 pub mod braid;
 mod chebyshev;
+mod clock;
 pub mod cut_chain;
 pub mod description;
 pub mod effects;

@@ -5,10 +5,13 @@ mod rigs;
 
 use pam_core::cut_chain::{predict, Block, Measured, Prediction, Signal};
 use pam_core::description::EffectSpec;
-use pam_core::effects::{leak_muscle, pressure_lag, EffectInfo, Port, EFFECTS};
+use pam_core::effects::{
+    base_flexibility, leak_muscle, payload_swing, pressure_lag, tube_flow_restriction, EffectInfo,
+    EffectState, Form, Port, Role, EFFECTS,
+};
 use pam_core::simulate::{simulate, Initial, Timing, Trajectory};
 use pam_core::{Rig, RigSpec};
-use rigs::{antagonists, effect, effect_at, shoulder, two_joints};
+use rigs::{antagonists, effect, effect_at, lone_tank, regulated, shoulder, two_joints, TYPICAL};
 
 const ROWS: usize = 60;
 const TIMING: Timing = Timing { sample_time: 0.01, substeps: 10 };
@@ -219,4 +222,81 @@ fn an_unknown_form_is_refused_with_those_that_there_are() {
         run(&other).channels,
         "the first form is the one without a name"
     );
+}
+
+fn typical(id: &str) -> EffectSpec {
+    TYPICAL.iter().find(|typical| typical.id == id).unwrap().on()
+}
+
+#[test]
+fn an_effect_without_a_place_is_refused_with_what_it_needs() {
+    let deadband = || vec![typical("supply_regulator_deadband")];
+    assert!(Rig::new(RigSpec { effects: deadband(), ..regulated() }).is_ok());
+    let text = refusal(shoulder(), deadband());
+    for word in ["'supply_regulator_deadband'", "of the kind regulator", "supply is a tank"] {
+        assert!(text.contains(word), "{text}");
+    }
+    let text = refusal(regulated(), vec![typical("compressor_cut_in")]);
+    assert!(text.contains("of the kind tank") && text.contains("supply is a regulator"), "{text}");
+    for (id, words) in [
+        ("valve_dead_zone", "acts on a valve, and the rig has none"),
+        ("muscle_creep", "acts on a muscle, and the rig has none"),
+        ("joint_end_stop", "acts on a joint, and the rig has nothing that moves"),
+        ("base_flexibility", "acts on an arm, and the rig has nothing that moves"),
+        ("payload_change", "joint or the mass of a load, and the rig has nothing that moves"),
+    ] {
+        let text = refusal(lone_tank(), vec![typical(id)]);
+        assert!(text.contains(&format!("'{id}'")) && text.contains(words), "{text}");
+    }
+}
+
+/// A form with a number of states, none of which says anything.
+const fn with_states(info: &EffectInfo, states: &'static [EffectState]) -> Form {
+    Form { states, ..info.forms[0] }
+}
+
+const STATE: EffectState = EffectState { name: "one", role: Role::Keeps };
+const TWO: EffectState = EffectState { name: "two", role: Role::Keeps };
+const NO_READING: EffectInfo =
+    EffectInfo { forms: &[with_states(&pressure_lag::INFO, &[])], ..pressure_lag::INFO };
+const TWO_TAPS: EffectInfo = EffectInfo {
+    forms: &[with_states(&tube_flow_restriction::INFO, &[STATE, TWO])],
+    ..tube_flow_restriction::INFO
+};
+const LAME_CORD: EffectInfo =
+    EffectInfo { forms: &[with_states(&payload_swing::INFO, &[STATE])], ..payload_swing::INFO };
+const STIFF_BASE: EffectInfo =
+    EffectInfo { forms: &[with_states(&base_flexibility::INFO, &[])], ..base_flexibility::INFO };
+static WRONG: &[&EffectInfo] = &[&NO_READING, &TWO_TAPS, &LAME_CORD, &STIFF_BASE];
+
+#[test]
+fn a_form_with_other_states_than_its_port_needs_is_refused() {
+    for (info, words) in WRONG.iter().zip([
+        "has 0 states, and what acts at the port Reading has 1",
+        "has 2 states, and what acts at the port Passage has 1",
+        "has 1 states, and what acts at the port Hanging has 2",
+        "has 0 states, and what acts at the port Mounting has 2",
+    ]) {
+        let spec = RigSpec { effects: vec![typical(info.id)], ..shoulder() };
+        assert!(Rig::new(spec.clone()).is_ok());
+        let text = Rig::with_effects(spec, WRONG).unwrap_err().to_string();
+        assert!(text.contains(info.id) && text.contains(words), "{text}");
+    }
+    for info in EFFECTS {
+        for form in info.forms {
+            for needed in form.ports.iter().filter_map(|port| port.states()) {
+                assert_eq!(form.states.len(), needed, "{}", info.id);
+            }
+        }
+    }
+}
+
+#[test]
+fn only_one_mass_can_hang() {
+    let swing = |at: &str| EffectSpec { at: at.into(), ..typical("payload_swing") };
+    let text = refusal(two_joints(), vec![swing("elbow"), swing("wrist")]);
+    for word in ["only one mass of an arm can hang", "at joint.elbow", "at joint.wrist"] {
+        assert!(text.contains(word), "{text}");
+    }
+    assert!(Rig::new(RigSpec { effects: vec![swing("elbow")], ..two_joints() }).is_ok());
 }

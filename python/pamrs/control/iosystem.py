@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs.control.linear import python_control
+from pamrs.effects import ports_of
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
 from pamrs.simulation import Simulator, core_rig
@@ -62,17 +63,18 @@ def iosystem(
     Raises
     ------
     ParameterError
-        If an argument is not allowed, the rig has no command, or it has the effect ``clock_skew``,
-        whose state grows.
+        If an argument is not allowed, the rig has no command, or it has an effect on the clock
+        (``clock_skew``), whose state grows.
     MissingPackageError
         If python-control is not installed.
     """
     library = python_control()
-    if any(effect["id"] == "clock_skew" for effect in rig.effects):
-        raise ParameterError(
-            "clock_skew is not allowed here: it keeps the samples before, a state that grows; "
-            "delay the inputs instead"
-        )
+    for effect in rig.effects:
+        if "clock" in ports_of(effect):
+            raise ParameterError(
+                f"{effect['id']} is not allowed here: it keeps the samples before, a state that "
+                "grows; delay the inputs instead"
+            )
     compiled = core_rig(rig)
     simulator = Simulator(rig, sample_time=sample_time, step=step)
     inputs = list(compiled.inputs)

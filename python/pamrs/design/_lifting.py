@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs.effects import ports_of
 from pamrs.errors import ParameterError
 from pamrs.rig import Joint
 
@@ -28,8 +29,21 @@ __all__ = ["Lift", "lift"]
 
 Array = NDArray[np.float64]
 
-#: Effects of the catalogue that change no static torque at a given pressure.
-_WITHOUT_TORQUE: Final = ("leak_muscle", "heat_transfer")
+#: Ports at which an effect changes no static torque at a given pressure: those of the gas, and of
+#: what is recorded.
+_WITHOUT_TORQUE: Final = frozenset(
+    {
+        "command",
+        "passage",
+        "clearance",
+        "leak",
+        "inflow",
+        "feed",
+        "balance",
+        "reading",
+        "clock",
+    }
+)
 _LIFTING, _HOLDING = -1.0, 1.0  # direction of the muscles: shortening, about to be drawn out
 
 
@@ -286,7 +300,11 @@ def lift(
     margin_angle = _least(balance.excess, angle)
     limit, limit_angle = balance.limit(angle)
     left_out = tuple(
-        e["id"] for e in rig.effects if e["id"] not in (*_WITHOUT_TORQUE, "muscle_hysteresis")
+        dict.fromkeys(
+            e["id"]
+            for e in rig.effects
+            if e["id"] != "muscle_hysteresis" and not _WITHOUT_TORQUE.issuperset(ports_of(e))
+        )
     )
     return Lift(
         rig=rig.name,
@@ -310,6 +328,17 @@ def lift(
     )
 
 
+def _hysteresis(rig: Rig, muscle: str) -> tuple[float, float]:
+    """Friction of one muscle of a group by the effect of the catalogue that acts on it: constant
+    [N], by pressure [N/Pa].
+    """
+    for effect in rig.effects:
+        if effect["id"] == "muscle_hysteresis" and effect.get("at", "") in ("", muscle):
+            values = effect["parameters"]
+            return values["friction_constant"], values["friction_pressure"]
+    return 0.0, 0.0
+
+
 class _Balance:
     """Torques of one rig at one pressure, as functions of the angle [rad] over arrays."""
 
@@ -320,25 +349,18 @@ class _Balance:
             (rig.muscle_of(name), Joint.from_model(transmissions.get(name, own)))
             for name in rig.tables("muscle")
         ]
+        self.hysteresis = [_hysteresis(rig, name) for name in rig.tables("muscle")]
         self.pressure = pressure
         self.coulomb = float(self.arm["coulomb"])
-        self.hysteresis = (
-            0.0,
-            0.0,
-        )  # of one muscle: constant [N], by pressure [N/Pa]; the effect of the catalogue
-        for effect in rig.effects:
-            if effect["id"] == "muscle_hysteresis":
-                self.hysteresis = (
-                    effect["parameters"]["friction_constant"],
-                    effect["parameters"]["friction_pressure"],
-                )
 
     def torque(self, angle: Array, direction: float) -> Array:
         """Of the muscles, while they shorten or are about to be drawn out [N m]; those that would
         lower the arm are vented.
         """
         total = np.zeros(angle.shape)
-        for muscle, joint in self.groups:
+        for (muscle, joint), (constant, by_pressure) in zip(
+            self.groups, self.hysteresis, strict=True
+        ):
             rest, count = float(muscle.parameters["rest_length"]), int(muscle.parameters["count"])
             arm = joint.torque_arm(angle)
             # a muscle on the other side of the joint lengthens where the arm rises
@@ -348,7 +370,7 @@ class _Balance:
                 if len(self.groups) > 1
                 else np.full(angle.shape, self.pressure)
             )
-            friction = self.hysteresis[0] + self.hysteresis[1] * np.maximum(pressure, 0.0)
+            friction = constant + by_pressure * np.maximum(pressure, 0.0)
             total += (
                 count
                 * (muscle.force(pressure, joint.shortening(angle) / rest, way) + way * friction)

@@ -16,6 +16,7 @@ from pamrs.effects._catalogue import (
     TERMS,
     WORDS,
     find_parameter,
+    ports_of,
 )
 from pamrs.effects._info import EffectInfo, EffectParameter, Form, SameData, Term, Words
 
@@ -33,4 +34,5 @@ __all__ = [
     "Term",
     "Words",
     "find_parameter",
+    "ports_of",
 ]

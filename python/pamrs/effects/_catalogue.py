@@ -4,13 +4,23 @@ from __future__ import annotations
 
 import json
 import tomllib
+from collections.abc import Mapping
 from importlib import resources
 from typing import Any, Final
 
 from pamrs import _core
 from pamrs.effects._info import EffectInfo, EffectParameter, Form, SameData, Term, Words
 
-__all__ = ["CATALOGUE", "CLOSURE_OF", "EFFECTS", "MEMORY_OF", "TERMS", "WORDS", "find_parameter"]
+__all__ = [
+    "CATALOGUE",
+    "CLOSURE_OF",
+    "EFFECTS",
+    "MEMORY_OF",
+    "TERMS",
+    "WORDS",
+    "find_parameter",
+    "ports_of",
+]
 
 
 def _words(effect: str) -> dict[str, Any]:
@@ -141,6 +151,11 @@ WORDS: Final[dict[str, Words]] = {name: _of_words(name) for name in TERMS}
 """How each sum of terms is put into words."""
 MEMORY_OF: Final[dict[str, str]] = {"time": "memory_time", "distance": "memory_angle"}
 """Shape that a term of a kind with memory depends on."""
+
+
+def ports_of(entry: Mapping[str, Any]) -> tuple[str, ...]:
+    """The ports at which an effect of a rig acts, as :attr:`pamrs.Rig.effects` lists it."""
+    return EFFECTS[entry["id"]].form(entry.get("form", "")).ports
 
 
 def find_parameter(name: str) -> EffectParameter:

@@ -9,18 +9,31 @@ import textwrap
 from collections.abc import Mapping
 from typing import Final
 
-from pamrs.effects import CATALOGUE, EffectInfo, EffectParameter
+from pamrs.effects import CATALOGUE, EffectInfo, EffectParameter, Form
 from pamrs.errors import ParameterError
 
 __all__ = ["catalogue", "description", "entry", "overview", "range_of", "snippet", "where"]
 
 _WIDTH: Final = 100
+_PLURAL: Final = {"supply": "supplies"}
 _ORDER: Final = ("supply", "valve", "line", "chamber", "muscle", "joint", "arm", "sensors")
 
 
 def catalogue() -> dict[str, list[EffectInfo]]:
-    """The effects of the catalogue by block, blocks and effects in the order of the chain."""
+    """The effects of the catalogue by block, blocks and effects in the order of the chain.
+
+    Raises
+    ------
+    ValueError
+        If an effect is in a block that has no place in that order.
+    """
     listed = CATALOGUE.values()
+    for info in listed:
+        if info.block not in _ORDER:
+            raise ValueError(
+                f"the effect {info.id} is in the block {info.block!r}; there are: "
+                f"{', '.join(_ORDER)}"
+            )
     return {
         block: [info for info in listed if info.block == block]
         for block in _ORDER
@@ -80,7 +93,9 @@ def range_of(parameter: EffectParameter) -> str:
     return text if parameter.neutral is None else f"{text}, off at {parameter.neutral:g}"
 
 
-def snippet(effect: str, values: Mapping[str, float] | None = None) -> str:
+def snippet(
+    effect: str, values: Mapping[str, float] | None = None, *, form: str = "", at: str = ""
+) -> str:
     """The lines of a rig file that switch an effect on.
 
     Parameters
@@ -89,6 +104,10 @@ def snippet(effect: str, values: Mapping[str, float] | None = None) -> str:
         Its id.
     values : mapping of str to float, optional
         SI values; what is left out has the catalogue's default.
+    form : str, optional
+        Name of one of its forms; by default the first.
+    at : str, optional
+        Name of the one block on which it acts; by default it acts on every block of its kind.
 
     Returns
     -------
@@ -98,16 +117,34 @@ def snippet(effect: str, values: Mapping[str, float] | None = None) -> str:
     Raises
     ------
     ParameterError
-        If there is no such effect.
+        If there is no such effect, or it has no such form or parameter, or acts at no block.
     """
     info, given = entry(effect), values or {}
-    width = max(len(parameter.name) for parameter in info.parameters)
-    lines = ["[[effects]]", f'id = "{info.id}"', "[effects.parameters]"]
-    for p in info.parameters:
+    chosen = _form(info, form)
+    if at and not info.at:
+        raise ParameterError(f"at = {at!r} is not allowed: {effect} acts on the whole rig")
+    names = [parameter.name for parameter in chosen.parameters]
+    if unknown := [name for name in given if name not in names]:
+        raise ParameterError(f"{effect} has no parameter {unknown[0]!r}; it has {', '.join(names)}")
+    width = max(map(len, names))
+    lines = ["[[effects]]", f'id = "{info.id}"']
+    lines += [f'at = "{at}"'] if at else []
+    lines += [f'form = "{chosen.name}"'] if chosen is not info.forms[0] else []
+    lines.append("[effects.parameters]")
+    for p in chosen.parameters:
         lines.append(
             f'{p.name:<{width}} = {{ value = {given.get(p.name, p.default):g}, unit = "{p.unit}" }}'
         )
     return "\n".join(lines)
+
+
+def _form(info: EffectInfo, name: str) -> Form:
+    """One form of an effect, the first without a name."""
+    try:
+        return info.form(name)
+    except KeyError:
+        allowed = ", ".join(repr(form.name) for form in info.forms)
+        raise ParameterError(f"form = {name!r} is not allowed: {info.id} has {allowed}") from None
 
 
 def overview() -> str:
@@ -121,8 +158,8 @@ def overview() -> str:
 
 
 def description(effect: str) -> str:
-    """One effect in full: equation, fingerprint, what it is confusable with, parameters, lines of a
-    rig file.
+    """One effect in full: equation, fingerprint, what it is confusable with, its forms with their
+    parameters, lines of a rig file.
 
     Parameters
     ----------
@@ -153,6 +190,15 @@ def description(effect: str) -> str:
         lines += textwrap.wrap(
             text, _WIDTH, initial_indent=f"  {head:<13}", subsequent_indent=" " * 15
         )
+    for form in info.forms:
+        lines += ["", *_parameters(info, form)]
+    for head, example in _examples(info).items():
+        lines += ["", head, "", textwrap.indent(example, "  ")]
+    return "\n".join(lines)
+
+
+def _parameters(info: EffectInfo, form: Form) -> list[str]:
+    """A table of the parameters of a form."""
     rows = [
         (
             p.name,
@@ -160,15 +206,28 @@ def description(effect: str) -> str:
             range_of(p),
             p.meaning,
         )
-        for p in info.parameters
+        for p in form.parameters
     ]
     widths = [max(len(row[column]) for row in rows) for column in range(3)]
-    lines += ["", "parameters: name, typical value, range, meaning", ""]
+    usual = " (the usual one)" if form is info.forms[0] else ""
+    head = f"form {form.name}{usual}, " if len(info.forms) > 1 else ""
+    lines = [f"{head}parameters: name, typical value, range, meaning", ""]
     for row in rows:
-        lines.append(
-            "  "
-            + "  ".join(
-                [*(f"{text:<{width}}" for text, width in zip(row, widths, strict=False)), row[3]]
-            )
-        )
-    return "\n".join([*lines, "", "in a rig file", "", textwrap.indent(snippet(effect), "  ")])
+        cells = [*(f"{text:<{width}}" for text, width in zip(row, widths, strict=False)), row[3]]
+        lines.append("  " + "  ".join(cells))
+    return lines
+
+
+def _examples(info: EffectInfo) -> dict[str, str]:
+    """Lines of a rig file under what they are for: each form, and an effect at two blocks with
+    values of its own.
+    """
+    found = {"in a rig file": snippet(info.id)}
+    for form in info.forms[1:]:
+        found[f"in a rig file, form {form.name}"] = snippet(info.id, form=form.name)
+    hangs = "hanging" in info.forms[0].ports  # one alone can hang
+    names = [f"{info.at}_{end}" for end in ("a", "b")[: 1 if hangs else 2]]
+    if info.at:
+        several = f"in a rig with several {_PLURAL.get(info.at, info.at + 's')}, by their names"
+        found[several] = "\n\n".join(snippet(info.id, at=name) for name in names)
+    return found

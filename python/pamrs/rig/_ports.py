@@ -13,7 +13,7 @@ from typing import Any, Final
 
 from pamrs.rig.schema import BLOCKS, PORTS, Port, kind_of, qualified, tables_of
 
-__all__ = ["Ports", "bare", "connect", "effect_problem", "near_name", "wiring"]
+__all__ = ["Ports", "bare", "connect", "effect_problem", "hanging_problem", "near_name", "wiring"]
 
 Ports = dict[str, dict[str, dict[str, str]]]
 """Kind of block -> name -> port -> the block at its other end in full, ``""`` for the inlet of a
@@ -52,6 +52,7 @@ def connect(model: Mapping[str, Any]) -> tuple[Ports, list[str]]:
         for entry in model.get("effects", ())
         if (text := effect_problem(model, entry["id"], entry.get("at", "")))
     ]
+    problems += [text] if (text := hanging_problem(model.get("effects", ()))) else []
     return connector.ports, problems
 
 
@@ -64,13 +65,38 @@ def effect_problem(model: Mapping[str, Any], effect: str, place: str) -> str:
     """What is wrong with the block that an effect acts on, ``""`` where nothing is."""
     from pamrs.effects import EFFECTS
 
-    block = EFFECTS[effect].at
-    if not block:
-        return f"{effect}: at = {place!r} is not allowed: it acts on the whole rig" if place else ""
-    names = [name for name in tables_of(model, block) if name]
-    if not place or place in names:
+    info = EFFECTS[effect]
+    if place and not info.at:
+        return f"{effect}: at = {place!r} is not allowed: it acts on the whole rig"
+    names = [name for name in tables_of(model, info.at) if name] if info.at else []
+    if place and place not in names:
+        return f"{effect}: at = {place!r} names no {info.at}{near_name(place, names)}"
+    usual = info.at or ("joint" if info.block == "arm" else "")
+    needs = info.needs or (((usual, ""),) if usual else ())
+    there = {
+        qualified(block, name): (block, kind_of(block, table))
+        for block in dict.fromkeys(block for block, _ in needs)
+        for name, table in tables_of(model, block).items()
+        if not place or name == place
+    }
+    if not needs or any(found in needs or (found[0], "") in needs for found in there.values()):
         return ""
-    return f"{effect}: at = {place!r} names no {block}{near_name(place, names)}"
+    what = " or ".join(f"a {b}" + (f" of the kind {kind}" if kind else "") for b, kind in needs)
+    has = ", ".join(f"{name} is a {kind}" for name, (_, kind) in there.items())
+    return f"{effect}: it acts on {what}, and {has or 'the rig has none'}"
+
+
+def hanging_problem(entries: Iterable[Mapping[str, Any]]) -> str:
+    """What is wrong with the masses that hang on an arm, ``""`` where nothing is."""
+    from pamrs.effects import ports_of
+
+    hung = [
+        f"{entry['id']} at {qualified('joint', entry['at']) if 'at' in entry else 'the last joint'}"
+        for entry in entries
+        if "hanging" in ports_of(entry)
+    ]
+    text = f"only one mass of an arm can hang, and {' and '.join(hung)} make {len(hung)}"
+    return text if len(hung) > 1 else ""
 
 
 def wiring(model: Mapping[str, Any], ports: Ports) -> list[str]:

@@ -17,9 +17,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pamrs._checks import checked_number, checked_table
 from pamrs.errors import ParameterError, RigError, joined
-from pamrs.rig._ports import Ports, bare, connect, effect_problem, near_name, wiring
+from pamrs.rig._ports import Ports, connect, wiring
 from pamrs.rig._reader import Content, read_model
+from pamrs.rig._switching import Entry, full_name, new_entry, placed, without
 from pamrs.rig._writer import core_json, toml_text
 from pamrs.rig.schema import BLOCKS, Key, keys_of, qualified, split_name, tables_of
 
@@ -307,22 +309,23 @@ class Rig:
         ParameterError
             For an unknown name, or a value outside the bounds of the possible.
         """
-        model = _opened(self._model, {split_name(name)[:2] for name in values})
-        problems = []
-        for name, value in values.items():
+        given = checked_table("values", values)
+        model = _opened(self._model, {split_name(name)[:2] for name in given})
+        problems, numbers = [], {}
+        for name, value in given.items():
             table, key = self._scalar(model, name)
-            number = float(value)
-            if not (math.isfinite(number) and key.lower <= number <= key.upper):
-                problems.append(f"{name} = {number:g} {key.unit} is not allowed: {_range(key)}")
             whole = key.kind == "count"
-            if whole and not number.is_integer():
-                problems.append(f"{name} = {number:g} is not allowed: a whole number is needed")
+            try:
+                number = checked_number(name, value, key.lower, key.upper, key.unit, whole=whole)
+            except ParameterError as error:
+                problems.append(str(error))
                 continue
+            numbers[name] = number
             table[key.name] = int(number) if whole else number
         if problems:
             raise ParameterError(joined(f"rig {self.name!r}", problems))
         found = Rig(self.name, model, self._tolerances, self._effect_std, self.source)
-        return found._with_origin(self, {name: float(value) for name, value in values.items()})
+        return found._with_origin(self, numbers)
 
     # A rig that differs from another one by numbers only is not wired again: the core takes the
     # numbers.
@@ -333,21 +336,33 @@ class Rig:
         object.__setattr__(self, "_origin", (origin, {**before, **values}))
         return self
 
-    def _with_entry(self, entry: dict[str, Any], std: dict[str, dict[str, float]]) -> Rig:
+    def _with_entry(self, entry: Entry, std: dict[str, dict[str, float]]) -> Rig:
         """The same rig with one effect more, as an entry of its model."""
-        model = {**self._model, "effects": [*self._model["effects"], entry]}
-        found = Rig(self.name, model, self._tolerances, {**self._effect_std, **std}, self.source)
+        before: list[Entry] = self._model["effects"]
+        entries = placed(before, entry)
+        full = full_name(entry)
+        left = {full_name(old) for old in entries} - {full}
+        kept = {name: known for name, known in self._effect_std.items() if name in left}
+        model = {**self._model, "effects": entries}
+        found = Rig(self.name, model, self._tolerances, {**kept, **std}, self.source)
+        own = {f"{full}.{name}": value for name, value in entry["parameters"].items()}
+        if len(entries) > len(before):
+            origin, numbers = self._grown_by(entry)
+            object.__setattr__(found, "_origin", (origin, {**numbers, **own}))
+            return found
+        same = [_kind(old) for old in before] == [_kind(new) for new in entries]
+        return found._with_origin(self, own) if same else found
+
+    def _grown_by(self, entry: Entry) -> tuple[Rig, dict[str, float]]:
+        """The rig that this one differs from by numbers with an effect more, and these numbers."""
         origin, before = self.__dict__.get("_origin", (self, {}))
         grown: dict[tuple[str, str, str], Rig] = origin.__dict__.get("_grown", {})
-        kind = (entry["id"], entry.get("at", ""), entry.get("form", ""))
+        kind = _kind(entry)
         if kind not in grown:
             same = {**origin._model, "effects": [*origin._model["effects"], entry]}
             grown[kind] = Rig(self.name, same, self._tolerances, origin._effect_std, self.source)
             object.__setattr__(origin, "_grown", grown)
-        full = qualified(entry["id"], entry.get("at", ""))
-        own = {f"{full}.{name}": value for name, value in entry["parameters"].items()}
-        object.__setattr__(found, "_origin", (grown[kind], {**before, **own}))
-        return found
+        return grown[kind], before
 
     def with_effect(
         self,
@@ -362,7 +377,7 @@ class Rig:
 
         Several of one id can be there, each at a block of its own and with its own parameters. One
         at the same block is replaced; one that acts everywhere replaces all of its id, and is
-        replaced by one at a block.
+        replaced by one at a block. The new one stands in the place of what it replaces.
 
         Parameters
         ----------
@@ -386,49 +401,14 @@ class Rig:
         Raises
         ------
         ParameterError
-            For an unknown effect, form, parameter or block, or a value outside its bounds.
+            For an unknown effect, form, parameter or block, a value outside its bounds, a rig that
+            has nothing on which the effect acts, or a second mass that hangs on an arm.
         """
-        from pamrs.effects import CATALOGUE, EFFECTS
-
-        info = EFFECTS.get(effect)
-        if info is None:
-            raise ParameterError(
-                f"effect = {effect!r} is not in the catalogue{near_name(str(effect), CATALOGUE)}"
-            )
-        at = bare(info.at, at)
-        given = dict(parameters or {})
-        if form and form not in (allowed := [known.name for known in info.forms]):
-            raise ParameterError(
-                f"form = {form!r} is not allowed: {effect} has {', '.join(map(repr, allowed))}"
-            )
-        chosen_form = info.form(form)
-        names = [parameter.name for parameter in chosen_form.parameters]
-        problems = [
-            f"unknown parameter {name!r}; it has: {', '.join(names)}"
-            for name in {*given, *(std or {})}
-            if name not in names
-        ]
-        problems += [text] if (text := effect_problem(self._model, effect, at)) else []
-        chosen: dict[str, float] = {}
-        for parameter in chosen_form.parameters:
-            value = float(given.get(parameter.name, parameter.default))
-            if not (math.isfinite(value) and parameter.lower <= value <= parameter.upper):
-                problems.append(
-                    f"{parameter.name} = {value:g} {parameter.unit} is not allowed: "
-                    f"from {parameter.lower:g} to {parameter.upper:g} {parameter.unit}"
-                )
-            chosen[parameter.name] = value
-        if problems:
-            raise ParameterError(joined(f"effect {effect!r}", problems))
-        base = self.without_effect(effect, at=at or None)
-        base = base.without_effect(effect, at="") if at else base
-        place = {"at": at} if at else {}
-        own = {"form": form} if form and form != info.forms[0].name else {}
-        known = {qualified(effect, at): {k: float(v) for k, v in std.items()}} if std else {}
-        return base._with_entry({"id": effect, **place, **own, "parameters": chosen}, known)
+        entry, known = new_entry(self._model, effect, parameters, std, at, form)
+        return self._with_entry(entry, {full_name(entry): known} if known else {})
 
     def without_effect(self, effect: str | None = None, *, at: str | None = None) -> Rig:
-        """A rig without one effect; an effect that is not there is no error.
+        """A rig without one effect; one that is nowhere is no error while no block is named.
 
         Parameters
         ----------
@@ -441,18 +421,17 @@ class Rig:
         Returns
         -------
         Rig
+
+        Raises
+        ------
+        ParameterError
+            If the effect does not act at the block that is named.
         """
-
-        def stays(entry: Mapping[str, Any]) -> bool:
-            if effect is None:
-                return False
-            return entry["id"] != effect or (at is not None and entry.get("at", "") != at)
-
-        entries = [entry for entry in self._model["effects"] if stays(entry)]
+        entries = without(self._model["effects"], effect, at)
         if len(entries) == len(self._model["effects"]):
             return self
         model = {**self._model, "effects": entries}
-        left = {qualified(entry["id"], entry.get("at", "")) for entry in model["effects"]}
+        left = {full_name(entry) for entry in entries}
         kept = {name: std for name, std in self._effect_std.items() if name in left}
         return Rig(self.name, model, self._tolerances, kept, self.source)
 
@@ -505,6 +484,11 @@ class Rig:
             raise RigError(f"{path}: cannot be written ({error.strerror or error})") from error
 
 
+def _kind(entry: Entry) -> tuple[str, str, str]:
+    """What an effect is beside its numbers."""
+    return entry["id"], entry.get("at", ""), entry.get("form", "")
+
+
 def _opened(model: dict[str, Any], tables: set[tuple[str, str]]) -> dict[str, Any]:
     """A model with copies of some of its tables, by block and name; what is not changed is
     shared.
@@ -519,10 +503,6 @@ def _opened(model: dict[str, Any], tables: set[tuple[str, str]]) -> dict[str, An
         if name in content:
             content[name] = dict(content[name])
     return opened
-
-
-def _range(key: Key) -> str:
-    return f"from {key.lower:g} to {key.upper:g} {key.unit}"
 
 
 def load_rig(path: str | os.PathLike[str]) -> Rig:

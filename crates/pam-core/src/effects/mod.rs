@@ -14,7 +14,7 @@ pub use self::info::{
     SameData, Use, LANES,
 };
 pub(crate) use self::port::{begun, BAR, BEGUN, LITRE};
-pub use self::port::{At, AtMuscle, Effect, Extremes, Port};
+pub use self::port::{At, AtMuscle, Cord, Effect, Extremes, Port};
 use crate::scalar::{constant, Scalar};
 
 /// The modules of the effects, and the list of what they are; a file that stands elsewhere is named

@@ -8,7 +8,7 @@
 //! pendulum, L. D. Landau & E. M. Lifshitz, *Mechanics*, section 5. Two states; at the start the
 //! cord hangs at rest.
 
-use super::{Effect, EffectInfo, EffectParameter, EffectState, Form, Port, Role};
+use super::{Cord, Effect, EffectInfo, EffectParameter, EffectState, Form, Port, Role};
 use crate::blocks::gas::Gas;
 use crate::made_by;
 use crate::scalar::Scalar;
@@ -43,44 +43,6 @@ pub const INFO: EffectInfo = EffectInfo {
     }],
     ..EffectInfo::USUAL
 };
-
-/// A hanging mass at one instant.
-#[derive(Debug, Clone, Copy)]
-pub struct Cord<S> {
-    /// Along the cord, away from the link: across and up.
-    pub along: [S; 2],
-    /// Across the cord.
-    pub across: [S; 2],
-    /// Damping, as an acceleration across the cord [m/s2].
-    pub damping: S,
-    /// Centripetal acceleration [m/s2].
-    pub centripetal: S,
-    length: S,
-}
-
-impl<S: Scalar> Cord<S> {
-    /// A cord of a length [m] and damping ratio at an angle [rad] and its rate, under gravity
-    /// [m/s2].
-    #[inline]
-    pub fn new(length: S, damping_ratio: S, gravity: f64, angle: S, rate: S) -> Self {
-        let (sin, cos) = angle.sin_cos();
-        let damping = damping_ratio * (length * gravity.abs()).sqrt() * rate * 2.0;
-        Self {
-            along: [sin, -cos],
-            across: [cos, sin],
-            damping,
-            centripetal: length * rate * rate,
-            length,
-        }
-    }
-
-    /// Angular acceleration [rad/s2] where the upper end accelerates [m/s2], gravity counted as an
-    /// acceleration upwards.
-    #[inline]
-    pub fn acceleration(&self, felt: [S; 2]) -> S {
-        -(felt[0] * self.across[0] + felt[1] * self.across[1] + self.damping) / self.length
-    }
-}
 
 /// Bound of the pendulum's frequency [rad/s], the link's inertia without the swinging mass being
 /// smaller by `ratio`.

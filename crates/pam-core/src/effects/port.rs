@@ -6,15 +6,15 @@ use crate::scalar::{constant, Scalar};
 use serde::Serialize;
 use std::fmt::Debug;
 
-use super::payload_swing::Cord;
-
-/// A place in the equations of a rig at which an effect acts.
+/// A place in the equations of a rig at which an effect acts. Some need a form with a certain number
+/// of states; a rig with an effect of another number is refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Port {
     /// Valve: the way from the command to the opening.
     Command,
-    /// Valve: what its flow passes through. One effect at most.
+    /// Valve: what its flow passes through. One effect at most, with one state: what a pressure
+    /// sensor in front of it reads.
     Passage,
     /// Valve: a path beside its opening, from the supply to the chamber and from the chamber to the
     /// ambient.
@@ -39,14 +39,27 @@ pub enum Port {
     Push,
     /// Arm: the mass at the end of a link.
     Payload,
-    /// Arm: a part of that mass that hangs on a cord. One effect at most.
+    /// Arm: a part of that mass that hangs on a cord. One effect at most, with two states: angle and
+    /// rate of the cord.
     Hanging,
-    /// Arm: what it stands on. One effect at most.
+    /// Arm: what it stands on. One effect at most, with two states: angle and rate.
     Mounting,
-    /// Chamber: what its pressure sensor reads. One effect at most.
+    /// Chamber: what its pressure sensor reads. One effect at most, with one state: the reading.
     Reading,
     /// The clock of what is recorded.
     Clock,
+}
+
+impl Port {
+    /// How many states an effect that acts here has at each block; None where any number will do.
+    #[must_use]
+    pub const fn states(self) -> Option<usize> {
+        match self {
+            Self::Passage | Self::Reading => Some(1),
+            Self::Hanging | Self::Mounting => Some(2),
+            _ => None,
+        }
+    }
 }
 
 /// What an effect sees of the block that it acts on. Pressures absolute [Pa] where nothing else is
@@ -107,6 +120,44 @@ pub struct AtMuscle<S> {
     pub rate: S,
     /// Stretch since the step began [m].
     pub stretched: S,
+}
+
+/// A hanging mass at one instant.
+#[derive(Debug, Clone, Copy)]
+pub struct Cord<S> {
+    /// Along the cord, away from the link: across and up.
+    pub along: [S; 2],
+    /// Across the cord.
+    pub across: [S; 2],
+    /// Damping, as an acceleration across the cord [m/s2].
+    pub damping: S,
+    /// Centripetal acceleration [m/s2].
+    pub centripetal: S,
+    length: S,
+}
+
+impl<S: Scalar> Cord<S> {
+    /// A cord of a length [m] and damping ratio at an angle [rad] and its rate, under gravity
+    /// [m/s2].
+    #[inline]
+    pub fn new(length: S, damping_ratio: S, gravity: f64, angle: S, rate: S) -> Self {
+        let (sin, cos) = angle.sin_cos();
+        let damping = damping_ratio * (length * gravity.abs()).sqrt() * rate * 2.0;
+        Self {
+            along: [sin, -cos],
+            across: [cos, sin],
+            damping,
+            centripetal: length * rate * rate,
+            length,
+        }
+    }
+
+    /// Angular acceleration [rad/s2] where the upper end accelerates [m/s2], gravity counted as an
+    /// acceleration upwards.
+    #[inline]
+    pub fn acceleration(&self, felt: [S; 2]) -> S {
+        -(felt[0] * self.across[0] + felt[1] * self.across[1] + self.damping) / self.length
+    }
 }
 
 /// Extremes of a block, for the fastest rate of what acts there.

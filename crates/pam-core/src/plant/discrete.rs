@@ -6,7 +6,7 @@ use super::rates::{Controls, Plant};
 use super::units::SupplyUnit;
 use crate::blocks::supply::Supply;
 use crate::blocks::valve::spool_position;
-use crate::effects::clock_skew::held_mean;
+use crate::clock::held_mean;
 use crate::scalar::{constant, Scalar};
 
 impl<S: Scalar> Plant<'_, S> {

@@ -276,8 +276,7 @@ fn acted_on(
 ) -> Result<Vec<Place>> {
     let names = names(spec, info.at);
     if !has(wiring, info, &names) {
-        let place = if info.at.is_empty() || info.block == "arm" { info.block } else { info.at };
-        return model(format!("effect '{}' acts in the {place}, and the rig has none", effect.id));
+        return model(lacking(wiring, info));
     }
     if info.at.is_empty() {
         if !effect.at.is_empty() {
@@ -306,21 +305,49 @@ fn acted_on(
         |k: &usize| info.supplies.is_empty() || fits_supply(&wiring.supplies[*k], info.supplies);
     let places: Vec<Place> =
         chosen.filter(|k| info.at != "supply" || fits(k)).map(|k| place(info.at, k)).collect();
-    if places.is_empty() && !effect.at.is_empty() {
-        return model(format!(
-            "effect '{}' acts at '{}', a supply of a kind that it does not act on",
-            effect.id, effect.at
-        ));
+    if places.is_empty() {
+        return model(other_supplies(spec, wiring, info, &effect.at));
     }
     Ok(places)
 }
 
-fn fits_supply(supply: &SupplyUnit, kinds: &[&str]) -> bool {
-    kinds.contains(&match supply {
+/// That the rig has no block of the kind that an effect acts on.
+fn lacking(wiring: &Wiring, info: &EffectInfo) -> String {
+    let place = match info {
+        _ if info.on_loads => "a joint or the mass of a load",
+        _ if info.block == "arm" => "an arm",
+        _ => &format!("a {}", info.at),
+    };
+    let there = match wiring.body {
+        _ if !(info.on_loads || info.block == "arm" || info.block == "joint") => "has none",
+        BodyUnit::Mass { .. } => "has a load instead",
+        _ => "has nothing that moves",
+    };
+    format!("effect '{}' acts on {place}, and the rig {there}", info.id)
+}
+
+/// That no supply, or not the one of a name, is of a kind that an effect acts on.
+fn other_supplies(spec: &RigSpec, wiring: &Wiring, info: &EffectInfo, at: &str) -> String {
+    let there: Vec<_> = (spec.supplies.iter().zip(&wiring.supplies))
+        .filter(|(supply, _)| at.is_empty() || supply.name == at)
+        .map(|(supply, unit)| {
+            format!("{} is a {}", dotted("supply", &supply.name), supply_kind(unit))
+        })
+        .collect();
+    let (kinds, there) = (info.supplies.join(" or "), there.join(", "));
+    format!("effect '{}' acts on a supply of the kind {kinds}, and {there}", info.id)
+}
+
+fn supply_kind(supply: &SupplyUnit) -> &'static str {
+    match supply {
         SupplyUnit::Tank(_) => "tank",
         SupplyUnit::Constant => "constant",
         SupplyUnit::Regulator { .. } => "regulator",
-    })
+    }
+}
+
+fn fits_supply(supply: &SupplyUnit, kinds: &[&str]) -> bool {
+    kinds.contains(&supply_kind(supply))
 }
 
 fn place(kind: &str, k: usize) -> Place {
@@ -389,6 +416,7 @@ impl Ports {
         wiring: &Wiring,
         spec: &RigSpec,
     ) -> Result<()> {
+        self.needs_states(port, acting)?;
         let taken = match (port, place) {
             (Port::Command, Place::Valve(k)) => push(&mut self.command[k], acting),
             (Port::Passage, Place::Valve(k)) => {
@@ -429,9 +457,7 @@ impl Ports {
             (Port::Torque, Place::Joint(k)) => push(&mut self.torque[k], acting),
             (Port::Push, Place::Joint(k)) => push(&mut self.push[k], acting),
             (Port::Payload, Place::Joint(k)) => push(&mut self.payload, (k, acting)),
-            (Port::Hanging, Place::Joint(k)) => {
-                self.hanging.replace((k, acting)).map(|(_, other)| other)
-            }
+            (Port::Hanging, Place::Joint(k)) => self.hang(k, acting, wiring, spec)?,
             (Port::Mounting, Place::Whole) => self.mounting.replace(acting),
             (Port::Clock, Place::Whole) => push(&mut self.clock, acting),
             _ => {
@@ -451,6 +477,33 @@ impl Ports {
                 ))
             }
         }
+    }
+
+    /// A port may need a certain number of states.
+    fn needs_states(&self, port: Port, acting: Acting) -> Result<()> {
+        match port.states() {
+            Some(needed) if needed != acting.count => model(format!(
+                "effect '{}' has {} states, and what acts at the port {port:?} has {needed}",
+                self.effects[acting.effect].info.id, acting.count
+            )),
+            _ => Ok(()),
+        }
+    }
+
+    /// Hang a mass on a link; an error that names both joints where one hangs already.
+    fn hang(
+        &mut self,
+        link: usize,
+        acting: Acting,
+        wiring: &Wiring,
+        spec: &RigSpec,
+    ) -> Result<Option<Acting>> {
+        let Some(other) = self.hanging.replace((link, acting)) else { return Ok(None) };
+        let [one, two] = [other, (link, acting)].map(|(link, acting)| {
+            let joint = dotted("joint", &block_name(spec, wiring, Place::Joint(link)));
+            format!("'{}' at {joint}", self.effects[acting.effect].info.id)
+        });
+        model(format!("only one mass of an arm can hang, and {one} and {two} make two"))
     }
 }
 

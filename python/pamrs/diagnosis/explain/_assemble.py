@@ -406,7 +406,9 @@ def _with_std(rig: Rig, candidates: list[Candidate]) -> Rig:
         for effect in candidate.fit.rig.effects:
             own = effect["id"] + "."
             std = {
-                n.removeprefix(own): s for n, s in candidate.fit.std.items() if n.startswith(own)
+                n.removeprefix(own): s
+                for n, s in candidate.fit.std.items()
+                if n.startswith(own) and math.isfinite(s)
             }
             rig = rig.with_effect(effect["id"], effect["parameters"], std=std)
     return rig

@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from pamrs._checks import checked_table
 from pamrs.diagnosis.settings._after import NextExperimentSettings, PlanSettings, WarningSettings
 from pamrs.diagnosis.settings._data import NoiseSettings, PlausibilitySettings, PrepareSettings
 from pamrs.diagnosis.settings._judgement import EvidenceSettings, VerdictSettings
@@ -154,7 +155,7 @@ class DiagnosisSettings:
             For a name that is not a setting, or a value that is not allowed.
         """
         given: dict[str, Any] = {}
-        for name, value in values.items():
+        for name, value in checked_table("settings", values).items():
             if name != "seed" and name not in _GROUPS:
                 raise ParameterError(
                     f"settings has {name!r}, which is not allowed: one of {', '.join(_GROUPS)}, "
@@ -181,7 +182,7 @@ class DiagnosisSettings:
             For a name that is not a setting, or a value that is not allowed.
         """
         changed = self.to_dict()
-        for name, value in values.items():
+        for name, value in checked_table("values", values).items():
             group, _, own = name.partition(".")
             if name == "seed":
                 changed["seed"] = value

@@ -7,6 +7,7 @@ import math
 from collections.abc import Mapping
 from typing import Any, Self
 
+from pamrs._checks import checked_table
 from pamrs.errors import ParameterError
 
 __all__ = ["SettingsGroup", "setting"]
@@ -78,12 +79,13 @@ class SettingsGroup:
             For a name that is not a setting, or a value that is not allowed.
         """
         known = [f.name for f in dataclasses.fields(cls)]
-        for name in values:
+        given = checked_table("settings", values)
+        for name in given:
             if name not in known:
                 raise ParameterError(
                     f"settings: {_title(cls)} has no {name!r}; it has {', '.join(known)}"
                 )
-        return cls(**values)
+        return cls(**given)
 
 
 def _title(group: type) -> str:

@@ -1,0 +1,129 @@
+"""Switching effects on and off: what is asked for, checked, and its place in the list of a rig."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any
+
+from pamrs._checks import checked_number, checked_table
+from pamrs.errors import ParameterError, joined
+from pamrs.rig._ports import bare, effect_problem, hanging_problem, near_name
+from pamrs.rig.schema import qualified
+
+if TYPE_CHECKING:
+    from pamrs.effects import Form
+
+__all__ = ["Entry", "full_name", "new_entry", "placed", "without"]
+
+Entry = dict[str, Any]
+"""An effect of a model: ``id``, ``parameters``, and ``at`` and ``form`` where they are given."""
+
+
+def new_entry(
+    model: Mapping[str, Any], effect: Any, parameters: Any, std: Any, at: Any, form: Any
+) -> tuple[Entry, dict[str, float]]:
+    """An effect as :meth:`pamrs.Rig.with_effect` is asked for it, and what is known of its
+    parameters.
+    """
+    from pamrs.effects import CATALOGUE, EFFECTS
+
+    if not isinstance(effect, str) or effect not in EFFECTS:
+        raise ParameterError(
+            f"effect = {effect!r} is not in the catalogue{near_name(str(effect), CATALOGUE)}"
+        )
+    info = EFFECTS[effect]
+    forms = [known.name for known in info.forms]
+    if form not in ("", *forms):
+        raise ParameterError(
+            f"form = {form!r} is not allowed: {effect} has {', '.join(map(repr, forms))}"
+        )
+    place = block_name(info.at, at)
+    given = {} if parameters is None else checked_table("parameters", parameters)
+    spread = {} if std is None else checked_table("std", std)
+    known = [parameter.name for parameter in info.form(form).parameters]
+    problems = [
+        f"unknown parameter {name!r}; it has: {', '.join(known)}"
+        for name in dict.fromkeys([*given, *spread])
+        if name not in known
+    ]
+    problems += [text] if (text := effect_problem(model, effect, place)) else []
+    chosen, wrong = _numbers(info.form(form), given)
+    deviations, wrong_too = _deviations(info.form(form), spread)
+    if problems := [*problems, *wrong, *wrong_too]:
+        raise ParameterError(joined(f"effect {effect!r}", problems))
+    where = {"at": place} if place else {}
+    own = {"form": form} if form not in ("", forms[0]) else {}
+    return {"id": effect, **where, **own, "parameters": chosen}, deviations
+
+
+def _numbers(form: Form, given: Mapping[str, Any]) -> tuple[dict[str, float], list[str]]:
+    """The parameters of a form, the usual ones where none is given, and what is wrong."""
+    chosen, problems = {}, []
+    for p in form.parameters:
+        value = given.get(p.name, p.default)
+        try:
+            chosen[p.name] = checked_number(p.name, value, p.lower, p.upper, p.unit)
+        except ParameterError as error:
+            problems.append(str(error))
+    return chosen, problems
+
+
+def _deviations(form: Form, given: Mapping[str, Any]) -> tuple[dict[str, float], list[str]]:
+    """The standard deviations that are given, and what is wrong."""
+    chosen, problems = {}, []
+    for p in form.parameters:
+        if p.name in given:
+            name = f"std of {p.name}"
+            try:
+                chosen[p.name] = checked_number(name, given[p.name], 0.0, math.inf, p.unit)
+            except ParameterError as error:
+                problems.append(str(error))
+    return chosen, problems
+
+
+def placed(entries: Iterable[Entry], entry: Entry) -> list[Entry]:
+    """The effects of a rig with one more, in the place of the first of those that it replaces."""
+    place, found, first = entry.get("at", ""), [], None
+    for old in entries:
+        if old["id"] != entry["id"] or (place and old.get("at", "") not in ("", place)):
+            found.append(old)
+        elif first is None:
+            first = len(found)
+    found.insert(len(found) if first is None else first, entry)
+    if text := hanging_problem(found):
+        raise ParameterError(joined(f"effect {entry['id']!r}", [text]))
+    return found
+
+
+def without(entries: list[Entry], effect: Any, at: Any) -> list[Entry]:
+    """The effects of a rig less those of an id, or less the one of them at a block."""
+    from pamrs.effects import EFFECTS
+
+    if effect is None:
+        if at is not None:
+            raise ParameterError(f"at = {at!r} is not allowed without the id of an effect")
+        return []
+    if at is None:
+        return [entry for entry in entries if entry["id"] != effect]
+    place = block_name(EFFECTS[effect].at if effect in EFFECTS else "", at)
+    of_id = [entry.get("at", "") for entry in entries if entry["id"] == effect]
+    if place not in of_id:
+        there = ", ".join(f"at {name!r}" if name else "everywhere" for name in of_id)
+        raise ParameterError(
+            f"at = {at!r} is not allowed: {effect} acts "
+            f"{there or 'nowhere in this rig, which is without it'}"
+        )
+    return [entry for entry in entries if entry["id"] != effect or entry.get("at", "") != place]
+
+
+def block_name(block: str, at: Any) -> str:
+    """Name of the block at which an effect acts, without its kind."""
+    if not isinstance(at, str):
+        raise ParameterError(f"at = {at!r} is not allowed: the name of a block is needed")
+    return bare(block, at)
+
+
+def full_name(entry: Entry) -> str:
+    """What an effect is called in full, ``leak_muscle.flexor``."""
+    return qualified(entry["id"], entry.get("at", ""))
