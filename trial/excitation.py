@@ -35,8 +35,8 @@ def select(count: int) -> list[tuple[str, str]]:
 
 @dataclass(frozen=True)
 class Excitation:
-    """Reference angle [rad], masks of samples with the valve at its believed null and wide open to
-    vent, dither [V].
+    """Reference angle [rad], masks of samples (valve at the null voltage
+    that the controller assumes, valve wide open to vent), dither [V].
 
     All of shape (n,). With `open_loop` the commands are found on the nominal plant and replayed.
     """

@@ -20,17 +20,17 @@ HEALTHY = ("none", "parameters")
 LEAST_ROOM = 0.05
 #: block of the rig in which an effect of a block of the plant acts; transducers go by their channel
 _ACTS = {
-    ("supply"): ("supply"),
-    ("valve"): ("chamber"),
-    ("line"): ("chamber"),
-    ("chamber"): ("chamber"),
-    ("muscle"): ("arm"),
-    ("joint"): ("arm"),
-    ("arm"): ("arm"),
-    ("encoder_gear_lash"): ("arm"),
-    ("encoder_eccentricity"): ("arm"),
-    ("pressure_lag"): ("chamber"),
-    ("pressure_zero_drift"): ("chamber"),
+    "supply": "supply",
+    "valve": "chamber",
+    "line": "chamber",
+    "chamber": "chamber",
+    "muscle": "arm",
+    "joint": "arm",
+    "arm": "arm",
+    "encoder_gear_lash": "arm",
+    "encoder_eccentricity": "arm",
+    "pressure_lag": "chamber",
+    "pressure_zero_drift": "chamber",
 }
 
 

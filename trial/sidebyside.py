@@ -121,7 +121,7 @@ def side_by_side(rows: Sequence[Compared]) -> str:
     mine = (_share(healthy, lambda c: c.row.detected), _share(seen, lambda c: c.row.detected))
     lines += [
         "\nThe refit raises an alarm by chi-square (1 %, its residual's means over 0.1 s against "
-        "the diagnosis' own noise floor). SINDy and the Gaussian process predict; they neither "
+        "the diagnosis' own noise level). SINDy and the Gaussian process predict; they neither "
         "test nor name a cause.\n",
         "| | refit, chi-square | SINDy | Gaussian process | pamrs |",
         "|---|---|---|---|---|",

@@ -10,7 +10,7 @@ from statistics import mean, median
 from .effects import LISTED
 from .score import Row, Scores
 
-#: multiple of the noise that an effect must leave after a refit to be asked for
+#: multiple of the noise that must remain of an effect after a refit for the targets to ask for it
 SEEN = 3.0
 
 
@@ -135,7 +135,7 @@ _EVERY = "catalogue effects, every strength"
 
 
 def _visible(rows: Iterable[Row]) -> list[Row]:
-    """Those of which a refit leaves enough to be asked for."""
+    """Those of which enough remains after a refit for the targets to ask for them."""
     return [r for r in rows if r.visible >= SEEN]
 
 

@@ -1,16 +1,20 @@
 """What holds for every controller: batches, restarts, and a bounded error in the loop."""
 
 import copy
+import inspect
 import json
 import math
 import pickle
+import re
 
 import numpy as np
 import pytest
 
 import pamrs
+from pamrs import control
 from pamrs.control import PID, Cascade, Feedforward, Parallel, Reference, cascaded_pid
 from pamrs.errors import ParameterError
+from tests.control import cases
 from tests.control.cases import (
     AIR,
     CONTROLLERS,
@@ -24,6 +28,15 @@ from tests.control.cases import (
 )
 
 ALL = pytest.mark.parametrize("name", CONTROLLERS)
+
+
+def test_every_public_controller_is_among_the_cases():
+    text = inspect.getsource(cases)
+    bases = {control.Controller, control.SampledController, control.SlidingController}
+    for name in control.__all__:
+        found = getattr(control, name)
+        if inspect.isclass(found) and issubclass(found, control.Controller) and found not in bases:
+            assert re.search(rf"\b{name}[.(]", text.partition("CONTROLLERS = ")[2]), name
 
 
 def aim_of(name, time):

@@ -5,14 +5,18 @@ from __future__ import annotations
 import json
 from typing import Any
 
+import numpy as np
 import pytest
 
 import pamrs
 from pamrs.cli import main
 from pamrs.diagnosis import DiagnosisSettings
+from pamrs.diagnosis.fit import Problem
 from pamrs.diagnosis.next_experiment import _planning as plan
-from pamrs.diagnosis.next_experiment import library, pressure_range
+from pamrs.diagnosis.next_experiment import library, pressure_range, trial_of
+from pamrs.diagnosis.next_experiment._differences import _free
 from pamrs.effects import CATALOGUE, EFFECTS
+from pamrs.simulation import core_rig
 
 SETTINGS = DiagnosisSettings()
 
@@ -25,6 +29,34 @@ def test_levels_follow_from_the_rig() -> None:
         span = pressure_range(rig, SETTINGS.next_experiment)
         assert 0.0 < span.low < span.high < rig.model["supply"]["initial_pressure"]
     assert pressure_range(pamrs.rigs.shoulder(), SETTINGS.next_experiment, highest=2e5).high <= 2e5
+
+
+@pytest.mark.parametrize("gas", [(287.05, 1.4), (2077.1, 1.667), (188.9, 1.3)])
+def test_commands_are_found_for_the_gas_of_the_rig(gas: tuple[float, float]) -> None:
+    constant, ratio = gas
+    rig = pamrs.rigs.shoulder().with_parameters(
+        {"gas.gas_constant": constant, "gas.heat_capacity_ratio": ratio}
+    )
+    reference = np.interp(np.arange(401) * 0.01, [0.0, 1.0, 2.0, 4.0], [0.0, 1e5, 1e5, 3e5])
+    command = trial_of(
+        rig, reference, sample_time=0.01, bandwidth=SETTINGS.next_experiment.bandwidth
+    )
+    found = pamrs.simulate(rig, command, sample_time=0.01)["muscle_pressure"]
+    assert np.abs(found - reference)[50:].max() < 0.1e5
+
+
+def test_each_of_two_leaks_keeps_its_own_uncertainty() -> None:
+    rig = pamrs.rigs.antagonistic_joint()
+    problem = Problem([], [], core_rig(rig), SETTINGS)
+    one = rig.with_effect(
+        "leak_muscle", {"conductance": 5e-11}, at="flexor", std={"conductance": 1e-11}
+    )
+    assert _free(problem, one)["leak_muscle.conductance"] == pytest.approx(1e-11)
+    two = one.with_effect("leak_muscle", {"conductance": 6e-11}, at="extensor")
+    free = _free(problem, two)
+    assert free["leak_muscle.flexor.conductance"] == pytest.approx(1e-11)
+    share = SETTINGS.next_experiment.known_share
+    assert free["leak_muscle.extensor.conductance"] == pytest.approx(share * 6e-11)
 
 
 def test_a_sealed_chamber_is_planned_quickly(capsys: pytest.CaptureFixture[str], tmp_path) -> None:
@@ -132,7 +164,7 @@ def test_without_the_angle_the_arm_is_not_isolable(few) -> None:
     assert "arm" not in [b["name"] for b in found.blocks]
     lost = {b["name"]: b["needs"] for b in found.missing}
     assert lost["arm"] == ["joint_angle"]
-    assert found.sight("muscle_hysteresis").verdict == "hidden"
+    assert found.sight("muscle_hysteresis").verdict == "not seen"
     assert found.additions[0].name == "joint_angle"
     assert "muscle_hysteresis" in found.additions[0].seen
     assert "not arm (muscle, joint and arm): without joint_angle" in found.text()
@@ -141,7 +173,7 @@ def test_without_the_angle_the_arm_is_not_isolable(few) -> None:
 def test_without_the_supply_the_arm_alone_is_left(few) -> None:
     found = few("muscle_pressure", "joint_angle")
     assert [b["name"] for b in found.blocks] == ["arm"]
-    assert found.sight("leak_muscle").verdict == "hidden"
+    assert found.sight("leak_muscle").verdict == "not seen"
     assert found.sight("muscle_hysteresis").verdict == "seen"
 
 

@@ -23,7 +23,7 @@ DIAGNOSIS = ROOT / "python/pamrs/diagnosis"
 CONSTANTS = {
     "screen/_leave_one_out.py": {"_RIDGE"},  # keeps a matrix invertible
     "prepare/_plausible.py": {"_DEGREES", "_TOLD"},  # of a circle; findings that a message lists
-    "next_experiment/_protocols.py": {"_CRITICAL", "_CHOKED"},  # of choked air
+    "next_experiment/_protocols.py": {"_LEAST_SHARE"},  # of the choked flow
     "explain/_conditions.py": {"_MAP_CELLS"},  # of a picture
     "explain/_assemble.py": {"_REFERENCE_DENSITY"},  # of ISO 6358
     "explain/_closure_words.py": {"_UNITS"},  # of sizes that are told

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from pamrs.errors import PamrsError, RecordingError
 from pamrs.recordings import CHANNELS, Recording, load_recording
 from pamrs.recordings._faults import find_faults
+from pamrs.recordings.table import _READERS, _TEXT
 
 Array = NDArray[np.float64]
 SHARED = Path(__file__).parents[2] / ".." / "shared"
@@ -272,6 +273,23 @@ def test_unreadable_files(tmp_path: Path) -> None:
         (tmp_path / name).write_bytes(content)
         with pytest.raises(RecordingError, match=name):
             load_recording(tmp_path / name)
+
+
+def test_a_column_of_a_table_of_numbers_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pandas = pytest.importorskip("pandas")
+    frame = pandas.DataFrame({"time [s]": [0.0, 0.1], "force [N]": ["1", "much"]})
+    monkeypatch.setattr(pandas, "read_parquet", lambda path: frame)
+    (tmp_path / "made.parquet").touch()
+    with pytest.raises(RecordingError, match=r"made\.parquet: column 'force \[N\]' does not hold"):
+        load_recording(tmp_path / "made.parquet")
+
+
+def test_the_help_names_every_ending_that_is_read() -> None:
+    assert all(
+        f"``{ending}``" in load_recording.__doc__ for ending in (*_TEXT, *_READERS) if ending
+    )
 
 
 @settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])

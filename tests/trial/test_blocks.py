@@ -169,8 +169,8 @@ def test_another_strength_is_made_again(tmp_path):
         "duration": 2.0,
         "measure": "reach",
         "strength": 1.0,
-        ("wanted"): {("leak_muscle"): ("medium"), ("hose_torque"): ("strong")},
-        ("recordings"): {RECORDINGS[0][0]: {("role"): RECORDINGS[0][1]}},
+        "wanted": {"leak_muscle": "medium", "hose_torque": "strong"},
+        "recordings": {RECORDINGS[0][0]: {"role": RECORDINGS[0][1]}},
     }
     (tmp_path / "keys").mkdir()
     (tmp_path / "keys" / "case_0001.json").write_text(json.dumps(key))
@@ -230,10 +230,10 @@ def test_make_a_wrong_parameter(tmp_path, capsys):
 
 def key(case="c", ids=(), kind=None, wanted=(), wrong=None, seed=1):
     told = {
-        ("case"): case,
-        ("kind"): kind or ("+").join(ids),
-        ("effects"): list(ids),
-        ("wanted"): dict(zip(ids, wanted, strict=False)),
+        "case": case,
+        "kind": kind or ("+").join(ids),
+        "effects": list(ids),
+        "wanted": dict(zip(ids, wanted, strict=False)),
         "reach": 5.0,
         "reach_left": 5.0,
         "seed": seed,
@@ -247,19 +247,19 @@ def key(case="c", ids=(), kind=None, wanted=(), wrong=None, seed=1):
 
 def result(verdict, probabilities, effects=(), *, wrong=None, unexplained=(), ambiguity=(), **more):
     return {
-        ("schema"): ("pamrs.diagnosis/1"),
-        ("verdict"): verdict,
-        ("effects"): [{("id"): e} for e in effects],
-        ("probabilities"): probabilities,
+        "schema": ("pamrs.diagnosis/1"),
+        "verdict": verdict,
+        "effects": [{"id": e} for e in effects],
+        "probabilities": probabilities,
         "ambiguity": [list(a) for a in ambiguity],
         "seconds": 10.0,
-        ("fit"): {
-            ("gap_closed"): None,
-            ("held_out"): {("joint_angle"): {("noise"): 1.0, ("refit"): 9.0, ("after"): 1.5}},
+        "fit": {
+            "gap_closed": None,
+            "held_out": {"joint_angle": {"noise": 1.0, "refit": 9.0, "after": 1.5}},
         },
         "wrong_parameters": [{"name": n, "interval": list(i)} for n, i in (wrong or {}).items()],
-        ("unexplained"): [
-            {("block"): b, ("channel"): ("joint_angle"), ("noises"): 15.0} for b in unexplained
+        "unexplained": [
+            {"block": b, "channel": "joint_angle", "noises": 15.0} for b in unexplained
         ],
         **more,
     }

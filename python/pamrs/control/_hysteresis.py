@@ -2,9 +2,9 @@
 diagnosis found.
 
 The effect ``muscle_hysteresis`` (Maxwell slip; Vo-Minh et al., IEEE/ASME Trans. Mechatronics
-16, 2011) adds to the pull of each muscle ``(W0 + c P) z``, z from -1 while it contracts to +1 while
-it lengthens, a memory of the way it moved. At a given memory the torque is still a line in the
-pressure, so that every law that inverts ``C1 P + C2`` inverts it with
+16, 2011) adds ``(W0 + c P) z`` to the force of each muscle, z from -1 while it contracts to +1
+while it lengthens, a memory of the way it moved. At a given memory the torque is still a line in
+the pressure, so that every law that inverts ``C1 P + C2`` inverts it with
 
 ::
 

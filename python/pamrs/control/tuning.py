@@ -156,7 +156,11 @@ def gain_map(
     unit: str = "rad",
     **loop: Any,
 ) -> GainMap:
-    """nu, omega and J over every combination of gains and payloads, in one batch.
+    """Nu, omega and J over every combination of gains and payloads, in one batch.
+
+    Nu is the integral of the squared error of the angle, omega the curvature of its path, and
+    ``J = w1 nu/min(nu) + w2 omega/min(omega)``, (4.18), with the smallest of each payload's map and
+    ``weights`` (w1, w2). The result has them as ``squared_error``, ``curvature`` and ``j``.
 
     Parameters
     ----------

@@ -41,7 +41,7 @@ class Condition(Entry):
     share, time : float
         Share of the excess that lies there, and share of the time.
     mean : float
-        Mean residual there [noises].
+        Mean residual there [noise levels].
     text : str
         The same as a sentence.
     """

@@ -16,7 +16,7 @@ from pamrs.fit._bench import from_recording
 from pamrs.fit._data import ForceMap
 from pamrs.fit._dialect import decimal_of, delimiter_of
 from pamrs.recordings import load_recording
-from pamrs.recordings.table import Table, read_table, read_text
+from pamrs.recordings.table import Table, is_text, read_table, read_text
 from pamrs.units import parse_unit, same_dimension, to_si
 
 __all__ = ["read_map"]
@@ -162,7 +162,7 @@ def _one_character(delimiter: str | None, decimal: str | None, source: str) -> N
 
 
 def _delimiter(file: Path) -> str:
-    return "," if file.suffix.lower() == ".parquet" else delimiter_of(read_text(file), str(file))
+    return delimiter_of(read_text(file), str(file)) if is_text(file) else ","
 
 
 def _texts(table: Table, found: Mapping[str, _Column]) -> list[Sequence[str]]:

@@ -62,12 +62,11 @@ def load_force_map(
     Parameters
     ----------
     path : path-like
-        A table (``.csv``, ``.tsv``, ``.txt``, ``.dat``, each also ``.gz``, or ``.parquet``) with
-        the columns length or contraction, pressure, force and, if known, direction (-1 or
-        "contracting", 1 or "lengthening"). Units are in the headings: ``length [mm]``,
-        ``pressure_kPa``, ``force (N)``. With a column ``time`` it is read as a recording of a
-        bench. Or a ``.toml`` description (schema ``pamrs.force_map/1``), to which no other argument
-        applies.
+        A table, of any kind that :func:`pamrs.load_recording` reads, with the columns length or
+        contraction, pressure, force and, if known, direction (-1 or "contracting", 1 or
+        "lengthening"). Units are in the headings: ``length [mm]``, ``pressure_kPa``,
+        ``force (N)``. With a column ``time`` it is read as a recording of a bench. Or a ``.toml``
+        description (schema ``pamrs.force_map/1``), to which no other argument applies.
     rest_length : float, optional
         Length at zero contraction [m]; needed for a table.
     columns : mapping of str to str, optional

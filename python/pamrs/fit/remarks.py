@@ -38,18 +38,18 @@ Array = NDArray[np.float64]
 #: One sentence for each force model.
 MODEL_WORDS = {
     "gaylord": "the gas force of an ideal braided cylinder, without wall or elasticity",
-    ("chou_hannaford"): (
+    "chou_hannaford": (
         "an ideal braided cylinder with a wall of constant thickness, without elasticity"
     ),
-    ("mooney_rivlin"): (
+    "mooney_rivlin": (
         "an ideal braided cylinder with a rubber bladder of two Mooney-Rivlin constants"
     ),
     "ferraresi": "a braided cylinder with a bladder of constant thickness and a polynomial stress",
     "kothera": "a braided cylinder with a bladder that thins as it widens and a polynomial stress",
-    ("robinson"): (
+    "robinson": (
         "a braid with elliptic ends and a bladder that thins as it widens, with a polynomial stress"
     ),
-    ("elbow_linear"): (
+    "elbow_linear": (
         "a braided cylinder with a bladder that thins as it widens and one constant modulus"
     ),
 }

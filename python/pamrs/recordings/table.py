@@ -11,20 +11,20 @@ import gzip
 import io
 import math
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pamrs.errors import RecordingError
 
-__all__ = ["Table", "read_table", "read_text", "split_rows"]
+__all__ = ["Table", "is_text", "read_table", "read_text", "split_rows"]
 
 Array = NDArray[np.float64]
 
 _NO_VALUE = frozenset({"", "nan", "na", "n/a", "null", "none", "-", "--", "inf", "-inf", "+inf"})
-_READABLE = ".csv, .tsv, .txt, .dat (each also .gz) and .parquet"
 _TEXT = (".csv", ".tsv", ".txt", ".dat", "")
 
 
@@ -122,13 +122,18 @@ def read_table(path: Path, *, delimiter: str, header: bool) -> Table:
     RecordingError
         If the file is missing, unreadable, empty or has no rows.
     """
-    if path.suffix.lower() == ".parquet":
-        return _parquet(path)
+    if not is_text(path):
+        return _READERS[path.suffix.lower()](path)
     return _parse(read_text(path), str(path), delimiter, header)
 
 
+def is_text(path: Path) -> bool:
+    """Whether a file is read as text, by its ending; the other kinds have a reader of their own."""
+    return path.suffix.lower() not in _READERS
+
+
 def read_text(path: Path) -> str:
-    """Text of a file that is not Parquet, unpacked.
+    """Text of a file, unpacked.
 
     Parameters
     ----------
@@ -221,12 +226,26 @@ def _parquet(path: Path) -> Table:
         ) from error
     try:
         frame = pd.read_parquet(path)
-        columns = [np.asarray(frame[name], dtype=np.float64) for name in frame.columns]
-    except Exception as error:
+    except Exception as error:  # each engine has its own kinds for a broken file
         raise RecordingError(f"{path}: cannot be read ({error})") from error
+    columns = []
+    for place, name in enumerate(frame.columns):
+        try:
+            columns.append(np.asarray(frame.iloc[:, place], dtype=np.float64))
+        except (TypeError, ValueError) as error:
+            raise RecordingError(
+                f"{path}: column {str(name)!r} does not hold numbers only ({error})"
+            ) from error
     if not len(frame):
         raise RecordingError(f"{path}: a header without rows")
     return Table([str(name) for name in frame.columns], columns, list(range(1, len(frame) + 1)), [])
+
+
+_READERS: Final[dict[str, Callable[[Path], Table]]] = {".parquet": _parquet}
+"""Reader of each ending whose files are not text: a new kind is one function and its entry here."""
+_READABLE: Final = (
+    f"{', '.join(ending for ending in _TEXT if ending)} (each also .gz) and {', '.join(_READERS)}"
+)
 
 
 def thousands_of(thousands: str | Mapping[str, str] | None, name: str) -> str | None:

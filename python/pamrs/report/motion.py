@@ -40,7 +40,7 @@ _PANELS: Final = (
     ("joint angle", "deg", 180.0 / math.pi, ("joint_angle",)),
     ("joint torque of the muscles", "N m", 1.0, ("joint_torque",)),
     ("length of the muscle", "mm", 1e3, ("length",)),
-    ("pull of the muscles", "N", 1.0, ("muscle_force",)),
+    ("muscle force", "N", 1.0, ("muscle_force",)),
     ("gas temperature", "K", 1.0, ("temperature",)),
 )
 #: A recorded channel that is drawn beside a simulated one of another name.

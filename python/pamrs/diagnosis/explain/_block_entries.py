@@ -60,8 +60,8 @@ def block_entries(
 def _sizes(
     block: Block, problem: Problem, found: Stages, noise_level: dict[Key, NoiseLevel]
 ) -> MismatchStages:
-    """What is more than noise at every stage: in noises, in the channel's unit, and whether noise
-    could be so large.
+    """What is more than noise at every stage: in noise levels, in the channel's unit, and whether
+    noise could be so large.
     """
     sizes = {}
     for stage, residuals in found.items():

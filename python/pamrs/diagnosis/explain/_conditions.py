@@ -4,6 +4,7 @@ conditions.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -37,7 +38,7 @@ class Picture:
     recording : str
         That recording.
     map : ConditionMap or None
-        Mean residual (in noise units) over two conditions, before and after.
+        Mean residual (in noise levels) over two conditions, before and after.
     """
 
     conditions: list[Condition] = field(default_factory=list)
@@ -200,9 +201,12 @@ def describe(
         time = float(mask.mean())
         mean = float(z[mask].mean())
         text = (
-            f"{name}: {100 * share:.0f} % of the excess in {100 * time:.0f} % of the time, mean "
-            f"{mean:+.2g} noise units"
+            f"{name}: {100 * share:.0f} % of what exceeds the noise, in {100 * time:.0f} % of the "
+            "time"
         )
+        # nearer to zero than half a digit of what is printed, or than chance puts it
+        if abs(mean) > max(0.05, 2.0 / math.sqrt(mask.sum())):
+            text += f"; mean {mean:+.2g} times the noise level"
         picture.conditions.append(Condition(name, share, time, mean, text))
     picture.conditions.sort(key=lambda c: -c.share / max(0.02, c.time) * c.share)
     picture.map = _map(joined, z, np.concatenate(scaled_after) if scaled_after else None, block)

@@ -51,8 +51,8 @@ def where(located: str | None, problem: Problem, judged: list[Judged], picture: 
     parts = "" if block.covers == located else f" ({block.covers})"
     text = (
         f"The mismatch lies in the {located} block{parts}. With the measured signals of its "
-        f"neighbours as inputs, the refitted model misses {block.channel.replace('_', ' ')} by "
-        f"{found.systematic:.2g} times the noise level."
+        f"neighbours as inputs, the refitted model misses {block.channel.replace('_', ' ')}: what "
+        f"exceeds the noise is {found.systematic:.2g} times the noise level."
     )
     group = next((g for g in groups if g.mismatch is not None and g.mismatch.name == located), None)
     wrong = next((j.wrong for j in judged if block in j.group.blocks), ())

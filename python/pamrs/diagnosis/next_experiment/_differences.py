@@ -21,10 +21,10 @@ from pamrs.diagnosis.fit import Key, Problem, bin_width, free_baseline, residual
 from pamrs.diagnosis.noise import bins_of, noise_levels
 from pamrs.diagnosis.prepare import Prepared, Residual, available_blocks, binned, prepare
 from pamrs.diagnosis.settings import DiagnosisSettings, NextExperimentSettings
-from pamrs.effects import EFFECTS
 from pamrs.errors import DiagnosisError, ParameterError
 from pamrs.recordings import Recording
 from pamrs.rig import Rig
+from pamrs.rig.schema import qualified
 from pamrs.simulation import Simulation, core_rig
 
 __all__ = [
@@ -193,12 +193,14 @@ def _free(problem: Problem, rig: Rig) -> dict[str, float]:
     """Parameters that may move, with the standard deviation of what is known [SI]."""
     out = {name: rig.parameter(name).tol for name in free_baseline(problem, rig.without_effect())}
     known = set(core_rig(rig).parameter_names)
+    ids = [effect["id"] for effect in rig.effects]
     for effect in rig.effects:
-        spread = rig.effect_std.get(effect["id"], {})
-        for parameter in EFFECTS[effect["id"]].parameters:
-            name = f"{effect['id']}.{parameter.name}"
-            value = abs(effect["parameters"][parameter.name])
-            std = spread.get(parameter.name, problem.settings.next_experiment.known_share * value)
+        alone = ids.count(effect["id"]) == 1
+        label = effect["id"] if alone else qualified(effect["id"], effect.get("at", ""))
+        spread = rig.effect_std.get(label, {})
+        for parameter, given in effect["parameters"].items():
+            name, value = f"{label}.{parameter}", abs(given)
+            std = spread.get(parameter, problem.settings.next_experiment.known_share * value)
             if name in known and math.isfinite(std) and std > 0.0:
                 out[name] = min(std, 2.0 * value) if value > 0.0 else std
     return out

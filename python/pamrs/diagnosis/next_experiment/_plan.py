@@ -23,16 +23,16 @@ class Sight:
         Its id.
     left : float
         What is left of its signature, root mean square over the recording where that is largest
-        [noise units].
+        [noise levels].
     block, recording : str
         Where; empty when it acts in no block that the channels surround.
     size : str
         Dotted name of the parameter that scales it; empty where no number does.
     typical, smallest : float
         Typical value of that parameter and the smallest one (of a restriction's conductance, the
-        largest) that leaves three noise units [SI]; NaN without one.
+        largest) that leaves three noise levels [SI]; NaN without one.
     verdict : str
-        ``seen``, ``faint`` or ``hidden`` at the typical size.
+        ``seen``, ``marginal`` or ``not seen`` at the typical size.
     """
 
     effect: str
@@ -42,7 +42,7 @@ class Sight:
     size: str = ""
     typical: float = math.nan
     smallest: float = math.nan
-    verdict: str = "hidden"
+    verdict: str = "not seen"
 
 
 @dataclass(frozen=True)
@@ -252,12 +252,13 @@ class Plan:
             "",
             (
                 "Effects of a small but usual size, after the baseline has moved inside its "
-                "tolerances (noise units of 0.1 s)"
+                "tolerances (in noise levels of means over 0.1 s)"
             ),
         ]
         lines += [
-            f"  {'effect':<25}{'':<8}{'left':>7}  "
-            f"{'in':<9}{'recording':<17}{'at size':>10}{'seen from':>11}  {'unit':<13}taken for"
+            f"  {'effect':<25}{'':<9}{'remains':>8}  "
+            f"{'in':<9}{'recording':<17}{'at size':>10}{'seen from':>11}  {'unit':<13}"
+            "cannot be told from"
         ]
         for sight in self.sights:
             rivals = [
@@ -267,14 +268,14 @@ class Plan:
             typical = f"{sight.typical:.3g}" if math.isfinite(sight.typical) else ""
             smallest = f"{sight.smallest:.2g}" if math.isfinite(sight.smallest) else ""
             where = f"{sight.block or '-':<9}{sight.recording or '-':<17}"
-            if sight.verdict == "hidden":
+            if sight.verdict == "not seen":
                 rivals += [
                     "the parameters inside their tolerances, or noise"
                     if sight.block
                     else "(nothing here shows it)"
                 ]
             lines.append(
-                f"  {sight.effect:<25}{sight.verdict:<8}{sight.left:>7.2g}  {where}{typical:>10}"
+                f"  {sight.effect:<25}{sight.verdict:<9}{sight.left:>8.2g}  {where}{typical:>10}"
                 f"{smallest:>11}  {'' if unit == '1' else unit:<13}{', '.join(rivals)}".rstrip()
             )
         return [

@@ -445,7 +445,8 @@ def _sight(start: Start, left: float, key: Key, settings: PlanSettings) -> Sight
     """How an effect shows from the start that shows most."""
     if left < 1e-6:
         return Sight(start.effect, 0.0)
-    verdict = "seen" if left >= settings.seen else "faint" if left >= settings.faint else "hidden"
+    marginal = left >= settings.suspect_from
+    verdict = "seen" if left >= settings.seen else "marginal" if marginal else "not seen"
     if not start.scalable:
         return Sight(start.effect, left, *key, verdict=verdict)
     leading = start.sizes[0]

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs.control import OrificeInverse
 from pamrs.diagnosis.settings import NextExperimentSettings
 from pamrs.errors import DiagnosisError, SimulationError
 from pamrs.rig import Rig
@@ -27,8 +28,9 @@ __all__ = ["Experiment", "Range", "library", "pressure_range", "trial_of"]
 Array = NDArray[np.float64]
 Points = list[tuple[float, float]]
 
-_CRITICAL = 0.528
-_CHOKED = 0.0404  # sqrt(k/R) (2/(k+1))^((k+1)/(2(k-1))) of air
+_LEAST_SHARE = 0.14
+"""Least flow that a command is found for, as a share of the choked one: near equal pressures the
+valve would open without bound."""
 
 
 @dataclass(frozen=True)
@@ -142,7 +144,10 @@ def trial_of(
     model = rig.model
     valve, gas = model["valve"], model["gas"]
     ambient, warm = gas["ambient_pressure"], gas["gas_constant"] * gas["temperature"]
-    flow = _CHOKED * valve["discharge_area_max"] / math.sqrt(gas["temperature"])
+    orifice = OrificeInverse(
+        ambient, gas["temperature"], gas["gas_constant"], gas["heat_capacity_ratio"]
+    )
+    widest = valve["discharge_area_max"]
     fractions, openings = np.asarray(valve["fraction"]), np.asarray(valve["opening"])
     null, half = valve["null_voltage"], valve["half_range"]
     slope = np.gradient(reference, sample_time)
@@ -155,13 +160,8 @@ def trial_of(
         mass = wanted * sample["air_volume"] / warm
         inside, supply = sample["muscle_pressure"] + ambient, sample["supply_pressure"] + ambient
         up, down = (supply, inside) if mass > 0.0 else (inside, ambient)
-        ratio = min(down / up, 0.999)
-        share = (
-            1.0
-            if ratio <= _CRITICAL
-            else math.sqrt(max(0.02, 1.0 - ((ratio - _CRITICAL) / (1.0 - _CRITICAL)) ** 2))
-        )
-        opening = float(np.interp(abs(mass) / (flow * up * share), fractions, openings))
+        flow = max(orifice.flow(up, down), _LEAST_SHARE * orifice.flow(up, 0.0))
+        opening = float(np.interp(abs(mass) / (widest * flow), fractions, openings))
         return float(
             np.clip(
                 null + math.copysign(half * opening, mass) + dither[k], null - half, null + half

@@ -191,7 +191,7 @@ def _explained(refit: _Refit, say: Say, tell: Say) -> list[Group]:
     mismatch = max(suspects, key=lambda b: trial.out[b.name].ratio + now[b.name].ratio)
     tell(
         f"after the refit the residual of {mismatch.name} is {now[mismatch.name].systematic:.2g} "
-        "noise units"
+        "noise levels"
     )
     marginal = _marginal(refit)
     acting = _acting(trial, suspects)

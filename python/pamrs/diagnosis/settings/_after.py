@@ -145,14 +145,14 @@ class PlanSettings(SettingsGroup):
 
     seen: float = setting(
         3.0,
-        unit="noises",
+        unit="noise levels",
         above=0.0,
-        reason="signature left, in noises of a bin of 0.1 s, from which an effect counts as seen",
+        reason="signature left, of the noise of a bin of 0.1 s, from which an effect is seen",
         origin="judgement",
     )
-    faint: float = setting(
+    suspect_from: float = setting(
         math.sqrt(0.45),
-        unit="noises",
+        unit="noise levels",
         above=0.0,
         reason="the same from which an arm, which scatters most, would be called suspect",
         origin="docs/decisions/0014: 1.45 times the variance of the noise",
@@ -167,7 +167,7 @@ class PlanSettings(SettingsGroup):
     )
     apart: float = setting(
         1.0,
-        unit="noises",
+        unit="noise levels",
         least=0.0,
         reason="what must be left of an effect when another one explains all that it can",
         origin="judgement",
@@ -187,7 +187,7 @@ class WarningSettings(SettingsGroup):
 
     missed_noises: float = setting(
         3.0,
-        unit="noises",
+        unit="noise levels",
         above=0.0,
         reason="error of a model with a name from which it is reported with a reservation",
         origin="judgement",

@@ -346,7 +346,7 @@ class PlausibilitySettings(SettingsGroup):
     )
     sense_least_noises: float = setting(
         3.0,
-        unit="noises",
+        unit="noise levels",
         above=0.0,
         reason="standard deviation of an angle below which its unit and sign are not tested",
         origin="judgement",

@@ -348,7 +348,7 @@ class VerdictSettings(SettingsGroup):
     )
     least_gap: float = setting(
         0.05,
-        unit="noises",
+        unit="noise levels",
         least=0.0,
         reason="gap between refit and noise, over all channels, below which nothing is said of "
         "how much of it closes",

@@ -298,7 +298,7 @@ class ScreenSettings(SettingsGroup):
     )
     invisible: float = setting(
         1e-6,
-        unit="noises^2",
+        unit="noise levels^2",
         least=0.0,
         reason="squared length below which a signature is none",
         origin="judgement: rounding",
