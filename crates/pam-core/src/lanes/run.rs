@@ -467,9 +467,11 @@ impl<S: Simd> Rk4<S> {
 
     #[inline(always)]
     fn step(&mut self, lanes: &mut Lanes<'_, S>, state: &mut [Num<S>], step: f64) {
-        lanes.rates(state, &mut self.rate);
-        self.sum.copy_from_slice(&self.rate);
-        for (fraction, weight) in [(0.5, 2.0), (0.5, 2.0), (1.0, 1.0)] {
+        // The rates stand here once: they are much code, and compiled for each kind of register.
+        for sum in &mut self.sum {
+            *sum = sum.constant(0.0);
+        }
+        for (fraction, weight) in [(0.0, 1.0), (0.5, 2.0), (0.5, 2.0), (1.0, 1.0)] {
             for ((stage, start), slope) in self.stage.iter_mut().zip(&*state).zip(&self.rate) {
                 *stage = *start + *slope * (fraction * step);
             }
