@@ -10,9 +10,10 @@ from __future__ import annotations
 import json
 import math
 import sys
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -93,6 +94,11 @@ def simulated() -> dict[str, float]:
     return moved
 
 
+def as_json(value: Any) -> Any:
+    """What JSON has no word for: entries of a result, numbers of NumPy."""
+    return dict(value) if isinstance(value, Mapping) else float(value)
+
+
 def main(folder: Path) -> None:
     """Simulate, conceal, diagnose, report."""
     moved = simulated()
@@ -116,7 +122,7 @@ def main(folder: Path) -> None:
         "named_by_page": pamrs.effects.EFFECTS[EFFECT].name in page.read_text(encoding="utf-8"),
         "model": found.model,
     }
-    print(json.dumps(told, default=float))
+    print(json.dumps(told, default=as_json))
 
 
 if __name__ == "__main__":
