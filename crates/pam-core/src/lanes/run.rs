@@ -2,7 +2,7 @@
 
 use super::num::{side_by_side, Num, MOST_LANES};
 use super::rates::Lanes;
-use super::request::{resting, Checked, Outcome, Request, Signal};
+use super::request::{resting, Checked, Outcome, Request};
 use super::steps::Steps;
 use super::Plan;
 use crate::blocks::valve::spool_position;
@@ -149,12 +149,10 @@ impl Work<'_, '_> {
         let timing = Timing { substeps: self.steps.of(plant), ..request.timing };
         let mut trajectory = Trajectory::new(&rig, request.rows);
         let mut progress = Progress::start(&rig, &self.checked.initial(plant)?)?;
-        let held = |signal: &Signal<'_>| signal.of(plant, request.rows).to_vec();
-        let signals: Vec<(&str, Vec<f64>)> =
-            request.signals.iter().map(|(name, signal)| (*name, held(signal))).collect();
-        let borrowed: Vec<(&str, &[f64])> =
-            signals.iter().map(|(name, values)| (*name, values.as_slice())).collect();
-        let drive = Drive::new(&rig, request.rows, &borrowed)?;
+        let signals: Vec<(&str, &[f64])> = (request.signals.iter())
+            .map(|(name, signal)| (*name, signal.of(plant, request.rows)))
+            .collect();
+        let drive = Drive::new(&rig, request.rows, &signals)?;
         let mut done = progress.observe(&rig, timing, &mut trajectory);
         if done.is_ok() {
             let samples = 0..request.rows.saturating_sub(1);
@@ -170,9 +168,8 @@ impl Work<'_, '_> {
         }
         let failure = match done {
             Ok(()) => None,
-            Err(Error::Integration { time, name, value, allowed }) => {
-                let message = Error::Integration { time, name, value, allowed }.to_string();
-                Some(Failure { time, message })
+            Err(error @ Error::Integration { time, .. }) => {
+                Some(Failure { time, message: error.to_string() })
             }
             Err(other) => return Err(other),
         };
