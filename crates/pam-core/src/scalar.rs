@@ -1,6 +1,6 @@
 //! The number type of the physics: `f64` for simulation, dual numbers for exact sensitivities.
 
-use num_dual::DualNum;
+use num_dual::{Dual64, DualNum};
 
 /// A real number or a dual number over one. Every equation of this crate is generic over it, so
 /// that one source of the physics gives values and exact first derivatives.
@@ -12,6 +12,17 @@ impl<T: DualNum<Primitive = f64> + Copy + nalgebra::Scalar + Send + Sync> Scalar
 #[inline(always)]
 pub fn constant<S: Scalar>(value: f64) -> S {
     S::from(value)
+}
+
+/// Functions of one variable with all derivatives of it that `S` carries: found with one of them, the
+/// others by the chain rule.
+#[inline(always)]
+pub fn chained<S: Scalar, const N: usize>(
+    x: S,
+    functions: impl Fn(Dual64) -> [Dual64; N],
+) -> [S; N] {
+    let change = x - x.re();
+    functions(Dual64::new(x.re(), 1.0)).map(|y| change * y.eps + y.re)
 }
 
 /// Hyperbolic tangent, also where the exponentials that a dual number makes it of overflow.

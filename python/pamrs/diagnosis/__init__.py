@@ -18,8 +18,11 @@ import math
 import os
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import replace
+
+from threadpoolctl import threadpool_limits
 
 from pamrs.channels import dotted
 from pamrs.diagnosis.evidence import Group
@@ -43,6 +46,8 @@ from pamrs.rig import Rig
 from pamrs.simulation import core_rig, regulators_of
 
 __all__ = ["Diagnosis", "DiagnosisSettings", "diagnose"]
+
+Say = Callable[[str], None]
 
 
 def _usable_share(block: Block, recordings: list[Prepared]) -> float:
@@ -179,12 +184,7 @@ def diagnose(
     blocks = inner.blocks
     gas, motion = [b for b in blocks if b.kind != "arm"], [b for b in blocks if b.kind == "arm"]
     with _in_range(case.name):
-        groups = [
-            group
-            for members in (gas, motion)
-            if members
-            for group in examine(inner, outer, case.rig, members, say)
-        ]
+        groups = _examined(inner, outer, case.rig, [part for part in (gas, motion) if part], say)
         unsettled = _unsettled(case.rig) if motion else []
         factor = chosen.verdict.unknown_geometry_probability
         if unsettled:
@@ -202,6 +202,24 @@ def diagnose(
     if not math.isfinite(sum(diagnosis.probabilities.values())):
         raise DiagnosisError("the probabilities are not finite: please report this case")
     return replace(diagnosis, warnings=warnings, seconds=round(time.perf_counter() - began, 3))
+
+
+def _examined(
+    inner: Problem, outer: Problem, nominal: Rig, parts: list[list[Block]], say: Say
+) -> list[Group]:
+    """The groups of the gas and of what moves, which share no parameter: both at the same time."""
+
+    def one(part: list[Block]) -> list[Group]:
+        return examine(inner, outer, nominal, part, say)
+
+    # two processors are kept busy by recordings and parts; threads of the linear algebra would only
+    # wait for each other
+    with threadpool_limits(1, user_api="blas"), ThreadPoolExecutor(len(parts)) as pool:
+        try:
+            return [group for groups in pool.map(one, parts) for group in groups]
+        except BaseException:
+            inner.stopped.set()
+            raise
 
 
 def _check_rig(case: Case) -> None:

@@ -2,8 +2,9 @@
 
 use super::boundary::Measured;
 use crate::description::dotted;
-use crate::plant::{Layout, Place, Rig, Simulated};
+use crate::plant::{Acting, Layout, Place, Rig, Simulated};
 use crate::{Error, Result};
+use std::ops::Range;
 
 /// A block whose output channel is predicted from its measured neighbours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -80,7 +81,13 @@ impl Block {
         let layout = rig.layout();
         let mut places = self.initial_states(layout);
         match self {
-            Self::Arm(_) => places.extend(layout.effect(0)..layout.states()),
+            Self::Arm(_) => {
+                // also what the motion itself moves, a base or a payload on a cord
+                let acting = rig.wiring.ports.all.iter().filter(|(at, _)| {
+                    matches!(at, Place::Group(_) | Place::Joint(_) | Place::Whole)
+                });
+                places.extend(acting.flat_map(|(_, acting)| own_states(layout, acting)));
+            }
             Self::Chamber(k) => {
                 places.push(layout.mass(k));
                 places.extend(effect_states(rig, Place::Gas(k)));
@@ -90,17 +97,20 @@ impl Block {
         if !matches!(self, Self::Arm(_)) {
             places.extend(hidden(layout, measured));
         }
-        Simulated::only(layout, &places)
+        Simulated::only(rig, &places)
     }
 }
 
 /// Integrated states of the effects on a block.
 fn effect_states(rig: &Rig, place: Place) -> impl Iterator<Item = usize> + '_ {
     let here = rig.wiring.ports.integrated().filter(move |(at, _)| *at == place);
-    here.flat_map(|(_, acting)| {
-        let first = rig.layout.effect(acting.first);
-        first..first + acting.count
-    })
+    here.flat_map(|(_, acting)| own_states(&rig.layout, &acting))
+}
+
+/// Places of the states of what acts.
+fn own_states(layout: &Layout, acting: &Acting) -> Range<usize> {
+    let first = layout.effect(acting.first);
+    first..first + acting.count
 }
 
 /// Pressures of line inlets that were not measured.

@@ -64,6 +64,8 @@ impl<'a, S: Number> Cut<'a, S> {
         let (drivers, taps) = (driven(&plant, block, measured), taps(&plant, block, measured));
         let (output, simulated) = (Output::new(&plant, block), block.simulated(rig, measured));
         let mut stepper = Stepper::new(plant);
+        // a block that neither moves nor has muscles around it does not see the angles
+        let unseen = if simulated.sees_angles() { usize::MAX } else { rig.layout().angle(0) };
         stepper.reads = matches!(block, Block::Chamber(_));
         Self {
             stepper,
@@ -75,6 +77,7 @@ impl<'a, S: Number> Cut<'a, S> {
             driving: drivers
                 .iter()
                 .filter(|driver| !own.contains(&driver.place))
+                .filter(|driver| driver.place < unseen)
                 .copied()
                 .collect(),
             driving_taps: taps
@@ -98,6 +101,7 @@ impl<'a, S: Number> Cut<'a, S> {
         let (n, dt) = (self.measured.samples, self.timing.sample_time);
         let mut course = self.at_rest();
         let mut starts = starts.iter().peekable();
+        let mut controls = self.stepper.plant.controls(|_| 0.0);
         for k in 0..n {
             if starts.next_if(|s| **s == k).is_some() {
                 self.start_window(k, &mut course);
@@ -105,10 +109,10 @@ impl<'a, S: Number> Cut<'a, S> {
             check_state(&self.stepper.plant, &course.state, k as f64 * dt)?;
             let time = k as f64 * dt;
             let clocks = Clocks::of(&self.stepper.plant, self.block, time);
-            let controls = self.controls(k, time, &clocks);
+            self.command(k, time, &clocks, &mut controls);
             sink(k, self.output.read(&course.state), &self.stepper, &course.state, &controls);
             if k + 1 < n {
-                self.sample(k, &mut course, clocks, controls);
+                self.sample(k, &mut course, clocks, &mut controls);
             }
         }
         Ok(())
@@ -198,10 +202,14 @@ impl<'a, S: Number> Cut<'a, S> {
     }
 
     /// Controls of sample `k` from a time [s] on.
-    fn controls(&self, k: usize, time: f64, clocks: &Clocks<S>) -> Controls<S> {
+    fn command(&self, k: usize, time: f64, clocks: &Clocks<S>, out: &mut Controls<S>) {
         let (plant, commands) = (&self.stepper.plant, &self.measured.commands);
         if !plant.skewed() {
-            return plant.controls(|input| commands[input][k]);
+            // most commands are held over many samples
+            if k == 0 || commands.iter().any(|command| command[k] != command[k - 1]) {
+                plant.command(|input| commands[input][k], out);
+            }
+            return;
         }
         let last = self.measured.samples as i64 - 1;
         let command = |input: usize, sample: i64| commands[input][sample.clamp(0, last) as usize];
@@ -211,7 +219,8 @@ impl<'a, S: Number> Cut<'a, S> {
             self.timing.step(),
             self.timing.sample_time,
             command,
-        )
+            out,
+        );
     }
 
     /// The steps from sample `k` to the next.
@@ -219,18 +228,17 @@ impl<'a, S: Number> Cut<'a, S> {
         &mut self,
         k: usize,
         course: &mut Course<S>,
-        clocks: Clocks<S>,
-        controls: Controls<S>,
+        mut clocks: Clocks<S>,
+        controls: &mut Controls<S>,
     ) {
         let (dt, step) = (self.timing.sample_time, self.timing.step());
         let h = 1.0 / self.timing.substeps as f64;
-        let (mut clocks, mut controls) = (clocks, controls);
         let Course { state, memory, last } = course;
         for i in 0..self.timing.substeps {
             let time = (k as f64 + i as f64 * h) * dt;
             if i > 0 && self.stepper.plant.skewed() {
                 clocks = Clocks::of(&self.stepper.plant, self.block, time);
-                controls = self.controls(k, time, &clocks);
+                self.command(k, time, &clocks, controls);
             }
             let (driving, taps) = (&self.driving, &self.driving_taps);
             let drive =
@@ -250,10 +258,10 @@ impl<'a, S: Number> Cut<'a, S> {
                         y[place] = plant.behind_tube(*gas, y[place], y, spool);
                     }
                 };
-            self.stepper.step(state, memory, &controls, time, step, &self.simulated, drive);
+            self.stepper.step(state, memory, controls, time, step, &self.simulated, drive);
         }
         if !self.taps.is_empty() {
-            last.spool.clone_from(&self.stepper.controls(&controls, 2).spool);
+            last.spool.clone_from(&self.stepper.controls(controls, 2).spool);
         }
     }
 }

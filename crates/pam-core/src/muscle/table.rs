@@ -20,7 +20,7 @@ use super::model::Elasticity;
 use crate::braid::MuscleGeometry;
 use crate::chebyshev::{interpolate, lobatto};
 use crate::error::{Error, Result};
-use crate::scalar::{constant, Scalar};
+use crate::scalar::{chained, constant, Scalar};
 
 /// Degree of the polynomials.
 pub const DEGREE: usize = 9;
@@ -246,7 +246,10 @@ impl Table {
         let position = (at - piece.start) * piece.cells_per_unit;
         let cell = (position as usize).min(piece.last);
         let x = (e - piece.start) * (2.0 * piece.cells_per_unit) - (2 * cell + 1) as f64;
-        TablePoint::from_columns(evaluate(&self.cells[piece.first + cell], x))
+        let cell = &self.cells[piece.first + cell];
+        let columns =
+            if S::NDERIV == 0 { evaluate(cell, x) } else { chained(x, |x| evaluate(cell, x)) };
+        TablePoint::from_columns(columns)
     }
 
     fn continuation(&self, e: f64) -> Continuation {

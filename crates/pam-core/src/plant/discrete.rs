@@ -12,21 +12,31 @@ use crate::scalar::{constant, Scalar};
 impl<S: Scalar> Plant<'_, S> {
     /// Commands [V, Pa gauge] of one sample, in the order of the rig's inputs.
     pub fn controls(&self, commands: impl Fn(usize) -> f64) -> Controls<S> {
+        let zeros = |n: usize| vec![constant(0.0); n];
+        let (supplies, valves) = (self.wiring.supplies.len(), self.wiring.valves.len());
+        let mut out = Controls { set_pressure: zeros(supplies), spool: zeros(valves), time: 0.0 };
+        self.command(commands, &mut out);
+        out
+    }
+
+    /// The same, written over others of this plant.
+    pub fn command(&self, commands: impl Fn(usize) -> f64, out: &mut Controls<S>) {
         let wiring = &self.wiring;
         let mut regulator = wiring.valves.len();
-        let spec = self.rig.spec();
-        let set_pressure =
-            wiring.supplies.iter().zip(&spec.supplies).map(|(unit, supply)| match unit {
+        let supplies = wiring.supplies.iter().zip(&self.rig.spec().supplies);
+        for ((unit, supply), set) in supplies.zip(&mut out.set_pressure) {
+            *set = match unit {
                 SupplyUnit::Regulator { .. } => {
                     regulator += 1;
                     self.set_pressure(commands(regulator - 1))
                 }
                 _ => self.set_pressure(supply.initial_pressure),
-            });
-        let set_pressure = set_pressure.collect();
-        let spool =
-            (0..wiring.valves.len()).map(|k| self.opened(k, self.commanded(k, commands(k))));
-        Controls { set_pressure, spool: spool.collect(), time: 0.0 }
+            };
+        }
+        for (k, spool) in out.spool.iter_mut().enumerate() {
+            *spool = self.opened(k, self.commanded(k, commands(k)));
+        }
+        out.time = 0.0;
     }
 
     fn set_pressure(&self, gauge: f64) -> S {
@@ -65,6 +75,7 @@ impl<S: Scalar> Plant<'_, S> {
 
     /// Commands over a step that begins at a time [s], later by a shift [s]; `command` gives those
     /// of a sample.
+    #[allow(clippy::too_many_arguments)]
     pub fn skewed_controls(
         &self,
         shift: S,
@@ -72,9 +83,10 @@ impl<S: Scalar> Plant<'_, S> {
         step: f64,
         sample_time: f64,
         command: impl Fn(usize, i64) -> f64,
-    ) -> Controls<S> {
+        controls: &mut Controls<S>,
+    ) {
         let wiring = &self.wiring;
-        let mut controls = self.controls(|_| 0.0);
+        self.command(|_| 0.0, controls);
         for (k, spool) in controls.spool.iter_mut().enumerate() {
             let position = |sample| self.commanded(k, command(k, sample));
             let mean = held_mean(position, time, step, sample_time, shift);
@@ -88,7 +100,6 @@ impl<S: Scalar> Plant<'_, S> {
                 input += 1;
             }
         }
-        controls
     }
 
     /// What an instant of a step sees of its controls: `age` after the step began at `time` [s],

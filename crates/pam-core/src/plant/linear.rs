@@ -351,7 +351,7 @@ impl<S: Scalar> Plant<'_, S> {
         let mut rates = vec![constant(0.0); layout.states()];
         let mut here = self.scratch();
         here.backwards = beside.backwards;
-        let all = Simulated::all_but(layout, &[]);
+        let all = Simulated::all_but(self.rig, &[]);
         self.rates(state, &controls, memory, start, &all, &mut here, &mut rates);
         for (acting, input) in closed {
             self.effect(acting).linear_rates(

@@ -23,7 +23,7 @@ pub use layout::{Channel, Layout, Names, StatePlace, StateRole, BALANCE};
 pub use linear::{LinearModel, Side};
 pub use memory::Memory;
 pub use parameters::{ParameterId, Parameters, Values};
-pub(crate) use ports::{moves, Place};
+pub(crate) use ports::{moves, Acting, Place};
 pub(crate) use rates::{Controls, Line, Plant, Scratch, Simulated};
 pub(crate) use units::{BodyUnit, Group, Node, Path};
 

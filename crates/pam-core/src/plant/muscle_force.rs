@@ -8,17 +8,22 @@ use crate::effects::AtMuscle;
 use crate::muscle::TablePoint;
 use crate::scalar::{constant, Scalar};
 
-/// One group at one instant.
-pub(super) struct MuscleForce<S> {
+/// How long and wide the muscles of a group are at one instant.
+pub(super) struct MuscleShape<S> {
+    pub point: JointPoint<S>,
     pub contraction: S,
-    /// Of all its muscles [N].
-    pub force: S,
-    pub moment_arm: S,
-    pub torque_arm: S,
     pub table: TablePoint<S>,
 }
 
 impl<S: Scalar> Plant<'_, S> {
+    #[inline(always)]
+    pub(super) fn muscle_shape(&self, group: &Group, state: &[S]) -> MuscleShape<S> {
+        let point = group.joint.eval(state[self.layout.angle(group.coordinate)]);
+        let contraction = point.shortening / group.rest_length;
+        MuscleShape { point, contraction, table: group.muscle.table.eval(contraction) }
+    }
+
+    /// Force of all muscles of a group [N].
     #[inline(always)]
     pub(super) fn muscle_force(
         &self,
@@ -27,25 +32,18 @@ impl<S: Scalar> Plant<'_, S> {
         state: &[S],
         memory: &Memory<S>,
         start: S,
-    ) -> MuscleForce<S> {
-        let point = group.joint.eval(state[self.layout.angle(group.coordinate)]);
-        let contraction = point.shortening / group.rest_length;
-        let table = group.muscle.table.eval(contraction);
+        shape: &MuscleShape<S>,
+    ) -> S {
+        let MuscleShape { point, contraction, table } = shape;
         let gauge = state[self.layout.pressure(group.chamber)] - self.rig.gas.ambient_pressure;
         let scale = self.scales[k];
         let force = if self.altered.muscles && self.wiring.ports.muscles[k].some {
-            self.altered_force(k, group, state, memory, start, &point, &table)
+            self.altered_force(k, group, state, memory, start, point, table)
         } else {
             let force = table.force(gauge, scale);
-            self.directed(group, memory, start, contraction, gauge, scale, force)
+            self.directed(group, memory, start, *contraction, gauge, scale, force)
         };
-        MuscleForce {
-            contraction,
-            force: force * group.count,
-            moment_arm: point.moment_arm,
-            torque_arm: point.torque_arm,
-            table,
-        }
+        force * group.count
     }
 
     /// The force of one muscle for the way in which it has been moving.

@@ -8,7 +8,7 @@
 use super::body::Body;
 use super::layout::{Channel, Layout, BALANCE_COUNT};
 use super::memory::Memory;
-use super::ports::{Acting, Ports};
+use super::ports::{Acting, Place, Ports};
 use super::units::{LineUnit, Path, SupplyUnit, Wiring};
 use super::{Rig, Values};
 use crate::blocks::chamber::Polytropic;
@@ -18,39 +18,80 @@ use crate::blocks::tube::Tube;
 use crate::effects::{Effect, Number};
 use crate::scalar::{constant, Scalar};
 use crate::Result;
+use std::ops::Range;
 
 /// What is integrated; the other states are driven.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Simulated {
     /// One for each state of the layout: not integrated.
     driven: Vec<bool>,
+    /// The places that are integrated, neighbours together.
+    runs: Vec<Range<usize>>,
     /// Some pressure is integrated.
     gas: bool,
     /// Some motion is integrated.
     motion: bool,
     /// Some state of an effect is integrated.
     effects: bool,
+    /// Somebody needs the volumes of the gases: all that asks for the muscles' shape without motion.
+    volumes: bool,
 }
 
 impl Simulated {
     /// Everything is integrated but the states of these places.
-    pub fn all_but(layout: &Layout, places: &[usize]) -> Self {
+    pub fn all_but(rig: &Rig, places: &[usize]) -> Self {
+        let layout = rig.layout();
         let driven: Vec<bool> = (0..layout.states()).map(|k| places.contains(&k)).collect();
         let some = |from: usize, to: usize| driven[from..to].iter().any(|d| !d);
         let end = layout.effect(0);
+        let mut effects = rig.wiring.ports.integrated().filter(|(_, acting)| {
+            let first = layout.effect(acting.first);
+            some(first, first + acting.count)
+        });
         Self {
             gas: some(0, layout.angle(0)),
             motion: some(layout.angle(0), end),
             effects: some(end, layout.states()),
+            volumes: some(layout.pressure(0), layout.angle(0))
+                || effects.any(|(at, _)| matches!(at, Place::Gas(_))),
+            runs: runs(&driven),
             driven,
         }
     }
 
     /// Only the states of these places are integrated.
-    pub fn only(layout: &Layout, places: &[usize]) -> Self {
-        let others: Vec<usize> = (0..layout.states()).filter(|k| !places.contains(k)).collect();
-        Self::all_but(layout, &others)
+    pub fn only(rig: &Rig, places: &[usize]) -> Self {
+        let states = 0..rig.layout().states();
+        let others: Vec<usize> = states.filter(|k| !places.contains(k)).collect();
+        Self::all_but(rig, &others)
     }
+
+    /// The places that are integrated, neighbours together.
+    pub fn runs(&self) -> &[Range<usize>] {
+        &self.runs
+    }
+
+    /// Whether anything is moved by angles or asks for them.
+    pub fn sees_angles(&self) -> bool {
+        self.motion || self.volumes
+    }
+
+    /// Whether the state at a place is integrated.
+    pub(super) fn moves(&self, place: usize) -> bool {
+        !self.driven[place]
+    }
+}
+
+/// Neighbours that are not driven, together.
+fn runs(driven: &[bool]) -> Vec<Range<usize>> {
+    let mut runs: Vec<Range<usize>> = Vec::new();
+    for place in (0..driven.len()).filter(|place| !driven[*place]) {
+        match runs.last_mut().filter(|run| run.end == place) {
+            Some(run) => run.end += 1,
+            None => runs.push(place..place + 1),
+        }
+    }
+    runs
 }
 
 /// Commands over one sample.
@@ -274,9 +315,17 @@ impl<'a, S: Scalar> Plant<'a, S> {
         }
     }
 
-    /// Volumes, torques and what the muscles do, written to the scratch.
+    /// Volumes, and torques with what the muscles do where they are asked for, written to the
+    /// scratch.
     #[inline(always)]
-    fn mechanics(&self, state: &[S], memory: &[Memory<S>], start: &[S], here: &mut Scratch<S>) {
+    fn mechanics(
+        &self,
+        state: &[S],
+        memory: &[Memory<S>],
+        start: &[S],
+        forces: bool,
+        here: &mut Scratch<S>,
+    ) {
         let zero = constant::<S>(0.0);
         here.volume.copy_from_slice(&self.fixed_volume);
         here.volume_rate.fill(zero);
@@ -287,17 +336,20 @@ impl<'a, S: Scalar> Plant<'a, S> {
             here.wall.fill(zero);
         }
         for (k, group) in self.wiring.groups.iter().enumerate() {
-            let muscle = self.muscle_force(k, group, state, &memory[k], start[k]);
+            let muscle = self.muscle_shape(group, state);
             let rate = state[self.layout.rate(group.coordinate)];
-            (here.contraction[k], here.force[k]) = (muscle.contraction, muscle.force);
             here.volume[group.chamber] += muscle.table.volume * group.count;
             here.volume_rate[group.chamber] += muscle.table.volume_slope
-                * muscle.moment_arm
+                * muscle.point.moment_arm
                 * rate
                 * (group.count / group.rest_length);
-            here.torque[group.coordinate] += muscle.force * muscle.torque_arm;
-            if self.balanced {
-                here.muscle_work += muscle.force * muscle.moment_arm * rate;
+            if forces {
+                let force = self.muscle_force(k, group, state, &memory[k], start[k], &muscle);
+                (here.contraction[k], here.force[k]) = (muscle.contraction, force);
+                here.torque[group.coordinate] += force * muscle.point.torque_arm;
+                if self.balanced {
+                    here.muscle_work += force * muscle.point.moment_arm * rate;
+                }
             }
             if heat {
                 let length = (-muscle.contraction + 1.0) * group.rest_length;
@@ -339,6 +391,12 @@ impl<'a, S: Scalar> Plant<'a, S> {
         }
     }
 
+    /// Whether anybody asks what the muscles pull.
+    #[inline]
+    pub fn pulls(&self, simulated: &Simulated) -> bool {
+        simulated.motion || self.balanced
+    }
+
     /// Time derivative of the state; entries of driven states are zero.
     #[inline]
     #[allow(clippy::too_many_arguments)]
@@ -353,7 +411,10 @@ impl<'a, S: Scalar> Plant<'a, S> {
         out: &mut [S],
     ) {
         let layout = &self.layout;
-        self.mechanics(state, memory, start, here);
+        let forces = self.pulls(simulated);
+        if forces || simulated.volumes {
+            self.mechanics(state, memory, start, forces, here);
+        }
         if simulated.gas {
             self.flows(state, controls, here);
             self.gas_rates(state, controls, here, out);
@@ -363,7 +424,7 @@ impl<'a, S: Scalar> Plant<'a, S> {
         let (angle, rate) = (layout.angle(0), layout.rate(0));
         let end = layout.effect(0);
         if simulated.effects {
-            self.effect_rates(state, controls, here, out);
+            self.effect_rates(state, controls, simulated, here, out);
         }
         if simulated.motion && self.body.moves() {
             let (angles, rates) = state[angle..end].split_at(layout.coordinates);
@@ -433,7 +494,7 @@ impl Plant<'_, f64> {
         if self.remembers() {
             self.contractions(state, &mut now);
         }
-        self.mechanics(state, memory, &now, here);
+        self.mechanics(state, memory, &now, true, here);
         let zero = |id: Option<super::ParameterId>| id.map_or(0.0, |id| self.values[id]);
         for ((_, channel), out) in self.rig.names.channels.iter().zip(out) {
             out.push(match *channel {

@@ -1,7 +1,7 @@
 //! What effects see of the blocks that they act on, and the rates and beginnings of their states.
 
-use super::ports::Place;
-use super::rates::{Controls, Plant, Scratch};
+use super::ports::{Acting, Place};
+use super::rates::{Controls, Plant, Scratch, Simulated};
 use super::units::Node;
 use crate::effects::{At, BAR};
 use crate::scalar::{constant, Scalar};
@@ -83,18 +83,22 @@ impl<S: Scalar> Plant<'_, S> {
         }
     }
 
-    /// Rates of the states of effects at the air, the muscles and the joints; of the rest zero.
+    /// Rates of the states of effects at the air, the muscles and the joints; of the rest, and of
+    /// what is driven, zero.
     #[inline(never)]
     pub(super) fn effect_rates(
         &self,
         state: &[S],
         controls: &Controls<S>,
+        simulated: &Simulated,
         here: &Scratch<S>,
         out: &mut [S],
     ) {
         let layout = &self.layout;
         out[layout.effect(0)..layout.states()].fill(constant(0.0));
-        for (place, acting) in self.wiring.ports.integrated() {
+        let moving =
+            |acting: &Acting| acting.count > 0 && simulated.moves(layout.effect(acting.first));
+        for (place, acting) in self.wiring.ports.integrated().filter(|(_, a)| moving(a)) {
             let at = self.at(place, state, &controls.spool, &here.volume_rate);
             self.effect(&acting).rates(&at, self.own(&acting, state), self.own_mut(&acting, out));
         }

@@ -141,14 +141,16 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         mut drive: impl FnMut(&Plant<'a, S>, &Controls<S>, f64, &mut [S]),
     ) {
         let Self { plant, scratch, method, start, end, remembers, stages, before, reads } = self;
+        let layout = plant.rig().layout();
         if let Some(stages) = stages {
             for (k, stage) in stages.iter_mut().enumerate() {
                 plant.stage(state, controls, time, 0.5 * k as f64 * dt, stage);
             }
         }
         let held = controls;
+        let remembers = *remembers && plant.pulls(simulated);
         let at = |stage: usize| stages.as_ref().map_or(held, |stages| &stages[stage]);
-        if *remembers {
+        if remembers {
             drive(plant, at(0), 0.0, state);
             plant.contractions(state, start);
         }
@@ -156,7 +158,9 @@ impl<'a, S: Scalar> Stepper<'a, S> {
             drive(plant, at(0), 0.0, state);
             before.copy_from_slice(state);
         }
-        method.step(state, dt, |fraction, y, out| {
+        let kept = layout.states()..state.len();
+        let runs = simulated.runs().iter().cloned().chain([kept]);
+        method.step_in(state, runs, dt, |fraction, y, out| {
             let controls = at((2.0 * fraction) as usize);
             drive(plant, controls, fraction, y);
             plant.rates(y, controls, memory, start, simulated, scratch, out);
@@ -168,7 +172,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
                 plant.read(before, state, [at(0), at(2)], dt);
             }
         }
-        if *remembers {
+        if remembers {
             plant.contractions(state, end);
             plant.follow_muscles(state, memory, start, end);
         }
@@ -201,11 +205,11 @@ pub(crate) fn check_state<S: Scalar>(plant: &Plant<'_, S>, state: &[S], time: f6
         }
     }
     for (group, spec) in rig.wiring.groups.iter().zip(&rig.spec().muscles) {
-        let angle = state[layout.angle(group.coordinate)];
-        if !group.joint.reaches(angle.re()) {
-            return failure("joint_angle", angle.re(), "an angle that the tendon reaches");
+        let angle = state[layout.angle(group.coordinate)].re();
+        if !group.joint.reaches(angle) {
+            return failure("joint_angle", angle, "an angle that the tendon reaches");
         }
-        let contraction = (group.joint.eval(angle).shortening / group.rest_length).re();
+        let contraction = group.joint.eval(angle).shortening / group.rest_length;
         let table = &group.muscle.table;
         if !table.contains(contraction) {
             let allowed =
@@ -439,7 +443,10 @@ impl Progress {
             self.past[(rows - 1 - back) * self.kept + input]
         };
         let (_, shift) = plant.skew(time);
-        plant.skewed_controls(shift.max(0.0), time, timing.step(), timing.sample_time, command)
+        let (step, sample_time) = (timing.step(), timing.sample_time);
+        let mut controls = plant.controls(|_| 0.0);
+        plant.skewed_controls(shift.max(0.0), time, step, sample_time, command, &mut controls);
+        controls
     }
 
     /// Hold the commands of each sample and append the sample after it. What is prescribed moves

@@ -31,7 +31,7 @@ impl<'a> Run<'a> {
     pub fn new(rig: &'a Rig) -> Result<Self> {
         Ok(Self {
             stepper: Stepper::new(Plant::new(rig, rig.parameters().lift(), true)?),
-            simulated: Simulated::all_but(&rig.layout, &[]),
+            simulated: Simulated::all_but(rig, &[]),
             places: Vec::new(),
             before: Watch::default(),
             after: Watch::default(),
@@ -44,7 +44,7 @@ impl<'a> Run<'a> {
     pub(crate) fn prescribe(&mut self, drive: &Drive<'_>) {
         if !drive.places().eq(self.places.iter().copied()) {
             self.places = drive.places().collect();
-            self.simulated = Simulated::all_but(&self.stepper.plant.rig().layout, &self.places);
+            self.simulated = Simulated::all_but(self.stepper.plant.rig(), &self.places);
         }
     }
 

@@ -5,10 +5,11 @@ several starts.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from threading import Event
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,13 +22,14 @@ from pamrs.diagnosis.settings import DiagnosisSettings, FitSettings
 from pamrs.effects import EFFECTS, find_parameter
 from pamrs.errors import ParameterError, RigError, SimulationError
 from pamrs.rig import Parameter, Rig
-from pamrs.simulation import core_rig
+from pamrs.simulation import core_rig, default_step
 
 __all__ = [
     "Events",
     "Fit",
     "Problem",
     "Scaling",
+    "Stopped",
     "changes",
     "fit",
     "residuals",
@@ -48,6 +50,10 @@ LOGARITHMIC = frozenset(
 """Shapes that are positive: fitted by their logarithm."""
 
 
+class Stopped(Exception):
+    """Nobody waits for this work any more."""
+
+
 @dataclass(frozen=True, eq=False)
 class Problem:
     """Blocks and recordings to be explained together.
@@ -62,12 +68,15 @@ class Problem:
         The nominal rig, compiled; others are made from it.
     settings : DiagnosisSettings
         What it is solved by.
+    stopped : Event, optional
+        Set by whoever wants no more of it: the next evaluation raises `Stopped`.
     """
 
     blocks: list[Block]
     recordings: list[Prepared]
     core: _core.Rig
     settings: DiagnosisSettings
+    stopped: Event = field(default_factory=Event)
 
 
 @dataclass(frozen=True)
@@ -163,10 +172,8 @@ def residuals(
         for prepared in problem.recordings
         if events is not None and (values := events.values.get(prepared.recording.name))
     }
-    tasks = [(block, prepared) for prepared in problem.recordings for block in problem.blocks]
 
-    def one(task: tuple[Block, Prepared]) -> Residual:
-        block, prepared = task
+    def one(block: Block, prepared: Prepared) -> Residual:
         relevant = [name for name in names if depends(block, name)]
         if (
             events is not None and prepared.recording.name not in own
@@ -181,9 +188,32 @@ def residuals(
             full[:, list(names).index(name)] = found.jacobian[:, column]
         return replace(found, jacobian=full)
 
+    return _everywhere(problem, one)
+
+
+def _everywhere(
+    problem: Problem, one: Callable[[Block, Prepared], Residual]
+) -> dict[Key, Residual]:
+    """What a function gives for every block and recording, two at a time.
+
+    The longest come first, so that no processor is left alone with one of them at the end.
+    """
+    keys = [(b.name, p.recording.name) for p in problem.recordings for b in problem.blocks]
+    tasks = [(block, prepared) for prepared in problem.recordings for block in problem.blocks]
+
+    def steps(task: tuple[Block, Prepared]) -> float:
+        block, prepared = task
+        return prepared.n * prepared.dt / default_step(prepared.dt, longest=block.step)
+
+    def run(task: tuple[Block, Prepared]) -> Residual:
+        if problem.stopped.is_set():
+            raise Stopped
+        return one(*task)
+
+    order = sorted(range(len(tasks)), key=lambda k: -steps(tasks[k]))
     with _inside_range(), ThreadPoolExecutor(max_workers=2) as pool:
-        found = list(pool.map(one, tasks))
-    return {(b.name, p.recording.name): r for (b, p), r in zip(tasks, found, strict=True)}
+        found = dict(zip(order, pool.map(run, [tasks[k] for k in order]), strict=True))
+    return {key: found[k] for k, key in enumerate(keys)}
 
 
 @contextmanager
@@ -358,19 +388,14 @@ def changes(
         If the model leaves the range in which it holds.
     """
     core = _compiled(problem, rig)
-    tasks = [(block, prepared) for prepared in problem.recordings for block in problem.blocks]
 
-    def one(task: tuple[Block, Prepared]) -> tuple[Key, Residual]:
-        block, prepared = task
-        key = (block.name, prepared.recording.name)
+    def one(block: Block, prepared: Prepared) -> Residual:
+        was = base[block.name, prepared.recording.name]
         if not acts_in(effect, block):
-            return key, replace(base[key], jacobian=None)
-        return key, replace(
-            base[key], value=change(block, core, prepared, base[key]), jacobian=None
-        )
+            return replace(was, jacobian=None)
+        return replace(was, value=change(block, core, prepared, was), jacobian=None)
 
-    with _inside_range(), ThreadPoolExecutor(max_workers=2) as pool:
-        return dict(pool.map(one, tasks))
+    return _everywhere(problem, one)
 
 
 def fit(

@@ -123,7 +123,7 @@ class Prepared:
         """The same recording with other smoothed channels; what the others begin from is not looked
         for again.
         """
-        kept = {key: state for key, state in self._begun.items() if key[0] not in shaken}
+        kept = {key: state for key, state in dict(self._begun).items() if key[0] not in shaken}
         return replace(self, signals=self.signals | shaken, _begun=kept)
 
     def usable(self, output: str, drives: tuple[str, ...], starts: list[int]) -> Mask:

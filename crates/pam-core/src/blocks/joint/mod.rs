@@ -13,7 +13,7 @@ pub use self::pulley::Pulley;
 pub use self::tendon::TendonJoint;
 use crate::description::TransmissionSpec;
 use crate::error::{check_range, Error, Result};
-use crate::scalar::{constant, Scalar};
+use crate::scalar::{chained, constant, Scalar};
 
 /// Shortening and moment arms at one angle.
 #[derive(Debug, Clone, Copy)]
@@ -98,6 +98,13 @@ impl Joint {
     #[inline]
     pub fn eval<S: Scalar>(&self, angle: S) -> JointPoint<S> {
         match self {
+            Self::Tendon(joint) if S::NDERIV > 0 => {
+                let [shortening, moment_arm, torque_arm] = chained(angle, |angle| {
+                    let point = joint.eval(angle);
+                    [point.shortening, point.moment_arm, point.torque_arm]
+                });
+                JointPoint { shortening, moment_arm, torque_arm }
+            }
             Self::Tendon(joint) => joint.eval(angle),
             Self::Pulley(joint) => joint.eval(angle),
             Self::Polynomial(joint) => joint.eval(angle),
