@@ -188,6 +188,13 @@ class Form:
     states: tuple[str, ...] = ()
     ports: tuple[str, ...] = ()
 
+    @property
+    def transient(self) -> bool:
+        """Whether it happens at times of its own in each recording, so that all recordings cannot
+        share its parameters.
+        """
+        return any(parameter.role == "time" for parameter in self.parameters)
+
 
 @dataclass(frozen=True, slots=True)
 class EffectInfo:
@@ -312,10 +319,13 @@ class EffectInfo:
 
     @property
     def transient(self) -> bool:
-        """Whether it happens at times of its own in each recording, so that all recordings cannot
-        share its parameters.
-        """
-        return any(parameter.role == "time" for parameter in self.parameters)
+        """Whether its first form happens at times of its own in each recording."""
+        return self.forms[0].transient
+
+    @property
+    def lasting(self) -> tuple[Form, ...]:
+        """Its forms that act all the time, the same in all recordings."""
+        return tuple(form for form in self.forms if not form.transient)
 
     @property
     def leading(self) -> EffectParameter:

@@ -120,8 +120,10 @@ class EffectFound(Entry):
     ----------
     id, name : str
         Id in the catalogue, and in words.
+    form : str
+        Which form of its equation predicts best, where it has several; empty for the usual one.
     probability : float
-        Of the effect, whatever else acts.
+        Of the effect, whatever its form and whatever else acts.
     inclusion : float or None
         Share of resampled recordings in which the screen would have taken it.
     parameters : dict of str to EffectParameterFound
@@ -133,6 +135,10 @@ class EffectFound(Entry):
 
     id: str = field(metadata=told(least_length=1))
     name: str = field(default="", metadata=told(json=False))
+    form: str = field(
+        default="",
+        metadata=told("form of the effect's equation, where it is not the usual", omit_empty=True),
+    )
     probability: float = field(default=math.nan, metadata=told(kind="probability"))
     inclusion: float | None = field(
         default=None,

@@ -208,7 +208,7 @@ class Attempts:
         white = self.white
         model = self.nominal
         for entry in beside.fit.rig.effects:
-            model = model.with_effect(entry["id"], entry["parameters"])
+            model = model.with_effect(entry["id"], entry["parameters"], form=entry.get("form", ""))
         found = fit_events(effect, self.inner, model, beside.fit, white)
         if found is None:
             return None
@@ -239,7 +239,7 @@ class Attempts:
         """
         assert found.events is not None
         effect = found.events.effect
-        own, kept = parts_of([self.start_of(beside.fit, e) for e in beside.effects])
+        own, kept, forms = parts_of([self.start_of(beside.fit, e) for e in beside.effects])
         warm = replace(
             beside.fit, values=beside.fit.values | {n: found.values[n] for n in beside.fit.moved}
         )
@@ -254,6 +254,7 @@ class Attempts:
             frozen=True,
             events=found.events,
             evaluations=self.settings.transients.evaluations_beside,
+            forms=forms,
         )
         happened = next(iter(found.events.values.values()))
         parts = {
@@ -309,7 +310,7 @@ class Attempts:
         step is not worth it.
         """
         effects = tuple(start.effect for start in starts)
-        free, held = parts_of(starts)
+        free, held, forms = parts_of(starts)
         settings, sealed = self.settings.fit, self.nominal.model["valve"] is None
         limit = settings.sealed_evaluations if sealed else settings.effect_evaluations
         try:
@@ -324,6 +325,7 @@ class Attempts:
                 frozen=True,
                 evaluations=limit,
                 share=share,
+                forms=forms,
             )
             autocorrelation = self.autocorrelation(best)
             if max(autocorrelation.values()) > self.settings.noise.correlated_variance:
@@ -343,6 +345,7 @@ class Attempts:
                     frozen=True,
                     evaluations=limit,
                     share=share,
+                    forms=forms,
                 )
             return self.judged(effects, best)
         except SimulationError:
@@ -392,7 +395,7 @@ class Attempts:
         if any(c.fit.events is not None for c in candidates):
             return None
         effects = tuple(effect for c in candidates for effect in c.effects)
-        free, held = parts_of(
+        free, held, forms = parts_of(
             self.start_of(c.fit, effect) for c in candidates for effect in c.effects
         )
         wrong = [name for c in candidates for name in c.wrong]
@@ -413,6 +416,7 @@ class Attempts:
                 warm=warm,
                 freed=wrong,
                 share=share,
+                forms=forms,
             )
         except SimulationError:
             return None
@@ -428,7 +432,7 @@ class Attempts:
         found = candidate.fit
         if found.events is not None or not candidate.effects:
             return candidate
-        free, held = parts_of([self.start_of(found, effect) for effect in candidate.effects])
+        free, held, forms = parts_of([self.start_of(found, effect) for effect in candidate.effects])
         autocorrelation = self.autocorrelation(found)
         try:
             best = fit(
@@ -441,6 +445,7 @@ class Attempts:
                 warm=found,
                 evaluations=self.settings.fit.polish_evaluations,
                 share=self.settings.fit.final_step_share,
+                forms=forms,
             )
             return replace(self.judged(candidate.effects, best), gain=candidate.gain)
         except SimulationError:
@@ -460,14 +465,18 @@ def autocorrelation_of(problem: Problem, found: Fit) -> dict[str, float]:
     }
 
 
-def parts_of(starts: Iterable[Start]) -> tuple[dict[str, float], dict[str, float]]:
-    """Parameters of several effects that are free, and those that are held."""
+def parts_of(
+    starts: Iterable[Start],
+) -> tuple[dict[str, float], dict[str, float], dict[str, str]]:
+    """Parameters of several effects that are free, those that are held, and the effects' forms."""
     free: dict[str, float] = {}
     held: dict[str, float] = {}
+    forms: dict[str, str] = {}
     for start in starts:
         free |= start.free
         held |= start.held
-    return free, held
+        forms[start.effect] = start.form
+    return free, held, forms
 
 
 def start_of(found: Fit, effect: str, least: float) -> Start:
@@ -486,7 +495,7 @@ def start_of(found: Fit, effect: str, least: float) -> Start:
         for n, v in entry["parameters"].items()
         if f"{effect}.{n}" not in found.values
     }
-    return Start(effect, own, held, (), False)
+    return Start(effect, own, held, (), False, entry.get("form", ""))
 
 
 def _off_zero(name: str, value: float, share: float) -> float:

@@ -366,7 +366,7 @@ def _settled(
         if apart and candidate.fit.events is None:
             own = replace(problem, blocks=judged[k].group.blocks)
             effects = candidate.fit.effects
-            free, fixed = parts_of(
+            free, fixed, forms = parts_of(
                 start_of(candidate.fit, effect, settings.least_start) for effect in effects
             )
             settled = {n: other.values[n] for n, other in common.items()}
@@ -383,6 +383,7 @@ def _settled(
                     share=settings.final_step_share,
                     settled=settled,
                     freed=candidate.fit.freed,
+                    forms=forms,
                 )
                 found[k] = replace(candidate, fit=again)
     return found
@@ -395,7 +396,8 @@ def _merged(nominal: Rig, candidates: list[Candidate]) -> Rig:
     rig = nominal
     for candidate in candidates:
         for effect in candidate.fit.rig.effects:
-            rig = rig.with_effect(effect["id"], effect["parameters"])
+            form = effect.get("form", "")
+            rig = rig.with_effect(effect["id"], effect["parameters"], form=form)
     return rig.with_parameters(
         {name: candidates[k].fit.values[name] for name, k in _owners(candidates).items()}
     )
@@ -410,7 +412,8 @@ def _with_std(rig: Rig, candidates: list[Candidate]) -> Rig:
                 for n, s in candidate.fit.std.items()
                 if n.startswith(own) and math.isfinite(s)
             }
-            rig = rig.with_effect(effect["id"], effect["parameters"], std=std)
+            form = effect.get("form", "")
+            rig = rig.with_effect(effect["id"], effect["parameters"], std=std, form=form)
     return rig
 
 
@@ -492,6 +495,7 @@ def _effects(judged: list[Judged], verdict: str, in_set: float) -> list[EffectFo
         EffectFound(
             id=effect,
             name=EFFECTS[effect].name,
+            form=form_in(candidate.fit.rig, effect),
             probability=p,
             inclusion=max(
                 (j.group.inclusion[effect] for j in judged if effect in j.group.inclusion),
@@ -563,12 +567,17 @@ def _events(effect: str, candidate: Candidate) -> list[dict[str, Any]]:
     return found
 
 
+def form_in(rig: Rig, effect: str) -> str:
+    """Form of an effect in a rig; empty for the first, and where the rig does not have it."""
+    return next((e.get("form", "") for e in rig.effects if e["id"] == effect), "")
+
+
 def _effect_parameters(effect: str, candidate: Candidate) -> dict[str, EffectParameterFound]:
     """Parameters of an effect, fitted or chosen."""
     rig = candidate.fit.rig
     unknown_volume = bool(words.unknown_volumes(rig))
     out: dict[str, EffectParameterFound] = {}
-    for parameter in EFFECTS[effect].parameters:
+    for parameter in EFFECTS[effect].form(form_in(rig, effect)).parameters:
         name = f"{effect}.{parameter.name}"
         if parameter.role in (*CHOSEN, "threshold"):
             chosen = next(e["parameters"] for e in rig.effects if e["id"] == effect)[parameter.name]
@@ -603,7 +612,7 @@ def _emptying(effect: str, candidate: Candidate) -> dict[str, EffectParameterFou
     """
     gas, chamber = candidate.fit.rig.model["gas"], candidate.fit.rig.model["chamber"]
     out: dict[str, EffectParameterFound] = {}
-    for parameter in EFFECTS[effect].parameters:
+    for parameter in EFFECTS[effect].form(form_in(candidate.fit.rig, effect)).parameters:
         name = f"{effect}.{parameter.name}"
         if parameter.unit != "m3/(s Pa)" or candidate.fit.values.get(name, 0.0) <= 0:
             continue

@@ -44,7 +44,8 @@ Key = tuple[str, str]
 LOGARITHMIC = frozenset(
     f"{effect.id}.{parameter.name}"
     for effect in EFFECTS.values()
-    for parameter in effect.parameters
+    for form in effect.forms
+    for parameter in form.parameters
     if parameter.neutral != 0.0 and parameter.lower > 0.0
 )
 """Shapes that are positive: fitted by their logarithm."""
@@ -265,8 +266,10 @@ class Scaling:
         starts: dict[str, float],
         settings: FitSettings,
         freed: Collection[str] = (),
+        forms: Mapping[str, str] | None = None,
     ) -> None:
         self.names = [*baseline, *starts]
+        self.forms = dict(forms or {})
         self.nominal, self.baseline, self.starts = nominal, list(baseline), dict(starts)
         known = nominal.parameters
         self.scale = {n: known[n].tol for n in baseline}
@@ -318,7 +321,7 @@ class Scaling:
         chosen = {**fixed, **{n: v for n, v in values.items() if n not in self.centre}}
         for effect in dict.fromkeys(n.partition(".")[0] for n in chosen):
             own = {n.partition(".")[2]: v for n, v in chosen.items() if n.startswith(effect + ".")}
-            rig = rig.with_effect(effect, own)
+            rig = rig.with_effect(effect, own, form=self.forms.get(effect, ""))
         return rig
 
 
@@ -413,6 +416,7 @@ def fit(
     share: float | None = None,
     settled: Mapping[str, float] | None = None,
     freed: Collection[str] = (),
+    forms: Mapping[str, str] | None = None,
 ) -> Fit:
     """Fit baseline parameters (with their tolerances as priors) and effects to the recordings.
 
@@ -446,6 +450,8 @@ def fit(
         Baseline parameters that are held at other values than the nominal ones.
     freed : collection of str, optional
         Baseline parameters that no prior holds, and that may leave their tolerance.
+    forms : mapping of str to str, optional
+        Form of each effect that is not in its first.
 
     Raises
     ------
@@ -455,7 +461,7 @@ def fit(
     nominal = nominal.with_parameters(settled or {})
     baseline = [name for name in free_baseline(problem, nominal) if name not in (settled or {})]
     own = problem.settings.fit
-    scaling = Scaling(nominal, baseline, starts, own, freed)
+    scaling = Scaling(nominal, baseline, starts, own, freed, forms)
     count = len(baseline)
     bound = np.array([0.0 if name in freed else 1.0 for name in baseline])
     kept = _jacobian_of(warm, baseline) if frozen and warm is not None else None

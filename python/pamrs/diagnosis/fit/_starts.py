@@ -8,7 +8,7 @@ import itertools
 import math
 from dataclasses import dataclass, replace
 
-from pamrs.effects import EFFECTS
+from pamrs.effects import EFFECTS, Form
 from pamrs.rig import Rig
 
 __all__ = ["CHOSEN", "Start", "starts_of"]
@@ -33,6 +33,8 @@ class Start:
         Those of ``free`` that scale the effect.
     signed : bool
         Whether it can turn its sign.
+    form : str
+        Which form of the effect it is; empty for the first.
     """
 
     effect: str
@@ -40,6 +42,7 @@ class Start:
     held: dict[str, float]
     sizes: tuple[str, ...]
     signed: bool
+    form: str = ""
 
     @property
     def scalable(self) -> bool:
@@ -49,13 +52,15 @@ class Start:
     def applied(self, rig: Rig) -> Rig:
         """The rig with the effect as it starts."""
         values = {name.partition(".")[2]: value for name, value in (self.free | self.held).items()}
-        return rig.with_effect(self.effect, values)
+        return rig.with_effect(self.effect, values, form=self.form)
 
     def scaled(self, size: float) -> Start:
         """The same start with its sizes multiplied (a restriction divided by the root), inside
         their bounds.
         """
-        bounds = {f"{self.effect}.{p.name}": p for p in EFFECTS[self.effect].parameters}
+        bounds = {
+            f"{self.effect}.{p.name}": p for p in EFFECTS[self.effect].form(self.form).parameters
+        }
 
         def sized(name: str, value: float) -> float:
             moved = value / math.sqrt(size) if bounds[name].restricts else value * size
@@ -69,7 +74,7 @@ class Start:
 
 
 def starts_of(effect: str, *, sealed: bool) -> list[Start]:
-    """Every start of an effect.
+    """Every start of every form of an effect that is the same in all recordings.
 
     Parameters
     ----------
@@ -81,13 +86,23 @@ def starts_of(effect: str, *, sealed: bool) -> list[Start]:
     Returns
     -------
     list of Start
-        One for each combination of shapes and choices; sizes at their typical value.
+        One for each form and each combination of its shapes and choices; sizes at their typical
+        value.
     """
+    info = EFFECTS[effect]
+    # of an effect that only ever happens at times of its own the first form stands for all
+    forms = info.lasting or info.forms[:1]
+    return [start for form in forms for start in _starts_of_form(effect, form, sealed=sealed)]
+
+
+def _starts_of_form(effect: str, form: Form, *, sealed: bool) -> list[Start]:
+    """Every start of one form."""
     shapes: list[list[tuple[str, float]]] = []
     sizes: dict[str, float] = {}
     held: list[list[tuple[str, float]]] = []
     signed = False
-    for parameter in EFFECTS[effect].parameters:
+    own = "" if form is EFFECTS[effect].forms[0] else form.name
+    for parameter in form.parameters:
         name = f"{effect}.{parameter.name}"
         role = parameter.role_in(sealed=sealed)
         if role == "size":
@@ -101,7 +116,7 @@ def starts_of(effect: str, *, sealed: bool) -> list[Start]:
             ends = (parameter.lower, parameter.upper) if role in CHOSEN else (parameter.default,)
             held.append([(name, value) for value in ends])
     return [
-        Start(effect, sizes | dict(shape), dict(fixed), tuple(sizes), signed)
+        Start(effect, sizes | dict(shape), dict(fixed), tuple(sizes), signed, own)
         for shape in itertools.product(*shapes)
         for fixed in itertools.product(*held)
     ]

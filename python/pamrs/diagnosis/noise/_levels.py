@@ -65,6 +65,8 @@ class Excess:
         to.
     rms, noise : float
         Residual and noise level of single samples, in the channel's unit.
+    pieces : tuple of (float, int)
+        The ratio in each piece of the recordings, and the bins in it.
     """
 
     ratio: float
@@ -74,6 +76,7 @@ class Excess:
     noise: float
     limit: float
     scatter: float = 0.0
+    pieces: tuple[tuple[float, int], ...] = ()
 
 
 def bins_of(prepared: Prepared) -> int:
@@ -156,10 +159,17 @@ def excess(
     """Pool a block's residual over recordings and compare it with its noise level."""
     keys: list[Key] = []
     ratios, weights, squares, noises = [], [], [], []
+    pieces: list[tuple[float, int]] = []
     for prepared in recordings:
         key = (block.name, prepared.recording.name)
         r = found[key]
         means, counts = binned(r.value, r.rows, bins_of(prepared))
+        length = max(1, round(settings.piece_time / (bins_of(prepared) * prepared.dt)))
+        own = noise_level[key].binned ** 2
+        for first in range(0, means.size, length):
+            there = means[first : first + length][counts[first : first + length] > 0]
+            if there.size:
+                pieces.append((float(np.mean(there**2)) / own, int(there.size)))
         means = means[counts > 0]
         if means.size == 0:
             continue
@@ -188,4 +198,5 @@ def excess(
         math.sqrt(float(np.average(noises, weights=weights))),
         min(settings.most_limit, settings.margin * math.exp(beyond)),
         scatter,
+        tuple(pieces),
     )

@@ -250,8 +250,10 @@ def screen(
             best = _switched(starts[0], problem, lambda start: try_(start, 1))
             signatures[before:] = [entry for entry in signatures[before:] if entry[1] is best]
         else:
-            for start in _placed(starts, problem, fitted.rig):
-                try_(start)
+            for form in dict.fromkeys(start.form for start in starts):
+                own = [start for start in starts if start.form == form]
+                for start in _placed(own, problem, fitted.rig):
+                    try_(start)
     return Screen(stand, signatures, settings)
 
 
@@ -271,14 +273,15 @@ def _placed(starts: list[Start], problem: Problem, rig: Rig) -> list[Start]:
     size of what it stands beside.
     """
     info = EFFECTS[starts[0].effect]
-    beside = next((p for p in info.parameters if p.like), None)
+    parameters = info.form(starts[0].form).parameters
+    beside = next((p for p in parameters if p.like), None)
     if beside is not None:
         return _beside(starts, beside, problem, rig)
-    place = next(iter(info.with_role("place")), None)
+    place = next((p for p in parameters if p.role == "place"), None)
     reached = None if place is None else _seen(problem, place.channel)
     if place is None or reached is None:
         return starts
-    sides = [f"{info.id}.{side.name}" for side in info.with_role("side")]
+    sides = [f"{info.id}.{side.name}" for side in parameters if side.role == "side"]
 
     def at(start: Start, share: float) -> Start:
         lower = any(start.held[side] < 0.0 for side in sides)
@@ -338,7 +341,9 @@ def _beside(
 def _shows(start: Start, block: Block) -> bool:
     """Whether an effect acts in a block with the choices that a start holds."""
     values = start.free | start.held
-    parameters = [p for p in EFFECTS[start.effect].parameters if block.kind in p.needed_in]
+    parameters = [
+        p for p in EFFECTS[start.effect].form(start.form).parameters if block.kind in p.needed_in
+    ]
     return acts_in(start.effect, block) and all(
         values[f"{start.effect}.{p.name}"] for p in parameters
     )

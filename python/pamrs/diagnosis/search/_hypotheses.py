@@ -4,6 +4,7 @@ recordings.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -24,11 +25,12 @@ from pamrs.diagnosis.evidence import (
 from pamrs.diagnosis.fit import Fit, Key, Problem, Start, acts_in, fits, residuals
 from pamrs.diagnosis.noise import Excess, excess, noise_levels
 from pamrs.diagnosis.prepare import Block, Residual
-from pamrs.diagnosis.screen import Screen, by_effect, inclusion, left_out, screen, stand_of
+from pamrs.diagnosis.screen import Score, Screen, by_effect, inclusion, left_out, screen, stand_of
 from pamrs.diagnosis.search._baseline import refitted, thorough, with_autocorrelation
 from pamrs.diagnosis.search._below_noise import below_noise
 from pamrs.diagnosis.search._closure import find_closure
 from pamrs.diagnosis.search._wrong_parameters import beside_quiet, freed
+from pamrs.diagnosis.settings import SearchSettings
 from pamrs.effects import CATALOGUE, EFFECTS, EffectInfo, SameData
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
@@ -177,7 +179,7 @@ def _quiet(refit: _Refit, say: Say, tell: Say) -> Group:
     """
     nothing = refit.group([refit.start], {"": 1.0}, None)
     blocks = refit.trial.inner.blocks
-    persistent = [e for e in _acting(refit.trial, blocks) if not EFFECTS[e].transient]
+    persistent = [e for e in _acting(refit.trial, blocks) if EFFECTS[e].lasting]
     trial = replace(refit.trial, suspects=blocks)
     return beside_quiet(trial, below_noise(trial, nothing, persistent, say) or nothing, tell)
 
@@ -197,7 +199,7 @@ def _explained(refit: _Refit, say: Say, tell: Say) -> list[Group]:
     acting = _acting(trial, suspects)
     # events of free times would always mend a noise level that was estimated too low
     transient = [] if marginal else [e for e in acting if EFFECTS[e].transient]
-    persistent = [e for e in acting if not EFFECTS[e].transient]
+    persistent = [e for e in acting if EFFECTS[e].lasting]
     mistaken = freed(trial, start.fit, refit.first, tell)
     sealed = trial.nominal.model["valve"] is None
     screened = screen(trial.inner, start.fit, persistent, trial.white, sealed=sealed)
@@ -471,13 +473,35 @@ def _singles(trial: Attempts, screened: Screen, baseline: Fit, tell: Say) -> lis
     white = trial.white
     found = []
     for place, effect in enumerate(chosen):
-        near = [s for s in ranked[effect] if s.gain > settings.near_start * gains[effect]]
-        count = settings.most_starts if place < settings.effects_with_starts else 1
-        tried = [trial.fitted([s.start.scaled(s.size)], baseline, white) for s in near[:count]]
+        several = place < settings.effects_with_starts
+        near = _near(ranked[effect], settings) if several else ranked[effect][:1]
+        tried = [trial.fitted([s.start.scaled(s.size)], baseline, white) for s in near]
         fitted = [candidate for candidate in tried if candidate is not None]
         if fitted:
-            found.append(replace(min(fitted, key=lambda c: c.misfit), gain=gains[effect]))
+            found.append(replace(min(fitted, key=_left_everywhere), gain=gains[effect]))
     return found
+
+
+def _near(scores: list[Score], settings: SearchSettings) -> list[Score]:
+    """The starts of an effect that are fitted: the best of each form that comes near, and further
+    ones of the best form.
+
+    A signature is a ranking of forms and no more: that of a strong effect is linear in what is not.
+    """
+    best = {score.start.form: score for score in reversed(scores)}
+    forms = [s for s in best.values() if s.gain > settings.near_form * scores[0].gain]
+    forms = sorted(forms, key=lambda s: -s.gain)[: settings.most_forms]
+    alike = [s for s in scores if s.start.form == scores[0].start.form]
+    near = [s for s in alike if s.gain > settings.near_start * scores[0].gain]
+    return [*near[: settings.most_starts], *(s for s in forms if s not in near)]
+
+
+def _left_everywhere(candidate: Candidate) -> float:
+    """Logarithm of what a hypothesis leaves of each block, on fitted and on held-out recordings:
+    by it the forms of an effect are compared.
+    """
+    stages = (candidate.fitted, candidate.held_out)
+    return sum(math.log(max(e.ratio, 1.0)) for stage in stages for e in stage.values())
 
 
 def _with_same_data(

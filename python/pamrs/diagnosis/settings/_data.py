@@ -382,6 +382,14 @@ class NoiseSettings(SettingsGroup):
     least_bin_samples: int = setting(
         5, unit="count", least=1, reason="fewest samples of such a bin", origin="judgement"
     )
+    piece_time: float = setting(
+        5.0,
+        unit="s",
+        above=0.0,
+        reason="length of the pieces of a recording that count as looks of their own: longer than "
+        "residuals of a wrong model stay alike",
+        origin="judgement: windows of the arm last 2.5 s, of gases longer",
+    )
     fit_bin_time: float = setting(
         0.02,
         unit="s",

@@ -92,6 +92,18 @@ class SearchSettings(SettingsGroup):
         reason="share of an effect's best gain from which another of its starts is fitted",
         origin="judgement; docs/decisions/0013",
     )
+    near_form: float = setting(
+        0.3,
+        unit="1",
+        above=0.0,
+        most=1.0,
+        reason="share of an effect's best gain from which another form of it is fitted: signatures "
+        "are linear in what a strong effect is not",
+        origin="judgement",
+    )
+    most_forms: int = setting(
+        4, unit="count", least=1, reason="forms of an effect that are fitted", origin="judgement"
+    )
     most_starts: int = setting(
         2,
         unit="count",
