@@ -15,14 +15,23 @@ from .blocks import blocks_page
 from .concealed import WRONG, make_case, write
 from .effects import KINDS, LISTED
 from .pictures import figure
-from .plan import PLANS, specs, write_plan
-from .report import report
+from .plan import MANIFEST, PLANS, specs, write_plan
+from .report import about, checked, report, run_of
 from .score import score
+from .second.cases import complete as second_complete
+from .second.cases import make as second_make
+from .second.design import ROUND
+from .second.design import specs as second_specs
+from .second.marks import is_second, marks
+from .second.tables import markdown as second_markdown
+from .second.tables import scores as second_scores
+from .second.tables import to_json
 from .selfcheck import selfcheck
 from .strength import LABELS, MEASURES
 from .summary import markdown, target_table
 from .targets import targets
 
+SECOND = "second"
 _MEASURE = (
     "what the multiple of the noise is of: all that the effect moves, or what a refit of the "
     "baseline leaves of it"
@@ -51,15 +60,24 @@ def _add_write(add: Add) -> None:
         "write", help="write the cases, keys and manifest of a plan; goes on where it was stopped"
     )
     whole.add_argument("folder", type=Path, help="gets cases/, keys/ and manifest.json")
-    whole.add_argument("--plan", choices=PLANS, default="full")
+    whole.add_argument("--plan", choices=(*PLANS, SECOND), default="full")
     whole.add_argument("--cases", type=int, help="how many (default: the whole plan)")
     whole.add_argument("--seed", type=int, required=True)
     whole.add_argument(
         "--duration", type=float, help="seconds per recording (default: 30 to 40; plan small 12)"
     )
     whole.add_argument("--jobs", type=int, default=1, help="processes (default 1)")
-    whole.add_argument("--measure", choices=MEASURES, default="reach", help=_MEASURE)
-    whole.add_argument("--rig", type=Path, help="nominal rig file (default: the shoulder)")
+    whole.add_argument(
+        "--measure",
+        choices=MEASURES,
+        default="reach",
+        help=f"{_MEASURE}; plan {SECOND} always: what is left",
+    )
+    whole.add_argument(
+        "--rig",
+        type=Path,
+        help=f"nominal rig file (default: the shoulder; plan {SECOND} has several)",
+    )
     whole.set_defaults(run=_write)
 
 
@@ -70,6 +88,20 @@ def _write(args: argparse.Namespace) -> None:
     def told(name: str, done: int, total: int) -> None:
         print(f"{name} written, {done} of {total}", file=sys.stderr, flush=True)
 
+    if args.plan == SECOND:
+        if args.rig is not None:
+            raise ValueError(f"plan {SECOND} has rigs of its own: leave --rig out")
+        chosen = second_specs(args.seed, args.cases or 25 * ROUND, args.duration)
+        manifest = write_plan(
+            args.folder,
+            chosen,
+            jobs=args.jobs,
+            progress=told,
+            make=second_make,
+            complete=second_complete,
+        )
+        print(f"sha256 of the manifest: {hashlib.sha256(manifest.read_bytes()).hexdigest()}")
+        return
     wanted = specs(args.plan, args.seed, args.cases, args.duration, args.measure, args.rig)
     manifest = write_plan(args.folder, wanted, jobs=args.jobs, rig=args.rig, progress=told)
     print(f"sha256 of the manifest: {hashlib.sha256(manifest.read_bytes()).hexdigest()}")
@@ -175,11 +207,39 @@ def _add_score(add: Add) -> None:
         help="effect ids that the diagnosis may name, comma separated",
     )
     mark.add_argument("--markdown", type=Path, help="write the tables here")
+    mark.add_argument("--json", type=Path, help=f"of plan {SECOND}: write the scores here")
+    mark.add_argument(
+        "--first", type=int, help=f"of plan {SECOND}: only the first so many cases, by name"
+    )
+    mark.add_argument(
+        "--command",
+        dest="words",
+        default="python -m trial score",
+        help=f"of plan {SECOND}: what makes the tables, as they say",
+    )
     mark.add_argument("--figure", type=Path, help="draw the figure here (needs matplotlib)")
     mark.set_defaults(run=_score)
 
 
+def _score_second(args: argparse.Namespace) -> None:
+    """Score keys of the second plan, which must be those of the manifest where there is one."""
+    folder, head = args.keys.parent, ["# Second plan\n"]
+    if (folder / MANIFEST).is_file():
+        digest, count = checked(folder)
+        head += about(folder, digest, count, run_of(args.results, digest), args.words)
+    told = second_scores(marks(args.keys, args.results, args.first))
+    text = "\n".join([*head, second_markdown(told)])
+    print(text)
+    if args.markdown is not None:
+        write(args.markdown, text)
+    if args.json is not None:
+        write(args.json, to_json(told))
+
+
 def _score(args: argparse.Namespace) -> None:
+    if is_second(args.keys):
+        _score_second(args)
+        return
     catalogue = tuple(c for c in args.catalogue.split(",") if c)
     scores = score(args.keys, args.results, catalogue)
     print(scores.text())

@@ -96,7 +96,7 @@ class Muscle:
             )
         taut = False
         rest = self.rest_radius
-        if contraction == 0.0:
+        if abs(contraction) < 1.0e-15:
             radius = rest
         else:
             floor = max(math.sqrt(self.rubber / (math.pi * length)), self.neck * rest)
@@ -178,19 +178,41 @@ class Tendon:
         return y - (self.offset - y) * x / math.sqrt(self.tendon**2 - (self.offset - y) ** 2)
 
 
+class Straight:
+    """A muscle that lifts a mass without a joint: the coordinate is its own shortening [m]."""
+
+    def __init__(self, spec: dict[str, Any]) -> None:
+        self.rest = float(spec["rest_angle"])
+
+    def contraction(self, angle: float) -> float:
+        """Shortening [m] of the muscles."""
+        return angle - self.rest
+
+    def arm(self, angle: float) -> float:
+        """Shortening per shortening."""
+        return 1.0
+
+
 @lru_cache(maxsize=4)
 def _rows(muscle: str, tendon: str, count: int) -> tuple[Array, Array]:
     """Knots [rad] and exact quantities of the joint, see :meth:`JointTables.exact`; the arguments
     are JSON.
     """
     spec, joint = json.loads(muscle), json.loads(tendon)
-    shapes, pull = Muscle(spec), Tendon(joint)
-    knots = float(joint["rest_angle"]) + math.radians(STEP) * np.arange(-BELOW, ABOVE + 1)
+    straight = joint.get("kind") == "mass"
+    shapes, pull = Muscle(spec), Straight(joint) if straight else Tendon(joint)
+    step, below, above = grid_of(joint)
+    knots = float(joint["rest_angle"]) + step * np.arange(-below, above + 1)
     return knots, np.array([JointTables.exact(shapes, pull, count, float(t)) for t in knots])
 
 
 #: knots per degree, and how many of them lie below and above the rest angle
 STEP, BELOW, ABOVE = 0.1, 80, 1160
+
+
+def grid_of(joint: dict[str, Any]) -> tuple[float, int, int]:
+    """Distance of the knots [rad, or m of shortening], and how many lie below and above rest."""
+    return (2.0e-4, 40, 480) if joint.get("kind") == "mass" else (math.radians(STEP), BELOW, ABOVE)
 
 
 class JointTables:
@@ -216,14 +238,14 @@ class JointTables:
         knots, exact = _rows(
             json.dumps(muscle, sort_keys=True), json.dumps(joint, sort_keys=True), count
         )
-        self.step = math.radians(STEP)
+        self.step, below, above = grid_of(joint)
         self.knots = knots
         self.start = float(knots[0])
         rows = np.column_stack(
             [exact[:, 0] + modulus_scale * exact[:, 1], modulus_scale * exact[:, 2], exact[:, 3:]]
         )
         cells: list[tuple[float, ...]] = []
-        for lo, hi, kind in ((0, BELOW, PchipInterpolator), (BELOW, BELOW + ABOVE, CubicSpline)):
+        for lo, hi, kind in ((0, below, PchipInterpolator), (below, below + above, CubicSpline)):
             pieces = kind(knots[lo : hi + 1], rows[lo : hi + 1])
             # c has shape (4, cells, quantities)
             cells.extend(
@@ -232,7 +254,7 @@ class JointTables:
         self.cells = cells
 
     @staticmethod
-    def exact(muscle: Muscle, tendon: Tendon, count: int, angle: float) -> Array:
+    def exact(muscle: Muscle, tendon: Tendon | Straight, count: int, angle: float) -> Array:
         """Quantities at one angle [rad] without interpolation.
 
         Gas torque per pressure without and per modulus scale, elastic torque per modulus scale, air
@@ -279,3 +301,23 @@ class JointTables:
         arm = (3.0 * k[12] * s + 2.0 * k[13]) * s + k[14]
         force = torque / arm
         return force, (slope - force * (6.0 * k[12] * s + 2.0 * k[13])) / (arm * arm), arm
+
+
+class RigidTables:
+    """A rigid cube of a volume [m3], without muscles: only its wall does not vanish."""
+
+    def __init__(self, volume: float) -> None:
+        self.start, self.step = 0.0, 1.0
+        self.cells = [(*(0.0,) * 19, 6.0 * volume ** (2.0 / 3.0))]
+
+    def at(self, angle: float) -> Array:
+        """Quantities as those of :class:`JointTables`, all zero."""
+        return np.zeros(5)
+
+    def contraction(self, angle: float) -> float:
+        """Contraction [m]."""
+        return 0.0
+
+    def pull(self, angle: float, gauge: float) -> tuple[float, float, float]:
+        """Force [N], its slope [N/m] and the moment arm [m/rad], of none."""
+        return 0.0, 0.0, 0.0

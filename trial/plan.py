@@ -8,7 +8,7 @@ import multiprocessing
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
@@ -254,17 +254,31 @@ def _complete(folder: Path, spec: Spec, digests: dict[str, str]) -> bool:
     )
 
 
-def _work(task: tuple[Spec, Path]) -> Case:
-    return generate(*task)
+class Named(Protocol):
+    """What a case is made from, of any plan."""
+
+    @property
+    def name(self) -> str:
+        """Name of the case."""
+
+
+S = TypeVar("S", bound=Named)
+
+
+def _work(task: tuple[Callable[[Any, Path], Case], Any, Path]) -> Case:
+    make, spec, rig = task
+    return make(spec, rig)
 
 
 def write_plan(
     folder: Path,
-    wanted: Sequence[Spec],
+    wanted: Sequence[S],
     *,
     jobs: int = 1,
     rig: Path | None = None,
     progress: Callable[[str, int, int], None] | None = None,
+    make: Callable[[S, Path], Case] | None = None,
+    complete: Callable[[Path, S, dict[str, str]], bool] | None = None,
 ) -> Path:
     """Write the cases of a plan below ``folder/cases``, their keys below ``folder/keys``, and the
     manifest.
@@ -284,6 +298,8 @@ def write_plan(
         Nominal rig file.
     progress : callable, optional
         Called with the name of each case made, the number done and the number of all.
+    make, complete : callable, optional
+        Make a case, and tell whether it is there, of another plan than those of :func:`specs`.
 
     Returns
     -------
@@ -303,7 +319,8 @@ def write_plan(
         if told.get("schema") != SCHEMA:
             raise ValueError(f"{manifest}: schema must be {SCHEMA!r}")
         digests = told["keys"]
-    missing = [s for s in wanted if not _complete(folder, s, digests)]
+    there: Any = complete or _complete
+    missing = [s for s in wanted if not there(folder, s, digests)]
     rig = (rig or default_rig()).resolve()
     done = len(wanted) - len(missing)
 
@@ -318,7 +335,7 @@ def write_plan(
         if progress is not None:
             progress(case.name, done, len(wanted))
 
-    tasks = [(s, rig) for s in missing]
+    tasks: list[tuple[Any, Any, Path]] = [(make or generate, s, rig) for s in missing]
     if jobs <= 1 or len(tasks) < 2:
         for task in tasks:
             keep(_work(task))

@@ -17,7 +17,7 @@ from scipy.optimize import brentq
 
 from .effects import Effects, Env, HeatTransfer, Start
 from .flows import area_of, orifice_of, settle
-from .geometry import JointTables
+from .geometry import JointTables, RigidTables
 from .rates import rates_of
 
 State = list[float]
@@ -28,6 +28,12 @@ Ports = list[Callable[..., Any]]
 class Parameters:
     """All numbers of the plant without effects; SI units, angles in rad, pressures in Pa (gauge if
     noted).
+
+    `kind` "joint": muscles turn an arm; "mass": they lift a mass, and the place of the angle is
+    taken by their shortening [m]; "rigid": there are none, only the volume. `feed` "valve": from a
+    tank; "regulator": its outlet follows the command with `time_constant` [s], less by `droop`
+    [Pa s/kg], and a nozzle of `area_max` leads to the muscles; "vent": the volume empties through
+    that nozzle.
     """
 
     ambient: float
@@ -59,6 +65,19 @@ class Parameters:
     gravity: float
     pressure_zero: float
     angle_zero: float
+    kind: str = "joint"
+    feed: str = "valve"
+    time_constant: float = 0.0
+    droop: float = 0.0
+
+    def pull(self, angle: float) -> float:
+        """Part of the weight's torque that acts at an angle [rad]: all of it on a hanging mass."""
+        return math.sin(angle) if self.kind == "joint" else 1.0
+
+    @property
+    def weight(self) -> float:
+        """Largest torque of the weight [N m], or the weight of a hanging mass [N]."""
+        return (self.first_moment + self.payload * self.length) * self.gravity
 
 
 class Plant:
@@ -84,8 +103,12 @@ class Plant:
         self.par = parameters
         # an effect of no size would still cost time, and a share of zero divide by it
         self.effects = Effects(*(e for e in effects or () if e.active()))
-        self.tables = JointTables(
-            parameters.muscle, parameters.joint, parameters.count, parameters.modulus_scale
+        self.tables: JointTables | RigidTables = (
+            RigidTables(parameters.dead_volume)
+            if parameters.kind == "rigid"
+            else JointTables(
+                parameters.muscle, parameters.joint, parameters.count, parameters.modulus_scale
+            )
         )
         self.scale = [1.0e5, 1.0e6, 1.0, 1.0]
         self.i_clock = -1
@@ -137,7 +160,7 @@ class Plant:
         if self.i_clock >= 0:
             y.append(clock)
         if self.effects.items:
-            weight = (par.first_moment + par.payload * par.length) * par.gravity * math.sin(angle)
+            weight = par.weight * par.pull(angle)
             at = Start(pressure, supply, angle, self.tables.contraction(angle), weight)
             for effect in self.effects:
                 y.extend(effect.start(at))
@@ -146,25 +169,32 @@ class Plant:
     def rest(self, supply: float, clock: float = 0.0) -> State:
         """Vented muscle, arm at rest on its lower stop."""
         par = self.par
-        low = par.joint["min_angle"]
-        weight = (par.first_moment + par.payload * par.length) * par.gravity
+        if par.kind == "rigid":
+            return self.initial(par.ambient, supply, 0.0, 0.0, clock)
+        low, weight = par.joint["min_angle"], par.weight
 
         def torque(angle: float) -> float:
             stop = par.joint["stop_stiffness"] * max(low - angle, 0.0)
-            return float(self.tables.at(angle)[1]) - weight * math.sin(angle) + stop
+            return float(self.tables.at(angle)[1]) - weight * par.pull(angle) + stop
 
-        angle = float(brentq(torque, low - math.radians(4.0), low + math.radians(20.0), xtol=1e-12))
+        below, above = (
+            (math.radians(4.0), math.radians(20.0)) if par.kind == "joint" else (3.0e-3, 0.02)
+        )
+        angle = float(brentq(torque, low - below, low + above, xtol=1e-12))
         return self.initial(par.ambient, supply, angle, 0.0, clock)
 
     def holding_pressure(self, angle: float) -> float:
         """Gauge pressure [Pa] that holds the arm at an angle [rad]."""
         par = self.par
         values = self.tables.at(angle)
-        weight = (par.first_moment + par.payload * par.length) * par.gravity
-        return float((weight * math.sin(angle) - values[1]) / values[0])
+        return float((par.weight * par.pull(angle) - values[1]) / values[0])
 
     def normalised(self, command: float) -> float:
-        """Command [V] as a part of half the stroke, -1..1."""
+        """Command [V] as a part of half the stroke, -1..1; of a regulator, set pressure [bar] as a
+        part of 10 bar.
+        """
+        if self.par.feed == "regulator":
+            return min(max(0.1 * command, -1.0), 1.0)
         return min(max((command - self.par.null_voltage) / self.par.half_range, -1.0), 1.0)
 
     def valve(self) -> Callable[[float, float, float, float], tuple[float, float]]:
@@ -177,13 +207,16 @@ class Plant:
         line, exhaust, gap = self.port("line", False), self.port("exhaust", False), self.port("gap")
         heat, _ = self.heat
         share = heat.share if heat is not None else 0.0
-        sqrt = math.sqrt
+        sqrt, regulated = math.sqrt, par.feed == "regulator"
         last = [math.nan, 0.0]  # opening and its conductance: constant over most steps
 
         def flows(x: float, ps: float, p: float, temperature: float) -> tuple[float, float]:
             if x != last[0]:
                 last[0], last[1] = x, jet * area(abs(x))
             c, m_in, m_out = last[1], 0.0, 0.0
+            if regulated:
+                net = jet * par.area_max * orifice(ps, p)
+                return (net, 0.0) if net > 0.0 else (0.0, -net)
             if x > 0.0:
                 m_in = c * orifice(ps, p)
                 if line is not None:

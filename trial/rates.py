@@ -85,6 +85,13 @@ def gas_of(plant: Plant) -> Callable[[State, float, Place, State], None]:
     heat, i_heat = plant.heat
     warm = None if heat is None else warming_of(plant, heat)
     share = 0.0 if heat is None else heat.share
+    seals, swells = plant.ports("seal", False), plant.ports("swell", False)
+    regulated, lag, droop, ambient = (
+        par.feed == "regulator",
+        par.time_constant,
+        par.droop,
+        par.ambient,
+    )
 
     def gas(y: State, x: float, at: Place, d: State) -> None:
         p, ps = y[0], y[1]
@@ -96,7 +103,12 @@ def gas_of(plant: Plant) -> Callable[[State, float, Place, State], None]:
         m_in, m_out = flows(x, ps, p, temperature)
         for leak in leaks:
             m_out += leak(p, temperature)
-        d[1] = -rt0 / vt * m_in
+        for seal in seals:
+            m_out += seal(p, y[2])
+        if regulated:
+            d[1] = (ambient + 1.0e6 * x - droop * (m_in - m_out) - ps) / lag
+        else:
+            d[1] = -rt0 / vt * m_in
         for tank in tanks:
             d[1] += tank(ps, m_in, y, d)
         change = (rt0 * (a_in * m_in - a_out * m_out) - a_vol * p * v_rate) / volume
@@ -105,6 +117,8 @@ def gas_of(plant: Plant) -> Callable[[State, float, Place, State], None]:
             wall = ((k16 * s + k17) * s + k18) * s + k19
             d[i_heat], balance = warm(p, temperature, (m_in, m_out), volume, v_rate, wall)
             change += share * (balance - change)
+        for swell in swells:
+            change *= swell(p, y[2])
         d[0] = change
 
     return gas
@@ -176,6 +190,8 @@ def muscles_of(plant: Plant) -> Callable[[State, float, Place, State], float]:
 def motion_of(plant: Plant) -> Callable[[State, float, float, State], None]:
     """Rates of the angle [rad/s] and of its rate [rad/s2] under a torque of the muscles [N m]."""
     par, clock = plant.par, plant.i_clock
+    if par.kind == "rigid":
+        return lambda y, pg, torque, d: None
     rest_inertia = par.inertia + par.payload * par.length**2
     rest_weight = (par.first_moment + par.payload * par.length) * par.gravity
     reach, pull = par.length**2, par.length * par.gravity
@@ -183,7 +199,7 @@ def motion_of(plant: Plant) -> Callable[[State, float, float, State], None]:
     low, high = par.joint["min_angle"], par.joint["max_angle"]
     ks, ds = par.joint["stop_stiffness"], par.joint["stop_damping"]
     torques, load, moving = plant.ports("torque"), plant.port("load", False), plant.port("motion")
-    tanh, sin = math.tanh, math.sin
+    tanh, sin = math.tanh, math.sin if par.kind == "joint" else par.pull
 
     def motion(y: State, pg: float, torque: float, d: State) -> None:
         angle, rate = y[2], y[3]

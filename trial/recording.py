@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,14 +58,28 @@ class Record:
     states: list[State]
 
 
+class Steering(Protocol):
+    """A controller: command [V] from reference, measured angle and pressure, dither, and whether
+    the valve is to be shut.
+    """
+
+    def reset(self) -> None:
+        """Forget the past."""
+
+    def __call__(
+        self, reference: float, angle: float, pressure: float, dither: float, sealed: bool, /
+    ) -> float:
+        """The next command [V]."""
+
+
 class CommandPath:
     """What a command goes through on its way to the opening of the valve."""
 
-    def __init__(self, plant: Plant) -> None:
-        self.plant = plant
+    def __init__(self, plant: Plant, sample_time: float = SAMPLE_TIME) -> None:
+        self.plant, self.sample_time = plant, sample_time
         delay = sum(e.delay() for e in plant.effects)
-        self.whole = int(delay / SAMPLE_TIME)
-        self.part = delay - self.whole * SAMPLE_TIME
+        self.whole = int(delay / sample_time)
+        self.part = delay - self.whole * sample_time
         self.past = [0.0] * (self.whole + 1)
         shapers = [e.shaper(plant.env) for e in plant.effects]
         self.shapers: list[Callable[[float, float], float]] = [f for f in shapers if f is not None]
@@ -76,7 +91,7 @@ class CommandPath:
             x = shaper(x, time)
         self.past.append(min(max(x, -1.0), 1.0))
         old, new = self.past[-self.whole - 2], self.past[-self.whole - 1]
-        spans = [(old, self.part), (new, SAMPLE_TIME - self.part)]
+        spans = [(old, self.part), (new, self.sample_time - self.part)]
         return [s for s in spans if s[1] > 1.0e-9]
 
 
@@ -106,12 +121,15 @@ def prepare(
 def run(
     plant: Plant,
     shape: Excitation,
-    control: Controller,
+    control: Steering,
     command: Array | None,
     supply: float,
     noise: Noise,
     rng: np.random.Generator,
     index: int = 0,
+    sample_time: float = SAMPLE_TIME,
+    held: int = 1,
+    start: State | None = None,
 ) -> Record:
     """One recording.
 
@@ -129,6 +147,12 @@ def run(
         Draws the noise.
     index : int
         Number of the recording in the case.
+    sample_time : float
+        Sample time [s].
+    held : int
+        Samples for which a command is held.
+    start : list of float, optional
+        State at the start; at rest by default.
     """
     n = len(shape.reference)
     control.reset()
@@ -143,10 +167,10 @@ def run(
     sent: list[float] = []
     clean: list[tuple[float, float, float]] = []
     states: list[State] = []
-    path = CommandPath(plant)
+    path = CommandPath(plant, sample_time)
     begin = RECORDING_PERIOD * index
-    y = plant.rest(supply + plant.par.ambient, begin)
-    opening, step = 0.0, 1.0e-3
+    y = start or plant.rest(supply + plant.par.ambient, begin)
+    opening, step, u = 0.0, 1.0e-3, 0.0
     for i in range(n):
         y = plant.tick(y)
         states.append(y)
@@ -154,14 +178,14 @@ def run(
         clean.append(reading)
         if command is not None:
             u = float(command[i])
-        else:
+        elif i % held == 0:
             p = round((reading[0] + noisy[i][0]) / steps[0]) * steps[0]
             angle = round((reading[2] + noisy[i][2]) / steps[2]) * steps[2]
             u = control(reference[i], angle, p, dither[i], sealed[i])
         sent.append(u)
-        for opening, span in path.spans(u, begin + i * SAMPLE_TIME):
+        for opening, span in path.spans(u, begin + i * sample_time):
             y, step = plant.advance(y, opening, span, step)
-    time = SAMPLE_TIME * np.arange(n)
+    time = sample_time * np.arange(n)
     true = _late(plant, time, np.array(clean))
     return Record(time, np.array(sent), np.round((true + white) / grid) * grid, true, states)
 
@@ -189,6 +213,7 @@ def follow(
     index: int = 0,
     shift: tuple[float, float] = (0.0, 0.0),
     window: float = 2.0,
+    sample_time: float = SAMPLE_TIME,
 ) -> Array:
     """Noise-free readings (n, 3) of a plant that gets the commands of a recording of another one.
 
@@ -207,10 +232,13 @@ def follow(
         Added to the pressure [Pa] and angle [rad] at the starts.
     window : float
         Length of a window [s].
+    sample_time : float
+        Sample time of the recording [s].
     """
-    every = round(window / SAMPLE_TIME)
+    every = round(window / sample_time)
+    parts = max(1, math.ceil(sample_time / 6.0e-3))
     found: list[tuple[float, float, float]] = []
-    path = CommandPath(bare)
+    path = CommandPath(bare, sample_time)
     begin = RECORDING_PERIOD * index
     command = record.command.tolist()
     opening = 0.0
@@ -219,12 +247,13 @@ def follow(
         if i % every == 0:
             supply = y[1] if y else state[1]
             y = bare.initial(
-                state[0] + shift[0], supply, state[2] + shift[1], state[3], begin + i * SAMPLE_TIME
+                state[0] + shift[0], supply, state[2] + shift[1], state[3], begin + i * sample_time
             )
         y = bare.tick(y)
         found.append(bare.reading(y, opening))
-        for opening, span in path.spans(command[i], begin + i * SAMPLE_TIME):
-            y = bare.classical(y, opening, span)
+        for opening, span in path.spans(command[i], begin + i * sample_time):
+            for _ in range(parts):
+                y = bare.classical(y, opening, span / parts)
     return _late(bare, record.time, np.array(found))
 
 

@@ -63,8 +63,10 @@ def read_rig(path: Path) -> tuple[dict[str, Any], dict[str, float]]:
     return model, tolerance
 
 
-def to_parameters(model: dict[str, Any]) -> Parameters:
-    """Plant parameters of a nested SI model as returned by :func:`read_rig`."""
+def to_parameters(model: dict[str, Any], **kind: Any) -> Parameters:
+    """Plant parameters of a nested SI model as returned by :func:`read_rig`; `kind` gives those
+    fields that say what rig it is.
+    """
     gas, valve, arm, chamber = model["gas"], model["valve"], model["arm"], model["chamber"]
     muscle = {
         k: v
@@ -91,7 +93,7 @@ def to_parameters(model: dict[str, Any]) -> Parameters:
         muscle=muscle,
         count=int(model["muscle"]["count"]),
         modulus_scale=model["muscle"]["modulus_scale"],
-        joint={k: v for k, v in model["joint"].items() if k != "kind"},
+        joint={k: v for k, v in model["joint"].items() if k != "kind" or v == "mass"},
         inertia=arm["inertia"],
         first_moment=arm["first_moment"],
         length=arm["length"],
@@ -102,6 +104,7 @@ def to_parameters(model: dict[str, Any]) -> Parameters:
         gravity=arm["gravity"],
         pressure_zero=model["sensors"]["pressure_zero"],
         angle_zero=model["sensors"]["angle_zero"],
+        **kind,
     )
 
 

@@ -66,7 +66,7 @@ class Effects:
         order = {
             name: i for i, name in enumerate((*_SHAPERS, *(i for i in TYPES if i not in _SHAPERS)))
         }
-        self.items = tuple(sorted(effects, key=lambda e: order[e.id]))
+        self.items = tuple(sorted(effects, key=lambda e: order.get(e.id, len(order))))
         if len({e.id for e in effects}) != len(effects):
             raise ValueError("an effect is given twice")
 

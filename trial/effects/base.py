@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 
 if TYPE_CHECKING:
-    from ..geometry import JointTables
+    from ..geometry import JointTables, RigidTables
     from ..plant import Parameters
 
 State = list[float]
@@ -42,7 +42,7 @@ class Env:
     """Plant that an effect is put into; `clock` is the index of the state that holds the time."""
 
     par: Parameters
-    tables: JointTables
+    tables: JointTables | RigidTables
     clock: int
 
 
@@ -141,6 +141,16 @@ class Effect:
 
     def leak(self, env: Env) -> Port:
         """``f(p, temperature)``: mass flow [kg/s] from the muscle to ambient."""
+        return None
+
+    def seal(self, env: Env) -> Port:
+        """``f(p, angle)``: mass flow [kg/s] from the muscle to ambient that depends on the
+        angle.
+        """
+        return None
+
+    def swell(self, env: Env) -> Port:
+        """``f(p, angle)``: factor on the rate of the muscle pressure."""
         return None
 
     def gear(self, env: Env) -> Port:

@@ -1,0 +1,250 @@
+"""Runs the recordings of a case with any effects, and measures what a refit leaves of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..effects import Effect, Effects
+from ..plant import Plant
+from ..recording import CHANNELS, Array, Noise, Record, follow, run
+from ..strength import FIRST, STRENGTHS
+from .design import Spec
+from .drive import Driver, course
+from .families import most
+from .rigs import RIGS, nominal, parameters_of
+
+#: part of a tolerance for the differences of the refit, and time between two of its rows [s]
+_STEP, _EVERY = 0.1, 0.05
+#: how near to its wanted size an effect must come, in how many runs
+NEAR, TRIES = 0.15, 7
+Measured = dict[int, tuple[Record, Array]]
+
+
+def put(model: dict[str, Any], values: dict[str, float]) -> dict[str, Any]:
+    """Copy of a nested model with other values, by dotted name."""
+    changed = {k: dict(v) if isinstance(v, dict) else v for k, v in model.items()}
+    for name, value in values.items():
+        section, key = name.split(".")
+        changed[section][key] = value
+    return changed
+
+
+class Bench:
+    """The recordings of one case.
+
+    Parameters
+    ----------
+    spec : Spec
+        The case.
+    true : dict
+        The true nested model.
+    tolerance : dict
+        Standard deviations by dotted name.
+    noise : Noise
+        Transducers.
+    """
+
+    def __init__(
+        self, spec: Spec, true: dict[str, Any], tolerance: dict[str, float], noise: Noise
+    ) -> None:
+        self.spec, self.true, self.tolerance, self.noise = spec, true, tolerance, noise
+        self.rig, self.step = RIGS[spec.rig], spec.lab.sample_time
+        self.par = parameters_of(true, self.rig)
+        roles = [role for _, role in spec.recordings]
+        self.fit = [i for i, role in enumerate(roles) if role == "fit"]
+        self.held = [i for i, role in enumerate(roles) if role != "fit"] or self.fit
+        self.floor = noise.floor()
+        _, _, believed = nominal(spec.rig)
+        self.drives: list[tuple[Any, Any, Array | None]] = []
+        self.supply: list[float] = []
+        start = self.par.supply_pressure
+        sigma = tolerance.get("supply.initial_pressure", 0.0)
+        for i, (name, _) in enumerate(spec.recordings):
+            own = np.random.default_rng([spec.seed, i, 77])
+            if spec.rig == "blow_down":
+                n = round(spec.duration / self.step)
+                self.supply.append(start * (1.0 - 0.12 * i) + float(own.uniform(-1.0, 1.0)) * sigma)
+                self.drives.append((None, None, np.full(n, -1.0)))
+                continue
+            self.supply.append(start + float(own.uniform(-1.0, 1.0)) * sigma)
+            shape = course(self.rig, name, spec.duration, self.step, own)
+            driver = Driver(believed, self.rig, self.step * spec.lab.held, own)
+            self.drives.append((shape, driver, None))
+        self._columns: dict[str, dict[int, Array]] = {}
+
+    def run(
+        self, effects: Sequence[Effect], model: dict[str, Any] | None = None
+    ) -> dict[int, Record]:
+        """Every recording of the plant with effects; of another model than the true one."""
+        par = self.par if model is None else parameters_of(model, self.rig)
+        plant = Plant(par, Effects(*effects))
+        found: dict[int, Record] = {}
+        for i, (shape, driver, command) in enumerate(self.drives):
+            rng = np.random.default_rng([self.spec.seed, i, 78])
+            start = None
+            if command is not None:
+                start = plant.initial(self.supply[i] + par.ambient, 2.0e5, 0.0, 0.0, 1000.0 * i)
+                shape, driver = _still(len(command)), _nobody
+            found[i] = run(
+                plant, shape, driver, command, self.supply[i], self.noise, rng, i,
+                self.step, self.spec.lab.held, start,
+            )  # fmt: skip
+            if not np.isfinite(found[i].clean).all():
+                raise ArithmeticError("the run left the numbers")
+        return found
+
+    def against(self, records: dict[int, Record], model: dict[str, Any]) -> Measured:
+        """How far records lie from the plant of a model without effects, in every channel."""
+        bare = Plant(parameters_of(model, self.rig))
+        return {i: (r, r.clean - self._follow(bare, r, i)) for i, r in records.items()}
+
+    def _follow(
+        self, plant: Plant, record: Record, index: int, shift: tuple[float, float] = (0.0, 0.0)
+    ) -> Array:
+        return follow(plant, record, index, shift, sample_time=self.step)
+
+    def prepare(self) -> None:
+        """Sensitivities to every parameter, on the recordings of the plant without effects."""
+        plain = self.run(())
+        base = Plant(self.par)
+        every = self.every
+        start = {i: self._follow(base, r, i)[::every] for i, r in plain.items()}
+        for name, sigma in self.tolerance.items():
+            section, key = name.split(".")
+            if key == "initial_pressure":
+                continue
+            step = _STEP * sigma
+            plant = Plant(
+                parameters_of(put(self.true, {name: self.true[section][key] + step}), self.rig)
+            )
+            # a zero of a transducer also moves the state that a window seems to start from
+            sign = {"pressure_zero": (-step, 0.0), "angle_zero": (0.0, -step)}
+            shift = sign.get(key, (0.0, step if key == "length_zero" else 0.0))
+            self._columns[name] = {
+                i: (self._follow(plant, r, i, shift)[::every] - start[i]) / _STEP
+                for i, r in plain.items()
+            }
+
+    @property
+    def every(self) -> int:
+        """Samples between two rows of the refit."""
+        return max(1, round(_EVERY / self.step))
+
+    def left(self, measured: Measured, without: Sequence[str] = ()) -> dict[str, float]:
+        """What of deviations is left, by channel, in units of the noise, on the recordings that are
+        held out, when the recordings to fit are refitted with the tolerances as priors.
+
+        Of one recording alone, on itself. Parameters in `without` stay. Every window of 2 s counts
+        as one observation per channel, since the deviations in it are coloured.
+        """
+        if not self._columns:
+            self.prepare()
+        names = [n for n in self._columns if n not in without]
+        every = self.every
+        weight = math.sqrt(every * self.step / 2.0) / self.floor
+        shown = self.shown
+        thin = {i: moved[::every] for i, (_, moved) in measured.items()}
+        rows = np.concatenate([(weight * thin[i])[:, shown].ravel() for i in self.fit])
+        matrix = np.column_stack(
+            [
+                np.concatenate([(weight * self._columns[n][i])[:, shown].ravel() for i in self.fit])
+                for n in names
+            ]
+        )
+        size = len(names)
+        z = np.linalg.lstsq(
+            np.vstack([matrix, np.eye(size)]), np.concatenate([rows, np.zeros(size)]), rcond=None
+        )[0]
+        worst = np.zeros(3)
+        for i in self.held:
+            rest = thin[i] - sum(v * self._columns[n][i] for v, n in zip(z, names, strict=True))
+            worst = np.maximum(worst, np.sqrt((rest**2).mean(axis=0)) / self.floor)
+        return {CHANNELS[i]: float(worst[i]) for i in shown}
+
+    @property
+    def shown(self) -> list[int]:
+        """Numbers of the channels that the log has."""
+        found = [0]
+        if self.rig.name != "blow_down" and self.spec.lab.missing != "supply_pressure":
+            found.append(1)
+        return [*found, 2] if "muscle" in self.rig.blocks else found
+
+    def scale(self, effect: Effect, target: float) -> tuple[float, float]:
+        """Factor on an effect, and what a refit then leaves of it alone [noises].
+
+        The size nearest to the target of those that the plant survives, within what is physical.
+        """
+        bound = most(effect)
+
+        def reached(factor: float) -> float:
+            try:
+                records = self.run([effect.scaled(factor)])
+                return max(self.left(self.against(records, self.true)).values())
+            except (ArithmeticError, ValueError, OverflowError):
+                return math.inf
+
+        start = 2.0 * FIRST.get(effect.id, 1.0) * target / STRENGTHS["medium"]
+        return search(reached, target, bound, start)
+
+
+def search(
+    reached: Callable[[float], float], target: float, bound: float, start: float
+) -> tuple[float, float]:
+    """Factor whose reach is nearest to a target in ratio, and that reach; infinite ones are passed.
+
+    Raises
+    ------
+    ArithmeticError
+        No factor has a finite reach.
+    """
+    low: tuple[float, float] | None = None
+    high: tuple[float, float] | None = None
+    best: tuple[float, float] | None = None
+    factor = min(start, bound)
+    for _ in range(TRIES):
+        found = max(reached(factor), 1.0e-9)
+        x, y = math.log(factor), min(math.log(found / target), 3.0)
+        if math.isfinite(found):
+            if best is None or abs(y) < abs(math.log(best[1] / target)):
+                best = (factor, found)
+            if abs(found / target - 1.0) <= NEAR or (found < target and factor >= bound):
+                break
+        if y < 0.0:
+            low = (x, y)
+        else:
+            high = (x, y)
+        if low and high:
+            share = -low[1] / (high[1] - low[1])
+            x = low[0] + min(max(share, 0.15), 0.85) * (high[0] - low[0])
+        else:
+            x -= min(max(y, -3.0), 3.0)
+        factor = min(math.exp(x), bound)
+    if best is None:
+        raise ArithmeticError("no size of the effect can be run")
+    return best
+
+
+class _Nobody:
+    """Where nothing is controlled."""
+
+    null = 0.0
+
+    def reset(self) -> None:
+        """Nothing to forget."""
+
+    def __call__(self, *_: Any) -> float:
+        return 0.0
+
+
+_nobody = _Nobody()
+
+
+def _still(count: int) -> Any:
+    from ..excitation import Excitation
+
+    zero = np.zeros(count)
+    return Excitation(zero, zero.astype(bool), zero, zero.astype(bool))

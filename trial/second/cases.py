@@ -1,0 +1,270 @@
+"""Make the cases of the second plan: files for the diagnosis, and the key with every size."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..concealed import Case
+from ..effects import Effect, Setting
+from ..recording import CHANNELS, Noise
+from ..rigfile import draw_parameters
+from .bench import Bench, put
+from .design import Spec
+from .errors import ModelError, model_errors
+from .families import BY_LABEL, UNLISTED, Form
+from .labs import Hole, holes, noise_of, table
+from .rigs import RIGS, nominal
+
+SCHEMA = "pamrs.trial-key/2"
+#: noises that a parameter far off is to leave
+VISIBLE = 3.0
+#: block of the rig in which an effect of a block of the plant shows, and the channel of that block
+_SHOWS = {"supply": "supply", "valve": "chamber", "line": "chamber", "chamber": "chamber"}
+_CHANNEL = {"supply": "supply_pressure", "chamber": "muscle_pressure", "arm": "joint_angle"}
+_SENSORS = {
+    "pressure_lag": "chamber",
+    "clock_skew": "chamber",
+    "model_error.muscle_pressure": "chamber",
+}
+
+
+def block_of(effect: Effect) -> str:
+    """Block of the rig in which an effect shows: supply, chamber or arm."""
+    return _SENSORS.get(effect.id) or _SHOWS.get(effect.block, "arm")
+
+
+def case_toml(recordings: tuple[tuple[str, str], ...]) -> str:
+    """The list of recordings of a case."""
+    parts = ['schema = "pamrs.case/1"\nrig = "rig.toml"\n']
+    parts += [f'[[recording]]\nfile = "{n}.csv"\nrole = "{role}"\n' for n, role in recordings]
+    return "\n".join(parts)
+
+
+def _chosen(
+    spec: Spec, bench: Bench, rng: np.random.Generator
+) -> tuple[list[Effect], list[dict[str, Any]]]:
+    """The effects of a case at their sizes, and what the key says of each."""
+    setting = Setting(
+        len(spec.recordings),
+        spec.duration,
+        float(np.median(bench.supply)),
+        bench.par.payload or 10.0,
+        bench.par.coulomb,
+    )
+    effects: list[Effect] = []
+    told: list[dict[str, Any]] = []
+    for label in spec.forms:
+        form = BY_LABEL[label]
+        best: tuple[float, Effect] | None = None
+        # an effect that does not come into play in these recordings is drawn again
+        for _ in range(2):
+            effect = form.draw(rng, setting)
+            try:
+                factor, reached = bench.scale(effect, spec.strength)
+            except ArithmeticError:
+                continue
+            if best is None or reached > best[0]:
+                best = reached, effect.scaled(factor)
+            if reached > 0.5 * spec.strength:
+                break
+        if best is None:
+            raise ArithmeticError(f"{spec.name}: {label} cannot be run on {spec.rig}")
+        effects.append(best[1])
+        told.append(_entry(form, best[1], best[0], spec, bench))
+    return effects, told
+
+
+def _entry(form: Form, effect: Effect, reached: float, spec: Spec, bench: Bench) -> dict[str, Any]:
+    """What the key says of one effect."""
+    return {
+        "id": form.family,
+        "form": form.name,
+        "mark": form.mark,
+        "first_catalogue": form.first,
+        "block": block_of(effect),
+        "wanted": spec.strength,
+        "reached": reached,
+        "parameters": effect.to_dict(),
+        "catalogue_parameters": form.truths(effect, bench.par) if form.truths else {},
+    }
+
+
+def _baseline(spec: Spec, noise: Noise) -> tuple[Bench, dict[str, float], dict[str, float]]:
+    """The rig without effects, by how many tolerances each parameter is off, and which is far off:
+    the first of those that the spec proposes of which a refit leaves enough to be seen, else the
+    one that leaves most.
+    """
+    model, tolerance, _ = nominal(spec.rig)
+    drawn = {k: v for k, v in tolerance.items() if not k.endswith("initial_pressure")}
+    best: tuple[float, Bench, dict[str, float], dict[str, float]] | None = None
+    for one in spec.wrong or (None,):
+        wrong = dict([one]) if one else {}
+        rng = np.random.default_rng([spec.seed, 20260704])
+        true, moved = draw_parameters("none", model, drawn, rng, wrong)
+        bench = Bench(spec, true, tolerance, noise)
+        left = max((max(_wrong_left(bench, n, model).values()) for n in wrong), default=0.0)
+        if best is None or left > best[0]:
+            best = left, bench, moved, wrong
+        if left >= VISIBLE:
+            break
+    assert best is not None
+    return best[1:]
+
+
+def _wrong_left(bench: Bench, name: str, model: dict[str, Any]) -> dict[str, float]:
+    """What a parameter that is far off leaves, all others refitted [noises by channel]."""
+    section, key = name.split(".")
+    plain = bench.against(bench.run(()), put(bench.true, {name: model[section][key]}))
+    return bench.left(plain, (name,))
+
+
+def make(spec: Spec, rig: Path | None = None) -> Case:
+    """Make one case in memory; the same spec gives the same bytes. `rig` is not used: a spec names
+    its own.
+    """
+    model = nominal(spec.rig)[0]
+    kind = RIGS[spec.rig]
+    noise = noise_of(spec.lab, kind, np.random.default_rng([spec.seed, 20260701]))
+    bench, moved, wrong = _baseline(spec, noise)
+    true = bench.true
+    effects, told = _chosen(spec, bench, np.random.default_rng([spec.seed, 20260702]))
+    gear = not {"tendon_compliance", "moment_arm_error"} & {e.id for e in effects}
+    weight = bench.par.weight if "muscle" in kind.blocks else 0.0
+    own = np.random.default_rng([spec.seed, 20260703])
+    errors = model_errors(kind, spec.percent, weight, own, gear)
+    effects, errors, shrunk = _survives(bench, effects, errors)
+    records = bench.run([*effects, *errors])
+    terms = _terms(bench, told, effects, errors, wrong, model)
+    files, lost = _tables(spec, bench, records)
+    key: dict[str, Any] = {
+        "schema": SCHEMA,
+        "case": spec.name,
+        "spec": spec.to_dict(),
+        "verdict": _verdict(spec, errors),
+        "effects": told,
+        "together": shrunk,
+        "model_error": {
+            "percent": spec.percent,
+            "stated": spec.stated,
+            "sizes": {e.id.split(".")[1]: {**e.to_dict(), "block": block_of(e)} for e in errors},
+        },
+        "wrong_parameters": {
+            name: {
+                "nominal": model[name.split(".")[0]][name.split(".")[1]],
+                "value": true[name.split(".")[0]][name.split(".")[1]],
+                "tolerances": z,
+            }
+            for name, z in wrong.items()
+        },
+        "terms": terms,
+        "moved_tolerances": moved,
+        "noise": asdict(noise),
+        "lost": lost,
+    }
+    files = {
+        "rig.toml": kind.path.read_text(encoding="utf-8"),
+        **files,
+        "case.toml": case_toml(spec.recordings),
+    }
+    return Case(spec.name, json.dumps(key, indent=1) + "\n", files)
+
+
+def _survives(
+    bench: Bench, effects: list[Effect], errors: list[ModelError]
+) -> tuple[list[Effect], list[ModelError], float]:
+    """Effects and errors that can be run together: all effects smaller by the last number where
+    they cannot.
+    """
+    factor = 1.0
+    for _ in range(6):
+        try:
+            bench.run([*effects, *errors])
+        except (ArithmeticError, ValueError, OverflowError):
+            factor *= 0.6
+            effects = [e.scaled(0.6) for e in effects]
+        else:
+            return effects, errors, factor
+    raise ArithmeticError(f"{bench.spec.name} cannot be run")
+
+
+def _terms(
+    bench: Bench,
+    told: list[dict[str, Any]],
+    effects: list[Effect],
+    errors: list[ModelError],
+    wrong: dict[str, float],
+    model: dict[str, Any],
+) -> list[dict[str, Any]]:
+    """What each thing that is wrong leaves alone, by channel [noises], and its share of all that is
+    left in the channel of its block.
+    """
+    found: list[dict[str, Any]] = []
+
+    def add(block: str, kind: str, name: str, left: dict[str, float]) -> None:
+        found.append({"block": block, "kind": kind, "id": name, "left": left})
+
+    for entry, effect in zip(told, effects, strict=True):
+        left = bench.left(bench.against(bench.run([effect]), bench.true))
+        add(str(entry["block"]), "effect", str(entry["id"]), left)
+    for block in ("supply", "chamber", "arm"):
+        if group := [e for e in errors if block_of(e) == block]:
+            left = bench.left(bench.against(bench.run(group), bench.true))
+            add(block, "model_error", f"model_error.{block}", left)
+    for name in wrong:
+        block = _SHOWS.get(name.split(".")[0], "arm")
+        add(block, "parameter", name, _wrong_left(bench, name, model))
+    for block, channel in _CHANNEL.items():
+        group_ = [t for t in found if t["block"] == block]
+        whole = sum(t["left"].get(channel, 0.0) ** 2 for t in group_)
+        for term in group_:
+            part = term["left"].get(channel, 0.0) ** 2
+            term["share"] = part / whole if whole > 0.0 else None
+    return found
+
+
+def _verdict(spec: Spec, errors: list[ModelError]) -> str:
+    """The right verdict on the whole case."""
+    marks = [BY_LABEL[f].mark for f in spec.forms]
+    if any(m != UNLISTED for m in marks):
+        return "effects"
+    if marks:
+        return "unlisted"
+    return "parameters" if spec.wrong else "unlisted" if errors and not spec.stated else "none"
+
+
+def _tables(
+    spec: Spec, bench: Bench, records: dict[int, Any]
+) -> tuple[dict[str, str], dict[str, Any]]:
+    """CSV files by name, and the samples that each lost."""
+    files: dict[str, str] = {}
+    lost: dict[str, Any] = {}
+    channels = [CHANNELS[i] for i in bench.shown]
+    for i, (name, _) in enumerate(spec.recordings):
+        rng = np.random.default_rng([spec.seed, i, 79])
+        gone: list[Hole] = holes(spec.lab, len(records[i].time), channels, rng)
+        rest = float(bench.true.get("muscle", {}).get("rest_length", 0.0))
+        files[f"{name}.csv"], _ = table(records[i], bench.rig, spec.lab, gone, rest)
+        if gone:
+            lost[name] = [asdict(h) for h in gone]
+    return files, lost
+
+
+def complete(folder: Path, spec: Spec, digests: dict[str, str]) -> bool:
+    """Whether a case, its key and its digest are there and belong to a spec."""
+    key = folder / "keys" / f"{spec.name}.json"
+    files = [
+        folder / "cases" / spec.name / f
+        for f in ("case.toml", "rig.toml", *(f"{n}.csv" for n, _ in spec.recordings))
+    ]
+    if spec.name not in digests or not key.is_file() or not all(f.is_file() for f in files):
+        return False
+    content = key.read_bytes()
+    if hashlib.sha256(content).hexdigest() != digests[spec.name]:
+        return False
+    return bool(json.loads(content).get("spec") == json.loads(json.dumps(spec.to_dict())))

@@ -1,0 +1,372 @@
+"""Scores of the second plan by stratum, beside their targets, as Markdown and as JSON."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from statistics import median
+from typing import Any
+
+from ..summary import percent, table
+from ..targets import mean_interval, median_interval, wilson
+from .families import OTHER
+from .marks import BLOCKS, Mark
+
+SCHEMA = "pamrs.trial-scores/2"
+BINS = (0.0, 0.5, 0.7, 0.8, 0.9, 0.95, 0.99, 1.0)
+#: shares of a stratum, by name: what it counts in a case (several entries of some)
+Counts = Callable[[Mark], Sequence[bool]]
+
+
+def _one(name: str) -> Counts:
+    def count(m: Mark) -> Sequence[bool]:
+        value = getattr(m, name)
+        return () if value is None else (bool(value),)
+
+    return count
+
+
+SHARES: dict[str, Counts] = {
+    "leading name right": _one("leading"),
+    "set holds the truth": _one("holds"),
+    "wrong parameter named": _one("wrong"),
+    "false name": _one("false_name"),
+    "unlisted right": _one("unlisted"),
+    "none or parameters, error stated": _one("calm"),
+    "interval holds": lambda m: m.inside,
+    "share within 15 points": lambda m: m.shares,
+}
+STRATA = (
+    "truth",
+    "strength",
+    "own channel",
+    "effects",
+    "placing",
+    "model error",
+    "form",
+    "first catalogue",
+    "block",
+    "rig",
+    "rate",
+    "bits",
+    "log",
+)
+
+
+def share_of(marks: Iterable[Mark], counts: Counts) -> tuple[int, int]:
+    """Hits and cases."""
+    told = [ok for m in marks for ok in counts(m)]
+    return sum(told), len(told)
+
+
+def gap_closed(marks: Iterable[Mark]) -> list[float]:
+    """Gaps closed of those cases that have one."""
+    return [m.gap for m in marks if m.gap is not None]
+
+
+def reliability(marks: Iterable[Mark]) -> tuple[list[dict[str, float]], float | None]:
+    """Bins of the stated probability of the leading hypothesis of every group of blocks, and the
+    mean distance of stated and true.
+    """
+    claims = [c for m in marks for c in m.claims]
+    bins: list[dict[str, float]] = []
+    for low, high in zip(BINS, BINS[1:], strict=False):
+        inside = [(p, ok) for p, ok in claims if low <= p < high or p == high == BINS[-1]]
+        if inside:
+            stated = sum(p for p, _ in inside) / len(inside)
+            hits = sum(ok for _, ok in inside)
+            bins.append(
+                {"low": low, "high": high, "stated": stated, "hits": hits, "n": len(inside)}
+            )
+    off = sum(abs(b["stated"] * b["n"] - b["hits"]) for b in bins)
+    return bins, off / len(claims) if claims else None
+
+
+def percentile(values: Sequence[float], part: float) -> float | None:
+    """The smallest value that this part of them does not exceed."""
+    ordered = sorted(values)
+    return ordered[min(len(ordered) - 1, int(part * len(ordered)))] if ordered else None
+
+
+def measures(marks: Sequence[Mark]) -> dict[str, Any]:
+    """Everything that is measured of some cases."""
+    found: dict[str, Any] = {
+        "cases": len(marks),
+        "missing": sum(m.verdict == "missing" for m in marks),
+    }
+    for name, counts in SHARES.items():
+        k, n = share_of(marks, counts)
+        found[name] = {"hits": k, "n": n, **(_interval(k, n) if n else {})}
+    gaps, seconds = gap_closed(marks), [m.seconds for m in marks if m.seconds is not None]
+    found["gap closed"] = {"n": len(gaps), "median": median(gaps) if gaps else None}
+    bins, off = reliability(marks)
+    found["reliability"] = {"bins": bins, "distance": off, "n": sum(int(b["n"]) for b in bins)}
+    found["seconds"] = {
+        "n": len(seconds),
+        "median": median(seconds) if seconds else None,
+        "95 %": percentile(seconds, 0.95),
+    }
+    found["by block"] = {
+        block: _by_block([b for m in marks for b in m.blocks if block in b.block.split("+")])
+        for block in BLOCKS
+    }
+    return found
+
+
+def _interval(k: int, n: int) -> dict[str, float]:
+    low, high = wilson(k, n)
+    return {"share": k / n, "low": low, "high": high}
+
+
+def _by_block(blocks: list[Any]) -> dict[str, Any]:
+    told = [b.leading for b in blocks if b.leading is not None]
+    false = [b.false_name for b in blocks]
+    return {
+        "leading name right": {"hits": sum(told), "n": len(told)},
+        "false name": {"hits": sum(false), "n": len(false)},
+    }
+
+
+@dataclass(frozen=True)
+class Target:
+    """A target of the second design, and what was measured."""
+
+    name: str
+    over: str
+    wanted: float
+    least: bool
+    measured: float | None
+    interval: tuple[float, float] | None
+    n: int
+    unit: str = "%"
+
+    @property
+    def met(self) -> bool | None:
+        """Whether it is met; None where nothing was measured."""
+        if self.measured is None:
+            return None
+        return self.measured >= self.wanted if self.least else self.measured <= self.wanted
+
+    def to_dict(self) -> dict[str, Any]:
+        """For the JSON of a score."""
+        return {**self.__dict__, "met": self.met}
+
+
+def targets(marks: Sequence[Mark]) -> list[Target]:
+    """Targets of the second design: over what leaves 3 noises, apart for little and much model
+    error, and beside model error that is smaller than the effect.
+    """
+    found: list[Target] = []
+    little = [m for m in marks if "3 %" not in m.tags["model error"]]
+    much = [m for m in marks if "3 %" in m.tags["model error"]]
+    for over, group, name, false in (
+        ("model error of 0 and 1 %", little, 0.90, 0.01),
+        ("the same, not below the model error", [m for m in little if m.above], 0.90, 0.01),
+        ("model error of 3 %", much, 0.80, 0.03),
+    ):
+        seen = [m for m in group if m.seen]
+        words = f"3 noises and more, {over}"
+        other = [m for m in seen if m.tags["form"] == (OTHER,)]
+
+        def share(
+            title: str, wanted: float, chosen: list[Mark], counts: Counts, least: bool, where: str
+        ) -> None:
+            k, n = share_of(chosen, counts)
+            measured, interval = (k / n, wilson(k, n)) if n else (None, None)
+            found.append(Target(title, where, wanted, least, measured, interval, n))
+
+        share("leading name right", name, seen, SHARES["leading name right"], True, words)
+        share(
+            "leading name right, forms left out", min(name, 0.85), other,
+            SHARES["leading name right"], True, words,
+        )  # fmt: skip
+        if group is much:
+            share("false name", false, much, SHARES["false name"], False, over)
+            continue
+        for title, wanted in (
+            ("set holds the truth", 0.98),
+            ("wrong parameter named", 0.95),
+            ("interval holds", 0.90),
+            ("share within 15 points", 1.0),
+            ("unlisted right", 0.85),
+        ):
+            share(title, wanted, seen, SHARES[title], True, words)
+        if group is little:
+            share("false name", false, little, SHARES["false name"], False, over)
+            share(
+                "none or parameters, error stated", 0.99, list(marks),
+                SHARES["none or parameters, error stated"], True, "healthy",
+            )  # fmt: skip
+        gaps = gap_closed(m for m in seen if m.leading is not None)
+        found.append(
+            Target(
+                "median gap closed",
+                words,
+                0.9,
+                True,
+                median(gaps) if gaps else None,
+                median_interval(gaps),
+                len(gaps),
+                "",
+            )  # fmt: skip
+        )
+    return [*found, *_overall(marks)]
+
+
+def _overall(marks: Sequence[Mark]) -> list[Target]:
+    """Reliability and time."""
+    bins, off = reliability(marks)
+    apart = [abs(p - ok) for m in marks for p, ok in m.claims]
+    seconds = [m.seconds for m in marks if m.seconds is not None]
+    middle = median(seconds) if seconds else None
+    late = percentile(seconds, 0.95)
+    n = len(seconds)
+    return [
+        Target("stated less true, mean", "all groups of blocks", 0.05, False, off,
+               None if off is None else _about(off, mean_interval(apart)),
+               sum(int(b["n"]) for b in bins)),
+        Target("seconds, median", "all", 10.0, False, middle, median_interval(seconds), n, "s"),
+        Target("seconds, 95 %", "all", 30.0, False, late, None, n, "s"),
+    ]  # fmt: skip
+
+
+def _about(off: float, spread: tuple[float, float] | None) -> tuple[float, float] | None:
+    """A rough interval of the distance, as wide as that of the mean claim."""
+    if spread is None:
+        return None
+    half = 0.5 * (spread[1] - spread[0])
+    return max(off - half, 0.0), min(off + half, 1.0)
+
+
+def scores(marks: Sequence[Mark]) -> dict[str, Any]:
+    """All scores as plain data: the whole, every stratum, targets and cases."""
+    strata: dict[str, Any] = {}
+    for name in STRATA:
+        values = sorted({v for m in marks for v in m.tags.get(name, ())}, key=_order)
+        strata[name] = {
+            v: measures([m for m in marks if v in m.tags.get(name, ())]) for v in values
+        }
+    return {
+        "schema": SCHEMA,
+        "all": measures(marks),
+        "strata": strata,
+        "leave_form_out": measures([m for m in marks if m.tags["form"] == (OTHER,)]),
+        "targets": [t.to_dict() for t in targets(marks)],
+        "cases": [m.to_dict() for m in marks],
+    }
+
+
+def _order(value: str) -> tuple[float, str]:
+    """Numbers by size, words by name."""
+    head = value.split(" ")[0]
+    try:
+        return float(head), value
+    except ValueError:
+        return 1.0e9, value
+
+
+def _cell(told: dict[str, Any]) -> str:
+    if not told["n"]:
+        return "-"
+    return f"{told['hits']} of {told['n']}; {percent(told['hits'], told['n'])}"
+
+
+def _line(name: str, told: dict[str, Any]) -> tuple[str, ...]:
+    gap, seconds, off = told["gap closed"], told["seconds"], told["reliability"]["distance"]
+    return (
+        name,
+        str(told["cases"]),
+        *(_cell(told[n]) for n in SHARES),
+        "-" if gap["median"] is None else f"{gap['median']:.2f}",
+        "-" if off is None else f"{off:.2f}",
+        "-" if seconds["median"] is None else f"{seconds['median']:.0f}, {seconds['95 %']:.0f}",
+    )
+
+
+def _target_rows(told: Sequence[dict[str, Any]]) -> str:
+    body = []
+    for t in told:
+        unit, factor = t["unit"], 100.0 if t["unit"] == "%" else 1.0
+
+        def show(value: float, unit: str = unit, factor: float = factor) -> str:
+            return f"{factor * value:.3g} {unit}".strip()
+
+        bound = f"{'at least' if t['least'] else 'at most'} {show(t['wanted'])}"
+        if t["measured"] is None:
+            body.append((t["name"], t["over"], bound, "-", "-", "0", "no case"))
+            continue
+        span = "-" if t["interval"] is None else " to ".join(show(v) for v in t["interval"])
+        word = "met" if t["met"] else "**missed**"
+        body.append((t["name"], t["over"], bound, show(t["measured"]), span, str(t["n"]), word))
+    head = ("measure", "over", "target", "measured", "95 % interval", "n", "")
+    return table(head, body)
+
+
+def markdown(told: dict[str, Any]) -> str:
+    """All tables of :func:`scores`."""
+    head = ("stratum", "cases", *SHARES, "gap closed", "stated less true", "seconds, 95 %")
+    parts = [
+        "## Targets\n",
+        _target_rows(told["targets"]),
+        "\nMet or missed by the measured value; with few cases the interval says little.\n",
+        "## Strata\n",
+        "Of so many; Wilson intervals of 95 %. A case may stand in several lines. Gap closed: "
+        "median. Stated less true: mean distance of the leading probability of each group of "
+        "blocks.\n",
+        table(head, [_line("all", told["all"]), _line("leave form out", told["leave_form_out"])]),
+    ]
+    for name, values in told["strata"].items():
+        if values:
+            rows = [_line(v, m) for v, m in values.items()]
+            parts += [f"\n### By {name}\n", table((name, *head[1:]), rows)]
+    parts += ["\n## By block of the rig\n", _block_rows(told["all"]["by block"])]
+    parts += ["\n## Stated probabilities\n", _bins(told["all"]["reliability"]["bins"])]
+    listing = [
+        (c["case"], ", ".join(c["tags"]["rig"]), c["truth"], c["said"], _outcome(c))
+        for c in told["cases"]
+    ]
+    parts += ["\n## Every case\n", table(("case", "rig", "truth", "said", ""), listing)]
+    return "\n".join(parts) + "\n"
+
+
+def _block_rows(told: dict[str, Any]) -> str:
+    rows = [
+        (block, _cell(entry["leading name right"]), _cell(entry["false name"]))
+        for block, entry in told.items()
+    ]
+    return table(("block", "leading name of the block right", "name where nothing acts"), rows)
+
+
+def _bins(bins: Sequence[dict[str, float]]) -> str:
+    rows = [
+        (
+            f"{b['low']:.2f} to {b['high']:.2f}",
+            f"{b['stated']:.3f}",
+            percent(int(b["hits"]), int(b["n"])),
+            str(int(b["n"])),
+        )
+        for b in bins
+    ]
+    return table(("stated", "mean stated", "true", "groups"), rows) if rows else "None stated."
+
+
+def _outcome(case: dict[str, Any]) -> str:
+    """What was right and what not, in words."""
+    words = {
+        "leading": ("name right", "name wrong"),
+        "wrong": ("parameter named", "parameter not named"),
+        "unlisted": ("unlisted right", "not called unlisted"),
+        "false_name": ("false name", "no false name"),
+    }
+    told = [
+        words[name][0 if case[name] else 1]
+        for name in ("leading", "wrong", "unlisted", "false_name")
+        if case[name] is not None
+    ]
+    return ", ".join(told)
+
+
+def to_json(told: dict[str, Any]) -> str:
+    """Scores as JSON, so that two tools can be laid side by side."""
+    return json.dumps(told, indent=1) + "\n"
