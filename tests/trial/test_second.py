@@ -13,7 +13,7 @@ from pamrs.effects import CATALOGUE
 from pamrs.simulation import replay
 from trial.__main__ import main
 from trial.concealed import store
-from trial.effects import Effects, Setting
+from trial.effects import LISTED, Effects, Setting
 from trial.plant import Plant
 from trial.second.bench import Bench, search
 from trial.second.cases import SCHEMA, complete, make
@@ -99,8 +99,8 @@ def test_marks_of_the_forms():
         assert (form.family in CATALOGUE) == (form.mark != UNLISTED)
         assert not (form.first and form.mark != KNOWN)
     families = {m: {f.family for f in FORMS if f.mark == m} for m in MARKS}
-    # every family but the ones below can be scored with its forms left out
-    assert families[KNOWN] == families[OTHER] == set(CATALOGUE) - {"supply_regulator_deadband"}
+    assert families[OTHER] <= families[KNOWN] == set(LISTED)
+    assert len(families[OTHER]) >= 20
     assert set(LIMITS) <= families[KNOWN] | families[UNLISTED]
 
 

@@ -37,6 +37,17 @@ SHARES: dict[str, Counts] = {
     "interval holds": lambda m: m.inside,
     "share within 15 points": lambda m: m.shares,
 }
+#: what the second design asks of them, and whether that is the least
+WANTED: dict[str, tuple[float, bool]] = {
+    "leading name right": (0.90, True),
+    "set holds the truth": (0.98, True),
+    "wrong parameter named": (0.95, True),
+    "false name": (0.01, False),
+    "unlisted right": (0.85, True),
+    "none or parameters, error stated": (0.99, True),
+    "interval holds": (0.90, True),
+    "share within 15 points": (1.0, True),
+}
 STRATA = (
     "truth",
     "strength",
@@ -185,11 +196,14 @@ def targets(marks: Sequence[Mark]) -> list[Target]:
             share("false name", false, much, SHARES["false name"], False, over)
             continue
         for title, wanted in (
-            ("set holds the truth", 0.98),
-            ("wrong parameter named", 0.95),
-            ("interval holds", 0.90),
-            ("share within 15 points", 1.0),
-            ("unlisted right", 0.85),
+            (t, WANTED[t][0])
+            for t in (
+                "set holds the truth",
+                "wrong parameter named",
+                "interval holds",
+                "share within 15 points",
+                "unlisted right",
+            )
         ):
             share(title, wanted, seen, SHARES[title], True, words)
         if group is little:
@@ -266,10 +280,20 @@ def _order(value: str) -> tuple[float, str]:
         return 1.0e9, value
 
 
-def _cell(told: dict[str, Any]) -> str:
+def _cell(told: dict[str, Any], name: str) -> str:
+    """Hits, cases and share with its interval; in bold where the target is missed."""
     if not told["n"]:
         return "-"
-    return f"{told['hits']} of {told['n']}; {percent(told['hits'], told['n'])}"
+    wanted, least = WANTED[name]
+    share = told["hits"] / told["n"]
+    text = f"{told['hits']} of {told['n']}; {percent(told['hits'], told['n'])}"
+    return text if (share >= wanted if least else share <= wanted) else f"**{text}**"
+
+
+def _asked() -> tuple[str, ...]:
+    """The line of the targets."""
+    words = (f"{'at least' if b else 'at most'} {100.0 * w:g} %" for w, b in WANTED.values())
+    return ("target", "", *words, "0.9", "0.05", "10, 30")
 
 
 def _line(name: str, told: dict[str, Any]) -> tuple[str, ...]:
@@ -277,7 +301,7 @@ def _line(name: str, told: dict[str, Any]) -> tuple[str, ...]:
     return (
         name,
         str(told["cases"]),
-        *(_cell(told[n]) for n in SHARES),
+        *(_cell(told[n], n) for n in SHARES),
         "-" if gap["median"] is None else f"{gap['median']:.2f}",
         "-" if off is None else f"{off:.2f}",
         "-" if seconds["median"] is None else f"{seconds['median']:.0f}, {seconds['95 %']:.0f}",
@@ -313,8 +337,12 @@ def markdown(told: dict[str, Any]) -> str:
         "## Strata\n",
         "Of so many; Wilson intervals of 95 %. A case may stand in several lines. Gap closed: "
         "median. Stated less true: mean distance of the leading probability of each group of "
-        "blocks.\n",
-        table(head, [_line("all", told["all"]), _line("leave form out", told["leave_form_out"])]),
+        "blocks. Bold: this line misses the target, which is asked of 3 noises and more beside at "
+        "most 1 % of model error.\n",
+        table(
+            head,
+            [_asked(), _line("all", told["all"]), _line("leave form out", told["leave_form_out"])],
+        ),
     ]
     for name, values in told["strata"].items():
         if values:
@@ -332,7 +360,7 @@ def markdown(told: dict[str, Any]) -> str:
 
 def _block_rows(told: dict[str, Any]) -> str:
     rows = [
-        (block, _cell(entry["leading name right"]), _cell(entry["false name"]))
+        (block, *(_cell(entry[n], n) for n in ("leading name right", "false name")))
         for block, entry in told.items()
     ]
     return table(("block", "leading name of the block right", "name where nothing acts"), rows)
