@@ -27,12 +27,14 @@ POINTS = 0.15
 @dataclass(frozen=True)
 class BlockMark:
     """One group of blocks of a case: where it is (supply, chamber, arm), whether its leading name
-    is right (None without an effect of a family there), whether it names what is not there.
+    is right (None without an effect of a family there), whether it names what is not there, and the
+    blocks of it where such effects act.
     """
 
     block: str
     leading: bool | None
     false_name: bool
+    acts: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -244,6 +246,7 @@ def _blocks(truth: _Truth, told: _Told) -> tuple[BlockMark, ...]:
                 "+".join(sorted(where)),
                 bool(named) and str(named[0]) in there if there else None,
                 bool(extra) and not there and not set(truth.unlisted) & where,
+                tuple(sorted({block for _, block in truth.listed if block in where})),
             )
         )
     return tuple(found)

@@ -11,7 +11,7 @@ from typing import Any
 from ..summary import percent, table
 from ..targets import mean_interval, median_interval, wilson
 from .families import OTHER
-from .marks import BLOCKS, Mark
+from .marks import BLOCKS, BlockMark, Mark
 
 SCHEMA = "pamrs.trial-scores/2"
 BINS = (0.0, 0.5, 0.7, 0.8, 0.9, 0.95, 0.99, 1.0)
@@ -119,7 +119,7 @@ def measures(marks: Sequence[Mark]) -> dict[str, Any]:
         "95 %": percentile(seconds, 0.95),
     }
     found["by block"] = {
-        block: _by_block([b for m in marks for b in m.blocks if block in b.block.split("+")])
+        block: _by_block(block, [b for m in marks for b in m.blocks if block in b.block.split("+")])
         for block in BLOCKS
     }
     return found
@@ -130,8 +130,9 @@ def _interval(k: int, n: int) -> dict[str, float]:
     return {"share": k / n, "low": low, "high": high}
 
 
-def _by_block(blocks: list[Any]) -> dict[str, Any]:
-    told = [b.leading for b in blocks if b.leading is not None]
+def _by_block(block: str, blocks: list[BlockMark]) -> dict[str, Any]:
+    """Marks of the groups that a block belongs to; names only where an effect acts in the block."""
+    told = [b.leading for b in blocks if b.leading is not None and block in b.acts]
     false = [b.false_name for b in blocks]
     return {
         "leading name right": {"hits": sum(told), "n": len(told)},
@@ -397,4 +398,4 @@ def _outcome(case: dict[str, Any]) -> str:
 
 def to_json(told: dict[str, Any]) -> str:
     """Scores as JSON, so that two tools can be laid side by side."""
-    return json.dumps(told, indent=1) + "\n"
+    return json.dumps(told) + "\n"
