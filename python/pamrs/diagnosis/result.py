@@ -89,6 +89,10 @@ class Diagnosis(Findings):
         each block its ``channel``, ``unit``, and ``fitted`` and ``held_out`` {before, refit, after:
         {noises, size, more_than_noise}}, the residual above the noise, in units of the noise and in
         SI.
+    budget : list of BudgetTerm
+        What of the nominal model's excess over the noise each term takes on held-out recordings:
+        ``block``, ``kind``, ``id``, ``form``, ``share`` with its ``interval``, ``probability``, and
+        what the block keeps after it (``noises``, ``size``, ``unit``).
     unexplained : list of Unexplained
         Blocks with a mismatch that stays unexplained: ``block``, ``channel``, ``unit``, ``noises``,
         ``size`` (SI), and the ``verdict`` of their group.
@@ -189,6 +193,7 @@ class Diagnosis(Findings):
                     lines.append(f"  {name}: these recordings do not determine it")
         for wrong in self.wrong_parameters:
             lines += ["", *textwrap.wrap(words.sentence_of(wrong), 96)]
+        lines += self._summary_budget()
         lines += self._summary_fit()
         for kept in self.unexplained:
             lines += textwrap.wrap(
@@ -209,6 +214,15 @@ class Diagnosis(Findings):
 
     def __repr__(self) -> str:
         return f"Diagnosis({self.case!r}: {self.verdict}; {self.headline})"
+
+    def _summary_budget(self) -> list[str]:
+        """What takes the mismatch of each block."""
+        lines = []
+        for block in dict.fromkeys(term.block for term in self.budget):
+            own = [term for term in self.budget if term.block == block]
+            told = f"Budget of {block}: {words.budget_sentence(own)}"
+            lines += textwrap.wrap(told, 96, subsequent_indent="  ")
+        return ["", *lines] if lines else []
 
     def _summary_fit(self) -> list[str]:
         """Error table of the held-out recordings, else of the fitted ones."""

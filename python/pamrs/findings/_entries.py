@@ -264,6 +264,52 @@ class Unexplained(Entry):
     verdict: str = field(metadata=told("of its group of blocks", enum=VERDICTS[1:]))
 
 
+TERMS = ("parameters", "wrong_parameter", "effect", "form", "unexplained")
+"""Kinds of the terms of a budget."""
+
+
+@dataclass(frozen=True, eq=False)
+class BudgetTerm(Entry):
+    """One term of a block's mismatch budget; the shares of a block add up to 1.
+
+    Attributes
+    ----------
+    block : str
+        The block.
+    kind : str
+        ``parameters`` (inside their tolerances), ``wrong_parameter``, ``effect``, ``form`` (without
+        a name) or ``unexplained``.
+    id : str
+        Id of the effect, or dotted names of the parameters joined by ``+``; else empty.
+    form : str
+        Form of the effect where it is not the usual one.
+    share : float
+        Share of the nominal model's excess variance over the noise that the term takes, after all
+        terms before it; negative where it makes the prediction worse.
+    interval : list of two floats
+        95 % interval of the share.
+    probability : float or None
+        Of the name.
+    noises, size : float
+        What the block keeps after it, in units of the noise and in the channel's unit.
+    unit : str
+        SI unit.
+    """
+
+    block: str
+    kind: str = field(metadata=told(enum=TERMS))
+    id: str
+    form: str
+    share: float = field(
+        metadata=told("of the nominal model's excess variance over the noise, after earlier terms")
+    )
+    interval: list[float] = field(metadata=told("95 % interval of the share", kind="pair"))
+    probability: float | None = field(metadata=told("of the name", kind="probability"))
+    noises: float = field(metadata=told("what the block keeps after it, in units of the noise"))
+    size: float = field(metadata=told("the same in the unit of the channel"))
+    unit: str
+
+
 @dataclass(frozen=True, eq=False)
 class StageError(Entry):
     """Root mean square error of a channel, before and after, SI.

@@ -8,6 +8,7 @@ from pamrs.findings._details import BlockResidual, ConditionMap, NextExperiment,
 from pamrs.findings._entries import (
     VERDICTS,
     BlockVerdict,
+    BudgetTerm,
     EffectFound,
     FitErrors,
     ParameterFound,
@@ -44,6 +45,8 @@ class Findings:
         is missing and nothing has a name). Those of each block are in ``blocks``.
     blocks : list of BlockVerdict
         The verdict of each group of blocks.
+    budget : list of BudgetTerm
+        What of the nominal model's excess over the noise each term takes, block by block.
     unexplained : list of Unexplained
         Blocks with a mismatch that stays unexplained, the largest first.
     wrong_parameters : list of WrongParameter
@@ -98,6 +101,13 @@ class Findings:
         default_factory=list,
         metadata=told(
             "the verdict of each group of blocks that is judged by itself", required=False
+        ),
+    )
+    budget: list[BudgetTerm] = field(
+        default_factory=list,
+        metadata=told(
+            "what of the nominal model's excess over the noise each term takes, block by block",
+            required=False,
         ),
     )
     unexplained: list[Unexplained] = field(

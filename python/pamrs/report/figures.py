@@ -16,7 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
 
-from pamrs.findings import ConditionMap, Curves, Findings, Trace
+from pamrs.findings import BudgetTerm, ConditionMap, Curves, Findings, Trace
 from pamrs.report.text import (
     display_unit,
     format_number,
@@ -27,12 +27,14 @@ from pamrs.report.text import (
     is_number,
     label,
     ranked_probabilities,
+    term_label,
 )
 
 __all__ = [
     "COLOURS",
     "STYLE",
     "blocks_svg",
+    "budget_svg",
     "decimate",
     "legend_above",
     "map_svg",
@@ -385,6 +387,50 @@ def blocks_svg(diagnosis: Findings, prefix: str = "blocks") -> str | None:
         figure = Figure(figsize=(5.6, 1.1 + 0.36 * (len(rows) + 1)), layout="constrained")
         _draw_blocks(figure.subplots(), rows)
         return svg_text(figure, prefix)
+
+
+def budget_svg(diagnosis: Findings, prefix: str = "budget") -> str | None:
+    """Waterfall of each block's budget: from the nominal model's excess down to what stays
+    unexplained; None where no block exceeds the noise.
+    """
+    blocks = list(dict.fromkeys(term.block for term in diagnosis.budget))
+    if not blocks:
+        return None
+    terms = [[t for t in diagnosis.budget if t.block == block] for block in blocks]
+    rows = sum(len(own) + 1 for own in terms)
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(7.2, 0.5 + 0.3 * rows + 0.45 * len(blocks)), layout="constrained")
+        panels = figure.subplots(
+            len(blocks), 1, squeeze=False, height_ratios=[len(own) + 1 for own in terms]
+        )[:, 0]
+        for axes, block, own in zip(panels, blocks, terms, strict=True):
+            _draw_budget(axes, block, own)
+        panels[-1].set_xlabel("share of the nominal model's excess over the noise [%]")
+        return svg_text(figure, prefix)
+
+
+def _draw_budget(axes: Axes, block: str, terms: Sequence[BudgetTerm]) -> None:
+    colours = {"parameters": COLOURS["quiet"], "unexplained": COLOURS["before"]}
+    names = ["nominal model"]
+    axes.barh(0, 100.0, color="#d1d5db", height=0.62)
+    left = 1.0
+    for row, term in enumerate(terms, 1):
+        rest = term.kind == "unexplained"
+        begin = 0.0 if rest else left - term.share
+        colour = colours.get(term.kind, COLOURS["after"])
+        axes.barh(row, 100.0 * term.share, left=100.0 * begin, color=colour, height=0.62)
+        if not rest:
+            ends = [100.0 * (left - share) for share in term.interval]
+            axes.plot(ends, [row, row], color="#1f1f1f", lw=0.9)
+            left -= term.share
+        side = 100.0 * max(begin, begin + term.share)
+        axes.text(side, row, f"  {100 * term.share:.0f} %", va="center", fontsize="small")
+        names.append(term_label(term))
+    axes.set_yticks(range(len(names)), names)
+    axes.set_ylim(len(names) - 0.5, -0.5)
+    axes.set_xlim(min(0.0, 100.0 * min(t.share for t in terms) - 5.0), 118.0)
+    axes.grid(axis="y", visible=False)
+    axes.set_title(label(block), loc="left", fontsize="medium")
 
 
 def _grids(

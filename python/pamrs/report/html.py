@@ -116,6 +116,16 @@ def _blocks(diagnosis: Findings) -> list[dict[str, Any]]:
     return rows
 
 
+def _budgets(diagnosis: Findings) -> list[str]:
+    """The budget of each block in a sentence."""
+    blocks = dict.fromkeys(term.block for term in diagnosis.budget)
+    return [
+        f"{words.label(block)}: "
+        + words.budget_sentence([term for term in diagnosis.budget if term.block == block])
+        for block in blocks
+    ]
+
+
 def _wrong(diagnosis: Findings) -> list[dict[str, Any]]:
     """Values of the rig file that are wrong."""
     rows = []
@@ -373,6 +383,8 @@ def render(diagnosis: Findings) -> str:
         probabilities=_probabilities(diagnosis),
         effects=_effects(diagnosis),
         verdicts=_blocks(diagnosis),
+        budget=_markup(figures.budget_svg(diagnosis)),
+        budgets=_budgets(diagnosis),
         wrong=_wrong(diagnosis),
         kept=[words.kept_sentence(u) for u in diagnosis.unexplained],
         ambiguity=[words.set_label(list(s)) for s in diagnosis.ambiguity],

@@ -3,12 +3,21 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any, TypeGuard
 
 from pamrs.effects import EFFECTS
-from pamrs.findings import BlockVerdict, EffectParameterFound, Findings, Unexplained, WrongParameter
+from pamrs.findings import (
+    BlockVerdict,
+    BudgetTerm,
+    EffectParameterFound,
+    Findings,
+    Unexplained,
+    WrongParameter,
+)
 
 __all__ = [
+    "budget_sentence",
     "display_unit",
     "format_number",
     "format_probability",
@@ -24,6 +33,7 @@ __all__ = [
     "sentence_of",
     "set_label",
     "span95",
+    "term_label",
 ]
 
 _LABELS = {
@@ -343,3 +353,32 @@ def _unnamed(diagnosis: Findings) -> str:
         )
     kept = [kept_sentence(u) for u in diagnosis.unexplained if u.verdict == "unlisted"]
     return "; ".join([f"Physics outside the catalogue acts{place or ' on this rig'}", *kept[:2]])
+
+
+def term_label(term: BudgetTerm) -> str:
+    """Name of a term of a budget, for tables and figures."""
+    fixed = {
+        "parameters": "parameters inside tolerance",
+        "form": "a form without a name",
+        "unexplained": "unexplained",
+    }
+    if term.kind in fixed:
+        return fixed[term.kind]
+    return set_label(term.id.split("+")) + (f" ({label(term.form)})" if term.form else "")
+
+
+def budget_sentence(terms: Sequence[BudgetTerm]) -> str:
+    """The budget of one block in words."""
+    told = []
+    for term in terms[:-1]:
+        low, high = (100.0 * share for share in term.interval)
+        told.append(f"{term_label(term)} {100 * term.share:.0f} % ({low:.0f} to {high:.0f})")
+    last = terms[-1]
+    unit, factor = display_unit(last.unit, abs(last.size))
+    left = (
+        f"{100 * last.share:.0f} % unexplained: {format_number(last.noises, 2)} noise levels, "
+        f"{format_number(last.size * factor, 2)} {unit}"
+        if last.noises > 0.0
+        else "nothing unexplained beyond the noise"
+    )
+    return "; ".join([*told, left]) + "."

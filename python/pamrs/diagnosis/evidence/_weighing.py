@@ -49,15 +49,16 @@ def visited(problem: Problem) -> Ranges:
     return found
 
 
-def probability_cap(fitted: Problem, mismatch: Block, left: float, *, same: bool) -> float:
+def probability_cap(fitted: Problem, mismatch: Block, left: float, *, alone: bool) -> float:
     """Largest probability that any name can get, which is less where the proof is weak.
 
-    A slow drift of less than two percent of the pressure, with no held-out recording, may as well
-    be the bench's own loss, creep of a wall or the transducer's drift. ``same`` says that nothing
-    is held out, ``left`` what the refit leaves of the channel.
+    A slow drift of less than two percent of the pressure of a sealed chamber, with no held-out
+    recording, may as well be the bench's own loss, creep of a wall or the transducer's drift.
+    ``alone`` says that the chamber is sealed and nothing is held out, ``left`` what the refit
+    leaves of the channel.
     """
     settings = fitted.settings.evidence
-    if not same or mismatch.channel != "muscle_pressure":
+    if not alone or mismatch.channel != "muscle_pressure":
         return settings.most_probability
     typical = np.mean([np.mean(np.abs(p.signals["muscle_pressure"][0])) for p in fitted.recordings])
     drifts = left < settings.drift_share * float(typical)
@@ -67,22 +68,20 @@ def probability_cap(fitted: Problem, mismatch: Block, left: float, *, same: bool
 def share_left(
     candidate: Candidate, baseline: Candidate, suspects: list[Block], settings: EvidenceSettings
 ) -> float:
-    """Share of the baseline's excess variance that a set of effects leaves, the larger of fitted
-    and held-out recordings.
+    """Share of the baseline's excess variance that a set of effects leaves in recordings that it
+    was not fitted to.
 
-    Recordings that hardly show the mismatch cannot say how much of it is left; what an effect
-    brings into them, beyond what noise may, counts beside the mismatch of the others.
+    Held-out recordings that hardly show the mismatch cannot say how much of it is left: those that
+    were fitted then do, and what an effect brings into the others, beyond what noise may, counts
+    beside it.
     """
-    found = _excesses(candidate, baseline, suspects)
-    most = max(before for before, _ in found)
+    (was, now), (before, after) = _excesses(candidate, baseline, suspects)
     telling = settings.telling_excess
-    threshold = min(telling, settings.telling_share * most)
-    shares = [after / before for before, after in found if before > threshold]
-    shares += [
-        (after - telling) / max(most, telling)
-        for before, after in found
-        if before <= threshold and after > telling
-    ]
+    if before > min(telling, settings.telling_share * max(was, before)):
+        return after / before
+    shares = [now / was] if was > 0.0 else []
+    if after > telling:
+        shares.append((after - telling) / max(was, telling))
     return max(shares, default=1.0)
 
 
@@ -129,10 +128,11 @@ def weigh(
     of a mismatch near the noise counts by what noise could leave of it. Each parameter and each
     further effect has its price, and so have a clock that does not drift and values that an effect
     hardly has (:func:`unlikely`). Against ``unlisted``: the share of the mismatch that the set
-    explains where it explains least, and whether its size is the same in all recordings; improbable
-    sets themselves say nothing against one that is. The constants are those under which the stated
-    probabilities came true in a trial with other seeds than the published one
-    (docs/decisions/0014).
+    explains in recordings that it was not fitted to (a name has to carry half of it; the rest may
+    be what no model has, and stands beside the name), its values, and whether its size is the same
+    in all recordings; improbable sets themselves say nothing against one that is. The constants are
+    those under which the stated probabilities came true in a trial with other seeds than the
+    published one (docs/decisions/0014, 0032).
 
     ``seconds`` is the length of the longest recording that was fitted, ``ranging`` what was visited
     in them, ``own`` the blocks in which each set is judged against ``unlisted``, where these are
@@ -144,7 +144,15 @@ def weigh(
     start = candidates[0]
     evidence = settings.evidence
     trusted = {
-        c: _trusted(c, start, suspects if own is None else own[c], most, seconds, evidence)
+        c: _trusted(
+            c,
+            start,
+            suspects if own is None else own[c],
+            most,
+            seconds,
+            unlikely(c, ranging or {}, evidence),
+            evidence,
+        )
         for c in named
     }
 
@@ -259,9 +267,10 @@ def _trusted(
     suspects: list[Block],
     most: float,
     seconds: float,
+    unlikely: float,
     settings: EvidenceSettings,
 ) -> float:
-    """Probability of a set against ``unlisted``."""
+    """Probability of a set against ``unlisted``; ``unlikely`` is what it loses by its values."""
     left = min(max(share_left(candidate, baseline, suspects, settings), 1e-6), 1.0 - 1e-6)
     even = (
         settings.log_odds_explained_pliable if _pliable(candidate) else settings.log_odds_explained
@@ -269,7 +278,7 @@ def _trusted(
     odds = (math.log((1.0 - left) / left) - even) / settings.softness
     if explains(candidate, baseline, suspects, settings):
         odds = max(odds, settings.log_odds_noise_left)
-    return capped(odds - penalty(candidate, seconds, settings), most)
+    return capped(odds - unlikely - penalty(candidate, seconds, settings), most)
 
 
 def _pliable(candidate: Candidate) -> bool:

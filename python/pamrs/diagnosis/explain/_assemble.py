@@ -27,6 +27,7 @@ from pamrs.diagnosis.evidence import (
 )
 from pamrs.diagnosis.explain import _words as words
 from pamrs.diagnosis.explain._block_entries import block_entries, unexplained
+from pamrs.diagnosis.explain._budget import budget
 from pamrs.diagnosis.explain._closure_words import describe_closure
 from pamrs.diagnosis.explain._conditions import Picture, describe
 from pamrs.diagnosis.fit import CHOSEN, Events, Key, Problem, events_of, fit, residuals
@@ -111,6 +112,7 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
         rig=_with_std(models.final, models.chosen) if models.final.effects else models.final,
         traces=_traces(fitted, held, fit_found, out_found),
         blocks=blocks,
+        budget=budget(judged, held, out_found, noise_level, models.final),
         unexplained=unexplained(judged, blocks),
         wrong_parameters=_wrong(nominal, judged, fitted, table),
         residuals=_block_table(groups),

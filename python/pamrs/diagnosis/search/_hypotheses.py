@@ -204,7 +204,7 @@ def _explained(refit: _Refit, say: Say, tell: Say) -> list[Group]:
     sealed = trial.nominal.model["valve"] is None
     screened = screen(trial.inner, start.fit, persistent, trial.white, sealed=sealed)
     terms = _Terms(
-        probability_cap(trial.inner, mismatch, now[mismatch.name].rms, same=trial.same),
+        probability_cap(trial.inner, mismatch, now[mismatch.name].rms, alone=trial.same and sealed),
         max(p.n * p.dt for p in trial.inner.recordings),
         visited(trial.inner),
     )

@@ -16,11 +16,11 @@ class EvidenceSettings(SettingsGroup):
     """How hypotheses are weighed against each other and against unlisted."""
 
     log_odds_explained: float = setting(
-        0.5,
+        0.0,
         unit="log odds",
         reason="odds of explained to unexplained variance at which a set of effects is as probable "
-        "as unlisted: even where 38 % is left",
-        origin="docs/decisions/0014, 26 cases of seed 501",
+        "as unlisted: even where half is left, since a name has to carry half",
+        origin="the definition of the verdict; docs/decisions/0032",
     )
     log_odds_explained_pliable: float = setting(
         2.6,

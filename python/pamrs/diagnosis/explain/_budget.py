@@ -1,0 +1,171 @@
+"""The mismatch budget of each block: what of the nominal model's excess over the noise each term
+takes, and what stays unexplained.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from pamrs.channels import unit_of
+from pamrs.diagnosis.evidence import Judged, is_parameter, significant
+from pamrs.diagnosis.fit import Key, Problem, residuals
+from pamrs.diagnosis.noise import Excess, NoiseLevel, excess
+from pamrs.diagnosis.prepare import Block, Residual
+from pamrs.errors import SimulationError
+from pamrs.findings import BudgetTerm
+from pamrs.rig import Rig
+
+__all__ = ["budget"]
+
+Stages = dict[str, dict[Key, Residual]]
+Stage = tuple[str, str, Excess]
+"""Kind of a term, its id, and what the block keeps with it and with all terms before it."""
+
+
+def budget(
+    judged: list[Judged],
+    problem: Problem,
+    found: Stages,
+    noise_level: dict[Key, NoiseLevel],
+    final: Rig,
+) -> list[BudgetTerm]:
+    """The budget of every block whose nominal model leaves more than noise.
+
+    Parameters
+    ----------
+    judged : list of Judged
+        The groups with their verdicts.
+    problem : Problem
+        Held-out recordings (those that were fitted, where there are no others).
+    found : dict of str to dict
+        Their residuals by stage (``before``, ``refit``, ``after``), block and recording.
+    noise_level : dict
+        Noise by block and recording.
+    final : Rig
+        The model with everything that was found.
+
+    Returns
+    -------
+    list of BudgetTerm
+        Block by block: parameters inside their tolerances, then what is named, the largest first,
+        then what no name explains. The shares of a block add up to 1.
+    """
+    terms: list[BudgetTerm] = []
+    for one in judged:
+        # what is left out again, term by term, where several are named
+        partial = _without(one, problem, final)
+        for block in one.group.blocks:
+
+            def kept(residual: dict[Key, Residual], block: Block = block) -> Excess:
+                return excess(
+                    block, problem.recordings, residual, noise_level, problem.settings.noise
+                )
+
+            before = kept(found["before"])
+            if not significant(before):
+                continue
+            stages: list[Stage] = [("parameters", "", kept(found["refit"]))]
+            stages += [(_kind(name), name, kept(residual)) for name, residual in partial[:-1]]
+            last = partial[-1][0] if partial else ""
+            form = one.verdict == "unlisted" and one.group.closure is not None
+            if last or form:
+                kind = "form" if form else _kind(last)
+                stages.append((kind, last, kept(found["after"])))
+            terms += _terms(block, before, stages, one, final, problem.settings.seed)
+    return terms
+
+
+def _kind(name: str) -> str:
+    """What a name of a hypothesis is."""
+    return "wrong_parameter" if is_parameter(name) else "effect"
+
+
+def _without(judged: Judged, problem: Problem, final: Rig) -> list[tuple[str, dict[Key, Residual]]]:
+    """What is named, that which leaves least by itself first, each with the residuals of the model
+    that has it and those before it; of the last one, which is the whole model, none.
+    """
+    names = _in_order(judged)
+    own = replace(problem, blocks=judged.group.blocks)
+    out: list[tuple[str, dict[Key, Residual]]] = []
+    for count, name in enumerate(names[:-1], 1):
+        rig = final
+        for later in names[count:]:
+            rig = rig.without_effect(later)
+        try:
+            out.append((name, residuals(own, rig)))
+        except SimulationError:  # it is said together with the next one
+            continue
+    return [*out, *((name, {}) for name in names[-1:])]
+
+
+def _in_order(judged: Judged) -> list[str]:
+    """Names of a group, the one that leaves least by itself first; wrong parameters in one."""
+    if judged.wrong:
+        return ["+".join(judged.wrong)]
+    alone = {
+        c.effects[0]: sum(e.ratio for e in c.held_out.values())
+        for c in judged.group.candidates
+        if len(c.effects) == 1
+    }
+    return sorted(judged.named, key=lambda name: alone.get(name, np.inf))
+
+
+def _terms(
+    block: Block, before: Excess, stages: list[Stage], judged: Judged, final: Rig, seed: int
+) -> Iterator[BudgetTerm]:
+    """The terms of one block, and what is left."""
+    was = before
+    for kind, name, now in stages:
+        share, interval = _share(before, was, now, seed)
+        form = next((e.get("form", "") for e in final.effects if e["id"] == name), "")
+        chance = judged.probabilities.get(name, judged.probability(name)) if name else None
+        yield BudgetTerm(
+            block=block.name,
+            kind=kind,
+            id=name,
+            form=form,
+            share=share,
+            interval=interval,
+            probability=chance,
+            noises=now.systematic,
+            size=now.systematic * now.noise,
+            unit=unit_of(block.channel),
+        )
+        was = now
+    share, interval = _share(before, was, None, seed)
+    yield BudgetTerm(
+        block=block.name,
+        kind="unexplained",
+        id="",
+        form="",
+        share=share,
+        interval=interval,
+        probability=None,
+        noises=was.systematic,
+        size=was.systematic * was.noise,
+        unit=unit_of(block.channel),
+    )
+
+
+_DRAWS = 400
+"""Weightings of the pieces of the recordings from which an interval comes."""
+
+
+def _share(before: Excess, was: Excess, now: Excess | None, seed: int) -> tuple[float, list[float]]:
+    """Share of the nominal model's excess variance that a step takes (the rest, where there is no
+    next one), and its interval of 95 % by a Bayesian bootstrap over the pieces of the recordings.
+    """
+    counts = np.array([n for _, n in before.pieces], dtype=np.float64)
+    first, upper, lower = (
+        np.array([r for r, _ in e.pieces]) if e is not None else np.ones(counts.size)
+        for e in (before, was, now)
+    )
+    draws = np.random.default_rng(seed).dirichlet(np.ones(counts.size), _DRAWS) * counts
+    excess_of = np.maximum(draws @ (first - 1.0), 1e-12)
+    shares = np.sort(draws @ (upper - lower) / excess_of)
+    whole = max(float(counts @ (first - 1.0)), 1e-12)
+    low, high = np.quantile(shares, [0.025, 0.975])
+    return float(counts @ (upper - lower)) / whole, [float(low), float(high)]
