@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fingerprints.table import EXPERIMENTS
-from pamrs.effects import EFFECTS, EffectInfo
+from pamrs.effects import EFFECTS, EffectInfo, Form
 from pamrs.effects.text import catalogue, snippet, where
 
 __all__ = ["COMMAND", "pages"]
@@ -46,7 +46,7 @@ What separates them: {separates}.
 ## Parameters
 
 {parameters}
-
+{forms}
 ## In a rig file
 
 ```toml
@@ -95,19 +95,6 @@ def page(info: EffectInfo) -> str:
         f"`{name}` {value:g} {units[name]}".removesuffix(" 1")
         for name, value in shown.values.items()
     ]
-    rows = [
-        [
-            f"`{p.name}`",
-            p.unit,
-            f"{p.default:g}",
-            f"{p.lower:g} to {p.upper:g}",
-            "" if p.neutral is None else f"{p.neutral:g}",
-            p.meaning
-            if p.expected is None
-            else "{}; expected {:g} to {:g}".format(p.meaning, *p.expected),
-        ]
-        for p in info.parameters
-    ]
     return PAGE.format(
         id=info.id,
         name=info.name,
@@ -125,13 +112,33 @@ def page(info: EffectInfo) -> str:
             for rival in info.rivals
         ),
         separates=info.separates,
-        parameters="\n".join(
-            table(["parameter", "unit", "usual", "bounds", "off at", "meaning"], rows)
+        parameters=parameters(info.forms[0]),
+        forms="".join(
+            f"\n### Form `{form.name}`\n\n```text\n{form.equation}\n```\n\n{parameters(form)}\n"
+            for form in info.forms[1:]
         ),
         snippet=snippet(info.id),
         given="{" + ", ".join(f'"{p.name}": {p.default:g}' for p in info.parameters) + "}",
         reference=info.reference,
     )
+
+
+def parameters(form: Form) -> str:
+    """A table of the parameters of a form."""
+    rows = [
+        [
+            f"`{p.name}`",
+            p.unit,
+            f"{p.default:g}",
+            f"{p.lower:g} to {p.upper:g}",
+            "" if p.neutral is None else f"{p.neutral:g}",
+            p.meaning
+            if p.expected is None
+            else "{}; expected {:g} to {:g}".format(p.meaning, *p.expected),
+        ]
+        for p in form.parameters
+    ]
+    return "\n".join(table(["parameter", "unit", "usual", "bounds", "off at", "meaning"], rows))
 
 
 def linked(rival: str) -> str:

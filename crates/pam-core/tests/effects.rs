@@ -5,12 +5,14 @@ mod rigs;
 
 use pam_core::cut_chain::{predict, Block};
 use pam_core::cut_chain::{Measured, Signal};
+use pam_core::description::EffectSpec;
 use pam_core::effects::EFFECTS;
 use pam_core::simulate::drive::Drive;
 use pam_core::simulate::{Initial, Progress, Timing, Trajectory};
 use pam_core::{Rig, RigSpec};
 use rigs::{
-    antagonists, effect, effect_at, lone_tank, regulated, shoulder, two_joints, Typical, TYPICAL,
+    antagonists, effect, effect_at, every, lone_tank, regulated, shoulder, two_joints, Typical,
+    FORMS, TYPICAL,
 };
 
 const DT: f64 = 0.01;
@@ -71,7 +73,7 @@ fn lacks_supply(id: &str, spec: &RigSpec) -> bool {
     !kinds.is_empty() && spec.supplies.iter().all(|s| !kinds.contains(&s.kind.as_str()))
 }
 
-fn with(spec: RigSpec, effects: Vec<pam_core::description::EffectSpec>) -> Rig {
+fn with(spec: RigSpec, effects: Vec<EffectSpec>) -> Rig {
     Rig::new(RigSpec { effects, ..spec }).unwrap()
 }
 
@@ -79,19 +81,19 @@ fn with(spec: RigSpec, effects: Vec<pam_core::description::EffectSpec>) -> Rig {
 fn every_effect_is_tested() {
     let others = ["heat_transfer"]; // it replaces an equation and has no neutral value
     for info in EFFECTS.iter().filter(|e| !others.contains(&e.id)) {
-        let typical =
-            TYPICAL.iter().find(|t| t.id == info.id).unwrap_or_else(|| panic!("{}", info.id));
-        assert!(info
-            .parameters()
-            .iter()
-            .map(|p| p.name)
-            .eq(typical.parameters.iter().map(|(n, _)| *n)));
+        for (k, form) in info.forms.iter().enumerate() {
+            let name = if k == 0 { "" } else { form.name };
+            let typical = (every().find(|t| (t.id, t.form) == (info.id, name)))
+                .unwrap_or_else(|| panic!("{} {name}", info.id));
+            let names = form.parameters.iter().map(|p| p.name);
+            assert!(names.eq(typical.parameters.iter().map(|(n, _)| *n)), "{} {name}", info.id);
+        }
     }
 }
 
 #[test]
 fn switched_off_it_changes_nothing_bit_for_bit() {
-    for typical in TYPICAL {
+    for typical in every() {
         for spec in [spec_for(typical.id), antagonists(), two_joints()] {
             if lacks_supply(typical.id, &spec) {
                 continue;
@@ -108,7 +110,7 @@ fn switched_off_it_changes_nothing_bit_for_bit() {
 
 #[test]
 fn switched_on_it_moves_its_channel() {
-    for typical in TYPICAL {
+    for typical in every() {
         let spec = spec_for(typical.id);
         let (plain, on) = (with(spec.clone(), vec![]), with(spec, vec![typical.on()]));
         let (a, b) = (run(&plain, ROWS), run(&on, ROWS));
@@ -126,7 +128,7 @@ fn switched_on_it_moves_its_channel() {
 
 #[test]
 fn rigs_of_several_blocks_take_it_everywhere_or_at_one_of_them() {
-    for typical in TYPICAL.iter().filter(|t| t.id != "supply_regulator_deadband") {
+    for typical in every().filter(|t| t.id != "supply_regulator_deadband") {
         let info = EFFECTS.iter().find(|e| e.id == typical.id).unwrap();
         for (spec, names) in
             [(antagonists(), ["flexor", "extensor"]), (two_joints(), ["elbow", "wrist"])]
@@ -140,17 +142,15 @@ fn rigs_of_several_blocks_take_it_everywhere_or_at_one_of_them() {
                 continue;
             }
             let at = |name: &str| {
-                run(&with(spec.clone(), vec![effect_at(typical.id, name, typical.parameters)]), 40)
+                run(&with(spec.clone(), vec![EffectSpec { at: name.into(), ..typical.on() }]), 40)
             };
             let (first, second) = (at(names[0]), at(names[1]));
             assert!(first.channels != second.channels, "{}: the same at either", typical.id);
             // alone it acts at the tip
             let tip = ["payload_swing", "payload_change"].contains(&typical.id);
             assert_eq!(all.channels == second.channels, tip, "{}", typical.id);
-            let wrong = RigSpec {
-                effects: vec![effect_at(typical.id, "nose", typical.parameters)],
-                ..spec
-            };
+            let wrong = EffectSpec { at: "nose".into(), ..typical.on() };
+            let wrong = RigSpec { effects: vec![wrong], ..spec };
             assert!(Rig::new(wrong).unwrap_err().to_string().contains("nose"));
         }
     }
@@ -183,18 +183,24 @@ fn one_block_alone_changes() {
 #[test]
 fn a_restart_is_bit_for_bit_with_every_effect_on() {
     let all = TYPICAL.iter().filter(|typical| !lacks_supply(typical.id, &shoulder()));
-    let rig = with(shoulder(), all.map(Typical::on).collect());
-    let signals = signals(&rig, ROWS);
-    let drive = Drive::new(&rig, ROWS, &borrowed(&signals)).unwrap();
-    let mut whole = Progress::start(&rig, &initial(&rig)).unwrap();
+    restarts(&with(shoulder(), all.map(Typical::on).collect()));
+    for typical in FORMS {
+        restarts(&with(spec_for(typical.id), vec![typical.on()]));
+    }
+}
+
+fn restarts(rig: &Rig) {
+    let signals = signals(rig, ROWS);
+    let drive = Drive::new(rig, ROWS, &borrowed(&signals)).unwrap();
+    let mut whole = Progress::start(rig, &initial(rig)).unwrap();
     let mut first = whole.clone();
-    let mut out = Trajectory::new(&rig, ROWS);
-    whole.advance(&rig, TIMING, &drive, &mut out).unwrap();
-    let mut parts = Trajectory::new(&rig, ROWS);
+    let mut out = Trajectory::new(rig, ROWS);
+    whole.advance(rig, TIMING, &drive, &mut out).unwrap();
+    let mut parts = Trajectory::new(rig, ROWS);
     for range in [0..33, 33..34, 34..ROWS] {
-        let fresh = Progress::start(&rig, &initial(&rig)).unwrap();
+        let fresh = Progress::start(rig, &initial(rig)).unwrap();
         first = fresh.restored(&first.to_vec()).unwrap();
-        first.advance(&rig, TIMING, &drive.part(range), &mut parts).unwrap();
+        first.advance(rig, TIMING, &drive.part(range), &mut parts).unwrap();
     }
     assert_eq!(whole, first);
     assert_eq!(out, parts);
@@ -266,15 +272,17 @@ fn sensitivities(
         assert_eq!(
             scale > 0.0,
             !blind.contains(name),
-            "{}.{name} has influence {scale}",
-            typical.id
+            "{} {}.{name} has influence {scale}",
+            typical.id,
+            typical.form
         );
         for k in 0..ROWS {
             let gap = (slope(k) - (up[k] - down[k]) / (2.0 * h)).abs();
             assert!(
                 gap <= 2e-3 * scale,
-                "{}.{name} in {block} at row {k}: {gap} of {scale}",
-                typical.id
+                "{} {}.{name} in {block} at row {k}: {gap} of {scale}",
+                typical.id,
+                typical.form
             );
         }
     }
@@ -293,7 +301,7 @@ fn blind(id: &str) -> &'static [&'static str] {
 
 #[test]
 fn sensitivities_are_those_of_differences() {
-    for typical in TYPICAL {
+    for typical in every() {
         let info = EFFECTS.iter().find(|e| e.id == typical.id).unwrap();
         let spec = spec_for(typical.id);
         let truth = run(&with(spec.clone(), vec![typical.on()]), ROWS);
@@ -316,6 +324,7 @@ fn sensitivities_are_those_of_differences() {
 /// A tube behind the transducer, close to the valve's own conductance.
 const TAPPED: Typical = Typical {
     id: "tube_flow_restriction",
+    form: "",
     parameters: &[("conductance", 1.5e-9), ("tap", 0.75)],
     neutral: &[("conductance", 1.0)],
 };
@@ -370,7 +379,7 @@ fn predictions_repeat_what_a_transducer_at_the_valve_reads() {
 
 #[test]
 fn sensitivities_hold_on_two_joints() {
-    for typical in TYPICAL {
+    for typical in every() {
         let info = EFFECTS.iter().find(|e| e.id == typical.id).unwrap();
         let spec = two_joints();
         if ["supply", "sensors"].contains(&info.block) {
@@ -392,7 +401,7 @@ fn sensitivities_hold_on_two_joints() {
 fn predictions_repeat_what_was_simulated() {
     // Measured without noise, cut anywhere, a block predicts what the whole rig did: to the error
     // of the signals' slopes.
-    for typical in TYPICAL {
+    for typical in every() {
         let rig = with(spec_for(typical.id), vec![typical.on()]);
         let truth = run(&rig, ROWS);
         let inputs = signals(&rig, ROWS);
@@ -410,7 +419,12 @@ fn predictions_repeat_what_was_simulated() {
             let span = was.iter().copied().fold(f64::MIN, f64::max)
                 - was.iter().copied().fold(f64::MAX, f64::min);
             let gap = found.iter().zip(was).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-            assert!(gap < 0.05 * span, "{}: {name} differs by {gap} of {span}", typical.id);
+            assert!(
+                gap < 0.05 * span,
+                "{} {}: {name} differs by {gap} of {span}",
+                typical.id,
+                typical.form
+            );
         }
     }
 }

@@ -65,12 +65,13 @@ def _parameter(told: dict[str, Any], meanings: dict[str, str]) -> EffectParamete
     )
 
 
-def _form(told: dict[str, Any], meanings: dict[str, str]) -> Form:
+def _form(told: dict[str, Any], meanings: dict[str, str], equation: str) -> Form:
     return Form(
         name=told["name"],
         parameters=tuple(_parameter(parameter, meanings) for parameter in told["parameters"]),
         states=tuple(state["name"] for state in told["states"]),
         ports=tuple(told["ports"]),
+        equation=equation,
     )
 
 
@@ -91,6 +92,9 @@ def _info(told: dict[str, Any]) -> EffectInfo:
         **{term.name: f"coefficient of {term.formula}" for term in terms},
         **words["parameters"],
     }
+    usual, *others = told["forms"]
+    equations = {usual["name"]: words["equation"]}
+    equations |= {form["name"]: words["forms"][form["name"]] for form in others}
     kink = told["kink"]
     return EffectInfo(
         id=told["id"],
@@ -100,7 +104,7 @@ def _info(told: dict[str, Any]) -> EffectInfo:
         equation=words["equation"],
         fingerprint=words["fingerprint"],
         separates=words["separates"],
-        forms=tuple(_form(form, meanings) for form in told["forms"]),
+        forms=tuple(_form(form, meanings, equations[form["name"]]) for form in told["forms"]),
         reference=told["source"],
         rivals=tuple(words.get("rivals", ())),
         catalogue=told["named"],

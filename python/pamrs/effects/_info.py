@@ -181,12 +181,15 @@ class Form:
         Names of its states at each block; an only one may have none.
     ports : tuple of str
         Where it acts in the equations of the rig.
+    equation : str
+        Its governing equation.
     """
 
     name: str
     parameters: tuple[EffectParameter, ...]
     states: tuple[str, ...] = ()
     ports: tuple[str, ...] = ()
+    equation: str = ""
 
     @property
     def transient(self) -> bool:
@@ -208,7 +211,7 @@ class EffectInfo:
         Kind of the blocks of which it can take one by its name, ``""`` for an effect on the whole
         rig.
     equation, fingerprint, separates : str
-        Governing equation; what it looks like in recordings; what it is confused with and what
+        Governing equation of the first form; what it looks like in recordings; what it is confused with and what
         separates them.
     forms : tuple of Form
         Its forms; the first one is meant where none is named.

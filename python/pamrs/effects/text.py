@@ -211,7 +211,8 @@ def _parameters(info: EffectInfo, form: Form) -> list[str]:
     widths = [max(len(row[column]) for row in rows) for column in range(3)]
     usual = " (the usual one)" if form is info.forms[0] else ""
     head = f"form {form.name}{usual}, " if len(info.forms) > 1 else ""
-    lines = [f"{head}parameters: name, typical value, range, meaning", ""]
+    lines = [] if form is info.forms[0] else [f"form {form.name}: {form.equation}", ""]
+    lines += [f"{head}parameters: name, typical value, range, meaning", ""]
     for row in rows:
         cells = [*(f"{text:<{width}}" for text, width in zip(row, widths, strict=False)), row[3]]
         lines.append("  " + "  ".join(cells))

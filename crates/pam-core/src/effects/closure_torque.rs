@@ -191,7 +191,7 @@ fn make<S: Scalar>(values: &[S], _gas: &Gas) -> Box<dyn Effect<S>> {
 /// What it sees of a joint, None elsewhere.
 fn here<S: Scalar>(at: &At<S>, own: &[S]) -> Option<Here<S>> {
     match at {
-        At::Joint { pressure, angle, rate } => Some(Here {
+        At::Joint { pressure, angle, rate, .. } => Some(Here {
             pressure: *pressure,
             angle: *angle,
             rate: *rate,

@@ -1,14 +1,59 @@
-//! `external_torque`: something pushes a link for a while, up to three times in a recording.
+//! `external_torque`: something from outside pushes a link; the environment, not the base.
 //!
-//! A torque on the joint from a time on for a duration, each edge over a rise (20 ms of a blow,
-//! half a second of a hand), and a second and a third of their own. The environment pushes, not the
-//! base. Time counts from the start of the recording. K. Ohnishi, M. Shibata & T. Murakami, "Motion
-//! control for advanced mechatronics", IEEE/ASME Trans. Mechatronics 1, 1996 (disturbance torque).
+//! `pushes`: a torque on the joint from a time on for a duration, each edge over a rise (20 ms of a
+//! blow, half a second of a hand), and a second and a third of their own. Time counts from the start
+//! of the recording. K. Ohnishi, M. Shibata & T. Murakami, "Motion control for advanced
+//! mechatronics", IEEE/ASME Trans. Mechatronics 1, 1996 (disturbance torque).
+//!
+//! `constant`: `tau = T` at all times. Ohnishi et al. (1996).
+//!
+//! `vibration`: `tau = T sin(2 pi f t) + U cos(2 pi f t)`, a machine that shakes with one frequency;
+//! with both parts the amplitude is linear and the phase free. M. Bodson, A. Sacks & P. Khosla,
+//! "Harmonic generation in adaptive feedforward cancellation schemes", IEEE Trans. Automatic
+//! Control 39, 1994.
 
 use super::{risen_over, Effect, EffectInfo, EffectParameter, Form, Port, Use};
 use crate::blocks::gas::Gas;
 use crate::made_by;
-use crate::scalar::Scalar;
+use crate::scalar::{constant, Scalar};
+use std::f64::consts::TAU;
+
+const TORQUE: EffectParameter = EffectParameter::new("torque", "N m", -1e9, 1e9, 5.0)
+    .starts(&[-5.0, 5.0])
+    .off(0.0)
+    .tried(1.0);
+
+const PUSHES: Form = Form {
+    name: "pushes",
+    parameters: &[
+        TORQUE,
+        EffectParameter::new("time", "s", -1e9, 1e9, 5.0).starts(&[5.0, 15.0]).role(Use::Time),
+        EffectParameter::new("duration", "s", 0.0, 1e9, 1.0)
+            .starts(&[0.5, 3.0])
+            .role(Use::Duration)
+            .tried(1.0),
+        EffectParameter::new("torque_2", "N m", -1e9, 1e9, 0.0)
+            .starts(&[0.0])
+            .off(0.0)
+            .again("torque"),
+        EffectParameter::new("time_2", "s", -1e9, 1e9, 0.0).starts(&[0.0]).again("time"),
+        EffectParameter::new("duration_2", "s", 0.0, 1e9, 1.0).starts(&[1.0]).again("duration"),
+        EffectParameter::new("torque_3", "N m", -1e9, 1e9, 0.0)
+            .starts(&[0.0])
+            .off(0.0)
+            .again("torque"),
+        EffectParameter::new("time_3", "s", -1e9, 1e9, 0.0).starts(&[0.0]).again("time"),
+        EffectParameter::new("duration_3", "s", 0.0, 1e9, 1.0).starts(&[1.0]).again("duration"),
+        EffectParameter::new("rise", "s", 0.02, 1e9, 0.02)
+            .starts(&[0.02])
+            .role(Use::Rise)
+            .tried(0.4),
+    ],
+    states: &[],
+    integrates: false,
+    ports: &[Port::Push],
+    make: made_by!(pushes),
+};
 
 /// What it is.
 pub const INFO: EffectInfo = EffectInfo {
@@ -16,40 +61,24 @@ pub const INFO: EffectInfo = EffectInfo {
     block: "arm",
     at: "joint",
     source: "Ohnishi, Shibata & Murakami (1996), disturbance torque",
-    forms: &[Form {
-        name: "pushes",
-        parameters: &[
-            EffectParameter::new("torque", "N m", -1e9, 1e9, 5.0)
-                .starts(&[-5.0, 5.0])
-                .off(0.0)
-                .tried(1.0),
-            EffectParameter::new("time", "s", -1e9, 1e9, 5.0).starts(&[5.0, 15.0]).role(Use::Time),
-            EffectParameter::new("duration", "s", 0.0, 1e9, 1.0)
-                .starts(&[0.5, 3.0])
-                .role(Use::Duration)
-                .tried(1.0),
-            EffectParameter::new("torque_2", "N m", -1e9, 1e9, 0.0)
-                .starts(&[0.0])
-                .off(0.0)
-                .again("torque"),
-            EffectParameter::new("time_2", "s", -1e9, 1e9, 0.0).starts(&[0.0]).again("time"),
-            EffectParameter::new("duration_2", "s", 0.0, 1e9, 1.0).starts(&[1.0]).again("duration"),
-            EffectParameter::new("torque_3", "N m", -1e9, 1e9, 0.0)
-                .starts(&[0.0])
-                .off(0.0)
-                .again("torque"),
-            EffectParameter::new("time_3", "s", -1e9, 1e9, 0.0).starts(&[0.0]).again("time"),
-            EffectParameter::new("duration_3", "s", 0.0, 1e9, 1.0).starts(&[1.0]).again("duration"),
-            EffectParameter::new("rise", "s", 0.02, 1e9, 0.02)
-                .starts(&[0.02])
-                .role(Use::Rise)
-                .tried(0.4),
-        ],
-        states: &[],
-        integrates: false,
-        ports: &[Port::Push],
-        make: made_by!(make),
-    }],
+    forms: &[
+        PUSHES,
+        Form { name: "constant", parameters: &[TORQUE], make: made_by!(steady), ..PUSHES },
+        Form {
+            name: "vibration",
+            parameters: &[
+                TORQUE,
+                EffectParameter::new("torque_cosine", "N m", -1e9, 1e9, 0.0)
+                    .starts(&[1.0])
+                    .off(0.0),
+                EffectParameter::new("frequency", "Hz", 0.01, 1000.0, 2.0)
+                    .starts(&[1.0, 4.0])
+                    .scan(0.25, 16.0, 25),
+            ],
+            make: made_by!(vibration),
+            ..PUSHES
+        },
+    ],
     ..EffectInfo::USUAL
 };
 
@@ -68,13 +97,41 @@ pub fn torque<S: Scalar>(pushes: [S; 10], now: f64) -> S {
 #[derive(Debug, Clone, Copy)]
 struct Pushes<S>([S; 10]);
 
-fn make<S: Scalar>(values: &[S], _gas: &Gas) -> Box<dyn Effect<S>> {
+fn pushes<S: Scalar>(values: &[S], _gas: &Gas) -> Box<dyn Effect<S>> {
     Box::new(Pushes(std::array::from_fn(|k| values[k])))
 }
 
 impl<S: Scalar> Effect<S> for Pushes<S> {
     fn push(&self, time: f64) -> S {
         torque(self.0, time)
+    }
+}
+
+/// A torque that stays, or shakes with a frequency [Hz].
+#[derive(Debug, Clone, Copy)]
+struct Vibration<S> {
+    sine: S,
+    cosine: S,
+    frequency: S,
+}
+
+fn steady<S: Scalar>(values: &[S], _gas: &Gas) -> Box<dyn Effect<S>> {
+    let zero = constant(0.0);
+    Box::new(Vibration { sine: zero, cosine: values[0], frequency: zero })
+}
+
+fn vibration<S: Scalar>(values: &[S], _gas: &Gas) -> Box<dyn Effect<S>> {
+    Box::new(Vibration { sine: values[0], cosine: values[1], frequency: values[2] })
+}
+
+impl<S: Scalar> Effect<S> for Vibration<S> {
+    fn push(&self, time: f64) -> S {
+        let (sine, cosine) = (self.frequency * (TAU * time)).sin_cos();
+        self.sine * sine + self.cosine * cosine
+    }
+
+    fn fastest(&self) -> f64 {
+        TAU * self.frequency.re()
     }
 }
 
@@ -91,5 +148,18 @@ mod tests {
         let area: f64 = (0..20_000).map(|k| at(1e-4 * f64::from(k)) * 1e-4).sum();
         assert!((area - 1.5).abs() < 1e-6, "the impulse is torque times duration: {area}");
         assert_eq!(torque([0.0, 1.0, 0.5, 0.0, 1.0, 0.5, 0.0, 1.0, 0.5, RISE], 1.2), 0.0);
+    }
+
+    #[test]
+    fn a_vibration_repeats_and_a_constant_stays() {
+        let gas = Gas::new(101_325.0, 293.15, 287.05, 1.4);
+        let made = |form: &str, values: &[f64]| (INFO.form(form).unwrap().make.plain)(values, &gas);
+        let shaken = made("vibration", &[3.0, 4.0, 2.0]);
+        let most = (0..500).map(|k| shaken.push(1e-3 * f64::from(k))).fold(0.0, f64::max);
+        assert!((most - 5.0).abs() < 1e-3);
+        assert!((shaken.push(0.0) - 4.0).abs() < 1e-12 && (shaken.push(0.125) - 3.0).abs() < 1e-12);
+        assert!((shaken.push(0.3) - shaken.push(1.3)).abs() < 1e-12);
+        let steady = made("constant", &[-2.0]);
+        assert_eq!([0.0, 0.3, 99.0].map(|now| steady.push(now)), [-2.0; 3]);
     }
 }

@@ -99,6 +99,9 @@ pub enum At<S> {
         angle: S,
         /// Rate [rad/s].
         rate: S,
+        /// Torques that the muscles put on it, all counted as positive [N m]; zero where
+        /// nobody asks what they pull.
+        load: S,
     },
     /// The arm.
     Arm {
@@ -120,6 +123,10 @@ pub struct AtMuscle<S> {
     pub rate: S,
     /// Stretch since the step began [m].
     pub stretched: S,
+    /// What the effect acts on, of one muscle [N]: at [`Port::Force`] its force before this effect,
+    /// in the order in which they act; at [`Port::Bladder`] the bladder's part of it. Only effects
+    /// with states see it in [`Effect::start`] and [`Effect::rates`].
+    pub force: S,
 }
 
 /// A hanging mass at one instant.
@@ -173,6 +180,8 @@ pub struct Extremes {
     pub contraction: f64,
     /// Valves at the block.
     pub valves: usize,
+    /// Largest torque that muscles put on a joint [N m].
+    pub load: f64,
 }
 
 /// An effect that is switched on, with its parameters in a scalar type: what it does at its ports,
@@ -362,8 +371,9 @@ pub trait Effect<S: Scalar>: Debug + Send + Sync {
         (0.0, 0.0)
     }
 
-    /// Stiffness of one muscle's friction before it slips [N/m] at a gauge pressure [Pa].
-    fn presliding(&self, _gauge: f64) -> f64 {
+    /// Stiffness of one muscle's friction before it slips [N/m] at a gauge pressure [Pa] at which
+    /// it pulls with a force [N].
+    fn presliding(&self, _gauge: f64, _force: f64) -> f64 {
         0.0
     }
 

@@ -297,7 +297,7 @@ impl Plant<'_, f64> {
     /// Extremes of a block of the air.
     fn extremes(&self, valves: usize) -> Extremes {
         let (pressure, ambient) = (self.rig.highest_pressure(), self.rig.gas.ambient_pressure);
-        Extremes { pressure, ambient, angles: (0.0, 0.0), contraction: 0.0, valves }
+        Extremes { pressure, ambient, angles: (0.0, 0.0), contraction: 0.0, valves, load: 0.0 }
     }
 
     /// Rate at which a gas takes the temperature of its wall [1/s], with the least of it: at

@@ -34,7 +34,7 @@ impl<S: Scalar> Plant<'_, S> {
         turn.copy_from_slice(rates);
         load.copy_from_slice(&here.torque);
         for (k, load) in load.iter_mut().enumerate() {
-            *load = self.joint_torque(k, *load, state);
+            *load = self.joint_torque(k, *load, state, here.load[k]);
         }
         let reaction = ports.mounting.as_ref().map(|acting| {
             let own = self.own(acting, state);
@@ -74,12 +74,12 @@ impl<S: Scalar> Plant<'_, S> {
 
     /// Torque of a joint with those of the effects on it [N m].
     #[inline]
-    fn joint_torque(&self, coordinate: usize, load: S, state: &[S]) -> S {
+    fn joint_torque(&self, coordinate: usize, load: S, state: &[S], pulled: S) -> S {
         let here = &self.wiring.ports.torque[coordinate];
         if here.is_empty() {
             return load;
         }
-        let at = self.at_joint(coordinate, state);
+        let at = self.at_joint(coordinate, state, pulled);
         here.iter().fold(load, |load, acting| {
             load + self.effect(acting).torque(&at, self.own(acting, state))
         })
@@ -257,7 +257,7 @@ impl Plant<'_, f64> {
             total += width.max(spec.friction_floor) * force * STUCK / group.muscle.presliding();
         }
         for acting in &self.wiring.ports.muscles[k].force {
-            total += self.effect(acting).presliding(gauge);
+            total += self.effect(acting).presliding(gauge, force);
         }
         total
     }
@@ -268,8 +268,10 @@ impl Plant<'_, f64> {
         let wiring = &self.wiring;
         let stops = wiring.coordinates[coordinate].stops;
         let angles = stops.map_or((0.0, 0.0), |s| (s.min_angle, s.max_angle));
-        let most = self.reach(angles, 0.0);
-        let (mut damping, mut stiffness) = self.summed(&wiring.ports.torque[coordinate], &most);
+        let torque = &wiring.ports.torque[coordinate];
+        let load = if torque.is_empty() { 0.0 } else { self.largest_load(coordinate) };
+        let most = Extremes { load, ..self.reach(angles, 0.0) };
+        let (mut damping, mut stiffness) = self.summed(torque, &most);
         for (k, group) in
             wiring.groups.iter().enumerate().filter(|(_, g)| g.coordinate == coordinate)
         {
@@ -291,6 +293,24 @@ impl Plant<'_, f64> {
         (damping, stiffness)
     }
 
+    /// Largest torques [N m] that the muscles put on a coordinate over its range, at the highest
+    /// pressure, all counted as positive.
+    fn largest_load(&self, coordinate: usize) -> f64 {
+        let gauge = self.rig.highest_pressure() - self.rig.gas.ambient_pressure;
+        let groups = self.wiring.groups.iter().enumerate();
+        let load = |(k, group): (usize, &Group)| {
+            let (low, high) = self.rig.angles(group);
+            let at = |i: u32| {
+                let angle = low + (high - low) * f64::from(i) / f64::from(ARM_POINTS);
+                let point = group.joint.eval(angle);
+                let table = group.muscle.table.eval(point.shortening / group.rest_length);
+                (table.force(gauge, self.scales[k]) * point.torque_arm * group.count).abs()
+            };
+            (0..=ARM_POINTS).map(at).fold(0.0, f64::max)
+        };
+        groups.filter(|(_, group)| group.coordinate == coordinate).map(load).sum()
+    }
+
     fn summed(&self, acting: &[Acting], most: &Extremes) -> (f64, f64) {
         acting
             .iter()
@@ -301,6 +321,6 @@ impl Plant<'_, f64> {
     /// Extremes of a joint or of a muscle on it.
     fn reach(&self, angles: (f64, f64), contraction: f64) -> Extremes {
         let (pressure, ambient) = (self.rig.highest_pressure(), self.rig.gas.ambient_pressure);
-        Extremes { pressure, ambient, angles, contraction, valves: 0 }
+        Extremes { pressure, ambient, angles, contraction, valves: 0, load: 0.0 }
     }
 }

@@ -1,6 +1,7 @@
 //! What the muscles pull, with what they remember and what effects make of it.
 
 use super::memory::Memory;
+use super::ports::Acting;
 use super::rates::Plant;
 use super::units::Group;
 use crate::blocks::joint::JointPoint;
@@ -15,6 +16,14 @@ pub(super) struct MuscleShape<S> {
     pub table: TablePoint<S>,
 }
 
+/// Write down what an effect with states acts on [N], where its first state stands.
+#[inline]
+fn feel<S: Scalar>(acting: &Acting, force: S, felt: &mut [S]) {
+    if acting.count > 0 {
+        felt[acting.first] = force;
+    }
+}
+
 impl<S: Scalar> Plant<'_, S> {
     #[inline(always)]
     pub(super) fn muscle_shape(&self, group: &Group, state: &[S]) -> MuscleShape<S> {
@@ -23,8 +32,9 @@ impl<S: Scalar> Plant<'_, S> {
         MuscleShape { point, contraction, table: group.muscle.table.eval(contraction) }
     }
 
-    /// Force of all muscles of a group [N].
+    /// Force of all muscles of a group [N]; what effects with states act on is written to `felt`.
     #[inline(always)]
+    #[allow(clippy::too_many_arguments)]
     pub(super) fn muscle_force(
         &self,
         k: usize,
@@ -33,12 +43,13 @@ impl<S: Scalar> Plant<'_, S> {
         memory: &Memory<S>,
         start: S,
         shape: &MuscleShape<S>,
+        felt: &mut [S],
     ) -> S {
         let MuscleShape { point, contraction, table } = shape;
         let gauge = state[self.layout.pressure(group.chamber)] - self.rig.gas.ambient_pressure;
         let scale = self.scales[k];
         let force = if self.altered.muscles && self.wiring.ports.muscles[k].some {
-            self.altered_force(k, group, state, memory, start, point, table)
+            self.altered_force(k, group, state, memory, start, point, table, felt)
         } else {
             let force = table.force(gauge, scale);
             self.directed(group, memory, start, *contraction, gauge, scale, force)
@@ -79,6 +90,7 @@ impl<S: Scalar> Plant<'_, S> {
         start: S,
         point: &JointPoint<S>,
         table: &TablePoint<S>,
+        felt: &mut [S],
     ) -> S {
         let here = &self.wiring.ports.muscles[k];
         let scale = self.scales[k];
@@ -90,10 +102,13 @@ impl<S: Scalar> Plant<'_, S> {
         let mut force = table.force(at.gauge, scale);
         for acting in &here.bladder {
             let bladder = scale * (at.gauge * table.a_elastic + table.b_elastic);
+            feel(acting, bladder, felt);
             force += self.effect(acting).bladder(self.own(acting, state), bladder, at.contraction);
         }
         force = self.directed(group, memory, start, at.contraction, at.gauge, scale, force);
         for acting in &here.force {
+            at.force = force;
+            feel(acting, force, felt);
             force += self.effect(acting).force(&at, self.own(acting, state));
         }
         force
@@ -107,6 +122,7 @@ impl<S: Scalar> Plant<'_, S> {
             length: -point.shortening + group.rest_length,
             rate: -(point.moment_arm * state[self.layout.rate(group.coordinate)]),
             stretched: constant(0.0),
+            force: constant(0.0),
         }
     }
 

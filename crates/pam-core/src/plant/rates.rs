@@ -179,6 +179,10 @@ pub struct Scratch<S> {
     pub(super) muscle_work: S,
     /// Poses, rates and torques that effects on the arm change.
     pub(super) arm: [Vec<S>; 4],
+    /// Torques of the muscles on each coordinate, all counted as positive, where effects act there.
+    pub(super) load: Vec<S>,
+    /// What effects with states act on at a muscle, where the first of their states stands.
+    pub(super) felt: Vec<S>,
     /// Contraction ratio and force of each group.
     contraction: Vec<S>,
     force: Vec<S>,
@@ -309,6 +313,8 @@ impl<'a, S: Scalar> Plant<'a, S> {
             backwards: false,
             muscle_work: constant(0.0),
             arm: std::array::from_fn(|_| zeros(coordinates)),
+            load: zeros(coordinates),
+            felt: zeros(self.wiring.ports.states),
             contraction: zeros(self.wiring.groups.len()),
             force: zeros(self.wiring.groups.len()),
             now: zeros(self.wiring.groups.len()),
@@ -331,6 +337,10 @@ impl<'a, S: Scalar> Plant<'a, S> {
         here.volume_rate.fill(zero);
         here.torque.fill(zero);
         here.muscle_work = zero;
+        let loads = self.altered.motion;
+        if loads {
+            here.load.fill(zero);
+        }
         let heat = self.altered.balances;
         if heat {
             here.wall.fill(zero);
@@ -344,9 +354,14 @@ impl<'a, S: Scalar> Plant<'a, S> {
                 * rate
                 * (group.count / group.rest_length);
             if forces {
-                let force = self.muscle_force(k, group, state, &memory[k], start[k], &muscle);
+                let felt = &mut here.felt;
+                let force = self.muscle_force(k, group, state, &memory[k], start[k], &muscle, felt);
                 (here.contraction[k], here.force[k]) = (muscle.contraction, force);
-                here.torque[group.coordinate] += force * muscle.point.torque_arm;
+                let torque = force * muscle.point.torque_arm;
+                here.torque[group.coordinate] += torque;
+                if loads {
+                    here.load[group.coordinate] += torque.abs();
+                }
                 if self.balanced {
                     here.muscle_work += force * muscle.point.moment_arm * rate;
                 }
@@ -359,6 +374,17 @@ impl<'a, S: Scalar> Plant<'a, S> {
         if heat {
             self.cubes(here);
         }
+    }
+
+    /// What muscles that have not moved put on the joints, and what effects act on there, written to
+    /// the scratch.
+    #[inline(never)]
+    pub(super) fn mechanics_at_rest(&self, state: &[S], here: &mut Scratch<S>) {
+        let mut now = std::mem::take(&mut here.now);
+        self.contractions(state, &mut now);
+        self.mechanics(state, &self.fresh_memory(), &now, true, here);
+        here.now = now;
+        here.volume_rate.fill(constant(0.0));
     }
 
     /// Wall area of the gases without muscles [m2]: the cube of their volume.

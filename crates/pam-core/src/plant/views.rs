@@ -3,7 +3,7 @@
 use super::ports::{Acting, Place};
 use super::rates::{Controls, Plant, Scratch, Simulated};
 use super::units::Node;
-use crate::effects::{At, BAR};
+use crate::effects::{At, AtMuscle, BAR};
 use crate::scalar::{constant, Scalar};
 
 impl<S: Scalar> Plant<'_, S> {
@@ -49,8 +49,8 @@ impl<S: Scalar> Plant<'_, S> {
         At::Chamber { pressure, supply, opening, volume_rate }
     }
 
-    /// A joint.
-    pub(super) fn at_joint(&self, coordinate: usize, state: &[S]) -> At<S> {
+    /// A joint under a load [N m].
+    pub(super) fn at_joint(&self, coordinate: usize, state: &[S], load: S) -> At<S> {
         let layout = &self.layout;
         let mut pressure = constant::<S>(0.0);
         let mut groups = 0.0;
@@ -63,19 +63,31 @@ impl<S: Scalar> Plant<'_, S> {
             pressure: if groups > 1.0 { pressure / groups } else { pressure },
             angle: state[layout.angle(coordinate)],
             rate: state[layout.rate(coordinate)],
+            load,
         }
     }
 
-    /// Any block, with the openings of the valves and the rates of the gases' volumes.
-    fn at(&self, place: Place, state: &[S], spool: &[S], volume_rate: &[S]) -> At<S> {
+    /// The block that an effect acts on, with the openings of the valves and what the equations wrote
+    /// down on the way.
+    fn at(
+        &self,
+        place: Place,
+        acting: &Acting,
+        state: &[S],
+        spool: &[S],
+        here: &Scratch<S>,
+    ) -> At<S> {
         match place {
             Place::Supply(k) => self.at_supply(k, state, spool),
             Place::Valve(k) => {
                 At::Valve { fed: state[self.layout.pressure(self.wiring.valves[k].to)] }
             }
-            Place::Gas(k) => self.at_chamber(k, state, spool, volume_rate[k]),
-            Place::Group(k) => At::Muscle(self.at_group(k, state)),
-            Place::Joint(k) => self.at_joint(k, state),
+            Place::Gas(k) => self.at_chamber(k, state, spool, here.volume_rate[k]),
+            Place::Group(k) => {
+                let force = here.felt.get(acting.first).copied().unwrap_or(constant(0.0));
+                At::Muscle(AtMuscle { force, ..self.at_group(k, state) })
+            }
+            Place::Joint(k) => self.at_joint(k, state, here.load[k]),
             Place::Whole => {
                 let angles = &state[self.layout.angle(0)..self.layout.rate(0)];
                 At::Arm { weight: self.body.weight(angles) }
@@ -99,7 +111,7 @@ impl<S: Scalar> Plant<'_, S> {
         let moving =
             |acting: &Acting| acting.count > 0 && simulated.moves(layout.effect(acting.first));
         for (place, acting) in self.wiring.ports.integrated().filter(|(_, a)| moving(a)) {
-            let at = self.at(place, state, &controls.spool, &here.volume_rate);
+            let at = self.at(place, &acting, state, &controls.spool, here);
             self.effect(&acting).rates(&at, self.own(&acting, state), self.own_mut(&acting, out));
         }
     }
@@ -109,9 +121,12 @@ impl<S: Scalar> Plant<'_, S> {
     pub fn start_effects(&self, state: &mut [S]) {
         let wiring = &self.wiring;
         let shut = vec![constant(0.0); wiring.valves.len()];
-        let still = vec![constant(0.0); wiring.gases.len()];
+        let mut here = self.scratch();
         for (place, acting) in wiring.ports.all.iter().filter(|(_, acting)| acting.count > 0) {
-            let at = self.at(*place, state, &shut, &still);
+            if matches!(place, Place::Group(_)) {
+                self.mechanics_at_rest(state, &mut here); // with what acts before it
+            }
+            let at = self.at(*place, acting, state, &shut, &here);
             self.effect(acting).start(&self.rig.gas, &at, self.own_mut(acting, state));
         }
     }
@@ -129,7 +144,7 @@ impl<S: Scalar> Plant<'_, S> {
         let unnamed = |effect: usize| !ports.effects[effect].info.named;
         match ports.all.iter().find(|(at, acting)| *at == place && unnamed(acting.effect)) {
             Some((_, acting)) => {
-                let at = self.at(place, state, &controls.spool, &here.volume_rate);
+                let at = self.at(place, acting, state, &controls.spool, here);
                 self.effect(acting).terms(&at, self.own(acting, state))
             }
             None => Vec::new(),

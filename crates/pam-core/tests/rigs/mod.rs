@@ -114,11 +114,18 @@ pub fn effect(id: &str, parameters: &[(&str, f64)]) -> EffectSpec {
 /// Typical values of every effect, and the parameters that switch it off.
 pub struct Typical {
     pub id: &'static str,
+    /// Empty for the usual one.
+    pub form: &'static str,
     pub parameters: &'static [(&'static str, f64)],
     pub neutral: &'static [(&'static str, f64)],
 }
 
-/// Every effect.
+/// Every effect in its usual form and in its others.
+pub fn every() -> impl Iterator<Item = &'static Typical> {
+    TYPICAL.iter().chain(FORMS)
+}
+
+/// Every effect in its usual form.
 pub const TYPICAL: &[Typical] = &[
     typical("supply_leak", &[("conductance", 5e-10)], &[("conductance", 0.0)]),
     typical(
@@ -225,6 +232,83 @@ pub const TYPICAL: &[Typical] = &[
     closure("closure_torque", CLOSURE_TORQUE),
 ];
 
+/// The other forms.
+pub const FORMS: &[Typical] = &[
+    formed(
+        "muscle_hysteresis",
+        "pressure_stops",
+        &[("friction_constant", 8.0), ("friction_pressure", 4e-5), ("presliding", 3e-3)],
+        &[("friction_constant", 0.0), ("friction_pressure", 0.0)],
+    ),
+    formed(
+        "muscle_hysteresis",
+        "force_proportional",
+        &[("friction_constant", 8.0), ("friction_force", 0.04), ("presliding", 3e-3)],
+        &[("friction_constant", 0.0), ("friction_force", 0.0)],
+    ),
+    formed(
+        "muscle_hysteresis",
+        "dahl",
+        &[("friction_constant", 8.0), ("friction_pressure", 4e-5), ("presliding", 3e-3)],
+        &[("friction_constant", 0.0), ("friction_pressure", 0.0)],
+    ),
+    formed(
+        "muscle_creep",
+        "two_branches",
+        &[("stiffness", 3e3), ("time_constant", 0.1)],
+        &[("stiffness", 0.0)],
+    ),
+    formed(
+        "muscle_creep",
+        "force_relaxation",
+        &[("share", 0.1), ("time_constant", 0.3)],
+        &[("share", 0.0)],
+    ),
+    formed(
+        "muscle_creep",
+        "bladder_relaxation",
+        &[("share", 0.3), ("time_constant", 0.3)],
+        &[("share", 0.0)],
+    ),
+    formed(
+        "joint_coulomb_stribeck",
+        "rational",
+        &[("stiction", 3.0), ("stribeck_speed", 0.08)],
+        &[("stiction", 0.0)],
+    ),
+    formed(
+        "joint_coulomb_stribeck",
+        "with_coulomb",
+        &[("stiction", 3.0), ("stribeck_speed", 0.08), ("coulomb", 1.0)],
+        &[("stiction", 0.0), ("coulomb", 0.0)],
+    ),
+    formed(
+        "joint_coulomb_stribeck",
+        "load_proportional",
+        &[("stiction", 3.0), ("stribeck_speed", 0.08), ("load_share", 0.02)],
+        &[("stiction", 0.0), ("load_share", 0.0)],
+    ),
+    formed(
+        "joint_coulomb_stribeck",
+        "per_direction",
+        &[("stiction", 3.0), ("stribeck_speed", 0.08), ("backward_ratio", 1.6)],
+        &[("stiction", 0.0)],
+    ),
+    formed(
+        "payload_change",
+        "ramp",
+        &[("mass_change", 1.5), ("time", 0.153), ("duration", 0.402)],
+        &[("mass_change", 0.0)],
+    ),
+    formed("external_torque", "constant", &[("torque", 6.0)], &[("torque", 0.0)]),
+    formed(
+        "external_torque",
+        "vibration",
+        &[("torque", 8.0), ("torque_cosine", 4.0), ("frequency", 3.0)],
+        &[("torque", 0.0), ("torque_cosine", 0.0)],
+    ),
+];
+
 const CLOSURE_SUPPLY: &[(&str, f64)] = &[
     ("constant", 1e-4),
     ("pressure", -2e-5),
@@ -283,7 +367,7 @@ const CLOSURE_TORQUE: &[(&str, f64)] = &[
 
 /// A closure, and how it is switched off: every coefficient zero.
 const fn closure(id: &'static str, parameters: &'static [(&'static str, f64)]) -> Typical {
-    Typical { id, parameters, neutral: parameters }
+    Typical { id, form: "", parameters, neutral: parameters }
 }
 
 const fn typical(
@@ -291,13 +375,22 @@ const fn typical(
     parameters: &'static [(&'static str, f64)],
     neutral: &'static [(&'static str, f64)],
 ) -> Typical {
-    Typical { id, parameters, neutral }
+    Typical { id, form: "", parameters, neutral }
+}
+
+const fn formed(
+    id: &'static str,
+    form: &'static str,
+    parameters: &'static [(&'static str, f64)],
+    neutral: &'static [(&'static str, f64)],
+) -> Typical {
+    Typical { id, form, parameters, neutral }
 }
 
 impl Typical {
     /// The effect at its typical values.
     pub fn on(&self) -> EffectSpec {
-        effect(self.id, self.parameters)
+        EffectSpec { form: self.form.into(), ..effect(self.id, self.parameters) }
     }
 
     /// The effect where it does nothing.
