@@ -115,4 +115,5 @@ def test_recordings_without_roles_name_a_leak_that_is_in_all_of_them() -> None:
             "holds", RIG, [hold("one", 1e-11, 120.0), hold("two", 9e-11, 120.0, seed=1)], Path()
         )
     )
-    assert differ.probabilities["unlisted"] > max(0.3, 10.0 * found.probabilities["unlisted"])
+    # a name still carries most of it; that it is not the same in both speaks against it
+    assert differ.probabilities["unlisted"] > 10.0 * found.probabilities["unlisted"]

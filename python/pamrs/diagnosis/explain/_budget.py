@@ -14,6 +14,7 @@ from pamrs.diagnosis.evidence import Judged, is_parameter, significant
 from pamrs.diagnosis.fit import Key, Problem, residuals
 from pamrs.diagnosis.noise import Excess, NoiseLevel, excess
 from pamrs.diagnosis.prepare import Block, Residual
+from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.errors import SimulationError
 from pamrs.findings import BudgetTerm
 from pamrs.rig import Rig
@@ -74,7 +75,7 @@ def budget(
             if last or form:
                 kind = "form" if form else _kind(last)
                 stages.append((kind, last, kept(found["after"])))
-            terms += _terms(block, before, stages, one, final, problem.settings.seed)
+            terms += _terms(block, before, stages, one, final, problem.settings)
     return terms
 
 
@@ -114,12 +115,17 @@ def _in_order(judged: Judged) -> list[str]:
 
 
 def _terms(
-    block: Block, before: Excess, stages: list[Stage], judged: Judged, final: Rig, seed: int
+    block: Block,
+    before: Excess,
+    stages: list[Stage],
+    judged: Judged,
+    final: Rig,
+    settings: DiagnosisSettings,
 ) -> Iterator[BudgetTerm]:
     """The terms of one block, and what is left."""
     was = before
     for kind, name, now in stages:
-        share, interval = _share(before, was, now, seed)
+        share, interval = _share(before, was, now, settings)
         form = next((e.get("form", "") for e in final.effects if e["id"] == name), "")
         chance = judged.probabilities.get(name, judged.probability(name)) if name else None
         yield BudgetTerm(
@@ -135,7 +141,7 @@ def _terms(
             unit=unit_of(block.channel),
         )
         was = now
-    share, interval = _share(before, was, None, seed)
+    share, interval = _share(before, was, None, settings)
     yield BudgetTerm(
         block=block.name,
         kind="unexplained",
@@ -150,11 +156,9 @@ def _terms(
     )
 
 
-_DRAWS = 400
-"""Weightings of the pieces of the recordings from which an interval comes."""
-
-
-def _share(before: Excess, was: Excess, now: Excess | None, seed: int) -> tuple[float, list[float]]:
+def _share(
+    before: Excess, was: Excess, now: Excess | None, settings: DiagnosisSettings
+) -> tuple[float, list[float]]:
     """Share of the nominal model's excess variance that a step takes (the rest, where there is no
     next one), and its interval of 95 % by a Bayesian bootstrap over the pieces of the recordings.
     """
@@ -163,7 +167,8 @@ def _share(before: Excess, was: Excess, now: Excess | None, seed: int) -> tuple[
         np.array([r for r, _ in e.pieces]) if e is not None else np.ones(counts.size)
         for e in (before, was, now)
     )
-    draws = np.random.default_rng(seed).dirichlet(np.ones(counts.size), _DRAWS) * counts
+    rng = np.random.default_rng(settings.seed)
+    draws = rng.dirichlet(np.ones(counts.size), settings.verdict.budget_draws) * counts
     excess_of = np.maximum(draws @ (first - 1.0), 1e-12)
     shares = np.sort(draws @ (upper - lower) / excess_of)
     whole = max(float(counts @ (first - 1.0)), 1e-12)

@@ -189,7 +189,7 @@ class EvidenceSettings(SettingsGroup):
         origin="judgement",
     )
     unseen_price: float = setting(
-        5.0,
+        6.5,
         unit="log odds",
         least=0.0,
         reason="price of an effect with such a time constant",
@@ -345,6 +345,13 @@ class VerdictSettings(SettingsGroup):
         reason="factor of the probability of effects on a joint beside geometry that the rig file "
         "marks unknown",
         origin="docs/decisions/0012",
+    )
+    budget_draws: int = setting(
+        400,
+        unit="count",
+        least=20,
+        reason="weightings of the pieces of the recordings from which a share's interval comes",
+        origin="judgement: the ends of an interval of 95 % rest on ten of them",
     )
     least_gap: float = setting(
         0.05,
