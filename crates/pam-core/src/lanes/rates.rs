@@ -259,9 +259,8 @@ impl<'a, S: Simd> Lanes<'a, S> {
                 taken = back.select(zero, *flow);
             }
             drawn += taken;
-            let mut raised = state[layout.supply(k)] / gas.ambient_pressure;
-            raised.numbers_mut().iter_mut().for_each(|ratio| *ratio = libm::log(*ratio));
-            exergy += raised * taken * rt;
+            let raised = state[layout.supply(k)] / gas.ambient_pressure;
+            exergy += raised.ln() * taken * rt;
         }
         let power = self.torque[0] * state[layout.rate(0)];
         let sums = [drawn, vented, drawn * rt, exergy, self.muscle_work, power.or_above(zero)];
