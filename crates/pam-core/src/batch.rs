@@ -23,14 +23,14 @@ use self_cell::self_cell;
 /// Rows that one thread advances at a time, at most: small enough that no thread is left with much
 /// to do alone.
 const MOST_ROWS: usize = 64;
-/// Such rows that run in lanes come in so many at least, so that they fill the widest registers.
-const LEAST_IN_LANES: usize = 16;
+/// Rows that fill the widest registers: chunks of those that run in lanes are multiples of it.
+const FLIGHT: usize = 16;
 /// What an RK4 step of a plant alone costs, in steps of a plant in lanes.
 const ALONE: usize = 20;
 /// Work that is worth a second thread, in steps in lanes (some 50 us).
 const WORTH_A_THREAD: usize = 1_000;
 /// The same between two looks outside: some hundredths of a second.
-const UNSEEN: usize = 1_000_000;
+const UNSEEN: usize = 200_000;
 
 /// Groups of rows, which stand on the rigs of their chunk.
 type Groups<'a> = Vec<Box<dyn Group + 'a>>;
@@ -104,8 +104,9 @@ impl Batch {
             (input >= valves).then(|| rigs.iter().map(|rig| set_pressure(rig, input)).collect())
         };
         let defaults = (0..first.names().inputs.len()).map(default).collect();
-        let least = if first.lanes().is_some() { LEAST_IN_LANES } else { 1 };
-        let size = rigs.len().div_ceil(4 * threads.max(1)).clamp(least, MOST_ROWS);
+        let whole = if first.lanes().is_some() { FLIGHT } else { 1 };
+        let size = rigs.len().div_ceil(4 * threads.max(1)).clamp(1, MOST_ROWS);
+        let size = size.next_multiple_of(whole);
         let mut chunks = Vec::new();
         for begin in (0..rigs.len()).step_by(size) {
             let end = (begin + size).min(rigs.len());

@@ -204,8 +204,11 @@ impl<'a, S: Simd> Flight<'a, S> {
                 break;
             }
             self.before.copy_from_slice(&self.state);
-            if was.contains(&true) {
+            let fly = was.iter().filter(|flies| **flies).count() as u64;
+            if fly > 0 {
+                let before = self.method.evaluations;
                 self.sample();
+                self.spent.evaluations += fly * (self.method.evaluations - before);
             }
             self.landed(&was, drive);
         }
@@ -321,8 +324,7 @@ impl<S: Simd> Group for Flight<'_, S> {
     }
 
     fn spent(&self) -> Spent {
-        let evaluations = self.method.evaluations * self.rows.len() as u64;
-        Spent { evaluations, ..self.spent }
+        self.spent
     }
 
     fn side_by_side(&self) -> bool {
