@@ -386,7 +386,7 @@ def test_bad_input_is_named_and_leaves_the_batch_alone() -> None:
         batch.step([5.0, 5.0])
     with pytest.raises(pamrs.ParameterError, match="valve_command is missing"):
         batch.step()
-    with pytest.raises(pamrs.ParameterError, match="valve_command is not allowed: numbers"):
+    with pytest.raises(pamrs.ParameterError, match=r"valve_command = .* is not allowed: numbers"):
         batch.step(["a", "b", "c"])
     with pytest.raises(pamrs.ParameterError, match="supply_command is given"):
         batch.step(5.0, supply_command=1e5)
